@@ -7,6 +7,7 @@ use image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader as CodecRe
 use super::FlightLog;
 use super::limits::{LogLimits, can_hold_image};
 use super::messages::{ImageMessage, MessageKind, read_compressed_image, read_image};
+use super::raw_encoding::{RawEncoding, luma};
 use crate::sensors::GrayImage;
 
 /// Larger images are refused: no camera has them, so the header is damaged.
@@ -41,11 +42,10 @@ impl BitDepth {
     pub(crate) fn of(kind: MessageKind, message: &[u8], limits: &LogLimits) -> Option<Self> {
         let brightest = if kind == MessageKind::Image {
             let raw = read_image(message).ok()?;
-            if !matches!(raw.encoding, "mono16" | "16UC1") {
-                return Some(Self::default());
+            match RawEncoding::from_name(raw.encoding) {
+                Some(encoding) if encoding.is_wide() => encoding.brightest(&raw)?,
+                _ => return Some(Self::default()),
             }
-            let value = |pair: &[u8]| wide_value([pair[0], pair[1]], raw.big_endian);
-            raw.data.chunks_exact(2).map(value).max()?
         } else {
             let (_, data) = read_compressed_image(message).ok()?;
             if !data.starts_with(&PNG) {
@@ -56,6 +56,11 @@ impl BitDepth {
                 _ => return Some(Self::default()),
             }
         };
+        Self::of_brightest(brightest)
+    }
+
+    /// From the brightest pixel of an image; `None` when it is black.
+    pub(super) fn of_brightest(brightest: u16) -> Option<Self> {
         let used = u16::BITS - brightest.leading_zeros();
         (used > 0).then(|| Self(used.next_multiple_of(2).max(8)))
     }
@@ -65,13 +70,10 @@ impl BitDepth {
         self.0
     }
 
-    fn narrowed(self, value: u16) -> u8 {
+    /// A 16-bit grey level as one of 8 bits.
+    pub(super) fn narrowed(self, value: u16) -> u8 {
         u8::try_from(value >> (self.0 - 8)).unwrap_or(u8::MAX)
     }
-}
-
-fn wide_value(pair: [u8; 2], big_endian: bool) -> u16 {
-    if big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) }
 }
 
 /// Why an image message gives no image.
@@ -132,14 +134,10 @@ fn check_resolution(
 
 /// What to do about an encoding that is not read.
 fn encoding_remedy(encoding: &str) -> &'static str {
-    if encoding.starts_with("bayer_") {
-        "a color filter mosaic: record the driver's mono8 or rgb8, or the debayered topic of image_proc (image_mono)"
-    } else if encoding.starts_with("yuv") || encoding == "uyvy" || encoding == "yuyv" {
-        "record the driver's mono8 or rgb8, or convert it with image_proc"
-    } else if encoding.starts_with("32F") || encoding.starts_with("64F") {
+    if encoding.starts_with("32F") || encoding.starts_with("64F") {
         "numbers such as depths, no grey levels: name the topic of the camera's images"
     } else {
-        "expected mono8, 8UC1, mono16, 16UC1, rgb8, bgr8 or 8UC3"
+        "expected mono8, mono16, rgb8, bgr8, rgba8, bgra8, rgb16, bgr16, yuv422, yuyv, nv12, bayer_* or 8UC1 to 16UC4"
     }
 }
 
@@ -151,13 +149,13 @@ fn gray_from_raw(
 ) -> Result<GrayImage, ImageProblem> {
     let (width, height) = (raw.width, raw.height);
     check_resolution([width, height], limits, expected_px)?;
-    let bytes_per_pixel = match raw.encoding {
-        "mono8" | "8UC1" => 1,
-        "mono16" | "16UC1" => 2,
-        "rgb8" | "bgr8" | "8UC3" => 3,
-        other => return Err(unreadable(format!("image encoding {other:?} is not read: {}", encoding_remedy(other)))),
-    };
-    let row_bytes = width * bytes_per_pixel;
+    let name = raw.encoding;
+    let encoding = RawEncoding::from_name(name)
+        .ok_or_else(|| unreadable(format!("image encoding {name:?} is not read: {}", encoding_remedy(name))))?;
+    if width.min(height) < encoding.smallest_side_px() {
+        return Err(unreadable(format!("{name} image of {width}×{height} pixels")));
+    }
+    let row_bytes = encoding.row_bytes(width);
     if raw.step < row_bytes || raw.data.len() < raw.step.saturating_mul(height - 1).saturating_add(row_bytes) {
         return Err(unreadable(format!(
             "{} bytes with {} per row for {width}×{height} {}, expected at least {}",
@@ -167,25 +165,7 @@ fn gray_from_raw(
             row_bytes * height
         )));
     }
-    let mut pixels = Vec::with_capacity(width * height);
-    for row in raw.data.chunks(raw.step).take(height) {
-        let row = &row[..row_bytes];
-        match raw.encoding {
-            "mono16" | "16UC1" => {
-                let value = |pair: &[u8]| depth.narrowed(wide_value([pair[0], pair[1]], raw.big_endian));
-                pixels.extend(row.chunks_exact(2).map(value));
-            }
-            "rgb8" => pixels.extend(row.chunks_exact(3).map(|rgb| luma(rgb[0], rgb[1], rgb[2]))),
-            "bgr8" | "8UC3" => pixels.extend(row.chunks_exact(3).map(|bgr| luma(bgr[2], bgr[1], bgr[0]))),
-            _ => pixels.extend_from_slice(row),
-        }
-    }
-    Ok(GrayImage { width, height, pixels })
-}
-
-/// Grey level of a colour, rounded (ITU-R BT.601, as in JPEG).
-fn luma(red: u8, green: u8, blue: u8) -> u8 {
-    ((u32::from(red) * 19_595 + u32::from(green) * 38_470 + u32::from(blue) * 7_471 + 32_768) >> 16) as u8
+    Ok(GrayImage { width, height, pixels: encoding.gray(raw, depth) })
 }
 
 /// Decodes a compressed image whose header claims a resolution that its bytes and the limits allow.
@@ -240,7 +220,10 @@ fn gray_from_compressed(
     let pixels = match image {
         DynamicImage::ImageLuma8(gray) => gray.into_raw(),
         DynamicImage::ImageLuma16(gray) => gray.into_raw().into_iter().map(|value| depth.narrowed(value)).collect(),
-        other => other.into_rgb8().into_raw().chunks_exact(3).map(|rgb| luma(rgb[0], rgb[1], rgb[2])).collect(),
+        other => {
+            let color = |rgb: &[u8]| luma([rgb[0], rgb[1], rgb[2]].map(u16::from)) as u8;
+            other.into_rgb8().into_raw().chunks_exact(3).map(color).collect()
+        }
     };
     Ok(GrayImage { width, height, pixels })
 }

@@ -15,6 +15,7 @@ mod limits;
 pub(crate) mod log;
 pub(crate) mod messages;
 pub mod output;
+mod raw_encoding;
 pub(crate) mod rig;
 mod sensor_frame;
 pub(crate) mod stream;
