@@ -1,6 +1,6 @@
 use nalgebra::{Matrix2, Vector2};
 
-use super::CameraError;
+use super::{CameraError, RationalLens};
 
 /// Newton steps before an inversion is given up; convergence is quadratic, so that five do in practice.
 const MAXIMUM_STEPS: usize = 30;
@@ -18,6 +18,8 @@ pub enum Distortion {
     None,
     /// Radial–tangential `k1 k2 p1 p2`.
     Radtan([f64; 4]),
+    /// Radial–tangential with up to six radial coefficients.
+    Rational(RationalLens),
     /// Equidistant fisheye `k1 k2 k3 k4` of Kannala and Brandt, `θ_d = θ·(1 + k1·θ² + k2·θ⁴ + k3·θ⁶ + k4·θ⁸)`.
     Equidistant([f64; 4]),
     /// Field of view of Devernay and Faugeras, with its angle in radians.
@@ -30,6 +32,8 @@ impl Distortion {
         match self {
             Self::None => "none",
             Self::Radtan(_) => "radtan",
+            Self::Rational(lens) if lens.is_polynomial() => "plumb_bob",
+            Self::Rational(_) => "rational_polynomial",
             Self::Equidistant(_) => "equidistant",
             Self::Fov(_) => "fov",
         }
@@ -37,16 +41,8 @@ impl Distortion {
 
     pub(super) fn check(&self) -> Result<(), CameraError> {
         match self {
-            Self::Radtan(coefficients) | Self::Equidistant(coefficients) => {
-                match coefficients.iter().find(|value| !value.is_finite()) {
-                    Some(&value) => Err(CameraError::Value {
-                        field: "an entry of distortion_coeffs",
-                        value,
-                        expected: "a finite number",
-                    }),
-                    None => Ok(()),
-                }
-            }
+            Self::Radtan(coefficients) | Self::Equidistant(coefficients) => check_finite(coefficients),
+            Self::Rational(lens) => check_finite(lens.coefficients()),
             Self::Fov(w) if !(*w > 0.0 && *w < std::f64::consts::PI) => Err(CameraError::Value {
                 field: "distortion_coeffs of 'fov'",
                 value: *w,
@@ -64,6 +60,10 @@ impl Distortion {
             Self::Radtan(coefficients) => {
                 let square = plane.norm_squared();
                 radtan_invertible(coefficients, square).then(|| radtan(coefficients, plane, square))
+            }
+            Self::Rational(lens) => {
+                let square = plane.norm_squared();
+                lens.is_invertible(square).then(|| lens.distort(plane, square).0)
             }
             Self::Equidistant(_) | Self::Fov(_) => {
                 let radius = plane.norm();
@@ -86,6 +86,10 @@ impl Distortion {
                 radtan_invertible(coefficients, square)
                     .then(|| (radtan(coefficients, plane, square), radtan_jacobian(coefficients, plane, square)))
             }
+            Self::Rational(lens) => {
+                let square = plane.norm_squared();
+                lens.is_invertible(square).then(|| lens.distort(plane, square))
+            }
             Self::Equidistant(_) | Self::Fov(_) => {
                 let radius = plane.norm();
                 if radius < SMALL_RADIUS {
@@ -106,7 +110,14 @@ impl Distortion {
     pub fn undistort(&self, distorted: &Vector2<f64>) -> Option<Vector2<f64>> {
         match self {
             Self::None => Some(*distorted),
-            Self::Radtan(coefficients) => undistort_radtan(coefficients, distorted),
+            Self::Radtan(coefficients) => invert(
+                distorted,
+                |plane, square| (radtan(coefficients, plane, square), radtan_jacobian(coefficients, plane, square)),
+                |square| radtan_invertible(coefficients, square),
+            ),
+            Self::Rational(lens) => {
+                invert(distorted, |plane, square| lens.distort(plane, square), |square| lens.is_invertible(square))
+            }
             Self::Equidistant(coefficients) => {
                 let radius = distorted.norm();
                 if radius < SMALL_RADIUS {
@@ -193,15 +204,30 @@ fn radtan_jacobian(&[k1, k2, p1, p2]: &[f64; 4], plane: &Vector2<f64>, square: f
     )
 }
 
+fn check_finite(coefficients: &[f64]) -> Result<(), CameraError> {
+    match coefficients.iter().find(|value| !value.is_finite()) {
+        Some(&value) => {
+            Err(CameraError::Value { field: "an entry of distortion_coeffs", value, expected: "a finite number" })
+        }
+        None => Ok(()),
+    }
+}
+
+/// The point that a lens with this distortion and derivative, at a point and its squared radius, moves to `distorted`.
+///
 /// Newton's method from the distorted point, which lies on the near side of the solution for a barrel and on the convex
 /// side for a pincushion, so that it approaches from one side.
-fn undistort_radtan(coefficients: &[f64; 4], distorted: &Vector2<f64>) -> Option<Vector2<f64>> {
+#[inline]
+fn invert(
+    distorted: &Vector2<f64>,
+    distort: impl Fn(&Vector2<f64>, f64) -> (Vector2<f64>, Matrix2<f64>),
+    is_invertible: impl Fn(f64) -> bool,
+) -> Option<Vector2<f64>> {
     let mut plane = *distorted;
     for _ in 0..MAXIMUM_STEPS {
         let square = plane.norm_squared();
-        let mismatch = radtan(coefficients, &plane, square) - distorted;
-        let jacobian = radtan_jacobian(coefficients, &plane, square);
-        let step = jacobian.try_inverse()? * mismatch;
+        let (value, jacobian) = distort(&plane, square);
+        let step = jacobian.try_inverse()? * (value - distorted);
         plane -= step;
         let size = step.norm();
         if !size.is_finite() {
@@ -212,9 +238,8 @@ fn undistort_radtan(coefficients: &[f64; 4], distorted: &Vector2<f64>) -> Option
         }
     }
     let square = plane.norm_squared();
-    let mismatch = (radtan(coefficients, &plane, square) - distorted).norm();
-    (mismatch <= MISMATCH_TOLERANCE * (1.0 + distorted.norm()) && radtan_invertible(coefficients, square))
-        .then_some(plane)
+    let mismatch = (distort(&plane, square).0 - distorted).norm();
+    (mismatch <= MISMATCH_TOLERANCE * (1.0 + distorted.norm()) && is_invertible(square)).then_some(plane)
 }
 
 /// `θ_d` and `d θ_d / d θ`.

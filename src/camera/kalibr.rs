@@ -1,12 +1,13 @@
 //! Cameras as Kalibr writes them: names and flat lists of numbers.
 
-use super::{CameraError, CameraModel, Distortion, Projection};
+use super::{CameraError, CameraModel, Distortion, Projection, RationalLens};
 
 impl CameraModel {
     /// A camera from Kalibr's `camera_model`, `intrinsics`, `distortion_model`, `distortion_coeffs` and `resolution`.
     ///
     /// `intrinsics` holds `fx fy cx cy`, preceded by `xi` for omni, `alpha beta` for eucm and `xi alpha` for ds.
-    /// `radial-tangential`, `plumb_bob`, `equi` and an empty distortion name are understood too.
+    /// `plumb_bob` and `rational_polynomial` are those of ROS and `OpenCV`, with 4 or 5 and with 8 coefficients;
+    /// `radial-tangential`, `equi`, `fisheye` and an empty distortion name are understood too.
     ///
     /// # Errors
     /// When a name is unknown, a list has the wrong length, or a number is out of its range.
@@ -49,10 +50,22 @@ impl CameraModel {
                     });
                 }
             },
-            "radtan" | "radial-tangential" | "plumb_bob" => {
-                Distortion::Radtan(numbers("distortion_coeffs", "radtan", distortion_coeffs, "k1, k2, p1, p2")?)
-            }
-            "equidistant" | "equi" => Distortion::Equidistant(numbers(
+            "radtan" | "radial-tangential" | "plumb_bob" => match *distortion_coeffs {
+                [k1, k2, p1, p2, k3] if k3 != 0.0 => {
+                    Distortion::Rational(RationalLens::new([k1, k2, p1, p2, k3, 0.0, 0.0, 0.0]))
+                }
+                [ref four @ .., _] if four.len() == 4 => {
+                    Distortion::Radtan(numbers("distortion_coeffs", "radtan", four, "k1, k2, p1, p2")?)
+                }
+                _ => Distortion::Radtan(numbers("distortion_coeffs", "radtan", distortion_coeffs, "k1, k2, p1, p2")?),
+            },
+            "rational_polynomial" => Distortion::Rational(RationalLens::new(numbers(
+                "distortion_coeffs",
+                "rational_polynomial",
+                distortion_coeffs,
+                "k1, k2, p1, p2, k3, k4, k5, k6",
+            )?)),
+            "equidistant" | "equi" | "fisheye" => Distortion::Equidistant(numbers(
                 "distortion_coeffs",
                 "equidistant",
                 distortion_coeffs,
@@ -84,6 +97,8 @@ impl CameraModel {
         match self.distortion {
             Distortion::None => vec![],
             Distortion::Radtan(values) | Distortion::Equidistant(values) => values.to_vec(),
+            Distortion::Rational(lens) if lens.is_polynomial() => lens.coefficients()[..5].to_vec(),
+            Distortion::Rational(lens) => lens.coefficients().to_vec(),
             Distortion::Fov(w) => vec![w],
         }
     }

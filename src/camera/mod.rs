@@ -7,11 +7,13 @@
 mod distortion;
 mod kalibr;
 mod projection;
+mod rational;
 #[cfg(test)]
 mod tests;
 
 pub use distortion::Distortion;
 pub use projection::Projection;
+pub use rational::RationalLens;
 
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 use thiserror::Error;
@@ -39,7 +41,9 @@ pub enum CameraError {
         name: String,
     },
     /// No such distortion.
-    #[error("unknown distortion_model '{name}': expected one of none, radtan, equidistant, fov")]
+    #[error(
+        "unknown distortion_model '{name}': expected one of none, radtan, plumb_bob, rational_polynomial, equidistant, fov"
+    )]
     UnknownDistortion {
         /// What was written.
         name: String,

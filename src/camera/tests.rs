@@ -1,6 +1,10 @@
+use std::collections::BTreeMap;
+
 use nalgebra::{Vector2, Vector3};
 
-use super::{CameraError, CameraModel, Distortion, Projection};
+use serde::Deserialize;
+
+use super::{CameraError, CameraModel, Distortion, Projection, RationalLens};
 
 const INTRINSICS_PX: [f64; 4] = [352.6, 348.1, 322.4, 238.1];
 const RESOLUTION_PX: [usize; 2] = [640, 480];
@@ -16,6 +20,11 @@ fn cameras() -> Vec<CameraModel> {
         (Projection::Pinhole, Distortion::None),
         (Projection::Pinhole, radtan),
         (Projection::Pinhole, pincushion),
+        (
+            Projection::Pinhole,
+            Distortion::Rational(RationalLens::new([-0.28, 0.07, 2e-4, 2e-5, -0.008, 0.0, 0.0, 0.0])),
+        ),
+        (Projection::Pinhole, Distortion::Rational(RationalLens::new([8.2, 3.1, -3e-4, 5e-4, 0.12, 8.5, 5.6, 0.61]))),
         (Projection::Pinhole, fisheye),
         (Projection::Pinhole, Distortion::Fov(0.93)),
         (omni, Distortion::None),
@@ -87,6 +96,37 @@ fn jacobian_meets_central_differences() {
     }
 }
 
+/// `tests/data/opencv_lenses.json`.
+#[derive(Deserialize)]
+struct OpenCvLenses {
+    points: Vec<[f64; 3]>,
+    lenses: BTreeMap<String, OpenCvLens>,
+}
+
+#[derive(Deserialize)]
+struct OpenCvLens {
+    coeffs: Vec<f64>,
+    uv: Vec<[f64; 2]>,
+}
+
+#[test]
+fn lenses_agree_with_opencv() {
+    let golden: OpenCvLenses = serde_json::from_str(include_str!("../../tests/data/opencv_lenses.json")).unwrap();
+    assert_eq!(golden.lenses.len(), 4);
+    for (name, lens) in &golden.lenses {
+        let model = if name == "wide" { "rational_polynomial" } else { name };
+        let camera = CameraModel::from_kalibr("pinhole", &INTRINSICS_PX, model, &lens.coeffs, RESOLUTION_PX).unwrap();
+        assert_eq!(camera.distortion.name(), model);
+        for (point, uv) in golden.points.iter().zip(&lens.uv) {
+            let (point, uv) = (Vector3::from(*point), Vector2::from(*uv));
+            let projected = camera.project(&point).unwrap();
+            assert!((projected - uv).norm() < 1e-9, "{name} {point:?}: {projected:?}, OpenCV {uv:?}");
+            let bearing = camera.unproject(&uv).unwrap();
+            assert!((bearing - point.normalize()).norm() < 1e-11, "{name} {uv:?} came back as {bearing:?}");
+        }
+    }
+}
+
 #[test]
 fn models_with_equal_parameters_project_equally() {
     let pinhole = CameraModel::pinhole(INTRINSICS_PX, RESOLUTION_PX).unwrap();
@@ -95,6 +135,7 @@ fn models_with_equal_parameters_project_equally() {
         (Projection::Eucm { alpha: 0.0, beta: 1.0 }, Distortion::None),
         (Projection::Ds { xi: 0.0, alpha: 0.0 }, Distortion::None),
         (Projection::Pinhole, Distortion::Radtan([0.0; 4])),
+        (Projection::Pinhole, Distortion::Rational(RationalLens::new([0.0; 8]))),
     ];
     for (projection, distortion) in same {
         let camera = CameraModel::new(projection, distortion, INTRINSICS_PX, RESOLUTION_PX).unwrap();
@@ -134,9 +175,9 @@ fn invisible_points_do_not_project() {
     assert_eq!(barrel.project(&bearing(1.35, 0.2)), None);
     assert_eq!(barrel.unproject(&Vector2::new(2000.0, 300.0)), None);
     // The equidistant lens ends at a right angle, the wide models go on behind it.
-    assert_eq!(cameras()[3].unproject(&Vector2::new(322.4 + 352.6 * 1.7, 238.1)), None);
+    assert_eq!(cameras()[5].unproject(&Vector2::new(322.4 + 352.6 * 1.7, 238.1)), None);
     let behind = bearing(1.7, 0.4);
-    let wide = &cameras()[9];
+    let wide = &cameras()[11];
     let uv = wide.project(&behind).unwrap();
     assert!((wide.unproject(&uv).unwrap() - behind).norm() < 1e-11);
     assert_eq!(wide.unproject(&Vector2::new(5000.0, 0.0)), None);

@@ -7,7 +7,7 @@ use crate::sensors::{CameraRig, ChainPrior, GimbalRig, Rig};
 
 /// A camera further from the IMU than this is unusual on a drone.
 const MAX_LEVER_M: f64 = 1.0;
-/// Difference of the log's intrinsics from the rig's that is reported, as a ratio of the focal length.
+/// Difference of a pixel by the log's `CameraInfo` from the rig's that is reported, as a ratio of the focal length.
 const INTRINSICS_TOLERANCE: f64 = 0.02;
 
 impl CheckReport {
@@ -106,17 +106,39 @@ fn field_of_view_deg(model: &CameraModel) -> Option<f64> {
 fn check_camera_info(log: &FlightLog, camera: &CameraRig, findings: &mut Findings) {
     use crate::flight_log::rig::CameraFacts as _;
     let Ok(from_log) = log.camera_model(&camera.topic) else { return };
-    let (rig, log) = (camera.model.intrinsics_px, from_log.intrinsics_px);
-    let scale = camera.model.focal_length_px();
-    let worst = rig.iter().zip(&log).map(|(a, b)| (a - b).abs() / scale).fold(0.0, f64::max);
-    let evidence = format!("the rig has {rig:?}, the log's CameraInfo {log:?}");
-    if worst > INTRINSICS_TOLERANCE || from_log.resolution_px != camera.model.resolution_px {
+    let model = &camera.model;
+    let (rig, log) = (model.intrinsics_px, from_log.intrinsics_px);
+    let scale_px = model.focal_length_px();
+    let of_intrinsics_px = rig.iter().zip(&log).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let (of_lens_px, at_px) = largest_pixel_difference(model, &from_log);
+    let lens = format!("the same direction lies up to {of_lens_px:.1} px apart (at {:.0}, {:.0})", at_px.x, at_px.y);
+    let evidence = format!(
+        "the rig has {rig:?} {}, the log's CameraInfo {log:?} {}: {lens}",
+        model.distortion.name(),
+        from_log.distortion.name()
+    );
+    let differs = of_intrinsics_px.max(of_lens_px) > INTRINSICS_TOLERANCE * scale_px;
+    if differs || from_log.resolution_px != model.resolution_px {
         let title = format!("CameraInfo differs from the rig for {}", camera.key);
         let remedy = "check which calibration applies to this flight; the rig's is used";
         findings.add(Severity::Warning, Area::Intrinsics, title, evidence, remedy);
     } else {
         findings.good(Area::Intrinsics, format!("CameraInfo agrees with the rig for {}", camera.key), evidence);
     }
+}
+
+/// The largest distance between the pixels of one direction through two cameras, in pixels, and the pixel of the first one.
+/// Directions are those of a grid over the first camera's image; one that the second camera does not see does not count.
+fn largest_pixel_difference(camera: &CameraModel, other: &CameraModel) -> (f64, Vector2<f64>) {
+    const CELLS: u32 = 8;
+    let [width, height] = camera.resolution_px.map(|side| side as f64 - 1.0);
+    let grid = (0..=CELLS).flat_map(|row| (0..=CELLS).map(move |column| (column, row)));
+    let at = |step: u32, side: f64| side * f64::from(step) / f64::from(CELLS);
+    let differences = grid.filter_map(|(column, row)| {
+        let uv_px = Vector2::new(at(column, width), at(row, height));
+        Some(((other.project(&camera.unproject(&uv_px)?)? - uv_px).norm(), uv_px))
+    });
+    differences.fold((0.0, Vector2::zeros()), |largest, found| if found.0 > largest.0 { found } else { largest })
 }
 
 fn check_chain(gimbal: &GimbalRig, findings: &mut Findings) {

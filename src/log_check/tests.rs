@@ -354,6 +354,12 @@ fn faults_of_images_and_lenses_are_found() {
     expect(&image(dark), Warning, &["all images of cam0 are blurred"]);
     expect(&image(dark), Warning, &["some images of cam0 have little texture"]);
     let bright = |_: i64, _: &mut MessageTimes, image: &mut GrayImage| {
+    let lens = "distortion_model: plumb_bob\n  distortion_coeffs: [-0.3, 0.09, 0.0, 0.0, 0.02]";
+    expect(
+        &Flight { rig: rig_text().replace("distortion_model: none", lens), ..Flight::default() },
+        Warning,
+        &["CameraInfo differs from the rig for cam0"],
+    );
         image.pixels.iter_mut().for_each(|pixel| *pixel = pixel.saturating_add(150));
         true
     };

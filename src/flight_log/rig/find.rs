@@ -138,13 +138,17 @@ fn model_of(info: &CameraInfoMessage) -> Result<CameraModel, String> {
     let coefficients = info.distortion.as_slice();
     let (name, coefficients) = match (info.distortion_model.as_str(), coefficients) {
         (_, coefficients) if coefficients.iter().all(|value| *value == 0.0) => ("none", &[][..]),
-        // ROS writes a third radial coefficient, which the radtan model does not have.
-        ("plumb_bob" | "radtan", [_, _, _, _, third]) if *third == 0.0 => ("radtan", &coefficients[..4]),
-        ("plumb_bob" | "radtan", [_, _, _, _]) => ("radtan", coefficients),
-        ("equidistant", [_, _, _, _]) => ("equidistant", coefficients),
+        ("plumb_bob" | "radtan", [_, _, _, _] | [_, _, _, _, _]) => ("plumb_bob", coefficients),
+        // Behind them lie OpenCV's coefficients of the thin prism and the tilted sensor, which are not modelled.
+        ("rational_polynomial", coefficients)
+            if matches!(coefficients.len(), 8 | 12 | 14) && coefficients[8..].iter().all(|value| *value == 0.0) =>
+        {
+            ("rational_polynomial", &coefficients[..8])
+        }
+        ("equidistant" | "fisheye", [_, _, _, _]) => ("equidistant", coefficients),
         (other, coefficients) => {
             return Err(format!(
-                "distortion '{other}' with {} coefficients, expected plumb_bob (k3 = 0) or equidistant",
+                "distortion '{other}' with {} coefficients, expected plumb_bob (4 or 5), rational_polynomial (8) or equidistant (4)",
                 coefficients.len()
             ));
         }

@@ -168,7 +168,7 @@ fn read_camera_model(camera: &Field<'_>) -> Result<CameraModel, LogError> {
 }
 
 const CAMERA_MODELS: &str = "pinhole, omni, eucm or ds";
-const DISTORTION_MODELS: &str = "none, radtan, equidistant or fov";
+const DISTORTION_MODELS: &str = "none, radtan, plumb_bob, rational_polynomial, equidistant or fov";
 
 /// An error of a camera model with the field of the rig that it concerns.
 fn name_the_field(camera: &Field<'_>, error: &CameraError) -> LogError {

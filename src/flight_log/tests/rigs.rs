@@ -1,5 +1,5 @@
 use super::*;
-use crate::camera::{CameraModel, Distortion, Projection};
+use crate::camera::{CameraModel, Distortion, Projection, RationalLens};
 
 /// A log with one message of each kind that a rig needs, and attachments.
 fn write_log(path: &Path, attachments: &[(&str, &str)], camera_info: Option<&CameraModel>) {
@@ -61,7 +61,10 @@ fn intrinsics_missing_in_the_rig_come_from_the_log() {
     let open_rig = RIG.replace("  intrinsics: [50.0, 50.0, 31.5, 23.5]\n", "").replace("  update_rate: 20.0\n", "");
     std::fs::write(folder.path().join("flight.rig.yaml"), open_rig).unwrap();
     let radtan = Distortion::Radtan([-0.1, 0.02, 1e-3, -1e-3]);
-    for distortion in [Distortion::None, radtan, Distortion::Equidistant([0.1, 0.02, 0.003, 0.004])] {
+    let plumb_bob = Distortion::Rational(RationalLens::new([-0.1, 0.02, 1e-3, -1e-3, 0.01, 0.0, 0.0, 0.0]));
+    let rational = Distortion::Rational(RationalLens::new([8.2, 3.1, -3e-4, 5e-4, 0.12, 8.5, 5.6, 0.61]));
+    let fisheye = Distortion::Equidistant([0.1, 0.02, 0.003, 0.004]);
+    for distortion in [Distortion::None, radtan, plumb_bob, rational, fisheye] {
         let model =
             CameraModel::new(Projection::Pinhole, distortion, [51.0, 52.0, 30.0, 22.0], [WIDTH, HEIGHT]).unwrap();
         write_log(&path, &[], Some(&model));

@@ -90,6 +90,8 @@ fn distortion(distortion: &Distortion) -> (&'static str, Vec<f64>) {
     match distortion {
         Distortion::None => ("plumb_bob", vec![0.0; 5]),
         Distortion::Radtan([k1, k2, p1, p2]) => ("plumb_bob", vec![*k1, *k2, *p1, *p2, 0.0]),
+        Distortion::Rational(lens) if lens.is_polynomial() => ("plumb_bob", lens.coefficients()[..5].to_vec()),
+        Distortion::Rational(lens) => ("rational_polynomial", lens.coefficients().to_vec()),
         Distortion::Equidistant(coefficients) => ("equidistant", coefficients.to_vec()),
         Distortion::Fov(angle_rad) => ("fov", vec![*angle_rad]),
     }
