@@ -10,6 +10,7 @@ mod error;
 mod file;
 pub(crate) mod image_decoding;
 mod image_reader;
+pub(crate) mod imu_merge;
 pub(crate) mod joint_merge;
 mod limits;
 pub(crate) mod log;

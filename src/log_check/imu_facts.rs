@@ -6,6 +6,8 @@ use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{ImuSample, Rig};
 
+/// A norm of the specific force below this is that of messages that leave it unset.
+const NO_FORCE_M_PER_S2: f64 = 0.01;
 /// Length of the windows that are classified as stationary or not.
 const WINDOW_NS: i64 = 500_000_000;
 /// Stationary: the standard deviation of the angular rate, white noise removed, is below this.
@@ -62,11 +64,17 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
     if samples.len() < 10 {
         return ImuFacts { samples, ..ImuFacts::default() };
     }
-    let windows = windows_of(&samples);
+    let windows = windows_of(&samples, &survey.accelerometer);
     let stationary: Vec<Window> = windows.iter().filter(|window| window.stationary).copied().collect();
-    check_gravity(&samples, &stationary, rig, findings);
+    let others: Vec<&String> =
+        survey.imu_topics.iter().filter(|topic| survey.imu_topic.as_ref() != Some(*topic)).collect();
+    check_gravity(&samples, &stationary, rig, &others, findings);
     let gyroscope_bias = check_gyroscope_bias(&stationary, findings);
-    check_noise(&samples, &windows, &stationary, rig, findings);
+    let rates_hz = [
+        sample_rate_hz(&samples, |sample| sample.stamp_ns),
+        sample_rate_hz(&survey.accelerometer, |(stamp_ns, _)| *stamp_ns),
+    ];
+    check_noise(rates_hz, &windows, &stationary, rig, findings);
     check_clipping(&samples, findings);
     check_stationary(&windows, findings);
     let forces = || samples.iter().map(|sample| sample.specific_force_m_per_s2).collect::<Vec<_>>();
@@ -76,7 +84,15 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
     ImuFacts { samples, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up) }
 }
 
-fn windows_of(samples: &[ImuSample]) -> Vec<Window> {
+/// Mean rate in Hz of at least two samples in the order of their stamps.
+fn sample_rate_hz<T>(samples: &[T], stamp_ns: impl Fn(&T) -> i64) -> Option<f64> {
+    let (first, last) = (samples.first()?, samples.last().filter(|_| samples.len() > 1)?);
+    Some((samples.len() - 1) as f64 / seconds_from_ns(stamp_ns(last) - stamp_ns(first)).max(1e-9))
+}
+
+/// The windows of a log. Specific forces are those of an accelerometer of its own when there is one: interpolation removes
+/// noise.
+fn windows_of(samples: &[ImuSample], accelerometer: &[(i64, Vector3<f64>)]) -> Vec<Window> {
     let mut windows = Vec::new();
     let mut begin = 0;
     while begin < samples.len() {
@@ -85,7 +101,13 @@ fn windows_of(samples: &[ImuSample]) -> Vec<Window> {
         let part = &samples[begin..end];
         if part.len() >= 20 && samples.len() > end {
             let rates: Vec<Vector3<f64>> = part.iter().map(|sample| sample.angular_velocity_rad_per_s).collect();
-            let forces: Vec<Vector3<f64>> = part.iter().map(|sample| sample.specific_force_m_per_s2).collect();
+            let forces: Vec<Vector3<f64>> = if accelerometer.is_empty() {
+                part.iter().map(|sample| sample.specific_force_m_per_s2).collect()
+            } else {
+                let from = accelerometer.partition_point(|(stamp_ns, _)| *stamp_ns < samples[begin].stamp_ns);
+                let own = accelerometer[from..].iter().take_while(|(stamp_ns, _)| *stamp_ns < end_ns);
+                own.map(|(_, force)| *force).collect()
+            };
             let (white_rate, white_force) = (white_standard_deviation(&rates), white_standard_deviation(&forces));
             let beyond =
                 |all: Vector3<f64>, white: Vector3<f64>| (all.norm_squared() - white.norm_squared()).max(0.0).sqrt();
@@ -107,7 +129,13 @@ fn windows_of(samples: &[ImuSample]) -> Vec<Window> {
     windows
 }
 
-fn check_gravity(samples: &[ImuSample], stationary: &[Window], rig: Option<&Rig>, findings: &mut Findings) {
+fn check_gravity(
+    samples: &[ImuSample],
+    stationary: &[Window],
+    rig: Option<&Rig>,
+    other_topics: &[&String],
+    findings: &mut Findings,
+) {
     let gravity = rig.map_or(9.81, |rig| rig.gravity_m_per_s2);
     if !(9.75..=9.85).contains(&gravity) {
         let evidence = format!("{gravity} m/s²; on the ground it lies between 9.78 and 9.83");
@@ -129,6 +157,21 @@ fn check_gravity(samples: &[ImuSample], stationary: &[Window], rig: Option<&Rig>
     };
     let difference = measured - gravity;
     let evidence = format!("|a| is {measured:.3} m/s² {when}, gravity {gravity:.3}: {difference:+.3} m/s²");
+    if measured < NO_FORCE_M_PER_S2 {
+        let quoted: Vec<String> = other_topics.iter().map(|topic| format!("'{topic}'")).collect();
+        let remedy = if quoted.is_empty() {
+            "record the accelerometer, too".to_owned()
+        } else {
+            format!("name the accelerometer's topic in imu0.accelerometer_rostopic: one of {}", quoted.join(", "))
+        };
+        return findings.add(
+            Severity::Error,
+            Area::Imu,
+            "the IMU's messages have no specific force",
+            evidence,
+            &remedy,
+        );
+    }
     let (severity, title, remedy) = if (measured - 1.0).abs() < 0.2 {
         (
             Severity::Error,
@@ -171,19 +214,19 @@ fn check_gyroscope_bias(stationary: &[Window], findings: &mut Findings) -> Optio
     Some(bias)
 }
 
-/// White noise against the rig's densities, and vibration.
+/// White noise against the rig's densities, and vibration. `rates_hz` are those of the IMU and of an accelerometer of its own.
 fn check_noise(
-    samples: &[ImuSample],
+    [imu_rate_hz, accelerometer_rate_hz]: [Option<f64>; 2],
     windows: &[Window],
     stationary: &[Window],
     rig: Option<&Rig>,
     findings: &mut Findings,
 ) {
-    let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return };
-    let rate_hz = (samples.len() - 1) as f64 / seconds_from_ns(last.stamp_ns - first.stamp_ns).max(1e-9);
+    let Some(imu_rate_hz) = imu_rate_hz else { return };
+    let rate_hz = |gyroscope: bool| accelerometer_rate_hz.filter(|_| !gyroscope).unwrap_or(imu_rate_hz);
     let average = |window: &Window, gyroscope: bool| {
         let white = if gyroscope { window.white_rate } else { window.white_force };
-        (white.norm_squared() / 3.0).sqrt() / rate_hz.sqrt()
+        (white.norm_squared() / 3.0).sqrt() / rate_hz(gyroscope).sqrt()
     };
     let quiet_when = if stationary.is_empty() { "in the quietest 10 % of the flight" } else { "while stationary" };
     let sensors = [
@@ -201,7 +244,7 @@ fn check_noise(
             findings.add(Severity::Note, Area::Imu, format!("vibration on the {name} in flight"), evidence, remedy);
         }
         let Some(given) = given else { continue };
-        compare_density(name, (quiet, quiet_when), given, unit, rate_hz, findings);
+        compare_density(name, (quiet, quiet_when), given, unit, rate_hz(gyroscope), findings);
     }
 }
 

@@ -254,6 +254,9 @@ fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
         }
     };
     require("imu0.rostopic".into(), &rig.imu.topic, &[MessageKind::Imu], Severity::Error);
+    if let Some(topic) = &rig.imu.accelerometer_topic {
+        require("imu0.accelerometer_rostopic".into(), topic, &[MessageKind::Imu], Severity::Error);
+    }
     for camera in &rig.cameras {
         require(format!("{}.rostopic", camera.key), &camera.topic, &IMAGES, Severity::Error);
     }
@@ -274,6 +277,9 @@ fn role_of(topic: &str, kind: Option<MessageKind>, rig: Option<&Rig>) -> String 
     if let Some(rig) = rig {
         if topic == rig.imu.topic {
             return "imu0".into();
+        }
+        if rig.imu.accelerometer_topic.as_deref() == Some(topic) {
+            return "imu0 accelerometer".into();
         }
         if let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic) {
             return camera.key.clone();

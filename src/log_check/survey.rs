@@ -1,9 +1,12 @@
 use std::collections::BTreeMap;
 
+use nalgebra::Vector3;
+
 use super::image_measure::{ImageMeasure, measure};
 use super::statistics::median;
 use crate::flight_log::container::DecodedBlock;
 use crate::flight_log::image_decoding::{BitDepth, decode_image};
+use crate::flight_log::imu_merge::ImuMerge;
 use crate::flight_log::joint_merge::{JointMerge, JointReading};
 use crate::flight_log::log::relative_ns;
 use crate::flight_log::stream::angle_fit;
@@ -82,8 +85,13 @@ pub(super) struct Survey {
     pub(super) topics: BTreeMap<String, TopicSurvey>,
     /// Topic of the IMU: the rig's, or the only one.
     pub(super) imu_topic: Option<String>,
-    /// Its samples in the order of log times, not-finite ones included.
+    /// All topics of the IMU's type.
+    pub(super) imu_topics: Vec<String>,
+    /// Samples of the IMU in the order of log times, not-finite ones included. With an accelerometer of its own they are merged, in the
+    /// order of their stamps and without those that are not finite.
     pub(super) imu: Vec<ImuSample>,
+    /// Stamps and specific forces of an accelerometer on a topic of its own, in the order of log times.
+    pub(super) accelerometer: Vec<(i64, Vector3<f64>)>,
     /// The encoders' messages in the order of log times.
     pub(super) joints: Vec<JointReading>,
     /// Angles of all joints at common stamps, in the order of the stamps, from the finite readings.
@@ -107,6 +115,7 @@ impl Survey {
         let imu_topics = log.topics_of(&[MessageKind::Imu]);
         let named = rig.map(|rig| rig.imu.topic.clone()).filter(|topic| imu_topics.contains(topic));
         survey.imu_topic = named.or_else(|| imu_topics.first().cloned());
+        survey.imu_topics = imu_topics;
         let sigma_rad = rig.and_then(|rig| rig.gimbal.as_ref()?.encoder_sigma_rad).unwrap_or(0.0);
         survey.encoder_variance_rad2 = sigma_rad.max(MIN_SIGMA_RAD).powi(2);
         let mut counts: BTreeMap<String, u64> = BTreeMap::new();
@@ -139,6 +148,11 @@ impl Survey {
             topic.times.sort_by_key(|times| times.log_time_ns);
         }
         survey.joint_samples = merged(&survey.joints);
+        if !survey.accelerometer.is_empty() {
+            survey.accelerometer.retain(|(_, force)| force.iter().all(|value| value.is_finite()));
+            survey.accelerometer.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+            survey.imu = merged_imu(&survey.imu, &survey.accelerometer);
+        }
         survey
     }
 
@@ -195,6 +209,12 @@ impl Survey {
             }
         }
         let Some(rig) = rig else { return };
+        if rig.imu.accelerometer_topic.as_deref() == Some(topic) {
+            match messages::read_imu(data) {
+                Ok(imu) => self.accelerometer.push((stamp_ns, imu.specific_force_m_per_s2)),
+                Err(error) => entry.refuse(error.to_string()),
+            }
+        }
         if let Some(gimbal) = rig.gimbal.as_ref().filter(|gimbal| gimbal.topic.as_deref() == Some(topic)) {
             match messages::read_joint_state(data) {
                 Ok(message) if message.lacks_positions() => entry.refuse(message.length_problem()),
@@ -229,6 +249,21 @@ impl Survey {
             }
         }
     }
+}
+
+/// The samples of the gyroscope with the specific forces of an accelerometer of its own, both in any order.
+fn merged_imu(gyroscope: &[ImuSample], accelerometer: &[(i64, Vector3<f64>)]) -> Vec<ImuSample> {
+    let mut ordered: Vec<&ImuSample> = gyroscope.iter().collect();
+    ordered.retain(|sample| sample.angular_velocity_rad_per_s.iter().all(|value| value.is_finite()));
+    ordered.sort_by_key(|sample| sample.stamp_ns);
+    let mut merge = ImuMerge::default();
+    for sample in ordered {
+        merge.push_gyroscope(sample.stamp_ns, sample.angular_velocity_rad_per_s);
+    }
+    for (stamp_ns, force) in accelerometer {
+        merge.push_accelerometer(*stamp_ns, *force);
+    }
+    std::iter::from_fn(|| merge.pop()).collect()
 }
 
 /// The readings of all messages as samples of all joints; those that are not finite are left out.

@@ -49,6 +49,8 @@ struct Flight {
     joint: fn(i64, &mut f64),
     rig: String,
     camera_info: [f64; 4],
+    /// Whether the accelerometer has a topic of its own, with 62.5 Hz.
+    accelerometer_apart: bool,
 }
 
 impl Default for Flight {
@@ -59,6 +61,7 @@ impl Default for Flight {
             joint: |_, _| {},
             rig: rig_text(),
             camera_info: [80.0, 80.0, 79.5, 59.5],
+            accelerometer_apart: false,
         }
     }
 }
@@ -118,10 +121,18 @@ impl Flight {
                 let mut rate = rate_at(time_s) + noise.vector() * (GYRO_DENSITY * sigma);
                 let mut force =
                     Vector3::new(0.3 * rate_at(time_s).x, 0.0, 9.81) + noise.vector() * (ACCEL_DENSITY * sigma);
+                if self.accelerometer_apart {
+                    force = Vector3::zeros();
+                }
                 let mut times = times;
                 if (self.imu)(millisecond, &mut times, &mut rate, &mut force) {
                     writer.write_imu("/imu", "imu", times, &rate, &force).unwrap();
                 }
+            }
+            if self.accelerometer_apart && millisecond % 16 == 3 {
+                let force = Vector3::new(0.3 * rate_at(time_s).x, 0.0, 9.81)
+                    + noise.vector() * (ACCEL_DENSITY * 62.5_f64.sqrt());
+                writer.write_imu("/accelerometer", "imu", times, &Vector3::zeros(), &force).unwrap();
             }
             if millisecond % 20 == 1 {
                 let mut angle = 0.7 * (0.9 * time_s).sin() + 0.0087 * noise.normal();
@@ -193,6 +204,21 @@ fn a_faultless_flight_has_no_warning() {
     let mut text = String::new();
     write!(text, "{report}").unwrap();
     assert!(text.contains("/camera/image") && text.contains("good    IMU"), "{text}");
+}
+
+#[test]
+fn an_accelerometer_on_its_own_topic_is_checked_with_its_own_rate() {
+    let rig = rig_text().replace("rostopic: /imu,", "rostopic: /imu, accelerometer_rostopic: /accelerometer,");
+    let report = Flight { accelerometer_apart: true, rig, ..Flight::default() }.check(&[]);
+    assert_eq!(report.worst(), Severity::Note, "{report}");
+    let good = |title: &str| report.findings.iter().find(|finding| finding.title == title).unwrap();
+    assert!(good("accelerometer noise agrees with the rig").evidence.contains("at 62 Hz"), "{report}");
+    assert!(good("gyroscope noise agrees with the rig").evidence.contains("at 200 Hz"), "{report}");
+    expect(
+        &Flight { accelerometer_apart: true, ..Flight::default() },
+        Severity::Error,
+        &["the IMU's messages have no specific force", "imu0.accelerometer_rostopic: one of '/accelerometer'"],
+    );
 }
 
 #[test]
@@ -328,6 +354,12 @@ fn faults_of_images_and_lenses_are_found() {
         Warning,
         &["CameraInfo differs from the rig for cam0"],
     );
+    let lens = "distortion_model: plumb_bob\n  distortion_coeffs: [-0.3, 0.09, 0.0, 0.0, 0.02]";
+    expect(
+        &Flight { rig: rig_text().replace("distortion_model: none", lens), ..Flight::default() },
+        Warning,
+        &["CameraInfo differs from the rig for cam0"],
+    );
     let blur = |ms: i64, _: &mut MessageTimes, image: &mut GrayImage| {
         if ms > 10_000 {
             let sharp = image.pixels.clone();
@@ -354,12 +386,6 @@ fn faults_of_images_and_lenses_are_found() {
     expect(&image(dark), Warning, &["all images of cam0 are blurred"]);
     expect(&image(dark), Warning, &["some images of cam0 have little texture"]);
     let bright = |_: i64, _: &mut MessageTimes, image: &mut GrayImage| {
-    let lens = "distortion_model: plumb_bob\n  distortion_coeffs: [-0.3, 0.09, 0.0, 0.0, 0.02]";
-    expect(
-        &Flight { rig: rig_text().replace("distortion_model: none", lens), ..Flight::default() },
-        Warning,
-        &["CameraInfo differs from the rig for cam0"],
-    );
         image.pixels.iter_mut().for_each(|pixel| *pixel = pixel.saturating_add(150));
         true
     };

@@ -26,8 +26,10 @@ fn quoted(keys: &[String]) -> String {
 /// The IMU with its noise densities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImuRig {
-    /// Topic of its `sensor_msgs/msg/Imu`.
+    /// Topic of its `sensor_msgs/msg/Imu`; only the angular velocities are read of it when the accelerometer is apart.
     pub topic: String,
+    /// Topic of the specific forces (`sensor_msgs/msg/Imu`), when they are apart from the angular velocities.
+    pub accelerometer_topic: Option<String>,
     /// Frame name.
     pub frame_id: String,
     /// Nominal rate.

@@ -94,6 +94,7 @@ impl Equipment {
             gravity_m_per_s2: GRAVITY_M_PER_S2,
             imu: ImuRig {
                 topic: "/imu".to_owned(),
+                accelerometer_topic: None,
                 frame_id: "imu".to_owned(),
                 rate_hz: IMU_RATE_HZ,
                 noise: FIREFLY_IMU,

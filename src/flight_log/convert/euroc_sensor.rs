@@ -116,6 +116,7 @@ pub(super) fn rig_of(
     let body_from_imu = imu_file.body_from_sensor()?;
     let imu = ImuRig {
         topic: IMU_TOPIC.to_owned(),
+        accelerometer_topic: None,
         frame_id: "imu0".to_owned(),
         rate_hz: imu_file.positive("rate_hz", "the rate in Hz")?,
         noise: ImuNoise {

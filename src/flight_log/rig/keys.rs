@@ -26,6 +26,7 @@ const APPENDICES: &[&str] = &["calibration", "truth"];
 const IMU: Keys = Keys {
     read: &[
         "rostopic",
+        "accelerometer_rostopic",
         "frame_id",
         "update_rate",
         "accelerometer_noise_density",

@@ -90,9 +90,12 @@ pub(super) fn read_imu(imu: &Field<'_>, default_topic: Option<&str>) -> Result<I
         (None, Some(topic)) => topic,
         _ => imu.field("rostopic").text("the topic of its sensor_msgs/msg/Imu")?,
     };
+    let accelerometer = imu.field("accelerometer_rostopic").optional();
+    let accelerometer = accelerometer.map(|field| field.text("the topic of a sensor_msgs/msg/Imu")).transpose()?;
     let density = |key: &str, unit: &str| imu.field(key).positive(&format!("a number greater than 0 in {unit}"));
     Ok(ImuRig {
         topic: topic.to_owned(),
+        accelerometer_topic: accelerometer.map(str::to_owned),
         frame_id: imu.field("frame_id").optional().map_or(Ok("imu"), |frame| frame.text("a frame's name"))?.to_owned(),
         rate_hz: imu.field("update_rate").positive("the rate in Hz")?,
         noise: ImuNoise {

@@ -13,6 +13,9 @@ impl Rig {
         line(&mut out, 0, "gravity", &number(self.gravity_m_per_s2));
         line(&mut out, 0, "imu0", "");
         line(&mut out, 1, "rostopic", &text(&self.imu.topic));
+        if let Some(topic) = &self.imu.accelerometer_topic {
+            line(&mut out, 1, "accelerometer_rostopic", &text(topic));
+        }
         line(&mut out, 1, "frame_id", &text(&self.imu.frame_id));
         line(&mut out, 1, "update_rate", &number(self.imu.rate_hz));
         line(&mut out, 1, "accelerometer_noise_density", &number(self.imu.noise.accelerometer_noise_density));

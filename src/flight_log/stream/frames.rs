@@ -5,6 +5,7 @@ use super::super::image_decoding::{BitDepth, ImageProblem, decode_image};
 use super::super::log::relative_ns;
 use super::super::messages::{self, MessageKind};
 use super::super::{FlightLog, LogError, LogWarning, SensorFrame};
+use super::imu::ImuStream;
 use super::joint_angles::JointAngleStream;
 use super::joint_topic::JointSamples;
 use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
@@ -59,7 +60,7 @@ impl<T> Lookup<T> {
 pub(super) struct FrameSource {
     context: ReadContext,
     camera: CameraStream,
-    imu: OrderedSamples<ImuSample>,
+    imu: ImuStream,
     imu_topic: String,
     imu_gap_ns: i64,
     imu_ended: bool,
@@ -108,8 +109,8 @@ impl FrameSource {
         let kind = images.kind.unwrap_or(MessageKind::Image);
         let count = images.count as usize;
         let image_gap_ns = gap_ns(IMAGE_GAP_PERIODS, camera.rate_hz, images.rate_hz);
-        let imu = log.require_topic("imu0.rostopic", &rig.imu.topic, &[MessageKind::Imu])?;
-        let imu_gap_ns = gap_ns(IMU_GAP_PERIODS, rig.imu.rate_hz, imu.rate_hz);
+        let imu_rate_hz = log.require_topic("imu0.rostopic", &rig.imu.topic, &[MessageKind::Imu])?.rate_hz;
+        let imu_gap_ns = gap_ns(IMU_GAP_PERIODS, rig.imu.rate_hz, imu_rate_hz);
         let start_ns = ns_from_seconds(start_s);
         let end_ns = duration_s.map_or(i64::MAX, |duration_s| start_ns.saturating_add(ns_from_seconds(duration_s)));
         let shift_ns = ns_from_seconds(camera.timeshift_cam_imu_s);
@@ -131,7 +132,7 @@ impl FrameSource {
             previous_stamp_ns: None,
         };
         Ok(Self {
-            imu: OrderedSamples::new(log, &rig.imu.topic, from_ns, false, imu_decoder(log.epoch_ns())),
+            imu: ImuStream::new(log, &rig.imu, from_ns)?,
             imu_topic: rig.imu.topic.clone(),
             context,
             camera: stream,
@@ -206,7 +207,7 @@ impl FrameSource {
 
     fn read_imu_until(&mut self, stamp_ns: i64) {
         while !self.imu_ended && self.samples.back().is_none_or(|last| last.stamp_ns < stamp_ns) {
-            let Some((_, sample)) = self.imu.next(&mut self.context) else {
+            let Some(sample) = self.imu.next(&mut self.context) else {
                 self.imu_ended = true;
                 return;
             };
@@ -369,27 +370,6 @@ fn image_decoder(epoch_ns: i64) -> Decoder<PendingImage> {
         let stamp_ns = messages::header_stamp_ns(source.data).map_err(|error| Refusal::not_decodable(&error))?;
         let log_time_ns = relative_ns(i64::try_from(source.position.log_time_ns).unwrap_or(i64::MAX), epoch_ns);
         Ok((stamp_ns, PendingImage { number: source.number, log_time_ns, message: source.data.to_vec() }))
-    })
-}
-
-fn imu_decoder(epoch_ns: i64) -> Decoder<ImuSample> {
-    Box::new(move |source: MessageSource<'_>| {
-        let imu = messages::read_imu(source.data).map_err(|error| Refusal::not_decodable(&error))?;
-        let numbers = imu.angular_velocity_rad_per_s.iter().chain(&imu.specific_force_m_per_s2);
-        if !numbers.clone().all(|number| number.is_finite()) {
-            let detail = format!(
-                "angular velocity {:?}, specific force {:?}",
-                imu.angular_velocity_rad_per_s.as_slice(),
-                imu.specific_force_m_per_s2.as_slice()
-            );
-            return Err(Refusal { reason: "values are not finite", detail });
-        }
-        let sample = ImuSample {
-            stamp_ns: relative_ns(imu.stamp_ns, epoch_ns),
-            angular_velocity_rad_per_s: imu.angular_velocity_rad_per_s,
-            specific_force_m_per_s2: imu.specific_force_m_per_s2,
-        };
-        Ok((imu.stamp_ns, sample))
     })
 }
 

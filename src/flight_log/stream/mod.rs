@@ -2,6 +2,7 @@
 
 pub(crate) mod angle_fit;
 mod frames;
+mod imu;
 mod joint_angles;
 mod joint_topic;
 mod ordered;

@@ -32,12 +32,21 @@ struct Flight {
     /// Changes an image's stamp and size; `false` leaves it out.
     image: fn(&mut i64, &mut [usize; 2]) -> bool,
     joints: bool,
+    /// Period of an accelerometer on a topic of its own, in milliseconds; the IMU's messages then have no force.
+    accelerometer_ms: Option<i64>,
 }
 
 impl Default for Flight {
     fn default() -> Self {
         let options = LogWriterOptions { chunk_bytes: Some(40_000), ..LogWriterOptions::default() };
-        Self { duration_ms: 3000, options, imu: |_, _, _| true, image: |_, _| true, joints: true }
+        Self {
+            duration_ms: 3000,
+            options,
+            imu: |_, _, _| true,
+            image: |_, _| true,
+            joints: true,
+            accelerometer_ms: None,
+        }
     }
 }
 
@@ -75,8 +84,15 @@ impl Flight {
                 let (mut at, time_s) = (stamp_ns, stamp_ns as f64 * 1e-9);
                 let (mut rate, mut force) = (Vector3::new(time_s, 0.0, 0.4), Vector3::new(0.0, 0.1 * time_s, 9.81));
                 if (self.imu)(&mut at, &mut rate, &mut force) {
+                    if self.accelerometer_ms.is_some() {
+                        force = Vector3::zeros();
+                    }
                     writer.write_imu("/imu", "imu", times(at, 1), &rate, &force).unwrap();
                 }
+            }
+            if self.accelerometer_ms.is_some_and(|period_ms| millisecond % period_ms == 1) {
+                let force = Vector3::new(0.0, 0.1 * stamp_ns as f64 * 1e-9, 9.81);
+                writer.write_imu("/accelerometer", "imu", times(stamp_ns, 1), &Vector3::zeros(), &force).unwrap();
             }
             if self.joints && millisecond % 10 == 3 {
                 writer.write_joints("/joints", times(stamp_ns, 1), &names, &[0.1, yaw_rad(stamp_ns)]).unwrap();

@@ -39,6 +39,33 @@ fn frames_are_the_same_whatever_the_container() {
 }
 
 #[test]
+fn an_accelerometer_on_its_own_topic_is_merged_at_the_stamps_of_the_gyroscope() {
+    let flight = Flight { accelerometer_ms: Some(16), ..Flight::default() };
+    let rig = RIG.replace("rostopic: /imu,", "rostopic: /imu, accelerometer_rostopic: /accelerometer,");
+    let (frames, warnings) = play(&flight, &rig, 0.0);
+    assert_eq!(warnings, []);
+    let (together, _) = play(&Flight::default(), RIG, 0.0);
+    assert_eq!(frames.len(), together.len());
+    for (number, (frame, expected)) in frames.iter().zip(&together).enumerate() {
+        // Only the very first sample has no force before it.
+        let expected = &expected.imu[usize::from(number == 0)..];
+        assert_eq!(frame.imu.len(), expected.len());
+        for (sample, expected) in frame.imu.iter().zip(expected) {
+            assert_eq!(sample.stamp_ns, expected.stamp_ns);
+            assert!((sample.angular_velocity_rad_per_s - expected.angular_velocity_rad_per_s).norm() < 1e-12);
+            assert!((sample.specific_force_m_per_s2 - expected.specific_force_m_per_s2).norm() < 1e-12);
+        }
+    }
+    let later = play(&flight, &rig, 1.5).0;
+    assert_eq!(later[5].imu, frames[later[5].index].imu, "wherever reading starts");
+    let missing = Rig::from_yaml(&rig.replace("/accelerometer,", "/accel,"), Path::new("test.rig.yaml")).unwrap();
+    let folder = TempDir::new().unwrap();
+    let log = Arc::new(FlightLog::open(&flight.write(folder.path())).unwrap());
+    let error = FrameStream::new(log, &missing, "cam0", 0.0, None).unwrap_err().to_string();
+    assert!(error.contains("imu0.accelerometer_rostopic") && error.contains("/accelerometer"), "{error}");
+}
+
+#[test]
 fn a_frame_has_its_measurements() {
     let (frames, warnings) = play(&Flight::default(), RIG, 0.0);
     assert_eq!(warnings, []);

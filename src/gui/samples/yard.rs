@@ -144,6 +144,7 @@ pub(super) fn rig_with(chain: ClassicalChain, name: &str) -> Rig {
         gravity_m_per_s2: 9.81,
         imu: ImuRig {
             topic: "/imu".to_owned(),
+            accelerometer_topic: None,
             frame_id: "imu".to_owned(),
             rate_hz: 200.0,
             noise: ImuNoise {
