@@ -17,6 +17,9 @@ use crate::session::{RunRecord, StepRecord};
 /// Number of alternatives to the best motion.
 const OTHERS_SHOWN: usize = 3;
 
+/// The advice where no motion helps.
+const NO_MOTION: &str = "No candidate motion constrains this calibration further";
+
 /// Seconds without a move of the cursor before advice is computed in the background.
 const CURSOR_IDLE_S: f64 = 0.15;
 /// Minimum period in seconds of the computation while the cursor moves.
@@ -109,6 +112,16 @@ impl AdviceUi {
         });
     }
 
+    /// The suggested excitation for a step of a run, once it is computed.
+    pub(super) fn sentence(&self, run: u64, step: &StepRecord) -> Option<String> {
+        if self.run != Some(run) || !self.results.has_result(step) {
+            return None;
+        }
+        let (_, results) = self.results.last()?;
+        let sentence = results.and_then(|results| results.advice.as_ref()).and_then(Advice::sentence);
+        Some(sentence.unwrap_or_else(|| NO_MOTION.to_owned()))
+    }
+
     /// Whether a computation in the background is due.
     fn is_due(&self, now_s: f64) -> bool {
         let rests = self.seen.as_ref().is_some_and(|(_, since_s)| now_s - since_s >= CURSOR_IDLE_S);
@@ -133,7 +146,7 @@ impl AdviceUi {
 /// The suggested excitation; `time` is the stamp it was computed for, where that is not the cursor's.
 fn advice_ui(ui: &mut Ui, ctx: &PanelContext<'_>, advice: Option<&Advice>, time: &str) {
     let Some(advice) = advice else {
-        ui.label(RichText::new("No candidate motion constrains this calibration further").color(ctx.theme.text_weak));
+        ui.label(RichText::new(NO_MOTION).color(ctx.theme.text_weak));
         return;
     };
     let response = fact_ui(
@@ -156,9 +169,9 @@ fn alternatives(advice: &Advice) -> Vec<String> {
     advice.candidates.iter().skip(1).take(OTHERS_SHOWN).map(|candidate| advice.line(candidate)).collect()
 }
 
-/// Since when the least observable direction, which the verdict names, has been null or weak without interruption;
-/// `before` are the run's earlier steps.
-fn since(before: &[Arc<StepRecord>], step: &StepRecord) -> Option<String> {
+/// `weak since 5.55 s`: since when the least observable direction has been null or weak without interruption; `before` are
+/// the run's earlier steps.
+pub(in crate::gui) fn since(before: &[Arc<StepRecord>], step: &StepRecord) -> Option<String> {
     let rank = step.rank.as_ref()?;
     let direction = least_observable(rank)?;
     let lost = steps_lost(&rank.parameters, &direction.weights, before.iter().rev().map(|step| step.rank.as_ref()));

@@ -18,6 +18,7 @@ use egui::text::{LayoutJob, TextFormat};
 use egui::{RichText, ScrollArea, TextStyle, Ui, UiBuilder, vec2};
 
 use self::advice::AdviceUi;
+pub(super) use self::advice::since;
 use self::information::InformationUi;
 use self::slider::SliderUi;
 use self::verdict::{Level, Verdict};
@@ -75,6 +76,11 @@ pub struct RankPanel {
 }
 
 impl RankPanel {
+    /// The suggested excitation for a step of a run, once the panel has computed it.
+    pub(in crate::gui) fn suggested_excitation(&self, run: u64, step: &StepRecord) -> Option<String> {
+        self.advice.sentence(run, step)
+    }
+
     /// Draws the shown run, or all runs side by side.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let recording = ctx.recording;

@@ -48,6 +48,8 @@ pub(crate) enum Action {
     Explain,
     /// Open the manual.
     Manual,
+    /// Begin the tour.
+    Tour,
     /// List all shortcuts.
     Shortcuts,
     /// List the warnings.
@@ -138,6 +140,7 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Export, "Export focused panel (PNG, SVG, CSV)", "Ctrl+E", &[(CTRL, Key::E)]),
     entry(Action::Save, "Save session", "Ctrl+S", &[(CTRL, Key::S)]),
     entry(Action::Dialog(Dialog::Palette), "Command palette…", "Ctrl+P", &[(CTRL, Key::P)]),
+    entry(Action::Tour, "Tour in six steps", "Ctrl+F1", &[(CTRL, Key::F1)]),
     entry(Action::Manual, "Manual", "Shift+F1", &[(SHIFT, Key::F1)]),
     entry(Action::TogglePlay, "Play or pause", "Space", &[(NONE, Key::Space)]),
     entry(Action::Step(1), "One frame forward", "Right", &[(NONE, Key::ArrowRight)]),
@@ -232,6 +235,8 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
         Action::Marker => ctx.commands.push(Command::ToggleMarker),
         Action::WholeLog => ctx.selection.visible_ns = None,
         Action::Dismiss if state.help.manual.is_open() => state.help.manual.close(),
+        Action::Dismiss if state.tour.is_running() => state.tour.end(),
+        Action::Tour => state.tour.start(),
         Action::Dismiss => {
             (ctx.selection.feature, ctx.selection.parameter, ctx.selection.slide) = (None, None, None);
             state.close_dialogs();

@@ -73,7 +73,10 @@ impl Menu {
                 &[Action::Event(true), Action::Event(false)],
                 &[Action::Loop, Action::Marker],
             ],
-            Self::Help => &[&[Action::Manual, Action::Explain], &[Action::Shortcuts, Action::Dialog(Dialog::Palette)]],
+            Self::Help => &[
+                &[Action::Tour, Action::Manual, Action::Explain],
+                &[Action::Shortcuts, Action::Dialog(Dialog::Palette)],
+            ],
         }
     }
 

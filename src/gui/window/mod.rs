@@ -27,6 +27,7 @@ mod status_bar;
 mod tests;
 mod tiles;
 mod top_bar;
+mod tour;
 mod warning_lines;
 
 use std::path::PathBuf;
@@ -47,6 +48,7 @@ pub use self::saved_layouts::SavedLayouts;
 pub use self::settings::{SCALES, Settings};
 use self::tiles::Layout;
 pub use self::tiles::Preset;
+use self::tour::Tour;
 use super::PanelContext;
 use super::desktop::PanelExport;
 use super::help::{self, Help};
@@ -106,6 +108,7 @@ pub struct WindowState {
     pub(crate) help: Help,
     /// Recently opened logs and sessions, newest first, for the menu.
     pub recent_logs: Vec<PathBuf>,
+    tour: Tour,
     ring: FocusRing,
     layout: Layout,
     history: History,
@@ -129,7 +132,13 @@ impl WindowState {
     /// Closes all dialogs and lists, for a session that ends.
     pub(in crate::gui) fn close_everything(&mut self) {
         self.close_dialogs();
+        self.tour.end();
         (self.progress, self.opening) = (None, None);
+    }
+
+    /// Begins the tour at its first stop.
+    pub(in crate::gui) fn start_tour(&mut self) {
+        self.tour.start();
     }
 
     fn close_dialogs(&mut self) {
@@ -247,6 +256,7 @@ const STATUS_HEIGHT: f32 = 22.0;
 pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
     let theme = *ctx.theme;
     slide::update(ctx);
+    tour::keys(ui, state);
     // Shortcuts have no effect while a dialog is open.
     let mut actions: Vec<Action> = if state.dialogs.is_open() { Vec::new() } else { actions::pressed(ui) };
     // A dialog receives the keys after the one that opens it, even in the same frame.
@@ -302,6 +312,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     dialogs::ui(ui, state, ctx, &mut actions);
     shortcuts::ui(ui, &theme, &mut state.shortcuts_open);
     state.notices.list_ui(ui, ctx);
+    tour::ui(ui, state, ctx);
     state.help.ui(ui, &theme, &state.places);
     state.notices.toasts_ui(ui, &theme);
     state.ring.ui(ui, &theme);

@@ -1,0 +1,77 @@
+//! The run and the instant that the tour is about.
+
+use std::sync::Arc;
+
+use crate::geometry::ns_from_seconds;
+use crate::gimbal::Parameterization;
+use crate::session::{RunRecord, StepRecord};
+
+/// The run that shows a redundant parameterization.
+pub(super) const CLASSICAL: &str = "classical";
+
+/// Time after the first rank that the tour looks at, in seconds.
+const SPAN_S: f64 = 6.0;
+/// Time for which a direction has been lost at the instant of the tour, in seconds.
+const LOST_S: f64 = 0.5;
+
+/// The run and the instant of the tour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Story {
+    /// Id of the run.
+    pub(super) run: u64,
+    /// Stamp of the step in nanoseconds since the log began, `None` until it is computed.
+    pub(super) instant_ns: Option<i64>,
+}
+
+impl Story {
+    /// The story of a run.
+    pub(super) fn new(run: &RunRecord) -> Self {
+        Self { run: run.id, instant_ns: None }
+    }
+
+    /// The run.
+    pub(super) fn run(self, runs: &[RunRecord]) -> Option<&RunRecord> {
+        runs.iter().find(|run| run.id == self.run)
+    }
+
+    /// The step of the instant.
+    pub(super) fn step(self, runs: &[RunRecord]) -> Option<&Arc<StepRecord>> {
+        self.run(runs)?.step_at(self.instant_ns?)
+    }
+
+    /// Finds the instant as soon as the run is far enough.
+    pub(super) fn read(&mut self, runs: &[RunRecord]) {
+        if self.instant_ns.is_none() {
+            self.instant_ns = self.run(runs).and_then(instant_ns);
+        }
+    }
+}
+
+/// The step shortly after the informed rank has fallen from its maximum, within the first seconds of tracking; the last
+/// step of a run without a rank. `None` while the run is not far enough.
+fn instant_ns(run: &RunRecord) -> Option<i64> {
+    let over = run.finished || run.error.is_some();
+    let last_ns = run.steps.last()?.report.stamp_ns;
+    let informed = |step: &StepRecord| {
+        step.rank.as_ref().filter(|rank| !rank.parameters.is_empty()).map(|rank| rank.rank_informed)
+    };
+    let ranked: Vec<(i64, usize)> =
+        run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, informed(step)?))).collect();
+    let Some((first_ns, _)) = ranked.first() else { return over.then_some(last_ns) };
+    let end_ns = first_ns + ns_from_seconds(SPAN_S);
+    if !over && last_ns < end_ns {
+        return None;
+    }
+    let ranked = &ranked[..ranked.partition_point(|(stamp_ns, _)| *stamp_ns <= end_ns)];
+    let largest = ranked.iter().map(|(_, rank)| *rank).max()?;
+    let (fell_ns, _) = ranked.iter().rev().find(|(_, rank)| *rank == largest)?;
+    let wanted_ns = fell_ns + ns_from_seconds(LOST_S);
+    ranked.iter().find(|(stamp_ns, _)| *stamp_ns >= wanted_ns).or(ranked.last()).map(|(stamp_ns, _)| *stamp_ns)
+}
+
+/// The index of a run with the classical parameterization that has a step.
+pub(super) fn classical(runs: &[RunRecord]) -> Option<usize> {
+    runs.iter().position(|run| {
+        run.steps.first().is_some_and(|step| step.report.calibration.parameterization == Parameterization::Classical)
+    })
+}
