@@ -14,6 +14,9 @@ pub(crate) struct ViewArguments {
     /// Folder of the screenshots when there is no display [default: dcvins-output/NAME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Begin with the tour: six steps over the log, or over the sample flight without a log.
+    #[arg(long)]
+    pub tour: bool,
     #[command(flatten)]
     pub estimation: EstimationArguments,
 }
@@ -79,6 +82,7 @@ mod window {
             open_log: Arc::new(open_log),
             desktop: Arc::new(Machine::new()),
             theme: ThemeName::Light,
+            tour: arguments.tour,
         };
         match (run_window(options), &plan) {
             (Err(WindowError::NoDisplay), Some(plan)) => write_screenshots(plan, arguments.out.as_deref()),

@@ -8,10 +8,11 @@ use directories::UserDirs;
 
 use super::error::ExportError;
 use super::recent_files::{RecentFiles, state_folder};
+use super::sample_flight;
 use super::screenshot::{write_csv, write_png, write_svg};
 use super::session_file::is_session;
 use crate::flight_log::output;
-use crate::gui::desktop::{Desktop, PanelExport, PathEntry};
+use crate::gui::desktop::{Desktop, PanelExport, PathEntry, SampleProgress};
 
 /// Maximum number of entries of a folder that are read.
 const MAX_ENTRIES: usize = 5000;
@@ -37,12 +38,19 @@ pub struct Machine {
     state: Option<PathBuf>,
     /// Folder of exported panels.
     output: PathBuf,
+    /// Folder of the sample flight that this program simulates.
+    samples: PathBuf,
 }
 
 impl Machine {
     /// The machine with the user's list of recent logs.
     pub fn new() -> Self {
-        Self { recent: RecentFiles::of_user(), state: state_folder(), output: PathBuf::from("dcvins-output") }
+        Self {
+            recent: RecentFiles::of_user(),
+            state: state_folder(),
+            output: PathBuf::from("dcvins-output"),
+            samples: sample_flight::folder(),
+        }
     }
 
     fn kept(&self, name: &str) -> Option<String> {
@@ -95,7 +103,7 @@ impl Desktop for Machine {
     fn pick_log(&self) -> Option<Receiver<Option<PathBuf>>> {
         let mut dialog = rfd::AsyncFileDialog::new()
             .set_title("Open flight log or session")
-            .add_filter("Flight logs and sessions", &["mcap", "MCAP", "json"]);
+            .add_filter("Flight logs and sessions", &["mcap", "MCAP", "zstd", "zst", "json"]);
         if let Ok(folder) = std::env::current_dir() {
             dialog = dialog.set_directory(folder);
         }
@@ -124,7 +132,16 @@ impl Desktop for Machine {
             program.iter().flat_map(|program| program.ancestors().skip(1).take(LEVELS_ABOVE)).map(Path::to_path_buf);
         let here = std::env::current_dir().into_iter().map(|folder| folder.join("sample_logs"));
         let folders = here.chain(above.flat_map(|folder| SAMPLE_FOLDERS.map(|name| folder.join(name))));
+        let folders = folders.chain([self.samples.clone()]);
         folders.map(|folder| logs_in(&folder)).find(|logs| !logs.is_empty()).unwrap_or_default()
+    }
+
+    fn sample_folder(&self) -> &Path {
+        &self.samples
+    }
+
+    fn make_sample(&self) -> Result<Receiver<SampleProgress>, String> {
+        sample_flight::start(&self.samples)
     }
 
     fn kept_layouts(&self) -> Option<String> {
@@ -177,8 +194,12 @@ impl Desktop for Machine {
     }
 }
 
+/// Whether the window opens it: a log, also under Zstandard, or a saved session.
 fn is_log(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap")) || is_session(path)
+    let is = |path: &Path, wanted: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(wanted));
+    let packed = is(path, "zstd") || is(path, "zst");
+    let plain = if packed { path.with_extension("") } else { path.to_path_buf() };
+    is(&plain, "mcap") || is_session(path)
 }
 
 fn logs_in(folder: &Path) -> Vec<PathBuf> {
@@ -197,6 +218,7 @@ mod tests {
             recent: RecentFiles::in_file(folder.join("recent")),
             state: Some(folder.join("state")),
             output: folder.join("output"),
+            samples: folder.join("samples"),
         }
     }
 
@@ -225,7 +247,7 @@ mod tests {
     #[test]
     fn folders_come_first_and_only_logs_are_offered() {
         let folder = tempfile::tempdir().unwrap();
-        for name in ["b.mcap", "a.MCAP", "b.rig.yaml", ".hidden.mcap"] {
+        for name in ["b.mcap", "a.MCAP", "b.rig.yaml", ".hidden.mcap", "c.mcap.zstd", "c.bag.zstd"] {
             fs::write(folder.path().join(name), "").unwrap();
         }
         fs::create_dir(folder.path().join("bags")).unwrap();
@@ -234,7 +256,7 @@ mod tests {
         let names = |typed: String| -> Vec<String> {
             machine.complete(&typed).into_iter().map(|entry| entry.path.replacen(&root, "", 1)).collect()
         };
-        assert_eq!(names(format!("{root}/")), ["/bags/", "/a.MCAP", "/b.mcap"]);
+        assert_eq!(names(format!("{root}/")), ["/bags/", "/a.MCAP", "/b.mcap", "/c.mcap.zstd"]);
         assert_eq!(names(format!("{root}/b")), ["/bags/", "/b.mcap"]);
         assert_eq!(names(format!("{root}/.h")), ["/.hidden.mcap"]);
         assert!(names(format!("{root}/nowhere/x")).is_empty());

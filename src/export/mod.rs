@@ -13,6 +13,8 @@ mod report;
 mod results;
 mod run_files;
 #[cfg(feature = "gui")]
+mod sample_flight;
+#[cfg(feature = "gui")]
 mod screenshot;
 mod session_file;
 mod structure;

@@ -28,6 +28,20 @@ pub struct PanelExport {
     pub table: String,
 }
 
+/// News of the sample flight that is being simulated.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SampleProgress {
+    /// Images rendered so far.
+    Images {
+        /// Rendered and written.
+        done: usize,
+        /// In all.
+        total: usize,
+    },
+    /// The path of the log, or the reason why there is none.
+    Done(Result<PathBuf, String>),
+}
+
 /// Access to files and memory of the machine.
 pub trait Desktop: Send + Sync {
     /// Folders and logs whose paths begin with the typed text, in order.
@@ -43,6 +57,10 @@ pub trait Desktop: Send + Sync {
     fn remember_log(&self, path: &Path);
     /// Sample logs that come with the program.
     fn sample_logs(&self) -> Vec<PathBuf>;
+    /// The folder into which [`Desktop::make_sample`] writes.
+    fn sample_folder(&self) -> &Path;
+    /// Starts to simulate a sample flight; dropping the receiver cancels it.
+    fn make_sample(&self) -> Result<Receiver<SampleProgress>, String>;
     /// The text of the last [`Desktop::keep_layouts`].
     fn kept_layouts(&self) -> Option<String>;
     /// Stores the saved layouts for the next start.

@@ -5,6 +5,7 @@ mod leaving;
 mod playing_log;
 mod requests;
 pub mod run_window;
+mod sample;
 mod session_log;
 #[cfg(test)]
 mod session_tests;
@@ -23,7 +24,7 @@ use self::kept_window::{KeptWindow, WindowKeeper};
 use self::leaving::{Departure, Leaving, Work};
 use self::playing_log::{Images, go_to_first_frame};
 pub use self::playing_log::{OpenLog, PlayingLog};
-use self::welcome::Welcome;
+use self::welcome::{Choice, Welcome};
 use crate::gui::desktop::Desktop;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::units::counted;
@@ -56,6 +57,8 @@ pub struct App {
     departure: Departure,
     keeper: WindowKeeper,
     welcome: Welcome,
+    /// The log over which the tour begins when it is open.
+    tour_of: Option<PathBuf>,
     state: WindowState,
     selection: Selection,
     theme: Theme,
@@ -89,6 +92,7 @@ impl App {
             log: None,
             at_first_frame: false,
             opening: None,
+            tour_of: None,
             departure: Departure::default(),
             keeper: WindowKeeper::new(kept),
             state,
@@ -129,6 +133,7 @@ impl App {
             self.state.take_layout(layout);
         }
         self.departure.saved = Work::of(log.as_ref());
+        self.welcome.stop();
         self.log = Some(log);
         self.at_first_frame = false;
         self.selection = Selection::default();
@@ -254,9 +259,33 @@ impl App {
         let opening = self.opening.as_ref().map(|opening| opening.path.as_path());
         let frame = Frame::new().fill(self.theme.surface).inner_margin(20);
         let chosen = CentralPanel::no_frame().frame(frame).show(ui, |ui| self.welcome.ui(ui, &self.theme, opening));
+        self.state.help.welcome_ui(ui, &self.theme);
         self.state.notices.toasts_ui(ui, &self.theme);
-        if let Some(path) = chosen.inner {
-            self.open(path);
+        if let Some(choice) = chosen.inner {
+            self.take_choice(choice);
+        }
+    }
+
+    fn take_choice(&mut self, choice: Choice) {
+        match choice {
+            Choice::Open(path) => self.open(path),
+            Choice::Tour(path) => {
+                self.tour_of = Some(path.clone());
+                self.open(path);
+            }
+            Choice::Manual => self.state.help.manual.show(None),
+            Choice::Tutorial => self.state.help.manual.show_tutorial(),
+        }
+    }
+
+    /// Begins the tour: over the log that is open or being opened, else over the sample flight.
+    pub fn start_tour(&mut self) {
+        if self.log.is_some() {
+            self.state.start_tour();
+        } else if let Some(opening) = &self.opening {
+            self.tour_of = Some(opening.path.clone());
+        } else if let Some(choice) = self.welcome.sample(true) {
+            self.take_choice(choice);
         }
     }
 
@@ -267,6 +296,9 @@ impl App {
             Ok(Ok(log)) => {
                 let path = self.opening.take().map(|opening| opening.path);
                 self.show(log, path.as_deref());
+                if self.tour_of.take().is_some_and(|of| Some(of) == path) {
+                    self.state.start_tour();
+                }
             }
             Ok(Err(message)) => {
                 self.opening = None;

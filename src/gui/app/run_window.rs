@@ -51,6 +51,8 @@ pub struct WindowOptions {
     pub desktop: Arc<dyn Desktop>,
     /// The initial theme.
     pub theme: ThemeName,
+    /// Whether the tour begins at once.
+    pub tour: bool,
 }
 
 /// Opens the window and returns when it is closed.
@@ -83,6 +85,9 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
                 }
                 if let Some(path) = options.log_path {
                     app.open(path);
+                }
+                if options.tour {
+                    app.start_tour();
                 }
                 Ok(Box::new(app))
             }),

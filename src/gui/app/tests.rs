@@ -9,7 +9,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
 use super::{App, OpenLog, PlayingLog};
-use crate::gui::desktop::{Desktop, PanelExport, PathEntry};
+use crate::gui::desktop::{Desktop, PanelExport, PathEntry, SampleProgress};
 use crate::gui::samples::{FRAME_PERIOD_NS, sample_images, sample_recording_of};
 use crate::gui::theme::ThemeName;
 use crate::gui::{ImageSource as _, Playback};
@@ -84,9 +84,10 @@ impl PlayingLog for SampleLog {
     }
 }
 
-/// A machine with two sample logs.
+/// A machine with a sample log, or with one that it simulates.
 #[derive(Default)]
 pub(super) struct TestDesktop {
+    stands_alone: bool,
     remembered: Mutex<Vec<PathBuf>>,
     layouts: Mutex<Option<String>>,
     written: Mutex<Vec<PanelExport>>,
@@ -120,7 +121,20 @@ impl Desktop for TestDesktop {
     }
 
     fn sample_logs(&self) -> Vec<PathBuf> {
-        vec![PathBuf::from("/samples/yard.mcap")]
+        if self.stands_alone { Vec::new() } else { vec![PathBuf::from("/samples/yard.mcap")] }
+    }
+
+    fn sample_folder(&self) -> &Path {
+        Path::new("/home/samples")
+    }
+
+    fn make_sample(&self) -> Result<Receiver<SampleProgress>, String> {
+        let (sender, receiver) = channel();
+        let images = SampleProgress::Images { done: 3, total: 8 };
+        for news in [images, SampleProgress::Done(Ok(PathBuf::from("/home/samples/garden.mcap")))] {
+            sender.send(news).map_err(|error| error.to_string())?;
+        }
+        Ok(receiver)
     }
 
     fn kept_layouts(&self) -> Option<String> {
@@ -220,6 +234,25 @@ fn the_welcome_view_offers_logs_and_opens_them() {
     assert!(harness.query_by_label("Play").is_some());
     assert!(harness.query_by_label("Frame 0").is_some(), "the cursor goes to the first frame");
     assert!(harness.query_by_label("300 MiB").is_some(), "the status bar shows the memory");
+}
+
+#[test]
+fn a_program_that_stands_alone_simulates_its_sample_and_begins_the_tour() {
+    let open: OpenLog = Arc::new(|path: &Path| Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>));
+    let desktop = Arc::new(TestDesktop { stands_alone: true, ..TestDesktop::default() });
+    let app = App::new(open, desktop, ThemeName::Dark);
+    let mut harness = Harness::builder().with_size([1400.0, 850.0]).build_ui_state(|ui, app: &mut App| app.ui(ui), app);
+    harness.run_steps(2);
+    assert!(harness.query_by_label_contains("24 MB in /home/samples").is_some());
+    harness.get_by_label("Tutorial").click();
+    harness.run_steps(4);
+    assert!(harness.query_by_label("1. Is the log sound?").is_some(), "documents open without a log");
+    harness.key_press(Key::Escape);
+    harness.run_steps(2);
+    harness.get_by_label("Take the tour").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    assert_eq!(opened(&harness), Some(PathBuf::from("/home/samples/garden.mcap")));
+    run_until(&mut harness, |harness| harness.query_by_label_contains("1 of 6: ").is_some());
 }
 
 #[test]

@@ -40,6 +40,9 @@ pub(super) enum Target {
 }
 
 impl DocumentId {
+    /// The tutorial.
+    pub(super) const TUTORIAL: Self = Self(1);
+
     /// All embedded documents.
     pub(super) fn all() -> impl Iterator<Item = Self> {
         (0..DOCUMENTS.len()).map(Self)
@@ -108,6 +111,7 @@ mod tests {
         assert_eq!(manual.follow("nowhere.md#rank"), None);
         assert!(manual.has_anchor("rank") && !manual.has_anchor("nowhere"));
         assert_eq!(manual.title(), "Manual of the window");
+        assert!(DocumentId::TUTORIAL.title().starts_with("Tutorial"));
     }
 
     #[test]

@@ -37,6 +37,11 @@ impl Manual {
         self.go(place);
     }
 
+    /// Opens the tutorial.
+    pub(crate) fn show_tutorial(&mut self) {
+        self.go(Place { document: DocumentId::TUTORIAL, anchor: None });
+    }
+
     /// Opens the target of a link in the manual.
     pub(crate) fn follow(&mut self, link: &str) {
         self.follow_from(DocumentId::default(), link);

@@ -6,7 +6,9 @@ mod manual;
 mod markdown;
 pub(crate) mod terms;
 
-use egui::{Button, Id, Popup, PopupAnchor, PopupCloseBehavior, Rect, RectAlign, RichText, Ui, WidgetInfo, vec2};
+use egui::{
+    Button, Id, Key, Modifiers, Popup, PopupAnchor, PopupCloseBehavior, Rect, RectAlign, RichText, Ui, WidgetInfo, vec2,
+};
 
 use self::blocks_ui::spans_ui;
 pub(crate) use self::manual::Manual;
@@ -59,6 +61,20 @@ impl Help {
         if let Some(panel) = self.panel {
             let place = places.iter().find(|(known, _)| *known == panel).map(|(_, place)| *place);
             self.popup_ui(ui, theme, panel, place.unwrap_or_else(|| ui.ctx().content_rect()), by_key);
+        }
+        self.manual.ui(ui, theme);
+    }
+
+    /// Draws the manual where no log is open, and reads its keys.
+    pub(crate) fn welcome_ui(&mut self, ui: &Ui, theme: &Theme) {
+        let (opens, closes) = ui.input_mut(|input| {
+            let opens = input.consume_key(Modifiers::SHIFT, Key::F1) || input.consume_key(Modifiers::NONE, Key::F1);
+            (opens, self.manual.is_open() && input.consume_key(Modifiers::NONE, Key::Escape))
+        });
+        if closes {
+            self.manual.close();
+        } else if opens {
+            self.manual.show(None);
         }
         self.manual.ui(ui, theme);
     }
