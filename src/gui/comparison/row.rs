@@ -79,7 +79,7 @@ pub(super) fn row_ui(
     }
     let name = if row.unit.is_empty() { row.name.to_owned() } else { format!("{}, {}", row.name, row.unit) };
     let names = painter.with_clip_rect(whole.with_max_x(rect.left() - 2.0));
-    let mut at = whole.left_top();
+    let mut at = whole.left_top() + vec2(2.0, 0.0);
     names.text(at, Align2::LEFT_TOP, name, theme::label_font(), theme.text);
     let inner = painter.with_clip_rect(rect);
     for (line, curve) in lines.iter().zip(curves.iter()) {

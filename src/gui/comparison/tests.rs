@@ -99,6 +99,7 @@ fn a_single_run_and_an_equal_run_are_reported() {
     let mut twin = harness.state().recording.runs[0].clone();
     (twin.id, twin.spec.label) = (u64::MAX, "twin".to_owned());
     harness.state_mut().recording.runs.push(twin);
+    harness.run_steps(2);
     harness.get_by_label("Numbers").click();
     harness.run_steps(3);
     assert!(harness.query_by_label("identical in all common frames").is_some());

@@ -77,7 +77,7 @@ pub(super) fn events_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
         ui.label(RichText::new("No events in this step").color(theme.text_weak));
     }
     for event in &report.events {
-        ui.horizontal(|ui| {
+        ui.horizontal_top(|ui| {
             let (mark, color) = look_of(event.kind, theme);
             let (rect, _) = ui.allocate_exact_size(vec2(11.0, 14.0), Sense::hover());
             paint_mark(ui.painter(), mark, rect.center(), 8.0, color);
@@ -91,11 +91,7 @@ pub(super) fn events_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
                 ui.label(text).on_hover_text("Measured value / threshold; the unit is that of the message");
             }
             let text = RichText::new(&event.message).color(theme.text);
-            ui.add(egui::Label::new(text).truncate().sense(Sense::hover())).on_hover_text(format!(
-                "{}: {}",
-                name_of(event.kind),
-                event.message
-            ));
+            ui.add(egui::Label::new(text).wrap()).on_hover_text(name_of(event.kind));
         });
     }
     for warning in &report.warnings {

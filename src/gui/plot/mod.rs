@@ -84,7 +84,7 @@ pub(crate) fn paint_value_grid(painter: &Painter, theme: &Theme, area: &PlotArea
         let y = area.y(shown / factor).round() + 0.5;
         painter.hline(area.rect.x_range(), y, Stroke::new(theme::HAIRLINE_WIDTH, theme.grid));
         // Labels that would leave the plot are omitted.
-        if y - 12.0 > area.rect.top() && y < area.rect.bottom() - 1.0 {
+        if y - 12.0 > area.rect.top() && y < area.rect.bottom() + 1.0 {
             let text = super::units::fixed(shown, decimals_of_step(step));
             let at = pos2(area.rect.left() + 2.0, y);
             painter.text(at, Align2::LEFT_BOTTOM, text, theme::number_font(), theme.text_weak);

@@ -105,11 +105,8 @@ fn table_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankC
             cell(ui, NAMES, RichText::new(name).color(theme.text_weak)).on_hover_text(meaning);
             for column in columns {
                 let (text, bad) = of(column.rank, names);
-                cell(
-                    ui,
-                    width,
-                    RichText::new(text).monospace().color(if bad { theme.error } else { theme.text_strong }),
-                );
+                let color = if bad { theme.error } else { theme.text_strong };
+                cell(ui, width, RichText::new(&text).monospace().color(color)).on_hover_text(text);
             }
             ui.end_row();
         }

@@ -60,7 +60,7 @@ impl SliderUi {
         if ctx.presentation.is_figure() {
             if let Some(slide) = slide::of(ctx, step.report.stamp_ns) {
                 let text = format!("Chain moved along {} by {}", label(&direction), signed(amount));
-                ui.add(Label::new(RichText::new(text).color(ctx.theme.text)).truncate());
+                ui.add(Label::new(RichText::new(text).color(ctx.theme.text)).wrap());
                 outcome_ui(ui, ctx, slide, &parameters);
             }
             return;
@@ -134,7 +134,7 @@ fn outcome_ui(ui: &mut Ui, ctx: &PanelContext<'_>, slide: &ChainSlide, parameter
     let (finite, first_order) = (significant(slide.largest_px), significant(slide.largest_first_order_px));
     let verdict = if stays { "unchanged" } else { "changed" };
     let text = format!("{mark} Reprojections {verdict}: at most {finite} px ({first_order} px to first order)");
-    ui.add(Label::new(RichText::new(&text).color(color)).truncate()).on_hover_text(text);
+    ui.add(Label::new(RichText::new(text).color(color)).wrap());
     let mut moved: Vec<usize> = (0..slide.changes.len().min(parameters.len())).collect();
     let scaled = |column: &usize| (slide.changes[*column] / parameters[*column].dimension().scale()).abs();
     moved.sort_by(|a, b| scaled(b).total_cmp(&scaled(a)));
@@ -143,7 +143,7 @@ fn outcome_ui(ui: &mut Ui, ctx: &PanelContext<'_>, slide: &ChainSlide, parameter
         format!("{} {}{}", names.name(parameters[*column]), signed(slide.changes[*column] * shown.factor), shown.unit)
     });
     let text = changes.collect::<Vec<_>>().join(", ");
-    ui.add(Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).truncate());
+    ui.add(Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).wrap());
 }
 
 fn signed(value: f64) -> String {

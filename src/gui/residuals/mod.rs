@@ -20,7 +20,7 @@ use super::plot::{
     Clicks, Curve, Interaction, PlotArea, Wheel, decimals_of_step, navigate, overflows, paint_cursor, paint_curve,
     paint_ground, paint_value_grid, ticks, visible_range,
 };
-use super::theme::{CURVE_WIDTH, Theme, label_font, number_font};
+use super::theme::{CURVE_WIDTH, ROW_HEIGHT, Theme, label_font, number_font};
 use super::units::{fixed, significant};
 use crate::estimator::{FactorKind, ResidualSummary, StepReport};
 use crate::gui::residuals::histogram::ResidualHistogram;
@@ -223,7 +223,8 @@ fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
         ui.label(RichText::new("No solve in this step").color(theme.text_weak));
         return;
     }
-    Grid::new("chi2 by factor").num_columns(5).spacing(vec2(10.0, 2.0)).striped(true).show(ui, |ui| {
+    let grid = Grid::new("chi2 by factor").num_columns(5).min_row_height(ROW_HEIGHT).spacing(vec2(10.0, 2.0));
+    grid.striped(true).show(ui, |ui| {
         for term in [factors::FACTOR, factors::COUNT, factors::CHI2_BEFORE, factors::CHI2_AFTER, factors::RATIO] {
             ui.label(RichText::new(term.name).small().color(theme.text_weak)).on_hover_text(term.meaning);
         }
