@@ -12,6 +12,7 @@ use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::chain_values::ParameterValues;
 use crate::gui::copied_value::offer;
+use crate::gui::help::terms::window;
 use crate::gui::plot::{
     Clicks, Interaction, PlotArea, Wheel, navigate, paint_band, paint_cursor, paint_curve, paint_ground, paint_hatch,
     paint_line, paint_value_grid, visible_range,
@@ -245,7 +246,7 @@ pub(super) fn cell_ui(
     let meaning = meaning_of(id, &ctx.recording.rig);
     response.on_hover_ui_at_pointer(|ui| {
         let column = format!("calibration.csv: {name}_{}", id.dimension().unit());
-        let mut lines = vec![format!("{name}: {meaning}"), text, column];
+        let mut lines = vec![format!("{name}: {meaning}"), text, window::CONVERGENCE.meaning.to_owned(), column];
         lines.extend(data.others_lines(ctx, &overlaid, id, shown, &area));
         ui.label(lines.join("\n"));
     });

@@ -98,6 +98,29 @@ pub(crate) mod block {
     }
 }
 
+/// The Jacobian panel: values of the selected block.
+pub(crate) mod jacobian {
+    use super::Term;
+
+    terms! {
+        FRAME: "frame" => "Number of the observing image in its stream.";
+        U: "u, px" => "Measured column of the pixel.";
+        V: "v, px" => "Measured row of the pixel.";
+        RESIDUAL_U: "residual u, px" => "Column of the prediction minus column of the measurement after the solve, px.";
+        RESIDUAL_V: "residual v, px" => "Row of the prediction minus row of the measurement after the solve, px.";
+        WEIGHT: "robust weight" => "Weight of the robust loss after the solve: 1 = full, towards 0 = outlier.";
+        SLOPE: "∂u, ∂v" => "Derivative of the predicted pixel with respect to the unknown, px per shown unit, before whitening.";
+        JOINT: "joint" => "Number of the joint, from the base.";
+        READING: "reading, °" => "Encoder angle at the stamp of the frame, degrees.";
+        ESTIMATE: "estimate, °" => "Joint angle after the solve, degrees.";
+        SIGMA: "σ, °" => "Standard deviation of the encoder angle, degrees: the encoder σ of the rig over the averaged readings.";
+        RESIDUAL: "residual, σ" => "Whitened residual after the solve: in σ of the measurement.";
+        ENCODER_SLOPE: "∂, σ/°" => "Derivative of the whitened residual with respect to the joint angle.";
+        ROW: "row" => "Number of the scalar residual within the factor.";
+        ROW_SLOPE: "∂" => "Derivative of the whitened residual with respect to the unknown, σ per shown unit.";
+    }
+}
+
 /// The inspector: the selected calibration parameter.
 pub(crate) mod parameter {
     use super::Term;
@@ -187,6 +210,7 @@ pub(crate) mod window {
         DURATION: "duration" => "Time from the first to the last message of the log, s.";
         FRAME: "frame" => "Number of the image at the cursor in its camera's stream, from 0.";
         COST: "cost" => "Half the sum of all squared whitened residuals before and after the shown solver iteration. No unit.";
+        CONVERGENCE: "convergence" => "Estimate ± posterior σ at the cursor, from the window and all priors. Band: ±3σ; Δ: estimate minus ground truth.";
         CAPTION: "caption" => "Frame number, stamp, features tracked, new, lost and rejected (front end and solve), and the RMS and median of the reprojection residuals in px over all observations of the window.";
         CHAIN_ROW: "chain table" => "Denavit–Hartenberg parameters of the estimated chain at the cursor: joint angle q, offset θ₀ and twist α in degrees, d and a in mm.";
         CHAIN_FRAMES: "chain frames" => "Frames of the chain: I IMU, B base, J2, J3 … after each joint, E end effector, C camera. Axes x red, y green, z blue; dashed: ground truth.";
@@ -220,6 +244,7 @@ mod tests {
             feature::ALL,
             observations::ALL,
             block::ALL,
+            jacobian::ALL,
             parameter::ALL,
             iterations::ALL,
             times::ALL,

@@ -9,6 +9,7 @@ use crate::estimator::{ColumnBlock, ColumnId, FeatureRows, FrameId, JacobianFact
 use crate::frontend::FeatureId;
 use crate::geometry::{Dimension, principal_angle};
 use crate::gui::PanelContext;
+use crate::gui::help::terms::{Term, jacobian as terms};
 use crate::gui::units::{Shown, fixed, significant};
 use crate::session::{RunRecord, StepRecord};
 
@@ -136,9 +137,13 @@ fn observations_ui(
     let block = &model.jacobian.columns[column];
     let Some(feature) = step.report.features.iter().find(|feature| feature.id == id) else { return };
     let parts = scalar_columns(block);
-    let mut heads =
-        ["frame", "u, px", "v, px", "residual u, px", "residual v, px", "robust weight"].map(str::to_owned).to_vec();
-    heads.extend(parts.iter().flat_map(|(name, _)| [format!("∂u{name}"), format!("∂v{name}")]));
+    let known = [terms::FRAME, terms::U, terms::V, terms::RESIDUAL_U, terms::RESIDUAL_V, terms::WEIGHT];
+    let slopes = parts.iter().flat_map(|(name, _)| [format!("∂u{name}"), format!("∂v{name}")]);
+    let heads: Vec<(String, Term)> = known
+        .into_iter()
+        .map(|term| (term.name.to_owned(), term))
+        .chain(slopes.map(|head| (head, terms::SLOPE)))
+        .collect();
     let lines = rows.frames.iter().enumerate().filter_map(|(place, frame)| {
         let seen = feature.observations.iter().find(|seen| seen.frame_index == frame.0)?;
         let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
@@ -189,7 +194,8 @@ fn readings_ui(
     numbers_ui(
         ui,
         ctx,
-        &["joint", "reading, °", "estimate, °", "σ, °", "residual, σ", "∂, σ/°"].map(str::to_owned),
+        &[terms::JOINT, terms::READING, terms::ESTIMATE, terms::SIGMA, terms::RESIDUAL, terms::ENCODER_SLOPE]
+            .map(|term| (term.name.to_owned(), term)),
         lines,
     );
 }

@@ -8,6 +8,7 @@ use super::numbers_table::numbers_ui;
 use crate::estimator::{ColumnBlock, ColumnId, FactorRows, JacobianFactor};
 use crate::geometry::Dimension;
 use crate::gui::PanelContext;
+use crate::gui::help::terms::jacobian as terms;
 use crate::gui::units::{Shown, fixed, significant};
 use crate::session::{Command, RunRecord};
 
@@ -67,8 +68,9 @@ pub(super) fn block_ui(
         significant(squared)
     );
     ui.label(RichText::new(text).color(ctx.theme.text));
-    let mut heads = vec!["row".to_owned(), "residual, σ".to_owned()];
-    heads.extend(parts.iter().map(|(name, _)| name.clone()));
+    let known = [terms::ROW, terms::RESIDUAL].map(|term| (term.name.to_owned(), term));
+    let slopes = parts.iter().map(|(name, _)| (name.clone(), terms::ROW_SLOPE));
+    let heads: Vec<_> = known.into_iter().chain(slopes).collect();
     let lines = order.iter().map(|row| {
         let mut cells = vec![(row + 1).to_string(), fixed(rows[(*row, residuals)], 3)];
         cells.extend(parts.iter().enumerate().map(|(part, (_, factor))| significant(own[(*row, part)] / factor)));

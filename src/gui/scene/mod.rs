@@ -153,10 +153,11 @@ impl ScenePanel {
                 self.world = Orbit::from_direction(Vector3::new(0.0, -0.01, 1.0));
             }
             ui.separator();
-            ui.checkbox(&mut self.landmarks, "Landmarks");
-            ui.checkbox(&mut self.keyframes, "Keyframes");
-            ui.checkbox(&mut self.image, "Image");
-            ui.checkbox(&mut self.chain, "Chain");
+            ui.checkbox(&mut self.landmarks, "Landmarks")
+                .on_hover_text("Landmarks of the shown run, coloured by height");
+            ui.checkbox(&mut self.keyframes, "Keyframes").on_hover_text("Camera frusta of the keyframes in the window");
+            ui.checkbox(&mut self.image, "Image").on_hover_text("The image of the shown run inside of its frustum");
+            ui.checkbox(&mut self.chain, "Chain").on_hover_text("The gimbal chain as an inset");
         });
     }
 
