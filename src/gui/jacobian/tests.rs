@@ -116,7 +116,7 @@ fn the_matrix_zooms_and_steps_without_a_linearization_are_reported() {
         assert!(whole != near);
     }
     let place = PanZoom { zoom: 2.0, centre: egui::vec2(0.25, 0.5) }
-        .place(egui::Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 50.0)));
+        .place(egui::Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 50.0)), egui::vec2(100.0, 50.0));
     assert_eq!(place, egui::Rect::from_min_max(pos2(0.0, -25.0), pos2(200.0, 75.0)));
 
     let recording = sample_recording_of(70, &["auto"]);
