@@ -1,6 +1,6 @@
 //! Zooming and panning of a picture with the pointer, the same in the image and in the matrix.
 
-use egui::{PointerButton, Rect, Response, Stroke, StrokeKind, Ui, Vec2};
+use egui::{LayerId, Order, PointerButton, Rect, Response, Stroke, StrokeKind, Ui, Vec2};
 
 use super::theme::Theme;
 
@@ -82,8 +82,11 @@ impl PanZoom {
         let Some((origin, pointer)) = origin.zip(response.interact_pointer_pos()) else { return };
         let selected = Rect::from_two_pos(origin, pointer).intersect(area);
         if dragged && !complete {
+            // Above the picture, which is drawn later.
+            let layer = LayerId::new(Order::Foreground, stored);
+            let painter = ui.ctx().layer_painter(layer).with_clip_rect(area);
             let line = Stroke::new(1.0, theme.accent);
-            ui.painter_at(area).rect(selected, 0.0, theme.accent.gamma_multiply(0.2), line, StrokeKind::Inside);
+            painter.rect(selected, 0.0, theme.accent.gamma_multiply(0.2), line, StrokeKind::Inside);
         } else if selected.width() >= MIN_BOX && selected.height() >= MIN_BOX {
             let place = self.place(area, fitted);
             let fit = (area.width() / selected.width()).min(area.height() / selected.height());

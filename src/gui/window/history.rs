@@ -24,28 +24,45 @@ pub(super) struct History {
     undone: Vec<Arrangement>,
     /// The state to which `before` leads and from which `undone` goes on.
     current: Option<Arrangement>,
+    /// The state after a change that is not yet recorded.
+    pending: Option<Arrangement>,
 }
 
 impl History {
-    /// Records a change since the last call. A change that is still going on (`settled` is false while a button of the
-    /// pointer is down) is recorded when it is complete; another open tab alone is no change.
-    pub(super) fn follow(&mut self, settings: &Settings, layout: &Layout, settled: bool) {
+    /// Records a change since the last call; returns whether another frame has to follow for that.
+    ///
+    /// A change is recorded when it is complete: no button of the pointer is down (`settled`), and two calls see the
+    /// same state, because the tree of panels is simplified in the frame after a drop. Another open tab alone is no
+    /// change.
+    pub(super) fn follow(&mut self, settings: &Settings, layout: &Layout, settled: bool) -> bool {
         let now = || Arrangement { settings: settings.clone(), layout: layout.clone() };
         let Some(current) = &mut self.current else {
             self.current = Some(now());
-            return;
+            return false;
         };
         if current.settings == *settings && current.layout == *layout {
-            return;
-        }
-        if current.settings == *settings && current.layout.differs_by_open_tabs_only(layout) {
+            self.pending = None;
+        } else if current.settings == *settings && current.layout.differs_by_open_tabs_only(layout) {
             *current = now();
+            self.pending = None;
         } else if settled {
-            self.before.push_back(std::mem::replace(current, now()));
-            self.undone.clear();
-            if self.before.len() > MAX_CHANGES {
-                self.before.pop_front();
+            let now = now();
+            if self.pending.as_ref() != Some(&now) {
+                self.pending = Some(now);
+                return true;
             }
+            self.record();
+        }
+        false
+    }
+
+    /// Records the change that is pending.
+    fn record(&mut self) {
+        let Some(now) = self.pending.take() else { return };
+        self.before.extend(self.current.replace(now));
+        self.undone.clear();
+        if self.before.len() > MAX_CHANGES {
+            self.before.pop_front();
         }
     }
 
@@ -61,6 +78,7 @@ impl History {
 
     /// Goes back by one change and returns the state before it.
     pub(super) fn undo(&mut self) -> Option<Arrangement> {
+        self.record();
         let before = self.before.pop_back()?;
         self.undone.extend(self.current.replace(before.clone()));
         Some(before)
@@ -68,6 +86,7 @@ impl History {
 
     /// Goes forward by one change that was undone and returns the state after it.
     pub(super) fn redo(&mut self) -> Option<Arrangement> {
+        self.record();
         let after = self.undone.pop()?;
         self.before.extend(self.current.replace(after.clone()));
         Some(after)
@@ -81,22 +100,28 @@ mod tests {
     use super::*;
     use crate::gui::theme::ThemeName;
 
+    /// Two frames after a change.
+    fn complete(history: &mut History, settings: &Settings, layout: &Layout) {
+        history.follow(settings, layout, true);
+        assert!(!history.follow(settings, layout, true));
+    }
+
     #[test]
     fn changes_are_undone_and_redone_in_order() {
         let (mut settings, mut layout) = (Settings::default(), Layout::default());
         let mut history = History::default();
-        history.follow(&settings, &layout, true);
+        complete(&mut history, &settings, &layout);
         assert!(!history.can_undo() && history.undo().is_none());
         layout.arrange(Preset::Scene);
-        history.follow(&settings, &layout, true);
+        complete(&mut history, &settings, &layout);
         // A slider that is being dragged is one change.
         for scale in [1.1, 1.2, 1.3] {
             settings.scale = scale;
             history.follow(&settings, &layout, false);
         }
-        history.follow(&settings, &layout, true);
+        complete(&mut history, &settings, &layout);
         layout.set_visible(PanelName::Rank, false);
-        history.follow(&settings, &layout, true);
+        complete(&mut history, &settings, &layout);
 
         let shown = |step: Option<Arrangement>| {
             step.map(|step| (step.layout.preset, step.settings.scale, step.layout.is_visible(PanelName::Rank)))
@@ -110,7 +135,7 @@ mod tests {
         // A new change takes the place of those that were undone.
         let Some(Arrangement { mut settings, layout }) = history.current.clone() else { panic!() };
         settings.theme = ThemeName::Print;
-        history.follow(&settings, &layout, true);
+        complete(&mut history, &settings, &layout);
         assert!(!history.can_redo());
         assert_eq!(history.undo().map(|step| step.settings.theme), Some(ThemeName::default()));
     }
@@ -119,13 +144,13 @@ mod tests {
     fn an_open_tab_is_no_change_and_the_number_of_changes_is_limited() {
         let (mut settings, mut layout) = (Settings::default(), Layout::default());
         let mut history = History::default();
-        history.follow(&settings, &layout, true);
+        complete(&mut history, &settings, &layout);
         layout.set_visible(PanelName::Residuals, true);
-        history.follow(&settings, &layout, true);
+        complete(&mut history, &settings, &layout);
         assert!(!history.can_undo(), "the tab of the residuals is in front now, and nothing else changed");
         for memory_mib in 0..2 * MAX_CHANGES {
             settings.memory_mib = memory_mib;
-            history.follow(&settings, &layout, true);
+            complete(&mut history, &settings, &layout);
         }
         assert_eq!(history.before.len(), MAX_CHANGES);
     }

@@ -18,6 +18,8 @@ mod menu;
 mod notices;
 mod panel_export;
 mod panels;
+#[cfg(test)]
+mod pointer_tests;
 mod progress;
 mod saved_layouts;
 mod settings;
@@ -324,7 +326,9 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
         actions::perform(action, state, ctx);
     }
     let settled = !ui.input(|input| input.pointer.any_down());
-    state.history.follow(&state.settings, &state.layout, settled);
+    if state.history.follow(&state.settings, &state.layout, settled) {
+        ui.request_repaint();
+    }
     if let Some(text) = state.copied.take() {
         ui.copy_text(text);
     }

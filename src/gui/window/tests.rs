@@ -28,6 +28,11 @@ pub(super) struct Bench {
 }
 
 impl Bench {
+    /// The commands since they were taken last.
+    pub(super) fn commands_mut(&mut self) -> &mut Vec<Command> {
+        &mut self.commands
+    }
+
     fn ui(&mut self, ui: &mut egui::Ui) {
         let theme = Theme::of(ThemeName::Dark);
         let mut context = PanelContext {
