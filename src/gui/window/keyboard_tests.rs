@@ -136,9 +136,7 @@ fn everything_that_can_be_used_has_a_name() {
             // Scroll bars report their position and belong to the content that they scroll.
             let container =
                 matches!(node.role(), Role::GenericContainer | Role::Window | Role::ScrollView | Role::ScrollBar);
-            // The lines between panels, which resize them, belong to the libraries and cannot have a name.
-            let line = node.bounding_box().is_some_and(|at| at.width().min(at.height()) < 14.0);
-            (acts(Action::Click) || acts(Action::Focus)) && !container && !(line && node.role() == Role::Unknown)
+            (acts(Action::Click) || acts(Action::Focus)) && !container
         });
         let mut count = 0;
         for node in harness.query_all(usable) {
@@ -150,6 +148,7 @@ fn everything_that_can_be_used_has_a_name() {
                 node.role(),
                 node.bounding_box()
             );
+            assert_ne!(node.role(), Role::Unknown, "{place}: {name}");
             count += 1;
         }
         assert!(count > 20, "{place}: {count} nodes");
@@ -212,4 +211,82 @@ fn tab_reaches_everything_and_shows_where_it_is() {
     harness.run_steps(1);
     let pushed = commands_of(&mut harness, |harness| harness.key_press(Key::Enter));
     assert_eq!(pushed, [Command::GoToEnd]);
+}
+
+/// What is painted says to a screen reader what it shows.
+#[test]
+fn painted_elements_have_a_role_and_say_their_content() {
+    let mut harness = bench();
+    let content = |harness: &Harness<'static, Bench>, name: &str, role: Role| {
+        let mut nodes = harness.query_all(By::new().label_contains(name).predicate(move |node| node.role() == role));
+        let node = nodes.next().unwrap_or_else(|| panic!("{role:?} {name}")).accesskit_node();
+        assert_eq!(node.value(), node.description(), "{name}");
+        node.description().unwrap_or_else(|| panic!("{name} says nothing"))
+    };
+    let frame = harness.state().recording.runs[0].step_at(3 * SECOND_NS).unwrap().report.frame_index;
+    let timeline = content(&harness, "Timeline", Role::Slider);
+    assert_eq!(timeline, format!("cursor 3.000 s, frame {frame}"));
+    assert!(content(&harness, "Image of auto", Role::Image).contains("frame"));
+    assert!(content(&harness, "View of the scene", Role::Image).starts_with("auto"));
+    assert!(content(&harness, "View of the gimbal's chain", Role::Image).contains("extrinsics error"));
+    let ranks = content(&harness, "Singular values", Role::Image);
+    assert!(ranks.starts_with("structural rank 18 of 18, informed rank"), "{ranks}");
+    assert!(content(&harness, "weights", Role::Button).starts_with("direction 1 "));
+    for (panel, name, part) in [
+        (PanelName::Residuals, "Histogram of reprojection residuals", "median"),
+        (PanelName::Residuals, "Reprojection RMS over time", " px"),
+        (PanelName::Jacobian, "Jacobian blocks", "columns of blocks"),
+        (PanelName::Comparison, "Difference in position over time", "classical"),
+    ] {
+        harness.state_mut().window.layout.set_visible(panel, true);
+        harness.run_steps(4);
+        let text = content(&harness, name, Role::Image);
+        assert!(text.contains(part), "{name}: {text}");
+    }
+    // The lanes have their values as labels.
+    assert!(harness.query_all_by_label_contains("informed rank 1").next().is_some());
+    // A screen reader steps the timeline.
+    let pushed = commands_of(&mut harness, |harness| {
+        let node = harness.get_by_role_and_label(Role::Slider, "Timeline").accesskit_node();
+        let (target_node, target_tree) = node.locate();
+        let request =
+            egui::accesskit::ActionRequest { action: Action::Increment, target_tree, target_node, data: None };
+        harness.event(egui::Event::AccessKitActionRequest(request));
+    });
+    assert_eq!(pushed, [Command::StepFrames(1)]);
+}
+
+/// The focus goes from the bar at the top through the panels, each with its tabs, to the timeline and the status bar.
+#[test]
+fn tab_goes_in_reading_order_and_not_to_lines() {
+    let mut harness = bench();
+    let places = harness.state().window.places.clone();
+    let region = |rect: egui::Rect| {
+        let inside = places.iter().position(|(_, place)| place.expand(1.0).contains(rect.center()));
+        // The tabs are above their panel.
+        let above = places.iter().position(|(panel, place)| {
+            let tabs = place.translate(egui::vec2(0.0, -20.0)).with_max_y(place.top());
+            *panel != PanelName::Timeline && tabs.expand(1.0).contains(rect.center())
+        });
+        let top = if rect.center().y < places[0].1.top() - 20.0 { Some(0) } else { None };
+        inside.or(above).map(|place| place + 1).or(top).unwrap_or(places.len() + 1)
+    };
+    harness.get_by_label("File").focus();
+    harness.run_steps(1);
+    let mut seen = vec![0];
+    for _ in 0..300 {
+        harness.key_press(Key::Tab);
+        harness.run_steps(1);
+        let id = harness.ctx.memory(egui::Memory::focused).unwrap();
+        let rect = harness.ctx.read_response(id).unwrap().rect;
+        assert!(rect.width().min(rect.height()) >= 10.0, "a line has the focus: {rect:?}");
+        let here = region(rect);
+        if here == 0 && *seen.last().unwrap() > 0 {
+            break;
+        }
+        if *seen.last().unwrap() != here {
+            seen.push(here);
+        }
+    }
+    assert!(seen.is_sorted() && seen.len() > places.len(), "{seen:?} of {places:?}");
 }
