@@ -17,6 +17,8 @@ const HEADER_HEIGHT: f32 = 28.0;
 const UPRIGHT_HEADER_HEIGHT: f32 = 46.0;
 const MAX_ROW_HEIGHT: f32 = 22.0;
 const MIN_ROW_HEIGHT: f32 = 12.0;
+/// Row height in points from which rows without weights are shown too.
+const COMFORTABLE_ROW_HEIGHT: f32 = 16.0;
 /// Height of the line about rows and columns that are not shown.
 const NOTE_HEIGHT: f32 = 16.0;
 /// Number of rows that are shown in a panel of any height.
@@ -91,8 +93,8 @@ struct Rows {
 }
 
 impl Rows {
-    /// All rows where they fit into the first of the `heights`, or at least into the second; else those with the
-    /// largest weights that fit into the second.
+    /// All rows where they fit into the first of the `heights` with room to spare; else those with weights that are
+    /// shown, at least in the second; else those with the largest weights that fit into the second.
     fn of(rank: &RankReport, directions: &[CalibrationDirection], heights: [f32; 2]) -> Self {
         let height_of =
             |height: f32, count: usize| (height / count.max(1) as f32).clamp(MIN_ROW_HEIGHT, MAX_ROW_HEIGHT);
@@ -101,18 +103,19 @@ impl Rows {
             rows.sort_by_key(|row| part_of(rank.parameters[*row]));
             rows
         };
-        if MIN_ROW_HEIGHT * all as f32 <= heights[1] {
+        if COMFORTABLE_ROW_HEIGHT * all as f32 <= heights[0] {
             let rows = sorted((0..all).collect());
             return Self { rows, row_height: height_of(heights[0], all), omitted: None };
         }
-        let fitting = ((heights[1] - NOTE_HEIGHT) / MIN_ROW_HEIGHT) as usize;
-        let rows = sorted(largest_rows(all, directions, fitting.clamp(MIN_ROWS.min(all), all)));
+        let [preferred, most] = heights.map(|height| height - NOTE_HEIGHT);
+        let fitting = ((most / MIN_ROW_HEIGHT) as usize).clamp(MIN_ROWS.min(all), all);
+        let rows = sorted(largest_rows(all, directions, fitting));
         let weight = |row: usize| {
             let weights = directions.iter().map(|direction| weight_of(direction, row));
             weights.fold(0.0, f64::max)
         };
         let omitted = (0..all).filter(|row| !rows.contains(row)).map(weight).reduce(f64::max);
-        let row_height = height_of(heights[1] - NOTE_HEIGHT, rows.len());
+        let row_height = height_of(preferred, rows.len());
         Self { rows, row_height, omitted }
     }
 }

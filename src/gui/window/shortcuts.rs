@@ -95,7 +95,9 @@ pub(super) fn ui(ui: &Ui, theme: &Theme, open: &mut bool) {
     let width = (room.x / count as f32 - GAP).clamp(160.0, COLUMN_WIDTH);
     let window = egui::Window::new("Shortcuts").open(open).collapsible(false).resizable(false);
     window.anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0)).show(ui.ctx(), |ui| {
-        ScrollArea::vertical().max_height(room.y.max(80.0)).auto_shrink(true).show(ui, |ui| {
+        let height = room.y.max(80.0);
+        let area = ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink(true);
+        area.show(ui, |ui| {
             ui.horizontal_top(|ui| {
                 ui.spacing_mut().item_spacing.x = GAP;
                 for column in columns(sections(), count) {
