@@ -270,7 +270,7 @@ mod tests {
         for name in panel_names() {
             let options = ScreenshotOptions { size_px: [800, 500], ..ScreenshotOptions::default() };
             let draw = || {
-                let screenshot = draw_panel(name, &recording, 9_000_000_000, &mut sample_images(), &options).unwrap();
+                let screenshot = draw_panel(name, &recording, 5_500_000_000, &mut sample_images(), &options).unwrap();
                 assert_eq!([screenshot.width(), screenshot.height()], options.size_px);
                 png_bytes(&screenshot).unwrap()
             };
@@ -287,7 +287,7 @@ mod tests {
     fn the_table_of_the_timeline_holds_every_step_and_every_event() {
         let recording = sample_recording();
         let images = &mut sample_images();
-        let table = panel_csv("timeline", &recording, 9_000_000_000, images, &ScreenshotOptions::default()).unwrap();
+        let table = panel_csv("timeline", &recording, 5_500_000_000, images, &ScreenshotOptions::default()).unwrap();
         let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
         let column = |name: &str| rows[0].iter().position(|head| *head == name).unwrap();
         let (run, phase, event) = (column("run"), column("phase"), column("event"));
@@ -314,7 +314,7 @@ mod tests {
         let words = [
             ("all", "Convergence"),
             ("image", "tracked"),
-            ("scene", "Trajectory"),
+            ("scene", "position error"),
             ("convergence", "±3σ"),
             ("rank", "informed rank over time"),
             ("residuals", "reprojection RMS after the solve, px"),
@@ -326,7 +326,7 @@ mod tests {
                 let options = ScreenshotOptions { size_px: [1200, 800], theme, ..ScreenshotOptions::default() };
                 let draw = || {
                     let images = &mut sample_images();
-                    draw_panel_svg(name, &recording, 9_000_000_000, images, &options, ["p", "a & b"]).unwrap()
+                    draw_panel_svg(name, &recording, 5_500_000_000, images, &options, ["p", "a & b"]).unwrap()
                 };
                 let svg = draw();
                 assert!(svg == draw(), "two drawings of '{name}' differ");
@@ -349,7 +349,7 @@ mod tests {
             (ThemeName::Print, 1.5, [2400, 1350]),
         ] {
             let options = ScreenshotOptions { size_px, pixels_per_point: scale, theme, ..ScreenshotOptions::default() };
-            let screenshot = draw_panel("all", &recording, 9_000_000_000, &mut sample_images(), &options).unwrap();
+            let screenshot = draw_panel("all", &recording, 5_500_000_000, &mut sample_images(), &options).unwrap();
             keep_screenshot(&format!("all-{}", theme.as_str()), &screenshot);
             assert_eq!([screenshot.width(), screenshot.height()], size_px);
         }

@@ -73,11 +73,11 @@ const AXES: [Quantity; 3] = [Quantity::Rx, Quantity::Ry, Quantity::Rz];
 mod tests {
     use super::*;
     use crate::gimbal::ParameterNames;
-    use crate::gui::samples::sample_recording_of;
+    use crate::gui::samples::sample_recording;
 
     #[test]
     fn ground_truth_has_the_names_of_the_run_and_is_near_its_end() {
-        let recording = sample_recording_of(240, &["auto", "classical"]);
+        let recording = sample_recording();
         let raw = |rig: &crate::sensors::Rig, parameter: ParameterId| {
             let chain = Chain::from_classical(&rig.chain_of_camera("cam0").unwrap(), Parameterization::Classical);
             let place = chain.parameters().iter().position(|known| *known == parameter).unwrap();

@@ -3,7 +3,7 @@
 use egui::Ui;
 
 use super::rendering::headless::{HeadlessOptions, draw};
-use super::samples::{sample_images, sample_recording, sample_recording_of};
+use super::samples::{rigid_recording, sample_images, sample_recording, sample_recording_of};
 use super::tests::{keep_screenshot, with_context};
 use super::theme::{Theme, ThemeName};
 use super::{PanelContext, Selection};
@@ -51,25 +51,8 @@ fn cases_with_missing_data() -> Vec<(&'static str, Recording, i64)> {
             std::sync::Arc::make_mut(step).ground_truth = None;
         }
     }
-    let mut rigid = whole.clone();
-    std::sync::Arc::make_mut(&mut rigid.rig).gimbal = None;
+    let mut rigid = rigid_recording();
     rigid.ground_truth_rig = None;
-    for step in rigid.runs.iter_mut().flat_map(|run| &mut run.steps) {
-        let step = std::sync::Arc::make_mut(step);
-        let calibration = &mut step.report.calibration;
-        calibration.parameters.clear();
-        calibration.values.clear();
-        calibration.sigmas.clear();
-        calibration.prior_sigmas.clear();
-        calibration.margins.clear();
-        calibration.classical.links.clear();
-        for frame in &mut step.report.window {
-            frame.joint_angles_rad.clear();
-            frame.encoder_angles_rad = None;
-            frame.encoder_sigmas_rad = None;
-        }
-        step.rank = None;
-    }
     let mut single_stamp = whole.clone();
     single_stamp.duration_ns = 0;
     let end_ns = whole.duration_ns;
@@ -96,11 +79,11 @@ fn check<P: Default>(name: &str, size_px: [u32; 2], mut ui: impl FnMut(&mut P, &
             ui(&mut panel, panel_ui, ctx);
         });
     };
-    shown("dark", 9 * SECOND_NS, size_px, ThemeName::Dark, &selection);
-    shown("light", 9 * SECOND_NS, size_px, ThemeName::Light, &selection);
-    shown("print", 9 * SECOND_NS, size_px, ThemeName::Print, &second);
-    shown("second", 4 * SECOND_NS, size_px, ThemeName::Dark, &second);
-    shown("tiny", 9 * SECOND_NS, [90, 40], ThemeName::Dark, &selection);
+    shown("dark", 5 * SECOND_NS, size_px, ThemeName::Dark, &selection);
+    shown("light", 5 * SECOND_NS, size_px, ThemeName::Light, &selection);
+    shown("print", 5 * SECOND_NS, size_px, ThemeName::Print, &second);
+    shown("second", 3 * SECOND_NS, size_px, ThemeName::Dark, &second);
+    shown("tiny", 5 * SECOND_NS, [90, 40], ThemeName::Dark, &selection);
     for (case, recording, cursor_ns) in cases_with_missing_data() {
         let mut panel = P::default();
         let file = format!("{name}-{case}");
@@ -140,7 +123,7 @@ fn the_window_is_drawn_in_every_case() {
         state.arrange(preset);
         let (recording, selection) = (sample_recording(), Selection::default());
         let name = format!("window-{preset:?}");
-        screenshot(&name, &recording, 9 * SECOND_NS, [1920, 1080], ThemeName::Dark, &selection, |ui, ctx| {
+        screenshot(&name, &recording, 5 * SECOND_NS, [1920, 1080], ThemeName::Dark, &selection, |ui, ctx| {
             window_ui(ui, &mut state, ctx);
         });
     }
@@ -159,46 +142,4 @@ fn the_inspector_is_drawn_in_every_case() {
         ctx.selection.feature = step.and_then(|step| Some(step.report.features.first()?.id));
         panel.ui(ui, ctx);
     });
-}
-
-/// Prints the computing time of a screenshot of the whole window: `cargo test --release --lib time_of_a -- --ignored
-/// --nocapture`.
-#[test]
-#[ignore = "a measurement, not a test"]
-#[expect(clippy::disallowed_methods, clippy::print_stdout, reason = "it measures and says so")]
-fn time_of_a_window_frame() {
-    use super::rendering::headless::Headless;
-    use super::rendering::painter::Painter;
-    use super::window::{WindowState, window_ui};
-    use std::time::Instant;
-
-    let recording = sample_recording_of(2400, &["auto", "classical"]);
-    let options = HeadlessOptions { size_px: [1920, 1080], pixels_per_point: 1.0, theme: ThemeName::Dark };
-    let (mut headless, mut painter) = (Headless::new(options), Painter::new());
-    let (mut state, mut selection, mut images) = (WindowState::default(), Selection::default(), sample_images());
-    let theme = Theme::of(ThemeName::Dark);
-    let mut times_ms: Vec<[f64; 2]> = Vec::new();
-    for number in 0..60 {
-        let begin = Instant::now();
-        let mut frame = headless.frame(Vec::new(), |ui| {
-            let cursor_ns = 100 * SECOND_NS + number * SECOND_NS / 20;
-            with_context(&recording, cursor_ns, &mut images, &mut selection, &theme, |ctx| {
-                window_ui(ui, &mut state, ctx);
-            });
-        });
-        let drawn = Instant::now();
-        painter.set_textures(&frame.textures);
-        painter.paint(&frame.primitives, options.size_px, 1.0, theme.background);
-        frame.textures.clear();
-        let painted = Instant::now();
-        times_ms.push([drawn - begin, painted - drawn].map(|time| time.as_secs_f64() * 1e3));
-    }
-    for (part, name) in ["interface and tessellation", "CPU painter"].into_iter().enumerate() {
-        let mut part_ms: Vec<f64> = times_ms[5..].iter().map(|times| times[part]).collect();
-        part_ms.sort_by(f64::total_cmp);
-        println!(
-            "{name}: first {:.1} ms, median {:.1} ms, worst {:.1} ms",
-            times_ms[0][part], part_ms[27], part_ms[54]
-        );
-    }
 }

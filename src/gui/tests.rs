@@ -1,6 +1,6 @@
 use super::theme::Theme;
 use super::{ImageSource, PanelContext, Playback, Presentation, Selection};
-use crate::gui::samples::{FIRST_TRACKED_FRAME, sample_images, sample_recording};
+use crate::gui::samples::{first_tracked_frame, sample_images, sample_recording};
 use crate::session::Recording;
 
 #[test]
@@ -12,7 +12,7 @@ fn the_sample_is_consistent() {
     let newest = step.report.newest().expect("it tracks by then");
     assert!(step.report.features.len() > 60, "{} features", step.report.features.len());
     assert_eq!(newest.frame_index, step.report.frame_index);
-    assert!(run.steps[FIRST_TRACKED_FRAME - 1].report.newest().is_none());
+    assert!(run.steps[first_tracked_frame() - 1].report.newest().is_none());
     // The aligned estimate is near the ground truth.
     let aligned = run.alignment.expect("aligned") * newest.world_from_imu;
     let error_m = (aligned.translation_m - step.ground_truth.expect("truth").translation_m).norm();

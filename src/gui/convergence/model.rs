@@ -222,7 +222,7 @@ pub(crate) fn parameter_states(rank: Option<&RankReport>) -> Option<BTreeMap<Par
 mod tests {
     use super::*;
     use crate::gimbal::ParameterNames;
-    use crate::gui::samples::{FIRST_TRACKED_FRAME, sample_recording_of};
+    use crate::gui::samples::{first_tracked_frame, sample_recording_of};
 
     fn id(name: &str) -> ParameterId {
         ParameterNames::default().parse(name).unwrap()
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn another_run_is_converted_to_the_same_columns() {
-        let recording = sample_recording_of(FIRST_TRACKED_FRAME + 30, &["auto", "classical"]);
+        let recording = sample_recording_of(first_tracked_frame() + 30, &["auto", "classical"]);
         let mut converted = ConvertedHistory::default();
         converted.read(&recording.runs[1], &recording.rig, Parameterization::Minimal);
         let mut own = CalibrationHistory::default();
@@ -265,7 +265,7 @@ mod tests {
 
     #[test]
     fn null_directions_make_their_parameters_unobservable() {
-        let recording = sample_recording_of(FIRST_TRACKED_FRAME + 5, &["classical"]);
+        let recording = sample_recording_of(first_tracked_frame() + 5, &["classical"]);
         let mut history = CalibrationHistory::default();
         history.read(&recording.runs[0]);
         let last = history.stamps_ns.len() - 1;

@@ -1,3 +1,5 @@
+use std::sync::LazyLock;
+
 use egui::{PointerButton, pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
@@ -8,13 +10,18 @@ use crate::estimator::{ColumnGroup, JacobianFactor};
 use crate::gimbal::tests::parameter;
 use crate::gui::Selection;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
-use crate::gui::samples::simulated_recording;
-use crate::gui::samples::{sample_images, sample_recording_of};
+use crate::gui::samples::{SAMPLE_FRAMES, first_tracked_frame, sample_images, sample_recording_of};
 use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::session::Recording;
 
 type Shown = (JacobianPanel, Selection);
+
+/// The sample with the run `classical` first.
+fn sample() -> &'static Recording {
+    static SAMPLE: LazyLock<Recording> = LazyLock::new(|| sample_recording_of(SAMPLE_FRAMES, &["classical", "auto"]));
+    &SAMPLE
+}
 
 fn show(ui: &mut egui::Ui, shown: &mut Shown, recording: &Recording, theme: ThemeName) {
     let theme = Theme::of(theme);
@@ -26,7 +33,7 @@ fn show(ui: &mut egui::Ui, shown: &mut Shown, recording: &Recording, theme: Them
 
 fn bench() -> Harness<'static, Shown> {
     let mut harness = Harness::builder().with_size([1000.0, 700.0]).build_ui_state(
-        |ui, shown: &mut Shown| show(ui, shown, simulated_recording(), ThemeName::Dark),
+        |ui, shown: &mut Shown| show(ui, shown, sample(), ThemeName::Dark),
         (JacobianPanel::default(), Selection::default()),
     );
     harness.run_steps(2);
@@ -34,7 +41,7 @@ fn bench() -> Harness<'static, Shown> {
 }
 
 fn model() -> JacobianModel {
-    let recording = simulated_recording();
+    let recording = sample();
     let run = &recording.runs[0];
     JacobianModel::of_step(&recording.rig, &recording.rig.parameter_names(), run, run.steps.last().unwrap()).unwrap()
 }
@@ -108,10 +115,10 @@ fn the_matrix_zooms_and_steps_without_a_linearization_are_reported() {
         let selection = Selection { parameter: Some(parameter("L2.alpha")), ..Selection::default() };
         let mut shown = (JacobianPanel::default(), selection);
         let options = HeadlessOptions { size_px: [1000, 640], pixels_per_point: 1.0, theme };
-        let whole = draw(options, |ui| show(ui, &mut shown, simulated_recording(), theme));
+        let whole = draw(options, |ui| show(ui, &mut shown, sample(), theme));
         keep_screenshot(&format!("jacobian-flown-{}", theme.as_str()), &whole);
         shown.0.view = PanZoom { zoom: 6.0, centre: egui::vec2(0.15, 0.3) };
-        let near = draw(options, |ui| show(ui, &mut shown, simulated_recording(), theme));
+        let near = draw(options, |ui| show(ui, &mut shown, sample(), theme));
         keep_screenshot(&format!("jacobian-near-{}", theme.as_str()), &near);
         assert!(whole != near);
     }
@@ -119,7 +126,7 @@ fn the_matrix_zooms_and_steps_without_a_linearization_are_reported() {
         .place(egui::Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 50.0)), egui::vec2(100.0, 50.0));
     assert_eq!(place, egui::Rect::from_min_max(pos2(0.0, -25.0), pos2(200.0, 75.0)));
 
-    let recording = sample_recording_of(70, &["auto"]);
+    let recording = sample_recording_of(first_tracked_frame(), &["auto"]);
     let mut harness = Harness::builder().with_size([400.0, 300.0]).build_ui_state(
         move |ui, shown: &mut Shown| show(ui, shown, &recording, ThemeName::Dark),
         (JacobianPanel::default(), Selection::default()),

@@ -188,16 +188,16 @@ pub(crate) fn parameters_of_weights(
 mod tests {
     use super::*;
     use crate::gimbal::{ParameterPart, Quantity};
-    use crate::gui::samples::{FIRST_TRACKED_FRAME, sample_recording_of};
+    use crate::gui::samples::{first_tracked_frame, sample_recording_of};
 
     #[test]
     fn the_verdict_reports_what_is_lost_and_why() {
-        let recording = sample_recording_of(FIRST_TRACKED_FRAME + 10, &["auto", "classical"]);
+        let recording = sample_recording_of(first_tracked_frame() + 10, &["auto", "classical"]);
         let said = |run: usize, step: usize| verdict(&recording.runs[run].steps[step], &ParameterNames::default());
         let waiting = said(0, 3);
         assert_eq!((waiting.level, waiting.headline.as_str()), (Level::None, "Initializing: no rank yet"));
-        assert_eq!(said(0, FIRST_TRACKED_FRAME + 5).level, Level::Weak);
-        let classical = said(1, FIRST_TRACKED_FRAME + 5);
+        assert_eq!(said(0, first_tracked_frame() + 5).level, Level::Weak);
+        let classical = said(1, first_tracked_frame() + 5);
         assert_eq!(classical.level, Level::Lost);
         assert!(classical.headline.starts_with("Structural rank 18 of 24: 6 unobservable"), "{}", classical.headline);
         assert_eq!(classical.reasons[0].text, "Rank deficit: 6 redundant in the parameterization");

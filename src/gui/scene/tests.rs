@@ -12,7 +12,7 @@ use super::model::{Dot, Face, ImageQuad, Line, SceneModel};
 use super::{Follow, ScenePanel, cpu};
 use crate::gui::Selection;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
-use crate::gui::samples::{chain_pose, given_chain, sample_images, sample_recording, sample_recording_of, true_chain};
+use crate::gui::samples::{sample_images, sample_recording, sample_recording_of};
 use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::sensors::GrayImage;
@@ -218,15 +218,17 @@ fn images_are_drawn_in_perspective() {
 
 #[test]
 fn the_chain_is_the_product_of_its_links() {
-    let chain = given_chain();
+    let recording = sample_recording();
+    let [chain, true_chain] = [Some(&recording.rig), recording.ground_truth_rig.as_ref()]
+        .map(|rig| rig.unwrap().chain_of_camera("cam0").unwrap());
     let angles_rad = [0.3, -0.2, 0.7];
     let pose = ChainPose::at(&chain, &angles_rad);
     assert_eq!(pose.names, ["I", "B", "J2", "J3", "E", "C"]);
-    let exact = chain_pose(&chain, &angles_rad);
+    let exact = chain.imu_from_camera(&angles_rad);
     assert!(pose.imu_from_camera().minus(&exact).norm() < 1e-12);
     let names: Vec<String> = ["yaw", "roll", "pitch"].map(str::to_owned).into();
-    let model = ChainModel::at(&angles_rad, &chain, Some(&true_chain()), &names);
-    let error = chain_pose(&true_chain(), &angles_rad).inverse() * exact;
+    let model = ChainModel::at(&angles_rad, &chain, Some(&true_chain), &names);
+    let error = true_chain.imu_from_camera(&angles_rad).inverse() * exact;
     let (distance_m, angle_rad) = model.camera_error.unwrap();
     assert!((distance_m - error.translation_m.norm()).abs() < 1e-12);
     assert!((angle_rad - error.rotation.angle()).abs() < 1e-9);
@@ -289,11 +291,11 @@ fn screenshots_repeat_and_every_stamp_can_be_drawn() {
         draw(options(theme), |ui| show(ui, &mut panel, &recording, cursor_ns, theme))
     };
     for theme in [ThemeName::Dark, ThemeName::Light, ThemeName::Print] {
-        let late = screenshot(11_000_000_000, theme, Follow::Trajectory);
+        let late = screenshot(5_500_000_000, theme, Follow::Trajectory);
         keep_screenshot(&format!("scene-{}", theme.as_str()), &late);
-        assert!(late == screenshot(11_000_000_000, theme, Follow::Trajectory));
+        assert!(late == screenshot(5_500_000_000, theme, Follow::Trajectory));
     }
-    let vehicle = screenshot(8_000_000_000, ThemeName::Dark, Follow::Vehicle);
+    let vehicle = screenshot(4_000_000_000, ThemeName::Dark, Follow::Vehicle);
     keep_screenshot("scene-vehicle", &vehicle);
     for cursor_ns in [-1, 0, 2_000_000_000] {
         keep_screenshot(&format!("scene-{cursor_ns}"), &screenshot(cursor_ns, ThemeName::Dark, Follow::Vehicle));

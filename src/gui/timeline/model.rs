@@ -96,11 +96,11 @@ impl RunLanes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gui::samples::{FIRST_TRACKED_FRAME, sample_recording_of};
+    use crate::gui::samples::{first_tracked_frame, sample_recording_of};
 
     #[test]
     fn lanes_have_the_values_of_the_steps() {
-        let recording = sample_recording_of(FIRST_TRACKED_FRAME + 20, &["auto"]);
+        let recording = sample_recording_of(first_tracked_frame() + 20, &["auto"]);
         let run = &recording.runs[0];
         let mut lanes = RunLanes::default();
         lanes.read(run);
@@ -108,7 +108,7 @@ mod tests {
         assert_eq!(lanes.stamps_ns.len(), run.steps.len());
         assert_eq!(lanes.tracking.iter().filter(|tracking| **tracking).count(), 20);
         let initialized = lanes.events.iter().find(|event| event.kind == EventKind::InitializedFromMotion).unwrap();
-        assert_eq!(initialized.step, FIRST_TRACKED_FRAME);
+        assert_eq!(initialized.step, first_tracked_frame());
         assert!(lanes.keyframes_ns.len() > 2);
         assert_eq!(lanes.at(INFORMED, 0), None);
         assert!(lanes.at(FEATURES, recording.duration_ns).unwrap() > 60.0);

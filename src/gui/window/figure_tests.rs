@@ -59,8 +59,11 @@ fn operable(recording: &Recording, panel: PanelName, presentation: Presentation,
         };
         alone_ui(panel, ui, window, &mut context);
     };
-    let mut harness =
-        Harness::builder().with_size(size).with_max_steps(20).build_ui_state(ui, (WindowState::default(), selection));
+    let mut harness = Harness::builder()
+        .with_size(size)
+        .with_max_steps(20)
+        .with_context_setup(|ctx| Theme::of(ThemeName::Print).apply(ctx))
+        .build_ui_state(ui, (WindowState::default(), selection));
     harness.run_steps(3);
     let nodes = harness.query_all(By::new().predicate(|node| OPERABLE.contains(&node.role())));
     nodes
