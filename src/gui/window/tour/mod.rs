@@ -52,14 +52,16 @@ impl Stop {
 pub(crate) struct Tour {
     /// Index of the stop, `None` while there is no tour.
     stop: Option<usize>,
-    /// Whether the window has been arranged for the stop.
-    arranged: bool,
-    /// Frames since it has been arranged.
+    /// Frames since the panels have been laid out for the stop; 0 before.
     frames: u8,
+    /// Whether cursor, run and selection have been set, which may have to wait for the estimator.
+    arranged: bool,
     /// Id of the run that the tour is about, and its instant.
     story: Option<Story>,
     /// Whether the run `classical` has been added.
     added: bool,
+    /// Whether that run is to be shown as soon as it has a step.
+    awaited: bool,
 }
 
 impl Tour {
@@ -79,7 +81,8 @@ impl Tour {
     }
 
     fn go(&mut self, stop: usize) {
-        (self.stop, self.arranged) = ((stop < Stop::ALL.len()).then_some(stop), false);
+        self.stop = (stop < Stop::ALL.len()).then_some(stop);
+        (self.frames, self.arranged, self.awaited) = (0, false, false);
     }
 
     fn apply(&mut self, pressed: Pressed) {
@@ -121,9 +124,16 @@ impl Tour {
         let stop = Stop::ALL[index];
         self.read_story(ctx);
         let Some(story) = self.story else { return };
+        if self.frames == 0 {
+            lay_out(stop, state);
+        }
         if !self.arranged {
-            self.arranged = self.arrange(stop, story, state, ctx);
-            self.frames = 0;
+            self.arranged = self.arrange(stop, story, ctx);
+        }
+        if self.awaited
+            && let Some(number) = story::classical(&ctx.recording.runs)
+        {
+            (ctx.selection.run, self.awaited) = (number, false);
         }
         if self.frames < FRAMES_TO_LAYOUT {
             self.frames += 1;
@@ -152,16 +162,8 @@ impl Tour {
         }
     }
 
-    /// Layout, cursor, shown run and selection of a stop; returns whether everything that it needs is computed.
-    fn arrange(&mut self, stop: Stop, story: Story, state: &mut WindowState, ctx: &mut PanelContext<'_>) -> bool {
-        let (preset, panel) = stop.place();
-        if state.layout.preset != Some(preset) {
-            state.layout.arrange(preset);
-        }
-        if panel != PanelName::Timeline {
-            state.layout.set_visible(panel, true);
-        }
-        state.focus = Some(panel);
+    /// Sets cursor, shown run and selection of a stop; returns whether everything that it needs is computed.
+    fn arrange(&mut self, stop: Stop, story: Story, ctx: &mut PanelContext<'_>) -> bool {
         let runs = &ctx.recording.runs;
         let number_of = |id: u64| runs.iter().position(|run| run.id == id);
         let own = number_of(story.run).unwrap_or(0);
@@ -179,18 +181,24 @@ impl Tour {
             Stop::Which | Stop::Remedy => texts::leading(&runs[own], instant_ns),
             Stop::Log | Stop::Image | Stop::Why => None,
         };
-        if stop == Stop::Why {
-            match story::classical(runs) {
-                Some(number) => ctx.selection.run = number,
-                None if !self.added && runs.len() < MAX_RUNS && !ctx.recording.rig.joint_names().is_empty() => {
-                    ctx.commands.extend(CLASSICAL.parse().ok().map(Command::AddRun));
-                    self.added = true;
-                    return false;
-                }
-                // It appears with its first step, or cannot be added.
-                None => return !self.added,
-            }
+        let room = runs.len() < MAX_RUNS && !ctx.recording.rig.joint_names().is_empty();
+        self.awaited = stop == Stop::Why;
+        if self.awaited && !self.added && room && story::classical(runs).is_none() {
+            ctx.commands.extend(CLASSICAL.parse().ok().map(Command::AddRun));
+            self.added = true;
         }
         true
     }
+}
+
+/// Arranges the panels for a stop and focuses its panel.
+fn lay_out(stop: Stop, state: &mut WindowState) {
+    let (preset, panel) = stop.place();
+    if state.layout.preset != Some(preset) {
+        state.layout.arrange(preset);
+    }
+    if panel != PanelName::Timeline {
+        state.layout.set_visible(panel, true);
+    }
+    state.focus = Some(panel);
 }

@@ -66,7 +66,7 @@ fn instant_ns(run: &RunRecord) -> Option<i64> {
     let largest = ranked.iter().map(|(_, rank)| *rank).max()?;
     let (fell_ns, _) = ranked.iter().rev().find(|(_, rank)| *rank == largest)?;
     let wanted_ns = fell_ns + ns_from_seconds(LOST_S);
-    ranked.iter().find(|(stamp_ns, _)| *stamp_ns >= wanted_ns).or(ranked.last()).map(|(stamp_ns, _)| *stamp_ns)
+    ranked.iter().find(|(stamp_ns, _)| *stamp_ns >= wanted_ns).or_else(|| ranked.last()).map(|(stamp_ns, _)| *stamp_ns)
 }
 
 /// The index of a run with the classical parameterization that has a step.

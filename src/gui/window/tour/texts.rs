@@ -7,6 +7,7 @@ use crate::gimbal::{ParameterId, ParameterNames};
 use crate::gui::PanelContext;
 use crate::gui::rank::since;
 use crate::gui::rank::verdict::{Verdict, least_observable, parameters_of, verdict};
+use crate::gui::theme::MAX_RUNS;
 use crate::gui::units::{Shown, counted, fixed};
 use crate::observability::RankReport;
 use crate::session::{RunRecord, StepRecord};
@@ -191,7 +192,7 @@ fn why_lines(ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord) -> (Vec
         lines.push(cause_line(run, step, rank));
     }
     let Some(other) = story::classical(&ctx.recording.runs).map(|number| &ctx.recording.runs[number]) else {
-        let waiting = !ctx.recording.rig.joint_names().is_empty();
+        let waiting = ctx.recording.runs.len() < MAX_RUNS && !ctx.recording.rig.joint_names().is_empty();
         return (lines, waiting.then(|| format!("Adding run {}", story::CLASSICAL)));
     };
     if other.id == run.id {
