@@ -282,7 +282,7 @@ fn a_fork_is_made_by_key_and_label_and_has_a_lane() {
         let combo = harness.get_all_by_role(Role::ComboBox).find(|node| node.value().as_deref() == Some("unchanged"));
         combo.unwrap().click();
     });
-    harness.get_by_label("classical").click();
+    harness.get_by_role_and_label(Role::Button, "classical").click();
     harness.run_steps(2);
     let type_text = |harness: &mut Harness<'static, Bench>, label: &str, text: &str| {
         harness.get_by_role_and_label(Role::TextInput, label).focus();
