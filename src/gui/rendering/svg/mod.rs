@@ -6,6 +6,7 @@
 mod document;
 mod element;
 mod mesh;
+mod symbols;
 #[cfg(test)]
 mod tests;
 mod text;

@@ -86,3 +86,14 @@ fn texts_stay_texts_with_their_fonts_colours_and_widths() {
     assert!(svg.contains("monospace") && svg.contains(r##"fill="#ff0000" xml:space="preserve">1.5</text>"##), "{svg}");
     assert!(svg.contains("textLength=") && svg.contains(r#"viewBox="0 0 200 60""#), "{svg}");
 }
+
+#[test]
+fn symbols_are_outlines_and_the_letters_beside_them_text() {
+    let options = HeadlessOptions { size_px: [300, 60], pixels_per_point: 1.0, theme: ThemeName::Print };
+    let svg = svg_of(options, "p", "t", |ui: &mut Ui| {
+        ui.label("✔ full rank → done");
+    });
+    assert_eq!(svg.matches("scale(").count(), 2, "{svg}");
+    assert!(svg.contains(">full rank</text>") && svg.contains(">done</text>"), "{svg}");
+    assert!(!svg.contains('✔') && !svg.contains('→'), "{svg}");
+}

@@ -1,10 +1,11 @@
 //! Laid-out text as SVG text: one element per run of one colour and font on a row, with its laid-out width.
 
 use egui::epaint::TextShape;
-use egui::epaint::text::{Glyph, LayoutSection};
+use egui::epaint::text::{Glyph, LayoutSection, TextFormat};
 use egui::{Color32, FontFamily, Rect, pos2, vec2};
 
 use super::element::{attribute, escape, number, paint, put, stroke};
+use super::symbols::outline;
 
 /// One text with all its rows.
 pub(super) fn text(svg: &mut String, shape: &TextShape) {
@@ -62,8 +63,6 @@ fn write_run(svg: &mut String, shape: &TextShape, row: egui::Vec2, run: &[&Glyph
     let begin = run.iter().position(|glyph| !glyph.chr.is_whitespace());
     let end = run.iter().rposition(|glyph| !glyph.chr.is_whitespace());
     let (Some(begin), Some(end)) = (begin, end) else { return };
-    let run = &run[begin..=end];
-    let [Some(first), Some(last)] = [run.first(), run.last()] else { return };
     let color = match shape.override_text_color {
         Some(color) => color,
         None if format.color == Color32::PLACEHOLDER => shape.fallback_color,
@@ -73,6 +72,45 @@ fn write_run(svg: &mut String, shape: &TextShape, row: egui::Vec2, run: &[&Glyph
         FontFamily::Monospace => "Hack, 'DejaVu Sans Mono', Menlo, Consolas, monospace",
         FontFamily::Proportional | FontFamily::Name(_) => "Ubuntu, 'DejaVu Sans', 'Segoe UI', sans-serif",
     };
+    for part in run[begin..=end].chunk_by(|a, b| outline(a.chr).is_none() && outline(b.chr).is_none()) {
+        match part {
+            [glyph] if outline(glyph.chr).is_some() => symbol(svg, glyph, offset, opaque(color), format.font_id.size),
+            letters => write_letters(svg, letters, offset, opaque(color), format, family),
+        }
+    }
+}
+
+/// A symbol as an outline of the height of capital letters, in the middle of its advance width.
+fn symbol(svg: &mut String, glyph: &Glyph, offset: egui::Vec2, color: Color32, font_size: f32) {
+    const SIZE_RATIO: f32 = 0.75;
+    let Some(path) = outline(glyph.chr) else { return };
+    let size = SIZE_RATIO * font_size;
+    let corner = glyph.pos + offset + vec2(0.5 * (glyph.advance_width - size), -size);
+    let [x, y] = [corner.x, corner.y].map(number);
+    let scale = number(size / 16.0);
+    let fill = paint("fill", color);
+    put(
+        svg,
+        format_args!(
+            "<path transform=\"translate({x} {y}) scale({scale})\" d=\"{path}\"{fill} fill-rule=\"evenodd\"/>\n"
+        ),
+    );
+}
+
+/// Letters of one colour and font, with their laid-out width.
+fn write_letters(
+    svg: &mut String,
+    run: &[&Glyph],
+    offset: egui::Vec2,
+    color: Color32,
+    format: &TextFormat,
+    family: &str,
+) {
+    let begin = run.iter().position(|glyph| !glyph.chr.is_whitespace());
+    let end = run.iter().rposition(|glyph| !glyph.chr.is_whitespace());
+    let (Some(begin), Some(end)) = (begin, end) else { return };
+    let run = &run[begin..=end];
+    let [Some(first), Some(last)] = [run.first(), run.last()] else { return };
     let at = first.pos + offset;
     let width = last.pos.x + last.advance_width - first.pos.x;
     svg.push_str("<text");
@@ -87,7 +125,7 @@ fn write_run(svg: &mut String, shape: &TextShape, row: egui::Vec2, run: &[&Glyph
     if format.italics {
         svg.push_str(" font-style=\"italic\"");
     }
-    svg.push_str(&paint("fill", opaque(color)));
+    svg.push_str(&paint("fill", color));
     let letters: String = run.iter().map(|glyph| glyph.chr).collect();
     put(svg, format_args!(" xml:space=\"preserve\">{}</text>\n", escape(&letters)));
     for (line, y) in [(format.underline, at.y + 2.0), (format.strikethrough, at.y - 0.3 * format.font_id.size)] {
