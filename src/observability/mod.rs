@@ -9,11 +9,13 @@
 
 mod analysis;
 mod classification;
+mod direction_words;
 mod directions;
 mod elimination;
 mod factor;
 mod information;
 pub mod laboratory;
+mod parameter_state;
 mod persistence;
 mod report;
 mod slide;
@@ -23,8 +25,10 @@ mod structure;
 mod tests;
 
 pub use analysis::{ScalingRule, analyse, analyse_with_scaling};
+pub use direction_words::{parameters_of, parameters_of_weights};
 pub use factor::PackedFactor;
 pub use information::{InformationRate, ParameterRate, information_rate};
+pub use parameter_state::{ParameterState, parameter_states};
 pub use persistence::steps_lost;
 pub use report::{CalibrationDirection, RankReport};
 pub use slide::{ChainSlide, chain_of_step, slide};

@@ -101,6 +101,12 @@ impl RankReport {
         self.known.iter().map(|known| known.spurious_gain).fold(0.0, f64::max)
     }
 
+    /// The least observable direction that is not a structural zero, else the first null direction.
+    pub fn least_observable_direction(&self) -> Option<&CalibrationDirection> {
+        let weak = self.directions.iter().find(|direction| !direction.structural);
+        weak.or_else(|| self.directions.first())
+    }
+
     /// Parameter with the largest weight in the least observable direction that is not a structural zero.
     pub fn least_observable(&self) -> Option<ParameterId> {
         let direction = self.directions.iter().find(|direction| !direction.structural)?;

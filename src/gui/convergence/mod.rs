@@ -12,11 +12,13 @@ use std::collections::BTreeMap;
 use egui::{Rect, RichText, ScrollArea, Ui, vec2};
 
 use self::model::{CalibrationHistory, ConvertedHistory};
-pub(crate) use self::model::{ParameterState, parameter_states};
 use super::PanelContext;
 use super::chain_values::{ParameterValues, true_values};
 use super::plot::{BandCurve, Curve, StateCurve, Wheel};
 use crate::gimbal::ParameterId;
+
+/// Height in points of the legend above the plots of a figure.
+const LEGEND_ROW_HEIGHT: f32 = 18.0;
 
 /// The cached curves of one parameter of one run.
 #[derive(Debug, Default)]
@@ -74,7 +76,13 @@ impl ConvergencePanel {
         self.read_converted(ctx, shown);
         let ground_truth = true_values(ctx.recording, &ctx.recording.runs[shown], ctx.cursor_ns).unwrap_or_default();
 
-        let available = ui.available_rect_before_wrap();
+        let mut available = ui.available_rect_before_wrap();
+        if ctx.presentation.is_figure() {
+            let (row, below) = available.split_top_bottom_at_y(available.top() + LEGEND_ROW_HEIGHT);
+            paint::legend_row(ui, ctx, row);
+            ui.advance_cursor_after_rect(row);
+            available = below.with_min_y(ui.cursor().top());
+        }
         let layout = layout::lay_out(&parameters, available);
         if layout.height > available.height() + 1.0 {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -120,7 +128,7 @@ impl ConvergencePanel {
         for (part, rect) in &layout.headings {
             paint::heading(ui, ctx, *part, *rect);
         }
-        if let Some(rect) = layout.legend {
+        if let Some(rect) = layout.legend.filter(|_| !ctx.presentation.is_figure()) {
             paint::legend(ui, ctx, rect);
         }
         for (parameter, rect) in parameters.iter().zip(&layout.cells) {

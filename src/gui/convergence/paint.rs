@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use egui::{Align2, Color32, Pos2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::ParameterCurves;
-use super::model::{CalibrationHistory, ConvertedHistory, ParameterState};
+use super::model::{CalibrationHistory, ConvertedHistory};
 use super::names::{ChainPart, heading_of, meaning_of};
 use super::range::{paint_outside, value_range};
 use crate::gimbal::ParameterId;
@@ -19,11 +19,14 @@ use crate::gui::plot::{
 };
 use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::gui::units::{Shown, fixed};
+use crate::observability::ParameterState;
 
 /// Height of the state strip at the bottom of a plot.
 const STRIP_HEIGHT: f32 = 3.0;
 /// Width beside the error that the values of the axis need.
 const TICK_WIDTH: f32 = 46.0;
+/// Width of a sample in the legend.
+const SAMPLE_WIDTH: f32 = 26.0;
 /// Height of the line with name and value.
 const TITLE_HEIGHT: f32 = 15.0;
 
@@ -43,41 +46,55 @@ pub(super) fn heading(ui: &Ui, ctx: &PanelContext<'_>, part: ChainPart, rect: Re
 /// The legend of lines and marks, where the layout has room for it.
 pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
     const LINE: f32 = 15.0;
-    let theme = ctx.theme;
     let painter = ui.painter_at(rect);
-    let sample = |line: usize| {
-        let top = rect.top() + TITLE_HEIGHT + line as f32 * LINE;
-        Rect::from_min_size(pos2(rect.left() + 8.0, top), vec2(26.0, LINE - 4.0))
-    };
     let mut line = 0;
-    let mut add_entry = |text: &str, paint: &dyn Fn(Rect)| {
-        let place = sample(line);
+    legend_entries(ctx, &mut |text, paint| {
+        let top = rect.top() + TITLE_HEIGHT + line as f32 * LINE;
+        let place = Rect::from_min_size(pos2(rect.left() + 8.0, top), vec2(SAMPLE_WIDTH, LINE - 4.0));
         if place.bottom() < rect.bottom() {
-            paint(place);
+            paint(&painter, place);
             let left = place.right_center() + vec2(6.0, 0.0);
-            painter.text(left, Align2::LEFT_CENTER, text, theme::label_font(), theme.text);
+            painter.text(left, Align2::LEFT_CENTER, text, theme::label_font(), ctx.theme.text);
             line += 1;
         }
-    };
+    });
+}
+
+/// The same legend in one row, for figures.
+pub(super) fn legend_row(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
+    const HEIGHT: f32 = 11.0;
+    let painter = ui.painter_at(rect);
+    let mut left = rect.left();
+    legend_entries(ctx, &mut |text, paint| {
+        let place = Rect::from_min_size(pos2(left, rect.center().y - 0.5 * HEIGHT), vec2(SAMPLE_WIDTH, HEIGHT));
+        paint(&painter, place);
+        let at = place.right_center() + vec2(5.0, 0.0);
+        left = painter.text(at, Align2::LEFT_CENTER, text, theme::label_font(), ctx.theme.text).right() + 14.0;
+    });
+}
+
+/// Passes every entry of the legend, its text and the drawing of its sample, to a function.
+fn legend_entries(ctx: &PanelContext<'_>, add_entry: &mut dyn FnMut(&str, &dyn Fn(&egui::Painter, Rect))) {
+    let theme = ctx.theme;
     for (number, run) in ctx.recording.runs.iter().enumerate() {
         let style = theme.run(number);
-        add_entry(&run.spec.label, &|place| {
-            paint_line(&painter, &[place.left_center(), place.right_center()], style, CURVE_WIDTH);
+        add_entry(&run.spec.label, &|painter, place| {
+            paint_line(painter, &[place.left_center(), place.right_center()], style, CURVE_WIDTH);
         });
     }
     let band = theme.run(ctx.selection.run).color.gamma_multiply(0.22);
-    add_entry("±3σ", &|place| {
+    add_entry("±3σ", &|painter, place| {
         painter.rect_filled(place, 0.0, band);
     });
     if ctx.recording.ground_truth_rig.is_some() {
-        add_entry("ground truth", &|place| {
-            paint_line(&painter, &[place.left_center(), place.right_center()], theme.ground_truth_style(), CURVE_WIDTH);
+        add_entry("ground truth", &|painter, place| {
+            paint_line(painter, &[place.left_center(), place.right_center()], theme.ground_truth_style(), CURVE_WIDTH);
         });
     }
     for (state, text) in MARKED.into_iter().zip(["weak: less than the prior", "unobservable", "initializing"]) {
-        add_entry(text, &|place| {
+        add_entry(text, &|painter, place| {
             if state != ParameterState::Weak {
-                paint_hatch(&painter, place, theme.hatch);
+                paint_hatch(painter, place, theme.hatch);
             }
             let strip = Rect::from_min_max(pos2(place.left(), place.bottom() - STRIP_HEIGHT), place.max);
             painter.rect_filled(strip, 0.0, state_color(theme, state));

@@ -7,9 +7,9 @@ use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::chain_values::true_values;
 use crate::gui::convergence::names::meaning_of;
-use crate::gui::convergence::{ParameterState, parameter_states};
 use crate::gui::help::terms::parameter as terms;
 use crate::gui::units::{Shown, fixed};
+use crate::observability::{ParameterState, parameter_states};
 use crate::session::{RunRecord, StepRecord};
 
 pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord, parameter: ParameterId) {

@@ -4,6 +4,7 @@
 
 mod curve;
 mod navigate;
+mod run_legend;
 mod ticks;
 
 use egui::containers::scroll_area::ScrollAreaOutput;
@@ -12,6 +13,7 @@ use egui::{Align2, Color32, Painter, Pos2, Rangef, Rect, Shape, Stroke, pos2};
 
 pub(crate) use curve::{BandCurve, Curve, StateCurve};
 pub(crate) use navigate::{Clicks, Interaction, Wheel, navigate, visible_range, zoom_about_cursor};
+pub(crate) use run_legend::run_legend_ui;
 pub(crate) use ticks::{decimals_of_step, ticks};
 
 use super::theme::{self, RunStyle, Theme};

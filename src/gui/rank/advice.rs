@@ -4,15 +4,13 @@ use std::sync::Arc;
 
 use egui::{RichText, Ui};
 
-use super::verdict::least_observable;
 use super::{fact_ui, section_ui};
 use crate::geometry::seconds_from_ns;
 use crate::gui::PanelContext;
 use crate::gui::step_work::{REPAINT, StepWork};
 use crate::gui::theme::ROW_HEIGHT;
 use crate::observability::laboratory::{Advice, Situation, advise};
-use crate::observability::steps_lost;
-use crate::session::{RunRecord, StepRecord};
+use crate::session::{LostSince, RunRecord, StepRecord};
 
 /// Number of alternatives to the best motion.
 const OTHERS_SHOWN: usize = 3;
@@ -138,7 +136,12 @@ impl AdviceUi {
                 .as_ref()
                 .and_then(|rank| Situation::of_step(&step.report, rank, &ctx.recording.rig, &run.camera_key));
             let step = Arc::clone(step);
-            move || Some(StepAdvice { since: since(&earlier, &step), advice: situation.as_ref().and_then(advise) })
+            move || {
+                Some(StepAdvice {
+                    since: LostSince::of(&earlier, &step).map(|lost| lost.to_string()),
+                    advice: situation.as_ref().and_then(advise),
+                })
+            }
         });
     }
 }
@@ -167,15 +170,4 @@ fn advice_ui(ui: &mut Ui, ctx: &PanelContext<'_>, advice: Option<&Advice>, time:
 /// The motions after the best one, one line each.
 fn alternatives(advice: &Advice) -> Vec<String> {
     advice.candidates.iter().skip(1).take(OTHERS_SHOWN).map(|candidate| advice.line(candidate)).collect()
-}
-
-/// `weak since 5.55 s`: since when the least observable direction has been null or weak without interruption; `before` are
-/// the run's earlier steps.
-pub(in crate::gui) fn since(before: &[Arc<StepRecord>], step: &StepRecord) -> Option<String> {
-    let rank = step.rank.as_ref()?;
-    let direction = least_observable(rank)?;
-    let lost = steps_lost(&rank.parameters, &direction.weights, before.iter().rev().map(|step| step.rank.as_ref()));
-    let first_ns = before.get(before.len() - lost).map_or(step.report.stamp_ns, |first| first.report.stamp_ns);
-    let kind = if direction.structural { "unobservable" } else { "weak" };
-    Some(format!("{kind} since {:.2} s", seconds_from_ns(first_ns)))
 }

@@ -3,14 +3,13 @@
 use egui::epaint::TextShape;
 use egui::{Align2, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
-use super::verdict::parameters_of;
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::accessible::describe;
 use crate::gui::convergence::names::{meaning_of, part_of};
 use crate::gui::theme::{self, Theme};
 use crate::gui::units::{counted, fixed, significant};
-use crate::observability::{CalibrationDirection, RankReport};
+use crate::observability::{CalibrationDirection, RankReport, parameters_of};
 
 const HEADER_HEIGHT: f32 = 28.0;
 /// Height of the header of narrow columns, whose numbers are vertical.

@@ -18,7 +18,6 @@ use egui::text::{LayoutJob, TextFormat};
 use egui::{RichText, ScrollArea, TextStyle, Ui, UiBuilder, vec2};
 
 use self::advice::AdviceUi;
-pub(super) use self::advice::since;
 use self::information::InformationUi;
 use self::slider::SliderUi;
 use self::verdict::{Level, Verdict};
@@ -27,7 +26,7 @@ use super::follow::RunTables;
 use super::help::terms::window;
 use super::plot::{
     Clicks, Curve, Interaction, PlotArea, Wheel, navigate, overflows, paint_cursor, paint_ground, paint_steps,
-    visible_range,
+    run_legend_ui, visible_range,
 };
 use super::theme::{CURVE_WIDTH, RunStyle, Theme};
 use super::{PanelContext, Presentation};
@@ -51,6 +50,9 @@ const MIN_WIDTH_WITH_DETAILS_BESIDE: f32 = 760.0;
 
 /// Height in points that the details below the heat map get before its rows grow.
 const DETAILS_HEIGHT: f32 = 210.0;
+
+/// The same in a figure, which cannot be scrolled: singular values and ranks over time with their headings.
+const FIGURE_DETAILS_HEIGHT: f32 = 320.0;
 
 /// Height of the ranks over time in points.
 const OVER_TIME_HEIGHT: f32 = 62.0;
@@ -104,7 +106,11 @@ impl RankPanel {
         }
         if count > 1 && ctx.presentation.is_figure() {
             let number = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
-            ui.label(RichText::new(&run.spec.label).strong().color(ctx.theme.run(number).color));
+            ui.horizontal(|ui| {
+                ui.label(RichText::new(format!("Run {}", run.spec.label)).strong().color(ctx.theme.run(number).color));
+                ui.add_space(16.0);
+                run_legend_ui(ui, ctx);
+            });
         } else if count > 1 {
             ui.horizontal(|ui| {
                 ui.selectable_value(&mut self.all_runs, false, "This run");
@@ -131,7 +137,9 @@ impl RankPanel {
         if all.width() < MIN_WIDTH_WITH_DETAILS_BESIDE {
             let shown = ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 let bottom = ui.cursor().top() + height;
-                if self.answers_ui(ui, ctx, run, step, bottom, [DETAILS_HEIGHT, HEAD_OF_DETAILS]) {
+                let figure = ctx.presentation.is_figure();
+                let details = if figure { [FIGURE_DETAILS_HEIGHT; 2] } else { [DETAILS_HEIGHT, HEAD_OF_DETAILS] };
+                if self.answers_ui(ui, ctx, run, step, bottom, details) {
                     self.details_ui(ui, ctx, run, step);
                 }
             });

@@ -3,11 +3,12 @@
 
 use egui::{ComboBox, Label, RichText, Role, Slider, Ui, WidgetInfo};
 
-use super::verdict::parameters_of_weights;
 use crate::gimbal::ParameterId;
 use crate::gui::units::{Shown, fixed, significant};
 use crate::gui::{PanelContext, slide};
-use crate::observability::{ChainSlide, RankReport, SlideDirection, SlidePosition, chain_of_step};
+use crate::observability::{
+    ChainSlide, RankReport, SlideDirection, SlidePosition, chain_of_step, parameters_of_weights,
+};
 use crate::session::StepRecord;
 
 /// Maximum displacement, in units of 10° and 3 cm along the unit direction.

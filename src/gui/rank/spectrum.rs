@@ -2,13 +2,12 @@
 
 use egui::{Align2, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
-use super::verdict::parameters_of;
 use crate::gimbal::ParameterNames;
 use crate::gui::accessible::describe;
 use crate::gui::plot::paint_ground;
 use crate::gui::theme::{Theme, label_font, number_font};
 use crate::gui::units::significant;
-use crate::observability::RankReport;
+use crate::observability::{RankReport, parameters_of};
 
 /// Draws the spectrum in `height` points.
 pub(super) fn ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, rank: &RankReport, height: f32) {

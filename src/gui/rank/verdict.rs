@@ -1,10 +1,9 @@
 //! The rank of a step in words.
 
 use crate::estimator::{EventKind, Phase};
-use crate::gimbal::{ParameterId, ParameterNames, SWITCH_MARGIN};
+use crate::gimbal::{ParameterNames, SWITCH_MARGIN};
 use crate::gui::help::terms::{Term, window};
-use crate::gui::units::counted;
-use crate::observability::{CalibrationDirection, KnownDirection, RankReport};
+use crate::observability::{KnownDirection, RankReport, parameters_of};
 use crate::session::StepRecord;
 
 /// Severity of the verdict.
@@ -105,7 +104,7 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
             ),
         });
     }
-    let direction = least_observable(rank).map(|direction| {
+    let direction = rank.least_observable_direction().map(|direction| {
         let kind = if direction.structural { "Unobservable" } else { "Least observable" };
         let text = format!("{kind}: {}", parameters_of(names, &rank.parameters, direction, 3));
         Reason { term: window::LEAST_OBSERVABLE, text }
@@ -124,12 +123,6 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
     Verdict { level, headline, reasons, direction, notes }
 }
 
-/// The least observable direction that is not lost altogether, else the first unobservable one.
-pub(crate) fn least_observable(rank: &RankReport) -> Option<&CalibrationDirection> {
-    let weak = rank.directions.iter().find(|direction| !direction.structural);
-    weak.or_else(|| rank.directions.first())
-}
-
 /// Every known loss with its reason and the measured response, one line each.
 pub(crate) fn structure_lines(rank: &RankReport, names: &ParameterNames) -> Vec<String> {
     let line = |known: &KnownDirection| {
@@ -144,50 +137,9 @@ pub(crate) fn structure_lines(rank: &RankReport, names: &ParameterNames) -> Vec<
     rank.known.iter().map(line).collect()
 }
 
-/// The parameters with the largest weights in a direction, `L1.d - I.tx`, at most `max_count`.
-pub(crate) fn parameters_of(
-    names: &ParameterNames,
-    parameters: &[ParameterId],
-    direction: &CalibrationDirection,
-    max_count: usize,
-) -> String {
-    parameters_of_weights(names, parameters, &direction.weights, max_count)
-}
-
-/// The same for weights without a direction.
-pub(crate) fn parameters_of_weights(
-    names: &ParameterNames,
-    parameters: &[ParameterId],
-    weights: &[f64],
-    max_count: usize,
-) -> String {
-    const SMALLEST_NAMED: f64 = 0.2;
-    let mut entries: Vec<(usize, f64)> = weights.iter().copied().enumerate().collect();
-    entries.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-    entries.retain(|(_, weight)| weight.abs() >= SMALLEST_NAMED);
-    let omitted = entries.len().saturating_sub(max_count);
-    // A direction has no sign of its own: the first weight counts as positive.
-    let flip = entries.first().map_or(1.0, |(_, weight)| weight.signum());
-    let mut text = String::new();
-    for (place, (column, weight)) in entries.iter().take(max_count).enumerate() {
-        let sign = if weight * flip < 0.0 { " − " } else { " + " };
-        if place > 0 {
-            text.push_str(sign);
-        }
-        let name = parameters.get(*column).map_or_else(|| "?".to_owned(), |parameter| names.name(*parameter));
-        text.push_str(&name);
-    }
-    if omitted > 0 {
-        text.push_str(" and ");
-        text.push_str(&counted(omitted, "other"));
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gimbal::{ParameterPart, Quantity};
     use crate::gui::samples::{first_tracked_frame, sample_recording_of};
 
     #[test]
@@ -201,19 +153,5 @@ mod tests {
         assert_eq!(classical.level, Level::Lost);
         assert!(classical.headline.starts_with("Structural rank 18 of 24: 6 unobservable"), "{}", classical.headline);
         assert_eq!(classical.reasons[0].text, "Rank deficit: 6 redundant in the parameterization");
-    }
-
-    #[test]
-    fn directions_are_named_by_their_largest_weights() {
-        let names = ParameterNames::default();
-        let parameters = Quantity::LINK.map(|quantity| ParameterId { part: ParameterPart::Link(0), quantity });
-        let direction =
-            |weights: &[f64]| CalibrationDirection { singular_value: 0.0, structural: true, weights: weights.to_vec() };
-        assert_eq!(parameters_of(&names, &parameters, &direction(&[-0.7, 0.7, 0.0, 0.1]), 3), "L1.theta − L1.d");
-        assert_eq!(
-            parameters_of(&names, &parameters, &direction(&[0.5, 0.5, 0.5, 0.5]), 2),
-            "L1.theta + L1.d and 2 others"
-        );
-        assert_eq!(parameters_of(&names, &parameters, &direction(&[0.0; 4]), 2), "");
     }
 }

@@ -18,7 +18,7 @@ use super::follow::RunTables;
 use super::help::terms::{Term, factors};
 use super::plot::{
     Clicks, Curve, Interaction, PlotArea, Wheel, decimals_of_step, navigate, overflows, paint_cursor, paint_curve,
-    paint_ground, paint_value_grid, ticks, visible_range,
+    paint_ground, paint_value_grid, run_legend_ui, ticks, visible_range,
 };
 use super::theme::{CURVE_WIDTH, ROW_HEIGHT, Theme, label_font, number_font};
 use super::units::{fixed, significant};
@@ -70,9 +70,11 @@ impl ResidualsPanel {
     fn left_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, report: &StepReport, height: f32) {
         let theme = *ctx.theme;
         let Some((_, histogram)) = &self.counted else { return };
+        let top = ui.cursor().top();
         summary_ui(ui, &theme, report, histogram);
+        let below = height - (ui.cursor().top() - top);
         let over_time = (0.3 * height).max(44.0);
-        histogram_ui(ui, &theme, histogram, (height - over_time - 44.0).max(60.0));
+        histogram_ui(ui, &theme, histogram, (below - over_time - 24.0).max(60.0));
         self.over_time_ui(ui, ctx, over_time);
     }
 
@@ -80,7 +82,10 @@ impl ResidualsPanel {
     fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, height: f32) {
         let theme = *ctx.theme;
         let top = ui.cursor().top();
-        ui.label(RichText::new("reprojection RMS after the solve, px").small().color(theme.text_weak));
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("reprojection RMS after the solve, px").small().color(theme.text_weak));
+            run_legend_ui(ui, ctx);
+        });
         let height = height - (ui.cursor().top() - top);
         let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
         let (begin_ns, end_ns) = visible_range(ctx);

@@ -1,6 +1,8 @@
 //! Stored reports of every step of every run, and values derived from them without running an estimator.
 
 mod comparison;
+mod lost_since;
+mod pose_uncertainty;
 mod recording;
 mod rig_values;
 mod run;
@@ -11,6 +13,8 @@ mod summary;
 mod warnings;
 
 pub use comparison::{Comparison, Divergence, Quantity};
+pub use lost_since::LostSince;
+pub use pose_uncertainty::PoseUncertainty;
 pub use recording::Recording;
 pub use run::{ForkOrigin, RunMemory, RunRecord};
 pub use run_accuracy::{ChainDistance, RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};

@@ -5,12 +5,11 @@ use super::story::{self, Story};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::gui::PanelContext;
-use crate::gui::rank::since;
-use crate::gui::rank::verdict::{Verdict, least_observable, parameters_of, verdict};
+use crate::gui::rank::verdict::{Verdict, verdict};
 use crate::gui::theme::MAX_RUNS;
 use crate::gui::units::{Shown, counted, fixed};
-use crate::observability::RankReport;
-use crate::session::{RunRecord, StepRecord};
+use crate::observability::{RankReport, parameters_of};
+use crate::session::{LostSince, RunRecord, StepRecord};
 
 /// What a card says.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -153,7 +152,7 @@ fn convergence_lines(step: &StepRecord, names: &ParameterNames) -> Vec<String> {
 /// The parameter with the largest weight in that direction.
 pub(super) fn leading(run: &RunRecord, instant_ns: i64) -> Option<ParameterId> {
     let rank = run.step_at(instant_ns)?.rank.as_ref()?;
-    let weights = &least_observable(rank)?.weights;
+    let weights = &rank.least_observable_direction()?.weights;
     let largest = (0..weights.len()).max_by(|a, b| weights[*a].abs().total_cmp(&weights[*b].abs()))?;
     rank.parameters.get(largest).copied()
 }
@@ -161,11 +160,11 @@ pub(super) fn leading(run: &RunRecord, instant_ns: i64) -> Option<ParameterId> {
 /// `weak since 5.55 s`.
 fn lost_since(run: &RunRecord, step: &StepRecord) -> Option<String> {
     let before = run.steps.partition_point(|other| other.report.stamp_ns < step.report.stamp_ns);
-    since(&run.steps[..before], step)
+    LostSince::of(&run.steps[..before], step).map(|lost| lost.to_string())
 }
 
 fn direction_name(rank: &RankReport, names: &ParameterNames) -> Option<String> {
-    Some(parameters_of(names, &rank.parameters, least_observable(rank)?, 3))
+    Some(parameters_of(names, &rank.parameters, rank.least_observable_direction()?, 3))
 }
 
 fn which_lines(run: &RunRecord, step: &StepRecord, names: &ParameterNames) -> Vec<String> {
@@ -229,7 +228,7 @@ fn why_lines(ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord) -> (Vec
 /// Why the direction of the tour is lost.
 fn cause_line(run: &RunRecord, step: &StepRecord, rank: &RankReport) -> String {
     let label = &run.spec.label;
-    let Some(direction) = least_observable(rank) else { return format!("Run {label} loses no direction.") };
+    let Some(direction) = rank.least_observable_direction() else { return format!("Run {label} loses no direction.") };
     let window = &step.report.window;
     let span_ns = window.first().zip(window.last()).map_or(0, |(first, last)| last.stamp_ns - first.stamp_ns);
     if direction.structural {
@@ -256,7 +255,7 @@ fn remedy_lines(
     let mut lines = Vec::new();
     let found = step.rank.as_ref().and_then(|rank| Some((rank, direction_name(rank, names)?)));
     if let (Some((rank, direction)), Some(since)) = (found, lost_since(run, step)) {
-        let cause = if least_observable(rank).is_some_and(|direction| direction.structural) {
+        let cause = if rank.least_observable_direction().is_some_and(|direction| direction.structural) {
             "no measurement in the window depends on it"
         } else {
             "the motion in the window hardly separates these parameters"

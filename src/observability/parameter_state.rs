@@ -1,0 +1,58 @@
+//! Observability of single parameters, from the null and weak directions of a step.
+
+use std::collections::BTreeMap;
+
+use super::RankReport;
+use crate::gimbal::ParameterId;
+
+/// A parameter counts as lost when at least this ratio of its squared unit vector lies in the span of the directions.
+const MIN_LOST_RATIO: f64 = 0.25;
+
+/// Observability of a parameter in a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ParameterState {
+    /// The window constrains it more than the prior.
+    Informed,
+    /// Fixed at its value.
+    Fixed,
+    /// The window constrains it less than the prior.
+    Weak,
+    /// Unobservable: it lies in a structural null direction.
+    Unobservable,
+    /// The estimator is not initialized yet.
+    Waiting,
+}
+
+impl ParameterState {
+    /// A one-word tag, empty for an informed parameter.
+    pub fn tag(self) -> &'static str {
+        match self {
+            Self::Informed => "",
+            Self::Fixed => "fixed",
+            Self::Weak => "weak",
+            Self::Unobservable => "unobservable",
+            Self::Waiting => "initializing",
+        }
+    }
+}
+
+/// Observability of each parameter, `None` during initialization.
+pub fn parameter_states(rank: Option<&RankReport>) -> Option<BTreeMap<ParameterId, ParameterState>> {
+    let rank = rank?;
+    let lost_ratio = |column: usize, structural_only: bool| -> f64 {
+        let directions = rank.directions.iter().filter(|direction| direction.structural || !structural_only);
+        directions.filter_map(|direction| direction.weights.get(column)).map(|weight| weight * weight).sum()
+    };
+    let verdict = |column: usize| {
+        if lost_ratio(column, true) >= MIN_LOST_RATIO {
+            ParameterState::Unobservable
+        } else if lost_ratio(column, false) >= MIN_LOST_RATIO {
+            ParameterState::Weak
+        } else {
+            ParameterState::Informed
+        }
+    };
+    let fixed = rank.fixed_parameters.iter().map(|parameter| (*parameter, ParameterState::Fixed));
+    let columns = rank.parameters.iter().enumerate().map(|(column, parameter)| (*parameter, verdict(column)));
+    Some(columns.chain(fixed).collect())
+}

@@ -1,0 +1,39 @@
+//! Since when a direction of the calibration has been unobservable.
+
+use std::fmt;
+use std::sync::Arc;
+
+use super::StepRecord;
+use crate::geometry::seconds_from_ns;
+use crate::observability::steps_lost;
+
+/// Since when the least observable direction of a step has been null or weak without interruption.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LostSince {
+    /// Stamp of the first step, since the log began.
+    pub stamp_ns: i64,
+    /// Whether the direction is a structural null direction, not only a weak one.
+    pub structural: bool,
+}
+
+impl LostSince {
+    /// Since when the least observable direction of `step` has been lost; `earlier` are the run's steps before it.
+    ///
+    /// Returns `None` for a step without a rank, and for a full informed rank.
+    pub fn of(earlier: &[Arc<StepRecord>], step: &StepRecord) -> Option<Self> {
+        let rank = step.rank.as_ref()?;
+        let direction = rank.least_observable_direction()?;
+        let ranks = earlier.iter().rev().map(|step| step.rank.as_ref());
+        let lost = steps_lost(&rank.parameters, &direction.weights, ranks);
+        let first = earlier.get(earlier.len() - lost).map_or(step, |first| first);
+        Some(Self { stamp_ns: first.report.stamp_ns, structural: direction.structural })
+    }
+}
+
+impl fmt::Display for LostSince {
+    /// `weak since 5.55 s`.
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = if self.structural { "unobservable" } else { "weak" };
+        write!(out, "{kind} since {:.2} s", seconds_from_ns(self.stamp_ns))
+    }
+}
