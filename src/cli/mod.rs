@@ -12,6 +12,8 @@ mod exit;
 mod interrupt;
 mod limit_arguments;
 mod report;
+#[cfg(feature = "gui")]
+mod report_figures;
 mod run;
 mod run_summary;
 #[cfg(feature = "gui")]

@@ -12,6 +12,8 @@ use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::Outcome;
 use crate::cli::interrupt::Interrupt;
+#[cfg(feature = "gui")]
+use crate::cli::report_figures;
 use crate::cli::run::{interrupted, is_initialized};
 use crate::cli::terminal::{Progress, notify, print};
 use crate::cli::value_parsers::seconds;
@@ -42,20 +44,24 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     export::check_report_folder(&arguments.output, &labels, &arguments.log, arguments.force)?;
     let interrupt = Interrupt::watch()?;
     let plan = SessionPlan { interrupted: interrupt.flag(), ..plan.clone() };
-    #[cfg_attr(not(feature = "gui"), expect(unused_mut, reason = "only figures need steps recomputed"))]
     let mut computation = compute(&plan, None)?;
     if interrupt.is_set() && computation.recording().runs.iter().all(|run| run.steps.is_empty()) {
         notify("dcvins: interrupted before the first step; nothing is written");
         return Ok(Outcome::Interrupted);
     }
+    #[cfg(feature = "gui")]
+    let figures = report_figures::draw(arguments, &plan, &mut computation)?;
+    #[cfg(not(feature = "gui"))]
+    let figures = Vec::new();
+    // The verdict needs the complete last steps.
+    computation.fill_in(computation.recording().last_stamp_ns());
+    let runs = 0..computation.recording().runs.len();
     let options = ReportOptions {
         command: command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned())),
         check: Some(check(&plan)),
         inputs: inputs(arguments),
-        #[cfg(feature = "gui")]
-        figures: figures::draw(arguments, &plan, &mut computation)?,
-        #[cfg(not(feature = "gui"))]
-        figures: Vec::new(),
+        figures,
+        pose_uncertainties: runs.map(|run| computation.last_pose_uncertainty(run)).collect(),
     };
     let recording = computation.recording();
     let page = write_report(recording, &arguments.output, &options)?;
@@ -98,87 +104,6 @@ fn command_line(mut words: impl Iterator<Item = String>) -> String {
     };
     let quoted = words.map(|word| if plain(&word) { word } else { format!("'{}'", word.replace('\'', "'\\''")) });
     std::iter::once(program).chain(quoted).collect::<Vec<_>>().join(" ")
-}
-
-#[cfg(feature = "gui")]
-mod figures {
-    use std::sync::Arc;
-
-    use anyhow::Result;
-    use dcvins::export::{ReportDrawing, ReportFigure, ScreenshotOptions, draw_panel, draw_panel_svg, png_bytes};
-    use dcvins::flight_log::ImageReader;
-    use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
-    use dcvins::gui::theme::ThemeName;
-    use dcvins::session::{Computation, SessionPlan};
-
-    use super::ReportArguments;
-    use crate::cli::terminal::Progress;
-
-    /// A panel of the report.
-    struct Shown {
-        panel: &'static str,
-        size_px: [u32; 2],
-        caption: &'static str,
-        /// Whether it is drawn as SVG; images and the scene are drawn as pixels.
-        plot: bool,
-    }
-
-    const fn shown(panel: &'static str, size_px: [u32; 2], caption: &'static str, plot: bool) -> Shown {
-        Shown { panel, size_px, caption, plot }
-    }
-
-    /// Panels that show one stamp.
-    const STAMP_PANELS: [Shown; 3] = [
-        shown("image", [1280, 900], "Image with feature tracks and residuals", false),
-        shown("scene", [1280, 900], "Trajectory, landmarks and gimbal chain", false),
-        shown("rank", [1280, 900], "Ranks, singular values and null directions", true),
-    ];
-    /// Panels that show the whole log.
-    const LOG_PANELS: [Shown; 3] = [
-        shown("convergence", [1680, 1200], "Calibration parameters with ±3σ and ground truth", true),
-        shown("residuals", [1280, 800], "Reprojection residuals, and χ² by factor", true),
-        shown("timeline", [1680, 480], "Events, informed rank, features and warnings", true),
-    ];
-
-    /// The figures of a report: of the whole log, then of each stamp (without one, of the end).
-    pub(super) fn draw(
-        arguments: &ReportArguments,
-        plan: &SessionPlan,
-        computation: &mut Computation,
-    ) -> Result<Vec<ReportFigure>> {
-        let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
-        let mut figures = Vec::new();
-        let end_ns = computation.recording().last_stamp_ns();
-        let stamps_ns: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(end_ns)).collect();
-        let stamps_ns = if stamps_ns.is_empty() { vec![end_ns] } else { stamps_ns };
-        let count = LOG_PANELS.len() + stamps_ns.len() * STAMP_PANELS.len();
-        let progress = Progress::new();
-        let mut draw = |heading: &str, panels: &[Shown], cursor_ns| -> Result<()> {
-            computation.fill_in(cursor_ns);
-            let recording = computation.recording();
-            for Shown { panel, size_px, caption, plot } in panels {
-                progress.show(figures.len() as f64 / count as f64, || format!("drawing {panel}"));
-                let options =
-                    ScreenshotOptions { size_px: *size_px, theme: ThemeName::Print, ..ScreenshotOptions::default() };
-                let caption = format!("{caption}, at {:.2} s", seconds_from_ns(cursor_ns));
-                let drawing = if *plot {
-                    let prefix = format!("clip{}-", figures.len());
-                    let names = [prefix.as_str(), caption.as_str()];
-                    ReportDrawing::Svg(draw_panel_svg(panel, recording, cursor_ns, &mut images, &options, names)?)
-                } else {
-                    let screenshot = draw_panel(panel, recording, cursor_ns, &mut images, &options)?;
-                    ReportDrawing::Png(png_bytes(&screenshot)?)
-                };
-                figures.push(ReportFigure { heading: heading.to_owned(), caption, drawing });
-            }
-            Ok(())
-        };
-        draw("Whole log", &LOG_PANELS, end_ns)?;
-        for cursor_ns in stamps_ns {
-            draw(&format!("At {:.2} s", seconds_from_ns(cursor_ns)), &STAMP_PANELS, cursor_ns)?;
-        }
-        Ok(figures)
-    }
 }
 
 #[cfg(test)]

@@ -196,6 +196,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
             RendererArgument::Cpu => Renderer::Cpu,
             RendererArgument::Wgpu => Renderer::Wgpu,
         },
+        run: 0,
         slide,
         layout: Preset::ALL.get(usize::from(arguments.layout) - 1).copied().unwrap_or_default(),
         playback: shown.playback(),

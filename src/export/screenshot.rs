@@ -57,7 +57,9 @@ pub struct ScreenshotOptions {
     pub theme: ThemeName,
     /// Renderer of the screenshot.
     pub renderer: Renderer,
-    /// Direction and distance by which the chain of the first run is moved.
+    /// Index of the run in panels that show one run.
+    pub run: usize,
+    /// Direction and distance by which the chain of that run is moved.
     pub slide: Option<SlidePosition>,
     /// Layout of the whole window.
     pub layout: Preset,
@@ -74,6 +76,7 @@ impl Default for ScreenshotOptions {
             pixels_per_point: 1.0,
             theme: ThemeName::Light,
             renderer: Renderer::Cpu,
+            run: 0,
             slide: None,
             layout: Preset::default(),
             playback: Playback::default(),
@@ -168,7 +171,7 @@ pub fn panel_csv(
     let panel = PanelName::ALL.into_iter().find(|known| known.as_str() == name);
     let panel = panel.ok_or_else(|| ScreenshotError::UnknownPanel { name: name.to_owned() })?;
     let theme = Theme::of(options.theme);
-    let mut selection = Selection { slide: options.slide, ..Selection::default() };
+    let mut selection = Selection { run: options.run, slide: options.slide, ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };
     let (selection, commands, playback, theme) = (&mut selection, &mut Vec::new(), &playback, &theme);
     let presentation = options.presentation;
@@ -193,7 +196,7 @@ fn with_panel<T>(
     let theme = Theme::of(options.theme);
     let mut state = WindowState::default();
     state.arrange(options.layout);
-    let mut selection = Selection { slide: options.slide, ..Selection::default() };
+    let mut selection = Selection { run: options.run, slide: options.slide, ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };
     let mut ui = |ui: &mut Ui| {
         // Commands of the panel have no effect.

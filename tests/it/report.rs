@@ -23,6 +23,54 @@ fn report(folder: &Path, threads: &str) -> (String, String) {
     (text("report.html"), text("report.json"))
 }
 
+/// The page opens with the verdict of each run, which names every parameter once.
+fn check_verdict(page: &str, report: &Value) {
+    let figures = page.find("<figure").unwrap_or(page.len());
+    for run in report["runs"].as_array().unwrap() {
+        let statements = run["verdict"]["statements"].as_array().unwrap();
+        let topics: Vec<&str> = statements.iter().map(|statement| statement["topic"].as_str().unwrap()).collect();
+        assert_eq!(topics, ["Accuracy", "Calibration", "Observability", "Estimation"]);
+        for statement in statements {
+            let at = page.find(statement["text"].as_str().unwrap()).expect("the statement is in the page");
+            assert!(at < figures, "the verdict comes before the figures");
+        }
+        let calibration: String = statements[1]["details"].as_array().unwrap().iter().map(Value::to_string).collect();
+        let parameters = run["verdict"]["parameters"].as_array().unwrap();
+        assert_eq!(parameters.len(), run["summary"]["calibration"]["columns"].as_u64().unwrap() as usize);
+        for parameter in parameters {
+            let named = format!("{} ±", parameter["name"].as_str().unwrap());
+            assert_eq!(calibration.matches(&named).count(), 1, "{named} in {calibration}");
+            let [sigma, prior] = ["sigma", "prior_sigma"].map(|key| parameter[key].as_f64().unwrap());
+            assert_eq!(parameter["informed"].as_bool().unwrap(), sigma <= 0.5_f64.sqrt() * prior, "{parameter}");
+        }
+    }
+    assert!(page.contains("Suggested excitation: "));
+    assert!(page.find(report["log_verdict"]["text"].as_str().unwrap()).unwrap() < figures);
+}
+
+/// Every figure has a number, in order, and says at which time it is.
+fn check_captions(page: &str, count: usize) {
+    let captions: Vec<&str> = page.split("<figcaption>").skip(1).collect();
+    assert_eq!(captions.len(), count);
+    for (number, caption) in (1..).zip(captions) {
+        let caption = &caption[..caption.find("</figcaption>").unwrap()];
+        assert!(caption.starts_with(&format!("<b>Figure {number}. ")), "{caption}");
+        let title = &caption[..caption.find("</b>").unwrap()];
+        assert!(title.contains(" s") && caption.len() > title.len() + 80, "{caption}");
+    }
+}
+
+/// All letters are those of ordinary text fonts: Latin, Greek, general punctuation, superscripts and subscripts, and
+/// mathematical operators.
+fn check_glyphs(page: &str) {
+    let ordinary = |letter: char| {
+        matches!(letter, '\n' | ' '..='~' | '\u{a0}'..='\u{ff}' | 'Α'..='ω' | '\u{2010}'..='\u{2030}'
+            | '\u{2070}'..='\u{208e}' | '∂' | '−' | '√' | '∞' | '≈' | '≠' | '≤' | '≥' | '∅')
+    };
+    let others: std::collections::BTreeSet<char> = page.chars().filter(|letter| !ordinary(*letter)).collect();
+    assert!(others.is_empty(), "not every font has {others:?}");
+}
+
 #[test]
 fn a_report_holds_everything_and_has_the_same_bytes_twice() {
     let folder = tempfile::tempdir().unwrap();
@@ -44,8 +92,11 @@ fn a_report_holds_everything_and_has_the_same_bytes_twice() {
         assert!(page.contains(text), "'{text}' is missing");
     }
     // Images and the scene are pixels, plots are lines and texts.
-    let pictures = [page.matches("src=\"data:image/png;base64,iVBOR").count(), page.matches("<figure><svg").count()];
-    assert_eq!(pictures, if cfg!(feature = "gui") { [2, 4] } else { [0, 0] });
+    let pictures = [page.matches("src=\"data:image/png;base64,iVBOR").count(), page.matches("\"><svg width=").count()];
+    assert_eq!(pictures, if cfg!(feature = "gui") { [2, 6] } else { [0, 0] });
+    check_verdict(&page, &report);
+    check_captions(&page, pictures.iter().sum());
+    check_glyphs(&page);
     assert_eq!(page.contains("informed rank over time, of 24"), cfg!(feature = "gui"), "plots hold their texts");
     // What `check` finds about the log stands in it.
     let findings = report["check"]["findings"].as_array().unwrap();

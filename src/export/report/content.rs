@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::ReportOptions;
 use super::inputs::InputFile;
 use super::rank_intervals::{RankInterval, rank_intervals};
+use super::verdict::{RunVerdict, Statement, log_statement};
 use crate::export::summary::{RunSummary, log_name};
 use crate::geometry::seconds_from_ns;
 use crate::log_check::CheckReport;
@@ -30,6 +31,8 @@ pub(super) struct ReportEvent {
 pub(super) struct RunContent {
     /// Label of the run.
     pub(super) label: String,
+    /// The verdict at the top of the page.
+    pub(super) verdict: RunVerdict,
     /// The summary, as in `summary.json`.
     pub(super) summary: RunSummary,
     /// Intervals of constant rank.
@@ -56,6 +59,8 @@ pub(super) struct ReportContent {
     pub(super) duration_s: f64,
     /// Input files with their hashes.
     pub(super) inputs: Vec<InputFile>,
+    /// The verdict on the log and the rig.
+    pub(super) log_verdict: Statement,
     /// The runs in the order of the command line.
     pub(super) runs: Vec<RunContent>,
     /// Findings about the log and its rig, as printed by `check --json`.
@@ -72,10 +77,12 @@ impl ReportContent {
         inputs: Vec<InputFile>,
         options: &ReportOptions,
     ) -> Self {
-        let runs = recording.runs.iter().zip(summaries).map(|(run, summary)| {
+        let runs = recording.runs.iter().zip(summaries).enumerate().map(|(number, (run, summary))| {
+            let pose = options.pose_uncertainties.get(number).copied().flatten();
             let (events, frequent_events) = events(run);
             RunContent {
                 label: run.spec.label.clone(),
+                verdict: RunVerdict::new(recording, run, &summary, pose),
                 summary,
                 rank_intervals: rank_intervals(run, &recording.rig),
                 events,
@@ -83,6 +90,9 @@ impl ReportContent {
             }
         });
         let warnings = recording.warnings.iter();
+        let log_warnings: Vec<String> = warnings
+            .map(|warning| format!("{:.3} s: {}", seconds_from_ns(warning.stamp_ns), warning.message))
+            .collect();
         Self {
             program: concat!("dcvins ", env!("CARGO_PKG_VERSION")),
             command: options.command.clone(),
@@ -90,11 +100,10 @@ impl ReportContent {
             rig: recording.rig.name.clone(),
             duration_s: seconds_from_ns(recording.duration_ns),
             inputs,
+            log_verdict: log_statement(options.check.as_ref(), &log_warnings),
             runs: runs.collect(),
             check: options.check.clone(),
-            log_warnings: warnings
-                .map(|warning| format!("{:.3} s: {}", seconds_from_ns(warning.stamp_ns), warning.message))
-                .collect(),
+            log_warnings,
         }
     }
 }

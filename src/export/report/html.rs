@@ -4,7 +4,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, PreEscaped, html};
 
-use super::ReportDrawing;
+use super::verdict::Mark;
+use super::{ReportDrawing, ReportFigure};
 
 /// An unordered list of texts, nothing for none.
 pub(super) fn list(items: &[String]) -> Markup {
@@ -42,22 +43,34 @@ pub(super) fn table<S: AsRef<str>>(caption: &str, header: &[S], rows: &[Vec<Stri
     }
 }
 
-/// A figure with its caption.
-pub(super) fn figure(caption: &str, drawing: &ReportDrawing) -> Markup {
+/// A figure with its number and caption.
+pub(super) fn figure(number: usize, figure: &ReportFigure) -> Markup {
+    let ReportFigure { title, reading, drawing, .. } = figure;
     html! {
-        figure {
+        figure id={ "figure-" (number) } {
             @match drawing {
                 ReportDrawing::Png(png) => {
-                    img alt=(caption) src={ "data:image/png;base64," (STANDARD.encode(png)) };
+                    img alt=(title) src={ "data:image/png;base64," (STANDARD.encode(png)) };
                 }
                 // SVG inside HTML needs no name space; without it the page contains nothing that looks like a URL.
                 ReportDrawing::Svg(svg) => {
                     (PreEscaped(svg.trim_end().replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1)))
                 }
             }
-            figcaption { (caption) }
+            figcaption { b { "Figure " (number) ". " (title) "." } " " (reading) }
         }
     }
+}
+
+/// The icon of a mark, drawn in the page so that it needs no symbol font.
+pub(super) fn icon(mark: Mark) -> Markup {
+    let svg = match mark {
+        Mark::Good => include_str!("../../../assets/report/icons/good.svg"),
+        Mark::Note => include_str!("../../../assets/report/icons/note.svg"),
+        Mark::Warning => include_str!("../../../assets/report/icons/warning.svg"),
+        Mark::Error => include_str!("../../../assets/report/icons/error.svg"),
+    };
+    PreEscaped(svg.trim_end().to_owned())
 }
 
 /// A number with so many decimals and a true minus sign; a negative zero is 0.
@@ -81,11 +94,17 @@ mod tests {
         assert!(!text.contains("<script>") && text.contains("&lt;script&gt;"), "{text}");
         assert!(text.contains("a &amp; b") && text.contains("&lt;name&gt;"), "{text}");
         assert!(text.contains("<td class=\"number\">-1</td>"), "{text}");
-        let image = figure("p", &ReportDrawing::Png(b"abc".to_vec())).into_string();
+        let shown = |drawing: ReportDrawing| {
+            let [heading, title, reading] = ["h", "<p>", "r & s"].map(str::to_owned);
+            figure(3, &ReportFigure { heading, title, reading, drawing }).into_string()
+        };
+        let image = shown(ReportDrawing::Png(b"abc".to_vec()));
         assert_eq!(image.matches("base64,YWJj").count(), 1);
         let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1\"></svg>\n".to_owned();
-        let drawing = figure("<p>", &ReportDrawing::Svg(svg)).into_string();
-        assert_eq!(drawing, "<figure><svg width=\"1\"></svg><figcaption>&lt;p&gt;</figcaption></figure>");
+        let drawing = shown(ReportDrawing::Svg(svg));
+        let expected = "<figure id=\"figure-3\"><svg width=\"1\"></svg><figcaption><b>Figure 3. &lt;p&gt;.</b> r &amp; s\
+                        </figcaption></figure>";
+        assert_eq!(drawing, expected);
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod inputs;
 mod page;
 mod rank_intervals;
 mod tables;
+mod verdict;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -22,15 +23,17 @@ use super::existing::{RUN_FILES, check_run_folder, read_index};
 use super::run_files::{RunFileOptions, remove_unwritten, stage_run};
 use crate::flight_log::output::OutputSet;
 use crate::log_check::CheckReport;
-use crate::session::Recording;
+use crate::session::{PoseUncertainty, Recording};
 
 /// A figure of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReportFigure {
     /// Heading above it; consecutive figures with the same heading share it.
     pub heading: String,
-    /// Caption below it.
-    pub caption: String,
+    /// What is shown, of which run and at which time; the page adds the number of the figure.
+    pub title: String,
+    /// How to read it: colours, dashes, units.
+    pub reading: String,
     /// Its drawing.
     pub drawing: ReportDrawing,
 }
@@ -55,6 +58,8 @@ pub struct ReportOptions {
     pub figures: Vec<ReportFigure>,
     /// Findings of `check` about the log and its rig.
     pub check: Option<CheckReport>,
+    /// Standard deviation of the last pose of each run, as far as known.
+    pub pose_uncertainties: Vec<Option<PoseUncertainty>>,
 }
 
 /// Writes `report.html`, `report.json` and a folder for each run as `run --no-timing` does; returns the HTML's path.

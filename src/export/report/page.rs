@@ -4,10 +4,11 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::ReportFigure;
 use super::content::{ReportContent, RunContent};
-use super::html::{figure, list, number};
+use super::html::{figure, icon, list, number};
+use super::verdict::Statement;
 use super::{RankInterval, tables};
 
-/// Style sheet for screens and for A4, where tables and figures are not split between pages.
+/// Style sheet for screens and for paper, where rows of tables and figures are not split between pages.
 const STYLE: &str = include_str!("../../../assets/report/style.css");
 
 /// The whole page.
@@ -26,10 +27,11 @@ pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String 
                 h1 { (title) }
                 p.lead { (lead(content)) }
                 (contents(content))
-                h2 #accuracy { "Accuracy" }
-                (tables::frames(content))
-                (tables::accuracy(content))
+                (verdict_section(content))
                 (grouped(figures))
+                h2 #accuracy { "Accuracy" }
+                (tables::accuracy(content))
+                (tables::frames(content))
                 @for (index, run) in content.runs.iter().enumerate() {
                     (run_section(index, run))
                 }
@@ -63,18 +65,50 @@ fn has_log_section(content: &ReportContent) -> bool {
     content.check.is_some() || !content.log_warnings.is_empty()
 }
 
-/// Summary of the report in one sentence.
+/// The log, the rig and the runs in one sentence.
 fn lead(content: &ReportContent) -> String {
-    let runs: Vec<String> = content
-        .runs
-        .iter()
-        .map(|run| match &run.summary.accuracy {
-            Some(accuracy) => format!("{} {} m", run.label, number(accuracy.ate_rmse_m, 3)),
-            None => run.label.clone(),
-        })
-        .collect();
-    let what = if content.runs.iter().any(|run| run.summary.accuracy.is_some()) { "ATE RMSE: " } else { "" };
-    format!("{} s, rig {}; {what}{}.", number(content.duration_s, 1), content.rig, runs.join(", "))
+    let runs: Vec<String> = content.runs.iter().map(|run| format!("{} ({})", run.label, run.summary.camera)).collect();
+    let noun = if runs.len() == 1 { "run" } else { "runs" };
+    format!(
+        "Log of {} s, rig {}, {noun} {}. {}.",
+        number(content.duration_s, 1),
+        content.rig,
+        runs.join(", "),
+        content.program
+    )
+}
+
+/// What a reader needs to know before any figure: one table for each run and one for the log.
+fn verdict_section(content: &ReportContent) -> Markup {
+    html! {
+        h2 #verdict { "Verdict" }
+        @for run in &content.runs {
+            @if content.runs.len() > 1 {
+                h3 { "Run " (run.label) }
+            }
+            (statements(&run.verdict.statements))
+        }
+        @if content.runs.len() > 1 {
+            h3 { "Log" }
+        }
+        (statements(std::slice::from_ref(&content.log_verdict)))
+    }
+}
+
+fn statements(statements: &[Statement]) -> Markup {
+    html! {
+        dl.verdict {
+            @for statement in statements {
+                div {
+                    dt { (icon(statement.mark)) " " (statement.topic) }
+                    dd {
+                        p { (statement.text) }
+                        (list(&statement.details))
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// Links to the sections.
@@ -82,7 +116,8 @@ fn contents(content: &ReportContent) -> Markup {
     html! {
         nav {
             ul {
-                li { a href="#accuracy" { "Accuracy" } }
+                li { a href="#verdict" { "Verdict" } }
+                " " li { a href="#accuracy" { "Accuracy" } }
                 @for (index, run) in content.runs.iter().enumerate() {
                     " " li { a href={ "#run-" (index) } { (run.label) } }
                 }
@@ -95,14 +130,16 @@ fn contents(content: &ReportContent) -> Markup {
     }
 }
 
+/// The figures, numbered over all groups.
 fn grouped(figures: &[ReportFigure]) -> Markup {
+    let numbered: Vec<(usize, &ReportFigure)> = (1..).zip(figures).collect();
     html! {
-        @for group in figures.chunk_by(|a, b| a.heading == b.heading) {
-            @if let Some(first) = group.first() {
+        @for group in numbered.chunk_by(|(_, a), (_, b)| a.heading == b.heading) {
+            @if let Some((_, first)) = group.first() {
                 h2 { (first.heading) }
             }
-            @for shown in group {
-                (figure(&shown.caption, &shown.drawing))
+            @for (number, shown) in group {
+                (figure(*number, shown))
             }
         }
     }
@@ -113,14 +150,6 @@ fn run_section(index: usize, run: &RunContent) -> Markup {
     let frequent: Vec<String> = run.frequent_events.iter().map(|(kind, count)| format!("{kind} {count}")).collect();
     html! {
         h2 id={ "run-" (index) } { "Run " (run.label) }
-        @if let (Some(first), Some(last)) = (&calibration.chain_error_initial, &calibration.chain_error) {
-            p {
-                "Extrinsics error of the camera, mean over the joint angles of the run: "
-                (number(first.translation_mean_m * 1e3, 1)) " mm, " (number(first.rotation_mean_rad.to_degrees(), 2))
-                "° with the rig's values; " (number(last.translation_mean_m * 1e3, 1)) " mm, "
-                (number(last.rotation_mean_rad.to_degrees(), 2)) "° with the final calibration."
-            }
-        }
         @if !calibration.parameters.is_empty() {
             (tables::calibration(run))
         }

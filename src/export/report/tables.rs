@@ -4,12 +4,15 @@ use maud::{Markup, html};
 
 use super::content::{ReportContent, RunContent};
 use super::html::{list, number, table};
+use super::verdict::ParameterVerdict;
 use crate::export::summary::ParameterSummary;
 use crate::geometry::Dimension;
 use crate::log_check::{CheckReport, Severity};
 
 /// Millimetres per metre.
 const MM_PER_M: f64 = 1e3;
+/// Number of columns of the calibration table before the prior: name, unit, values and σ.
+const VALUE_COLUMNS: usize = 5;
 /// Milliseconds per second.
 const MS_PER_S: f64 = 1e3;
 
@@ -86,24 +89,37 @@ pub(super) fn accuracy(content: &ReportContent) -> Markup {
 pub(super) fn calibration(run: &RunContent) -> Markup {
     let parameters = &run.summary.calibration.parameters;
     let with_ground_truth = parameters.iter().any(|parameter| parameter.ground_truth.is_some());
-    let mut header = vec!["parameter", "unit", "rig", "final", "± σ"];
+    let mut header = vec!["parameter", "unit", "rig", "final", "± σ", "prior ± σ", "informed"];
     if with_ground_truth {
         header.extend(["ground truth", "error", "error / σ"]);
     }
-    let rows: Vec<Vec<String>> =
-        parameters.iter().map(|parameter| calibration_row(parameter, with_ground_truth)).collect();
+    let row = |(parameter, verdict): (&ParameterSummary, &ParameterVerdict)| {
+        let mut row = calibration_row(parameter, with_ground_truth);
+        let (_, scale, decimals) = shown_unit(parameter.dimension);
+        let prior =
+            verdict.prior_sigma.map_or_else(String::new, |sigma| format!("±{}", number(sigma * scale, decimals)));
+        let informed = if verdict.informed { "yes" } else { "no" };
+        row.splice(VALUE_COLUMNS..VALUE_COLUMNS, [prior, informed.to_owned()]);
+        row
+    };
+    let rows: Vec<Vec<String>> = parameters.iter().zip(&run.verdict.parameters).map(row).collect();
     let caption =
         format!("Calibration of run {}, parameterization {}", run.label, run.summary.calibration.parameterization);
     table(&caption, &header, &rows)
 }
 
-fn calibration_row(parameter: &ParameterSummary, with_ground_truth: bool) -> Vec<String> {
-    let (unit, scale, decimals) = match parameter.dimension {
+/// The shown unit of a dimension, shown units per stored unit, and decimals in tables.
+pub(super) fn shown_unit(dimension: Dimension) -> (&'static str, f64, usize) {
+    match dimension {
         Dimension::Angle => ("°", 1f64.to_degrees(), 3),
         Dimension::Length => ("mm", MM_PER_M, 2),
         Dimension::Time => ("ms", MS_PER_S, 3),
         Dimension::Ratio => ("", 1.0, 6),
-    };
+    }
+}
+
+fn calibration_row(parameter: &ParameterSummary, with_ground_truth: bool) -> Vec<String> {
+    let (unit, scale, decimals) = shown_unit(parameter.dimension);
     let shown = |value: f64| number(value * scale, decimals);
     let sigma = parameter.sigma.map_or_else(String::new, |sigma| format!("±{}", number(sigma * scale, decimals)));
     let mut row = vec![parameter.name.clone(), unit.to_owned(), shown(parameter.initial), shown(parameter.last), sigma];
