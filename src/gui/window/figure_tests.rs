@@ -31,6 +31,16 @@ const OPERABLE: [Role; 12] = [
     Role::TextInput,
 ];
 
+/// Panels with a toolbar.
+const WITH_CONTROLS: [PanelName; 6] = [
+    PanelName::Image,
+    PanelName::Scene,
+    PanelName::Laboratory,
+    PanelName::Comparison,
+    PanelName::Breakpoints,
+    PanelName::Timeline,
+];
+
 /// Labels of the operable widgets of a panel that shows a selection, a moved chain and a breakpoint.
 fn operable(recording: &Recording, panel: PanelName, presentation: Presentation, size: [f32; 2]) -> Vec<String> {
     let cursor_ns = recording.last_stamp_ns();
@@ -80,9 +90,11 @@ fn figures_have_no_buttons_sliders_or_selectors() {
                 let found = operable(&recording, panel, Presentation::Figure, size);
                 assert!(found.is_empty(), "{} with {} runs at {size:?}: {found:?}", panel.as_str(), runs.len());
             }
-            // The same panel in the window: so the list of roles finds what there is.
-            let found = operable(&recording, panel, Presentation::Interactive, [1400.0, 900.0]);
-            assert!(panel == PanelName::Jacobian || !found.is_empty(), "{} has no controls", panel.as_str());
+            // The same panels in the window, so that the list of roles is known to find controls.
+            if WITH_CONTROLS.contains(&panel) {
+                let found = operable(&recording, panel, Presentation::Interactive, [1400.0, 900.0]);
+                assert!(!found.is_empty(), "{} has no controls", panel.as_str());
+            }
         }
     }
 }
