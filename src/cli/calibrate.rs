@@ -20,7 +20,7 @@ pub(crate) struct CalibrateArguments {
     /// The log; its rig names a static camera, a gimbal camera and encoders.
     pub log: PathBuf,
     /// Folder for rig.yaml, calibration.json and report.txt.
-    #[arg(long, value_name = "DIR")]
+    #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: PathBuf,
     /// The rig, when it is not beside the log (LOG with .rig.yaml) or attached to it.
     #[arg(long, value_name = "FILE")]

@@ -18,7 +18,7 @@ pub(crate) struct ConvertArguments {
     /// A EuRoC/ASL folder (with mav0), a ROS 1 bag, or a ROS 2 bag: its folder, one .db3 or one .mcap.
     pub source: PathBuf,
     /// The log to write; the rig, where the source describes one, gets the same name with .rig.yaml.
-    #[arg(short, long, value_name = "LOG.mcap")]
+    #[arg(short, long, visible_alias = "out", value_name = "LOG.mcap")]
     pub output: PathBuf,
     /// Overwrite whatever has the name of the log. Without it only a log is replaced that this command wrote; a rig beside the
     /// log that was edited is always kept.

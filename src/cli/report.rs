@@ -24,7 +24,7 @@ pub(crate) struct ReportArguments {
     /// The log.
     pub log: PathBuf,
     /// Folder for report.html, report.json and the files of each run.
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, visible_alias = "out", value_name = "DIR")]
     pub output: PathBuf,
     /// A time of the figures, in seconds since the first message of the log; may be given several times [default: the
     /// end].

@@ -22,7 +22,7 @@ pub(crate) struct RunArguments {
     /// The log.
     pub log: PathBuf,
     /// Folder for the files; each run gets a folder of its name in it.
-    #[arg(long, value_name = "DIR")]
+    #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: PathBuf,
     #[command(flatten)]
     pub estimation: EstimationArguments,

@@ -43,7 +43,7 @@ pub(crate) struct ScreenshotArguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=5))]
     pub layout: u8,
     /// The file to write: a PNG, or an SVG with the extension .svg.
-    #[arg(short, long, value_name = "FILE.png")]
+    #[arg(short, long, visible_alias = "out", value_name = "FILE.png")]
     pub output: PathBuf,
     /// File format, when it does not follow from the extension.
     #[arg(long, value_enum)]

@@ -19,7 +19,7 @@ pub(crate) struct SimulateArguments {
     #[arg(value_name = "EXPERIMENT", ignore_case = true)]
     pub experiment: ExperimentArgument,
     /// The log to write; its rig and the ground truth of the rig get the same name with .rig.yaml and .truth.yaml.
-    #[arg(short, long, value_name = "LOG.mcap")]
+    #[arg(short, long, visible_alias = "out", value_name = "LOG.mcap")]
     pub output: PathBuf,
     /// Seed of the random numbers.
     #[arg(long, default_value_t = 1)]

@@ -12,7 +12,7 @@ pub(crate) struct ViewArguments {
     /// The log or the saved session; without one the window lists the sample logs and the recent files.
     pub log: Option<PathBuf>,
     /// Folder of the screenshots when there is no display [default: dcvins-output/NAME].
-    #[arg(long, value_name = "DIR")]
+    #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Begin with the tour: six steps over the log, or over the sample flight without a log.
     #[arg(long)]

@@ -25,6 +25,13 @@ fn wrong_use_is_exit_code_2() {
     check(&["calibrate", "log.mcap"], 2, &["--out"]);
     check(&["run", "log.mcap", "--out", "x", "--run", "minimol"], 2, &["minimol", "minimal-swapped"]);
     check(&["run", "log.mcap", "--out", "x", "--start=-3"], 2, &["--start"]);
+    // The output has the same names in every command.
+    for name in ["-o", "--out", "--output"] {
+        for command in ["run", "report", "calibrate", "convert", "screenshot"] {
+            check(&[command, "log.mcap", name, "x", "--no-such"], 2, &["unexpected argument '--no-such'"]);
+        }
+        check(&["simulate", "t1", name, "x", "--no-such"], 2, &["unexpected argument '--no-such'"]);
+    }
     check(&["evaluate", "a.tum", "b.tum", "--delta", "3x"], 2, &["--delta", "10m"]);
     check(&["simulate", "T9", "-o", "x.mcap"], 2, &["T9", "t1"]);
 }
