@@ -60,7 +60,7 @@ pub(super) struct Departure {
     /// Where the user goes after the answer of the dialog.
     asked: Option<Leaving>,
     /// Whether the window may close without a question.
-    quits: bool,
+    pub(super) quits: bool,
 }
 
 impl App {

@@ -2,6 +2,8 @@
 
 mod kept_window;
 mod leaving;
+#[cfg(test)]
+mod leaving_tests;
 mod playing_log;
 mod requests;
 pub mod run_window;
@@ -260,6 +262,7 @@ impl App {
         let frame = Frame::new().fill(self.theme.surface).inner_margin(20);
         let chosen = CentralPanel::no_frame().frame(frame).show(ui, |ui| self.welcome.ui(ui, &self.theme, opening));
         self.state.help.welcome_ui(ui, &self.theme);
+        self.state.focus_ring_ui(ui, &self.theme);
         self.state.notices.toasts_ui(ui, &self.theme);
         if let Some(choice) = chosen.inner {
             self.take_choice(choice);

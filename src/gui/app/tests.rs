@@ -17,7 +17,7 @@ use crate::sensors::GrayImage;
 use crate::session::{Command, Recording};
 
 /// A log that has been computed already.
-struct SampleLog {
+pub(super) struct SampleLog {
     recording: Arc<Recording>,
     cursor_ns: i64,
     playback: Playback,
@@ -25,7 +25,7 @@ struct SampleLog {
 
 impl SampleLog {
     /// The cursor is before the first frame, as in a log whose images begin after its first message.
-    fn new(path: &Path) -> Self {
+    pub(super) fn new(path: &Path) -> Self {
         static SAMPLE: OnceLock<Recording> = OnceLock::new();
         let sample = SAMPLE.get_or_init(|| sample_recording_of(70, &["auto", "classical"]));
         let recording = Arc::new(Recording { log_path: path.to_path_buf(), ..sample.clone() });
@@ -92,9 +92,9 @@ pub(super) struct TestDesktop {
     remembered: Mutex<Vec<PathBuf>>,
     layouts: Mutex<Option<String>>,
     written: Mutex<Vec<PanelExport>>,
-    sessions: Mutex<Vec<String>>,
+    pub(super) sessions: Mutex<Vec<String>>,
     settings: Mutex<Option<String>>,
-    window: Mutex<Option<String>>,
+    pub(super) window: Mutex<Option<String>>,
     /// The answer of the desktop's file dialog, where it has one.
     picked: Mutex<Option<Receiver<Option<PathBuf>>>>,
 }
@@ -181,7 +181,7 @@ impl Desktop for TestDesktop {
 }
 
 #[derive(Debug)]
-struct Dropped(PathBuf);
+pub(super) struct Dropped(pub(super) PathBuf);
 
 impl egui::DroppedFile for Dropped {
     fn path(&self) -> &Path {
@@ -193,7 +193,7 @@ impl egui::DroppedFile for Dropped {
     }
 }
 
-fn app() -> (Harness<'static, App>, Arc<TestDesktop>) {
+pub(super) fn app() -> (Harness<'static, App>, Arc<TestDesktop>) {
     let open: OpenLog = Arc::new(|path: &Path| {
         if path.extension().is_some_and(|extension| extension == "mcap") {
             Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>)
@@ -220,7 +220,7 @@ pub(super) fn run_until(harness: &mut Harness<'static, App>, holds: impl Fn(&Har
     panic!("it never happened");
 }
 
-fn opened(harness: &Harness<'static, App>) -> Option<PathBuf> {
+pub(super) fn opened(harness: &Harness<'static, App>) -> Option<PathBuf> {
     harness.state().log().map(|log| log.recording().log_path.clone())
 }
 
@@ -513,129 +513,4 @@ fn dialogs_are_drawn() {
         keep_screenshot(name, &screenshot);
         assert_eq!(app.log().is_some(), log_is_shown);
     }
-}
-
-/// Opens the sample log and sets a marker.
-fn with_marker() -> (Harness<'static, App>, Arc<TestDesktop>) {
-    let (mut harness, desktop) = app();
-    harness.get_by_label("Open yard.mcap").click();
-    run_until(&mut harness, |harness| opened(harness).is_some());
-    harness.key_press(Key::M);
-    harness.run_steps(2);
-    (harness, desktop)
-}
-
-/// Presses a key with Ctrl; returns the commands to the window in the frames after it.
-fn with_ctrl(harness: &mut Harness<'static, App>, key: Key) -> Vec<egui::ViewportCommand> {
-    harness.key_press_modifiers(Modifiers::COMMAND, key);
-    viewport_commands(harness)
-}
-
-fn viewport_commands(harness: &mut Harness<'static, App>) -> Vec<egui::ViewportCommand> {
-    let mut commands = Vec::new();
-    for _ in 0..3 {
-        harness.run_steps(1);
-        let viewports = harness.output().viewport_output.values();
-        commands.extend(viewports.flat_map(|viewport| viewport.commands.clone()));
-    }
-    commands
-}
-
-#[test]
-fn ctrl_w_closes_a_log_without_unsaved_work_at_once() {
-    let (mut harness, _) = app();
-    harness.get_by_label("Open yard.mcap").click();
-    run_until(&mut harness, |harness| opened(harness).is_some());
-    with_ctrl(&mut harness, Key::W);
-    assert!(opened(&harness).is_none() && harness.query_by_label("Recent logs").is_some());
-    assert!(
-        with_ctrl(&mut harness, Key::Q).contains(&egui::ViewportCommand::Close),
-        "nothing is open, nothing is lost"
-    );
-}
-
-#[test]
-fn unsaved_work_is_asked_about_before_it_is_left() {
-    let (mut harness, desktop) = with_marker();
-    let question = "Not saved in yard.mcap: 1 marker";
-    // Cancel.
-    assert!(!with_ctrl(&mut harness, Key::Q).contains(&egui::ViewportCommand::Close));
-    assert!(harness.query_by_label(question).is_some());
-    harness.key_press(Key::Escape);
-    harness.run_steps(3);
-    assert!(harness.query_by_label(question).is_none() && opened(&harness).is_some());
-    // Opening another log, and saving before.
-    harness.input_mut().dropped_files.push(Arc::new(Dropped(PathBuf::from("/x/b.mcap"))));
-    harness.run_steps(3);
-    assert!(harness.query_by_label(question).is_some());
-    harness.get_by_label("Save").click();
-    run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/x/b.mcap")));
-    assert!(desktop.sessions.lock().unwrap()[0].contains("markers_ns"));
-    // The new log has a marker of its own; it is left without it.
-    harness.key_press(Key::M);
-    harness.run_steps(2);
-    with_ctrl(&mut harness, Key::W);
-    harness.get_by_label("Discard").click();
-    harness.run_steps(3);
-    assert!(opened(&harness).is_none());
-    assert_eq!(desktop.sessions.lock().unwrap().len(), 1);
-}
-
-#[test]
-fn a_saved_session_is_left_without_a_question() {
-    let (mut harness, _) = with_marker();
-    with_ctrl(&mut harness, Key::S);
-    assert!(with_ctrl(&mut harness, Key::Q).contains(&egui::ViewportCommand::Close));
-}
-
-#[test]
-fn the_close_button_of_the_window_asks_too() {
-    let (mut harness, _) = with_marker();
-    let close = |harness: &mut Harness<'static, App>| {
-        let viewports = &mut harness.input_mut().viewports;
-        viewports.get_mut(&egui::ViewportId::ROOT).unwrap().events.push(egui::ViewportEvent::Close);
-        viewport_commands(harness)
-    };
-    assert!(close(&mut harness).contains(&egui::ViewportCommand::CancelClose));
-    harness.get_by_label("Discard").click();
-    assert!(viewport_commands(&mut harness).contains(&egui::ViewportCommand::Close));
-    assert!(!close(&mut harness).contains(&egui::ViewportCommand::CancelClose), "the answer holds");
-}
-
-#[test]
-fn the_layout_is_kept_and_restored() {
-    let (mut harness, desktop) = app();
-    harness.get_by_label("Open yard.mcap").click();
-    run_until(&mut harness, |harness| opened(harness).is_some());
-    harness.key_press(Key::Num4);
-    // It is stored some time after the change.
-    harness.run_steps(90);
-    let kept = desktop.window.lock().unwrap().clone().expect("it is stored");
-    assert!(kept.contains("\"preset\":\"Scene\"") && kept.contains("\"size\""), "{kept}");
-    let open: OpenLog = Arc::new(|path: &Path| Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>));
-    let again = App::new(open, desktop as Arc<dyn Desktop>, ThemeName::Dark);
-    assert!(again.state.last_layout_value() == harness.state().state.last_layout_value());
-}
-
-#[test]
-fn everything_in_the_welcome_view_has_a_name() {
-    use egui::accesskit::Action;
-    use egui_kittest::kittest::{By, NodeT as _};
-
-    let (harness, _) = app();
-    let usable = By::new().predicate(|node| {
-        let acts = |action| node.data().supports_action(action);
-        let container = matches!(
-            node.role(),
-            egui::Role::GenericContainer | egui::Role::Window | egui::Role::ScrollView | egui::Role::ScrollBar
-        );
-        (acts(Action::Click) || acts(Action::Focus)) && !container
-    });
-    let names: Vec<(egui::Role, Option<String>)> =
-        harness.query_all(usable).map(|node| (node.accesskit_node().role(), node.accesskit_node().label())).collect();
-    assert!(names.len() > 3, "{names:?}");
-    let named = |(role, name): &(egui::Role, Option<String>)| {
-        *role != egui::Role::Unknown && name.as_ref().is_some_and(|name| !name.trim().is_empty())
-    };
-    assert!(names.iter().all(named), "{names:?}");
 }

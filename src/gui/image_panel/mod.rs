@@ -243,6 +243,7 @@ impl ImagePanel {
             ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
             let text = model::description(mark);
             offer(ui, text.clone());
+            describe(response, &text);
             response.clone().on_hover_text_at_pointer(text);
         }
     }

@@ -148,14 +148,11 @@ impl TimelinePanel {
     fn value_text(&self, ctx: &PanelContext<'_>) -> String {
         let run = ctx.recording.runs.get(ctx.selection.run.min(self.runs.len().saturating_sub(1)));
         let step = run.and_then(|run| run.step_at(ctx.cursor_ns));
-        let mut text = format!("cursor {} s", seconds(ctx.cursor_ns));
-        if let Some(step) = step {
-            text.push_str(&format!(", frame {}", step.report.frame_index));
-        }
-        if let Some((begin_ns, end_ns)) = ctx.selection.visible_ns {
-            text.push_str(&format!(", visible {} to {} s", seconds(begin_ns), seconds(end_ns)));
-        }
-        text
+        let cursor = Some(format!("cursor {} s", seconds(ctx.cursor_ns)));
+        let frame = step.map(|step| format!("frame {}", step.report.frame_index));
+        let range = ctx.selection.visible_ns;
+        let visible = range.map(|(begin, end)| format!("visible {} to {} s", seconds(begin), seconds(end)));
+        [cursor, frame, visible].into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
     /// Shift and drag sets the loop range.

@@ -5,7 +5,7 @@ use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
-use super::tests::{Bench, SECOND_NS, bench, commands_of};
+use super::tests::{Bench, SECOND_NS, bench, bench_of, commands_of, sample};
 use super::{Dialog, PanelName, Preset};
 use crate::frontend::FeatureId;
 use crate::gimbal::tests::parameter;
@@ -216,7 +216,8 @@ fn tab_reaches_everything_and_shows_where_it_is() {
 /// What is painted says to a screen reader what it shows.
 #[test]
 fn painted_elements_have_a_role_and_say_their_content() {
-    let mut harness = bench();
+    // High enough that every section of the rank panel is open.
+    let mut harness = bench_of(sample(), [1600.0, 1800.0]);
     let content = |harness: &Harness<'static, Bench>, name: &str, role: Role| {
         let mut nodes = harness.query_all(By::new().label_contains(name).predicate(move |node| node.role() == role));
         let node = nodes.next().unwrap_or_else(|| panic!("{role:?} {name}")).accesskit_node();

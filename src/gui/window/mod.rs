@@ -55,6 +55,7 @@ use super::PanelContext;
 use super::desktop::PanelExport;
 use super::help::{self, Help};
 use super::slide;
+use super::theme::Theme;
 use super::timeline::TimelinePanel;
 
 /// A request of the window to the application, beyond the commands of a session.
@@ -141,6 +142,11 @@ impl WindowState {
     /// Begins the tour at its first stop.
     pub(in crate::gui) fn start_tour(&mut self) {
         self.tour.start();
+    }
+
+    /// Draws the ring around the widget with the keyboard focus, in a view without a session.
+    pub(in crate::gui) fn focus_ring_ui(&mut self, ui: &Ui, theme: &Theme) {
+        self.ring.ui(ui, theme);
     }
 
     fn close_dialogs(&mut self) {
