@@ -11,6 +11,8 @@ mod hostile_logs;
 mod layering;
 mod outputs;
 #[cfg(feature = "gui")]
+mod pictures;
+#[cfg(feature = "gui")]
 mod renderers;
 mod report;
 mod results;
