@@ -20,13 +20,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
-use egui::{CentralPanel, Frame, Ui, ViewportCommand};
+use egui::{Ui, ViewportCommand};
 
 use self::kept_window::{KeptWindow, WindowKeeper};
 use self::leaving::{Departure, Leaving, Work};
 use self::playing_log::{Images, go_to_first_frame};
 pub use self::playing_log::{OpenLog, PlayingLog};
-use self::welcome::{Choice, Welcome};
+use self::welcome::Welcome;
 use crate::gui::desktop::Desktop;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::units::counted;
@@ -255,41 +255,6 @@ impl App {
             ui.ctx().request_repaint_after(std::time::Duration::from_millis(POLL_PERIOD_MS));
         }
         self.report_warnings(&recording);
-    }
-
-    fn welcome_ui(&mut self, ui: &mut Ui) {
-        let opening = self.opening.as_ref().map(|opening| opening.path.as_path());
-        let frame = Frame::new().fill(self.theme.surface).inner_margin(20);
-        let chosen = CentralPanel::no_frame().frame(frame).show(ui, |ui| self.welcome.ui(ui, &self.theme, opening));
-        self.state.help.welcome_ui(ui, &self.theme);
-        self.state.focus_ring_ui(ui, &self.theme);
-        self.state.notices.toasts_ui(ui, &self.theme);
-        if let Some(choice) = chosen.inner {
-            self.take_choice(choice);
-        }
-    }
-
-    fn take_choice(&mut self, choice: Choice) {
-        match choice {
-            Choice::Open(path) => self.open(path),
-            Choice::Tour(path) => {
-                self.tour_of = Some(path.clone());
-                self.open(path);
-            }
-            Choice::Manual => self.state.help.manual.show(None),
-            Choice::Tutorial => self.state.help.manual.show_tutorial(),
-        }
-    }
-
-    /// Begins the tour: over the log that is open or being opened, else over the sample flight.
-    pub fn start_tour(&mut self) {
-        if self.log.is_some() {
-            self.state.start_tour();
-        } else if let Some(opening) = &self.opening {
-            self.tour_of = Some(opening.path.clone());
-        } else if let Some(choice) = self.welcome.sample(true) {
-            self.take_choice(choice);
-        }
     }
 
     /// Shows a log that has been opened.

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use egui::{Align, Button, Layout, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, vec2};
+use egui::{Align, Button, CentralPanel, Frame, Layout, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, vec2};
 
+use super::App;
 use super::sample::SampleFlight;
 use crate::gui::desktop::Desktop;
 use crate::gui::path_field::PathField;
@@ -139,13 +140,51 @@ impl Welcome {
     }
 }
 
+impl App {
+    /// Draws the view, the manual over it and the notices, and executes the choice.
+    pub(super) fn welcome_ui(&mut self, ui: &mut Ui) {
+        let opening = self.opening.as_ref().map(|opening| opening.path.as_path());
+        let frame = Frame::new().fill(self.theme.surface).inner_margin(20);
+        let chosen = CentralPanel::no_frame().frame(frame).show(ui, |ui| self.welcome.ui(ui, &self.theme, opening));
+        self.state.help.welcome_ui(ui, &self.theme);
+        self.state.focus_ring_ui(ui, &self.theme);
+        self.state.notices.toasts_ui(ui, &self.theme);
+        if let Some(choice) = chosen.inner {
+            self.take_choice(choice);
+        }
+    }
+
+    fn take_choice(&mut self, choice: Choice) {
+        match choice {
+            Choice::Open(path) => self.open(path),
+            Choice::Tour(path) => {
+                self.tour_of = Some(path.clone());
+                self.open(path);
+            }
+            Choice::Manual => self.state.help.manual.show(None),
+            Choice::Tutorial => self.state.help.manual.show_tutorial(),
+        }
+    }
+
+    /// Begins the tour: over the log that is open or being opened, else over the sample flight.
+    pub fn start_tour(&mut self) {
+        if self.log.is_some() {
+            self.state.start_tour();
+        } else if let Some(opening) = &self.opening {
+            self.tour_of = Some(opening.path.clone());
+        } else if let Some(choice) = self.welcome.sample(true) {
+            self.take_choice(choice);
+        }
+    }
+}
+
 fn chosen_sample(path: PathBuf, tour: bool) -> Choice {
     if tour { Choice::Tour(path) } else { Choice::Open(path) }
 }
 
 /// The area for dropping a log; it is highlighted while a file is dragged over the window.
 fn drop_target_ui(ui: &mut Ui, theme: &Theme) {
-    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 92.0), Sense::hover());
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 92.0), Sense::hover());
     let file_over_window = ui.input(|input| !input.raw.hovered_files.is_empty());
     let color = if file_over_window { theme.accent } else { theme.outline };
     ui.painter().rect(rect, 6.0, theme.plot_background, Stroke::new(1.5, color), StrokeKind::Inside);
@@ -154,6 +193,8 @@ fn drop_target_ui(ui: &mut Ui, theme: &Theme) {
         ("Rig: NAME.rig.yaml beside NAME.mcap, or attached to the log", 12.0, theme.text_weak),
         ("ROS bags and EuRoC folders first become a log: dcvins convert SOURCE -o LOG.mcap", 12.0, theme.text_weak),
     ];
+    let spoken = lines.map(|(text, ..)| text).join(". ");
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &spoken));
     for (line, (text, size, color)) in lines.into_iter().enumerate() {
         let at = rect.center_top() + vec2(0.0, 22.0 + 24.0 * line as f32);
         let galley = ui.painter().layout(text.to_owned(), egui::FontId::proportional(size), color, rect.width() - 16.0);
