@@ -119,8 +119,8 @@ fn whole_log(recording: &Recording, end_ns: i64) -> Vec<Wanted> {
             reading: format!(
                 "One plot per parameter, in the order of the chain; horizontally time, vertically the value in degrees or \
                  millimetres. Lines: {runs}{truth}. Band: ±3σ of run {label}. Hatched: initializing. The strip below \
-                 each plot is amber where the parameter is weak (constrained less than by its prior) and red where it is \
-                 unobservable. Above each plot: value and σ at {end_s:.2} s.{error}"
+                 each plot is amber where the window of that time alone leaves the parameter weak (constrained less than by a \
+                 prior of 10° or 3 cm) and red where it leaves it unobservable. Above each plot: value and σ at {end_s:.2} s.{error}"
             ),
         });
     }

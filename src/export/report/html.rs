@@ -7,6 +7,9 @@ use maud::{Markup, PreEscaped, html};
 use super::verdict::Mark;
 use super::{ReportDrawing, ReportFigure};
 
+/// Tables with at most so many rows are not split between printed pages.
+const MAX_UNBROKEN_ROWS: usize = 14;
+
 /// An unordered list of texts, nothing for none.
 pub(super) fn list(items: &[String]) -> Markup {
     html! {
@@ -21,7 +24,7 @@ pub(super) fn list(items: &[String]) -> Markup {
 pub(super) fn table<S: AsRef<str>>(caption: &str, header: &[S], rows: &[Vec<String>]) -> Markup {
     let number = |cell: &str| cell.starts_with(|first: char| first.is_ascii_digit() || "−-±".contains(first));
     html! {
-        table {
+        table.short[rows.len() <= MAX_UNBROKEN_ROWS] {
             caption { (caption) }
             thead { tr { @for cell in header { th scope="col" { (cell.as_ref()) } } } }
             tbody {
@@ -73,6 +76,20 @@ pub(super) fn icon(mark: Mark) -> Markup {
     PreEscaped(svg.trim_end().to_owned())
 }
 
+/// The text with its numbers and their units on one line.
+pub(super) fn unbroken(text: &str) -> String {
+    const UNITS: [&str; 5] = [" mm", " m", " s", " px", " %"];
+    let mut words = String::new();
+    for (at, letter) in text.char_indices() {
+        let (before, after) = text.split_at(at);
+        let number = before.ends_with(|last: char| last.is_ascii_digit());
+        let unit = UNITS.iter().filter_map(|unit| after.strip_prefix(unit));
+        let mut ends = unit.filter(|rest| !rest.starts_with(|next: char| next.is_alphanumeric()));
+        words.push(if letter == ' ' && number && ends.next().is_some() { '\u{a0}' } else { letter });
+    }
+    words
+}
+
 /// A number with so many decimals and a true minus sign; a negative zero is 0.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
@@ -105,6 +122,12 @@ mod tests {
         let expected = "<figure id=\"figure-3\"><svg width=\"1\"></svg><figcaption><b>Figure 3. &lt;p&gt;.</b> r &amp; s\
                         </figcaption></figure>";
         assert_eq!(drawing, expected);
+    }
+
+    #[test]
+    fn units_stay_with_their_numbers() {
+        assert_eq!(unbroken("over 5 m 47.3 mm, 2 more"), "over 5\u{a0}m 47.3\u{a0}mm, 2 more");
+        assert_eq!(unbroken("for 4 s; 4 seconds; 0.05 % of"), "for 4\u{a0}s; 4 seconds; 0.05\u{a0}% of");
     }
 
     #[test]

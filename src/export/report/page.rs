@@ -4,7 +4,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::ReportFigure;
 use super::content::{ReportContent, RunContent};
-use super::html::{figure, icon, list, number};
+use super::html::{figure, icon, list, number, unbroken};
 use super::verdict::Statement;
 use super::{RankInterval, tables};
 
@@ -102,8 +102,8 @@ fn statements(statements: &[Statement]) -> Markup {
                 div {
                     dt { (icon(statement.mark)) " " (statement.topic) }
                     dd {
-                        p { (statement.text) }
-                        (list(&statement.details))
+                        p { (unbroken(&statement.text)) }
+                        (list(&statement.details.iter().map(|line| unbroken(line)).collect::<Vec<_>>()))
                     }
                 }
             }

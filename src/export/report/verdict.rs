@@ -184,13 +184,15 @@ fn calibration(parameters: &[ParameterVerdict], summary: &RunSummary) -> Stateme
         let text = if estimated { "Calibration fixed at the values of the rig." } else { "Not calibrated." };
         return statement("Calibration", Mark::Note, text.to_owned(), Vec::new());
     }
-    let rule = "the posterior σ is at most 0.71 of the prior σ";
+    let rule = "at most 0.71 of the prior σ, from all windows together";
     let count = parameters.len();
     let (mark, text) = match (informed.len(), others.len()) {
-        (_, 0) => (Mark::Good, format!("Calibrated: all {count} parameters are informed ({rule}).")),
-        (0, _) => (Mark::Warning, format!("Not calibrated: none of {count} parameters is informed ({rule}).")),
+        (_, 0) => (Mark::Good, format!("Calibrated: all {count} parameters reached an informed σ ({rule}).")),
+        (0, _) => {
+            (Mark::Warning, format!("Not calibrated: none of {count} parameters reached an informed σ ({rule})."))
+        }
         (known, _) => {
-            (Mark::Warning, format!("Partly calibrated: {known} of {count} parameters are informed ({rule})."))
+            (Mark::Warning, format!("Partly calibrated: {known} of {count} parameters reached an informed σ ({rule})."))
         }
     };
     let listed = |parameters: &[&ParameterVerdict]| {
@@ -207,7 +209,7 @@ fn calibration(parameters: &[ParameterVerdict], summary: &RunSummary) -> Stateme
     for state in states {
         let of_state: Vec<&ParameterVerdict> =
             others.iter().copied().filter(|parameter| parameter.state == state).collect();
-        let state = if state.is_empty() { String::new() } else { format!(", {state} at the end") };
+        let state = if state.is_empty() { String::new() } else { format!(", {state} in the last window") };
         details.push(format!("Not informed{state}: {}.", listed(&of_state)));
     }
     let errors = (&summary.calibration.chain_error_initial, &summary.calibration.chain_error);
