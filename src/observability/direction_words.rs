@@ -37,8 +37,8 @@ pub fn parameters_of_weights(
         text.push_str(&name);
     }
     if omitted > 0 {
-        text.push_str(" and ");
-        text.push_str(&if omitted == 1 { "1 other".to_owned() } else { format!("{omitted} others") });
+        let others = if omitted == 1 { "other" } else { "others" };
+        return format!("{text} and {omitted} {others}");
     }
     text
 }

@@ -73,8 +73,11 @@ pub(super) fn legend_row(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
     });
 }
 
+/// Draws the sample of an entry of the legend into a rectangle.
+type PaintSample<'a> = &'a dyn Fn(&egui::Painter, Rect);
+
 /// Passes every entry of the legend, its text and the drawing of its sample, to a function.
-fn legend_entries(ctx: &PanelContext<'_>, add_entry: &mut dyn FnMut(&str, &dyn Fn(&egui::Painter, Rect))) {
+fn legend_entries(ctx: &PanelContext<'_>, add_entry: &mut dyn FnMut(&str, PaintSample<'_>)) {
     let theme = ctx.theme;
     for (number, run) in ctx.recording.runs.iter().enumerate() {
         let style = theme.run(number);

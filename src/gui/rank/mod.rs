@@ -203,7 +203,7 @@ impl RankPanel {
         }
         let height = (0.2 * ui.clip_rect().height()).clamp(70.0, 150.0);
         section_ui(ui, &theme, presentation, "Singular values", height, |ui| {
-            spectrum::ui(ui, &theme, &names, rank, height)
+            spectrum::ui(ui, &theme, &names, rank, height);
         });
         self.information.ui(ui, ctx, run, step);
         let number = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
