@@ -71,7 +71,7 @@ pub(super) fn row_ui(
     area = area.with_values(0.0, 1.15 * max_value.max(row.min_high));
     let painter = ui.painter_at(whole);
     paint_ground(&painter, &theme, rect);
-    paint_value_grid(&painter, &theme, &area, row.factor, (height / 22.0) as usize);
+    paint_value_grid(&painter, &theme, &area, row.factor, (height / 16.0) as usize);
     let threshold = row.threshold.map(|threshold| area.y(threshold)).filter(|y| rect.y_range().contains(*y));
     if let Some(y) = threshold {
         let ends = [pos2(rect.left(), y), pos2(rect.right(), y)];

@@ -43,7 +43,7 @@ const PARAMETERS: usize = 2;
 const RUN_WIDTH: f32 = 480.0;
 
 /// Size of the headline of the verdict in points.
-const HEADLINE: f32 = 13.5;
+const HEADLINE: f32 = 13.0;
 
 /// Width in points from which the details are beside the heat map instead of below it.
 const MIN_WIDTH_WITH_DETAILS_BESIDE: f32 = 760.0;
@@ -275,7 +275,7 @@ fn verdict_ui(ui: &mut Ui, theme: &Theme, verdict: &Verdict, since: Option<&str>
     let (mark, color) = mark_of(verdict.level, theme);
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
-        ui.label(RichText::new(mark).color(color).size(14.0));
+        ui.label(RichText::new(mark).color(color).size(HEADLINE));
         let headline = RichText::new(&verdict.headline).color(theme.text_strong).size(HEADLINE);
         ui.add(egui::Label::new(headline).wrap()).on_hover_text(window::VERDICT.meaning);
     });

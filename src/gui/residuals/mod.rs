@@ -120,10 +120,14 @@ pub(crate) fn rms_px(report: &StepReport) -> f64 {
     if report.window.is_empty() { f64::NAN } else { report.reprojection_rms_after_px }
 }
 
+/// Height of a line of the summary in points.
+const SUMMARY_LINE: f32 = 14.0;
+
 /// Summary of the step in one line.
 fn summary_ui(ui: &mut Ui, theme: &Theme, report: &StepReport, histogram: &ResidualHistogram) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(12.0, 2.0);
+        ui.spacing_mut().interact_size.y = SUMMARY_LINE;
         let mut pair = |name: &str, value: String, hover: &str| {
             // Name and value stay on one line.
             let mut job = LayoutJob::default();
@@ -230,6 +234,7 @@ fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
     }
     let grid = Grid::new("chi2 by factor").num_columns(5).min_row_height(ROW_HEIGHT).spacing(vec2(10.0, 2.0));
     grid.striped(true).show(ui, |ui| {
+        ui.spacing_mut().interact_size.y = ROW_HEIGHT;
         for term in [factors::FACTOR, factors::COUNT, factors::CHI2_BEFORE, factors::CHI2_AFTER, factors::RATIO] {
             ui.label(RichText::new(term.name).small().color(theme.text_weak)).on_hover_text(term.meaning);
         }
