@@ -100,10 +100,15 @@ fn the_heat_map_is_above_the_fold_in_every_layout() {
             harness.run_steps(4);
             let what = format!("{}, run {run} of {count}", preset.name());
             let panel = harness.state().window.places.iter().find(|(panel, _)| *panel == PanelName::Rank).unwrap().1;
-            // The sample is drawn, not estimated: no motion constrains it further.
-            for answer in ["Structural rank 18 of", "Least observable: ", "No candidate motion"] {
-                let rect = harness.get_by_label_contains(answer).rect();
-                assert!(panel.contains_rect(rect), "{what}: {answer} at {rect:?} of {panel:?}");
+            for answers in [
+                ["Structural rank 18 of", "Full rank"],
+                ["Least observable: ", "Unobservable: "],
+                ["Suggested excitation", "No candidate motion"],
+            ] {
+                let shown = answers.into_iter().flat_map(|answer| harness.query_all_by_label_contains(answer));
+                let rects: Vec<Rect> = shown.map(|node| node.rect()).collect();
+                assert!(!rects.is_empty(), "{what}: {answers:?}");
+                assert!(rects.iter().all(|rect| panel.contains_rect(*rect)), "{what}: {answers:?} at {rects:?}");
             }
             let rows: Vec<Rect> = harness.query_all_by_label_contains(" weights").map(|row| row.rect()).collect();
             assert!(rows.len() >= 3, "{what}: {} rows", rows.len());
