@@ -78,6 +78,8 @@ struct Reader {
     /// Mark of an item whose text has not begun.
     marker: Option<String>,
     code: Option<String>,
+    /// Whether the text belongs to a figure. Figures are omitted: they show the window, in which the document is read.
+    figure: bool,
     rows: Vec<Vec<Vec<Span>>>,
 }
 
@@ -100,6 +102,9 @@ impl Reader {
     }
 
     fn push(&mut self, text: &str, code: bool) {
+        if self.figure {
+            return;
+        }
         if let Some(block) = &mut self.code {
             block.push_str(text);
             return;
@@ -120,11 +125,7 @@ impl Reader {
             Tag::Strong => self.look.strong = true,
             Tag::Emphasis => self.look.emphasis = true,
             Tag::Link { dest_url, .. } => self.look.link = Some(dest_url.into_string()),
-            // Figures are not embedded: their description stands for them.
-            Tag::Image { .. } => {
-                self.look.emphasis = true;
-                self.push("Figure: ", false);
-            }
+            Tag::Image { .. } => self.figure = true,
             Tag::List(first) => {
                 self.paragraph();
                 self.lists.push(first);
@@ -148,7 +149,8 @@ impl Reader {
     fn end(&mut self, tag: TagEnd) {
         match tag {
             TagEnd::Strong => self.look.strong = false,
-            TagEnd::Emphasis | TagEnd::Image => self.look.emphasis = false,
+            TagEnd::Emphasis => self.look.emphasis = false,
+            TagEnd::Image => self.figure = false,
             TagEnd::Link => self.look.link = None,
             TagEnd::Heading(level) => self.heading(level),
             TagEnd::Paragraph | TagEnd::Item => self.paragraph(),
@@ -220,6 +222,14 @@ mod tests {
         let rows = vec![vec![vec![plain("a")], vec![plain("b")]], vec![vec![plain("1")], vec![code]]];
         assert_eq!(rest[..], [Block::Code("run it".to_owned()), Block::Table(rows)]);
         assert_eq!(links_of(&blocks[1]).collect::<Vec<_>>(), ["x.md#y"]);
+    }
+
+    #[test]
+    fn figures_are_omitted() {
+        let [Block::Paragraph { spans, .. }] = &parse("![a figure](a.png)\n\nText ![with](b.png)one.\n")[..] else {
+            panic!("one paragraph")
+        };
+        assert_eq!(spans[..], [plain("Text one.")]);
     }
 
     #[test]
