@@ -206,7 +206,7 @@ fn why_lines(ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord) -> (Vec
     let lost = columns.saturating_sub(rank.rank_structural);
     lines.push(format!(
         "The other cause, for comparison: run {label}, shown now, has structural rank {} of {columns}. {} of its {} \
-         redundant in the parameterization; \"Closed-form null directions\" gives each reason.",
+         redundant in the parameterization; \"Closed-form null directions\", further down in the panel, gives each reason.",
         rank.rank_structural,
         rank.deficit_parameterization,
         if lost == 1 {
