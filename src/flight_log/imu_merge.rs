@@ -1,5 +1,6 @@
 //! Gyroscope and accelerometer of separate topics as IMU samples at the gyroscope's stamps.
 
+use std::cmp::Ordering;
 use std::collections::VecDeque;
 
 use nalgebra::Vector3;
@@ -43,14 +44,14 @@ impl ImuMerge {
                 self.accelerometer.pop_front();
             }
             let (before_ns, before) = *self.accelerometer.front()?;
-            let force = if before_ns == stamp_ns {
-                Some(before)
-            } else if before_ns > stamp_ns {
-                None
-            } else {
-                let (after_ns, after) = *self.accelerometer.get(1)?;
-                let fraction = (stamp_ns - before_ns) as f64 / (after_ns - before_ns) as f64;
-                (after_ns - before_ns <= MAX_GAP_NS).then(|| before + fraction * (after - before))
+            let force = match before_ns.cmp(&stamp_ns) {
+                Ordering::Equal => Some(before),
+                Ordering::Greater => None,
+                Ordering::Less => {
+                    let (after_ns, after) = *self.accelerometer.get(1)?;
+                    let fraction = (stamp_ns - before_ns) as f64 / (after_ns - before_ns) as f64;
+                    (after_ns - before_ns <= MAX_GAP_NS).then(|| before + fraction * (after - before))
+                }
             };
             self.gyroscope.pop_front();
             if let Some(specific_force_m_per_s2) = force {

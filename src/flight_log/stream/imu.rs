@@ -12,7 +12,7 @@ use crate::sensors::{ImuRig, ImuSample};
 /// IMU samples in the order of their stamps.
 pub(super) enum ImuStream {
     /// All six values in each message.
-    Together(OrderedSamples<ImuSample>),
+    Together(Box<OrderedSamples<ImuSample>>),
     /// Angular velocities and specific forces on topics of their own.
     Apart(Box<SeparateSensors>),
 }
@@ -30,7 +30,7 @@ impl ImuStream {
         log.require_topic("imu0.rostopic", &rig.topic, &[MessageKind::Imu])?;
         let Some(accelerometer) = &rig.accelerometer_topic else {
             let decoder = sample_decoder(log.epoch_ns());
-            return Ok(Self::Together(OrderedSamples::new(log, &rig.topic, from_ns, false, decoder)));
+            return Ok(Self::Together(Box::new(OrderedSamples::new(log, &rig.topic, from_ns, false, decoder))));
         };
         log.require_topic("imu0.accelerometer_rostopic", accelerometer, &[MessageKind::Imu])?;
         let gyroscope = vector_decoder("angular velocity", |imu| imu.angular_velocity_rad_per_s);
