@@ -35,7 +35,8 @@ fn unwrapped(text: &str) -> String {
 /// The section numbers of every citation, each with the text that follows the document's name.
 fn citations(text: &str) -> Vec<(Vec<u32>, String)> {
     let mut citations = Vec::new();
-    for after in text.split(DOCUMENT).skip(1) {
+    // A path in quotes is no citation.
+    for after in text.split(DOCUMENT).skip(1).filter(|after| !after.starts_with('"')) {
         let numbers = after.strip_prefix(", section").map(|rest| rest.strip_prefix('s').unwrap_or(rest));
         let words = numbers.unwrap_or_default().split_whitespace();
         let numbers = words
