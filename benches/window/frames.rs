@@ -7,7 +7,7 @@ use dcvins::gui::rendering::headless::{Frame, Headless, HeadlessOptions};
 use dcvins::gui::rendering::painter::Painter;
 use dcvins::gui::theme::{Theme, ThemeName};
 use dcvins::gui::window::{Preset, WindowState, window_ui};
-use dcvins::gui::{PanelContext, Playback, Selection};
+use dcvins::gui::{PanelContext, Playback, Presentation, Selection};
 use dcvins::sensors::GrayImage;
 use dcvins::session::{Recording, SessionPlan};
 
@@ -64,7 +64,16 @@ impl Player {
             let commands = &mut Vec::new();
             let (images, selection) = (&mut *images, &mut *selection);
             let (playback, theme) = (&playback, &theme);
-            let mut context = PanelContext { recording, cursor_ns, playback, images, selection, theme, commands };
+            let mut context = PanelContext {
+                recording,
+                cursor_ns,
+                playback,
+                images,
+                selection,
+                theme,
+                commands,
+                presentation: Presentation::Interactive,
+            };
             window_ui(ui, state, &mut context);
         });
         self.painter.set_textures(&frame.textures);

@@ -85,8 +85,7 @@ impl Subject {
             Self::Panel(PanelName::Breakpoints) => [480, 160],
             Self::Panel(PanelName::Timeline) => [1200, 210],
             Self::Layout(Preset::Overview) => [1600, 900],
-            Self::Layout(_) => [1366, 768],
-            Self::Dialog(_) | Self::Shortcuts => [1366, 768],
+            Self::Layout(_) | Self::Dialog(_) | Self::Shortcuts => [1366, 768],
             Self::Welcome => [1000, 640],
         }
     }
@@ -255,8 +254,9 @@ static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| root().join("docs/images"));
 /// The names of the PNG files in the folder of the pictures.
 fn committed() -> BTreeSet<String> {
     let entries = fs::read_dir(&*FOLDER).expect("the folder can be listed");
-    let names = entries.map(|entry| entry.expect("the entry can be read").file_name().to_string_lossy().into_owned());
-    names.filter(|name| name.ends_with(".png")).collect()
+    let paths = entries.map(|entry| entry.expect("the entry can be read").path());
+    let pictures = paths.filter(|path| path.extension().is_some_and(|extension| extension == "png"));
+    pictures.filter_map(|path| path.file_name().map(|name| name.to_string_lossy().into_owned())).collect()
 }
 
 /// The picture as a PNG, encoded for size: screenshots have large areas of one colour, which filters would hide.

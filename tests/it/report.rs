@@ -26,26 +26,32 @@ fn report(folder: &Path, threads: &str) -> (String, String) {
 /// The page opens with the verdict of each run, which names every parameter once.
 fn check_verdict(page: &str, report: &Value) {
     let figures = page.find("<figure").unwrap_or(page.len());
-    for run in report["runs"].as_array().unwrap() {
-        let statements = run["verdict"]["statements"].as_array().unwrap();
-        let topics: Vec<&str> = statements.iter().map(|statement| statement["topic"].as_str().unwrap()).collect();
+    for run in report["runs"].as_array().expect("a list") {
+        let statements = run["verdict"]["statements"].as_array().expect("a list");
+        let topics: Vec<&str> =
+            statements.iter().map(|statement| statement["topic"].as_str().expect("a text")).collect();
         assert_eq!(topics, ["Accuracy", "Calibration", "Observability", "Estimation"]);
         for statement in statements {
-            let at = page.find(statement["text"].as_str().unwrap()).expect("the statement is in the page");
+            let at = page.find(statement["text"].as_str().expect("a text")).expect("the statement is in the page");
             assert!(at < figures, "the verdict comes before the figures");
         }
-        let calibration: String = statements[1]["details"].as_array().unwrap().iter().map(Value::to_string).collect();
-        let parameters = run["verdict"]["parameters"].as_array().unwrap();
-        assert_eq!(parameters.len(), run["summary"]["calibration"]["columns"].as_u64().unwrap() as usize);
+        let calibration: String =
+            statements[1]["details"].as_array().expect("a list").iter().map(Value::to_string).collect();
+        let parameters = run["verdict"]["parameters"].as_array().expect("a list");
+        assert_eq!(parameters.len(), run["summary"]["calibration"]["columns"].as_u64().expect("a count") as usize);
         for parameter in parameters {
-            let named = format!("{} ±", parameter["name"].as_str().unwrap());
+            let named = format!("{} ±", parameter["name"].as_str().expect("a text"));
             assert_eq!(calibration.matches(&named).count(), 1, "{named} in {calibration}");
-            let [sigma, prior] = ["sigma", "prior_sigma"].map(|key| parameter[key].as_f64().unwrap());
-            assert_eq!(parameter["informed"].as_bool().unwrap(), sigma <= 0.5_f64.sqrt() * prior, "{parameter}");
+            let [sigma, prior] = ["sigma", "prior_sigma"].map(|key| parameter[key].as_f64().expect("a number"));
+            assert_eq!(
+                parameter["informed"].as_bool().expect("a truth value"),
+                sigma <= 0.5_f64.sqrt() * prior,
+                "{parameter}"
+            );
         }
     }
     assert!(page.contains("Suggested excitation: "));
-    assert!(page.find(report["log_verdict"]["text"].as_str().unwrap()).unwrap() < figures);
+    assert!(page.find(report["log_verdict"]["text"].as_str().expect("a text")).expect("it is in the page") < figures);
 }
 
 /// Every figure has a number, in order, and says at which time it is.
@@ -53,9 +59,9 @@ fn check_captions(page: &str, count: usize) {
     let captions: Vec<&str> = page.split("<figcaption>").skip(1).collect();
     assert_eq!(captions.len(), count);
     for (number, caption) in (1..).zip(captions) {
-        let caption = &caption[..caption.find("</figcaption>").unwrap()];
+        let caption = &caption[..caption.find("</figcaption>").expect("the caption ends")];
         assert!(caption.starts_with(&format!("<b>Figure {number}. ")), "{caption}");
-        let title = &caption[..caption.find("</b>").unwrap()];
+        let title = &caption[..caption.find("</b>").expect("the title ends")];
         assert!(title.contains(" s") && caption.len() > title.len() + 80, "{caption}");
     }
 }
