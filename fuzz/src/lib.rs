@@ -69,7 +69,7 @@ pub fn message(bytes: &[u8]) {
     let folder = folder();
     let path = folder.path().join("input.mcap");
     let mut writer = LogWriter::create(&path, &LogWriterOptions::default()).expect("the log can be created");
-    let message_type = MessageType::ros2(kind.schema_name(), "");
+    let message_type = MessageType { message_encoding: kind.encoding(), ..MessageType::ros2(kind.schema_name(), "") };
     for index in 0..2 {
         let times = MessageTimes { stamp_ns: index, log_time_ns: index };
         writer.write_typed(topic_of(kind), &message_type, times, message).expect("the message can be written");
@@ -84,6 +84,7 @@ pub fn topic_of(kind: MessageKind) -> &'static str {
         MessageKind::Imu => "/imu",
         MessageKind::Image => "/static_camera",
         MessageKind::CompressedImage => "/gimbal_camera",
+        MessageKind::CompressedVideo | MessageKind::CompressedVideoProtobuf | MessageKind::FfmpegPacket => "/video",
         MessageKind::CameraInfo => "/gimbal_camera/camera_info",
         MessageKind::JointState => "/gimbal/joint_states",
         MessageKind::Odometry => "/ground_truth/odometry",

@@ -84,6 +84,7 @@ impl<'a> CdrReader<'a> {
     read_number!(read_u32, u32);
     read_number!(read_i32, i32);
     read_number!(read_f64, f64);
+    read_number!(read_u64, u64);
 
     /// A fixed number of doubles.
     pub(crate) fn read_f64s<const N: usize>(&mut self) -> Result<[f64; N], CdrError> {

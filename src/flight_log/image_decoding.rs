@@ -6,8 +6,9 @@ use image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader as CodecRe
 
 use super::FlightLog;
 use super::limits::{LogLimits, can_hold_image};
-use super::messages::{ImageMessage, MessageKind, read_compressed_image, read_image};
+use super::messages::{ImageMessage, MessageKind, read_compressed_image, read_image, read_video_packet};
 use super::raw_encoding::{RawEncoding, luma};
+use super::video::VideoDecoder;
 use crate::sensors::GrayImage;
 
 /// Larger images are refused: no camera has them, so the header is damaged.
@@ -40,6 +41,9 @@ impl BitDepth {
 
     /// From one image message; `None` when it cannot be decoded or is black. Images of 8 bits have the default.
     pub(crate) fn of(kind: MessageKind, message: &[u8], limits: &LogLimits) -> Option<Self> {
+        if kind.is_video() {
+            return Some(Self::default());
+        }
         let brightest = if kind == MessageKind::Image {
             let raw = read_image(message).ok()?;
             match RawEncoding::from_name(raw.encoding) {
@@ -95,11 +99,11 @@ impl std::fmt::Display for ImageProblem {
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "for map_err")]
-fn unreadable(problem: impl ToString) -> ImageProblem {
+pub(super) fn unreadable(problem: impl ToString) -> ImageProblem {
     ImageProblem::Unreadable(problem.to_string())
 }
 
-/// Decodes a raw or compressed image message into 8-bit grey levels, when it has the expected resolution, if there is one.
+/// Decodes a raw or compressed image message, or a keyframe of a video, into 8-bit grey levels, when it has the expected resolution, if there is one.
 ///
 /// The resolution is read before anything is allocated.
 pub(crate) fn decode_image(
@@ -112,12 +116,16 @@ pub(crate) fn decode_image(
     if kind == MessageKind::Image {
         return gray_from_raw(&read_image(message).map_err(unreadable)?, depth, limits, expected_px);
     }
+    if kind.is_video() {
+        let packet = read_video_packet(kind, message).map_err(unreadable)?;
+        return VideoDecoder::new(packet.codec().map_err(unreadable)?, limits).decode(packet.data, expected_px);
+    }
     let (format, data) = read_compressed_image(message).map_err(unreadable)?;
     gray_from_compressed(format, data, depth, limits, expected_px)
 }
 
 /// Checks the resolution that an image claims.
-fn check_resolution(
+pub(super) fn check_resolution(
     claimed_px: [usize; 2],
     limits: &LogLimits,
     expected_px: Option<[usize; 2]>,

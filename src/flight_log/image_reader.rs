@@ -1,18 +1,22 @@
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use parking_lot::Mutex;
 
 use super::container::{BlockCache, TopicIndex};
 use super::image_decoding::{BitDepth, decode_image};
-use super::messages::MessageKind;
+use super::messages::{MessageKind, read_video_packet};
+use super::video::{VideoCodec, VideoDecoder, keyframe_before};
 use super::{FlightLog, LogError};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{GrayImage, Rig, UnknownCamera};
 
 /// Number of cached blocks, so that adjacent images do not decompress their chunk again.
 const BLOCKS: usize = 2;
-/// Number of cached images.
+/// Number of cached images of topics whose images do not depend on each other.
 const IMAGES: usize = 8;
+/// Pixels of the cached pictures of all videos: stepping back within a group of pictures decodes it once.
+const VIDEO_PIXELS: usize = 64 << 20;
 
 /// Random access to the images of a log by camera and number.
 #[derive(Debug)]
@@ -38,6 +42,22 @@ struct ImageCache {
     blocks: BlockCache,
     /// Cached images by camera and index; the most recently used is the last.
     images: Vec<((usize, usize), Arc<GrayImage>)>,
+    /// Where decoding of each camera's video stands, by camera.
+    streams: BTreeMap<usize, VideoPosition>,
+    /// Cached pictures of videos, as `images`.
+    pictures: Vec<((usize, usize), Picture)>,
+}
+
+/// A decoded picture of a video, or what is wrong with it.
+type Picture = Result<Arc<GrayImage>, String>;
+
+/// A video decoded up to a message.
+#[derive(Debug)]
+struct VideoPosition {
+    decoder: VideoDecoder,
+    codec: VideoCodec,
+    /// Number of the next message.
+    next: usize,
 }
 
 impl ImageReader {
@@ -55,7 +75,13 @@ impl ImageReader {
             })
             .collect();
         let topics = cameras.iter().map(|camera| log.topic_index(&camera.topic)).collect();
-        let cache = ImageCache { topics, blocks: BlockCache::new(BLOCKS), images: Vec::with_capacity(IMAGES + 1) };
+        let cache = ImageCache {
+            topics,
+            blocks: BlockCache::new(BLOCKS),
+            images: Vec::with_capacity(IMAGES + 1),
+            streams: BTreeMap::new(),
+            pictures: Vec::new(),
+        };
         Self { log, cameras, cache: Mutex::new(cache) }
     }
 
@@ -93,6 +119,9 @@ impl ImageReader {
             problem,
             path: self.log.path().to_owned(),
         };
+        if camera.kind.is_video() {
+            return cache.picture(&self.log, number, camera.kind, index).map_err(bad);
+        }
         let Some((block, message)) = self.log.message(&mut cache.blocks, position) else {
             let block = cache.blocks.get(self.log.file(), &self.log.index().blocks, position.block);
             let damage = block.and_then(|block| block.damage.clone());
@@ -106,5 +135,70 @@ impl ImageReader {
         }
         cache.images.push((key, Arc::clone(&image)));
         Ok(image)
+    }
+}
+
+impl ImageCache {
+    /// A picture of a video: decoded from the picture before, or from the keyframe before it.
+    fn picture(&mut self, log: &FlightLog, camera: usize, kind: MessageKind, index: usize) -> Picture {
+        if let Some(found) = self.pictures.iter().position(|(cached, _)| *cached == (camera, index)) {
+            let entry = self.pictures.remove(found);
+            self.pictures.push(entry.clone());
+            return entry.1;
+        }
+        let keyframe = keyframe_before(log, &mut self.topics[camera], kind, index);
+        let stands =
+            self.streams.get(&camera).map(|stream| stream.next).filter(|next| (keyframe..=index).contains(next));
+        if stands.is_none() {
+            self.streams.remove(&camera);
+        }
+        let mut picture = Err("it is no picture of a video".to_owned());
+        for number in stands.unwrap_or(keyframe)..=index {
+            picture = self.next_picture(log, camera, kind, number).map(Arc::new);
+            self.pictures.push(((camera, number), picture.clone()));
+        }
+        self.release();
+        picture
+    }
+
+    /// Decodes the message with this number, which follows the one decoded last.
+    fn next_picture(
+        &mut self,
+        log: &FlightLog,
+        camera: usize,
+        kind: MessageKind,
+        number: usize,
+    ) -> Result<GrayImage, String> {
+        let position = self.topics[camera].get(log.index(), log.file(), number);
+        let message = position.and_then(|position| log.message(&mut self.blocks, position));
+        let Some((block, message)) = message else {
+            self.streams.remove(&camera);
+            return Err("it is in a damaged chunk".into());
+        };
+        let packet = read_video_packet(kind, block.bytes(&message.data)).map_err(|error| error.to_string())?;
+        let codec = packet.codec()?;
+        let limits = log.file().limits();
+        let stream = self.streams.entry(camera).or_insert_with(|| VideoPosition {
+            decoder: VideoDecoder::new(codec, limits),
+            codec,
+            next: number,
+        });
+        if stream.codec != codec {
+            *stream = VideoPosition { decoder: VideoDecoder::new(codec, limits), codec, next: number };
+        }
+        stream.next = number + 1;
+        stream.decoder.decode(packet.data, None).map_err(|problem| problem.to_string())
+    }
+
+    /// Drops the pictures that were used longest ago.
+    fn release(&mut self) {
+        let pixels = |entry: &Picture| entry.as_ref().map_or(1, |image| image.pixels.len());
+        let mut held: usize = self.pictures.iter().map(|(_, picture)| pixels(picture)).sum();
+        let mut released = 0;
+        while held > VIDEO_PIXELS && released + 1 < self.pictures.len() {
+            held -= pixels(&self.pictures[released].1);
+            released += 1;
+        }
+        self.pictures.drain(..released);
     }
 }

@@ -256,16 +256,16 @@ impl FlightLog {
             let (Some(first), Some(last)) = (first_ones.first(), last_ones.last()) else { continue };
             let channel = ids.first().and_then(|id| self.index.channels.get(id));
             let Some(channel) = channel else { continue };
-            let kind = MessageKind::from_schema_name(&channel.schema_name).filter(|_| channel.encoding == "cdr");
-            if kind.is_some() {
+            let kind = MessageKind::of_channel(&channel.schema_name, &channel.encoding);
+            if let Some(kind) = kind {
                 let mut stamp = |position: &MessagePosition| {
                     let (block, message) = self.message(&mut cache, *position)?;
-                    messages::header_stamp_ns(block.bytes(&message.data)).ok()
+                    messages::stamp_ns(kind, block.bytes(&message.data)).ok()
                 };
                 let first_stamp = first_ones.iter().take(8).find_map(&mut stamp);
                 let last_stamp = last_ones.iter().rev().take(8).find_map(&mut stamp);
                 if let (Some(first_stamp), Some(last_stamp)) = (first_stamp, last_stamp) {
-                    stamps.push((kind == Some(MessageKind::Imu), topic.clone(), first_stamp, last_stamp));
+                    stamps.push((kind == MessageKind::Imu, topic.clone(), first_stamp, last_stamp));
                 }
             }
             // The statistics are claims, too.

@@ -3,6 +3,8 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::cdr::{CdrError, CdrReader};
+use super::protobuf::{ProtobufReader, ProtobufValue};
+use super::video::VideoCodec;
 use crate::geometry::RigidTransform;
 
 /// A message type that is read.
@@ -14,6 +16,12 @@ pub enum MessageKind {
     Image,
     /// `sensor_msgs/msg/CompressedImage`.
     CompressedImage,
+    /// `foxglove_msgs/msg/CompressedVideo`.
+    CompressedVideo,
+    /// `foxglove.CompressedVideo`, encoded as protobuf.
+    CompressedVideoProtobuf,
+    /// `ffmpeg_image_transport_msgs/msg/FFMPEGPacket`.
+    FfmpegPacket,
     /// `sensor_msgs/msg/CameraInfo`.
     CameraInfo,
     /// `sensor_msgs/msg/JointState`.
@@ -28,10 +36,13 @@ pub enum MessageKind {
 
 impl MessageKind {
     /// Every kind.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 11] = [
         Self::Imu,
         Self::Image,
         Self::CompressedImage,
+        Self::CompressedVideo,
+        Self::CompressedVideoProtobuf,
+        Self::FfmpegPacket,
         Self::CameraInfo,
         Self::JointState,
         Self::Odometry,
@@ -45,6 +56,9 @@ impl MessageKind {
             Self::Imu => "sensor_msgs/msg/Imu",
             Self::Image => "sensor_msgs/msg/Image",
             Self::CompressedImage => "sensor_msgs/msg/CompressedImage",
+            Self::CompressedVideo => "foxglove_msgs/msg/CompressedVideo",
+            Self::CompressedVideoProtobuf => "foxglove.CompressedVideo",
+            Self::FfmpegPacket => "ffmpeg_image_transport_msgs/msg/FFMPEGPacket",
             Self::CameraInfo => "sensor_msgs/msg/CameraInfo",
             Self::JointState => "sensor_msgs/msg/JointState",
             Self::Odometry => "nav_msgs/msg/Odometry",
@@ -61,9 +75,28 @@ impl MessageKind {
         })
     }
 
-    /// Whether its messages are images.
+    /// The kind of a channel with this schema name, when its messages are encoded as that kind is read.
+    pub fn of_channel(schema_name: &str, encoding: &str) -> Option<Self> {
+        Self::from_schema_name(schema_name).filter(|kind| kind.encoding() == encoding)
+    }
+
+    /// The encoding in which its messages are read.
+    pub fn encoding(self) -> &'static str {
+        if self == Self::CompressedVideoProtobuf { "protobuf" } else { "cdr" }
+    }
+
+    /// The kinds whose messages are images or pictures of a video.
+    pub const IMAGES: [Self; 5] =
+        [Self::Image, Self::CompressedImage, Self::CompressedVideo, Self::CompressedVideoProtobuf, Self::FfmpegPacket];
+
+    /// Whether its messages are images or pictures of a video.
     pub fn is_image(self) -> bool {
-        matches!(self, Self::Image | Self::CompressedImage)
+        Self::IMAGES.contains(&self)
+    }
+
+    /// Whether its messages are pictures of a video, which depend on those before them.
+    pub fn is_video(self) -> bool {
+        matches!(self, Self::CompressedVideo | Self::CompressedVideoProtobuf | Self::FfmpegPacket)
     }
 
     /// Whether its messages are poses.
@@ -88,7 +121,10 @@ fn read_header<'a>(reader: &mut CdrReader<'a>) -> Result<Header<'a>, CdrError> {
 }
 
 /// The header stamp of any message that starts with a header, in nanoseconds since the epoch.
-pub(crate) fn header_stamp_ns(message: &[u8]) -> Result<i64, CdrError> {
+pub(crate) fn stamp_ns(kind: MessageKind, message: &[u8]) -> Result<i64, CdrError> {
+    if kind == MessageKind::CompressedVideoProtobuf {
+        return read_compressed_video_protobuf(message).map(|packet| packet.stamp_ns);
+    }
     Ok(read_header(&mut CdrReader::new(message)?)?.stamp_ns)
 }
 
@@ -145,6 +181,89 @@ pub(crate) fn read_compressed_image(message: &[u8]) -> Result<(&str, &[u8]), Cdr
     read_header(&mut reader)?;
     let format = reader.read_string()?;
     Ok((format, reader.read_bytes()?))
+}
+
+/// A message of a video topic: one picture, borrowed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct VideoPacket<'a> {
+    /// Nanoseconds since the epoch.
+    pub(crate) stamp_ns: i64,
+    pub(crate) frame_id: &'a str,
+    /// Name of the compression, of which one is read or not.
+    pub(crate) format: &'a str,
+    /// Annex B.
+    pub(crate) data: &'a [u8],
+}
+
+impl VideoPacket<'_> {
+    /// The compression, or the problem with it.
+    pub(crate) fn codec(&self) -> Result<VideoCodec, String> {
+        VideoCodec::from_name(self.format)
+            .ok_or_else(|| format!("video of format {:?} is not read, expected h264 or h265", self.format))
+    }
+
+    /// Whether it depends on pictures before the keyframe that it follows.
+    pub(crate) fn is_leading(&self) -> bool {
+        self.codec().is_ok_and(|codec| codec.is_leading(self.data))
+    }
+
+    /// Whether decoding can start with it.
+    pub(crate) fn is_keyframe(&self) -> bool {
+        self.codec().is_ok_and(|codec| codec.is_keyframe(self.data))
+    }
+}
+
+pub(crate) fn read_video_packet(kind: MessageKind, message: &[u8]) -> Result<VideoPacket<'_>, CdrError> {
+    match kind {
+        MessageKind::CompressedVideoProtobuf => read_compressed_video_protobuf(message),
+        MessageKind::FfmpegPacket => {
+            let mut reader = CdrReader::new(message)?;
+            let Header { stamp_ns, frame_id } = read_header(&mut reader)?;
+            let _width = reader.read_u32()?;
+            let _height = reader.read_u32()?;
+            let format = reader.read_string()?;
+            let _presentation_time = reader.read_u64()?;
+            let _flags = reader.read_u8()?;
+            let _is_big_endian = reader.read_u8()?;
+            Ok(VideoPacket { stamp_ns, frame_id, format, data: reader.read_bytes()? })
+        }
+        _ => {
+            let mut reader = CdrReader::new(message)?;
+            let Header { stamp_ns, frame_id } = read_header(&mut reader)?;
+            let data = reader.read_bytes()?;
+            Ok(VideoPacket { stamp_ns, frame_id, format: reader.read_string()?, data })
+        }
+    }
+}
+
+/// `foxglove.CompressedVideo`: timestamp (1), frame (2), data (3), format (4).
+fn read_compressed_video_protobuf(message: &[u8]) -> Result<VideoPacket<'_>, CdrError> {
+    let (mut stamp_ns, mut frame_id, mut format, mut data) = (0, "", "", &[][..]);
+    let mut reader = ProtobufReader::new(message);
+    while let Some(field) = reader.next_field()? {
+        match field {
+            (1, ProtobufValue::Bytes(timestamp)) => stamp_ns = read_protobuf_timestamp(timestamp)?,
+            (2, ProtobufValue::Bytes(bytes)) => frame_id = reader.text(bytes)?,
+            (3, ProtobufValue::Bytes(bytes)) => data = bytes,
+            (4, ProtobufValue::Bytes(bytes)) => format = reader.text(bytes)?,
+            _ => {}
+        }
+    }
+    Ok(VideoPacket { stamp_ns, frame_id, format, data })
+}
+
+/// `google.protobuf.Timestamp`: seconds (1), nanoseconds (2).
+fn read_protobuf_timestamp(message: &[u8]) -> Result<i64, CdrError> {
+    let (mut seconds, mut nanoseconds) = (0, 0);
+    let mut reader = ProtobufReader::new(message);
+    while let Some(field) = reader.next_field()? {
+        match field {
+            (1, ProtobufValue::Number(value)) => seconds = value.cast_signed(),
+            (2, ProtobufValue::Number(value)) => nanoseconds = value.cast_signed(),
+            _ => {}
+        }
+    }
+    Ok(seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds))
 }
 
 /// `sensor_msgs/msg/CameraInfo`: resolution, distortion and intrinsics.

@@ -16,6 +16,7 @@ mod limits;
 pub(crate) mod log;
 pub(crate) mod messages;
 pub mod output;
+mod protobuf;
 mod raw_encoding;
 pub(crate) mod rig;
 mod sensor_frame;
@@ -23,6 +24,7 @@ pub(crate) mod stream;
 #[cfg(test)]
 mod tests;
 mod text;
+pub(crate) mod video;
 mod writer;
 
 pub use error::LogError;

@@ -235,7 +235,6 @@ fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
     }
 }
 
-const IMAGES: [MessageKind; 2] = [MessageKind::Image, MessageKind::CompressedImage];
 const POSES: [MessageKind; 3] = [MessageKind::Odometry, MessageKind::PoseStamped, MessageKind::TransformStamped];
 
 /// Whether the log has the topics that the rig names.
@@ -258,7 +257,7 @@ fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
         require("imu0.accelerometer_rostopic".into(), topic, &[MessageKind::Imu], Severity::Error);
     }
     for camera in &rig.cameras {
-        require(format!("{}.rostopic", camera.key), &camera.topic, &IMAGES, Severity::Error);
+        require(format!("{}.rostopic", camera.key), &camera.topic, &MessageKind::IMAGES, Severity::Error);
     }
     if let Some(topic) = rig.gimbal.as_ref().and_then(|gimbal| gimbal.topic.as_ref()) {
         require("gimbal.rostopic".into(), topic, &[MessageKind::JointState], Severity::Error);

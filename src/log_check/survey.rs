@@ -119,6 +119,7 @@ impl Survey {
         let sigma_rad = rig.and_then(|rig| rig.gimbal.as_ref()?.encoder_sigma_rad).unwrap_or(0.0);
         survey.encoder_variance_rad2 = sigma_rad.max(MIN_SIGMA_RAD).powi(2);
         let mut counts: BTreeMap<String, u64> = BTreeMap::new();
+        let mut keyframes_due: BTreeMap<String, u64> = BTreeMap::new();
         for block in &log.index().blocks {
             let decoded = DecodedBlock::decode(log.file(), block);
             // A scanned log has reported its damage when it was opened.
@@ -138,9 +139,18 @@ impl Survey {
                 let Some(kind) = info.kind else { continue };
                 let number = counts.entry(info.topic.clone()).or_default();
                 let stride = info.count.div_ceil(IMAGES_PER_CAMERA).max(1);
-                let sampled = number.is_multiple_of(stride);
-                *number += 1;
                 let data = decoded.bytes(&message.data);
+                // Of a video, keyframes are sampled: the others depend on those before.
+                let sampled = if kind.is_video() {
+                    let due = keyframes_due.entry(info.topic.clone()).or_default();
+                    let sampled = *number >= *due
+                        && messages::read_video_packet(kind, data).is_ok_and(|packet| packet.is_keyframe());
+                    *due = if sampled { *number + stride } else { *due };
+                    sampled
+                } else {
+                    number.is_multiple_of(stride)
+                };
+                *number += 1;
                 survey.take(log, rig, &info.topic, kind, log.since_start(message.log_time_ns), data, sampled);
             }
         }
@@ -193,7 +203,7 @@ impl Survey {
             .topics
             .entry(topic.to_owned())
             .or_insert_with(|| TopicSurvey { topic: topic.to_owned(), ..TopicSurvey::default() });
-        let stamp_ns = match messages::header_stamp_ns(data) {
+        let stamp_ns = match messages::stamp_ns(kind, data) {
             Ok(absolute_ns) => relative_ns(absolute_ns, log.epoch_ns()),
             Err(error) => return entry.refuse(error.to_string()),
         };

@@ -20,6 +20,10 @@ use rusqlite::Connection;
 
 type Failed = Box<dyn std::error::Error>;
 
+/// An H.264 stream, the size of its first message and the end of its second.
+const VIDEO: &[u8] = include_bytes!("../../../tests/data/video/h264.bin");
+const KEYFRAME_BYTES: usize = 859;
+const PICTURE_END: usize = 979;
 /// Header stamp of the first message.
 const EPOCH_NS: i64 = 1_700_000_000_250_000_000;
 /// Width and height of the images.
@@ -65,6 +69,9 @@ fn write_log(path: &Path, options: &LogWriterOptions) -> Result<(), Failed> {
                 "mono8",
                 &pixels,
             )?;
+            // A keyframe and a picture that depends on it.
+            let picture = if index % 20 == 0 { &VIDEO[..KEYFRAME_BYTES] } else { &VIDEO[KEYFRAME_BYTES..PICTURE_END] };
+            log.write_compressed_video(topic_of(MessageKind::CompressedVideo), "video", times(index), "h264", picture)?;
             let odometry = topic_of(MessageKind::Odometry);
             log.write_odometry(odometry, "world", "imu", times(index), &pose, &force, &rate)?;
             log.write_pose(topic_of(MessageKind::PoseStamped), "world", times(index), &pose)?;

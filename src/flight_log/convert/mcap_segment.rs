@@ -111,6 +111,7 @@ fn take(
         payload: match channel.encoding.as_str() {
             "cdr" => Payload::Cdr(data),
             "ros1" => Payload::Ros1(data),
+            "protobuf" => Payload::Protobuf(data),
             other => Payload::Other(other),
         },
     })

@@ -19,10 +19,10 @@ enum Field {
     F64Sequence,
 }
 
-/// The fields of a type in order.
-fn layout(kind: MessageKind) -> &'static [Field] {
+/// The fields of a type in order, `None` for one that ROS 1 has with other fields.
+fn layout(kind: MessageKind) -> Option<&'static [Field]> {
     use Field::{Bytes, F64Sequence, F64s, Header, Text, Texts, U8, U32};
-    match kind {
+    Some(match kind {
         // Orientation, angular velocity, specific force, each with its covariance.
         MessageKind::Imu => &[Header, F64s(4 + 9 + 3 + 9 + 3 + 9)],
         // Height, width, encoding, is_bigendian, step, data.
@@ -37,14 +37,16 @@ fn layout(kind: MessageKind) -> &'static [Field] {
         MessageKind::Odometry => &[Header, Text, F64s(7 + 36 + 6 + 36)],
         MessageKind::PoseStamped => &[Header, F64s(7)],
         MessageKind::TransformStamped => &[Header, Text, F64s(7)],
-    }
+        MessageKind::CompressedVideo | MessageKind::CompressedVideoProtobuf | MessageKind::FfmpegPacket => return None,
+    })
 }
 
 /// The CDR encoding of a message in ROS 1 serialization, or the problem with it.
 pub(super) fn cdr_from_ros1(kind: MessageKind, message: &[u8]) -> Result<Vec<u8>, String> {
     let mut reader = Ros1Reader { message, position: 0 };
     let mut out = CdrWriter::new();
-    for field in layout(kind) {
+    let fields = layout(kind).ok_or("video of ROS 1 is not read: convert the bag to ROS 2 or MCAP")?;
+    for field in fields {
         match *field {
             Field::Header => {
                 reader.u32()?; // sequence number, which ROS 2 has not

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::container::unpack_message;
 use super::super::limits::{LimitExceeded, LimitKind, LogLimits};
-use super::super::messages::header_stamp_ns;
+use super::super::messages::{read_video_packet, stamp_ns};
 use super::super::writer::MessageType;
 use super::super::{LogWriter, MessageKind, MessageTimes};
 use super::ros1_message::cdr_from_ros1;
@@ -27,6 +27,8 @@ pub(super) enum Payload<'a> {
     Ros1(&'a [u8]),
     /// CDR with its encapsulation header.
     Cdr(&'a [u8]),
+    /// Protobuf, as Foxglove's libraries write it.
+    Protobuf(&'a [u8]),
     /// Anything else, by the name of its encoding.
     Other(&'a str),
 }
@@ -204,7 +206,25 @@ impl<'a> Sink<'a> {
             other => other,
         };
         let written = match (kind, payload) {
-            (Some(kind), Payload::Cdr(bytes)) => match header_stamp_ns(bytes) {
+            (Some(MessageKind::CompressedVideoProtobuf), Payload::Protobuf(bytes)) => {
+                match read_video_packet(MessageKind::CompressedVideoProtobuf, bytes) {
+                    Ok(packet) => {
+                        let times = MessageTimes { stamp_ns: packet.stamp_ns, ..times };
+                        Ok(self.writer.write_compressed_video(
+                            topic,
+                            packet.frame_id,
+                            times,
+                            packet.format,
+                            packet.data,
+                        )?)
+                    }
+                    Err(error) => Err(format!("it cannot be decoded: {error}")),
+                }
+            }
+            (_, Payload::Protobuf(_)) => {
+                Err("encoded as protobuf, of which only foxglove.CompressedVideo is read".to_owned())
+            }
+            (Some(kind), Payload::Cdr(bytes)) => match stamp_ns(kind, bytes) {
                 Ok(_) => Ok(self.writer.write(topic, kind, times, bytes)?),
                 Err(error) => Err(format!("it cannot be decoded: {error}")),
             },

@@ -4,13 +4,14 @@ use std::sync::Arc;
 use super::super::image_decoding::{BitDepth, ImageProblem, decode_image};
 use super::super::log::relative_ns;
 use super::super::messages::{self, MessageKind};
+use super::super::video::{VideoCodec, VideoDecoder};
 use super::super::{FlightLog, LogError, LogWarning, SensorFrame};
 use super::imu::ImuStream;
 use super::joint_angles::JointAngleStream;
 use super::joint_topic::JointSamples;
 use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
-use crate::sensors::{GrayImage, ImuSample, PoseSample, Rig};
+use crate::sensors::{CameraRig, GrayImage, ImuSample, PoseSample, Rig};
 
 /// Length of the IMU samples before the first frame.
 const FIRST_FRAME_IMU_NS: i64 = 2_000_000_000;
@@ -27,7 +28,13 @@ const IMAGE_GAP_PERIODS: f64 = 1.75;
 struct PendingImage {
     number: usize,
     log_time_ns: i64,
-    message: Vec<u8>,
+    content: ImageContent,
+}
+
+/// Images are decoded when they are due, pictures of a video in the order of their messages.
+enum ImageContent {
+    Message(Vec<u8>),
+    Decoded(GrayImage),
 }
 
 /// Samples of a topic around a stamp: those before it, and the first one after it.
@@ -105,22 +112,28 @@ impl FrameSource {
         let log = &*Arc::clone(&context.log);
         let camera = rig.camera(camera_key)?;
         let field = format!("{camera_key}.rostopic");
-        let images = log.require_topic(&field, &camera.topic, &[MessageKind::Image, MessageKind::CompressedImage])?;
-        let kind = images.kind.unwrap_or(MessageKind::Image);
-        let count = images.count as usize;
-        let image_gap_ns = gap_ns(IMAGE_GAP_PERIODS, camera.rate_hz, images.rate_hz);
+        let info = log.require_topic(&field, &camera.topic, &MessageKind::IMAGES)?;
+        let kind = info.kind.unwrap_or(MessageKind::Image);
+        let count = info.count as usize;
+        let image_gap_ns = gap_ns(IMAGE_GAP_PERIODS, camera.rate_hz, info.rate_hz);
         let imu_rate_hz = log.require_topic("imu0.rostopic", &rig.imu.topic, &[MessageKind::Imu])?.rate_hz;
         let imu_gap_ns = gap_ns(IMU_GAP_PERIODS, rig.imu.rate_hz, imu_rate_hz);
         let start_ns = ns_from_seconds(start_s);
         let end_ns = duration_s.map_or(i64::MAX, |duration_s| start_ns.saturating_add(ns_from_seconds(duration_s)));
         let shift_ns = ns_from_seconds(camera.timeshift_cam_imu_s);
         let from_ns = start_ns.saturating_sub(FIRST_FRAME_IMU_NS + SEEK_MARGIN_NS + shift_ns.abs());
-        let half_interval_ns = gap_ns(0.5, camera.rate_hz, images.rate_hz);
+        let half_interval_ns = gap_ns(0.5, camera.rate_hz, info.rate_hz);
         let joints = joint_angles(log, rig, from_ns, half_interval_ns)?;
         let ground_truth = ground_truth_samples(log, rig, from_ns, &mut context).map(Lookup::new);
         let log_warnings = log.warnings().iter().cloned().collect();
+        let images = if kind.is_video() {
+            let decoder = picture_decoder(log, kind, camera);
+            OrderedSamples::new(log, &camera.topic, from_ns, true, decoder).starting_at_keyframe(log, kind)
+        } else {
+            OrderedSamples::new(log, &camera.topic, from_ns, true, image_decoder(kind, log.epoch_ns()))
+        };
         let stream = CameraStream {
-            images: OrderedSamples::new(log, &camera.topic, from_ns, true, image_decoder(log.epoch_ns())),
+            images,
             count,
             topic: camera.topic.clone(),
             kind,
@@ -173,7 +186,8 @@ impl FrameSource {
                 self.forget_samples_before(imu_stamp_ns - FIRST_FRAME_IMU_NS);
                 continue;
             }
-            let Some(image) = self.camera.decode(&mut self.context, stamp_ns, &pending) else { continue };
+            let (number, log_time_ns) = (pending.number, pending.log_time_ns);
+            let Some(image) = self.camera.decode(&mut self.context, stamp_ns, pending) else { continue };
             self.warn_of_skipped_images();
             let imu = self.take_imu(imu_stamp_ns);
             let context = &mut self.context;
@@ -183,9 +197,9 @@ impl FrameSource {
                 self.context.warnings.extend(self.log_warnings.pop_front());
             }
             return Some(SensorFrame {
-                index: pending.number,
+                index: number,
                 stamp_ns,
-                log_time_ns: pending.log_time_ns,
+                log_time_ns,
                 image: Arc::new(image),
                 imu,
                 joint_angles,
@@ -316,15 +330,15 @@ impl CameraStream {
     }
 
     /// The image, or `None` and a warning with the reason why it is skipped.
-    fn decode(&self, context: &mut ReadContext, stamp_ns: i64, pending: &PendingImage) -> Option<GrayImage> {
+    fn decode(&self, context: &mut ReadContext, stamp_ns: i64, pending: PendingImage) -> Option<GrayImage> {
+        let message = match pending.content {
+            ImageContent::Message(message) => message,
+            ImageContent::Decoded(image) => return Some(image),
+        };
         let limits = context.log.file().limits();
-        let problem = match decode_image(self.kind, &pending.message, self.depth, limits, Some(self.resolution_px)) {
+        let problem = match decode_image(self.kind, &message, self.depth, limits, Some(self.resolution_px)) {
             Ok(image) => return Some(image),
-            Err(ImageProblem::OtherResolution([width, height])) => format!(
-                "it has {width}×{height} pixels, {}×{} in the rig for {}",
-                self.resolution_px[0], self.resolution_px[1], self.key
-            ),
-            Err(ImageProblem::Unreadable(problem)) => problem,
+            Err(problem) => problem_text(problem, self.resolution_px, &self.key),
         };
         let message = format!(
             "{}: image {} at {:.3} s skipped: {problem}",
@@ -365,11 +379,48 @@ fn interpolate_pose(from: &RigidTransform, to: &RigidTransform, fraction: f64) -
     RigidTransform::new(rotation, from.translation_m.lerp(&to.translation_m, fraction))
 }
 
-fn image_decoder(epoch_ns: i64) -> Decoder<PendingImage> {
+/// What is wrong with an image of a camera.
+fn problem_text(problem: ImageProblem, resolution_px: [usize; 2], key: &str) -> String {
+    match problem {
+        ImageProblem::OtherResolution([width, height]) => {
+            format!("it has {width}×{height} pixels, {}×{} in the rig for {key}", resolution_px[0], resolution_px[1])
+        }
+        ImageProblem::Unreadable(problem) => problem,
+    }
+}
+
+/// Decodes the pictures of a video topic; a number that is left out is a message that could not be read.
+fn picture_decoder(log: &FlightLog, kind: MessageKind, camera: &CameraRig) -> Decoder<PendingImage> {
+    let (epoch_ns, limits) = (log.epoch_ns(), log.file().limits().clone());
+    let (resolution_px, key) = (camera.model.resolution_px, camera.key.clone());
+    let mut stream: Option<(VideoCodec, VideoDecoder)> = None;
+    let mut expected = 0;
     Box::new(move |source: MessageSource<'_>| {
-        let stamp_ns = messages::header_stamp_ns(source.data).map_err(|error| Refusal::not_decodable(&error))?;
+        let missing = std::mem::replace(&mut expected, source.number + 1) != source.number;
+        let packet = messages::read_video_packet(kind, source.data).map_err(|error| Refusal::not_decodable(&error));
+        let packet = packet.inspect_err(|_| stream = None)?;
+        let refused = |detail| Refusal { reason: "the picture cannot be decoded", detail };
+        let codec = packet.codec().map_err(refused)?;
+        if missing || stream.as_ref().is_none_or(|(known, _)| *known != codec) {
+            stream = None;
+        }
+        let (_, decoder) = stream.get_or_insert_with(|| (codec, VideoDecoder::new(codec, &limits)));
+        let image = decoder.decode(packet.data, Some(resolution_px));
+        let image = image.map_err(|problem| refused(problem_text(problem, resolution_px, &key)))?;
         let log_time_ns = relative_ns(i64::try_from(source.position.log_time_ns).unwrap_or(i64::MAX), epoch_ns);
-        Ok((stamp_ns, PendingImage { number: source.number, log_time_ns, message: source.data.to_vec() }))
+        Ok((
+            packet.stamp_ns,
+            PendingImage { number: source.number, log_time_ns, content: ImageContent::Decoded(image) },
+        ))
+    })
+}
+
+fn image_decoder(kind: MessageKind, epoch_ns: i64) -> Decoder<PendingImage> {
+    Box::new(move |source: MessageSource<'_>| {
+        let stamp_ns = messages::stamp_ns(kind, source.data).map_err(|error| Refusal::not_decodable(&error))?;
+        let log_time_ns = relative_ns(i64::try_from(source.position.log_time_ns).unwrap_or(i64::MAX), epoch_ns);
+        let content = ImageContent::Message(source.data.to_vec());
+        Ok((stamp_ns, PendingImage { number: source.number, log_time_ns, content }))
     })
 }
 

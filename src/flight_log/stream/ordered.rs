@@ -3,6 +3,8 @@ use std::sync::Arc;
 
 use super::super::container::{BlockCache, MessagePosition, TopicIndex};
 use super::super::log::relative_ns;
+use super::super::messages::MessageKind;
+use super::super::video::keyframe_before;
 use super::super::{FlightLog, LogWarning};
 use crate::geometry::seconds_from_ns;
 
@@ -113,6 +115,12 @@ impl<T> OrderedSamples<T> {
         let (topic, pending) = (topic.to_owned(), BTreeMap::new());
         let (released_ns, equal_stamps, dropped) = (None, false, None);
         Self { topic, messages, next, exhausted: false, decode, pending, released_ns, equal_stamps, dropped }
+    }
+
+    /// Starts with the keyframe on which the first message depends, when the topic is a video.
+    pub(super) fn starting_at_keyframe(mut self, log: &FlightLog, kind: MessageKind) -> Self {
+        self.next = keyframe_before(log, &mut self.messages, kind, self.next);
+        self
     }
 
     /// Accepts several messages with one stamp, from different senders.

@@ -281,7 +281,8 @@ fn a_rig_that_does_not_match_the_log_is_refused() {
     let message = stream_error(&RIG.replace("rostopic: /camera", "rostopic: /front"));
     assert!(message.contains("cam0.rostopic names the topic '/front', which is not in the log"), "{message}");
     assert!(
-        message.contains("of type sensor_msgs/msg/Image or sensor_msgs/msg/CompressedImage are '/camera'"),
+        message.contains("of type sensor_msgs/msg/Image or sensor_msgs/msg/CompressedImage or")
+            && message.contains("FFMPEGPacket are '/camera'"),
         "{message}"
     );
     let message = stream_error(&RIG.replace("rostopic: /imu", "rostopic: /camera"));

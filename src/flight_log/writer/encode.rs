@@ -54,6 +54,14 @@ pub(in super::super) fn image(
     out.finish()
 }
 
+/// `foxglove_msgs/msg/CompressedVideo`: one picture in Annex B.
+pub(in super::super) fn compressed_video(stamp_ns: i64, frame_id: &str, format: &str, data: &[u8]) -> Vec<u8> {
+    let mut out = with_header(stamp_ns, frame_id);
+    out.bytes(data);
+    out.string(format);
+    out.finish()
+}
+
 /// `sensor_msgs/msg/CompressedImage`.
 pub(in super::super) fn compressed_image(stamp_ns: i64, frame_id: &str, format: &str, data: &[u8]) -> Vec<u8> {
     let mut out = with_header(stamp_ns, frame_id);

@@ -185,6 +185,19 @@ impl LogWriter {
         self.write(topic, MessageKind::CompressedImage, times, &message)
     }
 
+    /// Writes one picture of a video, in Annex B; `format` is `h264` or `h265`.
+    pub fn write_compressed_video(
+        &mut self,
+        topic: &str,
+        frame_id: &str,
+        times: MessageTimes,
+        format: &str,
+        data: &[u8],
+    ) -> Result<(), LogError> {
+        let message = encode::compressed_video(times.stamp_ns, frame_id, format, data);
+        self.write(topic, MessageKind::CompressedVideo, times, &message)
+    }
+
     /// Writes a raw image of any ROS encoding, rows without padding, multi-byte pixels little-endian.
     pub fn write_raw_image(
         &mut self,

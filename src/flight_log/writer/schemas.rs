@@ -66,6 +66,11 @@ fn fields(kind: MessageKind) -> Definition<'static> {
         MessageKind::Imu => (fields!("sensor_msgs/Imu"), &[HEADER, TIME, QUATERNION, VECTOR3]),
         MessageKind::Image => (fields!("sensor_msgs/Image"), &[HEADER, TIME]),
         MessageKind::CompressedImage => (fields!("sensor_msgs/CompressedImage"), &[HEADER, TIME]),
+        // Protobuf is written as the same fields of ROS 2.
+        MessageKind::CompressedVideo | MessageKind::CompressedVideoProtobuf => {
+            (fields!("foxglove_msgs/CompressedVideo"), &[TIME])
+        }
+        MessageKind::FfmpegPacket => (fields!("ffmpeg_image_transport_msgs/FFMPEGPacket"), &[HEADER, TIME]),
         MessageKind::CameraInfo => (fields!("sensor_msgs/CameraInfo"), &[HEADER, TIME, REGION]),
         MessageKind::JointState => (fields!("sensor_msgs/JointState"), &[HEADER, TIME]),
         MessageKind::Odometry => (

@@ -1,0 +1,241 @@
+use std::cell::Cell;
+use std::ops::RangeInclusive;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Once;
+
+use rust_h264::nal::NalUnitType;
+
+use super::super::image_decoding::{ImageProblem, check_resolution, unreadable};
+use super::super::limits::LogLimits;
+use super::frame_numbers::FrameNumbers;
+use crate::sensors::GrayImage;
+
+/// A video compression that is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum VideoCodec {
+    /// H.264 (AVC).
+    H264,
+    /// H.265 (HEVC).
+    H265,
+}
+
+impl VideoCodec {
+    /// From a message's field: `h264`, `libx264`, `hevc_nvenc`, `h265;yuv420p;…`; `None` for a compression that is not read.
+    pub(crate) fn from_name(name: &str) -> Option<Self> {
+        let name = name.split(';').next().unwrap_or(name).to_ascii_lowercase();
+        let has = |parts: &[&str]| parts.iter().any(|part| name.contains(part));
+        if has(&["264", "avc"]) {
+            Some(Self::H264)
+        } else if has(&["265", "hevc"]) {
+            Some(Self::H265)
+        } else {
+            None
+        }
+    }
+
+    /// Whether a message (Annex B) holds a picture at which decoding can start, with its sequence parameter set.
+    pub(crate) fn is_keyframe(self, access_unit: &[u8]) -> bool {
+        let has = |types: RangeInclusive<u8>| self.unit_types(access_unit).any(|unit| types.contains(&unit));
+        match self {
+            Self::H264 => has(5..=5) && has(7..=7),
+            Self::H265 => has(16..=21) && has(33..=33),
+        }
+    }
+
+    /// Whether a message holds a picture that follows a keyframe and depends on pictures before it (H.265: RASL).
+    pub(crate) fn is_leading(self, access_unit: &[u8]) -> bool {
+        self == Self::H265 && self.unit_types(access_unit).any(|unit| unit == 8 || unit == 9)
+    }
+
+    /// Types of the units of a message (`nal_unit_type`).
+    fn unit_types(self, access_unit: &[u8]) -> impl Iterator<Item = u8> {
+        let headers = access_unit.windows(4).filter(|window| window[..3] == [0, 0, 1]).map(|window| window[3]);
+        headers.map(move |header| match self {
+            Self::H264 => header & 0x1F,
+            Self::H265 => header >> 1 & 0x3F,
+        })
+    }
+}
+
+/// Decodes the messages of one stream, in their order.
+pub(crate) struct VideoDecoder {
+    codec: VideoCodec,
+    stream: Stream,
+    limits: LogLimits,
+    /// Whether all pictures since a keyframe have been decoded.
+    synchronized: bool,
+    /// Whether that keyframe was the first one, so that pictures that depend on others before it are missing.
+    at_first_keyframe: bool,
+}
+
+impl std::fmt::Debug for VideoDecoder {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.debug_struct("VideoDecoder")
+            .field("codec", &self.codec)
+            .field("synchronized", &self.synchronized)
+            .finish_non_exhaustive()
+    }
+}
+
+/// State of a stream.
+enum Stream {
+    H264(Box<rust_h264::decoder::Decoder>, FrameNumbers),
+    H265(Box<rust_h265::Decoder>),
+}
+
+impl Stream {
+    fn new(codec: VideoCodec, limits: &LogLimits) -> Self {
+        match codec {
+            VideoCodec::H264 => Self::H264(Box::default(), FrameNumbers::default()),
+            VideoCodec::H265 => {
+                let limits =
+                    rust_h265::DecodeLimits { max_picture_pixels: limits.image_pixels(), ..Default::default() };
+                Self::H265(Box::new(rust_h265::Decoder::with_limits(limits)))
+            }
+        }
+    }
+}
+
+impl VideoDecoder {
+    /// A decoder that waits for a keyframe.
+    pub(crate) fn new(codec: VideoCodec, limits: &LogLimits) -> Self {
+        Self {
+            codec,
+            stream: Stream::new(codec, limits),
+            limits: limits.clone(),
+            synchronized: false,
+            at_first_keyframe: true,
+        }
+    }
+
+    /// Says that a message is missing before the next one: pictures are refused up to the next keyframe.
+    pub(crate) fn lose_message(&mut self) {
+        self.stream = Stream::new(self.codec, &self.limits);
+        (self.synchronized, self.at_first_keyframe) = (false, true);
+    }
+
+    /// The picture of a message (Annex B), 8-bit grey levels, when it has the expected resolution, if there is one.
+    pub(crate) fn decode(
+        &mut self,
+        access_unit: &[u8],
+        expected_px: Option<[usize; 2]>,
+    ) -> Result<GrayImage, ImageProblem> {
+        if self.codec.is_keyframe(access_unit) {
+            self.at_first_keyframe = !self.synchronized;
+        } else if !self.synchronized || (self.at_first_keyframe && self.codec.is_leading(access_unit)) {
+            return Err(unreadable(
+                "it depends on a picture that is damaged or missing; reading continues at the next keyframe",
+            ));
+        }
+        let (stream, limits) = (&mut self.stream, &self.limits);
+        let decoded = without_panic_message(|| stream.picture(access_unit, limits));
+        let picture =
+            decoded.unwrap_or_else(|| Err(unreadable("the video decoder failed: please report it with the log")));
+        match picture {
+            Ok(image) => {
+                self.synchronized = true;
+                check_resolution([image.width, image.height], &self.limits, expected_px)?;
+                Ok(image)
+            }
+            Err(problem) => {
+                self.lose_message();
+                Err(problem)
+            }
+        }
+    }
+}
+
+impl Stream {
+    /// Decodes the one picture of a message.
+    fn picture(&mut self, access_unit: &[u8], limits: &LogLimits) -> Result<GrayImage, ImageProblem> {
+        match self {
+            Self::H264(decoder, numbers) => {
+                let mut pictures = Vec::new();
+                for unit in rust_h264::nal::parse_annex_b(access_unit) {
+                    match unit.nal_unit_type {
+                        NalUnitType::Sps => {
+                            let info = rust_h264::nal::parse_sps_info(&unit).map_err(damaged)?;
+                            check_resolution([info.coded_width as usize, info.coded_height as usize], limits, None)?;
+                            numbers.take_sequence(&unit.rbsp);
+                        }
+                        NalUnitType::Slice | NalUnitType::SliceIdr => {
+                            let is_idr = unit.nal_unit_type == NalUnitType::SliceIdr;
+                            numbers.take_slice(&unit.rbsp, is_idr, unit.nal_ref_idc != 0).map_err(unreadable)?;
+                        }
+                        _ => {}
+                    }
+                    pictures.extend(decoder.decode_nal(&unit).map_err(damaged)?);
+                }
+                pictures.extend(decoder.flush());
+                let [picture] = one(pictures)?;
+                let (width, height) = (picture.width as usize, picture.height as usize);
+                let pixels = if picture.bit_depth > 8 {
+                    let sample = |pair: &[u8]| u16::from_le_bytes([pair[0], pair[1]]);
+                    picture.y.chunks_exact(2).map(|pair| narrowed(sample(pair), picture.bit_depth)).collect()
+                } else {
+                    picture.y
+                };
+                gray_image(width, height, pixels)
+            }
+            Self::H265(decoder) => {
+                let mut pictures = Vec::new();
+                for unit in rust_h265::parse_annex_b(access_unit) {
+                    pictures.extend(decoder.decode_nal(&unit).map_err(damaged)?);
+                }
+                pictures.extend(std::iter::from_fn(|| decoder.flush()));
+                let [picture] = one(pictures)?;
+                let (width, height) = (picture.width as usize, picture.height as usize);
+                let pixels = match (picture.y.as_u8(), picture.y.as_u16()) {
+                    (Some(samples), _) => samples.to_vec(),
+                    (None, Some(samples)) => {
+                        samples.iter().map(|sample| narrowed(*sample, picture.bit_depth)).collect()
+                    }
+                    (None, None) => Vec::new(),
+                };
+                gray_image(width, height, pixels)
+            }
+        }
+    }
+}
+
+fn damaged(error: impl std::fmt::Debug) -> ImageProblem {
+    unreadable(format!("damaged video ({error:?})"))
+}
+
+fn one<T>(pictures: Vec<T>) -> Result<[T; 1], ImageProblem> {
+    <[T; 1]>::try_from(pictures)
+        .map_err(|pictures| unreadable(format!("{} pictures in one message, expected 1", pictures.len())))
+}
+
+fn narrowed(sample: u16, bit_depth: u8) -> u8 {
+    u8::try_from(sample >> bit_depth.saturating_sub(8)).unwrap_or(u8::MAX)
+}
+
+fn gray_image(width: usize, height: usize, pixels: Vec<u8>) -> Result<GrayImage, ImageProblem> {
+    if pixels.len() != width * height {
+        return Err(unreadable(format!("{} samples of a picture of {width}×{height} pixels", pixels.len())));
+    }
+    Ok(GrayImage { width, height, pixels })
+}
+
+thread_local! {
+    /// Whether a panic on this thread is an error message of ours and prints nothing.
+    static SILENT: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Runs foreign code whose panic is an error of its input: `None` when it panics. Its message is not printed.
+fn without_panic_message<T>(run: impl FnOnce() -> T) -> Option<T> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let print = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if !SILENT.get() {
+                print(panic);
+            }
+        }));
+    });
+    let before = SILENT.replace(true);
+    let result = catch_unwind(AssertUnwindSafe(run));
+    SILENT.set(before);
+    result.ok()
+}

@@ -1,0 +1,114 @@
+use super::bits::BitReader;
+
+/// Profiles whose sequence parameter sets say more of the samples (H.264, section 7.3.2.1.1).
+const HIGH_PROFILES: [u32; 13] = [100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135];
+
+/// Follows `frame_num` of an H.264 stream: it grows by one after every reference picture, so that a lost one is noticed.
+#[derive(Clone, Debug, Default)]
+pub(super) struct FrameNumbers {
+    sequence: Option<Sequence>,
+    /// `frame_num` of the last reference picture.
+    reference: Option<u32>,
+}
+
+/// What a sequence parameter set says of `frame_num`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Sequence {
+    bits: u32,
+    gaps_allowed: bool,
+    separate_planes: bool,
+}
+
+impl FrameNumbers {
+    /// Takes the payload of a sequence parameter set.
+    pub(super) fn take_sequence(&mut self, payload: &[u8]) {
+        self.sequence = sequence(payload);
+    }
+
+    /// Takes the payload of a picture's first slice; the error says that a picture before it is missing.
+    pub(super) fn take_slice(&mut self, payload: &[u8], is_idr: bool, is_reference: bool) -> Result<(), String> {
+        let Some(sequence) = self.sequence else { return Ok(()) };
+        let mut bits = BitReader::new(payload);
+        let Some((0, number)) = first_macroblock_and_frame_number(&mut bits, sequence) else { return Ok(()) };
+        let next = |number: u32| (number + 1) % (1 << sequence.bits);
+        let follows = match self.reference {
+            _ if is_idr || sequence.gaps_allowed => true,
+            Some(reference) => number == reference || number == next(reference),
+            None => true,
+        };
+        let expected = self.reference.map_or(0, next);
+        if is_reference {
+            self.reference = Some(number);
+        }
+        if follows {
+            Ok(())
+        } else {
+            Err(format!("pictures before it are missing: number {number}, expected {expected}"))
+        }
+    }
+}
+
+/// `first_mb_in_slice` and `frame_num` of a slice header (section 7.3.3).
+fn first_macroblock_and_frame_number(bits: &mut BitReader<'_>, sequence: Sequence) -> Option<(u32, u32)> {
+    let first_macroblock = bits.unsigned()?;
+    let _slice_type = bits.unsigned()?;
+    let _picture_parameter_set = bits.unsigned()?;
+    if sequence.separate_planes {
+        bits.number(2)?;
+    }
+    Some((first_macroblock, bits.number(sequence.bits)?))
+}
+
+/// Reads a sequence parameter set (section 7.3.2.1.1) as far as `frame_num` needs it.
+fn sequence(payload: &[u8]) -> Option<Sequence> {
+    let mut bits = BitReader::new(payload);
+    let profile = bits.number(8)?;
+    let _constraints_and_level = bits.number(16)?;
+    let _id = bits.unsigned()?;
+    let mut separate_planes = false;
+    if HIGH_PROFILES.contains(&profile) {
+        let chroma_format = bits.unsigned()?;
+        if chroma_format == 3 {
+            separate_planes = bits.bit()?;
+        }
+        let _luma_depth = bits.unsigned()?;
+        let _chroma_depth = bits.unsigned()?;
+        let _transform_bypass = bits.bit()?;
+        if bits.bit()? {
+            for list in 0..if chroma_format == 3 { 12 } else { 8 } {
+                if bits.bit()? {
+                    skip_scaling_list(&mut bits, if list < 6 { 16 } else { 64 })?;
+                }
+            }
+        }
+    }
+    let frame_number_bits = bits.unsigned()?.checked_add(4).filter(|bits| *bits <= 16)?;
+    match bits.unsigned()? {
+        0 => {
+            bits.unsigned()?;
+        }
+        1 => {
+            bits.bit()?;
+            bits.signed()?;
+            bits.signed()?;
+            for _ in 0..bits.unsigned()?.min(255) {
+                bits.signed()?;
+            }
+        }
+        _ => {}
+    }
+    let _reference_frames = bits.unsigned()?;
+    Some(Sequence { bits: frame_number_bits, gaps_allowed: bits.bit()?, separate_planes })
+}
+
+/// Skips a scaling list (section 7.3.2.1.1.1).
+fn skip_scaling_list(bits: &mut BitReader<'_>, size: u32) -> Option<()> {
+    let (mut last, mut next) = (8_i64, 8_i64);
+    for _ in 0..size {
+        if next != 0 {
+            next = (last + bits.signed()? + 256).rem_euclid(256);
+        }
+        last = if next == 0 { last } else { next };
+    }
+    Some(())
+}
