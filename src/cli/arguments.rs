@@ -9,6 +9,7 @@ use crate::cli::degeneracy::DegeneracyArguments;
 use crate::cli::evaluate::EvaluateArguments;
 use crate::cli::exit;
 use crate::cli::report::ReportArguments;
+use crate::cli::rig::RigArguments;
 use crate::cli::run::RunArguments;
 #[cfg(feature = "gui")]
 use crate::cli::screenshot::ScreenshotArguments;
@@ -46,6 +47,8 @@ pub(crate) enum Command {
     /// Check a log and its rig: content, timing, calibration, noise, each finding with evidence and remedy.
     #[command(after_help = exit::CHECK)]
     Check(CheckArguments),
+    /// Write a rig for a recording that has none.
+    Rig(RigArguments),
     /// Write a synthetic flight: the log, its rig and the ground truth.
     #[command(after_help = exit::INTERRUPTIBLE)]
     Simulate(SimulateArguments),

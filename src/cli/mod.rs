@@ -14,6 +14,7 @@ mod limit_arguments;
 mod report;
 #[cfg(feature = "gui")]
 mod report_figures;
+mod rig;
 mod run;
 mod run_summary;
 #[cfg(feature = "gui")]
@@ -44,6 +45,7 @@ pub(crate) fn run() -> anyhow::Result<Outcome> {
         Command::Report(arguments) => report::report(&arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
         Command::Check(arguments) => check::check(&arguments),
+        Command::Rig(arguments) => rig::rig(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Degeneracy(arguments) => done(degeneracy::degeneracy(&arguments)),
         Command::Convert(arguments) => convert::convert(&arguments),

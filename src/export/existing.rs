@@ -112,6 +112,19 @@ pub fn check_converted_log(log: &Path, force: bool) -> Result<(), ExportError> {
     Err(ExportError::Existing { problem, path: log.to_owned() })
 }
 
+/// Writes the text of a new rig; an existing file is kept unless `force`.
+///
+/// # Errors
+/// When the file cannot be written or, without `force`, exists.
+pub fn write_new_rig(path: &Path, text: &str, force: bool) -> Result<(), ExportError> {
+    output::check_file(path).map_err(ExportError::write(path))?;
+    if !force && path.exists() {
+        return Err(ExportError::Existing { problem: "the rig exists".to_owned(), path: path.to_owned() });
+    }
+    let staged = output::StagedFile::with_content(path, text.as_bytes()).map_err(ExportError::write(path))?;
+    staged.commit().map_err(ExportError::write(path))
+}
+
 /// What a log of this program is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LogOrigin {

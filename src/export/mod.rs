@@ -30,7 +30,7 @@ pub use error::ExportError;
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 pub use existing::{
     check_calibration_folder, check_converted_log, check_report_folder, check_run_folders, check_screenshot,
-    check_simulated_log, other_runs,
+    check_simulated_log, other_runs, write_new_rig,
 };
 pub use recent_files::RecentFiles;
 pub use report::{ReportDrawing, ReportFigure, ReportOptions, write_report};

@@ -32,6 +32,7 @@ pub use image_reader::ImageReader;
 pub use limits::{LimitExceeded, LimitKind, LimitSetting, LogLimits};
 pub use log::{FlightLog, TopicInfo};
 pub use messages::MessageKind;
+pub use rig::template as rig_template;
 pub use sensor_frame::{LogWarning, SensorFrame};
 pub use stream::FrameStream;
 pub use text::{edit_distance, nearest_name, printable, printable_lines, shortened};

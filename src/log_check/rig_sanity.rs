@@ -3,7 +3,7 @@ use nalgebra::Vector2;
 use super::{Area, CheckReport, Finding, Findings, Severity};
 use crate::camera::{CameraModel, Projection};
 use crate::flight_log::FlightLog;
-use crate::sensors::{CameraRig, ChainPrior, GimbalRig, Rig};
+use crate::sensors::{AssumedField, CameraRig, ChainPrior, GimbalRig, Rig};
 
 /// A camera further from the IMU than this is unusual on a drone.
 const MAX_LEVER_M: f64 = 1.0;
@@ -42,6 +42,46 @@ pub(super) fn check_rig(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     }
     if let Some(gimbal) = &rig.gimbal {
         check_chain(gimbal, findings);
+    }
+    check_assumed(rig, findings);
+}
+
+/// One finding for each field that nobody has measured yet, with how to measure it.
+fn check_assumed(rig: &Rig, findings: &mut Findings) {
+    for AssumedField { field, reason } in &rig.assumed {
+        let (area, how) = how_to_measure(field);
+        let remedy = format!("{how}; then remove assumed.{field} from the rig");
+        findings.add(Severity::Warning, area, format!("{field} is only assumed"), reason.clone(), remedy);
+    }
+}
+
+/// Subject of a field of the rig, and how to get its value.
+fn how_to_measure(field: &str) -> (Area, &'static str) {
+    let (part, name) = field.split_once('.').unwrap_or((field, ""));
+    match (part, name) {
+        ("imu0", "rostopic" | "accelerometer_rostopic") | ("gimbal", "rostopic") => {
+            (Area::Log, "name the topic of the log")
+        }
+        ("imu0", _) => {
+            (Area::Imu, "record the IMU lying still for some minutes, or take twice the value that check measures")
+        }
+        ("gravity", _) => (Area::Imu, "set gravity for the place of the flight"),
+        ("gimbal", "source") => {
+            (Area::Encoders, "confirm frame, axes, order and unit of the attitude in the gimbal's documentation")
+        }
+        ("gimbal", "encoder_sigma") => (Area::Encoders, "take the noise of the joint angles that check measures"),
+        ("gimbal", name) if name.starts_with("links") => (
+            Area::Extrinsics,
+            "confirm order and signs of the axes by moving each joint by hand, measure the distances between the axes with a \
+             ruler, and refine with dcvins calibrate or a run",
+        ),
+        ("gimbal", _) => (Area::Extrinsics, "measure it with a ruler, and refine with dcvins calibrate or a run"),
+        ("ground_truth", _) => (Area::Log, "confirm that the topic is measured from outside and is the IMU's pose"),
+        (_, "rostopic") => (Area::Log, "name the topic of the log"),
+        (_, "timeshift_cam_imu") => (Area::Time, "take the time offset that check measures, or run with timeshift=on"),
+        (_, "T_cam_imu") => (Area::Extrinsics, "calibrate camera and IMU, as with Kalibr"),
+        (_, "update_rate") => (Area::Time, "take the rate in the log"),
+        _ => (Area::Intrinsics, "calibrate the camera with a target, as with Kalibr or OpenCV"),
     }
 }
 

@@ -11,4 +11,4 @@ pub use gray_image::GrayImage;
 pub use imu::{ImuNoise, ImuSample};
 pub use joints::{JointAngles, JointSample};
 pub use pose::PoseSample;
-pub use rig::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, Joint, Rig, UnknownCamera};
+pub use rig::{AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, Joint, Rig, UnknownCamera};

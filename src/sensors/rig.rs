@@ -118,6 +118,15 @@ pub struct GimbalRig {
     pub joints: Vec<Joint>,
 }
 
+/// A field of the rig whose value is only assumed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AssumedField {
+    /// Its path in the rig file, as in `gimbal.T_I_B`.
+    pub field: String,
+    /// What is assumed, as one sentence without a full stop.
+    pub reason: String,
+}
+
 /// A whole rig.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
@@ -133,6 +142,8 @@ pub struct Rig {
     pub gimbal: Option<GimbalRig>,
     /// Topic of the true pose of the IMU in the world.
     pub ground_truth_topic: Option<String>,
+    /// Fields that nobody has measured yet.
+    pub assumed: Vec<AssumedField>,
 }
 
 impl Rig {

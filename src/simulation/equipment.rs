@@ -102,6 +102,7 @@ impl Equipment {
             cameras,
             gimbal,
             ground_truth_topic: Some("/ground_truth/odometry".to_owned()),
+            assumed: Vec::new(),
         }
     }
 }

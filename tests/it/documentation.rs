@@ -145,15 +145,14 @@ fn the_readme_is_short() {
 }
 
 /// What `dcvins COMMAND --help` prints; without a command, the list of the commands.
-fn help(command: Option<&str>) -> String {
+fn help(command: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_dcvins")).args(command).arg("--help").output();
     String::from_utf8(output.expect("the program runs").stdout).expect("help is text")
 }
 
-/// The names of the commands that the program offers.
-fn commands() -> Vec<String> {
-    let text = help(None);
-    let listed = text.split("Commands:").nth(1).expect("the help lists the commands").lines().skip(1);
+/// The names of the commands that a help lists.
+fn commands(text: &str) -> Vec<String> {
+    let listed = text.split("Commands:").nth(1).unwrap_or_default().lines().skip(1);
     let names = listed.take_while(|line| !line.trim().is_empty()).filter_map(|line| line.split_whitespace().next());
     names.filter(|name| *name != "help").map(str::to_owned).collect()
 }
@@ -176,11 +175,17 @@ fn commands_and_options_are_those_of_the_program() {
     let readme = fs::read_to_string(root().join("README.md")).unwrap();
     let common = ["--help", "--version"].map(str::to_owned);
     let mut known = BTreeSet::from(common.clone());
-    for command in commands() {
+    let listed = commands(&help(&[]));
+    assert!(listed.len() > 5, "the help lists the commands: {listed:?}");
+    for command in listed {
         assert!(documented.contains(&format!("\n## {command}\n")), "docs/commands.md has no section '{command}'");
         assert!(readme.contains(&format!("`dcvins {command}")), "README.md does not list '{command}'");
         assert!(manual_page.contains(&format!("\n.B {command}\n")), "the manual page does not list '{command}'");
-        let offered = options(&help(Some(&command)));
+        let text = help(&[&command]);
+        let mut offered = options(&text);
+        for inner in commands(&text) {
+            offered.extend(options(&help(&[&command, &inner])));
+        }
         let lacks = |option: &&String| !documented.contains(*option) && !common.contains(option);
         let missing: Vec<&String> = offered.iter().filter(lacks).collect();
         assert!(missing.is_empty(), "docs/commands.md lacks options of {command}: {missing:?}");

@@ -16,6 +16,7 @@ mod pictures;
 mod renderers;
 mod report;
 mod results;
+mod rig_template;
 mod sample_log;
 #[cfg(feature = "gui")]
 mod screenshots;

@@ -146,6 +146,7 @@ pub(super) fn rig_of(
         cameras: described,
         gimbal: None,
         ground_truth_topic,
+        assumed: Vec::new(),
     }))
 }
 

@@ -39,6 +39,20 @@ impl<'a> Field<'a> {
         Self { path, value, parent: self.value, file: self.file }
     }
 
+    /// Whether this mapping has a field, null or not, by its path (`gimbal.links[0].alpha`).
+    pub(super) fn has_path(&self, path: &str) -> bool {
+        let mut value = self.value;
+        for step in path.split('.') {
+            let (key, indices) = step.split_once('[').unwrap_or((step, ""));
+            value = value.and_then(|value| value.get(key));
+            for index in indices.split('[').filter(|index| !index.is_empty()) {
+                let index = index.strip_suffix(']').and_then(|index| index.parse::<usize>().ok());
+                value = value.and_then(|value| value.get(index?));
+            }
+        }
+        value.is_some()
+    }
+
     /// Whether it is there and not null.
     pub(super) fn is_present(&self) -> bool {
         self.value.is_some()

@@ -52,5 +52,6 @@ pub(super) fn read_camera_chain(
         cameras,
         gimbal: None,
         ground_truth_topic: None,
+        assumed: Vec::new(),
     })
 }

@@ -16,7 +16,7 @@ struct Keys {
 }
 
 const ROOT: Keys = Keys {
-    read: &["rig_version", "name", "gravity", "imu0", "cam0", "gimbal", "ground_truth"],
+    read: &["rig_version", "name", "gravity", "imu0", "cam0", "gimbal", "ground_truth", "assumed"],
     // Written by `dcvins calibrate` and `dcvins simulate` at the end of a rig.
     unused: APPENDICES,
 };

@@ -7,6 +7,7 @@ mod kalibr;
 mod keys;
 mod read;
 mod save;
+pub mod template;
 #[cfg(test)]
 mod tests;
 mod write;

@@ -1,8 +1,9 @@
 use super::super::LogError;
+use super::super::text::shortened;
 use super::fields::Field;
 use crate::camera::{CameraError, CameraModel};
 use crate::gimbal::{ClassicalChain, DhLink};
-use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, Rig};
+use crate::sensors::{AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, Rig};
 
 /// The version of the schema that is read and written.
 const RIG_VERSION: u64 = 1;
@@ -10,6 +11,8 @@ const RIG_VERSION: u64 = 1;
 const MAX_LINKS: usize = 16;
 /// Most cameras of a rig.
 const MAX_CAMERAS: usize = 16;
+/// Most fields of a rig that are only assumed.
+const MAX_ASSUMED: usize = 256;
 /// Gravity for Kalibr's files, which do not contain it, in m/s².
 pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.81;
 
@@ -66,7 +69,30 @@ pub(super) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraF
     let ground_truth = root.field("ground_truth").optional();
     let ground_truth_topic = ground_truth.and_then(|ground_truth| ground_truth.field("rostopic").optional());
     let ground_truth_topic = ground_truth_topic.map(|topic| topic.text("a topic").map(str::to_owned)).transpose()?;
-    Ok(Rig { name, gravity_m_per_s2, imu, cameras, gimbal, ground_truth_topic })
+    let assumed = read_assumed(root)?;
+    Ok(Rig { name, gravity_m_per_s2, imu, cameras, gimbal, ground_truth_topic, assumed })
+}
+
+/// The fields that are only assumed, each of which must be there.
+fn read_assumed(root: &Field<'_>) -> Result<Vec<AssumedField>, LogError> {
+    const EXPECTED: &str = "a mapping of fields of the rig, such as cam0.intrinsics, to what is assumed";
+    let Some(assumed) = root.field("assumed").optional() else { return Ok(Vec::new()) };
+    let paths = assumed.keys(EXPECTED)?;
+    if paths.len() > MAX_ASSUMED {
+        return Err(assumed.error(format!("{} entries, expected at most {MAX_ASSUMED}", paths.len())));
+    }
+    let entry = |path: &str| {
+        let reason = assumed.field(path).text("a sentence that says what is assumed")?.to_owned();
+        if !root.has_path(path) {
+            let problem = format!(
+                "the rig has no field '{}'; remove the entry, or name a field as in cam0.intrinsics",
+                shortened(path, 60)
+            );
+            return Err(assumed.error(problem));
+        }
+        Ok(AssumedField { field: path.to_owned(), reason })
+    };
+    paths.into_iter().map(entry).collect()
 }
 
 /// `cam0`, `cam1`, … in the order of their numbers.

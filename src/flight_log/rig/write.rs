@@ -1,7 +1,7 @@
 use std::fmt::Write as _;
 
 use crate::geometry::RigidTransform;
-use crate::sensors::{CameraMount, CameraRig, GimbalRig, Rig};
+use crate::sensors::{AssumedField, CameraMount, CameraRig, GimbalRig, Rig};
 
 impl Rig {
     /// The rig as a YAML file, its chain in the classical parameterization. Numbers are written so that they read back
@@ -31,6 +31,12 @@ impl Rig {
         if let Some(topic) = &self.ground_truth_topic {
             line(&mut out, 0, "ground_truth", "");
             line(&mut out, 1, "rostopic", &text(topic));
+        }
+        if !self.assumed.is_empty() {
+            line(&mut out, 0, "assumed", "");
+        }
+        for AssumedField { field, reason } in &self.assumed {
+            line(&mut out, 1, &text(field), &text(reason));
         }
         out
     }

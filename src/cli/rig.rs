@@ -1,0 +1,165 @@
+//! `dcvins rig`: rigs for recordings without one.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::{Args, Subcommand};
+use dcvins::export;
+use dcvins::flight_log::FlightLog;
+use dcvins::flight_log::rig_template::{
+    CameraChoice, MechanismAxes, PublishedCamera, RigChoices, RigTemplate, VehicleAxes,
+};
+
+use crate::cli::exit::{self, Outcome};
+use crate::cli::limit_arguments::LimitArguments;
+use crate::cli::terminal::print;
+use crate::cli::value_parsers::sides;
+
+/// `dcvins rig`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct RigArguments {
+    /// What to do with a rig.
+    #[command(subcommand)]
+    pub command: RigCommand,
+}
+
+/// The sub-commands of `dcvins rig`.
+#[derive(Clone, Debug, Subcommand)]
+pub(crate) enum RigCommand {
+    /// Write a commented rig for a recording without one, and say what is only assumed in it.
+    #[command(after_help = exit::PLAIN)]
+    New(Box<NewArguments>),
+}
+
+/// `dcvins rig new`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct NewArguments {
+    /// The log: its topics, joint names, rates, image size and the direction of gravity are taken from it.
+    pub log: Option<PathBuf>,
+    /// Axes of the gimbal from the vehicle to the camera, as in yaw-roll-pitch, yaw-pitch or pitch; rigid for a camera without
+    /// a gimbal.
+    #[arg(long, value_name = "AXES", value_parser = parsed::<MechanismAxes>, required_unless_present = "list")]
+    pub mechanism: Option<MechanismAxes>,
+    /// The camera: fov:DEG (horizontal field of view), a name whose maker publishes it (--list prints all), or info[:TOPIC] for
+    /// the log's `CameraInfo`.
+    #[arg(long, value_name = "CAMERA", value_parser = parsed::<CameraChoice>, required_unless_present = "list")]
+    pub camera: Option<CameraChoice>,
+    /// The rig to write [default: the name of the log with .rig.yaml].
+    #[arg(short, long, visible_alias = "out", value_name = "FILE", required_unless_present_any = ["log", "list"])]
+    pub output: Option<PathBuf>,
+    /// Size of the images, when it cannot be read from the log.
+    #[arg(long, value_name = "WxH", value_parser = image_size)]
+    pub size: Option<[usize; 2]>,
+    /// Position of the gimbal, or of a rigid camera: metres forward, left and up of the IMU. A ruler is good enough.
+    #[arg(long, value_name = "X,Y,Z", value_parser = position, allow_hyphen_values = true)]
+    pub at: Option<[f64; 3]>,
+    /// Which joint angles are positive: frd (yaw to the right, pitch up, as of autopilots and DJI) or flu (yaw to the left, pitch
+    /// down, as in ROS) [default: frd].
+    #[arg(long, value_name = "frd|flu", value_parser = parsed::<VehicleAxes>)]
+    pub positive: Option<VehicleAxes>,
+    /// Axes of the IMU: flu or frd [default: from gravity in the log].
+    #[arg(long, value_name = "frd|flu", value_parser = parsed::<VehicleAxes>)]
+    pub imu_axes: Option<VehicleAxes>,
+    /// Topic of the IMU, where the log has several.
+    #[arg(long, value_name = "TOPIC")]
+    pub imu_topic: Option<String>,
+    /// Topic of the images, where the log has several.
+    #[arg(long, value_name = "TOPIC")]
+    pub image_topic: Option<String>,
+    /// Topic of the joint angles, where the log has several.
+    #[arg(long, value_name = "TOPIC", conflicts_with = "attitude")]
+    pub joint_topic: Option<String>,
+    /// Names of the joints in the order of the mechanism, where they do not contain yaw, roll or pitch.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
+    pub joints: Vec<String>,
+    /// Attitude topic from which the joint angles follow, with entries of gimbal.source, as in
+    /// /gimbal/attitude,type=euler,frame=earth,unit=deg.
+    #[arg(long, value_name = "TOPIC[,KEY=VALUE…]", value_parser = attitude)]
+    pub attitude: Option<Attitude>,
+    /// Overwrite an existing file.
+    #[arg(long)]
+    pub force: bool,
+    /// Print the names of the cameras.
+    #[arg(long)]
+    pub list: bool,
+    /// Limits on the log.
+    #[command(flatten)]
+    pub limits: LimitArguments,
+}
+
+/// Value of `--attitude`.
+#[derive(Clone, Debug)]
+pub(crate) struct Attitude {
+    topic: String,
+    entries: Vec<(String, String)>,
+}
+
+fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|error: T::Err| error.to_string())
+}
+
+fn image_size(text: &str) -> Result<[usize; 2], String> {
+    sides(text, 16..=65_535).ok_or_else(|| "expected WIDTHxHEIGHT in pixels, as in 1920x1080".to_owned())
+}
+
+fn position(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|number| number.trim().parse().ok().filter(|value: &f64| value.abs() < 100.0)).collect();
+    let numbers = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
+    numbers.ok_or_else(|| "expected metres forward, left and up, as in 0.1,0,-0.05".to_owned())
+}
+
+fn attitude(text: &str) -> Result<Attitude, String> {
+    const KEYS: [&str; 6] = ["type", "frame", "axes", "order", "unit", "vehicle"];
+    let mut parts = text.split(',');
+    let topic = parts.next().unwrap_or_default().to_owned();
+    let entry = |part: &str| {
+        let (key, value) = part.split_once('=')?;
+        let plain =
+            !value.is_empty() && value.chars().all(|letter| letter.is_ascii_alphanumeric() || "/_-".contains(letter));
+        (plain && KEYS.contains(&key)).then(|| (key.to_owned(), value.to_owned()))
+    };
+    let entries: Option<Vec<_>> = parts.map(entry).collect();
+    let entries = entries.filter(|_| !topic.is_empty());
+    entries
+        .map(|entries| Attitude { topic, entries })
+        .ok_or_else(|| format!("expected a topic and entries {}=VALUE between commas", KEYS.join("=VALUE, ")))
+}
+
+/// Runs `dcvins rig`.
+pub(crate) fn rig(arguments: &RigArguments) -> Result<Outcome> {
+    let RigCommand::New(arguments) = &arguments.command;
+    if arguments.list {
+        let names: Vec<&str> = PublishedCamera::ALL.iter().map(|camera| camera.name()).collect();
+        return print(&format!("{}\n", names.join("\n"))).map(|()| Outcome::Success);
+    }
+    let (Some(mechanism), Some(camera)) = (&arguments.mechanism, &arguments.camera) else {
+        bail!("--mechanism and --camera are missing");
+    };
+    let log = arguments.log.as_ref().map(|log| FlightLog::open_with(log, &arguments.limits.limits())).transpose()?;
+    let beside = arguments.log.as_ref().map(|log| log.with_extension("rig.yaml"));
+    let Some(output) = arguments.output.clone().or(beside) else { bail!("-o FILE is missing") };
+    let stem = output.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let choices = RigChoices {
+        name: stem.split('.').next().unwrap_or_default().to_owned(),
+        camera: camera.clone(),
+        resolution_px: arguments.size,
+        mechanism: mechanism.clone(),
+        positive: arguments.positive,
+        imu_axes: arguments.imu_axes,
+        position_m: arguments.at.map(Into::into),
+        imu_topic: arguments.imu_topic.clone(),
+        image_topic: arguments.image_topic.clone(),
+        joint_topic: arguments.joint_topic.clone(),
+        joint_names: arguments.joints.clone(),
+        attitude: arguments.attitude.clone().map(|attitude| (attitude.topic, attitude.entries)),
+        noise: None,
+    };
+    let template = RigTemplate::new(&choices, log.as_ref())?;
+    export::write_new_rig(&output, &template.to_yaml(), arguments.force)?;
+    let fields = template.assumed_fields();
+    let assumed: Vec<String> =
+        fields.iter().map(|assumed| format!("  {:<34}{}\n", assumed.field, assumed.reason)).collect();
+    print(&format!("{}\nassumed, to be measured or confirmed:\n{}", output.display(), assumed.concat()))?;
+    Ok(Outcome::Success)
+}

@@ -1,0 +1,92 @@
+//! The text of a template: the rig as it is written anywhere else, with comments.
+
+use std::fmt::Write as _;
+
+use super::{AngleTemplate, AttitudeTemplate, RigTemplate};
+
+/// Numbers of a rotation matrix that differ less from a whole one by rounding.
+const ROUNDING: f64 = 1e-9;
+
+impl RigTemplate {
+    /// The rig as YAML with comments.
+    pub fn to_yaml(&self) -> String {
+        let rig = self.rig();
+        let mut out = String::from(HEADER);
+        let mut path: Vec<(usize, String)> = Vec::new();
+        for line in rig.to_yaml().lines() {
+            let content = line.trim_start_matches([' ', '-']);
+            let indentation = line.len() - content.len();
+            if let Some((key, _)) = content.split_once(':') {
+                path.retain(|(depth, _)| *depth < indentation);
+                path.push((indentation, key.to_owned()));
+                let full = path.iter().map(|(_, key)| key.as_str()).collect::<Vec<_>>().join(".");
+                for comment in self.comments(&full) {
+                    // Writing to a string cannot fail.
+                    let _infallible = writeln!(out, "{:indentation$}# {comment}", "");
+                }
+                if full == "gimbal.encoder_sigma"
+                    && let Some(AngleTemplate::Attitude(attitude)) = self.gimbal.as_ref().map(|gimbal| &gimbal.angles)
+                {
+                    out.push_str(&source_line(attitude));
+                }
+            }
+            out.push_str(&with_whole_numbers(line));
+            out.push('\n');
+        }
+        out
+    }
+
+    /// The comments above a field.
+    fn comments(&self, path: &str) -> Vec<String> {
+        let text = match path {
+            "gravity" => "m/s²; 9.78 at the equator to 9.83 at the poles.",
+            "imu0.accelerometer_noise_density" => {
+                "m/s²/√Hz, m/s³/√Hz, rad/s/√Hz, rad/s²/√Hz; larger than in the data sheet, since airframes vibrate."
+            }
+            "cam0.intrinsics" => "fx fy cx cy in pixels; a calibration with a target also gives the distortion.",
+            "cam0.timeshift_cam_imu" => "Seconds: t_imu = t_cam + shift. `dcvins check` measures it.",
+            "cam0.T_cam_imu" => "Kalibr's direction: maps points from the IMU to the camera.",
+            "gimbal.rostopic" if self.has_attitude() => "No joint angles: they follow from the attitude below.",
+            "gimbal.rostopic" => "Joint angles (sensor_msgs/msg/JointState), null when there are none.",
+            "gimbal.encoder_sigma" => "Standard deviation of a joint angle in rad; `dcvins check` measures it.",
+            "gimbal.prior" => "How wrong T_I_B, links and T_E_C may be: bounds in m and rad.",
+            "gimbal.T_I_B" => "Pose of the first joint in the IMU frame; its z is the first axis.",
+            "gimbal.links" => {
+                "Joints from the vehicle to the camera: Rz(angle + theta_offset) Tz(d) Tx(a) Rx(alpha), limits in rad."
+            }
+            "gimbal.T_E_C" => "Pose of the camera (x right, y down, z forward) behind the last link.",
+            "assumed" => {
+                "What nobody has measured yet. `dcvins check` asks for each; remove an entry once it is known."
+            }
+            _ => return Vec::new(),
+        };
+        vec![text.to_owned()]
+    }
+
+    fn has_attitude(&self) -> bool {
+        matches!(self.gimbal.as_ref().map(|gimbal| &gimbal.angles), Some(AngleTemplate::Attitude(_)))
+    }
+}
+
+const HEADER: &str =
+    "# A rig before calibration. Usual values stand where nothing is known: see `assumed` at the end.\n";
+
+/// `gimbal.source` in one line.
+fn source_line(attitude: &AttitudeTemplate) -> String {
+    let quoted = |text: &str| serde_json::Value::from(text).to_string();
+    let entries = attitude.entries.iter().map(|(key, value)| format!(", {key}: {value}"));
+    format!("  source: {{topic: {}{}}}\n", quoted(&attitude.topic), entries.collect::<String>())
+}
+
+/// A row of a matrix whose numbers are whole but for rounding, as it is read best; any other line as it is.
+fn with_whole_numbers(line: &str) -> String {
+    let Some((head, row)) = line.split_once("- [") else { return line.to_owned() };
+    let Some(row) = row.strip_suffix(']') else { return line.to_owned() };
+    let number = |text: &str| match text.parse::<f64>() {
+        // Adding zero removes the sign of a negative one.
+        Ok(value) if (value - value.round()).abs() < ROUNDING => format!("{:?}", value.round() + 0.0),
+        _ => text.to_owned(),
+    };
+    let numbers: Vec<String> = row.split(", ").map(number).collect();
+    format!("{head}- [{}]", numbers.join(", "))
+}

@@ -1,0 +1,330 @@
+//! A template for a log: its topics, rates, image size and the direction of gravity in its IMU.
+
+use nalgebra::Vector3;
+
+use super::super::read::CameraFacts as _;
+use super::camera::{of_field_of_view, of_published};
+use super::{
+    AngleTemplate, AttitudeTemplate, CameraChoice, CameraTemplate, GimbalAxis, GimbalTemplate, ImuTemplate,
+    MechanismAxes, RigTemplate, Sourced, TYPICAL_IMU_NOISE, TemplateError, VehicleAxes,
+};
+use crate::camera::CameraModel;
+use crate::flight_log::image_decoding::{BitDepth, decode_image};
+use crate::flight_log::messages::{self, MessageKind};
+use crate::flight_log::{FlightLog, TopicInfo};
+use crate::sensors::ImuNoise;
+
+/// Messages of the IMU over which gravity is averaged.
+const GRAVITY_SAMPLES: usize = 2000;
+/// Gravity along an axis, as a ratio of the mean specific force, from which on the axis is taken for the vertical.
+const VERTICAL_RATIO: f64 = 0.8;
+/// Words in the names of topics with poses that were measured from outside.
+const GROUND_TRUTH_WORDS: [&str; 6] = ["truth", "vicon", "optitrack", "mocap", "leica", "qualisys"];
+/// Rates of templates without a log, in Hz.
+const IMU_RATE_HZ: f64 = 200.0;
+const IMAGE_RATE_HZ: f64 = 30.0;
+
+/// What is known beside the log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigChoices {
+    /// Name of the rig.
+    pub name: String,
+    /// The camera.
+    pub camera: CameraChoice,
+    /// Size of the images, when it is not to be read from the log.
+    pub resolution_px: Option<[usize; 2]>,
+    /// The mechanism.
+    pub mechanism: MechanismAxes,
+    /// Which rotations are positive; `None` when nobody knows.
+    pub positive: Option<VehicleAxes>,
+    /// Axes of the IMU; `None` to take them from gravity.
+    pub imu_axes: Option<VehicleAxes>,
+    /// Position of the gimbal: forward, left and up of the IMU, in metres; `None` when nobody has measured it.
+    pub position_m: Option<Vector3<f64>>,
+    /// Topic of the IMU, `None` for the log's only one.
+    pub imu_topic: Option<String>,
+    /// Topic of the images, `None` for the log's only one.
+    pub image_topic: Option<String>,
+    /// Topic of the joint angles, `None` for the log's only one.
+    pub joint_topic: Option<String>,
+    /// Joint names in the order of the mechanism, empty to match them by their words.
+    pub joint_names: Vec<String>,
+    /// Attitude topic of the gimbal with the entries of `gimbal.source`, when its angles are to follow from it.
+    pub attitude: Option<(String, Vec<(String, String)>)>,
+    /// Noise densities that were measured.
+    pub noise: Option<ImuNoise>,
+}
+
+impl RigTemplate {
+    /// The template for these choices and what the log, if there is one, says of the rest.
+    ///
+    /// # Errors
+    /// When the log has no images or no IMU, or several of them of which none is chosen, or when the size of the images is
+    /// not known.
+    pub fn new(choices: &RigChoices, log: Option<&FlightLog>) -> Result<Self, TemplateError> {
+        let imu = imu(choices, log)?;
+        let camera = camera(choices, log)?;
+        let gimbal = if choices.mechanism.0.is_empty() { None } else { Some(gimbal(choices, log)?) };
+        let nothing_known =
+            "nobody has measured where the gimbal is; it is taken to be at the IMU, give or take 3 cm per link";
+        let position_m = choices.position_m.map_or_else(
+            || Sourced::assumed(Vector3::zeros(), nothing_known),
+            |position_m| Sourced::assumed(position_m, "position measured by hand"),
+        );
+        Ok(Self {
+            name: choices.name.clone(),
+            imu,
+            camera,
+            gimbal,
+            position_m,
+            ground_truth_topic: log.and_then(ground_truth_topic),
+        })
+    }
+}
+
+/// A rate as it is written: to a tenth of a percent.
+fn rounded_hz(rate_hz: f64, default_hz: f64) -> f64 {
+    if rate_hz <= 0.0 {
+        return default_hz;
+    }
+    let unit = 10_f64.powf(rate_hz.log10().floor() - 3.0);
+    ((rate_hz / unit).round() * unit * 1e6).round() / 1e6
+}
+
+fn topics_of<'a>(log: &'a FlightLog, kinds: &[MessageKind]) -> Vec<&'a TopicInfo> {
+    log.topics().iter().filter(|info| info.kind.is_some_and(|kind| kinds.contains(&kind))).collect()
+}
+
+/// The chosen topic, or the only one of these kinds, or the only one whose name contains `preferred`; `None` without any.
+fn one_topic<'a>(
+    log: &'a FlightLog,
+    kinds: &[MessageKind],
+    chosen: Option<&String>,
+    preferred: &str,
+    (what, option): (&str, &'static str),
+) -> Result<Option<&'a TopicInfo>, TemplateError> {
+    let topics = topics_of(log, kinds);
+    let available = || topics.iter().map(|info| info.topic.clone()).collect::<Vec<_>>();
+    if let Some(chosen) = chosen {
+        let found = topics.iter().find(|info| info.topic == *chosen).copied();
+        return found.map(Some).ok_or_else(|| TemplateError::NoTopic {
+            what: format!("{what} '{chosen}'"),
+            remedy: format!("it has {}", if topics.is_empty() { "none".to_owned() } else { available().join(", ") }),
+        });
+    }
+    let of_name: Vec<_> =
+        topics.iter().copied().filter(|info| info.topic.to_ascii_lowercase().contains(preferred)).collect();
+    match (topics.as_slice(), of_name.as_slice()) {
+        ([], _) => Ok(None),
+        ([only], _) | (_, [only]) => Ok(Some(only)),
+        _ => Err(TemplateError::SeveralTopics { what: what.to_owned(), option, available: available() }),
+    }
+}
+
+fn imu(choices: &RigChoices, log: Option<&FlightLog>) -> Result<ImuTemplate, TemplateError> {
+    let typical =
+        "usual noise of an autopilot's MEMS IMU in flight, with its random walk; nobody has measured this one";
+    let noise = choices.noise.map_or_else(|| Sourced::assumed(TYPICAL_IMU_NOISE, typical), Sourced::known);
+    let Some(log) = log else {
+        let topic = choices.imu_topic.clone();
+        return Ok(ImuTemplate {
+            topic: topic.map_or_else(|| Sourced::assumed("/imu".to_owned(), NO_LOG), Sourced::known),
+            accelerometer_topic: None,
+            rate_hz: IMU_RATE_HZ,
+            axes: imu_axes(choices, None),
+            noise,
+        });
+    };
+    let topics = topics_of(log, &[MessageKind::Imu]);
+    // As of RealSense: angular velocities and specific forces on a topic each.
+    let named = |word: &str| topics.iter().find(|info| info.topic.to_ascii_lowercase().contains(word));
+    let apart = match (choices.imu_topic.as_ref(), named("gyro"), named("accel")) {
+        (None, Some(gyroscope), Some(accelerometer)) if topics.len() == 2 => Some((*gyroscope, *accelerometer)),
+        _ => None,
+    };
+    let (info, accelerometer) = if let Some((gyroscope, accelerometer)) = apart {
+        (gyroscope, Some(accelerometer))
+    } else {
+        let what = ("IMU topics", "--imu-topic");
+        let info = one_topic(log, &[MessageKind::Imu], choices.imu_topic.as_ref(), "/imu/data", what)?;
+        let missing = || TemplateError::NoTopic {
+            what: "IMU topic".to_owned(),
+            remedy: "record sensor_msgs/msg/Imu, or convert the autopilot's log".to_owned(),
+        };
+        (info.ok_or_else(missing)?, None)
+    };
+    let force = mean_force(log, &accelerometer.unwrap_or(info).topic);
+    Ok(ImuTemplate {
+        topic: Sourced::known(info.topic.clone()),
+        accelerometer_topic: accelerometer.map(|info| info.topic.clone()),
+        rate_hz: rounded_hz(info.rate_hz, IMU_RATE_HZ),
+        axes: imu_axes(choices, force),
+        noise,
+    })
+}
+
+/// Mean of the first specific forces.
+fn mean_force(log: &FlightLog, topic: &str) -> Option<Vector3<f64>> {
+    let (mut sum, mut count) = (Vector3::zeros(), 0);
+    log.for_each_message(topic, |_, data| {
+        let force = messages::read_imu(data).map(|imu| imu.specific_force_m_per_s2);
+        if let Ok(force) = force
+            && force.iter().all(|value| value.is_finite())
+        {
+            sum += force;
+            count += 1;
+        }
+        count < GRAVITY_SAMPLES
+    });
+    (count > 0).then(|| sum / count as f64)
+}
+
+fn imu_axes(choices: &RigChoices, force: Option<Vector3<f64>>) -> Sourced<VehicleAxes> {
+    if let Some(axes) = choices.imu_axes {
+        return Sourced::known(axes);
+    }
+    let (flu, frd) = (VehicleAxes::ForwardLeftUp, VehicleAxes::ForwardRightDown);
+    let vertical = force.map(|force| force.z / force.norm().max(f64::MIN_POSITIVE));
+    match vertical {
+        Some(ratio) if ratio.abs() > VERTICAL_RATIO => {
+            let (axes, word) = if ratio > 0.0 { (flu, "up") } else { (frd, "down") };
+            let reason = format!("gravity shows that the IMU's z points {word}; its x is taken to point forward");
+            Sourced::assumed(axes, reason)
+        }
+        Some(_) => Sourced::assumed(flu, "gravity is not along the IMU's z; it is taken for x forward, y left, z up"),
+        None => Sourced::assumed(flu, "the IMU is taken for x forward, y left, z up"),
+    }
+}
+
+const NO_LOG: &str = "a usual name; there was no log to take it from";
+
+fn camera(choices: &RigChoices, log: Option<&FlightLog>) -> Result<CameraTemplate, TemplateError> {
+    let timeshift_cam_imu_s = Sourced::assumed(0.0, "the time offset between camera and IMU is taken to be zero");
+    let Some(log) = log else {
+        let topic = choices.image_topic.clone();
+        return Ok(CameraTemplate {
+            topic: topic.map_or_else(|| Sourced::assumed("/camera/image_raw".to_owned(), NO_LOG), Sourced::known),
+            frame_id: "camera".to_owned(),
+            rate_hz: IMAGE_RATE_HZ,
+            model: camera_model(choices, None)?,
+            timeshift_cam_imu_s,
+        });
+    };
+    let what = ("image topics", "--image-topic");
+    let info = one_topic(log, &MessageKind::IMAGES, choices.image_topic.as_ref(), "gimbal", what)?;
+    let info = info.ok_or_else(|| TemplateError::NoTopic {
+        what: "images".to_owned(),
+        remedy: "record sensor_msgs/msg/Image, CompressedImage or foxglove_msgs/msg/CompressedVideo".to_owned(),
+    })?;
+    Ok(CameraTemplate {
+        topic: Sourced::known(info.topic.clone()),
+        frame_id: "camera".to_owned(),
+        rate_hz: rounded_hz(info.rate_hz, IMAGE_RATE_HZ),
+        model: camera_model(choices, Some((log, info)))?,
+        timeshift_cam_imu_s,
+    })
+}
+
+fn camera_model(
+    choices: &RigChoices,
+    images: Option<(&FlightLog, &TopicInfo)>,
+) -> Result<Sourced<CameraModel>, TemplateError> {
+    let size = || match (choices.resolution_px, images) {
+        (Some(resolution_px), _) => Ok(resolution_px),
+        (None, Some((log, info))) => image_size(log, info)
+            .ok_or_else(|| TemplateError::NoSize { reason: format!("no image of {} can be decoded", info.topic) }),
+        (None, None) => Err(TemplateError::NoSize { reason: "there is no log".to_owned() }),
+    };
+    let (model, reason) = match &choices.camera {
+        CameraChoice::FieldOfView(horizontal_deg) => of_field_of_view(*horizontal_deg, size()?),
+        CameraChoice::Published(camera) => of_published(*camera, size()?),
+        CameraChoice::CameraInfo(topic) => {
+            let missing = |reason: String| TemplateError::NoCameraInfo { reason };
+            let (log, info) = images.ok_or_else(|| missing("there is no log".to_owned()))?;
+            // A topic that is named is the one beside images of that folder.
+            let beside = topic.as_ref().map_or(info.topic.as_str(), String::as_str);
+            return log.camera_model(beside).map(Sourced::known).map_err(missing);
+        }
+    };
+    Ok(Sourced::assumed(model, reason))
+}
+
+/// Size of the first image that can be decoded.
+fn image_size(log: &FlightLog, info: &TopicInfo) -> Option<[usize; 2]> {
+    let kind = info.kind?;
+    let limits = log.file().limits();
+    let decoded = |data: &[u8]| decode_image(kind, data, BitDepth::default(), limits, None).ok();
+    log.find_message(&info.topic, |data| decoded(data).map(|image| [image.width, image.height]))
+}
+
+fn gimbal(choices: &RigChoices, log: Option<&FlightLog>) -> Result<GimbalTemplate, TemplateError> {
+    let angles = match (&choices.attitude, log) {
+        (Some((topic, entries)), log) => {
+            let info = log.map(|log| {
+                log.topic(topic).ok_or_else(|| TemplateError::NoTopic {
+                    what: format!("topic '{topic}'"),
+                    remedy: "give the topic of the gimbal's attitude".to_owned(),
+                })
+            });
+            let rate_hz = info.transpose()?.map_or(IMAGE_RATE_HZ, |info| rounded_hz(info.rate_hz, IMAGE_RATE_HZ));
+            let assumed = "frame, axes, order and unit of the attitude are as the command line says, or usual";
+            let (topic, entries) = (topic.clone(), entries.clone());
+            AngleTemplate::Attitude(AttitudeTemplate { topic, rate_hz, entries, assumed: Some(assumed.to_owned()) })
+        }
+        (None, Some(log)) => joints(choices, log)?,
+        (None, None) => AngleTemplate::None,
+    };
+    let positive = match (&choices.positive, &angles) {
+        (Some(positive), _) => Sourced::known(*positive),
+        (None, AngleTemplate::Joints { .. }) => Sourced::assumed(
+            VehicleAxes::ForwardRightDown,
+            "angles are taken to be positive to the right (yaw, roll) and upwards (pitch)",
+        ),
+        (None, _) => Sourced::known(VehicleAxes::ForwardRightDown),
+    };
+    Ok(GimbalTemplate { axes: choices.mechanism.clone(), positive, angles })
+}
+
+fn joints(choices: &RigChoices, log: &FlightLog) -> Result<AngleTemplate, TemplateError> {
+    let what = ("topics of joint angles", "--joint-topic");
+    let info = one_topic(log, &[MessageKind::JointState], choices.joint_topic.as_ref(), "gimbal", what)?;
+    let Some(info) = info else { return Ok(AngleTemplate::None) };
+    let found = log.find_message(&info.topic, |data| {
+        let message = messages::read_joint_state(data).ok()?;
+        Some(message.names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>())
+    });
+    let found = found.unwrap_or_default();
+    let names = if choices.joint_names.is_empty() {
+        names_of_axes(&choices.mechanism, &found)
+    } else {
+        let known = choices.joint_names.iter().all(|name| found.contains(name));
+        (known && choices.joint_names.len() == choices.mechanism.0.len()).then(|| choices.joint_names.clone())
+    };
+    let names = names.ok_or_else(|| TemplateError::Joints {
+        topic: info.topic.clone(),
+        found,
+        mechanism: choices.mechanism.to_string(),
+    })?;
+    let topic = Sourced::known(info.topic.clone());
+    Ok(AngleTemplate::Joints { topic, rate_hz: rounded_hz(info.rate_hz, IMU_RATE_HZ), names })
+}
+
+/// The joint of each axis: the only one whose name speaks of it.
+fn names_of_axes(mechanism: &MechanismAxes, found: &[String]) -> Option<Vec<String>> {
+    let name = |axis: &GimbalAxis| {
+        let mut named = found.iter().filter(|name| GimbalAxis::of_joint(name) == Some(*axis));
+        named.next().filter(|_| named.next().is_none()).cloned()
+    };
+    let names: Vec<String> = mechanism.0.iter().map(name).collect::<Option<_>>()?;
+    let twice = names.iter().enumerate().any(|(place, name)| names[..place].contains(name));
+    (!twice).then_some(names)
+}
+
+fn ground_truth_topic(log: &FlightLog) -> Option<String> {
+    let poses = topics_of(log, &[MessageKind::Odometry, MessageKind::PoseStamped, MessageKind::TransformStamped]);
+    let named = |info: &&&TopicInfo| {
+        let name = info.topic.to_ascii_lowercase();
+        GROUND_TRUTH_WORDS.iter().any(|word| name.contains(word))
+    };
+    poses.iter().find(named).map(|info| info.topic.clone())
+}
