@@ -103,16 +103,20 @@ impl RawEncoding {
             return Mosaic { width: raw.width, height: raw.height, samples: &samples, red }.gray(narrow);
         }
         let mut pixels = Vec::with_capacity(raw.width * raw.height);
+        let bytes = if self.is_wide() { 2 } else { 1 };
+        let sample = |pixel: &[u8], at: usize| self.sample(&pixel[at * bytes..(at + 1) * bytes], raw.big_endian);
         for row in self.rows(raw) {
-            let samples: Vec<u16> = self.samples(row, raw.big_endian).collect();
             match self.layout {
-                PixelLayout::Luma { samples: count, first } => {
-                    pixels.extend(samples.chunks_exact(count).map(|pixel| narrow(pixel[first])));
+                PixelLayout::Luma { samples, first } => {
+                    pixels.extend(row.chunks_exact(samples * bytes).map(|pixel| narrow(sample(pixel, first))));
                 }
-                PixelLayout::Color { samples: count, rgb } => {
-                    pixels.extend(samples.chunks_exact(count).map(|pixel| narrow(luma(rgb.map(|at| pixel[at])))));
+                PixelLayout::Color { samples, rgb } => {
+                    let gray = |pixel: &[u8]| narrow(luma(rgb.map(|at| sample(pixel, at))));
+                    pixels.extend(row.chunks_exact(samples * bytes).map(gray));
                 }
-                PixelLayout::LumaPlane | PixelLayout::Bayer { .. } => pixels.extend(samples.into_iter().map(narrow)),
+                PixelLayout::LumaPlane | PixelLayout::Bayer { .. } => {
+                    pixels.extend(self.samples(row, raw.big_endian).map(narrow));
+                }
             }
         }
         pixels
@@ -125,11 +129,16 @@ impl RawEncoding {
 
     fn samples(self, row: &[u8], big_endian: bool) -> impl Iterator<Item = u16> + use<'_> {
         let bytes = if self.is_wide() { 2 } else { 1 };
-        row.chunks_exact(bytes).map(move |sample| match *sample {
+        row.chunks_exact(bytes).map(move |sample| self.sample(sample, big_endian))
+    }
+
+    /// The value of a sample's one or two bytes.
+    fn sample(self, bytes: &[u8], big_endian: bool) -> u16 {
+        match *bytes {
             [low, high] if !big_endian => u16::from_le_bytes([low, high]),
             [high, low] => u16::from_be_bytes([high, low]),
-            _ => u16::from(sample[0]),
-        })
+            _ => u16::from(bytes[0]),
+        }
     }
 }
 
