@@ -50,15 +50,18 @@ impl CameraModel {
                     });
                 }
             },
-            "radtan" | "radial-tangential" | "plumb_bob" => match *distortion_coeffs {
-                [k1, k2, p1, p2, k3] if k3 != 0.0 => {
+            "radtan" | "radial-tangential" | "plumb_bob" => {
+                let (values, k3) = match distortion_coeffs {
+                    [values @ .., k3] if values.len() == 4 => (values, *k3),
+                    values => (values, 0.0),
+                };
+                let values @ [k1, k2, p1, p2] = numbers("distortion_coeffs", "radtan", values, "k1, k2, p1, p2")?;
+                if k3 == 0.0 {
+                    Distortion::Radtan(values)
+                } else {
                     Distortion::Rational(RationalLens::new([k1, k2, p1, p2, k3, 0.0, 0.0, 0.0]))
                 }
-                [ref four @ .., _] if four.len() == 4 => {
-                    Distortion::Radtan(numbers("distortion_coeffs", "radtan", four, "k1, k2, p1, p2")?)
-                }
-                _ => Distortion::Radtan(numbers("distortion_coeffs", "radtan", distortion_coeffs, "k1, k2, p1, p2")?),
-            },
+            }
             "rational_polynomial" => Distortion::Rational(RationalLens::new(numbers(
                 "distortion_coeffs",
                 "rational_polynomial",
