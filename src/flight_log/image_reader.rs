@@ -1,4 +1,3 @@
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use parking_lot::Mutex;
@@ -6,7 +5,7 @@ use parking_lot::Mutex;
 use super::container::{BlockCache, TopicIndex};
 use super::image_decoding::{BitDepth, decode_image};
 use super::messages::{MessageKind, read_video_packet};
-use super::video::{VideoCodec, VideoDecoder, keyframe_before};
+use super::video::{PictureStream, keyframe_before};
 use super::{FlightLog, LogError};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{GrayImage, Rig, UnknownCamera};
@@ -43,22 +42,13 @@ struct ImageCache {
     /// Cached images by camera and index; the most recently used is the last.
     images: Vec<((usize, usize), Arc<GrayImage>)>,
     /// Where decoding of each camera's video stands, by camera.
-    streams: BTreeMap<usize, VideoPosition>,
+    streams: Vec<PictureStream>,
     /// Cached pictures of videos, as `images`.
     pictures: Vec<((usize, usize), Picture)>,
 }
 
 /// A decoded picture of a video, or what is wrong with it.
 type Picture = Result<Arc<GrayImage>, String>;
-
-/// A video decoded up to a message.
-#[derive(Debug)]
-struct VideoPosition {
-    decoder: VideoDecoder,
-    codec: VideoCodec,
-    /// Number of the next message.
-    next: usize,
-}
 
 impl ImageReader {
     /// Finds the images of all cameras of a rig that the log has.
@@ -75,11 +65,12 @@ impl ImageReader {
             })
             .collect();
         let topics = cameras.iter().map(|camera| log.topic_index(&camera.topic)).collect();
+        let streams = cameras.iter().map(|_| PictureStream::default()).collect();
         let cache = ImageCache {
             topics,
             blocks: BlockCache::new(BLOCKS),
             images: Vec::with_capacity(IMAGES + 1),
-            streams: BTreeMap::new(),
+            streams,
             pictures: Vec::new(),
         };
         Self { log, cameras, cache: Mutex::new(cache) }
@@ -90,12 +81,32 @@ impl ImageReader {
         self.cameras.iter().find(|camera| camera.key == camera_key).map_or(0, |camera| camera.count)
     }
 
-    /// One image of one camera, numbered as in [`SensorFrame::index`](super::SensorFrame::index).
-    pub fn image(&self, camera_key: &str, index: usize) -> Result<Arc<GrayImage>, LogError> {
-        let number = self.cameras.iter().position(|camera| camera.key == camera_key).ok_or_else(|| {
+    /// Whether a camera's images are a video, so that one of them can take as long as all since its keyframe.
+    pub fn has_video(&self) -> bool {
+        self.cameras.iter().any(|camera| camera.kind.is_video())
+    }
+
+    /// Decodes the pictures that one image of a video depends on, while `go_on` holds. Returns whether
+    /// [`image`](Self::image) is short then, as it always is for images that do not depend on others.
+    pub fn decode_before(&self, camera_key: &str, index: usize, go_on: &dyn Fn() -> bool) -> bool {
+        let Ok(number) = self.number_of(camera_key) else { return true };
+        let camera = &self.cameras[number];
+        if !camera.kind.is_video() || index >= camera.count {
+            return true;
+        }
+        self.cache.lock().decode_pictures(&self.log, number, camera.kind, index, go_on)
+    }
+
+    fn number_of(&self, camera_key: &str) -> Result<usize, UnknownCamera> {
+        self.cameras.iter().position(|camera| camera.key == camera_key).ok_or_else(|| {
             let available = self.cameras.iter().map(|camera| camera.key.clone()).collect();
             UnknownCamera { key: camera_key.to_owned(), available }
-        })?;
+        })
+    }
+
+    /// One image of one camera, numbered as in [`SensorFrame::index`](super::SensorFrame::index).
+    pub fn image(&self, camera_key: &str, index: usize) -> Result<Arc<GrayImage>, LogError> {
+        let number = self.number_of(camera_key)?;
         let camera = &self.cameras[number];
         let mut cache = self.cache.lock();
         let position = cache.topics[number].get(self.log.index(), self.log.file(), index);
@@ -139,26 +150,46 @@ impl ImageReader {
 }
 
 impl ImageCache {
-    /// A picture of a video: decoded from the picture before, or from the keyframe before it.
+    /// A picture of a video.
     fn picture(&mut self, log: &FlightLog, camera: usize, kind: MessageKind, index: usize) -> Picture {
-        if let Some(found) = self.pictures.iter().position(|(cached, _)| *cached == (camera, index)) {
-            let entry = self.pictures.remove(found);
-            self.pictures.push(entry.clone());
-            return entry.1;
+        self.decode_pictures(log, camera, kind, index, &|| true);
+        self.cached_picture((camera, index)).unwrap_or_else(|| Err("it is no picture of a video".to_owned()))
+    }
+
+    fn cached_picture(&mut self, key: (usize, usize)) -> Option<Picture> {
+        let found = self.pictures.iter().position(|(cached, _)| *cached == key)?;
+        let entry = self.pictures.remove(found);
+        self.pictures.push(entry.clone());
+        Some(entry.1)
+    }
+
+    /// Decodes a video up to a picture, from the picture before it or from its keyframe, while `go_on` holds. Returns whether
+    /// the picture is cached.
+    fn decode_pictures(
+        &mut self,
+        log: &FlightLog,
+        camera: usize,
+        kind: MessageKind,
+        index: usize,
+        go_on: &dyn Fn() -> bool,
+    ) -> bool {
+        if self.cached_picture((camera, index)).is_some() {
+            return true;
         }
-        let keyframe = keyframe_before(log, &mut self.topics[camera], kind, index);
-        let stands =
-            self.streams.get(&camera).map(|stream| stream.next).filter(|next| (keyframe..=index).contains(next));
-        if stands.is_none() {
-            self.streams.remove(&camera);
+        let stands = self.streams[camera].next();
+        let first = stands.filter(|next| *next == index).unwrap_or_else(|| {
+            let keyframe = keyframe_before(log, &mut self.topics[camera], kind, index);
+            stands.filter(|next| (keyframe..=index).contains(next)).unwrap_or(keyframe)
+        });
+        for number in first..=index {
+            if !go_on() {
+                return false;
+            }
+            let picture = self.next_picture(log, camera, kind, number).map(Arc::new);
+            self.pictures.push(((camera, number), picture));
+            self.release();
         }
-        let mut picture = Err("it is no picture of a video".to_owned());
-        for number in stands.unwrap_or(keyframe)..=index {
-            picture = self.next_picture(log, camera, kind, number).map(Arc::new);
-            self.pictures.push(((camera, number), picture.clone()));
-        }
-        self.release();
-        picture
+        true
     }
 
     /// Decodes the message with this number, which follows the one decoded last.
@@ -171,23 +202,14 @@ impl ImageCache {
     ) -> Result<GrayImage, String> {
         let position = self.topics[camera].get(log.index(), log.file(), number);
         let message = position.and_then(|position| log.message(&mut self.blocks, position));
+        let stream = &mut self.streams[camera];
         let Some((block, message)) = message else {
-            self.streams.remove(&camera);
+            stream.lose_message();
             return Err("it is in a damaged chunk".into());
         };
-        let packet = read_video_packet(kind, block.bytes(&message.data)).map_err(|error| error.to_string())?;
-        let codec = packet.codec()?;
-        let limits = log.file().limits();
-        let stream = self.streams.entry(camera).or_insert_with(|| VideoPosition {
-            decoder: VideoDecoder::new(codec, limits),
-            codec,
-            next: number,
-        });
-        if stream.codec != codec {
-            *stream = VideoPosition { decoder: VideoDecoder::new(codec, limits), codec, next: number };
-        }
-        stream.next = number + 1;
-        stream.decoder.decode(packet.data, None).map_err(|problem| problem.to_string())
+        let packet = read_video_packet(kind, block.bytes(&message.data)).map_err(|error| error.to_string());
+        let packet = packet.inspect_err(|_| stream.lose_message())?;
+        stream.decode(number, &packet, log.file().limits(), None).map_err(|problem| problem.to_string())
     }
 
     /// Drops the pictures that were used longest ago.

@@ -22,7 +22,7 @@ pub(crate) mod rig;
 mod sensor_frame;
 pub(crate) mod stream;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod text;
 pub(crate) mod video;
 mod writer;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use super::super::image_decoding::{BitDepth, ImageProblem, decode_image};
 use super::super::log::relative_ns;
 use super::super::messages::{self, MessageKind};
-use super::super::video::{VideoCodec, VideoDecoder};
+use super::super::video::PictureStream;
 use super::super::{FlightLog, LogError, LogWarning, SensorFrame};
 use super::imu::ImuStream;
 use super::joint_angles::JointAngleStream;
@@ -393,20 +393,14 @@ fn problem_text(problem: ImageProblem, resolution_px: [usize; 2], key: &str) -> 
 fn picture_decoder(log: &FlightLog, kind: MessageKind, camera: &CameraRig) -> Decoder<PendingImage> {
     let (epoch_ns, limits) = (log.epoch_ns(), log.file().limits().clone());
     let (resolution_px, key) = (camera.model.resolution_px, camera.key.clone());
-    let mut stream: Option<(VideoCodec, VideoDecoder)> = None;
-    let mut expected = 0;
+    let mut stream = PictureStream::default();
     Box::new(move |source: MessageSource<'_>| {
-        let missing = std::mem::replace(&mut expected, source.number + 1) != source.number;
         let packet = messages::read_video_packet(kind, source.data).map_err(|error| Refusal::not_decodable(&error));
-        let packet = packet.inspect_err(|_| stream = None)?;
-        let refused = |detail| Refusal { reason: "the picture cannot be decoded", detail };
-        let codec = packet.codec().map_err(refused)?;
-        if missing || stream.as_ref().is_none_or(|(known, _)| *known != codec) {
-            stream = None;
-        }
-        let (_, decoder) = stream.get_or_insert_with(|| (codec, VideoDecoder::new(codec, &limits)));
-        let image = decoder.decode(packet.data, Some(resolution_px));
-        let image = image.map_err(|problem| refused(problem_text(problem, resolution_px, &key)))?;
+        let packet = packet.inspect_err(|_| stream.lose_message())?;
+        let image = stream.decode(source.number, &packet, &limits, Some(resolution_px)).map_err(|problem| Refusal {
+            reason: "the picture cannot be decoded",
+            detail: problem_text(problem, resolution_px, &key),
+        })?;
         let log_time_ns = relative_ns(i64::try_from(source.position.log_time_ns).unwrap_or(i64::MAX), epoch_ns);
         Ok((
             packet.stamp_ns,

@@ -4,7 +4,7 @@ mod broken;
 mod messages;
 mod rigs;
 mod streams;
-mod video;
+pub(crate) mod video;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

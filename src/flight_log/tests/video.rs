@@ -1,3 +1,5 @@
+use std::cell::Cell;
+
 use super::super::video::tests::{Stream, stream};
 use super::*;
 use crate::flight_log::writer::testing as encode;
@@ -110,7 +112,13 @@ fn write(folder: &Path, name: &str, storage: Storage, left_out: &[usize]) -> (Pa
     (path, stream)
 }
 
-fn crc32(image: &GrayImage) -> u32 {
+/// A log whose `cam0` is an H.264 video of 24 pictures with a keyframe in every eighth, its rig, and the CRC-32 of each picture.
+pub(crate) fn sample_video(folder: &Path) -> (Arc<FlightLog>, Rig, Vec<u32>) {
+    let (path, stream) = write(folder, "h264", Storage::Ros, &[]);
+    (Arc::new(FlightLog::open(&path).unwrap()), rig_from(&rig_text()), stream.luma_crc32)
+}
+
+pub(crate) fn crc32(image: &GrayImage) -> u32 {
     crc32fast::hash(&image.pixels)
 }
 
@@ -152,6 +160,49 @@ fn pictures_are_read_in_any_order() {
             assert_eq!(crc32(&reader.image("cam0", index).unwrap()), stream.luma_crc32[index], "{name} {index}");
         }
         assert!(reader.image("cam0", 24).is_err());
+    }
+}
+
+#[test]
+fn decoding_that_is_ended_goes_on_where_it_stands() {
+    let folder = TempDir::new().unwrap();
+    let (log, rig, expected) = sample_video(folder.path());
+    let reader = ImageReader::new(log, &rig);
+    assert!(reader.has_video());
+    let remaining = Cell::new(3);
+    let go_on = || remaining.replace(remaining.get() - 1) > 0;
+    assert!(!reader.decode_before("cam0", 7, &go_on));
+    assert_eq!(remaining.replace(5), -1);
+    // Pictures 3 to 7 are left: five questions, all answered with yes.
+    assert!(reader.decode_before("cam0", 7, &go_on));
+    assert_eq!(remaining.get(), 0);
+    assert!(reader.decode_before("cam0", 2, &go_on), "a decoded picture asks nothing");
+    for index in [7, 2] {
+        assert_eq!(crc32(&reader.image("cam0", index).unwrap()), expected[index]);
+    }
+}
+
+/// A message that cannot be read ends the stream for the images of the window as for the frames of a run.
+#[test]
+fn pictures_behind_an_unreadable_message_are_missing() {
+    for name in ["h264", "h265"] {
+        let folder = TempDir::new().unwrap();
+        let stream = stream(name);
+        let damaged = folder.path().join("damaged.mcap");
+        let mut writer = LogWriter::create(&damaged, &LogWriterOptions::default()).unwrap();
+        for (number, data) in stream.messages.iter().enumerate() {
+            let stamp_ns = EPOCH_NS + 50 * number as i64 * MS;
+            let times = MessageTimes { stamp_ns, log_time_ns: stamp_ns };
+            let mut message = encode::compressed_video(stamp_ns, "camera", name, data);
+            if number == 3 {
+                message.truncate(20);
+            }
+            writer.write("/camera", MessageKind::CompressedVideo, times, &message).unwrap();
+        }
+        writer.finish().unwrap();
+        let reader = ImageReader::new(Arc::new(FlightLog::open(&damaged).unwrap()), &rig_from(&rig_text()));
+        let readable: Vec<usize> = (0..24).filter(|index| reader.image("cam0", *index).is_ok()).collect();
+        assert_eq!(readable, (0..3).chain(8..24).collect::<Vec<_>>(), "{name}");
     }
 }
 

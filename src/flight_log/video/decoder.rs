@@ -108,8 +108,13 @@ impl VideoDecoder {
         }
     }
 
+    /// The compression of the stream.
+    pub(crate) fn codec(&self) -> VideoCodec {
+        self.codec
+    }
+
     /// Says that a message is missing before the next one: pictures are refused up to the next keyframe.
-    pub(crate) fn lose_message(&mut self) {
+    pub(super) fn lose_message(&mut self) {
         self.stream = Stream::new(self.codec, &self.limits);
         (self.synchronized, self.at_first_keyframe) = (false, true);
     }

@@ -6,10 +6,12 @@
 mod bits;
 mod decoder;
 mod frame_numbers;
+mod picture_stream;
 #[cfg(test)]
 pub(super) mod tests;
 
 pub(crate) use decoder::{VideoCodec, VideoDecoder};
+pub(crate) use picture_stream::PictureStream;
 
 use super::FlightLog;
 use super::container::{BlockCache, TopicIndex};
