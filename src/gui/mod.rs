@@ -44,14 +44,13 @@ use self::theme::Theme;
 use crate::frontend::FeatureId;
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::observability::SlidePosition;
-use crate::sensors::GrayImage;
 use crate::session::breakpoints::Breakpoints;
-use crate::session::{Command, Recording, RunRecord, SolverPosition};
+use crate::session::{Command, FrameImage, Recording, RunRecord, SolverPosition};
 
 /// Gives the images of the log's cameras, by camera key and index in the stream.
 pub trait ImageSource {
-    /// The image, `None` when it is missing or cannot be decoded.
-    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>>;
+    /// The image of a camera by its number in the log.
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage;
 }
 
 /// The selection, common to all panels.

@@ -17,7 +17,7 @@ fn the_sample_is_consistent() {
     let aligned = run.alignment.expect("aligned") * newest.world_from_imu;
     let error_m = (aligned.translation_m - step.ground_truth.expect("truth").translation_m).norm();
     assert!(error_m < 1.0, "{error_m} m off");
-    let image = sample_images().image("cam0", step.report.frame_index).expect("an image");
+    let image = sample_images().image("cam0", step.report.frame_index).ready().expect("an image");
     assert_eq!(image.pixels.len(), image.width * image.height);
 }
 

@@ -32,7 +32,7 @@ pub use plan::{
     RunSpec, RunSpecError, SessionError, SessionPlan, SessionRequest,
 };
 pub use playback::{
-    Command, Cursor, MoveOutcome, Moved, PlaybackSpeed, SavedBreakpoint, SavedFork, SavedLog, SavedSession,
+    Command, Cursor, FrameImage, MoveOutcome, Moved, PlaybackSpeed, SavedBreakpoint, SavedFork, SavedLog, SavedSession,
     SavedSessionError, Session,
 };
 pub use record::{

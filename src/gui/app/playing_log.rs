@@ -4,8 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::gui::{ImageSource, Playback};
-use crate::sensors::GrayImage;
-use crate::session::{Command, Recording};
+use crate::session::{Command, FrameImage, Recording};
 
 /// A log during playback: the interface of a session that the window needs.
 pub trait PlayingLog: Send {
@@ -22,7 +21,7 @@ pub trait PlayingLog: Send {
     /// Moves the cursor by `elapsed_s` seconds of the wall clock.
     fn advance(&mut self, elapsed_s: f64);
     /// An image of the log by camera and index in its stream.
-    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>>;
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage;
     /// Messages about commands that failed, since the last call.
     fn take_notices(&mut self) -> Vec<String>;
     /// The session as text, with the layout of the panels; `None` for a log without a session.
@@ -49,7 +48,7 @@ pub(super) fn go_to_first_frame(log: &mut dyn PlayingLog) -> bool {
 pub(super) struct Images<'a>(pub(super) &'a mut dyn PlayingLog);
 
 impl ImageSource for Images<'_> {
-    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage {
         self.0.image(camera_key, frame_index)
     }
 }

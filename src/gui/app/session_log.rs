@@ -5,8 +5,7 @@ use std::sync::Arc;
 use crate::flight_log::ImageReader;
 use crate::gui::app::PlayingLog;
 use crate::gui::{ImageSource, Playback};
-use crate::sensors::GrayImage;
-use crate::session::{Command, Recording, Session};
+use crate::session::{Command, FrameImage, Recording, Session};
 
 impl PlayingLog for Session {
     fn recording(&self) -> Arc<Recording> {
@@ -42,7 +41,7 @@ impl PlayingLog for Session {
         Self::advance(self, elapsed_s);
     }
 
-    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage {
         Self::image(self, camera_key, frame_index)
     }
 
@@ -60,13 +59,13 @@ impl PlayingLog for Session {
 }
 
 impl ImageSource for Session {
-    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
-        Self::image(self, camera_key, frame_index)
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage {
+        Self::decoded_image(self, camera_key, frame_index)
     }
 }
 
 impl ImageSource for ImageReader {
-    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
-        Self::image(self, camera_key, frame_index).ok()
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage {
+        Self::image(self, camera_key, frame_index).map_or(FrameImage::Missing, FrameImage::Ready)
     }
 }

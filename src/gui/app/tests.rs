@@ -13,8 +13,7 @@ use crate::gui::desktop::{Desktop, PanelExport, PathEntry, SampleProgress};
 use crate::gui::samples::{FRAME_PERIOD_NS, sample_images, sample_recording_of};
 use crate::gui::theme::ThemeName;
 use crate::gui::{ImageSource as _, Playback};
-use crate::sensors::GrayImage;
-use crate::session::{Command, Recording};
+use crate::session::{Command, FrameImage, Recording};
 
 /// A log that has been computed already.
 pub(super) struct SampleLog {
@@ -68,7 +67,7 @@ impl PlayingLog for SampleLog {
         }
     }
 
-    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage {
         sample_images().image(camera_key, frame_index)
     }
 

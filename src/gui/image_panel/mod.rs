@@ -7,6 +7,7 @@ mod paint;
 mod tests;
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Align2, ColorImage, PopupCloseBehavior, Rect, Sense, TextureHandle, TextureOptions, Ui, Vec2, pos2, vec2};
@@ -21,6 +22,7 @@ use super::pan_zoom::PanZoom;
 use super::units::significant;
 use super::{PanelContext, slide};
 use crate::sensors::GrayImage;
+use crate::session::FrameImage;
 
 /// Maximum magnification relative to the fitted size.
 const MAX_ZOOM: f32 = 16.0;
@@ -29,6 +31,8 @@ const OPTIONS_WIDTH: f32 = 395.0;
 /// The whole legend in words, for images too narrow for it.
 const LEGEND: &str = "Colour: age of the track in frames\nRing: used in the solve\nDot: tracked only\nCross: rejected\n\
     Line: residual (prediction − measurement), magnified";
+/// Period at which an image that is being decoded is asked for again.
+const DECODING_PERIOD: Duration = Duration::from_millis(15);
 /// Height of legend and caption in points.
 const LINE_HEIGHT: f32 = 18.0;
 
@@ -170,8 +174,13 @@ impl ImagePanel {
         response: &egui::Response,
         context: &mut PanelContext<'_>,
         model: &ImageModel,
-        image: Option<Arc<GrayImage>>,
+        image: FrameImage,
     ) {
+        let absence = if image == FrameImage::Decoding { "decoding the video" } else { "image missing" };
+        if image == FrameImage::Decoding {
+            ui.ctx().request_repaint_after(DECODING_PERIOD);
+        }
+        let image = image.ready();
         let painter = ui.painter_at(area);
         painter.rect_filled(area, 0.0, context.theme.plot_background);
         let size_px = image.as_ref().map(|image| [image.width, image.height]).unwrap_or_else(|| {
@@ -190,7 +199,7 @@ impl ImagePanel {
         } else {
             let outline = egui::Stroke::new(1.0, context.theme.outline);
             painter.rect_stroke(place.rect, 0.0, outline, egui::StrokeKind::Inside);
-            paint::label(&painter, area.center_top() + vec2(0.0, 8.0), Align2::CENTER_TOP, "image missing");
+            paint::label(&painter, area.center_top() + vec2(0.0, 8.0), Align2::CENTER_TOP, absence);
         }
         let options = self.mark_options();
         for mark in &model.marks {

@@ -12,7 +12,7 @@ use crate::gui::samples::{FRAME_PERIOD_NS, first_tracked_frame, sample_images, s
 use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{ImageSource, Selection};
-use crate::session::{Recording, StepRecord};
+use crate::session::{FrameImage, Recording, StepRecord};
 
 /// A recording of 80 frames; the estimator tracks in the last one.
 fn recording() -> Recording {
@@ -147,8 +147,8 @@ fn a_click_selects_the_feature_under_it() {
 fn missing_runs_frames_and_images_are_reported() {
     struct NoImages;
     impl ImageSource for NoImages {
-        fn image(&mut self, _: &str, _: usize) -> Option<std::sync::Arc<crate::sensors::GrayImage>> {
-            None
+        fn image(&mut self, _: &str, _: usize) -> FrameImage {
+            FrameImage::Missing
         }
     }
     let recording = recording();

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::gui::ImageSource;
 use crate::sensors::GrayImage;
+use crate::session::FrameImage;
 
 /// Size of the images in pixels.
 const SIZE_PX: [usize; 2] = [640, 480];
@@ -19,13 +20,17 @@ pub(crate) fn sample_images() -> SampleImages {
 }
 
 impl ImageSource for SampleImages {
-    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage {
         let [width, height] = SIZE_PX;
         let brightness = |row: usize, column: usize| {
             let field = (row / FIELD_PX + (column + frame_index) / FIELD_PX) % 2;
             (60 + 80 * field + 100 * row / height) as u8
         };
         let pixels = (0..width * height).map(|index| brightness(index / width, index % width)).collect();
-        (camera_key == "cam0").then(|| Arc::new(GrayImage { width, height, pixels }))
+        if camera_key == "cam0" {
+            FrameImage::Ready(Arc::new(GrayImage { width, height, pixels }))
+        } else {
+            FrameImage::Missing
+        }
     }
 }

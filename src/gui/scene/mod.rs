@@ -201,8 +201,9 @@ impl ScenePanel {
             let camera = camera_of(&context.recording.rig, run.run);
             let is_selected = run.number == context.selection.run;
             let image = (is_selected && self.image)
-                .then(|| run.newest().and_then(|frame| context.images.image(&run.run.camera_key, frame.frame_index)))
-                .flatten();
+                .then(|| run.newest())
+                .flatten()
+                .and_then(|frame| context.images.image(&run.run.camera_key, frame.frame_index).ready());
             if is_selected {
                 builder.details(run, camera, ground_height_m(&points));
             }

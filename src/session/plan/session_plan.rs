@@ -52,7 +52,7 @@ pub enum SessionError {
         path: PathBuf,
     },
     /// A thread could not be started.
-    #[error("cannot start an estimator thread: {source}")]
+    #[error("cannot start a thread: {source}")]
     Thread {
         /// The error of the operating system.
         source: std::io::Error,

@@ -1,5 +1,6 @@
 //! A cursor over the record, the commands that move it, and the session that connects cursor, engine and record.
 
+mod background_images;
 mod command;
 mod cursor;
 mod recomputed_view;
@@ -10,6 +11,7 @@ mod saved_path;
 mod session;
 mod shared;
 
+pub use background_images::FrameImage;
 pub use command::{Command, PlaybackSpeed};
 pub use cursor::{Cursor, MoveOutcome, Moved};
 pub use saved::{SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError};

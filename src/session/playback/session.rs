@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::background_images::{BackgroundImages, FrameImage};
 use super::command::{Command, PlaybackSpeed};
 use super::cursor::{Cursor, MoveOutcome};
 use super::saved::PendingRestore;
 use super::shared::SharedComputation;
 use crate::flight_log::ImageReader;
 use crate::geometry::ns_from_seconds;
-use crate::sensors::GrayImage;
 use crate::session::breakpoints::{Breakpoints, Condition};
 use crate::session::engine::{Computation, Engine, RecomputeThread};
 use crate::session::plan::{SessionError, SessionPlan, SessionRequest};
@@ -44,7 +44,7 @@ pub struct Session {
     /// The panel layout of the saved session.
     pub(super) layout: Option<serde_json::Value>,
     pub(super) notices: Vec<String>,
-    images: ImageReader,
+    images: BackgroundImages,
 }
 
 impl Session {
@@ -60,7 +60,7 @@ impl Session {
         let mut shared = SharedComputation::new(computation);
         shared.collect(engine.take_receiver())?;
         let recompute = RecomputeThread::start(shared.receiver_of_recomputed())?;
-        let images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
+        let images = BackgroundImages::start(ImageReader::new(Arc::clone(&plan.log), &plan.rig))?;
         Ok(Self {
             cursor: Cursor::new(ns_from_seconds(plan.start_s)),
             plan,
@@ -152,9 +152,14 @@ impl Session {
         std::mem::take(&mut self.notices)
     }
 
-    /// An image of the log by camera and index in its stream, `None` when it is missing or cannot be decoded.
-    pub fn image(&self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
-        self.images.image(camera_key, frame_index).ok()
+    /// An image of the log by camera and index in its stream; waits a few milliseconds for a picture of a video.
+    pub fn image(&self, camera_key: &str, frame_index: usize) -> FrameImage {
+        self.images.image(camera_key, frame_index)
+    }
+
+    /// An image of the log by camera and index in its stream; waits until it is decoded.
+    pub fn decoded_image(&self, camera_key: &str, frame_index: usize) -> FrameImage {
+        self.images.decoded_image(camera_key, frame_index)
     }
 
     /// Moves the cursor by `elapsed_s` seconds of the wall clock; see [`Cursor::advance`].

@@ -1,0 +1,233 @@
+//! Images for a window that must not wait: pictures of videos are decoded on a thread of their own.
+
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use parking_lot::{Condvar, Mutex};
+
+use crate::flight_log::ImageReader;
+use crate::sensors::GrayImage;
+use crate::session::plan::SessionError;
+
+/// Longest time that a window waits for an image; the next picture of a video is decoded within it, so that playing shows
+/// every picture.
+const WINDOW_WAITS: Duration = Duration::from_millis(25);
+/// Number of delivered images that are kept: those of all panels of a window.
+const DELIVERED: usize = 8;
+
+/// The image of a frame, as far as it is decoded.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FrameImage {
+    /// The decoded image.
+    Ready(Arc<GrayImage>),
+    /// It is being decoded: ask again a little later.
+    Decoding,
+    /// It is missing, or cannot be decoded.
+    Missing,
+}
+
+impl FrameImage {
+    /// The decoded image, `None` without one.
+    pub fn ready(self) -> Option<Arc<GrayImage>> {
+        match self {
+            Self::Ready(image) => Some(image),
+            Self::Decoding | Self::Missing => None,
+        }
+    }
+}
+
+/// Camera and number of an image.
+type Key = (String, usize);
+
+/// The images of a log. Logs without a video are read at once, because each of their images is decoded alone; a video from
+/// its last keyframe on, which can take longer than a window may wait.
+#[derive(Debug)]
+pub(super) struct BackgroundImages {
+    reader: Arc<ImageReader>,
+    worker: Option<Worker>,
+}
+
+#[derive(Debug)]
+struct Worker {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    /// The image of each camera that was asked for last and is not delivered yet; the oldest request is the first.
+    wanted: Vec<Key>,
+    /// Delivered images, `None` for one that is missing; the one used last is the last.
+    delivered: Vec<(Key, Option<Arc<GrayImage>>)>,
+    ended: bool,
+}
+
+impl BackgroundImages {
+    /// Starts the thread when the log has a video.
+    pub(super) fn start(reader: ImageReader) -> Result<Self, SessionError> {
+        let reader = Arc::new(reader);
+        let worker = reader.has_video().then(|| Worker::start(Arc::clone(&reader))).transpose()?;
+        Ok(Self { reader, worker })
+    }
+
+    /// One image of one camera; of a video when it is decoded in a few milliseconds.
+    pub(super) fn image(&self, camera_key: &str, index: usize) -> FrameImage {
+        self.image_within(camera_key, index, Some(WINDOW_WAITS))
+    }
+
+    /// One image of one camera, however long its decoding takes.
+    pub(super) fn decoded_image(&self, camera_key: &str, index: usize) -> FrameImage {
+        self.image_within(camera_key, index, None)
+    }
+
+    fn image_within(&self, camera_key: &str, index: usize, time: Option<Duration>) -> FrameImage {
+        match &self.worker {
+            Some(worker) => worker.image(camera_key, index, time),
+            None => self.reader.image(camera_key, index).map_or(FrameImage::Missing, FrameImage::Ready),
+        }
+    }
+}
+
+impl Worker {
+    fn start(reader: Arc<ImageReader>) -> Result<Self, SessionError> {
+        let shared = Arc::new(Shared::default());
+        let of_thread = Arc::clone(&shared);
+        let thread = std::thread::Builder::new().name("video".into()).spawn(move || of_thread.decode(&reader));
+        Ok(Self { shared, thread: Some(thread.map_err(|source| SessionError::Thread { source })?) })
+    }
+
+    fn image(&self, camera_key: &str, index: usize, time: Option<Duration>) -> FrameImage {
+        let key = (camera_key.to_owned(), index);
+        let mut state = self.shared.state.lock();
+        if state.delivered(&key).is_none() {
+            state.want(key.clone());
+            self.shared.changed.notify_all();
+            let decoding = |state: &mut State| state.wanted.contains(&key);
+            match time {
+                Some(time) => {
+                    self.shared.changed.wait_while_for(&mut state, decoding, time);
+                }
+                None => self.shared.changed.wait_while(&mut state, decoding),
+            }
+        }
+        match state.delivered(&key) {
+            Some(Some(image)) => FrameImage::Ready(image),
+            Some(None) => FrameImage::Missing,
+            None => FrameImage::Decoding,
+        }
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.shared.state.lock().ended = true;
+        self.shared.changed.notify_all();
+        if let Some(thread) = self.thread.take() {
+            // A panic has been printed by the thread itself; there is nothing left to do for it.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Shared {
+    /// Decodes what is asked for until the session ends. A newer request for a camera ends the decoding of an older one.
+    fn decode(&self, reader: &ImageReader) {
+        loop {
+            let mut state = self.state.lock();
+            self.changed.wait_while(&mut state, |state| state.wanted.is_empty() && !state.ended);
+            if state.ended {
+                return;
+            }
+            let key = state.wanted[0].clone();
+            drop(state);
+            let is_wanted = || {
+                let state = self.state.lock();
+                !state.ended && state.wanted.contains(&key)
+            };
+            if reader.decode_before(&key.0, key.1, &is_wanted) {
+                let image = reader.image(&key.0, key.1).ok();
+                self.state.lock().deliver(key, image);
+                self.changed.notify_all();
+            }
+        }
+    }
+}
+
+impl State {
+    /// A delivered image, `None` when it is not there.
+    fn delivered(&mut self, key: &Key) -> Option<Option<Arc<GrayImage>>> {
+        let found = self.delivered.iter().position(|(delivered, _)| delivered == key)?;
+        let entry = self.delivered.remove(found);
+        self.delivered.push(entry.clone());
+        Some(entry.1)
+    }
+
+    /// Asks for an image instead of the one of its camera that was asked for before.
+    fn want(&mut self, key: Key) {
+        self.wanted.retain(|(camera, _)| *camera != key.0);
+        self.wanted.push(key);
+    }
+
+    fn deliver(&mut self, key: Key, image: Option<Arc<GrayImage>>) {
+        self.wanted.retain(|wanted| *wanted != key);
+        self.delivered.push((key, image));
+        let surplus = self.delivered.len().saturating_sub(DELIVERED);
+        self.delivered.drain(..surplus);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight_log::tests::video::{crc32, sample_video};
+
+    /// Asks for an image until it is decoded, as a window does at every frame.
+    fn shown(images: &BackgroundImages, index: usize) -> Option<Arc<GrayImage>> {
+        loop {
+            match images.image("cam0", index) {
+                FrameImage::Ready(image) => return Some(image),
+                FrameImage::Decoding => {}
+                FrameImage::Missing => return None,
+            }
+        }
+    }
+
+    #[test]
+    fn a_window_sees_the_pictures_of_a_video_in_any_order() {
+        let folder = tempfile::TempDir::new().unwrap();
+        let (log, rig, expected) = sample_video(folder.path());
+        let images = BackgroundImages::start(ImageReader::new(log, &rig)).unwrap();
+        assert!(images.worker.is_some());
+        for index in [0, 1, 2, 23, 22, 7, 15, 8, 23] {
+            assert_eq!(crc32(&shown(&images, index).unwrap()), expected[index], "{index}");
+            assert_eq!(images.decoded_image("cam0", index).ready().map(|image| crc32(&image)), Some(expected[index]));
+        }
+        assert_eq!(shown(&images, 24), None);
+        assert_eq!(images.decoded_image("cam7", 0), FrameImage::Missing);
+    }
+
+    #[test]
+    fn a_newer_request_replaces_an_older_one() {
+        let state = |wanted: &[(&str, usize)]| State {
+            wanted: wanted.iter().map(|(camera, index)| ((*camera).to_owned(), *index)).collect(),
+            ..State::default()
+        };
+        let mut waiting = state(&[("cam0", 3), ("cam1", 9)]);
+        waiting.want(("cam0".to_owned(), 4));
+        assert_eq!(waiting.wanted, state(&[("cam1", 9), ("cam0", 4)]).wanted);
+        waiting.deliver(("cam0".to_owned(), 4), None);
+        assert_eq!(waiting.wanted, state(&[("cam1", 9)]).wanted);
+        assert_eq!(waiting.delivered(&("cam0".to_owned(), 4)), Some(None));
+        for index in 0..DELIVERED {
+            waiting.deliver(("cam1".to_owned(), index), None);
+        }
+        assert_eq!(waiting.delivered(&("cam0".to_owned(), 4)), None, "only the last ones are kept");
+    }
+}
