@@ -222,7 +222,7 @@ fn imu_rotation(imu_facts: &ImuFacts, from_ns: i64, to_ns: i64) -> Option<UnitQu
 
 /// The rotation that minimizes `Σ |measured − R·predicted|²` (Wahba's problem, by SVD), with the ratio of the second
 /// singular value to the first, which is near zero when all rotations are about one axis.
-fn best_rotation(pairs: &[Pair]) -> Option<(UnitQuaternion<f64>, f64)> {
+pub(super) fn best_rotation(pairs: &[Pair]) -> Option<(UnitQuaternion<f64>, f64)> {
     let sum: Matrix3<f64> = pairs.iter().map(|(predicted, measured)| measured * predicted.transpose()).sum();
     let svd = sum.svd(true, true);
     let (u, v_t) = (svd.u?, svd.v_t?);

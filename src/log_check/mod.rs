@@ -1,6 +1,7 @@
 //! Checks of a log and its rig that need no estimator: topics, timing, IMU, encoders, images, intrinsics and extrinsics,
 //! each finding with its evidence and its remedy.
 
+mod clock_alignment;
 mod hand_eye;
 mod image_measure;
 mod images;
@@ -14,6 +15,8 @@ mod survey;
 #[cfg(test)]
 mod tests;
 mod timing;
+
+pub use self::clock_alignment::{AlignmentError, ClockAlignment, OrientationSeries, align_clocks};
 
 use nalgebra::UnitQuaternion;
 use serde::Serialize;

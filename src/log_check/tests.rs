@@ -18,7 +18,7 @@ const GYRO_DENSITY: f64 = 3.4e-4;
 const ACCEL_DENSITY: f64 = 0.004;
 
 /// Normal random numbers, always the same ones.
-struct Noise(u64);
+pub(super) struct Noise(pub(super) u64);
 
 impl Noise {
     fn uniform(&mut self) -> f64 {
@@ -30,7 +30,7 @@ impl Noise {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 
-    fn vector(&mut self) -> Vector3<f64> {
+    pub(super) fn vector(&mut self) -> Vector3<f64> {
         Vector3::new(self.normal(), self.normal(), self.normal())
     }
 }

@@ -1,0 +1,230 @@
+//! Offset and drift between the clock of a camera and the clock of an IMU or of a gimbal's attitude, from the rotations that
+//! both measure.
+//!
+//! The angular speeds, which do not depend on how the camera is mounted, are correlated over all offsets of the search. Each
+//! of the best offsets is then refined by least squares on the rotation vectors: offset, drift, the constant rotation from
+//! the reference to the camera, and a scale, because a wrong focal length scales the rotations that images show.
+
+mod coarse;
+mod refinement;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use serde::Serialize;
+
+use self::refinement::Refined;
+use super::ImageRotation;
+use super::statistics::median;
+use crate::geometry::{seconds_from_ns, so3};
+
+/// Minimum number of image rotations.
+const MIN_ROTATIONS: usize = 40;
+/// Minimum median rotation between two images; below it the noise of the images dominates.
+const MIN_ROTATION_RAD: f64 = 0.001;
+/// Minimum ratio of the squared rotations that the reference explains.
+const MIN_EXPLAINED: f64 = 0.6;
+/// The next offset must leave this many times as much unexplained.
+const MIN_DISTINCTION: f64 = 1.5;
+/// Offsets closer than this are one.
+const DISTINCT_S: f64 = 0.25;
+
+/// Orientations on one clock, up to a constant rotation on either side: `fixed_from_body` at increasing stamps.
+///
+/// From a gyroscope they are its integral; from a gimbal its attitudes relative to the earth.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OrientationSeries {
+    samples: Vec<(i64, UnitQuaternion<f64>)>,
+}
+
+impl OrientationSeries {
+    /// From orientations with stamps in nanoseconds; a sample whose stamp does not increase is left out.
+    pub fn from_orientations(orientations: impl IntoIterator<Item = (i64, UnitQuaternion<f64>)>) -> Self {
+        let mut samples: Vec<(i64, UnitQuaternion<f64>)> = Vec::new();
+        for (stamp_ns, orientation) in orientations {
+            if samples.last().is_none_or(|(last, _)| *last < stamp_ns) {
+                samples.push((stamp_ns, orientation));
+            }
+        }
+        Self { samples }
+    }
+
+    /// The integral of angular velocities in rad/s with stamps in nanoseconds.
+    pub fn from_angular_velocities(rates: impl IntoIterator<Item = (i64, Vector3<f64>)>) -> Self {
+        let mut orientation = UnitQuaternion::identity();
+        let mut previous: Option<(i64, Vector3<f64>)> = None;
+        let integrated = rates.into_iter().filter_map(move |(stamp_ns, rate)| {
+            if let Some((before_ns, before)) = previous {
+                if stamp_ns <= before_ns {
+                    return None;
+                }
+                orientation *= so3::exp(&((before + rate) * (0.5 * seconds_from_ns(stamp_ns - before_ns))));
+            }
+            previous = Some((stamp_ns, rate));
+            Some((stamp_ns, orientation))
+        });
+        Self { samples: integrated.collect() }
+    }
+
+    /// First and last stamp, `None` without samples.
+    fn range_ns(&self) -> Option<(i64, i64)> {
+        Some((self.samples.first()?.0, self.samples.last()?.0))
+    }
+
+    /// Interpolated orientation, `None` outside of the series.
+    fn at(&self, stamp_ns: i64) -> Option<UnitQuaternion<f64>> {
+        let after = self.samples.partition_point(|(sample_ns, _)| *sample_ns < stamp_ns);
+        let (after_ns, to) = self.samples.get(after)?;
+        if *after_ns == stamp_ns {
+            return Some(*to);
+        }
+        let (before_ns, from) = self.samples.get(after.checked_sub(1)?)?;
+        let fraction = (stamp_ns - before_ns) as f64 / (after_ns - before_ns) as f64;
+        Some(from.try_slerp(to, fraction, 1e-9).unwrap_or(*from))
+    }
+
+    /// Rotation vector of `second_from_first` between two times, in radians.
+    fn rotation(&self, from_ns: i64, to_ns: i64) -> Option<Vector3<f64>> {
+        Some(so3::log(&(self.at(to_ns)?.inverse() * self.at(from_ns)?)))
+    }
+}
+
+/// Times of the camera on the clock of the reference: `t_reference = t_camera + offset + drift · (t_camera − middle)`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ClockAlignment {
+    /// Offset at the middle, in seconds.
+    pub offset_s: f64,
+    /// Its standard deviation.
+    pub offset_sigma_s: f64,
+    /// Drift of the reference's clock against the camera's, 10⁻⁶.
+    pub drift_ppm: f64,
+    /// Its standard deviation.
+    pub drift_sigma_ppm: f64,
+    /// The middle of the image rotations on the camera's clock, in seconds.
+    pub middle_s: f64,
+    /// Ratio of the squared rotations of the images that the reference explains, at most 1.
+    pub explained: f64,
+    /// The next offset and the ratio that it explains, if there is one.
+    pub next: Option<(f64, f64)>,
+    /// Rotation from the reference's body frame to the camera frame, as a rotation vector in radians.
+    pub camera_from_body_rad: [f64; 3],
+    /// Ratio of the rotations of the images to those of the reference; with a focal length that is too long it is below 1.
+    pub scale: f64,
+    /// Number of image rotations that overlap with the reference.
+    pub rotations: usize,
+    /// Median rotation between two images, in degrees.
+    pub rotation_deg: f64,
+    /// Median residual of a rotation, in degrees.
+    pub residual_deg: f64,
+    /// Correlation of the angular speeds by offset in seconds.
+    #[serde(skip)]
+    pub correlation: Vec<(f64, f64)>,
+    /// Angular speeds in rad/s of images and reference, by time on the reference's clock in seconds.
+    #[serde(skip)]
+    pub speeds: Vec<(f64, f64, f64)>,
+}
+
+impl ClockAlignment {
+    /// The time in nanoseconds to add to a stamp of the camera.
+    pub fn shift_ns(&self, camera_ns: i64) -> i64 {
+        let since_middle_s = seconds_from_ns(camera_ns) - self.middle_s;
+        crate::geometry::ns_from_seconds(self.offset_s + self.drift_ppm * 1e-6 * since_middle_s)
+    }
+}
+
+/// Reason why two clocks cannot be aligned.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum AlignmentError {
+    /// Too few image rotations.
+    #[error("only {found} rotations between images could be measured, {MIN_ROTATIONS} are needed")]
+    TooFewRotations {
+        /// Their number.
+        found: usize,
+    },
+    /// The camera does not rotate.
+    #[error(
+        "the camera rotates by {rotation_deg:.3}° from image to image in the median, which is too little to compare"
+    )]
+    TooLittleRotation {
+        /// Median rotation between two images.
+        rotation_deg: f64,
+    },
+    /// No offset of the search lets images and reference overlap.
+    #[error("within ±{search_s:.0} s no offset lets at least {MIN_ROTATIONS} image rotations overlap with it")]
+    NoOverlap {
+        /// Half the range of the search.
+        search_s: f64,
+    },
+    /// The best offset explains too little.
+    #[error(
+        "the best offset, {offset_s:+.2} s, explains {:.0} % of the images' rotation, {:.0} % are needed",
+        100.0 * explained,
+        100.0 * MIN_EXPLAINED
+    )]
+    NoAgreement {
+        /// The best offset.
+        offset_s: f64,
+        /// Ratio of the squared rotations that it explains.
+        explained: f64,
+    },
+    /// Two offsets explain the rotations nearly as well.
+    #[error(
+        "it is ambiguous: {offset_s:+.2} s explains {:.1} % of the images' rotation, {next_s:+.2} s explains {:.1} %",
+        100.0 * explained,
+        100.0 * next_explained
+    )]
+    Ambiguous {
+        /// The best offset.
+        offset_s: f64,
+        /// Ratio of the squared rotations that it explains.
+        explained: f64,
+        /// The next one.
+        next_s: f64,
+        /// Ratio that the next one explains.
+        next_explained: f64,
+    },
+}
+
+/// Finds the offset of a camera's clock within ±`search_s` around `guess_s` from the rotations of its images.
+///
+/// # Errors
+/// When there are too few rotations, or no single offset explains them.
+pub fn align_clocks(
+    images: &[ImageRotation],
+    reference: &OrientationSeries,
+    guess_s: f64,
+    search_s: f64,
+) -> Result<ClockAlignment, AlignmentError> {
+    let measured: Vec<(i64, i64, Vector3<f64>)> = images
+        .iter()
+        .filter(|rotation| rotation.to_ns > rotation.from_ns)
+        .map(|rotation| (rotation.from_ns, rotation.to_ns, so3::log(&rotation.second_from_first)))
+        .collect();
+    if measured.len() < MIN_ROTATIONS {
+        return Err(AlignmentError::TooFewRotations { found: measured.len() });
+    }
+    let rotation_rad = median(&measured.iter().map(|(_, _, rotation)| rotation.norm()).collect::<Vec<_>>());
+    if rotation_rad < MIN_ROTATION_RAD {
+        return Err(AlignmentError::TooLittleRotation { rotation_deg: rotation_rad.to_degrees() });
+    }
+    let correlation = coarse::correlation(&measured, reference, guess_s, search_s);
+    let mut candidates: Vec<Refined> = coarse::peaks(&correlation)
+        .into_iter()
+        .filter_map(|offset_s| refinement::refine(&measured, reference, offset_s))
+        .filter(|refined| (refined.offset_s - guess_s).abs() <= search_s + DISTINCT_S)
+        .collect();
+    candidates.sort_by(|a, b| b.explained.total_cmp(&a.explained));
+    let Some(best) = candidates.first() else { return Err(AlignmentError::NoOverlap { search_s }) };
+    let (offset_s, explained) = (best.offset_s, best.explained);
+    if explained < MIN_EXPLAINED {
+        return Err(AlignmentError::NoAgreement { offset_s, explained });
+    }
+    let next = candidates.iter().find(|other| (other.offset_s - offset_s).abs() > DISTINCT_S);
+    if let Some(next) = next.filter(|next| 1.0 - next.explained < MIN_DISTINCTION * (1.0 - explained)) {
+        let (next_s, next_explained) = (next.offset_s, next.explained);
+        return Err(AlignmentError::Ambiguous { offset_s, explained, next_s, next_explained });
+    }
+    let next = next.map(|next| (next.offset_s, next.explained));
+    let curve = correlation.iter().map(|at| (at.offset_s, at.correlation)).collect();
+    Ok(best.alignment(&measured, reference, next, curve))
+}

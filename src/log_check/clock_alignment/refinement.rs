@@ -1,0 +1,224 @@
+//! Offset, drift, rotation and scale by robust least squares on rotation vectors.
+
+use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector3, Vector6};
+
+use super::super::hand_eye::best_rotation;
+use super::super::statistics::median;
+use super::{ClockAlignment, MIN_ROTATIONS, OrientationSeries};
+use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
+
+/// Standard deviation of the drift that is expected of two quartz clocks.
+const DRIFT_SIGMA: f64 = 1e-4;
+/// Standard deviation of the scale: focal lengths by a field of view are known to some tenths.
+const SCALE_SIGMA: f64 = 0.3;
+/// Maximum number of iterations.
+const ITERATIONS: usize = 20;
+/// An update of the offset below this ends the iterations.
+const CONVERGED_S: f64 = 1e-7;
+/// Largest update of the offset in one iteration.
+const MAX_UPDATE_S: f64 = 0.05;
+/// Step of the central difference by time.
+const DIFFERENCE_S: f64 = 0.004;
+/// Huber's threshold in standard deviations.
+const HUBER: f64 = 1.345;
+/// Ratio of a normal distribution's standard deviation to the median norm of three such residuals.
+const SIGMA_PER_MEDIAN_NORM: f64 = 1.0 / 1.538;
+
+/// An image rotation: stamps of its images, and the rotation vector of `second_from_first`.
+type Measured = (i64, i64, Vector3<f64>);
+
+/// The best solution near one offset.
+pub(super) struct Refined {
+    pub(super) offset_s: f64,
+    pub(super) explained: f64,
+    drift: f64,
+    middle_s: f64,
+    camera_from_body: UnitQuaternion<f64>,
+    scale: f64,
+    covariance: Matrix6<f64>,
+    residual_rad: f64,
+    rotations: usize,
+}
+
+/// A measured rotation vector with the prediction and its derivative by the offset, both in the reference's body frame.
+struct Row {
+    measured: Vector3<f64>,
+    predicted: Vector3<f64>,
+    by_offset: Vector3<f64>,
+    since_middle_s: f64,
+}
+
+/// Refines an offset; `None` when too few rotations overlap, or without convergence.
+pub(super) fn refine(measured: &[Measured], reference: &OrientationSeries, offset_s: f64) -> Option<Refined> {
+    let stamps = measured.iter().map(|(from_ns, to_ns, _)| 0.5 * (seconds_from_ns(*from_ns) + seconds_from_ns(*to_ns)));
+    let (first_s, last_s) =
+        stamps.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), stamp| (first.min(stamp), last.max(stamp)));
+    let middle_s = 0.5 * (first_s + last_s);
+    let mut state = Refined {
+        offset_s,
+        explained: 0.0,
+        drift: 0.0,
+        middle_s,
+        camera_from_body: UnitQuaternion::identity(),
+        scale: 1.0,
+        covariance: Matrix6::zeros(),
+        residual_rad: 0.0,
+        rotations: 0,
+    };
+    let first_rows = state.rows(measured, reference);
+    state.camera_from_body = constant_rotation(&first_rows)?;
+    for _ in 0..ITERATIONS {
+        let rows = state.rows(measured, reference);
+        if rows.len() < MIN_ROTATIONS {
+            return None;
+        }
+        let update = state.update(&rows)?;
+        if update.abs() < CONVERGED_S {
+            state.finish(&rows)?;
+            return Some(state);
+        }
+    }
+    let rows = state.rows(measured, reference);
+    state.finish(&rows)?;
+    Some(state)
+}
+
+impl Refined {
+    fn rows(&self, measured: &[Measured], reference: &OrientationSeries) -> Vec<Row> {
+        let row = |(from_ns, to_ns, rotation): &Measured| {
+            let since_middle_s = 0.5 * (seconds_from_ns(*from_ns) + seconds_from_ns(*to_ns)) - self.middle_s;
+            let shift_ns = ns_from_seconds(self.offset_s + self.drift * since_middle_s);
+            let at = |extra_ns: i64| reference.rotation(from_ns + shift_ns + extra_ns, to_ns + shift_ns + extra_ns);
+            let step_ns = ns_from_seconds(DIFFERENCE_S);
+            let by_offset = (at(step_ns)? - at(-step_ns)?) / (2.0 * DIFFERENCE_S);
+            Some(Row { measured: *rotation, predicted: at(0)?, by_offset, since_middle_s })
+        };
+        measured.iter().filter_map(row).collect()
+    }
+
+    fn residual(&self, row: &Row) -> Vector3<f64> {
+        row.measured - self.scale * (self.camera_from_body * row.predicted)
+    }
+
+    /// Standard deviation of a residual's coordinate, from the median norm.
+    fn sigma_rad(&self, rows: &[Row]) -> f64 {
+        let norms: Vec<f64> = rows.iter().map(|row| self.residual(row).norm()).collect();
+        (SIGMA_PER_MEDIAN_NORM * median(&norms)).max(1e-9)
+    }
+
+    /// Weight of a residual by Huber's loss.
+    fn weight(residual: &Vector3<f64>, sigma_rad: f64) -> f64 {
+        (HUBER * 3.0_f64.sqrt() * sigma_rad / residual.norm().max(1e-12)).min(1.0)
+    }
+
+    /// Columns: offset, drift, rotation (3), scale.
+    fn jacobian(&self, row: &Row) -> SMatrix<f64, 3, 6> {
+        let rotated = self.camera_from_body * row.predicted;
+        let by_offset = self.scale * (self.camera_from_body * row.by_offset);
+        let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
+        jacobian.set_column(0, &by_offset);
+        jacobian.set_column(1, &(by_offset * row.since_middle_s));
+        jacobian.fixed_view_mut::<3, 3>(0, 2).copy_from(&(-self.scale * so3::hat(&rotated)));
+        jacobian.set_column(5, &rotated);
+        jacobian
+    }
+
+    /// Normal equations in units of the residuals' variance, with the prior of the drift.
+    fn normal_equations(&self, rows: &[Row]) -> (Matrix6<f64>, Vector6<f64>) {
+        let sigma_rad = self.sigma_rad(rows);
+        let (mut information, mut gradient) = (Matrix6::zeros(), Vector6::zeros());
+        for row in rows {
+            let residual = self.residual(row);
+            let jacobian = self.jacobian(row);
+            let weight = Self::weight(&residual, sigma_rad) / (sigma_rad * sigma_rad);
+            information += weight * jacobian.transpose() * jacobian;
+            gradient += weight * jacobian.transpose() * residual;
+        }
+        information[(1, 1)] += 1.0 / (DRIFT_SIGMA * DRIFT_SIGMA);
+        gradient[1] -= self.drift / (DRIFT_SIGMA * DRIFT_SIGMA);
+        information[(5, 5)] += 1.0 / (SCALE_SIGMA * SCALE_SIGMA);
+        gradient[5] -= (self.scale - 1.0) / (SCALE_SIGMA * SCALE_SIGMA);
+        // Rotations about one axis leave the rotation about it open.
+        for axis in 2..5 {
+            information[(axis, axis)] += 1.0;
+        }
+        (information, gradient)
+    }
+
+    /// One iteration of Gauss and Newton; returns the update of the offset in seconds.
+    fn update(&mut self, rows: &[Row]) -> Option<f64> {
+        let (information, gradient) = self.normal_equations(rows);
+        let step = information.cholesky()?.solve(&gradient);
+        let damping = (MAX_UPDATE_S / step[0].abs().max(1e-12)).min(1.0);
+        let step = step * damping;
+        self.offset_s += step[0];
+        self.drift += step[1];
+        self.camera_from_body = so3::exp(&Vector3::new(step[2], step[3], step[4])) * self.camera_from_body;
+        self.scale = (self.scale + step[5]).clamp(0.3, 3.0);
+        Some(step[0])
+    }
+
+    fn finish(&mut self, rows: &[Row]) -> Option<()> {
+        if rows.len() < MIN_ROTATIONS {
+            return None;
+        }
+        let sigma_rad = self.sigma_rad(rows);
+        let (information, _) = self.normal_equations(rows);
+        // Residuals of consecutive images may be correlated; the variance grows accordingly.
+        let residuals: Vec<Vector3<f64>> = rows.iter().map(|row| self.residual(row)).collect();
+        let squares: f64 = residuals.iter().map(Vector3::norm_squared).sum();
+        let products: f64 = residuals.windows(2).map(|pair| pair[0].dot(&pair[1])).sum();
+        let correlation = (products / squares.max(1e-30)).clamp(0.0, 0.95);
+        self.covariance = information.try_inverse()? * ((1.0 + correlation) / (1.0 - correlation));
+        let weighted = |value: &dyn Fn(&Row) -> f64| -> f64 {
+            rows.iter().map(|row| Self::weight(&self.residual(row), sigma_rad) * value(row)).sum()
+        };
+        let left = weighted(&|row| self.residual(row).norm_squared());
+        let all = weighted(&|row| row.measured.norm_squared());
+        self.explained = 1.0 - left / all.max(1e-30);
+        self.residual_rad = median(&residuals.iter().map(Vector3::norm).collect::<Vec<_>>());
+        self.rotations = rows.len();
+        Some(())
+    }
+
+    /// The result with its evidence.
+    pub(super) fn alignment(
+        &self,
+        measured: &[Measured],
+        reference: &OrientationSeries,
+        next: Option<(f64, f64)>,
+        correlation: Vec<(f64, f64)>,
+    ) -> ClockAlignment {
+        let speed = |(from_ns, to_ns, rotation): &Measured| {
+            let middle_s = 0.5 * (seconds_from_ns(*from_ns) + seconds_from_ns(*to_ns));
+            let shift_s = self.offset_s + self.drift * (middle_s - self.middle_s);
+            let shift_ns = ns_from_seconds(shift_s);
+            let predicted = reference.rotation(from_ns + shift_ns, to_ns + shift_ns)?;
+            let interval_s = seconds_from_ns(to_ns - from_ns);
+            Some((middle_s + shift_s, rotation.norm() / interval_s, self.scale * predicted.norm() / interval_s))
+        };
+        let rotations: Vec<f64> = measured.iter().map(|(_, _, rotation)| rotation.norm()).collect();
+        ClockAlignment {
+            offset_s: self.offset_s,
+            offset_sigma_s: self.covariance[(0, 0)].sqrt(),
+            drift_ppm: self.drift * 1e6,
+            drift_sigma_ppm: self.covariance[(1, 1)].sqrt() * 1e6,
+            middle_s: self.middle_s,
+            explained: self.explained,
+            next,
+            camera_from_body_rad: so3::log(&self.camera_from_body).into(),
+            scale: self.scale,
+            rotations: self.rotations,
+            rotation_deg: median(&rotations).to_degrees(),
+            residual_deg: self.residual_rad.to_degrees(),
+            correlation,
+            speeds: measured.iter().filter_map(speed).collect(),
+        }
+    }
+}
+
+/// The constant rotation that explains the rows best.
+fn constant_rotation(rows: &[Row]) -> Option<UnitQuaternion<f64>> {
+    let pairs: Vec<_> = rows.iter().map(|row| (row.predicted, row.measured)).collect();
+    best_rotation(&pairs).filter(|_| rows.len() >= MIN_ROTATIONS).map(|(rotation, _)| rotation)
+}
