@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use dcvins::export;
-use dcvins::flight_log::{self, convert::ConvertError};
+use dcvins::flight_log::convert::{self, AutopilotLog, AutopilotLogKind, ConvertError, ConvertOptions, VideoClock};
 
 use crate::cli::exit::Outcome;
 use crate::cli::interrupt::Interrupt;
@@ -15,11 +15,25 @@ use crate::cli::terminal::{Progress, notify, print_report};
 /// `dcvins convert`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ConvertArguments {
-    /// A EuRoC/ASL folder (with mav0), a ROS 1 bag, or a ROS 2 bag: its folder, one .db3 or one .mcap.
+    /// A EuRoC/ASL folder (with mav0), a ROS 1 bag, a ROS 2 bag (its folder, one .db3 or one .mcap), an MP4 video (H.264 or
+    /// H.265; with GoPro's telemetry, or with a log of the autopilot), or a log of an autopilot alone (.ulg, .bin, .tlog).
     pub source: PathBuf,
     /// The log to write; the rig, where the source describes one, gets the same name with .rig.yaml.
     #[arg(short, long, visible_alias = "out", value_name = "LOG.mcap")]
     pub output: PathBuf,
+    /// PX4's ULog of the flight that the video shows.
+    #[arg(long, value_name = "LOG.ulg", group = "autopilot_log")]
+    pub ulog: Option<PathBuf>,
+    /// ArduPilot's DataFlash log of the flight that the video shows.
+    #[arg(long, value_name = "LOG.bin", group = "autopilot_log")]
+    pub dataflash: Option<PathBuf>,
+    /// The telemetry log (MAVLink) of the flight that the video shows.
+    #[arg(long, value_name = "LOG.tlog", group = "autopilot_log")]
+    pub tlog: Option<PathBuf>,
+    /// Start of the video minus the first IMU sample of the autopilot's log. Without it the video is placed by the times of
+    /// camera and autopilot, and at the start of the log where one of them knew no time.
+    #[arg(long, value_name = "SECONDS", requires = "autopilot_log", allow_hyphen_values = true, value_parser = offset)]
+    pub video_offset: Option<f64>,
     /// Overwrite whatever has the name of the log. Without it only a log is replaced that this command wrote; a rig beside the
     /// log that was edited is always kept.
     #[arg(long)]
@@ -32,13 +46,38 @@ pub(crate) struct ConvertArguments {
     pub limits: LimitArguments,
 }
 
+/// Largest distance of a video from the start of the autopilot's log, in seconds (about four months).
+const MAX_OFFSET_S: f64 = 1e7;
+
+/// Parses the offset of a video.
+fn offset(text: &str) -> std::result::Result<f64, String> {
+    let offset_s = text.parse::<f64>().ok().filter(|offset_s| offset_s.abs() <= MAX_OFFSET_S);
+    offset_s.ok_or_else(|| format!("expected seconds from -{MAX_OFFSET_S} to {MAX_OFFSET_S}, such as -2.35"))
+}
+
+impl ConvertArguments {
+    fn options(&self) -> ConvertOptions {
+        let logs = [
+            (AutopilotLogKind::Ulog, &self.ulog),
+            (AutopilotLogKind::DataFlash, &self.dataflash),
+            (AutopilotLogKind::Tlog, &self.tlog),
+        ];
+        let mut given = logs.into_iter().filter_map(|(kind, path)| Some(AutopilotLog { kind, path: path.clone()? }));
+        ConvertOptions {
+            limits: self.limits.limits(),
+            autopilot: given.next(),
+            video_clock: self.video_offset.map(|offset_s| VideoClock { offset_s, drift_ppm: 0.0 }),
+        }
+    }
+}
+
 /// Runs `dcvins convert`.
 pub(crate) fn convert(arguments: &ConvertArguments) -> Result<Outcome> {
     let interrupt = Interrupt::watch()?;
     export::check_converted_log(&arguments.output, arguments.force)?;
     let progress = Progress::new();
-    let limits = arguments.limits.limits();
-    let converted = flight_log::convert::convert_with(&arguments.source, &arguments.output, &limits, &mut |ratio| {
+    let options = arguments.options();
+    let converted = convert::convert_with(&arguments.source, &arguments.output, &options, &mut |ratio| {
         progress.show(ratio, String::new);
         interrupt.control_flow()
     });

@@ -23,7 +23,8 @@ pub enum ConvertError {
     },
     /// The source is of no known kind.
     #[error(
-        "{found}; expected a EuRoC/ASL folder (with mav0), a ROS 1 bag, or a ROS 2 bag (its folder, .db3 or .mcap): {}",
+        "{found}; expected a EuRoC/ASL folder (with mav0), a ROS 1 bag, a ROS 2 bag (its folder, .db3 or .mcap), an MP4 video, \
+         or a log of an autopilot (.ulg, .bin, .tlog): {}",
         path.display()
     )]
     UnknownSource {
@@ -56,6 +57,24 @@ pub enum ConvertError {
         /// The topics with their types and why each was skipped.
         topics: String,
         /// The source.
+        path: PathBuf,
+    },
+    /// Options that need a video, for another source.
+    #[error("{kind} has no video: --ulog, --dataflash, --tlog and --video-offset are for an MP4 video as the source: {}", path.display())]
+    NoVideo {
+        /// Kind of the source.
+        kind: &'static str,
+        /// The source.
+        path: PathBuf,
+    },
+    /// The file beside a video is no log of the named kind.
+    #[error("no {expected}, {found}: {}", path.display())]
+    NotThatLog {
+        /// Name of the expected kind.
+        expected: &'static str,
+        /// What it is.
+        found: String,
+        /// The file.
         path: PathBuf,
     },
     /// The caller has stopped it.

@@ -1,4 +1,5 @@
-//! Logs of other recorders as flight logs: EuRoC folders, ROS 1 bags and ROS 2 bags in, MCAP out.
+//! Logs of other recorders as flight logs: EuRoC folders, ROS 1 bags, ROS 2 bags, MP4 videos and logs of autopilots in,
+//! MCAP out.
 //!
 //! Messages are rewritten one after another, so that a bag of any size needs little memory.
 //! The report has a row for every topic, with the number of skipped messages and the reason.
@@ -7,6 +8,8 @@ mod error;
 mod euroc;
 mod euroc_sensor;
 mod mcap_segment;
+mod options;
+mod recording;
 mod report;
 mod ros1_bag;
 mod ros1_message;
@@ -21,6 +24,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 pub use error::ConvertError;
+pub use options::{AutopilotLog, AutopilotLogKind, ConvertOptions, VideoClock};
 pub use report::{ConversionReport, ConvertedTopic};
 
 use super::file::{LogFile, ZSTD_MAGIC, kind_of, unpacked_name};
@@ -41,6 +45,9 @@ enum SourceKind {
     /// SQLite under Zstandard.
     PackedSqlite,
     Mcap,
+    /// A video in MP4.
+    Video,
+    Autopilot(AutopilotLogKind),
 }
 
 impl SourceKind {
@@ -51,6 +58,8 @@ impl SourceKind {
             Self::Ros2Bag => "ROS 2 bag",
             Self::Sqlite | Self::PackedSqlite => "ROS 2 bag (one SQLite file)",
             Self::Mcap => "MCAP",
+            Self::Video => "MP4 video",
+            Self::Autopilot(kind) => kind.name(),
         }
     }
 }
@@ -64,29 +73,35 @@ impl SourceKind {
 /// When the source is of no known kind or damaged at its start, when it has no usable message, or when files cannot be
 /// read or written. Of a damaged source everything that can be read is converted; notes in the report count what is lost.
 pub fn convert(source: &Path, output: &Path, progress: &mut dyn FnMut(f64)) -> Result<ConversionReport, ConvertError> {
-    convert_with(source, output, &LogLimits::default(), &mut |ratio| {
+    convert_with(source, output, &ConvertOptions::default(), &mut |ratio| {
         progress(ratio);
         ControlFlow::Continue(())
     })
 }
 
-/// Converts as [`convert`] does, within limits other than the usual ones, and ends where `progress` breaks.
+/// Converts as [`convert`] does, with options, and ends where `progress` breaks.
 ///
 /// # Errors
-/// As [`convert`], and [`ConvertError::Interrupted`], in which case no file is written.
+/// As [`convert`], [`ConvertError::Interrupted`], in which case no file is written, and
+/// [`ConvertError::NoVideo`] for options that need a video.
 pub fn convert_with(
     source: &Path,
     output: &Path,
-    limits: &LogLimits,
+    options: &ConvertOptions,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<ConversionReport, ConvertError> {
-    let kind = detect(source, limits)?;
+    let kind = detect(source, &options.limits)?;
+    if kind != SourceKind::Video && (options.autopilot.is_some() || options.video_clock.is_some()) {
+        return Err(ConvertError::NoVideo { kind: kind.name(), path: source.to_owned() });
+    }
     let same = |a: &Path, b: &Path| fs::canonicalize(a).ok().is_some_and(|path| fs::canonicalize(b).ok() == Some(path));
-    if same(source, output) || output.parent().is_some_and(|folder| kind == SourceKind::Ros2Bag && same(source, folder))
+    if same(source, output)
+        || output.parent().is_some_and(|folder| kind == SourceKind::Ros2Bag && same(source, folder))
+        || options.autopilot.as_ref().is_some_and(|log| same(&log.path, output))
     {
         return Err(ConvertError::OntoItself { path: output.to_owned() });
     }
-    let (mut report, rig) = write(kind, source, output, limits, progress)?;
+    let (mut report, rig) = write(kind, source, output, options, progress)?;
     let log = FlightLog::open(output)?;
     report.duration_s = seconds_from_ns(log.duration_ns());
     report.log = output.to_owned();
@@ -117,9 +132,10 @@ fn write(
     kind: SourceKind,
     source: &Path,
     output: &Path,
-    limits: &LogLimits,
+    options: &ConvertOptions,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<(ConversionReport, Option<Rig>), ConvertError> {
+    let limits = &options.limits;
     let writer = LogWriter::create(output, &LogWriterOptions::default())?;
     let mut sink = Sink::new(writer, limits.clone(), progress);
     let rig = match kind {
@@ -141,6 +157,11 @@ fn write(
         SourceKind::Mcap => {
             let file = mcap_segment::open(source, &sink)?;
             mcap_segment::convert(&file, source, &mut sink).map(|()| None)?
+        }
+        SourceKind::Video => recording::convert_video(source, options, &mut sink).map(|()| None)?,
+        SourceKind::Autopilot(kind) => {
+            let log = AutopilotLog { kind, path: source.to_owned() };
+            recording::convert_autopilot(&log, &mut sink).map(|()| None)?
         }
     };
     let report = sink.finish(kind.name(), source)?;
@@ -214,6 +235,10 @@ fn detect(source: &Path, limits: &LogLimits) -> Result<SourceKind, ConvertError>
         Err(unknown(format!("a bag of version {version:?}; only ROSBAG V2.0 is read ('rosbag fix' makes one)")))
     } else if start.starts_with(b"SQLite format 3") {
         Ok(if packed { SourceKind::PackedSqlite } else { SourceKind::Sqlite })
+    } else if recording::is_movie(&start) {
+        Ok(SourceKind::Video)
+    } else if let Some(kind) = recording::autopilot_log_kind(&start) {
+        Ok(SourceKind::Autopilot(kind))
     } else if start.is_empty() {
         Err(unknown("an empty file".to_owned()))
     } else if let Some(bytes) = lfs_pointer(&start) {

@@ -106,6 +106,15 @@ impl<'a> Sink<'a> {
         self.interrupted |= (self.progress)(fraction).is_break();
     }
 
+    /// Reports a position in the source now and then; an error when the caller has stopped the conversion.
+    pub(super) fn advance(&mut self, at: usize, length: usize) -> Result<(), ConvertError> {
+        self.since += 1;
+        if self.since >= MESSAGES_PER_REPORT {
+            self.progress(at as f64 / length.max(1) as f64);
+        }
+        self.ensure_running()
+    }
+
     /// An error when the caller has stopped the conversion.
     pub(super) fn ensure_running(&self) -> Result<(), ConvertError> {
         if self.interrupted {
@@ -140,6 +149,11 @@ impl<'a> Sink<'a> {
         let tally = self.tally(topic, message_type);
         tally.taken += 1;
         tally
+    }
+
+    /// Says something of a topic that is in the log.
+    pub(super) fn remark(&mut self, topic: &str, message_type: &str, remark: impl Into<String>) {
+        self.tally(topic, message_type).reason.get_or_insert_with(|| remark.into());
     }
 
     /// The row of a topic in the report; topics beyond their limit share one.

@@ -33,6 +33,14 @@ impl VideoCodec {
         }
     }
 
+    /// The name that is written into messages.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::H264 => "h264",
+            Self::H265 => "h265",
+        }
+    }
+
     /// Whether a message (Annex B) holds a picture at which decoding can start, with its sequence parameter set.
     pub(crate) fn is_keyframe(self, access_unit: &[u8]) -> bool {
         let has = |types: RangeInclusive<u8>| self.unit_types(access_unit).any(|unit| types.contains(&unit));

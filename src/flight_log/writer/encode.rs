@@ -156,3 +156,10 @@ pub(in super::super) fn transform_stamped(
     put_rotation(&mut out, &pose.rotation);
     out.finish()
 }
+
+/// `geometry_msgs/msg/QuaternionStamped`.
+pub(in super::super) fn quaternion_stamped(stamp_ns: i64, frame_id: &str, rotation: &UnitQuaternion<f64>) -> Vec<u8> {
+    let mut out = with_header(stamp_ns, frame_id);
+    put_rotation(&mut out, rotation);
+    out.finish()
+}

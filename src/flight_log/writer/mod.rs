@@ -16,7 +16,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder as _};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::output::{OutputFile, StagedFile};
 use super::{LogError, MessageKind};
@@ -273,6 +273,20 @@ impl LogWriter {
     ) -> Result<(), LogError> {
         let message = encode::transform_stamped(times.stamp_ns, frame_id, child_frame_id, pose);
         self.write(topic, MessageKind::TransformStamped, times, &message)
+    }
+
+    /// Writes a rotation from a body's frame to `frame_id`.
+    pub fn write_rotation(
+        &mut self,
+        topic: &str,
+        frame_id: &str,
+        times: MessageTimes,
+        rotation: &UnitQuaternion<f64>,
+    ) -> Result<(), LogError> {
+        let definition = schemas::compose(&schemas::QUATERNION_STAMPED);
+        let message_type = MessageType::ros2("geometry_msgs/msg/QuaternionStamped", definition);
+        let message = encode::quaternion_stamped(times.stamp_ns, frame_id, rotation);
+        self.write_typed(topic, &message_type, times, &message)
     }
 
     /// Attaches a text file, such as `city.rig.yaml`.

@@ -60,6 +60,10 @@ pub(super) const IMAGE_ANNOTATIONS: Definition<'_> =
 /// `rcl_interfaces/msg/Log`.
 pub(super) const LOG_LINE: Definition<'_> = (fields!("rcl_interfaces/Log"), &[TIME]);
 
+/// `geometry_msgs/msg/QuaternionStamped`.
+pub(super) const QUATERNION_STAMPED: Definition<'_> =
+    (fields!("geometry_msgs/QuaternionStamped"), &[HEADER, TIME, QUATERNION]);
+
 /// The fields of a message, and the types they need.
 fn fields(kind: MessageKind) -> Definition<'static> {
     match kind {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use dcvins::flight_log::LogLimits;
-use dcvins::flight_log::convert::convert_with;
+use dcvins::flight_log::convert::{ConvertOptions, convert_with};
 use rusqlite::Connection;
 
 use super::ros1::{Compression, Message, bag};
@@ -124,8 +124,9 @@ fn compressed_sources_are_unpacked_within_the_limit() {
     let opened = dcvins::flight_log::FlightLog::open(&source).unwrap();
     assert_eq!(opened.topics(), dcvins::flight_log::FlightLog::open(&plain).unwrap().topics());
     let limits = LogLimits { settings: vec!["unpacked-bytes=100".parse().unwrap()] };
+    let options = ConvertOptions { limits, ..ConvertOptions::default() };
     let problem =
-        convert_with(&source, &log, &limits, &mut |_| std::ops::ControlFlow::Continue(())).unwrap_err().to_string();
+        convert_with(&source, &log, &options, &mut |_| std::ops::ControlFlow::Continue(())).unwrap_err().to_string();
     assert!(problem.contains("--limit unpacked-bytes="), "{problem}");
 
     // A compressed ROS 1 bag, and messages that are compressed one by one.

@@ -1,0 +1,198 @@
+//! `DataFlash` logs of `ArduPilot` (`.bin`).
+
+mod records;
+
+use std::path::Path;
+
+use nalgebra::UnitQuaternion;
+
+use super::super::super::file::LogFile;
+use super::super::ConvertError;
+use super::super::sink::Sink;
+use super::geodesy::Geodetic;
+use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, finite, from_euler, nanoseconds};
+pub(super) use records::START;
+use records::{Damage, Record};
+
+/// Reads a log; its clock is the time since the autopilot started.
+pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
+    let file = LogFile::open(path, sink.limits())?;
+    let mut recorded = Recorded::new("ArduPilot DataFlash", "");
+    let length = file.len();
+    let damage = records::walk(&file, path, |record, behind| {
+        take(record, &mut recorded);
+        sink.advance(behind, length)
+    })?;
+    report(&damage, &mut recorded);
+    Ok(recorded)
+}
+
+fn report(damage: &Damage, recorded: &mut Recorded) {
+    if let Some(problem) = &damage.description {
+        recorded.notes.push(format!("a record type is not read: {problem}"));
+    }
+    if damage.skipped_bytes > 0 {
+        recorded.notes.push(format!(
+            "{} bytes at {} places, the first at byte {}, belong to no record and are skipped",
+            damage.skipped_bytes, damage.places, damage.first_at
+        ));
+    }
+    if damage.cut_bytes > 0 {
+        recorded.notes.push(format!(
+            "the log ends within a record (power lost, or the copy is incomplete): its last {} bytes are lost",
+            damage.cut_bytes
+        ));
+    }
+}
+
+/// Takes what a record measures, or counts it.
+fn take(record: &Record<'_>, recorded: &mut Recorded) {
+    let name = record.record_type.name.as_str();
+    let taken = match name {
+        "IMU" | "IMU2" | "IMU3" => imu(record, name, recorded),
+        _ if name.starts_with("GYR") || name.starts_with("ACC") => one_sensor(record, name, recorded),
+        "ATT" | "AHR2" => attitude(record, name, u8::from(name == "AHR2"), recorded),
+        "XKF1" | "NKF1" | "EKF1" => position(record, name, recorded),
+        "GPS" => fix(record, recorded),
+        "MNT" => mount(record, recorded),
+        "FMTU" | "UNIT" | "MULT" => Ok(()),
+        _ => Err("not read"),
+    };
+    if let Err(reason) = taken {
+        recorded.leave(name, reason);
+    }
+}
+
+/// Time since the start of the autopilot.
+fn time_ns(record: &Record<'_>) -> Result<i64, &'static str> {
+    let time_ns = match record.raw("TimeUS") {
+        Some(microseconds) => nanoseconds(microseconds, 1e3),
+        None => record.raw("TimeMS").and_then(|milliseconds| nanoseconds(milliseconds, 1e6)),
+    };
+    time_ns.ok_or("without a time")
+}
+
+/// The name of an instance: `IMU[1]` for `IMU` records with instance 1, and for `IMU2`.
+fn instance(record: &Record<'_>, name: &str) -> String {
+    let (base, number) = name.split_at(3);
+    let by_name = number.parse::<u64>().ok().map(|number| number.saturating_sub(1));
+    let number = by_name.unwrap_or_else(|| record.raw("I").map_or(0, |number| number as u64));
+    format!("{base}[{number}]")
+}
+
+fn imu(record: &Record<'_>, name: &str, recorded: &mut Recorded) -> Result<(), &'static str> {
+    let (Some(rate), Some(force)) =
+        (record.numbers(["GyrX", "GyrY", "GyrZ"]), record.numbers(["AccX", "AccY", "AccZ"]))
+    else {
+        return Err("without angular velocity or specific force");
+    };
+    let (rate, force) = finite(rate).zip(finite(force)).ok_or(NOT_FINITE)?;
+    let time_ns = time_ns(record)?;
+    recorded.imu(&instance(record, name)).combined.push((time_ns, [rate, force]));
+    Ok(())
+}
+
+const NOT_FINITE: &str = "a number that is not finite";
+
+/// `GYR` and `ACC`: the samples of one sensor as they were measured.
+fn one_sensor(record: &Record<'_>, name: &str, recorded: &mut Recorded) -> Result<(), &'static str> {
+    let sampled = record.raw("SampleUS").filter(|time| *time > 0.0).and_then(|time| nanoseconds(time, 1e3));
+    let time_ns = sampled.map_or_else(|| time_ns(record), Ok)?;
+    let instance = instance(record, name).replace("ACC", "GYR").replace("GYR", "GYR/ACC");
+    if let Some(rate) = record.numbers(["GyrX", "GyrY", "GyrZ"]) {
+        let rate = finite(rate).ok_or(NOT_FINITE)?;
+        recorded.imu(&instance).gyroscope.push((time_ns, rate));
+    } else if let Some(force) = record.numbers(["AccX", "AccY", "AccZ"]) {
+        let force = finite(force).ok_or(NOT_FINITE)?;
+        recorded.imu(&instance).accelerometer.push((time_ns, force));
+    } else {
+        return Err("not read");
+    }
+    Ok(())
+}
+
+fn attitude(record: &Record<'_>, name: &str, rank: u8, recorded: &mut Recorded) -> Result<(), &'static str> {
+    let angles_deg = record.numbers(["Roll", "Pitch", "Yaw"]).ok_or("without roll, pitch and yaw")?;
+    let rotation = from_euler(angles_deg.map(f64::to_radians)).ok_or(NOT_FINITE)?;
+    recorded.attitudes.push(rank, name, time_ns(record)?, rotation);
+    Ok(())
+}
+
+/// The position of the first core of a Kalman filter.
+fn position(record: &Record<'_>, name: &str, recorded: &mut Recorded) -> Result<(), &'static str> {
+    if record.raw("C").is_some_and(|core| core != 0.0) {
+        return Err("of another core of the filter");
+    }
+    let position_m = record.numbers(["PN", "PE", "PD"]).ok_or("without a position")?;
+    let position_m = finite(position_m).ok_or(NOT_FINITE)?;
+    let rank = match name {
+        "XKF1" => 0,
+        "NKF1" => 1,
+        _ => 2,
+    };
+    recorded.positions.push(rank, name, time_ns(record)?, position_m);
+    Ok(())
+}
+
+/// Least status of a receiver with a position in three dimensions.
+const FIX_3D: f64 = 3.0;
+
+fn fix(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static str> {
+    if record.raw("I").is_some_and(|instance| instance != 0.0) {
+        return Err("of another receiver");
+    }
+    // Before the microseconds came, TimeMS was GPS time and T the time since the start.
+    let time_ns = match record.raw("T") {
+        Some(milliseconds) => nanoseconds(milliseconds, 1e6).ok_or("without a time")?,
+        None => time_ns(record)?,
+    };
+    if record.raw("Status").is_some_and(|status| status < FIX_3D) {
+        return Err("without a fix in three dimensions");
+    }
+    let [latitude_deg, longitude_deg, altitude_m] =
+        record.numbers(["Lat", "Lng", "Alt"]).ok_or("without a position")?;
+    let fix = Geodetic::from_deg(latitude_deg, longitude_deg, altitude_m).ok_or("without a position")?;
+    recorded.fixes.push(0, "GPS", time_ns, fix);
+    let week = record.raw("GWk").or_else(|| record.raw("Week"));
+    let in_week = record.raw("GMS").or_else(|| record.raw("TimeMS"));
+    if let (Some(week), Some(milliseconds)) = (week, in_week)
+        && let Some(utc_ns) = utc_from_gps_ns(week, milliseconds)
+    {
+        recorded.utc.push((time_ns, utc_ns));
+    }
+    Ok(())
+}
+
+/// Seconds from the epoch to the start of GPS time, 6 January 1980.
+const GPS_EPOCH_S: f64 = 315_964_800.0;
+/// GPS time minus UTC in seconds from each GPS time on (leap seconds of 2012, 2015 and 2017).
+const LEAP_SECONDS: [(f64, f64); 3] = [(1_025_136_016.0, 16.0), (1_119_744_017.0, 17.0), (1_167_264_018.0, 18.0)];
+
+/// UTC in nanoseconds since the epoch of a GPS week and the milliseconds in it.
+fn utc_from_gps_ns(week: f64, milliseconds: f64) -> Option<i64> {
+    let gps_s = week * 604_800.0 + milliseconds * 1e-3;
+    let leap_s = LEAP_SECONDS.iter().rev().find(|(from_s, _)| gps_s >= *from_s)?.1;
+    nanoseconds(GPS_EPOCH_S + week * 604_800.0 + milliseconds * 1e-3 - leap_s, 1e9)
+}
+
+/// A gimbal's angles: roll and pitch from the horizon, yaw from the vehicle (`YawB`) or from north (`YawE`, `Yaw`).
+fn mount(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static str> {
+    if record.raw("I").is_some_and(|instance| instance != 0.0) {
+        return Err("of another gimbal");
+    }
+    let angle_deg = |name: &str| record.number(name).filter(|angle| angle.is_finite());
+    let (Some(roll_deg), Some(pitch_deg)) = (angle_deg("Roll"), angle_deg("Pitch")) else {
+        return Err("without measured angles");
+    };
+    let (frame, yaw_deg) = if let Some(yaw_deg) = angle_deg("YawB").or_else(|| angle_deg("Yaw")) {
+        (GimbalFrame::Vehicle, yaw_deg)
+    } else if let Some(yaw_deg) = angle_deg("YawE") {
+        (GimbalFrame::Earth, yaw_deg)
+    } else {
+        return Err("without measured angles");
+    };
+    let frame_from_camera: UnitQuaternion<f64> =
+        from_euler([roll_deg, pitch_deg, yaw_deg].map(f64::to_radians)).ok_or(NOT_FINITE)?;
+    recorded.gimbal.push(0, "MNT", time_ns(record)?, GimbalAttitude { frame, frame_from_camera });
+    Ok(())
+}

@@ -1,0 +1,278 @@
+//! The records of a `DataFlash` log: each begins with two fixed bytes and a type, whose fields `FMT` records describe.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::super::super::super::file::{FileWindow, LogFile};
+use super::super::super::ConvertError;
+use super::super::scalar::Scalar;
+
+/// First bytes of every record.
+pub(in super::super) const START: [u8; 2] = [0xA3, 0x95];
+/// Bytes before the fields of a record: the two first bytes and the type.
+const HEADER_BYTES: usize = 3;
+/// Type of the records that describe types.
+const FORMAT_TYPE: u8 = 128;
+/// Bytes of a record that describes a type: type, length, name (4), format (16) and columns (64).
+const FORMAT_BYTES: usize = 89;
+
+/// A field of a record type.
+#[derive(Clone, Debug, PartialEq)]
+struct Field {
+    name: String,
+    /// Letter of its format.
+    letter: u8,
+    /// From the first byte behind the header.
+    offset: usize,
+}
+
+/// A record type.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct RecordType {
+    pub(super) name: String,
+    /// With the header.
+    length: usize,
+    fields: Vec<Field>,
+    /// Letters of the multipliers of its fields (`FMTU`).
+    multipliers: Vec<u8>,
+}
+
+/// Bytes of a format letter.
+fn size(letter: u8) -> Option<usize> {
+    Some(match letter {
+        b'b' | b'B' | b'M' => 1,
+        b'h' | b'H' | b'c' | b'C' | b'g' => 2,
+        b'i' | b'I' | b'f' | b'e' | b'E' | b'L' | b'n' => 4,
+        b'd' | b'q' | b'Q' => 8,
+        b'N' => 16,
+        b'Z' | b'a' => 64,
+        _ => return None,
+    })
+}
+
+/// The number type of a format letter, and the factor that the letter implies; `None` for text, arrays and half floats.
+fn scalar(letter: u8) -> Option<(Scalar, f64)> {
+    Some(match letter {
+        b'b' => (Scalar::I8, 1.0),
+        b'B' | b'M' => (Scalar::U8, 1.0),
+        b'h' => (Scalar::I16, 1.0),
+        b'H' => (Scalar::U16, 1.0),
+        b'c' => (Scalar::I16, 0.01),
+        b'C' => (Scalar::U16, 0.01),
+        b'i' => (Scalar::I32, 1.0),
+        b'I' => (Scalar::U32, 1.0),
+        b'e' => (Scalar::I32, 0.01),
+        b'E' => (Scalar::U32, 0.01),
+        b'L' => (Scalar::I32, 1e-7),
+        b'f' => (Scalar::F32, 1.0),
+        b'd' => (Scalar::F64, 1.0),
+        b'q' => (Scalar::I64, 1.0),
+        b'Q' => (Scalar::U64, 1.0),
+        _ => return None,
+    })
+}
+
+fn text(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    String::from_utf8_lossy(&bytes[..end]).into_owned()
+}
+
+impl RecordType {
+    /// Of the content of an `FMT` record: the type's number and description, or the problem with it.
+    fn parse(content: &[u8]) -> Result<(u8, Self), String> {
+        let (Some(number), Some(length), Some(name), Some(letters), Some(columns)) =
+            (content.first(), content.get(1), content.get(2..6), content.get(6..22), content.get(22..86))
+        else {
+            return Err("a description of a record type that is too short".to_owned());
+        };
+        let (name, letters, columns) = (text(name), text(letters), text(columns));
+        let mut fields = Vec::new();
+        let mut offset = 0;
+        for (letter, column) in letters.bytes().zip(columns.split(',').chain(std::iter::repeat(""))) {
+            let bytes = size(letter)
+                .ok_or_else(|| format!("record type {name} has a field of format {:?}", char::from(letter)))?;
+            fields.push(Field { name: column.trim().to_owned(), letter, offset });
+            offset += bytes;
+        }
+        let length = usize::from(*length);
+        if length != HEADER_BYTES + offset {
+            return Err(format!(
+                "record type {name} has {length} bytes, but its fields take {}",
+                HEADER_BYTES + offset
+            ));
+        }
+        Ok((*number, Self { name, length, fields, multipliers: Vec::new() }))
+    }
+}
+
+/// The types of a log, and its multipliers.
+#[derive(Clone, Debug, Default)]
+struct Types {
+    types: BTreeMap<u8, RecordType>,
+    multipliers: BTreeMap<u8, f64>,
+}
+
+/// What a record says of others.
+enum Lesson {
+    /// Letters of the multipliers of a type's fields.
+    Letters(u8, Vec<u8>),
+    /// The multiplier of a letter.
+    Multiplier(u8, f64),
+}
+
+impl Lesson {
+    fn of(record: &Record<'_>) -> Option<Self> {
+        match record.record_type.name.as_str() {
+            "FMTU" => Some(Self::Letters(record.raw("FmtType")? as u8, record.bytes("MultIds")?.to_vec())),
+            "MULT" => Some(Self::Multiplier(record.raw("Id")? as i64 as u8, record.raw("Mult")?)),
+            _ => None,
+        }
+    }
+}
+
+impl Types {
+    fn learn(&mut self, lesson: Lesson) {
+        match lesson {
+            Lesson::Letters(number, letters) => {
+                if let Some(described) = self.types.get_mut(&number) {
+                    described.multipliers = letters;
+                }
+            }
+            Lesson::Multiplier(letter, factor) => {
+                self.multipliers.insert(letter, factor);
+            }
+        }
+    }
+}
+
+/// A record of a log.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Record<'a> {
+    pub(super) record_type: &'a RecordType,
+    multipliers: &'a BTreeMap<u8, f64>,
+    content: &'a [u8],
+}
+
+impl<'a> Record<'a> {
+    fn field(&self, name: &str) -> Option<(usize, &'a Field)> {
+        self.record_type.fields.iter().enumerate().find(|(_, field)| field.name == name)
+    }
+
+    /// A field as it is stored.
+    pub(super) fn raw(&self, name: &str) -> Option<f64> {
+        let (_, field) = self.field(name)?;
+        scalar(field.letter)?.0.little_endian(self.content, field.offset)
+    }
+
+    /// The bytes of a text.
+    fn bytes(&self, name: &str) -> Option<&'a [u8]> {
+        let (_, field) = self.field(name)?;
+        let bytes = self.content.get(field.offset..field.offset + size(field.letter)?)?;
+        Some(&bytes[..bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len())])
+    }
+
+    /// A field in its unit: multiplied as the log's own multipliers say (`FMTU`, `MULT`), else as its format letter implies.
+    pub(super) fn number(&self, name: &str) -> Option<f64> {
+        let (index, field) = self.field(name)?;
+        let (scalar, implied) = scalar(field.letter)?;
+        let raw = scalar.little_endian(self.content, field.offset)?;
+        let described = self.record_type.multipliers.get(index).and_then(|letter| self.multipliers.get(letter));
+        let factor = described.copied().filter(|factor| *factor != 0.0 && factor.is_finite()).unwrap_or(implied);
+        // The quotient by 100 is the number nearest to the decimal one, the product with 0.01 is not.
+        let divisor = (1.0 / factor).round();
+        Some(if (divisor * factor - 1.0).abs() < 1e-12 { raw / divisor } else { raw * factor })
+    }
+
+    /// Several fields.
+    pub(super) fn numbers<const N: usize>(&self, names: [&str; N]) -> Option<[f64; N]> {
+        let mut numbers = [0.0; N];
+        for (number, name) in numbers.iter_mut().zip(names) {
+            *number = self.number(name)?;
+        }
+        Some(numbers)
+    }
+}
+
+/// What was skipped of a log.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Damage {
+    /// Bytes that belong to no record.
+    pub(super) skipped_bytes: u64,
+    /// Places at which bytes were skipped.
+    pub(super) places: u64,
+    /// The first of them.
+    pub(super) first_at: usize,
+    /// Bytes of a record at the end that is cut off.
+    pub(super) cut_bytes: usize,
+    /// The first problem with a description.
+    pub(super) description: Option<String>,
+}
+
+/// Calls `visit` with every record and the position behind it, until it returns an error; what is no record is skipped.
+pub(super) fn walk(
+    file: &LogFile,
+    path: &Path,
+    mut visit: impl FnMut(&Record<'_>, usize) -> Result<(), ConvertError>,
+) -> Result<Damage, ConvertError> {
+    let unreadable = |problem: String| ConvertError::unreadable(problem, path);
+    let mut window = FileWindow::new(file);
+    let mut types = Types::default();
+    let description =
+        RecordType { name: "FMT".to_owned(), length: FORMAT_BYTES, fields: Vec::new(), multipliers: Vec::new() };
+    types.types.insert(FORMAT_TYPE, description);
+    let mut damage = Damage::default();
+    let mut at = 0;
+    let mut skipping = false;
+    while at < file.len() {
+        let end = at.saturating_add(HEADER_BYTES);
+        let header = if end <= file.len() { window.read(at..end).map_err(unreadable)? } else { &[] };
+        let known = match header {
+            [first, second, number] if [*first, *second] == START => {
+                types.types.get(number).map(|kind| (*number, kind.length))
+            }
+            _ => None,
+        };
+        let whole = known.filter(|(_, length)| at.saturating_add(*length) <= file.len());
+        let Some((number, length)) = whole else {
+            if known.is_some() && !skipping {
+                damage.cut_bytes = file.len() - at;
+                break;
+            }
+            if !skipping {
+                damage.places += 1;
+                if damage.places == 1 {
+                    damage.first_at = at;
+                }
+            }
+            skipping = true;
+            damage.skipped_bytes += 1;
+            at += 1;
+            continue;
+        };
+        skipping = false;
+        let content = window.read(at + HEADER_BYTES..at + length).map_err(unreadable)?;
+        if number == FORMAT_TYPE {
+            match RecordType::parse(content) {
+                Ok((FORMAT_TYPE, _)) => {}
+                Ok((described, kind)) => {
+                    types.types.insert(described, kind);
+                }
+                Err(problem) => {
+                    damage.description.get_or_insert(problem);
+                }
+            }
+        } else {
+            let mut lesson = None;
+            if let Some(record_type) = types.types.get(&number) {
+                let record = Record { record_type, multipliers: &types.multipliers, content };
+                visit(&record, at + length)?;
+                lesson = Lesson::of(&record);
+            }
+            if let Some(lesson) = lesson {
+                types.learn(lesson);
+            }
+        }
+        at += length;
+    }
+    Ok(damage)
+}

@@ -1,0 +1,178 @@
+//! Recordings of vehicles: an MP4 video with `GoPro`'s telemetry or beside an autopilot's log, and autopilots' logs alone.
+
+mod attitude;
+mod dataflash;
+mod geodesy;
+mod gpmf;
+mod mavlink_gimbal;
+mod mp4;
+mod recorded;
+mod scalar;
+mod tlog;
+mod topics;
+mod ulog;
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
+use super::super::file::ZSTD_MAGIC;
+use super::sink::Sink;
+use super::{AutopilotLog, AutopilotLogKind, ConvertError, ConvertOptions, VideoClock};
+use crate::geometry::{ns_from_seconds, seconds_from_ns};
+use mp4::Movie;
+use recorded::Recorded;
+use topics::Topics;
+
+/// Kind of an autopilot's log by the first bytes of the file.
+pub(super) fn autopilot_log_kind(start: &[u8]) -> Option<AutopilotLogKind> {
+    if start.starts_with(&ulog::MAGIC) {
+        Some(AutopilotLogKind::Ulog)
+    } else if start.starts_with(&dataflash::START) {
+        Some(AutopilotLogKind::DataFlash)
+    } else if tlog::is_telemetry(start) {
+        Some(AutopilotLogKind::Tlog)
+    } else {
+        None
+    }
+}
+
+pub(super) use mp4::is_movie;
+
+/// Bytes by which a log is recognized.
+const START_BYTES: u64 = 16;
+
+/// Reads an autopilot's log.
+fn read_autopilot(log: &AutopilotLog, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
+    let mut start = Vec::new();
+    let file = File::open(&log.path).map_err(ConvertError::io("open the log of the autopilot", &log.path))?;
+    file.take(START_BYTES).read_to_end(&mut start).map_err(ConvertError::io("read", &log.path))?;
+    let found = autopilot_log_kind(&start);
+    // A file under Zstandard begins otherwise.
+    if found != Some(log.kind) && !start.starts_with(&ZSTD_MAGIC) {
+        let found = found.map_or("and no log of another autopilot either", AutopilotLogKind::name);
+        return Err(ConvertError::NotThatLog {
+            expected: log.kind.name(),
+            found: found.to_owned(),
+            path: log.path.clone(),
+        });
+    }
+    match log.kind {
+        AutopilotLogKind::Ulog => ulog::read(&log.path, sink),
+        AutopilotLogKind::DataFlash => dataflash::read(&log.path, sink),
+        AutopilotLogKind::Tlog => tlog::read(&log.path, sink),
+    }
+}
+
+/// Converts an autopilot's log without a video.
+pub(super) fn convert_autopilot(log: &AutopilotLog, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
+    let mut recorded = read_autopilot(log, sink)?;
+    to_utc(&mut recorded);
+    let mut topics = Topics::default();
+    topics.add_recorded(recorded, sink);
+    topics.write(None, sink)
+}
+
+/// Brings the times to UTC where the recorder knew it.
+fn to_utc(recorded: &mut Recorded) {
+    match recorded.utc_offset_ns() {
+        Some(offset_ns) => recorded.shift(offset_ns),
+        None => recorded.notes.push(NO_UTC.to_owned()),
+    }
+}
+
+const NO_UTC: &str = "the log has no UTC: its times count from the start of the autopilot";
+/// Start of a video whose camera knew no time, in nanoseconds since the epoch: stamps of 0 would be stamps that were never set.
+const UNKNOWN_START_NS: i64 = 1_000_000_000;
+/// UTC of a satellite receiver and the clock of a camera may differ by a time zone.
+const TIME_ZONES_NS: i64 = 14 * 3600 * 1_000_000_000;
+
+/// Converts a video with its own telemetry, and an autopilot's log beside it.
+pub(super) fn convert_video(source: &Path, options: &ConvertOptions, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
+    let Movie { video, telemetry, created_ns, notes } = mp4::open(source, &options.limits)?;
+    for note in notes {
+        sink.note(note);
+    }
+    let (mut camera, drone) = gpmf::read(&telemetry);
+    let video_utc_ns = camera.utc_offset_ns().or_else(|| drone.as_ref().and_then(Recorded::utc_offset_ns));
+    let mut topics = Topics::default();
+    let place = if let Some(log) = &options.autopilot {
+        let mut recorded = read_autopilot(log, sink)?;
+        to_utc(&mut recorded);
+        let place = place_video(&recorded, video.span_ns(), video_utc_ns.or(created_ns), options.video_clock, sink);
+        if let Some(drone) = drone {
+            let count = drone.count();
+            sink.leave("Karma", "GoPro Karma", count, "the autopilot's log is read instead");
+        }
+        topics.add_recorded(recorded, sink);
+        place
+    } else {
+        let start_ns = video_utc_ns.or(created_ns).unwrap_or(UNKNOWN_START_NS);
+        if video_utc_ns.is_none() && created_ns.is_none() {
+            sink.note("the camera knew no time: the video starts 1 s after the epoch");
+        }
+        if let Some(mut drone) = drone {
+            drone.shift(start_ns);
+            topics.add_recorded(drone, sink);
+        }
+        Place { start_ns, rate: 1.0 }
+    };
+    camera.map_times(|time_ns| place.time_ns(time_ns));
+    topics.add_recorded(camera, sink);
+    topics.add_video(&video, |time_ns| place.time_ns(time_ns));
+    topics.write(Some(&video), sink)
+}
+
+/// Where the video lies in the log.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Time of the log at the start of the video.
+    start_ns: i64,
+    /// Seconds of the log in a second of the video.
+    rate: f64,
+}
+
+impl Place {
+    fn time_ns(self, video_ns: i64) -> i64 {
+        let drifted_ns = (video_ns as f64 * (self.rate - 1.0)).round() as i64;
+        self.start_ns.saturating_add(video_ns).saturating_add(drifted_ns)
+    }
+}
+
+/// The place of a video in an autopilot's log: as it was given, by UTC where both know it, else both start together.
+fn place_video(
+    recorded: &Recorded,
+    (first_ns, last_ns): (i64, i64),
+    video_utc_ns: Option<i64>,
+    clock: Option<VideoClock>,
+    sink: &mut Sink<'_>,
+) -> Place {
+    let (log_start_ns, log_end_ns) = recorded.span_ns().unwrap_or((UNKNOWN_START_NS, UNKNOWN_START_NS));
+    if let Some(clock) = clock {
+        let start_ns = log_start_ns.saturating_add(ns_from_seconds(clock.offset_s));
+        return Place { start_ns, rate: 1.0 + clock.drift_ppm * 1e-6 };
+    }
+    let has_utc = !recorded.utc.is_empty();
+    let overlaps = |start_ns: i64| {
+        start_ns.saturating_add(last_ns) > log_start_ns && start_ns.saturating_add(first_ns) < log_end_ns
+    };
+    let (start_ns, reason) = match video_utc_ns {
+        Some(start_ns) if has_utc && overlaps(start_ns) => (start_ns, "by the times of camera and autopilot"),
+        Some(start_ns) if has_utc => {
+            let distance_ns = start_ns.saturating_sub(log_start_ns).saturating_abs();
+            let reason = if distance_ns < TIME_ZONES_NS {
+                "start with start: by the camera's clock they do not overlap (is it set to local time?)"
+            } else {
+                "start with start: by the camera's clock they do not overlap"
+            };
+            (log_start_ns.saturating_sub(first_ns), reason)
+        }
+        _ => (log_start_ns.saturating_sub(first_ns), "start with start: camera or autopilot knew no time"),
+    };
+    let offset_s = seconds_from_ns(start_ns.saturating_sub(log_start_ns));
+    sink.note(format!(
+        "the video is placed {offset_s:.3} s after the first measurement of the autopilot's log ({reason}); this is good to \
+         seconds at best, give a better one with --video-offset"
+    ));
+    Place { start_ns, rate: 1.0 }
+}

@@ -1,0 +1,230 @@
+//! MP4 files: the pictures of their video with their times, and the payloads of their telemetry.
+
+mod annex_b;
+mod boxes;
+mod track;
+
+use std::path::Path;
+
+use super::super::super::file::LogFile;
+use super::super::super::limits::LogLimits;
+use super::super::super::video::VideoCodec;
+use super::super::ConvertError;
+use super::recorded::Samples;
+use annex_b::UnitFormat;
+use boxes::{child, children, file_boxes, u32_at, u64_at};
+use track::{Sample, Track};
+
+/// Seconds from 1904, from which MP4 counts, to the epoch.
+const EPOCH_1904_S: u64 = 2_082_844_800;
+
+/// A picture of a video.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Picture {
+    /// When it was taken, in nanoseconds since the start of the video.
+    pub(super) presented_ns: i64,
+    /// When its message is in the log: in the order of decoding, never before it was taken.
+    pub(super) decoded_ns: i64,
+    start: usize,
+    length: usize,
+}
+
+/// The video of a file.
+#[derive(Debug)]
+pub(super) struct Video {
+    file: LogFile,
+    format: UnitFormat,
+    pub(super) codec: VideoCodec,
+    pub(super) resolution_px: [usize; 2],
+    pub(super) pictures: Vec<Picture>,
+    has_reordered_pictures: bool,
+}
+
+/// A payload of telemetry.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Payload {
+    /// Nanoseconds from the start of the video to its first sample, and to the next payload.
+    pub(super) start_ns: i64,
+    pub(super) end_ns: i64,
+    pub(super) bytes: Vec<u8>,
+}
+
+/// What is read of a file.
+#[derive(Debug)]
+pub(super) struct Movie {
+    pub(super) video: Video,
+    /// `GoPro`'s telemetry.
+    pub(super) telemetry: Vec<Payload>,
+    /// When the recording started by the camera's clock, in nanoseconds since the epoch.
+    pub(super) created_ns: Option<i64>,
+    pub(super) notes: Vec<String>,
+}
+
+/// Whether a file begins like an MP4 or `QuickTime` file.
+pub(in super::super) fn is_movie(start: &[u8]) -> bool {
+    start
+        .get(4..8)
+        .is_some_and(|kind| [b"ftyp", b"moov", b"mdat", b"wide", b"skip", b"free"].iter().any(|name| *name == kind))
+}
+
+/// Opens a file and reads its tables.
+pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertError> {
+    let file = LogFile::open(path, limits)?;
+    let unreadable = |problem: String| ConvertError::unreadable(problem, path);
+    let found = file_boxes(&file).map_err(unreadable)?;
+    let has = |kind: &[u8; 4]| found.iter().any(|found| &found.kind == kind);
+    let Some(moov) = found.iter().find(|found| &found.kind == b"moov") else {
+        return Err(unreadable(
+            "the MP4 has no moov box, the table of its pictures: the recording was not closed (power lost, card removed) or \
+             the copy is incomplete; copy it again, let the camera repair it, or rebuild the table with untrunc and an \
+             intact recording of the same camera"
+                .to_owned(),
+        ));
+    };
+    if has(b"moof") {
+        return Err(unreadable(
+            "a fragmented MP4 (moof boxes) is not read; rewrite it with \
+             'ffmpeg -i IN.mp4 -map 0 -c copy -copy_unknown OUT.mp4'"
+                .to_owned(),
+        ));
+    }
+    let table = file.read(moov.start..moov.end).map_err(|problem| unreadable(format!("the moov box: {problem}")))?;
+    let mut notes = Vec::new();
+    let header = child(&table, b"mvhd").unwrap_or_default();
+    let (created_s, movie_timescale) = if header.first() == Some(&1) {
+        (u64_at(header, 4), u32_at(header, 20))
+    } else {
+        (u32_at(header, 4).map(u64::from), u32_at(header, 12))
+    };
+    let created_s = created_s.and_then(|created_s| i64::try_from(created_s.checked_sub(EPOCH_1904_S)?).ok());
+    let max_samples = limits.messages(file.len() as u64);
+    let traks = children(&table).filter(|(kind, _)| kind == b"trak");
+    let tracks: Vec<Track<'_>> =
+        traks.filter_map(|(_, trak)| track::read(trak, movie_timescale.unwrap_or(1), max_samples)).collect();
+    let telemetry = telemetry(&tracks, &file, &mut notes);
+    let (track, format, resolution_px) = video_track(&tracks).map_err(unreadable)?;
+    let (pictures, has_reordered_pictures) = pictures(track, file.len(), &mut notes);
+    if pictures.is_empty() {
+        return Err(unreadable(format!("the video has no picture within the file; {}", notes.join("; "))));
+    }
+    if !track.is_upright {
+        notes.push("the video is marked to be shown rotated; its pictures are taken as they are stored".to_owned());
+    }
+    if track.edits > 1 {
+        notes.push(format!("the video has an edit list of {} parts; only its first time is applied", track.edits));
+    }
+    let codec = format.codec;
+    let video = Video { file, format, codec, resolution_px, pictures, has_reordered_pictures };
+    let created_ns = created_s.and_then(|created_s| created_s.checked_mul(1_000_000_000));
+    Ok(Movie { video, telemetry, created_ns, notes })
+}
+
+/// The first video track that can be read, how its units are stored, and its resolution.
+fn video_track<'a>(tracks: &'a [Track<'a>]) -> Result<(&'a Track<'a>, UnitFormat, [usize; 2]), String> {
+    let mut others = Vec::new();
+    for track in tracks.iter().filter(|track| &track.handler == b"vide") {
+        let (kind, description) = track.description;
+        let read = track::visual(description).and_then(|(resolution_px, boxes)| {
+            let format = match &kind {
+                b"avc1" | b"avc3" => UnitFormat::avc(child(boxes, b"avcC")?),
+                b"hvc1" | b"hev1" => UnitFormat::hevc(child(boxes, b"hvcC")?),
+                _ => None,
+            };
+            Some((track, format?, resolution_px))
+        });
+        if let Some(read) = read {
+            return Ok(read);
+        }
+        others.push(String::from_utf8_lossy(&kind).into_owned());
+    }
+    Err(if others.is_empty() {
+        "the MP4 has no video track".to_owned()
+    } else {
+        format!(
+            "the video is of type {:?}, of which no description is read; expected H.264 (avc1) or H.265 (hvc1, hev1): \
+             re-encode it with 'ffmpeg -i IN.mp4 -map 0 -c:v libx264 -bf 0 -c:d copy -copy_unknown OUT.mp4'",
+            others.join(", ")
+        )
+    })
+}
+
+/// The pictures that lie in the file, and whether they are shown in another order than decoded.
+fn pictures(track: &Track<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (Vec<Picture>, bool) {
+    // Pictures that wait for others are written when the last of those that they wait for is decoded.
+    let delay_ns = track.samples.iter().map(|sample| sample.presented_ns.saturating_sub(sample.decoded_ns)).max();
+    let delay_ns = delay_ns.unwrap_or(0);
+    let mut lost = track.undescribed;
+    let mut pictures = Vec::with_capacity(track.samples.len());
+    for sample in &track.samples {
+        match place(sample, file_bytes) {
+            Some((start, length)) => {
+                let decoded_ns = sample.decoded_ns.saturating_add(delay_ns);
+                pictures.push(Picture { presented_ns: sample.presented_ns, decoded_ns, start, length });
+            }
+            None => lost += 1,
+        }
+    }
+    if lost > 0 {
+        let all = track.samples.len() as u64 + track.undescribed;
+        notes.push(format!(
+            "{lost} of {all} pictures lie beyond the end of the file (cut off) or are not described: lost"
+        ));
+    }
+    let reordered = pictures.windows(2).any(|pair| pair[1].presented_ns < pair[0].presented_ns);
+    (pictures, reordered)
+}
+
+/// Place of a sample that lies in the file.
+fn place(sample: &Sample, file_bytes: usize) -> Option<(usize, usize)> {
+    let (start, length) = (usize::try_from(sample.start).ok()?, usize::try_from(sample.length).ok()?);
+    (length > 0 && start.checked_add(length)? <= file_bytes).then_some((start, length))
+}
+
+/// The payloads of `GoPro`'s telemetry.
+fn telemetry(tracks: &[Track<'_>], file: &LogFile, notes: &mut Vec<String>) -> Vec<Payload> {
+    let Some(track) = tracks.iter().find(|track| &track.description.0 == b"gpmd") else { return Vec::new() };
+    let mut payloads = Vec::new();
+    let mut lost = track.undescribed;
+    // Together they cannot be longer than the file.
+    let mut budget = file.len();
+    for sample in &track.samples {
+        let read = place(sample, file.len()).filter(|(_, length)| *length <= budget).and_then(|(start, length)| {
+            budget -= length;
+            file.read(start..start + length).ok()
+        });
+        match read {
+            Some(bytes) => payloads.push(Payload {
+                start_ns: sample.presented_ns,
+                end_ns: sample.presented_ns.saturating_add(sample.duration_ns),
+                bytes,
+            }),
+            None => lost += 1,
+        }
+    }
+    if lost > 0 {
+        notes.push(format!("{lost} payloads of telemetry lie beyond the end of the file (cut off): lost"));
+    }
+    payloads
+}
+
+impl Video {
+    /// A picture in Annex B.
+    pub(super) fn access_unit(&self, number: usize) -> Result<Vec<u8>, String> {
+        let Picture { start, length, .. } = self.pictures[number];
+        self.format.access_unit(&self.file.read(start..start + length)?)
+    }
+
+    /// `h264, 854×480, 29.97 fps`.
+    pub(super) fn description(&self) -> String {
+        let times: Samples<()> = self.pictures.iter().map(|picture| (picture.decoded_ns, ())).collect();
+        let [width, height] = self.resolution_px;
+        let order = if self.has_reordered_pictures { "; with B-frames, in the order of decoding" } else { "" };
+        format!("{}, {width}×{height}, {:.2} fps{order}", self.codec.name(), super::topics::rate_hz(&times))
+    }
+
+    /// First and last time of its pictures in nanoseconds since its start.
+    pub(super) fn span_ns(&self) -> (i64, i64) {
+        let times = || self.pictures.iter().map(|picture| picture.presented_ns);
+        (times().min().unwrap_or(0), times().max().unwrap_or(0))
+    }
+}

@@ -1,0 +1,242 @@
+//! What was measured during a recording, in SI units, by the clock of its recorder.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use super::geodesy::Geodetic;
+
+/// Standard gravity (ISO 80000-3), the unit of accelerations in g.
+pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.80665;
+
+/// Measurements with their times in nanoseconds of the recorder's clock.
+pub(super) type Samples<T> = Vec<(i64, T)>;
+
+/// Measurements of a record, with its name.
+pub(super) type NamedSamples<T> = (String, Samples<T>);
+
+/// One IMU of a recording: angular velocities in rad/s and specific forces in m/s², in the IMU frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RecordedImu {
+    /// Both in one record.
+    pub(super) combined: Samples<[Vector3<f64>; 2]>,
+    /// Angular velocities alone.
+    pub(super) gyroscope: Samples<Vector3<f64>>,
+    /// Specific forces alone.
+    pub(super) accelerometer: Samples<Vector3<f64>>,
+}
+
+/// The frame of a gimbal's attitude (`MAVLink` gimbal protocol v2), with forward, right and down as its axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum GimbalFrame {
+    /// Levelled, with the heading of the vehicle.
+    Vehicle,
+    /// North, east, down.
+    Earth,
+}
+
+/// A gimbal's attitude: the rotation from the camera's axes (forward, right, down) to those of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct GimbalAttitude {
+    pub(super) frame: GimbalFrame,
+    pub(super) frame_from_camera: UnitQuaternion<f64>,
+}
+
+/// Measurements of the same quantity by record, of which one is taken: the one with the smallest rank.
+#[derive(Clone, Debug)]
+pub(super) struct Candidates<T>(BTreeMap<(u8, String), Samples<T>>);
+
+impl<T> Default for Candidates<T> {
+    fn default() -> Self {
+        Self(BTreeMap::new())
+    }
+}
+
+impl<T> Candidates<T> {
+    /// Adds a measurement of a record.
+    pub(super) fn push(&mut self, rank: u8, record: &str, time_ns: i64, value: T) {
+        self.0.entry((rank, record.to_owned())).or_default().push((time_ns, value));
+    }
+
+    fn map_times(&mut self, map: &impl Fn(i64) -> i64) {
+        self.0.values_mut().for_each(|samples| map_times(samples, map));
+    }
+
+    fn append(&mut self, other: Self) {
+        for (record, mut samples) in other.0 {
+            self.0.entry(record).or_default().append(&mut samples);
+        }
+    }
+
+    fn count(&self) -> usize {
+        self.0.values().map(Vec::len).sum()
+    }
+
+    /// The name and the measurements of the best record, and the others.
+    pub(super) fn into_best(self) -> (Option<NamedSamples<T>>, Vec<NamedSamples<T>>) {
+        let mut all = self.0.into_iter().map(|((_, name), samples)| (name, samples));
+        (all.next(), all.collect())
+    }
+
+    pub(super) fn samples(&self) -> impl Iterator<Item = &Samples<T>> {
+        self.0.values()
+    }
+}
+
+fn map_times<T>(samples: &mut Samples<T>, map: &impl Fn(i64) -> i64) {
+    for (time_ns, _) in samples {
+        *time_ns = map(*time_ns);
+    }
+}
+
+/// Records that are not in the log.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Left {
+    pub(super) count: u64,
+    /// Why the first one is not.
+    pub(super) reason: String,
+}
+
+/// What a recording holds besides its video.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Recorded {
+    /// Name of its format, `PX4 ULog`.
+    pub(super) format: &'static str,
+    /// Before the names of its topics: empty, or `/camera`.
+    pub(super) prefix: &'static str,
+    /// IMUs by the records that they are from.
+    pub(super) imus: BTreeMap<String, RecordedImu>,
+    /// Rotations from the vehicle's body (forward, right, down) to the earth (north, east, down).
+    pub(super) attitudes: Candidates<UnitQuaternion<f64>>,
+    pub(super) gimbal: Candidates<GimbalAttitude>,
+    /// Positions in a local frame (north, east, down), in metres.
+    pub(super) positions: Candidates<Vector3<f64>>,
+    pub(super) fixes: Candidates<Geodetic>,
+    /// UTC in nanoseconds since the epoch.
+    pub(super) utc: Samples<i64>,
+    /// Records that are not read, by their names.
+    pub(super) left: BTreeMap<String, Left>,
+    pub(super) notes: Vec<String>,
+}
+
+impl Recorded {
+    pub(super) fn new(format: &'static str, prefix: &'static str) -> Self {
+        Self { format, prefix, ..Self::default() }
+    }
+
+    /// The IMU of a record.
+    pub(super) fn imu(&mut self, record: &str) -> &mut RecordedImu {
+        self.imus.entry(record.to_owned()).or_default()
+    }
+
+    /// Counts a record that is left out.
+    pub(super) fn leave(&mut self, record: &str, reason: &str) {
+        self.leave_many(record, 1, reason);
+    }
+
+    /// Counts records that are left out.
+    pub(super) fn leave_many(&mut self, record: &str, count: u64, reason: &str) {
+        if let Some(left) = self.left.get_mut(record) {
+            left.count = left.count.saturating_add(count);
+        } else {
+            self.left.insert(record.to_owned(), Left { count, reason: reason.to_owned() });
+        }
+    }
+
+    /// Adds an offset to all times.
+    pub(super) fn shift(&mut self, offset_ns: i64) {
+        self.map_times(|time_ns| time_ns.saturating_add(offset_ns));
+    }
+
+    /// Changes all times.
+    pub(super) fn map_times(&mut self, map: impl Fn(i64) -> i64) {
+        for imu in self.imus.values_mut() {
+            map_times(&mut imu.combined, &map);
+            map_times(&mut imu.gyroscope, &map);
+            map_times(&mut imu.accelerometer, &map);
+        }
+        self.attitudes.map_times(&map);
+        self.gimbal.map_times(&map);
+        self.positions.map_times(&map);
+        self.fixes.map_times(&map);
+        map_times(&mut self.utc, &map);
+    }
+
+    /// Adds what another recorder of the same clock measured.
+    pub(super) fn append(&mut self, other: Self) {
+        for (record, mut imu) in other.imus {
+            let own = self.imu(&record);
+            own.combined.append(&mut imu.combined);
+            own.gyroscope.append(&mut imu.gyroscope);
+            own.accelerometer.append(&mut imu.accelerometer);
+        }
+        self.attitudes.append(other.attitudes);
+        self.gimbal.append(other.gimbal);
+        self.positions.append(other.positions);
+        self.fixes.append(other.fixes);
+        self.utc.extend(other.utc);
+        self.notes.extend(other.notes);
+        other.left.into_iter().for_each(|(record, left)| self.leave_many(&record, left.count, &left.reason));
+    }
+
+    /// Number of measurements.
+    pub(super) fn count(&self) -> u64 {
+        let imu = |imu: &RecordedImu| imu.combined.len() + imu.gyroscope.len() + imu.accelerometer.len();
+        let imus: usize = self.imus.values().map(imu).sum();
+        let others = self.attitudes.count() + self.gimbal.count() + self.positions.count() + self.fixes.count();
+        (imus + others) as u64
+    }
+
+    /// UTC minus the recorder's clock: the median of what it recorded, `None` where it knew no UTC.
+    pub(super) fn utc_offset_ns(&self) -> Option<i64> {
+        let mut offsets: Vec<i64> = self.utc.iter().map(|(time_ns, utc_ns)| utc_ns.saturating_sub(*time_ns)).collect();
+        offsets.sort_unstable();
+        offsets.get(offsets.len() / 2).copied()
+    }
+
+    /// First and last time of the IMUs, of everything where there is none.
+    pub(super) fn span_ns(&self) -> Option<(i64, i64)> {
+        let mut times: Vec<i64> = Vec::new();
+        for imu in self.imus.values() {
+            ends(&imu.combined, &mut times);
+            ends(&imu.gyroscope, &mut times);
+            ends(&imu.accelerometer, &mut times);
+        }
+        if times.is_empty() {
+            self.attitudes.samples().for_each(|samples| ends(samples, &mut times));
+            self.gimbal.samples().for_each(|samples| ends(samples, &mut times));
+            self.positions.samples().for_each(|samples| ends(samples, &mut times));
+            self.fixes.samples().for_each(|samples| ends(samples, &mut times));
+        }
+        Some((*times.iter().min()?, *times.iter().max()?))
+    }
+}
+
+fn ends<T>(samples: &Samples<T>, times: &mut Vec<i64>) {
+    times.extend(samples.first().into_iter().chain(samples.last()).map(|(time_ns, _)| *time_ns));
+}
+
+/// Nanoseconds of a time in a unit of so many nanoseconds; `None` for what is no time, such as a negative number.
+pub(super) fn nanoseconds(time: f64, unit_ns: f64) -> Option<i64> {
+    // 9e18 ns are the year 2255.
+    let time_ns = time * unit_ns;
+    (time_ns >= 0.0 && time_ns < 9e18).then(|| time_ns.round() as i64)
+}
+
+/// A vector of finite numbers.
+pub(super) fn finite(components: [f64; 3]) -> Option<Vector3<f64>> {
+    components.iter().all(|value| value.is_finite()).then(|| Vector3::from(components))
+}
+
+/// The rotation of a quaternion with the scalar part first; `None` for numbers that are no rotation.
+pub(super) fn rotation([w, x, y, z]: [f64; 4]) -> Option<UnitQuaternion<f64>> {
+    let quaternion = Quaternion::new(w, x, y, z);
+    let norm = quaternion.norm();
+    (norm > 0.9 && norm < 1.1).then(|| UnitQuaternion::new_normalize(quaternion))
+}
+
+/// The rotation of roll, pitch and yaw in radians (`Rz Ry Rx`); `None` for numbers that are not finite.
+pub(super) fn from_euler(angles_rad: [f64; 3]) -> Option<UnitQuaternion<f64>> {
+    let [roll_rad, pitch_rad, yaw_rad] = finite(angles_rad)?.into();
+    Some(UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad))
+}

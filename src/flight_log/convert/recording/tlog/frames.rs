@@ -1,0 +1,150 @@
+//! The records of a telemetry log: a time of the ground station, then a `MAVLink` frame of version 1 or 2.
+
+use super::super::super::super::file::{FileWindow, LogFile};
+
+/// Bytes of the time before a frame: microseconds since the epoch, big-endian.
+const TIME_BYTES: usize = 8;
+/// Bytes of the longest frame: header (10), payload (255), checksum (2), signature (13).
+const MAX_FRAME_BYTES: usize = 280;
+/// First bytes of frames of both versions.
+const VERSION_1: u8 = 0xFE;
+const VERSION_2: u8 = 0xFD;
+/// Flag of a frame with a signature.
+const SIGNED: u8 = 1;
+/// Years 2001 to 2100 in microseconds since the epoch; the time of a record lies between them.
+const TIMES_US: std::ops::Range<u64> = 1_000_000_000_000_000..4_102_444_800_000_000;
+/// Longest payload; shorter ones are filled up with zeros.
+pub(super) const MAX_PAYLOAD_BYTES: usize = 255;
+
+/// A frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Frame {
+    /// When the ground station received it, in nanoseconds since the epoch.
+    pub(super) received_ns: i64,
+    pub(super) system: u8,
+    pub(super) component: u8,
+    pub(super) message: u32,
+    /// Filled up with zeros, as version 2 leaves them out at the end.
+    pub(super) payload: [u8; MAX_PAYLOAD_BYTES],
+    /// Position behind it.
+    pub(super) end: usize,
+}
+
+/// Whether bytes begin like a record.
+pub(in super::super) fn is_telemetry(start: &[u8]) -> bool {
+    let Some((time, behind)) = start.split_first_chunk::<TIME_BYTES>() else { return false };
+    TIMES_US.contains(&u64::from_be_bytes(*time))
+        && behind.first().is_some_and(|byte| [VERSION_1, VERSION_2].contains(byte))
+}
+
+/// What was skipped of a log.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Damage {
+    pub(super) skipped_bytes: usize,
+    /// Places at which bytes were skipped.
+    pub(super) places: u64,
+    /// The first of them.
+    pub(super) first_at: usize,
+    /// Bytes at the end that are no whole record.
+    pub(super) cut_bytes: usize,
+}
+
+/// Walks the frames of a log.
+pub(super) struct Frames<'a> {
+    file: &'a LogFile,
+    window: FileWindow<'a>,
+    /// The byte behind the checksum of messages that are read, by their number.
+    checksum_byte: fn(u32) -> Option<u8>,
+    pub(super) damage: Damage,
+}
+
+impl<'a> Frames<'a> {
+    pub(super) fn new(file: &'a LogFile, checksum_byte: fn(u32) -> Option<u8>) -> Self {
+        Self { file, window: FileWindow::new(file), checksum_byte, damage: Damage::default() }
+    }
+
+    /// The first frame from a position on; what is none is skipped. `None` at the end.
+    pub(super) fn next(&mut self, from: usize) -> Result<Option<Frame>, String> {
+        let mut at = from;
+        while at < self.file.len() {
+            let end = at.saturating_add(TIME_BYTES + MAX_FRAME_BYTES).min(self.file.len());
+            let bytes = self.window.read(at..end)?;
+            if let Some(frame) = frame(bytes, at, self.checksum_byte)
+                && self.continues(frame.end)?
+            {
+                if at > from {
+                    self.damage.skipped_bytes += at - from;
+                    self.damage.places += 1;
+                    if self.damage.places == 1 {
+                        self.damage.first_at = from;
+                    }
+                }
+                return Ok(Some(frame));
+            }
+            at += 1;
+        }
+        self.damage.cut_bytes += self.file.len().saturating_sub(from);
+        Ok(None)
+    }
+
+    /// Whether a record can begin at a position: there is one, the file ends, or its end is cut off.
+    fn continues(&mut self, at: usize) -> Result<bool, String> {
+        let end = at.saturating_add(TIME_BYTES + 1);
+        if end > self.file.len() {
+            return Ok(true);
+        }
+        Ok(is_telemetry(self.window.read(at..end)?))
+    }
+}
+
+/// The frame at the start of bytes that lie at a position.
+fn frame(bytes: &[u8], at: usize, checksum_byte: fn(u32) -> Option<u8>) -> Option<Frame> {
+    if !is_telemetry(bytes) {
+        return None;
+    }
+    let (time, frame) = bytes.split_first_chunk::<TIME_BYTES>()?;
+    let length = usize::from(*frame.get(1)?);
+    let (header, message, signature) = if frame[0] == VERSION_1 {
+        (6, u32::from(*frame.get(5)?), 0)
+    } else {
+        let number = frame.get(7..10)?;
+        let message = u32::from_le_bytes([number[0], number[1], number[2], 0]);
+        (10, message, if frame.get(2)? & SIGNED != 0 { 13 } else { 0 })
+    };
+    let checksum_at = header + length;
+    let checksum = u16::from_le_bytes(frame.get(checksum_at..checksum_at + 2)?.try_into().ok()?);
+    let whole = checksum_at + 2 + signature;
+    if frame.len() < whole {
+        return None;
+    }
+    if let Some(last) = checksum_byte(message)
+        && checksum != checksum_of(frame[1..checksum_at].iter().chain([&last]))
+    {
+        return None;
+    }
+    let mut payload = [0; MAX_PAYLOAD_BYTES];
+    payload[..length].copy_from_slice(&frame[header..checksum_at]);
+    let (system, component) = if frame[0] == VERSION_1 { (frame[3], frame[4]) } else { (frame[5], frame[6]) };
+    let received_ns = i64::try_from(u64::from_be_bytes(*time)).ok()?.checked_mul(1000)?;
+    Some(Frame { received_ns, system, component, message, payload, end: at + TIME_BYTES + whole })
+}
+
+/// CRC-16/MCRF4XX, as `MAVLink` computes it.
+fn checksum_of<'a>(bytes: impl Iterator<Item = &'a u8>) -> u16 {
+    bytes.fold(0xFFFF, |checksum, byte| {
+        let low = *byte ^ (checksum & 0xFF) as u8;
+        let mixed = u16::from(low ^ (low << 4));
+        (checksum >> 8) ^ (mixed << 8) ^ (mixed << 3) ^ (mixed >> 4)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn checksums_are_those_of_the_catalogue() {
+        // CRC-16/MCRF4XX of "123456789", by the catalogue of parametrised CRC algorithms.
+        assert_eq!(checksum_of(b"123456789".iter()), 0x6F91);
+    }
+}

@@ -1,0 +1,288 @@
+//! Telemetry logs of ground stations (`.tlog`): `MAVLink` messages with the times of their reception.
+
+mod frames;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use super::super::super::file::LogFile;
+use super::super::ConvertError;
+use super::super::sink::Sink;
+use super::geodesy::Geodetic;
+use super::mavlink_gimbal::gimbal_attitude;
+use super::recorded::{
+    GimbalAttitude, GimbalFrame, Recorded, STANDARD_GRAVITY_M_PER_S2, finite, from_euler, nanoseconds, rotation,
+};
+use super::scalar::Scalar;
+pub(super) use frames::is_telemetry;
+use frames::{Frame, Frames};
+
+/// Numbers of the messages that are read (`MAVLink` common).
+mod id {
+    pub(super) const HEARTBEAT: u32 = 0;
+    pub(super) const SYSTEM_TIME: u32 = 2;
+    pub(super) const GPS_RAW_INT: u32 = 24;
+    pub(super) const SCALED_IMU: u32 = 26;
+    pub(super) const RAW_IMU: u32 = 27;
+    pub(super) const ATTITUDE: u32 = 30;
+    pub(super) const ATTITUDE_QUATERNION: u32 = 31;
+    pub(super) const LOCAL_POSITION_NED: u32 = 32;
+    pub(super) const GLOBAL_POSITION_INT: u32 = 33;
+    pub(super) const HIGHRES_IMU: u32 = 105;
+    pub(super) const SCALED_IMU2: u32 = 116;
+    pub(super) const SCALED_IMU3: u32 = 129;
+    pub(super) const MOUNT_ORIENTATION: u32 = 265;
+    pub(super) const GIMBAL_DEVICE_ATTITUDE_STATUS: u32 = 285;
+}
+
+/// Name of a message that is read, and the byte behind its checksum (`CRC_EXTRA`).
+fn described(message: u32) -> Option<(&'static str, u8)> {
+    Some(match message {
+        id::HEARTBEAT => ("HEARTBEAT", 50),
+        id::SYSTEM_TIME => ("SYSTEM_TIME", 137),
+        id::GPS_RAW_INT => ("GPS_RAW_INT", 24),
+        id::SCALED_IMU => ("SCALED_IMU", 170),
+        id::RAW_IMU => (RAW_IMU, 144),
+        id::ATTITUDE => ("ATTITUDE", 39),
+        id::ATTITUDE_QUATERNION => ("ATTITUDE_QUATERNION", 246),
+        id::LOCAL_POSITION_NED => ("LOCAL_POSITION_NED", 185),
+        id::GLOBAL_POSITION_INT => ("GLOBAL_POSITION_INT", 104),
+        id::HIGHRES_IMU => ("HIGHRES_IMU", 93),
+        id::SCALED_IMU2 => ("SCALED_IMU2", 76),
+        id::SCALED_IMU3 => ("SCALED_IMU3", 46),
+        id::MOUNT_ORIENTATION => ("MOUNT_ORIENTATION", 26),
+        id::GIMBAL_DEVICE_ATTITUDE_STATUS => ("GIMBAL_DEVICE_ATTITUDE_STATUS", 137),
+        _ => return None,
+    })
+}
+
+fn checksum_byte(message: u32) -> Option<u8> {
+    described(message).map(|(_, byte)| byte)
+}
+
+const RAW_IMU: &str = "RAW_IMU";
+/// `MAV_AUTOPILOT_INVALID`: a component that is no autopilot.
+const NO_AUTOPILOT: u8 = 8;
+/// `MAV_AUTOPILOT_ARDUPILOTMEGA`, whose `RAW_IMU` has the units of `SCALED_IMU`.
+const ARDUPILOT: u8 = 3;
+/// Component of the autopilot itself.
+const AUTOPILOT_COMPONENT: u8 = 1;
+/// Times of a component that go back by more than this say that it has restarted.
+const RESTART_NS: i64 = 10_000_000_000;
+/// Times beyond this are since the epoch, others since the start of the component.
+const EPOCH_TIMES_NS: i64 = 1_000_000_000_000_000_000;
+
+/// What a component sent from one start to the next, by the time since its start.
+#[derive(Debug)]
+struct Session {
+    recorded: Recorded,
+    last_ns: i64,
+    /// Smallest delay from a measurement to its reception: the offset of both clocks, and the fastest message's delay.
+    offset_ns: i64,
+}
+
+#[derive(Debug)]
+struct State {
+    /// What has times since the epoch.
+    recorded: Recorded,
+    sessions: BTreeMap<u8, Session>,
+    /// The vehicle, and the kind of its autopilot.
+    system: Option<u8>,
+    autopilot: Option<u8>,
+    restarts: u64,
+}
+
+fn empty() -> Recorded {
+    Recorded::new("MAVLink telemetry log", "")
+}
+
+/// Reads a log; its clock is UTC, as the autopilot knows it (`SYSTEM_TIME`), else as the ground station does.
+pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
+    let file = LogFile::open(path, sink.limits())?;
+    let mut frames = Frames::new(&file, checksum_byte);
+    let mut state = State { recorded: empty(), sessions: BTreeMap::new(), system: None, autopilot: None, restarts: 0 };
+    let mut at = 0;
+    while let Some(frame) = frames.next(at).map_err(|problem| ConvertError::unreadable(problem, path))? {
+        at = frame.end;
+        state.take(&frame);
+        sink.advance(at, file.len())?;
+    }
+    let damage = frames.damage;
+    let State { mut recorded, sessions, autopilot, restarts, .. } = state;
+    for session in sessions.into_values() {
+        recorded.append(session.finish());
+    }
+    if autopilot != Some(ARDUPILOT)
+        && let Some(raw) = recorded.imus.remove(RAW_IMU)
+    {
+        let reason = "its units are those of the sensor; only ArduPilot's are known";
+        recorded.leave_many(RAW_IMU, raw.combined.len() as u64, reason);
+    }
+    if damage.skipped_bytes > 0 {
+        recorded.notes.push(format!(
+            "{} bytes at {} places, the first at byte {}, are no records and are skipped",
+            damage.skipped_bytes, damage.places, damage.first_at
+        ));
+    }
+    if damage.cut_bytes > 0 {
+        recorded.notes.push(format!("the log ends within a record: its last {} bytes are lost", damage.cut_bytes));
+    }
+    if restarts > 0 {
+        recorded.notes.push(format!("the autopilot or the gimbal has restarted {restarts} times during the log"));
+    }
+    // Its times are UTC already.
+    if let Some((time_ns, _)) = recorded.span_ns() {
+        recorded.utc = vec![(time_ns, time_ns)];
+    }
+    Ok(recorded)
+}
+
+impl Session {
+    /// What was sent, at times since the epoch.
+    fn finish(mut self) -> Recorded {
+        let offset_ns = self.recorded.utc_offset_ns().unwrap_or(self.offset_ns);
+        self.recorded.shift(offset_ns);
+        self.recorded
+    }
+}
+
+impl State {
+    fn take(&mut self, frame: &Frame) {
+        let Some((name, _)) = described(frame.message) else {
+            return self.recorded.leave(&format!("message {}", frame.message), "not read");
+        };
+        if frame.message == id::HEARTBEAT {
+            let autopilot = frame.payload[5];
+            if self.system.is_none() && autopilot != NO_AUTOPILOT {
+                (self.system, self.autopilot) = (Some(frame.system), Some(autopilot));
+            }
+            return;
+        }
+        if self.system.is_some_and(|system| system != frame.system) {
+            return self.recorded.leave(&format!("{name} of system {}", frame.system), "of another vehicle");
+        }
+        let (Some(time_ns), false) = (time_ns(frame), frame.message == id::SYSTEM_TIME && unix_ns(frame).is_none())
+        else {
+            return self.recorded.leave(name, "without a time");
+        };
+        let recorded = if time_ns >= EPOCH_TIMES_NS { &mut self.recorded } else { self.session(frame, time_ns) };
+        if let Err(reason) = measure(frame, name, time_ns, recorded) {
+            recorded.leave(name, reason);
+        }
+    }
+
+    /// The session of a component at a time since its start.
+    fn session(&mut self, frame: &Frame, time_ns: i64) -> &mut Recorded {
+        let offset_ns = frame.received_ns.saturating_sub(time_ns);
+        let new = || Session { recorded: empty(), last_ns: time_ns, offset_ns };
+        let session = self.sessions.entry(frame.component).or_insert_with(new);
+        if time_ns < session.last_ns.saturating_sub(RESTART_NS) {
+            let ended = std::mem::replace(session, new());
+            self.recorded.append(ended.finish());
+            self.restarts += 1;
+        }
+        session.last_ns = time_ns;
+        session.offset_ns = session.offset_ns.min(offset_ns);
+        &mut session.recorded
+    }
+}
+
+fn number(frame: &Frame, scalar: Scalar, at: usize) -> f64 {
+    scalar.little_endian(&frame.payload, at).unwrap_or(f64::NAN)
+}
+
+fn numbers<const N: usize>(frame: &Frame, scalar: Scalar, at: usize) -> [f64; N] {
+    std::array::from_fn(|index| number(frame, scalar, at + index * scalar.size()))
+}
+
+/// The time of a measurement, since the start of the component or since the epoch.
+fn time_ns(frame: &Frame) -> Option<i64> {
+    match frame.message {
+        id::SYSTEM_TIME => nanoseconds(number(frame, Scalar::U32, 8), 1e6),
+        id::GPS_RAW_INT | id::RAW_IMU | id::HIGHRES_IMU => nanoseconds(number(frame, Scalar::U64, 0), 1e3),
+        _ => nanoseconds(number(frame, Scalar::U32, 0), 1e6),
+    }
+}
+
+/// UTC of a `SYSTEM_TIME` message.
+fn unix_ns(frame: &Frame) -> Option<i64> {
+    nanoseconds(number(frame, Scalar::U64, 0), 1e3).filter(|time_ns| *time_ns >= EPOCH_TIMES_NS)
+}
+
+const NOT_FINITE: &str = "a number that is not finite";
+
+fn measure(frame: &Frame, name: &str, time_ns: i64, recorded: &mut Recorded) -> Result<(), &'static str> {
+    match frame.message {
+        id::SYSTEM_TIME => {
+            if frame.component == AUTOPILOT_COMPONENT {
+                recorded.utc.extend(unix_ns(frame).map(|utc_ns| (time_ns, utc_ns)));
+            }
+        }
+        id::SCALED_IMU | id::SCALED_IMU2 | id::SCALED_IMU3 | id::RAW_IMU => {
+            let first = if frame.message == id::RAW_IMU { 8 } else { 4 };
+            // Thousandths of g and of rad/s.
+            let milli = |at: usize| Vector3::from(numbers::<3>(frame, Scalar::I16, at)) / 1e3;
+            let sample = [milli(first + 6), milli(first) * STANDARD_GRAVITY_M_PER_S2];
+            recorded.imu(name).combined.push((time_ns, sample));
+        }
+        id::HIGHRES_IMU => {
+            // The first six bits say that the accelerations and the angular rates are new.
+            let updated = number(frame, Scalar::U16, 60) as u16;
+            if updated != 0 && updated.trailing_zeros() >= 6 {
+                return Err("neither acceleration nor angular rate is new");
+            }
+            let force = finite(numbers(frame, Scalar::F32, 8)).ok_or(NOT_FINITE)?;
+            let rate = finite(numbers(frame, Scalar::F32, 20)).ok_or(NOT_FINITE)?;
+            recorded.imu(&format!("HIGHRES_IMU[{}]", frame.payload[62])).combined.push((time_ns, [rate, force]));
+        }
+        id::ATTITUDE => {
+            let rotation = from_euler(numbers(frame, Scalar::F32, 4)).ok_or(NOT_FINITE)?;
+            recorded.attitudes.push(1, name, time_ns, rotation);
+        }
+        id::ATTITUDE_QUATERNION => {
+            let rotation = rotation(numbers(frame, Scalar::F32, 4)).ok_or("no unit quaternion")?;
+            recorded.attitudes.push(0, name, time_ns, rotation);
+        }
+        id::LOCAL_POSITION_NED => {
+            let position_m = finite(numbers(frame, Scalar::F32, 4)).ok_or(NOT_FINITE)?;
+            recorded.positions.push(0, name, time_ns, position_m);
+        }
+        id::GLOBAL_POSITION_INT => push_fix(frame, name, 1, 4, time_ns, recorded)?,
+        id::GPS_RAW_INT => {
+            if frame.payload[28] < 3 {
+                return Err("without a fix in three dimensions");
+            }
+            push_fix(frame, name, 0, 8, time_ns, recorded)?;
+        }
+        id::MOUNT_ORIENTATION => {
+            let [roll_deg, pitch_deg, yaw_deg, _] = numbers(frame, Scalar::F32, 4);
+            let angles_rad = [roll_deg, pitch_deg, yaw_deg].map(f64::to_radians);
+            let frame_from_camera = from_euler(angles_rad).ok_or(NOT_FINITE)?;
+            recorded.gimbal.push(1, name, time_ns, GimbalAttitude { frame: GimbalFrame::Vehicle, frame_from_camera });
+        }
+        id::GIMBAL_DEVICE_ATTITUDE_STATUS => {
+            let flags = number(frame, Scalar::U16, 36) as u32;
+            let attitude = gimbal_attitude(flags, numbers(frame, Scalar::F32, 4)).ok_or("no unit quaternion")?;
+            recorded.gimbal.push(0, name, time_ns, attitude);
+        }
+        _ => return Err("not read"),
+    }
+    Ok(())
+}
+
+/// Adds latitude and longitude in 1e-7 degrees and altitude in millimetres.
+fn push_fix(
+    frame: &Frame,
+    name: &str,
+    rank: u8,
+    at: usize,
+    time_ns: i64,
+    recorded: &mut Recorded,
+) -> Result<(), &'static str> {
+    let [latitude, longitude, altitude] = numbers(frame, Scalar::I32, at);
+    let fix = Geodetic::from_deg(latitude / 1e7, longitude / 1e7, altitude / 1e3).ok_or("without a position")?;
+    recorded.fixes.push(rank, name, time_ns, fix);
+    Ok(())
+}
