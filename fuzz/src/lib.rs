@@ -90,6 +90,12 @@ pub fn topic_of(kind: MessageKind) -> &'static str {
         MessageKind::Odometry => "/ground_truth/odometry",
         MessageKind::PoseStamped => "/pose",
         MessageKind::TransformStamped => "/transform",
+        MessageKind::QuaternionStamped => "/gimbal/quaternion",
+        MessageKind::Vector3Stamped => "/gimbal/angles",
+        MessageKind::Transforms => "/tf",
+        MessageKind::MavrosGimbalAttitude => "/gimbal/device",
+        MessageKind::Px4GimbalAttitude => "/gimbal/status",
+        MessageKind::Px4VehicleAttitude => "/vehicle/attitude",
     }
 }
 

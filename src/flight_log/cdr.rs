@@ -81,8 +81,10 @@ impl<'a> CdrReader<'a> {
     }
 
     read_number!(read_u8, u8);
+    read_number!(read_u16, u16);
     read_number!(read_u32, u32);
     read_number!(read_i32, i32);
+    read_number!(read_f32, f32);
     read_number!(read_f64, f64);
     read_number!(read_u64, u64);
 
@@ -91,6 +93,15 @@ impl<'a> CdrReader<'a> {
         let mut values = [0.0; N];
         for value in &mut values {
             *value = self.read_f64()?;
+        }
+        Ok(values)
+    }
+
+    /// A fixed number of 32-bit numbers.
+    pub(crate) fn read_f32s<const N: usize>(&mut self) -> Result<[f32; N], CdrError> {
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = self.read_f32()?;
         }
         Ok(values)
     }
@@ -155,12 +166,28 @@ impl CdrWriter {
         self.message.push(value);
     }
 
+    pub(crate) fn u16(&mut self, value: u16) {
+        self.align(2);
+        self.message.extend_from_slice(&value.to_le_bytes());
+    }
+
     pub(crate) fn u32(&mut self, value: u32) {
         self.align(4);
         self.message.extend_from_slice(&value.to_le_bytes());
     }
 
     pub(crate) fn i32(&mut self, value: i32) {
+        self.align(4);
+        self.message.extend_from_slice(&value.to_le_bytes());
+    }
+
+    #[cfg(test)]
+    pub(crate) fn u64(&mut self, value: u64) {
+        self.align(8);
+        self.message.extend_from_slice(&value.to_le_bytes());
+    }
+
+    pub(crate) fn f32(&mut self, value: f32) {
         self.align(4);
         self.message.extend_from_slice(&value.to_le_bytes());
     }

@@ -94,6 +94,34 @@ pub enum LogError {
         /// The log.
         path: PathBuf,
     },
+    /// The frames of a gimbal's attitude are not connected in the log.
+    #[error(
+        "gimbal.source: parent and child are not connected by '{topic}' and '/tf_static': {problem}: {}",
+        path.display()
+    )]
+    NoTransform {
+        /// Topic of the transforms.
+        topic: String,
+        /// What is missing.
+        problem: String,
+        /// The log.
+        path: PathBuf,
+    },
+    /// The times of a topic have no known relation to those of the log.
+    #[error(
+        "'{topic}': the first stamp is {stamp_s:.3} s since an unknown start (PX4 counts from its own), the first time of recording          {log_s:.3} s after the first stamp of the log; neither lies within the log, so that the two clocks cannot be related; record with          synchronized clocks (UXRCE_DDS_SYNCT 1): {}",
+        path.display()
+    )]
+    UnknownClock {
+        /// The topic.
+        topic: String,
+        /// Its first stamp in seconds.
+        stamp_s: f64,
+        /// Its first log time since the log began in seconds.
+        log_s: f64,
+        /// The log.
+        path: PathBuf,
+    },
     /// A field of a rig is missing or wrong.
     #[error("{field}: {problem}: {}", path.display())]
     Rig {

@@ -257,7 +257,7 @@ impl FlightLog {
             let channel = ids.first().and_then(|id| self.index.channels.get(id));
             let Some(channel) = channel else { continue };
             let kind = MessageKind::of_channel(&channel.schema_name, &channel.encoding);
-            if let Some(kind) = kind {
+            if let Some(kind) = kind.filter(|kind| !kind.is_attitude()) {
                 let mut stamp = |position: &MessagePosition| {
                     let (block, message) = self.message(&mut cache, *position)?;
                     messages::stamp_ns(kind, block.bytes(&message.data)).ok()

@@ -1,5 +1,9 @@
 //! ROS messages of a flight log, decoded from CDR.
 
+mod attitudes;
+
+pub(crate) use attitudes::{bare_name, read_gimbal_attitude, read_transforms, read_vehicle_attitude};
+
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::cdr::{CdrError, CdrReader};
@@ -32,11 +36,23 @@ pub enum MessageKind {
     PoseStamped,
     /// `geometry_msgs/msg/TransformStamped`.
     TransformStamped,
+    /// `geometry_msgs/msg/QuaternionStamped`.
+    QuaternionStamped,
+    /// `geometry_msgs/msg/Vector3Stamped`.
+    Vector3Stamped,
+    /// `tf2_msgs/msg/TFMessage`.
+    Transforms,
+    /// `mavros_msgs/msg/GimbalDeviceAttitudeStatus`.
+    MavrosGimbalAttitude,
+    /// `px4_msgs/msg/GimbalDeviceAttitudeStatus`.
+    Px4GimbalAttitude,
+    /// `px4_msgs/msg/VehicleAttitude`.
+    Px4VehicleAttitude,
 }
 
 impl MessageKind {
     /// Every kind.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 17] = [
         Self::Imu,
         Self::Image,
         Self::CompressedImage,
@@ -48,6 +64,12 @@ impl MessageKind {
         Self::Odometry,
         Self::PoseStamped,
         Self::TransformStamped,
+        Self::QuaternionStamped,
+        Self::Vector3Stamped,
+        Self::Transforms,
+        Self::MavrosGimbalAttitude,
+        Self::Px4GimbalAttitude,
+        Self::Px4VehicleAttitude,
     ];
 
     /// The schema's name in the log.
@@ -64,6 +86,12 @@ impl MessageKind {
             Self::Odometry => "nav_msgs/msg/Odometry",
             Self::PoseStamped => "geometry_msgs/msg/PoseStamped",
             Self::TransformStamped => "geometry_msgs/msg/TransformStamped",
+            Self::QuaternionStamped => "geometry_msgs/msg/QuaternionStamped",
+            Self::Vector3Stamped => "geometry_msgs/msg/Vector3Stamped",
+            Self::Transforms => "tf2_msgs/msg/TFMessage",
+            Self::MavrosGimbalAttitude => "mavros_msgs/msg/GimbalDeviceAttitudeStatus",
+            Self::Px4GimbalAttitude => "px4_msgs/msg/GimbalDeviceAttitudeStatus",
+            Self::Px4VehicleAttitude => "px4_msgs/msg/VehicleAttitude",
         }
     }
 
@@ -99,6 +127,18 @@ impl MessageKind {
         matches!(self, Self::CompressedVideo | Self::CompressedVideoProtobuf | Self::FfmpegPacket)
     }
 
+    /// Whether its messages are attitudes: those of a gimbal, or of the vehicle that carries it. Robots record such messages for
+    /// many purposes, with stamps of other times (static transforms) and clocks (PX4), so that a log does not start by them.
+    pub fn is_attitude(self) -> bool {
+        matches!(self, Self::QuaternionStamped | Self::Vector3Stamped | Self::Transforms | Self::MavrosGimbalAttitude)
+            || self.counts_since_boot()
+    }
+
+    /// Whether its stamps are in microseconds, by default of PX4's own clock, which counts from its start.
+    pub fn counts_since_boot(self) -> bool {
+        matches!(self, Self::Px4GimbalAttitude | Self::Px4VehicleAttitude)
+    }
+
     /// Whether its messages are poses.
     pub fn is_pose(self) -> bool {
         matches!(self, Self::Odometry | Self::PoseStamped | Self::TransformStamped)
@@ -125,7 +165,14 @@ pub(crate) fn stamp_ns(kind: MessageKind, message: &[u8]) -> Result<i64, CdrErro
     if kind == MessageKind::CompressedVideoProtobuf {
         return read_compressed_video_protobuf(message).map(|packet| packet.stamp_ns);
     }
-    Ok(read_header(&mut CdrReader::new(message)?)?.stamp_ns)
+    let mut reader = CdrReader::new(message)?;
+    if kind.counts_since_boot() {
+        return attitudes::read_px4_stamp(&mut reader);
+    }
+    if kind == MessageKind::Transforms && reader.read_u32()? == 0 {
+        return Err(CdrError { what: "no transform".into(), offset: 4 });
+    }
+    Ok(read_header(&mut reader)?.stamp_ns)
 }
 
 /// `sensor_msgs/msg/Imu` without its orientation and covariances.

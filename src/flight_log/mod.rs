@@ -3,6 +3,7 @@
 //!
 //! Time is nanoseconds since the first message of the log (header stamps; the log time is kept beside them).
 
+pub(crate) mod attitude;
 mod cdr;
 pub(crate) mod container;
 pub mod convert;

@@ -1,3 +1,4 @@
+use super::attitude;
 use super::statistics::percentile;
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
@@ -14,13 +15,14 @@ pub(super) fn check_joints(survey: &Survey, rig: &Rig, findings: &mut Findings) 
     let Some(gimbal) = &rig.gimbal else { return };
     if gimbal.topic.is_none() || gimbal.encoder_sigma_rad.is_none() {
         let evidence = match (&gimbal.topic, gimbal.encoder_sigma_rad) {
-            (None, _) => "gimbal.rostopic is null",
+            (None, _) => "gimbal.rostopic is null, and there is no gimbal.source",
             (Some(_), _) => "gimbal.encoder_sigma is null",
         };
         let title = "the gimbal's encoders are not used";
         let remedy = "joint angles are then estimated in every frame and need more observations to converge";
         return findings.add(Severity::Note, Area::Encoders, title, evidence, remedy);
     }
+    attitude::check_attitude(survey, findings);
     if survey.joints.is_empty() {
         return;
     }

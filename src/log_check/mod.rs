@@ -1,6 +1,7 @@
 //! Checks of a log and its rig that need no estimator: topics, timing, IMU, encoders, images, intrinsics and extrinsics,
 //! each finding with its evidence and its remedy.
 
+mod attitude;
 mod clock_alignment;
 mod hand_eye;
 mod image_measure;
@@ -22,6 +23,7 @@ use nalgebra::UnitQuaternion;
 use serde::Serialize;
 
 use self::survey::Survey;
+use crate::flight_log::attitude::{VEHICLE_KINDS, gimbal_kinds, topic_field};
 use crate::flight_log::log::WarningKind;
 use crate::flight_log::{FlightLog, LogError, MessageKind, TopicInfo};
 use crate::geometry::seconds_from_ns;
@@ -262,8 +264,13 @@ fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     for camera in &rig.cameras {
         require(format!("{}.rostopic", camera.key), &camera.topic, &MessageKind::IMAGES, Severity::Error);
     }
-    if let Some(topic) = rig.gimbal.as_ref().and_then(|gimbal| gimbal.topic.as_ref()) {
-        require("gimbal.rostopic".into(), topic, &[MessageKind::JointState], Severity::Error);
+    if let Some(gimbal) = &rig.gimbal
+        && let Some(topic) = &gimbal.topic
+    {
+        require(topic_field(gimbal).into(), topic, gimbal_kinds(gimbal), Severity::Error);
+    }
+    if let Some(topic) = rig.vehicle_topic() {
+        require("gimbal.source.vehicle".into(), topic, &VEHICLE_KINDS, Severity::Error);
     }
     if let Some(topic) = &rig.ground_truth_topic {
         require("ground_truth.rostopic".into(), topic, &POSES, Severity::Note);
@@ -288,6 +295,9 @@ fn role_of(topic: &str, kind: Option<MessageKind>, rig: Option<&Rig>) -> String 
         }
         if rig.gimbal.as_ref().is_some_and(|gimbal| gimbal.topic.as_deref() == Some(topic)) {
             return "gimbal".into();
+        }
+        if rig.vehicle_topic() == Some(topic) {
+            return "vehicle".into();
         }
         if rig.ground_truth_topic.as_deref() == Some(topic) {
             return "ground truth".into();

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
+use super::attitude::{AttitudeSurvey, SolvedAttitude};
 use super::image_measure::{ImageMeasure, measure};
 use super::statistics::median;
 use crate::flight_log::container::DecodedBlock;
@@ -11,8 +12,8 @@ use crate::flight_log::joint_merge::{JointMerge, JointReading};
 use crate::flight_log::log::relative_ns;
 use crate::flight_log::stream::angle_fit;
 use crate::flight_log::{FlightLog, messages, messages::MessageKind};
-use crate::geometry::{seconds_from_ns, wrap_angle};
-use crate::sensors::{ImuSample, JointSample, Rig};
+use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
+use crate::sensors::{GimbalRig, ImuSample, JointSample, Rig};
 
 /// Joint names that are listed; messages may name more.
 const JOINT_NAMES: usize = 64;
@@ -96,6 +97,12 @@ pub(super) struct Survey {
     pub(super) joints: Vec<JointReading>,
     /// Angles of all joints at common stamps, in the order of the stamps, from the finite readings.
     pub(super) joint_samples: Vec<JointSample>,
+    /// The attitudes that the joint angles come from, where the rig names them.
+    pub(super) attitude: Option<AttitudeSurvey>,
+    /// Why there is none although the rig names one.
+    pub(super) attitude_problem: Option<String>,
+    /// The joint angles of `attitude`.
+    pub(super) solved: Vec<SolvedAttitude>,
     /// Variance of a reading from the rig.
     encoder_variance_rad2: f64,
     /// Names that the joint messages use.
@@ -118,6 +125,12 @@ impl Survey {
         survey.imu_topics = imu_topics;
         let sigma_rad = rig.and_then(|rig| rig.gimbal.as_ref()?.encoder_sigma_rad).unwrap_or(0.0);
         survey.encoder_variance_rad2 = sigma_rad.max(MIN_SIGMA_RAD).powi(2);
+        if let Some(gimbal) = rig.and_then(|rig| rig.gimbal.as_ref()) {
+            match AttitudeSurvey::new(log, gimbal) {
+                Ok(attitude) => survey.attitude = attitude,
+                Err(error) => survey.attitude_problem = Some(error.to_string()),
+            }
+        }
         let mut counts: BTreeMap<String, u64> = BTreeMap::new();
         let mut keyframes_due: BTreeMap<String, u64> = BTreeMap::new();
         for block in &log.index().blocks {
@@ -157,7 +170,9 @@ impl Survey {
         for topic in survey.topics.values_mut() {
             topic.times.sort_by_key(|times| times.log_time_ns);
         }
-        survey.joint_samples = merged(&survey.joints);
+        if let Some(gimbal) = rig.and_then(|rig| rig.gimbal.as_ref()) {
+            survey.set_joints(gimbal);
+        }
         if !survey.accelerometer.is_empty() {
             survey.accelerometer.retain(|(_, force)| force.iter().all(|value| value.is_finite()));
             survey.accelerometer.sort_by_key(|(stamp_ns, _)| *stamp_ns);
@@ -188,6 +203,21 @@ impl Survey {
         (0..around.len()).map(angle).collect()
     }
 
+    /// Joint angles of all joints from encoders or attitudes, on the IMU's clock.
+    fn set_joints(&mut self, gimbal: &GimbalRig) {
+        if let Some(attitude) = &mut self.attitude {
+            attitude.finish();
+            self.solved = attitude.solve(gimbal);
+            self.joints = self.solved.iter().map(|solved| solved.reading.clone()).collect();
+        } else {
+            let shift_ns = ns_from_seconds(gimbal.timeshift_gimbal_imu_s);
+            for reading in &mut self.joints {
+                reading.stamp_ns = reading.stamp_ns.saturating_add(shift_ns);
+            }
+        }
+        self.joint_samples = merged(&self.joints);
+    }
+
     #[expect(clippy::too_many_arguments, reason = "the fields of one message")]
     fn take(
         &mut self,
@@ -203,7 +233,9 @@ impl Survey {
             .topics
             .entry(topic.to_owned())
             .or_insert_with(|| TopicSurvey { topic: topic.to_owned(), ..TopicSurvey::default() });
+        let log_times = self.attitude.as_ref().is_some_and(|attitude| attitude.counts_log_times(topic));
         let stamp_ns = match messages::stamp_ns(kind, data) {
+            Ok(_) if log_times => log_time_ns,
             Ok(absolute_ns) => relative_ns(absolute_ns, log.epoch_ns()),
             Err(error) => return entry.refuse(error.to_string()),
         };
@@ -225,7 +257,13 @@ impl Survey {
                 Err(error) => entry.refuse(error.to_string()),
             }
         }
-        if let Some(gimbal) = rig.gimbal.as_ref().filter(|gimbal| gimbal.topic.as_deref() == Some(topic)) {
+        if let Some(attitude) = &mut self.attitude
+            && let Err(problem) = attitude.take(topic, kind, stamp_ns, log.epoch_ns(), data)
+        {
+            entry.refuse(problem);
+        }
+        let encoders = rig.gimbal.as_ref().filter(|gimbal| gimbal.attitude.is_none());
+        if let Some(gimbal) = encoders.filter(|gimbal| gimbal.topic.as_deref() == Some(topic)) {
             match messages::read_joint_state(data) {
                 Ok(message) if message.lacks_positions() => entry.refuse(message.length_problem()),
                 Ok(message) => {

@@ -2,7 +2,7 @@ use super::statistics::{median, percentile, slope};
 use super::survey::{Survey, TopicSurvey};
 use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
-use crate::sensors::Rig;
+use crate::sensors::{AttitudeMessage, GimbalRig, Rig};
 
 /// Relative difference from the rig's rate that is reported.
 const RATE_TOLERANCE: f64 = 0.05;
@@ -60,9 +60,15 @@ fn used_topics<'a>(survey: &'a Survey, rig: Option<&Rig>) -> Vec<Used<'a>> {
     for camera in &rig.cameras {
         add(camera.key.clone(), Some(&camera.topic), Some(camera.rate_hz), true);
     }
-    if let Some(gimbal) = &rig.gimbal {
+    // Transforms of other frames come between those of the gimbal.
+    let of_one_kind = |gimbal: &&GimbalRig| {
+        let message = gimbal.attitude.as_ref().map(|source| &source.message);
+        !matches!(message, Some(AttitudeMessage::Transforms { .. }))
+    };
+    if let Some(gimbal) = rig.gimbal.as_ref().filter(of_one_kind) {
         add("gimbal".into(), gimbal.topic.as_deref(), Some(gimbal.rate_hz), false);
     }
+    add("vehicle".into(), rig.vehicle_topic(), None, false);
     add("ground truth".into(), rig.ground_truth_topic.as_deref(), None, false);
     used
 }

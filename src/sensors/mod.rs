@@ -1,12 +1,17 @@
 //! Plain types of sensor data and rig: IMU samples, joint angles, gray images, noise densities. They do not
 //! depend on the source of the data (log, simulation, driver).
 
+mod attitude_source;
 mod gray_image;
 mod imu;
 mod joints;
 mod pose;
 mod rig;
 
+pub use attitude_source::{
+    AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, BodyAxes, EulerAngles, EulerRotation,
+    NamedAxes,
+};
 pub use gray_image::GrayImage;
 pub use imu::{ImuNoise, ImuSample};
 pub use joints::{JointAngles, JointSample};

@@ -4,7 +4,7 @@ use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, ParameterNames};
 
-use super::ImuNoise;
+use super::{AttitudeFrame, AttitudeSource, ImuNoise};
 
 /// The rig has no camera with this key.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -102,8 +102,12 @@ pub struct Joint {
 /// The gimbal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GimbalRig {
-    /// Topic of its `sensor_msgs/msg/JointState`, `None` when there is none.
+    /// Topic of its `sensor_msgs/msg/JointState` or of its attitude, `None` when there is neither.
     pub topic: Option<String>,
+    /// What the topic's messages mean when they are attitudes, `None` for joint angles.
+    pub attitude: Option<AttitudeSource>,
+    /// `timeshift_gimbal_imu`: `t_imu = t_gimbal + shift`, for the stamps of `topic`.
+    pub timeshift_gimbal_imu_s: f64,
     /// Nominal rate.
     pub rate_hz: f64,
     /// Standard deviation of a reading, `None` without encoders.
@@ -153,6 +157,12 @@ impl Rig {
             key: key.to_owned(),
             available: self.cameras.iter().map(|camera| camera.key.clone()).collect(),
         })
+    }
+
+    /// Topic of the vehicle's attitude, when the gimbal's is relative to another frame than the body.
+    pub fn vehicle_topic(&self) -> Option<&str> {
+        let source = self.gimbal.as_ref()?.attitude.as_ref()?;
+        source.vehicle_topic.as_deref().filter(|_| source.frame != AttitudeFrame::Body)
     }
 
     /// Names of the gimbal's joints, from the base on; none without a gimbal.

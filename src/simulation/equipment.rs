@@ -82,6 +82,8 @@ impl Equipment {
         }
         let gimbal = self.gimbal_camera.then(|| GimbalRig {
             topic: self.encoder_sigma_rad.map(|_| "/gimbal/joint_states".to_owned()),
+            attitude: None,
+            timeshift_gimbal_imu_s: 0.0,
             rate_hz: IMU_RATE_HZ,
             encoder_sigma_rad: self.encoder_sigma_rad,
             prior: ChainPrior { translation_bound_m: 0.0, rotation_bound_rad: 0.0 },

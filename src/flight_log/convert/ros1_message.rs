@@ -11,17 +11,25 @@ use super::super::cdr::CdrWriter;
 enum Field {
     Header,
     U8,
+    U16,
     U32,
+    /// 32-bit numbers.
+    F32s(usize),
     Text,
     Texts,
     Bytes,
     F64s(usize),
     F64Sequence,
+    /// A sequence of `geometry_msgs/TransformStamped`.
+    Transforms,
 }
+
+/// Child frame, translation and rotation.
+const TRANSFORM: &[Field] = &[Field::Header, Field::Text, Field::F64s(7)];
 
 /// The fields of a type in order, `None` for one that ROS 1 has with other fields.
 fn layout(kind: MessageKind) -> Option<&'static [Field]> {
-    use Field::{Bytes, F64Sequence, F64s, Header, Text, Texts, U8, U32};
+    use Field::{Bytes, F32s, F64Sequence, F64s, Header, Text, Texts, Transforms, U8, U16, U32};
     Some(match kind {
         // Orientation, angular velocity, specific force, each with its covariance.
         MessageKind::Imu => &[Header, F64s(4 + 9 + 3 + 9 + 3 + 9)],
@@ -36,8 +44,17 @@ fn layout(kind: MessageKind) -> Option<&'static [Field]> {
         // Child frame, pose with covariance, twist with covariance.
         MessageKind::Odometry => &[Header, Text, F64s(7 + 36 + 6 + 36)],
         MessageKind::PoseStamped => &[Header, F64s(7)],
-        MessageKind::TransformStamped => &[Header, Text, F64s(7)],
-        MessageKind::CompressedVideo | MessageKind::CompressedVideoProtobuf | MessageKind::FfmpegPacket => return None,
+        MessageKind::TransformStamped => TRANSFORM,
+        MessageKind::QuaternionStamped => &[Header, F64s(4)],
+        MessageKind::Vector3Stamped => &[Header, F64s(3)],
+        MessageKind::Transforms => &[Transforms],
+        // Target, flags, quaternion, angular velocity, failures.
+        MessageKind::MavrosGimbalAttitude => &[Header, U8, U8, U16, F64s(4), F32s(3), U32],
+        MessageKind::CompressedVideo
+        | MessageKind::CompressedVideoProtobuf
+        | MessageKind::FfmpegPacket
+        | MessageKind::Px4GimbalAttitude
+        | MessageKind::Px4VehicleAttitude => return None,
     })
 }
 
@@ -45,7 +62,16 @@ fn layout(kind: MessageKind) -> Option<&'static [Field]> {
 pub(super) fn cdr_from_ros1(kind: MessageKind, message: &[u8]) -> Result<Vec<u8>, String> {
     let mut reader = Ros1Reader { message, position: 0 };
     let mut out = CdrWriter::new();
-    let fields = layout(kind).ok_or("video of ROS 1 is not read: convert the bag to ROS 2 or MCAP")?;
+    let fields = layout(kind).ok_or("such messages of ROS 1 are not read: convert the bag to ROS 2 or MCAP")?;
+    copy_fields(fields, &mut reader, &mut out)?;
+    let rest = message.len() - reader.position;
+    if rest > 0 {
+        return Err(format!("{rest} bytes more than a {} has", kind.schema_name()));
+    }
+    Ok(out.finish())
+}
+
+fn copy_fields(fields: &[Field], reader: &mut Ros1Reader<'_>, out: &mut CdrWriter) -> Result<(), String> {
     for field in fields {
         match *field {
             Field::Header => {
@@ -58,6 +84,23 @@ pub(super) fn cdr_from_ros1(kind: MessageKind, message: &[u8]) -> Result<Vec<u8>
                 out.string(reader.text()?);
             }
             Field::U8 => out.u8(reader.take(1)?[0]),
+            Field::U16 => {
+                let mut bytes = [0; 2];
+                bytes.copy_from_slice(reader.take(2)?);
+                out.u16(u16::from_le_bytes(bytes));
+            }
+            Field::F32s(count) => {
+                for _ in 0..count {
+                    out.f32(f32::from_bits(reader.u32()?));
+                }
+            }
+            Field::Transforms => {
+                let count = reader.length(4)?;
+                out.u32(count as u32);
+                for _ in 0..count {
+                    copy_fields(TRANSFORM, reader, out)?;
+                }
+            }
             Field::U32 => out.u32(reader.u32()?),
             Field::Text => out.string(reader.text()?),
             Field::Texts => {
@@ -77,11 +120,7 @@ pub(super) fn cdr_from_ros1(kind: MessageKind, message: &[u8]) -> Result<Vec<u8>
             }
         }
     }
-    let rest = message.len() - reader.position;
-    if rest > 0 {
-        return Err(format!("{rest} bytes more than a {} has", kind.schema_name()));
-    }
-    Ok(out.finish())
+    Ok(())
 }
 
 /// Reads fields in order with bounds checks.

@@ -64,8 +64,36 @@ const CAMERA: Keys = Keys {
     unused: &["cam_overlaps", "T_cn_cnm1", "line_delay", "model"],
 };
 const GIMBAL: Keys = Keys {
-    read: &["rostopic", "update_rate", "encoder_sigma", "prior", "parameterization", "T_I_B", "links", "T_E_C"],
+    read: &[
+        "rostopic",
+        "source",
+        "timeshift_gimbal_imu",
+        "update_rate",
+        "encoder_sigma",
+        "prior",
+        "parameterization",
+        "T_I_B",
+        "links",
+        "T_E_C",
+    ],
     unused: &["frame_id", "model"],
+};
+const SOURCE: Keys = Keys {
+    read: &[
+        "topic",
+        "type",
+        "frame",
+        "axes",
+        "gimbal_axes",
+        "imu_axes",
+        "order",
+        "unit",
+        "parent",
+        "child",
+        "vehicle",
+        "vehicle_axes",
+    ],
+    unused: &[],
 };
 const PRIOR: Keys = Keys { read: &["translation_bound", "rotation_bound"], unused: &[] };
 const LINK: Keys = Keys { read: &["joint", "theta_offset", "d", "a", "alpha", "limits"], unused: &[] };
@@ -121,6 +149,9 @@ fn check_gimbal(gimbal: &Value, found: &mut Found) {
     check_mapping(gimbal, "gimbal", &GIMBAL, found);
     if let Some(prior) = gimbal.get("prior") {
         check_mapping(prior, "gimbal.prior", &PRIOR, found);
+    }
+    if let Some(source) = gimbal.get("source") {
+        check_mapping(source, "gimbal.source", &SOURCE, found);
     }
     for (index, link) in gimbal.get("links").and_then(Value::as_array).into_iter().flatten().enumerate() {
         check_mapping(link, &format!("gimbal.links[{index}]"), &LINK, found);

@@ -1,8 +1,9 @@
 use super::super::LogError;
 use super::super::text::shortened;
+use super::attitude;
 use super::fields::Field;
 use crate::camera::{CameraError, CameraModel};
-use crate::gimbal::{ClassicalChain, DhLink};
+use crate::gimbal::{ClassicalChain, DhLink, InverseChain};
 use crate::sensors::{AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, Rig};
 
 /// The version of the schema that is read and written.
@@ -22,6 +23,9 @@ const MAX_OFFSET_RAD: f64 = std::f64::consts::TAU;
 const MAX_LIMIT_RAD: f64 = 2.0 * std::f64::consts::TAU;
 /// An encoder with a larger standard deviation measures nothing; 0.5 to 1 occur as degrees.
 const MAX_SIGMA_RAD: f64 = 0.5;
+
+/// Further apart are clocks that were never set, and no delays.
+const MAX_TIMESHIFT_S: f64 = 10.0;
 
 /// Values of a log for a rig that does not contain them, by image topic.
 pub(crate) trait CameraFacts {
@@ -219,10 +223,23 @@ fn name_the_field(camera: &Field<'_>, error: &CameraError) -> LogError {
 }
 
 fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
-    let topic = gimbal.field("rostopic").optional();
-    let topic =
-        topic.map(|topic| topic.text("the topic of its sensor_msgs/msg/JointState, or null").map(str::to_owned));
-    let topic = topic.transpose()?;
+    let joint_topic = gimbal.field("rostopic").optional();
+    let joint_topic = joint_topic
+        .map(|topic| topic.text("the topic of its sensor_msgs/msg/JointState, or null").map(str::to_owned))
+        .transpose()?;
+    let source = gimbal.field("source").optional().map(|source| attitude::read(&source)).transpose()?;
+    if joint_topic.is_some() && source.is_some() {
+        let problem = "is there beside gimbal.source; expected one of them: joint angles, or an attitude";
+        return Err(gimbal.field("rostopic").error(problem));
+    }
+    let (topic, attitude) = source.map_or((joint_topic, None), |(topic, source)| (Some(topic), Some(source)));
+    let shift = gimbal.field("timeshift_gimbal_imu").optional();
+    let timeshift_gimbal_imu_s =
+        shift.map_or(Ok(0.0), |shift| shift.number("seconds, t_imu = t_gimbal + shift")).and_then(|shift_s| {
+            let limit = MAX_TIMESHIFT_S;
+            let field = gimbal.field("timeshift_gimbal_imu");
+            if shift_s.abs() <= limit { Ok(shift_s) } else { Err(field.unexpected("seconds, at most 10 either way")) }
+        })?;
     let rate = gimbal.field("update_rate").optional();
     let rate_hz = match (&topic, rate) {
         (None, None) => 0.0,
@@ -288,5 +305,19 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
         links,
         effector_from_camera: gimbal.field("T_E_C").transform()?,
     };
-    Ok(GimbalRig { topic, rate_hz, encoder_sigma_rad, prior, switches_parameterization, chain, joints })
+    if attitude.is_some() && !(1..=InverseChain::MAX_JOINTS).contains(&joints.len()) {
+        let problem = format!("{} links, expected one to three: an attitude does not determine more", joints.len());
+        return Err(gimbal.field("links").error(problem));
+    }
+    Ok(GimbalRig {
+        topic,
+        attitude,
+        timeshift_gimbal_imu_s,
+        rate_hz,
+        encoder_sigma_rad,
+        prior,
+        switches_parameterization,
+        chain,
+        joints,
+    })
 }

@@ -2,7 +2,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::flight_log::tests::RIG;
-use crate::sensors::{CameraMount, Rig};
+use crate::sensors::{AttitudeMessage, CameraMount, Rig};
 
 fn parse(text: &str) -> Result<Rig, String> {
     Rig::from_yaml(text, Path::new("some.rig.yaml")).map_err(|error| error.to_string())
@@ -25,6 +25,65 @@ fn a_rig_reads_back_as_written() {
     let yaml = odd.to_yaml();
     assert!(yaml.contains("1.0e+22") && !yaml.contains("1e22"), "{yaml}");
     check_same(&odd, &parse(&yaml).unwrap());
+}
+
+/// The test rig with a source in place of its topic of joint angles.
+fn with_source(source: &str) -> String {
+    RIG.replace("rostopic: /joints", &format!("source: {source}"))
+}
+
+#[test]
+fn every_source_of_the_gimbals_attitude_reads_back_as_written() {
+    for source in [
+        "{topic: /g, type: quaternion, frame: body, axes: flu}",
+        "{topic: /g, type: pose, frame: vehicle, axes: frd, vehicle: /v, vehicle_axes: flu}",
+        "{topic: /g, type: euler, frame: earth, axes: frd, order: yaw=z roll=y pitch=-x, unit: deg, vehicle: /v}",
+        "{topic: /tf, type: tf, frame: body, axes: flu, parent: base_link, child: camera, gimbal_axes: rdf, imu_axes: frd}",
+        "{topic: /g, type: mavros, vehicle: /v, vehicle_axes: flu}",
+        "{topic: /g, type: px4, frame: earth, vehicle: /v}",
+    ] {
+        let rig = parse(&with_source(&format!("{source}\n  timeshift_gimbal_imu: -0.08"))).unwrap();
+        let gimbal = rig.gimbal.as_ref().unwrap();
+        assert!(gimbal.topic.is_some() && gimbal.attitude.is_some(), "{source}");
+        assert_eq!(gimbal.timeshift_gimbal_imu_s, -0.08);
+        check_same(&rig, &parse(&rig.to_yaml()).unwrap());
+    }
+    let euler = parse(&with_source(
+        "{topic: /g, type: euler, frame: body, axes: frd, order: yaw=z roll=y pitch=-x, unit: deg}",
+    ));
+    let euler = euler.unwrap().gimbal.unwrap().attitude.unwrap();
+    let yaml = parse(RIG).map(|rig| rig.to_yaml()).unwrap();
+    assert!(!yaml.contains("source") && !yaml.contains("timeshift_gimbal_imu"), "{yaml}");
+    assert!(matches!(euler.message, AttitudeMessage::Euler(angles) if angles.order.len() == 3));
+}
+
+#[test]
+fn what_a_source_lacks_is_named_with_the_possible_values() {
+    let full = "{topic: /g, type: euler, frame: earth, axes: frd, order: yaw=z roll=y pitch=x, unit: deg, vehicle: /v}";
+    let check = |found: &str, replaced: &str, expected: &str| {
+        assert!(full.contains(found), "{found}");
+        let error = parse(&with_source(&full.replace(found, replaced))).unwrap_err();
+        assert!(error.starts_with(&format!("gimbal.source.{expected}")), "{error}");
+    };
+    check("topic: /g, ", "", "topic: missing, expected the topic of the gimbal's attitude");
+    check("type: euler, ", "", "type: missing, expected quaternion, pose, euler, tf, mavros or px4");
+    check("type: euler", "type: angles", "type: holds the text 'angles', expected quaternion, pose");
+    check("frame: earth, ", "", "frame: missing, expected body, vehicle (levelled, x towards the heading) or earth");
+    check("frame: earth", "frame: flags", "frame: holds the text 'flags', expected body");
+    check("axes: frd, ", "", "axes: missing, expected frd (forward, right, down; earth: NED) or flu");
+    check("order: yaw=z roll=y pitch=x, ", "", "order: missing, expected rotations in their order");
+    check("pitch=x", "pitch=y", "order: holds the text 'yaw=z roll=y pitch=y', expected rotations");
+    check("unit: deg, ", "", "unit: missing, expected rad or deg");
+    check(", vehicle: /v", "", "vehicle: missing, expected the topic of the vehicle's attitude");
+    check("type: euler", "type: quaternion", "order: has no meaning with type quaternion, only with euler");
+    check("axes: frd", "axes: frd, imu_axes: fru", "imu_axes: holds the text 'fru', expected three letters");
+    check("axes: frd", "axes: frd, axis: z", "axis: unknown key, the nearest known key is 'axes'");
+    let error = parse(&with_source("{topic: /tf, type: tf, frame: body, axes: flu, parent: a}")).unwrap_err();
+    assert!(error.starts_with("gimbal.source.child: missing, expected the name of the gimbal's frame"), "{error}");
+    let both = RIG.replace("rostopic: /joints", &format!("rostopic: /joints\n  source: {full}"));
+    assert!(parse(&both).unwrap_err().starts_with("gimbal.rostopic: is there beside gimbal.source"));
+    let far = RIG.replace("rostopic: /joints", "rostopic: /joints\n  timeshift_gimbal_imu: 100");
+    assert!(parse(&far).unwrap_err().starts_with("gimbal.timeshift_gimbal_imu: holds 100, expected seconds"));
 }
 
 /// Equal in every number but the rotations, which are equal to within rounding.

@@ -1,5 +1,6 @@
 use std::fmt::Write as _;
 
+use super::attitude;
 use crate::geometry::RigidTransform;
 use crate::sensors::{AssumedField, CameraMount, CameraRig, GimbalRig, Rig};
 
@@ -63,7 +64,17 @@ fn write_camera(out: &mut String, camera: &CameraRig) {
 
 fn write_gimbal(out: &mut String, gimbal: &GimbalRig) {
     line(out, 0, "gimbal", "");
-    line(out, 1, "rostopic", &gimbal.topic.as_deref().map_or_else(|| "null".into(), text));
+    if let (Some(topic), Some(source)) = (&gimbal.topic, &gimbal.attitude) {
+        line(out, 1, "source", "");
+        for (key, value) in attitude::entries(topic, source) {
+            line(out, 2, key, &text(&value));
+        }
+    } else {
+        line(out, 1, "rostopic", &gimbal.topic.as_deref().map_or_else(|| "null".into(), text));
+    }
+    if gimbal.timeshift_gimbal_imu_s != 0.0 {
+        line(out, 1, "timeshift_gimbal_imu", &number(gimbal.timeshift_gimbal_imu_s));
+    }
     if gimbal.rate_hz > 0.0 {
         line(out, 1, "update_rate", &number(gimbal.rate_hz));
     }

@@ -9,7 +9,7 @@ use super::super::{FlightLog, LogError, LogWarning, SensorFrame};
 use super::imu::ImuStream;
 use super::joint_angles::JointAngleStream;
 use super::joint_topic::JointSamples;
-use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
+use super::ordered::{Decoder, Lookup, MessageSource, OrderedSamples, ReadContext, Refusal};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraRig, GrayImage, ImuSample, PoseSample, Rig};
 
@@ -35,32 +35,6 @@ struct PendingImage {
 enum ImageContent {
     Message(Vec<u8>),
     Decoded(GrayImage),
-}
-
-/// Samples of a topic around a stamp: those before it, and the first one after it.
-struct Lookup<T> {
-    samples: OrderedSamples<T>,
-    before: Option<(i64, T)>,
-    after: Option<(i64, T)>,
-    ended: bool,
-}
-
-impl<T> Lookup<T> {
-    fn new(samples: OrderedSamples<T>) -> Self {
-        Self { samples, before: None, after: None, ended: false }
-    }
-
-    /// The last sample at or before a time and the first after it; times must not decrease.
-    fn around(&mut self, context: &mut ReadContext, stamp_ns: i64) -> [Option<&(i64, T)>; 2] {
-        while !self.ended && self.after.as_ref().is_none_or(|(after, _)| *after <= stamp_ns) {
-            if let Some(passed) = self.after.take() {
-                self.before = Some(passed);
-            }
-            self.after = self.samples.next(context);
-            self.ended = self.after.is_none();
-        }
-        [self.before.as_ref(), self.after.as_ref()]
-    }
 }
 
 /// Assembles the frames of one camera, in order.
@@ -109,7 +83,7 @@ impl FrameSource {
         duration_s: Option<f64>,
     ) -> Result<Self, LogError> {
         let mut context = ReadContext::new(log);
-        let log = &*Arc::clone(&context.log);
+        let log = &Arc::clone(&context.log);
         let camera = rig.camera(camera_key)?;
         let field = format!("{camera_key}.rostopic");
         let info = log.require_topic(&field, &camera.topic, &MessageKind::IMAGES)?;
@@ -420,7 +394,7 @@ fn image_decoder(kind: MessageKind, epoch_ns: i64) -> Decoder<PendingImage> {
 
 /// The gimbal's joint angles, `None` without a gimbal or encoders.
 fn joint_angles(
-    log: &FlightLog,
+    log: &Arc<FlightLog>,
     rig: &Rig,
     from_ns: i64,
     half_interval_ns: i64,

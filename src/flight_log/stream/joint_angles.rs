@@ -10,6 +10,11 @@ use crate::sensors::{JointAngles, JointSample};
 
 /// Largest distance of a reading from the stamp at which it is used.
 const NEAREST_NS: i64 = 100_000_000;
+/// The same of an attitude, of which some gimbals record 5 per second.
+const NEAREST_ATTITUDE_NS: i64 = 150_000_000;
+/// Between two attitudes a joint deviates from a constant rate by about this much of its rotation from one to the other: half way
+/// between them, one standard deviation. A joint that rotates during one half of the time only deviates by four times as much.
+const DEVIATION_OF_ROTATION: f64 = 1.0 / 16.0;
 /// Largest half length of a batch; over longer spans a stabilized joint does not follow a parabola.
 const MAX_HALF_BATCH_NS: i64 = 25_000_000;
 /// The rate is fitted to this many times the batch on either side, neighbouring batches included: its noise falls with the
@@ -30,7 +35,9 @@ pub(super) struct JointAngleStream {
 impl JointAngleStream {
     /// `sigma_rad` is the rig's standard deviation of a reading, `half_interval_ns` half an image interval.
     pub(super) fn new(samples: JointSamples, sigma_rad: f64, half_interval_ns: i64) -> Self {
-        Self { samples, ended: false, average: EncoderAverage::new(sigma_rad, half_interval_ns) }
+        let average = EncoderAverage::new(sigma_rad, half_interval_ns);
+        let average = if samples.are_of_attitude() { average.of_attitude() } else { average };
+        Self { samples, ended: false, average }
     }
 
     /// The angles in radians at a stamp, `None` without a reading near it; stamps must not decrease, and `previous_ns` is
@@ -63,6 +70,8 @@ pub(super) struct EncoderAverage {
     noise: WhiteNoise,
     sigma_rad: f64,
     half_batch_ns: i64,
+    /// Whether the readings are of an attitude, which may be further apart than images.
+    of_attitude: bool,
 }
 
 impl EncoderAverage {
@@ -72,7 +81,19 @@ impl EncoderAverage {
             noise: WhiteNoise::default(),
             sigma_rad,
             half_batch_ns: half_interval_ns.min(MAX_HALF_BATCH_NS),
+            of_attitude: false,
         }
+    }
+
+    /// For readings of an attitude: they are interpolated over larger gaps, with an uncertainty that grows with the gap and with
+    /// the rotation in it, and the rate over the gap counts.
+    pub(super) fn of_attitude(self) -> Self {
+        Self { of_attitude: true, ..self }
+    }
+
+    /// Largest distance of a reading from the stamp at which it is used.
+    fn nearest_ns(&self) -> i64 {
+        if self.of_attitude { NEAREST_ATTITUDE_NS } else { NEAREST_NS }
     }
 
     /// Whether readings that belong to a stamp may still be missing.
@@ -102,9 +123,19 @@ impl EncoderAverage {
         let after = self.readings.iter().position(|sample| sample.stamp_ns > stamp_ns).unwrap_or(self.readings.len());
         let pair: Vec<&JointSample> = self.readings.range(after.saturating_sub(1)..).take(2).collect();
         let nearest = *pair.iter().min_by_key(|sample| (sample.stamp_ns - stamp_ns).abs())?;
-        if (nearest.stamp_ns - stamp_ns).abs() > NEAREST_NS {
+        let nearest_ns = self.nearest_ns();
+        if (nearest.stamp_ns - stamp_ns).abs() > nearest_ns {
             return None;
         }
+        let span = (pair.len() == 2).then(|| (pair[0].stamp_ns, pair[1].stamp_ns));
+        let span = span.filter(|(first_ns, second_ns)| *first_ns <= stamp_ns && second_ns > first_ns);
+        // Of an attitude, the readings on both sides count however the distances are shared.
+        let between = span.is_some_and(|(first_ns, second_ns)| {
+            let farthest_ns = (second_ns - stamp_ns).max(stamp_ns - first_ns);
+            if self.of_attitude { second_ns - first_ns <= 2 * nearest_ns } else { farthest_ns <= nearest_ns }
+        });
+        let fraction =
+            span.map_or(0.0, |(first_ns, second_ns)| (stamp_ns - first_ns) as f64 / (second_ns - first_ns) as f64);
         let joints = nearest.angles_rad.len();
         let given = self.sigma_rad * self.sigma_rad;
         let (mut angles_rad, mut sigmas_rad, mut lasting_sigmas_rad) = (Vec::new(), Vec::new(), Vec::new());
@@ -119,12 +150,15 @@ impl EncoderAverage {
             });
             // Two readings that neighbouring images may use as well: interpolated without averaging.
             let interpolated = || {
-                let fitted = angle_fit::fit(&near(&pair), given)?;
-                let apart_ns = (pair[1].stamp_ns - stamp_ns).max(stamp_ns - pair[0].stamp_ns);
-                let between = pair[0].stamp_ns <= stamp_ns && apart_ns <= NEAREST_NS;
-                between.then(|| (fitted.angle_rad, fitted.variance_rad2.max(given), given))
+                let fitted = angle_fit::fit(&near(&pair), given).filter(|_| between)?;
+                let rotated_rad = wrap_angle(pair[1].angles_rad[joint] - pair[0].angles_rad[joint]);
+                let deviation_rad = DEVIATION_OF_ROTATION * rotated_rad * 4.0 * fraction * (1.0 - fraction);
+                let deviation = if self.of_attitude { deviation_rad * deviation_rad } else { 0.0 };
+                Some((fitted.angle_rad, fitted.variance_rad2.max(given) + deviation, given))
             };
-            let rate = angle_fit::fit(&near(&around), given).map_or(0.0, |fitted| fitted.rate_rad_per_s);
+            let rates_of: &[&JointSample] =
+                if self.of_attitude && around.len() < 2 && between { &pair } else { &around };
+            let rate = angle_fit::fit(&near(rates_of), given).map_or(0.0, |fitted| fitted.rate_rad_per_s);
             let (angle, variance, lasting) = averaged.or_else(interpolated).unwrap_or_else(|| {
                 let rotated_rad = UNKNOWN_RATE_RAD_PER_S * seconds_from_ns(nearest.stamp_ns - stamp_ns);
                 (nearest.angles_rad[joint], given + rotated_rad * rotated_rad, given)

@@ -1,17 +1,63 @@
-//! The encoder messages of a log as samples of all joints.
+//! The joint angles of a log as samples of all joints, whatever they are recorded as.
+
+use std::sync::Arc;
 
 use super::super::joint_merge::{JointMerge, JointReading};
 use super::super::log::relative_ns;
 use super::super::messages::{self, JointMessage, MessageKind};
 use super::super::{FlightLog, LogError};
+use super::attitude::AttitudeJoints;
 use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
+use crate::geometry::ns_from_seconds;
 use crate::sensors::{GimbalRig, JointSample};
 
 /// Number of messages within which every joint of the rig must be named once.
 const MESSAGES_SEARCHED: usize = 1000;
 
-/// Samples of all joints in time order; messages with only some joints are merged by name.
+/// Samples of all joints in time order.
 pub(super) struct JointSamples {
+    source: JointSource,
+    timeshift_ns: i64,
+}
+
+/// What the samples are made of.
+enum JointSource {
+    Encoders(Box<EncoderJoints>),
+    Attitude(Box<AttitudeJoints>),
+}
+
+impl JointSamples {
+    /// Reads from a stamp on; `topic` is the gimbal's.
+    pub(super) fn new(log: &Arc<FlightLog>, gimbal: &GimbalRig, topic: &str, from_ns: i64) -> Result<Self, LogError> {
+        let timeshift_ns = ns_from_seconds(gimbal.timeshift_gimbal_imu_s);
+        let from_ns = from_ns.saturating_sub(timeshift_ns);
+        let source = match &gimbal.attitude {
+            None => JointSource::Encoders(Box::new(EncoderJoints::new(log, gimbal, topic, from_ns)?)),
+            Some(source) => JointSource::Attitude(Box::new(AttitudeJoints::new(log, gimbal, source, topic, from_ns)?)),
+        };
+        Ok(Self { source, timeshift_ns })
+    }
+
+    /// Whether they are made of an attitude, at lower rates than encoders have.
+    pub(super) fn are_of_attitude(&self) -> bool {
+        matches!(self.source, JointSource::Attitude(_))
+    }
+
+    /// The next sample, `None` at the end of the log.
+    pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<JointSample> {
+        match &mut self.source {
+            JointSource::Encoders(joints) => {
+                let sample = joints.next(context)?;
+                Some(JointSample { stamp_ns: sample.stamp_ns.saturating_add(self.timeshift_ns), ..sample })
+            }
+            // The shift is of the gimbal alone; the vehicle's attitude has the time of the IMU.
+            JointSource::Attitude(joints) => joints.next(context),
+        }
+    }
+}
+
+/// Samples of encoders; messages with only some joints are merged by name.
+struct EncoderJoints {
     topic: String,
     readings: OrderedSamples<JointReading>,
     merge: JointMerge,
@@ -19,9 +65,8 @@ pub(super) struct JointSamples {
     repeats_reported: bool,
 }
 
-impl JointSamples {
-    /// Reads from a stamp on; `topic` is the gimbal's.
-    pub(super) fn new(log: &FlightLog, gimbal: &GimbalRig, topic: &str, from_ns: i64) -> Result<Self, LogError> {
+impl EncoderJoints {
+    fn new(log: &FlightLog, gimbal: &GimbalRig, topic: &str, from_ns: i64) -> Result<Self, LogError> {
         log.require_topic("gimbal.rostopic", topic, &[MessageKind::JointState])?;
         let names: Vec<String> = gimbal.joints.iter().map(|joint| joint.name.clone()).collect();
         let together = named_together(log, topic, &names)?;
@@ -36,8 +81,7 @@ impl JointSamples {
         })
     }
 
-    /// The next sample, `None` at the end of the log.
-    pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<JointSample> {
+    fn next(&mut self, context: &mut ReadContext) -> Option<JointSample> {
         loop {
             if let Some(sample) = self.merge.pop() {
                 return Some(sample);

@@ -1,6 +1,7 @@
 //! The frames of one camera, each with the samples of the other sensors for it.
 
 pub(crate) mod angle_fit;
+mod attitude;
 mod frames;
 mod imu;
 mod joint_angles;

@@ -58,6 +58,11 @@ pub(super) struct Refusal {
 }
 
 impl Refusal {
+    /// For a message that is of no use and no error either: it is passed over without a word.
+    pub(super) fn unneeded() -> Self {
+        Self { reason: "", detail: String::new() }
+    }
+
     /// For a message whose bytes do not match its schema.
     pub(super) fn not_decodable(error: &impl ToString) -> Self {
         Self { reason: "it cannot be decoded", detail: error.to_string() }
@@ -182,6 +187,7 @@ impl<T> OrderedSamples<T> {
                     self.pending.insert((stamp_ns, number), sample);
                 }
             }
+            Err(refusal) if refusal.reason.is_empty() => {}
             Err(refusal) => self.refuse(context, log_time_ns, refusal),
         }
     }
@@ -214,5 +220,31 @@ impl<T> OrderedSamples<T> {
 
     pub(super) fn finish(&mut self, context: &mut ReadContext) {
         self.end_run(context);
+    }
+}
+
+/// Samples of a topic around a stamp: those before it, and the first one after it.
+pub(super) struct Lookup<T> {
+    samples: OrderedSamples<T>,
+    before: Option<(i64, T)>,
+    after: Option<(i64, T)>,
+    ended: bool,
+}
+
+impl<T> Lookup<T> {
+    pub(super) fn new(samples: OrderedSamples<T>) -> Self {
+        Self { samples, before: None, after: None, ended: false }
+    }
+
+    /// The last sample at or before a time and the first after it; times must not decrease.
+    pub(super) fn around(&mut self, context: &mut ReadContext, stamp_ns: i64) -> [Option<&(i64, T)>; 2] {
+        while !self.ended && self.after.as_ref().is_none_or(|(after, _)| *after <= stamp_ns) {
+            if let Some(passed) = self.after.take() {
+                self.before = Some(passed);
+            }
+            self.after = self.samples.next(context);
+            self.ended = self.after.is_none();
+        }
+        [self.before.as_ref(), self.after.as_ref()]
     }
 }

@@ -1,5 +1,6 @@
 //! Small logs written by [`LogWriter`], intact and damaged, and the frames and warnings read from them.
 
+mod attitude;
 mod broken;
 mod messages;
 mod rigs;

@@ -283,10 +283,8 @@ impl LogWriter {
         times: MessageTimes,
         rotation: &UnitQuaternion<f64>,
     ) -> Result<(), LogError> {
-        let definition = schemas::compose(&schemas::QUATERNION_STAMPED);
-        let message_type = MessageType::ros2("geometry_msgs/msg/QuaternionStamped", definition);
         let message = encode::quaternion_stamped(times.stamp_ns, frame_id, rotation);
-        self.write_typed(topic, &message_type, times, &message)
+        self.write(topic, MessageKind::QuaternionStamped, times, &message)
     }
 
     /// Attaches a text file, such as `city.rig.yaml`.

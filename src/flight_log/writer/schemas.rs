@@ -60,10 +60,6 @@ pub(super) const IMAGE_ANNOTATIONS: Definition<'_> =
 /// `rcl_interfaces/msg/Log`.
 pub(super) const LOG_LINE: Definition<'_> = (fields!("rcl_interfaces/Log"), &[TIME]);
 
-/// `geometry_msgs/msg/QuaternionStamped`.
-pub(super) const QUATERNION_STAMPED: Definition<'_> =
-    (fields!("geometry_msgs/QuaternionStamped"), &[HEADER, TIME, QUATERNION]);
-
 /// The fields of a message, and the types they need.
 fn fields(kind: MessageKind) -> Definition<'static> {
     match kind {
@@ -85,6 +81,14 @@ fn fields(kind: MessageKind) -> Definition<'static> {
         MessageKind::TransformStamped => {
             (fields!("geometry_msgs/TransformStamped"), &[HEADER, TIME, TRANSFORM, VECTOR3, QUATERNION])
         }
+        MessageKind::QuaternionStamped => (fields!("geometry_msgs/QuaternionStamped"), &[HEADER, TIME, QUATERNION]),
+        MessageKind::Vector3Stamped => (fields!("geometry_msgs/Vector3Stamped"), &[HEADER, TIME, VECTOR3]),
+        MessageKind::Transforms => TRANSFORMS,
+        MessageKind::MavrosGimbalAttitude => {
+            (fields!("mavros_msgs/GimbalDeviceAttitudeStatus"), &[HEADER, TIME, QUATERNION])
+        }
+        MessageKind::Px4GimbalAttitude => (fields!("px4_msgs/GimbalDeviceAttitudeStatus"), &[]),
+        MessageKind::Px4VehicleAttitude => (fields!("px4_msgs/VehicleAttitude"), &[]),
     }
 }
 

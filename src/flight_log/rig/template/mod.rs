@@ -273,6 +273,8 @@ impl RigTemplate {
         };
         GimbalRig {
             topic,
+            attitude: None,
+            timeshift_gimbal_imu_s: 0.0,
             rate_hz,
             encoder_sigma_rad: sigma_rad,
             prior: CHAIN_PRIOR,

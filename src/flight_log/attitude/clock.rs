@@ -1,0 +1,61 @@
+use super::super::log::relative_ns;
+use super::super::messages::{self, MessageKind};
+use super::super::{FlightLog, LogError};
+use crate::geometry::seconds_from_ns;
+
+/// Stamps and log times this far outside of the log's stamps are of another clock.
+const TOLERANCE_NS: i64 = 60_000_000_000;
+
+/// Where the times of a topic's messages are taken from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum StampClock {
+    /// The stamps of the messages.
+    Stamps,
+    /// The log times: the stamps are of a clock whose relation to the log's is unknown.
+    LogTimes {
+        /// The first stamp since that clock's zero.
+        first_stamp_ns: i64,
+    },
+}
+
+impl StampClock {
+    /// Of a topic. Stamps of PX4 count from its start unless its bridge has converted them; they are used when the first one lies
+    /// within the times of the log. Fails when neither stamps nor log times do.
+    pub(crate) fn of(log: &FlightLog, topic: &str, kind: MessageKind) -> Result<Self, LogError> {
+        if !kind.counts_since_boot() {
+            return Ok(Self::Stamps);
+        }
+        let Some(first_stamp_ns) = log.find_message(topic, |data| messages::stamp_ns(kind, data).ok()) else {
+            return Ok(Self::Stamps);
+        };
+        let last_ns = log.duration_ns().saturating_add(TOLERANCE_NS);
+        let fits = |since_start_ns: i64| (-TOLERANCE_NS..=last_ns).contains(&since_start_ns);
+        let first_log_ns = log.topic(topic).map_or(0, |info| info.first_ns);
+        if fits(relative_ns(first_stamp_ns, log.epoch_ns())) {
+            Ok(Self::Stamps)
+        } else if fits(first_log_ns) {
+            Ok(Self::LogTimes { first_stamp_ns })
+        } else {
+            let (stamp_s, log_s) = (seconds_from_ns(first_stamp_ns), seconds_from_ns(first_log_ns));
+            Err(LogError::UnknownClock { topic: topic.to_owned(), stamp_s, log_s, path: log.path().to_owned() })
+        }
+    }
+
+    /// The stamp of a message, both since the epoch.
+    pub(crate) fn stamp_ns(self, stamp_ns: i64, log_time_ns: u64) -> i64 {
+        match self {
+            Self::Stamps => stamp_ns,
+            Self::LogTimes { .. } => i64::try_from(log_time_ns).unwrap_or(i64::MAX),
+        }
+    }
+
+    /// The warning about stamps that are not used.
+    pub(crate) fn warning(self, topic: &str) -> Option<String> {
+        let Self::LogTimes { first_stamp_ns } = self else { return None };
+        Some(format!(
+            "{topic}: the stamps count from PX4's start (the first is {:.3} s), and how they relate to the other topics is unknown; the \
+             times of recording are used, with their delay and jitter (let the bridge synchronize: UXRCE_DDS_SYNCT 1)",
+            seconds_from_ns(first_stamp_ns)
+        ))
+    }
+}

@@ -1,0 +1,184 @@
+//! A rotation along a chain of frames whose transforms are in messages of their own.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use nalgebra::UnitQuaternion;
+
+use super::super::messages::{MessageKind, bare_name, read_transforms};
+use super::super::{FlightLog, LogError};
+use super::rotation_between;
+
+/// Messages of a topic within which every frame must occur.
+const MESSAGES_SEARCHED: usize = 5000;
+/// Frames of a robot; further ones are not looked at.
+const MAX_FRAMES: usize = 4096;
+/// Larger gaps between readings of a transform are not interpolated.
+const MAX_GAP_NS: i64 = 200_000_000;
+
+/// The transforms from a gimbal's frame to the one that its attitude is relative to.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct TransformPath {
+    edges: Vec<Edge>,
+}
+
+/// A transform between a frame and its parent.
+#[derive(Clone, Debug, PartialEq)]
+struct Edge {
+    child: String,
+    /// Whether the path goes from the parent to the child.
+    inverted: bool,
+    /// `parent_from_child` when it is static.
+    fixed: Option<UnitQuaternion<f64>>,
+}
+
+/// Every frame's parent, with the rotation when it is static.
+type Tree = BTreeMap<String, (String, Option<UnitQuaternion<f64>>)>;
+
+impl TransformPath {
+    /// The path between two frames of a log: static transforms of `/tf_static` (or the topic with `_static`), others of
+    /// `topic`.
+    pub(crate) fn find(log: &FlightLog, topic: &str, parent: &str, child: &str) -> Result<Self, LogError> {
+        let (parent, child) = (bare_name(parent), bare_name(child));
+        let mut tree = Tree::new();
+        for fixed in [format!("{topic}_static"), "/tf_static".to_owned()] {
+            if log.topic(&fixed).is_some_and(|info| info.kind == Some(MessageKind::Transforms)) {
+                collect(log, &fixed, true, &mut tree, |_| false);
+            }
+        }
+        let mut found = Err(String::new());
+        collect(log, topic, false, &mut tree, |tree| {
+            found = Self::in_tree(tree, parent, child);
+            found.is_ok()
+        });
+        if found.is_err() {
+            found = Self::in_tree(&tree, parent, child);
+        }
+        found.map_err(|problem| LogError::NoTransform { topic: topic.to_owned(), problem, path: log.path().to_owned() })
+    }
+
+    fn in_tree(tree: &Tree, parent: &str, child: &str) -> Result<Self, String> {
+        let ancestors = |frame: &str| {
+            let mut frames = vec![frame.to_owned()];
+            while let Some((above, _)) = frames.last().and_then(|last| tree.get(last)) {
+                // A loop of frames has no end.
+                if frames.contains(above) {
+                    break;
+                }
+                frames.push(above.clone());
+            }
+            frames
+        };
+        let (down, up) = (ancestors(parent), ancestors(child));
+        for (frame, frames) in [(parent, &down), (child, &up)] {
+            let is_parent = tree.values().any(|(above, _)| above == frame);
+            if frames.len() == 1 && !is_parent {
+                let known: Vec<&str> = tree.keys().map(String::as_str).take(20).collect();
+                let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+                return Err(format!("there is no frame '{frame}'; the frames are {known}"));
+            }
+        }
+        let common = up.iter().find(|frame| down.contains(*frame));
+        let common = common.ok_or_else(|| format!("'{parent}' and '{child}' are not connected"))?;
+        let edge = |inverted: bool| {
+            move |frame: &String| {
+                let fixed = tree.get(frame).and_then(|(_, fixed)| *fixed);
+                Edge { child: frame.clone(), inverted, fixed }
+            }
+        };
+        let below = |frames: &[String]| frames.iter().take_while(|frame| *frame != common).cloned().collect::<Vec<_>>();
+        // From the outer frame up to the common one, then down to the gimbal.
+        let mut edges: Vec<Edge> = below(&down).iter().map(edge(true)).collect();
+        edges.extend(below(&up).iter().rev().map(edge(false)));
+        if edges.iter().all(|edge| edge.fixed.is_some()) {
+            return Err(format!("all transforms between '{parent}' and '{child}' are static"));
+        }
+        Ok(Self { edges })
+    }
+
+    /// Number of the transform with this child frame among those that change.
+    pub(crate) fn moving(&self, child: &str) -> Option<usize> {
+        self.edges.iter().filter(|edge| edge.fixed.is_none()).position(|edge| edge.child == child)
+    }
+
+    fn moving_count(&self) -> usize {
+        self.edges.iter().filter(|edge| edge.fixed.is_none()).count()
+    }
+
+    /// The rotation from the last frame to the first with one rotation for each transform that changes.
+    fn rotation(&self, moving: &[UnitQuaternion<f64>]) -> UnitQuaternion<f64> {
+        let mut next = moving.iter();
+        self.edges.iter().fold(UnitQuaternion::identity(), |before, edge| {
+            let rotation = edge.fixed.or_else(|| next.next().copied()).unwrap_or_default();
+            before * if edge.inverted { rotation.inverse() } else { rotation }
+        })
+    }
+}
+
+/// Adds the transforms of a topic to the tree until `complete`.
+fn collect(log: &FlightLog, topic: &str, fixed: bool, tree: &mut Tree, mut complete: impl FnMut(&Tree) -> bool) {
+    let mut searched = 0;
+    log.for_each_message(topic, |_, data| {
+        let mut added = false;
+        for entry in read_transforms(data).unwrap_or_default() {
+            let Some(rotation) = entry.rotation.filter(|_| tree.len() < MAX_FRAMES) else { continue };
+            let value = (entry.parent.to_owned(), fixed.then_some(rotation));
+            added |= tree.insert(entry.child.to_owned(), value.clone()) != Some(value);
+        }
+        searched += 1;
+        !(added && complete(tree)) && searched < MESSAGES_SEARCHED
+    });
+}
+
+/// Joins the transforms that change at the stamps of the first of them; the others are interpolated.
+#[derive(Clone, Debug)]
+pub(crate) struct TransformMerge {
+    path: TransformPath,
+    /// By transform: readings from the last one at or before the next stamp on.
+    readings: Vec<VecDeque<(i64, UnitQuaternion<f64>)>>,
+    newest_ns: i64,
+    ended: bool,
+}
+
+impl TransformMerge {
+    pub(crate) fn new(path: TransformPath) -> Self {
+        let readings = vec![VecDeque::new(); path.moving_count()];
+        Self { path, readings, newest_ns: i64::MIN, ended: false }
+    }
+
+    /// Takes the next reading of a transform; a second one with the same stamp or an older one is left out.
+    pub(crate) fn push(&mut self, transform: usize, stamp_ns: i64, rotation: UnitQuaternion<f64>) {
+        self.newest_ns = self.newest_ns.max(stamp_ns);
+        if let Some(queue) = self.readings.get_mut(transform)
+            && queue.back().is_none_or(|(last_ns, _)| *last_ns < stamp_ns)
+        {
+            queue.push_back((stamp_ns, rotation));
+        }
+    }
+
+    pub(crate) fn finish(&mut self) {
+        self.ended = true;
+    }
+
+    /// The next rotation along the path with its stamp, `None` while later readings are needed.
+    pub(crate) fn pop(&mut self) -> Option<(i64, UnitQuaternion<f64>)> {
+        loop {
+            let (stamp_ns, _) = *self.readings.first()?.front()?;
+            for queue in &mut self.readings {
+                while queue.get(1).is_some_and(|(second_ns, _)| *second_ns <= stamp_ns) {
+                    queue.pop_front();
+                }
+            }
+            let late = self.ended || self.newest_ns.saturating_sub(stamp_ns) > MAX_GAP_NS;
+            let waits = |queue: &VecDeque<_>| queue.back().is_none_or(|(last_ns, _): &(i64, _)| *last_ns < stamp_ns);
+            if !late && self.readings.iter().any(waits) {
+                return None;
+            }
+            let at = |queue: &VecDeque<_>| rotation_between(queue.front(), queue.get(1), stamp_ns, MAX_GAP_NS);
+            let moving: Option<Vec<UnitQuaternion<f64>>> = self.readings.iter().map(at).collect();
+            self.readings[0].pop_front();
+            if let Some(moving) = moving {
+                return Some((stamp_ns, self.path.rotation(&moving)));
+            }
+        }
+    }
+}

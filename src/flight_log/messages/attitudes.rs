@@ -1,0 +1,138 @@
+//! Attitudes of gimbals and vehicles.
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use super::super::cdr::{CdrError, CdrReader};
+use super::{MessageKind, read_header};
+use crate::sensors::AttitudeValue;
+
+/// Transforms of one message; robots publish some dozens.
+const MAX_TRANSFORMS: usize = 4096;
+
+/// A message with an attitude; `None` when its numbers are none (not finite, or a zero quaternion).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct StampedRotation<T> {
+    /// Nanoseconds since the epoch, or since PX4 started.
+    pub(crate) stamp_ns: i64,
+    pub(crate) content: Option<T>,
+}
+
+/// Microseconds as nanoseconds.
+pub(super) fn read_px4_stamp(reader: &mut CdrReader<'_>) -> Result<i64, CdrError> {
+    let microseconds = i64::try_from(reader.read_u64()?).unwrap_or(i64::MAX);
+    Ok(microseconds.saturating_mul(1000))
+}
+
+/// The rotation of a quaternion; its norm may be rounded (32-bit numbers), but not far from 1.
+fn rotation([x, y, z, w]: [f64; 4]) -> Option<UnitQuaternion<f64>> {
+    let quaternion = Quaternion::new(w, x, y, z);
+    let norm = quaternion.norm();
+    (norm.is_finite() && norm > 0.5).then(|| UnitQuaternion::new_normalize(quaternion))
+}
+
+/// PX4's quaternions begin with w.
+fn read_px4_rotation(reader: &mut CdrReader<'_>) -> Result<Option<UnitQuaternion<f64>>, CdrError> {
+    let [w, x, y, z] = reader.read_f32s::<4>()?.map(f64::from);
+    Ok(rotation([x, y, z, w]))
+}
+
+/// Skips to the orientation of a message with a header and reads it.
+fn read_stamped_rotation(
+    kind: MessageKind,
+    reader: &mut CdrReader<'_>,
+) -> Result<(i64, Option<UnitQuaternion<f64>>), CdrError> {
+    if kind == MessageKind::Px4VehicleAttitude {
+        let stamp_ns = read_px4_stamp(reader)?;
+        reader.read_u64()?; // the stamp of the sample that the estimate was made from
+        return Ok((stamp_ns, read_px4_rotation(reader)?));
+    }
+    let header = read_header(reader)?;
+    if matches!(kind, MessageKind::Odometry | MessageKind::TransformStamped) {
+        reader.read_string()?; // child_frame_id
+    }
+    if !matches!(kind, MessageKind::QuaternionStamped | MessageKind::Imu) {
+        reader.read_f64s::<3>()?; // position
+    }
+    Ok((header.stamp_ns, rotation(reader.read_f64s::<4>()?)))
+}
+
+/// The attitude of a gimbal in a message of any kind but `Transforms`.
+pub(crate) fn read_gimbal_attitude(
+    kind: MessageKind,
+    message: &[u8],
+) -> Result<StampedRotation<AttitudeValue>, CdrError> {
+    let mut reader = CdrReader::new(message)?;
+    let reader = &mut reader;
+    let (stamp_ns, content) = match kind {
+        MessageKind::Vector3Stamped => {
+            let header = read_header(reader)?;
+            let vector = Vector3::from(reader.read_f64s::<3>()?);
+            let finite = vector.iter().all(|value| value.is_finite());
+            (header.stamp_ns, finite.then_some(AttitudeValue::Vector(vector)))
+        }
+        MessageKind::MavrosGimbalAttitude | MessageKind::Px4GimbalAttitude => {
+            let px4 = kind == MessageKind::Px4GimbalAttitude;
+            let stamp_ns = if px4 { read_px4_stamp(reader)? } else { read_header(reader)?.stamp_ns };
+            reader.read_u8()?; // target_system
+            reader.read_u8()?; // target_component
+            let flags = reader.read_u16()?;
+            let rotation = if px4 { read_px4_rotation(reader)? } else { rotation(reader.read_f64s::<4>()?) };
+            (stamp_ns, rotation.map(|rotation| AttitudeValue::Flagged(rotation, flags)))
+        }
+        _ => {
+            let (stamp_ns, rotation) = read_stamped_rotation(kind, reader)?;
+            (stamp_ns, rotation.map(AttitudeValue::Rotation))
+        }
+    };
+    Ok(StampedRotation { stamp_ns, content })
+}
+
+/// The attitude of a vehicle, `earth_from_vehicle`, in a message of any kind that has an orientation.
+pub(crate) fn read_vehicle_attitude(
+    kind: MessageKind,
+    message: &[u8],
+) -> Result<StampedRotation<UnitQuaternion<f64>>, CdrError> {
+    let mut reader = CdrReader::new(message)?;
+    let (stamp_ns, mut content) = read_stamped_rotation(kind, &mut reader)?;
+    if kind == MessageKind::Imu {
+        // A first covariance of −1 says that there is no orientation.
+        let [first, ..] = reader.read_f64s::<9>()?;
+        content = content.filter(|_| first >= 0.0);
+    }
+    Ok(StampedRotation { stamp_ns, content })
+}
+
+/// One transform of a `tf2_msgs/msg/TFMessage`; without a rotation when its numbers are none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TransformEntry<'a> {
+    pub(crate) stamp_ns: i64,
+    pub(crate) parent: &'a str,
+    pub(crate) child: &'a str,
+    /// `parent_from_child`.
+    pub(crate) rotation: Option<UnitQuaternion<f64>>,
+}
+
+/// The transforms of a message; the slash before names of old frames is left out.
+pub(crate) fn read_transforms(message: &[u8]) -> Result<Vec<TransformEntry<'_>>, CdrError> {
+    let mut reader = CdrReader::new(message)?;
+    let count = reader.read_u32()? as usize;
+    let mut entries = Vec::with_capacity(count.min(MAX_TRANSFORMS));
+    for _ in 0..count.min(MAX_TRANSFORMS) {
+        let header = read_header(&mut reader)?;
+        let child = reader.read_string()?;
+        reader.read_f64s::<3>()?; // translation
+        let rotation = rotation(reader.read_f64s::<4>()?);
+        entries.push(TransformEntry {
+            stamp_ns: header.stamp_ns,
+            parent: bare_name(header.frame_id),
+            child: bare_name(child),
+            rotation,
+        });
+    }
+    Ok(entries)
+}
+
+/// A frame's name without the slash before it that ROS 1 once had.
+pub(crate) fn bare_name(frame: &str) -> &str {
+    frame.strip_prefix('/').unwrap_or(frame)
+}

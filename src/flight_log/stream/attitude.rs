@@ -1,0 +1,273 @@
+//! The gimbal's attitude as samples of all joints.
+
+use std::sync::Arc;
+
+use nalgebra::UnitQuaternion;
+
+use super::super::attitude::{self, MAX_VEHICLE_GAP_NS, StampClock, TransformMerge, TransformPath, rotation_between};
+use super::super::log::relative_ns;
+use super::super::messages::{self, MessageKind};
+use super::super::{FlightLog, LogError};
+use super::ordered::{Decoder, Lookup, MessageSource, OrderedSamples, ReadContext, Refusal};
+use crate::geometry::{ns_from_seconds, seconds_from_ns};
+use crate::gimbal::{InverseChain, InverseSolution};
+use crate::sensors::{AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig, JointSample};
+
+/// Rotations that the joints cannot make are reported from this size on: noise and inaccurate chains stay below it.
+const UNREACHABLE_RAD: f64 = 0.035;
+/// Stretches of reported samples that are closer together than this are one.
+const STRETCH_NS: i64 = 1_000_000_000;
+/// Distances before the wanted start from which reading is tried for a sample that does not depend on those before it; after
+/// that it begins with the log.
+const EARLIER_NS: [i64; 4] = [0, 4_000_000_000, 16_000_000_000, 64_000_000_000];
+
+/// Samples of all joints in time order, by inverting the rig's chain.
+///
+/// A sample depends on the one before it near a singularity, and where the limits admit two solutions. So that the samples are
+/// the same wherever reading starts, it starts with a sample that depends on none, or with the log.
+pub(super) struct AttitudeJoints {
+    gimbal: GimbalReadings,
+    vehicle: Option<Lookup<UnitQuaternion<f64>>>,
+    source: AttitudeSource,
+    inverse: InverseChain,
+    timeshift_ns: i64,
+    previous_rad: Option<Vec<f64>>,
+    unreachable: Stretch,
+    without_vehicle: Stretch,
+    topic: String,
+    /// Warnings that belong to the start of the log.
+    warnings: Vec<String>,
+}
+
+/// The readings of the gimbal in time order.
+enum GimbalReadings {
+    Messages(OrderedSamples<AttitudeValue>),
+    Transforms { samples: OrderedSamples<Vec<MovedTransform>>, merge: TransformMerge, ended: bool },
+}
+
+/// A reading of one of the transforms of a path.
+type MovedTransform = (usize, i64, UnitQuaternion<f64>);
+
+/// Consecutive samples with one problem.
+#[derive(Debug, Default)]
+struct Stretch {
+    /// First and last stamp, the largest value.
+    open: Option<(i64, i64, f64)>,
+}
+
+impl AttitudeJoints {
+    pub(super) fn new(
+        log: &Arc<FlightLog>,
+        gimbal: &GimbalRig,
+        source: &AttitudeSource,
+        topic: &str,
+        from_ns: i64,
+    ) -> Result<Self, LogError> {
+        for earlier_ns in EARLIER_NS {
+            let start_ns = from_ns.saturating_sub(earlier_ns);
+            let joints = Self::from(log, gimbal, source, topic, start_ns)?;
+            let decided = start_ns <= 0 || {
+                let mut first = Self::from(log, gimbal, source, topic, start_ns)?;
+                let mut context = ReadContext::new(Arc::clone(log));
+                first.next_solution(&mut context).is_none_or(|(_, solution)| solution.decided)
+            };
+            if decided {
+                return Ok(joints);
+            }
+        }
+        Self::from(log, gimbal, source, topic, i64::MIN / 4)
+    }
+
+    fn from(
+        log: &FlightLog,
+        gimbal: &GimbalRig,
+        source: &AttitudeSource,
+        topic: &str,
+        from_ns: i64,
+    ) -> Result<Self, LogError> {
+        let info = log.require_topic(attitude::topic_field(gimbal), topic, attitude::gimbal_kinds(gimbal))?;
+        let kind = info.kind.unwrap_or(MessageKind::QuaternionStamped);
+        let mut warnings = Vec::new();
+        let readings = if let AttitudeMessage::Transforms { parent, child } = &source.message {
+            let path = TransformPath::find(log, topic, parent, child)?;
+            let decoder = transform_decoder(path.clone(), log.epoch_ns());
+            let samples = OrderedSamples::new(log, topic, from_ns, false, decoder).with_equal_stamps();
+            GimbalReadings::Transforms { samples, merge: TransformMerge::new(path), ended: false }
+        } else {
+            let clock = StampClock::of(log, topic, kind)?;
+            warnings.extend(clock.warning(topic));
+            GimbalReadings::Messages(OrderedSamples::new(log, topic, from_ns, false, value_decoder(kind, clock)))
+        };
+        let vehicle = match attitude::vehicle_topic(log, source)? {
+            None => None,
+            Some((vehicle, kind)) => {
+                let clock = StampClock::of(log, vehicle, kind)?;
+                warnings.extend(clock.warning(vehicle));
+                let decoder = vehicle_decoder(source.clone(), kind, clock);
+                // The gimbal's stamps may be shifted back against these.
+                let shift_ns = ns_from_seconds(gimbal.timeshift_gimbal_imu_s).min(0);
+                let from_ns = from_ns.saturating_add(shift_ns).saturating_sub(MAX_VEHICLE_GAP_NS);
+                Some(Lookup::new(OrderedSamples::new(log, vehicle, from_ns, false, decoder)))
+            }
+        };
+        let limits: Vec<(f64, f64)> = gimbal.joints.iter().map(|joint| joint.limits_rad).collect();
+        let inverse = InverseChain::new(&gimbal.chain, &limits).ok_or_else(|| LogError::Rig {
+            field: "gimbal.links".to_owned(),
+            problem: format!("{} links, expected one to three with gimbal.source", limits.len()),
+            path: log.path().to_owned(),
+        })?;
+        Ok(Self {
+            gimbal: readings,
+            vehicle,
+            source: source.clone(),
+            inverse,
+            timeshift_ns: ns_from_seconds(gimbal.timeshift_gimbal_imu_s),
+            previous_rad: None,
+            unreachable: Stretch::default(),
+            without_vehicle: Stretch::default(),
+            topic: topic.to_owned(),
+            warnings,
+        })
+    }
+
+    /// The next sample, `None` at the end of the log.
+    pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<JointSample> {
+        for warning in self.warnings.drain(..) {
+            context.warn(0, warning);
+        }
+        let Some((stamp_ns, solution)) = self.next_solution(context) else {
+            self.report_unreachable(context, i64::MAX);
+            self.report_without_vehicle(context, i64::MAX);
+            return None;
+        };
+        self.report_unreachable(context, stamp_ns);
+        self.report_without_vehicle(context, stamp_ns);
+        if solution.unreachable_rad > UNREACHABLE_RAD {
+            self.unreachable.add(stamp_ns, solution.unreachable_rad);
+        }
+        Some(JointSample { stamp_ns, angles_rad: solution.joint_angles_rad })
+    }
+
+    fn next_solution(&mut self, context: &mut ReadContext) -> Option<(i64, InverseSolution)> {
+        loop {
+            let (recorded_ns, value) = self.gimbal.next(context)?;
+            let stamp_ns = recorded_ns.saturating_add(self.timeshift_ns);
+            let attitude = self.vehicle.as_mut().and_then(|vehicle| {
+                let [before, after] = vehicle.around(context, stamp_ns);
+                rotation_between(before, after, stamp_ns, MAX_VEHICLE_GAP_NS)
+            });
+            let Some(imu_from_camera) = self.source.imu_from_camera(&value, attitude.as_ref()) else {
+                self.without_vehicle.add(stamp_ns, 0.0);
+                continue;
+            };
+            let solution = self.inverse.solve(&imu_from_camera, self.previous_rad.as_deref());
+            self.previous_rad = Some(solution.joint_angles_rad.clone());
+            return Some((stamp_ns, solution));
+        }
+    }
+
+    fn report_unreachable(&mut self, context: &mut ReadContext, now_ns: i64) {
+        let Some((first_ns, last_ns, largest_rad)) = self.unreachable.ended_before(now_ns) else { return };
+        let message = format!(
+            "{}: up to {:.1}° of the attitude from {:.3} s to {:.3} s are a rotation that the joints cannot make within their limits; \
+             joint angles are the nearest (check gimbal.source, links and limits)",
+            self.topic,
+            largest_rad.to_degrees(),
+            seconds_from_ns(first_ns),
+            seconds_from_ns(last_ns)
+        );
+        context.warn(first_ns, message);
+    }
+
+    fn report_without_vehicle(&mut self, context: &mut ReadContext, now_ns: i64) {
+        let Some((first_ns, last_ns, _)) = self.without_vehicle.ended_before(now_ns) else { return };
+        // The topics of a log seldom begin and end together.
+        if last_ns.saturating_sub(first_ns.max(0)) < MAX_VEHICLE_GAP_NS {
+            return;
+        }
+        let message = format!(
+            "{}: attitudes from {:.3} s to {:.3} s are not used: {} has none within {:.1} s, or no heading",
+            self.topic,
+            seconds_from_ns(first_ns),
+            seconds_from_ns(last_ns),
+            self.source.vehicle_topic.as_deref().unwrap_or("the vehicle"),
+            seconds_from_ns(MAX_VEHICLE_GAP_NS)
+        );
+        context.warn(first_ns, message);
+    }
+}
+
+impl Stretch {
+    fn add(&mut self, stamp_ns: i64, value: f64) {
+        let (first_ns, _, largest) = self.open.unwrap_or((stamp_ns, stamp_ns, value));
+        self.open = Some((first_ns, stamp_ns, largest.max(value)));
+    }
+
+    /// The stretch, when it ended long enough before a stamp.
+    fn ended_before(&mut self, now_ns: i64) -> Option<(i64, i64, f64)> {
+        self.open.take_if(|(_, last_ns, _)| now_ns.saturating_sub(*last_ns) > STRETCH_NS)
+    }
+}
+
+impl GimbalReadings {
+    fn next(&mut self, context: &mut ReadContext) -> Option<(i64, AttitudeValue)> {
+        let (samples, merge, ended) = match self {
+            Self::Messages(samples) => return samples.next(context),
+            Self::Transforms { samples, merge, ended } => (samples, merge, ended),
+        };
+        loop {
+            if let Some((stamp_ns, rotation)) = merge.pop() {
+                return Some((stamp_ns, AttitudeValue::Rotation(rotation)));
+            }
+            if *ended {
+                return None;
+            }
+            if let Some((_, moved)) = samples.next(context) {
+                for (transform, stamp_ns, rotation) in moved {
+                    merge.push(transform, stamp_ns, rotation);
+                }
+            } else {
+                *ended = true;
+                merge.finish();
+            }
+        }
+    }
+}
+
+fn value_decoder(kind: MessageKind, clock: StampClock) -> Decoder<AttitudeValue> {
+    Box::new(move |source: MessageSource<'_>| {
+        let message =
+            messages::read_gimbal_attitude(kind, source.data).map_err(|error| Refusal::not_decodable(&error))?;
+        let refusal = || Refusal { reason: "not an attitude", detail: "not finite, or a zero quaternion".into() };
+        let value = message.content.ok_or_else(refusal)?;
+        Ok((clock.stamp_ns(message.stamp_ns, source.position.log_time_ns), value))
+    })
+}
+
+fn vehicle_decoder(rig: AttitudeSource, kind: MessageKind, clock: StampClock) -> Decoder<UnitQuaternion<f64>> {
+    Box::new(move |source: MessageSource<'_>| {
+        let (stamp_ns, rotation) = attitude::read_vehicle(&rig, kind, source.data)
+            .map_err(|detail| Refusal { reason: "it is no attitude of the vehicle", detail })?;
+        Ok((clock.stamp_ns(stamp_ns, source.position.log_time_ns), rotation))
+    })
+}
+
+/// The transforms of the path in a message; messages without one are passed over.
+fn transform_decoder(path: TransformPath, epoch_ns: i64) -> Decoder<Vec<MovedTransform>> {
+    Box::new(move |source: MessageSource<'_>| {
+        let entries = messages::read_transforms(source.data).map_err(|error| Refusal::not_decodable(&error))?;
+        let mut moved = Vec::new();
+        let mut first_ns = None;
+        for entry in entries {
+            let Some(transform) = path.moving(entry.child) else { continue };
+            let rotation = entry.rotation.ok_or_else(|| Refusal {
+                reason: "not a rotation",
+                detail: "not finite, or a zero quaternion".into(),
+            })?;
+            first_ns.get_or_insert(entry.stamp_ns);
+            moved.push((transform, relative_ns(entry.stamp_ns, epoch_ns), rotation));
+        }
+        let first_ns = first_ns.ok_or_else(Refusal::unneeded)?;
+        Ok((first_ns, moved))
+    })
+}

@@ -1,0 +1,234 @@
+//! The gimbal's attitude over a whole log, for a rig that names one in place of joint angles.
+
+use nalgebra::UnitQuaternion;
+
+use super::statistics::median;
+use super::survey::Survey;
+use super::{Area, Findings, Severity};
+use crate::flight_log::attitude::{
+    MAX_VEHICLE_GAP_NS, StampClock, TransformMerge, TransformPath, gimbal_kinds, rotation_between, topic_field,
+    vehicle_topic,
+};
+use crate::flight_log::joint_merge::JointReading;
+use crate::flight_log::log::relative_ns;
+use crate::flight_log::messages::{self, MessageKind};
+use crate::flight_log::{FlightLog, LogError};
+use crate::geometry::{ns_from_seconds, seconds_from_ns};
+use crate::gimbal::InverseChain;
+use crate::sensors::{AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig};
+
+/// The gimbal's attitude and the vehicle's, as they are recorded.
+#[derive(Debug)]
+pub(super) struct AttitudeSurvey {
+    topic: String,
+    clock: StampClock,
+    /// Of transforms.
+    merge: Option<(TransformPath, TransformMerge)>,
+    /// Readings of the transforms of a path, in the order of log times.
+    moved: Vec<(usize, i64, UnitQuaternion<f64>)>,
+    vehicle_topic: Option<(String, MessageKind, StampClock)>,
+    /// In the order of their stamps, which are those of the messages.
+    pub(super) values: Vec<(i64, AttitudeValue)>,
+    /// `earth_from_vehicle` as recorded, in the order of the stamps.
+    pub(super) vehicle: Vec<(i64, UnitQuaternion<f64>)>,
+    /// Warnings about clocks.
+    pub(super) warnings: Vec<String>,
+}
+
+/// The joint angles of one attitude.
+#[derive(Clone, Debug)]
+pub(super) struct SolvedAttitude {
+    pub(super) reading: JointReading,
+    /// The rotation that the joints cannot make, in radians.
+    pub(super) unreachable_rad: f64,
+    /// Whether the orientation alone determines the joint angles.
+    pub(super) decided: bool,
+}
+
+impl AttitudeSurvey {
+    /// What has to be known before the log is read; `None` for a rig with joint angles.
+    pub(super) fn new(log: &FlightLog, gimbal: &GimbalRig) -> Result<Option<Self>, LogError> {
+        let (Some(source), Some(topic)) = (&gimbal.attitude, &gimbal.topic) else { return Ok(None) };
+        let info = log.require_topic(topic_field(gimbal), topic, gimbal_kinds(gimbal))?;
+        let clock = StampClock::of(log, topic, info.kind.unwrap_or(MessageKind::QuaternionStamped))?;
+        let mut warnings: Vec<String> = clock.warning(topic).into_iter().collect();
+        let merge = match &source.message {
+            AttitudeMessage::Transforms { parent, child } => {
+                let path = TransformPath::find(log, topic, parent, child)?;
+                Some((path.clone(), TransformMerge::new(path)))
+            }
+            _ => None,
+        };
+        let vehicle = match vehicle_topic(log, source)? {
+            None => None,
+            Some((topic, kind)) => {
+                let clock = StampClock::of(log, topic, kind)?;
+                warnings.extend(clock.warning(topic));
+                Some((topic.to_owned(), kind, clock))
+            }
+        };
+        Ok(Some(Self {
+            topic: topic.clone(),
+            clock,
+            merge,
+            moved: Vec::new(),
+            vehicle_topic: vehicle,
+            values: Vec::new(),
+            vehicle: Vec::new(),
+            warnings,
+        }))
+    }
+
+    /// Whether a topic's log times count for its stamps.
+    pub(super) fn counts_log_times(&self, topic: &str) -> bool {
+        let of_vehicle = self.vehicle_topic.as_ref().filter(|(vehicle, ..)| vehicle == topic).map(|(.., clock)| *clock);
+        let clock = if topic == self.topic { Some(self.clock) } else { of_vehicle };
+        matches!(clock, Some(StampClock::LogTimes { .. }))
+    }
+
+    /// Takes a message of any topic; `stamp_ns` and the stamps within it count since the log's start. Returns what is wrong with it.
+    pub(super) fn take(
+        &mut self,
+        topic: &str,
+        kind: MessageKind,
+        stamp_ns: i64,
+        epoch_ns: i64,
+        data: &[u8],
+    ) -> Result<(), String> {
+        const NO_ATTITUDE: &str = "the attitude is not finite, a zero quaternion, or said to be unknown";
+        if topic == self.topic {
+            if let Some((path, _)) = &self.merge {
+                for entry in messages::read_transforms(data).map_err(|error| error.to_string())? {
+                    let Some(transform) = path.moving(entry.child) else { continue };
+                    let rotation = entry.rotation.ok_or(NO_ATTITUDE)?;
+                    self.moved.push((transform, relative_ns(entry.stamp_ns, epoch_ns), rotation));
+                }
+            } else {
+                let message = messages::read_gimbal_attitude(kind, data).map_err(|error| error.to_string())?;
+                self.values.push((stamp_ns, message.content.ok_or(NO_ATTITUDE)?));
+            }
+        }
+        if self.vehicle_topic.as_ref().is_some_and(|(vehicle, ..)| vehicle == topic) {
+            let message = messages::read_vehicle_attitude(kind, data).map_err(|error| error.to_string())?;
+            self.vehicle.push((stamp_ns, message.content.ok_or(NO_ATTITUDE)?));
+        }
+        Ok(())
+    }
+
+    /// Orders what was read.
+    pub(super) fn finish(&mut self) {
+        if let Some((_, merge)) = &mut self.merge {
+            self.moved.sort_by_key(|(_, stamp_ns, _)| *stamp_ns);
+            for (transform, stamp_ns, rotation) in self.moved.drain(..) {
+                merge.push(transform, stamp_ns, rotation);
+                self.values.extend(
+                    std::iter::from_fn(|| merge.pop()).map(|(stamp_ns, it)| (stamp_ns, AttitudeValue::Rotation(it))),
+                );
+            }
+            merge.finish();
+            self.values.extend(
+                std::iter::from_fn(|| merge.pop()).map(|(at, rotation)| (at, AttitudeValue::Rotation(rotation))),
+            );
+        }
+        self.values.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+        self.values.dedup_by_key(|(stamp_ns, _)| *stamp_ns);
+        self.vehicle.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+        self.vehicle.dedup_by_key(|(stamp_ns, _)| *stamp_ns);
+    }
+
+    /// The vehicle's attitude in FLU and ENU at a stamp.
+    fn enu_from_flu(&self, source: &AttitudeSource, stamp_ns: i64) -> Option<UnitQuaternion<f64>> {
+        let (_, kind, _) = self.vehicle_topic.as_ref()?;
+        let after = self.vehicle.partition_point(|(at, _)| *at <= stamp_ns);
+        let before = after.checked_sub(1).and_then(|before| self.vehicle.get(before));
+        let rotation = rotation_between(before, self.vehicle.get(after), stamp_ns, MAX_VEHICLE_GAP_NS)?;
+        Some(source.enu_from_flu(&rotation, *kind == MessageKind::Px4VehicleAttitude))
+    }
+
+    /// Orientations `imu_from_camera` by a source, which may differ from the rig's, with stamps shifted by `timeshift_ns`.
+    pub(super) fn orientations(&self, source: &AttitudeSource, timeshift_ns: i64) -> Vec<(i64, UnitQuaternion<f64>)> {
+        let orientation = |(at, value): &(i64, AttitudeValue)| {
+            let stamp_ns = at.saturating_add(timeshift_ns);
+            let attitude = self.enu_from_flu(source, stamp_ns);
+            Some((stamp_ns, source.imu_from_camera(value, attitude.as_ref())?))
+        };
+        self.values.iter().filter_map(orientation).collect()
+    }
+
+    /// The joint angles of all attitudes by the rig.
+    pub(super) fn solve(&self, gimbal: &GimbalRig) -> Vec<SolvedAttitude> {
+        let Some(source) = &gimbal.attitude else { return Vec::new() };
+        let limits: Vec<(f64, f64)> = gimbal.joints.iter().map(|joint| joint.limits_rad).collect();
+        let Some(inverse) = InverseChain::new(&gimbal.chain, &limits) else { return Vec::new() };
+        let mut previous: Option<Vec<f64>> = None;
+        let orientations = self.orientations(source, ns_from_seconds(gimbal.timeshift_gimbal_imu_s));
+        let solved = orientations.into_iter().map(|(stamp_ns, imu_from_camera)| {
+            let solution = inverse.solve(&imu_from_camera, previous.as_deref());
+            previous = Some(solution.joint_angles_rad.clone());
+            let angles_rad = solution.joint_angles_rad.into_iter().map(Some).collect();
+            SolvedAttitude {
+                reading: JointReading { stamp_ns, angles_rad },
+                unreachable_rad: solution.unreachable_rad,
+                decided: solution.decided,
+            }
+        });
+        solved.collect()
+    }
+}
+
+/// Rotations that the joints cannot make are tolerated up to this size: the chain may be wrong by degrees before it is
+/// calibrated.
+const UNREACHABLE_RAD: f64 = 0.035;
+
+/// Whether the attitude could be read, whether the joints can make it, and whether it determines their angles.
+pub(super) fn check_attitude(survey: &Survey, findings: &mut Findings) {
+    if let Some(problem) = &survey.attitude_problem {
+        let title = "the gimbal's attitude cannot be read";
+        let remedy = "correct gimbal.source; its topics and types are in the table of topics";
+        findings.add(Severity::Error, Area::Encoders, title, problem.clone(), remedy);
+    }
+    let Some(attitude) = &survey.attitude else { return };
+    for warning in &attitude.warnings {
+        let title = "the stamps of an attitude are of an unknown clock";
+        findings.add(Severity::Warning, Area::Time, title, warning.clone(), "record with synchronized clocks");
+    }
+    let all = attitude.values.len();
+    let solved = &survey.solved;
+    if solved.len() < all {
+        let evidence = format!("{} of {all} attitudes have no attitude of the vehicle near them", all - solved.len());
+        let remedy = format!(
+            "record the vehicle's attitude at 10 Hz or more; gaps above {:.1} s are not interpolated",
+            seconds_from_ns(MAX_VEHICLE_GAP_NS)
+        );
+        findings.add(Severity::Warning, Area::Encoders, "attitudes of the gimbal are not used", evidence, remedy);
+    }
+    if solved.is_empty() {
+        return;
+    }
+    let unreachable: Vec<f64> = solved.iter().map(|solved| solved.unreachable_rad).collect();
+    let worst = solved.iter().max_by(|a, b| a.unreachable_rad.total_cmp(&b.unreachable_rad));
+    let (worst_rad, worst_ns) = worst.map_or((0.0, 0), |worst| (worst.unreachable_rad, worst.reading.stamp_ns));
+    let evidence = format!(
+        "the nearest attitude of the joints within their limits differs by {:.2}° in the median, by at most {:.1}° at {:.1} s",
+        median(&unreachable).to_degrees(),
+        worst_rad.to_degrees(),
+        seconds_from_ns(worst_ns)
+    );
+    let beyond = unreachable.iter().filter(|angle| **angle > UNREACHABLE_RAD).count();
+    if beyond * 100 > solved.len() {
+        let severity = if beyond * 2 > solved.len() { Severity::Error } else { Severity::Warning };
+        let title = "the joints cannot make the recorded attitude";
+        let remedy = "check frame, axes, order and unit of gimbal.source, then links and limits";
+        findings.add(severity, Area::Encoders, title, evidence, remedy);
+    } else {
+        findings.good(Area::Encoders, "the joints can make the recorded attitude", evidence);
+    }
+    let undecided = solved.iter().filter(|solved| !solved.decided).count();
+    if undecided * 2 > solved.len() {
+        let title = "the limits of the joints admit two solutions";
+        let evidence =
+            format!("for {undecided} of {} attitudes; the one nearest to the previous is taken", solved.len());
+        let remedy = "narrow the limits of gimbal.links to the mechanism's: a jump into the log then need not read it from its start";
+        findings.add(Severity::Note, Area::Encoders, title, evidence, remedy);
+    }
+}

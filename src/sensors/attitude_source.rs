@@ -1,0 +1,434 @@
+//! How a rig says that the gimbal's attitude is recorded where no joint angles are.
+
+use std::fmt;
+use std::str::FromStr;
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+/// Where the attitude of a gimbal is recorded and what it means (`gimbal.source` of a rig); its topic is the gimbal's.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AttitudeSource {
+    /// Message type and how its values make a rotation.
+    pub message: AttitudeMessage,
+    /// The frame that the attitude is relative to.
+    pub frame: AttitudeFrame,
+    /// Axes of that frame and of the gimbal, x forward in both; of the earth, NED goes with FRD and ENU with FLU.
+    pub axes: BodyAxes,
+    /// Axes of the gimbal where they are others than [`AttitudeSource::axes`].
+    pub gimbal_axes: Option<NamedAxes>,
+    /// Axes of the rig's IMU relative to the vehicle.
+    pub imu_axes: NamedAxes,
+    /// Topic of the vehicle's attitude; frames other than the body need it.
+    pub vehicle_topic: Option<String>,
+    /// Axes of the vehicle's attitude where they are others than [`AttitudeSource::axes`].
+    pub vehicle_axes: Option<BodyAxes>,
+}
+
+/// A message type for the gimbal's attitude.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum AttitudeMessage {
+    /// `geometry_msgs/msg/QuaternionStamped`.
+    Quaternion,
+    /// The orientation of a `PoseStamped`, an `Odometry` or a `TransformStamped`.
+    Pose,
+    /// `geometry_msgs/msg/Vector3Stamped` with Euler angles.
+    Euler(EulerAngles),
+    /// `tf2_msgs/msg/TFMessage`: the transforms between two frames.
+    Transforms {
+        /// The frame that the attitude is relative to.
+        parent: String,
+        /// The gimbal's frame.
+        child: String,
+    },
+    /// `mavros_msgs/msg/GimbalDeviceAttitudeStatus`.
+    Mavros,
+    /// `px4_msgs/msg/GimbalDeviceAttitudeStatus`.
+    Px4,
+}
+
+impl AttitudeMessage {
+    /// Its name as `type` of a rig's source.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Quaternion => "quaternion",
+            Self::Pose => "pose",
+            Self::Euler(_) => "euler",
+            Self::Transforms { .. } => "tf",
+            Self::Mavros => "mavros",
+            Self::Px4 => "px4",
+        }
+    }
+}
+
+/// A recorded attitude of a gimbal, before the rig says what it means.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AttitudeValue {
+    /// A rotation from the gimbal to the frame of the source, in the axes of the source.
+    Rotation(UnitQuaternion<f64>),
+    /// Euler angles.
+    Vector(Vector3<f64>),
+    /// A rotation with the flags of a `MAVLink` message.
+    Flagged(UnitQuaternion<f64>, u16),
+}
+
+impl AttitudeSource {
+    /// The frame of a recorded attitude.
+    pub fn frame_of(&self, value: &AttitudeValue) -> AttitudeFrame {
+        match (self.frame, value) {
+            (AttitudeFrame::Flags, AttitudeValue::Flagged(_, flags)) => AttitudeFrame::of_flags(*flags),
+            (frame, _) => frame,
+        }
+    }
+
+    /// The rotation `imu_from_camera` (camera: x right, y down, z forward) that a recorded attitude stands for.
+    ///
+    /// `enu_from_flu` is the vehicle's attitude by [`AttitudeSource::enu_from_flu`], which frames other than the body need.
+    /// Returns `None` without it, and for the vehicle frame where the vehicle points up or down and has no heading.
+    pub fn imu_from_camera(
+        &self,
+        value: &AttitudeValue,
+        enu_from_flu: Option<&UnitQuaternion<f64>>,
+    ) -> Option<UnitQuaternion<f64>> {
+        let frame_from_gimbal = match (value, &self.message) {
+            (AttitudeValue::Rotation(rotation) | AttitudeValue::Flagged(rotation, _), _) => *rotation,
+            (AttitudeValue::Vector(vector), AttitudeMessage::Euler(angles)) => angles.rotation(vector),
+            (AttitudeValue::Vector(_), _) => return None,
+        };
+        let gimbal_axes = self.gimbal_axes.unwrap_or_else(|| self.axes.into());
+        let frame_from_gimbal = frame_from_gimbal * gimbal_axes.flu_from_axes().inverse();
+        let vehicle_from_gimbal = match self.frame_of(value) {
+            AttitudeFrame::Body | AttitudeFrame::Flags => self.axes.flu_from_axes() * frame_from_gimbal,
+            AttitudeFrame::Vehicle => {
+                let attitude = enu_from_flu?;
+                let forward = attitude * Vector3::x();
+                if forward.xy().norm() < MIN_HORIZONTAL {
+                    return None;
+                }
+                let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), forward.y.atan2(forward.x));
+                attitude.inverse() * heading * self.axes.flu_from_axes() * frame_from_gimbal
+            }
+            AttitudeFrame::Earth => enu_from_flu?.inverse() * self.axes.enu_from_earth() * frame_from_gimbal,
+        };
+        Some(self.imu_axes.flu_from_axes().inverse() * vehicle_from_gimbal * NamedAxes::RDF.flu_from_axes())
+    }
+
+    /// The vehicle's attitude in axes forward, left, up and east, north, up, from the recorded `earth_from_vehicle`; PX4's
+    /// messages are in FRD and NED.
+    pub fn enu_from_flu(&self, earth_from_vehicle: &UnitQuaternion<f64>, of_px4: bool) -> UnitQuaternion<f64> {
+        let axes = if of_px4 { BodyAxes::Frd } else { self.vehicle_axes.unwrap_or(self.axes) };
+        axes.enu_from_earth() * earth_from_vehicle * axes.flu_from_axes().inverse()
+    }
+}
+
+/// The vehicle frame needs a heading: the horizontal part of the forward direction, at least 1°.
+const MIN_HORIZONTAL: f64 = 0.0175;
+
+/// The frame that a gimbal's attitude is relative to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AttitudeFrame {
+    /// The vehicle's body.
+    Body,
+    /// `MAVLink`'s vehicle frame: levelled, x towards the vehicle's heading.
+    Vehicle,
+    /// North and east.
+    Earth,
+    /// Vehicle or earth by the `MAVLink` flags of each message.
+    Flags,
+}
+
+impl AttitudeFrame {
+    /// Every frame.
+    pub const ALL: [Self; 4] = [Self::Body, Self::Vehicle, Self::Earth, Self::Flags];
+
+    /// Its name in a rig.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Body => "body",
+            Self::Vehicle => "vehicle",
+            Self::Earth => "earth",
+            Self::Flags => "flags",
+        }
+    }
+
+    /// By the flags of a `GIMBAL_DEVICE_ATTITUDE_STATUS`: the one that names the frame of the yaw; without one, the yaw lock.
+    pub fn of_flags(flags: u16) -> Self {
+        const YAW_LOCK: u16 = 16;
+        const YAW_IN_VEHICLE_FRAME: u16 = 32;
+        const YAW_IN_EARTH_FRAME: u16 = 64;
+        let names_vehicle = flags & YAW_IN_VEHICLE_FRAME != 0;
+        if flags & YAW_IN_EARTH_FRAME != 0 || (!names_vehicle && flags & YAW_LOCK != 0) {
+            Self::Earth
+        } else {
+            Self::Vehicle
+        }
+    }
+}
+
+/// Axes of a body, x forward.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BodyAxes {
+    /// Forward, right, down; its earth is north, east, down.
+    Frd,
+    /// Forward, left, up; its earth is east, north, up.
+    Flu,
+}
+
+impl BodyAxes {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Frd, Self::Flu];
+
+    /// Its name in a rig.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Frd => "frd",
+            Self::Flu => "flu",
+        }
+    }
+
+    /// Rotates vectors from these axes to forward, left, up.
+    pub fn flu_from_axes(self) -> UnitQuaternion<f64> {
+        NamedAxes::from(self).flu_from_axes()
+    }
+
+    /// Rotates vectors from the earth that belongs to these axes to east, north, up.
+    pub fn enu_from_earth(self) -> UnitQuaternion<f64> {
+        match self {
+            Self::Frd => rotation_of(&Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0)),
+            Self::Flu => UnitQuaternion::identity(),
+        }
+    }
+}
+
+/// Right-handed axes by the directions of x, y and z: `flu`, `frd`, `rdf` (a camera's).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NamedAxes([Direction; 3]);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Direction {
+    Forward,
+    Back,
+    Left,
+    Right,
+    Up,
+    Down,
+}
+
+impl Direction {
+    const ALL: [Self; 6] = [Self::Forward, Self::Back, Self::Left, Self::Right, Self::Up, Self::Down];
+
+    fn letter(self) -> char {
+        match self {
+            Self::Forward => 'f',
+            Self::Back => 'b',
+            Self::Left => 'l',
+            Self::Right => 'r',
+            Self::Up => 'u',
+            Self::Down => 'd',
+        }
+    }
+
+    fn in_flu(self) -> Vector3<f64> {
+        match self {
+            Self::Forward => Vector3::x(),
+            Self::Back => -Vector3::x(),
+            Self::Left => Vector3::y(),
+            Self::Right => -Vector3::y(),
+            Self::Up => Vector3::z(),
+            Self::Down => -Vector3::z(),
+        }
+    }
+}
+
+impl NamedAxes {
+    /// Forward, left, up: a body's in ROS.
+    pub const FLU: Self = Self([Direction::Forward, Direction::Left, Direction::Up]);
+    /// Forward, right, down: a body's in `MAVLink`.
+    pub const FRD: Self = Self([Direction::Forward, Direction::Right, Direction::Down]);
+    /// Right, down, forward: a camera's.
+    pub const RDF: Self = Self([Direction::Right, Direction::Down, Direction::Forward]);
+
+    fn matrix(self) -> Matrix3<f64> {
+        Matrix3::from_columns(&self.0.map(Direction::in_flu))
+    }
+
+    /// Rotates vectors from these axes to forward, left, up.
+    pub fn flu_from_axes(self) -> UnitQuaternion<f64> {
+        rotation_of(&self.matrix())
+    }
+}
+
+impl From<BodyAxes> for NamedAxes {
+    fn from(axes: BodyAxes) -> Self {
+        match axes {
+            BodyAxes::Frd => Self::FRD,
+            BodyAxes::Flu => Self::FLU,
+        }
+    }
+}
+
+impl fmt::Display for NamedAxes {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let letters: String = self.0.map(Direction::letter).iter().collect();
+        formatter.write_str(&letters)
+    }
+}
+
+impl FromStr for NamedAxes {
+    type Err = ();
+
+    fn from_str(text: &str) -> Result<Self, ()> {
+        let direction = |letter: char| Direction::ALL.into_iter().find(|direction| direction.letter() == letter);
+        let directions: Vec<Direction> = text.chars().map(direction).collect::<Option<_>>().ok_or(())?;
+        let axes = Self(<[Direction; 3]>::try_from(directions).map_err(|_count| ())?);
+        if axes.matrix().determinant() > 0.5 { Ok(axes) } else { Err(()) }
+    }
+}
+
+fn rotation_of(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*matrix))
+}
+
+/// Unit of recorded angles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AngleUnit {
+    /// Radians.
+    Radians,
+    /// Degrees.
+    Degrees,
+}
+
+impl AngleUnit {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Radians, Self::Degrees];
+
+    /// Its name in a rig.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Radians => "rad",
+            Self::Degrees => "deg",
+        }
+    }
+
+    fn radians(self, angle: f64) -> f64 {
+        match self {
+            Self::Radians => angle,
+            Self::Degrees => angle.to_radians(),
+        }
+    }
+}
+
+/// Euler angles in the fields of a vector: rotations about moved axes, from the frame to the gimbal.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EulerAngles {
+    /// At most one rotation about each axis, in their order.
+    pub order: Vec<EulerRotation>,
+    /// Unit of the fields.
+    pub unit: AngleUnit,
+}
+
+/// One of the rotations of Euler angles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EulerRotation {
+    /// The axis: 0 (x, roll), 1 (y, pitch) or 2 (z, yaw).
+    pub axis: usize,
+    /// The field of the vector that holds the angle: 0 (x), 1 (y) or 2 (z).
+    pub field: usize,
+    /// Whether the field holds the negative angle.
+    pub negative: bool,
+}
+
+impl EulerAngles {
+    /// Names of the rotations about x, y and z.
+    const ROTATIONS: [&'static str; 3] = ["roll", "pitch", "yaw"];
+    /// Names of the fields.
+    const FIELDS: [&'static str; 3] = ["x", "y", "z"];
+
+    /// The order of a rig, such as `yaw=z roll=y pitch=-x`; `None` for another text.
+    pub fn parse_order(text: &str) -> Option<Vec<EulerRotation>> {
+        let mut order: Vec<EulerRotation> = Vec::new();
+        for word in text.split_whitespace() {
+            let (rotation, field) = word.split_once('=')?;
+            let axis = Self::ROTATIONS.iter().position(|name| *name == rotation)?;
+            let (negative, field) = field.strip_prefix('-').map_or((false, field), |field| (true, field));
+            let field = Self::FIELDS.iter().position(|name| *name == field)?;
+            if order.iter().any(|other| other.axis == axis || other.field == field) {
+                return None;
+            }
+            order.push(EulerRotation { axis, field, negative });
+        }
+        (!order.is_empty()).then_some(order)
+    }
+
+    /// The order as a rig has it.
+    pub fn order_text(&self) -> String {
+        let word = |rotation: &EulerRotation| {
+            let sign = if rotation.negative { "-" } else { "" };
+            format!("{}={sign}{}", Self::ROTATIONS[rotation.axis], Self::FIELDS[rotation.field])
+        };
+        self.order.iter().map(word).collect::<Vec<_>>().join(" ")
+    }
+
+    /// The rotation from the gimbal to the frame that a vector stands for.
+    pub fn rotation(&self, vector: &Vector3<f64>) -> UnitQuaternion<f64> {
+        let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
+        self.order.iter().fold(UnitQuaternion::identity(), |before, rotation| {
+            let angle_rad = self.unit.radians(vector[rotation.field]);
+            let signed = if rotation.negative { -angle_rad } else { angle_rad };
+            before * UnitQuaternion::from_axis_angle(&axes[rotation.axis], signed)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_are_named_by_their_directions() {
+        for (text, x_in_flu) in [("flu", Vector3::x()), ("rdf", -Vector3::y()), ("frd", Vector3::x())] {
+            let axes: NamedAxes = text.parse().unwrap();
+            assert_eq!(axes.to_string(), text);
+            assert!((axes.flu_from_axes() * Vector3::x() - x_in_flu).norm() < 1e-15);
+        }
+        assert!((NamedAxes::RDF.flu_from_axes() * Vector3::z() - Vector3::x()).norm() < 1e-15);
+        assert!((BodyAxes::Frd.enu_from_earth() * Vector3::x() - Vector3::y()).norm() < 1e-15, "north");
+        for text in ["fru", "ff", "fflu", "flx", "fbu", "FLU", ""] {
+            assert!(text.parse::<NamedAxes>().is_err(), "{text}");
+        }
+        let mut right_handed = 0;
+        for x in "fblrud".chars() {
+            for y in "fblrud".chars() {
+                right_handed += "fblrud".chars().filter(|z| format!("{x}{y}{z}").parse::<NamedAxes>().is_ok()).count();
+            }
+        }
+        assert_eq!(right_handed, 24);
+    }
+
+    #[test]
+    fn the_flags_of_mavlink_name_the_frame() {
+        for (flags, frame) in [
+            (0, AttitudeFrame::Vehicle),
+            (12, AttitudeFrame::Vehicle),
+            (16, AttitudeFrame::Earth),
+            (16 + 32, AttitudeFrame::Vehicle),
+            (64, AttitudeFrame::Earth),
+            (64 + 16, AttitudeFrame::Earth),
+        ] {
+            assert_eq!(AttitudeFrame::of_flags(flags), frame, "{flags}");
+        }
+    }
+
+    #[test]
+    fn euler_angles_follow_their_order() {
+        let order = EulerAngles::parse_order("yaw=z roll=y pitch=-x").unwrap();
+        let angles = EulerAngles { order, unit: AngleUnit::Degrees };
+        assert_eq!(angles.order_text(), "yaw=z roll=y pitch=-x");
+        let about = |axis, degrees: f64| UnitQuaternion::from_axis_angle(&axis, degrees.to_radians());
+        let expected =
+            about(Vector3::z_axis(), 30.0) * about(Vector3::x_axis(), 20.0) * about(Vector3::y_axis(), -10.0);
+        assert!(angles.rotation(&Vector3::new(10.0, 20.0, 30.0)).angle_to(&expected) < 1e-12);
+        for text in ["", "yaw", "yaw=w", "turn=x", "yaw=x yaw=y", "yaw=x pitch=x", "yaw=+x", "yaw = x"] {
+            assert_eq!(EulerAngles::parse_order(text), None, "{text}");
+        }
+    }
+}
