@@ -4,7 +4,8 @@ use parking_lot::Mutex;
 
 use super::container::{BlockCache, TopicIndex};
 use super::image_decoding::{BitDepth, decode_image};
-use super::messages::{MessageKind, read_video_packet};
+use super::log::relative_ns;
+use super::messages::{MessageKind, read_video_packet, stamp_ns};
 use super::video::{PictureStream, keyframe_before};
 use super::{FlightLog, LogError};
 use crate::geometry::seconds_from_ns;
@@ -95,6 +96,24 @@ impl ImageReader {
             return true;
         }
         self.cache.lock().decode_pictures(&self.log, number, camera.kind, index, go_on)
+    }
+
+    /// Numbers and header stamps of a camera's images in the order of the stamps, in nanoseconds since the log began; an image
+    /// whose stamp cannot be read is left out.
+    pub fn stamps_ns(&self, camera_key: &str) -> Vec<(usize, i64)> {
+        let Ok(number) = self.number_of(camera_key) else { return Vec::new() };
+        let camera = &self.cameras[number];
+        let mut cache = self.cache.lock();
+        let ImageCache { topics, blocks, .. } = &mut *cache;
+        let stamp_ns = |index: usize| {
+            let position = topics[number].get(self.log.index(), self.log.file(), index)?;
+            let (block, message) = self.log.message(blocks, position)?;
+            let stamp_ns = stamp_ns(camera.kind, block.bytes(&message.data)).ok()?;
+            Some((index, relative_ns(stamp_ns, self.log.epoch_ns())))
+        };
+        let mut stamps: Vec<(usize, i64)> = (0..camera.count).filter_map(stamp_ns).collect();
+        stamps.sort_by_key(|(_, stamp_ns)| *stamp_ns);
+        stamps
     }
 
     fn number_of(&self, camera_key: &str) -> Result<usize, UnknownCamera> {

@@ -25,7 +25,7 @@ mod tests;
 
 pub use engine::{
     BreakpointHit, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation, SnapshotUse, Stopwatch,
-    calibrate, compute, compute_until, image_rotations,
+    calibrate, camera_rotations, compute, compute_until, image_rotations,
 };
 pub use plan::{
     DEFAULT_MEMORY_BUDGET_BYTES, FORK_PARAMETERIZATIONS, ForkChanges, ForkError, MAX_RUNS, ParameterizationChoice,

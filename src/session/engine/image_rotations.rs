@@ -7,11 +7,11 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use crate::estimator::initialization::relative_pose::{RotationPrior, relative_poses};
-use crate::flight_log::{FlightLog, FrameStream};
+use crate::flight_log::{FlightLog, FrameStream, ImageReader, LogError, MessageKind};
 use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions, TrackedFrame};
 use crate::geometry::seconds_from_ns;
 use crate::log_check::ImageRotation;
-use crate::sensors::{CameraRig, Rig};
+use crate::sensors::{CameraRig, GrayImage, Rig};
 
 /// Number of sections of the log, evenly spaced.
 const SECTIONS: usize = 3;
@@ -55,19 +55,56 @@ fn rotations_of(
     let Ok(mut stream) = FrameStream::new(Arc::clone(log), rig, &camera.key, start_s, Some(length_s)) else {
         return Vec::new();
     };
+    between(camera, std::iter::from_fn(|| stream.next_frame().map(|frame| (frame.stamp_ns, frame.image))))
+}
+
+/// Rotations between consecutive images of one camera in evenly spaced sections of its images. Only the camera's model is
+/// needed of the rig: the stamps may be those of a clock that is not the IMU's.
+///
+/// # Errors
+/// When the log has no such camera.
+pub fn camera_rotations(
+    log: &Arc<FlightLog>,
+    rig: &Rig,
+    camera_key: &str,
+    sections: usize,
+    section_s: f64,
+) -> Result<Vec<ImageRotation>, LogError> {
+    let camera = rig.camera(camera_key)?;
+    log.require_topic(&format!("{camera_key}.rostopic"), &camera.topic, &MessageKind::IMAGES)?;
+    let stamps = ImageReader::new(Arc::clone(log), rig).stamps_ns(camera_key);
+    let duration_s = match (stamps.first(), stamps.last()) {
+        (Some((_, first)), Some((_, last))) if last > first => seconds_from_ns(last - first),
+        _ => return Ok(Vec::new()),
+    };
+    let length = ((section_s / duration_s * stamps.len() as f64).ceil() as usize).clamp(1, stamps.len());
+    let sections = sections.min(stamps.len() / length).max(1);
+    let of_section = |number: usize| {
+        let middle = stamps.len() * (2 * number + 1) / (2 * sections);
+        let first = middle.saturating_sub(length / 2).min(stamps.len() - length);
+        let reader = ImageReader::new(Arc::clone(log), rig);
+        let image = |(index, stamp_ns): &(usize, i64)| Some((*stamp_ns, reader.image(camera_key, *index).ok()?));
+        between(camera, stamps[first..first + length].iter().filter_map(image))
+    };
+    let found: Vec<Vec<ImageRotation>> = (0..sections).into_par_iter().map(of_section).collect();
+    Ok(found.into_iter().flatten().collect())
+}
+
+/// Rotations between consecutive images with their stamps.
+fn between(camera: &CameraRig, images: impl Iterator<Item = (i64, Arc<GrayImage>)>) -> Vec<ImageRotation> {
     let mut front_end = FrontEnd::new(camera.model.clone(), FrontEndOptions::default());
     let focal_px = 0.5 * (camera.model.intrinsics_px[0] + camera.model.intrinsics_px[1]);
     let mut previous: Option<(TrackedFrame, i64)> = None;
     let mut rotations = Vec::new();
-    while let Some(frame) = stream.next_frame() {
-        let Ok(tracks) = front_end.process(&frame.image, frame.stamp_ns, None) else { continue };
+    for (stamp_ns, image) in images {
+        let Ok(tracks) = front_end.process(&image, stamp_ns, None) else { continue };
         if let Some((before, from_ns)) = &previous
             && let Some(second_from_first) = rotation_between(before, &tracks, PIXEL_SIGMA_PX / focal_px)
         {
-            let (camera_key, to_ns) = (camera.key.clone(), frame.stamp_ns);
+            let (camera_key, to_ns) = (camera.key.clone(), stamp_ns);
             rotations.push(ImageRotation { camera_key, from_ns: *from_ns, to_ns, second_from_first });
         }
-        previous = Some((tracks, frame.stamp_ns));
+        previous = Some((tracks, stamp_ns));
     }
     rotations
 }

@@ -30,7 +30,7 @@ pub(in crate::session) use configuration::estimator_config;
 pub(in crate::session) use fork::apply_fork;
 pub(in crate::session) use history::History;
 pub use history::SnapshotUse;
-pub use image_rotations::image_rotations;
+pub use image_rotations::{camera_rotations, image_rotations};
 pub(in crate::session) use message::EngineMessage;
 pub(in crate::session) use recompute::{Detail, RecomputeRequest, RecomputeThread, Recomputed, STEPS_AT_ONCE};
 #[cfg(test)]
