@@ -17,7 +17,9 @@ mod survey;
 mod tests;
 mod timing;
 
-pub use self::clock_alignment::{AlignmentError, ClockAlignment, OrientationSeries, align_clocks};
+pub use self::clock_alignment::{
+    AlignmentError, AlignmentReference, ClockAlignment, OrientationSeries, align_camera, align_clocks,
+};
 
 use nalgebra::UnitQuaternion;
 use serde::Serialize;

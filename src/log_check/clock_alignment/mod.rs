@@ -6,6 +6,7 @@
 //! the reference to the camera, and a scale, because a wrong focal length scales the rotations that images show.
 
 mod coarse;
+mod references;
 mod refinement;
 #[cfg(test)]
 mod tests;
@@ -13,6 +14,7 @@ mod tests;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Serialize;
 
+pub use self::references::{AlignmentReference, align_camera};
 use self::refinement::Refined;
 use super::ImageRotation;
 use super::statistics::median;

@@ -1,0 +1,67 @@
+//! The clock of a camera against the IMU of its log.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{AlignmentError, ClockAlignment, OrientationSeries, align_clocks};
+use crate::flight_log::FlightLog;
+use crate::log_check::ImageRotation;
+use crate::log_check::survey::Survey;
+use crate::sensors::{CameraMount, Rig};
+
+/// What the rotations of the images were compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AlignmentReference {
+    /// The gyroscope, for a camera that is rigidly mounted or a gimbal that does not move.
+    Gyroscope,
+    /// The gyroscope and the angles of the gimbal's joints.
+    GyroscopeAndJoints,
+}
+
+impl fmt::Display for AlignmentReference {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(match self {
+            Self::Gyroscope => "gyroscope",
+            Self::GyroscopeAndJoints => "gyroscope and joint angles",
+        })
+    }
+}
+
+/// Finds the offset of a camera's clock from that of the log's IMU, by the gyroscope and, for a camera on a gimbal, by gyroscope
+/// and joint angles; the better of both.
+///
+/// # Errors
+/// That of the reference which comes closer, when no offset explains the rotations.
+pub fn align_camera(
+    log: &FlightLog,
+    rig: &Rig,
+    camera_key: &str,
+    rotations: &[ImageRotation],
+    search_s: f64,
+) -> Result<(AlignmentReference, ClockAlignment), AlignmentError> {
+    let survey = Survey::of(log, Some(rig));
+    let mut samples: Vec<_> =
+        survey.imu.iter().map(|sample| (sample.stamp_ns, sample.angular_velocity_rad_per_s)).collect();
+    samples.retain(|(_, rate)| rate.iter().all(|value| value.is_finite()));
+    samples.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+    let gyroscope = OrientationSeries::from_angular_velocities(samples);
+    let rigid = align_clocks(rotations, &gyroscope, 0.0, search_s).map(|found| (AlignmentReference::Gyroscope, found));
+    let on_gimbal = rig.cameras.iter().any(|camera| camera.key == camera_key && camera.mount == CameraMount::Gimbal);
+    let Some(chain) = rig.chain_of_camera(camera_key).filter(|_| on_gimbal && !survey.joint_samples.is_empty()) else {
+        return rigid;
+    };
+    let camera = OrientationSeries::from_orientations(survey.joint_samples.iter().filter_map(|sample| {
+        let imu_from_camera = chain.imu_from_camera(&sample.angles_rad).rotation;
+        Some((sample.stamp_ns, gyroscope.at(sample.stamp_ns)? * imu_from_camera))
+    }));
+    let moving =
+        align_clocks(rotations, &camera, 0.0, search_s).map(|found| (AlignmentReference::GyroscopeAndJoints, found));
+    match (rigid, moving) {
+        (Ok(rigid), Ok(moving)) => Ok(if moving.1.explained >= rigid.1.explained { moving } else { rigid }),
+        (Err(_), moving @ Ok(_)) => moving,
+        (rigid @ Ok(_), Err(_)) => rigid,
+        (Err(_), moving @ Err(_)) => moving,
+    }
+}
