@@ -21,6 +21,7 @@ mod structure;
 mod summary;
 mod tables;
 pub mod trajectory;
+mod video_alignment;
 
 pub use calibration_files::write_calibration;
 pub use calibration_report::{CalibrationReport, report_calibration};
@@ -44,3 +45,4 @@ pub use screenshot::{
 pub use session_file::{is_session, read_session};
 pub use structure::KnownLossSummary;
 pub use summary::{CalibrationSummary, RunSummary, StageSummary, TimingSummary, log_name, summarize};
+pub use video_alignment::{VideoAlignment, VideoAlignmentError, align_video, write_alignment_plot};

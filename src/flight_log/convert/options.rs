@@ -1,5 +1,7 @@
 use std::path::PathBuf;
 
+use serde::Serialize;
+
 use super::super::LogLimits;
 
 /// Options of a conversion.
@@ -45,7 +47,7 @@ pub struct AutopilotLog {
 }
 
 /// The clock of a video against the clock of an autopilot's log.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct VideoClock {
     /// Start of the video minus the first IMU sample of the autopilot's log, in seconds of the log.
     pub offset_s: f64,

@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
 
+use super::VideoClock;
 use crate::flight_log::text::{printable, shortened};
 
 /// Result of one topic of a source.
@@ -36,6 +37,8 @@ pub struct ConversionReport {
     pub rig: Option<PathBuf>,
     /// Length of the log in seconds.
     pub duration_s: f64,
+    /// Where the video was placed in the autopilot's log; `None` without both.
+    pub video_clock: Option<VideoClock>,
     /// Every topic of the source, in the order of their names.
     pub topics: Vec<ConvertedTopic>,
     /// Remarks, such as damage or a missing rig.

@@ -11,7 +11,7 @@ use super::super::messages::{read_video_packet, stamp_ns};
 use super::super::writer::MessageType;
 use super::super::{LogWriter, MessageKind, MessageTimes};
 use super::ros1_message::cdr_from_ros1;
-use super::{ConversionReport, ConvertError, ConvertedTopic};
+use super::{ConversionReport, ConvertError, ConvertedTopic, VideoClock};
 
 /// Characters of a name that is too long which are shown.
 const SHOWN_CHARS: usize = 48;
@@ -62,6 +62,8 @@ pub(super) struct Sink<'a> {
     types: BTreeMap<String, String>,
     notes: Vec<String>,
     limits: LogLimits,
+    /// Where the video was placed in the autopilot's log.
+    pub(super) video_clock: Option<VideoClock>,
     /// Messages in the log so far.
     count: u64,
     progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
@@ -82,7 +84,8 @@ impl<'a> Sink<'a> {
     ) -> Self {
         let (tallies, types, notes) = (BTreeMap::new(), BTreeMap::new(), Vec::new());
         let (fraction, since, interrupted) = (0.0, 0, false);
-        Self { writer, tallies, types, notes, limits, count: 0, progress, fraction, since, interrupted }
+        let video_clock = None;
+        Self { writer, tallies, types, notes, limits, video_clock, count: 0, progress, fraction, since, interrupted }
     }
 
     /// Limits on what is read from the source.
@@ -303,6 +306,7 @@ impl<'a> Sink<'a> {
             log: PathBuf::new(),
             rig: None,
             duration_s: 0.0,
+            video_clock: self.video_clock,
             topics,
             notes: self.notes,
         })

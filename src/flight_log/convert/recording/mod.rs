@@ -150,6 +150,7 @@ fn place_video(
     let (log_start_ns, log_end_ns) = recorded.span_ns().unwrap_or((UNKNOWN_START_NS, UNKNOWN_START_NS));
     if let Some(clock) = clock {
         let start_ns = log_start_ns.saturating_add(ns_from_seconds(clock.offset_s));
+        sink.video_clock = Some(clock);
         return Place { start_ns, rate: 1.0 + clock.drift_ppm * 1e-6 };
     }
     let has_utc = !recorded.utc.is_empty();
@@ -170,6 +171,7 @@ fn place_video(
         _ => (log_start_ns.saturating_sub(first_ns), "start with start: camera or autopilot knew no time"),
     };
     let offset_s = seconds_from_ns(start_ns.saturating_sub(log_start_ns));
+    sink.video_clock = Some(VideoClock { offset_s, drift_ppm: 0.0 });
     sink.note(format!(
         "the video is placed {offset_s:.3} s after the first measurement of the autopilot's log ({reason}); this is good to \
          seconds at best, give a better one with --video-offset"

@@ -1,0 +1,131 @@
+//! Where a video lies in an autopilot's log, by the rotations that both recorded.
+
+mod plot;
+
+use std::fmt;
+use std::io;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use thiserror::Error;
+
+pub use self::plot::write_alignment_plot;
+use crate::flight_log::convert::{ConvertError, ConvertOptions, VideoClock, convert_with};
+use crate::flight_log::output::folder_of;
+use crate::flight_log::{FlightLog, LogError};
+use crate::geometry::seconds_from_ns;
+use crate::log_check::{AlignmentError, AlignmentReference, ClockAlignment, align_camera};
+use crate::sensors::Rig;
+use crate::session::camera_rotations;
+
+/// Range of the search around the first guess, either sign.
+const SEARCH_S: f64 = 60.0;
+/// Sections of the video whose rotations are measured, and the length of each.
+const SECTIONS: usize = 6;
+const SECTION_S: f64 = 12.0;
+/// Part of the progress that the first conversion takes.
+const CONVERTED: f64 = 0.5;
+
+/// The clock of a video against that of an autopilot's log, with its evidence.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VideoAlignment {
+    /// What the images were compared with.
+    pub reference: AlignmentReference,
+    /// Where the video lies.
+    pub clock: VideoClock,
+    /// The alignment relative to the first guess.
+    pub alignment: ClockAlignment,
+}
+
+/// The reason why a video could not be aligned.
+#[derive(Debug, Error)]
+pub enum VideoAlignmentError {
+    /// The sources cannot be converted.
+    #[error(transparent)]
+    Convert(#[from] ConvertError),
+    /// The converted log or its rig cannot be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// No single offset explains the rotations.
+    #[error(
+        "the video cannot be aligned with the log of the autopilot: {source}; give the offset with --video-offset: {path}"
+    )]
+    NotAligned {
+        /// Why not.
+        source: AlignmentError,
+        /// The video.
+        path: PathBuf,
+    },
+    /// The log for the first guess cannot be written.
+    #[error("cannot write a log for the alignment: {source}: {path}")]
+    Write {
+        /// The error of the operating system.
+        source: io::Error,
+        /// The folder.
+        path: PathBuf,
+    },
+}
+
+impl fmt::Display for VideoAlignment {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let found = &self.alignment;
+        write!(
+            out,
+            "the video starts {:+.3} s after the first measurement of the autopilot's log (σ {:.1} ms), drift {:+.0} ± {:.0} ppm: \
+             {} explain {:.0} % of the rotation of {} image pairs, {:.2}° each with residuals of {:.2}°",
+            self.clock.offset_s,
+            1e3 * found.offset_sigma_s,
+            found.drift_ppm,
+            found.drift_sigma_ppm,
+            self.reference,
+            100.0 * found.explained,
+            found.rotations,
+            found.rotation_deg,
+            found.residual_deg,
+        )?;
+        if let Some((offset_s, explained)) = found.next {
+            let distance_s = offset_s - found.offset_s;
+            write!(out, "; the next best, {distance_s:+.2} s from it, explains {:.0} %", 100.0 * explained.max(0.0))?;
+        }
+        let percent = 100.0 * (found.scale - 1.0);
+        if percent.abs() > 3.0 {
+            // Rotations are as much too small as the focal length is too long.
+            let word = if percent < 0.0 { "long" } else { "short" };
+            write!(out, "; the focal length of the rig seems to be {:.0} % too {word}", percent.abs())?;
+        }
+        Ok(())
+    }
+}
+
+/// Finds where a video lies in the autopilot's log of `options` within ±60 s of the first guess, which is that of the
+/// conversion. A rig beside `output` is used for the camera's model.
+///
+/// # Errors
+/// When the sources cannot be converted, or the rotations do not tell one offset from the others.
+pub fn align_video(
+    source: &Path,
+    output: &Path,
+    options: &ConvertOptions,
+    progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<VideoAlignment, VideoAlignmentError> {
+    let beside = folder_of(output);
+    let folder = tempfile::Builder::new().prefix(".dcvins-").tempdir_in(&beside);
+    let folder = folder.map_err(|source| VideoAlignmentError::Write { source, path: beside })?;
+    let path = folder.path().join("first-guess.mcap");
+    let report = convert_with(source, &path, options, &mut |ratio| progress(CONVERTED * ratio))?;
+    let guess = report.video_clock.unwrap_or_default();
+    let log = Arc::new(FlightLog::open_with(&path, &options.limits)?);
+    let existing = output.with_extension("rig.yaml");
+    let rig = Rig::for_log(&log, existing.is_file().then_some(existing.as_path()))?;
+    let camera_key = rig.cameras.first().map(|camera| camera.key.clone()).unwrap_or_default();
+    let rotations = camera_rotations(&log, &rig, &camera_key, SECTIONS, SECTION_S)?;
+    let aligned = align_camera(&log, &rig, &camera_key, &rotations, SEARCH_S);
+    let (reference, alignment) =
+        aligned.map_err(|problem| VideoAlignmentError::NotAligned { source: problem, path: source.to_owned() })?;
+    // The guess has no drift, and the log of the first guess starts at its first measurement or with the video.
+    let log_start_s = if guess.offset_s < 0.0 { -guess.offset_s } else { 0.0 };
+    let shift_s = seconds_from_ns(alignment.shift_ns(crate::geometry::ns_from_seconds(log_start_s + guess.offset_s)));
+    let clock = VideoClock { offset_s: guess.offset_s + shift_s, drift_ppm: alignment.drift_ppm };
+    Ok(VideoAlignment { reference, clock, alignment })
+}
