@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use dcvins::export;
+use dcvins::export::{self, VideoAlignmentError};
 use dcvins::flight_log::convert::{self, AutopilotLog, AutopilotLogKind, ConvertError, ConvertOptions, VideoClock};
 
 use crate::cli::exit::Outcome;
@@ -30,8 +30,8 @@ pub(crate) struct ConvertArguments {
     /// The telemetry log (MAVLink) of the flight that the video shows.
     #[arg(long, value_name = "LOG.tlog", group = "autopilot_log")]
     pub tlog: Option<PathBuf>,
-    /// Start of the video minus the first IMU sample of the autopilot's log. Without it the video is placed by the times of
-    /// camera and autopilot, and at the start of the log where one of them knew no time.
+    /// Start of the video minus the first measurement of the autopilot's log. Without it it is found by comparing the
+    /// rotations of the images with the gyroscope, up to 60 s from the times that camera and autopilot recorded.
     #[arg(long, value_name = "SECONDS", requires = "autopilot_log", allow_hyphen_values = true, value_parser = offset)]
     pub video_offset: Option<f64>,
     /// Overwrite whatever has the name of the log. Without it only a log is replaced that this command wrote; a rig beside the
@@ -76,14 +76,36 @@ pub(crate) fn convert(arguments: &ConvertArguments) -> Result<Outcome> {
     let interrupt = Interrupt::watch()?;
     export::check_converted_log(&arguments.output, arguments.force)?;
     let progress = Progress::new();
-    let options = arguments.options();
+    let mut options = arguments.options();
+    let mut aligned = None;
+    if options.autopilot.is_some() && options.video_clock.is_none() {
+        let found = export::align_video(&arguments.source, &arguments.output, &options, &mut |ratio| {
+            progress.show(0.5 * ratio, || "aligning the video".to_owned());
+            interrupt.control_flow()
+        });
+        match found {
+            Ok(found) => options.video_clock = Some(aligned.insert(found).clock),
+            Err(VideoAlignmentError::Convert(error @ ConvertError::Interrupted { .. })) => {
+                notify(&format!("dcvins: {error}"));
+                return Ok(Outcome::Interrupted);
+            }
+            Err(error) => return Err(error.into()),
+        }
+    }
     let converted = convert::convert_with(&arguments.source, &arguments.output, &options, &mut |ratio| {
         progress.show(ratio, String::new);
         interrupt.control_flow()
     });
     drop(progress);
     match converted {
-        Ok(report) => print_report(&report, arguments.json).map(|()| Outcome::Success),
+        Ok(mut report) => {
+            if let Some(aligned) = &aligned {
+                let plot = arguments.output.with_extension("alignment.svg");
+                export::write_alignment_plot(aligned, &plot)?;
+                report.notes.insert(0, format!("{aligned}: {}", plot.display()));
+            }
+            print_report(&report, arguments.json).map(|()| Outcome::Success)
+        }
         Err(error @ ConvertError::Interrupted { .. }) => {
             notify(&format!("dcvins: {error}"));
             Ok(Outcome::Interrupted)

@@ -49,11 +49,14 @@ pub enum VideoAlignmentError {
     Log(#[from] LogError),
     /// No single offset explains the rotations.
     #[error(
-        "the video cannot be aligned with the log of the autopilot: {source}; give the offset with --video-offset: {path}"
+        "the video cannot be aligned with the log of the autopilot: {source}; give its place with --video-offset SECONDS (by the \
+         times of camera and autopilot it would be {guess_s:.3}): {path}"
     )]
     NotAligned {
         /// Why not.
         source: AlignmentError,
+        /// Offset of the video by the times that both recorded, or where both start together.
+        guess_s: f64,
         /// The video.
         path: PathBuf,
     },
@@ -121,8 +124,11 @@ pub fn align_video(
     let camera_key = rig.cameras.first().map(|camera| camera.key.clone()).unwrap_or_default();
     let rotations = camera_rotations(&log, &rig, &camera_key, SECTIONS, SECTION_S)?;
     let aligned = align_camera(&log, &rig, &camera_key, &rotations, SEARCH_S);
-    let (reference, alignment) =
-        aligned.map_err(|problem| VideoAlignmentError::NotAligned { source: problem, path: source.to_owned() })?;
+    let (reference, alignment) = aligned.map_err(|problem| VideoAlignmentError::NotAligned {
+        source: problem,
+        guess_s: guess.offset_s,
+        path: source.to_owned(),
+    })?;
     // The guess has no drift, and the log of the first guess starts at its first measurement or with the video.
     let log_start_s = if guess.offset_s < 0.0 { -guess.offset_s } else { 0.0 };
     let shift_s = seconds_from_ns(alignment.shift_ns(crate::geometry::ns_from_seconds(log_start_s + guess.offset_s)));
