@@ -7,6 +7,7 @@ mod hand_eye;
 mod image_measure;
 mod images;
 mod imu_facts;
+mod imu_topics;
 mod joints;
 mod render;
 mod rig_sanity;
@@ -157,6 +158,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         ),
     }
     timing::check_timing(&survey, rig.ok(), &mut findings);
+    imu_topics::check_orientation_topics(log, rig, &mut findings);
     let imu_facts = imu_facts::check_imu(&survey, rig.ok(), &mut findings);
     if let Ok(rig) = rig {
         joints::check_joints(&survey, rig, &mut findings);

@@ -51,6 +51,8 @@ struct Flight {
     camera_info: [f64; 4],
     /// Whether the accelerometer has a topic of its own, with 62.5 Hz.
     accelerometer_apart: bool,
+    /// A topic of orientations only.
+    orientations: Option<&'static str>,
 }
 
 impl Default for Flight {
@@ -62,6 +64,7 @@ impl Default for Flight {
             rig: rig_text(),
             camera_info: [80.0, 80.0, 79.5, 59.5],
             accelerometer_apart: false,
+            orientations: None,
         }
     }
 }
@@ -128,6 +131,9 @@ impl Flight {
                 if (self.imu)(millisecond, &mut times, &mut rate, &mut force) {
                     writer.write_imu("/imu", "imu", times, &rate, &force).unwrap();
                 }
+            }
+            if let Some(topic) = self.orientations.filter(|_| millisecond % 10 == 4) {
+                writer.write_imu(topic, "imu", times, &Vector3::zeros(), &Vector3::zeros()).unwrap();
             }
             if self.accelerometer_apart && millisecond % 16 == 3 {
                 let force = Vector3::new(0.3 * rate_at(time_s).x, 0.0, 9.81)
@@ -204,6 +210,16 @@ fn a_faultless_flight_has_no_warning() {
     let mut text = String::new();
     write!(text, "{report}").unwrap();
     assert!(text.contains("/camera/image") && text.contains("good    IMU"), "{text}");
+}
+
+#[test]
+fn topics_of_orientations_only_are_named() {
+    let flight = Flight { orientations: Some("/imu/orientation"), ..Flight::default() };
+    expect(&flight, Severity::Note, &["'/imu/orientation' holds orientations only", "it is not used"]);
+    let rig = rig_text().replace("rostopic: /imu,", "rostopic: /imu/orientation,");
+    let words =
+        ["'/imu/orientation' holds orientations only", "name a topic with measurements in imu0.rostopic: '/imu'"];
+    expect(&Flight { rig, ..flight }, Severity::Error, &words);
 }
 
 #[test]

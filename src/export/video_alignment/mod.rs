@@ -76,15 +76,15 @@ impl fmt::Display for VideoAlignment {
         write!(
             out,
             "the video starts {:+.3} s after the first measurement of the autopilot's log (σ {:.1} ms), drift {:+.0} ± {:.0} ppm: \
-             {} explain {:.0} % of the rotation of {} image pairs, {:.2}° each with residuals of {:.2}°",
+             {:.0} % of {} rotations of the images, {:.2}° each, are explained by {}, with residuals of {:.2}°",
             self.clock.offset_s,
             1e3 * found.offset_sigma_s,
             found.drift_ppm,
             found.drift_sigma_ppm,
-            self.reference,
             100.0 * found.explained,
             found.rotations,
             found.rotation_deg,
+            self.reference,
             found.residual_deg,
         )?;
         if let Some((offset_s, explained)) = found.next {

@@ -1,8 +1,6 @@
 //! Correlation of angular speeds over all offsets of the search.
 
-use nalgebra::Vector3;
-
-use super::{DISTINCT_S, MIN_ROTATIONS, OrientationSeries};
+use super::{DISTINCT_S, MIN_ROTATIONS, Measured, OrientationSeries};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 
 /// Step of the search and of the sampled speeds.
@@ -35,7 +33,7 @@ struct SpeedGrid {
 }
 
 impl SpeedGrid {
-    fn of(measured: &[(i64, i64, Vector3<f64>)]) -> Self {
+    fn of(measured: &[Measured]) -> Self {
         let step_ns = ns_from_seconds(STEP_S);
         let start_ns = measured.iter().map(|(from_ns, _, _)| *from_ns).min().unwrap_or(0);
         let mut speeds: Vec<(usize, f64)> = Vec::new();
@@ -54,7 +52,7 @@ impl SpeedGrid {
 /// Correlation coefficient of the angular speeds of images and reference by offset in seconds; offsets at which too little
 /// overlaps are left out.
 pub(super) fn correlation(
-    measured: &[(i64, i64, Vector3<f64>)],
+    measured: &[Measured],
     reference: &OrientationSeries,
     guess_s: f64,
     search_s: f64,

@@ -28,8 +28,14 @@ const MIN_ROTATION_RAD: f64 = 0.001;
 const MIN_EXPLAINED: f64 = 0.6;
 /// The next offset must leave this many times as much unexplained.
 const MIN_DISTINCTION: f64 = 1.5;
+/// Lengths over which rotations of consecutive images are composed, in seconds; 0 for each pair of images. Noisy joint angles
+/// need more than the rotation of a stabilized camera from one image to the next.
+const LENGTHS_S: [f64; 3] = [0.0, 0.2, 0.6];
 /// Offsets closer than this are one.
 const DISTINCT_S: f64 = 0.25;
+
+/// An image rotation: stamps of both images in nanoseconds, and the rotation vector of `second_from_first`.
+type Measured = (i64, i64, Vector3<f64>);
 
 /// Orientations on one clock, up to a constant rotation on either side: `fixed_from_body` at increasing stamps.
 ///
@@ -187,7 +193,8 @@ pub enum AlignmentError {
     },
 }
 
-/// Finds the offset of a camera's clock within ±`search_s` around `guess_s` from the rotations of its images.
+/// Finds the offset of a camera's clock within ±`search_s` around `guess_s` from the rotations of its images, which are in the
+/// order of their times.
 ///
 /// # Errors
 /// When there are too few rotations, or no single offset explains them.
@@ -197,11 +204,46 @@ pub fn align_clocks(
     guess_s: f64,
     search_s: f64,
 ) -> Result<ClockAlignment, AlignmentError> {
-    let measured: Vec<(i64, i64, Vector3<f64>)> = images
-        .iter()
-        .filter(|rotation| rotation.to_ns > rotation.from_ns)
-        .map(|rotation| (rotation.from_ns, rotation.to_ns, so3::log(&rotation.second_from_first)))
-        .collect();
+    let mut best = align_rotations(&composed(images, LENGTHS_S[0]), reference, guess_s, search_s);
+    for length_s in &LENGTHS_S[1..] {
+        let longer = align_rotations(&composed(images, *length_s), reference, guess_s, search_s);
+        best = match (best, longer) {
+            (Ok(best), Ok(longer)) if longer.offset_sigma_s < best.offset_sigma_s => Ok(longer),
+            (Err(_), Ok(longer)) => Ok(longer),
+            (best, _) => best,
+        };
+    }
+    best
+}
+
+/// Rotation vectors of `second_from_first` over at least a length, from consecutive image rotations; the next one starts in the
+/// middle of the one before.
+fn composed(images: &[ImageRotation], length_s: f64) -> Vec<Measured> {
+    let mut found = Vec::new();
+    let mut start = 0;
+    while let Some(first) = images.get(start) {
+        let mut rotation = first.second_from_first;
+        let mut end = start;
+        while seconds_from_ns(images[end].to_ns - first.from_ns) < length_s {
+            let Some(next) = images.get(end + 1).filter(|next| next.from_ns == images[end].to_ns) else { break };
+            rotation = next.second_from_first * rotation;
+            end += 1;
+        }
+        let interval_ns = images[end].to_ns - first.from_ns;
+        if interval_ns > 0 && seconds_from_ns(interval_ns) >= length_s {
+            found.push((first.from_ns, images[end].to_ns, so3::log(&rotation)));
+        }
+        start += (end - start).div_ceil(2).max(1);
+    }
+    found
+}
+
+fn align_rotations(
+    measured: &[Measured],
+    reference: &OrientationSeries,
+    guess_s: f64,
+    search_s: f64,
+) -> Result<ClockAlignment, AlignmentError> {
     if measured.len() < MIN_ROTATIONS {
         return Err(AlignmentError::TooFewRotations { found: measured.len() });
     }
@@ -209,10 +251,10 @@ pub fn align_clocks(
     if rotation_rad < MIN_ROTATION_RAD {
         return Err(AlignmentError::TooLittleRotation { rotation_deg: rotation_rad.to_degrees() });
     }
-    let correlation = coarse::correlation(&measured, reference, guess_s, search_s);
+    let correlation = coarse::correlation(measured, reference, guess_s, search_s);
     let mut candidates: Vec<Refined> = coarse::peaks(&correlation)
         .into_iter()
-        .filter_map(|offset_s| refinement::refine(&measured, reference, offset_s))
+        .filter_map(|offset_s| refinement::refine(measured, reference, offset_s))
         .filter(|refined| (refined.offset_s - guess_s).abs() <= search_s + DISTINCT_S)
         .collect();
     candidates.sort_by(|a, b| b.explained.total_cmp(&a.explained));
@@ -228,5 +270,5 @@ pub fn align_clocks(
     }
     let next = next.map(|next| (next.offset_s, next.explained));
     let curve = correlation.iter().map(|at| (at.offset_s, at.correlation)).collect();
-    Ok(best.alignment(&measured, reference, next, curve))
+    Ok(best.alignment(measured, reference, next, curve))
 }

@@ -23,7 +23,7 @@ pub enum AlignmentReference {
 impl fmt::Display for AlignmentReference {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.write_str(match self {
-            Self::Gyroscope => "gyroscope",
+            Self::Gyroscope => "the gyroscope",
             Self::GyroscopeAndJoints => "gyroscope and joint angles",
         })
     }

@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector3, Vector6};
 
 use super::super::hand_eye::best_rotation;
 use super::super::statistics::median;
-use super::{ClockAlignment, MIN_ROTATIONS, OrientationSeries};
+use super::{ClockAlignment, MIN_ROTATIONS, Measured, OrientationSeries};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 
 /// Standard deviation of the drift that is expected of two quartz clocks.
@@ -23,9 +23,6 @@ const DIFFERENCE_S: f64 = 0.004;
 const HUBER: f64 = 1.345;
 /// Ratio of a normal distribution's standard deviation to the median norm of three such residuals.
 const SIGMA_PER_MEDIAN_NORM: f64 = 1.0 / 1.538;
-
-/// An image rotation: stamps of its images, and the rotation vector of `second_from_first`.
-type Measured = (i64, i64, Vector3<f64>);
 
 /// The best solution near one offset.
 pub(super) struct Refined {

@@ -78,7 +78,8 @@ pub fn camera_rotations(
         _ => return Ok(Vec::new()),
     };
     let length = ((section_s / duration_s * stamps.len() as f64).ceil() as usize).clamp(1, stamps.len());
-    let sections = sections.min(stamps.len() / length).max(1);
+    // A short video is one section.
+    let (sections, length) = if sections * length >= stamps.len() { (1, stamps.len()) } else { (sections, length) };
     let of_section = |number: usize| {
         let middle = stamps.len() * (2 * number + 1) / (2 * sections);
         let first = middle.saturating_sub(length / 2).min(stamps.len() - length);
