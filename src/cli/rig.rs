@@ -110,13 +110,25 @@ fn position(text: &str) -> Result<[f64; 3], String> {
 }
 
 fn attitude(text: &str) -> Result<Attitude, String> {
-    const KEYS: [&str; 6] = ["type", "frame", "axes", "order", "unit", "vehicle"];
+    const KEYS: [&str; 11] = [
+        "type",
+        "frame",
+        "axes",
+        "order",
+        "unit",
+        "vehicle",
+        "parent",
+        "child",
+        "gimbal_axes",
+        "imu_axes",
+        "vehicle_axes",
+    ];
     let mut parts = text.split(',');
     let topic = parts.next().unwrap_or_default().to_owned();
     let entry = |part: &str| {
         let (key, value) = part.split_once('=')?;
         let plain =
-            !value.is_empty() && value.chars().all(|letter| letter.is_ascii_alphanumeric() || "/_-".contains(letter));
+            !value.is_empty() && value.chars().all(|letter| letter.is_ascii_alphanumeric() || "/_-= ".contains(letter));
         (plain && KEYS.contains(&key)).then(|| (key.to_owned(), value.to_owned()))
     };
     let entries: Option<Vec<_>> = parts.map(entry).collect();

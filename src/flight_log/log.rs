@@ -236,7 +236,7 @@ impl FlightLog {
     }
 
     /// The first message of a topic for which `test` returns a value, and that value.
-    pub(super) fn find_message<T>(&self, topic: &str, mut test: impl FnMut(&[u8]) -> Option<T>) -> Option<T> {
+    pub(crate) fn find_message<T>(&self, topic: &str, mut test: impl FnMut(&[u8]) -> Option<T>) -> Option<T> {
         let mut found = None;
         self.for_each_message(topic, |_, data| {
             found = test(data);

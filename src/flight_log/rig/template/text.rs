@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{AngleTemplate, AttitudeTemplate, RigTemplate};
+use super::{AngleTemplate, AttitudeTemplate, RigTemplate, VehicleAxes};
 
 /// Numbers of a rotation matrix that differ less from a whole one by rounding.
 const ROUNDING: f64 = 1e-9;
@@ -27,7 +27,7 @@ impl RigTemplate {
                 if full == "gimbal.encoder_sigma"
                     && let Some(AngleTemplate::Attitude(attitude)) = self.gimbal.as_ref().map(|gimbal| &gimbal.angles)
                 {
-                    out.push_str(&source_line(attitude));
+                    out.push_str(&source_line(attitude, self.imu.axes.value));
                 }
             }
             out.push_str(&with_whole_numbers(line));
@@ -71,11 +71,17 @@ impl RigTemplate {
 const HEADER: &str =
     "# A rig before calibration. Usual values stand where nothing is known: see `assumed` at the end.\n";
 
-/// `gimbal.source` in one line.
-fn source_line(attitude: &AttitudeTemplate) -> String {
+/// `gimbal.source` in one line; the axes of the IMU where they are not those that the source takes for granted.
+fn source_line(attitude: &AttitudeTemplate, imu_axes: VehicleAxes) -> String {
     let quoted = |text: &str| serde_json::Value::from(text).to_string();
     let entries = attitude.entries.iter().map(|(key, value)| format!(", {key}: {value}"));
-    format!("  source: {{topic: {}{}}}\n", quoted(&attitude.topic), entries.collect::<String>())
+    let is_given = attitude.entries.iter().any(|(key, _)| key == "imu_axes");
+    let of_imu = if is_given || imu_axes == VehicleAxes::ForwardLeftUp {
+        String::new()
+    } else {
+        format!(", imu_axes: {}", imu_axes.name())
+    };
+    format!("  source: {{topic: {}{}{of_imu}}}\n", quoted(&attitude.topic), entries.collect::<String>())
 }
 
 /// A row of a matrix whose numbers are whole but for rounding, as it is read best; any other line as it is.
@@ -89,4 +95,25 @@ fn with_whole_numbers(line: &str) -> String {
     };
     let numbers: Vec<String> = row.split(", ").map(number).collect();
     format!("{head}- [{}]", numbers.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_source_names_the_axes_of_an_imu_that_points_down() {
+        let attitude = |entries: &[(&str, &str)]| AttitudeTemplate {
+            topic: "/gimbal/attitude".to_owned(),
+            rate_hz: 10.0,
+            entries: entries.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect(),
+            assumed: None,
+        };
+        let plain = attitude(&[("type", "quaternion"), ("axes", "frd")]);
+        let start = "  source: {topic: \"/gimbal/attitude\", type: quaternion, axes: frd";
+        assert_eq!(source_line(&plain, VehicleAxes::ForwardLeftUp), format!("{start}}}\n"));
+        assert_eq!(source_line(&plain, VehicleAxes::ForwardRightDown), format!("{start}, imu_axes: frd}}\n"));
+        let given = attitude(&[("type", "quaternion"), ("axes", "frd"), ("imu_axes", "flu")]);
+        assert_eq!(source_line(&given, VehicleAxes::ForwardRightDown), format!("{start}, imu_axes: flu}}\n"));
+    }
 }
