@@ -15,7 +15,10 @@ use crate::flight_log::messages::{self, MessageKind};
 use crate::flight_log::{FlightLog, LogError};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::gimbal::InverseChain;
-use crate::sensors::{AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig};
+use crate::sensors::{AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig};
+
+/// Attitudes further apart are not interpolated.
+const MAX_GAP_NS: i64 = 300_000_000;
 
 /// The gimbal's attitude and the vehicle's, as they are recorded.
 #[derive(Debug)]
@@ -59,7 +62,13 @@ impl AttitudeSurvey {
             }
             _ => None,
         };
-        let vehicle = match vehicle_topic(log, source)? {
+        // Also for an attitude relative to the body: other frames are tried, too.
+        let any_frame = AttitudeSource { frame: AttitudeFrame::Earth, ..source.clone() };
+        let read_vehicle = if source.frame == AttitudeFrame::Body { &any_frame } else { source };
+        let vehicle = match vehicle_topic(log, read_vehicle).or_else(|error| match source.frame {
+            AttitudeFrame::Body => Ok(None),
+            _ => Err(error),
+        })? {
             None => None,
             Some((topic, kind)) => {
                 let clock = StampClock::of(log, topic, kind)?;
@@ -143,6 +152,35 @@ impl AttitudeSurvey {
         let before = after.checked_sub(1).and_then(|before| self.vehicle.get(before));
         let rotation = rotation_between(before, self.vehicle.get(after), stamp_ns, MAX_VEHICLE_GAP_NS)?;
         Some(source.enu_from_flu(&rotation, *kind == MessageKind::Px4VehicleAttitude))
+    }
+
+    /// Whether the vehicle's attitude is known.
+    pub(super) fn has_vehicle(&self) -> bool {
+        !self.vehicle.is_empty()
+    }
+
+    /// Topic of the gimbal's attitude.
+    pub(super) fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    /// The orientation `imu_from_camera` at a time by a source, which may differ from the rig's, between the recorded ones.
+    pub(super) fn orientation_at(
+        &self,
+        source: &AttitudeSource,
+        timeshift_ns: i64,
+        stamp_ns: i64,
+    ) -> Option<UnitQuaternion<f64>> {
+        let at_ns = stamp_ns.saturating_sub(timeshift_ns);
+        let after = self.values.partition_point(|(at, _)| *at <= at_ns);
+        let (before_ns, before) = self.values.get(after.checked_sub(1)?)?;
+        let (after_ns, after) = self.values.get(after)?;
+        if after_ns - before_ns > MAX_GAP_NS {
+            return None;
+        }
+        let fraction = (at_ns - before_ns) as f64 / (after_ns - before_ns) as f64;
+        let value = source.between(before, after, fraction)?;
+        source.imu_from_camera(&value, self.enu_from_flu(source, stamp_ns).as_ref())
     }
 
     /// Orientations `imu_from_camera` by a source, which may differ from the rig's, with stamps shifted by `timeshift_ns`.

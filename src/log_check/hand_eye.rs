@@ -102,7 +102,7 @@ impl HandEye<'_> {
             (-steps..=steps).map(|step| f64::from(step) * OFFSET_STEP_S).map(|offset| (offset, cost(offset))).collect();
         let best = (0..costs.len()).min_by(|a, b| costs[*a].1.total_cmp(&costs[*b].1)).unwrap_or(0);
         let unshifted = costs[steps as usize].1;
-        let (offset_s, least) = (vertex(&costs, best), costs[best].1);
+        let (offset_s, least) = (vertex(&costs, best, OFFSET_STEP_S), costs[best].1);
         let evidence = format!(
             "rotations of {:.3}° in the median differ by {:.3}°, by {:.3}° with the images {:+.1} ms later",
             rotation_rad.to_degrees(),
@@ -200,7 +200,7 @@ impl HandEye<'_> {
 
 /// Rotation of the IMU between two times by its gyroscope, bias removed: `second_from_first`, which rotates vectors from
 /// the first IMU frame to the second.
-fn imu_rotation(imu_facts: &ImuFacts, from_ns: i64, to_ns: i64) -> Option<UnitQuaternion<f64>> {
+pub(super) fn imu_rotation(imu_facts: &ImuFacts, from_ns: i64, to_ns: i64) -> Option<UnitQuaternion<f64>> {
     let samples = &imu_facts.samples;
     let (first, last) = (samples.first()?.stamp_ns, samples.last()?.stamp_ns);
     if from_ns < first || to_ns > last || to_ns <= from_ns {
@@ -239,7 +239,7 @@ fn misfit_rad(pairs: &[Pair], error: &UnitQuaternion<f64>) -> f64 {
 
 /// Minimum of the parabola through the squared costs around the best offset, in seconds; the offset itself at the end of
 /// the range.
-fn vertex(costs: &[(f64, f64)], best: usize) -> f64 {
+pub(super) fn vertex(costs: &[(f64, f64)], best: usize, step: f64) -> f64 {
     let square = |index: usize| costs[index].1 * costs[index].1;
     let offset_s = costs[best].0;
     if best == 0 || best + 1 >= costs.len() {
@@ -247,5 +247,5 @@ fn vertex(costs: &[(f64, f64)], best: usize) -> f64 {
     }
     let (left, middle, right) = (square(best - 1), square(best), square(best + 1));
     let curvature = left - 2.0 * middle + right;
-    if curvature > 0.0 { offset_s + 0.5 * OFFSET_STEP_S * (left - right) / curvature } else { offset_s }
+    if curvature > 0.0 { offset_s + 0.5 * step * (left - right) / curvature } else { offset_s }
 }

@@ -12,6 +12,7 @@ mod joints;
 mod render;
 mod rig_sanity;
 mod rotation;
+mod source_fit;
 mod statistics;
 mod survey;
 #[cfg(test)]
@@ -141,7 +142,7 @@ pub struct CheckReport {
 /// `image_rotations` are optional: with them the extrinsic rotations and the time offset of the cameras are checked
 /// against the gyroscope.
 pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[ImageRotation]) -> CheckReport {
-    let survey = Survey::of(log, rig.ok());
+    let mut survey = Survey::of(log, rig.ok());
     let mut findings = Findings::default();
     check_file(log, &survey, &mut findings);
     match rig {
@@ -163,6 +164,10 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
     if let Ok(rig) = rig {
         joints::check_joints(&survey, rig, &mut findings);
         images::check_images(&survey, rig, &imu_facts, &mut findings);
+        if let Some(fitted) = source_fit::check_source(&survey, rig, &imu_facts, image_rotations, &mut findings) {
+            // The cameras are checked with the attitude as it should be read.
+            survey.use_source(rig, fitted.source, fitted.timeshift_s);
+        }
         rotation::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);
     }
     let mut findings = findings.list;

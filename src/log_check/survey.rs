@@ -13,7 +13,7 @@ use crate::flight_log::log::relative_ns;
 use crate::flight_log::stream::angle_fit;
 use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
-use crate::sensors::{GimbalRig, ImuSample, JointSample, Rig};
+use crate::sensors::{AttitudeSource, GimbalRig, ImuSample, JointSample, Rig};
 
 /// Joint names that are listed; messages may name more.
 const JOINT_NAMES: usize = 64;
@@ -216,6 +216,16 @@ impl Survey {
             }
         }
         self.joint_samples = merged(&self.joints);
+    }
+
+    /// Takes the joint angles of another meaning of the gimbal's attitude than the rig's.
+    pub(super) fn use_source(&mut self, rig: &Rig, source: AttitudeSource, timeshift_s: f64) {
+        if let (Some(attitude), Some(gimbal)) = (&self.attitude, &rig.gimbal) {
+            let gimbal = GimbalRig { attitude: Some(source), timeshift_gimbal_imu_s: timeshift_s, ..gimbal.clone() };
+            let readings: Vec<JointReading> =
+                attitude.solve(&gimbal).into_iter().map(|solved| solved.reading).collect();
+            self.joint_samples = merged(&readings);
+        }
     }
 
     #[expect(clippy::too_many_arguments, reason = "the fields of one message")]

@@ -80,6 +80,29 @@ impl AttitudeSource {
         }
     }
 
+    /// The rotation from the gimbal to the frame of a recorded attitude, in the axes of the source.
+    fn frame_from_gimbal(&self, value: &AttitudeValue) -> Option<UnitQuaternion<f64>> {
+        match (value, &self.message) {
+            (AttitudeValue::Rotation(rotation) | AttitudeValue::Flagged(rotation, _), _) => Some(*rotation),
+            (AttitudeValue::Vector(vector), AttitudeMessage::Euler(angles)) => Some(angles.rotation(vector)),
+            (AttitudeValue::Vector(_), _) => None,
+        }
+    }
+
+    /// The attitude between two recorded ones, at a fraction of the time between them; `None` when their frames differ.
+    pub fn between(&self, first: &AttitudeValue, second: &AttitudeValue, fraction: f64) -> Option<AttitudeValue> {
+        let frame = self.frame_of(first);
+        if self.frame_of(second) != frame {
+            return None;
+        }
+        let (from, to) = (self.frame_from_gimbal(first)?, self.frame_from_gimbal(second)?);
+        let rotation = from.try_slerp(&to, fraction, 1e-9)?;
+        Some(match first {
+            AttitudeValue::Flagged(_, flags) => AttitudeValue::Flagged(rotation, *flags),
+            _ => AttitudeValue::Rotation(rotation),
+        })
+    }
+
     /// The rotation `imu_from_camera` (camera: x right, y down, z forward) that a recorded attitude stands for.
     ///
     /// `enu_from_flu` is the vehicle's attitude by [`AttitudeSource::enu_from_flu`], which frames other than the body need.
@@ -89,11 +112,7 @@ impl AttitudeSource {
         value: &AttitudeValue,
         enu_from_flu: Option<&UnitQuaternion<f64>>,
     ) -> Option<UnitQuaternion<f64>> {
-        let frame_from_gimbal = match (value, &self.message) {
-            (AttitudeValue::Rotation(rotation) | AttitudeValue::Flagged(rotation, _), _) => *rotation,
-            (AttitudeValue::Vector(vector), AttitudeMessage::Euler(angles)) => angles.rotation(vector),
-            (AttitudeValue::Vector(_), _) => return None,
-        };
+        let frame_from_gimbal = self.frame_from_gimbal(value)?;
         let gimbal_axes = self.gimbal_axes.unwrap_or_else(|| self.axes.into());
         let frame_from_gimbal = frame_from_gimbal * gimbal_axes.flu_from_axes().inverse();
         let vehicle_from_gimbal = match self.frame_of(value) {

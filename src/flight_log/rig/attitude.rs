@@ -93,7 +93,7 @@ fn one_of<T: Copy>(
 }
 
 /// The keys and values of a source in the order of a rig; texts without quotes.
-pub(super) fn entries(topic: &str, source: &AttitudeSource) -> Vec<(&'static str, String)> {
+pub(crate) fn entries(topic: &str, source: &AttitudeSource) -> Vec<(&'static str, String)> {
     let mut entries = vec![("topic", topic.to_owned()), ("type", source.message.name().to_owned())];
     entries.push(("frame", source.frame.name().to_owned()));
     entries.push(("axes", source.axes.name().to_owned()));

@@ -1,6 +1,6 @@
 //! Rig files: our own schema and Kalibr's, read and written.
 
-mod attitude;
+pub(crate) mod attitude;
 mod document;
 mod fields;
 mod find;

@@ -32,6 +32,12 @@ const MIN_INLIER_RATIO: f64 = 0.6;
 /// They do not depend on gyroscope, encoders and extrinsics. A camera whose images cannot be read has none; `check`
 /// reports the reason.
 pub fn image_rotations(log: &Arc<FlightLog>, rig: &Rig) -> Vec<ImageRotation> {
+    // Nor do they end with a topic of joint angles that cannot be read.
+    let mut rig = rig.clone();
+    if let Some(gimbal) = &mut rig.gimbal {
+        gimbal.topic = None;
+    }
+    let rig = &rig;
     let duration_s = seconds_from_ns(log.duration_ns());
     let length_s = SECTION_S.min(duration_s / SECTIONS as f64);
     let section = |number: usize| {

@@ -1,0 +1,276 @@
+//! The meaning of a gimbal's attitude against the rotations in the images: frame, axes, order, signs, unit and time offset that
+//! predict them, when the rig's do not.
+
+mod meanings;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::{Unit, UnitQuaternion, Vector3};
+
+use self::meanings::{changes, difference};
+use super::attitude::AttitudeSurvey;
+use super::hand_eye::{imu_rotation, vertex};
+use super::imu_facts::ImuFacts;
+use super::statistics::median;
+use super::survey::Survey;
+use super::{Area, Findings, ImageRotation, Severity};
+use crate::geometry::{ns_from_seconds, so3};
+use crate::gimbal::ClassicalChain;
+use crate::sensors::{AttitudeSource, CameraMount, GimbalRig, Rig};
+
+/// Consecutive image rotations that are joined to one: over a third of a second attitudes of 10 Hz predict more than their errors.
+const JOINED: usize = 6;
+/// Minimum number of joined rotations.
+const MIN_SPANS: usize = 20;
+/// Smallest median rotation of camera or vehicle over such a time that tells one meaning from another.
+const MIN_ROTATION_RAD: f64 = 0.02;
+/// A meaning fits when its misfit is below this ratio of the rotation.
+const FITTING_RATIO: f64 = 0.25;
+/// Another meaning is preferred when its misfit is below this ratio of the rig's.
+const BETTER_RATIO: f64 = 0.6;
+/// Time offsets (`t_imu = t_gimbal + shift`) beyond the rig's with which every meaning is tried: delays of gimbals reach 0.2 s.
+const COARSE_SHIFTS_S: [f64; 5] = [0.0, -0.05, -0.1, -0.15, -0.2];
+/// Range and step of the search for the time offset.
+const MAX_SHIFT_S: f64 = 0.3;
+const SHIFT_STEP_S: f64 = 0.01;
+/// Time offset that is reported: gimbals at 50 Hz stamp no better.
+const SHIFT_TOLERANCE_S: f64 = 0.01;
+/// Offset of the first joint that is reported.
+const OFFSET_TOLERANCE_RAD: f64 = 0.026;
+/// Minimum relative decrease of the squared misfit by an offset of time or of a joint.
+const MIN_GAIN: f64 = 0.2;
+
+/// What was found to be right in place of the rig's.
+pub(super) struct FittedSource {
+    pub(super) source: AttitudeSource,
+    pub(super) timeshift_s: f64,
+}
+
+/// A joined rotation of the camera.
+struct Span {
+    /// On the clock of the IMU.
+    from_ns: i64,
+    to_ns: i64,
+    /// Measured rotation vector, second from first image.
+    measured: Vector3<f64>,
+    /// Rotation of the IMU, second from first.
+    of_imu: UnitQuaternion<f64>,
+}
+
+/// The rotations of the gimbal camera and the attitudes that should predict them.
+struct SourceFit<'a> {
+    attitude: &'a AttitudeSurvey,
+    spans: Vec<Span>,
+}
+
+/// A meaning with its misfit in radians, at the time offset at which it is least.
+#[derive(Clone)]
+struct Meaning {
+    source: AttitudeSource,
+    misfit_rad: f64,
+}
+
+/// Compares the rig's source with others; returns what fits better, if anything.
+pub(super) fn check_source(
+    survey: &Survey,
+    rig: &Rig,
+    imu_facts: &ImuFacts,
+    rotations: &[ImageRotation],
+    findings: &mut Findings,
+) -> Option<FittedSource> {
+    let (attitude, gimbal) = (survey.attitude.as_ref()?, rig.gimbal.as_ref()?);
+    let source = gimbal.attitude.as_ref()?;
+    let camera = rig.cameras.iter().find(|camera| camera.mount == CameraMount::Gimbal)?;
+    let of_camera: Vec<&ImageRotation> =
+        rotations.iter().filter(|rotation| rotation.camera_key == camera.key).collect();
+    let fit = SourceFit { attitude, spans: spans(&of_camera, camera.timeshift_cam_imu_s, imu_facts) };
+    let rotation_rad = fit.rotation_rad();
+    if fit.spans.len() < MIN_SPANS || rotation_rad < MIN_ROTATION_RAD {
+        let title = "too little rotation to compare the gimbal's attitude with the images";
+        let evidence = format!("{} rotations, {:.2}° in the median", fit.spans.len(), rotation_rad.to_degrees());
+        findings.add(Severity::Note, Area::Encoders, title, evidence, "rotate vehicle and camera about all axes");
+        return None;
+    }
+    let given_s = gimbal.timeshift_gimbal_imu_s;
+    let given = fit.best_shift(source, given_s);
+    let others = fit.single_changes(source, given_s);
+    let best = fit.best_of(&given, &others, given_s);
+    let listed = listed(gimbal, source, &given, &others);
+    let fits = best.misfit_rad < FITTING_RATIO * rotation_rad;
+    if !fits {
+        let title = "no meaning of gimbal.source predicts the rotations in the images";
+        let evidence = format!("rotations of {:.2}° in the median; {listed}", rotation_rad.to_degrees());
+        let remedy =
+            "check its topic, the stamps, and gimbal_axes and imu_axes; then the findings on time and intrinsics";
+        findings.add(Severity::Warning, Area::Encoders, title, evidence, remedy);
+        return None;
+    }
+    let better = best.misfit_rad < BETTER_RATIO * given.misfit_rad;
+    let chosen = if better { best } else { given.clone() };
+    let evidence = format!(
+        "rotations of {:.2}° in the median differ from the images' by {:.3}°; {listed}",
+        rotation_rad.to_degrees(),
+        chosen.misfit_rad.to_degrees()
+    );
+    if better {
+        let changes = difference(gimbal, source, &chosen.source);
+        let title = format!("gimbal.source means another attitude than the rig says: {changes}");
+        let remedy = format!("set {changes} in gimbal.source");
+        findings.add(Severity::Error, Area::Encoders, title, evidence, remedy);
+    } else {
+        findings.good(Area::Encoders, "gimbal.source predicts the rotations in the images", evidence);
+    }
+    let timeshift_s = fit.check_shift(&chosen, given_s, findings);
+    fit.check_first_joint(&chosen, timeshift_s, gimbal, findings);
+    Some(FittedSource { source: chosen.source, timeshift_s })
+}
+
+/// Joins consecutive rotations, from every image on, where the IMU covers them.
+fn spans(rotations: &[&ImageRotation], timeshift_s: f64, imu_facts: &ImuFacts) -> Vec<Span> {
+    let shift_ns = ns_from_seconds(timeshift_s);
+    let joined = |few: &[&ImageRotation]| {
+        let gapless = few.windows(2).all(|pair| pair[0].to_ns == pair[1].from_ns);
+        let (first, last) = (few.first()?, few.last().filter(|_| gapless)?);
+        let rotation = few.iter().fold(UnitQuaternion::identity(), |before, next| next.second_from_first * before);
+        let (from_ns, to_ns) = (first.from_ns + shift_ns, last.to_ns + shift_ns);
+        let of_imu = imu_rotation(imu_facts, from_ns, to_ns)?;
+        Some(Span { from_ns, to_ns, measured: so3::log(&rotation), of_imu })
+    };
+    rotations.windows(JOINED).filter_map(joined).collect()
+}
+
+impl SourceFit<'_> {
+    /// The larger of the median rotations of camera and IMU: a stabilized camera hardly rotates, but a wrong meaning says that it
+    /// does.
+    fn rotation_rad(&self) -> f64 {
+        let of_camera: Vec<f64> = self.spans.iter().map(|span| span.measured.norm()).collect();
+        let of_imu: Vec<f64> = self.spans.iter().map(|span| span.of_imu.angle()).collect();
+        median(&of_camera).max(median(&of_imu))
+    }
+
+    /// Median difference of predicted and measured rotations in radians, with a further rotation of the gimbal's first joint.
+    fn misfit(&self, source: &AttitudeSource, shift_s: f64, first_joint: &UnitQuaternion<f64>) -> f64 {
+        let shift_ns = ns_from_seconds(shift_s);
+        let difference = |span: &Span| {
+            let from = first_joint * self.attitude.orientation_at(source, shift_ns, span.from_ns)?;
+            let to = first_joint * self.attitude.orientation_at(source, shift_ns, span.to_ns)?;
+            Some((so3::log(&(to.inverse() * span.of_imu * from)) - span.measured).norm())
+        };
+        let differences: Vec<f64> = self.spans.iter().filter_map(difference).collect();
+        // A meaning for which most times are lacking (no heading, frames that alternate) is none.
+        if differences.len() * 2 < self.spans.len() { f64::INFINITY } else { median(&differences) }
+    }
+
+    fn best_shift(&self, source: &AttitudeSource, given_s: f64) -> Meaning {
+        let at = |shift_s: &f64| self.misfit(source, given_s + shift_s, &UnitQuaternion::identity());
+        let misfit_rad = COARSE_SHIFTS_S.iter().map(at).fold(f64::INFINITY, f64::min);
+        Meaning { source: source.clone(), misfit_rad }
+    }
+
+    /// The meanings that differ from one in one respect, those of each respect together.
+    fn single_changes(&self, source: &AttitudeSource, given_s: f64) -> Vec<Vec<Meaning>> {
+        let of = |sources: Vec<AttitudeSource>| {
+            sources.iter().map(|source| self.best_shift(source, given_s)).collect::<Vec<_>>()
+        };
+        changes(source, self.attitude.has_vehicle()).into_iter().map(of).collect()
+    }
+
+    /// The meaning with the least misfit among one, its single changes, and changes of each of the better of those.
+    fn best_of(&self, given: &Meaning, others: &[Vec<Meaning>], given_s: f64) -> Meaning {
+        /// Single changes from which a second one is tried.
+        const FOLLOWED: usize = 12;
+        /// Equal meanings in other words differ by rounding; the one with fewer changes is kept.
+        const CLEARLY: f64 = 0.95;
+        let clearly_better = |best: Meaning, other: &Meaning| {
+            if other.misfit_rad < CLEARLY * best.misfit_rad { other.clone() } else { best }
+        };
+        let mut singles: Vec<&Meaning> = others.iter().flatten().collect();
+        singles.sort_by(|a, b| a.misfit_rad.total_cmp(&b.misfit_rad));
+        let mut best = singles.iter().copied().fold(given.clone(), clearly_better);
+        for single in singles.iter().take(FOLLOWED) {
+            let further = self.single_changes(&single.source, given_s);
+            best = further.iter().flatten().fold(best, clearly_better);
+        }
+        best
+    }
+
+    /// The time offset of the gimbal at which the misfit is least, in seconds.
+    fn check_shift(&self, chosen: &Meaning, given_s: f64, findings: &mut Findings) -> f64 {
+        let steps = (MAX_SHIFT_S / SHIFT_STEP_S).round() as i32;
+        let cost = |step: i32| {
+            let shift_s = given_s + f64::from(step) * SHIFT_STEP_S;
+            (shift_s, self.misfit(&chosen.source, shift_s, &UnitQuaternion::identity()))
+        };
+        let costs: Vec<(f64, f64)> = (-steps..=steps).map(cost).collect();
+        let best = (0..costs.len()).min_by(|a, b| costs[*a].1.total_cmp(&costs[*b].1)).unwrap_or(steps as usize);
+        let (unshifted, least) = (costs[steps as usize].1, costs[best].1);
+        let shift_s = vertex(&costs, best, SHIFT_STEP_S);
+        let evidence = format!(
+            "rotations in the images differ by {:.3}° from those predicted, by {:.3}° with timeshift_gimbal_imu {shift_s:+.3} s",
+            unshifted.to_degrees(),
+            least.to_degrees()
+        );
+        let topic = self.attitude.topic();
+        let gain = 1.0 - (least / unshifted.max(f64::MIN_POSITIVE)).powi(2);
+        if (shift_s - given_s).abs() < SHIFT_TOLERANCE_S || gain < MIN_GAIN {
+            findings.good(Area::Time, format!("{topic} and the images are synchronized"), evidence);
+            return given_s;
+        }
+        let title = format!("time offset of {topic} to the IMU: {:+.0} ms", (shift_s - given_s) * 1e3);
+        let remedy = format!("set gimbal.timeshift_gimbal_imu to {shift_s:+.3}");
+        findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
+        shift_s
+    }
+
+    /// An offset of the first joint that decreases the misfit: a yaw that is measured from another direction.
+    fn check_first_joint(&self, chosen: &Meaning, shift_s: f64, gimbal: &GimbalRig, findings: &mut Findings) {
+        let Some((axis, link)) = first_axis(&gimbal.chain).zip(gimbal.chain.links.first()) else { return };
+        let cost = |offset_rad: f64| {
+            (offset_rad, self.misfit(&chosen.source, shift_s, &UnitQuaternion::from_axis_angle(&axis, -offset_rad)))
+        };
+        let scan = |middle_rad: f64, step_rad: f64, steps: i32| {
+            let costs: Vec<(f64, f64)> =
+                (-steps..=steps).map(|step| cost(middle_rad + f64::from(step) * step_rad)).collect();
+            let best = (0..costs.len()).min_by(|a, b| costs[*a].1.total_cmp(&costs[*b].1)).unwrap_or(0);
+            (vertex(&costs, best, step_rad), costs[best].1)
+        };
+        let (coarse_rad, _) = scan(0.0, 10_f64.to_radians(), 18);
+        let (offset_rad, least) = scan(coarse_rad, 1_f64.to_radians(), 10);
+        let unturned = cost(0.0).1;
+        let gain = 1.0 - (least / unturned.max(f64::MIN_POSITIVE)).powi(2);
+        if offset_rad.abs() < OFFSET_TOLERANCE_RAD || gain < MIN_GAIN {
+            return;
+        }
+        let joint = gimbal.joints.first().map_or("the first joint", |joint| joint.name.as_str());
+        let title = format!("the attitude is rotated by {:.1}° about the axis of '{joint}'", offset_rad.to_degrees());
+        let evidence = format!(
+            "rotations in the images differ by {:.3}° from those predicted, by {:.3}° without it",
+            unturned.to_degrees(),
+            least.to_degrees()
+        );
+        let remedy = format!(
+            "set gimbal.links[0].theta_offset to {:.4}, or raise gimbal.prior.rotation_bound above {:.3}",
+            link.theta_offset_rad - offset_rad,
+            offset_rad.abs()
+        );
+        findings.add(Severity::Warning, Area::Encoders, title, evidence, remedy);
+    }
+}
+
+/// Axis of the first joint in the IMU frame.
+fn first_axis(chain: &ClassicalChain) -> Option<Unit<Vector3<f64>>> {
+    (!chain.links.is_empty()).then(|| Unit::new_normalize(chain.imu_from_base.rotation * Vector3::z()))
+}
+
+/// The misfits of the rig's meaning and of the best change in each respect.
+fn listed(gimbal: &GimbalRig, source: &AttitudeSource, given: &Meaning, others: &[Vec<Meaning>]) -> String {
+    let degrees = |misfit_rad: f64| {
+        if misfit_rad.is_finite() { format!("{:.2}°", misfit_rad.to_degrees()) } else { "not defined".to_owned() }
+    };
+    let best = |meanings: &Vec<Meaning>| {
+        let best = meanings.iter().min_by(|a, b| a.misfit_rad.total_cmp(&b.misfit_rad))?;
+        Some(format!("{} {}", difference(gimbal, source, &best.source), degrees(best.misfit_rad)))
+    };
+    let all: Vec<String> = others.iter().filter_map(best).collect();
+    format!("misfit as in the rig {}, with {}", degrees(given.misfit_rad), all.join("; "))
+}
