@@ -22,6 +22,21 @@ use tempfile::TempDir;
 /// The rig of the logs that the seeds hold: a gimballed and a rigid camera of 16 × 12 pixels.
 pub const RIG: &str = include_str!("rig.yaml");
 
+/// Sources of the gimbal's attitude that are read in place of its joint angles, each from the topic of [`topic_of`].
+pub const SOURCES: [&str; 6] = [
+    "{topic: /gimbal/quaternion, type: quaternion, frame: earth, axes: frd, vehicle: /vehicle/attitude}",
+    "{topic: /pose, type: pose, frame: body, axes: flu, gimbal_axes: rdf}",
+    "{topic: /gimbal/angles, type: euler, frame: vehicle, axes: frd, order: yaw=z pitch=x, unit: deg, vehicle: /vehicle/attitude}",
+    "{topic: /tf, type: tf, frame: body, axes: flu, parent: base, child: gimbal}",
+    "{topic: /gimbal/device, type: mavros, vehicle: /pose}",
+    "{topic: /gimbal/status, type: px4, vehicle: /vehicle/attitude}",
+];
+
+/// The rig of the seeds with an attitude in place of joint angles.
+pub fn rig_with_source(source: &str) -> String {
+    RIG.replace("rostopic: /gimbal/joint_states", &format!("source: {source}"))
+}
+
 /// Images and frames that are read of one input.
 const MAX_READ: usize = 40;
 
@@ -51,6 +66,17 @@ fn read_log(path: &Path) {
     let rig = Rig::from_yaml(RIG, Path::new("rig.yaml")).expect("the rig of the seeds is valid");
     for camera in &rig.cameras {
         if let Ok(frames) = FrameStream::new(Arc::clone(&log), &rig, &camera.key, 0.0, None) {
+            frames.take(MAX_READ).for_each(drop);
+        }
+    }
+    for source in SOURCES {
+        let rig = Rig::from_yaml(&rig_with_source(source), Path::new("rig.yaml")).expect("the source is valid");
+        let topic = rig.gimbal.as_ref().and_then(|gimbal| gimbal.topic.as_deref());
+        if topic.is_some_and(|topic| log.topic(topic).is_none()) {
+            continue;
+        }
+        drop(log_check::check(&log, Ok(&rig), &[]));
+        if let Ok(frames) = FrameStream::new(Arc::clone(&log), &rig, "cam0", 0.0, None) {
             frames.take(MAX_READ).for_each(drop);
         }
     }

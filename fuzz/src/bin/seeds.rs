@@ -9,10 +9,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use dcvins::camera::{CameraModel, Distortion, Projection};
-use dcvins::flight_log::{LogCompression, LogWriter, LogWriterOptions, MessageKind, MessageTimes};
+use dcvins::flight_log::{LogCompression, LogWriter, LogWriterOptions, MessageKind, MessageTimes, MessageType};
 use dcvins::geometry::RigidTransform;
 use dcvins::sensors::Rig;
-use dcvins_fuzz::{EUROC_FILES, RIG, topic_of};
+use dcvins_fuzz::{EUROC_FILES, RIG, SOURCES, rig_with_source, topic_of};
 use libfuzzer_sys as _; // it defines what the counters of the build call
 use nalgebra::Vector3;
 use ros1::{Compression, Message, bag, f64_sequence, f64s, header, text};
@@ -76,10 +76,78 @@ fn write_log(path: &Path, options: &LogWriterOptions) -> Result<(), Failed> {
             log.write_odometry(odometry, "world", "imu", times(index), &pose, &force, &rate)?;
             log.write_pose(topic_of(MessageKind::PoseStamped), "world", times(index), &pose)?;
             log.write_transform(topic_of(MessageKind::TransformStamped), "world", "imu", times(index), &pose)?;
+            write_attitudes(&mut log, times(index))?;
         }
     }
     log.attach("seed.rig.yaml", "application/yaml", RIG, EPOCH_NS)?;
     log.finish()?;
+    Ok(())
+}
+
+/// A message in CDR, little-endian.
+struct Cdr(Vec<u8>);
+
+impl Cdr {
+    fn put<const N: usize>(mut self, values: &[[u8; N]]) -> Self {
+        for value in values {
+            self.0.resize((self.0.len() - 4).next_multiple_of(N) + 4, 0);
+            self.0.extend_from_slice(value);
+        }
+        self
+    }
+
+    fn text(self, text: &str) -> Self {
+        let mut out = self.put(&[(text.len() as u32 + 1).to_le_bytes()]);
+        out.0.extend_from_slice(text.as_bytes());
+        out.0.push(0);
+        out
+    }
+
+    fn header(self, stamp_ns: i64, frame: &str) -> Self {
+        let (seconds, rest) = ((stamp_ns / 1_000_000_000) as i32, (stamp_ns % 1_000_000_000) as u32);
+        self.put(&[seconds.to_le_bytes()]).put(&[rest.to_le_bytes()]).text(frame)
+    }
+
+    fn f64s(self, values: &[f64]) -> Self {
+        values.iter().fold(self, |out, value| out.put(&[value.to_le_bytes()]))
+    }
+
+    fn f32s(self, values: &[f32]) -> Self {
+        values.iter().fold(self, |out, value| out.put(&[value.to_le_bytes()]))
+    }
+}
+
+/// The attitude of gimbal and vehicle in every message that is read.
+fn write_attitudes(log: &mut LogWriter, times: MessageTimes) -> Result<(), Failed> {
+    let start = || Cdr(vec![0, 1, 0, 0]);
+    let stamp_ns = times.stamp_ns;
+    let boot = (stamp_ns as u64 / 1000).to_le_bytes();
+    let rotation = [0.1, -0.2, 0.3, 0.927];
+    let px4_rotation = [0.927_f32, 0.1, -0.2, 0.3];
+    let transforms = start()
+        .put(&[2_u32.to_le_bytes()])
+        .header(stamp_ns, "base")
+        .text("yaw")
+        .f64s(&[0.0; 3])
+        .f64s(&rotation)
+        .header(stamp_ns, "/yaw")
+        .text("gimbal")
+        .f64s(&[0.0; 3])
+        .f64s(&rotation);
+    let flags = 12_u16.to_le_bytes();
+    let device = start().header(stamp_ns, "").put(&[[1], [154]]).put(&[flags]).f64s(&rotation).f32s(&[0.0; 3]);
+    let status = start().put(&[boot]).put(&[[1], [154]]).put(&[flags]).f32s(&px4_rotation).f32s(&[0.0; 6]);
+    let messages = [
+        (MessageKind::QuaternionStamped, start().header(stamp_ns, "earth").f64s(&rotation)),
+        (MessageKind::Vector3Stamped, start().header(stamp_ns, "").f64s(&[-20.0, 1.0, 90.0])),
+        (MessageKind::Transforms, transforms),
+        (MessageKind::MavrosGimbalAttitude, device.put(&[[0; 4]])),
+        (MessageKind::Px4GimbalAttitude, status),
+        (MessageKind::Px4VehicleAttitude, start().put(&[boot, boot]).f32s(&px4_rotation).f32s(&[0.0; 4])),
+    ];
+    for (kind, message) in messages {
+        log.write_typed(topic_of(kind), &MessageType::ros2(kind.schema_name(), ""), times, &message.0)?;
+    }
     Ok(())
 }
 
@@ -195,6 +263,9 @@ fn databases(corpus: &Path, log: &Path) -> Result<(), Failed> {
 fn texts(corpus: &Path) -> Result<(), Failed> {
     let rigs = target(corpus, "rig")?;
     fs::write(rigs.join("commented"), RIG)?;
+    for (number, source) in SOURCES.iter().enumerate() {
+        fs::write(rigs.join(format!("source-{number}")), rig_with_source(source))?;
+    }
     fs::write(rigs.join("written"), Rig::from_yaml(RIG, Path::new("rig.yaml"))?.to_yaml())?;
     fs::write(
         rigs.join("kalibr"),
