@@ -46,7 +46,7 @@ pub(crate) struct SimulateArguments {
     /// A disturbance, in seconds and SI units; may be given several times: camera-offset=S, joint-lag=S,
     /// joint-start=S, image-gap=START,LENGTH, exposure=S, gyroscope-range=RAD/S, accelerometer-range=M/S²,
     /// light=START,FACTOR, blank=START,LENGTH, slew=START,LENGTH, spin=START,LENGTH,RAD/S, hold-joint=NUMBER,START,LENGTH,
-    /// hover=START,LENGTH, stabilize=START,LENGTH.
+    /// hover=START,LENGTH, stabilize=START,LENGTH, vibration=HZ,RAD/S,M/S².
     #[arg(long, value_name = "KEY=VALUE[,VALUE…]")]
     pub disturb: Vec<String>,
 }

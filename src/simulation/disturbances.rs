@@ -2,6 +2,7 @@
 
 use super::interval::during;
 use super::options::SimulationError;
+use super::vibration::Vibration;
 
 /// What may go wrong on a flight; by default nothing.
 ///
@@ -39,6 +40,8 @@ pub struct Disturbances {
     /// Start, duration and rate (in rad/s) of a rotation of the vehicle about the vertical, beyond the limits of
     /// experiments.
     pub spin: Option<[f64; 3]>,
+    /// Vibration of the airframe in the IMU; images and gimbal are free of it.
+    pub vibration: Option<Vibration>,
 }
 
 /// Time constant of the cameras' automatic exposure.
@@ -49,8 +52,8 @@ pub(crate) const BLANK_GREY: f32 = 150.0;
 /// What [`Disturbances::set`] reads, for messages and help.
 const KEYS: &str = "camera-offset=S, joint-lag=S, joint-start=S, image-gap=START,LENGTH, exposure=S, \
                     gyroscope-range=RAD/S, accelerometer-range=M/S², light=START,FACTOR, blank=START,LENGTH, \
-                    slew=START,LENGTH, spin=START,LENGTH,RAD/S, hold-joint=NUMBER,START,LENGTH, hover=START,LENGTH or \
-                    stabilize=START,LENGTH";
+                    slew=START,LENGTH, spin=START,LENGTH,RAD/S, hold-joint=NUMBER,START,LENGTH, hover=START,LENGTH, \
+                    stabilize=START,LENGTH or vibration=HZ,RAD/S,M/S²";
 
 impl Disturbances {
     /// Adds one disturbance written as `KEY=VALUE[,VALUE…]`, in seconds and SI units, as on the command line.
@@ -84,6 +87,10 @@ impl Disturbances {
             "spin" => self.spin = Some(three()?),
             "hold-joint" => self.fixed_joint = Some(three()?),
             "hover" => self.hover_s = Some(two()?),
+            "vibration" => {
+                let [rotor_hz, rate_rad_per_s, force_m_per_s2] = three()?;
+                self.vibration = Some(Vibration { rotor_hz, rate_rad_per_s, force_m_per_s2 });
+            }
             "stabilize" => self.stabilized_s = Some(two()?),
             _ => return Err(unknown()),
         }
@@ -105,6 +112,10 @@ impl Disturbances {
         within("factor of the light", self.light_change.map_or(1.0, |[_, factor]| factor), 0.01, 100.0)?;
         within("number of the fixed joint", self.fixed_joint.map_or(1.0, |[joint, _, _]| joint), 1.0, 3.0)?;
         within("length of the hover in seconds", self.hover_s.map_or(0.0, |[_, length]| length), 0.0, 3600.0)?;
+        let vibration = self.vibration.unwrap_or(Vibration { rotor_hz: 1.0, rate_rad_per_s: 0.0, force_m_per_s2: 0.0 });
+        within("frequency of the rotors in Hz", vibration.rotor_hz, 1.0, 1000.0)?;
+        within("vibration in rad/s", vibration.rate_rad_per_s, 0.0, 100.0)?;
+        within("vibration in m/s²", vibration.force_m_per_s2, 0.0, 1000.0)?;
         within("rate of the spin in rad/s", self.spin.map_or(0.0, |[_, _, rate]| rate), -6.0, 6.0)
     }
 

@@ -28,6 +28,7 @@ mod synthetic;
 #[cfg(test)]
 mod tests;
 mod trajectory;
+mod vibration;
 #[cfg(feature = "logs")]
 mod world;
 
@@ -46,3 +47,4 @@ pub use synthetic::{
     SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks,
 };
 pub use trajectory::{Kinematics, Trajectory, VehicleLimits};
+pub use vibration::Vibration;

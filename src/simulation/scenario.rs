@@ -20,6 +20,7 @@ pub(crate) mod stream {
     pub(crate) const FEATURES: u64 = 8;
     pub(crate) const IMAGES: u64 = 9;
     pub(crate) const DELIVERY: u64 = 10;
+    pub(crate) const VIBRATION: u64 = 11;
 }
 
 /// Time from an IMU sample to the encoder reading.

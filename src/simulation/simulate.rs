@@ -18,6 +18,7 @@ use super::random::RandomStream;
 use super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{AIR_DRAG_PER_S, Trajectory, VehicleLimits};
+use super::vibration::shake;
 use super::world;
 use crate::flight_log::output::OutputSet;
 use crate::flight_log::{LogError, LogWriter, LogWriterOptions, MessageTimes};
@@ -149,6 +150,9 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
             imu_noise_scale: options.imu_noise_scale,
         },
     );
+    if let Some(vibration) = &options.disturbances.vibration {
+        shake(&mut scenario.imu_record, &scenario.trajectory, vibration, &mut random(stream::VIBRATION));
+    }
     for sample in &mut scenario.imu_record.samples {
         if let Some(range) = options.disturbances.gyroscope_range_rad_per_s {
             sample.angular_velocity_rad_per_s.apply(|rate| *rate = rate.clamp(-range.abs(), range.abs()));

@@ -167,6 +167,11 @@ impl Trajectory {
         self.duration_s
     }
 
+    /// Gravity of its world, in m/s².
+    pub(super) fn gravity_m_per_s2(&self) -> f64 {
+        self.gravity_m_per_s2
+    }
+
     /// Pose, velocity and the measurement of an ideal IMU, `time_s` after the start.
     pub fn at(&self, time_s: f64) -> Kinematics {
         let position_m = self.position_m.derivative(time_s, 0);
