@@ -15,7 +15,9 @@ use nalgebra::Vector3;
 use thiserror::Error;
 
 use crate::camera::CameraModel;
-use crate::sensors::{AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Rig};
+use crate::sensors::{
+    AssumedField, AttitudeSource, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Rig,
+};
 
 /// Standard deviation of a joint angle of a gimbal whose encoders nobody has measured, in radians (0.5°).
 const JOINT_SIGMA_RAD: f64 = 0.0087;
@@ -101,6 +103,12 @@ pub enum TemplateError {
         /// Why not.
         reason: String,
     },
+    /// The meaning of an attitude topic is not complete.
+    #[error("--attitude: {problem}")]
+    Attitude {
+        /// What is missing or wrong.
+        problem: String,
+    },
     /// The joints of the log do not match the mechanism.
     #[error("the joints of {topic} ({}) do not match the mechanism {mechanism}: name them in its order with --joints", found.join(", "))]
     Joints {
@@ -182,17 +190,15 @@ pub enum AngleTemplate {
     None,
 }
 
-/// The attitude topic of a gimbal: the entries of `gimbal.source`.
+/// The attitude topic of a gimbal: `gimbal.source`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AttitudeTemplate {
     /// The topic.
     pub topic: String,
     /// Rate in Hz.
     pub rate_hz: f64,
-    /// Further entries in the order in which they are written, such as `("frame", "earth")`.
-    pub entries: Vec<(String, String)>,
-    /// Why the entries are only assumed; `None` when they are known.
-    pub assumed: Option<String>,
+    /// What its messages mean.
+    pub source: Sourced<AttitudeSource>,
 }
 
 /// The gimbal of a template.
@@ -226,7 +232,7 @@ pub struct RigTemplate {
 }
 
 impl RigTemplate {
-    /// The rig with its `assumed` fields. An attitude topic is not in it but in the text of [`Self::to_yaml`].
+    /// The rig with its `assumed` fields.
     pub fn rig(&self) -> Rig {
         let imu_axes = self.imu.axes.value;
         let mount = if self.gimbal.is_some() {
@@ -267,13 +273,16 @@ impl RigTemplate {
                 (Some(topic.value.clone()), *rate_hz, Some(JOINT_SIGMA_RAD), names.clone())
             }
             AngleTemplate::Attitude(attitude) => {
-                (None, attitude.rate_hz, Some(ATTITUDE_SIGMA_RAD), gimbal.axes.default_names())
+                (Some(attitude.topic.clone()), attitude.rate_hz, Some(ATTITUDE_SIGMA_RAD), gimbal.axes.default_names())
             }
             AngleTemplate::None => (None, 0.0, None, gimbal.axes.default_names()),
         };
         GimbalRig {
             topic,
-            attitude: None,
+            attitude: match &gimbal.angles {
+                AngleTemplate::Attitude(attitude) => Some(attitude.source.value.clone()),
+                _ => None,
+            },
             timeshift_gimbal_imu_s: 0.0,
             rate_hz,
             encoder_sigma_rad: sigma_rad,
@@ -309,7 +318,7 @@ impl RigTemplate {
         };
         match &gimbal.angles {
             AngleTemplate::Joints { topic, .. } => add("gimbal.rostopic", topic.assumed.clone()),
-            AngleTemplate::Attitude(attitude) => add("gimbal.source", attitude.assumed.clone()),
+            AngleTemplate::Attitude(attitude) => add("gimbal.source", attitude.source.assumed.clone()),
             AngleTemplate::None => {}
         }
         if gimbal.angles != AngleTemplate::None {

@@ -159,11 +159,25 @@ fn an_assumed_field_must_exist() {
 
 #[test]
 fn an_attitude_is_written_as_the_source_of_the_angles() {
-    let entries = [("type", "euler"), ("frame", "earth"), ("unit", "deg")];
-    let attitude =
-        ("/gimbal/attitude".to_owned(), entries.map(|(key, value)| (key.to_owned(), value.to_owned())).to_vec());
-    let choices = RigChoices { attitude: Some(attitude), ..choices("yaw-pitch", "fov:84") };
-    let text = RigTemplate::new(&choices, None).unwrap().to_yaml();
-    assert!(text.contains("  source: {topic: \"/gimbal/attitude\", type: euler, frame: earth, unit: deg}\n"), "{text}");
-    assert!(text.contains("  gimbal.source: "), "{text}");
+    let with = |entries: &[(&str, &str)]| {
+        let entries = entries.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        let attitude = Some(("/gimbal/attitude".to_owned(), entries));
+        RigTemplate::new(
+            &RigChoices { attitude, imu_axes: Some(VehicleAxes::ForwardRightDown), ..choices("yaw-pitch", "fov:84") },
+            None,
+        )
+    };
+    let template =
+        with(&[("type", "quaternion"), ("frame", "earth"), ("axes", "frd"), ("vehicle", "/attitude")]).unwrap();
+    let read = Rig::from_yaml(&template.to_yaml(), Path::new("new.rig.yaml")).unwrap();
+    let gimbal = read.gimbal.unwrap();
+    assert_eq!(gimbal.topic.as_deref(), Some("/gimbal/attitude"));
+    let source = gimbal.attitude.unwrap();
+    assert_eq!(
+        (source.frame.name(), source.axes.name(), source.imu_axes.to_string().as_str()),
+        ("earth", "frd", "frd")
+    );
+    assert!(read.assumed.iter().any(|assumed| assumed.field == "gimbal.source"));
+    let error = with(&[("type", "quaternion"), ("frame", "earth"), ("axes", "frd")]).unwrap_err().to_string();
+    assert!(error.contains("--attitude: vehicle: missing"), "{error}");
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{AngleTemplate, AttitudeTemplate, RigTemplate, VehicleAxes};
+use super::RigTemplate;
 
 /// Numbers of a rotation matrix that differ less from a whole one by rounding.
 const ROUNDING: f64 = 1e-9;
@@ -20,14 +20,9 @@ impl RigTemplate {
                 path.retain(|(depth, _)| *depth < indentation);
                 path.push((indentation, key.to_owned()));
                 let full = path.iter().map(|(_, key)| key.as_str()).collect::<Vec<_>>().join(".");
-                for comment in self.comments(&full) {
+                for comment in Self::comments(&full) {
                     // Writing to a string cannot fail.
                     let _infallible = writeln!(out, "{:indentation$}# {comment}", "");
-                }
-                if full == "gimbal.encoder_sigma"
-                    && let Some(AngleTemplate::Attitude(attitude)) = self.gimbal.as_ref().map(|gimbal| &gimbal.angles)
-                {
-                    out.push_str(&source_line(attitude, self.imu.axes.value));
                 }
             }
             out.push_str(&with_whole_numbers(line));
@@ -37,7 +32,7 @@ impl RigTemplate {
     }
 
     /// The comments above a field.
-    fn comments(&self, path: &str) -> Vec<String> {
+    fn comments(path: &str) -> Vec<String> {
         let text = match path {
             "gravity" => "m/s²; 9.78 at the equator to 9.83 at the poles.",
             "imu0.accelerometer_noise_density" => {
@@ -46,7 +41,7 @@ impl RigTemplate {
             "cam0.intrinsics" => "fx fy cx cy in pixels; a calibration with a target also gives the distortion.",
             "cam0.timeshift_cam_imu" => "Seconds: t_imu = t_cam + shift. `dcvins check` measures it.",
             "cam0.T_cam_imu" => "Kalibr's direction: maps points from the IMU to the camera.",
-            "gimbal.rostopic" if self.has_attitude() => "No joint angles: they follow from the attitude below.",
+            "gimbal.source" => "No joint angles: they follow from this attitude.",
             "gimbal.rostopic" => "Joint angles (sensor_msgs/msg/JointState), null when there are none.",
             "gimbal.encoder_sigma" => "Standard deviation of a joint angle in rad; `dcvins check` measures it.",
             "gimbal.prior" => "How wrong T_I_B, links and T_E_C may be: bounds in m and rad.",
@@ -62,27 +57,10 @@ impl RigTemplate {
         };
         vec![text.to_owned()]
     }
-
-    fn has_attitude(&self) -> bool {
-        matches!(self.gimbal.as_ref().map(|gimbal| &gimbal.angles), Some(AngleTemplate::Attitude(_)))
-    }
 }
 
 const HEADER: &str =
     "# A rig before calibration. Usual values stand where nothing is known: see `assumed` at the end.\n";
-
-/// `gimbal.source` in one line; the axes of the IMU where they are not those that the source takes for granted.
-fn source_line(attitude: &AttitudeTemplate, imu_axes: VehicleAxes) -> String {
-    let quoted = |text: &str| serde_json::Value::from(text).to_string();
-    let entries = attitude.entries.iter().map(|(key, value)| format!(", {key}: {value}"));
-    let is_given = attitude.entries.iter().any(|(key, _)| key == "imu_axes");
-    let of_imu = if is_given || imu_axes == VehicleAxes::ForwardLeftUp {
-        String::new()
-    } else {
-        format!(", imu_axes: {}", imu_axes.name())
-    };
-    format!("  source: {{topic: {}{}{of_imu}}}\n", quoted(&attitude.topic), entries.collect::<String>())
-}
 
 /// A row of a matrix whose numbers are whole but for rounding, as it is read best; any other line as it is.
 fn with_whole_numbers(line: &str) -> String {
@@ -95,25 +73,4 @@ fn with_whole_numbers(line: &str) -> String {
     };
     let numbers: Vec<String> = row.split(", ").map(number).collect();
     format!("{head}- [{}]", numbers.join(", "))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_source_names_the_axes_of_an_imu_that_points_down() {
-        let attitude = |entries: &[(&str, &str)]| AttitudeTemplate {
-            topic: "/gimbal/attitude".to_owned(),
-            rate_hz: 10.0,
-            entries: entries.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect(),
-            assumed: None,
-        };
-        let plain = attitude(&[("type", "quaternion"), ("axes", "frd")]);
-        let start = "  source: {topic: \"/gimbal/attitude\", type: quaternion, axes: frd";
-        assert_eq!(source_line(&plain, VehicleAxes::ForwardLeftUp), format!("{start}}}\n"));
-        assert_eq!(source_line(&plain, VehicleAxes::ForwardRightDown), format!("{start}, imu_axes: frd}}\n"));
-        let given = attitude(&[("type", "quaternion"), ("axes", "frd"), ("imu_axes", "flu")]);
-        assert_eq!(source_line(&given, VehicleAxes::ForwardRightDown), format!("{start}, imu_axes: flu}}\n"));
-    }
 }

@@ -1,7 +1,10 @@
 //! A template for a log: its topics, rates, image size and the direction of gravity in its IMU.
 
+use std::path::Path;
+
 use nalgebra::Vector3;
 
+use super::super::fields::Field;
 use super::super::read::CameraFacts as _;
 use super::camera::{of_field_of_view, of_published};
 use super::{
@@ -11,7 +14,7 @@ use super::{
 use crate::camera::CameraModel;
 use crate::flight_log::image_decoding::{BitDepth, decode_image};
 use crate::flight_log::messages::{self, MessageKind};
-use crate::flight_log::{FlightLog, TopicInfo};
+use crate::flight_log::{FlightLog, LogError, TopicInfo};
 use crate::sensors::ImuNoise;
 
 /// Messages of the IMU over which gravity is averaged.
@@ -64,7 +67,7 @@ impl RigTemplate {
     pub fn new(choices: &RigChoices, log: Option<&FlightLog>) -> Result<Self, TemplateError> {
         let imu = imu(choices, log)?;
         let camera = camera(choices, log)?;
-        let gimbal = if choices.mechanism.0.is_empty() { None } else { Some(gimbal(choices, log)?) };
+        let gimbal = if choices.mechanism.0.is_empty() { None } else { Some(gimbal(choices, imu.axes.value, log)?) };
         let nothing_known =
             "nobody has measured where the gimbal is; it is taken to be at the IMU, give or take 3 cm per link";
         let position_m = choices.position_m.map_or_else(
@@ -257,20 +260,13 @@ fn image_size(log: &FlightLog, info: &TopicInfo) -> Option<[usize; 2]> {
     log.find_message(&info.topic, |data| decoded(data).map(|image| [image.width, image.height]))
 }
 
-fn gimbal(choices: &RigChoices, log: Option<&FlightLog>) -> Result<GimbalTemplate, TemplateError> {
+fn gimbal(
+    choices: &RigChoices,
+    imu_axes: VehicleAxes,
+    log: Option<&FlightLog>,
+) -> Result<GimbalTemplate, TemplateError> {
     let angles = match (&choices.attitude, log) {
-        (Some((topic, entries)), log) => {
-            let info = log.map(|log| {
-                log.topic(topic).ok_or_else(|| TemplateError::NoTopic {
-                    what: format!("topic '{topic}'"),
-                    remedy: "give the topic of the gimbal's attitude".to_owned(),
-                })
-            });
-            let rate_hz = info.transpose()?.map_or(IMAGE_RATE_HZ, |info| rounded_hz(info.rate_hz, IMAGE_RATE_HZ));
-            let assumed = "frame, axes, order and unit of the attitude are as the command line says, or usual";
-            let (topic, entries) = (topic.clone(), entries.clone());
-            AngleTemplate::Attitude(AttitudeTemplate { topic, rate_hz, entries, assumed: Some(assumed.to_owned()) })
-        }
+        (Some((topic, entries)), log) => AngleTemplate::Attitude(attitude(topic, entries, imu_axes, log)?),
         (None, Some(log)) => joints(choices, log)?,
         (None, None) => AngleTemplate::None,
     };
@@ -283,6 +279,36 @@ fn gimbal(choices: &RigChoices, log: Option<&FlightLog>) -> Result<GimbalTemplat
         (None, _) => Sourced::known(VehicleAxes::ForwardRightDown),
     };
     Ok(GimbalTemplate { axes: choices.mechanism.clone(), positive, angles })
+}
+
+/// The attitude on a topic with these entries of `gimbal.source`; the axes of the IMU need not be among them.
+fn attitude(
+    topic: &str,
+    entries: &[(String, String)],
+    imu_axes: VehicleAxes,
+    log: Option<&FlightLog>,
+) -> Result<AttitudeTemplate, TemplateError> {
+    let info = log.map(|log| {
+        log.topic(topic).ok_or_else(|| TemplateError::NoTopic {
+            what: format!("topic '{topic}'"),
+            remedy: "give the topic of the gimbal's attitude".to_owned(),
+        })
+    });
+    let rate_hz = info.transpose()?.map_or(IMAGE_RATE_HZ, |info| rounded_hz(info.rate_hz, IMAGE_RATE_HZ));
+    let mut mapping = serde_json::Map::new();
+    mapping.insert("imu_axes".to_owned(), imu_axes.name().into());
+    mapping.extend(entries.iter().map(|(key, value)| (key.clone(), value.as_str().into())));
+    mapping.insert("topic".to_owned(), topic.into());
+    let document = serde_json::Value::Object(mapping);
+    let source = super::super::attitude::read(&Field::root(&document, Path::new("")));
+    let (_, source) = source.map_err(|error| TemplateError::Attitude {
+        problem: match error {
+            LogError::Rig { field, problem, .. } => format!("{field}: {problem}"),
+            error => error.to_string(),
+        },
+    })?;
+    let reason = "frame, axes, order and unit of the attitude are as they were given, and not confirmed";
+    Ok(AttitudeTemplate { topic: topic.to_owned(), rate_hz, source: Sourced::assumed(source, reason) })
 }
 
 fn joints(choices: &RigChoices, log: &FlightLog) -> Result<AngleTemplate, TemplateError> {
