@@ -1,6 +1,8 @@
 use nalgebra::Vector3;
 
-use super::statistics::{mean, median, percentile, standard_deviation, white_standard_deviation};
+use super::imu_noise::check_noise;
+use super::spectrum::Spectrum;
+use super::statistics::{mean, median, standard_deviation};
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
@@ -10,17 +12,16 @@ use crate::sensors::{ImuSample, Rig};
 const NO_FORCE_M_PER_S2: f64 = 0.01;
 /// Length of the windows that are classified as stationary or not.
 const WINDOW_NS: i64 = 500_000_000;
-/// Stationary: the standard deviation of the angular rate, white noise removed, is below this.
+/// Half width of the Hann window by which motion is told from vibration and white noise: what is slower than 4 Hz remains.
+const SMOOTHING_NS: i64 = 125_000_000;
+/// Step of the smoothed signal.
+const SMOOTHED_STEP_NS: i64 = 31_250_000;
+/// Stationary: the standard deviation of the smoothed angular rate, white noise removed, is below this.
 const STATIONARY_RATE_RAD_PER_S: f64 = 0.012;
-/// Stationary: the standard deviation of the specific force, white noise removed, is below this.
+/// Stationary: the standard deviation of the smoothed specific force, white noise removed, is below this.
 const STATIONARY_FORCE_M_PER_S2: f64 = 0.06;
 /// Stationary: the mean angular rate, bias included, is below this.
 const STATIONARY_MEAN_RAD_PER_S: f64 = 0.08;
-/// Measured noise above this many times the rig's is reported.
-const NOISE_TOO_SMALL: f64 = 3.0;
-/// Measured noise this many times below the rig's is reported.
-const NOISE_TOO_LARGE: f64 = 30.0;
-
 /// Half a second of IMU samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
@@ -29,8 +30,6 @@ pub(super) struct Window {
     pub(super) stationary: bool,
     mean_rate: Vector3<f64>,
     mean_force: Vector3<f64>,
-    white_rate: Vector3<f64>,
-    white_force: Vector3<f64>,
 }
 
 /// IMU samples and what they measure of the motion, for later checks.
@@ -64,17 +63,22 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
     if samples.len() < 10 {
         return ImuFacts { samples, ..ImuFacts::default() };
     }
-    let windows = windows_of(&samples, &survey.accelerometer);
+    let rates: Vec<Stamped> =
+        samples.iter().map(|sample| (sample.stamp_ns, sample.angular_velocity_rad_per_s)).collect();
+    // Specific forces are those of an accelerometer of its own when there is one: interpolation removes noise.
+    let forces: Vec<Stamped> = if survey.accelerometer.is_empty() {
+        samples.iter().map(|sample| (sample.stamp_ns, sample.specific_force_m_per_s2)).collect()
+    } else {
+        survey.accelerometer.clone()
+    };
+    let spectra = [Spectrum::of(&rates), Spectrum::of(&forces)];
+    let windows = windows_of(&rates, &forces, &spectra);
     let stationary: Vec<Window> = windows.iter().filter(|window| window.stationary).copied().collect();
     let others: Vec<&String> =
         survey.imu_topics.iter().filter(|topic| survey.imu_topic.as_ref() != Some(*topic)).collect();
     check_gravity(&samples, &stationary, rig, &others, findings);
     let gyroscope_bias = check_gyroscope_bias(&stationary, findings);
-    let rates_hz = [
-        sample_rate_hz(&samples, |sample| sample.stamp_ns),
-        sample_rate_hz(&survey.accelerometer, |(stamp_ns, _)| *stamp_ns),
-    ];
-    check_noise(rates_hz, &windows, &stationary, rig, findings);
+    check_noise(&spectra, rig, findings);
     check_clipping(&samples, findings);
     check_stationary(&windows, findings);
     let forces = || samples.iter().map(|sample| sample.specific_force_m_per_s2).collect::<Vec<_>>();
@@ -84,49 +88,72 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
     ImuFacts { samples, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up) }
 }
 
-/// Mean rate in Hz of at least two samples in the order of their stamps.
-fn sample_rate_hz<T>(samples: &[T], stamp_ns: impl Fn(&T) -> i64) -> Option<f64> {
-    let (first, last) = (samples.first()?, samples.last().filter(|_| samples.len() > 1)?);
-    Some((samples.len() - 1) as f64 / seconds_from_ns(stamp_ns(last) - stamp_ns(first)).max(1e-9))
-}
+/// A stamp with a vector in the IMU frame.
+type Stamped = (i64, Vector3<f64>);
 
-/// The windows of a log. Specific forces are those of an accelerometer of its own when there is one: interpolation removes
-/// noise.
-fn windows_of(samples: &[ImuSample], accelerometer: &[(i64, Vector3<f64>)]) -> Vec<Window> {
+/// The windows of a log from its angular rates and specific forces, both in the order of their stamps.
+fn windows_of(rates: &[Stamped], forces: &[Stamped], spectra: &[Option<Spectrum>; 2]) -> Vec<Window> {
     let mut windows = Vec::new();
+    let white = |sensor: usize| spectra[sensor].as_ref().map_or(0.0, |spectrum| smoothed_white(spectrum.density));
+    let slow_rate = |range: (i64, i64)| (smoothed_deviation(rates, range).powi(2) - white(0)).max(0.0).sqrt();
+    let slow_force = |range: (i64, i64)| (smoothed_deviation(forces, range).powi(2) - white(1)).max(0.0).sqrt();
     let mut begin = 0;
-    while begin < samples.len() {
-        let end_ns = samples[begin].stamp_ns + WINDOW_NS;
-        let end = samples.partition_point(|sample| sample.stamp_ns < end_ns);
-        let part = &samples[begin..end];
-        if part.len() >= 20 && samples.len() > end {
-            let rates: Vec<Vector3<f64>> = part.iter().map(|sample| sample.angular_velocity_rad_per_s).collect();
-            let forces: Vec<Vector3<f64>> = if accelerometer.is_empty() {
-                part.iter().map(|sample| sample.specific_force_m_per_s2).collect()
-            } else {
-                let from = accelerometer.partition_point(|(stamp_ns, _)| *stamp_ns < samples[begin].stamp_ns);
-                let own = accelerometer[from..].iter().take_while(|(stamp_ns, _)| *stamp_ns < end_ns);
-                own.map(|(_, force)| *force).collect()
-            };
-            let (white_rate, white_force) = (white_standard_deviation(&rates), white_standard_deviation(&forces));
-            let beyond =
-                |all: Vector3<f64>, white: Vector3<f64>| (all.norm_squared() - white.norm_squared()).max(0.0).sqrt();
-            let mean_rate = mean(&rates);
+    while begin < rates.len() {
+        let start_ns = rates[begin].0;
+        let end_ns = start_ns + WINDOW_NS;
+        let end = rates.partition_point(|(stamp_ns, _)| *stamp_ns < end_ns);
+        if end - begin >= 20 && rates.len() > end {
+            let range = (start_ns, end_ns);
+            let mean_rate = mean(&vectors_within(rates, range));
             windows.push(Window {
-                start_ns: samples[begin].stamp_ns,
+                start_ns,
                 end_ns,
-                stationary: beyond(standard_deviation(&rates), white_rate) < STATIONARY_RATE_RAD_PER_S
-                    && beyond(standard_deviation(&forces), white_force) < STATIONARY_FORCE_M_PER_S2
+                stationary: slow_rate(range) < STATIONARY_RATE_RAD_PER_S
+                    && slow_force(range) < STATIONARY_FORCE_M_PER_S2
                     && mean_rate.norm() < STATIONARY_MEAN_RAD_PER_S,
                 mean_rate,
-                mean_force: mean(&forces),
-                white_rate,
-                white_force,
+                mean_force: mean(&vectors_within(forces, range)),
             });
         }
         begin = end;
     }
     windows
+}
+
+/// Variance of a smoothed vector of white noise of this density per axis. A Hann window of width `w` averages noise to a
+/// bandwidth of `1.5 / w`.
+fn smoothed_white(density: f64) -> f64 {
+    3.0 * density * density * 1.5 / seconds_from_ns(2 * SMOOTHING_NS)
+}
+
+fn within(samples: &[Stamped], (start_ns, end_ns): (i64, i64)) -> &[Stamped] {
+    let before = |time_ns: i64| samples.partition_point(|(stamp_ns, _)| *stamp_ns < time_ns);
+    samples.get(before(start_ns)..before(end_ns)).unwrap_or_default()
+}
+
+fn vectors_within(samples: &[Stamped], range: (i64, i64)) -> Vec<Vector3<f64>> {
+    within(samples, range).iter().map(|(_, vector)| *vector).collect()
+}
+
+/// Norm of the standard deviation of the smoothed signal within a range of time, infinite where there are no samples.
+fn smoothed_deviation(samples: &[Stamped], (start_ns, end_ns): (i64, i64)) -> f64 {
+    let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return f64::INFINITY };
+    let mut smoothed = Vec::new();
+    let mut centre_ns = start_ns.max(first.0 + SMOOTHING_NS);
+    while centre_ns < end_ns.min(last.0 - SMOOTHING_NS) {
+        let (mut sum, mut weights) = (Vector3::zeros(), 0.0);
+        for (stamp_ns, vector) in within(samples, (centre_ns - SMOOTHING_NS, centre_ns + SMOOTHING_NS)) {
+            let place = (stamp_ns - centre_ns) as f64 / SMOOTHING_NS as f64;
+            let weight = 0.5 + 0.5 * (std::f64::consts::PI * place).cos();
+            sum += vector * weight;
+            weights += weight;
+        }
+        if weights > 0.0 {
+            smoothed.push(sum / weights);
+        }
+        centre_ns += SMOOTHED_STEP_NS;
+    }
+    if smoothed.is_empty() { f64::INFINITY } else { standard_deviation(&smoothed).norm() }
 }
 
 fn check_gravity(
@@ -212,70 +239,6 @@ fn check_gyroscope_bias(stationary: &[Window], findings: &mut Findings) -> Optio
         findings.good(Area::Imu, "the gyroscope's bias is small", evidence);
     }
     Some(bias)
-}
-
-/// White noise against the rig's densities, and vibration. `rates_hz` are those of the IMU and of an accelerometer of its own.
-fn check_noise(
-    [imu_rate_hz, accelerometer_rate_hz]: [Option<f64>; 2],
-    windows: &[Window],
-    stationary: &[Window],
-    rig: Option<&Rig>,
-    findings: &mut Findings,
-) {
-    let Some(imu_rate_hz) = imu_rate_hz else { return };
-    let rate_hz = |gyroscope: bool| accelerometer_rate_hz.filter(|_| !gyroscope).unwrap_or(imu_rate_hz);
-    let average = |window: &Window, gyroscope: bool| {
-        let white = if gyroscope { window.white_rate } else { window.white_force };
-        (white.norm_squared() / 3.0).sqrt() / rate_hz(gyroscope).sqrt()
-    };
-    let quiet_when = if stationary.is_empty() { "in the quietest 10 % of the flight" } else { "while stationary" };
-    let sensors = [
-        ("gyroscope", true, rig.map(|rig| rig.imu.noise.gyroscope_noise_density), "rad/s/√Hz"),
-        ("accelerometer", false, rig.map(|rig| rig.imu.noise.accelerometer_noise_density), "m/s²/√Hz"),
-    ];
-    for (name, gyroscope, given, unit) in sensors {
-        let all: Vec<f64> = windows.iter().map(|window| average(window, gyroscope)).collect();
-        let stationary_noise: Vec<f64> = stationary.iter().map(|window| average(window, gyroscope)).collect();
-        let quiet = if stationary_noise.is_empty() { percentile(&all, 0.1) } else { median(&stationary_noise) };
-        let flight = percentile(&all, 0.9);
-        if quiet > 0.0 && flight > 10.0 * quiet {
-            let evidence = format!("{flight:.2e} {unit} in the noisiest 10 % of the windows, {quiet:.2e} {quiet_when}");
-            let remedy = "isolate the IMU from vibration, or raise the noise density to the value in flight";
-            findings.add(Severity::Note, Area::Imu, format!("vibration on the {name} in flight"), evidence, remedy);
-        }
-        let Some(given) = given else { continue };
-        compare_density(name, (quiet, quiet_when), given, unit, rate_hz(gyroscope), findings);
-    }
-}
-
-fn compare_density(
-    name: &str,
-    (measured, when): (f64, &str),
-    given: f64,
-    unit: &str,
-    rate_hz: f64,
-    findings: &mut Findings,
-) {
-    let ratio = measured / given;
-    let evidence = format!("{measured:.2e} {unit} measured {when} at {rate_hz:.0} Hz, {given:.2e} in the rig");
-    // A density confused with the noise of one sample differs by √rate.
-    let discrete = |ratio: f64| (ratio.ln() - 0.5 * rate_hz.ln()).abs() < 0.3;
-    let field = format!("imu0.{name}_noise_density");
-    if ratio > NOISE_TOO_SMALL {
-        let hint = if discrete(ratio) { " (it appears to have been divided by √rate twice)" } else { "" };
-        let remedy =
-            format!("raise {field} to {:.1e}{hint}; estimators need 2 to 10 times the measured value", 2.0 * measured);
-        let title = format!("{name} noise in the rig is {ratio:.1} times too small");
-        findings.add(Severity::Warning, Area::Imu, title, evidence, remedy);
-    } else if ratio < 1.0 / NOISE_TOO_LARGE || (measured > 0.0 && discrete(1.0 / ratio)) {
-        let hint =
-            if discrete(1.0 / ratio) { ": it appears to be the noise of one sample; divide it by √rate" } else { "" };
-        let remedy = format!("{field} is a continuous-time density in {unit}{hint}");
-        let title = format!("{name} noise in the rig is {:.0} times too large", 1.0 / ratio);
-        findings.add(Severity::Note, Area::Imu, title, evidence, remedy);
-    } else {
-        findings.good(Area::Imu, format!("{name} noise agrees with the rig"), evidence);
-    }
 }
 
 /// Saturation (many samples at exactly the largest value) and samples that repeat.

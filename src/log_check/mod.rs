@@ -7,12 +7,14 @@ mod hand_eye;
 mod image_measure;
 mod images;
 mod imu_facts;
+mod imu_noise;
 mod imu_topics;
 mod joints;
 mod render;
 mod rig_sanity;
 mod rotation;
 mod source_fit;
+mod spectrum;
 mod statistics;
 mod survey;
 #[cfg(test)]

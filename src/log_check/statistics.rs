@@ -31,14 +31,6 @@ pub(super) fn standard_deviation(vectors: &[Vector3<f64>]) -> Vector3<f64> {
     mean(&squares).map(f64::sqrt)
 }
 
-/// Standard deviation of the white part of each component, from second differences: motion that is smooth over three
-/// samples drops out. `var(x₋ − 2x + x₊) = 6σ²`.
-pub(super) fn white_standard_deviation(vectors: &[Vector3<f64>]) -> Vector3<f64> {
-    let second: Vec<Vector3<f64>> =
-        vectors.windows(3).map(|three| (three[0] - three[1] * 2.0 + three[2]).map(|entry| entry * entry)).collect();
-    (mean(&second) / 6.0).map(f64::sqrt)
-}
-
 /// Slope and standard error of `y` over `x` by least squares; zeros for fewer than three points.
 pub(super) fn slope(points: &[(f64, f64)]) -> (f64, f64) {
     let count = points.len() as f64;

@@ -263,7 +263,7 @@ fn imu_faults_are_found() {
     expect(
         &rig("gyroscope_noise_density: 0.00034", "gyroscope_noise_density: 3.4e-5"),
         Warning,
-        &["gyroscope noise in the rig is 9.6 times too small"],
+        &["gyroscope noise in the rig is 10.0 times too small"],
     );
     expect(
         &rig("gyroscope_noise_density: 0.00034", "gyroscope_noise_density: 2.4e-5"),
@@ -273,7 +273,7 @@ fn imu_faults_are_found() {
     expect(
         &rig("accelerometer_noise_density: 0.004", "accelerometer_noise_density: 0.0566"),
         Note,
-        &["accelerometer noise in the rig is 15 times too large", "it appears to be the noise of one sample"],
+        &["accelerometer noise in the rig is 14 times too large", "it appears to be the noise of one sample"],
     );
     expect(&rig("gravity: 9.81", "gravity: 9.6"), Warning, &["gravity is unusual"]);
     // Vibration in flight only.
@@ -281,7 +281,29 @@ fn imu_faults_are_found() {
         force.z += if ms > 3000 && ms % 10 == 0 { 3.0 } else { 0.0 };
         true
     };
-    expect(&imu(vibrates), Note, &["vibration on the accelerometer in flight"]);
+    expect(&imu(vibrates), Note, &["vibration on the accelerometer", "at 100 Hz"]);
+}
+
+/// Rotors that idle at 57 Hz on the ground and in flight.
+fn idling_rotors(ms: i64, _: &mut MessageTimes, rate: &mut Vector3<f64>, force: &mut Vector3<f64>) -> bool {
+    let phase = std::f64::consts::TAU * 57.0 * ms as f64 * 1e-3;
+    rate.x += 0.3 * phase.sin();
+    force.z += 3.0 * phase.cos();
+    true
+}
+
+#[test]
+fn vibration_is_neither_noise_nor_motion() {
+    use Severity::{Good, Note};
+    let flight = Flight { imu: idling_rotors, ..Flight::default() };
+    expect(&flight, Note, &["vibration on the gyroscope", "0.212 rad/s at 57 Hz"]);
+    expect(&flight, Note, &["vibration on the accelerometer", "m/s² at 57 Hz"]);
+    expect(&flight, Good, &["gyroscope noise agrees with the rig"]);
+    expect(&flight, Good, &["accelerometer noise agrees with the rig"]);
+    let report = flight.check(&[]);
+    let stationary = report.findings.iter().find(|finding| finding.title.contains("is stationary")).unwrap();
+    assert!(stationary.evidence.contains("0.0–2.5 s"), "{}", stationary.evidence);
+    assert!(report.worst() == Note, "{report}");
 }
 
 fn scaled(vector: &mut Vector3<f64>, factor: f64) -> bool {
