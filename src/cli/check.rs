@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use clap::Args;
+use dcvins::export;
 use dcvins::flight_log::FlightLog;
 use dcvins::log_check::{self, Severity};
 use dcvins::sensors::Rig;
@@ -12,7 +13,7 @@ use dcvins::session;
 
 use crate::cli::exit::Outcome;
 use crate::cli::limit_arguments::LimitArguments;
-use crate::cli::terminal::{Progress, print_report};
+use crate::cli::terminal::{Progress, notify, print_report};
 
 /// `dcvins check`.
 #[derive(Args, Clone, Debug)]
@@ -22,6 +23,12 @@ pub(crate) struct CheckArguments {
     /// The rig, when it is not beside the log or attached to it.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
+    /// Write a mask for each camera in whose images a part never moves into this folder, as CAMERA.mask.png.
+    #[arg(long, value_name = "FOLDER")]
+    pub write_masks: Option<PathBuf>,
+    /// Overwrite masks that exist.
+    #[arg(long, requires = "write_masks")]
+    pub force: bool,
     /// Print the findings as JSON.
     #[arg(long)]
     pub json: bool,
@@ -44,5 +51,13 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<Outcome> {
     log.require_unshortened()?;
     drop(progress);
     print_report(&report, arguments.json)?;
+    if let Some(folder) = &arguments.write_masks {
+        let written = export::write_masks(&report.proposed_masks, folder, arguments.force)?;
+        let mut names = written.iter().map(|path| path.display().to_string());
+        notify(&names.next().map_or_else(
+            || "no camera needs a mask that it does not have".to_owned(),
+            |first| names.fold(first, |all, name| format!("{all}\n{name}")),
+        ));
+    }
     Ok(if report.worst() == Severity::Error { Outcome::ErrorsFound } else { Outcome::Success })
 }

@@ -73,7 +73,7 @@ pub(crate) struct NewArguments {
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     pub joints: Vec<String>,
     /// Attitude topic from which the joint angles follow, with entries of gimbal.source, as in
-    /// /gimbal/attitude,type=euler,frame=earth,unit=deg.
+    /// /gimbal/attitude,type=quaternion,frame=body,axes=frd.
     #[arg(long, value_name = "TOPIC[,KEY=VALUE…]", value_parser = attitude)]
     pub attitude: Option<Attitude>,
     /// Overwrite an existing file.

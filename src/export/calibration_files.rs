@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::calibration_report::{CalibrationReport, ParameterReport};
 use super::error::ExportError;
+use super::masks;
 use crate::flight_log::output::OutputSet;
 use crate::session::CalibrationRun;
 
@@ -16,15 +17,21 @@ pub fn write_calibration(run: &CalibrationRun, report: &CalibrationReport, folde
     fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     let json = serde_json::to_string_pretty(report)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("calibration.json") })?;
+    let mut rig = run.rig.clone();
+    let masks = masks::beside(&mut rig)?;
     let files = [
         ("calibration.json", format!("{json}\n")),
-        ("rig.yaml", format!("{}{}", run.rig.to_yaml(), sigmas_yaml(report))),
+        ("rig.yaml", format!("{}{}", rig.to_yaml(), sigmas_yaml(report))),
         ("report.txt", report.to_string()),
     ];
     let mut outputs = OutputSet::default();
     for (name, text) in files {
         let path = folder.join(name);
         outputs.write(&path, text.as_bytes()).map_err(ExportError::write(&path))?;
+    }
+    for (name, png) in masks {
+        let path = folder.join(name);
+        outputs.write(&path, &png).map_err(ExportError::write(&path))?;
     }
     outputs.commit().map_err(ExportError::commit)
 }

@@ -12,6 +12,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::error::ExportError;
+use super::masks::is_mask_name;
 use super::summary::log_name;
 use crate::flight_log::output;
 use crate::flight_log::{FlightLog, shortened};
@@ -194,7 +195,8 @@ pub(super) fn check_run_folder(folder: &Path, log: &str) -> Result<(), ExportErr
     let existing = |problem: String| ExportError::Existing { problem, path: folder.to_owned() };
     for entry in fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok) {
         let name = entry.file_name();
-        let ours = name.to_str().is_some_and(|name| RUN_FILES.contains(&name)) && entry.path().is_file();
+        let ours =
+            name.to_str().is_some_and(|name| RUN_FILES.contains(&name) || is_mask_name(name)) && entry.path().is_file();
         if !ours && !output::is_temporary(&name) {
             let name = name.to_string_lossy();
             return Err(existing(format!(

@@ -8,6 +8,7 @@ mod desktop;
 mod error;
 mod evaluation;
 mod existing;
+mod masks;
 mod recent_files;
 mod report;
 mod results;
@@ -33,6 +34,7 @@ pub use existing::{
     check_calibration_folder, check_converted_log, check_report_folder, check_run_folders, check_screenshot,
     check_simulated_log, other_runs, write_new_rig,
 };
+pub use masks::write_masks;
 pub use recent_files::RecentFiles;
 pub use report::{ReportDrawing, ReportFigure, ReportOptions, write_report};
 pub use results::write_results;

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::ExportError;
+use super::masks;
 use super::results::stage_results;
 use super::summary::{RunSummary, summarize, to_json};
 use super::tables::{calibration_csv, frames_csv, information_csv, rank_csv};
@@ -66,6 +67,8 @@ pub(super) fn stage_run(
     let summary = summarize(recording, run, options.timing);
     let json = to_json(&summary)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("summary.json") })?;
+    let mut rig = calibrated_rig(recording, run);
+    let masks = masks::beside(&mut rig)?;
     // The summary says of which log the files are, and comes first.
     let mut files = vec![
         ("summary.json", json),
@@ -74,7 +77,7 @@ pub(super) fn stage_run(
         ("rank.csv", rank_csv(run, &recording.rig.parameter_names())),
         ("information.csv", information_csv(run, &recording.rig)),
         ("frames.csv", frames_csv(run, options.timing)),
-        ("rig.yaml", calibrated_rig(recording, run).to_yaml()),
+        ("rig.yaml", rig.to_yaml()),
     ];
     if options.euroc_trajectory {
         files.push((EUROC_TRAJECTORY, euroc_of_run(run, recording.epoch_ns)));
@@ -82,6 +85,10 @@ pub(super) fn stage_run(
     for (name, text) in files {
         let path = folder.join(name);
         outputs.write(&path, text.as_bytes()).map_err(ExportError::write(&path))?;
+    }
+    for (name, png) in masks {
+        let path = folder.join(name);
+        outputs.write(&path, &png).map_err(ExportError::write(&path))?;
     }
     if options.mcap {
         outputs.add(stage_results(recording, run, &folder.join(RESULTS))?);

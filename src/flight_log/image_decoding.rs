@@ -177,7 +177,7 @@ fn gray_from_raw(
 }
 
 /// Decodes a compressed image whose header claims a resolution that its bytes and the limits allow.
-fn decode_within(
+pub(super) fn decode_within(
     data: &[u8],
     codec: ImageFormat,
     limits: &LogLimits,

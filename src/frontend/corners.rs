@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 
 use super::responses::{Responses, TILE};
-use crate::sensors::GrayImage;
+use crate::sensors::{GrayImage, ImageMask};
 
 /// Options of corner detection.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,13 +59,14 @@ pub struct CornerDetector {
 impl CornerDetector {
     /// Adds to `found` corners of `image` until there are `max_features` with the `existing` ones (all in pixels).
     ///
-    /// The image is divided into about as many cells as there may be features. First every cell that has no feature gets
+    /// None lies in a pixel that is masked. The image is divided into about as many cells as there may be features. First every cell that has no feature gets
     /// its best corner, however weak beside those of other cells, then every cell that has one gets a second, and so on.
     pub fn detect(
         &mut self,
         image: &GrayImage,
         existing: impl Iterator<Item = Vector2<f64>>,
         options: &CornerOptions,
+        mask: Option<&ImageMask>,
         found: &mut Vec<Vector2<f64>>,
     ) {
         found.clear();
@@ -89,7 +90,7 @@ impl CornerDetector {
         let mut round = 0;
         while count < options.max_features {
             // The first round fills empty cells, so it needs the corners of no others; most often it is the only one.
-            self.collect(image, options, |tile| round > 0 || cells.about(tile).any(|cell| crowd[cell] == 0));
+            self.collect(image, options, mask, |tile| round > 0 || cells.about(tile).any(|cell| crowd[cell] == 0));
             if self.candidates.is_empty() && self.tiles.is_empty() {
                 break;
             }
@@ -114,13 +115,19 @@ impl CornerDetector {
     }
 
     /// Collects the best corners of tiles that are `wanted`, not searched yet and not covered by features.
-    fn collect(&mut self, image: &GrayImage, options: &CornerOptions, wanted: impl Fn(&Tile) -> bool) {
+    fn collect(
+        &mut self,
+        image: &GrayImage,
+        options: &CornerOptions,
+        mask: Option<&ImageMask>,
+        wanted: impl Fn(&Tile) -> bool,
+    ) {
         let mut tiles = std::mem::take(&mut self.tiles);
         let before = self.candidates.len();
         tiles.retain(|tile| {
             let searched = wanted(tile);
             if searched && !self.is_covered(tile) {
-                self.search(image, tile, options);
+                self.search(image, tile, options, mask);
             }
             !searched
         });
@@ -131,13 +138,13 @@ impl CornerDetector {
     }
 
     /// Adds the best corners of a tile to the candidates.
-    fn search(&mut self, image: &GrayImage, tile: &Tile, options: &CornerOptions) {
+    fn search(&mut self, image: &GrayImage, tile: &Tile, options: &CornerOptions, mask: Option<&ImageMask>) {
         self.responses.compute(image, [tile.left, tile.top], options.min_eigenvalue as f32);
         self.in_tile.clear();
         for peak in self.responses.peaks(tile.width, tile.height) {
             let [x, y] = peak.pixel;
             let uv_px = Vector2::new((tile.left + x) as f64, (tile.top + y) as f64) + peak.shift;
-            if self.taken.is_free(&uv_px) {
+            if self.taken.is_free(&uv_px) && !mask.is_some_and(|mask| mask.covers(&uv_px)) {
                 self.in_tile.push(Candidate { uv_px, response: peak.response });
             }
         }

@@ -11,7 +11,7 @@ use super::reference::{ReferenceMatch, ReferenceOptions, ReferencePatch, Referen
 use super::tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::camera::CameraModel;
 use crate::geometry::median;
-use crate::sensors::GrayImage;
+use crate::sensors::{GrayImage, ImageMask};
 
 /// Options of a front end, by stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -90,6 +90,7 @@ struct Buffers {
 #[derive(Clone, Debug)]
 pub struct FrontEnd {
     camera: CameraModel,
+    mask: Option<ImageMask>,
     options: FrontEndOptions,
     previous: Pyramid,
     now: Pyramid,
@@ -114,6 +115,7 @@ impl FrontEnd {
         Self {
             coarse: CoarseAligner::new(camera.clone()),
             camera,
+            mask: None,
             options,
             previous: Pyramid::default(),
             now: Pyramid::default(),
@@ -123,6 +125,13 @@ impl FrontEnd {
             crowd: PointGrid::default(),
             found: Vec::new(),
         }
+    }
+
+    /// Leaves out what a mask of the camera's size covers: no feature is detected there, and none is followed there.
+    #[must_use]
+    pub fn with_mask(mut self, mask: Option<ImageMask>) -> Self {
+        self.mask = mask;
+        self
     }
 
     /// The camera model of its images.
@@ -244,6 +253,9 @@ impl FrontEnd {
                 lucas_kanade::arrive(&self.previous, &self.now, &track.uv_px, &near_px, options, motion)?
             }
         };
+        if self.mask.as_ref().is_some_and(|mask| mask.covers(&uv_px)) {
+            return None;
+        }
         let bearing = self.camera.unproject(&uv_px)?;
         Some(Step {
             id: track.id,
@@ -297,7 +309,7 @@ impl FrontEnd {
 
     fn detect(&mut self, image: &GrayImage, features: &mut Vec<TrackedFeature>) {
         let existing = features.iter().map(|feature| feature.uv_px);
-        self.detector.detect(image, existing, &self.options.corners, &mut self.found);
+        self.detector.detect(image, existing, &self.options.corners, self.mask.as_ref(), &mut self.found);
         for uv_px in &self.found {
             if let Some(bearing) = self.camera.unproject(uv_px) {
                 let id = FeatureId(self.next_id);

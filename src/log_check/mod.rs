@@ -16,6 +16,7 @@ mod rotation;
 mod source_fit;
 mod spectrum;
 mod statistics;
+mod still_pixels;
 mod survey;
 #[cfg(test)]
 mod tests;
@@ -33,7 +34,7 @@ use crate::flight_log::attitude::{VEHICLE_KINDS, gimbal_kinds, topic_field};
 use crate::flight_log::log::WarningKind;
 use crate::flight_log::{FlightLog, LogError, MessageKind, TopicInfo};
 use crate::geometry::seconds_from_ns;
-use crate::sensors::Rig;
+use crate::sensors::{ImageMask, Rig};
 
 /// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -136,6 +137,18 @@ pub struct CheckReport {
     pub topics: Vec<TopicReport>,
     /// Most severe first, then by area.
     pub findings: Vec<Finding>,
+    /// Masks for cameras that see the vehicle.
+    #[serde(skip)]
+    pub proposed_masks: Vec<ProposedMask>,
+}
+
+/// A mask for what never moves in the images of a camera.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ProposedMask {
+    /// Key of the camera.
+    pub camera_key: String,
+    /// The mask, that of the rig not included.
+    pub mask: ImageMask,
 }
 
 /// Checks an entire log against its rig.
@@ -163,6 +176,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
     timing::check_timing(&survey, rig.ok(), &mut findings);
     imu_topics::check_orientation_topics(log, rig, &mut findings);
     let imu_facts = imu_facts::check_imu(&survey, rig.ok(), &mut findings);
+    let mut proposed_masks = Vec::new();
     if let Ok(rig) = rig {
         joints::check_joints(&survey, rig, &mut findings);
         images::check_images(&survey, rig, &imu_facts, &mut findings);
@@ -171,6 +185,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
             survey.use_source(rig, fitted.source, fitted.timeshift_s);
         }
         rotation::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);
+        proposed_masks = still_pixels::check_still_pixels(&survey, rig, image_rotations, &mut findings);
     }
     let mut findings = findings.list;
     findings.sort_by_key(|finding| (std::cmp::Reverse(finding.severity), finding.area));
@@ -181,6 +196,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         duration_s: seconds_from_ns(log.duration_ns()),
         topics: topic_reports(log, &survey, rig.ok()),
         findings,
+        proposed_masks,
     }
 }
 

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::attitude::{AttitudeSurvey, SolvedAttitude};
 use super::image_measure::{ImageMeasure, measure};
 use super::statistics::median;
+use super::still_pixels::GradientSums;
 use crate::flight_log::container::DecodedBlock;
 use crate::flight_log::image_decoding::{BitDepth, decode_image};
 use crate::flight_log::imu_merge::ImuMerge;
@@ -111,6 +112,8 @@ pub(super) struct Survey {
     pub(super) images: BTreeMap<String, Vec<SampledImage>>,
     /// Bits of a grey value by camera key.
     pub(super) depths: BTreeMap<String, BitDepth>,
+    /// Sums of the gradients of those images by camera key.
+    pub(super) gradients: BTreeMap<String, GradientSums>,
     /// Position and damage of each damaged chunk.
     pub(super) damages: Vec<String>,
 }
@@ -300,6 +303,7 @@ impl Survey {
             }
             match decode_image(kind, data, known.unwrap_or_default(), log.file().limits(), None) {
                 Ok(image) => {
+                    self.gradients.entry(camera.key.clone()).or_default().add(&image);
                     let image = SampledImage { stamp_ns, measure: measure(&image) };
                     self.images.entry(camera.key.clone()).or_default().push(image);
                 }

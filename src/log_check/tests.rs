@@ -7,7 +7,7 @@ use tempfile::TempDir;
 use super::{CheckReport, ImageRotation, Severity, check};
 use crate::camera::CameraModel;
 use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes};
-use crate::geometry::so3;
+use crate::geometry::{SplitMix64, so3};
 use crate::sensors::{GrayImage, Rig};
 
 const EPOCH_NS: i64 = 1_700_000_000_000_000_000;
@@ -304,6 +304,54 @@ fn vibration_is_neither_noise_nor_motion() {
     let stationary = report.findings.iter().find(|finding| finding.title.contains("is stationary")).unwrap();
     assert!(stationary.evidence.contains("0.0–2.5 s"), "{}", stationary.evidence);
     assert!(report.worst() == Note, "{report}");
+}
+
+/// An image whose scene moves, behind a frame of the vehicle in its lower left corner.
+fn behind_a_frame(_: i64, times: &mut MessageTimes, image: &mut GrayImage) -> bool {
+    let at = (times.stamp_ns - EPOCH_NS) / (50 * MS);
+    for (index, pixel) in image.pixels.iter_mut().enumerate() {
+        let (column, row) = ((index % 160) as i64, (index / 160) as i64);
+        if column < 48 && row >= 80 {
+            // Struts of the vehicle.
+            *pixel = if (column / 6 + row / 9) % 2 == 0 { 30 } else { 90 };
+        } else {
+            // A scene that is another one in every image.
+            let random = SplitMix64::new(((column / 5 * 1000 + row / 5) * 1000 + at) as u64).next_u64();
+            *pixel = 60 + u8::try_from(random % 120).unwrap();
+        }
+    }
+    true
+}
+
+#[test]
+fn a_mask_is_proposed_for_what_never_moves() {
+    let turn = |index: i64| ImageRotation {
+        camera_key: "cam0".to_owned(),
+        from_ns: index * 50 * MS,
+        to_ns: (index + 1) * 50 * MS,
+        second_from_first: UnitQuaternion::from_euler_angles(0.0, 0.01, 0.0),
+    };
+    let turns: Vec<ImageRotation> = (0..200).map(turn).collect();
+    let flight = Flight { image: behind_a_frame, ..Flight::default() };
+    let report = flight.check(&turns);
+    let [proposed] = report.proposed_masks.as_slice() else { panic!("{report}") };
+    assert_eq!((proposed.camera_key.as_str(), proposed.mask.size_px()), ("cam0", [160, 120]));
+    let (mut missed, mut beyond) = (0, 0);
+    for (row, column) in (0..120).flat_map(|row| (0..160).map(move |column| (row, column))) {
+        let vehicle = column < 48 && row >= 80;
+        // Blocks of 8 pixels, and the blocks around them.
+        let near = column < 48 + 16 && row >= 80 - 16;
+        missed += usize::from(vehicle && !proposed.mask.is_masked(column, row));
+        beyond += usize::from(!near && proposed.mask.is_masked(column, row));
+    }
+    assert_eq!((missed, beyond), (0, 0));
+    // Without rotation, or with everything still, there is nothing to compare.
+    assert!(flight.check(&turns[..10]).proposed_masks.is_empty());
+    let still = |_: i64, _: &mut MessageTimes, image: &mut GrayImage| {
+        *image = texture(0);
+        true
+    };
+    assert!(Flight { image: still, ..Flight::default() }.check(&turns).proposed_masks.is_empty());
 }
 
 fn scaled(vector: &mut Vector3<f64>, factor: f64) -> bool {

@@ -3,6 +3,7 @@
 
 mod attitude_source;
 mod gray_image;
+mod image_mask;
 mod imu;
 mod joints;
 mod pose;
@@ -13,7 +14,10 @@ pub use attitude_source::{
     NamedAxes,
 };
 pub use gray_image::GrayImage;
+pub use image_mask::ImageMask;
 pub use imu::{ImuNoise, ImuSample};
 pub use joints::{JointAngles, JointSample};
 pub use pose::PoseSample;
-pub use rig::{AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, Joint, Rig, UnknownCamera};
+pub use rig::{
+    AssumedField, CameraMask, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, Joint, Rig, UnknownCamera,
+};

@@ -4,7 +4,7 @@ use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, ParameterNames};
 
-use super::{AttitudeFrame, AttitudeSource, ImuNoise};
+use super::{AttitudeFrame, AttitudeSource, ImageMask, ImuNoise};
 
 /// The rig has no camera with this key.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -67,6 +67,17 @@ pub struct CameraRig {
     pub model: CameraModel,
     /// Kalibr's `timeshift_cam_imu`: `t_imu = t_cam + shift`.
     pub timeshift_cam_imu_s: f64,
+    /// Pixels that show the vehicle, `None` without.
+    pub mask: Option<CameraMask>,
+}
+
+/// The mask of a camera with the file that it came from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CameraMask {
+    /// Name of the PNG, relative to the folder of the rig; the same name as an attachment of a log.
+    pub file: String,
+    /// The mask, of the size of the images.
+    pub image: ImageMask,
 }
 
 /// How wrong the rig's chain may be: bounds of a uniform error on each parameter.

@@ -77,6 +77,7 @@ impl Equipment {
                     rate_hz: self.camera_rate_hz,
                     model: camera_model(which, self.lens, self.resolution_px),
                     timeshift_cam_imu_s: self.camera_time_offset_s,
+                    mask: None,
                 });
             }
         }

@@ -9,6 +9,7 @@ mod documentation;
 mod evaluate;
 mod hostile_logs;
 mod layering;
+mod masks;
 mod outputs;
 #[cfg(feature = "gui")]
 mod pictures;

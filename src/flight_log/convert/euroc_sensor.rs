@@ -189,5 +189,6 @@ fn camera_rig(
             .or_else(|error| if measured_hz.is_finite() && measured_hz > 0.0 { Ok(measured_hz) } else { Err(error) })?,
         model,
         timeshift_cam_imu_s: 0.0,
+        mask: None,
     })
 }

@@ -80,10 +80,13 @@ pub(super) fn convert(file: &LogFile, path: &Path, sink: &mut Sink<'_>) -> Resul
         }
     }
     for place in &index.attachments {
-        let content = ContainerIndex::attachment(file, place).and_then(|content| String::from_utf8(content).ok());
-        match content {
-            Some(content) => sink.writer.attach(&place.name, "text/plain", &content, 0)?,
-            None => sink.note(format!("the attachment {:?} is damaged or not text, and is left out", place.name)),
+        match ContainerIndex::attachment(file, place) {
+            Some(content) => {
+                let is_text = std::str::from_utf8(&content).is_ok();
+                let media_type = if is_text { "text/plain" } else { "application/octet-stream" };
+                sink.writer.attach(&place.name, media_type, &content, 0)?;
+            }
+            None => sink.note(format!("the attachment {:?} is damaged, and is left out", place.name)),
         }
     }
     if file.require_unshortened(path).is_err() {

@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 use super::super::messages::{self, CameraInfoMessage, MessageKind};
 use super::super::{FlightLog, LogError};
 use super::document::Document;
+use super::mask::{Attached, InFolder};
 use super::read::{self, CameraFacts, NoFacts};
 use super::{kalibr, keys};
 use crate::camera::CameraModel;
@@ -16,7 +17,8 @@ impl Rig {
 
     /// Parses the text of a rig in the schema of this program; `file` is named in errors.
     pub fn from_yaml(text: &str, file: &Path) -> Result<Self, LogError> {
-        from_document(&Document::parse(text.to_owned(), file)?, &NoFacts).map(|(rig, _)| rig)
+        let facts = InFolder { facts: &NoFacts, folder: folder_of(file) };
+        from_document(&Document::parse(text.to_owned(), file)?, &facts).map(|(rig, _)| rig)
     }
 
     /// Reads `NAME.rig.yaml` beside `NAME.mcap`, `None` when there is no such file.
@@ -62,11 +64,16 @@ fn find(
     }
     let Some((name, content)) = log.attachment(ending) else { return Ok(None) };
     let file = PathBuf::from(format!("{} (attachment {name})", log.path().display()));
-    from_document(&Document::from_bytes(content, &file)?, log).map(Some)
+    from_document(&Document::from_bytes(content, &file)?, &Attached(log)).map(Some)
 }
 
 fn from_file(path: &Path, facts: &dyn CameraFacts) -> Result<RigWithUnusedKeys, LogError> {
-    from_document(&Document::read(path)?, facts)
+    from_document(&Document::read(path)?, &InFolder { facts, folder: folder_of(path) })
+}
+
+/// The folder that the files beside a rig are in.
+fn folder_of(rig: &Path) -> &Path {
+    rig.parent().unwrap_or(rig)
 }
 
 fn from_document(document: &Document, facts: &dyn CameraFacts) -> Result<RigWithUnusedKeys, LogError> {

@@ -60,6 +60,7 @@ const CAMERA: Keys = Keys {
         "resolution",
         "timeshift_cam_imu",
         "T_cam_imu",
+        "mask",
     ],
     unused: &["cam_overlaps", "T_cn_cnm1", "line_delay", "model"],
 };

@@ -6,6 +6,7 @@ mod fields;
 mod find;
 mod kalibr;
 mod keys;
+mod mask;
 mod read;
 mod save;
 pub mod template;

@@ -2,6 +2,7 @@ use super::super::LogError;
 use super::super::text::shortened;
 use super::attitude;
 use super::fields::Field;
+use super::mask;
 use crate::camera::{CameraError, CameraModel};
 use crate::gimbal::{ClassicalChain, DhLink, InverseChain};
 use crate::sensors::{AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, Rig};
@@ -33,6 +34,10 @@ pub(crate) trait CameraFacts {
     fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String>;
     /// Mean rate of the images.
     fn rate_hz(&self, image_topic: &str) -> Option<f64>;
+    /// Content of a file that the rig names, beside it or attached with it, or why there is none.
+    fn file_beside_rig(&self, _name: &str) -> Result<Vec<u8>, String> {
+        Err("there is no folder to take it from".into())
+    }
 }
 
 /// Without a log.
@@ -168,11 +173,13 @@ pub(super) fn read_camera_as(
             camera.field("intrinsics").unexpected(&expected)
         })?
     };
+    let mask = mask::read(camera, model.resolution_px, facts)?;
     Ok(CameraRig {
         key: key.to_owned(),
         mount,
         rate_hz,
         model,
+        mask,
         frame_id: camera.field("frame_id").optional().map_or(Ok(key), |frame| frame.text("a frame's name"))?.to_owned(),
         timeshift_cam_imu_s: shift.map_or(Ok(0.0), |shift| shift.number("seconds, t_imu = t_cam + shift"))?,
         topic,

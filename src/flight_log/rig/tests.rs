@@ -1,7 +1,10 @@
 use std::fs;
 use std::path::Path;
 
+use nalgebra::Vector3;
+
 use crate::flight_log::tests::RIG;
+use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes};
 use crate::sensors::{AttitudeMessage, CameraMount, Rig};
 
 fn parse(text: &str) -> Result<Rig, String> {
@@ -353,4 +356,52 @@ fn keys_of_kalibr_without_a_use_are_listed() {
         "{message}"
     );
     assert!(message.ends_with("imu.yaml"), "{message}");
+}
+
+/// Writes a mask of this size whose upper half is white.
+fn write_mask(path: &Path, width: u32, height: u32) {
+    let image =
+        image::GrayImage::from_fn(width, height, |_, row| image::Luma([if row < height / 2 { 255 } else { 0 }]));
+    image.save(path).unwrap();
+}
+
+#[test]
+fn a_mask_lies_beside_the_rig_or_is_attached_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let [width, height] = parse(RIG).unwrap().cameras[0].model.resolution_px;
+    write_mask(&at("arm.png"), width as u32, height as u32);
+    write_mask(&at("small.png"), 16, 8);
+    fs::write(at("text.png"), "no image").unwrap();
+    let with_mask = |mask: &str| RIG.replacen("  mount: gimbal", &format!("  mask: {mask}\n  mount: gimbal"), 1);
+    let read = |mask: &str| {
+        fs::write(at("x.rig.yaml"), with_mask(mask)).unwrap();
+        Rig::from_file(&at("x.rig.yaml")).map_err(|error| error.to_string())
+    };
+    let rig = read("arm.png").unwrap();
+    let mask = rig.cameras[0].mask.as_ref().unwrap();
+    assert_eq!((mask.file.as_str(), mask.image.size_px()), ("arm.png", [width, height]));
+    assert!(mask.image.is_masked(0, height / 2 - 1) && !mask.image.is_masked(0, height / 2));
+    assert!(rig.to_yaml().contains("  mask: arm.png\n"));
+    let check = |mask: &str, expected: &str| {
+        let error = read(mask).unwrap_err();
+        assert!(error.contains("cam0.mask") && error.contains(expected), "{error}");
+    };
+    check("small.png", &format!("16×8 pixels, expected the resolution of the camera, {width}×{height}"));
+    check("missing.png", "no such file");
+    check("text.png", "no PNG that can be read");
+    check("../arm.png", "in the folder of the rig");
+    check("/dev/zero", "in the folder of the rig");
+
+    // A log with both as attachments needs no file.
+    let path = at("flight.mcap");
+    let mut writer = LogWriter::create(&path, &LogWriterOptions::default()).unwrap();
+    writer.attach("x.rig.yaml", "application/yaml", &with_mask("arm.png"), 0).unwrap();
+    writer.attach("arm.png", "image/png", &fs::read(at("arm.png")).unwrap(), 0).unwrap();
+    let times = MessageTimes { stamp_ns: 1_000_000_000, log_time_ns: 1_000_000_000 };
+    writer.write_imu("/imu", "imu", times, &Vector3::zeros(), &Vector3::z()).unwrap();
+    writer.finish().unwrap();
+    fs::remove_file(at("arm.png")).unwrap();
+    let log = FlightLog::open(&path).unwrap();
+    assert_eq!(Rig::for_log(&log, None).unwrap().cameras[0].mask, rig.cameras[0].mask);
 }

@@ -57,6 +57,9 @@ fn write_camera(out: &mut String, camera: &CameraRig) {
     let [width, height] = camera.model.resolution_px;
     line(out, 1, "resolution", &format!("[{width}, {height}]"));
     line(out, 1, "timeshift_cam_imu", &number(camera.timeshift_cam_imu_s));
+    if let Some(mask) = &camera.mask {
+        line(out, 1, "mask", &text(&mask.file));
+    }
     if let CameraMount::Static { imu_from_camera } = &camera.mount {
         write_transform(out, "T_cam_imu", &imu_from_camera.inverse());
     }

@@ -287,14 +287,20 @@ impl LogWriter {
         self.write(topic, MessageKind::QuaternionStamped, times, &message)
     }
 
-    /// Attaches a text file, such as `city.rig.yaml`.
-    pub fn attach(&mut self, name: &str, media_type: &str, content: &str, log_time_ns: i64) -> Result<(), LogError> {
+    /// Attaches a file, such as `city.rig.yaml` or the mask of a camera.
+    pub fn attach(
+        &mut self,
+        name: &str,
+        media_type: &str,
+        content: &(impl AsRef<[u8]> + ?Sized),
+        log_time_ns: i64,
+    ) -> Result<(), LogError> {
         let attachment = Attachment {
             log_time: log_time_ns.max(0) as u64,
             create_time: log_time_ns.max(0) as u64,
             name: name.to_owned(),
             media_type: media_type.to_owned(),
-            data: Cow::Borrowed(content.as_bytes()),
+            data: Cow::Borrowed(content.as_ref()),
         };
         self.writer.attach(&attachment).map_err(|error| write_error(&self.path, &error))
     }

@@ -8,7 +8,7 @@ use crate::sensors::GrayImage;
 
 fn detect(image: &GrayImage, existing: &[Vector2<f64>], options: &CornerOptions) -> Vec<Vector2<f64>> {
     let mut found = Vec::new();
-    CornerDetector::default().detect(image, existing.iter().copied(), options, &mut found);
+    CornerDetector::default().detect(image, existing.iter().copied(), options, None, &mut found);
     found
 }
 

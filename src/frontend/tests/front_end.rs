@@ -7,7 +7,7 @@ use super::{blank, camera_of, scene, texture};
 use crate::frontend::corners::CornerOptions;
 use crate::frontend::{FeatureId, FrontEnd, FrontEndError, FrontEndOptions, PredictedRotation, TrackedFrame};
 use crate::geometry::{median, so3};
-use crate::sensors::GrayImage;
+use crate::sensors::{GrayImage, ImageMask};
 
 fn front_end(scene: &Scene) -> FrontEnd {
     let corners = CornerOptions { max_features: 60, min_distance_px: 18.0, ..Default::default() };
@@ -160,4 +160,33 @@ fn images_of_another_size_are_refused_and_change_nothing() {
     let error = FrontEndError::PixelCount { width: 320, height: 240, pixels: 17 };
     assert_eq!(front_end.process(&short, 1, None), Err(error));
     assert_eq!(front_end.process(&image, 1, None).unwrap().statistics.tracked, 60);
+}
+
+#[test]
+fn nothing_is_tracked_under_a_mask() {
+    let (scene, texture) = (scene(0.4), texture());
+    let [width, height] = camera_of(&scene).resolution_px;
+    // The right third, and a bar across the middle.
+    let masked =
+        |index: usize| 3 * (index % width) >= 2 * width || (height / 2..height / 2 + 12).contains(&(index / width));
+    let pixels = (0..width * height).map(|index| if masked(index) { 255 } else { 0 }).collect();
+    let mask = ImageMask::from_image(&GrayImage { width, height, pixels });
+    let play = |mask: Option<ImageMask>| {
+        let mut front_end = front_end(&scene).with_mask(mask);
+        let frames =
+            (0..10).map(|index| front_end.process(&scene.render(&texture, index), index as i64, None).unwrap());
+        frames.collect::<Vec<_>>()
+    };
+    let (free, covered) = (play(None), play(Some(mask.clone())));
+    let under = |frames: &[TrackedFrame]| {
+        frames.iter().flat_map(|frame| &frame.features).filter(|feature| mask.covers(&feature.uv_px)).count()
+    };
+    assert!(under(&free) > 100, "{} features lie there without a mask", under(&free));
+    assert_eq!(under(&covered), 0);
+    // Elsewhere features are followed as before.
+    let tracked: usize = covered[1..].iter().map(|frame| frame.statistics.tracked).sum();
+    assert!(tracked > 200, "{tracked} features followed");
+    // An empty mask changes nothing.
+    let empty = ImageMask::from_image(&blank(&scene));
+    assert_eq!(play(Some(empty)), free);
 }

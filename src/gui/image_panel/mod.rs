@@ -21,13 +21,15 @@ use super::help::terms::window;
 use super::pan_zoom::PanZoom;
 use super::units::significant;
 use super::{PanelContext, slide};
-use crate::sensors::GrayImage;
+use crate::sensors::{GrayImage, ImageMask};
 use crate::session::FrameImage;
 
 /// Maximum magnification relative to the fitted size.
 const MAX_ZOOM: f32 = 16.0;
 /// Width in points of the row with all options.
 const OPTIONS_WIDTH: f32 = 395.0;
+/// Width in points of the option of a mask.
+const MASK_WIDTH: f32 = 60.0;
 /// The whole legend in words, for images too narrow for it.
 const LEGEND: &str = "Colour: age of the track in frames\nRing: used in the solve\nDot: tracked only\nCross: rejected\n\
     Line: residual (prediction − measurement), magnified";
@@ -48,6 +50,8 @@ pub struct ImagePanel {
     pub trails: bool,
     /// Write every feature's id.
     pub ids: bool,
+    /// Tint what the mask of the camera covers.
+    pub mask: bool,
     view: PanZoom,
     texture: Option<CachedTexture>,
 }
@@ -60,6 +64,7 @@ impl Default for ImagePanel {
             residuals: true,
             trails: true,
             ids: false,
+            mask: true,
             view: PanZoom::default(),
             texture: None,
         }
@@ -68,28 +73,30 @@ impl Default for ImagePanel {
 
 struct CachedTexture {
     image: Arc<GrayImage>,
+    /// Whether the mask is tinted in it.
+    masked: bool,
     handle: TextureHandle,
 }
 
 impl ImagePanel {
     /// A panel with the same view and no texture of a window.
     pub(in crate::gui) fn view_copy(&self) -> Self {
-        let Self { side, magnification, residuals, trails, ids, view, .. } = *self;
-        Self { side, magnification, residuals, trails, ids, view, texture: None }
+        let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *self;
+        Self { side, magnification, residuals, trails, ids, mask, view, texture: None }
     }
 
     /// Copies the view of another panel.
     pub(in crate::gui) fn follow(&mut self, other: &Self) {
-        let Self { side, magnification, residuals, trails, ids, view, .. } = *other;
+        let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *other;
         let texture = self.texture.take();
-        *self = Self { side, magnification, residuals, trails, ids, view, texture };
+        *self = Self { side, magnification, residuals, trails, ids, mask, view, texture };
     }
 
     /// Whether it has the view of another panel.
     pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
         let look = |panel: &Self| {
-            let Self { side, magnification, residuals, trails, ids, view, .. } = *panel;
-            (side, magnification, residuals, trails, ids, view)
+            let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *panel;
+            (side, magnification, residuals, trails, ids, mask, view)
         };
         look(self) == look(other)
     }
@@ -136,22 +143,24 @@ impl ImagePanel {
                 ui.weak(format!("residuals {side} the solve"));
                 return;
             }
+            let has_mask = mask_of(context).is_some();
             ui.separator();
             ui.selectable_value(&mut self.side, SolveSide::Before, "Before")
                 .on_hover_text("Reprojection residuals before the solve of this step");
             ui.selectable_value(&mut self.side, SolveSide::After, "After")
                 .on_hover_text("Reprojection residuals after the solve of this step");
-            if ui.available_width() >= OPTIONS_WIDTH {
-                self.options_ui(ui);
+            let wanted = OPTIONS_WIDTH + if has_mask { MASK_WIDTH } else { 0.0 };
+            if ui.available_width() >= wanted {
+                self.options_ui(ui, has_mask);
             } else {
                 let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
-                MenuButton::new("Show").config(config).ui(ui, |ui| self.options_ui(ui));
+                MenuButton::new("Show").config(config).ui(ui, |ui| self.options_ui(ui, has_mask));
             }
         });
     }
 
     /// The options of the overlay: in a row where there is room, else in a menu.
-    fn options_ui(&mut self, ui: &mut Ui) {
+    fn options_ui(&mut self, ui: &mut Ui, has_mask: bool) {
         ui.checkbox(&mut self.residuals, "Residuals")
             .on_hover_text("Reprojection residuals, prediction − measurement, px, magnified");
         ui.spacing_mut().slider_width = 70.0;
@@ -165,6 +174,9 @@ impl ImagePanel {
         );
         ui.checkbox(&mut self.trails, "Trails").on_hover_text("Track trails: earlier pixels of each feature");
         ui.checkbox(&mut self.ids, "Ids").on_hover_text("Feature ids");
+        if has_mask {
+            ui.checkbox(&mut self.mask, "Mask").on_hover_text("Pixels that the camera's mask covers, tinted");
+        }
     }
 
     fn image_ui(
@@ -193,7 +205,8 @@ impl ImagePanel {
         self.view.navigate(ui, context.theme, area, fitted, response, MAX_ZOOM);
         let place = ImagePlacement { rect: self.view.place(area, fitted), size_px };
         if let Some(image) = image {
-            let texture = self.texture(ui, image);
+            let mask = mask_of(context).filter(|_| self.mask);
+            let texture = self.texture(ui, image, mask);
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
             painter.image(texture, place.rect, uv, egui::Color32::WHITE);
         } else {
@@ -257,24 +270,38 @@ impl ImagePanel {
         }
     }
 
-    fn texture(&mut self, ui: &Ui, image: Arc<GrayImage>) -> egui::TextureId {
+    fn texture(&mut self, ui: &Ui, image: Arc<GrayImage>, mask: Option<&ImageMask>) -> egui::TextureId {
+        let masked = mask.is_some();
         if let Some(cached) = &self.texture
             && Arc::ptr_eq(&cached.image, &image)
+            && cached.masked == masked
         {
             return cached.handle.id();
         }
         let wanted = image.width * image.height;
         let mut pixels = image.pixels.clone();
         pixels.resize(wanted, 0);
-        let color_image = ColorImage::from_gray([image.width, image.height], &pixels);
+        let mut color_image = ColorImage::from_gray([image.width, image.height], &pixels);
+        if let Some(mask) = mask {
+            paint::tint(&mut color_image, mask);
+        }
         let mut cached = self.texture.take().unwrap_or_else(|| CachedTexture {
             image: Arc::clone(&image),
+            masked,
             handle: ui.ctx().load_texture("camera image", color_image.clone(), TextureOptions::LINEAR),
         });
         cached.handle.set(color_image, TextureOptions::LINEAR);
         cached.image = image;
+        cached.masked = masked;
         self.texture.insert(cached).handle.id()
     }
+}
+
+/// The mask of the camera of the selected run.
+fn mask_of<'a>(context: &PanelContext<'a>) -> Option<&'a ImageMask> {
+    let key = &context.recording.runs.get(context.selection.run)?.camera_key;
+    let camera = context.recording.rig.cameras.iter().find(|camera| camera.key == *key)?;
+    camera.mask.as_ref().map(|mask| &mask.image)
 }
 
 /// Size in points of an image that fills the area in one direction.

@@ -1,11 +1,14 @@
 //! Painting of tracks, residuals and legend over an image.
 
-use egui::{Align2, Color32, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
+use egui::{Align2, Color32, ColorImage, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 use nalgebra::Vector2;
 
 use super::model::{FeatureMark, SolveSide};
 use crate::gui::theme::{self, Theme, ThemeName};
+use crate::sensors::ImageMask;
 
+/// Period of the hatch over masked pixels, in image pixels.
+const HATCH_PX: usize = 12;
 /// Age in frames with the last colour of the map.
 const MAX_AGE: f64 = 100.0;
 /// Ages in the legend.
@@ -62,6 +65,18 @@ pub(super) struct MarkOptions {
 /// Colour of an age in frames: viridis over the square root, so that young tracks differ most.
 pub(super) fn age_color(age: u32) -> Color32 {
     theme::viridis((f64::from(age) / MAX_AGE).sqrt())
+}
+
+/// Tints the masked pixels of an image: red throughout, with a darker diagonal hatch.
+pub(super) fn tint(image: &mut ColorImage, mask: &ImageMask) {
+    let [width, height] = image.size;
+    for (index, pixel) in image.pixels.iter_mut().enumerate().take(width * height) {
+        let (column, row) = (index % width, index / width);
+        if mask.is_masked(column, row) {
+            let hatched = (column + row) % HATCH_PX < HATCH_PX / 3;
+            *pixel = pixel.lerp_to_gamma(ink().error, if hatched { 0.6 } else { 0.25 });
+        }
+    }
 }
 
 /// The colour below a mark.

@@ -6,12 +6,13 @@ use nalgebra::Vector2;
 
 use super::ImagePanel;
 use super::model::{ImageModel, SolveSide, description};
-use super::paint::ImagePlacement;
+use super::paint::{ImagePlacement, tint};
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
 use crate::gui::samples::{FRAME_PERIOD_NS, first_tracked_frame, sample_images, sample_recording_of};
 use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{ImageSource, Selection};
+use crate::sensors::{CameraMask, GrayImage, ImageMask};
 use crate::session::{FrameImage, Recording, StepRecord};
 
 /// A recording of 80 frames; the estimator tracks in the last one.
@@ -181,4 +182,32 @@ fn screenshots_repeat_and_show_the_image() {
     keep_screenshot("image", &late);
     assert!(late == screenshot(recording.duration_ns));
     assert!(late != screenshot(60 * FRAME_PERIOD_NS));
+}
+
+#[test]
+fn a_mask_is_tinted_and_can_be_hidden() {
+    let mut recording = recording();
+    let rig = Arc::make_mut(&mut recording.rig);
+    let [width, height] = rig.cameras[0].model.resolution_px;
+    let pixels = (0..width * height).map(|index| if index % width < width / 2 { 255 } else { 0 }).collect();
+    let image = ImageMask::from_image(&GrayImage { width, height, pixels });
+    rig.cameras[0].mask = Some(CameraMask { file: "cam0.mask.png".to_owned(), image: image.clone() });
+    let end_ns = recording.duration_ns;
+    let mut harness = Harness::builder().with_size([900.0, 700.0]).build_ui_state(
+        move |ui, (panel, selection)| show(ui, panel, &recording, end_ns, selection),
+        (ImagePanel::default(), Selection::default()),
+    );
+    harness.run();
+    assert!(harness.state().0.mask);
+    harness.get_by_label("Mask").click();
+    harness.run();
+    assert!(!harness.state().0.mask);
+
+    let mut tinted = egui::ColorImage::from_gray([width, height], &vec![90; width * height]);
+    let plain = tinted.clone();
+    tint(&mut tinted, &image);
+    for (index, (pixel, before)) in tinted.pixels.iter().zip(&plain.pixels).enumerate() {
+        assert_eq!(pixel == before, !image.is_masked(index % width, index / width));
+        assert!(pixel == before || pixel.r() > pixel.b());
+    }
 }

@@ -99,7 +99,8 @@ pub fn camera_rotations(
 
 /// Rotations between consecutive images with their stamps.
 fn between(camera: &CameraRig, images: impl Iterator<Item = (i64, Arc<GrayImage>)>) -> Vec<ImageRotation> {
-    let mut front_end = FrontEnd::new(camera.model.clone(), FrontEndOptions::default());
+    let mask = camera.mask.as_ref().map(|mask| mask.image.clone());
+    let mut front_end = FrontEnd::new(camera.model.clone(), FrontEndOptions::default()).with_mask(mask);
     let focal_px = 0.5 * (camera.model.intrinsics_px[0] + camera.model.intrinsics_px[1]);
     let mut previous: Option<(TrackedFrame, i64)> = None;
     let mut rotations = Vec::new();

@@ -37,9 +37,10 @@ impl CameraTracker {
     ) -> Result<Self, SessionError> {
         let stream = FrameStream::new(log, rig, camera_key, start_s, duration_s)?;
         let camera = rig.camera(camera_key).map_err(LogError::from)?;
+        let mask = camera.mask.as_ref().map(|mask| mask.image.clone());
         Ok(Self {
             stream,
-            front_end: FrontEnd::new(camera.model.clone(), FrontEndOptions::default()),
+            front_end: FrontEnd::new(camera.model.clone(), FrontEndOptions::default()).with_mask(mask),
             chain: rig.chain_of_camera(camera_key).unwrap_or_default(),
             noise: prediction_noise(rig, &camera.mount),
             previous_orientation: None,

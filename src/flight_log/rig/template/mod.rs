@@ -259,6 +259,7 @@ impl RigTemplate {
                 rate_hz: self.camera.rate_hz,
                 model: self.camera.model.value.clone(),
                 timeshift_cam_imu_s: self.camera.timeshift_cam_imu_s.value,
+                mask: None,
             }],
             gimbal: self.gimbal.as_ref().map(|gimbal| self.gimbal_rig(gimbal)),
             ground_truth_topic: self.ground_truth_topic.clone(),

@@ -1,0 +1,98 @@
+//! `mask` of a camera: a PNG beside the rig file, or attached to the log like the rig itself.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Component, Path};
+
+use image::ImageFormat;
+
+use super::super::image_decoding::decode_within;
+use super::super::{FlightLog, LogError, LogLimits};
+use super::fields::Field;
+use super::read::CameraFacts;
+use crate::camera::CameraModel;
+use crate::sensors::{CameraMask, GrayImage, ImageMask};
+
+/// Largest file of a mask in bytes.
+const MAX_MASK_BYTES: u64 = 64 << 20;
+
+/// The facts of a log, and the files in the folder of a rig.
+pub(super) struct InFolder<'a> {
+    pub(super) facts: &'a dyn CameraFacts,
+    pub(super) folder: &'a Path,
+}
+
+impl CameraFacts for InFolder<'_> {
+    fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String> {
+        self.facts.camera_model(image_topic)
+    }
+
+    fn rate_hz(&self, image_topic: &str) -> Option<f64> {
+        self.facts.rate_hz(image_topic)
+    }
+
+    fn file_beside_rig(&self, name: &str) -> Result<Vec<u8>, String> {
+        // A rig of somebody else names files of its own folder, and no device.
+        if !Path::new(name).components().all(|part| matches!(part, Component::Normal(_))) {
+            return Err("expected a file in the folder of the rig".into());
+        }
+        let path = self.folder.join(name);
+        if !path.is_file() {
+            return Err(format!("no such file: {}", path.display()));
+        }
+        let cannot = |error: std::io::Error| format!("{error}: {}", path.display());
+        let file = File::open(&path).map_err(cannot)?;
+        let mut bytes = Vec::new();
+        file.take(MAX_MASK_BYTES + 1).read_to_end(&mut bytes).map_err(cannot)?;
+        if bytes.len() as u64 > MAX_MASK_BYTES {
+            return Err(format!("more than {MAX_MASK_BYTES} bytes: {}", path.display()));
+        }
+        Ok(bytes)
+    }
+}
+
+/// The facts of a log, and its attachments.
+pub(super) struct Attached<'a>(pub(super) &'a FlightLog);
+
+impl CameraFacts for Attached<'_> {
+    fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String> {
+        self.0.camera_model(image_topic)
+    }
+
+    fn rate_hz(&self, image_topic: &str) -> Option<f64> {
+        self.0.rate_hz(image_topic)
+    }
+
+    fn file_beside_rig(&self, name: &str) -> Result<Vec<u8>, String> {
+        let attached = self.0.attachment(file_name(name)).map(|(_, content)| content);
+        attached.ok_or_else(|| format!("the log has no readable attachment {:?}", file_name(name)))
+    }
+}
+
+fn file_name(name: &str) -> &str {
+    name.rsplit(['/', '\\']).next().unwrap_or(name)
+}
+
+/// The mask that a camera names, `None` when it names none.
+pub(super) fn read(
+    camera: &Field<'_>,
+    resolution_px: [usize; 2],
+    facts: &dyn CameraFacts,
+) -> Result<Option<CameraMask>, LogError> {
+    let Some(field) = camera.field("mask").optional() else { return Ok(None) };
+    let file = field.text("the file of a PNG image beside the rig")?;
+    let bytes = facts.file_beside_rig(file).map_err(|problem| field.error(format!("names '{file}': {problem}")))?;
+    let decoded = decode_within(&bytes, ImageFormat::Png, &LogLimits::default(), None);
+    let gray = decoded
+        .map_err(|problem| field.error(format!("names '{file}', which is no PNG that can be read: {problem}")))?;
+    let gray = gray.into_luma8();
+    let [width, height] = [gray.width() as usize, gray.height() as usize];
+    if [width, height] != resolution_px {
+        let [expected_width, expected_height] = resolution_px;
+        return Err(field.error(format!(
+            "names '{file}' of {width}×{height} pixels, expected the resolution of the camera, {expected_width}×{expected_height}"
+        )));
+    }
+    let image = ImageMask::from_image(&GrayImage { width, height, pixels: gray.into_raw() });
+    Ok(Some(CameraMask { file: file.to_owned(), image }))
+}

@@ -1,0 +1,227 @@
+//! Parts of a camera's images that never move although the camera does: the vehicle in view.
+//!
+//! The gradient of a pixel that shows the vehicle keeps its direction in all images; that of the scene points anywhere.
+
+use std::collections::BTreeMap;
+
+use super::survey::Survey;
+use super::{Area, Findings, ImageRotation, ProposedMask, Severity};
+use crate::sensors::{GrayImage, ImageMask, Rig};
+
+/// Images are averaged down to at most this width.
+const LARGEST_WIDTH: usize = 640;
+/// Side of the blocks that are judged, in pixels of the averaged images.
+const BLOCK: usize = 8;
+/// Mean gradient of a block with texture, in grey levels per pixel; compression and noise stay below.
+const MIN_GRADIENT: f32 = 2.0;
+/// Ratio of the norm of the summed gradients to the sum of their norms above which a block is still. Scenes that move have
+/// about the inverse square root of the number of images.
+const STILL_COHERENCE: f32 = 0.6;
+/// Fewest neighbouring blocks of a part.
+const MIN_BLOCKS: usize = 3;
+/// Fewest images that are compared.
+const MIN_IMAGES: usize = 20;
+/// The camera must have rotated by this much in all measured pairs of images together, in degrees.
+const MIN_ROTATION_DEG: f64 = 45.0;
+/// With more of the textured blocks still, the camera has seen one and the same scene.
+const MAX_STILL_RATIO: f64 = 0.5;
+/// A mask over more of the image than this is likely inverted.
+const MAX_MASKED_RATIO: f64 = 0.6;
+
+/// Sums of the gradients of all sampled images of a camera.
+#[derive(Clone, Debug, Default)]
+pub(super) struct GradientSums {
+    size_px: [usize; 2],
+    width: usize,
+    height: usize,
+    /// Number of pixels along each side that are averaged.
+    scale: usize,
+    images: usize,
+    /// Sum of the gradients along columns and rows, and of their norms.
+    sums: Vec<[f32; 3]>,
+}
+
+impl GradientSums {
+    /// Adds an image; one of another size than the first is left out.
+    pub(super) fn add(&mut self, image: &GrayImage) {
+        if self.images == 0 {
+            self.size_px = [image.width, image.height];
+            self.scale = image.width.div_ceil(LARGEST_WIDTH).max(1);
+            (self.width, self.height) = (image.width / self.scale, image.height / self.scale);
+            self.sums = vec![[0.0; 3]; self.width * self.height];
+        }
+        if self.size_px != [image.width, image.height] {
+            return;
+        }
+        self.images += 1;
+        let small = self.averaged(image);
+        for row in 1..self.height.saturating_sub(1) {
+            for column in 1..self.width.saturating_sub(1) {
+                let at = row * self.width + column;
+                let along = 0.5 * (small[at + 1] - small[at - 1]);
+                let down = 0.5 * (small[at + self.width] - small[at - self.width]);
+                let sum = &mut self.sums[at];
+                *sum = [sum[0] + along, sum[1] + down, sum[2] + along.hypot(down)];
+            }
+        }
+    }
+
+    fn averaged(&self, image: &GrayImage) -> Vec<f32> {
+        let scale = self.scale;
+        let pixel = |index: usize| {
+            let (left, top) = (scale * (index % self.width), scale * (index / self.width));
+            let row = |row: usize| &image.pixels[row * image.width + left..][..scale];
+            let sum: u32 = (top..top + scale).flat_map(row).map(|pixel| u32::from(*pixel)).sum();
+            sum as f32 / (scale * scale) as f32
+        };
+        (0..self.width * self.height).map(pixel).collect()
+    }
+
+    fn blocks(&self) -> [usize; 2] {
+        [self.width / BLOCK, self.height / BLOCK]
+    }
+
+    /// Whether each block is still, row by row; `None` for one without texture.
+    fn judge(&self) -> Vec<Option<bool>> {
+        let [columns, rows] = self.blocks();
+        let block = |index: usize| {
+            let (left, top) = (BLOCK * (index % columns), BLOCK * (index / columns));
+            let row = |row: usize| &self.sums[row * self.width + left..][..BLOCK];
+            let (mut summed, mut norms) = (0.0_f32, 0.0_f32);
+            for [along, down, norm] in (top..top + BLOCK).flat_map(row) {
+                summed += along.hypot(*down);
+                norms += norm;
+            }
+            let textured = norms > MIN_GRADIENT * (self.images * BLOCK * BLOCK) as f32;
+            textured.then_some(summed > STILL_COHERENCE * norms)
+        };
+        (0..columns * rows).map(block).collect()
+    }
+
+    /// The pixels of some blocks and of those around them.
+    fn mask(&self, blocks: &[bool]) -> ImageMask {
+        let [columns, rows] = self.blocks();
+        let near = |column: usize, row: usize| {
+            let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
+            around(row, rows).any(|row| around(column, columns).any(|column| blocks[row * columns + column]))
+        };
+        let [width, height] = self.size_px;
+        let side = BLOCK * self.scale;
+        let pixel = |index: usize| {
+            // What is left beside the last block belongs to it.
+            let (column, row) = ((index % width / side).min(columns - 1), (index / width / side).min(rows - 1));
+            if near(column, row) { u8::MAX } else { 0 }
+        };
+        ImageMask::from_image(&GrayImage { width, height, pixels: (0..width * height).map(pixel).collect() })
+    }
+
+    /// Whether a mask covers most of a block.
+    fn is_covered(&self, mask: &ImageMask, block: usize) -> bool {
+        let side = BLOCK * self.scale;
+        let [columns, _] = self.blocks();
+        let (left, top) = (side * (block % columns), side * (block / columns));
+        let masked = (top..top + side).flat_map(|row| (left..left + side).map(move |column| (column, row)));
+        2 * masked.filter(|(column, row)| mask.is_masked(*column, *row)).count() > side * side
+    }
+}
+
+/// Keeps the still blocks that have neighbours enough.
+fn connected(still: &[bool], columns: usize) -> Vec<bool> {
+    let mut kept = vec![false; still.len()];
+    let mut visited = vec![false; still.len()];
+    let rows = still.len().checked_div(columns).unwrap_or(0);
+    for start in 0..still.len() {
+        if !still[start] || visited[start] {
+            continue;
+        }
+        let (mut part, mut open) = (Vec::new(), vec![start]);
+        visited[start] = true;
+        while let Some(block) = open.pop() {
+            part.push(block);
+            let (column, row) = (block % columns, block / columns);
+            for row in row.saturating_sub(1)..(row + 2).min(rows) {
+                for column in column.saturating_sub(1)..(column + 2).min(columns) {
+                    let next = row * columns + column;
+                    if still[next] && !visited[next] {
+                        visited[next] = true;
+                        open.push(next);
+                    }
+                }
+            }
+        }
+        if part.len() >= MIN_BLOCKS {
+            for block in part {
+                kept[block] = true;
+            }
+        }
+    }
+    kept
+}
+
+/// Proposes a mask for each camera that sees the vehicle, and checks the masks of the rig.
+pub(super) fn check_still_pixels(
+    survey: &Survey,
+    rig: &Rig,
+    rotations: &[ImageRotation],
+    findings: &mut Findings,
+) -> Vec<ProposedMask> {
+    let mut rotated_deg: BTreeMap<&str, (f64, usize)> = BTreeMap::new();
+    for rotation in rotations {
+        let entry = rotated_deg.entry(&rotation.camera_key).or_default();
+        *entry = (entry.0 + rotation.second_from_first.angle().to_degrees(), entry.1 + 1);
+    }
+    let mut proposed = Vec::new();
+    for camera in &rig.cameras {
+        let given = camera.mask.as_ref().map(|mask| &mask.image);
+        if let Some(mask) = given.filter(|mask| mask.ratio() > MAX_MASKED_RATIO) {
+            let title = format!("most of the images of {} is masked", camera.key);
+            let evidence = format!("{:.0} % of the pixels", 100.0 * mask.ratio());
+            let remedy = "white pixels are masked: invert the mask when it marks what is to be used";
+            findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
+        }
+        let (rotation_deg, pairs) = rotated_deg.get(camera.key.as_str()).copied().unwrap_or_default();
+        let Some(sums) = survey.gradients.get(&camera.key).filter(|sums| sums.images >= MIN_IMAGES) else { continue };
+        if rotation_deg < MIN_ROTATION_DEG {
+            continue;
+        }
+        let judged = sums.judge();
+        let textured = judged.iter().flatten().count();
+        let open = |(index, still): (usize, &Option<bool>)| {
+            *still == Some(true) && !given.is_some_and(|mask| sums.is_covered(mask, index))
+        };
+        let still: Vec<bool> = judged.iter().enumerate().map(open).collect();
+        let all_still = judged.iter().filter(|still| **still == Some(true)).count();
+        if all_still as f64 > MAX_STILL_RATIO * textured as f64 {
+            continue;
+        }
+        let parts = connected(&still, sums.blocks()[0]);
+        let motion =
+            format!("in {} images, while the camera rotated by {rotation_deg:.0}° over {pairs} pairs", sums.images);
+        if !parts.contains(&true) {
+            if given.is_some() {
+                let title = format!("the mask of {} covers what never moves", camera.key);
+                findings.good(Area::Images, title, motion);
+            }
+            continue;
+        }
+        let mask = sums.mask(&parts);
+        let title = format!("a part of the images of {} never moves", camera.key);
+        let evidence = format!("{:.1} % of the pixels {motion}: {}", 100.0 * mask.ratio(), extent(&mask));
+        let remedy = format!(
+            "it is likely the vehicle: write the proposed mask with dcvins check --write-masks FOLDER, correct it, and name it in {}.mask",
+            camera.key
+        );
+        findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
+        proposed.push(ProposedMask { camera_key: camera.key.clone(), mask });
+    }
+    proposed
+}
+
+/// Columns and rows of the masked pixels.
+fn extent(mask: &ImageMask) -> String {
+    let [width, height] = mask.size_px();
+    let columns: Vec<usize> = (0..width).filter(|column| (0..height).any(|row| mask.is_masked(*column, row))).collect();
+    let rows: Vec<usize> = (0..height).filter(|row| (0..width).any(|column| mask.is_masked(column, *row))).collect();
+    let range = |places: &[usize]| format!("{} to {}", places.first().unwrap_or(&0), places.last().unwrap_or(&0));
+    format!("columns {}, rows {}", range(&columns), range(&rows))
+}
