@@ -88,6 +88,25 @@ fn read_log(path: &Path) {
     }
 }
 
+/// A video: the first byte picks H.264 or H.265, then follow its messages (Annex B), each behind its length in two bytes.
+pub fn video(bytes: &[u8]) {
+    let Some((codec, mut rest)) = bytes.split_first() else { return };
+    let format = if codec % 2 == 0 { "h264" } else { "h265" };
+    let folder = folder();
+    let path = folder.path().join("input.mcap");
+    let mut writer = LogWriter::create(&path, &LogWriterOptions::default()).expect("the log can be created");
+    for index in 0..MAX_READ as i64 {
+        let Some(([low, high], behind)) = rest.split_first_chunk() else { break };
+        let (message, behind) = behind.split_at(behind.len().min(usize::from(u16::from_le_bytes([*low, *high]))));
+        rest = behind;
+        let times = MessageTimes { stamp_ns: index, log_time_ns: index };
+        let topic = topic_of(MessageKind::CompressedVideo);
+        writer.write_compressed_video(topic, "video", times, format, message).expect("the message can be written");
+    }
+    writer.finish().expect("the log can be finished");
+    read_log(&path);
+}
+
 /// A message in CDR, wrapped into a log: the first byte picks the type, the rest is the message.
 pub fn message(bytes: &[u8]) {
     let Some((kind, message)) = bytes.split_first() else { return };

@@ -22,6 +22,7 @@ type Failed = Box<dyn std::error::Error>;
 
 /// An H.264 stream, the size of its first message and the end of its second.
 const VIDEO: &[u8] = include_bytes!("../../../tests/data/video/h264.bin");
+const VIDEO_LISTING: &str = include_str!("../../../tests/data/video/streams.json");
 const KEYFRAME_BYTES: usize = 859;
 const PICTURE_END: usize = 979;
 /// Header stamp of the first message.
@@ -187,6 +188,31 @@ fn messages(corpus: &Path, log: &Path) -> Result<(), Failed> {
     Ok(())
 }
 
+/// The streams of the tests, as inputs of the target `video`.
+fn videos(corpus: &Path) -> Result<(), Failed> {
+    let folder = target(corpus, "video")?;
+    let streams: [(&str, u8, &[u8]); 4] = [
+        ("h264", 0, VIDEO),
+        ("h264_10_bit", 0, include_bytes!("../../../tests/data/video/h264_10_bit.bin")),
+        ("h264_b_frames", 0, include_bytes!("../../../tests/data/video/h264_b_frames.bin")),
+        ("h265", 1, include_bytes!("../../../tests/data/video/h265.bin")),
+    ];
+    for (name, codec, mut rest) in streams {
+        // The sizes of the messages are the first list of numbers behind the name.
+        let listing = VIDEO_LISTING.split_once(&format!("\"{name}\":")).ok_or("no such stream")?.1;
+        let sizes = listing.split_once('[').and_then(|(_, numbers)| numbers.split_once(']')).ok_or("no sizes")?.0;
+        let mut input = vec![codec];
+        for size in sizes.split(',') {
+            let (message, behind) = rest.split_at(size.trim().parse()?);
+            input.extend(u16::try_from(message.len())?.to_le_bytes());
+            input.extend(message);
+            rest = behind;
+        }
+        fs::write(folder.join(name), input)?;
+    }
+    Ok(())
+}
+
 fn bags(corpus: &Path) -> Result<(), Failed> {
     let folder = target(corpus, "bag")?;
     let covariance = f64s(&[0.0; 9]);
@@ -305,6 +331,7 @@ fn main() -> Result<(), Failed> {
     let corpus = Path::new(&corpus);
     let log = logs(corpus)?;
     messages(corpus, &log)?;
+    videos(corpus)?;
     bags(corpus)?;
     databases(corpus, &log)?;
     texts(corpus)
