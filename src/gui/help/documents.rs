@@ -13,9 +13,10 @@ struct Document {
 }
 
 /// The manual comes first.
-const DOCUMENTS: [Document; 10] = [
+const DOCUMENTS: [Document; 11] = [
     Document { path: "docs/manual.md", text: include_str!("../../../docs/manual.md") },
     Document { path: "docs/tutorial.md", text: include_str!("../../../docs/tutorial.md") },
+    Document { path: "docs/recordings.md", text: include_str!("../../../docs/recordings.md") },
     Document { path: "docs/commands.md", text: include_str!("../../../docs/commands.md") },
     Document { path: "docs/formats.md", text: include_str!("../../../docs/formats.md") },
     Document { path: "docs/coming_from.md", text: include_str!("../../../docs/coming_from.md") },
