@@ -35,12 +35,12 @@ struct SpeedGrid {
 impl SpeedGrid {
     fn of(measured: &[Measured]) -> Self {
         let step_ns = ns_from_seconds(STEP_S);
-        let start_ns = measured.iter().map(|(from_ns, _, _)| *from_ns).min().unwrap_or(0);
+        let start_ns = measured.iter().map(|pair| pair.from_ns).min().unwrap_or(0);
         let mut speeds: Vec<(usize, f64)> = Vec::new();
-        for (from_ns, to_ns, rotation) in measured {
-            let speed = rotation.norm() / seconds_from_ns(to_ns - from_ns);
-            let first = (from_ns - start_ns).div_euclid(step_ns);
-            let last = (to_ns - start_ns).div_euclid(step_ns).max(first + 1);
+        for pair in measured {
+            let speed = pair.rotation.norm() / pair.interval_s();
+            let first = (pair.from_ns - start_ns).div_euclid(step_ns);
+            let last = (pair.to_ns - start_ns).div_euclid(step_ns).max(first + 1);
             speeds.extend((first..last).filter_map(|place| Some((usize::try_from(place).ok()?, speed))));
         }
         speeds.sort_by_key(|(place, _)| *place);
@@ -60,7 +60,7 @@ pub(super) fn correlation(
     let Some((first_ns, last_ns)) = reference.range_ns() else { return Vec::new() };
     let step_ns = ns_from_seconds(STEP_S);
     let images = SpeedGrid::of(measured);
-    let interval_ns = measured.iter().map(|(from_ns, to_ns, _)| to_ns - from_ns).min().unwrap_or(step_ns).max(step_ns);
+    let interval_ns = measured.iter().map(|pair| pair.to_ns - pair.from_ns).min().unwrap_or(step_ns).max(step_ns);
     // The reference's speed over the interval of the images, so that both are smoothed alike.
     let count = usize::try_from((last_ns - first_ns) / step_ns).unwrap_or(0);
     let speed = |place: usize| {

@@ -18,7 +18,7 @@ pub use self::references::{AlignmentReference, align_camera};
 use self::refinement::Refined;
 use super::ImageRotation;
 use super::statistics::median;
-use crate::geometry::{seconds_from_ns, so3};
+use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 
 /// Minimum number of image rotations.
 const MIN_ROTATIONS: usize = 40;
@@ -28,14 +28,35 @@ const MIN_ROTATION_RAD: f64 = 0.001;
 const MIN_EXPLAINED: f64 = 0.6;
 /// The next offset must leave this many times as much unexplained.
 const MIN_DISTINCTION: f64 = 1.5;
-/// Lengths over which rotations of consecutive images are composed, in seconds; 0 for each pair of images. Noisy joint angles
-/// need more than the rotation of a stabilized camera from one image to the next.
-const LENGTHS_S: [f64; 3] = [0.0, 0.2, 0.6];
+/// Lengths over which rotations of consecutive images are composed, in seconds, for a noisy reference: it needs more than the
+/// rotation of a stabilized camera from one image to the next.
+const NOISY_LENGTHS_S: [f64; 2] = [0.3, 0.6];
+/// An image rotation that differs from its neighbours by this many times the median is wrong.
+const OUTLIER_RATIO: f64 = 8.0;
 /// Offsets closer than this are one.
 const DISTINCT_S: f64 = 0.25;
 
-/// An image rotation: stamps of both images in nanoseconds, and the rotation vector of `second_from_first`.
-type Measured = (i64, i64, Vector3<f64>);
+/// The rotation between two images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Measured {
+    /// Stamps of both images.
+    from_ns: i64,
+    to_ns: i64,
+    /// Rotation vector of `second_from_first`, in radians.
+    rotation: Vector3<f64>,
+    /// Its derivative when both times are shifted, in rad/s, from the rotations of images around both; zero for single pairs.
+    by_shift: Vector3<f64>,
+}
+
+impl Measured {
+    fn interval_s(&self) -> f64 {
+        seconds_from_ns(self.to_ns - self.from_ns)
+    }
+
+    fn middle_s(&self) -> f64 {
+        0.5 * (seconds_from_ns(self.from_ns) + seconds_from_ns(self.to_ns))
+    }
+}
 
 /// Orientations on one clock, up to a constant rotation on either side: `fixed_from_body` at increasing stamps.
 ///
@@ -43,6 +64,8 @@ type Measured = (i64, i64, Vector3<f64>);
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OrientationSeries {
     samples: Vec<(i64, UnitQuaternion<f64>)>,
+    /// Whether its noise from sample to sample exceeds that of the images, as that of measured joint angles does.
+    is_noisy: bool,
 }
 
 impl OrientationSeries {
@@ -54,7 +77,13 @@ impl OrientationSeries {
                 samples.push((stamp_ns, orientation));
             }
         }
-        Self { samples }
+        Self { samples, is_noisy: false }
+    }
+
+    /// The same series, of which only rotations over longer times are precise.
+    #[must_use]
+    pub fn with_noise(self) -> Self {
+        Self { is_noisy: true, ..self }
     }
 
     /// The integral of angular velocities in rad/s with stamps in nanoseconds.
@@ -71,7 +100,7 @@ impl OrientationSeries {
             previous = Some((stamp_ns, rate));
             Some((stamp_ns, orientation))
         });
-        Self { samples: integrated.collect() }
+        Self { samples: integrated.collect(), is_noisy: false }
     }
 
     /// First and last stamp, `None` without samples.
@@ -136,7 +165,7 @@ impl ClockAlignment {
     /// The time in nanoseconds to add to a stamp of the camera.
     pub fn shift_ns(&self, camera_ns: i64) -> i64 {
         let since_middle_s = seconds_from_ns(camera_ns) - self.middle_s;
-        crate::geometry::ns_from_seconds(self.offset_s + self.drift_ppm * 1e-6 * since_middle_s)
+        ns_from_seconds(self.offset_s + self.drift_ppm * 1e-6 * since_middle_s)
     }
 }
 
@@ -204,21 +233,51 @@ pub fn align_clocks(
     guess_s: f64,
     search_s: f64,
 ) -> Result<ClockAlignment, AlignmentError> {
-    let mut best = align_rotations(&composed(images, LENGTHS_S[0]), reference, guess_s, search_s);
-    for length_s in &LENGTHS_S[1..] {
-        let longer = align_rotations(&composed(images, *length_s), reference, guess_s, search_s);
-        best = match (best, longer) {
-            (Ok(best), Ok(longer)) if longer.offset_sigma_s < best.offset_sigma_s => Ok(longer),
-            (Err(_), Ok(longer)) => Ok(longer),
-            (best, _) => best,
-        };
+    if !reference.is_noisy {
+        return align_rotations(&single(images), reference, guess_s, search_s);
+    }
+    let images = &without_outliers(images);
+    let [mut best, longer] =
+        NOISY_LENGTHS_S.map(|length_s| align_rotations(&composed(images, length_s), reference, guess_s, search_s));
+    let precision = |aligned: &Result<ClockAlignment, AlignmentError>| {
+        aligned.as_ref().map_or(f64::INFINITY, |found| found.offset_sigma_s)
+    };
+    if precision(&longer) < precision(&best) || best.is_err() {
+        best = longer;
     }
     best
 }
 
-/// Rotation vectors of `second_from_first` over at least a length, from consecutive image rotations; the next one starts in the
-/// middle of the one before.
+/// The rotation between each pair of images.
+fn single(images: &[ImageRotation]) -> Vec<Measured> {
+    let measured = |image: &ImageRotation| Measured {
+        from_ns: image.from_ns,
+        to_ns: image.to_ns,
+        rotation: so3::log(&image.second_from_first),
+        by_shift: Vector3::zeros(),
+    };
+    images.iter().filter(|image| image.to_ns > image.from_ns).map(measured).collect()
+}
+
+/// The image rotations without those that differ from both neighbours far more than usual: one wrong rotation would spoil every
+/// longer one that contains it.
+fn without_outliers(images: &[ImageRotation]) -> Vec<ImageRotation> {
+    let rate = |image: &ImageRotation| {
+        so3::log(&image.second_from_first) / seconds_from_ns(image.to_ns - image.from_ns).max(1e-9)
+    };
+    let rates: Vec<Vector3<f64>> = images.iter().map(rate).collect();
+    let distance = |place: usize| {
+        let to = |other: Option<&Vector3<f64>>| other.map_or(f64::INFINITY, |other| (other - rates[place]).norm());
+        to(place.checked_sub(1).and_then(|before| rates.get(before))).min(to(rates.get(place + 1)))
+    };
+    let distances: Vec<f64> = (0..rates.len()).map(distance).collect();
+    let limit = OUTLIER_RATIO * median(&distances);
+    images.iter().zip(&distances).filter(|(_, distance)| **distance <= limit).map(|(image, _)| image.clone()).collect()
+}
+
+/// Rotations over at least a length from those of consecutive images; the next one starts in the middle of the one before.
 fn composed(images: &[ImageRotation], length_s: f64) -> Vec<Measured> {
+    let half_ns = ns_from_seconds(0.25 * length_s);
     let mut found = Vec::new();
     let mut start = 0;
     while let Some(first) = images.get(start) {
@@ -229,13 +288,26 @@ fn composed(images: &[ImageRotation], length_s: f64) -> Vec<Measured> {
             rotation = next.second_from_first * rotation;
             end += 1;
         }
-        let interval_ns = images[end].to_ns - first.from_ns;
-        if interval_ns > 0 && seconds_from_ns(interval_ns) >= length_s {
-            found.push((first.from_ns, images[end].to_ns, so3::log(&rotation)));
+        let (from_ns, to_ns) = (first.from_ns, images[end].to_ns);
+        if seconds_from_ns(to_ns - from_ns) >= length_s
+            && let (Some(before), Some(after)) =
+                (mean_rate(images, from_ns, half_ns), mean_rate(images, to_ns, half_ns))
+        {
+            found.push(Measured { from_ns, to_ns, rotation: so3::log(&rotation), by_shift: after - before });
         }
         start += (end - start).div_ceil(2).max(1);
     }
     found
+}
+
+/// Mean rotation per second of the images around a time, `None` without images there.
+fn mean_rate(images: &[ImageRotation], around_ns: i64, half_ns: i64) -> Option<Vector3<f64>> {
+    let first = images.partition_point(|image| image.to_ns <= around_ns - half_ns);
+    let near = images[first..].iter().take_while(|image| image.from_ns < around_ns + half_ns);
+    let (sum, length_s) = near.fold((Vector3::zeros(), 0.0), |(sum, length_s), image| {
+        (sum + so3::log(&image.second_from_first), length_s + seconds_from_ns(image.to_ns - image.from_ns))
+    });
+    (length_s > 0.0).then(|| sum / length_s)
 }
 
 fn align_rotations(
@@ -247,7 +319,7 @@ fn align_rotations(
     if measured.len() < MIN_ROTATIONS {
         return Err(AlignmentError::TooFewRotations { found: measured.len() });
     }
-    let rotation_rad = median(&measured.iter().map(|(_, _, rotation)| rotation.norm()).collect::<Vec<_>>());
+    let rotation_rad = median(&measured.iter().map(|pair| pair.rotation.norm()).collect::<Vec<_>>());
     if rotation_rad < MIN_ROTATION_RAD {
         return Err(AlignmentError::TooLittleRotation { rotation_deg: rotation_rad.to_degrees() });
     }

@@ -55,7 +55,8 @@ pub fn align_camera(
     let camera = OrientationSeries::from_orientations(survey.joint_samples.iter().filter_map(|sample| {
         let imu_from_camera = chain.imu_from_camera(&sample.angles_rad).rotation;
         Some((sample.stamp_ns, gyroscope.at(sample.stamp_ns)? * imu_from_camera))
-    }));
+    }))
+    .with_noise();
     let moving =
         align_clocks(rotations, &camera, 0.0, search_s).map(|found| (AlignmentReference::GyroscopeAndJoints, found));
     match (rigid, moving) {

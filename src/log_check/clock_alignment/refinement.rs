@@ -5,7 +5,7 @@ use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector3, Vector6};
 use super::super::hand_eye::best_rotation;
 use super::super::statistics::median;
 use super::{ClockAlignment, MIN_ROTATIONS, Measured, OrientationSeries};
-use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
+use crate::geometry::{ns_from_seconds, so3};
 
 /// Standard deviation of the drift that is expected of two quartz clocks.
 const DRIFT_SIGMA: f64 = 1e-4;
@@ -37,19 +37,27 @@ pub(super) struct Refined {
     rotations: usize,
 }
 
-/// A measured rotation vector with the prediction and its derivative by the offset, both in the reference's body frame.
+/// A measured rotation vector (camera frame) with the prediction (body frame of the reference).
 struct Row {
     measured: Vector3<f64>,
     predicted: Vector3<f64>,
-    by_offset: Vector3<f64>,
+    derivative: Derivative,
     since_middle_s: f64,
+}
+
+/// What the derivatives of a prediction are computed from: noise in them would bias the solution and make it look precise.
+enum Derivative {
+    /// The reference: derivative of the prediction by the offset, body frame.
+    Reference(Vector3<f64>),
+    /// The images, as for a noisy reference: derivative of the measured rotation by the offset, camera frame.
+    Images(Vector3<f64>),
 }
 
 /// Refines an offset; `None` when too few rotations overlap, or without convergence.
 pub(super) fn refine(measured: &[Measured], reference: &OrientationSeries, offset_s: f64) -> Option<Refined> {
-    let stamps = measured.iter().map(|(from_ns, to_ns, _)| 0.5 * (seconds_from_ns(*from_ns) + seconds_from_ns(*to_ns)));
+    let middles = measured.iter().map(Measured::middle_s);
     let (first_s, last_s) =
-        stamps.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), stamp| (first.min(stamp), last.max(stamp)));
+        middles.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), middle| (first.min(middle), last.max(middle)));
     let middle_s = 0.5 * (first_s + last_s);
     let mut state = Refined {
         offset_s,
@@ -82,13 +90,19 @@ pub(super) fn refine(measured: &[Measured], reference: &OrientationSeries, offse
 
 impl Refined {
     fn rows(&self, measured: &[Measured], reference: &OrientationSeries) -> Vec<Row> {
-        let row = |(from_ns, to_ns, rotation): &Measured| {
-            let since_middle_s = 0.5 * (seconds_from_ns(*from_ns) + seconds_from_ns(*to_ns)) - self.middle_s;
+        let row = |pair: &Measured| {
+            let since_middle_s = pair.middle_s() - self.middle_s;
             let shift_ns = ns_from_seconds(self.offset_s + self.drift * since_middle_s);
-            let at = |extra_ns: i64| reference.rotation(from_ns + shift_ns + extra_ns, to_ns + shift_ns + extra_ns);
-            let step_ns = ns_from_seconds(DIFFERENCE_S);
-            let by_offset = (at(step_ns)? - at(-step_ns)?) / (2.0 * DIFFERENCE_S);
-            Some(Row { measured: *rotation, predicted: at(0)?, by_offset, since_middle_s })
+            let at = |extra_ns: i64| {
+                reference.rotation(pair.from_ns + shift_ns + extra_ns, pair.to_ns + shift_ns + extra_ns)
+            };
+            let derivative = if reference.is_noisy {
+                Derivative::Images(pair.by_shift)
+            } else {
+                let step_ns = ns_from_seconds(DIFFERENCE_S);
+                Derivative::Reference((at(step_ns)? - at(-step_ns)?) / (2.0 * DIFFERENCE_S))
+            };
+            Some(Row { measured: pair.rotation, predicted: at(0)?, derivative, since_middle_s })
         };
         measured.iter().filter_map(row).collect()
     }
@@ -110,8 +124,12 @@ impl Refined {
 
     /// Columns: offset, drift, rotation (3), scale.
     fn jacobian(&self, row: &Row) -> SMatrix<f64, 3, 6> {
-        let rotated = self.camera_from_body * row.predicted;
-        let by_offset = self.scale * (self.camera_from_body * row.by_offset);
+        let (rotated, by_offset) = match row.derivative {
+            Derivative::Reference(by_offset) => {
+                (self.camera_from_body * row.predicted, self.scale * (self.camera_from_body * by_offset))
+            }
+            Derivative::Images(by_offset) => (row.measured / self.scale, by_offset),
+        };
         let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
         jacobian.set_column(0, &by_offset);
         jacobian.set_column(1, &(by_offset * row.since_middle_s));
@@ -186,15 +204,15 @@ impl Refined {
         next: Option<(f64, f64)>,
         correlation: Vec<(f64, f64)>,
     ) -> ClockAlignment {
-        let speed = |(from_ns, to_ns, rotation): &Measured| {
-            let middle_s = 0.5 * (seconds_from_ns(*from_ns) + seconds_from_ns(*to_ns));
-            let shift_s = self.offset_s + self.drift * (middle_s - self.middle_s);
+        let speed = |pair: &Measured| {
+            let shift_s = self.offset_s + self.drift * (pair.middle_s() - self.middle_s);
             let shift_ns = ns_from_seconds(shift_s);
-            let predicted = reference.rotation(from_ns + shift_ns, to_ns + shift_ns)?;
-            let interval_s = seconds_from_ns(to_ns - from_ns);
-            Some((middle_s + shift_s, rotation.norm() / interval_s, self.scale * predicted.norm() / interval_s))
+            let predicted = reference.rotation(pair.from_ns + shift_ns, pair.to_ns + shift_ns)?;
+            let [images, reference] =
+                [pair.rotation.norm(), self.scale * predicted.norm()].map(|angle_rad| angle_rad / pair.interval_s());
+            Some((pair.middle_s() + shift_s, images, reference))
         };
-        let rotations: Vec<f64> = measured.iter().map(|(_, _, rotation)| rotation.norm()).collect();
+        let rotations: Vec<f64> = measured.iter().map(|pair| pair.rotation.norm()).collect();
         ClockAlignment {
             offset_s: self.offset_s,
             offset_sigma_s: self.covariance[(0, 0)].sqrt(),
