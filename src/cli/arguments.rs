@@ -55,7 +55,7 @@ pub(crate) enum Command {
     /// Compute which calibration parameters are observable with a mechanism, a parameterization and a motion, without a log.
     #[command(after_help = exit::PLAIN)]
     Degeneracy(DegeneracyArguments),
-    /// Convert a EuRoC/ASL folder, a ROS 1 bag or a ROS 2 bag into a log.
+    /// Convert a EuRoC/ASL folder, a ROS bag, an MP4 video or a log of an autopilot into a log.
     #[command(after_help = exit::INTERRUPTIBLE)]
     Convert(ConvertArguments),
     /// Compare a trajectory with a reference: absolute and relative errors, as evo computes them.

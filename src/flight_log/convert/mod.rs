@@ -30,9 +30,10 @@ pub use report::{ConversionReport, ConvertedTopic};
 use super::file::{LogFile, ZSTD_MAGIC, kind_of, unpacked_name};
 use super::limits::DESCRIPTION_BYTES;
 use super::log::lfs_pointer;
-use super::{FlightLog, LogLimits, LogWriter, LogWriterOptions};
+use super::{FlightLog, LogError, LogLimits, LogWriter, LogWriterOptions};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
+use recording::VideoFacts;
 use sink::Sink;
 
 /// Kind of a source.
@@ -105,15 +106,28 @@ pub fn convert_with(
     let log = FlightLog::open(output)?;
     report.duration_s = seconds_from_ns(log.duration_ns());
     report.log = output.to_owned();
-    if let Some(rig) = rig {
+    let (text, assumed) = match rig {
+        SourceRig::Calibrated(rig) => (Some(rig.to_yaml()), Vec::new()),
+        SourceRig::Video(facts) => rig_of_video(&facts, output, &log, &mut report),
+        SourceRig::None => (None, Vec::new()),
+    };
+    if let Some(text) = text {
         let path = output.with_extension("rig.yaml");
         match fs::read(&path) {
             // Edited by hand, or a rig of the user's own.
-            Ok(existing) if existing != rig.to_yaml().as_bytes() => report.notes.push(format!(
-                "the rig beside the log is kept; it differs from the calibration of the source: {}",
+            Ok(existing) if existing != text.as_bytes() => report.notes.push(format!(
+                "the rig beside the log is kept; it differs from what the source says: {}",
                 path.display()
             )),
-            _ => rig.save(&path, "")?,
+            Ok(_) => report.notes.extend(assumed),
+            Err(_) => {
+                super::output::write_file(&path, text.as_bytes()).map_err(|source| LogError::Io {
+                    action: "write the rig",
+                    source,
+                    path: path.clone(),
+                })?;
+                report.notes.extend(assumed);
+            }
         }
         report.rig = Some(path);
     } else if output.with_extension("rig.yaml").is_file() {
@@ -127,6 +141,39 @@ pub fn convert_with(
     Ok(report)
 }
 
+/// What a source says of its rig.
+enum SourceRig {
+    None,
+    /// Its calibration.
+    Calibrated(Box<Rig>),
+    /// A few facts, from which a rig is written whose other fields are assumed.
+    Video(VideoFacts),
+}
+
+/// Text of the rig of a video, and what it assumes as notes; nothing where no rig can be written.
+fn rig_of_video(
+    facts: &VideoFacts,
+    output: &Path,
+    log: &FlightLog,
+    report: &mut ConversionReport,
+) -> (Option<String>, Vec<String>) {
+    let name = output.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    match facts.template(&name, log) {
+        Ok(template) => {
+            let fields: Vec<String> = template.assumed_fields().into_iter().map(|assumed| assumed.field).collect();
+            let note = format!(
+                "the rig assumes {}; `dcvins check` asks for each, and `dcvins rig new --camera … --force` writes another one",
+                fields.join(", ")
+            );
+            (Some(template.to_yaml()), vec![note])
+        }
+        Err(error) => {
+            report.notes.push(format!("no rig is written: {error}"));
+            (None, Vec::new())
+        }
+    }
+}
+
 /// Writes the log and returns the result of each topic, with the rig where the source describes one.
 fn write(
     kind: SourceKind,
@@ -134,34 +181,37 @@ fn write(
     output: &Path,
     options: &ConvertOptions,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> Result<(ConversionReport, Option<Rig>), ConvertError> {
+) -> Result<(ConversionReport, SourceRig), ConvertError> {
     let limits = &options.limits;
     let writer = LogWriter::create(output, &LogWriterOptions::default())?;
     let mut sink = Sink::new(writer, limits.clone(), progress);
     let rig = match kind {
-        SourceKind::Euroc => euroc::convert(source, &mut sink)?,
+        SourceKind::Euroc => {
+            let rig = euroc::convert(source, &mut sink)?;
+            rig.map_or(SourceRig::None, |rig| SourceRig::Calibrated(Box::new(rig)))
+        }
         SourceKind::Ros1Bag => {
             let bag = ros1_bag::open(source, &sink)?;
-            ros1_bag::convert(&bag, &mut sink).map(|()| None)?
+            ros1_bag::convert(&bag, &mut sink).map(|()| SourceRig::None)?
         }
-        SourceKind::Ros2Bag => ros2_bag::convert(source, &mut sink).map(|()| None)?,
+        SourceKind::Ros2Bag => ros2_bag::convert(source, &mut sink).map(|()| SourceRig::None)?,
         SourceKind::Sqlite => {
             let database = sqlite::open(source, limits)?;
-            sqlite::convert(&database, &mut sink).map(|()| None)?
+            sqlite::convert(&database, &mut sink).map(|()| SourceRig::None)?
         }
         SourceKind::PackedSqlite => {
             let plain = ros2_bag::unpack_to_path(source, limits)?;
             let database = sqlite::open(plain.path(), limits)?;
-            sqlite::convert(&database, &mut sink).map(|()| None)?
+            sqlite::convert(&database, &mut sink).map(|()| SourceRig::None)?
         }
         SourceKind::Mcap => {
             let file = mcap_segment::open(source, &sink)?;
-            mcap_segment::convert(&file, source, &mut sink).map(|()| None)?
+            mcap_segment::convert(&file, source, &mut sink).map(|()| SourceRig::None)?
         }
-        SourceKind::Video => recording::convert_video(source, options, &mut sink).map(|()| None)?,
+        SourceKind::Video => SourceRig::Video(recording::convert_video(source, options, &mut sink)?),
         SourceKind::Autopilot(kind) => {
             let log = AutopilotLog { kind, path: source.to_owned() };
-            recording::convert_autopilot(&log, &mut sink).map(|()| None)?
+            recording::convert_autopilot(&log, &mut sink).map(|()| SourceRig::None)?
         }
     };
     let report = sink.finish(kind.name(), source)?;

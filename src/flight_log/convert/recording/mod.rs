@@ -7,6 +7,7 @@ mod gpmf;
 mod mavlink_gimbal;
 mod mp4;
 mod recorded;
+mod rig;
 mod scalar;
 mod tlog;
 mod topics;
@@ -22,6 +23,7 @@ use super::{AutopilotLog, AutopilotLogKind, ConvertError, ConvertOptions, VideoC
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use mp4::Movie;
 use recorded::Recorded;
+pub(super) use rig::VideoFacts;
 use topics::Topics;
 
 /// Kind of an autopilot's log by the first bytes of the file.
@@ -88,12 +90,16 @@ const UNKNOWN_START_NS: i64 = 1_000_000_000;
 const TIME_ZONES_NS: i64 = 14 * 3600 * 1_000_000_000;
 
 /// Converts a video with its own telemetry, and an autopilot's log beside it.
-pub(super) fn convert_video(source: &Path, options: &ConvertOptions, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
-    let Movie { video, telemetry, created_ns, notes } = mp4::open(source, &options.limits)?;
+pub(super) fn convert_video(
+    source: &Path,
+    options: &ConvertOptions,
+    sink: &mut Sink<'_>,
+) -> Result<VideoFacts, ConvertError> {
+    let Movie { video, telemetry, created_ns, firmware, notes } = mp4::open(source, &options.limits)?;
     for note in notes {
         sink.note(note);
     }
-    let (mut camera, drone) = gpmf::read(&telemetry);
+    let gpmf::Telemetry { mut camera, drone, field_of_view } = gpmf::read(&telemetry);
     let video_utc_ns = camera.utc_offset_ns().or_else(|| drone.as_ref().and_then(Recorded::utc_offset_ns));
     let mut topics = Topics::default();
     let place = if let Some(log) = &options.autopilot {
@@ -120,7 +126,15 @@ pub(super) fn convert_video(source: &Path, options: &ConvertOptions, sink: &mut 
     camera.map_times(|time_ns| place.time_ns(time_ns));
     topics.add_recorded(camera, sink);
     topics.add_video(&video, |time_ns| place.time_ns(time_ns));
-    topics.write(Some(&video), sink)
+    let facts = VideoFacts {
+        resolution_px: video.resolution_px,
+        firmware,
+        field_of_view,
+        gimbal_frame: topics.gimbal_frame,
+        has_autopilot: options.autopilot.is_some(),
+    };
+    topics.write(Some(&video), sink)?;
+    Ok(facts)
 }
 
 /// Where the video lies in the log.

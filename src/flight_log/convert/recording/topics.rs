@@ -18,15 +18,15 @@ const VIDEO_TYPE: &str = "foxglove_msgs/msg/CompressedVideo";
 /// An IMU, without its number.
 const IMU_TOPIC: &str = "/imu";
 /// The gimbal's attitude.
-const GIMBAL_TOPIC: &str = "/gimbal/attitude";
+pub(super) const GIMBAL_TOPIC: &str = "/gimbal/attitude";
 /// Rotation from the vehicle's body (forward, right, down) to the earth (north, east, down).
-const VEHICLE_TOPIC: &str = "/vehicle/attitude";
+pub(super) const VEHICLE_TOPIC: &str = "/vehicle/attitude";
 /// Poses by the autopilot's own estimate (east, north, up).
 const VEHICLE_POSE_TOPIC: &str = "/vehicle/pose";
 /// Poses by the satellite receiver (east, north, up from the first fix).
 const GPS_POSE_TOPIC: &str = "/gps/pose";
 /// The video.
-const VIDEO_TOPIC: &str = "/camera/video";
+pub(super) const VIDEO_TOPIC: &str = "/camera/video";
 
 /// A time that is so much later than the next one, or than all before at the end, is a damaged one.
 const MAX_JUMP_NS: i64 = 60_000_000_000;
@@ -64,6 +64,8 @@ struct Topic {
 #[derive(Debug, Default)]
 pub(super) struct Topics {
     topics: Vec<Topic>,
+    /// The frame of the gimbal's attitude.
+    pub(super) gimbal_frame: Option<GimbalFrame>,
 }
 
 /// The name and the measurements of the best record; the others are counted as left out.
@@ -218,6 +220,7 @@ impl Topics {
         if left > 0 {
             sink.leave(&record, format, left, "in another frame, without the vehicle's heading at that time");
         }
+        self.gimbal_frame = Some(frame);
         let (name, frame_id) = match frame {
             GimbalFrame::Vehicle => ("vehicle: levelled, with the vehicle's heading", "vehicle"),
             GimbalFrame::Earth => ("earth: north, east, down", "earth"),
@@ -279,7 +282,7 @@ impl Topics {
 
     /// Writes everything in the order of log times.
     pub(super) fn write(self, video: Option<&Video>, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
-        let Self { topics } = self;
+        let Self { topics, .. } = self;
         let mut order: Vec<(i64, usize, usize)> = Vec::new();
         for (number, topic) in topics.iter().enumerate() {
             order

@@ -42,6 +42,8 @@ struct State {
     problem: Option<String>,
     /// Axes that the camera names, of the first sensor.
     axes: Option<String>,
+    /// Letter of the field of view (`VFOV`).
+    field_of_view: Option<String>,
 }
 
 /// What the items of a stream say of its samples.
@@ -56,9 +58,19 @@ struct Properties {
     fix: Option<f64>,
 }
 
-/// Reads the telemetry of a video: what the camera measured, and what its drone measured where there is one. Times are
-/// nanoseconds since the start of the video.
-pub(super) fn read(payloads: &[Payload]) -> (Recorded, Option<Recorded>) {
+/// The telemetry of a video, by nanoseconds since its start.
+#[derive(Debug)]
+pub(super) struct Telemetry {
+    /// What the camera measured.
+    pub(super) camera: Recorded,
+    /// What its drone measured.
+    pub(super) drone: Option<Recorded>,
+    /// Letter of the field of view.
+    pub(super) field_of_view: Option<String>,
+}
+
+/// Reads the telemetry of a video.
+pub(super) fn read(payloads: &[Payload]) -> Telemetry {
     let mut state = State {
         camera: Recorded::new(FORMAT, "/camera"),
         karma: Karma::default(),
@@ -67,6 +79,7 @@ pub(super) fn read(payloads: &[Payload]) -> (Recorded, Option<Recorded>) {
         damaged_payloads: 0,
         problem: None,
         axes: None,
+        field_of_view: None,
     };
     for payload in payloads {
         if let Err(problem) = read_payload(payload, &mut state) {
@@ -74,7 +87,7 @@ pub(super) fn read(payloads: &[Payload]) -> (Recorded, Option<Recorded>) {
             state.problem.get_or_insert(problem);
         }
     }
-    let State { mut camera, karma, gyroscope, accelerometer, damaged_payloads, problem, axes } = state;
+    let State { mut camera, karma, gyroscope, accelerometer, damaged_payloads, problem, axes, field_of_view } = state;
     if let Some(problem) = problem {
         camera.notes.push(format!(
             "{damaged_payloads} of {} payloads of telemetry are damaged, of which what lies before the damage is read: {problem}",
@@ -90,11 +103,13 @@ pub(super) fn read(payloads: &[Payload]) -> (Recorded, Option<Recorded>) {
                 .push("the samples of the camera's IMU are spread evenly over each payload of telemetry".to_owned());
         }
         let axes = axes.unwrap_or_else(|| DEFAULT_AXES.to_owned());
-        camera.notes.push(format!("the camera's IMU is given along GoPro's axes X, Y, Z (stored in the order {axes})"));
+        camera.notes.push(format!(
+            "the camera's IMU is given along the camera's axes forward, left, up (the file has GoPro's axes in the order {axes})"
+        ));
         let imu = camera.imu("GYRO/ACCL");
         (imu.gyroscope, imu.accelerometer) = (gyroscope, accelerometer);
     }
-    (camera, karma.finish())
+    Telemetry { camera, drone: karma.finish(), field_of_view }
 }
 
 fn read_payload(payload: &Payload, state: &mut State) -> Result<(), String> {
@@ -105,8 +120,10 @@ fn read_payload(payload: &Payload, state: &mut State) -> Result<(), String> {
         }
         for stream in items(device.data) {
             let stream = stream?;
-            if &stream.key == b"STRM" && stream.kind == 0 {
-                read_stream(&stream, payload, state)?;
+            match (&stream.key, stream.kind) {
+                (b"STRM", 0) => read_stream(&stream, payload, state)?,
+                (b"VFOV", _) => state.field_of_view = Some(stream.text()),
+                _ => {}
             }
         }
     }
@@ -167,7 +184,9 @@ fn axes_of_name(name: &str) -> Option<String> {
     (axes.len() == 3 && axes.bytes().all(|axis| b"XYZ".contains(&axis))).then_some(axes)
 }
 
-/// Numbers stored along `axes` (`YxZ`: y, −x, z) as x, y, z.
+/// Numbers stored along `axes` (`YxZ`: Y, −X, Z) along the camera's axes forward, left, up.
+///
+/// `GoPro`'s X points to the left of the camera, Y back and Z up, as the images of a HERO5 rotate.
 fn along_axes(row: &[f64], axes: &str) -> Option<Vector3<f64>> {
     let [first, second, third] = *row else { return None };
     let mut components = [f64::NAN; 3];
@@ -175,7 +194,8 @@ fn along_axes(row: &[f64], axes: &str) -> Option<Vector3<f64>> {
         let index = usize::from(axis.to_ascii_lowercase().checked_sub(b'x')?);
         *components.get_mut(index)? = if axis.is_ascii_uppercase() { value } else { -value };
     }
-    finite(components)
+    let [left, back, up] = components;
+    finite([-back, left, up])
 }
 
 impl Sensor {
@@ -235,8 +255,8 @@ mod tests {
 
     #[test]
     fn axes_are_reordered() {
-        assert_eq!(along_axes(&[1.0, 2.0, 3.0], "YxZ"), Some(Vector3::new(-2.0, 1.0, 3.0)));
-        assert_eq!(along_axes(&[1.0, 2.0, 3.0], "ZXY"), Some(Vector3::new(2.0, 3.0, 1.0)));
+        assert_eq!(along_axes(&[1.0, 2.0, 3.0], "YxZ"), Some(Vector3::new(-1.0, -2.0, 3.0)));
+        assert_eq!(along_axes(&[1.0, 2.0, 3.0], "ZXY"), Some(Vector3::new(-3.0, 2.0, 1.0)));
         for (row, axes) in [(&[1.0, 2.0][..], "XYZ"), (&[1.0, 2.0, 3.0], "XXY"), (&[1.0, 2.0, 3.0], "abc")] {
             assert_eq!(along_axes(row, axes), None, "{axes}");
         }

@@ -12,7 +12,7 @@ use super::super::super::video::VideoCodec;
 use super::super::ConvertError;
 use super::recorded::Samples;
 use annex_b::UnitFormat;
-use boxes::{child, children, file_boxes, u32_at, u64_at};
+use boxes::{child, children, descendant, file_boxes, u32_at, u64_at};
 use track::{Sample, Track};
 
 /// Seconds from 1904, from which MP4 counts, to the epoch.
@@ -57,6 +57,8 @@ pub(super) struct Movie {
     pub(super) telemetry: Vec<Payload>,
     /// When the recording started by the camera's clock, in nanoseconds since the epoch.
     pub(super) created_ns: Option<i64>,
+    /// Version of a `GoPro`'s firmware.
+    pub(super) firmware: Option<String>,
     pub(super) notes: Vec<String>,
 }
 
@@ -97,6 +99,7 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
         (u32_at(header, 4).map(u64::from), u32_at(header, 12))
     };
     let created_s = created_s.and_then(|created_s| i64::try_from(created_s.checked_sub(EPOCH_1904_S)?).ok());
+    let firmware = descendant(&table, &[b"udta", b"FIRM"]).map(|text| String::from_utf8_lossy(text).into_owned());
     let max_samples = limits.messages(file.len() as u64);
     let traks = children(&table).filter(|(kind, _)| kind == b"trak");
     let tracks: Vec<Track<'_>> =
@@ -116,7 +119,7 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     let codec = format.codec;
     let video = Video { file, format, codec, resolution_px, pictures, has_reordered_pictures };
     let created_ns = created_s.and_then(|created_s| created_s.checked_mul(1_000_000_000));
-    Ok(Movie { video, telemetry, created_ns, notes })
+    Ok(Movie { video, telemetry, created_ns, firmware, notes })
 }
 
 /// The first video track that can be read, how its units are stored, and its resolution.
@@ -155,9 +158,12 @@ fn pictures(track: &Track<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (V
     let delay_ns = delay_ns.unwrap_or(0);
     let mut lost = track.undescribed;
     let mut pictures = Vec::with_capacity(track.samples.len());
+    // Pictures do not overlap: together they cannot be longer than the file.
+    let mut budget = file_bytes;
     for sample in &track.samples {
-        match place(sample, file_bytes) {
+        match place(sample, file_bytes).filter(|(_, length)| *length <= budget) {
             Some((start, length)) => {
+                budget -= length;
                 let decoded_ns = sample.decoded_ns.saturating_add(delay_ns);
                 pictures.push(Picture { presented_ns: sample.presented_ns, decoded_ns, start, length });
             }

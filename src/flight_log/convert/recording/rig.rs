@@ -1,0 +1,109 @@
+//! The rig of a video: what its recorders say, usual values for the rest.
+
+use super::super::super::FlightLog;
+use super::super::super::rig_template::{
+    CameraChoice, MechanismAxes, RigChoices, RigTemplate, TemplateError, VehicleAxes,
+};
+use super::recorded::GimbalFrame;
+use super::topics::{GIMBAL_TOPIC, VEHICLE_TOPIC, VIDEO_TOPIC};
+
+/// Horizontal field of view of a camera that is not known, in degrees: a common one of gimballed cameras.
+const USUAL_FIELD_OF_VIEW_DEG: f64 = 84.0;
+/// Mechanism of a gimbal that is not known: the usual order of three axes.
+const USUAL_MECHANISM: &str = "yaw-roll-pitch";
+/// `GoPro`'s cameras by the first letters of their firmware.
+const FIRMWARES: [(&str, &str); 8] = [
+    ("HD3", "hero3"),
+    ("HD4", "hero4"),
+    ("HD5", "hero5"),
+    ("HD6", "hero6"),
+    ("HD7", "hero7"),
+    ("HD8", "hero8"),
+    ("HD9", "hero9"),
+    ("H21", "hero10"),
+];
+
+/// What a video and its recorders say of their rig.
+#[derive(Clone, Debug)]
+pub(in super::super) struct VideoFacts {
+    pub(super) resolution_px: [usize; 2],
+    /// Version of a `GoPro`'s firmware, and the letter of its field of view.
+    pub(super) firmware: Option<String>,
+    pub(super) field_of_view: Option<String>,
+    /// The frame of the gimbal's attitude, where it was recorded.
+    pub(super) gimbal_frame: Option<GimbalFrame>,
+    /// Whether the IMU is an autopilot's.
+    pub(super) has_autopilot: bool,
+}
+
+impl VideoFacts {
+    /// The published camera, else the usual field of view.
+    fn camera(&self) -> CameraChoice {
+        let usual = CameraChoice::FieldOfView(USUAL_FIELD_OF_VIEW_DEG);
+        let Some(firmware) = &self.firmware else { return usual };
+        let Some((_, model)) = FIRMWARES.into_iter().find(|(start, _)| firmware.starts_with(start)) else {
+            return usual;
+        };
+        let lens = match self.field_of_view.as_deref() {
+            Some("W") => "wide",
+            Some("M") => "medium",
+            Some("N") => "narrow",
+            Some("L") => "linear",
+            _ => return usual,
+        };
+        format!("gopro-{model}-{lens}").parse().unwrap_or(usual)
+    }
+
+    /// The template of a rig for the log.
+    pub(in super::super) fn template(&self, name: &str, log: &FlightLog) -> Result<RigTemplate, TemplateError> {
+        let prefix = if self.has_autopilot { "/imu" } else { "/camera/imu" };
+        let both = |suffix: &str| [format!("{prefix}{suffix}"), format!("{prefix}0{suffix}")];
+        let present = |names: [String; 2]| names.into_iter().find(|name| log.topic(name).is_some());
+        let imu = present(both("")).or_else(|| present(both("/gyroscope")));
+        let accelerometer = imu.as_ref().and_then(|imu| imu.strip_suffix("/gyroscope"));
+        let accelerometer = accelerometer.map(|imu| format!("{imu}/accelerometer"));
+        let frame = self.gimbal_frame.filter(|_| log.topic(VEHICLE_TOPIC).is_some());
+        let attitude = frame.map(|frame| {
+            let frame = match frame {
+                GimbalFrame::Vehicle => "vehicle",
+                GimbalFrame::Earth => "earth",
+            };
+            let entries = [
+                ("type", "quaternion"),
+                ("frame", frame),
+                ("axes", "frd"),
+                ("imu_axes", "frd"),
+                ("vehicle", VEHICLE_TOPIC),
+            ];
+            let entries = entries.map(|(key, value)| (key.to_owned(), value.to_owned()));
+            (GIMBAL_TOPIC.to_owned(), entries.to_vec())
+        });
+        let (frd, flu) = (VehicleAxes::ForwardRightDown, VehicleAxes::ForwardLeftUp);
+        let mechanism = if self.gimbal_frame.is_some() { USUAL_MECHANISM } else { "rigid" };
+        let choices = RigChoices {
+            name: name.to_owned(),
+            camera: self.camera(),
+            // That of the pictures, which the container may want to be shown in another.
+            resolution_px: None,
+            mechanism: mechanism.parse::<MechanismAxes>()?,
+            positive: Some(frd),
+            imu_axes: Some(if self.has_autopilot { frd } else { flu }),
+            position_m: None,
+            imu_topic: imu,
+            image_topic: Some(VIDEO_TOPIC.to_owned()),
+            joint_topic: None,
+            joint_names: Vec::new(),
+            attitude,
+            noise: None,
+        };
+        let template = RigTemplate::new(&choices, Some(log));
+        let of_container =
+            || RigTemplate::new(&RigChoices { resolution_px: Some(self.resolution_px), ..choices.clone() }, Some(log));
+        let mut template = template.or_else(|error| match error {
+            TemplateError::NoSize { .. } => of_container(),
+            other => Err(other),
+        })?;
+        template.imu.accelerometer_topic = accelerometer;
+        Ok(template)
+    }
+}
