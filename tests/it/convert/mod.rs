@@ -3,6 +3,8 @@
 
 mod damage;
 mod euroc;
+mod recorders;
+mod recordings;
 mod ros1;
 
 use std::fs;
