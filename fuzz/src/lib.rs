@@ -37,6 +37,13 @@ pub fn rig_with_source(source: &str) -> String {
     RIG.replace("rostopic: /gimbal/joint_states", &format!("source: {source}"))
 }
 
+/// Recordings of autopilots and cameras.
+#[path = "../../tests/it/convert/recorders.rs"]
+mod recorders;
+
+/// The first message of an H.264 stream of 96 × 64 pixels.
+const KEYFRAME: &[u8] = include_bytes!("../../tests/data/video/h264.bin").as_slice().split_at(859).0;
+
 /// Images and frames that are read of one input.
 const MAX_READ: usize = 40;
 
@@ -155,6 +162,69 @@ fn converted(name: &str, bytes: &[u8]) {
 /// A ROS 1 bag.
 pub fn bag(bytes: &[u8]) {
     converted("input.bag", bytes);
+}
+
+/// A `DataFlash` log of `ArduPilot`.
+pub fn dataflash(bytes: &[u8]) {
+    converted("input.bin", bytes);
+}
+
+/// A `ULog` of PX4.
+pub fn ulog(bytes: &[u8]) {
+    converted("input.ulg", bytes);
+}
+
+/// A telemetry log of a ground station.
+pub fn tlog(bytes: &[u8]) {
+    converted("input.tlog", bytes);
+}
+
+/// An MP4 video.
+pub fn movie(bytes: &[u8]) {
+    converted("input.mp4", bytes);
+}
+
+/// Valid inputs of the five targets of recordings: target, name, bytes.
+pub fn recordings() -> Vec<(&'static str, &'static str, Vec<u8>)> {
+    let track = |axes: &str| recorders::telemetry_track(recorders::telemetry(6, axes));
+    let video = || recorders::video_track(&[KEYFRAME], [96, 64]);
+    let payload = recorders::telemetry(1, "YxZ").concat();
+    vec![
+        ("dataflash", "flight", recorders::dataflash(30)),
+        ("ulog", "flight", recorders::ulog(30)),
+        ("tlog", "flight", recorders::telemetry_log(30)),
+        ("movie", "tables-first", recorders::movie(&[video(), track("ZXY")], true)),
+        ("movie", "tables-last", recorders::movie(&[track("YxZ"), video()], false)),
+        ("gpmf", "camera", payload),
+        ("gpmf", "receiver", receiver()),
+    ]
+}
+
+/// A payload with what cameras with a satellite receiver and a Karma drone add.
+fn receiver() -> Vec<u8> {
+    use recorders::{item, nested};
+    let words = |values: &[i32]| values.iter().flat_map(|value| value.to_be_bytes()).collect::<Vec<u8>>();
+    let floats = |values: &[f32]| values.iter().flat_map(|value| value.to_be_bytes()).collect::<Vec<u8>>();
+    let fix = [
+        item(b"GPSF", b'L', 4, &words(&[3])),
+        item(b"GPSU", b'U', 16, b"240610000000.000"),
+        item(b"SCAL", b'l', 4, &words(&[10_000_000, 10_000_000, 1000, 1000, 100])),
+        item(b"GPS5", b'l', 20, &words(&[470_000_000, 80_000_000, 500_000, 0, 0])),
+    ];
+    let attitude = [
+        item(b"TYPE", b'c', 1, b"Lfff"),
+        item(b"SCAL", b'l', 4, &words(&[1000, 1, 1, 1])),
+        item(b"ATTD", b'?', 16, &[words(&[5000]), floats(&[0.1, -0.2, 1.5])].concat()),
+    ];
+    nested(b"DEVC", &[nested(b"STRM", &fix), nested(b"STRM", &attitude)])
+}
+
+/// The second and last payload of the telemetry in an MP4 video.
+pub fn gpmf(bytes: &[u8]) {
+    let video = recorders::video_track(&[KEYFRAME], [96, 64]);
+    let mut payloads = recorders::telemetry(1, "ZXY");
+    payloads.push(bytes.to_vec());
+    converted("input.mp4", &recorders::movie(&[video, recorders::telemetry_track(payloads)], true));
 }
 
 /// An SQLite file of a ROS 2 bag.

@@ -12,7 +12,7 @@ use dcvins::camera::{CameraModel, Distortion, Projection};
 use dcvins::flight_log::{LogCompression, LogWriter, LogWriterOptions, MessageKind, MessageTimes, MessageType};
 use dcvins::geometry::RigidTransform;
 use dcvins::sensors::Rig;
-use dcvins_fuzz::{EUROC_FILES, RIG, SOURCES, rig_with_source, topic_of};
+use dcvins_fuzz::{EUROC_FILES, RIG, SOURCES, recordings, rig_with_source, topic_of};
 use libfuzzer_sys as _; // it defines what the counters of the build call
 use nalgebra::Vector3;
 use ros1::{Compression, Message, bag, f64_sequence, f64s, header, text};
@@ -334,5 +334,8 @@ fn main() -> Result<(), Failed> {
     videos(corpus)?;
     bags(corpus)?;
     databases(corpus, &log)?;
+    for (name, seed, bytes) in recordings() {
+        fs::write(target(corpus, name)?.join(seed), bytes)?;
+    }
     texts(corpus)
 }
