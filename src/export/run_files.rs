@@ -132,7 +132,7 @@ fn calibrated_rig(recording: &Recording, run: &RunRecord) -> Rig {
     match &mut camera.mount {
         CameraMount::Gimbal => {
             if let Some(gimbal) = &mut rig.gimbal {
-                gimbal.chain = chain.clone();
+                gimbal.set_chain(chain.clone());
             }
         }
         CameraMount::Static { imu_from_camera } => *imu_from_camera = chain.imu_from_camera(&[]),

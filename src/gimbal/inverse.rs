@@ -76,6 +76,12 @@ impl InverseChain {
         })
     }
 
+    /// The same for orientations that are rotated by a constant angle about the axis of the first joint.
+    pub fn with_first_joint_offset(self, offset_rad: f64) -> Self {
+        let offset = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), offset_rad);
+        Self { imu_from_base: self.imu_from_base * offset, ..self }
+    }
+
     /// The joint angles for a rotation `imu_from_camera`, least squares where the joints cannot make it.
     ///
     /// Two solutions may exist, on either side of a singularity. Where only one is within the limits, and the chain is not

@@ -14,7 +14,6 @@ use crate::flight_log::log::relative_ns;
 use crate::flight_log::messages::{self, MessageKind};
 use crate::flight_log::{FlightLog, LogError};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
-use crate::gimbal::InverseChain;
 use crate::sensors::{AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig};
 
 /// Attitudes further apart are not interpolated.
@@ -196,8 +195,7 @@ impl AttitudeSurvey {
     /// The joint angles of all attitudes by the rig.
     pub(super) fn solve(&self, gimbal: &GimbalRig) -> Vec<SolvedAttitude> {
         let Some(source) = &gimbal.attitude else { return Vec::new() };
-        let limits: Vec<(f64, f64)> = gimbal.joints.iter().map(|joint| joint.limits_rad).collect();
-        let Some(inverse) = InverseChain::new(&gimbal.chain, &limits) else { return Vec::new() };
+        let Some(inverse) = gimbal.inverse_chain() else { return Vec::new() };
         let mut previous: Option<Vec<f64>> = None;
         let orientations = self.orientations(source, ns_from_seconds(gimbal.timeshift_gimbal_imu_s));
         let solved = orientations.into_iter().map(|(stamp_ns, imu_from_camera)| {

@@ -5,8 +5,10 @@ use std::str::FromStr;
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
+use crate::gimbal::ClassicalChain;
+
 /// Where the attitude of a gimbal is recorded and what it means (`gimbal.source` of a rig); its topic is the gimbal's.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct AttitudeSource {
     /// Message type and how its values make a rotation.
     pub message: AttitudeMessage,
@@ -22,6 +24,12 @@ pub struct AttitudeSource {
     pub vehicle_topic: Option<String>,
     /// Axes of the vehicle's attitude where they are others than [`AttitudeSource::axes`].
     pub vehicle_axes: Option<BodyAxes>,
+    /// Constant rotation of the attitude about the axis of the first joint, in radians: a yaw that counts from another direction
+    /// than forward.
+    pub first_joint_offset_rad: f64,
+    /// The chain by which joint angles follow from the attitude; `None` while it is the rig's own. A calibrated rig keeps the
+    /// one that its joint angles followed from: by the calibrated one they would be others, and undo the calibration.
+    pub chain: Option<Box<ClassicalChain>>,
 }
 
 /// A message type for the gimbal's attitude.

@@ -2,7 +2,7 @@
 
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
-use crate::gimbal::{ClassicalChain, ParameterNames};
+use crate::gimbal::{ClassicalChain, InverseChain, ParameterNames};
 
 use super::{AttitudeFrame, AttitudeSource, ImageMask, ImuNoise};
 
@@ -131,6 +131,25 @@ pub struct GimbalRig {
     pub chain: ClassicalChain,
     /// The joints, one per link of `chain`.
     pub joints: Vec<Joint>,
+}
+
+impl GimbalRig {
+    /// The inverse of the chain by which joint angles follow from an attitude; `None` unless the rig names one and has one to
+    /// three joints.
+    pub fn inverse_chain(&self) -> Option<InverseChain> {
+        let source = self.attitude.as_ref()?;
+        let limits: Vec<(f64, f64)> = self.joints.iter().map(|joint| joint.limits_rad).collect();
+        let chain = source.chain.as_deref().unwrap_or(&self.chain);
+        Some(InverseChain::new(chain, &limits)?.with_first_joint_offset(source.first_joint_offset_rad))
+    }
+
+    /// Takes a calibrated chain; joint angles go on to follow from an attitude as before.
+    pub fn set_chain(&mut self, chain: ClassicalChain) {
+        let before = std::mem::replace(&mut self.chain, chain);
+        if let Some(source) = &mut self.attitude {
+            source.chain.get_or_insert_with(|| Box::new(before));
+        }
+    }
 }
 
 /// A field of the rig whose value is only assumed.

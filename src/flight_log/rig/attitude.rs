@@ -2,6 +2,8 @@
 
 use super::super::LogError;
 use super::fields::Field;
+use super::read::read_link;
+use crate::gimbal::{ClassicalChain, InverseChain};
 use crate::sensors::{AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, BodyAxes, EulerAngles, NamedAxes};
 
 const TYPES: &str = "quaternion, pose, euler, tf, mavros or px4";
@@ -46,7 +48,34 @@ pub(super) fn read(source: &Field<'_>) -> Result<(String, AttitudeSource), LogEr
     let gimbal_axes = source.field("gimbal_axes").optional().map(|field| named_axes(&field)).transpose()?;
     let imu_axes = source.field("imu_axes").optional().map(|field| named_axes(&field)).transpose()?;
     let imu_axes = imu_axes.unwrap_or(NamedAxes::FLU);
-    Ok((topic, AttitudeSource { message, frame, axes, gimbal_axes, imu_axes, vehicle_topic, vehicle_axes }))
+    let offset = source.field("first_joint_offset");
+    let first_joint_offset_rad = if offset.is_present() {
+        offset.in_radians(offset.number("an angle in rad")?, std::f64::consts::TAU)?
+    } else {
+        0.0
+    };
+    let chain = source.field("chain").optional().map(|chain| read_chain(&chain).map(Box::new)).transpose()?;
+    let source = AttitudeSource {
+        message,
+        frame,
+        axes,
+        gimbal_axes,
+        imu_axes,
+        vehicle_topic,
+        vehicle_axes,
+        first_joint_offset_rad,
+        chain,
+    };
+    Ok((topic, source))
+}
+
+fn read_chain(chain: &Field<'_>) -> Result<ClassicalChain, LogError> {
+    let links = chain.field("links").list("a list of links with theta_offset, d, a and alpha")?;
+    Ok(ClassicalChain {
+        imu_from_base: chain.field("T_I_B").transform()?,
+        links: links.iter().take(InverseChain::MAX_JOINTS + 1).map(read_link).collect::<Result<_, _>>()?,
+        effector_from_camera: chain.field("T_E_C").transform()?,
+    })
 }
 
 fn read_message(source: &Field<'_>) -> Result<AttitudeMessage, LogError> {
@@ -92,7 +121,7 @@ fn one_of<T: Copy>(
     values.into_iter().find(|value| name(*value) == text).ok_or_else(|| field.unexpected(expected))
 }
 
-/// The keys and values of a source in the order of a rig; texts without quotes.
+/// The keys and values of a source in the order of a rig, without its chain; texts without quotes.
 pub(crate) fn entries(topic: &str, source: &AttitudeSource) -> Vec<(&'static str, String)> {
     let mut entries = vec![("topic", topic.to_owned()), ("type", source.message.name().to_owned())];
     entries.push(("frame", source.frame.name().to_owned()));
@@ -119,6 +148,9 @@ pub(crate) fn entries(topic: &str, source: &AttitudeSource) -> Vec<(&'static str
     }
     if let Some(axes) = source.vehicle_axes {
         entries.push(("vehicle_axes", axes.name().to_owned()));
+    }
+    if source.first_joint_offset_rad != 0.0 {
+        entries.push(("first_joint_offset", format!("{:?}", source.first_joint_offset_rad)));
     }
     entries
 }

@@ -93,9 +93,12 @@ const SOURCE: Keys = Keys {
         "child",
         "vehicle",
         "vehicle_axes",
+        "first_joint_offset",
+        "chain",
     ],
     unused: &[],
 };
+const CHAIN: Keys = Keys { read: &["T_I_B", "links", "T_E_C"], unused: &[] };
 const PRIOR: Keys = Keys { read: &["translation_bound", "rotation_bound"], unused: &[] };
 const LINK: Keys = Keys { read: &["joint", "theta_offset", "d", "a", "alpha", "limits"], unused: &[] };
 const GROUND_TRUTH: Keys = Keys { read: &["rostopic"], unused: &["frame_id"] };
@@ -153,6 +156,9 @@ fn check_gimbal(gimbal: &Value, found: &mut Found) {
     }
     if let Some(source) = gimbal.get("source") {
         check_mapping(source, "gimbal.source", &SOURCE, found);
+        if let Some(chain) = source.get("chain") {
+            check_mapping(chain, "gimbal.source.chain", &CHAIN, found);
+        }
     }
     for (index, link) in gimbal.get("links").and_then(Value::as_array).into_iter().flatten().enumerate() {
         check_mapping(link, &format!("gimbal.links[{index}]"), &LINK, found);

@@ -229,6 +229,21 @@ fn name_the_field(camera: &Field<'_>, error: &CameraError) -> LogError {
     }
 }
 
+/// The numbers of one link.
+pub(super) fn read_link(link: &Field<'_>) -> Result<DhLink, LogError> {
+    let angle = |key: &str| {
+        let angle_rad = link.field(key).number("an angle in rad")?;
+        link.field(key).in_radians(angle_rad, MAX_OFFSET_RAD)
+    };
+    let length = |key: &str| link.field(key).number("a length in m");
+    Ok(DhLink {
+        theta_offset_rad: angle("theta_offset")?,
+        d_m: length("d")?,
+        a_m: length("a")?,
+        alpha_rad: angle("alpha")?,
+    })
+}
+
 fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
     let joint_topic = gimbal.field("rostopic").optional();
     let joint_topic = joint_topic
@@ -282,17 +297,7 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
         if joints.iter().any(|joint| joint.name == name) {
             return Err(link.field("joint").error(format!("'{name}' again, expected each joint once")));
         }
-        let angle = |key: &str| {
-            let angle_rad = link.field(key).number("an angle in rad")?;
-            link.field(key).in_radians(angle_rad, MAX_OFFSET_RAD)
-        };
-        let length = |key: &str| link.field(key).number("a length in m");
-        links.push(DhLink {
-            theta_offset_rad: angle("theta_offset")?,
-            d_m: length("d")?,
-            a_m: length("a")?,
-            alpha_rad: angle("alpha")?,
-        });
+        links.push(read_link(&link)?);
         let limits = link.field("limits").optional();
         let limits = match limits {
             Some(limits) => limits.exactly::<2>("2 (lower upper, in rad)")?,
@@ -315,6 +320,11 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
     if attitude.is_some() && !(1..=InverseChain::MAX_JOINTS).contains(&joints.len()) {
         let problem = format!("{} links, expected one to three: an attitude does not determine more", joints.len());
         return Err(gimbal.field("links").error(problem));
+    }
+    let of_source = attitude.as_ref().and_then(|source| source.chain.as_ref());
+    if let Some(found) = of_source.map(|chain| chain.links.len()).filter(|found| *found != joints.len()) {
+        let problem = format!("{found} links, expected {} as in gimbal.links", joints.len());
+        return Err(gimbal.field("source").field("chain").field("links").error(problem));
     }
     Ok(GimbalRig {
         topic,

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use crate::flight_log::tests::RIG;
 use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes};
-use crate::sensors::{AttitudeMessage, CameraMount, Rig};
+use crate::sensors::{AttitudeMessage, AttitudeSource, CameraMount, Rig};
 
 fn parse(text: &str) -> Result<Rig, String> {
     Rig::from_yaml(text, Path::new("some.rig.yaml")).map_err(|error| error.to_string())
@@ -43,7 +43,7 @@ fn every_source_of_the_gimbals_attitude_reads_back_as_written() {
         "{topic: /g, type: euler, frame: earth, axes: frd, order: yaw=z roll=y pitch=-x, unit: deg, vehicle: /v}",
         "{topic: /tf, type: tf, frame: body, axes: flu, parent: base_link, child: camera, gimbal_axes: rdf, imu_axes: frd}",
         "{topic: /g, type: mavros, vehicle: /v, vehicle_axes: flu}",
-        "{topic: /g, type: px4, frame: earth, vehicle: /v}",
+        "{topic: /g, type: px4, frame: earth, vehicle: /v, first_joint_offset: -1.5}",
     ] {
         let rig = parse(&with_source(&format!("{source}\n  timeshift_gimbal_imu: -0.08"))).unwrap();
         let gimbal = rig.gimbal.as_ref().unwrap();
@@ -51,6 +51,21 @@ fn every_source_of_the_gimbals_attitude_reads_back_as_written() {
         assert_eq!(gimbal.timeshift_gimbal_imu_s, -0.08);
         check_same(&rig, &parse(&rig.to_yaml()).unwrap());
     }
+    // A calibrated chain leaves the joint angles as they were.
+    let mut calibrated = parse(&with_source("{topic: /g, type: quaternion, frame: body, axes: flu}")).unwrap();
+    let gimbal = calibrated.gimbal.as_mut().unwrap();
+    let given = gimbal.chain.clone();
+    for theta_offset_rad in [-1.4, -1.3] {
+        let mut chain = given.clone();
+        chain.links[0].theta_offset_rad = theta_offset_rad;
+        gimbal.set_chain(chain);
+    }
+    assert_eq!(gimbal.chain.links[0].theta_offset_rad, -1.3);
+    assert_eq!(gimbal.attitude.as_ref().unwrap().chain.as_deref(), Some(&given));
+    check_same(&calibrated, &parse(&calibrated.to_yaml()).unwrap());
+    let wanted = given.imu_from_camera(&[0.7]).rotation;
+    let angles_rad = calibrated.gimbal.unwrap().inverse_chain().unwrap().solve(&wanted, None).joint_angles_rad;
+    assert!((angles_rad[0] - 0.7).abs() < 1e-9, "{angles_rad:?}");
     let euler = parse(&with_source(
         "{topic: /g, type: euler, frame: body, axes: frd, order: yaw=z roll=y pitch=-x, unit: deg}",
     ));
@@ -106,6 +121,13 @@ fn check_same(a: &Rig, b: &Rig) {
     if let (Some(a), Some(b)) = (&a.gimbal, &mut b.gimbal) {
         settle(&a.chain.imu_from_base, &mut b.chain.imu_from_base);
         settle(&a.chain.effector_from_camera, &mut b.chain.effector_from_camera);
+        let chain_of_source = |source: &AttitudeSource| source.chain.clone();
+        if let (Some(a), Some(b)) =
+            (a.attitude.as_ref().and_then(chain_of_source), b.attitude.as_mut().and_then(|b| b.chain.as_mut()))
+        {
+            settle(&a.imu_from_base, &mut b.imu_from_base);
+            settle(&a.effector_from_camera, &mut b.effector_from_camera);
+        }
     }
     assert!(worst < 1e-14, "{worst}");
     assert_eq!(*a, b);

@@ -2,6 +2,7 @@ use std::fmt::Write as _;
 
 use super::attitude;
 use crate::geometry::RigidTransform;
+use crate::gimbal::DhLink;
 use crate::sensors::{AssumedField, CameraMount, CameraRig, GimbalRig, Rig};
 
 impl Rig {
@@ -61,7 +62,7 @@ fn write_camera(out: &mut String, camera: &CameraRig) {
         line(out, 1, "mask", &text(&mask.file));
     }
     if let CameraMount::Static { imu_from_camera } = &camera.mount {
-        write_transform(out, "T_cam_imu", &imu_from_camera.inverse());
+        write_transform(out, 1, "T_cam_imu", &imu_from_camera.inverse());
     }
 }
 
@@ -70,7 +71,18 @@ fn write_gimbal(out: &mut String, gimbal: &GimbalRig) {
     if let (Some(topic), Some(source)) = (&gimbal.topic, &gimbal.attitude) {
         line(out, 1, "source", "");
         for (key, value) in attitude::entries(topic, source) {
-            line(out, 2, key, &text(&value));
+            let value = if key == "first_joint_offset" { number(source.first_joint_offset_rad) } else { text(&value) };
+            line(out, 2, key, &value);
+        }
+        if let Some(chain) = &source.chain {
+            line(out, 2, "chain", "");
+            write_transform(out, 3, "T_I_B", &chain.imu_from_base);
+            line(out, 3, "links", "");
+            for link in &chain.links {
+                line(out, 3, "- theta_offset", &number(link.theta_offset_rad));
+                write_lengths(out, 4, link);
+            }
+            write_transform(out, 3, "T_E_C", &chain.effector_from_camera);
         }
     } else {
         line(out, 1, "rostopic", &gimbal.topic.as_deref().map_or_else(|| "null".into(), text));
@@ -88,25 +100,30 @@ fn write_gimbal(out: &mut String, gimbal: &GimbalRig) {
     if gimbal.switches_parameterization {
         line(out, 1, "parameterization", "auto");
     }
-    write_transform(out, "T_I_B", &gimbal.chain.imu_from_base);
+    write_transform(out, 1, "T_I_B", &gimbal.chain.imu_from_base);
     line(out, 1, "links", if gimbal.joints.is_empty() { "[]" } else { "" });
     for (joint, link) in gimbal.joints.iter().zip(&gimbal.chain.links) {
         line(out, 1, "- joint", &text(&joint.name));
         line(out, 2, "theta_offset", &number(link.theta_offset_rad));
-        line(out, 2, "d", &number(link.d_m));
-        line(out, 2, "a", &number(link.a_m));
-        line(out, 2, "alpha", &number(link.alpha_rad));
+        write_lengths(out, 2, link);
         line(out, 2, "limits", &numbers(&[joint.limits_rad.0, joint.limits_rad.1]));
     }
-    write_transform(out, "T_E_C", &gimbal.chain.effector_from_camera);
+    write_transform(out, 1, "T_E_C", &gimbal.chain.effector_from_camera);
 }
 
-fn write_transform(out: &mut String, key: &str, transform: &RigidTransform) {
-    line(out, 1, key, "");
+/// What follows `theta_offset` in a link.
+fn write_lengths(out: &mut String, depth: usize, link: &DhLink) {
+    line(out, depth, "d", &number(link.d_m));
+    line(out, depth, "a", &number(link.a_m));
+    line(out, depth, "alpha", &number(link.alpha_rad));
+}
+
+fn write_transform(out: &mut String, depth: usize, key: &str, transform: &RigidTransform) {
+    line(out, depth, key, "");
     let matrix = transform.to_matrix();
     for row in matrix.row_iter() {
         let row: Vec<f64> = row.iter().copied().collect();
-        out.push_str("  - ");
+        let _infallible = write!(out, "{:width$}- ", "", width = 2 * depth);
         out.push_str(&numbers(&row));
         out.push('\n');
     }

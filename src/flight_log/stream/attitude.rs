@@ -110,10 +110,9 @@ impl AttitudeJoints {
                 Some(Lookup::new(OrderedSamples::new(log, vehicle, from_ns, false, decoder)))
             }
         };
-        let limits: Vec<(f64, f64)> = gimbal.joints.iter().map(|joint| joint.limits_rad).collect();
-        let inverse = InverseChain::new(&gimbal.chain, &limits).ok_or_else(|| LogError::Rig {
+        let inverse = gimbal.inverse_chain().ok_or_else(|| LogError::Rig {
             field: "gimbal.links".to_owned(),
-            problem: format!("{} links, expected one to three with gimbal.source", limits.len()),
+            problem: format!("{} links, expected one to three with gimbal.source", gimbal.joints.len()),
             path: log.path().to_owned(),
         })?;
         Ok(Self {

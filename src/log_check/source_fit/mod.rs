@@ -14,8 +14,7 @@ use super::imu_facts::ImuFacts;
 use super::statistics::median;
 use super::survey::Survey;
 use super::{Area, Findings, ImageRotation, Severity};
-use crate::geometry::{ns_from_seconds, so3};
-use crate::gimbal::ClassicalChain;
+use crate::geometry::{ns_from_seconds, principal_angle, so3};
 use crate::sensors::{AttitudeSource, CameraMount, GimbalRig, Rig};
 
 /// Consecutive image rotations that are joined to one: over a third of a second attitudes of 10 Hz predict more than their errors.
@@ -61,6 +60,8 @@ struct Span {
 struct SourceFit<'a> {
     attitude: &'a AttitudeSurvey,
     spans: Vec<Span>,
+    /// What the rig's offset of the first joint does to an orientation.
+    offset: UnitQuaternion<f64>,
 }
 
 /// A meaning with its misfit in radians, at the time offset at which it is least.
@@ -83,7 +84,8 @@ pub(super) fn check_source(
     let camera = rig.cameras.iter().find(|camera| camera.mount == CameraMount::Gimbal)?;
     let of_camera: Vec<&ImageRotation> =
         rotations.iter().filter(|rotation| rotation.camera_key == camera.key).collect();
-    let fit = SourceFit { attitude, spans: spans(&of_camera, camera.timeshift_cam_imu_s, imu_facts) };
+    let spans = spans(&of_camera, camera.timeshift_cam_imu_s, imu_facts);
+    let fit = SourceFit { attitude, spans, offset: about_first_joint(gimbal, -source.first_joint_offset_rad) };
     let rotation_rad = fit.rotation_rad();
     if fit.spans.len() < MIN_SPANS || rotation_rad < MIN_ROTATION_RAD {
         let title = "too little rotation to compare the gimbal's attitude with the images";
@@ -148,8 +150,13 @@ impl SourceFit<'_> {
         median(&of_camera).max(median(&of_imu))
     }
 
-    /// Median difference of predicted and measured rotations in radians, with a further rotation of the gimbal's first joint.
-    fn misfit(&self, source: &AttitudeSource, shift_s: f64, first_joint: &UnitQuaternion<f64>) -> f64 {
+    /// Median difference of predicted and measured rotations in radians, with the rig's offset of the first joint.
+    fn misfit(&self, source: &AttitudeSource, shift_s: f64) -> f64 {
+        self.misfit_with(source, shift_s, &self.offset)
+    }
+
+    /// The same with another rotation about the axis of the first joint.
+    fn misfit_with(&self, source: &AttitudeSource, shift_s: f64, first_joint: &UnitQuaternion<f64>) -> f64 {
         let shift_ns = ns_from_seconds(shift_s);
         let difference = |span: &Span| {
             let from = first_joint * self.attitude.orientation_at(source, shift_ns, span.from_ns)?;
@@ -162,7 +169,7 @@ impl SourceFit<'_> {
     }
 
     fn best_shift(&self, source: &AttitudeSource, given_s: f64) -> Meaning {
-        let at = |shift_s: &f64| self.misfit(source, given_s + shift_s, &UnitQuaternion::identity());
+        let at = |shift_s: &f64| self.misfit(source, given_s + shift_s);
         let misfit_rad = COARSE_SHIFTS_S.iter().map(at).fold(f64::INFINITY, f64::min);
         Meaning { source: source.clone(), misfit_rad }
     }
@@ -199,7 +206,7 @@ impl SourceFit<'_> {
         let steps = (MAX_SHIFT_S / SHIFT_STEP_S).round() as i32;
         let cost = |step: i32| {
             let shift_s = given_s + f64::from(step) * SHIFT_STEP_S;
-            (shift_s, self.misfit(&chosen.source, shift_s, &UnitQuaternion::identity()))
+            (shift_s, self.misfit(&chosen.source, shift_s))
         };
         let costs: Vec<(f64, f64)> = (-steps..=steps).map(cost).collect();
         let best = (0..costs.len()).min_by(|a, b| costs[*a].1.total_cmp(&costs[*b].1)).unwrap_or(steps as usize);
@@ -224,9 +231,10 @@ impl SourceFit<'_> {
 
     /// An offset of the first joint that decreases the misfit: a yaw that is measured from another direction.
     fn check_first_joint(&self, chosen: &Meaning, shift_s: f64, gimbal: &GimbalRig, findings: &mut Findings) {
-        let Some((axis, link)) = first_axis(&gimbal.chain).zip(gimbal.chain.links.first()) else { return };
-        let cost = |offset_rad: f64| {
-            (offset_rad, self.misfit(&chosen.source, shift_s, &UnitQuaternion::from_axis_angle(&axis, -offset_rad)))
+        let given_rad = chosen.source.first_joint_offset_rad;
+        let cost = |change_rad: f64| {
+            let first_joint = about_first_joint(gimbal, -given_rad - change_rad);
+            (change_rad, self.misfit_with(&chosen.source, shift_s, &first_joint))
         };
         let scan = |middle_rad: f64, step_rad: f64, steps: i32| {
             let costs: Vec<(f64, f64)> =
@@ -248,18 +256,16 @@ impl SourceFit<'_> {
             unturned.to_degrees(),
             least.to_degrees()
         );
-        let remedy = format!(
-            "set gimbal.links[0].theta_offset to {:.4}, or raise gimbal.prior.rotation_bound above {:.3}",
-            link.theta_offset_rad - offset_rad,
-            offset_rad.abs()
-        );
+        let offset_rad = principal_angle(given_rad + offset_rad);
+        let remedy = format!("set first_joint_offset: {offset_rad:.4} in gimbal.source");
         findings.add(Severity::Warning, Area::Encoders, title, evidence, remedy);
     }
 }
 
-/// Axis of the first joint in the IMU frame.
-fn first_axis(chain: &ClassicalChain) -> Option<Unit<Vector3<f64>>> {
-    (!chain.links.is_empty()).then(|| Unit::new_normalize(chain.imu_from_base.rotation * Vector3::z()))
+/// The rotation about the axis of the first joint in the IMU frame.
+fn about_first_joint(gimbal: &GimbalRig, angle_rad: f64) -> UnitQuaternion<f64> {
+    let axis = Unit::new_normalize(gimbal.chain.imu_from_base.rotation * Vector3::z());
+    UnitQuaternion::from_axis_angle(&axis, angle_rad)
 }
 
 /// The misfits of the rig's meaning and of the best change in each respect.

@@ -216,8 +216,10 @@ fn delays_and_offsets_of_the_attitude_are_measured() {
     };
     let body = "{topic: /gimbal, type: quaternion, frame: body, axes: frd}";
     // The yaw axis of the rig points down, so that a positive rotation about the vertical is a negative one about it.
-    let words = ["about the axis of 'yaw'", "rotated by -2", "set gimbal.links[0].theta_offset to -1.2"];
+    let words = ["about the axis of 'yaw'", "rotated by -2", "set first_joint_offset: -0.3"];
     expect(turned, 0, body, Severity::Warning, &words);
+    let corrected = body.replace("axes: frd", "axes: frd, first_joint_offset: -0.349");
+    expect(turned, 0, &corrected, Severity::Good, &[GOOD, "misfit as in the rig 0.2"]);
 }
 
 #[test]

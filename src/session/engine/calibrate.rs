@@ -295,7 +295,7 @@ fn calibrated(rig: &Rig, entries: &CalibratedEntries, outcome: &CalibrationOutco
         }
     }
     if let Some(gimbal) = &mut calibrated.gimbal {
-        gimbal.chain = outcome.chain.clone();
+        gimbal.set_chain(outcome.chain.clone());
         gimbal.prior = ChainPrior {
             translation_bound_m: largest(Dimension::Length),
             rotation_bound_rad: largest(Dimension::Angle),
