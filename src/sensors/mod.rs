@@ -6,17 +6,18 @@ mod gray_image;
 mod image_mask;
 mod imu;
 mod joints;
+mod named_axes;
 mod pose;
 mod rig;
 
 pub use attitude_source::{
-    AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, BodyAxes, EulerAngles, EulerRotation,
-    NamedAxes,
+    AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, EulerAngles, EulerRotation,
 };
 pub use gray_image::GrayImage;
 pub use image_mask::ImageMask;
 pub use imu::{ImuNoise, ImuSample};
 pub use joints::{JointAngles, JointSample};
+pub use named_axes::{BodyAxes, NamedAxes};
 pub use pose::PoseSample;
 pub use rig::{
     AssumedField, CameraMask, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, Joint, Rig, UnknownCamera,

@@ -17,6 +17,8 @@ use crate::sensors::{AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig, 
 const UNREACHABLE_RAD: f64 = 0.035;
 /// Stretches of reported samples that are closer together than this are one.
 const STRETCH_NS: i64 = 1_000_000_000;
+/// Reading of the vehicle's attitude starts so much earlier than that of the gimbal's.
+const VEHICLE_MARGIN_NS: i64 = 1_200_000_000;
 /// Distances before the wanted start from which reading is tried for a sample that does not depend on those before it; after
 /// that it begins with the log.
 const EARLIER_NS: [i64; 4] = [0, 4_000_000_000, 16_000_000_000, 64_000_000_000];
@@ -104,9 +106,9 @@ impl AttitudeJoints {
                 let clock = StampClock::of(log, vehicle, kind)?;
                 warnings.extend(clock.warning(vehicle));
                 let decoder = vehicle_decoder(source.clone(), kind, clock);
-                // The gimbal's stamps may be shifted back against these.
+                // The gimbal's stamps may be shifted back against these, and its messages recorded later.
                 let shift_ns = ns_from_seconds(gimbal.timeshift_gimbal_imu_s).min(0);
-                let from_ns = from_ns.saturating_add(shift_ns).saturating_sub(MAX_VEHICLE_GAP_NS);
+                let from_ns = from_ns.saturating_add(shift_ns).saturating_sub(VEHICLE_MARGIN_NS);
                 Some(Lookup::new(OrderedSamples::new(log, vehicle, from_ns, false, decoder)))
             }
         };
