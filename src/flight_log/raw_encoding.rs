@@ -104,7 +104,7 @@ impl RawEncoding {
         }
         let mut pixels = Vec::with_capacity(raw.width * raw.height);
         let bytes = if self.is_wide() { 2 } else { 1 };
-        let sample = |pixel: &[u8], at: usize| self.sample(&pixel[at * bytes..(at + 1) * bytes], raw.big_endian);
+        let sample = |pixel: &[u8], at: usize| Self::sample(&pixel[at * bytes..(at + 1) * bytes], raw.big_endian);
         for row in self.rows(raw) {
             match self.layout {
                 PixelLayout::Luma { samples, first } => {
@@ -129,11 +129,11 @@ impl RawEncoding {
 
     fn samples(self, row: &[u8], big_endian: bool) -> impl Iterator<Item = u16> + use<'_> {
         let bytes = if self.is_wide() { 2 } else { 1 };
-        row.chunks_exact(bytes).map(move |sample| self.sample(sample, big_endian))
+        row.chunks_exact(bytes).map(move |sample| Self::sample(sample, big_endian))
     }
 
     /// The value of a sample's one or two bytes.
-    fn sample(self, bytes: &[u8], big_endian: bool) -> u16 {
+    fn sample(bytes: &[u8], big_endian: bool) -> u16 {
         match *bytes {
             [low, high] if !big_endian => u16::from_le_bytes([low, high]),
             [high, low] => u16::from_be_bytes([high, low]),

@@ -43,7 +43,7 @@ impl Plot {
             let (along, up) = self.at(x, y);
             let command = if x - before > gap { 'M' } else { 'L' };
             // Writing to a string cannot fail.
-            let _ = write!(path, "{command}{along:.1} {up:.1}");
+            let _infallible = write!(path, "{command}{along:.1} {up:.1}");
             before = x;
         }
         html! { path d=(path) fill="none" stroke=(color) stroke-width="1" {} }

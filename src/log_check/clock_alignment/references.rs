@@ -61,8 +61,7 @@ pub fn align_camera(
         align_clocks(rotations, &camera, 0.0, search_s).map(|found| (AlignmentReference::GyroscopeAndJoints, found));
     match (rigid, moving) {
         (Ok(rigid), Ok(moving)) => Ok(if moving.1.explained >= rigid.1.explained { moving } else { rigid }),
-        (Err(_), moving @ Ok(_)) => moving,
         (rigid @ Ok(_), Err(_)) => rigid,
-        (Err(_), moving @ Err(_)) => moving,
+        (Err(_), moving) => moving,
     }
 }

@@ -93,7 +93,6 @@ fn offset_drift_rotation_and_scale_are_found() {
     ] {
         let found = align_clocks(&video.rotations(rate), &reference, 0.0, 60.0).unwrap();
         let expected_s = video.offset_at(found.middle_s);
-        println!("{found:?}", found = ClockAlignment { correlation: vec![], speeds: vec![], ..found.clone() });
         assert!((found.offset_s - expected_s).abs() < 0.002, "{} {expected_s}", found.offset_s);
         assert!((found.offset_s - expected_s).abs() < 4.0 * found.offset_sigma_s && found.offset_sigma_s < 0.003);
         assert!((found.drift_ppm - video.drift * 1e6).abs() < 4.0 * found.drift_sigma_ppm);
@@ -117,7 +116,6 @@ fn the_standard_deviation_of_the_offset_is_that_of_its_errors() {
         squares += ((found.offset_s - video.offset_at(found.middle_s)) / found.offset_sigma_s).powi(2);
     }
     let ratio = (squares / f64::from(count)).sqrt();
-    println!("errors are {ratio:.2} standard deviations");
     assert!((0.4..1.8).contains(&ratio), "{ratio}");
 }
 
@@ -137,17 +135,10 @@ fn a_noisy_reference_gives_neither_a_bias_nor_a_small_standard_deviation() {
         let video = Video { noise_rad: 0.0005, scale: 1.0, offset_s: 5.0 + 0.3 * f64::from(seed), ..Video::default() };
         let found = align_clocks(&video.rotations(slow), &reference, 6.0, 15.0).unwrap();
         let error_s = found.offset_s - video.offset_at(found.middle_s);
-        println!(
-            "error {:.1} ms, σ {:.1} ms, {:.2} explained",
-            1e3 * error_s,
-            1e3 * found.offset_sigma_s,
-            found.explained
-        );
         assert!(error_s.abs() < 0.06, "{error_s}");
         squares += (error_s / found.offset_sigma_s).powi(2);
     }
     let ratio = (squares / f64::from(count)).sqrt();
-    println!("errors are {ratio:.2} standard deviations");
     assert!((0.3..2.0).contains(&ratio), "{ratio}");
 }
 

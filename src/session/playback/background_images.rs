@@ -17,7 +17,7 @@ const WINDOW_WAITS: Duration = Duration::from_millis(25);
 const DELIVERED: usize = 8;
 
 /// The image of a frame, as far as it is decoded.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FrameImage {
     /// The decoded image.
     Ready(Arc<GrayImage>),
@@ -64,8 +64,8 @@ struct Shared {
 struct State {
     /// The image of each camera that was asked for last and is not delivered yet; the oldest request is the first.
     wanted: Vec<Key>,
-    /// Delivered images, `None` for one that is missing; the one used last is the last.
-    delivered: Vec<(Key, Option<Arc<GrayImage>>)>,
+    /// Delivered images, ready or missing; the one used last is the last.
+    delivered: Vec<(Key, FrameImage)>,
     ended: bool,
 }
 
@@ -117,11 +117,7 @@ impl Worker {
                 None => self.shared.changed.wait_while(&mut state, decoding),
             }
         }
-        match state.delivered(&key) {
-            Some(Some(image)) => FrameImage::Ready(image),
-            Some(None) => FrameImage::Missing,
-            None => FrameImage::Decoding,
-        }
+        state.delivered(&key).unwrap_or(FrameImage::Decoding)
     }
 }
 
@@ -131,7 +127,7 @@ impl Drop for Worker {
         self.shared.changed.notify_all();
         if let Some(thread) = self.thread.take() {
             // A panic has been printed by the thread itself; there is nothing left to do for it.
-            let _ = thread.join();
+            let _printed = thread.join();
         }
     }
 }
@@ -152,7 +148,7 @@ impl Shared {
                 !state.ended && state.wanted.contains(&key)
             };
             if reader.decode_before(&key.0, key.1, &is_wanted) {
-                let image = reader.image(&key.0, key.1).ok();
+                let image = reader.image(&key.0, key.1).map_or(FrameImage::Missing, FrameImage::Ready);
                 self.state.lock().deliver(key, image);
                 self.changed.notify_all();
             }
@@ -162,7 +158,7 @@ impl Shared {
 
 impl State {
     /// A delivered image, `None` when it is not there.
-    fn delivered(&mut self, key: &Key) -> Option<Option<Arc<GrayImage>>> {
+    fn delivered(&mut self, key: &Key) -> Option<FrameImage> {
         let found = self.delivered.iter().position(|(delivered, _)| delivered == key)?;
         let entry = self.delivered.remove(found);
         self.delivered.push(entry.clone());
@@ -175,7 +171,7 @@ impl State {
         self.wanted.push(key);
     }
 
-    fn deliver(&mut self, key: Key, image: Option<Arc<GrayImage>>) {
+    fn deliver(&mut self, key: Key, image: FrameImage) {
         self.wanted.retain(|wanted| *wanted != key);
         self.delivered.push((key, image));
         let surplus = self.delivered.len().saturating_sub(DELIVERED);
@@ -222,11 +218,11 @@ mod tests {
         let mut waiting = state(&[("cam0", 3), ("cam1", 9)]);
         waiting.want(("cam0".to_owned(), 4));
         assert_eq!(waiting.wanted, state(&[("cam1", 9), ("cam0", 4)]).wanted);
-        waiting.deliver(("cam0".to_owned(), 4), None);
+        waiting.deliver(("cam0".to_owned(), 4), FrameImage::Missing);
         assert_eq!(waiting.wanted, state(&[("cam1", 9)]).wanted);
-        assert_eq!(waiting.delivered(&("cam0".to_owned(), 4)), Some(None));
+        assert_eq!(waiting.delivered(&("cam0".to_owned(), 4)), Some(FrameImage::Missing));
         for index in 0..DELIVERED {
-            waiting.deliver(("cam1".to_owned(), index), None);
+            waiting.deliver(("cam1".to_owned(), index), FrameImage::Missing);
         }
         assert_eq!(waiting.delivered(&("cam0".to_owned(), 4)), None, "only the last ones are kept");
     }
