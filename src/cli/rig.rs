@@ -6,9 +6,8 @@ use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use dcvins::export;
 use dcvins::flight_log::FlightLog;
-use dcvins::flight_log::rig_template::{
-    CameraChoice, MechanismAxes, PublishedCamera, RigChoices, RigTemplate, VehicleAxes,
-};
+use dcvins::flight_log::rig_template::{CameraChoice, MechanismAxes, PublishedCamera, RigChoices, RigTemplate};
+use dcvins::sensors::BodyAxes;
 
 use crate::cli::exit::{self, Outcome};
 use crate::cli::limit_arguments::LimitArguments;
@@ -55,11 +54,11 @@ pub(crate) struct NewArguments {
     pub at: Option<[f64; 3]>,
     /// Which joint angles are positive: frd (yaw to the right, pitch up, as of autopilots and DJI) or flu (yaw to the left, pitch
     /// down, as in ROS) [default: frd].
-    #[arg(long, value_name = "frd|flu", value_parser = parsed::<VehicleAxes>)]
-    pub positive: Option<VehicleAxes>,
+    #[arg(long, value_name = "frd|flu", value_parser = body_axes)]
+    pub positive: Option<BodyAxes>,
     /// Axes of the IMU: flu or frd [default: from gravity in the log].
-    #[arg(long, value_name = "frd|flu", value_parser = parsed::<VehicleAxes>)]
-    pub imu_axes: Option<VehicleAxes>,
+    #[arg(long, value_name = "frd|flu", value_parser = body_axes)]
+    pub imu_axes: Option<BodyAxes>,
     /// Topic of the IMU, where the log has several.
     #[arg(long, value_name = "TOPIC")]
     pub imu_topic: Option<String>,
@@ -96,6 +95,11 @@ pub(crate) struct Attitude {
 
 fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(text: &str) -> Result<T, String> {
     text.parse().map_err(|error: T::Err| error.to_string())
+}
+
+fn body_axes(text: &str) -> Result<BodyAxes, String> {
+    let axes = BodyAxes::ALL.into_iter().find(|axes| axes.name().eq_ignore_ascii_case(text));
+    axes.ok_or_else(|| "expected flu (forward, left, up) or frd (forward, right, down)".to_owned())
 }
 
 fn image_size(text: &str) -> Result<[usize; 2], String> {

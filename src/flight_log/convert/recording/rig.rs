@@ -1,11 +1,10 @@
 //! The rig of a video: what its recorders say, usual values for the rest.
 
 use super::super::super::FlightLog;
-use super::super::super::rig_template::{
-    CameraChoice, MechanismAxes, RigChoices, RigTemplate, TemplateError, VehicleAxes,
-};
+use super::super::super::rig_template::{CameraChoice, MechanismAxes, RigChoices, RigTemplate, TemplateError};
 use super::recorded::GimbalFrame;
 use super::topics::{GIMBAL_TOPIC, VEHICLE_TOPIC, VIDEO_TOPIC};
+use crate::sensors::BodyAxes;
 
 /// Horizontal field of view of a camera that is not known, in degrees: a common one of gimballed cameras.
 const USUAL_FIELD_OF_VIEW_DEG: f64 = 84.0;
@@ -78,7 +77,7 @@ impl VideoFacts {
             let entries = entries.map(|(key, value)| (key.to_owned(), value.to_owned()));
             (GIMBAL_TOPIC.to_owned(), entries.to_vec())
         });
-        let (frd, flu) = (VehicleAxes::ForwardRightDown, VehicleAxes::ForwardLeftUp);
+        let (frd, flu) = (BodyAxes::Frd, BodyAxes::Flu);
         let mechanism = if self.gimbal_frame.is_some() { USUAL_MECHANISM } else { "rigid" };
         let choices = RigChoices {
             name: name.to_owned(),

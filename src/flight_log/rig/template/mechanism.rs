@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use super::TemplateError;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, DhLink, JointAxis};
-use crate::sensors::Joint;
+use crate::sensors::{BodyAxes, Joint};
 
 /// Most axes of a mechanism in words.
 const MAX_AXES: usize = 8;
@@ -45,62 +45,23 @@ impl GimbalAxis {
     }
 
     /// Direction in the vehicle (x forward, y left, z up) at angle zero.
-    fn direction(self, positive: VehicleAxes) -> Vector3<f64> {
+    fn direction(self, positive: BodyAxes) -> Vector3<f64> {
         let direction = match self {
             Self::Yaw => Vector3::z(),
             Self::Roll => Vector3::x(),
             Self::Pitch => Vector3::y(),
         };
-        if self != Self::Roll && positive == VehicleAxes::ForwardRightDown { -direction } else { direction }
+        if self != Self::Roll && positive == BodyAxes::Frd { -direction } else { direction }
     }
 
     /// Usual range in radians: gimbals roll little, and look down further than up. Pitch is positive upwards, or downwards.
-    fn limits_rad(self, positive: VehicleAxes) -> (f64, f64) {
+    fn limits_rad(self, positive: BodyAxes) -> (f64, f64) {
         let degrees = |low: f64, high: f64| (low.to_radians(), high.to_radians());
         match (self, positive) {
             (Self::Yaw, _) => (-std::f64::consts::PI, std::f64::consts::PI),
             (Self::Roll, _) => degrees(-60.0, 60.0),
-            (Self::Pitch, VehicleAxes::ForwardRightDown) => degrees(-135.0, 60.0),
-            (Self::Pitch, VehicleAxes::ForwardLeftUp) => degrees(-60.0, 135.0),
-        }
-    }
-}
-
-/// Axes of a vehicle or of its IMU.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum VehicleAxes {
-    /// x forward, y left, z up, as in ROS: yaw is positive to the left, pitch downwards.
-    ForwardLeftUp,
-    /// x forward, y right, z down, as of autopilots: yaw is positive to the right, pitch upwards.
-    ForwardRightDown,
-}
-
-impl VehicleAxes {
-    /// Rotates vectors from forward-left-up axes to these.
-    pub(super) fn rotation_of_vehicle(self) -> UnitQuaternion<f64> {
-        match self {
-            Self::ForwardLeftUp => UnitQuaternion::identity(),
-            Self::ForwardRightDown => UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI),
-        }
-    }
-
-    /// `flu` or `frd`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ForwardLeftUp => "flu",
-            Self::ForwardRightDown => "frd",
-        }
-    }
-}
-
-impl FromStr for VehicleAxes {
-    type Err = TemplateError;
-
-    fn from_str(text: &str) -> Result<Self, TemplateError> {
-        match text.to_ascii_lowercase().as_str() {
-            "flu" => Ok(Self::ForwardLeftUp),
-            "frd" => Ok(Self::ForwardRightDown),
-            _ => Err(TemplateError::Axes { given: text.to_owned() }),
+            (Self::Pitch, BodyAxes::Frd) => degrees(-135.0, 60.0),
+            (Self::Pitch, BodyAxes::Flu) => degrees(-60.0, 135.0),
         }
     }
 }
@@ -145,8 +106,8 @@ impl std::fmt::Display for MechanismAxes {
 impl MechanismAxes {
     /// The chain whose axes meet at right angles at `position_m` (forward, left and up of the IMU), which is also where the
     /// camera is; it looks forward, level, while all angles are zero.
-    pub(super) fn chain(&self, positive: VehicleAxes, imu: VehicleAxes, position_m: Vector3<f64>) -> ClassicalChain {
-        let imu_from_vehicle = imu.rotation_of_vehicle();
+    pub(super) fn chain(&self, positive: BodyAxes, imu: BodyAxes, position_m: Vector3<f64>) -> ClassicalChain {
+        let imu_from_vehicle = imu.flu_from_axes().inverse();
         let position_in_imu_m = imu_from_vehicle * position_m;
         let axis =
             |axis: &GimbalAxis| -> JointAxis { (imu_from_vehicle * axis.direction(positive), position_in_imu_m) };
@@ -157,7 +118,7 @@ impl MechanismAxes {
     }
 
     /// Its joints, by these names.
-    pub(super) fn joints(&self, names: &[String], positive: VehicleAxes) -> Vec<Joint> {
+    pub(super) fn joints(&self, names: &[String], positive: BodyAxes) -> Vec<Joint> {
         let joint =
             |(name, axis): (&String, &GimbalAxis)| Joint { name: name.clone(), limits_rad: axis.limits_rad(positive) };
         names.iter().zip(&self.0).map(joint).collect()

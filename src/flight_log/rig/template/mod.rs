@@ -8,7 +8,7 @@ mod text;
 mod topics;
 
 pub use camera::{CameraChoice, PublishedCamera};
-pub use mechanism::{GimbalAxis, MechanismAxes, VehicleAxes};
+pub use mechanism::{GimbalAxis, MechanismAxes};
 pub use topics::RigChoices;
 
 use nalgebra::Vector3;
@@ -16,7 +16,7 @@ use thiserror::Error;
 
 use crate::camera::CameraModel;
 use crate::sensors::{
-    AssumedField, AttitudeSource, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Rig,
+    AssumedField, AttitudeSource, BodyAxes, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Rig,
 };
 
 /// Standard deviation of a joint angle of a gimbal whose encoders nobody has measured, in radians (0.5°).
@@ -64,12 +64,6 @@ pub enum TemplateError {
          yaw-roll-pitch, no axis twice in a row, or rigid"
     )]
     UnknownMechanism {
-        /// The given text.
-        given: String,
-    },
-    /// Axes that are not known.
-    #[error("unknown axes '{given}': expected flu (forward, left, up) or frd (forward, right, down)")]
-    Axes {
         /// The given text.
         given: String,
     },
@@ -152,7 +146,7 @@ pub struct ImuTemplate {
     /// Rate in Hz.
     pub rate_hz: f64,
     /// Its axes in the vehicle.
-    pub axes: Sourced<VehicleAxes>,
+    pub axes: Sourced<BodyAxes>,
     /// Noise densities, measured or [`TYPICAL_IMU_NOISE`].
     pub noise: Sourced<ImuNoise>,
 }
@@ -207,7 +201,7 @@ pub struct GimbalTemplate {
     /// Its axes from the vehicle to the camera.
     pub axes: MechanismAxes,
     /// Which directions of rotation are positive.
-    pub positive: Sourced<VehicleAxes>,
+    pub positive: Sourced<BodyAxes>,
     /// Source of its angles.
     pub angles: AngleTemplate,
 }

@@ -4,7 +4,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::*;
 use crate::camera::{CameraModel, Distortion};
-use crate::sensors::Rig;
+use crate::sensors::{BodyAxes, Rig};
 
 const SIZE_PX: [usize; 2] = [640, 480];
 
@@ -78,8 +78,8 @@ fn the_camera_looks_forward_at_zero_angles() {
     for mechanism in
         ["yaw-roll-pitch", "yaw-pitch-roll", "yaw-pitch", "pitch-yaw", "pitch", "roll-pitch", "yaw", "rigid"]
     {
-        for positive in [VehicleAxes::ForwardLeftUp, VehicleAxes::ForwardRightDown] {
-            for imu in [VehicleAxes::ForwardLeftUp, VehicleAxes::ForwardRightDown] {
+        for positive in [BodyAxes::Flu, BodyAxes::Frd] {
+            for imu in [BodyAxes::Flu, BodyAxes::Frd] {
                 let position_m = Vector3::new(0.1, 0.02, -0.05);
                 let choices = RigChoices {
                     positive: Some(positive),
@@ -90,7 +90,7 @@ fn the_camera_looks_forward_at_zero_angles() {
                 let rig = RigTemplate::new(&choices, None).unwrap().rig();
                 let chain = rig.chain_of_camera("cam0").unwrap();
                 let imu_from_camera = chain.imu_from_camera(&vec![0.0; chain.joint_count()]);
-                let vehicle_from_imu = imu.rotation_of_vehicle().inverse();
+                let vehicle_from_imu = imu.flu_from_axes();
                 let forward = vehicle_from_imu * (imu_from_camera.rotation * Vector3::z());
                 let down = vehicle_from_imu * (imu_from_camera.rotation * Vector3::y());
                 assert!((forward - Vector3::x()).norm() < 1e-12, "{mechanism}: {forward}");
@@ -107,16 +107,16 @@ fn the_camera_looks_forward_at_zero_angles() {
 #[test]
 fn positive_angles_rotate_as_stated() {
     // Where the camera looks after 0.1 rad of one joint, in forward-left-up axes.
-    let look = |positive: VehicleAxes, angles: [f64; 2]| {
+    let look = |positive: BodyAxes, angles: [f64; 2]| {
         let choices = RigChoices { positive: Some(positive), ..choices("yaw-pitch", "fov:84") };
         let rig = RigTemplate::new(&choices, None).unwrap().rig();
         rig.chain_of_camera("cam0").unwrap().imu_from_camera(&angles).rotation * Vector3::z()
     };
     let sine = 0.1_f64.sin();
-    assert!((look(VehicleAxes::ForwardRightDown, [0.1, 0.0]).y + sine).abs() < 1e-12, "to the right");
-    assert!((look(VehicleAxes::ForwardRightDown, [0.0, 0.1]).z - sine).abs() < 1e-12, "up");
-    assert!((look(VehicleAxes::ForwardLeftUp, [0.1, 0.0]).y - sine).abs() < 1e-12, "to the left");
-    assert!((look(VehicleAxes::ForwardLeftUp, [0.0, 0.1]).z + sine).abs() < 1e-12, "down");
+    assert!((look(BodyAxes::Frd, [0.1, 0.0]).y + sine).abs() < 1e-12, "to the right");
+    assert!((look(BodyAxes::Frd, [0.0, 0.1]).z - sine).abs() < 1e-12, "up");
+    assert!((look(BodyAxes::Flu, [0.1, 0.0]).y - sine).abs() < 1e-12, "to the left");
+    assert!((look(BodyAxes::Flu, [0.0, 0.1]).z + sine).abs() < 1e-12, "down");
 }
 
 #[test]
@@ -163,7 +163,7 @@ fn an_attitude_is_written_as_the_source_of_the_angles() {
         let entries = entries.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
         let attitude = Some(("/gimbal/attitude".to_owned(), entries));
         RigTemplate::new(
-            &RigChoices { attitude, imu_axes: Some(VehicleAxes::ForwardRightDown), ..choices("yaw-pitch", "fov:84") },
+            &RigChoices { attitude, imu_axes: Some(BodyAxes::Frd), ..choices("yaw-pitch", "fov:84") },
             None,
         )
     };

@@ -9,13 +9,13 @@ use super::super::read::CameraFacts as _;
 use super::camera::{of_field_of_view, of_published};
 use super::{
     AngleTemplate, AttitudeTemplate, CameraChoice, CameraTemplate, GimbalAxis, GimbalTemplate, ImuTemplate,
-    MechanismAxes, RigTemplate, Sourced, TYPICAL_IMU_NOISE, TemplateError, VehicleAxes,
+    MechanismAxes, RigTemplate, Sourced, TYPICAL_IMU_NOISE, TemplateError,
 };
 use crate::camera::CameraModel;
 use crate::flight_log::image_decoding::{BitDepth, decode_image};
 use crate::flight_log::messages::{self, MessageKind};
 use crate::flight_log::{FlightLog, LogError, TopicInfo};
-use crate::sensors::ImuNoise;
+use crate::sensors::{BodyAxes, ImuNoise};
 
 /// Messages of the IMU over which gravity is averaged.
 const GRAVITY_SAMPLES: usize = 2000;
@@ -39,9 +39,9 @@ pub struct RigChoices {
     /// The mechanism.
     pub mechanism: MechanismAxes,
     /// Which rotations are positive; `None` when nobody knows.
-    pub positive: Option<VehicleAxes>,
+    pub positive: Option<BodyAxes>,
     /// Axes of the IMU; `None` to take them from gravity.
-    pub imu_axes: Option<VehicleAxes>,
+    pub imu_axes: Option<BodyAxes>,
     /// Position of the gimbal: forward, left and up of the IMU, in metres; `None` when nobody has measured it.
     pub position_m: Option<Vector3<f64>>,
     /// Topic of the IMU, `None` for the log's only one.
@@ -182,11 +182,11 @@ fn mean_force(log: &FlightLog, topic: &str) -> Option<Vector3<f64>> {
     (count > 0).then(|| sum / count as f64)
 }
 
-fn imu_axes(choices: &RigChoices, force: Option<Vector3<f64>>) -> Sourced<VehicleAxes> {
+fn imu_axes(choices: &RigChoices, force: Option<Vector3<f64>>) -> Sourced<BodyAxes> {
     if let Some(axes) = choices.imu_axes {
         return Sourced::known(axes);
     }
-    let (flu, frd) = (VehicleAxes::ForwardLeftUp, VehicleAxes::ForwardRightDown);
+    let (flu, frd) = (BodyAxes::Flu, BodyAxes::Frd);
     let vertical = force.map(|force| force.z / force.norm().max(f64::MIN_POSITIVE));
     match vertical {
         Some(ratio) if ratio.abs() > VERTICAL_RATIO => {
@@ -260,11 +260,7 @@ fn image_size(log: &FlightLog, info: &TopicInfo) -> Option<[usize; 2]> {
     log.find_message(&info.topic, |data| decoded(data).map(|image| [image.width, image.height]))
 }
 
-fn gimbal(
-    choices: &RigChoices,
-    imu_axes: VehicleAxes,
-    log: Option<&FlightLog>,
-) -> Result<GimbalTemplate, TemplateError> {
+fn gimbal(choices: &RigChoices, imu_axes: BodyAxes, log: Option<&FlightLog>) -> Result<GimbalTemplate, TemplateError> {
     let angles = match (&choices.attitude, log) {
         (Some((topic, entries)), log) => AngleTemplate::Attitude(attitude(topic, entries, imu_axes, log)?),
         (None, Some(log)) => joints(choices, log)?,
@@ -273,10 +269,10 @@ fn gimbal(
     let positive = match (&choices.positive, &angles) {
         (Some(positive), _) => Sourced::known(*positive),
         (None, AngleTemplate::Joints { .. }) => Sourced::assumed(
-            VehicleAxes::ForwardRightDown,
+            BodyAxes::Frd,
             "angles are taken to be positive to the right (yaw, roll) and upwards (pitch)",
         ),
-        (None, _) => Sourced::known(VehicleAxes::ForwardRightDown),
+        (None, _) => Sourced::known(BodyAxes::Frd),
     };
     Ok(GimbalTemplate { axes: choices.mechanism.clone(), positive, angles })
 }
@@ -285,7 +281,7 @@ fn gimbal(
 fn attitude(
     topic: &str,
     entries: &[(String, String)],
-    imu_axes: VehicleAxes,
+    imu_axes: BodyAxes,
     log: Option<&FlightLog>,
 ) -> Result<AttitudeTemplate, TemplateError> {
     let info = log.map(|log| {
