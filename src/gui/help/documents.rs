@@ -106,8 +106,8 @@ mod tests {
         let section =
             |id: usize, anchor: Option<&str>| Some(Target::Section(DocumentId(id), anchor.map(str::to_owned)));
         assert_eq!(manual.follow("#rank"), section(0, Some("rank")));
-        assert_eq!(manual.follow("commands.md"), section(2, None));
-        assert_eq!(manual.follow("../assets/README.md"), section(9, None));
+        assert_eq!(manual.follow("commands.md"), section(3, None));
+        assert_eq!(manual.follow("../assets/README.md"), section(10, None));
         assert_eq!(manual.follow("https://mcap.dev"), Some(Target::Web("https://mcap.dev".to_owned())));
         assert_eq!(manual.follow("nowhere.md#rank"), None);
         assert!(manual.has_anchor("rank") && !manual.has_anchor("nowhere"));
