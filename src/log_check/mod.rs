@@ -10,6 +10,7 @@ mod imu_facts;
 mod imu_noise;
 mod imu_topics;
 mod joints;
+mod pictures;
 mod render;
 mod rig_sanity;
 mod rotation;
@@ -179,6 +180,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
     let mut proposed_masks = Vec::new();
     if let Ok(rig) = rig {
         joints::check_joints(&survey, rig, &mut findings);
+        pictures::check_pictures(log, &survey, rig, &mut findings);
         images::check_images(&survey, rig, &imu_facts, &mut findings);
         if let Some(fitted) = source_fit::check_source(&survey, rig, &imu_facts, image_rotations, &mut findings) {
             // The cameras are checked with the attitude as it should be read.

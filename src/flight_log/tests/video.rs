@@ -1,5 +1,6 @@
 use std::cell::Cell;
 
+use super::super::video::missing_pictures;
 use super::super::video::tests::{Stream, stream};
 use super::*;
 use crate::flight_log::writer::testing as encode;
@@ -219,6 +220,13 @@ fn pictures_behind_a_lost_one_are_left_out_up_to_the_next_keyframe() {
     }
     let warning = warning_with(&warnings, &["/camera: 4 messages from 0.627 s to 0.777 s dropped"]);
     assert!(warning.message.contains("the picture cannot be decoded"), "{}", warning.message);
+    let log = FlightLog::open(&path).unwrap();
+    let (read, missing) = missing_pictures(&log, "/camera", MessageKind::CompressedVideo, 100);
+    // Message 11 is the first one behind the lost picture; the keyframe is message 15.
+    assert_eq!((read, missing.len()), (23, 1));
+    assert_eq!((missing[0].first, missing[0].count), (11, 4));
+    assert!(missing[0].problem.contains("missing"), "{}", missing[0].problem);
+    assert_eq!(missing_pictures(&log, "/camera", MessageKind::CompressedVideo, 11), (11, Vec::new()));
     let reader = ImageReader::new(Arc::new(FlightLog::open(&path).unwrap()), &rig_from(&rig_text()));
     let error = reader.image("cam0", 13).unwrap_err().to_string();
     assert!(error.contains("damaged or missing"), "{error}");

@@ -7,11 +7,13 @@ mod bits;
 mod decoder;
 mod frame_numbers;
 mod picture_stream;
+mod stretches;
 #[cfg(test)]
 pub(super) mod tests;
 
 pub(crate) use decoder::{VideoCodec, VideoDecoder};
 pub(crate) use picture_stream::PictureStream;
+pub(crate) use stretches::{MissingPictures, missing_pictures};
 
 use super::FlightLog;
 use super::container::{BlockCache, TopicIndex};
