@@ -1,6 +1,7 @@
 //! Recordings of vehicles: an MP4 video with `GoPro`'s telemetry or beside an autopilot's log, and autopilots' logs alone.
 
 mod attitude;
+mod damage;
 mod dataflash;
 mod geodesy;
 mod gpmf;

@@ -11,38 +11,23 @@ use super::super::ConvertError;
 use super::super::sink::Sink;
 use super::geodesy::Geodetic;
 use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, finite, from_euler, nanoseconds};
+use records::Record;
 pub(super) use records::START;
-use records::{Damage, Record};
 
 /// Reads a log; its clock is the time since the autopilot started.
 pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
     let file = LogFile::open(path, sink.limits())?;
     let mut recorded = Recorded::new("ArduPilot DataFlash", "");
     let length = file.len();
-    let damage = records::walk(&file, path, |record, behind| {
+    let (damage, problem) = records::walk(&file, path, |record, behind| {
         take(record, &mut recorded);
         sink.advance(behind, length)
     })?;
-    report(&damage, &mut recorded);
+    recorded.notes.extend(problem.map(|problem| format!("a record type is not read: {problem}")));
+    recorded.notes.extend(damage.notes("belong to no record", |bytes| {
+        format!("the log ends within a record (power lost, or the copy is incomplete): its last {bytes} bytes are lost")
+    }));
     Ok(recorded)
-}
-
-fn report(damage: &Damage, recorded: &mut Recorded) {
-    if let Some(problem) = &damage.description {
-        recorded.notes.push(format!("a record type is not read: {problem}"));
-    }
-    if damage.skipped_bytes > 0 {
-        recorded.notes.push(format!(
-            "{} bytes at {} places, the first at byte {}, belong to no record and are skipped",
-            damage.skipped_bytes, damage.places, damage.first_at
-        ));
-    }
-    if damage.cut_bytes > 0 {
-        recorded.notes.push(format!(
-            "the log ends within a record (power lost, or the copy is incomplete): its last {} bytes are lost",
-            damage.cut_bytes
-        ));
-    }
 }
 
 /// Takes what a record measures, or counts it.

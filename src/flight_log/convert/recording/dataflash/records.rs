@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::super::super::super::file::{FileWindow, LogFile};
 use super::super::super::ConvertError;
+use super::super::damage::Damage;
 use super::super::scalar::Scalar;
 
 /// First bytes of every record.
@@ -193,36 +194,22 @@ impl<'a> Record<'a> {
     }
 }
 
-/// What was skipped of a log.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Damage {
-    /// Bytes that belong to no record.
-    pub(super) skipped_bytes: u64,
-    /// Places at which bytes were skipped.
-    pub(super) places: u64,
-    /// The first of them.
-    pub(super) first_at: usize,
-    /// Bytes of a record at the end that is cut off.
-    pub(super) cut_bytes: usize,
-    /// The first problem with a description.
-    pub(super) description: Option<String>,
-}
-
 /// Calls `visit` with every record and the position behind it, until it returns an error; what is no record is skipped.
+/// Returns what was skipped, and the first problem with a description.
 pub(super) fn walk(
     file: &LogFile,
     path: &Path,
     mut visit: impl FnMut(&Record<'_>, usize) -> Result<(), ConvertError>,
-) -> Result<Damage, ConvertError> {
+) -> Result<(Damage, Option<String>), ConvertError> {
     let unreadable = |problem: String| ConvertError::unreadable(problem, path);
     let mut window = FileWindow::new(file);
     let mut types = Types::default();
     let description =
         RecordType { name: "FMT".to_owned(), length: FORMAT_BYTES, fields: Vec::new(), multipliers: Vec::new() };
     types.types.insert(FORMAT_TYPE, description);
-    let mut damage = Damage::default();
+    let (mut damage, mut problem) = (Damage::default(), None);
     let mut at = 0;
-    let mut skipping = false;
+    let mut skipped_from = None;
     while at < file.len() {
         let end = at.saturating_add(HEADER_BYTES);
         let header = if end <= file.len() { window.read(at..end).map_err(unreadable)? } else { &[] };
@@ -234,22 +221,17 @@ pub(super) fn walk(
         };
         let whole = known.filter(|(_, length)| at.saturating_add(*length) <= file.len());
         let Some((number, length)) = whole else {
-            if known.is_some() && !skipping {
-                damage.cut_bytes = file.len() - at;
+            if known.is_some() && skipped_from.is_none() {
+                damage.cut(file.len() - at);
                 break;
             }
-            if !skipping {
-                damage.places += 1;
-                if damage.places == 1 {
-                    damage.first_at = at;
-                }
-            }
-            skipping = true;
-            damage.skipped_bytes += 1;
+            skipped_from.get_or_insert(at);
             at += 1;
             continue;
         };
-        skipping = false;
+        if let Some(from) = skipped_from.take() {
+            damage.skip(from, at - from);
+        }
         let content = window.read(at + HEADER_BYTES..at + length).map_err(unreadable)?;
         if number == FORMAT_TYPE {
             match RecordType::parse(content) {
@@ -257,8 +239,8 @@ pub(super) fn walk(
                 Ok((described, kind)) => {
                     types.types.insert(described, kind);
                 }
-                Err(problem) => {
-                    damage.description.get_or_insert(problem);
+                Err(found) => {
+                    problem.get_or_insert(found);
                 }
             }
         } else {
@@ -274,5 +256,8 @@ pub(super) fn walk(
         }
         at += length;
     }
-    Ok(damage)
+    if let Some(from) = skipped_from {
+        damage.skip(from, at - from);
+    }
+    Ok((damage, problem))
 }

@@ -1,6 +1,7 @@
 //! The records of a telemetry log: a time of the ground station, then a `MAVLink` frame of version 1 or 2.
 
 use super::super::super::super::file::{FileWindow, LogFile};
+use super::super::damage::Damage;
 
 /// Bytes of the time before a frame: microseconds since the epoch, big-endian.
 const TIME_BYTES: usize = 8;
@@ -37,18 +38,6 @@ pub(in super::super) fn is_telemetry(start: &[u8]) -> bool {
         && behind.first().is_some_and(|byte| [VERSION_1, VERSION_2].contains(byte))
 }
 
-/// What was skipped of a log.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Damage {
-    pub(super) skipped_bytes: usize,
-    /// Places at which bytes were skipped.
-    pub(super) places: u64,
-    /// The first of them.
-    pub(super) first_at: usize,
-    /// Bytes at the end that are no whole record.
-    pub(super) cut_bytes: usize,
-}
-
 /// Walks the frames of a log.
 pub(super) struct Frames<'a> {
     file: &'a LogFile,
@@ -73,17 +62,13 @@ impl<'a> Frames<'a> {
                 && self.continues(frame.end)?
             {
                 if at > from {
-                    self.damage.skipped_bytes += at - from;
-                    self.damage.places += 1;
-                    if self.damage.places == 1 {
-                        self.damage.first_at = from;
-                    }
+                    self.damage.skip(from, at - from);
                 }
                 return Ok(Some(frame));
             }
             at += 1;
         }
-        self.damage.cut_bytes += self.file.len().saturating_sub(from);
+        self.damage.cut(self.file.len().saturating_sub(from));
         Ok(None)
     }
 

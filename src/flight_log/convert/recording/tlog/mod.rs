@@ -120,15 +120,10 @@ pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, Convert
         let reason = "its units are those of the sensor; only ArduPilot's are known";
         recorded.leave_many(RAW_IMU, raw.combined.len() as u64, reason);
     }
-    if damage.skipped_bytes > 0 {
-        recorded.notes.push(format!(
-            "{} bytes at {} places, the first at byte {}, are no records and are skipped",
-            damage.skipped_bytes, damage.places, damage.first_at
-        ));
-    }
-    if damage.cut_bytes > 0 {
-        recorded.notes.push(format!("the log ends within a record: its last {} bytes are lost", damage.cut_bytes));
-    }
+    recorded.notes.extend(
+        damage
+            .notes("are no records", |bytes| format!("the log ends within a record: its last {bytes} bytes are lost")),
+    );
     if restarts > 0 {
         recorded.notes.push(format!("the autopilot or the gimbal has restarted {restarts} times during the log"));
     }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::super::super::super::file::{FileWindow, LogFile};
+use super::super::damage::Damage;
 
 /// First bytes of every log.
 pub(in super::super) const MAGIC: [u8; 7] = [0x55, 0x4C, 0x6F, 0x67, 0x01, 0x12, 0x35];
@@ -29,18 +30,6 @@ pub(super) struct Messages<'a> {
     /// Looks at the messages behind a position while damage is skipped.
     ahead: FileWindow<'a>,
     pub(super) damage: Damage,
-}
-
-/// What was skipped of a log.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Damage {
-    pub(super) skipped_bytes: usize,
-    /// Places at which bytes were skipped.
-    pub(super) places: u64,
-    /// The first of them.
-    pub(super) first_at: usize,
-    /// Bytes at the end that are no whole message.
-    pub(super) cut_bytes: usize,
 }
 
 /// Whether messages have this type.
@@ -74,14 +63,10 @@ impl<'a> Messages<'a> {
         if found.is_none() {
             let next = self.resume(at + 1, end)?;
             if next >= end {
-                self.damage.cut_bytes += end - at;
+                self.damage.cut(end - at);
                 return Ok(None);
             }
-            self.damage.skipped_bytes += next - at;
-            self.damage.places += 1;
-            if self.damage.places == 1 {
-                self.damage.first_at = at;
-            }
+            self.damage.skip(at, next - at);
             found = Self::header(&mut self.window, next, end)?;
         }
         let Some((kind, range)) = found else { return Ok(None) };

@@ -9,12 +9,13 @@ use std::path::Path;
 use super::super::super::file::LogFile;
 use super::super::ConvertError;
 use super::super::sink::Sink;
+use super::damage::Damage;
 use super::geodesy::Geodetic;
 use super::mavlink_gimbal::gimbal_attitude;
 use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, finite, from_euler, nanoseconds, rotation};
 use formats::{Formats, Layout};
 pub(super) use messages::MAGIC;
-use messages::{Damage, HEADER_BYTES, Messages};
+use messages::{HEADER_BYTES, Messages};
 
 /// Bit of the flags of a log that has data behind its former end.
 const APPENDED: u8 = 1;
@@ -67,18 +68,9 @@ pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, Convert
 }
 
 fn report(state: &State, damage: &Damage, recorded: &mut Recorded) {
-    if damage.skipped_bytes > 0 {
-        recorded.notes.push(format!(
-            "{} bytes at {} places, the first at byte {}, are no messages and are skipped",
-            damage.skipped_bytes, damage.places, damage.first_at
-        ));
-    }
-    if damage.cut_bytes > 0 {
-        recorded.notes.push(format!(
-            "the log ends within a message (power lost, or the copy is incomplete): {} bytes are lost",
-            damage.cut_bytes
-        ));
-    }
+    recorded.notes.extend(damage.notes("are no messages", |bytes| {
+        format!("the log ends within a message (power lost, or the copy is incomplete): {bytes} bytes are lost")
+    }));
     if state.dropouts > 0 {
         recorded.notes.push(format!(
             "the autopilot could not write {} times, {:.3} s together (dropouts)",
