@@ -6,7 +6,7 @@ use super::statistics::median;
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
 use crate::flight_log::attitude::{
-    MAX_VEHICLE_GAP_NS, StampClock, TransformMerge, TransformPath, gimbal_kinds, rotation_between, topic_field,
+    MAX_VEHICLE_GAP_NS, StampClock, TransformMerge, TransformPath, gimbal_kinds, rotation_at, topic_field,
     vehicle_topic,
 };
 use crate::flight_log::joint_merge::JointReading;
@@ -147,9 +147,7 @@ impl AttitudeSurvey {
     /// The vehicle's attitude in FLU and ENU at a stamp.
     fn enu_from_flu(&self, source: &AttitudeSource, stamp_ns: i64) -> Option<UnitQuaternion<f64>> {
         let (_, kind, _) = self.vehicle_topic.as_ref()?;
-        let after = self.vehicle.partition_point(|(at, _)| *at <= stamp_ns);
-        let before = after.checked_sub(1).and_then(|before| self.vehicle.get(before));
-        let rotation = rotation_between(before, self.vehicle.get(after), stamp_ns, MAX_VEHICLE_GAP_NS)?;
+        let rotation = rotation_at(&self.vehicle, stamp_ns, MAX_VEHICLE_GAP_NS)?;
         Some(source.enu_from_flu(&rotation, *kind == MessageKind::Px4VehicleAttitude))
     }
 

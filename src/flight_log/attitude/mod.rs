@@ -67,6 +67,17 @@ pub(crate) fn vehicle_topic<'a>(
     Ok(Some((topic, kind)))
 }
 
+/// The rotation at a stamp between samples in the order of their stamps, as [`rotation_between`].
+pub(crate) fn rotation_at(
+    samples: &[(i64, UnitQuaternion<f64>)],
+    stamp_ns: i64,
+    max_gap_ns: i64,
+) -> Option<UnitQuaternion<f64>> {
+    let after = samples.partition_point(|(at_ns, _)| *at_ns <= stamp_ns);
+    let before = after.checked_sub(1).and_then(|before| samples.get(before));
+    rotation_between(before, samples.get(after), stamp_ns, max_gap_ns)
+}
+
 /// The rotation between two samples at a stamp; `None` outside of them or when they are too far apart.
 pub(crate) fn rotation_between(
     before: Option<&(i64, UnitQuaternion<f64>)>,

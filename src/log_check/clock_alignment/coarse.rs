@@ -26,7 +26,7 @@ impl Correlation {
     }
 }
 
-/// Angular speeds of the images on a grid of [`STEP_S`], in rad/s; `None` where there are none.
+/// Angular speeds of the images in rad/s, by the places of a grid of [`STEP_S`] where there are some.
 struct SpeedGrid {
     start_ns: i64,
     speeds: Vec<(usize, f64)>,

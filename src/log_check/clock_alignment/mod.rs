@@ -18,6 +18,7 @@ pub use self::references::{AlignmentReference, align_camera};
 use self::refinement::Refined;
 use super::ImageRotation;
 use super::statistics::median;
+use crate::flight_log::attitude::rotation_at;
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 
 /// Minimum number of image rotations.
@@ -110,14 +111,7 @@ impl OrientationSeries {
 
     /// Interpolated orientation, `None` outside of the series.
     fn at(&self, stamp_ns: i64) -> Option<UnitQuaternion<f64>> {
-        let after = self.samples.partition_point(|(sample_ns, _)| *sample_ns < stamp_ns);
-        let (after_ns, to) = self.samples.get(after)?;
-        if *after_ns == stamp_ns {
-            return Some(*to);
-        }
-        let (before_ns, from) = self.samples.get(after.checked_sub(1)?)?;
-        let fraction = (stamp_ns - before_ns) as f64 / (after_ns - before_ns) as f64;
-        Some(from.try_slerp(to, fraction, 1e-9).unwrap_or(*from))
+        rotation_at(&self.samples, stamp_ns, i64::MAX)
     }
 
     /// Rotation vector of `second_from_first` between two times, in radians.
