@@ -136,10 +136,7 @@ impl ImageReader {
             path: self.log.path().to_owned(),
         })?;
         let key = (number, index);
-        if let Some(found) = cache.images.iter().position(|(cached, _)| *cached == key) {
-            let entry = cache.images.remove(found);
-            let image = Arc::clone(&entry.1);
-            cache.images.push(entry);
+        if let Some(image) = cached(&mut cache.images, key) {
             return Ok(image);
         }
         let bad = |problem: String| LogError::BadMessage {
@@ -168,18 +165,19 @@ impl ImageReader {
     }
 }
 
+/// A cached image by camera and index, which becomes the most recently used one.
+fn cached<V: Clone>(entries: &mut Vec<((usize, usize), V)>, key: (usize, usize)) -> Option<V> {
+    let found = entries.iter().position(|(cached, _)| *cached == key)?;
+    let entry = entries.remove(found);
+    entries.push(entry.clone());
+    Some(entry.1)
+}
+
 impl ImageCache {
     /// A picture of a video.
     fn picture(&mut self, log: &FlightLog, camera: usize, kind: MessageKind, index: usize) -> Picture {
         self.decode_pictures(log, camera, kind, index, &|| true);
-        self.cached_picture((camera, index)).unwrap_or_else(|| Err("it is no picture of a video".to_owned()))
-    }
-
-    fn cached_picture(&mut self, key: (usize, usize)) -> Option<Picture> {
-        let found = self.pictures.iter().position(|(cached, _)| *cached == key)?;
-        let entry = self.pictures.remove(found);
-        self.pictures.push(entry.clone());
-        Some(entry.1)
+        cached(&mut self.pictures, (camera, index)).unwrap_or_else(|| Err("it is no picture of a video".to_owned()))
     }
 
     /// Decodes a video up to a picture, from the picture before it or from its keyframe, while `go_on` holds. Returns whether
@@ -192,7 +190,7 @@ impl ImageCache {
         index: usize,
         go_on: &dyn Fn() -> bool,
     ) -> bool {
-        if self.cached_picture((camera, index)).is_some() {
+        if cached(&mut self.pictures, (camera, index)).is_some() {
             return true;
         }
         let stands = self.streams[camera].next();
