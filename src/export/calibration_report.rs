@@ -373,6 +373,7 @@ impl fmt::Display for CalibrationReport {
                 Dimension::Angle => (180.0 / std::f64::consts::PI, "°"),
                 Dimension::Length => (1e3, "mm"),
                 Dimension::Time => (1e3, "ms"),
+                Dimension::Pixel => (1.0, "px"),
                 Dimension::Ratio => (1.0, ""),
             };
             write!(

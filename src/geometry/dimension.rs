@@ -1,6 +1,6 @@
 use serde::Serialize;
 
-/// Physical dimension of a parameter; written to files as the symbol of its SI unit.
+/// Physical dimension of a parameter; written to files as the symbol of its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub enum Dimension {
     /// Radians.
@@ -12,23 +12,27 @@ pub enum Dimension {
     /// Seconds.
     #[serde(rename = "s")]
     Time,
+    /// Pixels.
+    #[serde(rename = "px")]
+    Pixel,
     /// A number without a unit.
     #[serde(rename = "")]
     Ratio,
 }
 
 impl Dimension {
-    /// Symbol of the SI unit, empty for a ratio.
+    /// Symbol of the unit, empty for a ratio.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Angle => "rad",
             Self::Length => "m",
             Self::Time => "s",
+            Self::Pixel => "px",
             Self::Ratio => "",
         }
     }
 
-    /// Scale of the observability analysis, in the SI unit: 10°, 3 cm, 20 ms, one tenth.
+    /// Scale of the observability analysis, in the unit: 10°, 3 cm, 20 ms, 10 px, one tenth.
     ///
     /// Columns of a Jacobian are multiplied by the scale of their parameter, so that columns of different dimensions
     /// compare: about what a calibration is uncertain by before the first flight.
@@ -37,6 +41,7 @@ impl Dimension {
             Self::Angle => 10.0 * std::f64::consts::PI / 180.0,
             Self::Length => 0.03,
             Self::Time => 0.02,
+            Self::Pixel => 10.0,
             Self::Ratio => 0.1,
         }
     }

@@ -29,7 +29,7 @@ pub use covariance::{generic_joint_angles, stacked_jacobian, transport, transpor
 pub use inverse::{InverseChain, InverseSolution};
 pub use linearize::ChainLinearization;
 pub use nearest::NearestForm;
-pub use parameter::{ParameterId, ParameterNames, ParameterPart, Quantity};
+pub use parameter::{ParameterGroup, ParameterId, ParameterNames, ParameterPart, Quantity};
 pub use parameterization::{Parameterization, UnknownParameterization};
 pub use redundancy::redundant_directions;
 pub use singularity::{SWITCH_MARGIN, Singularity, auto_parameterization};

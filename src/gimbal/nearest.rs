@@ -96,10 +96,8 @@ mod tests {
         let mut random = Random::new(5);
         for joints in 0..4 {
             let near = Chain::from_classical(&random.chain(joints), Parameterization::Classical);
-            let scales = DVector::from_iterator(
-                near.dof(),
-                near.parameters().into_iter().map(|parameter| parameter.dimension().scale()),
-            );
+            let scales =
+                DVector::from_iterator(near.dof(), near.parameters().into_iter().map(|parameter| parameter.scale()));
             let form = NearestForm::new(near.clone(), &scales);
             assert_eq!(form.of(&near), near);
             let step = DVector::from_fn(near.dof(), |_, _| random.within(0.1)).component_mul(&scales);

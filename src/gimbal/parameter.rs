@@ -16,6 +16,34 @@ pub struct ParameterId {
     pub quantity: Quantity,
 }
 
+/// Calibration parameters of one kind, which are switched on together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ParameterGroup {
+    /// Gimbal chain and extrinsics of cameras.
+    Chain,
+    /// Camera intrinsics.
+    Camera,
+    /// IMU intrinsics.
+    Imu,
+    /// Time offsets, and readout times of rolling shutters.
+    Clocks,
+}
+
+impl ParameterGroup {
+    /// In the order of display.
+    pub const ALL: [Self; 4] = [Self::Chain, Self::Camera, Self::Imu, Self::Clocks];
+
+    /// Label.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Chain => "chain",
+            Self::Camera => "camera",
+            Self::Imu => "IMU",
+            Self::Clocks => "clocks",
+        }
+    }
+}
+
 /// Transform, link or sensor that has calibration parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ParameterPart {
@@ -31,10 +59,14 @@ pub enum ParameterPart {
     Exponential(u8),
     /// `imu_from_camera` of a rigid camera.
     ImuFromCamera(u8),
-    /// Clock of a camera.
+    /// Clock, shutter and intrinsics of a camera.
     Camera(u8),
     /// Clock of the joint encoders.
     Encoder,
+    /// Intrinsics of the gyroscope, and its rotation relative to the accelerometer.
+    Gyroscope,
+    /// Intrinsics of the accelerometer, whose axes are those of the IMU.
+    Accelerometer,
 }
 
 /// Quantity of a calibration parameter.
@@ -74,6 +106,32 @@ pub enum Quantity {
     Vy,
     /// Time offset to the IMU: `t_imu = t_sensor + timeshift`.
     Timeshift,
+    /// Readout time of a rolling shutter: row `v` is exposed `v / height · readout` after the first row.
+    Readout,
+    /// Focal length in x.
+    Fx,
+    /// Focal length in y.
+    Fy,
+    /// Principal point in x.
+    Cx,
+    /// Principal point in y.
+    Cy,
+    /// First coefficient of the distortion.
+    K1,
+    /// Second coefficient of the distortion.
+    K2,
+    /// Scale error of the x axis of an inertial sensor: the corrected value is `1 + Sx` times the measured one.
+    Sx,
+    /// Scale error of the y axis.
+    Sy,
+    /// Scale error of the z axis.
+    Sz,
+    /// Misalignment: part of the measured y in the corrected x.
+    Mxy,
+    /// Misalignment: part of the measured z in the corrected x.
+    Mxz,
+    /// Misalignment: part of the measured z in the corrected y.
+    Myz,
 }
 
 impl ParameterId {
@@ -85,9 +143,36 @@ impl ParameterId {
     /// Time offset of the joint encoders.
     pub const ENCODER_TIMESHIFT: Self = Self { part: ParameterPart::Encoder, quantity: Quantity::Timeshift };
 
+    /// Readout time of a camera's rolling shutter.
+    pub const fn readout(camera: u8) -> Self {
+        Self { part: ParameterPart::Camera(camera), quantity: Quantity::Readout }
+    }
+
     /// Physical dimension, which gives unit and scale.
     pub const fn dimension(self) -> Dimension {
         self.quantity.dimension()
+    }
+
+    /// Scale of the observability analysis, in the unit of its dimension: [`Dimension::scale`], and one percent or a
+    /// hundredth of a radian for the intrinsics of the IMU.
+    ///
+    /// Columns of a Jacobian are multiplied by it, so that columns of different dimensions compare.
+    pub const fn scale(self) -> f64 {
+        const IMU_INTRINSICS: f64 = 0.01;
+        match self.group() {
+            ParameterGroup::Imu => IMU_INTRINSICS,
+            _ => self.dimension().scale(),
+        }
+    }
+
+    /// The sensor or mechanism that it describes.
+    pub const fn group(self) -> ParameterGroup {
+        match (self.part, self.quantity) {
+            (_, Quantity::Timeshift | Quantity::Readout) => ParameterGroup::Clocks,
+            (ParameterPart::Camera(_), _) => ParameterGroup::Camera,
+            (ParameterPart::Gyroscope | ParameterPart::Accelerometer, _) => ParameterGroup::Imu,
+            _ => ParameterGroup::Chain,
+        }
     }
 
     /// A value as it is shown and written: angles of the base block and of links in (−π, π], in radians; everything
@@ -134,7 +219,10 @@ impl ParameterPart {
 
     /// Whether some parameterization has the quantity in this transform, link or sensor.
     fn has(self, quantity: Quantity) -> bool {
-        use Quantity::{A, Alpha, Beta, D, Rx, Ry, Rz, Theta, Timeshift, Tx, Ty, Tz, Vx, Vy, Wx, Wy, Y};
+        use Quantity::{
+            A, Alpha, Beta, Cx, Cy, D, Fx, Fy, K1, K2, Mxy, Mxz, Myz, Readout, Rx, Ry, Rz, Sx, Sy, Sz, Theta,
+            Timeshift, Tx, Ty, Tz, Vx, Vy, Wx, Wy, Y,
+        };
         match self {
             Self::ImuFromBase | Self::EffectorFromCamera | Self::ImuFromCamera(_) => {
                 matches!(quantity, Rx | Ry | Rz | Tx | Ty | Tz)
@@ -142,7 +230,10 @@ impl ParameterPart {
             Self::Base => matches!(quantity, Rx | Ry | Tx | Ty),
             Self::Link(_) => matches!(quantity, Theta | D | A | Alpha | Beta | Y),
             Self::Exponential(_) => matches!(quantity, Wx | Wy | Vx | Vy | Rx | Ry | Rz | Tx | Ty | Tz),
-            Self::Camera(_) | Self::Encoder => matches!(quantity, Timeshift),
+            Self::Camera(_) => matches!(quantity, Timeshift | Readout | Fx | Fy | Cx | Cy | K1 | K2),
+            Self::Encoder => matches!(quantity, Timeshift),
+            Self::Gyroscope => matches!(quantity, Sx | Sy | Sz | Mxy | Mxz | Myz | Rx | Ry | Rz),
+            Self::Accelerometer => matches!(quantity, Sx | Sy | Sz | Mxy | Mxz | Myz),
         }
     }
 }
@@ -155,7 +246,12 @@ impl Quantity {
     /// Columns of an inner transform of the product of exponentials.
     pub const EXPONENTIAL: [Self; 4] = [Self::Wx, Self::Wy, Self::Vx, Self::Vy];
 
-    const ALL: [Self; 17] = [
+    /// Columns of the intrinsics of a camera; a lens without coefficients has the first four.
+    pub const INTRINSICS: [Self; 6] = [Self::Fx, Self::Fy, Self::Cx, Self::Cy, Self::K1, Self::K2];
+    /// Columns of scale and misalignment of an inertial sensor.
+    pub const SCALE_MISALIGNMENT: [Self; 6] = [Self::Sx, Self::Sy, Self::Sz, Self::Mxy, Self::Mxz, Self::Myz];
+
+    const ALL: [Self; 30] = [
         Self::Rx,
         Self::Ry,
         Self::Rz,
@@ -173,6 +269,19 @@ impl Quantity {
         Self::Vx,
         Self::Vy,
         Self::Timeshift,
+        Self::Readout,
+        Self::Fx,
+        Self::Fy,
+        Self::Cx,
+        Self::Cy,
+        Self::K1,
+        Self::K2,
+        Self::Sx,
+        Self::Sy,
+        Self::Sz,
+        Self::Mxy,
+        Self::Mxz,
+        Self::Myz,
     ];
 
     /// Second half of a parameter's name, after the dot.
@@ -195,6 +304,19 @@ impl Quantity {
             Self::Vx => "vx",
             Self::Vy => "vy",
             Self::Timeshift => "timeshift",
+            Self::Readout => "readout",
+            Self::Fx => "fx",
+            Self::Fy => "fy",
+            Self::Cx => "cx",
+            Self::Cy => "cy",
+            Self::K1 => "k1",
+            Self::K2 => "k2",
+            Self::Sx => "sx",
+            Self::Sy => "sy",
+            Self::Sz => "sz",
+            Self::Mxy => "mxy",
+            Self::Mxz => "mxz",
+            Self::Myz => "myz",
         }
     }
 
@@ -205,7 +327,11 @@ impl Quantity {
                 Dimension::Angle
             }
             Self::Tx | Self::Ty | Self::Tz | Self::D | Self::A | Self::Y | Self::Vx | Self::Vy => Dimension::Length,
-            Self::Timeshift => Dimension::Time,
+            Self::Timeshift | Self::Readout => Dimension::Time,
+            Self::Fx | Self::Fy | Self::Cx | Self::Cy => Dimension::Pixel,
+            Self::K1 | Self::K2 | Self::Sx | Self::Sy | Self::Sz | Self::Mxy | Self::Mxz | Self::Myz => {
+                Dimension::Ratio
+            }
         }
     }
 }
@@ -247,6 +373,8 @@ impl ParameterNames {
                 numbered(&self.cameras, usize::from(camera) - 1, "cam")
             }
             ParameterPart::Encoder => "encoder".to_owned(),
+            ParameterPart::Gyroscope => "gyroscope".to_owned(),
+            ParameterPart::Accelerometer => "accelerometer".to_owned(),
         }
     }
 
@@ -285,10 +413,8 @@ impl ParameterNames {
         let part = if let Some(link) = index_of(&self.joints) {
             ParameterPart::Link(u8::try_from(link).ok()?)
         } else if let Some(camera) = camera.or_else(|| number("cam").filter(|camera| *camera > 0)) {
-            match quantity {
-                Quantity::Timeshift => ParameterPart::Camera(camera),
-                _ => ParameterPart::ImuFromCamera(camera),
-            }
+            let part = ParameterPart::Camera(camera);
+            if part.has(quantity) { part } else { ParameterPart::ImuFromCamera(camera) }
         } else {
             match part {
                 "" => ParameterPart::Camera(0),
@@ -297,6 +423,8 @@ impl ParameterNames {
                 "EC" => ParameterPart::EffectorFromCamera,
                 "IC" => ParameterPart::ImuFromCamera(0),
                 "encoder" => ParameterPart::Encoder,
+                "gyroscope" => ParameterPart::Gyroscope,
+                "accelerometer" => ParameterPart::Accelerometer,
                 _ => match number("L") {
                     Some(link) => ParameterPart::Link(link.checked_sub(1)?),
                     None => ParameterPart::Exponential(number("X")?),
@@ -328,7 +456,17 @@ mod tests {
                     ParameterId::timeshift(0),
                     ParameterId::timeshift(1),
                     ParameterId::ENCODER_TIMESHIFT,
+                    ParameterId::readout(0),
+                    ParameterId::readout(1),
                 ]);
+                let of = |part| move |quantity| ParameterId { part, quantity };
+                for camera in [0, 1] {
+                    parameters.extend(Quantity::INTRINSICS.map(of(ParameterPart::Camera(camera))));
+                }
+                for sensor in [ParameterPart::Gyroscope, ParameterPart::Accelerometer] {
+                    parameters.extend(Quantity::SCALE_MISALIGNMENT.map(of(sensor)));
+                }
+                parameters.push(ParameterId { part: ParameterPart::Gyroscope, quantity: Quantity::Rx });
                 parameters.extend(
                     Quantity::TRANSFORM.map(|quantity| ParameterId { part: ParameterPart::ImuFromCamera(1), quantity }),
                 );
@@ -351,7 +489,20 @@ mod tests {
     #[test]
     fn quantities_outside_a_block_are_no_parameters() {
         let names = ParameterNames { joints: vec!["yaw".to_owned()], cameras: Vec::new() };
-        for name in ["", "yaw", "yaw.rx", "L0.d", "IB.theta", "encoder.rx", "rx", "X.wx", "pan.alpha", "cam0.rx"] {
+        for name in [
+            "",
+            "yaw",
+            "yaw.rx",
+            "L0.d",
+            "IB.theta",
+            "encoder.rx",
+            "rx",
+            "X.wx",
+            "pan.alpha",
+            "cam0.rx",
+            "sx",
+            "accelerometer.rx",
+        ] {
             assert_eq!(names.parse(name), None, "{name}");
         }
     }

@@ -81,7 +81,7 @@ mod tests {
         let raw = |rig: &crate::sensors::Rig, parameter: ParameterId| {
             let chain = Chain::from_classical(&rig.chain_of_camera("cam0").unwrap(), Parameterization::Classical);
             let place = chain.parameters().iter().position(|known| *known == parameter).unwrap();
-            (chain.values()[place], parameter.dimension().scale())
+            (chain.values()[place], parameter.scale())
         };
         for run in &recording.runs {
             let end = &run.steps.last().unwrap().report;

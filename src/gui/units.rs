@@ -18,6 +18,7 @@ impl Shown {
             Dimension::Angle => Self { factor: 180.0 / std::f64::consts::PI, unit: "°" },
             Dimension::Length => Self { factor: 1000.0, unit: " mm" },
             Dimension::Time => Self { factor: 1000.0, unit: " ms" },
+            Dimension::Pixel => Self { factor: 1.0, unit: " px" },
             Dimension::Ratio => Self { factor: 1.0, unit: "" },
         }
     }

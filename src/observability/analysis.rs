@@ -34,7 +34,7 @@ impl ScalingRule {
     fn scale(&self, columns: &[ParameterId]) -> DVector<f64> {
         match self {
             Self::PriorSigmas(sigmas) if sigmas.len() == columns.len() => DVector::from_column_slice(sigmas),
-            _ => DVector::from_iterator(columns.len(), columns.iter().map(|column| column.dimension().scale())),
+            _ => DVector::from_iterator(columns.len(), columns.iter().map(|column| column.scale())),
         }
     }
 }

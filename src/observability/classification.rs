@@ -72,7 +72,7 @@ pub(super) fn excitable_directions(chain: &Chain, joints_free: bool) -> DMatrix<
 fn scaled_stack(chain: &Chain, joint_angles_rad: &[Vec<f64>]) -> DMatrix<f64> {
     let mut stack = stacked_jacobian(chain, joint_angles_rad);
     for (mut column, parameter) in stack.column_iter_mut().zip(chain.parameters()) {
-        let column_scale = parameter.dimension().scale();
+        let column_scale = parameter.scale();
         for (row, entry) in column.iter_mut().enumerate() {
             *entry *= column_scale / row_scale(row);
         }

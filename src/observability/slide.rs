@@ -68,7 +68,7 @@ pub fn slide(
 ) -> Option<ChainSlide> {
     let parameters = chain.parameters();
     let weights = weights.get(..parameters.len())?;
-    let entries = weights.iter().zip(&parameters).map(|(weight, parameter)| weight * parameter.dimension().scale());
+    let entries = weights.iter().zip(&parameters).map(|(weight, parameter)| weight * parameter.scale());
     let step = DVector::from_iterator(parameters.len(), entries);
     let all_extrinsics = |chain: &Chain, like: Option<&[RigidTransform]>| -> Vec<RigidTransform> {
         let frames = report.window.iter().enumerate();

@@ -98,9 +98,8 @@ impl SlideDirection {
             Self::Known(loss) => {
                 let known = known_losses(chain, true).into_iter();
                 let (_, direction) = known.into_iter().find(|(known, _)| known == loss)?;
-                let scaled = DVector::from_fn(parameters.len(), |column, _| {
-                    direction[column] / parameters[column].dimension().scale()
-                });
+                let scaled =
+                    DVector::from_fn(parameters.len(), |column, _| direction[column] / parameters[column].scale());
                 Some(scaled.normalize().iter().copied().collect())
             }
             Self::Parameter(parameter) => parameters.iter().position(|known| known == parameter).map(unit_vector),

@@ -44,7 +44,7 @@ fn example(seed: u64, encoder_sigma_rad: f64, noise: (f64, f64), still: bool) ->
     let mut random = Random(SplitMix64::new(seed));
     let minimal = Chain::from_classical(&ground_truth, Parameterization::MinimalYx);
     let parameters = minimal.parameters();
-    let error = DVector::from_fn(minimal.dof(), |k, _| random.next() * parameters[k].dimension().scale());
+    let error = DVector::from_fn(minimal.dof(), |k, _| random.next() * parameters[k].scale());
     let given = minimal.plus(&error).to_classical();
     let mut visited = Vec::new();
     let segments = (0..8)

@@ -72,7 +72,7 @@ impl ColumnId {
         const GYROSCOPE_BIAS_RAD_PER_S: f64 = std::f64::consts::PI / 180.0;
         const ACCELEROMETER_BIAS_M_PER_S2: f64 = 0.1;
         match (self, place) {
-            (Self::Calibration(parameter), _) => parameter.dimension().scale(),
+            (Self::Calibration(parameter), _) => parameter.scale(),
             (Self::Joints(_), _) | (Self::Pose(_), 0..3) => Dimension::Angle.scale(),
             (Self::Pose(_), _) => Dimension::Length.scale(),
             (Self::VelocityBias(_), 0..3) => VELOCITY_M_PER_S,

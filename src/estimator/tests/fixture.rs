@@ -226,7 +226,7 @@ pub(super) fn disturb(test: &mut TestWindow, scale: f64) {
             Dimension::Angle => 0.0035 * random.normal(),
             Dimension::Length => 0.002 * random.normal(),
             // Derivatives by velocity and bias, which an offset of the clocks multiplies, are left out.
-            Dimension::Time | Dimension::Ratio => 0.0,
+            Dimension::Time | Dimension::Pixel | Dimension::Ratio => 0.0,
         };
     }
     delta *= scale;

@@ -114,6 +114,7 @@ pub(super) fn shown_unit(dimension: Dimension) -> (&'static str, f64, usize) {
         Dimension::Angle => ("°", 1f64.to_degrees(), 3),
         Dimension::Length => ("mm", MM_PER_M, 2),
         Dimension::Time => ("ms", MS_PER_S, 3),
+        Dimension::Pixel => ("px", 1.0, 3),
         Dimension::Ratio => ("", 1.0, 6),
     }
 }

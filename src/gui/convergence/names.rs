@@ -60,10 +60,24 @@ pub(crate) fn meaning_of(parameter: ParameterId, rig: &Rig) -> String {
         Quantity::Wx | Quantity::Wy => "local rotation of the product of exponentials",
         Quantity::Vx | Quantity::Vy => "local translation of the product of exponentials",
         Quantity::Timeshift => "time offset, t_imu = t_sensor + timeshift",
+        Quantity::Readout => "readout time of the rolling shutter, from the first row to the last",
+        Quantity::Fx => "focal length in x",
+        Quantity::Fy => "focal length in y",
+        Quantity::Cx => "principal point in x",
+        Quantity::Cy => "principal point in y",
+        Quantity::K1 => "first coefficient of the lens distortion",
+        Quantity::K2 => "second coefficient of the lens distortion",
+        Quantity::Sx | Quantity::Sy | Quantity::Sz => "scale error of an axis",
+        Quantity::Mxy | Quantity::Mxz | Quantity::Myz => "misalignment of two axes",
     };
     let place = match part {
         _ if parameter == ParameterId::ENCODER_TIMESHIFT => "joint encoders".to_owned(),
-        _ if parameter.quantity == Quantity::Timeshift => "camera".to_owned(),
+        _ if matches!(parameter.part, ParameterPart::Gyroscope) => "gyroscope".to_owned(),
+        _ if matches!(parameter.part, ParameterPart::Accelerometer) => "accelerometer".to_owned(),
+        ChainPart::Rigid if matches!(parameter.part, ParameterPart::Camera(_)) => {
+            rig.parameter_names().part(parameter.part)
+        }
+        _ if matches!(parameter.part, ParameterPart::Camera(_)) => "camera".to_owned(),
         ChainPart::Base => "IMU to gimbal base".to_owned(),
         ChainPart::Link(number) => match joint_name(number, rig) {
             Some(joint) => format!("link {number}, joint {joint}"),

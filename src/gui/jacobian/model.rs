@@ -189,6 +189,7 @@ pub(super) fn unit_text(id: ColumnId) -> &'static str {
             Dimension::Angle => "σ per 10°",
             Dimension::Length => "σ per 3 cm",
             Dimension::Time => "σ per 20 ms",
+            Dimension::Pixel => "σ per 10 px",
             Dimension::Ratio => "σ per 0.1",
         },
         ColumnId::Joints(_) => "σ per 10°",

@@ -137,7 +137,7 @@ fn outcome_ui(ui: &mut Ui, ctx: &PanelContext<'_>, slide: &ChainSlide, parameter
     let text = format!("{mark} Reprojections {verdict}: at most {finite} px ({first_order} px to first order)");
     ui.add(Label::new(RichText::new(text).color(color)).wrap());
     let mut moved: Vec<usize> = (0..slide.changes.len().min(parameters.len())).collect();
-    let scaled = |column: &usize| (slide.changes[*column] / parameters[*column].dimension().scale()).abs();
+    let scaled = |column: &usize| (slide.changes[*column] / parameters[*column].scale()).abs();
     moved.sort_by(|a, b| scaled(b).total_cmp(&scaled(a)));
     let changes = moved.iter().take(CHANGES_SHOWN).filter(|column| scaled(column) > 1e-3).map(|column| {
         let shown = Shown::of(parameters[*column].dimension());

@@ -127,7 +127,7 @@ impl Situation {
     /// One unit of each column: 10° or 3 cm.
     pub(super) fn scale(&self) -> DVector<f64> {
         let parameters = self.chain.parameters();
-        DVector::from_iterator(parameters.len(), parameters.iter().map(|parameter| parameter.dimension().scale()))
+        DVector::from_iterator(parameters.len(), parameters.iter().map(|parameter| parameter.scale()))
     }
 }
 

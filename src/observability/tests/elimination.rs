@@ -101,7 +101,7 @@ fn chain() -> Chain {
 fn block_elimination_equals_the_projection() {
     let mut random = Random::new(32);
     let chain = chain();
-    let scale: Vec<f64> = chain.parameters().iter().map(|parameter| parameter.dimension().scale()).collect();
+    let scale: Vec<f64> = chain.parameters().iter().map(|parameter| parameter.scale()).collect();
     for _ in 0..3 {
         let linearization = window(&mut random, &chain.parameters());
         let angles: Vec<_> = (0..FRAMES).map(|_| random.angles(JOINTS)).collect();

@@ -196,7 +196,7 @@ fn moving_along_a_redundant_direction_keeps_the_camera_pose() {
     let parameters = chain.parameters();
     let mut random = Random::new(43);
     for direction in report.directions.iter().filter(|direction| direction.structural) {
-        let step = DVector::from_fn(24, |index, _| direction.weights[index] * parameters[index].dimension().scale());
+        let step = DVector::from_fn(24, |index, _| direction.weights[index] * parameters[index].scale());
         let angles = random.angles(3);
         let shift = |scale: f64| {
             let moved = chain.plus(&(&step * scale)).imu_from_camera(&angles);

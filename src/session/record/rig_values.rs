@@ -44,7 +44,7 @@ impl RunRecord {
         let scales = if estimate.parameters.starts_with(&parameters) {
             estimate.prior_sigmas[..parameters.len()].to_vec()
         } else {
-            parameters.iter().map(|parameter| parameter.dimension().scale()).collect()
+            parameters.iter().map(|parameter| parameter.scale()).collect()
         };
         Some(NearestForm::new(near, &scales.into()))
     }
