@@ -5,6 +5,7 @@ mod attitude_source;
 mod gray_image;
 mod image_mask;
 mod imu;
+mod imu_intrinsics;
 mod joints;
 mod named_axes;
 mod pose;
@@ -16,9 +17,11 @@ pub use attitude_source::{
 pub use gray_image::GrayImage;
 pub use image_mask::ImageMask;
 pub use imu::{ImuNoise, ImuSample};
+pub use imu_intrinsics::{ImuIntrinsics, ImuIntrinsicsParameters, KalibrImuMatrices, ScaleMisalignment};
 pub use joints::{JointAngles, JointSample};
 pub use named_axes::{BodyAxes, NamedAxes};
 pub use pose::PoseSample;
 pub use rig::{
-    AssumedField, CameraMask, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, Joint, Rig, UnknownCamera,
+    AssumedField, CameraMask, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, IntrinsicsSigma, Joint, Rig,
+    UnknownCamera,
 };

@@ -4,7 +4,7 @@ use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, InverseChain, ParameterNames};
 
-use super::{AttitudeFrame, AttitudeSource, ImageMask, ImuNoise};
+use super::{AttitudeFrame, AttitudeSource, ImageMask, ImuIntrinsics, ImuNoise};
 
 /// The rig has no camera with this key.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -36,6 +36,8 @@ pub struct ImuRig {
     pub rate_hz: f64,
     /// Noise densities.
     pub noise: ImuNoise,
+    /// Scale and misalignment, the identity when nothing is known of them.
+    pub intrinsics: ImuIntrinsics,
 }
 
 /// How a camera is carried.
@@ -67,8 +69,34 @@ pub struct CameraRig {
     pub model: CameraModel,
     /// Kalibr's `timeshift_cam_imu`: `t_imu = t_cam + shift`.
     pub timeshift_cam_imu_s: f64,
+    /// Time from the exposure of the first row to that of a row behind the last one: 0 for a global shutter, negative where
+    /// rows are read upwards.
+    pub readout_s: f64,
+    /// Standard deviation of `readout_s`, `None` when nobody has measured it.
+    pub readout_sigma_s: Option<f64>,
+    /// How wrong the intrinsics of `model` may be, `None` when the rig does not say.
+    pub intrinsics_sigma: Option<IntrinsicsSigma>,
     /// Pixels that show the vehicle, `None` without.
     pub mask: Option<CameraMask>,
+}
+
+/// Standard deviations of a camera's intrinsics.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IntrinsicsSigma {
+    /// Of each focal length, as a ratio of it.
+    pub focal_ratio: f64,
+    /// Of each coordinate of the principal point.
+    pub centre_px: f64,
+    /// Of each distortion coefficient.
+    pub distortion: f64,
+}
+
+impl CameraRig {
+    /// Time in seconds from an image's stamp to the exposure of a row (0 is the centre of the first one), in the camera's
+    /// clock: `row / height · readout`.
+    pub fn row_time_s(&self, row_px: f64) -> f64 {
+        row_px / self.model.resolution_px[1] as f64 * self.readout_s
+    }
 }
 
 /// The mask of a camera with the file that it came from.

@@ -8,7 +8,7 @@ use super::random::RandomStream;
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::ClassicalChain;
-use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, Rig};
+use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuRig, Rig};
 
 /// Gravity in the simulated worlds, in m/s².
 pub(crate) const GRAVITY_M_PER_S2: f64 = 9.81;
@@ -77,6 +77,9 @@ impl Equipment {
                     rate_hz: self.camera_rate_hz,
                     model: camera_model(which, self.lens, self.resolution_px),
                     timeshift_cam_imu_s: self.camera_time_offset_s,
+                    readout_s: 0.0,
+                    readout_sigma_s: None,
+                    intrinsics_sigma: None,
                     mask: None,
                 });
             }
@@ -101,6 +104,7 @@ impl Equipment {
                 frame_id: "imu".to_owned(),
                 rate_hz: IMU_RATE_HZ,
                 noise: FIREFLY_IMU,
+                intrinsics: ImuIntrinsics::default(),
             },
             cameras,
             gimbal,

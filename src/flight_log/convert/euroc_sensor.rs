@@ -11,7 +11,7 @@ use super::sink::Sink;
 use super::{ConvertError, read_description};
 use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, seconds_from_ns};
-use crate::sensors::{CameraMount, CameraRig, ImuNoise, ImuRig, Rig};
+use crate::sensors::{CameraMount, CameraRig, ImuIntrinsics, ImuNoise, ImuRig, Rig};
 
 /// Topic of the IMU.
 pub(super) const IMU_TOPIC: &str = "/imu0";
@@ -125,6 +125,7 @@ pub(super) fn rig_of(
             gyroscope_noise_density: imu_file.positive("gyroscope_noise_density", "rad/s/√Hz above 0")?,
             gyroscope_random_walk: imu_file.positive("gyroscope_random_walk", "rad/s²/√Hz above 0")?,
         },
+        intrinsics: ImuIntrinsics::default(),
     };
     let mut described = Vec::new();
     for camera in cameras {
@@ -189,6 +190,9 @@ fn camera_rig(
             .or_else(|error| if measured_hz.is_finite() && measured_hz > 0.0 { Ok(measured_hz) } else { Err(error) })?,
         model,
         timeshift_cam_imu_s: 0.0,
+        readout_s: 0.0,
+        readout_sigma_s: None,
+        intrinsics_sigma: None,
         mask: None,
     })
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::Matrix4;
+use nalgebra::{Matrix3, Matrix4};
 use serde_json::Value;
 
 use super::super::LogError;
@@ -160,6 +160,34 @@ impl<'a> Field<'a> {
         let numbers = self.numbers(expected)?;
         <[f64; N]>::try_from(numbers.as_slice())
             .map_err(|_wrong_count| self.error(format!("{} numbers, expected {expected}", numbers.len())))
+    }
+
+    /// A 3×3 matrix, row by row.
+    pub(super) fn matrix3(&self) -> Result<Matrix3<f64>, LogError> {
+        const EXPECTED: &str = "3 rows of 3 numbers";
+        let rows = self.list(EXPECTED)?;
+        if rows.len() != 3 {
+            return Err(self.error(format!("{} rows, expected {EXPECTED}", rows.len())));
+        }
+        let mut matrix = Matrix3::zeros();
+        for (index, row) in rows.iter().enumerate() {
+            matrix.row_mut(index).copy_from_slice(&row.exactly::<3>("3 numbers, a row of a matrix")?);
+        }
+        Ok(matrix)
+    }
+
+    /// A rotation as a 3×3 matrix, row by row.
+    pub(super) fn rotation(&self) -> Result<Matrix3<f64>, LogError> {
+        let matrix = self.matrix3()?;
+        let defect = (matrix.transpose() * matrix - Matrix3::identity()).amax();
+        if defect <= ROTATION_TOLERANCE && matrix.determinant() > 0.0 {
+            return Ok(matrix);
+        }
+        Err(self.error(format!(
+            "has determinant {:.4} and is {defect:.2e} from orthonormal, expected a rotation (determinant +1, within \
+             {ROTATION_TOLERANCE:.0e})",
+            matrix.determinant()
+        )))
     }
 
     /// A rigid transform as a 4×4 matrix, row by row.

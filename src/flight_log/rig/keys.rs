@@ -33,19 +33,10 @@ const IMU: Keys = Keys {
         "accelerometer_random_walk",
         "gyroscope_noise_density",
         "gyroscope_random_walk",
-    ],
-    unused: &[
-        "model",
-        "T_i_b",
-        "time_offset",
-        "accelerometers",
         "gyroscopes",
-        "Tw",
-        "R_IMUtoGYRO",
-        "Ta",
-        "R_IMUtoACC",
-        "Tg",
+        "accelerometers",
     ],
+    unused: &["model", "T_i_b", "time_offset", "Tw", "R_IMUtoGYRO", "Ta", "R_IMUtoACC", "Tg"],
 };
 const CAMERA: Keys = Keys {
     read: &[
@@ -59,11 +50,19 @@ const CAMERA: Keys = Keys {
         "distortion_coeffs",
         "resolution",
         "timeshift_cam_imu",
+        "readout",
+        "readout_sigma",
+        "line_delay",
+        "intrinsics_sigma",
         "T_cam_imu",
         "mask",
     ],
-    unused: &["cam_overlaps", "T_cn_cnm1", "line_delay", "model"],
+    unused: &["cam_overlaps", "T_cn_cnm1", "model"],
 };
+const INTRINSICS_SIGMA: Keys = Keys { read: &["focal", "centre", "distortion"], unused: &[] };
+/// The gyroscope's dependence on acceleration and the places of the accelerometers' axes have no meaning here.
+const GYROSCOPES: Keys = Keys { read: &["M", "C_gyro_i"], unused: &["A"] };
+const ACCELEROMETERS: Keys = Keys { read: &["M"], unused: &["rx_i", "ry_i", "rz_i"] };
 const GIMBAL: Keys = Keys {
     read: &[
         "rostopic",
@@ -124,7 +123,7 @@ pub(super) fn check_imu_file(document: &Value, file: &Path) -> Result<Vec<String
     if document.get("imu0").is_some() {
         check_root(document, &mut found);
     } else {
-        check_mapping(document, "", &IMU, &mut found);
+        check_imu(document, "", &mut found);
     }
     found.into_result(file)
 }
@@ -138,14 +137,31 @@ fn check_root(document: &Value, found: &mut Found) {
     let Some(mapping) = document.as_object() else { return };
     for (key, value) in mapping {
         match key.as_str() {
-            "imu0" => check_mapping(value, key, &IMU, found),
+            "imu0" => check_imu(value, key, found),
             "gimbal" => check_gimbal(value, found),
             "ground_truth" => check_mapping(value, key, &GROUND_TRUTH, found),
-            key if is_numbered(key, "cam") => check_mapping(value, key, &CAMERA, found),
+            key if is_numbered(key, "cam") => check_camera(value, key, found),
             // One IMU is estimated; Kalibr's files may have several.
             key if is_numbered(key, "imu") => found.unused.push(key.to_owned()),
             key => found.check_key("", key, &ROOT),
         }
+    }
+}
+
+fn check_imu(imu: &Value, path: &str, found: &mut Found) {
+    check_mapping(imu, path, &IMU, found);
+    for (key, keys) in [("gyroscopes", &GYROSCOPES), ("accelerometers", &ACCELEROMETERS)] {
+        if let Some(sensor) = imu.get(key) {
+            let path = if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+            check_mapping(sensor, &path, keys, found);
+        }
+    }
+}
+
+fn check_camera(camera: &Value, path: &str, found: &mut Found) {
+    check_mapping(camera, path, &CAMERA, found);
+    if let Some(sigma) = camera.get("intrinsics_sigma") {
+        check_mapping(sigma, &format!("{path}.intrinsics_sigma"), &INTRINSICS_SIGMA, found);
     }
 }
 

@@ -9,6 +9,7 @@ mod keys;
 mod mask;
 mod read;
 mod save;
+mod sensor;
 pub mod template;
 #[cfg(test)]
 mod tests;

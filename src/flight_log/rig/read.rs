@@ -3,6 +3,7 @@ use super::super::text::shortened;
 use super::attitude;
 use super::fields::Field;
 use super::mask;
+use super::sensor;
 use crate::camera::{CameraError, CameraModel};
 use crate::gimbal::{ClassicalChain, DhLink, InverseChain};
 use crate::sensors::{AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, Rig};
@@ -139,6 +140,7 @@ pub(super) fn read_imu(imu: &Field<'_>, default_topic: Option<&str>) -> Result<I
             gyroscope_noise_density: density("gyroscope_noise_density", "rad/s/√Hz")?,
             gyroscope_random_walk: density("gyroscope_random_walk", "rad/s²/√Hz")?,
         },
+        intrinsics: sensor::read_imu_intrinsics(imu)?,
     })
 }
 
@@ -174,12 +176,17 @@ pub(super) fn read_camera_as(
         })?
     };
     let mask = mask::read(camera, model.resolution_px, facts)?;
+    let shutter = sensor::read_shutter(camera, model.resolution_px[1])?;
+    let intrinsics_sigma = sensor::read_intrinsics_sigma(camera)?;
     Ok(CameraRig {
         key: key.to_owned(),
         mount,
         rate_hz,
         model,
         mask,
+        readout_s: shutter.readout_s,
+        readout_sigma_s: shutter.sigma_s,
+        intrinsics_sigma,
         frame_id: camera.field("frame_id").optional().map_or(Ok(key), |frame| frame.text("a frame's name"))?.to_owned(),
         timeshift_cam_imu_s: shift.map_or(Ok(0.0), |shift| shift.number("seconds, t_imu = t_cam + shift"))?,
         topic,

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use crate::flight_log::tests::RIG;
 use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes};
-use crate::sensors::{AttitudeMessage, AttitudeSource, CameraMount, Rig};
+use crate::sensors::{AttitudeMessage, AttitudeSource, CameraMount, IntrinsicsSigma, Rig};
 
 fn parse(text: &str) -> Result<Rig, String> {
     Rig::from_yaml(text, Path::new("some.rig.yaml")).map_err(|error| error.to_string())
@@ -131,6 +131,75 @@ fn check_same(a: &Rig, b: &Rig) {
     }
     assert!(worst < 1e-14, "{worst}");
     assert_eq!(*a, b);
+}
+
+/// The test rig with further lines in `cam0`, and further keys in `imu0`.
+fn with_sensors(camera: &str, imu: &str) -> String {
+    RIG.replace("  timeshift_cam_imu: 0.0\n", &format!("  timeshift_cam_imu: 0.0\n{camera}"))
+        .replace("gyroscope_random_walk: 3.9e-5}", &format!("gyroscope_random_walk: 3.9e-5{imu}}}"))
+}
+
+#[test]
+fn shutter_and_intrinsics_read_back_as_written() {
+    const IMU: &str = ", gyroscopes: {M: [[1.01, 0, 0], [0.002, 0.99, 0], [-0.003, 0.004, 1.02]], C_gyro_i: [[0.8, -0.6, 0], \
+                       [0.6, 0.8, 0], [0, 0, 1]]}, accelerometers: {M: [[1.01, 0, 0], [0.02, 1, 0], [0, 0, 0.97]]}";
+    let camera = "  readout: -0.0213\n  readout_sigma: 4.0e-4\n  \
+                  intrinsics_sigma: {focal: 0.01, centre: 5.0, distortion: 0.02}\n";
+    let rig = parse(&with_sensors(camera, IMU)).unwrap();
+    let sigma = IntrinsicsSigma { focal_ratio: 0.01, centre_px: 5.0, distortion: 0.02 };
+    let camera = &rig.cameras[0];
+    assert_eq!(
+        (camera.readout_s, camera.readout_sigma_s, camera.intrinsics_sigma),
+        (-0.0213, Some(4.0e-4), Some(sigma))
+    );
+    assert!((camera.row_time_s(24.0) + 0.01065).abs() < 1e-15);
+    let yaml = rig.to_yaml();
+    let mut again = parse(&yaml).unwrap();
+    let (kalibr, written) = (rig.imu.intrinsics.to_kalibr().unwrap(), again.imu.intrinsics.to_kalibr().unwrap());
+    assert!((kalibr.gyroscope_m - written.gyroscope_m).amax() < 1e-14, "{yaml}");
+    assert!(
+        (kalibr.gyroscope_m[(1, 0)] - 0.002).abs() < 1e-14 && (kalibr.gyroscope_from_imu[(0, 0)] - 0.8).abs() < 1e-14
+    );
+    assert!((kalibr.accelerometer_m - written.accelerometer_m).amax() < 1e-14, "{yaml}");
+    again.imu.intrinsics = rig.imu.intrinsics;
+    check_same(&rig, &again);
+    // What is not there is not written.
+    let yaml = parse(RIG).unwrap().to_yaml();
+    assert!(["readout", "intrinsics_sigma", "gyroscopes", "accelerometers"].iter().all(|key| !yaml.contains(key)));
+    // Kalibr's time from one row to the next.
+    let rig = parse(&with_sensors("  line_delay: 0.0005\n", "")).unwrap();
+    assert_eq!(rig.cameras[0].readout_s, 0.0005 * 48.0);
+}
+
+#[test]
+fn wrong_shutters_and_intrinsics_are_named() {
+    let check = |camera: &str, imu: &str, expected: &str| {
+        let error = parse(&with_sensors(camera, imu)).unwrap_err();
+        assert!(error.starts_with(expected), "{error}\nexpected {expected}");
+    };
+    check("  readout: 30\n", "", "cam0.readout: a readout of 30 s, expected seconds, at most 0.2 either way");
+    check("  line_delay: 30\n", "", "cam0.line_delay: a readout of 1440 s, expected seconds");
+    check("  line_delay: 1e-5\n  readout: 0.03\n", "", "cam0.line_delay: is there beside readout");
+    check("  readout_sigma: 0\n", "", "cam0.readout_sigma: holds 0, expected a standard deviation greater than 0");
+    check("  intrinsics_sigma: {focal: 0.01, centre: 5}\n", "", "cam0.intrinsics_sigma.distortion: missing, expected");
+    check(
+        "  intrinsics_sigma: {focal: 3, centre: 5, distortion: 0.1}\n",
+        "",
+        "cam0.intrinsics_sigma.focal: holds 3, expected a ratio",
+    );
+    check("  intrinsics_sigma: {fx: 1}\n", "", "cam0.intrinsics_sigma.fx: unknown key, the nearest known key is");
+    check("", ", gyroscopes: {M: [[1, 0], [0, 1]]}", "imu0.gyroscopes.M: 2 rows, expected 3 rows of 3 numbers");
+    check(
+        "",
+        ", gyroscopes: {M: [[100, 0, 0], [0, 1, 0], [0, 0, 1]]}",
+        "imu0.gyroscopes.M: an entry is 99.000 from the identity",
+    );
+    check(
+        "",
+        ", gyroscopes: {C_gyro_i: [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}",
+        "imu0.gyroscopes.C_gyro_i: has determinant -1.0000",
+    );
+    check("", ", accelerometers: {C: 3}", "imu0.accelerometers.C: unknown key, the nearest known key is 'M'");
 }
 
 #[test]

@@ -1,9 +1,11 @@
 use std::fmt::Write as _;
 
+use nalgebra::SMatrix;
+
 use super::attitude;
 use crate::geometry::RigidTransform;
 use crate::gimbal::DhLink;
-use crate::sensors::{AssumedField, CameraMount, CameraRig, GimbalRig, Rig};
+use crate::sensors::{AssumedField, CameraMount, CameraRig, GimbalRig, ImuIntrinsics, Rig};
 
 impl Rig {
     /// The rig as a YAML file, its chain in the classical parameterization. Numbers are written so that they read back
@@ -24,6 +26,7 @@ impl Rig {
         line(&mut out, 1, "accelerometer_random_walk", &number(self.imu.noise.accelerometer_random_walk));
         line(&mut out, 1, "gyroscope_noise_density", &number(self.imu.noise.gyroscope_noise_density));
         line(&mut out, 1, "gyroscope_random_walk", &number(self.imu.noise.gyroscope_random_walk));
+        write_imu_intrinsics(&mut out, &self.imu.intrinsics);
         for camera in &self.cameras {
             write_camera(&mut out, camera);
         }
@@ -44,6 +47,17 @@ impl Rig {
     }
 }
 
+/// Kalibr's matrices, where they are not the identity.
+fn write_imu_intrinsics(out: &mut String, intrinsics: &ImuIntrinsics) {
+    // A rig that was read has invertible corrections; an estimate that has none is no calibration to write down.
+    let Some(kalibr) = intrinsics.to_kalibr().filter(|_| !intrinsics.is_identity()) else { return };
+    line(out, 1, "gyroscopes", "");
+    write_matrix(out, 2, "M", &kalibr.gyroscope_m);
+    write_matrix(out, 2, "C_gyro_i", &kalibr.gyroscope_from_imu);
+    line(out, 1, "accelerometers", "");
+    write_matrix(out, 2, "M", &kalibr.accelerometer_m);
+}
+
 fn write_camera(out: &mut String, camera: &CameraRig) {
     line(out, 0, &camera.key, "");
     let mount = if camera.mount == CameraMount::Gimbal { "gimbal" } else { "static" };
@@ -58,6 +72,16 @@ fn write_camera(out: &mut String, camera: &CameraRig) {
     let [width, height] = camera.model.resolution_px;
     line(out, 1, "resolution", &format!("[{width}, {height}]"));
     line(out, 1, "timeshift_cam_imu", &number(camera.timeshift_cam_imu_s));
+    if camera.readout_s != 0.0 {
+        line(out, 1, "readout", &number(camera.readout_s));
+    }
+    if let Some(sigma_s) = camera.readout_sigma_s {
+        line(out, 1, "readout_sigma", &number(sigma_s));
+    }
+    if let Some(sigma) = &camera.intrinsics_sigma {
+        let [focal, centre, distortion] = [sigma.focal_ratio, sigma.centre_px, sigma.distortion].map(number);
+        line(out, 1, "intrinsics_sigma", &format!("{{focal: {focal}, centre: {centre}, distortion: {distortion}}}"));
+    }
     if let Some(mask) = &camera.mask {
         line(out, 1, "mask", &text(&mask.file));
     }
@@ -119,8 +143,11 @@ fn write_lengths(out: &mut String, depth: usize, link: &DhLink) {
 }
 
 fn write_transform(out: &mut String, depth: usize, key: &str, transform: &RigidTransform) {
+    write_matrix(out, depth, key, &transform.to_matrix());
+}
+
+fn write_matrix<const N: usize>(out: &mut String, depth: usize, key: &str, matrix: &SMatrix<f64, N, N>) {
     line(out, depth, key, "");
-    let matrix = transform.to_matrix();
     for row in matrix.row_iter() {
         let row: Vec<f64> = row.iter().copied().collect();
         let _infallible = write!(out, "{:width$}- ", "", width = 2 * depth);

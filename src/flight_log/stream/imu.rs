@@ -7,10 +7,16 @@ use super::super::log::relative_ns;
 use super::super::messages::{self, ImuMessage, MessageKind};
 use super::super::{FlightLog, LogError};
 use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
-use crate::sensors::{ImuRig, ImuSample};
+use crate::sensors::{ImuIntrinsics, ImuRig, ImuSample};
 
-/// IMU samples in the order of their stamps.
-pub(super) enum ImuStream {
+/// IMU samples in the order of their stamps, corrected by the rig's scale and misalignment.
+pub(super) struct ImuStream {
+    source: ImuSource,
+    intrinsics: ImuIntrinsics,
+}
+
+/// Samples as they are measured.
+enum ImuSource {
     /// All six values in each message.
     Together(Box<OrderedSamples<ImuSample>>),
     /// Angular velocities and specific forces on topics of their own.
@@ -30,23 +36,25 @@ impl ImuStream {
         log.require_topic("imu0.rostopic", &rig.topic, &[MessageKind::Imu])?;
         let Some(accelerometer) = &rig.accelerometer_topic else {
             let decoder = sample_decoder(log.epoch_ns());
-            return Ok(Self::Together(Box::new(OrderedSamples::new(log, &rig.topic, from_ns, false, decoder))));
+            let samples = OrderedSamples::new(log, &rig.topic, from_ns, false, decoder);
+            return Ok(Self { source: ImuSource::Together(Box::new(samples)), intrinsics: rig.intrinsics });
         };
         log.require_topic("imu0.accelerometer_rostopic", accelerometer, &[MessageKind::Imu])?;
         let gyroscope = vector_decoder("angular velocity", |imu| imu.angular_velocity_rad_per_s);
         let of_accelerometer = vector_decoder("specific force", |imu| imu.specific_force_m_per_s2);
-        Ok(Self::Apart(Box::new(SeparateSensors {
+        let sensors = SeparateSensors {
             gyroscope: OrderedSamples::new(log, &rig.topic, from_ns, false, gyroscope),
             accelerometer: OrderedSamples::new(log, accelerometer, from_ns, false, of_accelerometer),
             merge: ImuMerge::default(),
-        })))
+        };
+        Ok(Self { source: ImuSource::Apart(Box::new(sensors)), intrinsics: rig.intrinsics })
     }
 
     /// Reports what was dropped last.
     pub(super) fn finish(&mut self, context: &mut ReadContext) {
-        match self {
-            Self::Together(samples) => samples.finish(context),
-            Self::Apart(sensors) => {
+        match &mut self.source {
+            ImuSource::Together(samples) => samples.finish(context),
+            ImuSource::Apart(sensors) => {
                 sensors.gyroscope.finish(context);
                 sensors.accelerometer.finish(context);
             }
@@ -55,10 +63,11 @@ impl ImuStream {
 
     /// The next sample, `None` at the end of the log.
     pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<ImuSample> {
-        match self {
-            Self::Together(samples) => samples.next(context).map(|(_, sample)| sample),
-            Self::Apart(sensors) => sensors.next(context),
-        }
+        let measured = match &mut self.source {
+            ImuSource::Together(samples) => samples.next(context).map(|(_, sample)| sample),
+            ImuSource::Apart(sensors) => sensors.next(context),
+        };
+        measured.map(|sample| self.intrinsics.correct(&sample))
     }
 }
 

@@ -124,6 +124,25 @@ fn the_time_offset_shifts_everything_but_the_image() {
 }
 
 #[test]
+fn samples_are_corrected_by_the_rigs_scale() {
+    const SCALE: &str = ", gyroscopes: {M: [[1.25, 0, 0], [0, 0.8, 0], [0, 0, 1]]}, accelerometers: {M: [[1, 0, 0], [0, 1, 0], \
+                         [0.25, 0, 1.25]]}}";
+    let (measured, _) = play(&Flight::default(), RIG, 0.0);
+    let (corrected, _) = play(&Flight::default(), &RIG.replace("3.9e-5}", &format!("3.9e-5{SCALE}")), 0.0);
+    let pairs = measured.iter().zip(&corrected).flat_map(|(a, b)| a.imu.iter().zip(&b.imu));
+    let mut count = 0;
+    for (a, b) in pairs {
+        let rate = a.angular_velocity_rad_per_s;
+        assert!((b.angular_velocity_rad_per_s - Vector3::new(rate.x * 0.8, rate.y * 1.25, rate.z)).norm() < 1e-12);
+        let force = a.specific_force_m_per_s2;
+        let expected = Vector3::new(force.x, force.y, (force.z - 0.25 * force.x) / 1.25);
+        assert!((b.specific_force_m_per_s2 - expected).norm() < 1e-12 && force.norm() > 1.0);
+        count += 1;
+    }
+    assert!(count > 500, "{count}");
+}
+
+#[test]
 fn a_rig_without_encoders_gives_frames_without_angles() {
     for rig in [
         RIG.replace("encoder_sigma: 0.0087", "encoder_sigma: null"),

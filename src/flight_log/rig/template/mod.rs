@@ -16,7 +16,8 @@ use thiserror::Error;
 
 use crate::camera::CameraModel;
 use crate::sensors::{
-    AssumedField, AttitudeSource, BodyAxes, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Rig,
+    AssumedField, AttitudeSource, BodyAxes, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuNoise,
+    ImuRig, Rig,
 };
 
 /// Standard deviation of a joint angle of a gimbal whose encoders nobody has measured, in radians (0.5°).
@@ -244,6 +245,7 @@ impl RigTemplate {
                 frame_id: "imu".to_owned(),
                 rate_hz: self.imu.rate_hz,
                 noise: self.imu.noise.value,
+                intrinsics: ImuIntrinsics::default(),
             },
             cameras: vec![CameraRig {
                 key: "cam0".to_owned(),
@@ -253,6 +255,9 @@ impl RigTemplate {
                 rate_hz: self.camera.rate_hz,
                 model: self.camera.model.value.clone(),
                 timeshift_cam_imu_s: self.camera.timeshift_cam_imu_s.value,
+                readout_s: 0.0,
+                readout_sigma_s: None,
+                intrinsics_sigma: None,
                 mask: None,
             }],
             gimbal: self.gimbal.as_ref().map(|gimbal| self.gimbal_rig(gimbal)),

@@ -1,0 +1,99 @@
+//! The fields of a rig that describe a sensor beyond its model: shutter, uncertain intrinsics, scale and axes of the IMU.
+
+use nalgebra::Matrix3;
+
+use super::super::LogError;
+use super::fields::Field;
+use crate::sensors::{ImuIntrinsics, IntrinsicsSigma, KalibrImuMatrices};
+
+/// Longest readout: no camera for video reads an image slower; a larger number is one in milliseconds.
+const MAX_READOUT_S: f64 = 0.2;
+/// Focal lengths and distortion coefficients with a larger standard deviation are unknown.
+const MAX_INTRINSICS_RATIO: f64 = 1.0;
+/// A calibrated scale or misalignment is nearer to that of a perfect sensor than this.
+const MAX_IMU_ERROR: f64 = 0.3;
+
+/// How a camera reads its rows.
+pub(super) struct Shutter {
+    /// Time in seconds from the first row to behind the last one.
+    pub(super) readout_s: f64,
+    /// Its standard deviation in seconds.
+    pub(super) sigma_s: Option<f64>,
+}
+
+/// `readout` and its `readout_sigma`, or Kalibr's `line_delay` in seconds per row.
+pub(super) fn read_shutter(camera: &Field<'_>, height_px: usize) -> Result<Shutter, LogError> {
+    let [readout, line_delay] = ["readout", "line_delay"].map(|key| camera.field(key));
+    let (field, readout_s) = match (readout.is_present(), line_delay.is_present()) {
+        (true, true) => {
+            let problem = "is there beside readout; expected one of them: readout = line_delay · height";
+            return Err(line_delay.error(problem));
+        }
+        (false, true) => {
+            let delay_s = line_delay.number("seconds from one row to the next")?;
+            (line_delay, delay_s * height_px as f64)
+        }
+        (true, false) => {
+            let readout_s = readout.number(READOUT)?;
+            (readout, readout_s)
+        }
+        (false, false) => (readout, 0.0),
+    };
+    if readout_s.abs() > MAX_READOUT_S {
+        let problem = format!("a readout of {readout_s} s, expected seconds, at most {MAX_READOUT_S} either way");
+        return Err(field.error(problem));
+    }
+    let sigma = camera.field("readout_sigma").optional();
+    let sigma_s = sigma.map(|sigma| {
+        let sigma_s = sigma.positive("a standard deviation greater than 0 in seconds")?;
+        if sigma_s <= MAX_READOUT_S { Ok(sigma_s) } else { Err(sigma.unexpected("seconds, at most 0.2")) }
+    });
+    Ok(Shutter { readout_s, sigma_s: sigma_s.transpose()? })
+}
+
+const READOUT: &str = "seconds from the first row to the last, negative when read upwards";
+
+/// `intrinsics_sigma`.
+pub(super) fn read_intrinsics_sigma(camera: &Field<'_>) -> Result<Option<IntrinsicsSigma>, LogError> {
+    let Some(sigma) = camera.field("intrinsics_sigma").optional() else { return Ok(None) };
+    let ratio = |key: &str, expected: &str| {
+        let field = sigma.field(key);
+        let value = field.positive(expected)?;
+        if value <= MAX_INTRINSICS_RATIO { Ok(value) } else { Err(field.unexpected(expected)) }
+    };
+    Ok(Some(IntrinsicsSigma {
+        focal_ratio: ratio("focal", "a ratio of the focal length greater than 0, at most 1")?,
+        centre_px: sigma.field("centre").positive("a standard deviation greater than 0 in pixels")?,
+        distortion: ratio("distortion", "a standard deviation of each coefficient greater than 0, at most 1")?,
+    }))
+}
+
+/// `gyroscopes` and `accelerometers` as Kalibr writes them; a matrix that is not there is the identity.
+pub(super) fn read_imu_intrinsics(imu: &Field<'_>) -> Result<ImuIntrinsics, LogError> {
+    let (gyroscopes, accelerometers) = (imu.field("gyroscopes"), imu.field("accelerometers"));
+    let from_imu = gyroscopes.field("C_gyro_i").optional().map(|field| field.rotation()).transpose()?;
+    let kalibr = KalibrImuMatrices {
+        gyroscope_m: read_scale(&gyroscopes.field("M"))?,
+        gyroscope_from_imu: from_imu.unwrap_or_else(Matrix3::identity),
+        accelerometer_m: read_scale(&accelerometers.field("M"))?,
+    };
+    ImuIntrinsics::from_kalibr(&kalibr)
+        .ok_or_else(|| gyroscopes.field("M").error("the matrix cannot be inverted, expected one near the identity"))
+}
+
+/// `M`, scale on the diagonal and misalignment beside it.
+fn read_scale(field: &Field<'_>) -> Result<Matrix3<f64>, LogError> {
+    if !field.is_present() {
+        return Ok(Matrix3::identity());
+    }
+    let matrix = field.matrix3()?;
+    let error = (matrix - Matrix3::identity()).amax();
+    if error > MAX_IMU_ERROR {
+        let problem = format!(
+            "an entry is {error:.3} from the identity, expected scales of 1 and misalignments of 0, each within \
+             {MAX_IMU_ERROR}"
+        );
+        return Err(field.error(problem));
+    }
+    Ok(matrix)
+}

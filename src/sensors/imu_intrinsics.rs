@@ -1,0 +1,253 @@
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+use super::ImuSample;
+use crate::geometry::so3;
+
+/// Scale and misalignment of both inertial sensors: `true = C · measured - bias`, with the identity for a calibrated IMU.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImuIntrinsics {
+    /// `C_g`, maps measured angular velocities to those in the IMU frame (3 × 3).
+    pub gyroscope_correction: Matrix3<f64>,
+    /// `C_a`, maps measured specific forces to those in the IMU frame (3 × 3).
+    pub accelerometer_correction: Matrix3<f64>,
+}
+
+impl Default for ImuIntrinsics {
+    fn default() -> Self {
+        Self { gyroscope_correction: Matrix3::identity(), accelerometer_correction: Matrix3::identity() }
+    }
+}
+
+/// Scale and misalignment of one sensor: `U = I + [[sx, mxy, mxz], [0, sy, myz], [0, 0, sz]]`, without units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ScaleMisalignment {
+    /// `sx`, `sy`, `sz`.
+    pub scale: Vector3<f64>,
+    /// `mxy`, `mxz`, `myz`.
+    pub misalignment: Vector3<f64>,
+}
+
+/// The 15 independent parameters of [`ImuIntrinsics`]: `C_a = U_a` and `C_g = Exp(r) · U_g`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImuIntrinsicsParameters {
+    /// `U_g`.
+    pub gyroscope: ScaleMisalignment,
+    /// `r`, rotation vector in radians from the gyroscope's axes to the IMU frame.
+    pub gyroscope_rotation_rad: Vector3<f64>,
+    /// `U_a`.
+    pub accelerometer: ScaleMisalignment,
+}
+
+/// The matrices of Kalibr's IMU file: `measured = M · C_gyro_i · true + bias`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KalibrImuMatrices {
+    /// `gyroscopes.M` (3 × 3).
+    pub gyroscope_m: Matrix3<f64>,
+    /// `gyroscopes.C_gyro_i`, a rotation from the IMU frame to the gyroscope's axes (3 × 3).
+    pub gyroscope_from_imu: Matrix3<f64>,
+    /// `accelerometers.M` (3 × 3).
+    pub accelerometer_m: Matrix3<f64>,
+}
+
+impl ScaleMisalignment {
+    /// `U` (3 × 3), upper triangular.
+    pub fn matrix(&self) -> Matrix3<f64> {
+        let (s, m) = (self.scale, self.misalignment);
+        Matrix3::identity() + Matrix3::new(s.x, m.x, m.y, 0.0, s.y, m.z, 0.0, 0.0, s.z)
+    }
+
+    /// The inverse of [`Self::matrix`]; what is below the diagonal is not looked at.
+    fn of_matrix(upper: &Matrix3<f64>) -> Self {
+        let u = upper - Matrix3::identity();
+        Self { scale: u.diagonal(), misalignment: Vector3::new(u[(0, 1)], u[(0, 2)], u[(1, 2)]) }
+    }
+}
+
+impl ImuIntrinsics {
+    /// Whether both sensors are taken as they measure.
+    pub fn is_identity(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The corrected sample, `C · measured` of both sensors; the same bits for the identity.
+    pub fn correct(&self, sample: &ImuSample) -> ImuSample {
+        ImuSample {
+            stamp_ns: sample.stamp_ns,
+            angular_velocity_rad_per_s: self.correct_angular_velocity(&sample.angular_velocity_rad_per_s),
+            specific_force_m_per_s2: if self.accelerometer_correction == Matrix3::identity() {
+                sample.specific_force_m_per_s2
+            } else {
+                self.accelerometer_correction * sample.specific_force_m_per_s2
+            },
+        }
+    }
+
+    /// `C_g · measured`, in rad/s; the same bits for the identity.
+    pub fn correct_angular_velocity(&self, measured_rad_per_s: &Vector3<f64>) -> Vector3<f64> {
+        if self.gyroscope_correction == Matrix3::identity() {
+            return *measured_rad_per_s;
+        }
+        self.gyroscope_correction * measured_rad_per_s
+    }
+
+    /// The intrinsics of raw samples, when `self` belongs to samples that `first` has corrected.
+    pub fn after(&self, first: &Self) -> Self {
+        Self {
+            gyroscope_correction: self.gyroscope_correction * first.gyroscope_correction,
+            accelerometer_correction: self.accelerometer_correction * first.accelerometer_correction,
+        }
+    }
+
+    /// What is left of `self` when samples have been corrected by `first`: `self = left.after(first)`. `None` where a matrix of
+    /// `first` is singular.
+    pub fn left_after(&self, first: &Self) -> Option<Self> {
+        Some(Self {
+            gyroscope_correction: self.gyroscope_correction * first.gyroscope_correction.try_inverse()?,
+            accelerometer_correction: self.accelerometer_correction * first.accelerometer_correction.try_inverse()?,
+        })
+    }
+
+    /// From the independent parameters.
+    pub fn from_parameters(parameters: &ImuIntrinsicsParameters) -> Self {
+        let rotation = so3::exp(&parameters.gyroscope_rotation_rad).to_rotation_matrix().into_inner();
+        Self {
+            gyroscope_correction: rotation * parameters.gyroscope.matrix(),
+            accelerometer_correction: parameters.accelerometer.matrix(),
+        }
+    }
+
+    /// The independent parameters, in the IMU frame in which the accelerometer's matrix is upper triangular: where it is
+    /// `C_a = Q · U`, that frame is rotated by `Q`. Both matrices must have a positive determinant.
+    pub fn parameters(&self) -> ImuIntrinsicsParameters {
+        let (imu_from_triangle, accelerometer) = rotation_and_upper(&self.accelerometer_correction);
+        let (rotation, gyroscope) = rotation_and_upper(&(imu_from_triangle.transpose() * self.gyroscope_correction));
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        ImuIntrinsicsParameters {
+            gyroscope: ScaleMisalignment::of_matrix(&gyroscope),
+            gyroscope_rotation_rad: so3::log(&rotation),
+            accelerometer: ScaleMisalignment::of_matrix(&accelerometer),
+        }
+    }
+
+    /// From the matrices of Kalibr's file; `None` where one cannot be inverted.
+    pub fn from_kalibr(kalibr: &KalibrImuMatrices) -> Option<Self> {
+        Some(Self {
+            gyroscope_correction: (kalibr.gyroscope_m * kalibr.gyroscope_from_imu).try_inverse()?,
+            accelerometer_correction: kalibr.accelerometer_m.try_inverse()?,
+        })
+    }
+
+    /// The matrices of Kalibr's file, the gyroscope's `M` lower triangular as Kalibr has it; `None` where a correction cannot
+    /// be inverted.
+    pub fn to_kalibr(&self) -> Option<KalibrImuMatrices> {
+        let measured_from_true = self.gyroscope_correction.try_inverse()?;
+        // `A = L · Q` from the transpose, `Aᵀ = Qᵀ · Lᵀ`.
+        let (rotation, upper) = rotation_and_upper(&measured_from_true.transpose());
+        Some(KalibrImuMatrices {
+            gyroscope_m: upper.transpose(),
+            gyroscope_from_imu: rotation.transpose(),
+            accelerometer_m: self.accelerometer_correction.try_inverse()?,
+        })
+    }
+}
+
+/// `A = Q · U` (each 3 × 3) with a rotation and an upper triangular matrix of positive diagonal, by Gram–Schmidt on the
+/// columns; exact for an upper triangular matrix with a positive diagonal.
+fn rotation_and_upper(matrix: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+    let (mut q, mut u) = (Matrix3::zeros(), Matrix3::zeros());
+    for column in 0..3 {
+        let mut rest: Vector3<f64> = matrix.column(column).into_owned();
+        for before in 0..column {
+            let axis: Vector3<f64> = q.column(before).into_owned();
+            let along = axis.dot(&rest);
+            u[(before, column)] = along;
+            rest -= axis * along;
+        }
+        let length = rest.norm();
+        u[(column, column)] = length;
+        q.set_column(column, &(rest / length));
+    }
+    (q, u)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn some() -> ImuIntrinsicsParameters {
+        ImuIntrinsicsParameters {
+            gyroscope: ScaleMisalignment {
+                scale: Vector3::new(0.01, -0.02, 0.004),
+                misalignment: Vector3::new(0.003, -0.001, 0.012),
+            },
+            gyroscope_rotation_rad: Vector3::new(0.02, -0.05, 0.01),
+            accelerometer: ScaleMisalignment {
+                scale: Vector3::new(-0.006, 0.001, 0.015),
+                misalignment: Vector3::new(0.008, 0.002, -0.004),
+            },
+        }
+    }
+
+    fn check_near(found: &ImuIntrinsics, expected: &ImuIntrinsics) {
+        let differences = [
+            found.gyroscope_correction - expected.gyroscope_correction,
+            found.accelerometer_correction - expected.accelerometer_correction,
+        ];
+        assert!(differences.iter().all(|difference| difference.amax() < 1e-14), "{found:?}\n{expected:?}");
+    }
+
+    #[test]
+    fn parameters_and_kalibrs_matrices_lead_back_to_the_corrections() {
+        let intrinsics = ImuIntrinsics::from_parameters(&some());
+        check_near(&ImuIntrinsics::from_parameters(&intrinsics.parameters()), &intrinsics);
+        let found = intrinsics.parameters();
+        assert!((found.gyroscope_rotation_rad - some().gyroscope_rotation_rad).norm() < 1e-15);
+        assert!((found.gyroscope.misalignment - some().gyroscope.misalignment).norm() < 1e-15);
+        assert_eq!(found.accelerometer, some().accelerometer);
+        let kalibr = intrinsics.to_kalibr().unwrap();
+        check_near(&ImuIntrinsics::from_kalibr(&kalibr).unwrap(), &intrinsics);
+        // Kalibr's own form: M lower triangular, C_gyro_i a rotation.
+        assert_eq!([(0, 1), (0, 2), (1, 2)].map(|entry| kalibr.gyroscope_m[entry]), [0.0; 3]);
+        let rotation = kalibr.gyroscope_from_imu;
+        assert!((rotation.transpose() * rotation - Matrix3::identity()).amax() < 1e-14 && rotation.determinant() > 0.0);
+        // measured = M · C_gyro_i · true
+        let actual = Vector3::new(0.3, -0.7, 1.1);
+        let measured = kalibr.gyroscope_m * kalibr.gyroscope_from_imu * actual;
+        assert!((intrinsics.correct_angular_velocity(&measured) - actual).norm() < 1e-14);
+        assert!(measured.metric_distance(&actual) > 0.01);
+    }
+
+    #[test]
+    fn the_identity_changes_no_bit_and_corrections_chain() {
+        let sample = ImuSample {
+            stamp_ns: 7,
+            angular_velocity_rad_per_s: Vector3::new(0.1, -0.0, 1e-300),
+            specific_force_m_per_s2: Vector3::new(1.0 / 3.0, 9.81, -0.0),
+        };
+        let bits = |v: &Vector3<f64>| v.map(f64::to_bits);
+        let corrected = ImuIntrinsics::default().correct(&sample);
+        assert_eq!(bits(&corrected.angular_velocity_rad_per_s), bits(&sample.angular_velocity_rad_per_s));
+        assert_eq!(bits(&corrected.specific_force_m_per_s2), bits(&sample.specific_force_m_per_s2));
+        let whole = ImuIntrinsics::from_parameters(&some());
+        let first = ImuIntrinsics { gyroscope_correction: Matrix3::identity(), ..whole };
+        let left = whole.left_after(&first).unwrap();
+        check_near(&left, &ImuIntrinsics { accelerometer_correction: Matrix3::identity(), ..whole });
+        check_near(&left.after(&first), &whole);
+    }
+
+    #[test]
+    fn a_lower_triangular_accelerometer_rotates_the_frame() {
+        let kalibr = KalibrImuMatrices {
+            gyroscope_m: Matrix3::identity(),
+            gyroscope_from_imu: Matrix3::identity(),
+            accelerometer_m: Matrix3::new(1.01, 0.0, 0.0, 0.02, 0.99, 0.0, -0.01, 0.005, 1.0),
+        };
+        let intrinsics = ImuIntrinsics::from_kalibr(&kalibr).unwrap();
+        let again = ImuIntrinsics::from_parameters(&intrinsics.parameters());
+        // Both matrices differ by one rotation on the left.
+        let rotation = again.accelerometer_correction * intrinsics.accelerometer_correction.try_inverse().unwrap();
+        assert!((rotation.transpose() * rotation - Matrix3::identity()).amax() < 1e-14);
+        assert!((rotation - Matrix3::identity()).amax() > 0.01);
+        assert!((rotation * intrinsics.gyroscope_correction - again.gyroscope_correction).amax() < 1e-14);
+    }
+}
