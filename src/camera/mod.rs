@@ -5,6 +5,7 @@
 //! [`Distortion`] moves it there, and focal lengths and principal point make pixels of it.
 
 mod distortion;
+mod intrinsics;
 mod kalibr;
 mod projection;
 mod rational;

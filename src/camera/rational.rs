@@ -49,12 +49,18 @@ impl RationalLens {
         square < self.turning_square
     }
 
+    /// `1 + k4·s + k5·s² + k6·s³` at a squared radius.
+    pub(super) fn denominator(&self, square: f64) -> f64 {
+        let [_, _, _, _, _, k4, k5, k6] = self.coefficients;
+        1.0 + square * (k4 + square * (k5 + square * k6))
+    }
+
     /// The distorted point of a point with squared radius `square`, and its derivative (2 × 2).
     pub(super) fn distort(&self, plane: &Vector2<f64>, square: f64) -> (Vector2<f64>, Matrix2<f64>) {
         let [k1, k2, p1, p2, k3, k4, k5, k6] = self.coefficients;
         let (x, y, s) = (plane.x, plane.y, square);
         let numerator = 1.0 + s * (k1 + s * (k2 + s * k3));
-        let denominator = 1.0 + s * (k4 + s * (k5 + s * k6));
+        let denominator = self.denominator(s);
         let radial = numerator / denominator;
         let by_square =
             (k1 + s * (2.0 * k2 + s * 3.0 * k3) - radial * (k4 + s * (2.0 * k5 + s * 3.0 * k6))) / denominator;

@@ -96,6 +96,54 @@ fn jacobian_meets_central_differences() {
     }
 }
 
+#[test]
+fn intrinsics_jacobian_meets_central_differences() {
+    for camera in cameras() {
+        let values = camera.intrinsics();
+        for point in points() {
+            let (uv, by_point, by_intrinsics) = camera.project_with_intrinsics_jacobian(&point).unwrap();
+            assert_eq!(Some((uv, by_point)), camera.project_with_jacobian(&point), "{camera:?}");
+            for index in 0..6 {
+                let step = if index < 4 { 1e-3 } else { 1e-6 };
+                let at = |change: f64| {
+                    let mut values = values;
+                    values[index] += change;
+                    camera.with_intrinsics(values).unwrap().project(&point).unwrap()
+                };
+                let numeric = (at(step) - at(-step)) / (2.0 * step);
+                let error = (by_intrinsics.column(index) - numeric).norm();
+                let bound = if index < 4 { 1e-9 } else { 1e-6 };
+                assert!(error < bound, "{camera:?} {point:?} column {index}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn intrinsics_are_those_of_the_model() {
+    for camera in cameras() {
+        assert_eq!(camera.with_intrinsics(camera.intrinsics()).as_ref(), Ok(&camera));
+        let expected = match camera.distortion {
+            Distortion::None => 4,
+            Distortion::Fov(_) => 5,
+            Distortion::Radtan(_) | Distortion::Rational(_) | Distortion::Equidistant(_) => 6,
+        };
+        assert_eq!(camera.intrinsic_count(), expected, "{camera:?}");
+        let mut changed = camera.intrinsics();
+        for (index, value) in changed.iter_mut().enumerate() {
+            *value += if index < 4 { 1.5 } else { 0.01 };
+        }
+        let again = camera.with_intrinsics(changed).unwrap();
+        assert_eq!(again.intrinsics()[..expected], changed[..expected], "{camera:?}");
+        let by_intrinsics = camera.project_with_intrinsics_jacobian(&Vector3::new(0.3, -0.2, 1.0)).unwrap().2;
+        for index in 4..6 {
+            assert_eq!(by_intrinsics.column(index).norm() > 0.0, index < expected, "{camera:?} column {index}");
+        }
+        assert!(camera.with_intrinsics([0.0, 1.0, 1.0, 1.0, 0.5, 0.0]).is_err());
+        assert!(camera.with_intrinsics([1.0, 1.0, f64::NAN, 1.0, 0.5, 0.0]).is_err());
+    }
+}
+
 /// `tests/data/opencv_lenses.json`.
 #[derive(Deserialize)]
 struct OpenCvLenses {
