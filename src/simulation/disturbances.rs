@@ -11,6 +11,16 @@ use super::vibration::Vibration;
 pub struct Disturbances {
     /// Kalibr's `timeshift_cam_imu`, untold to the given rig: `t_imu = t_cam + shift`.
     pub camera_time_offset_s: f64,
+    /// Readout of the cameras, untold to the given rig: row v is exposed `v / height · readout` after the stamp.
+    pub readout_s: f64,
+    /// Error of the given rig's focal lengths, as a ratio: 0.01 makes them 1 % too long.
+    pub focal_ratio: f64,
+    /// Standard deviations of the errors of the IMU's scales and of its angles in radians (misalignment, rotation of the
+    /// gyroscope), untold to the given rig.
+    pub imu_intrinsics: [f64; 2],
+    /// First-order Gauss–Markov error of each axis of the accelerometer: standard deviation in m/s², time constant in
+    /// seconds.
+    pub accelerometer_drift: Option<[f64; 2]>,
     /// How much later than measured the joint angles are stamped.
     pub joint_lag_s: f64,
     /// Joint angles are recorded from this time on.
@@ -50,8 +60,8 @@ const AUTO_EXPOSURE_S: f64 = 0.4;
 pub(crate) const BLANK_GREY: f32 = 150.0;
 
 /// What [`Disturbances::set`] reads, for messages and help.
-const KEYS: &str = "camera-offset=S, joint-lag=S, joint-start=S, image-gap=START,LENGTH, exposure=S, \
-                    gyroscope-range=RAD/S, accelerometer-range=M/S², light=START,FACTOR, blank=START,LENGTH, \
+const KEYS: &str = "camera-offset=S, readout=S, focal=RATIO, imu-intrinsics=SCALE,RAD, accelerometer-drift=M/S²,S, \
+                    joint-lag=S, joint-start=S, image-gap=START,LENGTH, exposure=S, gyroscope-range=RAD/S, accelerometer-range=M/S², light=START,FACTOR, blank=START,LENGTH, \
                     slew=START,LENGTH, spin=START,LENGTH,RAD/S, hold-joint=NUMBER,START,LENGTH, hover=START,LENGTH, \
                     stabilize=START,LENGTH or vibration=HZ,RAD/S,M/S²";
 
@@ -75,6 +85,10 @@ impl Disturbances {
         let three = || <[f64; 3]>::try_from(values.as_slice()).map_err(|_length| wants(3));
         match key {
             "camera-offset" => self.camera_time_offset_s = one()?,
+            "readout" => self.readout_s = one()?,
+            "focal" => self.focal_ratio = one()?,
+            "imu-intrinsics" => self.imu_intrinsics = two()?,
+            "accelerometer-drift" => self.accelerometer_drift = Some(two()?),
             "joint-lag" => self.joint_lag_s = one()?,
             "joint-start" => self.joint_start_s = one()?,
             "image-gap" => self.image_gap_s = Some(two()?),
@@ -104,6 +118,13 @@ impl Disturbances {
             inside.then_some(()).ok_or(SimulationError::BadOption { option, value, low, high })
         };
         within("camera time offset in seconds", self.camera_time_offset_s, -1.0, 1.0)?;
+        within("readout in seconds", self.readout_s, -0.2, 0.2)?;
+        within("error of the focal length as a ratio", self.focal_ratio, -0.5, 0.5)?;
+        within("error of the IMU's scales", self.imu_intrinsics[0], 0.0, 0.1)?;
+        within("error of the IMU's angles in radians", self.imu_intrinsics[1], 0.0, 0.1)?;
+        let [drift_m_per_s2, drift_s] = self.accelerometer_drift.unwrap_or([0.0, 1.0]);
+        within("drift of the accelerometer in m/s²", drift_m_per_s2, 0.0, 10.0)?;
+        within("time constant of the accelerometer's drift in seconds", drift_s, 0.01, 1e5)?;
         within("joint lag in seconds", self.joint_lag_s, 0.0, 10.0)?;
         within("start of the joint angles in seconds", self.joint_start_s, 0.0, 3600.0)?;
         within("exposure in seconds", self.exposure_s, 0.0, 0.2)?;

@@ -8,7 +8,10 @@ use super::random::RandomStream;
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::ClassicalChain;
-use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuRig, Rig};
+use crate::sensors::{
+    CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuIntrinsicsParameters, ImuRig, Rig,
+    ScaleMisalignment,
+};
 
 /// Gravity in the simulated worlds, in m/s².
 pub(crate) const GRAVITY_M_PER_S2: f64 = 9.81;
@@ -54,6 +57,7 @@ pub(crate) struct Equipment {
     pub(crate) resolution_px: [usize; 2],
     pub(crate) camera_rate_hz: f64,
     pub(crate) camera_time_offset_s: f64,
+    pub(crate) readout_s: f64,
     pub(crate) encoder_sigma_rad: Option<f64>,
 }
 
@@ -77,7 +81,7 @@ impl Equipment {
                     rate_hz: self.camera_rate_hz,
                     model: camera_model(which, self.lens, self.resolution_px),
                     timeshift_cam_imu_s: self.camera_time_offset_s,
-                    readout_s: 0.0,
+                    readout_s: self.readout_s,
                     readout_sigma_s: None,
                     intrinsics_sigma: None,
                     mask: None,
@@ -126,7 +130,7 @@ fn static_extrinsics(random: &mut RandomStream) -> RigidTransform {
 
 /// The rig an estimator is given: each of the chain's `4N + 6` independent parameters (the minimal form's) is wrong by
 /// a uniform error within `bounds`, as the paper starts its experiments; static cameras are wrong within the same
-/// bounds, but by no more than 3 mm and 0.5° per axis, and the cameras' time offset is not in it.
+/// bounds, but by no more than 3 mm and 0.5° per axis, and the cameras' time offset and readout are not in it.
 pub(crate) fn given_rig(ground_truth: &Rig, bounds: ChainPrior, random: &mut RandomStream) -> Rig {
     let mut given = ground_truth.clone();
     if let Some(gimbal) = &mut given.gimbal {
@@ -137,6 +141,7 @@ pub(crate) fn given_rig(ground_truth: &Rig, bounds: ChainPrior, random: &mut Ran
     let shift = bounds.translation_bound_m.min(0.003);
     for camera in &mut given.cameras {
         camera.timeshift_cam_imu_s = 0.0;
+        camera.readout_s = 0.0;
         if let CameraMount::Static { imu_from_camera } = &mut camera.mount {
             let phi = Vector3::from_fn(|_, _| random.uniform(-rotation_bound, rotation_bound));
             imu_from_camera.rotation *= so3::exp(&phi);
@@ -144,6 +149,44 @@ pub(crate) fn given_rig(ground_truth: &Rig, bounds: ChainPrior, random: &mut Ran
         }
     }
     given
+}
+
+/// How wrong the intrinsics of a given camera are.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct IntrinsicsError {
+    /// Of both focal lengths, as a ratio: 0.01 makes the given ones 1 % too long.
+    pub focal_ratio: f64,
+    /// Of the principal point.
+    pub centre_px: [f64; 2],
+    /// Of the first two coefficients of the lens, where it has any.
+    pub distortion: [f64; 2],
+}
+
+impl IntrinsicsError {
+    /// The camera with this error.
+    pub(crate) fn applied(&self, model: &CameraModel) -> CameraModel {
+        let mut wrong = model.clone();
+        let [fx, fy, cx, cy] = &mut wrong.intrinsics_px;
+        *fx *= 1.0 + self.focal_ratio;
+        *fy *= 1.0 + self.focal_ratio;
+        *cx += self.centre_px[0];
+        *cy += self.centre_px[1];
+        if let Distortion::Radtan([k1, k2, ..]) = &mut wrong.distortion {
+            *k1 += self.distortion[0];
+            *k2 += self.distortion[1];
+        }
+        wrong
+    }
+}
+
+/// Scale and axes of an IMU as a random stream draws them: normal errors of a scale's and an angle's standard deviation, at
+/// most twice it. The angle (in radians) is that of misalignments and of the rotation between gyroscope and accelerometer.
+pub(crate) fn random_imu_intrinsics(scale: f64, angle_rad: f64, random: &mut RandomStream) -> ImuIntrinsics {
+    let mut errors = |sigma: f64| Vector3::from_fn(|_, _| sigma * random.normal().clamp(-2.0, 2.0));
+    let mut sensor = || ScaleMisalignment { scale: errors(scale), misalignment: errors(angle_rad) };
+    let (gyroscope, accelerometer) = (sensor(), sensor());
+    let gyroscope_rotation_rad = errors(angle_rad);
+    ImuIntrinsics::from_parameters(&ImuIntrinsicsParameters { gyroscope, gyroscope_rotation_rad, accelerometer })
 }
 
 /// Adds a uniform error to the independent parameters: two rotations and two translations of the base, all of

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::random::RandomStream;
 use super::trajectory::Trajectory;
-use crate::geometry::ns_from_seconds;
-use crate::sensors::{ImuNoise, ImuSample};
+use crate::geometry::{ns_from_seconds, seconds_from_ns};
+use crate::sensors::{ImuIntrinsics, ImuNoise, ImuSample};
 
 /// Noise of the ADIS16448 as `RotorS` gives it, the IMU of the paper.
 pub(crate) const FIREFLY_IMU: ImuNoise = ImuNoise {
@@ -70,6 +70,30 @@ impl ImuRecord {
             bias.accelerometer_m_per_s2 += random.normal_vector(noise.accelerometer_random_walk * walk);
         }
         record
+    }
+
+    /// Adds a first-order Gauss–Markov error of this stationary standard deviation (m/s²) and time constant to each axis of the
+    /// accelerometer; it counts as bias.
+    pub(crate) fn drift(&mut self, sigma_m_per_s2: f64, time_constant_s: f64, random: &mut RandomStream) {
+        let mut error = random.normal_vector(sigma_m_per_s2);
+        let mut before_ns = None;
+        for (sample, bias) in self.samples.iter_mut().zip(&mut self.biases) {
+            if let Some(before_ns) = before_ns.replace(sample.stamp_ns) {
+                let kept = (-seconds_from_ns(sample.stamp_ns - before_ns) / time_constant_s).exp();
+                error = error * kept + random.normal_vector(sigma_m_per_s2 * (1.0 - kept * kept).sqrt());
+            }
+            sample.specific_force_m_per_s2 += error;
+            bias.accelerometer_m_per_s2 += error;
+        }
+    }
+
+    /// Measures with wrong scales and axes: the samples that `intrinsics` corrects to those so far.
+    pub(crate) fn miscalibrate(&mut self, intrinsics: &ImuIntrinsics) {
+        // The inverse of a correction near the identity exists.
+        let Some(measured) = ImuIntrinsics::default().left_after(intrinsics) else { return };
+        for sample in &mut self.samples {
+            *sample = measured.correct(sample);
+        }
     }
 
     /// The sample at a stamp, interpolated linearly; the first or last one outside.

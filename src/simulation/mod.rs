@@ -34,7 +34,7 @@ mod world;
 
 #[cfg(feature = "logs")]
 pub use disturbances::Disturbances;
-pub use equipment::Lens;
+pub use equipment::{IntrinsicsError, Lens};
 pub use exercise::{Exercise, JOINT_PERIOD_S, JointSwing, ROCK_M, ROCK_PERIOD_S, SWING_M, VehicleSwing, YAW_SWING_RAD};
 pub use experiment::{Environment, Experiment};
 pub use gimbal::JointMotion;

@@ -1,6 +1,6 @@
 //! A flight with its rig and everything that the sensors but the cameras measure.
 
-use super::equipment::{Equipment, GRAVITY_M_PER_S2, IMU_RATE_HZ, given_rig};
+use super::equipment::{Equipment, GRAVITY_M_PER_S2, IMU_RATE_HZ, IntrinsicsError, given_rig, random_imu_intrinsics};
 use super::gimbal::{JointMotion, LookAround, Stabilizer};
 use super::imu::{FIREFLY_IMU, ImuRecord};
 use super::random::RandomStream;
@@ -21,6 +21,8 @@ pub(crate) mod stream {
     pub(crate) const IMAGES: u64 = 9;
     pub(crate) const DELIVERY: u64 = 10;
     pub(crate) const VIBRATION: u64 = 11;
+    pub(crate) const IMU_INTRINSICS: u64 = 12;
+    pub(crate) const ACCELEROMETER_DRIFT: u64 = 13;
 }
 
 /// Time from an IMU sample to the encoder reading.
@@ -64,6 +66,20 @@ impl Scenario {
             &mut random(stream::IMU),
         );
         Self { trajectory, joints, imu_record, true_rig, given_rig, seed: options.seed }
+    }
+
+    /// Measures with an IMU of random scales and axes, of which the given rig does not know.
+    pub(crate) fn miscalibrate_imu(&mut self, [scale, angle_rad]: [f64; 2], random: &mut RandomStream) {
+        let intrinsics = random_imu_intrinsics(scale, angle_rad, random);
+        self.imu_record.miscalibrate(&intrinsics);
+        self.true_rig.imu.intrinsics = intrinsics;
+    }
+
+    /// Makes the intrinsics of all cameras of the given rig wrong.
+    pub(crate) fn spoil_intrinsics(&mut self, error: &IntrinsicsError) {
+        for (given, actual) in self.given_rig.cameras.iter_mut().zip(&self.true_rig.cameras) {
+            given.model = error.applied(&actual.model);
+        }
     }
 
     /// Ground truth `world_from_camera` at a time of the IMU's clock.

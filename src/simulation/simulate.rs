@@ -10,7 +10,7 @@ use image::{ExtendedColorType, ImageEncoder as _};
 use rayon::prelude::*;
 
 use super::disturbances::BLANK_GREY;
-use super::equipment::Equipment;
+use super::equipment::{Equipment, IntrinsicsError};
 use super::experiment::Experiment;
 use super::interval::during;
 use super::options::{SimulationError, SimulationOptions, SimulationProgress, SimulationSummary};
@@ -33,6 +33,9 @@ const FIRST_IMAGE_S: f64 = 0.003;
 const BATCH: usize = 24;
 /// Rendered images that are averaged into one with motion blur.
 const BLUR_STEPS: usize = 7;
+/// Rows of an image that are rendered at the pose of their middle when a camera has a readout. A row is then half a row from
+/// its time: with 30 ms over 480 rows 0.03 ms, in which the image moves by 0.03 px at 2.4 rad/s, the vehicle's limit.
+const SHUTTER_ROWS: usize = 2;
 /// Mean velocity that flights are planned for, a lower bound.
 const PLANNED_M_PER_S: f64 = 2.5;
 /// Delay from measurement to recording: IMU, encoders, first camera, and each further camera.
@@ -144,6 +147,7 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
                 resolution_px: options.resolution_px,
                 camera_rate_hz: options.camera_rate_hz,
                 camera_time_offset_s: options.disturbances.camera_time_offset_s,
+                readout_s: options.disturbances.readout_s,
                 encoder_sigma_rad: options.encoder_sigma_rad,
             },
             start_error: options.start_error,
@@ -152,6 +156,16 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
     );
     if let Some(vibration) = &options.disturbances.vibration {
         shake(&mut scenario.imu_record, &scenario.trajectory, vibration, &mut random(stream::VIBRATION));
+    }
+    if let Some([sigma_m_per_s2, time_constant_s]) = options.disturbances.accelerometer_drift {
+        scenario.imu_record.drift(sigma_m_per_s2, time_constant_s, &mut random(stream::ACCELEROMETER_DRIFT));
+    }
+    if options.disturbances.imu_intrinsics != [0.0; 2] {
+        scenario.miscalibrate_imu(options.disturbances.imu_intrinsics, &mut random(stream::IMU_INTRINSICS));
+    }
+    let focal_ratio = options.disturbances.focal_ratio;
+    if focal_ratio != 0.0 {
+        scenario.spoil_intrinsics(&IntrinsicsError { focal_ratio, ..IntrinsicsError::default() });
     }
     for sample in &mut scenario.imu_record.samples {
         if let Some(range) = options.disturbances.gyroscope_range_rad_per_s {
@@ -242,7 +256,8 @@ fn write_messages(
                 let camera = &rig.cameras[shot.camera];
                 let info = camera.topic.replace("image_raw/compressed", "camera_info");
                 let times = times(shot.stamp_ns);
-                log.write_camera_info(&info, &camera.frame_id, times, &camera.model)?;
+                // A camera publishes the intrinsics that its calibration has found, right or wrong.
+                log.write_camera_info(&info, &camera.frame_id, times, &scenario.given_rig.cameras[shot.camera].model)?;
                 if let Some(jpeg) = ready.pop_front() {
                     log.write_compressed_image(&camera.topic, &camera.frame_id, times, "jpeg", &jpeg)?;
                 }
@@ -262,17 +277,19 @@ fn recordings(options: &SimulationOptions, scenario: &Scenario) -> Recordings {
     joints.retain(|sample| sample.stamp_ns >= start_ns);
     let duration_s = scenario.trajectory.duration_s();
     let shift_s = options.disturbances.camera_time_offset_s;
+    // Rows that are exposed first and last.
+    let rows_s = [options.disturbances.readout_s.min(0.0), options.disturbances.readout_s.max(0.0)];
     let mut shots = Vec::new();
     for (camera, _) in scenario.true_rig.cameras.iter().enumerate() {
         let period_s = 1.0 / options.camera_rate_hz;
         let mut frame_index = 0;
         loop {
             let stamp_s = FIRST_IMAGE_S + frame_index as f64 * period_s;
-            if stamp_s.max(stamp_s + shift_s) > duration_s {
+            if stamp_s.max(stamp_s + shift_s + rows_s[1]) > duration_s {
                 break;
             }
             let lost = during(options.disturbances.image_gap_s, stamp_s);
-            if stamp_s + shift_s >= 0.0 && !lost {
+            if stamp_s + shift_s + rows_s[0] >= 0.0 && !lost {
                 shots.push(Shot { camera, frame_index, stamp_ns: ns_from_seconds(stamp_s) });
             }
             frame_index += 1;
@@ -349,6 +366,7 @@ impl<'a> Studio<'a> {
         let (camera, view, sensor) = &self.cameras[shot.camera];
         let disturbances = &self.options.disturbances;
         let time_s = seconds_from_ns(shot.stamp_ns) + disturbances.camera_time_offset_s;
+        let end_s = self.scenario.trajectory.duration_s();
         radiance.clear();
         radiance.resize(view.pixels(), 0.0);
         let steps = match disturbances.exposure_s {
@@ -360,11 +378,14 @@ impl<'a> Studio<'a> {
             _ => 1,
         };
         for step in 0..steps {
-            // The stamp is the middle of the exposure.
+            // The stamp is the middle of the first row's exposure.
             let place = (step as f64 + 0.5) / steps as f64 - 0.5;
-            let at_s = (time_s + place * disturbances.exposure_s).clamp(0.0, self.scenario.trajectory.duration_s());
-            let pose = self.scenario.world_from_camera(camera, at_s);
-            self.renderer.render(view, &pose, 1.0 / steps as f32, workspace, radiance);
+            for rows in view.bands(if camera.readout_s == 0.0 { usize::MAX } else { SHUTTER_ROWS }) {
+                let middle_px = 0.5 * (rows.start + rows.end - 1) as f64;
+                let at_s = time_s + place * disturbances.exposure_s + camera.row_time_s(middle_px);
+                let pose = self.scenario.world_from_camera(camera, at_s.clamp(0.0, end_s));
+                self.renderer.render(view, rows, &pose, 1.0 / steps as f32, workspace, radiance);
+            }
         }
         let light = disturbances.light_at(time_s) as f32;
         if light != 1.0 {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::equipment::{Equipment, Lens};
+use super::equipment::{Equipment, IntrinsicsError, Lens};
 use super::exercise::Exercise;
 use super::experiment::Experiment;
 use super::gimbal::LookAround;
@@ -65,6 +65,16 @@ pub struct SyntheticOptions {
     pub encoder_sigma_rad: Option<f64>,
     /// How long after their stamps the camera took its images and the encoders their readings, in seconds.
     pub clock_offsets_s: [f64; 2],
+    /// Readout of the camera, which the given rig does not have: each landmark is observed at the time of its row.
+    pub readout_s: f64,
+    /// How wrong the given rig's intrinsics are; bearings are those of the given camera.
+    pub intrinsics_error: IntrinsicsError,
+    /// Standard deviations of the IMU's scales and of its angles in radians (misalignment, rotation between the sensors), of
+    /// which the given rig does not know; zeros for a perfect one.
+    pub imu_intrinsics_error: [f64; 2],
+    /// First-order Gauss–Markov error of each axis of the accelerometer: standard deviation in m/s², time constant in
+    /// seconds.
+    pub accelerometer_drift: Option<[f64; 2]>,
     /// How wrong the given rig's chain is.
     pub start_error: ChainPrior,
     /// How far the gimbal looks around in yaw, in radians (pitch 0.4 and roll 0.15 of it); 0 stabilizes only.
@@ -89,6 +99,10 @@ impl Default for SyntheticOptions {
             imu_noise_scale: 1.0,
             encoder_sigma_rad: Some(0.5_f64.to_radians()),
             clock_offsets_s: [0.0; 2],
+            readout_s: 0.0,
+            intrinsics_error: IntrinsicsError::default(),
+            imu_intrinsics_error: [0.0; 2],
+            accelerometer_drift: None,
             start_error: Experiment::T1.start_error(),
             look_around_rad: 0.5,
             lens: Lens::Pinhole,
@@ -121,7 +135,7 @@ pub struct SyntheticFrame {
     pub true_joint_angles_rad: Vec<f64>,
     /// True rates of the joints in rad/s, empty for a rigid camera.
     pub true_joint_rates_rad_per_s: Vec<f64>,
-    /// True pose of the camera in the world when it took the image.
+    /// True pose of the camera in the world when it took the image (its first row).
     pub true_world_from_camera: RigidTransform,
 }
 
@@ -168,6 +182,7 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
         resolution_px: [640, 480],
         camera_rate_hz: options.frame_rate_hz,
         camera_time_offset_s: 0.0,
+        readout_s: options.readout_s,
         encoder_sigma_rad: options.encoder_sigma_rad,
     };
     let swing_deg = options.look_around_rad.to_degrees();
@@ -193,9 +208,10 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
     {
         motion.exercise_from(*start_s, exercise, &gimbal.joints);
     }
+    spoil(&mut scenario, options);
     let camera = &scenario.true_rig.cameras[0];
     let mut encoders = RandomStream::new(options.seed, stream::ENCODERS);
-    let mut tracker = Tracker::new(camera.model.clone(), options);
+    let mut tracker = Tracker::new(camera.model.clone(), scenario.given_rig.cameras[0].model.clone(), options);
     let count = ((options.duration_s - FIRST_FRAME_S) * options.frame_rate_hz).floor().max(0.0) as usize + 1;
     let mut frames = Vec::with_capacity(count);
     let mut previous_ns = 0;
@@ -205,6 +221,10 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
         let ground_truth = scenario.trajectory.at(time_s);
         let [camera_offset_s, encoder_offset_s] = options.clock_offsets_s;
         let true_world_from_camera = scenario.world_from_camera(camera, time_s + camera_offset_s);
+        let world_from_camera = |row_px: f64| match camera.row_time_s(row_px) {
+            0.0 => true_world_from_camera,
+            row_s => scenario.world_from_camera(camera, time_s + camera_offset_s + row_s),
+        };
         let joint_angles_rad = |time_s: f64| scenario.joint_angles_rad(time_s).unwrap_or_default();
         let true_joint_angles_rad = joint_angles_rad(time_s);
         let (before, after) = (joint_angles_rad(time_s - RATE_STEP_S), joint_angles_rad(time_s + RATE_STEP_S));
@@ -219,7 +239,7 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
             stamp_ns,
             imu: scenario.imu_record.between(previous_ns, stamp_ns),
             joint_angles_rad: read_angles_rad,
-            tracks: tracker.track(stamp_ns, &true_world_from_camera),
+            tracks: tracker.track(stamp_ns, &world_from_camera),
             true_world_from_imu: ground_truth.world_from_imu,
             true_velocity_m_per_s: ground_truth.velocity_m_per_s,
             true_bias: scenario.imu_record.bias_at(stamp_ns),
@@ -230,6 +250,21 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
         previous_ns = stamp_ns;
     }
     SyntheticFlight { frames, given_rig: scenario.given_rig, true_rig: scenario.true_rig, landmarks: tracker.landmarks }
+}
+
+/// Makes IMU and given rig as wrong as asked.
+fn spoil(scenario: &mut Scenario, options: &SyntheticOptions) {
+    if let Some([sigma_m_per_s2, time_constant_s]) = options.accelerometer_drift {
+        let mut random = RandomStream::new(options.seed, stream::ACCELEROMETER_DRIFT);
+        scenario.imu_record.drift(sigma_m_per_s2, time_constant_s, &mut random);
+    }
+    if options.imu_intrinsics_error != [0.0; 2] {
+        let mut random = RandomStream::new(options.seed, stream::IMU_INTRINSICS);
+        scenario.miscalibrate_imu(options.imu_intrinsics_error, &mut random);
+    }
+    if options.intrinsics_error != IntrinsicsError::default() {
+        scenario.spoil_intrinsics(&options.intrinsics_error);
+    }
 }
 
 /// The flight around the house of T1, or a stay at one place.
@@ -271,6 +306,8 @@ struct Track {
 /// An ideal front end with known correspondences.
 struct Tracker {
     model: CameraModel,
+    /// The camera that the estimator is given: bearings are its.
+    given: CameraModel,
     random: RandomStream,
     pixel_sigma_px: f64,
     outlier_ratio: f64,
@@ -285,15 +322,20 @@ struct Tracker {
 const SPACING_PX: f64 = 22.0;
 /// Features end this close to the border.
 const BORDER_PX: f64 = 6.0;
+/// Steps towards the row in which a landmark is seen.
+const MOST_ROW_STEPS: usize = 12;
+/// How well that row is known.
+const ROW_TOLERANCE_PX: f64 = 1e-9;
 /// Mean life of a track that stays in sight, in frames.
 const LIFE_FRAMES: f64 = 60.0;
 /// Nearest and farthest landmark when first seen.
 const DEPTH_M: [f64; 2] = [2.5, 20.0];
 
 impl Tracker {
-    fn new(model: CameraModel, options: &SyntheticOptions) -> Self {
+    fn new(model: CameraModel, given: CameraModel, options: &SyntheticOptions) -> Self {
         Self {
             model,
+            given,
             random: RandomStream::new(options.seed, stream::FEATURES),
             pixel_sigma_px: options.pixel_sigma_px,
             outlier_ratio: options.outlier_ratio,
@@ -305,17 +347,18 @@ impl Tracker {
         }
     }
 
-    /// The frame seen from a camera pose.
-    fn track(&mut self, stamp_ns: i64, world_from_camera: &RigidTransform) -> TrackedFrame {
+    /// The frame of a camera whose rows have these poses.
+    fn track(&mut self, stamp_ns: i64, world_from_camera: &dyn Fn(f64) -> RigidTransform) -> TrackedFrame {
         let before = self.tracks.len();
         let mut features = Vec::with_capacity(self.features);
         self.follow(world_from_camera, &mut features);
         let tracked = features.len();
         let mut statistics = FrontEndStatistics { tracked, lost: before - tracked, ..Default::default() };
-        self.measure_motion(world_from_camera, &features, &mut statistics);
+        let first_row = world_from_camera(0.0);
+        self.measure_motion(&first_row, &features, &mut statistics);
         self.find(world_from_camera, &mut features);
         statistics.detected = features.len() - tracked;
-        self.before = Some(*world_from_camera);
+        self.before = Some(first_row);
         TrackedFrame { stamp_ns, features, statistics }
     }
 
@@ -324,18 +367,16 @@ impl Tracker {
     }
 
     /// Follows the tracks that stay in sight.
-    fn follow(&mut self, world_from_camera: &RigidTransform, features: &mut Vec<TrackedFeature>) {
-        let camera_from_world = world_from_camera.inverse();
+    fn follow(&mut self, world_from_camera: &dyn Fn(f64) -> RigidTransform, features: &mut Vec<TrackedFeature>) {
         for mut track in std::mem::take(&mut self.tracks) {
-            let point = camera_from_world.transform(&track.landmark_m);
             if let Some(slip) = &mut track.slip_px {
                 *slip += Vector2::new(self.random.normal(), self.random.normal()) * 1.5;
             }
             track.remaining = track.remaining.saturating_sub(1);
-            let seen = self.model.project(&point).filter(|_| point.z > 0.3 && track.remaining > 0);
+            let seen = self.observe(world_from_camera, &track.landmark_m).filter(|_| track.remaining > 0);
             let Some(ideal_px) = seen else { continue };
             let uv_px = self.noisy(ideal_px) + track.slip_px.unwrap_or_default();
-            let Some(bearing) = self.model.unproject(&uv_px).filter(|_| self.model.contains(&uv_px, BORDER_PX)) else {
+            let Some(bearing) = self.given.unproject(&uv_px).filter(|_| self.model.contains(&uv_px, BORDER_PX)) else {
                 continue;
             };
             track.age += 1;
@@ -346,8 +387,31 @@ impl Tracker {
         }
     }
 
+    /// Where a landmark is seen, at the pose of the row that it is seen in.
+    fn observe(
+        &self,
+        world_from_camera: &dyn Fn(f64) -> RigidTransform,
+        landmark_m: &Vector3<f64>,
+    ) -> Option<Vector2<f64>> {
+        let at_row = |row_px: f64| {
+            let point = world_from_camera(row_px).inverse().transform(landmark_m);
+            self.model.project(&point).filter(|_| point.z > 0.3)
+        };
+        let mut seen_px = at_row(0.5 * self.model.resolution_px[1] as f64)?;
+        // Each step leaves the part of an error that the image moves by during the error's readout: a tenth, or all of it
+        // for a global shutter.
+        for _ in 0..MOST_ROW_STEPS {
+            let before_px = seen_px;
+            seen_px = at_row(before_px.y)?;
+            if (seen_px.y - before_px.y).abs() < ROW_TOLERANCE_PX {
+                break;
+            }
+        }
+        Some(seen_px)
+    }
+
     /// Fills free places of the image with new features.
-    fn find(&mut self, world_from_camera: &RigidTransform, features: &mut Vec<TrackedFeature>) {
+    fn find(&mut self, world_from_camera: &dyn Fn(f64) -> RigidTransform, features: &mut Vec<TrackedFeature>) {
         let [width, height] = self.model.resolution_px.map(|size| size as f64);
         for _ in 0..20 * self.features {
             if features.len() >= self.features {
@@ -359,9 +423,9 @@ impl Tracker {
                 continue;
             }
             let Some(ray) = self.model.unproject(&ideal_px) else { continue };
-            let Some(landmark_m) = self.landmark(world_from_camera, &ray) else { continue };
+            let Some(landmark_m) = self.landmark(&world_from_camera(ideal_px.y), &ray) else { continue };
             let uv_px = self.noisy(ideal_px);
-            let Some(bearing) = self.model.unproject(&uv_px) else { continue };
+            let Some(bearing) = self.given.unproject(&uv_px) else { continue };
             let id = FeatureId(self.next_id);
             self.next_id += 1;
             let slips = self.random.chance(self.outlier_ratio);
@@ -399,7 +463,7 @@ impl Tracker {
         for feature in features {
             let Some(previous_px) = feature.previous_uv_px else { continue };
             flows.push((feature.uv_px - previous_px).norm());
-            if let Some(turned_px) = self.model.project(&(before_from_now * feature.bearing)) {
+            if let Some(turned_px) = self.given.project(&(before_from_now * feature.bearing)) {
                 parallax_px += (turned_px - previous_px).norm();
                 counted += 1;
             }

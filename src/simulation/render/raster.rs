@@ -62,8 +62,9 @@ pub(super) struct Shape {
 }
 
 impl Workspace {
-    /// Projects the faces of a world: into `prepared` what shading needs, into `shapes` what drawing needs.
-    pub(super) fn prepare(&mut self, world: &World, eye: &Eye, grid: &Grid) {
+    /// Projects the faces of a world that some rows of the grid show: into `prepared` what shading needs, into `shapes` what
+    /// drawing needs.
+    pub(super) fn prepare(&mut self, world: &World, eye: &Eye, grid: &Grid, shown: &Range<usize>) {
         self.prepared.clear();
         self.shapes.clear();
         self.outlines.clear();
@@ -74,7 +75,7 @@ impl Workspace {
                 continue;
             }
             let inverse_depth = eye.camera_from_world * face.normal / -before_m;
-            if !self.outline(&face.corners, &inverse_depth, eye, grid) {
+            if !self.outline(&face.corners, &inverse_depth, eye, grid, shown) {
                 continue;
             }
             self.prepared.push(Prepared {
@@ -86,8 +87,15 @@ impl Workspace {
         }
     }
 
-    /// Adds a face's corners, cut at the near plane, as a shape; false when it lies outside the grid.
-    fn outline(&mut self, corners: &[Vector3<f64>], inverse_depth: &Vector3<f64>, eye: &Eye, grid: &Grid) -> bool {
+    /// Adds a face's corners, cut at the near plane, as a shape; false when it lies outside these rows of the grid.
+    fn outline(
+        &mut self,
+        corners: &[Vector3<f64>],
+        inverse_depth: &Vector3<f64>,
+        eye: &Eye,
+        grid: &Grid,
+        shown: &Range<usize>,
+    ) -> bool {
         let first = self.outlines.len();
         let seen = |corner: &Vector3<f64>| eye.camera_from_world * (corner - eye.centre_m);
         let Some(last) = corners.last() else { return false };
@@ -109,7 +117,7 @@ impl Workspace {
         };
         let (left, right) = (bound(0, f64::MAX, f64::min), bound(0, f64::MIN, f64::max));
         let (top, bottom) = (bound(1, f64::MAX, f64::min), bound(1, f64::MIN, f64::max));
-        let rows = ceiled(top)..ceiled(bottom).min(grid.rows);
+        let rows = ceiled(top).max(shown.start)..ceiled(bottom).min(shown.end);
         if outline.len() < 3 || right < -1.0 || left > grid.columns as f64 + 1.0 || rows.is_empty() {
             self.outlines.truncate(first);
             return false;

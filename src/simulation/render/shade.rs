@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use nalgebra::Vector3;
 
 use super::raster::{Eye, Prepared, SKY};
@@ -51,17 +53,19 @@ impl<'a> Renderer<'a> {
         Self { world, shadows: ShadowMap::new(world) }
     }
 
-    /// Renders the image of a camera at a pose: linear gray values, row by row, added to `radiance` times `fraction`.
+    /// Renders some rows of the image of a camera at a pose: linear gray values, added to the rows of `radiance` (the whole
+    /// image) times `fraction`.
     pub(crate) fn render(
         &self,
         view: &View,
+        shown: Range<usize>,
         world_from_camera: &RigidTransform,
         fraction: f32,
         workspace: &mut Workspace,
         radiance: &mut [f32],
     ) {
         let eye = Eye::new(world_from_camera);
-        workspace.prepare(self.world, &eye, &view.grid);
+        workspace.prepare(self.world, &eye, &view.grid, &view.sample_rows(shown.clone()));
         let world_from_ray = eye.camera_from_world.transpose();
         let offset: Vector3<f64> = self.shadows.linear * eye.centre_m + self.shadows.offset;
         let light = Light {
@@ -71,9 +75,9 @@ impl<'a> Renderer<'a> {
         };
         // A band's samples stay in the cache; where the lens bends rows, all are needed at once.
         let band = if view.places.is_some() { view.height } else { BAND_ROWS };
-        for top in (0..view.height).step_by(band) {
-            let bottom = (top + band).min(view.height);
-            let samples = if view.places.is_some() { 0..view.grid.rows } else { top * SAMPLES..bottom * SAMPLES };
+        for top in shown.clone().step_by(band) {
+            let bottom = (top + band).min(shown.end);
+            let samples = view.sample_rows(top..bottom);
             workspace.draw(&view.grid, samples.clone());
             for row in top..bottom {
                 let pixels = &mut radiance[row * view.width..][..view.width];
@@ -96,7 +100,9 @@ impl<'a> Renderer<'a> {
     ) {
         let faces_of = |face: &[u32], column: usize| -> [u32; SAMPLES] {
             if let Some(places) = &view.places {
-                places[row * view.width + column].map(|place| face[place as usize])
+                let first = first_sample * view.grid.columns;
+                // Pixels that the lens does not show have no samples; what stands in for them is not looked at.
+                places[row * view.width + column].map(|place| face[(place as usize).saturating_sub(first)])
             } else {
                 let first = (row * SAMPLES - first_sample) * view.grid.columns + column;
                 std::array::from_fn(|sample| face[first + sample * view.grid.columns])

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use nalgebra::Vector2;
 
 use crate::camera::CameraModel;
@@ -138,6 +140,25 @@ impl View {
         view
     }
 
+    /// Bands of at most this many rows, from the top down.
+    pub(crate) fn bands(&self, rows: usize) -> impl Iterator<Item = Range<usize>> + use<> {
+        let height = self.height;
+        (0..height).step_by(rows.min(height)).map(move |top| top..(top + rows.min(height)).min(height))
+    }
+
+    /// The rows of the grid in which the samples of some rows of pixels lie.
+    pub(super) fn sample_rows(&self, pixels: Range<usize>) -> Range<usize> {
+        let Some(places) = &self.places else { return pixels.start * SAMPLES..pixels.end * SAMPLES };
+        if pixels.len() == self.height {
+            return 0..self.grid.rows;
+        }
+        let places = places[pixels.start * self.width..pixels.end * self.width].iter().flatten();
+        // Pixels that the lens does not show have their samples at 0.
+        let seen = places.filter(|place| **place > 0).map(|place| *place as usize / self.grid.columns);
+        let (first, last) = seen.fold((self.grid.rows, 0), |(first, last), row| (first.min(row), last.max(row)));
+        first.min(last)..last + 1
+    }
+
     /// The ray of a pixel with its differences to the neighbours; `None` where the lens shows nothing.
     #[inline]
     pub(super) fn pixel_ray(&self, column: usize, row: usize) -> Option<PixelRay> {
@@ -209,7 +230,7 @@ impl Workspace {
         world: &crate::simulation::world::World,
         world_from_camera: &crate::geometry::RigidTransform,
     ) -> Vec<f64> {
-        self.prepare(world, &super::raster::Eye::new(world_from_camera), &view.grid);
+        self.prepare(world, &super::raster::Eye::new(world_from_camera), &view.grid, &(0..view.grid.rows));
         self.draw(&view.grid, 0..view.grid.rows);
         let place = |pixel: usize| {
             let (row, column) = (pixel / view.width, pixel % view.width);

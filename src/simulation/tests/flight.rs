@@ -135,6 +135,7 @@ fn the_gimbal_keeps_its_limits_and_stabilizes_the_image() {
             resolution_px: [640, 480],
             camera_rate_hz: 20.0,
             camera_time_offset_s: 0.0,
+            readout_s: 0.0,
             encoder_sigma_rad: Some(0.01),
         };
         let options = ScenarioOptions {

@@ -17,7 +17,14 @@ fn radiance(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> G
     let heading = so3::exp(&Vector3::new(0.0, 0.0, heading_deg.to_radians())) * so3::exp(&Vector3::new(0.0, 0.14, 0.0));
     let mut grey = vec![0.0; view.pixels()];
     let pose = RigidTransform::new(heading * optical, Vector3::from(place_m));
-    Renderer::new(world).render(&view, &pose, 1.0, &mut Workspace::default(), &mut grey);
+    Renderer::new(world).render(
+        &view,
+        view.bands(usize::MAX).next().unwrap(),
+        &pose,
+        1.0,
+        &mut Workspace::default(),
+        &mut grey,
+    );
     let options = SensorOptions { noise: 2.0, exposure_drift: 0.0, vignetting: 0.12 };
     Sensor::new(&view, options, 5).expose(&grey, 0, 0.0)
 }
@@ -115,7 +122,14 @@ fn textures_do_not_flicker_under_slow_motion() {
         let heading = so3::exp(&Vector3::new(0.0, 0.0, 0.4 + turn_px / 180.0));
         let mut grey = vec![0.0; view.pixels()];
         let pose = RigidTransform::new(heading * optical, Vector3::new(-15.0, -4.0, 2.9));
-        renderer.render(&view, &pose, 1.0, &mut Workspace::default(), &mut grey);
+        renderer.render(
+            &view,
+            view.bands(usize::MAX).next().unwrap(),
+            &pose,
+            1.0,
+            &mut Workspace::default(),
+            &mut grey,
+        );
         grey
     };
     let first = shot(0.0);
@@ -126,6 +140,30 @@ fn textures_do_not_flicker_under_slow_motion() {
     let (tenth, half, whole) = (difference(&shot(0.1)), difference(&shot(0.5)), difference(&shot(1.0)));
     assert!(tenth < 0.2 * whole && half < 0.65 * whole, "{tenth} {half} {whole}");
     assert!(whole > 3.0, "{whole}");
+}
+
+#[test]
+fn rows_rendered_apart_are_those_of_the_whole_image() {
+    let world = world::build(Environment::House, 1);
+    let renderer = Renderer::new(&world);
+    let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+    let rotation = nalgebra::UnitQuaternion::from_matrix(&optical) * so3::exp(&Vector3::new(0.1, 0.7, 0.2));
+    let pose = RigidTransform::new(rotation, Vector3::new(-13.0, -11.0, 2.6));
+    for lens in [Lens::Pinhole, Lens::Radtan] {
+        let view = View::new(&camera_model(0, lens, [160, 120]));
+        let render = |rows: usize| {
+            let mut grey = vec![0.0; view.pixels()];
+            for rows in view.bands(rows) {
+                renderer.render(&view, rows, &pose, 1.0, &mut Workspace::default(), &mut grey);
+            }
+            grey
+        };
+        let whole = render(usize::MAX);
+        assert_eq!(view.bands(7).count(), 18);
+        assert!(whole.iter().all(|grey| *grey > 0.0));
+        assert_eq!(render(7), whole, "{lens:?}");
+        assert_eq!(render(1), whole, "{lens:?}");
+    }
 }
 
 #[test]

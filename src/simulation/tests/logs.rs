@@ -108,6 +108,10 @@ fn disturbances_are_read_as_they_are_written_on_the_command_line() {
     let mut disturbances = Disturbances::default();
     for text in [
         "camera-offset=0.01",
+        "readout=-0.02",
+        "focal=0.03",
+        "imu-intrinsics=0.01,0.005",
+        "accelerometer-drift=0.02,30",
         "image-gap=3,0.5",
         "light=4,0.5",
         "blank=5,1.5",
@@ -121,6 +125,10 @@ fn disturbances_are_read_as_they_are_written_on_the_command_line() {
     }
     let expected = Disturbances {
         camera_time_offset_s: 0.01,
+        readout_s: -0.02,
+        focal_ratio: 0.03,
+        imu_intrinsics: [0.01, 0.005],
+        accelerometer_drift: Some([0.02, 30.0]),
         image_gap_s: Some([3.0, 0.5]),
         light_change: Some([4.0, 0.5]),
         blank_s: Some([5.0, 1.5]),
@@ -140,6 +148,46 @@ fn disturbances_are_read_as_they_are_written_on_the_command_line() {
     ] {
         let message = disturbances.set(text).unwrap_err().to_string();
         assert!(message.contains(words) && message.contains(text), "{message}");
+    }
+}
+
+#[test]
+fn a_row_shows_what_is_there_at_its_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let images = |disturbances: &[&str]| {
+        let mut options = SimulationOptions { image_noise: 0.0, jpeg_quality: 100, ..small(Experiment::T3) };
+        for text in ["spin=0,1,2"].iter().chain(disturbances) {
+            options.disturbances.set(text).unwrap();
+        }
+        let summary = write(&options, folder.path());
+        let log = Arc::new(FlightLog::open(&summary.log).unwrap());
+        let rigs = [Rig::for_log(&log, None).unwrap(), Rig::ground_truth_for_log(&log, None).unwrap().unwrap()];
+        let readouts_s = rigs.map(|rig| rig.cameras.iter().map(|camera| camera.readout_s).collect::<Vec<_>>());
+        let rig = Rig::for_log(&log, None).unwrap();
+        let images = ["cam0", "cam1"].map(|camera| {
+            let frames = FrameStream::new(Arc::clone(&log), &rig, camera, 0.0, None).unwrap();
+            frames.map(|frame| frame.image).collect::<Vec<_>>()
+        });
+        (images, readouts_s)
+    };
+    // Row 48 of 72 is exposed 100 ms after the stamp.
+    let (rolling, readouts_s) = images(&["readout=0.15"]);
+    assert_eq!(readouts_s, [vec![0.0; 2], vec![0.15; 2]]);
+    let (at_first, _) = images(&[]);
+    let (at_row, _) = images(&["camera-offset=0.1"]);
+    let difference = |a: &crate::sensors::GrayImage, b: &crate::sensors::GrayImage, row: usize| {
+        let greys = |image: &crate::sensors::GrayImage| image.pixels[row * 96..(row + 1) * 96].to_vec();
+        let sum: u32 = greys(a).iter().zip(greys(b)).map(|(a, b)| u32::from(a.abs_diff(b))).sum();
+        f64::from(sum) / 96.0
+    };
+    for camera in 0..2 {
+        for index in [4, 9] {
+            let [rolling, at_first, at_row] = [&rolling, &at_first, &at_row].map(|images| &images[camera][index]);
+            let near = [difference(rolling, at_first, 0), difference(rolling, at_row, 48)];
+            let far = [difference(rolling, at_row, 0), difference(rolling, at_first, 48)];
+            let case = format!("camera {camera}, image {index}: {near:?} {far:?}");
+            assert!(near.iter().all(|near| *near < 2.5) && far.iter().all(|far| *far > 5.0), "{case}");
+        }
     }
 }
 

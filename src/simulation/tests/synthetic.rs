@@ -1,6 +1,6 @@
 use nalgebra::Vector3;
 
-use super::super::{SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks};
+use super::super::{IntrinsicsError, SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks};
 use crate::geometry::{RigidTransform, so3};
 
 fn short(mount: SyntheticMount, motion: SyntheticMotion) -> SyntheticOptions {
@@ -30,6 +30,76 @@ fn tracks_are_projections_of_their_landmarks_through_the_true_rig() {
             flight.frames.iter().flat_map(|frame| &frame.tracks.features).map(|f| f64::from(f.age)).sum();
         let count: usize = flight.frames.iter().map(|frame| frame.tracks.features.len()).sum();
         assert!(mean_age / count as f64 > 8.0, "tracks live {} frames only", mean_age / count as f64);
+    }
+}
+
+#[test]
+fn with_a_readout_each_landmark_is_observed_at_the_time_of_its_row() {
+    for (mount, readout_s) in [(SyntheticMount::Gimbal, 0.03), (SyntheticMount::Static, -0.02)] {
+        let options = SyntheticOptions { pixel_sigma_px: 0.0, readout_s, ..short(mount, SyntheticMotion::Aggressive) };
+        let flight = synthetic_tracks(&options);
+        let camera = &flight.true_rig.cameras[0];
+        assert_eq!((camera.readout_s, flight.given_rig.cameras[0].readout_s), (readout_s, 0.0));
+        // Poses of many times, from the frames' first rows of a flight with a shifted clock.
+        let rows = [90.0, 240.0, 400.0];
+        let shifted = rows.map(|row_px| {
+            let clock_offsets_s = [camera.row_time_s(row_px), 0.0];
+            synthetic_tracks(&SyntheticOptions { clock_offsets_s, readout_s: 0.0, ..options.clone() }).frames
+        });
+        let (mut worst_px, mut moved_px, mut count) = (0.0_f64, 0.0_f64, 0);
+        for (index, frame) in flight.frames.iter().enumerate() {
+            for feature in &frame.tracks.features {
+                let near = rows.iter().position(|row_px| (feature.uv_px.y - row_px).abs() < 0.5);
+                let Some(row) = near else { continue };
+                let landmark = &flight.landmarks[&feature.id];
+                let error_px = |pose: &RigidTransform| {
+                    let seen = camera.model.project(&pose.inverse().transform(landmark)).unwrap();
+                    (seen - feature.uv_px).norm()
+                };
+                worst_px = worst_px.max(error_px(&shifted[row][index].true_world_from_camera));
+                moved_px = moved_px.max(error_px(&frame.true_world_from_camera));
+                count += 1;
+            }
+        }
+        // Half a row is 0.03 ms, in which a point moves by a few hundredths of a pixel.
+        assert!(count > 50 && worst_px < 0.08 && moved_px > 3.0, "{count}, {worst_px} px, {moved_px} px");
+    }
+}
+
+#[test]
+fn the_imu_measures_with_its_scales_and_axes_and_drifts() {
+    let plain = short(SyntheticMount::Static, SyntheticMotion::Aggressive);
+    let wrong = SyntheticOptions {
+        imu_intrinsics_error: [0.01, 0.02],
+        accelerometer_drift: Some([0.02, 3.0]),
+        intrinsics_error: IntrinsicsError { focal_ratio: 0.01, centre_px: [2.0, -1.0], distortion: [0.0; 2] },
+        ..plain.clone()
+    };
+    let (plain, wrong) = (synthetic_tracks(&plain), synthetic_tracks(&wrong));
+    let intrinsics = wrong.true_rig.imu.intrinsics;
+    let parameters = intrinsics.parameters();
+    assert!(parameters.gyroscope.scale.amin() > 1e-5 && parameters.gyroscope.scale.amax() <= 0.02);
+    assert!(parameters.gyroscope_rotation_rad.amax() <= 0.04 && parameters.accelerometer.misalignment.norm() > 1e-3);
+    assert!(wrong.given_rig.imu.intrinsics.is_identity());
+    let mut drift = Vec::new();
+    for (before, after) in plain.frames.iter().zip(&wrong.frames) {
+        let error = after.true_bias.accelerometer_m_per_s2 - before.true_bias.accelerometer_m_per_s2;
+        assert_eq!(after.true_bias.gyroscope_rad_per_s, before.true_bias.gyroscope_rad_per_s);
+        let (measured, expected) = (&after.imu[after.imu.len() - 2], &before.imu[before.imu.len() - 2]);
+        let corrected = intrinsics.correct(measured);
+        assert!((corrected.angular_velocity_rad_per_s - expected.angular_velocity_rad_per_s).norm() < 1e-12);
+        let found = corrected.specific_force_m_per_s2 - expected.specific_force_m_per_s2;
+        assert!((found - error).norm() < 0.01, "{found} {error}");
+        drift.push(error.x);
+    }
+    let spread = (drift.iter().map(|error| error * error).sum::<f64>() / drift.len() as f64).sqrt();
+    assert!((0.005..0.06).contains(&spread), "{spread}");
+    let step = drift.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+    assert!(step < spread, "{step}");
+    let (given, actual) = (&wrong.given_rig.cameras[0].model, &wrong.true_rig.cameras[0].model);
+    assert_eq!(given.intrinsics_px[0], actual.intrinsics_px[0] * 1.01);
+    for feature in &wrong.frames[3].tracks.features {
+        assert!((given.unproject(&feature.uv_px).unwrap() - feature.bearing).norm() < 1e-12);
     }
 }
 
