@@ -187,7 +187,11 @@ fn wrong_shutters_and_intrinsics_are_named() {
         "",
         "cam0.intrinsics_sigma.focal: holds 3, expected a ratio",
     );
-    check("  intrinsics_sigma: {fx: 1}\n", "", "cam0.intrinsics_sigma.fx: unknown key, the nearest known key is");
+    check(
+        "  intrinsics_sigma: {focal: 0.1, centre: 5, distortion: 0.1, fx: 1}\n",
+        "",
+        "cam0.intrinsics_sigma.fx: unknown key, the nearest known key is",
+    );
     check("", ", gyroscopes: {M: [[1, 0], [0, 1]]}", "imu0.gyroscopes.M: 2 rows, expected 3 rows of 3 numbers");
     check(
         "",

@@ -78,8 +78,8 @@ fn the_imu_measures_with_its_scales_and_axes_and_drifts() {
     let (plain, wrong) = (synthetic_tracks(&plain), synthetic_tracks(&wrong));
     let intrinsics = wrong.true_rig.imu.intrinsics;
     let parameters = intrinsics.parameters();
-    assert!(parameters.gyroscope.scale.amin() > 1e-5 && parameters.gyroscope.scale.amax() <= 0.02);
-    assert!(parameters.gyroscope_rotation_rad.amax() <= 0.04 && parameters.accelerometer.misalignment.norm() > 1e-3);
+    assert!(parameters.gyroscope.scale.amin() > 1e-5 && parameters.gyroscope.scale.amax() < 0.0201);
+    assert!(parameters.gyroscope_rotation_rad.amax() < 0.0401 && parameters.accelerometer.misalignment.norm() > 1e-3);
     assert!(wrong.given_rig.imu.intrinsics.is_identity());
     let mut drift = Vec::new();
     for (before, after) in plain.frames.iter().zip(&wrong.frames) {
