@@ -26,6 +26,7 @@ pub(super) fn estimate_trajectory(
             frame_index: view.frame_index,
             stamp_ns: view.stamp_ns,
             imu: &view.imu,
+            imu_after: &[],
             joint_angles: None,
             tracks: &view.tracks,
             rigid_tracks: &[],

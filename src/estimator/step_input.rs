@@ -12,6 +12,9 @@ pub struct StepInput<'a> {
     pub stamp_ns: i64,
     /// IMU samples from the previous image's stamp to this one's, both ends included and interpolated.
     pub imu: &'a [ImuSample],
+    /// IMU samples from the stamp on, the first one at the stamp, for the rows of a rolling shutter that are exposed after
+    /// it; empty where no run needs them.
+    pub imu_after: &'a [ImuSample],
     /// Encoder angles at the stamp with their standard deviations, `None` without encoders.
     pub joint_angles: Option<&'a JointAngles>,
     /// Tracked features; none where the main camera has no image in this frame set.

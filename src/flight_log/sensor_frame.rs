@@ -28,6 +28,8 @@ pub struct SensorFrame {
     /// interpolated to the very stamps (shifted by the rig's `timeshift_cam_imu`).
     /// The first frame has the samples before it, as far as they go back (at most 2 s).
     pub imu: Vec<ImuSample>,
+    /// IMU samples from the stamp on, the first one at it, where the stream was asked for them; empty otherwise.
+    pub imu_after: Vec<ImuSample>,
     /// Encoder angles at the stamp, from all readings around it; `None` without encoders or when none lies within 0.1 s.
     pub joint_angles: Option<JointAngles>,
     /// Ground truth `world_from_imu` interpolated at the stamp: for comparison and display only, never for estimation.

@@ -21,12 +21,35 @@ pub struct JointAngles {
     pub lasting_sigmas_rad: Vec<f64>,
     /// Angular rate of each joint in rad/s from the readings around the stamp; zero where they do not constrain it.
     pub rates_rad_per_s: Vec<f64>,
+    /// How well the readings constrain rate and acceleration of each joint.
+    pub motion_fits: Vec<JointMotionFit>,
+}
+
+/// Motion of a joint about a stamp as a parabola through the readings has it, beside its rate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointMotionFit {
+    /// Standard deviation of the rate in rad/s, infinite where the readings do not constrain it.
+    pub rate_sigma_rad_per_s: f64,
+    /// Angular acceleration in rad/s².
+    pub acceleration_rad_per_s2: f64,
+    /// Its standard deviation in rad/s², infinite where the readings do not constrain it.
+    pub acceleration_sigma_rad_per_s2: f64,
+}
+
+impl JointMotionFit {
+    /// Without readings.
+    pub const UNKNOWN: Self = Self {
+        rate_sigma_rad_per_s: f64::INFINITY,
+        acceleration_rad_per_s2: 0.0,
+        acceleration_sigma_rad_per_s2: f64::INFINITY,
+    };
 }
 
 impl JointAngles {
     /// Bytes on the heap.
     pub fn heap_bytes(&self) -> usize {
         let all = [&self.angles_rad, &self.sigmas_rad, &self.lasting_sigmas_rad, &self.rates_rad_per_s];
-        all.iter().map(|numbers| numbers.capacity() * size_of::<f64>()).sum()
+        all.iter().map(|numbers| numbers.capacity() * size_of::<f64>()).sum::<usize>()
+            + self.motion_fits.capacity() * size_of::<JointMotionFit>()
     }
 }

@@ -18,7 +18,7 @@ pub use gray_image::GrayImage;
 pub use image_mask::ImageMask;
 pub use imu::{ImuNoise, ImuSample};
 pub use imu_intrinsics::{ImuIntrinsics, ImuIntrinsicsParameters, KalibrImuMatrices, ScaleMisalignment};
-pub use joints::{JointAngles, JointSample};
+pub use joints::{JointAngles, JointMotionFit, JointSample};
 pub use named_axes::{BodyAxes, NamedAxes};
 pub use pose::PoseSample;
 pub use rig::{

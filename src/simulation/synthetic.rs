@@ -16,7 +16,7 @@ use super::trajectory::{Trajectory, VehicleLimits};
 use crate::camera::CameraModel;
 use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::geometry::{RigidTransform, median, ns_from_seconds};
-use crate::sensors::{ChainPrior, ImuSample, JointAngles, Rig};
+use crate::sensors::{ChainPrior, ImuSample, JointAngles, JointMotionFit, Rig};
 
 /// What carries the camera of a synthetic flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,6 +150,7 @@ impl SyntheticFrame {
             sigmas_rad: vec![sigma_rad; count],
             lasting_sigmas_rad: vec![0.0; count],
             rates_rad_per_s: self.true_joint_rates_rad_per_s.clone(),
+            motion_fits: vec![JointMotionFit::UNKNOWN; count],
         })
     }
 }

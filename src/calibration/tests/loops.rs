@@ -8,7 +8,7 @@ use crate::calibration::pose_loop::{LoopNoise, LoopState, PairedSegment, PoseLoo
 use crate::geometry::{RigidTransform, SplitMix64, so3, wrap_angle};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::optimization::RobustLoss;
-use crate::sensors::{ChainPrior, JointAngles};
+use crate::sensors::{ChainPrior, JointAngles, JointMotionFit};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
 struct Random(SplitMix64);
@@ -84,6 +84,7 @@ fn example(seed: u64, encoder_sigma_rad: f64, noise: (f64, f64), still: bool) ->
                             sigmas_rad: vec![encoder_sigma_rad; 3],
                             lasting_sigmas_rad: vec![0.0; 3],
                             rates_rad_per_s: vec![0.0; 3],
+                            motion_fits: vec![JointMotionFit::UNKNOWN; 3],
                         },
                     }
                 })

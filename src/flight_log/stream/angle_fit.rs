@@ -12,6 +12,11 @@ pub(crate) struct FittedAngle {
     pub(crate) rate_rad_per_s: f64,
     /// Variance from white noise of the readings and the prior on the acceleration.
     pub(crate) variance_rad2: f64,
+    /// The same of the rate, in rad²/s².
+    pub(crate) rate_variance: f64,
+    pub(crate) acceleration_rad_per_s2: f64,
+    /// The same of the acceleration, in rad²/s⁴.
+    pub(crate) acceleration_variance: f64,
 }
 
 /// Standard deviation of a joint's acceleration.
@@ -31,10 +36,14 @@ pub(crate) fn fit(readings: &[Reading], white_variance_rad2: f64) -> Option<Fitt
         return None;
     }
     let parabola = Parabola::fit(readings, white_variance_rad2, Some(0.5 * ACCELERATION_RAD_PER_S2))?;
+    let span_s = parabola.span_s;
     Some(FittedAngle {
         angle_rad: parabola.coefficients[0],
-        rate_rad_per_s: parabola.coefficients[1] / parabola.span_s,
-        variance_rad2: parabola.variance,
+        rate_rad_per_s: parabola.coefficients[1] / span_s,
+        variance_rad2: parabola.variances[0],
+        rate_variance: parabola.variances[1] / span_s.powi(2),
+        acceleration_rad_per_s2: 2.0 * parabola.coefficients[2] / span_s.powi(2),
+        acceleration_variance: 4.0 * parabola.variances[2] / span_s.powi(4),
     })
 }
 
@@ -49,8 +58,8 @@ struct Parabola {
     /// Coefficients of 1, u and u² with `u` the time over `span_s`.
     coefficients: Vector3<f64>,
     span_s: f64,
-    /// Variance of the first coefficient.
-    variance: f64,
+    /// Variances of the coefficients.
+    variances: Vector3<f64>,
 }
 
 impl Parabola {
@@ -72,7 +81,7 @@ impl Parabola {
             normal[(2, 2)] += variance / (sigma * span_s * span_s).powi(2);
         }
         let inverse = normal.cholesky()?.inverse();
-        Some(Self { coefficients: inverse * right, span_s, variance: inverse[(0, 0)] * variance })
+        Some(Self { coefficients: inverse * right, span_s, variances: inverse.diagonal() * variance })
     }
 
     fn distance(&self, (time_s, angle_rad): &Reading) -> f64 {

@@ -57,6 +57,8 @@ pub(super) struct FrameSource {
     log_warnings: VecDeque<LogWarning>,
     /// Images before the first IMU sample.
     skipped: usize,
+    /// Length of the samples after a stamp that its frame has.
+    after_ns: i64,
 }
 
 /// A camera's topic and its expected rate and size.
@@ -133,7 +135,13 @@ impl FrameSource {
             end_ns,
             log_warnings,
             skipped: 0,
+            after_ns: 0,
         })
+    }
+
+    /// Frames with the IMU samples of so many seconds after their stamps, as far as the log has them.
+    pub(super) fn with_motion_after(self, after_s: f64) -> Self {
+        Self { after_ns: ns_from_seconds(after_s), ..self }
     }
 
     /// The next frame, `None` at the end of the log or of the requested duration.
@@ -164,6 +172,7 @@ impl FrameSource {
             let Some(image) = self.camera.decode(&mut self.context, stamp_ns, pending) else { continue };
             self.warn_of_skipped_images();
             let imu = self.take_imu(imu_stamp_ns);
+            let imu_after = self.imu_after(imu_stamp_ns);
             let context = &mut self.context;
             let joint_angles = self.joints.as_mut().and_then(|joints| joints.at(context, imu_stamp_ns, previous_ns));
             let ground_truth = self.ground_truth_at(imu_stamp_ns);
@@ -176,6 +185,7 @@ impl FrameSource {
                 log_time_ns,
                 image: Arc::new(image),
                 imu,
+                imu_after,
                 joint_angles,
                 ground_truth,
                 warnings: std::mem::take(&mut self.context.warnings),
@@ -240,6 +250,17 @@ impl FrameSource {
         }
         self.forget_samples_before(end_ns);
         imu
+    }
+
+    /// The samples from the end of the frame on, the first one interpolated at it.
+    fn imu_after(&mut self, end_ns: i64) -> Vec<ImuSample> {
+        if self.after_ns == 0 {
+            return Vec::new();
+        }
+        let last_ns = end_ns.saturating_add(self.after_ns);
+        self.read_imu_until(last_ns);
+        let following = self.samples.iter().filter(|sample| (end_ns + 1..=last_ns).contains(&sample.stamp_ns));
+        self.previous_end.iter().chain(following).copied().collect()
     }
 
     fn ground_truth_at(&mut self, stamp_ns: i64) -> Option<RigidTransform> {

@@ -6,7 +6,7 @@ use super::angle_fit::{self, Reading};
 use super::joint_topic::JointSamples;
 use super::ordered::ReadContext;
 use crate::geometry::{seconds_from_ns, wrap_angle};
-use crate::sensors::{JointAngles, JointSample};
+use crate::sensors::{JointAngles, JointMotionFit, JointSample};
 
 /// Largest distance of a reading from the stamp at which it is used.
 const NEAREST_NS: i64 = 100_000_000;
@@ -139,7 +139,7 @@ impl EncoderAverage {
         let joints = nearest.angles_rad.len();
         let given = self.sigma_rad * self.sigma_rad;
         let (mut angles_rad, mut sigmas_rad, mut lasting_sigmas_rad) = (Vec::new(), Vec::new(), Vec::new());
-        let mut rates_rad_per_s = Vec::new();
+        let (mut rates_rad_per_s, mut motion_fits) = (Vec::new(), Vec::new());
         for joint in 0..joints {
             let near = |samples: &[&JointSample]| readings_of(samples, joint, nearest.angles_rad[joint], stamp_ns);
             let averaged = self.noise.at(stamp_ns, joint).filter(|_| batch.len() >= MIN_BATCH).and_then(|noise| {
@@ -158,17 +158,23 @@ impl EncoderAverage {
             };
             let rates_of: &[&JointSample] =
                 if self.of_attitude && around.len() < 2 && between { &pair } else { &around };
-            let rate = angle_fit::fit(&near(rates_of), given).map_or(0.0, |fitted| fitted.rate_rad_per_s);
+            let motion = angle_fit::fit(&near(rates_of), given);
+            let rate = motion.map_or(0.0, |fitted| fitted.rate_rad_per_s);
             let (angle, variance, lasting) = averaged.or_else(interpolated).unwrap_or_else(|| {
                 let rotated_rad = UNKNOWN_RATE_RAD_PER_S * seconds_from_ns(nearest.stamp_ns - stamp_ns);
                 (nearest.angles_rad[joint], given + rotated_rad * rotated_rad, given)
             });
             angles_rad.push(angle);
             rates_rad_per_s.push(rate);
+            motion_fits.push(motion.map_or(JointMotionFit::UNKNOWN, |fitted| JointMotionFit {
+                rate_sigma_rad_per_s: fitted.rate_variance.sqrt(),
+                acceleration_rad_per_s2: fitted.acceleration_rad_per_s2,
+                acceleration_sigma_rad_per_s2: fitted.acceleration_variance.sqrt(),
+            }));
             sigmas_rad.push(variance.sqrt());
             lasting_sigmas_rad.push(lasting.sqrt());
         }
-        Some(JointAngles { angles_rad, sigmas_rad, lasting_sigmas_rad, rates_rad_per_s })
+        Some(JointAngles { angles_rad, sigmas_rad, lasting_sigmas_rad, rates_rad_per_s, motion_fits })
     }
 
     /// Drops readings that no later stamp needs, except the last one before the stamp.

@@ -49,8 +49,21 @@ impl FrameStream {
         start_s: f64,
         duration_s: Option<f64>,
     ) -> Result<Self, LogError> {
+        Self::with_motion_after(log, rig, camera_key, start_s, duration_s, 0.0)
+    }
+
+    /// [`Self::new`] with the IMU samples of so many seconds after each stamp, during which the rows of a rolling shutter
+    /// are exposed.
+    pub fn with_motion_after(
+        log: Arc<FlightLog>,
+        rig: &Rig,
+        camera_key: &str,
+        start_s: f64,
+        duration_s: Option<f64>,
+        after_s: f64,
+    ) -> Result<Self, LogError> {
         let path = log.path().to_owned();
-        let mut source = FrameSource::new(log, rig, camera_key, start_s, duration_s)?;
+        let mut source = FrameSource::new(log, rig, camera_key, start_s, duration_s)?.with_motion_after(after_s);
         let (sender, receiver) = sync_channel(FRAMES_AHEAD);
         let read_ahead = move || {
             while let Some(frame) = source.next_frame() {

@@ -29,6 +29,8 @@ pub(in crate::session) struct OwnedStepInput {
     pub(in crate::session) log_time_ns: i64,
     /// IMU samples from the stamp of the previous input to this one, both ends included.
     pub(in crate::session) imu: Vec<ImuSample>,
+    /// IMU samples from the stamp on, for the rows of rolling shutters; empty where no run needs them.
+    pub(in crate::session) imu_after: Vec<ImuSample>,
     /// Encoder readings at the stamp.
     pub(in crate::session) joint_angles: Option<JointAngles>,
     /// Tracks by camera, the main camera first; empty where an image is missing.
@@ -47,6 +49,7 @@ impl OwnedStepInput {
             stamp_ns: frame.stamp_ns,
             log_time_ns: frame.log_time_ns,
             imu: frame.imu,
+            imu_after: frame.imu_after,
             joint_angles: frame.joint_angles,
             tracks: vec![Arc::new(tracks)],
             ground_truth: frame.ground_truth,
@@ -70,6 +73,7 @@ impl OwnedStepInput {
         let rigid: usize = self.tracks.iter().skip(1).map(|tracks| tracks_bytes(tracks)).sum();
         allocated_bytes(size_of::<Self>() + 2 * size_of::<usize>())
             + allocated_bytes(self.imu.capacity() * size_of::<ImuSample>())
+            + allocated_bytes(self.imu_after.capacity() * size_of::<ImuSample>())
             + self.joint_angles.as_ref().map_or(0, |angles| allocated_bytes(angles.heap_bytes()))
             + rigid
     }
@@ -136,6 +140,7 @@ mod tests {
                 stamp_ns,
                 log_time_ns: 0,
                 imu: Vec::new(),
+                imu_after: Vec::new(),
                 joint_angles: None,
                 tracks: vec![Arc::default()],
                 ground_truth: None,

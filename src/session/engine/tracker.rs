@@ -26,6 +26,12 @@ const GYROSCOPE_BIAS_SIGMA_RAD_PER_S: f64 = 0.02;
 /// Standard deviation of the orientation of a rigid camera's extrinsics, in radians (0.6°).
 const RIGID_EXTRINSICS_SIGMA_RAD: f64 = 0.01;
 
+/// Time after a stamp over which the motion of the vehicle is kept for the rows of a rolling shutter: shutters read an image
+/// in at most 40 ms, and a time offset may be added. A run or a fork may estimate the readout on any log.
+const LONGEST_READOUT_S: f64 = 0.06;
+/// The same beyond the readout that the rig states.
+const READOUT_MARGIN_S: f64 = 0.03;
+
 impl CameraTracker {
     /// Starts at a stamp of the log.
     pub(super) fn new(
@@ -35,8 +41,9 @@ impl CameraTracker {
         start_s: f64,
         duration_s: Option<f64>,
     ) -> Result<Self, SessionError> {
-        let stream = FrameStream::new(log, rig, camera_key, start_s, duration_s)?;
         let camera = rig.camera(camera_key).map_err(LogError::from)?;
+        let after_s = LONGEST_READOUT_S.max(camera.readout_s.abs() + READOUT_MARGIN_S);
+        let stream = FrameStream::with_motion_after(log, rig, camera_key, start_s, duration_s, after_s)?;
         let mask = camera.mask.as_ref().map(|mask| mask.image.clone());
         Ok(Self {
             stream,
