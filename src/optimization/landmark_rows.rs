@@ -3,22 +3,26 @@
 
 use std::ops::Range;
 
-use super::Reprojection;
+use nalgebra::Matrix2x6;
+
+use super::BlockTerm;
 
 /// Columns of a landmark.
 const LANDMARK: usize = 3;
-/// Columns of a camera pose.
-const POSE: usize = 6;
+/// Columns of a block.
+const BLOCK: usize = 6;
 
-/// The whitened rows of one landmark's observations, `[landmark 3 | anchor 6 | observers 6 each | residual 1]`: of the
-/// camera poses only those that observe it.
+/// The whitened rows of one landmark's observations, `[landmark 3 | anchor | shared | observers | residual 1]`, six columns
+/// a block: of the blocks only those that its observations depend on.
 #[derive(Debug, Default)]
 pub(crate) struct LandmarkRows {
     /// Row-major.
     entries: Vec<f64>,
     width: usize,
-    /// Poses of the blocks of columns, the anchor's first.
-    poses: Vec<usize>,
+    /// The blocks of columns: the anchor's, the shared one, then those of the observers.
+    blocks: Vec<usize>,
+    /// Number of blocks before those of the observers.
+    common: usize,
     /// Rows that the landmark still fills after the projection.
     used: usize,
     /// Rows behind them that the last observation adds to the others.
@@ -28,12 +32,15 @@ pub(crate) struct LandmarkRows {
 }
 
 impl LandmarkRows {
-    /// A landmark without rows yet, of at most so many observations.
-    pub(crate) fn begin(&mut self, anchor: usize, observations: usize) {
-        self.poses.clear();
-        self.poses.push(anchor);
+    /// A landmark without rows yet, with the blocks of its anchor, the block that all observations share, and room for so
+    /// many blocks of observers.
+    pub(crate) fn begin(&mut self, anchor: impl IntoIterator<Item = usize>, shared: Option<usize>, observers: usize) {
+        self.blocks.clear();
+        self.blocks.extend(anchor);
+        self.blocks.extend(shared);
+        self.common = self.blocks.len();
         self.entries.clear();
-        self.width = LANDMARK + POSE * observations.max(1) + 1;
+        self.width = LANDMARK + BLOCK * (self.common + observers) + 1;
         (self.used, self.added) = (0, 0);
     }
 
@@ -41,13 +48,10 @@ impl LandmarkRows {
         self.entries.len() / self.width
     }
 
-    /// Adds the two rows of an observation from a pose.
-    pub(crate) fn push(&mut self, pose: usize, term: &Reprojection) {
-        let anchor = self.poses[0];
-        if pose != anchor {
-            self.poses.push(pose);
-        }
-        let place = LANDMARK + POSE * (self.poses.len() - 1);
+    /// Adds the two rows of an observation.
+    pub(crate) fn push(&mut self, term: &BlockTerm<usize>) {
+        let observers = self.blocks.len();
+        self.blocks.extend(term.observer.iter().flatten().map(|(block, _)| *block));
         for axis in 0..2 {
             let begin = self.entries.len();
             self.entries.resize(begin + self.width, 0.0);
@@ -55,19 +59,27 @@ impl LandmarkRows {
             for k in 0..LANDMARK {
                 row[k] = term.by_landmark[(axis, k)];
             }
-            if pose != anchor {
-                for k in 0..POSE {
-                    row[LANDMARK + k] = term.by_anchor[(axis, k)];
-                    row[place + k] = term.by_observer[(axis, k)];
+            let mut write = |place: usize, by_block: &Matrix2x6<f64>| {
+                for k in 0..BLOCK {
+                    row[LANDMARK + BLOCK * place + k] = by_block[(axis, k)];
                 }
+            };
+            for (place, (_, by_block)) in term.anchor.iter().flatten().enumerate() {
+                write(place, by_block);
+            }
+            if let Some((_, by_block)) = &term.shared {
+                write(self.common - 1, by_block);
+            }
+            for (place, (_, by_block)) in (observers..).zip(term.observer.iter().flatten()) {
+                write(place, by_block);
             }
             row[self.width - 1] = term.residual[axis];
         }
     }
 
-    /// The pose of the newest observation; the anchor's before any other.
-    pub(crate) fn last_pose(&self) -> Option<usize> {
-        self.poses.last().copied()
+    /// The last block of the newest observation, `None` before any but the anchor's.
+    pub(crate) fn last_observer(&self) -> Option<usize> {
+        self.blocks[self.common..].last().copied()
     }
 
     /// Eliminates the landmark from all rows.
@@ -141,17 +153,17 @@ impl LandmarkRows {
         self.used..self.used + self.added
     }
 
-    /// Appends some rows, row-major, as `[poses from first on, 6 each | residual]`; `columns` counts those of all poses and
+    /// Appends some rows, row-major, as `[blocks from first on, 6 each | residual]`; `columns` counts those of all blocks and
     /// the residual.
     pub(crate) fn append_to(&self, rows: &mut Vec<f64>, columns: usize, first: usize, range: Range<usize>) {
-        let width = columns - POSE * first;
+        let width = columns - BLOCK * first;
         for row in self.entries.chunks_exact(self.width).skip(range.start).take(range.len()) {
             let begin = rows.len();
             rows.resize(begin + width, 0.0);
             let target = &mut rows[begin..];
-            for (pose, block) in self.poses.iter().zip(row[LANDMARK..].chunks_exact(POSE)) {
-                let place = POSE * (pose - first);
-                target[place..place + POSE].copy_from_slice(block);
+            for (number, block) in self.blocks.iter().zip(row[LANDMARK..].chunks_exact(BLOCK)) {
+                let place = BLOCK * (number - first);
+                target[place..place + BLOCK].copy_from_slice(block);
             }
             target[width - 1] = row[self.width - 1];
         }

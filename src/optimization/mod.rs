@@ -6,6 +6,7 @@
 //! landmarks by QR (`LandmarkRows`) or by the Schur complement (`ReprojectionEquations`), carries the result on to its
 //! unknowns, and hands itself to `damped::minimize`.
 
+mod block_term;
 pub(crate) mod damped;
 pub(crate) mod dense;
 mod landmark;
@@ -17,6 +18,7 @@ mod schur;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use block_term::{BlockTerm, PoseBlocksOf};
 pub(crate) use landmark::Landmark;
 pub use landmark::LandmarkModel;
 pub(crate) use landmark_rows::LandmarkRows;

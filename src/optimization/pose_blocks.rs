@@ -1,6 +1,6 @@
 use nalgebra::{DMatrix, DVector, Matrix6};
 
-use super::Reprojection;
+use super::BlockTerm;
 
 /// A symmetric matrix over camera poses, its upper 6 × 6 blocks stored row by row: `(0,0) (0,1) … (1,1) …`.
 #[derive(Clone, Debug)]
@@ -36,15 +36,19 @@ impl PoseBlocks {
         &mut self.blocks[index]
     }
 
-    /// Adds the `JᵀJ` of one observation by another camera than the anchor.
-    pub(crate) fn add(&mut self, anchor: usize, observer: usize, term: &Reprojection) {
-        *self.block_mut(observer, observer) += term.by_observer.tr_mul(&term.by_observer);
-        if anchor < observer {
-            *self.block_mut(anchor, observer) += term.by_anchor.tr_mul(&term.by_observer);
-        } else {
-            *self.block_mut(observer, anchor) += term.by_observer.tr_mul(&term.by_anchor);
+    /// Adds the `JᵀJ` of one observation.
+    pub(crate) fn add(&mut self, term: &BlockTerm<usize>) {
+        let mut blocks = term.blocks();
+        while let Some((block, by_block)) = blocks.next() {
+            *self.block_mut(*block, *block) += by_block.tr_mul(by_block);
+            for (other, by_other) in blocks.clone() {
+                if block <= other {
+                    *self.block_mut(*block, *other) += by_block.tr_mul(by_other);
+                } else {
+                    *self.block_mut(*other, *block) += by_other.tr_mul(by_block);
+                }
+            }
         }
-        *self.block_mut(anchor, anchor) += term.by_anchor.tr_mul(&term.by_anchor);
     }
 
     /// The diagonal of `CᵀAC` for the columns `C` that move the camera poses, one 6 × n matrix a pose.

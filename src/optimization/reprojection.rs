@@ -154,8 +154,13 @@ impl Reprojection {
     /// Divided by the standard deviation and multiplied by the root of the robust weight, so that `rᵀr` and `Jᵀr` are those
     /// of the reweighted problem.
     pub(crate) fn whitened(&self, sigma: f64, loss: RobustLoss) -> Self {
+        self.weighted(sigma, self.robust_weight(sigma, loss))
+    }
+
+    /// Robust weight of the residual.
+    pub(crate) fn robust_weight(&self, sigma: f64, loss: RobustLoss) -> f64 {
         let squared = self.residual.norm_squared() / (sigma * sigma);
-        self.weighted(sigma, loss.cost_and_weight(squared).1)
+        loss.cost_and_weight(squared).1
     }
 
     /// [`Self::whitened`] with a given robust weight.

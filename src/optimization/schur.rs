@@ -1,7 +1,8 @@
 //! Normal equations of reprojection residuals, the landmarks eliminated by their Schur complement.
 //!
 //! Six columns per camera pose hold whatever a camera observes, however many joints and parameters move it: the landmarks
-//! are eliminated there, and only the result is carried on to the states.
+//! are eliminated there, and only the result is carried on to the states. A rolling shutter has two poses per image
+//! ([`BlockTerm`]), and the intrinsics of the camera are one more block of six.
 //!
 //! ```text
 //! [ H_pp  H_pl ] [ δp ]     [ g_p ]        (H_pp − H_pl H_ll⁻¹ H_lp) δp = −(g_p − H_pl H_ll⁻¹ g_l)
@@ -14,7 +15,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
-use super::{PoseBlocks, Reprojection};
+use super::{BlockTerm, PoseBlocks, Reprojection};
 
 /// Hessian and gradient over camera poses; of the Hessian the blocks `(row, column)` with `row ≤ column`.
 pub(crate) trait PoseEquations: Clone {
@@ -125,34 +126,68 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         observations: usize,
         terms: impl Iterator<Item = (P::Pose, Reprojection)>,
     ) {
+        let terms = terms.map(|(pose, term)| BlockTerm::of_poses(anchor, pose, &term));
+        self.add_landmark_by_blocks([anchor, None], None, observations, terms);
+    }
+
+    /// [`Self::add_landmark`] by terms that may have several blocks: those of the anchor rise and come before those of the
+    /// observers, which rise as well; the shared one comes after all.
+    pub(crate) fn add_landmark_by_blocks(
+        &mut self,
+        anchor: [Option<P::Pose>; 2],
+        shared: Option<P::Pose>,
+        observations: usize,
+        terms: impl Iterator<Item = BlockTerm<P::Pose>>,
+    ) {
         let mut block = LandmarkBlock {
             hessian: Matrix3::zeros(),
             gradient: Vector3::zeros(),
             couplings: Vec::with_capacity(observations + 1),
         };
-        let mut anchor_hessian = Matrix6::zeros();
-        let mut anchor_gradient = Vector6::zeros();
-        let mut anchor_coupling = Matrix6x3::zeros();
-        for (pose, term) in terms {
+        // The anchor's blocks and the shared one have a part of nearly every term: summed here first.
+        let common = [anchor[0], anchor[1], shared];
+        let mut hessians = [[Matrix6::zeros(); 3]; 3];
+        let mut gradients = [Vector6::zeros(); 3];
+        let mut couplings = [Matrix6x3::zeros(); 3];
+        for term in terms {
             block.hessian += term.by_landmark.tr_mul(&term.by_landmark);
             block.gradient += term.by_landmark.tr_mul(&term.residual);
-            if anchor == Some(pose) {
-                continue;
+            let of_common = [&term.anchor[0], &term.anchor[1], &term.shared];
+            for (place, observed) in term.observer.iter().enumerate() {
+                let Some((pose, by_pose)) = observed else { continue };
+                for (other, by_other) in term.observer[place..].iter().flatten() {
+                    *self.poses.hessian_mut(*pose, *other) += by_pose.tr_mul(by_other);
+                }
+                *self.poses.gradient_mut(*pose) += by_pose.tr_mul(&term.residual);
+                block.couplings.push((*pose, by_pose.tr_mul(&term.by_landmark)));
+                for (anchor, by_anchor) in term.anchor.iter().flatten() {
+                    *self.poses.hessian_mut(*anchor, *pose) += by_anchor.tr_mul(by_pose);
+                }
+                if let Some((shared, by_shared)) = &term.shared {
+                    *self.poses.hessian_mut(*pose, *shared) += by_pose.tr_mul(by_shared);
+                }
             }
-            *self.poses.hessian_mut(pose, pose) += term.by_observer.tr_mul(&term.by_observer);
-            *self.poses.gradient_mut(pose) += term.by_observer.tr_mul(&term.residual);
-            block.couplings.push((pose, term.by_observer.tr_mul(&term.by_landmark)));
-            let Some(anchor) = anchor else { continue };
-            anchor_hessian += term.by_anchor.tr_mul(&term.by_anchor);
-            anchor_gradient += term.by_anchor.tr_mul(&term.residual);
-            anchor_coupling += term.by_anchor.tr_mul(&term.by_landmark);
-            *self.poses.hessian_mut(anchor, pose) += term.by_anchor.tr_mul(&term.by_observer);
+            for (row, left) in of_common.iter().enumerate() {
+                let Some((_, left)) = left else { continue };
+                gradients[row] += left.tr_mul(&term.residual);
+                couplings[row] += left.tr_mul(&term.by_landmark);
+                for (column, right) in of_common.iter().enumerate().skip(row) {
+                    let Some((_, right)) = right else { continue };
+                    hessians[row][column] += left.tr_mul(right);
+                }
+            }
         }
-        if let Some(anchor) = anchor {
-            *self.poses.hessian_mut(anchor, anchor) += anchor_hessian;
-            *self.poses.gradient_mut(anchor) += anchor_gradient;
-            block.couplings.insert(0, (anchor, anchor_coupling));
+        for (row, first) in common.iter().enumerate() {
+            let Some(first) = first else { continue };
+            *self.poses.gradient_mut(*first) += gradients[row];
+            for (column, second) in common.iter().enumerate().skip(row) {
+                let Some(second) = second else { continue };
+                *self.poses.hessian_mut(*first, *second) += hessians[row][column];
+            }
         }
+        let anchors = anchor.iter().enumerate().filter_map(|(row, anchor)| Some(((*anchor)?, couplings[row])));
+        block.couplings.splice(0..0, anchors);
+        block.couplings.extend(shared.map(|shared| (shared, couplings[2])));
         self.landmarks.push(block);
     }
 

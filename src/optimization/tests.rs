@@ -3,8 +3,8 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3, Vector6};
 use super::damped::{DampedOptions, DampedProblem, StopReason, minimize};
 use super::reprojection::{self, Projection, TangentPlane};
 use super::{
-    CameraPose, DensePoseEquations, Landmark, LandmarkRows, RelativePose, Reprojection, ReprojectionEquations,
-    RobustLoss,
+    BlockTerm, CameraPose, DensePoseEquations, Landmark, LandmarkRows, RelativePose, Reprojection,
+    ReprojectionEquations, RobustLoss,
 };
 use crate::camera::{self, CameraModel, Distortion};
 use crate::geometry::{RigidTransform, SplitMix64, so3};
@@ -146,9 +146,9 @@ fn elimination_by_qr_equals_the_schur_complement() {
         let columns = 6 * poses + 1;
         for apart in [false, true] {
             let mut local = LandmarkRows::default();
-            local.begin(0, poses);
+            local.begin([0], None, poses - 1);
             for (observer, term) in &terms {
-                local.push(*observer, term);
+                local.push(&BlockTerm::of_poses(Some(0), *observer, term));
             }
             if apart {
                 local.eliminate_last_apart();

@@ -1,0 +1,45 @@
+//! Derivatives of one observation by blocks of six unknowns: camera poses, and what all observations of a camera share.
+
+use nalgebra::{Matrix2x3, Matrix2x6, Vector2};
+
+use super::Reprojection;
+
+/// Residual of one observation with its derivatives by the landmark and by blocks of six unknowns named by `K`.
+///
+/// A global shutter has one block per camera pose; a rolling shutter has two, the poses of the first and of the last
+/// row. The intrinsics of a camera are one more block, which all its observations share.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BlockTerm<K> {
+    /// Predicted minus measured (2), whitened.
+    pub(crate) residual: Vector2<f64>,
+    /// By [`super::Landmark::plus`].
+    pub(crate) by_landmark: Matrix2x3<f64>,
+    /// By the blocks of the anchor's camera pose; none in the anchor's own observation.
+    pub(crate) anchor: PoseBlocksOf<K>,
+    /// By the blocks of the observing camera pose; none in the anchor's own observation.
+    pub(crate) observer: PoseBlocksOf<K>,
+    /// By the block that all observations share.
+    pub(crate) shared: Option<(K, Matrix2x6<f64>)>,
+}
+
+/// Derivatives by the blocks of one camera pose, at most two.
+pub(crate) type PoseBlocksOf<K> = [Option<(K, Matrix2x6<f64>)>; 2];
+
+impl<K: Copy + PartialEq> BlockTerm<K> {
+    /// A term with one block per camera pose; the anchor's own observation (`anchor` equals `pose`) has none.
+    pub(crate) fn of_poses(anchor: Option<K>, pose: K, term: &Reprojection) -> Self {
+        let apart = anchor != Some(pose);
+        Self {
+            residual: term.residual,
+            by_landmark: term.by_landmark,
+            anchor: [anchor.filter(|_| apart).map(|anchor| (anchor, term.by_anchor)), None],
+            observer: [apart.then_some((pose, term.by_observer)), None],
+            shared: None,
+        }
+    }
+
+    /// All blocks with their derivatives.
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = &(K, Matrix2x6<f64>)> + Clone {
+        self.anchor.iter().flatten().chain(&self.shared).chain(self.observer.iter().flatten())
+    }
+}
