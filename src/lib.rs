@@ -58,6 +58,7 @@
 //!         frame_index: frame.index,
 //!         stamp_ns: frame.stamp_ns,
 //!         imu: &frame.imu,
+//!         imu_after: &[],
 //!         joint_angles: frame.encoder_angles(encoder_sigma_rad).as_ref(),
 //!         tracks: &frame.tracks,
 //!         rigid_tracks: &[],

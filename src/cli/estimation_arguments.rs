@@ -12,8 +12,8 @@ use crate::cli::value_parsers::seconds;
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct EstimationArguments {
     /// A run over the log: NAME[:key=value,…], NAME one of auto, minimal, minimal-swapped, classical, poe, static,
-    /// cluster; keys encoder=on|off, calibrate=on|off, timeshift=on|off, first-estimates=on|off, window=N,
-    /// camera=KEY, name=LABEL. Up to four.
+    /// cluster; keys encoder=on|off, calibrate=on|off, timeshift=on|off, readout=on|off, intrinsics=on|off,
+    /// imu-intrinsics=on|off, first-estimates=on|off, window=N, camera=KEY, name=LABEL. Up to four.
     #[arg(long = "run", value_name = "SPEC")]
     pub runs: Vec<RunSpec>,
     /// The rig, when it is not beside the log (LOG with .rig.yaml) or attached to it.

@@ -4,7 +4,7 @@ use super::options::EstimatorOptions;
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, ClassicalChain, ParameterId, Parameterization};
-use crate::sensors::{CameraMount, CameraRig, ImuNoise, Rig, UnknownCamera};
+use crate::sensors::{CameraMount, CameraRig, ImuIntrinsics, ImuNoise, IntrinsicsSigma, Rig, UnknownCamera};
 
 /// Configuration of an estimator: sensors, given calibration, options.
 #[derive(Clone, Debug)]
@@ -32,6 +32,16 @@ pub struct EstimatorConfig {
     pub chain_prior: Option<(f64, f64)>,
     /// Whether the time offsets of cameras and encoders to the IMU are estimated, which requires `calibrate`.
     pub estimate_timeshift: bool,
+    /// Whether the readout times of the cameras' rolling shutters are estimated, which requires `calibrate`.
+    pub estimate_readout: bool,
+    /// Whether the intrinsics of the cameras are estimated, which requires `calibrate`.
+    pub estimate_intrinsics: bool,
+    /// Whether the intrinsics of the IMU are estimated, which requires `calibrate`.
+    pub estimate_imu_intrinsics: bool,
+    /// Intrinsics of the IMU in the rig; samples are already corrected by them.
+    pub imu_intrinsics: ImuIntrinsics,
+    /// Shutter of the main camera, and how well its intrinsics are known.
+    pub sensor: CameraSensorPrior,
     /// Given time offset of the main camera, in seconds (`t_imu = t_cam + shift`); stamps already include it.
     pub timeshift_s: f64,
     /// Rigid cameras beside the main one.
@@ -55,6 +65,30 @@ pub struct RigidCamera {
     pub prior: (f64, f64),
     /// Given time offset, in seconds.
     pub timeshift_s: f64,
+    /// Shutter, and how well the intrinsics are known.
+    pub sensor: CameraSensorPrior,
+}
+
+/// Shutter of a camera, and how well shutter and intrinsics are known.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CameraSensorPrior {
+    /// Time from the exposure of the first row to that of the last one, in seconds; zero for a global shutter.
+    pub readout_s: f64,
+    /// Its standard deviation, `None` when the rig does not state it.
+    pub readout_sigma_s: Option<f64>,
+    /// Standard deviations of the intrinsics, `None` when the rig does not state them.
+    pub intrinsics_sigma: Option<IntrinsicsSigma>,
+}
+
+impl CameraSensorPrior {
+    /// Shutter and intrinsics of a camera as the rig has them.
+    pub fn of_rig(camera: &CameraRig) -> Self {
+        Self {
+            readout_s: camera.readout_s,
+            readout_sigma_s: camera.readout_sigma_s,
+            intrinsics_sigma: camera.intrinsics_sigma,
+        }
+    }
 }
 
 /// Parameters and values of the six columns of a rigid camera by its number: rotation vector and translation of
@@ -83,6 +117,7 @@ impl RigidCamera {
             imu_from_camera: *imu_from_camera,
             prior: rig.extrinsics_prior(camera).sigmas(),
             timeshift_s: camera.timeshift_cam_imu_s,
+            sensor: CameraSensorPrior::of_rig(camera),
         })
     }
 }
@@ -111,6 +146,11 @@ impl EstimatorConfig {
             calibrate: true,
             chain_prior: Some(rig.extrinsics_prior(camera).sigmas()),
             estimate_timeshift: false,
+            estimate_readout: false,
+            estimate_intrinsics: false,
+            estimate_imu_intrinsics: false,
+            imu_intrinsics: rig.imu.intrinsics,
+            sensor: CameraSensorPrior::of_rig(camera),
             timeshift_s: camera.timeshift_cam_imu_s,
             rigid_cameras: Vec::new(),
             options: EstimatorOptions::default(),
@@ -121,6 +161,11 @@ impl EstimatorConfig {
     /// Model of a camera by its number, the main one first.
     pub(super) fn model(&self, camera: usize) -> &CameraModel {
         camera.checked_sub(1).map_or(&self.camera, |rigid| &self.rigid_cameras[rigid].model)
+    }
+
+    /// Shutter of a camera by its number, and how well its intrinsics are known.
+    pub(super) fn sensor(&self, camera: usize) -> CameraSensorPrior {
+        camera.checked_sub(1).map_or(self.sensor, |rigid| self.rigid_cameras[rigid].sensor)
     }
 
     /// Prior standard deviations of a camera's extrinsics, in metres and radians.

@@ -19,7 +19,7 @@ use crate::estimator::window::problem::{CameraFactors, Estimate, Problem};
 use crate::geometry::ns_from_seconds;
 use crate::gimbal::{ClassicalChain, Parameterization};
 use crate::optimization::{Landmark, LandmarkModel, RelativePose, RobustLoss};
-use crate::sensors::{ImuNoise, ImuSample, JointAngles};
+use crate::sensors::{ImuNoise, ImuSample, JointAngles, JointMotionFit};
 
 /// Knowledge of the poses in a hypothetical window.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,6 +157,7 @@ impl HypotheticalWindow {
                 sigmas_rad: vec![sigma_rad; hypothetical.joints_rad.len()],
                 lasting_sigmas_rad: vec![0.0; hypothetical.joints_rad.len()],
                 rates_rad_per_s: vec![0.0; hypothetical.joints_rad.len()],
+                motion_fits: vec![JointMotionFit::UNKNOWN; hypothetical.joints_rad.len()],
             }),
             JointKnowledge::Known | JointKnowledge::Unknown => None,
         };
@@ -166,6 +167,7 @@ impl HypotheticalWindow {
             state: FrameState {
                 navigation,
                 joints_rad: hypothetical.joints_rad.clone(),
+                joint_motion: Vec::new(),
                 rates: Arc::new(Rates::default()),
             },
             first_estimate: None,
@@ -179,7 +181,7 @@ impl HypotheticalWindow {
 
     /// Landmarks with exact pixels; where they do not project they are not observed.
     fn tracks(&self, states: &[FrameState], calibration: &Calibration) -> (Vec<Track>, Vec<Landmark>) {
-        let cameras = camera_pose::by_slot(states, calibration);
+        let cameras: Vec<_> = states.iter().map(|state| camera_pose::at(state, calibration)).collect();
         let mut tracks = Vec::with_capacity(self.landmarks.len());
         let mut landmarks = Vec::with_capacity(self.landmarks.len());
         for hypothetical in &self.landmarks {

@@ -45,18 +45,17 @@ impl Estimator {
 
     /// Fixes a parameter at its present value from the next solve on.
     pub fn freeze(&mut self, parameter: ParameterId) -> Result<(), InterventionError> {
-        let (camera, index) = self.free_column(parameter)?;
-        self.calibration_mut().of_mut(camera).freeze(index);
+        let column = self.free_column(parameter)?;
+        self.calibration_mut().freeze(column);
         Ok(())
     }
 
     /// Sets a parameter to another value; window and priors stay and pull it back.
     pub fn set_value(&mut self, parameter: ParameterId, value: f64) -> Result<(), InterventionError> {
-        let (camera, index) = self.free_column(parameter)?;
+        let column = self.free_column(parameter)?;
         let calibration = self.calibration_mut();
         let mut step = DVector::zeros(calibration.dof());
-        let before = calibration.of(camera).values()[index];
-        step[calibration.columns(camera).start + index] = value - before;
+        step[column] = value - calibration.values()[column];
         *calibration = calibration.stepped(step.as_slice());
         Ok(())
     }
@@ -83,22 +82,14 @@ impl Estimator {
         }
     }
 
-    /// Camera and column of an estimated parameter.
-    fn free_column(&self, parameter: ParameterId) -> Result<(usize, usize), InterventionError> {
+    /// Column of an estimated parameter.
+    fn free_column(&self, parameter: ParameterId) -> Result<usize, InterventionError> {
         let known = self.calibration().parameters();
-        let Some(mut index) = known.iter().position(|known| *known == parameter) else {
-            return Err(InterventionError::UnknownParameter(parameter));
-        };
+        let column = known.iter().position(|known| *known == parameter);
+        let column = column.ok_or(InterventionError::UnknownParameter(parameter))?;
         if self.calibration().dof() == 0 {
             return Err(InterventionError::FixedCalibration);
         }
-        for camera in 0..self.calibration().cameras() {
-            let columns = self.calibration().of(camera).parameters().len();
-            if index < columns {
-                return Ok((camera, index));
-            }
-            index -= columns;
-        }
-        Err(InterventionError::UnknownParameter(parameter))
+        Ok(column)
     }
 }

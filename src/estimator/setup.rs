@@ -3,11 +3,16 @@
 use nalgebra::Vector3;
 
 use super::config::{EstimatorConfig, rigid_chain};
-use super::state::calibration::{Calibration, FreeClocks, GivenSigmas};
+use super::state::calibration::{Calibration, GivenSigmas};
 use super::state::calibrations::{Calibrations, MAIN};
+use super::state::imu_calibration::ImuCalibration;
+use super::state::motion_profile::MotionProfile;
+use super::state::navigation::ImuBias;
+use super::state::sensor_columns::SensorColumn;
 use super::step_input::StepInput;
+use super::window::joints::measured_joint_motion;
 use crate::gimbal::Parameterization;
-use crate::sensors::{ImuNoise, JointAngles};
+use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 
 /// Gravity in the world frame, whose z axis points up: `(0, 0, −g)` in m/s².
 pub fn gravity_in_world(gravity_m_per_s2: f64) -> Vector3<f64> {
@@ -51,19 +56,60 @@ impl Setup {
         };
         let encoders = config.encoder_in_use().is_some();
         let main = Calibration::new(&config.chain, config.parameterization, given(MAIN), config.calibrate, encoders);
-        let clocks = |encoders: bool| match (config.estimate_timeshift, encoders) {
-            (false, _) => FreeClocks::None,
-            (true, false) => FreeClocks::Camera,
-            (true, true) => FreeClocks::CameraAndEncoders,
-        };
         let has_readings = main.joint_count() > 0 && encoders;
-        let main = main.with_clocks(clocks(has_readings), config.timeshift_s);
+        let main = self.with_sensors(main, MAIN, config.timeshift_s, has_readings);
         let rigid = config.rigid_cameras.iter().enumerate().map(|(index, camera)| {
             let mount = rigid_chain(&camera.imu_from_camera);
-            Calibration::new(&mount, Parameterization::Minimal, given(index + 1), config.calibrate, false)
-                .with_clocks(clocks(false), camera.timeshift_s)
+            let rigid = Calibration::new(&mount, Parameterization::Minimal, given(index + 1), config.calibrate, false);
+            self.with_sensors(rigid, index + 1, camera.timeshift_s, false)
         });
-        Calibrations::new(main, rigid)
+        let estimated = config.calibrate && config.estimate_imu_intrinsics;
+        Calibrations::new(main, rigid).with_imu(estimated.then(|| ImuCalibration::new(config.imu_intrinsics)))
+    }
+
+    /// Adds the estimated clocks, shutter and intrinsics of a camera.
+    fn with_sensors(&self, calibration: Calibration, camera: usize, timeshift_s: f64, encoders: bool) -> Calibration {
+        let config = &self.config;
+        let sensor = config.sensor(camera);
+        let mut columns = Vec::new();
+        if config.estimate_timeshift {
+            columns.push(SensorColumn::camera_clock(timeshift_s));
+            columns.extend(encoders.then_some(SensorColumn::ENCODER_CLOCK));
+        }
+        if config.estimate_readout {
+            columns.push(SensorColumn::readout(sensor.readout_s, sensor.readout_sigma_s));
+        }
+        if config.estimate_intrinsics {
+            columns.extend(SensorColumn::intrinsics(config.model(camera), sensor.intrinsics_sigma));
+        }
+        calibration.with_sensors(columns).with_given_readout(sensor.readout_s)
+    }
+
+    /// Whether some camera has a rolling shutter: camera poses then depend on the motion after the stamp.
+    pub(crate) fn has_moving_rows(&self) -> bool {
+        let config = &self.config;
+        let given = |camera: usize| config.sensor(camera).readout_s != 0.0;
+        (config.estimate_readout && config.calibrate) || (0..=config.rigid_cameras.len()).any(given)
+    }
+
+    /// Motion of the vehicle after a stamp, where camera poses depend on it: from the samples up to the stamp and those
+    /// from it on.
+    pub(crate) fn motion_profile(
+        &self,
+        before: &[ImuSample],
+        after: &[ImuSample],
+        bias: ImuBias,
+    ) -> Option<MotionProfile> {
+        let samples = if after.is_empty() { &before[before.len().saturating_sub(1)..] } else { after };
+        let profile = || MotionProfile::new(samples, bias, self.gravity_in_world);
+        self.has_moving_rows()
+            .then(|| profile().unwrap_or_else(|| MotionProfile::stationary(bias, self.gravity_in_world)))
+    }
+
+    /// Joint rates and joint accelerations at which the solver starts, where camera poses depend on them.
+    pub(crate) fn initial_joint_motion(&self, encoder: Option<&JointAngles>, joints: usize) -> Vec<f64> {
+        let count = if self.has_moving_rows() { 2 * joints } else { 0 };
+        (0..count).map(|place| measured_joint_motion(encoder, place, joints).0).collect()
     }
 
     /// Encoder angles of the joints, `None` where they are unused or unusable.

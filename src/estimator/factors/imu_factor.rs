@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::preintegration::Preintegration;
+use crate::estimator::state::imu_errors::ImuErrors;
 use crate::estimator::state::navigation::{Matrix15, NavigationState, Vector15};
 use crate::geometry::so3;
 
@@ -14,7 +15,18 @@ pub fn residual(
     to: &NavigationState,
     gravity_in_world: &Vector3<f64>,
 ) -> Vector15 {
-    let motion = preintegration.corrected(&from.bias);
+    residual_with(preintegration, from, to, gravity_in_world, None)
+}
+
+/// [`residual`] with intrinsics of the IMU.
+pub(crate) fn residual_with(
+    preintegration: &Preintegration,
+    from: &NavigationState,
+    to: &NavigationState,
+    gravity_in_world: &Vector3<f64>,
+    errors: Option<&ImuErrors>,
+) -> Vector15 {
+    let motion = preintegration.shifted(&preintegration.shift(&from.bias, errors));
     let t = preintegration.duration_s();
     let back = from.world_from_imu.rotation.inverse();
     let relative_rotation = back * to.world_from_imu.rotation;
@@ -40,10 +52,22 @@ pub fn jacobians(
     to: &NavigationState,
     gravity_in_world: &Vector3<f64>,
 ) -> (Matrix15, Matrix15) {
+    let (by_from, by_to, _) = jacobians_with(preintegration, from, to, gravity_in_world, None);
+    (by_from, by_to)
+}
+
+/// [`jacobians`] with intrinsics of the IMU; the third matrix is by these (15 × 15, zero without any).
+pub(crate) fn jacobians_with(
+    preintegration: &Preintegration,
+    from: &NavigationState,
+    to: &NavigationState,
+    gravity_in_world: &Vector3<f64>,
+    errors: Option<&ImuErrors>,
+) -> (Matrix15, Matrix15, Matrix15) {
     let t = preintegration.duration_s();
     let by_bias = preintegration.bias_jacobian();
-    let change = preintegration.bias_change(&from.bias);
-    let motion = preintegration.corrected(&from.bias);
+    let total_shift = preintegration.shift(&from.bias, errors);
+    let motion = preintegration.shifted(&total_shift);
     let back_rotation = from.world_from_imu.rotation.inverse();
     let back: Matrix3<f64> = back_rotation.to_rotation_matrix().into_inner();
     let relative_rotation = back_rotation * to.world_from_imu.rotation;
@@ -58,10 +82,10 @@ pub fn jacobians(
     let identity = Matrix3::<f64>::identity();
 
     // The bias correction rotates by Exp(J δb): its derivative passes through the rotation error.
-    let correction = (by_bias.fixed_view::<3, 6>(0, 0) * change).fixed_rows::<3>(0).into_owned();
+    let correction = total_shift.fixed_rows::<3>(0).into_owned();
     let error_back: Matrix3<f64> = so3::exp(&-rotation_error).to_rotation_matrix().into_inner();
-    let phi_by_bias =
-        -(error_inverse * error_back * so3::right_jacobian(&correction)) * by_bias.fixed_view::<3, 6>(0, 0);
+    let phi_by_correction = -(error_inverse * error_back * so3::right_jacobian(&correction));
+    let phi_by_bias = phi_by_correction * by_bias.fixed_view::<3, 6>(0, 0);
 
     let mut by_from = Matrix15::zeros();
     by_from.fixed_view_mut::<3, 3>(0, 0).copy_from(&-(error_inverse * relative_rotation_transpose));
@@ -82,5 +106,12 @@ pub fn jacobians(
     by_to.fixed_view_mut::<3, 3>(6, 6).copy_from(&back);
     by_to.fixed_view_mut::<3, 3>(9, 9).copy_from(&identity);
     by_to.fixed_view_mut::<3, 3>(12, 12).copy_from(&identity);
-    (by_from, by_to)
+
+    let mut by_intrinsics = Matrix15::zeros();
+    if errors.is_some() {
+        let increment = preintegration.intrinsics_jacobian();
+        by_intrinsics.fixed_rows_mut::<3>(0).copy_from(&(phi_by_correction * increment.fixed_rows::<3>(0)));
+        by_intrinsics.fixed_rows_mut::<6>(3).copy_from(&-increment.fixed_rows::<6>(3));
+    }
+    (by_from, by_to, by_intrinsics)
 }

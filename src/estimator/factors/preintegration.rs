@@ -7,12 +7,24 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
+use crate::estimator::state::imu_errors::{self, ImuErrors};
+
 pub use crate::estimator::state::navigation::{ImuBias, Matrix15, NavigationState, Vector15};
 use crate::geometry::{RigidTransform, seconds_from_ns, so3};
 use crate::sensors::{ImuNoise, ImuSample};
 
 /// Derivative of `[φ, p, v]` with respect to `[b_g, b_a]` (9 × 6).
 pub type BiasJacobian = SMatrix<f64, 9, 6>;
+
+/// Derivative of `[φ, p, v]` with respect to the IMU intrinsics (9 × 15), in the order of [`ImuErrors`].
+pub(crate) type IntrinsicsJacobian = SMatrix<f64, 9, 15>;
+
+/// Intrinsics of an interval's integration, and what a change of them changes.
+#[derive(Clone, Debug)]
+struct IntegratedIntrinsics {
+    errors: ImuErrors,
+    jacobian: IntrinsicsJacobian,
+}
 
 /// Motion of the IMU over an interval in its frame at the start, without gravity and initial velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +92,8 @@ pub struct Preintegration {
     duration_s: f64,
     increment: MotionIncrement,
     bias_jacobian: BiasJacobian,
+    /// `None` where the samples are taken as they are.
+    intrinsics: Option<Box<IntegratedIntrinsics>>,
     covariance: Matrix15,
     repeats: Repeats,
     saturated: usize,
@@ -99,10 +113,18 @@ impl Preintegration {
                 velocity_m_per_s: Vector3::zeros(),
             },
             bias_jacobian: BiasJacobian::zeros(),
+            intrinsics: None,
             covariance: Matrix15::zeros(),
             repeats: Repeats::default(),
             saturated: 0,
         }
+    }
+
+    /// [`Self::new`] with samples that are corrected by intrinsics, if there are any.
+    pub(crate) fn with_intrinsics(noise: ImuNoise, bias: ImuBias, errors: Option<ImuErrors>) -> Self {
+        let intrinsics =
+            errors.map(|errors| Box::new(IntegratedIntrinsics { errors, jacobian: IntrinsicsJacobian::zeros() }));
+        Self { intrinsics, ..Self::new(noise, bias) }
     }
 
     /// Integrates the samples of one interval, both ends included.
@@ -131,8 +153,15 @@ impl Preintegration {
 
     /// Reintegrates the samples with another bias.
     pub fn reintegrate(&mut self, bias: ImuBias) {
+        let errors = self.intrinsics.as_ref().map(|intrinsics| intrinsics.errors);
+        self.reintegrate_with(bias, errors);
+    }
+
+    /// Reintegrates the samples with another bias and other intrinsics.
+    pub(crate) fn reintegrate_with(&mut self, bias: ImuBias, errors: Option<ImuErrors>) {
         let samples = std::mem::take(&mut self.samples);
-        *self = Self::from_samples(self.noise, bias, &samples);
+        *self = Self::with_intrinsics(self.noise, bias, errors);
+        self.extend(&samples);
     }
 
     /// The samples.
@@ -170,10 +199,32 @@ impl Preintegration {
         &self.covariance
     }
 
+    /// Derivative of the increment's `[φ, p, v]` with respect to the intrinsics (9 × 15), zero without any.
+    pub(crate) fn intrinsics_jacobian(&self) -> IntrinsicsJacobian {
+        self.intrinsics.as_ref().map_or_else(IntrinsicsJacobian::zeros, |intrinsics| intrinsics.jacobian)
+    }
+
+    /// Change of the intrinsics from those of the integration; `None` without any in the integration or now.
+    pub(crate) fn intrinsics_change(&self, errors: Option<&ImuErrors>) -> Option<ImuErrors> {
+        Some(errors? - self.intrinsics.as_ref()?.errors)
+    }
+
     /// Motion at another bias, to first order in the change.
     pub fn corrected(&self, bias: &ImuBias) -> MotionIncrement {
-        let change = self.bias_change(bias);
-        let shift: SVector<f64, 9> = self.bias_jacobian * change;
+        self.shifted(&self.shift(bias, None))
+    }
+
+    /// Change of `[φ, p, v]` (9 × 1) by a change of bias and intrinsics, to first order.
+    pub(crate) fn shift(&self, bias: &ImuBias, errors: Option<&ImuErrors>) -> SVector<f64, 9> {
+        let shift: SVector<f64, 9> = self.bias_jacobian * self.bias_change(bias);
+        match self.intrinsics_change(errors) {
+            Some(change) => shift + self.intrinsics_jacobian() * change,
+            None => shift,
+        }
+    }
+
+    /// The increment with a change of `[φ, p, v]`.
+    pub(crate) fn shifted(&self, shift: &SVector<f64, 9>) -> MotionIncrement {
         MotionIncrement {
             rotation: self.increment.rotation * so3::exp(&shift.fixed_rows::<3>(0).into_owned()),
             position_m: self.increment.position_m + shift.fixed_rows::<3>(3),
@@ -230,10 +281,15 @@ impl Preintegration {
             self.noise.accelerometer_noise_density,
         );
         self.saturated += usize::from(gyroscope_saturated || force_saturated);
-        let w0 = from.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
-        let w1 = to.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
-        let a0 = from.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
-        let a1 = to.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
+        let corrected = self
+            .intrinsics
+            .as_ref()
+            .map(|it| (imu_errors::corrected(&it.errors, from), imu_errors::corrected(&it.errors, to)));
+        let (from_corrected, to_corrected) = corrected.as_ref().map_or((from, to), |(from, to)| (from, to));
+        let w0 = from_corrected.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
+        let w1 = to_corrected.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
+        let a0 = from_corrected.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
+        let a1 = to_corrected.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
         let a_half = (a0 + a1) * 0.5;
 
         // Rotations over the first half and over the whole, second Magnus term included.
@@ -273,6 +329,20 @@ impl Preintegration {
             [&phi_by_w, &dp_by_w, &dv_by_w],
             [&dp_by_a, &dv_by_a],
         );
+
+        if let Some(intrinsics) = &mut self.intrinsics {
+            // Both ends change by nearly the same: their mean counts for the whole interval.
+            let [first, second] = [from, to].map(|sample| imu_errors::derivatives(&intrinsics.errors, sample));
+            let (rates, forces) = ((first.0 + second.0) * 0.5, (first.1 + second.1) * 0.5);
+            let j = &mut intrinsics.jacobian;
+            let phi: SMatrix<f64, 3, 15> = j.fixed_rows::<3>(0).into_owned();
+            let velocity: SMatrix<f64, 3, 15> = j.fixed_rows::<3>(6).into_owned();
+            let mut position = j.fixed_rows_mut::<3>(3);
+            position += velocity * h + dp_by_phi * phi + dp_by_w * rates + dp_by_a * forces;
+            let mut velocity = j.fixed_rows_mut::<3>(6);
+            velocity += dv_by_phi * phi + dv_by_w * rates + dv_by_a * forces;
+            j.fixed_rows_mut::<3>(0).copy_from(&(step_rotation_transpose * phi + phi_by_w * rates));
+        }
 
         let mut transition = Matrix15::identity();
         transition.fixed_view_mut::<3, 3>(0, 0).copy_from(&step_rotation_transpose);

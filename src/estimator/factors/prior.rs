@@ -95,6 +95,20 @@ impl Prior {
         }
     }
 
+    /// Renumbers the columns for a layout with more columns: of joint motion within each frame, and of the calibration,
+    /// where `places` has the new place of each old column.
+    pub(crate) fn move_columns(&mut self, old: &Layout, new: &Layout, places: &[usize]) {
+        let added = new.joint_motion - old.joint_motion;
+        let before_motion = POSE + old.joints;
+        for column in &mut self.columns {
+            match column {
+                PriorColumn::Frame { offset, .. } if *offset >= before_motion => *offset += added,
+                PriorColumn::Frame { .. } => {}
+                PriorColumn::Calibration(place) => *place = places[*place],
+            }
+        }
+    }
+
     /// Whether the prior has columns of the frame at `slot`.
     pub(crate) fn holds_frame(&self, slot: usize) -> bool {
         self.columns
@@ -214,7 +228,7 @@ impl StartPrior {
 
     /// Whitened rows on the first frame's block `[pose | joints | velocity and biases]` and their residuals.
     pub(crate) fn rows(&self, state: &FrameState) -> (DMatrix<f64>, DVector<f64>) {
-        let joints = state.joints_rad.len();
+        let joints = state.joint_block();
         let mut jacobian = DMatrix::zeros(Self::LEN, 15 + joints);
         let mut residual = DVector::zeros(Self::LEN);
         let pose = &state.navigation.world_from_imu;

@@ -1,25 +1,26 @@
-//! Reprojection factors as rows over the camera poses with every landmark projected out orthogonally: without
+//! Reprojection factors as rows over the blocks of a camera (its poses, and its intrinsics) with every landmark projected out orthogonally: without
 //! normal equations, unobservable directions stay exactly unobservable.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimator::factors::visual::{Track, VisualModel, whitened};
-use crate::optimization::{CameraPose, Landmark, LandmarkRows, PoseBlocks, RelativePoses, dense};
+use crate::estimator::factors::visual::{Anchor, Track, VisualModel, whitened};
+use crate::estimator::state::camera_view::CameraView;
+use crate::optimization::{Landmark, LandmarkRows, PoseBlocks, dense};
 
 /// Columns of a landmark.
 const LANDMARK: usize = 3;
-/// Columns of a camera pose.
-const POSE: usize = 6;
+/// Columns of a block of the camera: a pose, or its intrinsics.
+const BLOCK: usize = 6;
 
 /// The whitened rows of some tracks.
 #[derive(Clone, Debug)]
 pub(crate) struct ProjectedRows {
-    /// `[camera poses 6·frames | residual]`, compressed to its upper echelon factor.
+    /// `[blocks of the camera, 6 each | residual]`, compressed to its upper echelon factor.
     pub(crate) rows: DMatrix<f64>,
     /// Rows of the newest frame's observations, conditioned on the landmarks' posterior from all other
     /// observations, in the same columns. They are included in `rows`.
     pub(crate) newest_rows: DMatrix<f64>,
-    /// `JᵀJ` of the camera poses before the landmarks were projected out.
+    /// `JᵀJ` of the blocks before the landmarks were projected out.
     blocks: PoseBlocks,
 }
 
@@ -27,51 +28,52 @@ impl ProjectedRows {
     /// Linearizes at `current`, with the derivatives by poses taken at `linearized`.
     pub(crate) fn new(
         model: &VisualModel<'_>,
-        current: &[CameraPose],
-        linearized: &[CameraPose],
+        current: &CameraView<'_>,
+        linearized: &CameraView<'_>,
         tracks: &[Track],
         landmarks: &[Landmark],
         apart: NewestRows,
     ) -> Self {
-        let frames = current.len();
+        let (frames, per_frame) = (current.frames(), current.blocks_per_frame());
         let newest = frames.saturating_sub(1);
-        let relative = RelativePoses::new(current);
-        let relative_linearized = RelativePoses::new(linearized);
-        let mut blocks = PoseBlocks::new(frames);
-        let columns = POSE * frames + 1;
-        // Grouped by the first observing slot, from its columns on.
-        let mut rows: Vec<Vec<f64>> =
-            (0..frames).map(|slot| Vec::with_capacity(height_of(tracks, slot) * (columns - POSE * slot))).collect();
+        let mut blocks = PoseBlocks::new(current.blocks());
+        let columns = BLOCK * current.blocks() + 1;
+        // Grouped by the first block of the first observing slot, from its columns on.
+        let capacity = |block: usize| {
+            let starts = block % per_frame == 0 && block / per_frame < frames;
+            if starts { height_of(tracks, block / per_frame) * (columns - BLOCK * block) } else { 0 }
+        };
+        let mut rows: Vec<Vec<f64>> = (0..current.blocks()).map(|block| Vec::with_capacity(capacity(block))).collect();
         let mut newest_rows = Vec::new();
         let mut local = LandmarkRows::default();
         for (track, landmark) in tracks.iter().zip(landmarks) {
-            let Some(anchor) = track.observations.first().map(|first| first.slot) else { continue };
-            local.begin(anchor, track.observations.len());
+            let Some(first) = track.observations.first() else { continue };
+            let anchor = Anchor::new(current, linearized, first);
+            let observers = per_frame * (track.observations.len() - 1);
+            local.begin(current.blocks_of(first.slot).into_iter().flatten(), current.intrinsics_block(), observers);
             for observation in &track.observations {
-                let term = whitened(model, &relative, &relative_linearized, anchor, landmark, observation, None);
-                let Some(term) = term else { continue };
-                if observation.slot != anchor {
-                    blocks.add(anchor, observation.slot, &term);
-                }
-                local.push(observation.slot, &term);
+                let Some(term) = whitened(model, &anchor, landmark, observation, None) else { continue };
+                blocks.add(&term);
+                local.push(&term);
             }
-            let seen_last = anchor != newest && local.last_pose() == Some(newest);
+            let seen_last =
+                first.slot != newest && local.last_observer().map(|block| block / per_frame) == Some(newest);
             if apart == NewestRows::Apart && seen_last {
                 local.eliminate_last_apart();
                 local.append_to(&mut newest_rows, columns, 0, local.added_by_last());
             } else {
                 local.eliminate();
             }
-            let first = first_slot(track).unwrap_or(anchor);
+            let first = per_frame * first_slot(track).unwrap_or(first.slot);
             local.append_to(&mut rows[first], columns, first, local.remaining());
         }
-        // Without a row of the residual alone, which no camera pose can change.
-        let rows = dense::triangularize_groups(&rows, POSE, columns);
+        // Without a row of the residual alone, which no unknown can change.
+        let rows = dense::triangularize_groups(&rows, BLOCK, columns);
         let newest_rows = DMatrix::from_row_slice(newest_rows.len() / columns, columns, &newest_rows);
         Self { rows, newest_rows, blocks }
     }
 
-    /// Squared norms of the columns that move the cameras by `columns` (per slot 6 × n), before the projection.
+    /// Squared norms of the columns that change the blocks by `columns` (6 × n each), before the projection.
     pub(crate) fn squared_column_norms(&self, columns: &[DMatrix<f64>]) -> DVector<f64> {
         self.blocks.squared_norms(columns)
     }

@@ -4,9 +4,10 @@ use nalgebra::Vector2;
 
 use crate::camera::CameraModel;
 use crate::estimator::options::EstimatorOptions;
+use crate::estimator::state::camera_view::{CameraView, RelativeTo};
 use crate::optimization::{
-    CameraPose, DensePoseEquations, Landmark, LandmarkModel, ReducedEquations, RelativePoses, Reprojection,
-    ReprojectionEquations, RobustLoss, reprojection,
+    BlockTerm, DensePoseEquations, Landmark, LandmarkModel, ReducedEquations, Reprojection, ReprojectionEquations,
+    RobustLoss, reprojection,
 };
 
 /// An observation of a feature: slot of the frame and pixel.
@@ -25,9 +26,10 @@ pub(crate) struct Track {
     pub(crate) observations: Vec<TrackObservation>,
 }
 
-/// Camera model, pixel noise and robust loss.
+/// Camera model of the rig, pixel noise and robust loss.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct VisualModel<'a> {
+    /// The model of the rig; a [`CameraView`] has the one with estimated intrinsics.
     pub(crate) camera: &'a CameraModel,
     pub(crate) sigma_px: f64,
     pub(crate) loss: RobustLoss,
@@ -48,33 +50,32 @@ impl<'a> VisualModel<'a> {
 /// Reprojection residual of one observation in pixels (2 × 1), `None` when the landmark does not project into
 /// the camera.
 pub(crate) fn observation_residual_px(
-    model: &VisualModel<'_>,
-    relative: &RelativePoses,
-    anchor: usize,
+    view: &CameraView<'_>,
+    anchor: &RelativeTo<'_>,
     landmark: &Landmark,
     observation: &TrackObservation,
 ) -> Option<Vector2<f64>> {
-    reprojection::residual(model.camera, relative.get(anchor, observation.slot), landmark, &observation.uv_px)
+    reprojection::residual(view.model(), &anchor.get(observation), landmark, &observation.uv_px)
 }
 
 /// Robust cost (half the sum of losses) of all reprojection factors.
-pub(crate) fn cost(model: &VisualModel<'_>, cameras: &[CameraPose], tracks: &[Track], landmarks: &[Landmark]) -> f64 {
-    let relative = RelativePoses::new(cameras);
+pub(crate) fn cost(model: &VisualModel<'_>, view: &CameraView<'_>, tracks: &[Track], landmarks: &[Landmark]) -> f64 {
     let mut total = 0.0;
     for (track, landmark) in tracks.iter().zip(landmarks) {
-        let Some(anchor) = track.observations.first().map(|first| first.slot) else { continue };
+        let Some(first) = track.observations.first() else { continue };
+        let anchor = view.relative_to(first);
         for observation in &track.observations {
-            if observation.slot == anchor && !model.measures_in_anchor() {
+            if observation.slot == first.slot && !model.measures_in_anchor() {
                 continue;
             }
-            let residual = observation_residual_px(model, &relative, anchor, landmark, observation);
+            let residual = observation_residual_px(view, &anchor, landmark, observation);
             total += 0.5 * model.loss.cost_of(residual, model.sigma_px);
         }
     }
     total
 }
 
-/// Normal equations of the reprojection factors of one camera; poses are slots of the window.
+/// Normal equations of the reprojection factors of one camera over the blocks of its [`CameraView`].
 pub(crate) type VisualEquations = ReprojectionEquations<DensePoseEquations>;
 
 /// [`VisualEquations`] with the landmarks eliminated.
@@ -83,57 +84,86 @@ pub(crate) type ReducedVisualEquations = ReducedEquations<DensePoseEquations>;
 /// Linearizes all observations at `current`, with the derivatives by poses taken at `linearized`.
 pub(crate) fn equations(
     model: &VisualModel<'_>,
-    current: &[CameraPose],
-    linearized: &[CameraPose],
+    current: &CameraView<'_>,
+    linearized: &CameraView<'_>,
     tracks: &[Track],
     landmarks: &[Landmark],
 ) -> VisualEquations {
-    let relative = RelativePoses::new(current);
-    let linearized = RelativePoses::new(linearized);
-    let mut equations = ReprojectionEquations::new(DensePoseEquations::new(current.len()), tracks.len());
+    let mut equations = ReprojectionEquations::new(DensePoseEquations::new(current.blocks()), tracks.len());
     for (track, landmark) in tracks.iter().zip(landmarks) {
         // Observations come in the order of the slots and the anchor is the first of them.
-        let anchor = track.observations.first().map(|first| first.slot);
-        let terms = track.observations.iter().filter_map(|observation| {
-            let term = whitened(model, &relative, &linearized, anchor?, landmark, observation, None)?;
-            Some((observation.slot, term))
-        });
-        equations.add_landmark(anchor, track.observations.len(), terms);
+        let anchor = track.observations.first().map(|first| Anchor::new(current, linearized, first));
+        let blocks = anchor.as_ref().map_or([None; 2], |anchor| current.blocks_of(anchor.observation.slot));
+        let terms = track
+            .observations
+            .iter()
+            .filter_map(|observation| whitened(model, anchor.as_ref()?, landmark, observation, None));
+        let observations = track.observations.len() * current.blocks_per_frame();
+        equations.add_landmark_by_blocks(blocks, current.intrinsics_block(), observations, terms);
     }
     equations
 }
 
-/// Linearizes one observation, divided by sigma and multiplied by the root of its robust weight: that of its
-/// residual, unless given.
+/// The anchor of a track at the current estimate and at the linearization point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Anchor<'a> {
+    current: &'a CameraView<'a>,
+    linearized: &'a CameraView<'a>,
+    observation: &'a TrackObservation,
+    to_current: RelativeTo<'a>,
+    to_linearized: RelativeTo<'a>,
+}
+
+impl<'a> Anchor<'a> {
+    pub(crate) fn new(
+        current: &'a CameraView<'a>,
+        linearized: &'a CameraView<'a>,
+        observation: &'a TrackObservation,
+    ) -> Self {
+        let (to_current, to_linearized) = (current.relative_to(observation), linearized.relative_to(observation));
+        Self { current, linearized, observation, to_current, to_linearized }
+    }
+}
+
+/// Linearizes one observation by the blocks of the camera, divided by sigma and multiplied by the root of its robust
+/// weight: that of its residual, unless given.
 pub(crate) fn whitened(
     model: &VisualModel<'_>,
-    relative: &RelativePoses,
-    linearized: &RelativePoses,
-    anchor: usize,
+    anchor: &Anchor<'_>,
     landmark: &Landmark,
     observation: &TrackObservation,
     known_weight: Option<f64>,
-) -> Option<Reprojection> {
-    let term = if observation.slot == anchor {
+) -> Option<BlockTerm<usize>> {
+    let camera = anchor.current.model();
+    let in_anchor = observation.slot == anchor.observation.slot;
+    let relative = anchor.to_current.get(observation);
+    let term = if in_anchor {
         if !model.measures_in_anchor() {
             return None;
         }
-        reprojection::linearize_in_anchor(model.camera, landmark, &observation.uv_px)?
+        reprojection::linearize_in_anchor(camera, landmark, &observation.uv_px)?
     } else {
-        reprojection::linearize(
-            model.camera,
-            relative.get(anchor, observation.slot),
-            linearized.get(anchor, observation.slot),
-            landmark,
-            &observation.uv_px,
-        )?
+        let linearized = anchor.to_linearized.get(observation);
+        reprojection::linearize(camera, &relative, &linearized, landmark, &observation.uv_px)?
     };
-    let mut term = match known_weight {
-        Some(weight) => term.weighted(model.sigma_px, weight),
-        None => term.whitened(model.sigma_px, model.loss),
-    };
+    let weight = known_weight.unwrap_or_else(|| term.robust_weight(model.sigma_px, model.loss));
+    let mut term: Reprojection = term.weighted(model.sigma_px, weight);
     if !model.measures_in_anchor() {
         term.by_landmark.fixed_view_mut::<2, 2>(0, 0).fill(0.0);
     }
-    Some(term)
+    let shared = match anchor.current.intrinsics_block() {
+        None => None,
+        Some(block) => {
+            let direction = if in_anchor { landmark.bearing } else { relative.direction(landmark) };
+            let (_, _, by_intrinsics) = camera.project_with_intrinsics_jacobian(&direction)?;
+            Some((block, by_intrinsics * (weight.sqrt() / model.sigma_px)))
+        }
+    };
+    let by_blocks = |observation: &TrackObservation, by_pose| anchor.linearized.by_blocks(observation, by_pose);
+    let (anchor, observer) = if in_anchor {
+        ([None; 2], [None; 2])
+    } else {
+        (by_blocks(anchor.observation, &term.by_anchor), by_blocks(observation, &term.by_observer))
+    };
+    Some(BlockTerm { residual: term.residual, by_landmark: term.by_landmark, anchor, observer, shared })
 }

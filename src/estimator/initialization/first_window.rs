@@ -50,7 +50,8 @@ impl<'a> FirstWindow<'a> {
         let world = world_from_solution(solution, resume_at);
         let room = options.window * options.first_window_factor;
         let views = &solution.frames[solution.frames.len().saturating_sub(room + 1)..];
-        let empty = || Preintegration::new(setup.imu_noise, solution.bias);
+        let errors = calibration.imu_errors().copied();
+        let empty = || Preintegration::with_intrinsics(setup.imu_noise, solution.bias, errors);
         let mut imu = empty();
         let mut extrinsics = Vec::new();
         let mut observed = Vec::new();
@@ -67,10 +68,17 @@ impl<'a> FirstWindow<'a> {
                 bias: solution.bias,
             };
             let joints_rad = waiting.initial_joints_rad(joints);
+            let joint_motion = setup.initial_joint_motion(waiting.encoder.as_ref(), joints_rad.len());
+            let profile = setup.motion_profile(&waiting.imu, &waiting.imu_after, solution.bias);
             let frame = Frame {
                 index: waiting.index,
                 stamp_ns: waiting.stamp_ns,
-                state: FrameState { navigation, joints_rad, rates: Rates::at(&waiting.imu, waiting.encoder.as_ref()) },
+                state: FrameState {
+                    navigation,
+                    joints_rad,
+                    joint_motion,
+                    rates: Rates::at(&waiting.imu, waiting.encoder.as_ref(), profile),
+                },
                 first_estimate: None,
                 encoder: waiting.encoder,
                 stationary: None,
@@ -138,7 +146,7 @@ impl<'a> FirstWindow<'a> {
             100.0 * scale_sigma
         );
         events.push(Event::decided(kind, message, scale_sigma, max_scale_sigma));
-        events.push(window.choose_keyframe(options));
+        events.push(window.choose_keyframe(setup));
         let report = self.window.report(setup, input, &mut solved);
         self.window.state.drop_rejected(&solved, options, events);
         self.window.state.make_room(setup, events);

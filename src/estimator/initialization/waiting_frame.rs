@@ -15,6 +15,8 @@ pub(super) struct WaitingFrame {
     /// Of the leading camera.
     pub(super) imu_from_camera: RigidTransform,
     pub(super) imu: Vec<ImuSample>,
+    /// From the stamp on.
+    pub(super) imu_after: Vec<ImuSample>,
 }
 
 impl WaitingFrame {
@@ -27,7 +29,10 @@ impl WaitingFrame {
     pub(super) fn bytes(&self) -> usize {
         let features: usize = self.features.iter().map(|seen| seen.capacity() * size_of::<TrackedFeature>()).sum();
         let encoder = self.encoder.as_ref().map_or(0, JointAngles::heap_bytes);
-        size_of::<Self>() + features + encoder + self.imu.capacity() * size_of::<ImuSample>()
+        size_of::<Self>()
+            + features
+            + encoder
+            + (self.imu.capacity() + self.imu_after.capacity()) * size_of::<ImuSample>()
     }
 }
 

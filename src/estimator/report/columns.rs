@@ -20,7 +20,7 @@ impl fmt::Display for FrameId {
 pub enum ColumnId {
     /// A parameter of the static calibration, one column.
     Calibration(ParameterId),
-    /// Joint angles of a frame.
+    /// Joint angles of a frame; with a rolling shutter then joint rates and joint accelerations.
     Joints(FrameId),
     /// Pose of a frame, rotation before translation, six columns.
     Pose(FrameId),

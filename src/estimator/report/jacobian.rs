@@ -1,22 +1,24 @@
 //! The full Jacobian of a step by blocks: rows by factor, columns by unknowns.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, Matrix2x6, Vector3};
+use nalgebra::{DMatrix, Vector3};
 
 use super::columns::scales_of;
 use super::linearization::column_blocks;
 use crate::camera::CameraModel;
-use crate::estimator::factors::visual::{TrackObservation, VisualModel, whitened};
-use crate::estimator::state::camera_pose::{self, CameraExtrinsics, CameraMaps};
+use crate::estimator::factors::visual::{Anchor, TrackObservation, VisualModel, whitened};
+use crate::estimator::state::camera_pose::{self, CameraMaps, CameraSensor};
+use crate::estimator::state::camera_view::CameraView;
 use crate::estimator::state::frame_state::FrameState;
-use crate::estimator::state::layout::{Layout, POSE};
+use crate::estimator::state::layout::{Layout, POSE, VELOCITY_BIAS};
 use crate::estimator::{
     ColumnBlock, ColumnId, FeatureReport, FrameId, JacobianFactor, JacobianRow, JacobianSource, StepReport,
 };
 use crate::frontend::FeatureId;
-use crate::gimbal::Chain;
-use crate::optimization::{CameraPose, Landmark, RelativePoses, Reprojection};
+use crate::gimbal::ParameterId;
+use crate::optimization::{BlockTerm, CameraPose, Landmark};
 
 /// The Jacobian of a step by blocks.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,14 +65,12 @@ impl StepReport {
 /// One camera at the states of the window.
 struct WindowCamera<'a> {
     model: VisualModel<'a>,
-    /// Poses by slot.
-    current: Vec<CameraPose>,
-    relative: RelativePoses,
-    linearized: RelativePoses,
-    /// By slot: derivative of the camera pose with respect to pose and joints, and to the calibration.
-    maps: Vec<(DMatrix<f64>, DMatrix<f64>)>,
-    /// First column of the camera's calibration.
+    current: CameraView<'a>,
+    linearized: CameraView<'a>,
+    maps: CameraMaps,
+    /// First column of the camera's calibration, and their number.
     start: usize,
+    columns: usize,
 }
 
 struct Writer<'a> {
@@ -90,14 +90,20 @@ impl<'a> Writer<'a> {
         let frames = report.window.len();
         let joints = report.window.first().map_or(0, |frame| frame.joint_angles_rad.len());
         let states = source.frames(joints);
-        let clocks: usize = source.clocks.iter().map(|clocks| clocks.count).sum();
-        let columns = source.chains.iter().map(Chain::dof).sum::<usize>() + clocks;
-        let known = columns == report.calibration.parameters.len();
-        if !known || states.len() != frames || cameras.len() < source.chains.len() {
+        if !source.describes(&report.calibration.parameters)
+            || states.len() != frames
+            || cameras.len() < source.chains.len()
+        {
             return None;
         }
-        let calibration = if source.calibrated { report.calibration.parameters.len() } else { 0 };
-        let layout = Layout { frames, joints, calibration };
+        let first = states.first();
+        let layout = Layout {
+            frames,
+            joints,
+            joint_motion: first.map_or(0, |state| state.joint_motion.len()),
+            moving_rows: first.is_some_and(FrameState::has_moving_rows),
+            calibration: if source.calibrated { report.calibration.parameters.len() } else { 0 },
+        };
         let numbers: Vec<FrameId> = report.window.iter().map(|frame| FrameId(frame.frame_index)).collect();
         let mut columns = column_blocks(&layout, &report.calibration.parameters, &numbers);
         let start = columns.last().map_or(0, |last| last.start + last.len);
@@ -110,7 +116,7 @@ impl<'a> Writer<'a> {
             .enumerate()
             .map(|(camera, (_, model))| {
                 let camera = window_camera(report, source, &states, camera, model, start);
-                start += camera.maps.first().map_or(0, |(_, calibration)| calibration.ncols());
+                start += camera.columns;
                 camera
             })
             .collect();
@@ -123,21 +129,21 @@ impl<'a> Writer<'a> {
         let camera = self.cameras.get(feature.id.camera())?;
         let slot_of = |number: usize| self.report.window.iter().position(|frame| frame.frame_index == number);
         let anchor = slot_of(feature.anchor_frame_index)?;
-        let landmark = self.landmark(index, feature, &camera.current[anchor])?;
         let width = self.columns.last().map_or(0, |last| last.start + last.len);
         let mut rows = DMatrix::zeros(2 * feature.observations.len(), width);
         let mut frames = Vec::new();
+        let anchored = feature.observations.iter().find(|seen| seen.frame_index == feature.anchor_frame_index)?;
+        let anchored = TrackObservation { slot: anchor, uv_px: anchored.measured_px };
+        let landmark = self.landmark(index, feature, &camera.current.pose(anchor, &anchored.uv_px))?;
+        let anchor = Anchor::new(&camera.current, &camera.linearized, &anchored);
         for seen in feature.observations.iter() {
             let Some(slot) = slot_of(seen.frame_index) else { continue };
             let observation = TrackObservation { slot, uv_px: seen.measured_px };
-            let (now, then) = (&camera.relative, &camera.linearized);
             // Stored residuals are rounded: the robust weight of the step is used instead of a recomputed one.
             let weight = seen.residual_after_px.map(|_| seen.robust_weight);
-            let Some(term) = whitened(&camera.model, now, then, anchor, &landmark, &observation, weight) else {
-                continue;
-            };
+            let Some(term) = whitened(&camera.model, &anchor, &landmark, &observation, weight) else { continue };
             let mut target = rows.rows_mut(2 * frames.len(), 2);
-            self.write(&mut target, camera, anchor, slot, &term);
+            self.write(&mut target, camera, &term);
             frames.push(FrameId(seen.frame_index));
         }
         let height = 2 * frames.len();
@@ -174,7 +180,7 @@ impl<'a> Writer<'a> {
             let mut norms = vec![(column as u16, squared.sqrt() as f32)];
             if let Some((clock, block)) = self.encoder_clock() {
                 let scale = block.id.scale(0);
-                let rate = |joint: usize| self.states[slot].rates.joint_rad_per_s(joint);
+                let rate = |joint: usize| self.states[slot].joint_rate_rad_per_s(joint);
                 let squared: f64 = sigmas().map(|(joint, sigma)| (scale * rate(joint) / sigma).powi(2)).sum();
                 if squared > 0.0 {
                     norms.insert(0, (clock as u16, squared.sqrt() as f32));
@@ -187,36 +193,34 @@ impl<'a> Writer<'a> {
         rows
     }
 
-    /// Column and parameter of the encoders' time offset, if estimated.
+    /// Number and block of the column of the encoders' time offset, if estimated.
     fn encoder_clock(&self) -> Option<(usize, &ColumnBlock)> {
-        let main = self.source.clocks.first().filter(|clocks| clocks.count > 1 && self.source.calibrated)?;
-        let number = self.source.chains.first()?.dof() + main.count - 1;
-        Some((number, self.columns.get(number)?))
+        let id = ColumnId::Calibration(ParameterId::ENCODER_TIMESHIFT);
+        self.columns.iter().enumerate().find(|(_, block)| block.id == id)
     }
 
-    fn write(
-        &self,
-        rows: &mut nalgebra::DMatrixViewMut<'_, f64>,
-        camera: &WindowCamera<'_>,
-        anchor: usize,
-        slot: usize,
-        term: &Reprojection,
-    ) {
+    fn write(&self, rows: &mut nalgebra::DMatrixViewMut<'_, f64>, camera: &WindowCamera<'_>, term: &BlockTerm<usize>) {
         rows.column_mut(rows.ncols() - 1).copy_from(&term.by_landmark.column(2));
-        if slot == anchor {
-            return;
-        }
-        let joints = self.layout.calibration;
-        let poses = joints + self.layout.joints * self.layout.frames;
-        for (slot, by_camera) in [(anchor, &term.by_anchor), (slot, &term.by_observer)] {
-            let by_camera: &Matrix2x6<f64> = by_camera;
-            let (own, calibration) = &camera.maps[slot];
-            let by_frame = by_camera * own;
-            rows.columns_mut(poses + POSE * slot, POSE).copy_from(&by_frame.columns(0, POSE));
-            let count = self.layout.joints;
-            rows.columns_mut(joints + count * slot, count).copy_from(&by_frame.columns(POSE, count));
-            let mut by_calibration = rows.columns_mut(camera.start, calibration.ncols());
-            by_calibration += by_camera * calibration;
+        let layout = &self.layout;
+        let (joints, count) = (layout.calibration, layout.joint_block());
+        let poses = joints + count * layout.frames;
+        let velocities = poses + POSE * layout.frames;
+        for (block, by_block) in term.blocks() {
+            let mut by_calibration = rows.columns_mut(camera.start, camera.columns);
+            by_calibration += by_block * &camera.maps.calibration[*block];
+            let of_frame = camera.maps.columns(layout, *block);
+            if of_frame.is_empty() {
+                continue;
+            }
+            let slot = of_frame.start / layout.frame_len();
+            let by_frame = by_block * &camera.maps.own[*block];
+            let mut add = |place: usize, from: usize, count: usize| {
+                let mut target = rows.columns_mut(place, count);
+                target += by_frame.columns(from, count);
+            };
+            add(poses + POSE * slot, 0, POSE);
+            add(joints + count * slot, POSE, count);
+            add(velocities + VELOCITY_BIAS * slot, POSE + count, of_frame.len() - POSE - count);
         }
     }
 
@@ -239,26 +243,42 @@ impl<'a> Writer<'a> {
 }
 
 fn window_camera<'a>(
-    report: &StepReport,
-    source: &JacobianSource,
+    report: &'a StepReport,
+    source: &'a JacobianSource,
     states: &[FrameState],
     camera: usize,
     model: &'a CameraModel,
     start: usize,
 ) -> WindowCamera<'a> {
+    let (sigma_px, loss, landmark_model) = (source.pixel_sigma_px, source.loss, source.landmark_model);
+    let visual = VisualModel { camera: model, sigma_px, loss, landmark_model };
+    if let Some(exact) = &source.exact {
+        let (current, linearized) = (exact.current.1.of(camera), exact.linearized.1.of(camera));
+        return WindowCamera {
+            model: visual,
+            current: CameraView::new(&exact.current.0, current, model),
+            linearized: CameraView::new(&exact.linearized.0, linearized, model),
+            maps: CameraMaps::new(&exact.linearized.0, linearized),
+            start,
+            columns: linearized.dof(),
+        };
+    }
     let chain = &source.chains[camera];
     let clocks = source.clocks.get(camera).copied().unwrap_or_default();
     let [then_s, now_s] = clocks.shifts_s;
-    let extrinsics = CameraExtrinsics {
-        chain,
+    let sensor = CameraSensor {
+        chain: Cow::Borrowed(chain),
         columns: if source.calibrated { chain.dof() + clocks.count } else { 0 },
         shift_s: then_s,
         shift_column: (source.calibrated && clocks.count > 0).then(|| chain.dof()),
+        rolling: false,
+        readout_s: 0.0,
+        readout_column: None,
+        intrinsics: 0..0,
     };
-    let linearized: Vec<CameraPose> =
-        states.iter().map(|state| camera_pose::at_extrinsics(state, &extrinsics)).collect();
-    let maps = CameraMaps::of_extrinsics(states, &extrinsics);
-    let maps = maps.own.into_iter().zip(maps.calibration).collect();
+    let columns = sensor.columns;
+    let maps = CameraMaps::of_sensor(states, &sensor);
+    let linearized = CameraView::of_sensor(Cow::Owned(states.to_vec()), sensor, Cow::Borrowed(model), false);
     let rigid = camera.checked_sub(1).and_then(|rigid| report.calibration.rigid_cameras.get(rigid));
     let now = report.window.iter().zip(states).map(|(frame, state)| {
         let mut state = state.clone();
@@ -277,17 +297,8 @@ fn window_camera<'a>(
                 frame.imu_from_camera * moved
             }
         };
-        let pose = seen.navigation.world_from_imu * imu_from_observer;
-        CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
+        CameraPose::from(seen.navigation.world_from_imu * imu_from_observer)
     });
-    let current: Vec<CameraPose> = now.collect();
-    let (sigma_px, loss, landmark_model) = (source.pixel_sigma_px, source.loss, source.landmark_model);
-    WindowCamera {
-        model: VisualModel { camera: model, sigma_px, loss, landmark_model },
-        relative: RelativePoses::new(&current),
-        current,
-        linearized: RelativePoses::new(&linearized),
-        maps,
-        start,
-    }
+    let current = CameraView::of_poses(now.collect(), model);
+    WindowCamera { model: visual, current, linearized, maps, start, columns }
 }

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Quaternion, UnitQuaternion, Vector3};
 
+use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::layout::POSE;
 use crate::estimator::{FactorKind, FrameId, ImuBias, NavigationState, allocated_bytes};
 use crate::geometry::RigidTransform;
-use crate::gimbal::Chain;
+use crate::gimbal::{Chain, ParameterId};
 use crate::optimization::{LandmarkModel, RobustLoss};
 
 /// Linearization points of the step's Jacobian, and blocks that cannot be reproduced from the report.
@@ -25,6 +26,9 @@ pub struct JacobianSource {
     pub(crate) clocks: Box<[ClockColumns]>,
     /// By slot, with estimated time offsets: rates of the body's rotation and position, then of the joints.
     pub(crate) rates: Box<[f32]>,
+    /// States and calibrations where rows of the images have poses of their own or intrinsics are estimated, which the
+    /// fields above do not describe.
+    pub(crate) exact: Option<Box<ExactSource>>,
     /// Whether the calibration has columns.
     pub(crate) calibrated: bool,
     /// Indices of the rejected features in the report, which have no landmark there, and their unit bearings in
@@ -37,6 +41,23 @@ pub struct JacobianSource {
     pub(crate) pixel_sigma_px: f64,
     pub(crate) loss: RobustLoss,
     pub(crate) landmark_model: LandmarkModel,
+}
+
+/// States by slot with the calibrations, in full precision.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ExactSource {
+    /// Linearization point.
+    pub(crate) linearized: (Vec<FrameState>, Calibrations),
+    /// Final estimate.
+    pub(crate) current: (Vec<FrameState>, Calibrations),
+}
+
+impl ExactSource {
+    /// Bytes of the states; the calibrations share their priors with the estimator.
+    fn bytes(&self) -> usize {
+        let states = || self.linearized.0.iter().chain(&self.current.0);
+        size_of::<Self>() + states().map(|state| size_of::<FrameState>() + 8 * state.joint_block()).sum::<usize>()
+    }
 }
 
 /// Time offsets that are estimated with a camera.
@@ -152,11 +173,26 @@ impl JacobianSource {
             + allocated_bytes(size_of_val(&*self.rows))
             + allocated_bytes(size_of_val(&*self.columns))
             + allocated_bytes(size_of_val(&*self.norms))
+            + self.exact.as_ref().map_or(0, |exact| allocated_bytes(exact.bytes()))
+    }
+
+    /// Whether these are the parameters of its calibration columns.
+    pub(crate) fn describes(&self, parameters: &[ParameterId]) -> bool {
+        match &self.exact {
+            Some(exact) => exact.linearized.1.parameters() == parameters,
+            None => {
+                let clocks: usize = self.clocks.iter().map(|clocks| clocks.count).sum();
+                self.chains.iter().map(Chain::dof).sum::<usize>() + clocks == parameters.len()
+            }
+        }
     }
 
     /// States by slot, for frames with this number of joints; velocities and rates only with estimated time
     /// offsets, bias-corrected.
     pub(crate) fn frames(&self, joints: usize) -> Vec<FrameState> {
+        if let Some(exact) = &self.exact {
+            return exact.linearized.0.clone();
+        }
         let mut rates = self.rates.chunks_exact(POSE + joints);
         let states = self.poses(joints).into_iter().map(|(world_from_imu, joints_rad)| {
             let rates: Vec<f64> = rates.next().unwrap_or_default().iter().map(|rate| f64::from(*rate)).collect();
@@ -164,9 +200,11 @@ impl JacobianSource {
             FrameState {
                 navigation: NavigationState { world_from_imu, velocity_m_per_s: three(3), bias: ImuBias::default() },
                 joints_rad,
+                joint_motion: Vec::new(),
                 rates: Arc::new(Rates {
                     gyroscope_rad_per_s: three(0),
                     joints_rad_per_s: rates.get(POSE..).unwrap_or_default().to_vec(),
+                    profile: None,
                 }),
             }
         });

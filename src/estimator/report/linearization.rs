@@ -44,7 +44,7 @@ pub(crate) fn column_blocks(layout: &Layout, parameters: &[ParameterId], frames:
         }
     }
     for frame in frames {
-        push(ColumnId::Joints(*frame), layout.joints);
+        push(ColumnId::Joints(*frame), layout.joint_block());
     }
     for frame in frames {
         push(ColumnId::Pose(*frame), POSE);
@@ -58,7 +58,7 @@ pub(crate) fn column_blocks(layout: &Layout, parameters: &[ParameterId], frames:
 /// Columns of the layout in the order of the report: calibration, joints, poses, velocities and biases.
 pub(crate) fn column_order(layout: &Layout) -> Vec<usize> {
     let mut order: Vec<usize> = layout.calibration().collect();
-    order.extend((0..layout.frames).flat_map(|slot| layout.joints(slot)));
+    order.extend((0..layout.frames).flat_map(|slot| layout.joints(slot).start..layout.joint_motion(slot).end));
     order.extend((0..layout.frames).flat_map(|slot| layout.pose(slot)));
     order.extend((0..layout.frames).flat_map(|slot| layout.velocity_bias(slot)));
     order

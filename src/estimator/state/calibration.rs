@@ -1,10 +1,19 @@
-//! The estimated static calibration: the gimbal's chain with its prior, and the linearization point of the
-//! marginalization prior.
+//! The estimated static calibration of a camera: its chain, clocks, shutter and intrinsics with their priors, and the
+//! linearization point of the marginalization prior.
+
+use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::sensor_columns::SensorColumn;
+use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, so3};
-use crate::gimbal::{Chain, ChainLinearization, ClassicalChain, NearestForm, ParameterId, Parameterization, transport};
+use crate::gimbal::{
+    Chain, ChainLinearization, ClassicalChain, NearestForm, ParameterId, ParameterPart, Parameterization, Quantity,
+    transport,
+};
 
 /// Prior standard deviations of the given chain, for every parameter of its classical form.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,7 +23,7 @@ pub(crate) struct GivenSigmas {
 }
 
 /// Given chain with its prior.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 struct GivenChain {
     classical: ClassicalChain,
     chain: Chain,
@@ -24,69 +33,42 @@ struct GivenChain {
     square_root_information: DMatrix<f64>,
 }
 
-/// Prior standard deviation of a time offset relative to the rig, in seconds: transport and exposure delay an
-/// image by a frame period at most.
-const CLOCK_SIGMA_S: f64 = 0.02;
-
-/// Estimated time offsets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum FreeClocks {
-    /// None.
-    None,
-    /// That of the camera.
-    Camera,
-    /// Those of camera and encoders.
-    CameraAndEncoders,
-}
-
-impl FreeClocks {
-    /// Time offsets in the order of their columns after the chain's, as parameters of the main camera.
-    fn parameters(self) -> &'static [ParameterId] {
-        const ALL: [ParameterId; 2] = [ParameterId::timeshift(0), ParameterId::ENCODER_TIMESHIFT];
-        match self {
-            Self::None => &[],
-            Self::Camera => &ALL[..1],
-            Self::CameraAndEncoders => &ALL,
-        }
-    }
-}
-
 /// Estimated values.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 struct Values {
     chain: Chain,
-    /// Estimated time offsets relative to the rig, in seconds: IMU time is the stamp plus the offset. The camera's,
-    /// then the encoders'.
-    clocks_s: DVector<f64>,
+    /// Estimated values of the sensor columns relative to the rig's.
+    sensors: DVector<f64>,
 }
 
 impl Values {
     fn dof(&self) -> usize {
-        self.chain.dof() + self.clocks_s.len()
+        self.chain.dof() + self.sensors.len()
     }
 
     fn plus(&self, delta: &[f64]) -> Self {
-        let (chain, clocks) = delta.split_at(self.chain.dof());
-        Self { chain: self.chain.plus_slice(chain), clocks_s: &self.clocks_s + DVector::from_column_slice(clocks) }
+        let (chain, sensors) = delta.split_at(self.chain.dof());
+        Self { chain: self.chain.plus_slice(chain), sensors: &self.sensors + DVector::from_column_slice(sensors) }
     }
 
     fn minus(&self, origin: &Self) -> DVector<f64> {
         let mut difference = DVector::zeros(self.dof());
         let chain = self.chain.dof();
         difference.rows_mut(0, chain).copy_from(&self.chain.minus(&origin.chain));
-        difference.rows_mut(chain, self.clocks_s.len()).copy_from(&(&self.clocks_s - &origin.clocks_s));
+        difference.rows_mut(chain, self.sensors.len()).copy_from(&(&self.sensors - &origin.sensors));
         difference
     }
 }
 
-/// A chain with its time offsets, free or fixed.
-#[derive(Clone, Debug)]
+/// A chain with the clocks, the shutter and the intrinsics of its camera, free or fixed.
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Calibration {
     values: Values,
-    given: GivenChain,
-    clocks: FreeClocks,
-    /// Time offset of the camera in the given rig: stamps already include it.
-    given_timeshift_s: f64,
+    given: Arc<GivenChain>,
+    /// Columns after the chain's, as parameters of the main camera.
+    sensors: Arc<[SensorColumn]>,
+    /// Readout time of the rig, in seconds.
+    given_readout_s: f64,
     first_estimate: Option<Values>,
     free: bool,
     /// Parameters fixed at their values; the parameterization may change.
@@ -103,61 +85,138 @@ impl Calibration {
         joint_offsets: bool,
     ) -> Self {
         let given = GivenChain::new(classical, parameterization, sigmas, joint_offsets);
-        let values = Values { chain: given.chain.clone(), clocks_s: DVector::zeros(0) };
+        let values = Values { chain: given.chain.clone(), sensors: DVector::zeros(0) };
         Self {
             values,
-            given,
-            clocks: FreeClocks::None,
-            given_timeshift_s: 0.0,
+            given: Arc::new(given),
+            sensors: Arc::default(),
+            given_readout_s: 0.0,
             first_estimate: None,
             free,
             frozen: Vec::new(),
         }
     }
 
-    /// Adds time offsets; a fixed calibration has none.
-    pub(crate) fn with_clocks(self, clocks: FreeClocks, given_timeshift_s: f64) -> Self {
-        let clocks = if self.free { clocks } else { FreeClocks::None };
-        let clocks_s = DVector::zeros(clocks.parameters().len());
-        Self { values: Values { clocks_s, ..self.values }, clocks, given_timeshift_s, ..self }
+    /// Adds columns of clocks, shutter and intrinsics; a fixed calibration has none.
+    pub(crate) fn with_sensors(self, columns: Vec<SensorColumn>) -> Self {
+        let columns = if self.free { columns } else { Vec::new() };
+        let sensors = DVector::zeros(columns.len());
+        Self { values: Values { sensors, ..self.values }, sensors: columns.into(), ..self }
+    }
+
+    /// This calibration with the columns of another one, which has all of its own; new ones start at the rig's values.
+    pub(crate) fn with_columns_of(&self, wanted: &Self) -> Self {
+        let of_columns = |values: &Values| {
+            let value =
+                |column: &SensorColumn| self.sensor(column.parameter).map_or(0.0, |place| values.sensors[place]);
+            let sensors = wanted.sensors.iter().map(value);
+            Values { chain: values.chain.clone(), sensors: DVector::from_iterator(wanted.sensors.len(), sensors) }
+        };
+        Self {
+            values: of_columns(&self.values),
+            first_estimate: self.first_estimate.as_ref().map(of_columns),
+            sensors: Arc::clone(&wanted.sensors),
+            ..self.clone()
+        }
+    }
+
+    /// Readout time of the rig, in seconds; zero for a global shutter.
+    pub(crate) fn with_given_readout(self, given_readout_s: f64) -> Self {
+        Self { given_readout_s, ..self }
     }
 
     pub(crate) fn chain(&self) -> &Chain {
         &self.values.chain
     }
 
+    /// Place of a parameter among the columns after the chain's.
+    fn sensor(&self, parameter: ParameterId) -> Option<usize> {
+        self.sensors.iter().position(|column| column.parameter == parameter)
+    }
+
+    /// Column of a parameter after the chain's.
+    fn sensor_column(&self, parameter: ParameterId) -> Option<usize> {
+        self.sensor(parameter).map(|place| self.chain().dof() + place)
+    }
+
+    /// Estimated value of a parameter relative to the rig's, zero without a column.
+    fn sensor_value(&self, parameter: ParameterId) -> f64 {
+        self.sensor(parameter).map_or(0.0, |place| self.values.sensors[place])
+    }
+
     /// Time offset of the camera relative to the rig, in seconds: exposure time minus stamp.
     pub(crate) fn camera_shift_s(&self) -> f64 {
-        self.values.clocks_s.get(0).copied().unwrap_or(0.0)
+        self.sensor_value(ParameterId::timeshift(0))
     }
 
     /// Column of the camera's time offset.
     pub(crate) fn camera_shift_column(&self) -> Option<usize> {
-        (self.clocks != FreeClocks::None).then(|| self.chain().dof())
+        self.sensor_column(ParameterId::timeshift(0))
     }
 
     /// Time offset of the encoders, in seconds: measurement time minus stamp.
     pub(crate) fn encoder_shift_s(&self) -> f64 {
-        self.values.clocks_s.get(1).copied().unwrap_or(0.0)
+        self.sensor_value(ParameterId::ENCODER_TIMESHIFT)
     }
 
     /// Column of the encoders' time offset.
     pub(crate) fn encoder_shift_column(&self) -> Option<usize> {
-        (self.clocks == FreeClocks::CameraAndEncoders).then(|| self.chain().dof() + 1)
+        self.sensor_column(ParameterId::ENCODER_TIMESHIFT)
+    }
+
+    /// Readout time of the camera's shutter, in seconds.
+    pub(crate) fn readout_s(&self) -> f64 {
+        self.given_readout_s + self.sensor_value(ParameterId::readout(0))
+    }
+
+    /// Column of the readout time.
+    pub(crate) fn readout_column(&self) -> Option<usize> {
+        self.sensor_column(ParameterId::readout(0))
+    }
+
+    /// Whether the rows of an image are exposed at different times: by the rig, or because the readout is estimated.
+    pub(crate) fn has_rolling_shutter(&self) -> bool {
+        self.given_readout_s != 0.0 || self.readout_column().is_some()
+    }
+
+    /// Columns of the camera's intrinsics, in the order of [`Quantity::INTRINSICS`]; empty without.
+    pub(crate) fn intrinsics_columns(&self) -> Range<usize> {
+        let is_intrinsic = |column: &&SensorColumn| {
+            column.parameter.part == ParameterPart::Camera(0)
+                && Quantity::INTRINSICS.contains(&column.parameter.quantity)
+        };
+        let first = self.sensors.iter().position(|column| is_intrinsic(&column)).unwrap_or(0);
+        let start = self.chain().dof() + first;
+        start..start + self.sensors.iter().filter(is_intrinsic).count()
+    }
+
+    /// The camera model with the estimated intrinsics.
+    pub(crate) fn camera_model<'m>(&self, given: &'m CameraModel) -> Cow<'m, CameraModel> {
+        let columns = self.intrinsics_columns();
+        if columns.is_empty() {
+            return Cow::Borrowed(given);
+        }
+        let first = columns.start - self.chain().dof();
+        let mut intrinsics = given.intrinsics();
+        for (value, change) in intrinsics.iter_mut().zip(self.values.sensors.rows(first, columns.len()).iter()) {
+            *value += change;
+        }
+        // Only a step of the solver far out of range is no camera any more; its cost is that of the given one.
+        given.with_intrinsics(intrinsics).map_or(Cow::Borrowed(given), Cow::Owned)
     }
 
     /// The parameters of all columns, free or not, as those of the main camera.
     pub(crate) fn parameters(&self) -> Vec<ParameterId> {
         let mut parameters = self.chain().parameters();
-        parameters.extend(self.clocks.parameters());
+        parameters.extend(self.sensors.iter().map(|column| column.parameter));
         parameters
     }
 
     /// Values of all columns; the camera's time offset as Kalibr's `timeshift_cam_imu`.
     pub(crate) fn values(&self) -> Vec<f64> {
-        let given = [self.given_timeshift_s, 0.0];
-        let clocks = self.values.clocks_s.iter().zip(given).map(|(shift_s, given_s)| given_s + shift_s);
-        self.chain().values().iter().copied().chain(clocks).collect()
+        let sensors = self.values.sensors.iter().zip(self.sensors.iter());
+        let sensors = sensors.map(|(change, column)| column.given + change);
+        self.chain().values().iter().copied().chain(sensors).collect()
     }
 
     /// Fixes a parameter at its present value.
@@ -201,7 +260,7 @@ impl Calibration {
     }
 
     /// Returns `imu_from_camera` with its derivatives with respect to the free columns and the joint angles; those
-    /// of time offsets are zero.
+    /// of the columns after the chain's are zero.
     pub(crate) fn linearize(&self, joints_rad: &[f64]) -> ChainLinearization {
         let mut linearization = self.chain().linearize(self.own(joints_rad));
         if linearization.by_parameters.ncols() != self.dof() {
@@ -243,11 +302,11 @@ impl Calibration {
         };
     }
 
-    /// Whitened prior residual: difference from the given chain, and time offsets; one row per column.
+    /// Whitened prior residual: difference from the rig's values; one row per column.
     pub(crate) fn prior_residual(&self) -> DVector<f64> {
         let chain = &self.given.square_root_information * self.chain().minus(&self.given.chain);
-        let clocks = self.values.clocks_s.iter().map(|shift_s| shift_s / CLOCK_SIGMA_S);
-        DVector::from_iterator(self.values.dof(), chain.iter().copied().chain(clocks))
+        let sensors = self.values.sensors.iter().zip(self.sensors.iter()).map(|(change, column)| change / column.sigma);
+        DVector::from_iterator(self.values.dof(), chain.iter().copied().chain(sensors))
     }
 
     /// Derivative of the prior residual with respect to a step (columns × columns).
@@ -257,7 +316,9 @@ impl Calibration {
     pub(crate) fn prior_jacobian(&self) -> DMatrix<f64> {
         let (all, chain) = (self.values.dof(), self.chain().dof());
         let mut jacobian = self.given.square_root_information.clone().resize(all, all, 0.0);
-        (chain..all).for_each(|clock| jacobian[(clock, clock)] = CLOCK_SIGMA_S.recip());
+        for (place, column) in (chain..all).zip(self.sensors.iter()) {
+            jacobian[(place, place)] = column.sigma.recip();
+        }
         let starts: &[usize] = match self.chain().parameterization() {
             Parameterization::Classical => &[0, chain - 6],
             Parameterization::Poe => &[chain - 6],
@@ -283,8 +344,8 @@ impl Calibration {
 
     /// Prior standard deviation of each column.
     pub(crate) fn prior_sigmas(&self) -> impl Iterator<Item = f64> + '_ {
-        let clocks = std::iter::repeat_n(CLOCK_SIGMA_S, self.values.clocks_s.len());
-        self.given.prior_sigmas.iter().copied().chain(clocks)
+        let sensors = self.sensors.iter().map(|column| column.sigma);
+        self.given.prior_sigmas.iter().copied().chain(sensors)
     }
 
     /// Sets the ground truth in a test.
@@ -301,14 +362,14 @@ impl Calibration {
         let given = GivenChain::new(&self.given.classical, parameterization, self.given.sigmas, offsets);
         let new = given.form_of(old);
         let chain = transport(&new, old);
-        let clocks = self.values.clocks_s.len();
-        let mut old_from_new = DMatrix::identity(chain.nrows() + clocks, chain.ncols() + clocks);
+        let sensors = self.values.sensors.len();
+        let mut old_from_new = DMatrix::identity(chain.nrows() + sensors, chain.ncols() + sensors);
         old_from_new.view_mut((0, 0), chain.shape()).copy_from(&chain);
         if let Some(first) = &mut self.first_estimate {
             first.chain = new;
         }
         self.values.chain = given.form_of(&self.values.chain);
-        self.given = given;
+        self.given = Arc::new(given);
         old_from_new
     }
 }

@@ -1,41 +1,89 @@
-//! Static calibrations of all cameras with adjacent free columns.
+//! Static calibrations of all cameras and of the IMU with adjacent free columns.
 
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::calibration::Calibration;
+use super::imu_calibration::ImuCalibration;
+use super::imu_errors::{self, ImuErrors};
 use crate::gimbal::{ParameterId, Parameterization};
 
 /// Index of the main camera, which may have joints. Its image is shown, its calibration has the first columns.
 pub(crate) const MAIN: usize = 0;
 
-/// The calibrations by camera, the main camera's first.
-#[derive(Clone, Debug)]
-pub(crate) struct Calibrations(Vec<Calibration>);
+/// The calibrations by camera, the main camera's first, then that of the IMU where it is estimated.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Calibrations {
+    cameras: Vec<Calibration>,
+    imu: Option<ImuCalibration>,
+}
 
 impl Calibrations {
     /// Collects the main camera's calibration and those of the further rigid cameras.
     pub(crate) fn new(main: Calibration, rigid: impl IntoIterator<Item = Calibration>) -> Self {
-        Self(std::iter::once(main).chain(rigid).collect())
+        Self { cameras: std::iter::once(main).chain(rigid).collect(), imu: None }
+    }
+
+    /// Adds the intrinsics of the IMU.
+    pub(crate) fn with_imu(self, imu: Option<ImuCalibration>) -> Self {
+        Self { imu, ..self }
+    }
+
+    /// These calibrations with all columns that others have.
+    pub(crate) fn with_columns_of(&self, wanted: &Self) -> Self {
+        let cameras = self.cameras.iter().zip(&wanted.cameras);
+        Self {
+            cameras: cameras.map(|(one, wanted)| one.with_columns_of(wanted)).collect(),
+            imu: self.imu.clone().or_else(|| wanted.imu.clone()),
+        }
+    }
+
+    /// Intrinsics of the IMU, `None` where they are not estimated.
+    pub(crate) fn imu(&self) -> Option<&ImuCalibration> {
+        self.imu.as_ref()
+    }
+
+    /// Correction of the IMU's samples beyond that of the rig, `None` where it is not estimated.
+    pub(crate) fn imu_errors(&self) -> Option<&ImuErrors> {
+        self.imu.as_ref().map(ImuCalibration::errors)
+    }
+
+    /// Range of the IMU's columns, empty where its intrinsics are not estimated.
+    pub(crate) fn imu_columns(&self) -> Range<usize> {
+        let start = self.cameras.iter().map(Calibration::dof).sum();
+        start..start + self.imu.as_ref().map_or(0, |_| ImuCalibration::DOF)
+    }
+
+    /// Fixes a parameter at its present value.
+    pub(crate) fn freeze(&mut self, column: usize) {
+        let imu = self.imu_columns();
+        if let Some(calibration) = self.imu.as_mut().filter(|_| imu.contains(&column)) {
+            calibration.freeze(column - imu.start);
+            return;
+        }
+        if let Some(camera) = (0..self.cameras()).find(|camera| self.columns(*camera).contains(&column)) {
+            let first = self.columns(camera).start;
+            self.cameras[camera].freeze(column - first);
+        }
     }
 
     /// Number of cameras.
     pub(crate) fn cameras(&self) -> usize {
-        self.0.len()
+        self.cameras.len()
     }
 
     pub(crate) fn of(&self, camera: usize) -> &Calibration {
-        &self.0[camera]
+        &self.cameras[camera]
     }
 
     pub(crate) fn of_mut(&mut self, camera: usize) -> &mut Calibration {
-        &mut self.0[camera]
+        &mut self.cameras[camera]
     }
 
     /// Camera with which the window starts: a rigid one if there is one, since its extrinsics are most accurate.
     pub(crate) fn leading(&self) -> usize {
-        self.0.iter().position(|calibration| calibration.joint_count() == 0).unwrap_or(MAIN)
+        self.cameras.iter().position(|calibration| calibration.joint_count() == 0).unwrap_or(MAIN)
     }
 
     /// Parameters of all columns, free or not: the main camera's chain and time offsets, then those of the rigid
@@ -44,45 +92,68 @@ impl Calibrations {
         let of = |(camera, one): (usize, &Calibration)| {
             one.parameters().into_iter().map(move |parameter| parameter.of_camera(camera as u8))
         };
-        self.0.iter().enumerate().flat_map(of).collect()
+        let imu = self.imu.iter().flat_map(|_| imu_errors::parameters());
+        self.cameras.iter().enumerate().flat_map(of).chain(imu).collect()
+    }
+
+    /// Values of all columns, free or not.
+    pub(crate) fn values(&self) -> Vec<f64> {
+        let imu: Vec<f64> = self.imu.iter().flat_map(|imu| imu.values().data.0[0]).collect();
+        self.cameras.iter().flat_map(Calibration::values).chain(imu).collect()
+    }
+
+    /// Prior standard deviation of each column.
+    pub(crate) fn prior_sigmas(&self) -> Vec<f64> {
+        let imu: Vec<f64> = self.imu.iter().flat_map(|_| ImuCalibration::sigmas().data.0[0]).collect();
+        self.cameras.iter().flat_map(Calibration::prior_sigmas).chain(imu).collect()
     }
 
     /// Number of free columns.
     pub(crate) fn dof(&self) -> usize {
-        self.0.iter().map(Calibration::dof).sum()
+        self.imu_columns().end
     }
 
     /// Range of one camera's columns.
     pub(crate) fn columns(&self, camera: usize) -> Range<usize> {
-        let start = self.0[..camera].iter().map(Calibration::dof).sum();
-        start..start + self.0[camera].dof()
+        let start = self.cameras[..camera].iter().map(Calibration::dof).sum();
+        start..start + self.cameras[camera].dof()
     }
 
     /// Columns fixed at their values.
     pub(crate) fn frozen_columns(&self) -> Vec<usize> {
         let of_camera = |camera: usize| {
             let start = self.columns(camera).start;
-            self.0[camera].frozen_columns().into_iter().map(move |column| start + column)
+            self.cameras[camera].frozen_columns().into_iter().map(move |column| start + column)
         };
-        (0..self.cameras()).flat_map(of_camera).collect()
+        let first = self.imu_columns().start;
+        let of_imu = self.imu.iter().flat_map(ImuCalibration::frozen_columns).map(|column| first + column);
+        (0..self.cameras()).flat_map(of_camera).chain(of_imu).collect()
     }
 
     /// Fixes the same parameters as others.
     pub(crate) fn freeze_as(&mut self, others: &Self) {
-        for (one, other) in self.0.iter_mut().zip(&others.0) {
+        for (one, other) in self.cameras.iter_mut().zip(&others.cameras) {
             one.freeze_as(other);
+        }
+        if let (Some(imu), Some(other)) = (&mut self.imu, &others.imu) {
+            imu.freeze_as(other);
         }
     }
 
     /// Applies a step of the solver, counted from the first estimates where there are any.
     pub(crate) fn stepped(&self, delta: &[f64]) -> Self {
-        Self(self.0.iter().enumerate().map(|(camera, one)| one.stepped(&delta[self.columns(camera)])).collect())
+        let cameras = self.cameras.iter().enumerate();
+        Self {
+            cameras: cameras.map(|(camera, one)| one.stepped(&delta[self.columns(camera)])).collect(),
+            imu: self.imu.as_ref().map(|imu| imu.stepped(&delta[self.imu_columns()])),
+        }
     }
 
     /// Returns `x ⊟ x₀` (free columns), zero for a camera without a first estimate; `None` when no camera has one.
     pub(crate) fn first_estimate_offset(&self) -> Option<DVector<f64>> {
-        let offsets: Vec<_> = self.0.iter().map(Calibration::first_estimate_offset).collect();
-        if offsets.iter().all(Option::is_none) {
+        let offsets: Vec<_> = self.cameras.iter().map(Calibration::first_estimate_offset).collect();
+        let imu = self.imu.as_ref().and_then(ImuCalibration::first_estimate_offset);
+        if imu.is_none() && offsets.iter().all(Option::is_none) {
             return None;
         }
         let mut first_estimate_offset = DVector::zeros(self.dof());
@@ -92,12 +163,18 @@ impl Calibrations {
                 first_estimate_offset.rows_range_mut(columns).copy_from(offset);
             }
         }
+        if let Some(offset) = imu {
+            first_estimate_offset.rows_range_mut(self.imu_columns()).copy_from(&offset);
+        }
         Some(first_estimate_offset)
     }
 
     /// Returns the calibrations at their first estimates, or the present ones.
     pub(crate) fn at_first_estimate(&self) -> Self {
-        Self(self.0.iter().map(Calibration::at_first_estimate).collect())
+        Self {
+            cameras: self.cameras.iter().map(Calibration::at_first_estimate).collect(),
+            imu: self.imu.as_ref().map(ImuCalibration::at_first_estimate),
+        }
     }
 
     /// Cameras with columns in the marginalization prior keep their first estimate, or take the present one; the
@@ -105,14 +182,20 @@ impl Calibrations {
     pub(crate) fn keep_first_estimates(&mut self, prior_holds: impl Fn(&Range<usize>) -> bool) {
         for camera in 0..self.cameras() {
             let columns = self.columns(camera);
-            self.0[camera].keep_first_estimate(prior_holds(&columns));
+            self.cameras[camera].keep_first_estimate(prior_holds(&columns));
+        }
+        let columns = self.imu_columns();
+        if let Some(imu) = &mut self.imu {
+            imu.keep_first_estimate(prior_holds(&columns));
         }
     }
 
     /// Whitened prior residuals of all cameras.
     pub(crate) fn prior_residual(&self) -> DVector<f64> {
         let offsets: Vec<DVector<f64>> = self.free().map(|(_, one)| one.prior_residual()).collect();
-        DVector::from_iterator(self.dof(), offsets.iter().flat_map(DVector::iter).copied())
+        let imu: Vec<ImuErrors> = self.imu.iter().map(ImuCalibration::prior_residual).collect();
+        let values = offsets.iter().flat_map(DVector::iter).chain(imu.iter().flat_map(ImuErrors::iter));
+        DVector::from_iterator(self.dof(), values.copied())
     }
 
     /// Derivative of the prior residuals with respect to a step.
@@ -122,19 +205,22 @@ impl Calibrations {
             let columns = self.columns(camera);
             jacobian.view_range_mut(columns.clone(), columns).copy_from(&one.prior_jacobian());
         }
+        for (column, sigma) in self.imu_columns().zip(ImuCalibration::sigmas().iter()) {
+            jacobian[(column, column)] = sigma.recip();
+        }
         jacobian
     }
 
     fn free(&self) -> impl Iterator<Item = (usize, &Calibration)> {
-        self.0.iter().enumerate().filter(|(_, one)| one.dof() > 0)
+        self.cameras.iter().enumerate().filter(|(_, one)| one.dof() > 0)
     }
 
     /// Switches the main camera's chain to another parameterization; returns the derivative of the old columns with
     /// respect to the new ones at the first estimate.
     pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
-        let old_from_new = self.0[MAIN].switch_parameterization(parameterization);
+        let old_from_new = self.cameras[MAIN].switch_parameterization(parameterization);
         let (old, main) = (old_from_new.nrows(), old_from_new.ncols());
-        let others = self.dof() - self.0[MAIN].dof();
+        let others = self.dof() - self.cameras[MAIN].dof();
         let mut all = DMatrix::identity(old + others, main + others);
         all.view_mut((0, 0), (old, main)).copy_from(&old_from_new);
         all

@@ -1,29 +1,38 @@
 //! Camera poses and their derivatives with respect to the unknowns of the window.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
-use nalgebra::{DMatrix, Matrix3, Matrix6xX};
+use nalgebra::{DMatrix, Matrix3, Matrix6x3, Matrix6xX, Vector3};
 
 use super::calibration::Calibration;
-use super::layout::POSE;
+use super::layout::{Layout, POSE, ROW_MOTION};
 use crate::estimator::state::frame_state::FrameState;
 use crate::geometry::so3;
 use crate::gimbal::{Chain, ChainLinearization};
 use crate::optimization::CameraPose;
 
-/// Extrinsics and time offset of a camera.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct CameraExtrinsics<'a> {
-    pub(crate) chain: &'a Chain,
-    /// Number of calibration columns, time offsets after the chain; zero when fixed.
+/// Extrinsics, clock and shutter of a camera.
+#[derive(Clone, Debug)]
+pub(crate) struct CameraSensor<'a> {
+    pub(crate) chain: Cow<'a, Chain>,
+    /// Number of calibration columns, those of clock, shutter and intrinsics after the chain; zero when fixed.
     pub(crate) columns: usize,
-    /// Time offset in seconds: exposure time minus stamp.
+    /// Time offset in seconds: exposure time of the first row minus stamp.
     pub(crate) shift_s: f64,
     /// Column of the time offset.
     pub(crate) shift_column: Option<usize>,
+    /// Whether the rows are exposed at different times.
+    pub(crate) rolling: bool,
+    /// Time from the exposure of the first row to that of the last one, in seconds.
+    pub(crate) readout_s: f64,
+    /// Column of the readout time.
+    pub(crate) readout_column: Option<usize>,
+    /// Columns of the intrinsics.
+    pub(crate) intrinsics: Range<usize>,
 }
 
-impl CameraExtrinsics<'_> {
+impl CameraSensor<'_> {
     /// A rigid camera ignores the joints.
     fn own<'j>(&self, joints_rad: &'j [f64]) -> &'j [f64] {
         &joints_rad[..self.chain.joint_count().min(joints_rad.len())]
@@ -36,30 +45,45 @@ impl CameraExtrinsics<'_> {
         }
         linearization
     }
+
+    /// Time of a row after the stamp, in seconds; `row` is 0 for the first one and 1 for the end of the last one.
+    pub(crate) fn row_time_s(&self, row: f64) -> f64 {
+        if self.rolling { self.shift_s + row * self.readout_s } else { self.shift_s }
+    }
+
+    /// Rows whose poses have a block of unknowns.
+    pub(crate) fn block_rows(&self) -> &'static [f64] {
+        if self.rolling { &[0.0, 1.0] } else { &[0.0] }
+    }
 }
 
 impl Calibration {
-    /// Extrinsics and time offset of the camera.
-    pub(crate) fn extrinsics(&self) -> CameraExtrinsics<'_> {
-        CameraExtrinsics {
-            chain: self.chain(),
+    /// Extrinsics, clock and shutter of the camera.
+    pub(crate) fn sensor_model(&self) -> CameraSensor<'_> {
+        let free = self.dof() > 0;
+        CameraSensor {
+            chain: Cow::Borrowed(self.chain()),
             columns: self.dof(),
             shift_s: self.camera_shift_s(),
             shift_column: self.camera_shift_column(),
+            rolling: self.has_rolling_shutter(),
+            readout_s: self.readout_s(),
+            readout_column: self.readout_column().filter(|_| free),
+            intrinsics: if free { self.intrinsics_columns() } else { 0..0 },
         }
     }
 }
 
-/// Returns `world_from_camera` at a state: the IMU pose and the extrinsics at the state's joint angles, both
-/// shifted by the time offset.
+/// Returns `world_from_camera` at a state and the camera's time offset: the IMU pose and the extrinsics at the state's
+/// joint angles, for the first row.
 pub(crate) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
-    at_extrinsics(state, &calibration.extrinsics())
+    at_row(state, &calibration.sensor_model(), 0.0)
 }
 
-/// [`at`] for given extrinsics.
-pub(crate) fn at_extrinsics(state: &FrameState, extrinsics: &CameraExtrinsics<'_>) -> CameraPose {
-    let state = &*when_seen(state, extrinsics.shift_s);
-    let pose = state.navigation.world_from_imu * extrinsics.chain.imu_from_camera(extrinsics.own(&state.joints_rad));
+/// Returns `world_from_camera` at a state and the exposure of a row, from 0 for the first one to 1 for the last one.
+pub(crate) fn at_row(state: &FrameState, sensor: &CameraSensor<'_>, row: f64) -> CameraPose {
+    let state = &*when_seen(state, sensor.row_time_s(row));
+    let pose = state.navigation.world_from_imu * sensor.chain.imu_from_camera(sensor.own(&state.joints_rad));
     CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
 }
 
@@ -68,51 +92,110 @@ pub(crate) fn when_seen(state: &FrameState, shift_s: f64) -> Cow<'_, FrameState>
     if shift_s == 0.0 { Cow::Borrowed(state) } else { Cow::Owned(state.later(shift_s)) }
 }
 
-/// Poses of the camera by slot.
-pub(crate) fn by_slot(frames: &[FrameState], calibration: &Calibration) -> Vec<CameraPose> {
-    frames.iter().map(|state| at(state, calibration)).collect()
-}
-
-/// Derivatives of `[φ; δt]` of `world_from_camera` with respect to the unknowns, by slot.
+/// Derivatives of the blocks of a camera with respect to the unknowns: `[φ; δt]` of `world_from_camera` by frame (with a
+/// rolling shutter of the first row and of the last one), then the intrinsics where they are estimated.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraMaps {
-    /// 6 × (6 + N), with respect to pose and joints of the frame.
+    /// 6 × columns of [`Layout::camera`], with respect to the unknowns of the block's frame; 6 × 0 for the intrinsics.
     pub(crate) own: Vec<DMatrix<f64>>,
     /// 6 × columns, with respect to the camera's calibration.
     pub(crate) calibration: Vec<DMatrix<f64>>,
+    blocks_per_frame: usize,
+    frames: usize,
 }
 
 impl CameraMaps {
     /// Derivatives at these states and this calibration.
     pub(crate) fn new(frames: &[FrameState], calibration: &Calibration) -> Self {
-        Self::of_extrinsics(frames, &calibration.extrinsics())
+        Self::of_sensor(frames, &calibration.sensor_model())
     }
 
-    /// [`Self::new`] for given extrinsics.
+    /// [`Self::new`] for a given sensor.
     ///
-    /// The derivative of a time offset with respect to velocity and gyroscope bias is neglected: a bias change over
-    /// a centisecond has no effect.
-    pub(crate) fn of_extrinsics(frames: &[FrameState], extrinsics: &CameraExtrinsics<'_>) -> Self {
-        let mut maps = Self { own: Vec::new(), calibration: Vec::new() };
+    /// At constant rates the derivative of a time offset with respect to velocity and gyroscope bias is neglected: a bias
+    /// change over a centisecond has no effect. Along a measured motion it is not.
+    pub(crate) fn of_sensor(frames: &[FrameState], sensor: &CameraSensor<'_>) -> Self {
+        let rows = sensor.block_rows();
+        let mut maps =
+            Self { own: Vec::new(), calibration: Vec::new(), blocks_per_frame: rows.len(), frames: frames.len() };
         for stamped in frames {
-            let state = &*when_seen(stamped, extrinsics.shift_s);
-            let chain = extrinsics.linearize(&state.joints_rad);
-            let world_from_imu = state.navigation.world_from_imu.rotation_matrix();
-            let (mut own, mut by_calibration) = camera_map(&world_from_imu, state.joints_rad.len(), &chain);
-            if let Some(column) = extrinsics.shift_column {
-                by_calibration.set_column(column, &(&own * state.motion()));
+            for row in rows {
+                let (own, calibration) = block_map(stamped, sensor, *row);
+                maps.own.push(own);
+                maps.calibration.push(calibration);
             }
-            if extrinsics.shift_s != 0.0 {
-                // The unknown attitude is the one at the stamp.
-                let at_stamp = stamped.navigation.world_from_imu.rotation_matrix();
-                let by_rotation = own.fixed_columns::<3>(0) * world_from_imu.tr_mul(&at_stamp);
-                own.fixed_columns_mut::<3>(0).copy_from(&by_rotation);
+        }
+        if !sensor.intrinsics.is_empty() {
+            let mut selection = DMatrix::zeros(6, sensor.columns);
+            for (row, column) in sensor.intrinsics.clone().enumerate() {
+                selection[(row, column)] = 1.0;
             }
-            maps.own.push(own);
-            maps.calibration.push(by_calibration);
+            maps.own.push(DMatrix::zeros(6, 0));
+            maps.calibration.push(selection);
         }
         maps
     }
+
+    /// Number of blocks.
+    pub(crate) fn blocks(&self) -> usize {
+        self.own.len()
+    }
+
+    /// Columns of the layout that move a block beside the calibration; none for the intrinsics.
+    pub(crate) fn columns(&self, layout: &Layout, block: usize) -> Range<usize> {
+        let slot = block / self.blocks_per_frame;
+        if slot < self.frames { layout.camera(slot) } else { 0..0 }
+    }
+}
+
+/// Derivatives of the camera pose at a row with respect to the unknowns of its frame and to the calibration.
+fn block_map(stamped: &FrameState, sensor: &CameraSensor<'_>, row: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+    let time_s = sensor.row_time_s(row);
+    let state = &*when_seen(stamped, time_s);
+    let chain = sensor.linearize(&state.joints_rad);
+    let world_from_imu = state.navigation.world_from_imu.rotation_matrix();
+    let (mut own, mut by_calibration) = camera_map(&world_from_imu, state.joints_rad.len(), &chain);
+    for (column, factor) in [(sensor.shift_column, 1.0), (sensor.readout_column, row)] {
+        if let Some(column) = column.filter(|_| factor != 0.0) {
+            by_calibration.set_column(column, &(&own * stamped.motion_at(time_s) * factor));
+        }
+    }
+    if time_s != 0.0 {
+        // The unknown attitude is the one at the stamp.
+        let at_stamp = stamped.navigation.world_from_imu.rotation_matrix();
+        let by_attitude: Matrix6x3<f64> = own.fixed_view::<6, 3>(0, 0) * world_from_imu.tr_mul(&at_stamp);
+        if stamped.has_moving_rows() {
+            own = moving_map(stamped, &own, &by_attitude, time_s);
+        } else {
+            own.fixed_columns_mut::<3>(0).copy_from(&by_attitude);
+        }
+    } else if stamped.has_moving_rows() {
+        let width = own.ncols() + stamped.joint_motion.len() + ROW_MOTION;
+        own = own.resize_horizontally(width, 0.0);
+    }
+    (own, by_calibration)
+}
+
+/// Extends the derivatives by pose and joints at a time after the stamp to those by the state at the stamp:
+/// `[φ, p, joints, joint rates and accelerations, v, b_g]`; `by_rotation` are those by the attitude at the stamp through the attitude alone.
+fn moving_map(stamped: &FrameState, own: &DMatrix<f64>, by_rotation: &Matrix6x3<f64>, time_s: f64) -> DMatrix<f64> {
+    let (joints, motion) = (stamped.joints_rad.len(), stamped.joint_motion.len());
+    let mut map = DMatrix::zeros(6, POSE + joints + motion + ROW_MOTION);
+    map.columns_mut(0, POSE + joints).copy_from(own);
+    let by_position: Matrix6x3<f64> = own.fixed_view::<6, 3>(0, 3).into_owned();
+    let moved = stamped.row_motion(time_s).map_or_else(Vector3::zeros, |(motion, _)| motion.position_m);
+    let at_stamp = stamped.navigation.world_from_imu.rotation_matrix();
+    let by_attitude = by_rotation - by_position * at_stamp * so3::hat(&moved);
+    map.fixed_columns_mut::<3>(0).copy_from(&by_attitude);
+    // Rates, then accelerations.
+    for (part, factor) in [time_s, 0.5 * time_s * time_s].into_iter().enumerate().take(motion / joints.max(1)) {
+        let by_part = own.columns(POSE, joints) * factor;
+        map.columns_mut(POSE + joints * (1 + part), joints).copy_from(&by_part);
+    }
+    let by_velocity = POSE + joints + motion;
+    map.fixed_columns_mut::<3>(by_velocity).copy_from(&(by_position * time_s));
+    map.fixed_columns_mut::<3>(by_velocity + 3).copy_from(&(own.fixed_columns::<3>(0) * -time_s));
+    map
 }
 
 /// Derivatives of the camera pose with respect to pose and joints of its frame (6 × (6 + N)) and to its

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DVector, Vector3};
 
 use super::layout::{POSE, VELOCITY_BIAS};
+use super::motion_profile::{MotionProfile, RowMotion};
 use super::navigation::{NavigationState, Vector15};
 use crate::geometry::{so3, wrap_angle};
 use crate::sensors::{ImuSample, JointAngles};
@@ -16,6 +17,8 @@ pub(crate) struct FrameState {
     pub(crate) navigation: NavigationState,
     /// Joint angles without the static offsets, in radians.
     pub(crate) joints_rad: Vec<f64>,
+    /// Joint rates in rad/s, then joint accelerations in rad/s², where rows of the image depend on them; empty otherwise.
+    pub(crate) joint_motion: Vec<f64>,
     /// Measured rates of attitude and joints.
     pub(crate) rates: Arc<Rates>,
 }
@@ -27,17 +30,20 @@ pub(crate) struct Rates {
     pub(crate) gyroscope_rad_per_s: Vector3<f64>,
     /// Joint rates of the encoders, in rad/s; empty without readings.
     pub(crate) joints_rad_per_s: Vec<f64>,
+    /// Motion of the vehicle after the stamp, where rows of the image depend on it.
+    pub(crate) profile: Option<MotionProfile>,
 }
 
 impl Rates {
     /// Rates at the last of these samples, whose stamp is the frame's.
-    pub(crate) fn at(imu: &[ImuSample], encoder: Option<&JointAngles>) -> Arc<Self> {
+    pub(crate) fn at(imu: &[ImuSample], encoder: Option<&JointAngles>, profile: Option<MotionProfile>) -> Arc<Self> {
         let gyroscope_rad_per_s = imu.last().map_or_else(Vector3::zeros, |sample| sample.angular_velocity_rad_per_s);
         let finite = gyroscope_rad_per_s.iter().all(|rate| rate.is_finite());
         let joints = encoder.map_or_else(Vec::new, |encoder| encoder.rates_rad_per_s.clone());
         Arc::new(Self {
             gyroscope_rad_per_s: if finite { gyroscope_rad_per_s } else { Vector3::zeros() },
             joints_rad_per_s: if joints.iter().all(|rate| rate.is_finite()) { joints } else { Vec::new() },
+            profile,
         })
     }
 
@@ -48,25 +54,75 @@ impl Rates {
 }
 
 impl FrameState {
-    /// Extrapolates the state over a time, at constant rates.
+    /// Extrapolates the state over a time: along the measured motion where there is one, else at constant rates.
     pub(crate) fn later(&self, seconds: f64) -> Self {
         let mut later = self.clone();
-        let rotation_vector = self.body_rate_rad_per_s() * seconds;
         let pose = &mut later.navigation.world_from_imu;
-        pose.rotation *= so3::exp(&rotation_vector);
-        pose.translation_m += self.navigation.velocity_m_per_s * seconds;
+        if let Some((motion, gravity)) = self.row_motion(seconds) {
+            let attitude = self.navigation.world_from_imu.rotation;
+            pose.rotation *= motion.rotation;
+            pose.translation_m += self.navigation.velocity_m_per_s * seconds
+                + gravity * (0.5 * seconds * seconds)
+                + attitude * motion.position_m;
+            later.navigation.velocity_m_per_s += gravity * seconds + attitude * motion.velocity_m_per_s;
+        } else {
+            pose.rotation *= so3::exp(&(self.body_rate_rad_per_s() * seconds));
+            pose.translation_m += self.navigation.velocity_m_per_s * seconds;
+        }
         for (joint, angle) in later.joints_rad.iter_mut().enumerate() {
-            *angle += self.rates.joint_rad_per_s(joint) * seconds;
+            *angle += self.joint_rate_rad_per_s(joint) * seconds;
+            if let Some(acceleration) = self.joint_acceleration_rad_per_s2(joint) {
+                *angle += acceleration * (0.5 * seconds * seconds);
+            }
         }
         later
     }
 
-    /// Time derivative of pose and joints, in the order of [`Layout::camera`].
-    pub(crate) fn motion(&self) -> DVector<f64> {
-        let joints = (0..self.joints_rad.len()).map(|joint| self.rates.joint_rad_per_s(joint));
-        let (angular_velocity, velocity) = (self.body_rate_rad_per_s(), self.navigation.velocity_m_per_s);
+    /// Measured motion of the vehicle over a time since the stamp, and gravity; `None` where it is not recorded.
+    pub(crate) fn row_motion(&self, seconds: f64) -> Option<(RowMotion, Vector3<f64>)> {
+        let profile = self.rates.profile.as_ref()?;
+        Some((profile.at(seconds, &self.navigation.bias.gyroscope_rad_per_s), profile.gravity_in_world))
+    }
+
+    /// Whether camera poses at other times than the stamp are derived by all unknowns on which they depend.
+    pub(crate) fn has_moving_rows(&self) -> bool {
+        self.rates.profile.is_some()
+    }
+
+    /// Rate of one joint, in rad/s: the estimated one, else the measured one, else zero.
+    pub(crate) fn joint_rate_rad_per_s(&self, joint: usize) -> f64 {
+        let estimated = self.joint_motion.get(joint).copied();
+        estimated.unwrap_or_else(|| self.rates.joint_rad_per_s(joint))
+    }
+
+    /// Estimated acceleration of one joint, in rad/s².
+    fn joint_acceleration_rad_per_s2(&self, joint: usize) -> Option<f64> {
+        self.joint_motion.get(self.joints_rad.len() + joint).copied()
+    }
+
+    /// Time derivative of pose and joints at a time since the stamp: `[angular velocity; velocity; joint rates]` of
+    /// [`Self::later`].
+    pub(crate) fn motion_at(&self, seconds: f64) -> DVector<f64> {
+        let joints = (0..self.joints_rad.len()).map(|joint| {
+            let acceleration = self.joint_acceleration_rad_per_s2(joint).unwrap_or(0.0);
+            self.joint_rate_rad_per_s(joint) + acceleration * seconds
+        });
+        let (angular_velocity, velocity) = match self.row_motion(seconds) {
+            Some((motion, gravity)) => (
+                motion.rate_rad_per_s,
+                self.navigation.velocity_m_per_s
+                    + gravity * seconds
+                    + self.navigation.world_from_imu.rotation * motion.velocity_m_per_s,
+            ),
+            None => (self.body_rate_rad_per_s(), self.navigation.velocity_m_per_s),
+        };
         let all: Vec<f64> = angular_velocity.iter().chain(velocity.iter()).copied().chain(joints).collect();
         DVector::from_vec(all)
+    }
+
+    /// [`Self::motion_at`] the stamp.
+    pub(crate) fn motion(&self) -> DVector<f64> {
+        self.motion_at(0.0)
     }
 
     fn body_rate_rad_per_s(&self) -> Vector3<f64> {
@@ -75,28 +131,40 @@ impl FrameState {
 
     /// `x ⊞ δ` with `δ` in the order of [`Layout`]: pose, joints, velocity and biases.
     pub(crate) fn plus(&self, delta: &[f64]) -> Self {
-        let joints = self.joints_rad.len();
+        let block = self.joint_block();
         let mut navigation = Vector15::zeros();
         navigation.as_mut_slice()[..POSE].copy_from_slice(&delta[..POSE]);
-        navigation.as_mut_slice()[POSE..].copy_from_slice(&delta[POSE + joints..POSE + joints + VELOCITY_BIAS]);
+        navigation.as_mut_slice()[POSE..].copy_from_slice(&delta[POSE + block..POSE + block + VELOCITY_BIAS]);
+        let moved =
+            |values: &[f64], steps: &[f64]| values.iter().zip(steps).map(|(value, step)| value + step).collect();
         Self {
             navigation: self.navigation.plus(&navigation),
-            joints_rad: self.joints_rad.iter().zip(&delta[POSE..]).map(|(angle, step)| angle + step).collect(),
+            joints_rad: moved(&self.joints_rad, &delta[POSE..]),
+            joint_motion: moved(&self.joint_motion, &delta[POSE + self.joints_rad.len()..]),
             rates: Arc::clone(&self.rates),
         }
     }
 
     /// `self ⊟ origin` in the order of [`Layout`].
     pub(crate) fn minus(&self, origin: &Self) -> DVector<f64> {
-        let joints = self.joints_rad.len();
+        let (joints, block) = (self.joints_rad.len(), self.joint_block());
         let navigation = self.navigation.minus(&origin.navigation);
-        let mut delta = DVector::zeros(POSE + joints + VELOCITY_BIAS);
+        let mut delta = DVector::zeros(POSE + block + VELOCITY_BIAS);
         delta.rows_mut(0, POSE).copy_from(&navigation.fixed_rows::<POSE>(0));
-        delta.rows_mut(POSE + joints, VELOCITY_BIAS).copy_from(&navigation.fixed_rows::<VELOCITY_BIAS>(POSE));
+        delta.rows_mut(POSE + block, VELOCITY_BIAS).copy_from(&navigation.fixed_rows::<VELOCITY_BIAS>(POSE));
         for (joint, (angle, start)) in self.joints_rad.iter().zip(&origin.joints_rad).enumerate() {
             delta[POSE + joint] = angle - start;
         }
+        let rates = self.joint_motion.iter().zip(&origin.joint_motion);
+        for (joint, (rate, start)) in rates.enumerate() {
+            delta[POSE + joints + joint] = rate - start;
+        }
         delta
+    }
+
+    /// Number of joint angles, rates and accelerations among the unknowns.
+    pub(crate) fn joint_block(&self) -> usize {
+        self.joints_rad.len() + self.joint_motion.len()
     }
 
     /// Largest rotation of vehicle or joints from another state, in radians.

@@ -6,31 +6,44 @@ use std::ops::Range;
 pub(crate) const POSE: usize = 6;
 /// Length of a velocity-bias block, `[v, b_g, b_a]`.
 pub(crate) const VELOCITY_BIAS: usize = 9;
+/// Length of `[v, b_g]`, the part of the velocity-bias block on which the pose at another time than the stamp depends.
+pub(crate) const ROW_MOTION: usize = 6;
 
-/// Columns of the window: frame by frame `[pose 6 | joints N | velocity and biases 9]`, then the static calibration.
+/// Columns of the window: frame by frame `[pose 6 | joint angles N | joint motion | velocity and biases 9]`, then the static
+/// calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Layout {
     /// Number of frames.
     pub(crate) frames: usize,
     /// Number of joints.
     pub(crate) joints: usize,
+    /// Number of joint rates and joint accelerations, which rows of a rolling shutter depend on: 2 N, or zero.
+    pub(crate) joint_motion: usize,
+    /// Whether camera poses are taken at other times than the stamp, so that they depend on velocity and gyroscope bias.
+    pub(crate) moving_rows: bool,
     /// Number of free calibration parameters.
     pub(crate) calibration: usize,
 }
 
 impl Layout {
     pub(crate) fn frame_len(&self) -> usize {
-        POSE + self.joints + VELOCITY_BIAS
+        POSE + self.joint_block() + VELOCITY_BIAS
     }
 
     pub(crate) fn frame(&self, slot: usize) -> Range<usize> {
         slot * self.frame_len()..(slot + 1) * self.frame_len()
     }
 
-    /// Pose and joints, which move the camera.
+    /// Number of joint angles, rates and accelerations.
+    pub(crate) fn joint_block(&self) -> usize {
+        self.joints + self.joint_motion
+    }
+
+    /// Pose and joints, which move the camera; with moving rows also velocity and gyroscope bias.
     pub(crate) fn camera(&self, slot: usize) -> Range<usize> {
         let start = slot * self.frame_len();
-        start..start + POSE + self.joints
+        let rows = if self.moving_rows { ROW_MOTION } else { 0 };
+        start..start + POSE + self.joint_block() + rows
     }
 
     pub(crate) fn pose(&self, slot: usize) -> Range<usize> {
@@ -43,8 +56,13 @@ impl Layout {
         start..start + self.joints
     }
 
-    pub(crate) fn velocity_bias(&self, slot: usize) -> Range<usize> {
+    pub(crate) fn joint_motion(&self, slot: usize) -> Range<usize> {
         let start = slot * self.frame_len() + POSE + self.joints;
+        start..start + self.joint_motion
+    }
+
+    pub(crate) fn velocity_bias(&self, slot: usize) -> Range<usize> {
+        let start = slot * self.frame_len() + POSE + self.joint_block();
         start..start + VELOCITY_BIAS
     }
 

@@ -5,6 +5,11 @@
 pub(crate) mod calibration;
 pub(crate) mod calibrations;
 pub(crate) mod camera_pose;
+pub(crate) mod camera_view;
 pub(crate) mod frame_state;
+pub(crate) mod imu_calibration;
+pub(crate) mod imu_errors;
 pub(crate) mod layout;
+pub(crate) mod motion_profile;
 pub(crate) mod navigation;
+pub(crate) mod sensor_columns;

@@ -9,15 +9,15 @@ use crate::estimator::factors::prior::StartPrior;
 use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::frame_state::{FrameState, Rates};
-use crate::estimator::state::layout::Layout;
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::window::active_tracks::ActiveTracks;
 use crate::estimator::window::features::{self, FeatureMap};
-use crate::estimator::window::frames::{Frame, Frames};
+use crate::estimator::window::frames::{Frame, Frames, layout};
 use crate::estimator::window::problem::{Estimate, Problem};
 use crate::estimator::window::window_state::WindowState;
 use crate::estimator::{
-    DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, StepInput, StepReport,
+    CameraSensorPrior, DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, StepInput,
+    StepReport,
 };
 use crate::frontend::TrackedFrame;
 use crate::geometry::Dimension;
@@ -77,6 +77,7 @@ pub(super) fn rigid_camera(flight: &SyntheticFlight) -> RigidCamera {
         model: flight.given_rig.cameras[0].model.clone(),
         imu_from_camera: flight.given_rig.chain_of_camera("cam0").unwrap().imu_from_camera(&[]),
         prior: DEFAULT_CHAIN_PRIOR,
+        sensor: CameraSensorPrior::default(),
     }
 }
 
@@ -87,11 +88,23 @@ pub(super) fn step(
     tracks: &TrackedFrame,
     rigid_tracks: &[&TrackedFrame],
 ) -> StepReport {
+    step_before(estimator, frame, None, tracks, rigid_tracks)
+}
+
+/// [`step`] with the IMU samples of the next frame, during which the rows of a rolling shutter are exposed.
+pub(super) fn step_before(
+    estimator: &mut Estimator,
+    frame: &SyntheticFrame,
+    next: Option<&SyntheticFrame>,
+    tracks: &TrackedFrame,
+    rigid_tracks: &[&TrackedFrame],
+) -> StepReport {
     let joint_angles = estimator.config().encoder_sigma_rad.and_then(|sigma_rad| frame.encoder_angles(sigma_rad));
     estimator.step(&StepInput {
         frame_index: frame.index,
         stamp_ns: frame.stamp_ns,
         imu: &frame.imu,
+        imu_after: next.map_or(&[], |next| &next.imu),
         joint_angles: joint_angles.as_ref(),
         tracks,
         rigid_tracks,
@@ -124,6 +137,18 @@ pub(super) fn cluster_window(options: EstimatorOptions, estimate_timeshift: bool
     window_of(&main, Some(&rigid), config)
 }
 
+/// A window of a gimballed or a rigid camera with another configuration.
+pub(super) fn changed_window(
+    gimbal: bool,
+    options: EstimatorOptions,
+    change: impl FnOnce(&mut EstimatorConfig),
+) -> TestWindow {
+    let flight = flight(gimbal);
+    let mut config = config(&flight.given_rig, Parameterization::Minimal, options);
+    change(&mut config);
+    window_of(&flight, None, config)
+}
+
 fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: EstimatorConfig) -> TestWindow {
     let parameterization = config.parameterization;
     let setup = Setup::new(config);
@@ -152,6 +177,8 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
                 motion.extend(&frame.imu);
             }
         }
+        let profile = setup.motion_profile(&ground_truth.imu, &flight.frames[index + 1].imu, bias);
+        let joint_motion = setup.initial_joint_motion(encoder.as_ref(), ground_truth.true_joint_angles_rad.len());
         let frame = Frame {
             index,
             stamp_ns: ground_truth.stamp_ns,
@@ -162,7 +189,8 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
                     bias,
                 },
                 joints_rad: ground_truth.true_joint_angles_rad.clone(),
-                rates: Rates::at(&ground_truth.imu, encoder.as_ref()),
+                joint_motion,
+                rates: Rates::at(&ground_truth.imu, encoder.as_ref(), profile),
             },
             first_estimate: None,
             encoder,
@@ -188,7 +216,7 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
         gyroscope_bias_sigma: 0.02,
     };
     let mut window = WindowState { frames, features, calibration, prior: None, start: Some(start) };
-    window.triangulate_new(&setup.config.options);
+    window.triangulate_new(&setup);
     assert!(window.active_tracks().iter().all(|active| active.ids.len() > 20), "enough landmarks");
     TestWindow { setup, window }
 }
@@ -204,11 +232,7 @@ pub(super) fn marginalize_once(test: &mut TestWindow) {
 /// Moves every unknown but the clocks at random; `scale` 1 is 2 cm and 1° of pose, 0.1 m/s, 2 mm and 0.2° of calibration.
 pub(super) fn disturb(test: &mut TestWindow, scale: f64) {
     let mut random = Noise::new(11);
-    let layout = Layout {
-        frames: test.window.frames.len(),
-        joints: test.window.calibration.of(MAIN).joint_count(),
-        calibration: test.window.calibration.dof(),
-    };
+    let layout = layout(&test.window.frames, test.window.calibration.dof());
     let mut delta = DVector::zeros(layout.total());
     for slot in 0..layout.frames {
         for (offset, column) in layout.pose(slot).enumerate() {

@@ -33,6 +33,18 @@ pub(super) fn run_flight(frames: &[SyntheticFrame], config: EstimatorConfig) -> 
     (estimator, reports)
 }
 
+/// [`run_flight`] with the IMU samples after each stamp.
+pub(super) fn run_flight_by_rows(frames: &[SyntheticFrame], config: EstimatorConfig) -> (Estimator, Vec<StepReport>) {
+    let mut estimator = Estimator::new(config);
+    let following = frames.iter().skip(1).map(Some).chain([None]);
+    let reports = frames
+        .iter()
+        .zip(following)
+        .map(|(frame, next)| fixture::step_before(&mut estimator, frame, next, &frame.tracks, &[]))
+        .collect();
+    (estimator, reports)
+}
+
 /// Root mean square position error after alignment of yaw and position with the ground truth, and the length of
 /// the trajectory.
 pub(super) fn trajectory_error_m(frames: &[SyntheticFrame], reports: &[StepReport]) -> (f64, f64) {

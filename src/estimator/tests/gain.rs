@@ -6,7 +6,7 @@ use super::fixture::{self, TestWindow};
 use super::flight::step;
 use crate::estimator::factors::projection::NewestRows;
 use crate::estimator::options::EstimatorOptions;
-use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::estimator::state::camera_pose::CameraMaps;
 use crate::estimator::window::active_tracks::ActiveTracks;
 use crate::estimator::window::information_gain::CameraInformation;
 use crate::estimator::window::motion_parts::motion_parts;
@@ -52,16 +52,14 @@ fn the_terms_of_the_motions_sum_to_the_calibration_jacobian() {
         for camera in 0..problem.cameras.len() {
             let calibration = calibrations.of(camera);
             let maps = CameraMaps::new(&frames, calibration);
-            let poses = camera_pose::by_slot(&frames, calibration);
-            let seen: Vec<_> =
-                frames.iter().map(|state| camera_pose::when_seen(state, calibration.camera_shift_s())).collect();
-            let parts = motion_parts(&seen, calibration, &maps, problem.layout.joints);
+            let linearized = problem.view(camera, &frames, &calibrations);
+            let parts = motion_parts(&frames, calibration, &maps, problem.layout.joints);
             let sum = parts.iter().fold(DMatrix::zeros(6 * frames.len(), calibration.dof()), |sum, part| sum + part);
             let mut whole = DMatrix::zeros(6 * frames.len(), calibration.dof());
             for (slot, map) in maps.calibration.iter().enumerate() {
                 whole.rows_mut(6 * slot, 6).copy_from(map);
             }
-            let projected = problem.projected_rows(camera, &estimate, &poses, NewestRows::Among);
+            let projected = problem.projected_rows(camera, &estimate, &linearized, NewestRows::Among);
             let by_camera = projected.rows.columns(0, 6 * frames.len());
             let (left, all) = (by_camera * (&whole - sum), by_camera * whole);
             assert!(left.norm() < 1e-9 * all.norm(), "{name}, camera {camera}: {} of {}", left.norm(), all.norm());

@@ -9,6 +9,7 @@ mod flight;
 mod gain;
 mod jacobian;
 mod preintegration;
+mod sensors;
 mod stationary;
 mod trouble;
 mod window;

@@ -2,7 +2,6 @@
 
 use crate::estimator::report::CalibrationEstimate;
 use crate::estimator::setup::Setup;
-use crate::estimator::state::calibration::Calibration;
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 
 /// Returns the static calibration with the standard deviations of its columns, NaN without a solve.
@@ -21,9 +20,9 @@ pub(crate) fn calibration_estimate(setup: &Setup, calibration: &Calibrations, si
     CalibrationEstimate {
         parameterization: chain.parameterization(),
         parameters,
-        values: cameras().flat_map(Calibration::values).collect(),
+        values: calibration.values(),
         sigmas,
-        prior_sigmas: cameras().flat_map(Calibration::prior_sigmas).collect(),
+        prior_sigmas: calibration.prior_sigmas(),
         classical: chain.to_classical(),
         margins: chain.margins(),
         rigid_cameras: rigid_cameras

@@ -44,13 +44,15 @@ pub(crate) struct ConsistencyMonitor {
     means: [Mean; MONITORED.len()],
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Mean {
     value: f64,
     /// Time averaged so far, up to [`AVERAGED_NS`].
     over_ns: i64,
     /// Value that started the present warning. The warning keeps it, so that one inconsistency is one message.
     reported: Option<f64>,
+    /// What the warning suggests, as long as it lasts.
+    cause: Option<String>,
 }
 
 impl Mean {
@@ -62,12 +64,14 @@ impl Mean {
 }
 
 impl ConsistencyMonitor {
-    /// Adds the residuals of a solved window and returns the warnings that hold in this step.
+    /// Adds the residuals of a solved window and returns the warnings that hold in this step; `cause` names what explains an
+    /// inconsistency that starts, if anything does.
     pub(crate) fn observe(
         &mut self,
         stamp_ns: i64,
         residuals: &[ResidualSummary],
         config: &EstimatorConfig,
+        cause: impl Fn() -> Option<String>,
     ) -> Vec<String> {
         let Some(last_ns) = self.last_ns.replace(stamp_ns) else { return Vec::new() };
         let mut warnings = Vec::new();
@@ -78,21 +82,29 @@ impl ConsistencyMonitor {
             let limit = if mean.reported.is_some() { RELEASE * monitored.limit } else { monitored.limit };
             let inconsistent = mean.over_ns >= AVERAGED_NS && mean.value > limit;
             mean.reported = inconsistent.then(|| mean.reported.unwrap_or(mean.value));
-            if let Some(value) = mean.reported {
-                warnings.push(warning_text(monitored, value, config));
-            }
+            let Some(value) = mean.reported else {
+                mean.cause = None;
+                continue;
+            };
+            let cause = mean.cause.get_or_insert_with(|| cause().unwrap_or_else(|| usual_causes(config)));
+            warnings.push(warning_text(monitored, value, cause));
         }
         warnings
     }
 }
 
-/// The warning with the mean that started it (χ²/dof), its limit, and the options that may remove it.
-fn warning_text(monitored: &MonitoredFactor, value: f64, config: &EstimatorConfig) -> String {
+/// What may be wrong where no single parameter explains an inconsistency, and the options that may remove it.
+fn usual_causes(config: &EstimatorConfig) -> String {
     let options = [("calibrate=on", config.calibrate), ("timeshift=on", config.estimate_timeshift)];
     let tries: Vec<&str> = options.into_iter().filter(|(_, on)| !on).map(|(option, _)| option).collect();
     let tries = if tries.is_empty() { String::new() } else { format!("; try {}", tries.join(" and ")) };
+    format!("check time offsets, calibration, noise densities{tries}")
+}
+
+/// The warning with the mean that started it (χ²/dof), its limit, and the cause.
+fn warning_text(monitored: &MonitoredFactor, value: f64, cause: &str) -> String {
     format!(
-        "{} (χ²/dof {value:.2} > {:.2} over {:.0} s): check time offsets, calibration, noise densities{tries}",
+        "{} (χ²/dof {value:.2} > {:.2} over {:.0} s): {cause}",
         monitored.inconsistency,
         monitored.limit,
         seconds_from_ns(AVERAGED_NS)

@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 
 use crate::estimator::allocated_bytes;
 use crate::estimator::options::EstimatorOptions;
+use crate::estimator::state::camera_view::CameraView;
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::optimization::LandmarkModel;
 use crate::optimization::{CameraPose, Landmark};
@@ -31,11 +32,6 @@ pub(crate) struct Feature {
 }
 
 impl Feature {
-    /// Slot of the anchor.
-    pub(crate) fn anchor(&self) -> Option<usize> {
-        self.observations.first().map(|first| first.slot)
-    }
-
     pub(crate) fn observation(&self, slot: usize) -> Option<&Observation> {
         self.observations.iter().find(|observation| observation.slot == slot)
     }
@@ -57,16 +53,16 @@ pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFea
 }
 
 /// Removes a frame: its observations are dropped, later slots move up, and landmarks that it anchors move to
-/// the next observing frame. `cameras` are the poses before the removal.
-pub(crate) fn drop_frame(features: &mut FeatureMap, gone: usize, cameras: &[CameraPose]) {
+/// the next observing frame. `view` has the poses before the removal.
+pub(crate) fn drop_frame(features: &mut FeatureMap, gone: usize, view: &CameraView<'_>) {
     for feature in features.values_mut() {
-        let anchored = feature.anchor() == Some(gone);
+        let anchor = feature.observations.first().filter(|first| first.slot == gone).map(|first| first.uv_px);
         feature.observations.retain(|observation| observation.slot != gone);
-        if anchored {
-            feature.landmark = feature
-                .observations
-                .first()
-                .and_then(|next| moved(feature.landmark.as_ref()?, &cameras[gone], &cameras[next.slot]));
+        if let Some(uv_px) = anchor {
+            feature.landmark = feature.observations.first().and_then(|next| {
+                let (from, to) = (view.pose(gone, &uv_px), view.pose(next.slot, &next.uv_px));
+                moved(feature.landmark.as_ref()?, &from, &to)
+            });
         }
         for observation in &mut feature.observations {
             if observation.slot > gone {
@@ -91,20 +87,17 @@ fn moved(landmark: &Landmark, from: &CameraPose, to: &CameraPose) -> Option<Land
 /// Triangulates a feature from all its observations: least squares of the distances across the bearings,
 /// weighted by depth in a second iteration. `None` when the parallax is too small, or the point is out of range
 /// or behind a camera.
-pub(crate) fn triangulate(feature: &Feature, cameras: &[CameraPose], options: &EstimatorOptions) -> Option<Landmark> {
+pub(crate) fn triangulate(feature: &Feature, view: &CameraView<'_>, options: &EstimatorOptions) -> Option<Landmark> {
     let anchor = feature.observations.first()?;
     if feature.observations.len() < options.min_observations {
         return None;
     }
     let in_world = |observation: &Observation| {
-        (cameras[observation.slot].rotation * observation.bearing, cameras[observation.slot].position_m)
+        let pose = view.pose(observation.slot, &observation.uv_px);
+        (pose.rotation * view.bearing(&observation.uv_px, &observation.bearing), pose.position_m)
     };
-    let (first_ray, _) = in_world(anchor);
-    let opening = feature
-        .observations
-        .iter()
-        .map(|observation| first_ray.cross(&in_world(observation).0).norm())
-        .fold(0.0, f64::max);
+    let rays: Vec<(Vector3<f64>, Vector3<f64>)> = feature.observations.iter().map(in_world).collect();
+    let opening = rays.iter().map(|(ray, _)| rays[0].0.cross(ray).norm()).fold(0.0, f64::max);
     if opening < options.min_triangulation_angle_rad {
         return None;
     }
@@ -112,8 +105,7 @@ pub(crate) fn triangulate(feature: &Feature, cameras: &[CameraPose], options: &E
     for _ in 0..2 {
         let mut normal = Matrix3::zeros();
         let mut right = Vector3::zeros();
-        for observation in &feature.observations {
-            let (ray, centre) = in_world(observation);
+        for (ray, centre) in &rays {
             let distance = point.map_or(1.0, |known| (known - centre).norm().max(1e-3));
             let across = (Matrix3::identity() - ray * ray.transpose()) / (distance * distance);
             normal += across;
@@ -122,17 +114,14 @@ pub(crate) fn triangulate(feature: &Feature, cameras: &[CameraPose], options: &E
         point = Some(normal.cholesky()?.solve(&right));
     }
     let point = point?;
-    let visible = feature.observations.iter().all(|observation| {
-        let (ray, centre) = in_world(observation);
-        (point - centre).dot(&ray) > 0.0
-    });
-    let camera = &cameras[anchor.slot];
+    let visible = rays.iter().all(|(ray, centre)| (point - centre).dot(ray) > 0.0);
+    let camera = view.pose(anchor.slot, &anchor.uv_px);
     let in_anchor = camera.rotation.transpose() * (point - camera.position_m);
     let distance = in_anchor.norm();
     let (nearest, farthest) = options.distance_range_m;
     (visible && distance >= nearest && distance <= farthest).then(|| {
         let bearing = match options.landmark_model {
-            LandmarkModel::InverseDistance => anchor.bearing,
+            LandmarkModel::InverseDistance => view.bearing(&anchor.uv_px, &anchor.bearing),
             LandmarkModel::BearingAndInverseDistance => in_anchor / distance,
         };
         Landmark { bearing, inverse_distance: 1.0 / distance }
@@ -142,16 +131,24 @@ pub(crate) fn triangulate(feature: &Feature, cameras: &[CameraPose], options: &E
 /// Mean rotation-compensated parallax between two frames, in radians, and the number of common features.
 pub(crate) fn compensated_parallax(
     features: &FeatureMap,
-    cameras: &[CameraPose],
+    view: &CameraView<'_>,
     from: usize,
     to: usize,
 ) -> (f64, usize) {
-    let to_from_from = cameras[to].rotation.transpose() * cameras[from].rotation;
+    let in_world = |observation: &Observation| {
+        view.pose(observation.slot, &observation.uv_px).rotation
+            * view.bearing(&observation.uv_px, &observation.bearing)
+    };
+    let to_from_from = view.first_row(to).rotation.transpose() * view.first_row(from).rotation;
     let angles: Vec<f64> = features
         .values()
         .filter_map(|feature| {
-            let first = to_from_from * feature.observation(from)?.bearing;
-            let second = feature.observation(to)?.bearing;
+            let (first, second) = (feature.observation(from)?, feature.observation(to)?);
+            let (first, second) = if view.has_nominal_bearings() {
+                (to_from_from * first.bearing, second.bearing)
+            } else {
+                (in_world(first), in_world(second))
+            };
             Some(first.cross(&second).norm().atan2(first.dot(&second)))
         })
         .collect();

@@ -7,9 +7,15 @@ use crate::estimator::factors::preintegration::Preintegration;
 use crate::estimator::factors::zero_velocity::Stationary;
 use crate::estimator::options::EstimatorOptions;
 use crate::estimator::state::frame_state::{FrameState, Rates};
+use crate::estimator::state::imu_errors::ImuErrors;
 use crate::estimator::state::layout::Layout;
+use crate::estimator::state::motion_profile::MotionProfile;
 use crate::estimator::state::navigation::Matrix15;
 use crate::sensors::JointAngles;
+
+/// Change of a scale error, a misalignment or the rotation in radians at which an interval is reintegrated: second-order
+/// effects are then a millionth.
+const REINTEGRATION_INTRINSICS_CHANGE: f64 = 1e-3;
 
 /// One frame of the window.
 #[derive(Clone, Debug)]
@@ -47,9 +53,10 @@ impl Frame {
         let of_vec = |numbers: &Vec<f64>| allocated_bytes(numbers.capacity() * size_of::<f64>());
         size_of::<Self>()
             + allocated_bytes(size_of_val(self.motion.samples()))
-            + states * of_vec(&self.state.joints_rad)
+            + states * (of_vec(&self.state.joints_rad) + of_vec(&self.state.joint_motion))
             + allocated_bytes(size_of::<Rates>())
             + of_vec(&self.state.rates.joints_rad_per_s)
+            + self.state.rates.profile.as_ref().map_or(0, MotionProfile::heap_bytes)
             + encoder
     }
 }
@@ -106,9 +113,10 @@ impl Frames {
         next.motion = motion;
     }
 
-    /// Reintegrates intervals whose bias has changed by more than [`EstimatorOptions::reintegration_change`] since
+    /// Reintegrates intervals whose intrinsics have changed by more than [`REINTEGRATION_INTRINSICS_CHANGE`] or whose bias
+    /// has changed by more than [`EstimatorOptions::reintegration_change`] since
     /// their integration.
-    pub(crate) fn reintegrate(&mut self, options: &EstimatorOptions) {
+    pub(crate) fn reintegrate(&mut self, options: &EstimatorOptions, intrinsics: Option<&ImuErrors>) {
         let limit = options.reintegration_change;
         for slot in 1..self.0.len() {
             let bias = self.0[slot - 1].state.navigation.bias;
@@ -116,8 +124,10 @@ impl Frames {
             let change = frame.motion.bias_change(&bias);
             let gyroscope = change.fixed_rows::<3>(0).abs() - limit.gyroscope_rad_per_s;
             let accelerometer = change.fixed_rows::<3>(3).abs() - limit.accelerometer_m_per_s2;
-            if gyroscope.max() > 0.0 || accelerometer.max() > 0.0 {
-                frame.motion.reintegrate(bias);
+            let intrinsics_change = frame.motion.intrinsics_change(intrinsics).map_or(0.0, |change| change.amax());
+            let reaches = intrinsics_change > REINTEGRATION_INTRINSICS_CHANGE;
+            if gyroscope.max() > 0.0 || accelerometer.max() > 0.0 || reaches {
+                frame.motion.reintegrate_with(bias, intrinsics.copied());
                 frame.motion_information = frame.motion.square_root_information();
             }
         }
@@ -145,6 +155,12 @@ impl DerefMut for Frames {
 
 /// Column layout of a window with these frames.
 pub(crate) fn layout(frames: &[Frame], calibration: usize) -> Layout {
-    let joints = frames.first().map_or(0, |frame| frame.state.joints_rad.len());
-    Layout { frames: frames.len(), joints, calibration }
+    let first = frames.first().map(|frame| &frame.state);
+    Layout {
+        frames: frames.len(),
+        joints: first.map_or(0, |state| state.joints_rad.len()),
+        joint_motion: first.map_or(0, |state| state.joint_motion.len()),
+        moving_rows: first.is_some_and(FrameState::has_moving_rows),
+        calibration,
+    }
 }

@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 use super::motion_parts::motion_parts;
 use crate::estimator::factors::projection::ProjectedRows;
 use crate::estimator::report::InformationGain;
-use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::estimator::state::camera_pose::CameraMaps;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::Layout;
 use crate::estimator::window::problem::{Estimate, Problem};
@@ -30,14 +30,14 @@ const ROUNDING: f64 = 1e-10;
 #[derive(Debug)]
 pub(crate) struct CameraInformation {
     maps: CameraMaps,
-    /// Information matrix of the camera poses (6·frames square), landmarks eliminated.
+    /// Information matrix of the camera's blocks (6 columns each), landmarks eliminated.
     with: DMatrix<f64>,
     without: DMatrix<f64>,
 }
 
 impl CameraInformation {
     pub(crate) fn new(projected: &ProjectedRows, maps: CameraMaps) -> Self {
-        let poses = 6 * maps.own.len();
+        let poses = 6 * maps.blocks();
         let squared = |rows: &DMatrix<f64>| {
             let rows = rows.columns(0, poses);
             rows.tr_mul(&rows)
@@ -139,18 +139,23 @@ impl Problem<'_> {
     fn carry(&self, camera: usize, maps: &CameraMaps, poses: &DMatrix<f64>, hessian: &mut DMatrix<f64>) {
         let layout = self.layout;
         let calibration = self.cameras[camera].columns.clone();
-        for row in 0..layout.frames {
+        for row in 0..maps.blocks() {
+            let of_row = maps.columns(&layout, row);
             let mut by_calibration = DMatrix::zeros(6, calibration.len());
-            for column in 0..layout.frames {
+            for column in 0..maps.blocks() {
                 let block = poses.fixed_view::<6, 6>(6 * row, 6 * column);
                 by_calibration += block * &maps.calibration[column];
                 if column <= row {
                     let carried = maps.own[row].tr_mul(&(block * &maps.own[column]));
-                    let mut place = hessian.view_range_mut(layout.camera(row), layout.camera(column));
-                    place += carried;
+                    let of_column = maps.columns(&layout, column);
+                    let mut place = hessian.view_range_mut(of_row.clone(), of_column.clone());
+                    place += &carried;
+                    if column < row && of_column == of_row {
+                        place += carried.transpose();
+                    }
                 }
             }
-            let mut coupling = hessian.view_range_mut(calibration.clone(), layout.camera(row));
+            let mut coupling = hessian.view_range_mut(calibration.clone(), of_row);
             coupling += by_calibration.tr_mul(&maps.own[row]);
             let mut corner = hessian.view_range_mut(calibration.clone(), calibration.clone());
             corner += maps.calibration[row].tr_mul(&by_calibration);
@@ -178,9 +183,7 @@ impl Problem<'_> {
             let force = &information.with * moved(&with_p) - &information.without * moved(&without_p);
             let own = with_p.rows_range(columns.clone());
             let of_camera = calibration.of(camera);
-            let seen: Vec<_> =
-                frames.iter().map(|state| camera_pose::when_seen(state, of_camera.camera_shift_s())).collect();
-            for (motion, moves) in motion_parts(&seen, of_camera, maps, layout.joints).into_iter().enumerate() {
+            for (motion, moves) in motion_parts(frames, of_camera, maps, layout.joints).into_iter().enumerate() {
                 let moves = moves * own;
                 for column in 0..free.len() {
                     motion_terms[(motion, column)] += moves.column(column).dot(&force.column(column));
@@ -204,7 +207,7 @@ impl Problem<'_> {
         for slot in 0..self.layout.frames {
             let joints = self.layout.joints(slot).start;
             for (joint, _, slope) in self.encoder_residuals(slot, estimate) {
-                let by_clock = slope * estimate.frames[slot].rates.joint_rad_per_s(joint);
+                let by_clock = slope * estimate.frames[slot].joint_rate_rad_per_s(joint);
                 let row = |answer: &DMatrix<f64>| answer.row(joints + joint) * slope + answer.row(clock) * by_clock;
                 let force = if slot == newest { row(with) } else { row(with) - row(without) };
                 for column in 0..force.len() {
@@ -215,18 +218,18 @@ impl Problem<'_> {
     }
 }
 
-/// Derivative of the camera poses (6 rows each) with respect to the unknowns.
+/// Derivative of the camera's blocks (6 rows each) with respect to the unknowns.
 fn camera_moves(
     layout: Layout,
     maps: &CameraMaps,
     calibration: &std::ops::Range<usize>,
     unknowns: &DMatrix<f64>,
 ) -> DMatrix<f64> {
-    let mut moves = DMatrix::zeros(6 * layout.frames, unknowns.ncols());
-    for slot in 0..layout.frames {
-        let moved = &maps.own[slot] * unknowns.rows_range(layout.camera(slot))
-            + &maps.calibration[slot] * unknowns.rows_range(calibration.clone());
-        moves.rows_mut(6 * slot, 6).copy_from(&moved);
+    let mut moves = DMatrix::zeros(6 * maps.blocks(), unknowns.ncols());
+    for block in 0..maps.blocks() {
+        let moved = &maps.own[block] * unknowns.rows_range(maps.columns(&layout, block))
+            + &maps.calibration[block] * unknowns.rows_range(calibration.clone());
+        moves.rows_mut(6 * block, 6).copy_from(&moved);
     }
     moves
 }

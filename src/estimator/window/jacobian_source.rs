@@ -4,7 +4,9 @@ use nalgebra::DMatrix;
 
 use super::window_state::WindowState;
 use crate::estimator::report::columns::scales_of;
-use crate::estimator::report::jacobian_source::{ClockColumns, FactorRows, JacobianSource, PackedKind, PackedRow};
+use crate::estimator::report::jacobian_source::{
+    ClockColumns, ExactSource, FactorRows, JacobianSource, PackedKind, PackedRow,
+};
 use crate::estimator::report::linearization::{column_blocks, column_order};
 use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::Calibrations;
@@ -71,11 +73,20 @@ impl WindowState {
             })
             .collect();
         let any = clocks.iter().any(|clocks| clocks.count > 0);
+        let views = (0..calibration.cameras()).map(|camera| problem.view(camera, &frames, &calibration));
+        let exact = layout.moving_rows || views.into_iter().any(|view| view.intrinsics_block().is_some());
+        let exact = exact.then(|| {
+            Box::new(ExactSource {
+                linearized: (frames.clone(), calibration.clone()),
+                current: (estimate.frames.clone(), estimate.calibration.clone()),
+            })
+        });
         let rates = |state: &FrameState| state.motion().iter().map(|rate| *rate as f32).collect::<Vec<f32>>();
         let source = JacobianSource {
             rates: if any { frames.iter().flat_map(rates).collect() } else { Box::default() },
             clocks: if any { clocks.into() } else { Box::default() },
             frames: frames.iter().flat_map(packed_frame).collect(),
+            exact,
             chains: (0..calibration.cameras()).map(|camera| calibration.of(camera).chain().clone()).collect(),
             calibrated: layout.calibration > 0,
             rejected: rejected.map(|(place, (_, bearing))| (place as u32, bearing.cast::<f32>().into())).collect(),

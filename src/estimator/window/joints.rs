@@ -6,8 +6,9 @@ use super::window_state::WindowState;
 use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::estimator::state::camera_view::CameraView;
 use crate::geometry::wrap_angle;
-use crate::optimization::{CameraPose, RelativePose, reprojection};
+use crate::optimization::{RelativePose, reprojection};
 use crate::sensors::JointAngles;
 
 /// Standard deviation of a joint's rotation since the previous frame, without an encoder.
@@ -18,6 +19,31 @@ const MIN_LANDMARKS: usize = 15;
 /// readings are propagated with it: the visual rotation between the frames is then independent of the encoder.
 const SHARPER: f64 = 3.0;
 
+/// Standard deviation of a joint rate without a measurement, in rad/s: motors of gimbals rotate at up to 200°/s.
+const UNKNOWN_RATE_RAD_PER_S: f64 = 2.0;
+/// Standard deviation of a joint acceleration without a measurement, in rad/s²: a stabilized joint compensates the
+/// vehicle, which reaches 20 rad/s² when it is agile.
+const UNKNOWN_ACCELERATION_RAD_PER_S2: f64 = 10.0;
+/// Smallest standard deviations of rate and acceleration, in rad/s and rad/s²: over the 0.1 s of the readings a joint does
+/// not follow a parabola any better.
+const MIN_MOTION_SIGMAS: [f64; 2] = [0.02, 2.0];
+
+/// Value and standard deviation of a joint rate or joint acceleration: what the encoders measure, or zero. `place` counts
+/// the rates of all joints, then their accelerations.
+pub(crate) fn measured_joint_motion(encoder: Option<&JointAngles>, place: usize, joints: usize) -> (f64, f64) {
+    let (joint, derivative) = (place % joints.max(1), place / joints.max(1));
+    let unknown = [UNKNOWN_RATE_RAD_PER_S, UNKNOWN_ACCELERATION_RAD_PER_S2][derivative.min(1)];
+    let measured = encoder.and_then(|encoder| {
+        let fit = encoder.motion_fits.get(joint)?;
+        let (value, sigma) = match derivative {
+            0 => (*encoder.rates_rad_per_s.get(joint)?, fit.rate_sigma_rad_per_s),
+            _ => (fit.acceleration_rad_per_s2, fit.acceleration_sigma_rad_per_s2),
+        };
+        (value.is_finite() && sigma.is_finite()).then(|| (value, sigma.hypot(MIN_MOTION_SIGMAS[derivative.min(1)])))
+    });
+    measured.filter(|(_, sigma)| *sigma < unknown).unwrap_or((0.0, unknown))
+}
+
 impl WindowState {
     /// Fits the newest frame's joint angles to the observations of triangulated landmarks with a fixed pose: an
     /// encoder may have an error of many degrees, and without encoders there is no other initial value.
@@ -27,14 +53,14 @@ impl WindowState {
             return;
         }
         let slot = self.frames.newest_slot();
-        let cameras = self.camera_poses(MAIN);
+        let view = self.view(setup, MAIN);
         let known = self.frames[slot].encoder.as_ref().map(|encoder| encoder.sigmas_rad.as_slice());
         let prior =
             DVector::from_fn(joints, |joint, _| known.map_or(UNKNOWN_JOINT_SIGMA_RAD, |sigmas| sigmas[joint]).powi(-2));
         let start = self.frames[slot].state.joints_rad.clone();
         let mut angles = start.clone();
         for _ in 0..5 {
-            let (hessian, gradient, _) = self.joints_by_landmarks(setup, slot, &angles, &cameras);
+            let (hessian, gradient, _) = self.joints_by_landmarks(setup, slot, &angles, &view);
             let hessian = hessian + DMatrix::from_diagonal(&prior);
             let gradient =
                 gradient + DVector::from_fn(joints, |joint, _| (angles[joint] - start[joint]) * prior[joint]);
@@ -59,31 +85,32 @@ impl WindowState {
         setup: &Setup,
         slot: usize,
         angles_rad: &[f64],
-        cameras: &[CameraPose],
+        view: &CameraView<'_>,
     ) -> (DMatrix<f64>, DVector<f64>, usize) {
         let joints = angles_rad.len();
         let sigma = setup.config.options.pixel_sigma_px;
         let mut state = self.frames[slot].state.clone();
         state.joints_rad = angles_rad.to_vec();
-        let calibration = self.calibration.of(MAIN);
-        let camera = camera_pose::at(&state, calibration);
-        let own = CameraMaps::new(std::slice::from_ref(&state), calibration).own.remove(0);
+        let sensor = self.calibration.of(MAIN).sensor_model();
+        let camera_at = |row: f64| camera_pose::at_row(&state, &sensor, row);
+        let first_row = camera_at(0.0);
+        let own = CameraMaps::of_sensor(std::slice::from_ref(&state), &sensor).own.remove(0);
         let by_joints = own.columns(6, joints).into_owned();
         let mut hessian = DMatrix::zeros(joints, joints);
         let mut gradient = DVector::zeros(joints);
         let mut count = 0;
         for feature in self.features[MAIN].values() {
             let (Some(anchor), Some(landmark), Some(seen)) =
-                (feature.anchor(), feature.landmark.as_ref(), feature.observation(slot))
+                (feature.observations.first(), feature.landmark.as_ref(), feature.observation(slot))
             else {
                 continue;
             };
-            if anchor == slot {
+            if anchor.slot == slot {
                 continue;
             }
-            let relative = RelativePose::new(&cameras[anchor], &camera);
-            let Some(term) = reprojection::linearize(&setup.config.camera, &relative, &relative, landmark, &seen.uv_px)
-            else {
+            let camera = if sensor.rolling { camera_at(view.row_fraction(&seen.uv_px)) } else { first_row };
+            let relative = RelativePose::new(&view.pose(anchor.slot, &anchor.uv_px), &camera);
+            let Some(term) = reprojection::linearize(view.model(), &relative, &relative, landmark, &seen.uv_px) else {
                 continue;
             };
             let squared = term.residual.norm_squared() / (sigma * sigma);
@@ -97,8 +124,8 @@ impl WindowState {
     }
 
     /// Variances of a frame's joint angles from the image alone, `None` with too few landmarks.
-    fn visual_variances(&self, setup: &Setup, slot: usize, cameras: &[CameraPose]) -> Option<DVector<f64>> {
-        let (hessian, _, count) = self.joints_by_landmarks(setup, slot, &self.frames[slot].state.joints_rad, cameras);
+    fn visual_variances(&self, setup: &Setup, slot: usize, view: &CameraView<'_>) -> Option<DVector<f64>> {
+        let (hessian, _, count) = self.joints_by_landmarks(setup, slot, &self.frames[slot].state.joints_rad, view);
         let inverse = hessian.cholesky()?.inverse();
         (count >= MIN_LANDMARKS).then(|| inverse.diagonal())
     }
@@ -109,9 +136,9 @@ impl WindowState {
     /// Only independent errors are averaged; the variance of the visual rotation is added.
     pub(crate) fn carry_encoder(&mut self, setup: &Setup, from: usize, to: usize) {
         let (Some(removed), Some(own)) = (&self.frames[from].encoder, &self.frames[to].encoder) else { return };
-        let cameras = self.camera_poses(MAIN);
+        let view = self.view(setup, MAIN);
         let (Some(variance_from), Some(variance_to)) =
-            (self.visual_variances(setup, from, &cameras), self.visual_variances(setup, to, &cameras))
+            (self.visual_variances(setup, from, &view), self.visual_variances(setup, to, &view))
         else {
             return;
         };
@@ -127,8 +154,8 @@ impl WindowState {
             let removed_variance = removed_variance + between;
             let removed_weight = own_variance / (own_variance + removed_variance);
             // A reading that is late by the clocks' offset is late at either frame's rate.
-            let faster = self.frames[to].state.rates.joint_rad_per_s(joint)
-                - self.frames[from].state.rates.joint_rad_per_s(joint);
+            let faster =
+                self.frames[to].state.joint_rate_rad_per_s(joint) - self.frames[from].state.joint_rate_rad_per_s(joint);
             let rotation_rad = rotation_rad + faster * self.calibration.of(MAIN).encoder_shift_s();
             let change = wrap_angle(removed.angles_rad[joint] + rotation_rad - own.angles_rad[joint]);
             let bias_variance = own_bias_variance.max(removed_bias_variance);

@@ -2,7 +2,7 @@
 
 use super::features;
 use super::window_state::WindowState;
-use crate::estimator::options::EstimatorOptions;
+use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::{Event, EventKind};
 use crate::geometry::seconds_from_ns;
@@ -24,13 +24,13 @@ impl Decision {
 
 impl WindowState {
     /// Decides whether the newest frame becomes a keyframe.
-    pub(crate) fn choose_keyframe(&mut self, options: &EstimatorOptions) -> Event {
-        let decision = self.keyframe_decision(options);
+    pub(crate) fn choose_keyframe(&mut self, setup: &Setup) -> Event {
+        let decision = self.keyframe_decision(setup);
         self.frames.newest_mut().keyframe = decision.keyframe;
         decision.event
     }
 
-    fn keyframe_decision(&self, options: &EstimatorOptions) -> Decision {
+    fn keyframe_decision(&self, setup: &Setup) -> Decision {
         let newest = self.frames.newest_slot();
         let Some(last) = (0..newest).rev().find(|slot| self.frames[*slot].keyframe) else {
             return Decision::new(true, "the first keyframe of the window", 0.0, 0.0);
@@ -53,10 +53,10 @@ impl WindowState {
         let mut decisions: Vec<Decision> = (0..self.features.len())
             .map(observed)
             .filter(|(_, observed)| *observed > 0)
-            .map(|(camera, observed)| self.keyframe_by_image(options, camera, last, observed))
+            .map(|(camera, observed)| self.keyframe_by_image(setup, camera, last, observed))
             .collect();
         if decisions.is_empty() {
-            return self.keyframe_by_image(options, MAIN, last, 0);
+            return self.keyframe_by_image(setup, MAIN, last, 0);
         }
         let first = decisions.iter().position(|decision| decision.keyframe).unwrap_or(0);
         decisions.swap_remove(first)
@@ -64,10 +64,11 @@ impl WindowState {
 
     /// Whether one camera requests a keyframe, by what it has in common with the last one; `observed` features are in its
     /// newest image.
-    fn keyframe_by_image(&self, options: &EstimatorOptions, camera: usize, last: usize, observed: usize) -> Decision {
+    fn keyframe_by_image(&self, setup: &Setup, camera: usize, last: usize, observed: usize) -> Decision {
+        let options = &setup.config.options;
         let newest = self.frames.newest_slot();
-        let poses = self.camera_poses(camera);
-        let (parallax, common) = features::compensated_parallax(&self.features[camera], &poses, last, newest);
+        let view = self.view(setup, camera);
+        let (parallax, common) = features::compensated_parallax(&self.features[camera], &view, last, newest);
         let new_ratio = 1.0 - common as f64 / observed.max(1) as f64;
         if common < options.keyframe_min_tracked {
             let limit = options.keyframe_min_tracked as f64;

@@ -1,13 +1,13 @@
 //! Linearization of a solved window, for observability analysis and display.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::window_state::WindowState;
 use crate::estimator::factors::projection::NewestRows;
 use crate::estimator::report::linearization::{column_blocks, column_order};
 use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::MAIN;
-use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::estimator::state::camera_pose::CameraMaps;
 use crate::estimator::window::information_gain::CameraInformation;
 use crate::estimator::window::problem::{Estimate, Problem};
 use crate::estimator::window::rows::stack_columns;
@@ -55,9 +55,9 @@ impl Problem<'_> {
         let mut norms = Vec::new();
         for camera in 0..self.cameras.len() {
             let maps = CameraMaps::new(&frames, calibration.of(camera));
-            let poses = camera_pose::by_slot(&frames, calibration.of(camera));
+            let linearized = self.view(camera, &frames, &calibration);
             let apart = if seen.is_some() { NewestRows::Apart } else { NewestRows::Among };
-            let projected = self.projected_rows(camera, estimate, &poses, apart);
+            let projected = self.projected_rows(camera, estimate, &linearized, apart);
             measured.push(self.carried_rows(camera, &projected, &maps));
             let squared = projected.squared_column_norms(&maps.calibration);
             norms.extend(squared.iter().map(|squared| squared.max(0.0).sqrt()));
@@ -65,7 +65,12 @@ impl Problem<'_> {
                 seen.push(CameraInformation::new(&projected, maps));
             }
         }
-        measured.extend((1..layout.frames).map(|slot| self.imu_rows_at(slot, estimate, &frames)));
+        let imu: Vec<DMatrix<f64>> = (1..layout.frames).map(|slot| self.imu_rows_at(slot, estimate, &frames)).collect();
+        norms.extend(
+            self.imu_columns(&estimate.calibration)
+                .map(|column| imu.iter().map(|rows| rows.column(column).norm_squared()).sum::<f64>().sqrt()),
+        );
+        measured.extend(imu);
         measured.extend((0..layout.frames).map(|slot| self.encoder_rows(slot, estimate)));
         let stationary: Vec<_> = self.zero_velocity_terms(&estimate.frames).collect();
         measured.push(self.zero_velocity_rows(&stationary));

@@ -48,7 +48,7 @@ impl WindowState {
         }
         let estimate = self.estimate(vec![Vec::new(); self.features.len()]);
         self.prior = marginalization::dropped(&self.problem(setup, &[]), &estimate, gone);
-        self.drop_observations(gone);
+        self.drop_observations(setup, gone);
         self.frames.drop_before_newest(gone);
         self.renumber_prior(gone);
     }
@@ -80,7 +80,7 @@ impl WindowState {
         }
         self.prior = prior;
         self.start = None;
-        self.drop_observations(0);
+        self.drop_observations(setup, 0);
         if setup.config.options.landmark_model == LandmarkModel::InverseDistance {
             self.face_measured_bearings();
         }
@@ -89,10 +89,11 @@ impl WindowState {
     }
 
     /// Removes the observations of a frame from all features.
-    fn drop_observations(&mut self, gone: usize) {
+    fn drop_observations(&mut self, setup: &Setup, gone: usize) {
         for camera in 0..self.features.len() {
-            let poses = self.camera_poses(camera);
-            features::drop_frame(&mut self.features[camera], gone, &poses);
+            let mut features = std::mem::take(&mut self.features[camera]);
+            features::drop_frame(&mut features, gone, &self.view(setup, camera));
+            self.features[camera] = features;
         }
     }
 

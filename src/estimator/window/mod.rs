@@ -5,6 +5,7 @@
 
 pub(crate) mod active_tracks;
 pub(crate) mod calibration_columns;
+pub(crate) mod column_groups;
 pub(crate) mod consistency;
 pub(crate) mod failure;
 pub(crate) mod features;

@@ -13,7 +13,7 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 
 use crate::estimator::state::calibration::Calibration;
-use crate::estimator::state::camera_pose::CameraMaps;
+use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::POSE;
 use crate::geometry::{RigidTransform, so3};
@@ -26,33 +26,43 @@ struct Twists {
 }
 
 /// Returns, for each motion (translations along and rotations about the IMU's axes, then the joints), its
-/// contribution to the derivative of the camera poses with respect to the calibration (6·frames × columns).
+/// contribution to the derivative of the camera's blocks with respect to the calibration (6·blocks × columns).
 ///
-/// The sum over motions is that derivative up to a rigid motion of all poses.
+/// The sum over motions is that derivative up to a rigid motion of all poses. Intrinsics change the images without any
+/// motion: nothing of them is attributed.
 pub(crate) fn motion_parts(
-    frames: &[Cow<'_, FrameState>],
+    stamped: &[FrameState],
     calibration: &Calibration,
     maps: &CameraMaps,
     joints: usize,
 ) -> Vec<DMatrix<f64>> {
     let columns = calibration.dof();
-    let mut parts = vec![DMatrix::zeros(6 * frames.len(), columns); 6 + joints];
+    let mut parts = vec![DMatrix::zeros(6 * maps.blocks(), columns); 6 + joints];
+    let sensor = calibration.sensor_model();
+    let rows = sensor.block_rows();
+    // The states at the exposures of the blocks.
+    let frames: Vec<Cow<'_, FrameState>> = stamped
+        .iter()
+        .flat_map(|state| rows.iter().map(|row| camera_pose::when_seen(state, sensor.row_time_s(*row))))
+        .collect();
     let Some(newest) = frames.last() else { return parts };
     let there = twists(calibration, &newest.joints_rad);
-    for (slot, frame) in frames.iter().enumerate() {
+    for (block, frame) in frames.iter().enumerate() {
         let pose = &frame.navigation.world_from_imu;
         let extrinsics = calibration.imu_from_camera(&frame.joints_rad);
         let to_newest = pose.inverse() * newest.navigation.world_from_imu;
         let mut put = |motion: usize, twists: &Twists| {
             let moved = camera_moves(twists, &extrinsics, &pose.rotation_matrix());
-            let mut place = parts[motion].view_mut((6 * slot, 0), (6, columns));
+            let mut place = parts[motion].view_mut((6 * block, 0), (6, columns));
             place += moved;
         };
         body_parts(&to_newest, &there, &mut put);
         joint_parts(calibration, &newest.joints_rad, &frame.joints_rad, &mut put);
     }
-    if let Some(clock) = calibration.camera_shift_column() {
-        clock_parts(frames, maps, clock, &mut parts);
+    let shift = sensor.shift_column.map(|column| (column, [1.0, 1.0]));
+    let readout = sensor.readout_column.map(|column| (column, [0.0, 1.0]));
+    for (column, factors) in shift.into_iter().chain(readout) {
+        clock_parts(&frames, maps, column, &factors[..rows.len()], &mut parts);
     }
     parts
 }
@@ -104,10 +114,16 @@ fn joint_parts(calibration: &Calibration, from_rad: &[f64], to_rad: &[f64], put:
     }
 }
 
-/// Contributions to a camera's time offset: it moves the camera by its velocity.
-fn clock_parts(frames: &[Cow<'_, FrameState>], maps: &CameraMaps, clock: usize, parts: &mut [DMatrix<f64>]) {
-    for (slot, frame) in frames.iter().enumerate() {
-        let (own, rates) = (&maps.own[slot], frame.motion());
+/// Contributions to a time offset or readout time: it moves the camera of a row by its velocity times the row's factor.
+fn clock_parts(
+    frames: &[Cow<'_, FrameState>],
+    maps: &CameraMaps,
+    clock: usize,
+    factors: &[f64],
+    parts: &mut [DMatrix<f64>],
+) {
+    for ((block, frame), factor) in frames.iter().enumerate().zip(factors.iter().cycle()) {
+        let (own, rates) = (&maps.own[block], frame.motion());
         let body_from_world = frame.navigation.world_from_imu.rotation_matrix().transpose();
         let velocity = body_from_world * rates.fixed_rows::<3>(3);
         for (motion, part) in parts.iter_mut().enumerate() {
@@ -116,7 +132,7 @@ fn clock_parts(frames: &[Cow<'_, FrameState>], maps: &CameraMaps, clock: usize, 
                 3..6 => own.column(motion - 3) * rates[motion - 3],
                 joint => own.column(POSE + joint - 6) * rates[joint],
             };
-            part.view_mut((6 * slot, clock), (6, 1)).copy_from(&moved);
+            part.view_mut((6 * block, clock), (6, 1)).copy_from(&(moved * *factor));
         }
     }
 }

@@ -9,11 +9,13 @@ use crate::estimator::factors::prior::{Prior, StartPrior};
 use crate::estimator::factors::visual::{self, ReducedVisualEquations, Track, VisualEquations, VisualModel};
 use crate::estimator::factors::zero_velocity::ZeroVelocityTerm;
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
-use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::estimator::state::camera_pose::CameraMaps;
+use crate::estimator::state::camera_view::CameraView;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{Layout, POSE, VELOCITY_BIAS};
 use crate::estimator::state::navigation::{Matrix15, Vector15};
 use crate::estimator::window::frames::Frame;
+use crate::estimator::window::joints::measured_joint_motion;
 use crate::geometry::wrap_angle;
 use crate::optimization::Landmark;
 
@@ -69,6 +71,19 @@ impl Costs {
     }
 }
 
+/// Whitened IMU factor between two frames.
+#[derive(Clone, Debug)]
+pub(crate) struct ImuBlocks {
+    /// With respect to the earlier frame (15 × 15).
+    pub(crate) by_from: Matrix15,
+    /// With respect to the later frame (15 × 15).
+    pub(crate) by_to: Matrix15,
+    /// With respect to the IMU's intrinsics (15 × 15), where they are estimated.
+    pub(crate) by_intrinsics: Option<Matrix15>,
+    /// 15 × 1.
+    pub(crate) residual: Vector15,
+}
+
 /// Reprojection factors of one camera.
 #[derive(Clone, Debug)]
 struct CameraEquations {
@@ -96,20 +111,31 @@ impl Problem<'_> {
             .collect()
     }
 
+    /// A camera over frames and calibrations.
+    pub(crate) fn view<'v>(
+        &'v self,
+        camera: usize,
+        frames: &'v [FrameState],
+        calibrations: &'v Calibrations,
+    ) -> CameraView<'v> {
+        CameraView::new(frames, calibrations.of(camera), self.cameras[camera].visual.camera)
+    }
+
     /// The cost by kind of factor.
     pub(crate) fn costs(&self, estimate: &Estimate) -> Costs {
         let mut costs = Costs::default();
         for (camera, (factors, landmarks)) in self.cameras.iter().zip(&estimate.landmarks).enumerate() {
-            let poses = camera_pose::by_slot(&estimate.frames, estimate.calibration.of(camera));
-            costs.visual += 2.0 * visual::cost(&factors.visual, &poses, factors.tracks, landmarks);
+            let view = self.view(camera, &estimate.frames, &estimate.calibration);
+            costs.visual += 2.0 * visual::cost(&factors.visual, &view, factors.tracks, landmarks);
         }
         for slot in 1..self.frames.len() {
-            if let Some(residual) = self.imu_residual(slot, &estimate.frames) {
+            if let Some(residual) = self.imu_residual(slot, &estimate.frames, &estimate.calibration) {
                 costs.imu += residual.norm_squared();
             }
         }
         for slot in 0..self.frames.len() {
             costs.encoder += self.encoder_residuals(slot, estimate).map(|(_, r, _)| r * r).sum::<f64>();
+            costs.encoder += self.joint_motion_residuals(slot, estimate).map(|(_, r, _)| r * r).sum::<f64>();
         }
         costs.zero_velocity =
             self.zero_velocity_terms(&estimate.frames).map(|term| term.residual * term.residual).sum();
@@ -141,13 +167,14 @@ impl Problem<'_> {
         first_estimate_offset
     }
 
-    fn imu_residual(&self, slot: usize, frames: &[FrameState]) -> Option<Vector15> {
+    fn imu_residual(&self, slot: usize, frames: &[FrameState], calibration: &Calibrations) -> Option<Vector15> {
         let information = self.frames[slot].motion_information.as_ref()?;
-        let residual = imu_factor::residual(
+        let residual = imu_factor::residual_with(
             &self.frames[slot].motion,
             &frames[slot - 1].navigation,
             &frames[slot].navigation,
             &self.gravity_in_world,
+            calibration.imu_errors(),
         );
         Some(information * residual)
     }
@@ -164,8 +191,23 @@ impl Problem<'_> {
         let readings =
             self.frames[slot].encoder.iter().flat_map(|encoder| encoder.angles_rad.iter().zip(&encoder.sigmas_rad));
         state.joints_rad.iter().zip(readings).enumerate().map(move |(joint, (angle, (reading, sigma)))| {
-            let read = angle + state.rates.joint_rad_per_s(joint) * shift_s;
+            let read = angle + state.joint_rate_rad_per_s(joint) * shift_s;
             (joint, wrap_angle(read - reading) / sigma, 1.0 / sigma)
+        })
+    }
+
+    /// Returns place, whitened residual and its derivative, for each joint rate and joint acceleration of a frame: against
+    /// what the encoders measure, or against zero with the motion of a gimbal as standard deviation.
+    pub(crate) fn joint_motion_residuals<'s>(
+        &'s self,
+        slot: usize,
+        estimate: &'s Estimate,
+    ) -> impl Iterator<Item = (usize, f64, f64)> + 's {
+        let encoder = self.frames[slot].encoder.as_ref();
+        let motion = &estimate.frames[slot].joint_motion;
+        motion.iter().enumerate().map(move |(place, value)| {
+            let (measured, sigma) = measured_joint_motion(encoder, place, motion.len() / 2);
+            (place, (value - measured) / sigma, 1.0 / sigma)
         })
     }
 
@@ -224,8 +266,8 @@ impl Problem<'_> {
             .zip(&estimate.landmarks)
             .enumerate()
             .map(|(camera, (factors, landmarks))| {
-                let current = camera_pose::by_slot(&estimate.frames, estimate.calibration.of(camera));
-                let linearized = camera_pose::by_slot(&frames, calibration.of(camera));
+                let current = self.view(camera, &estimate.frames, &estimate.calibration);
+                let linearized = self.view(camera, &frames, &calibration);
                 CameraEquations {
                     visual: visual::equations(&factors.visual, &current, &linearized, factors.tracks, landmarks),
                     maps: CameraMaps::new(&frames, calibration.of(camera)),
@@ -249,8 +291,8 @@ impl Problem<'_> {
         let mut hessian = DMatrix::zeros(total, total);
         let mut gradient = DVector::zeros(total);
         for slot in 1..slots {
-            if let Some((by_from, by_to, residual)) = self.imu_blocks(slot, estimate, linearized) {
-                self.add_imu(slot, &by_from, &by_to, &residual, &mut hessian, &mut gradient);
+            if let Some(blocks) = self.imu_blocks(slot, estimate, linearized) {
+                self.add_imu(slot, &blocks, &self.imu_columns(&estimate.calibration), &mut hessian, &mut gradient);
             }
         }
         let clock = self.encoder_clock_column(estimate);
@@ -260,11 +302,16 @@ impl Problem<'_> {
                 hessian[(start + joint, start + joint)] += slope * slope;
                 gradient[start + joint] += slope * residual;
                 if let Some(clock) = clock {
-                    let by_clock = slope * estimate.frames[slot].rates.joint_rad_per_s(joint);
+                    let by_clock = slope * estimate.frames[slot].joint_rate_rad_per_s(joint);
                     hessian[(clock, start + joint)] += by_clock * slope;
                     hessian[(clock, clock)] += by_clock * by_clock;
                     gradient[clock] += by_clock * residual;
                 }
+            }
+            let motion = self.layout.joint_motion(slot).start;
+            for (place, residual, slope) in self.joint_motion_residuals(slot, estimate) {
+                hessian[(motion + place, motion + place)] += slope * slope;
+                gradient[motion + place] += slope * residual;
             }
         }
         for term in self.zero_velocity_terms_of(&estimate.frames, slots) {
@@ -301,31 +348,36 @@ impl Problem<'_> {
         (hessian, gradient)
     }
 
-    /// Whitened Jacobians (15 × 15 with respect to either frame) and residual (15 × 1) of the IMU factor that ends
-    /// at `slot`.
-    pub(crate) fn imu_blocks(
-        &self,
-        slot: usize,
-        estimate: &Estimate,
-        linearized: &[FrameState],
-    ) -> Option<(Matrix15, Matrix15, Vector15)> {
+    /// Whitened Jacobians and residual of the IMU factor that ends at `slot`.
+    pub(crate) fn imu_blocks(&self, slot: usize, estimate: &Estimate, linearized: &[FrameState]) -> Option<ImuBlocks> {
         let information = self.frames[slot].motion_information.as_ref()?;
-        let residual = self.imu_residual(slot, &estimate.frames)?;
-        let (by_from, by_to) = imu_factor::jacobians(
+        let residual = self.imu_residual(slot, &estimate.frames, &estimate.calibration)?;
+        let (by_from, by_to, by_intrinsics) = imu_factor::jacobians_with(
             &self.frames[slot].motion,
             &linearized[slot - 1].navigation,
             &linearized[slot].navigation,
             &self.gravity_in_world,
+            estimate.calibration.imu_errors(),
         );
-        Some((information * by_from, information * by_to, residual))
+        Some(ImuBlocks {
+            by_from: information * by_from,
+            by_to: information * by_to,
+            by_intrinsics: estimate.calibration.imu().map(|_| information * by_intrinsics),
+            residual,
+        })
+    }
+
+    /// Columns of the IMU's intrinsics in the layout, empty where they are not estimated.
+    pub(crate) fn imu_columns(&self, calibration: &Calibrations) -> Range<usize> {
+        let (start, columns) = (self.layout.calibration().start, calibration.imu_columns());
+        start + columns.start..start + columns.end
     }
 
     fn add_imu(
         &self,
         slot: usize,
-        by_from: &Matrix15,
-        by_to: &Matrix15,
-        residual: &Vector15,
+        ImuBlocks { by_from, by_to, by_intrinsics, residual }: &ImuBlocks,
+        intrinsics: &Range<usize>,
         hessian: &mut DMatrix<f64>,
         gradient: &mut DVector<f64>,
     ) {
@@ -353,6 +405,16 @@ impl Problem<'_> {
             for (column, right) in &velocity_bias_blocks {
                 add_block(hessian, *row, *column, &left.tr_mul(right));
             }
+        }
+        let Some(by_intrinsics) = by_intrinsics else { return };
+        let row = intrinsics.start;
+        add_vector(gradient, row, &by_intrinsics.tr_mul(residual));
+        add_block(hessian, row, row, &by_intrinsics.tr_mul(by_intrinsics));
+        for (column, right) in &pose_blocks {
+            add_block(hessian, row, *column, &by_intrinsics.tr_mul(right));
+        }
+        for (column, right) in &velocity_bias_blocks {
+            add_block(hessian, row, *column, &by_intrinsics.tr_mul(right));
         }
     }
 
@@ -409,8 +471,8 @@ impl NormalEquations {
             .iter()
             .zip(reduced)
             .map(|(camera, reduced)| {
-                let steps = camera.pose_steps(layout, step);
-                camera.visual.substitute(reduced, |slot| steps[slot])
+                let steps = camera.block_steps(layout, step);
+                camera.visual.substitute(reduced, |block| steps[block])
             })
             .collect()
     }
@@ -426,36 +488,43 @@ impl CameraEquations {
         gradient: &mut DVector<f64>,
     ) {
         let calibration = self.columns.clone();
-        for row in 0..layout.frames {
+        let blocks = self.maps.blocks();
+        for row in 0..blocks {
+            let of_row = self.maps.columns(layout, row);
             let mut by_cameras: DMatrix<f64> = DMatrix::zeros(6, calibration.len());
-            for column in 0..layout.frames {
+            for column in 0..blocks {
                 let block = visual.poses.hessian.symmetric_block(row, column);
                 by_cameras += block * &self.maps.calibration[column];
                 if column <= row {
-                    // Lower triangle: the frame `row` below the frame `column`.
+                    // Lower triangle: the frame of `row` below the frame of `column`. Two blocks of one frame make a block
+                    // on the diagonal, with its transpose.
                     let carried = self.maps.own[row].tr_mul(&(block * &self.maps.own[column]));
-                    let mut place = hessian.view_range_mut(layout.camera(row), layout.camera(column));
+                    let of_column = self.maps.columns(layout, column);
+                    let mut place = hessian.view_range_mut(of_row.clone(), of_column.clone());
                     place += &carried;
+                    if column < row && of_column == of_row {
+                        place += carried.transpose();
+                    }
                 }
             }
-            let mut coupling = hessian.view_range_mut(calibration.clone(), layout.camera(row));
+            let mut coupling = hessian.view_range_mut(calibration.clone(), of_row.clone());
             coupling += by_cameras.tr_mul(&self.maps.own[row]);
             let mut corner = hessian.view_range_mut(calibration.clone(), calibration.clone());
             corner += self.maps.calibration[row].tr_mul(&by_cameras);
             let camera_gradient = &visual.poses.gradient[row];
-            let mut part = gradient.rows_range_mut(layout.camera(row));
+            let mut part = gradient.rows_range_mut(of_row);
             part += self.maps.own[row].tr_mul(camera_gradient);
             let mut part = gradient.rows_range_mut(calibration.clone());
             part += self.maps.calibration[row].tr_mul(camera_gradient);
         }
     }
 
-    /// Steps `[φ; δt]` of the camera poses, for a step of the unknowns.
-    fn pose_steps(&self, layout: &Layout, step: &DVector<f64>) -> Vec<Vector6<f64>> {
-        (0..layout.frames)
-            .map(|slot| {
-                let moved = &self.maps.own[slot] * step.rows_range(layout.camera(slot))
-                    + &self.maps.calibration[slot] * step.rows_range(self.columns.clone());
+    /// Steps of the camera's blocks, for a step of the unknowns.
+    fn block_steps(&self, layout: &Layout, step: &DVector<f64>) -> Vec<Vector6<f64>> {
+        (0..self.maps.blocks())
+            .map(|block| {
+                let moved = &self.maps.own[block] * step.rows_range(self.maps.columns(layout, block))
+                    + &self.maps.calibration[block] * step.rows_range(self.columns.clone());
                 Vector6::from_column_slice(moved.as_slice())
             })
             .collect()

@@ -66,7 +66,7 @@ impl WindowState {
         report.features = self.feature_reports(setup, solved);
         report.counts = FeatureCounts::of(&report.features);
         report.effective_pixel_sigma_px = effective_sigma(report.pixel_sigma_px, &report.features);
-        report.landmarks = self.landmark_reports(solved);
+        report.landmarks = self.landmark_reports(setup, solved);
         report.residuals = self.residual_summaries(setup, solved);
         report.reprojection_rms_before_px =
             root_mean_square(solved.checks.iter().map(|checks| &checks.residuals_before));
@@ -150,13 +150,14 @@ impl WindowState {
         reports
     }
 
-    fn landmark_reports(&self, solved: &SolvedWindow) -> Vec<LandmarkReport> {
+    fn landmark_reports(&self, setup: &Setup, solved: &SolvedWindow) -> Vec<LandmarkReport> {
         let mut landmarks = Vec::new();
         for (camera, of_camera) in solved.cameras.iter().enumerate() {
-            let poses = self.camera_poses(camera);
+            let view = self.view(setup, camera);
             let kept = (0..of_camera.ids.len()).filter(|index| !solved.checks[camera].rejected[*index]);
             landmarks.extend(kept.map(|index| {
-                let pose = &poses[of_camera.tracks[index].observations[0].slot];
+                let anchor = &of_camera.tracks[index].observations[0];
+                let pose = view.pose(anchor.slot, &anchor.uv_px);
                 let point = solved.solution.estimate.landmarks[camera][index].point_in_anchor();
                 LandmarkReport {
                     id: of_camera.ids[index].of_camera(camera),
@@ -189,7 +190,7 @@ impl WindowState {
         let mut summaries = vec![
             summary(FactorKind::Visual, 2 * observations, |costs| costs.visual),
             summary(FactorKind::Imu, 15 * intervals, |costs| costs.imu),
-            summary(FactorKind::Encoder, joints * read, |costs| costs.encoder),
+            summary(FactorKind::Encoder, (joints + problem.layout.joint_motion) * read, |costs| costs.encoder),
             summary(FactorKind::CalibrationPrior, problem.layout.calibration, |costs| costs.calibration),
             summary(FactorKind::MarginalizationPrior, prior_rows, |costs| costs.prior),
         ];

@@ -5,10 +5,10 @@ use nalgebra::DMatrix;
 use super::problem::{Estimate, Problem};
 use crate::estimator::factors::projection::{NewestRows, ProjectedRows};
 use crate::estimator::factors::zero_velocity::ZeroVelocityTerm;
-use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::estimator::state::camera_pose::CameraMaps;
+use crate::estimator::state::camera_view::CameraView;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{POSE, VELOCITY_BIAS};
-use crate::optimization::CameraPose;
 
 impl Problem<'_> {
     /// Reprojection factors with landmarks projected out; at most `6·frames` rows per camera.
@@ -19,41 +19,41 @@ impl Problem<'_> {
         let rows: Vec<DMatrix<f64>> = seeing
             .map(|camera| {
                 let maps = CameraMaps::new(&frames, calibration.of(camera));
-                let poses = camera_pose::by_slot(&frames, calibration.of(camera));
-                let projected = self.projected_rows(camera, estimate, &poses, NewestRows::Among);
+                let linearized = self.view(camera, &frames, &calibration);
+                let projected = self.projected_rows(camera, estimate, &linearized, NewestRows::Among);
                 self.carried_rows(camera, &projected, &maps)
             })
             .collect();
         stack(&rows, self.layout.total() + 1)
     }
 
-    /// Reprojection factors of one camera with respect to its poses; derivatives at `linearized`.
+    /// Reprojection factors of one camera with respect to its blocks; derivatives at `linearized`.
     pub(crate) fn projected_rows(
         &self,
         camera: usize,
         estimate: &Estimate,
-        linearized: &[CameraPose],
+        linearized: &CameraView<'_>,
         apart: NewestRows,
     ) -> ProjectedRows {
         let factors = &self.cameras[camera];
-        let current = camera_pose::by_slot(&estimate.frames, estimate.calibration.of(camera));
+        let current = self.view(camera, &estimate.frames, &estimate.calibration);
         let landmarks = &estimate.landmarks[camera];
         ProjectedRows::new(&factors.visual, &current, linearized, factors.tracks, landmarks, apart)
     }
 
-    /// Converts rows with respect to camera poses to rows with respect to the unknowns.
+    /// Converts rows with respect to the blocks of a camera to rows with respect to the unknowns.
     pub(crate) fn carried_rows(&self, camera: usize, projected: &ProjectedRows, maps: &CameraMaps) -> DMatrix<f64> {
         let by_camera = &projected.rows;
         let total = self.layout.total();
         let height = by_camera.nrows();
         let calibration = &self.cameras[camera].columns;
         let mut rows = DMatrix::zeros(height, total + 1);
-        for slot in 0..self.layout.frames {
-            let columns = by_camera.view((0, 6 * slot), (height, 6));
-            rows.columns_range_mut(self.layout.camera(slot)).gemm(1.0, &columns, &maps.own[slot], 0.0);
-            rows.columns_range_mut(calibration.clone()).gemm(1.0, &columns, &maps.calibration[slot], 1.0);
+        for block in 0..maps.blocks() {
+            let columns = by_camera.view((0, 6 * block), (height, 6));
+            rows.columns_range_mut(maps.columns(&self.layout, block)).gemm(1.0, &columns, &maps.own[block], 1.0);
+            rows.columns_range_mut(calibration.clone()).gemm(1.0, &columns, &maps.calibration[block], 1.0);
         }
-        rows.set_column(total, &by_camera.view((0, 6 * self.layout.frames), (height, 1)).column(0));
+        rows.set_column(total, &by_camera.view((0, 6 * maps.blocks()), (height, 1)).column(0));
         rows
     }
 
@@ -65,29 +65,38 @@ impl Problem<'_> {
     /// [`Self::imu_rows`] with derivatives at `linearized`.
     pub(crate) fn imu_rows_at(&self, slot: usize, estimate: &Estimate, linearized: &[FrameState]) -> DMatrix<f64> {
         let total = self.layout.total();
-        let Some((by_from, by_to, residual)) = self.imu_blocks(slot, estimate, linearized) else {
+        let Some(blocks) = self.imu_blocks(slot, estimate, linearized) else {
             return DMatrix::zeros(0, total + 1);
         };
         let mut rows = DMatrix::zeros(15, total + 1);
-        for (slot, part) in [(slot - 1, &by_from), (slot, &by_to)] {
+        for (slot, part) in [(slot - 1, &blocks.by_from), (slot, &blocks.by_to)] {
             rows.columns_range_mut(self.layout.pose(slot)).copy_from(&part.fixed_columns::<POSE>(0));
             rows.columns_range_mut(self.layout.velocity_bias(slot))
                 .copy_from(&part.fixed_columns::<VELOCITY_BIAS>(POSE));
         }
-        rows.set_column(total, &residual);
+        if let Some(by_intrinsics) = &blocks.by_intrinsics {
+            rows.columns_range_mut(self.imu_columns(&estimate.calibration)).copy_from(by_intrinsics);
+        }
+        rows.set_column(total, &blocks.residual);
         rows
     }
 
-    /// One row per encoder reading of a frame.
+    /// One row per encoder reading of a frame, and one per joint rate and acceleration where these are unknowns.
     pub(crate) fn encoder_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
         let readings: Vec<_> = self.encoder_residuals(slot, estimate).collect();
         let clock = self.encoder_clock_column(estimate);
-        let mut rows = DMatrix::zeros(readings.len(), self.layout.total() + 1);
+        let motion: Vec<_> = self.joint_motion_residuals(slot, estimate).collect();
+        let angles = readings.len();
+        let mut rows = DMatrix::zeros(angles + motion.len(), self.layout.total() + 1);
         for (row, (joint, residual, slope)) in readings.into_iter().enumerate() {
             rows[(row, self.layout.joints(slot).start + joint)] = slope;
             if let Some(clock) = clock {
-                rows[(row, clock)] = slope * estimate.frames[slot].rates.joint_rad_per_s(joint);
+                rows[(row, clock)] = slope * estimate.frames[slot].joint_rate_rad_per_s(joint);
             }
+            rows[(row, self.layout.total())] = residual;
+        }
+        for (row, (place, residual, slope)) in (angles..).zip(motion) {
+            rows[(row, self.layout.joint_motion(slot).start + place)] = slope;
             rows[(row, self.layout.total())] = residual;
         }
         rows

@@ -75,18 +75,20 @@ impl SlidingWindow {
             events.push(failure);
             return Err(self.failed(input, events));
         }
-        events.push(self.state.choose_keyframe(options));
+        events.push(self.state.choose_keyframe(setup));
         let optimized_ms = setup.clock_ms();
 
         let mut report = self.report(setup, input, &mut solved);
         let marginalizing_ms = setup.clock_ms();
+        let cause = || self.state.suspected_shutter(setup);
+        let warnings = self.consistency.observe(report.stamp_ns, &report.residuals, &setup.config, cause);
         self.state.drop_rejected(&solved, options, &mut events);
         events.extend(self.switch_near_singularity(setup));
         self.state.make_room(setup, &mut events);
         report.times.optimize_ms = optimized_ms - begin_ms;
         report.times.marginalize_ms = setup.clock_ms() - marginalizing_ms;
         report.events.extend(events);
-        report.warnings = self.consistency.observe(report.stamp_ns, &report.residuals, &setup.config);
+        report.warnings = warnings;
         Ok(report)
     }
 
@@ -128,7 +130,9 @@ impl SlidingWindow {
         let window = &mut self.state;
         let last = window.frames.newest();
         let interval_s = seconds_from_ns(input.stamp_ns - last.stamp_ns);
-        let motion = Preintegration::from_samples(setup.imu_noise, last.state.navigation.bias, input.imu);
+        let errors = window.calibration.imu_errors().copied();
+        let mut motion = Preintegration::with_intrinsics(setup.imu_noise, last.state.navigation.bias, errors);
+        motion.extend(input.imu);
         let covered = motion.duration_s();
         if covered < 0.5 * interval_s || interval_s <= 0.0 {
             let message = format!("IMU samples cover {covered:.3} s of the {interval_s:.3} s since the last image");
@@ -139,10 +143,17 @@ impl SlidingWindow {
         let joints_rad =
             encoder.as_ref().map_or_else(|| last.state.joints_rad.clone(), |encoder| encoder.angles_rad.clone());
         let motion_information = motion.square_root_information();
+        let joint_motion = setup.initial_joint_motion(encoder.as_ref(), joints_rad.len());
+        let profile = setup.motion_profile(input.imu, input.imu_after, navigation.bias);
         window.frames.push(Frame {
             index: input.frame_index,
             stamp_ns: input.stamp_ns,
-            state: FrameState { navigation, joints_rad, rates: Rates::at(input.imu, encoder.as_ref()) },
+            state: FrameState {
+                navigation,
+                joints_rad,
+                joint_motion,
+                rates: Rates::at(input.imu, encoder.as_ref(), profile),
+            },
             first_estimate: None,
             encoder,
             stationary: None,

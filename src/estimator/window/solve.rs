@@ -9,9 +9,7 @@ use super::window_state::WindowState;
 use crate::estimator::factors::visual::{self, TrackObservation};
 use crate::estimator::options::EstimatorOptions;
 use crate::estimator::setup::Setup;
-use crate::estimator::state::camera_pose;
 use crate::estimator::{Event, EventKind};
-use crate::optimization::RelativePoses;
 
 /// Reprojection residuals in pixels, by track and observation; `None` behind the camera.
 pub(crate) type TrackResiduals = Vec<Vec<Option<Vector2<f64>>>>;
@@ -38,8 +36,8 @@ impl WindowState {
     /// Solves the window, applies the estimate and marks outliers as rejected.
     pub(crate) fn solve(&mut self, setup: &Setup, iterations: usize) -> SolvedWindow {
         let options = &setup.config.options;
-        self.frames.reintegrate(options);
-        self.triangulate_new(options);
+        self.frames.reintegrate(options, self.calibration.imu_errors());
+        self.triangulate_new(setup);
         let cameras = self.active_tracks();
         let start = self.estimate(cameras.iter().map(|active| active.landmarks.clone()).collect());
         let limits = SolverLimits { iterations, relative_cost_tolerance: options.relative_cost_tolerance };
@@ -99,16 +97,15 @@ fn is_outlier(residuals: &[Option<Vector2<f64>>], options: &EstimatorOptions) ->
 /// Reprojection residuals of all observations at an estimate, by camera.
 fn track_residuals(problem: &Problem<'_>, estimate: &Estimate) -> Vec<TrackResiduals> {
     let of_camera = |(camera, factors): (usize, &CameraFactors<'_>)| {
-        let poses = camera_pose::by_slot(&estimate.frames, estimate.calibration.of(camera));
-        let relative = RelativePoses::new(&poses);
+        let view = problem.view(camera, &estimate.frames, &estimate.calibration);
         factors
             .tracks
             .iter()
             .zip(&estimate.landmarks[camera])
             .map(|(track, landmark)| {
-                let anchor = track.observations[0].slot;
+                let anchor = view.relative_to(&track.observations[0]);
                 let residual = |observation: &TrackObservation| {
-                    visual::observation_residual_px(&factors.visual, &relative, anchor, landmark, observation)
+                    visual::observation_residual_px(&view, &anchor, landmark, observation)
                 };
                 track.observations.iter().map(residual).collect()
             })

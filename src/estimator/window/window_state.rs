@@ -6,12 +6,11 @@ use super::frames::{self, Frames};
 use super::problem::{CameraFactors, Estimate, Problem};
 use crate::estimator::factors::prior::{Prior, StartPrior};
 use crate::estimator::factors::visual::VisualModel;
-use crate::estimator::options::EstimatorOptions;
 use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::Calibrations;
-use crate::estimator::state::camera_pose;
+use crate::estimator::state::camera_view::CameraView;
 use crate::gimbal::Parameterization;
-use crate::optimization::{CameraPose, Landmark};
+use crate::optimization::Landmark;
 
 /// Frames, features, calibration and priors of the window.
 #[derive(Clone, Debug)]
@@ -27,10 +26,10 @@ pub(crate) struct WindowState {
 }
 
 impl WindowState {
-    /// Poses of a camera by slot.
-    pub(crate) fn camera_poses(&self, camera: usize) -> Vec<CameraPose> {
-        let calibration = self.calibration.of(camera);
-        self.frames.iter().map(|frame| camera_pose::at(&frame.state, calibration)).collect()
+    /// A camera at the present estimate.
+    pub(crate) fn view<'v>(&'v self, setup: &'v Setup, camera: usize) -> CameraView<'v> {
+        let states = self.frames.iter().map(|frame| frame.state.clone()).collect();
+        CameraView::of_states(states, self.calibration.of(camera), setup.config.model(camera))
     }
 
     /// The least-squares problem of the window as it is, with the tracks of each camera; cameras without any may be left out
@@ -74,14 +73,14 @@ impl WindowState {
     }
 
     /// Triangulates features whose rays open far enough.
-    pub(crate) fn triangulate_new(&mut self, options: &EstimatorOptions) {
+    pub(crate) fn triangulate_new(&mut self, setup: &Setup) {
         for camera in 0..self.features.len() {
-            let poses = self.camera_poses(camera);
-            for feature in self.features[camera].values_mut() {
-                if feature.landmark.is_none() {
-                    feature.landmark = features::triangulate(feature, &poses, options);
-                }
+            let mut features = std::mem::take(&mut self.features[camera]);
+            let view = self.view(setup, camera);
+            for feature in features.values_mut().filter(|feature| feature.landmark.is_none()) {
+                feature.landmark = features::triangulate(feature, &view, &setup.config.options);
             }
+            self.features[camera] = features;
         }
     }
 

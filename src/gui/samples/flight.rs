@@ -121,6 +121,7 @@ fn run_on(flight: &SyntheticFlight, name: &str) -> RunRecord {
             frame_index: frame.index,
             stamp_ns: frame.stamp_ns,
             imu: &frame.imu,
+            imu_after: &[],
             joint_angles: joint_angles.as_ref(),
             tracks: &frame.tracks,
             rigid_tracks: &[],

@@ -6,8 +6,7 @@ use super::step_inputs::OwnedStepInput;
 use super::stopwatch::Stopwatch;
 use crate::estimator::{Estimator, EstimatorConfig, Linearization, StepInput, StepReport};
 use crate::frontend::TrackedFrame;
-use crate::geometry::Dimension;
-use crate::gimbal::{Chain, ParameterId};
+use crate::gimbal::{Chain, ParameterGroup, ParameterId};
 use crate::observability::{RankReport, analyse};
 use crate::session::record::StepRecord;
 
@@ -123,6 +122,7 @@ impl RunEngine {
             frame_index: input.frame_index,
             stamp_ns: input.stamp_ns,
             imu: &input.imu,
+            imu_after: &input.imu_after,
             joint_angles: noisy.as_ref().or(angles),
             tracks: &altered[0],
             rigid_tracks: &rigid,
@@ -136,9 +136,8 @@ impl RunEngine {
         let calibration = &report.calibration;
         let chain = Chain::from_classical(&calibration.classical, calibration.parameterization);
         let rigid = RIGID_COLUMNS * calibration.rigid_cameras.len();
-        let is_clock = |parameter: &&ParameterId| parameter.dimension() == Dimension::Time;
-        let clocks = calibration.parameters.iter().filter(is_clock).count();
-        let chain_columns = calibration.parameters.len() - clocks;
+        let is_of_chain = |parameter: &&ParameterId| parameter.group() == ParameterGroup::Chain;
+        let chain_columns = calibration.parameters.iter().filter(is_of_chain).count();
         let chain = if chain.dof() + rigid == chain_columns { chain } else { chain.without_joint_offsets() };
         // In a fork without encoders, frames of the window may still have encoder readings that the parent used.
         let unread = || report.window.iter().all(|frame| frame.encoder_angles_rad.is_none());

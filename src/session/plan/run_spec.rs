@@ -78,6 +78,12 @@ pub struct RunSpec {
     pub calibrate: bool,
     /// Whether the time offsets of cameras and encoders are estimated (`timeshift=on` sets it).
     pub timeshift: bool,
+    /// Whether the readout times of rolling shutters are estimated (`readout=on` sets it).
+    pub readout: bool,
+    /// Whether the intrinsics of the cameras are estimated (`intrinsics=on` sets it).
+    pub intrinsics: bool,
+    /// Whether the intrinsics of the IMU are estimated (`imu-intrinsics=on` sets it).
+    pub imu_intrinsics: bool,
     /// Whether Jacobians are evaluated at first estimates, FEJ (`first-estimates=off` clears it). Without FEJ the prior
     /// gains spurious information.
     pub first_estimates: bool,
@@ -96,6 +102,9 @@ impl Default for RunSpec {
             encoder: true,
             calibrate: true,
             timeshift: false,
+            readout: false,
+            intrinsics: false,
+            imu_intrinsics: false,
             first_estimates: true,
             window: DEFAULT_WINDOW,
             camera_key: None,
@@ -122,6 +131,18 @@ pub enum RunSpecError {
     },
 }
 
+impl RunSpec {
+    /// The keys that add groups of columns beside the chain's, and whether they are on.
+    fn estimated_sensors(&self) -> [(&'static str, bool); 4] {
+        [
+            ("timeshift", self.timeshift),
+            ("readout", self.readout),
+            ("intrinsics", self.intrinsics),
+            ("imu-intrinsics", self.imu_intrinsics),
+        ]
+    }
+}
+
 impl FromStr for RunSpec {
     type Err = RunSpecError;
 
@@ -146,6 +167,14 @@ impl FromStr for RunSpec {
                 "timeshift" => {
                     run.timeshift = on_or_off(value).map_err(|problem| bad(format!("timeshift: {problem}")))?;
                 }
+                "readout" => run.readout = on_or_off(value).map_err(|problem| bad(format!("readout: {problem}")))?,
+                "intrinsics" => {
+                    run.intrinsics = on_or_off(value).map_err(|problem| bad(format!("intrinsics: {problem}")))?;
+                }
+                "imu-intrinsics" => {
+                    run.imu_intrinsics =
+                        on_or_off(value).map_err(|problem| bad(format!("imu-intrinsics: {problem}")))?;
+                }
                 "first-estimates" => {
                     run.first_estimates =
                         on_or_off(value).map_err(|problem| bad(format!("first-estimates: {problem}")))?;
@@ -163,13 +192,13 @@ impl FromStr for RunSpec {
                     return Err(bad(format!("name is '{value}', expected letters, digits, '-', '_' and '.' only")));
                 }
                 _ => {
-                    let known = "encoder, calibrate, timeshift, first-estimates, window, camera, name";
+                    let known = "encoder, calibrate, timeshift, readout, intrinsics, imu-intrinsics, first-estimates, window, camera, name";
                     return Err(bad(format!("unknown key '{key}', expected one of {known}")));
                 }
             }
         }
-        if run.timeshift && !run.calibrate {
-            return Err(bad("timeshift=on requires calibrate=on".to_owned()));
+        if let Some((key, _)) = run.estimated_sensors().into_iter().find(|(_, on)| *on && !run.calibrate) {
+            return Err(bad(format!("{key}=on requires calibrate=on")));
         }
         Ok(run)
     }
@@ -185,8 +214,8 @@ impl fmt::Display for RunSpec {
         if !self.calibrate {
             options.push("calibrate=off".to_owned());
         }
-        if self.timeshift {
-            options.push("timeshift=on".to_owned());
+        for (key, on) in self.estimated_sensors() {
+            options.extend(on.then(|| format!("{key}=on")));
         }
         if !self.first_estimates {
             options.push("first-estimates=off".to_owned());

@@ -14,6 +14,7 @@ pub(in crate::session) fn input_of(frame: &SyntheticFrame, encoder_sigma_rad: f6
         stamp_ns: frame.stamp_ns,
         log_time_ns: frame.stamp_ns,
         imu: frame.imu.clone(),
+        imu_after: Vec::new(),
         joint_angles: frame.encoder_angles(encoder_sigma_rad),
         tracks: vec![Arc::new(frame.tracks.clone())],
         ground_truth: Some(frame.true_world_from_imu),

@@ -45,6 +45,7 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> (StepReport, Optio
         frame_index: frame.index,
         stamp_ns: frame.stamp_ns,
         imu: &frame.imu,
+        imu_after: &[],
         joint_angles: joints.as_ref(),
         tracks: &frame.tracks,
         rigid_tracks: &[],

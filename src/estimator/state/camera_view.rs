@@ -1,0 +1,197 @@
+//! A camera in a window at one estimate: its model, and its pose at each observation.
+
+use std::borrow::Cow;
+
+use nalgebra::{Matrix2x6, Vector2, Vector3};
+
+use super::calibration::Calibration;
+use super::camera_pose::{self, CameraSensor};
+use crate::camera::CameraModel;
+use crate::estimator::factors::visual::TrackObservation;
+use crate::estimator::state::frame_state::FrameState;
+use crate::optimization::{CameraPose, PoseBlocksOf, RelativePose, RelativePoses};
+
+/// A camera with its intrinsics and poses at an estimate.
+///
+/// Derivatives are by blocks of six: one per frame with a global shutter, the pose `[φ; δt]` of `world_from_camera`; two
+/// per frame with a rolling shutter, the poses of the first and of the last row; and after all frames the intrinsics, where
+/// they are estimated. [`camera_pose::CameraMaps`] has the same blocks.
+#[derive(Clone, Debug)]
+pub(crate) struct CameraView<'a> {
+    model: Cow<'a, CameraModel>,
+    has_intrinsics: bool,
+    frames: usize,
+    poses: Poses<'a>,
+}
+
+#[derive(Clone, Debug)]
+enum Poses<'a> {
+    Global {
+        /// By slot.
+        poses: Vec<CameraPose>,
+        relative: RelativePoses,
+    },
+    Rolling {
+        frames: Cow<'a, [FrameState]>,
+        sensor: CameraSensor<'a>,
+        /// Of the first and the last row, by slot.
+        ends: Vec<[CameraPose; 2]>,
+    },
+}
+
+impl<'a> CameraView<'a> {
+    /// The camera of a calibration over the frames of a window; `given` is the model of the rig.
+    pub(crate) fn new(frames: &'a [FrameState], calibration: &'a Calibration, given: &'a CameraModel) -> Self {
+        let has_intrinsics = !calibration.intrinsics_columns().is_empty();
+        Self::of_sensor(
+            Cow::Borrowed(frames),
+            calibration.sensor_model(),
+            calibration.camera_model(given),
+            has_intrinsics,
+        )
+    }
+
+    /// [`Self::new`] with states of its own.
+    pub(crate) fn of_states(frames: Vec<FrameState>, calibration: &'a Calibration, given: &'a CameraModel) -> Self {
+        let has_intrinsics = !calibration.intrinsics_columns().is_empty();
+        Self::of_sensor(Cow::Owned(frames), calibration.sensor_model(), calibration.camera_model(given), has_intrinsics)
+    }
+
+    /// [`Self::new`] for a given sensor.
+    pub(crate) fn of_sensor(
+        frames: Cow<'a, [FrameState]>,
+        sensor: CameraSensor<'a>,
+        model: Cow<'a, CameraModel>,
+        has_intrinsics: bool,
+    ) -> Self {
+        let count = frames.len();
+        let poses = if sensor.rolling {
+            let ends = |state: &FrameState| [0.0, 1.0].map(|row| camera_pose::at_row(state, &sensor, row));
+            Poses::Rolling { ends: frames.iter().map(ends).collect(), frames, sensor }
+        } else {
+            let poses: Vec<CameraPose> = frames.iter().map(|state| camera_pose::at_row(state, &sensor, 0.0)).collect();
+            Poses::Global { relative: RelativePoses::new(&poses), poses }
+        };
+        Self { model, has_intrinsics, frames: count, poses }
+    }
+
+    /// A camera at given poses by slot, with a global shutter.
+    pub(crate) fn of_poses(poses: Vec<CameraPose>, model: &'a CameraModel) -> Self {
+        let relative = RelativePoses::new(&poses);
+        let frames = poses.len();
+        Self { model: Cow::Borrowed(model), has_intrinsics: false, frames, poses: Poses::Global { poses, relative } }
+    }
+
+    /// The camera model with the estimated intrinsics.
+    pub(crate) fn model(&self) -> &CameraModel {
+        &self.model
+    }
+
+    /// Unit bearing of a pixel; `nominal` is that of the rig's model.
+    pub(crate) fn bearing(&self, uv_px: &Vector2<f64>, nominal: &Vector3<f64>) -> Vector3<f64> {
+        if self.has_intrinsics { self.model.unproject(uv_px).unwrap_or(*nominal) } else { *nominal }
+    }
+
+    /// Whether all observations of a frame have its one pose and the bearings of the rig's model.
+    pub(crate) fn has_nominal_bearings(&self) -> bool {
+        !self.has_intrinsics && matches!(self.poses, Poses::Global { .. })
+    }
+
+    /// Number of blocks of a frame.
+    pub(crate) fn blocks_per_frame(&self) -> usize {
+        match self.poses {
+            Poses::Global { .. } => 1,
+            Poses::Rolling { .. } => 2,
+        }
+    }
+
+    /// Number of all blocks.
+    pub(crate) fn blocks(&self) -> usize {
+        self.frames * self.blocks_per_frame() + usize::from(self.has_intrinsics)
+    }
+
+    /// Number of frames.
+    pub(crate) fn frames(&self) -> usize {
+        self.frames
+    }
+
+    /// Block of the intrinsics, `None` where they are fixed.
+    pub(crate) fn intrinsics_block(&self) -> Option<usize> {
+        self.has_intrinsics.then(|| self.frames * self.blocks_per_frame())
+    }
+
+    /// Blocks of the pose of a frame, the second one only with a rolling shutter.
+    pub(crate) fn blocks_of(&self, slot: usize) -> [Option<usize>; 2] {
+        match self.poses {
+            Poses::Global { .. } => [Some(slot), None],
+            Poses::Rolling { .. } => [Some(2 * slot), Some(2 * slot + 1)],
+        }
+    }
+
+    /// Pose at the row of a pixel.
+    pub(crate) fn pose(&self, slot: usize, uv_px: &Vector2<f64>) -> CameraPose {
+        match &self.poses {
+            Poses::Global { poses, .. } => poses[slot],
+            Poses::Rolling { frames, sensor, .. } => {
+                camera_pose::at_row(&frames[slot], sensor, self.row_fraction(uv_px))
+            }
+        }
+    }
+
+    /// Pose at the first row, by slot.
+    pub(crate) fn first_row(&self, slot: usize) -> CameraPose {
+        match &self.poses {
+            Poses::Global { poses, .. } => poses[slot],
+            Poses::Rolling { ends, .. } => ends[slot][0],
+        }
+    }
+
+    /// Relative poses of other observations to an anchor's.
+    pub(crate) fn relative_to(&self, anchor: &TrackObservation) -> RelativeTo<'_> {
+        RelativeTo { view: self, slot: anchor.slot, pose: self.pose(anchor.slot, &anchor.uv_px) }
+    }
+
+    /// Place of a pixel's row between the first one (0) and the end of the last one (1).
+    pub(crate) fn row_fraction(&self, uv_px: &Vector2<f64>) -> f64 {
+        uv_px.y / self.model.resolution_px[1] as f64
+    }
+
+    /// Derivatives by the blocks of a frame from those by the pose at an observation's row (2 × 6).
+    ///
+    /// Between the first and the last row, a change of the pose is interpolated linearly, rotations in world axes. It is
+    /// exact for changes of pose, velocity and readout; for the others it neglects how far their axes rotate during the
+    /// readout, to second order.
+    pub(crate) fn by_blocks(&self, observation: &TrackObservation, by_pose: &Matrix2x6<f64>) -> PoseBlocksOf<usize> {
+        let slot = observation.slot;
+        let Poses::Rolling { ends, .. } = &self.poses else { return [Some((slot, *by_pose)), None] };
+        let fraction = self.row_fraction(&observation.uv_px);
+        let world_from_row = self.pose(slot, &observation.uv_px).rotation;
+        let by_world = by_pose.fixed_columns::<3>(0) * world_from_row.transpose();
+        let part = |end: usize, weight: f64| {
+            let mut by_end = by_pose * weight;
+            by_end.fixed_columns_mut::<3>(0).copy_from(&(by_world * ends[slot][end].rotation * weight));
+            Some((2 * slot + end, by_end))
+        };
+        [part(0, 1.0 - fraction), part(1, fraction)]
+    }
+}
+
+/// An anchor's observation to which others are related.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RelativeTo<'a> {
+    view: &'a CameraView<'a>,
+    slot: usize,
+    pose: CameraPose,
+}
+
+impl RelativeTo<'_> {
+    /// `observer_from_anchor` at the rows of both observations.
+    pub(crate) fn get(&self, observation: &TrackObservation) -> RelativePose {
+        match &self.view.poses {
+            Poses::Global { relative, .. } => *relative.get(self.slot, observation.slot),
+            Poses::Rolling { .. } => {
+                RelativePose::new(&self.pose, &self.view.pose(observation.slot, &observation.uv_px))
+            }
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Motion of the vehicle in the time after a stamp, during which the rows of a rolling shutter are exposed.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::navigation::ImuBias;
+use crate::estimator::factors::preintegration::Preintegration;
+use crate::geometry::{seconds_from_ns, so3};
+use crate::sensors::{ImuNoise, ImuSample};
+
+/// The motion over the rows of an image is taken as it was measured.
+const NO_NOISE: ImuNoise = ImuNoise {
+    accelerometer_noise_density: 0.0,
+    accelerometer_random_walk: 0.0,
+    gyroscope_noise_density: 0.0,
+    gyroscope_random_walk: 0.0,
+};
+
+/// Motion of the IMU from a stamp on, integrated from its samples without gravity and initial velocity.
+///
+/// It does not depend on the state at the stamp: it is what the samples say about the rows of the image, to which the
+/// state adds pose, velocity and gyroscope bias.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct MotionProfile {
+    /// Biases of the integration.
+    pub(crate) bias: ImuBias,
+    /// In the world, in m/s².
+    pub(crate) gravity_in_world: Vector3<f64>,
+    /// At the stamp and at the times of the samples after it, rising; the first one is at zero, without motion.
+    pub(crate) knots: Vec<ProfileKnot>,
+}
+
+/// Motion from the stamp to one sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ProfileKnot {
+    /// Time since the stamp, in seconds.
+    pub(crate) time_s: f64,
+    /// Rotation from the IMU at that time to the IMU at the stamp.
+    pub(crate) rotation: UnitQuaternion<f64>,
+    /// Integral of the specific force in the IMU frame at the stamp, in m/s.
+    pub(crate) velocity_m_per_s: Vector3<f64>,
+    /// Integral of that, in metres.
+    pub(crate) position_m: Vector3<f64>,
+    /// Angular velocity measured there, in rad/s.
+    pub(crate) rate_rad_per_s: Vector3<f64>,
+    /// Specific force without bias there, in the IMU frame at that time, in m/s².
+    pub(crate) force_m_per_s2: Vector3<f64>,
+}
+
+/// Motion from the stamp to another time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct RowMotion {
+    /// Rotation from the IMU at that time to the IMU at the stamp, at the given gyroscope bias.
+    pub(crate) rotation: UnitQuaternion<f64>,
+    /// As in [`ProfileKnot::velocity_m_per_s`].
+    pub(crate) velocity_m_per_s: Vector3<f64>,
+    /// As in [`ProfileKnot::position_m`].
+    pub(crate) position_m: Vector3<f64>,
+    /// Angular velocity without bias there, in rad/s.
+    pub(crate) rate_rad_per_s: Vector3<f64>,
+}
+
+impl MotionProfile {
+    /// Integrates samples from a stamp on, the first of them at the stamp; samples that are not later than the one before
+    /// or not finite are skipped. `None` without a sample at the stamp.
+    pub(crate) fn new(samples: &[ImuSample], bias: ImuBias, gravity_in_world: Vector3<f64>) -> Option<Self> {
+        let first = samples.first()?;
+        let mut motion = Preintegration::new(NO_NOISE, bias);
+        let mut knots = Vec::with_capacity(samples.len());
+        for sample in samples {
+            let before = motion.samples().len();
+            motion.extend(std::slice::from_ref(sample));
+            if motion.samples().len() == before {
+                continue;
+            }
+            let increment = motion.increment();
+            knots.push(ProfileKnot {
+                time_s: seconds_from_ns(sample.stamp_ns - first.stamp_ns),
+                rotation: increment.rotation,
+                velocity_m_per_s: increment.velocity_m_per_s,
+                position_m: increment.position_m,
+                rate_rad_per_s: sample.angular_velocity_rad_per_s,
+                force_m_per_s2: sample.specific_force_m_per_s2 - bias.accelerometer_m_per_s2,
+            });
+        }
+        (!knots.is_empty()).then_some(Self { bias, gravity_in_world, knots })
+    }
+
+    /// Without samples: a stationary vehicle.
+    pub(crate) fn stationary(bias: ImuBias, gravity_in_world: Vector3<f64>) -> Self {
+        let knot = ProfileKnot {
+            time_s: 0.0,
+            rotation: UnitQuaternion::identity(),
+            velocity_m_per_s: Vector3::zeros(),
+            position_m: Vector3::zeros(),
+            rate_rad_per_s: bias.gyroscope_rad_per_s,
+            force_m_per_s2: -gravity_in_world,
+        };
+        Self { bias, gravity_in_world, knots: vec![knot] }
+    }
+
+    /// Motion over `time_s` from the stamp on, at a gyroscope bias; outside of the samples at the rate and the
+    /// specific force of the nearest one.
+    ///
+    /// Between samples the rotation is interpolated at a constant rate, the position with constant specific force. A
+    /// change of the gyroscope bias counts to first order.
+    pub(crate) fn at(&self, time_s: f64, gyroscope_bias_rad_per_s: &Vector3<f64>) -> RowMotion {
+        let next = self.knots.iter().position(|knot| knot.time_s > time_s).unwrap_or(self.knots.len());
+        let before = self.knots[next.saturating_sub(1)];
+        let elapsed_s = time_s - before.time_s;
+        let (rotation_vector, force, rate_rad_per_s) = match self.knots.get(next).filter(|_| next > 0) {
+            Some(next) => {
+                let interval_s = next.time_s - before.time_s;
+                let fraction = elapsed_s / interval_s;
+                (
+                    so3::log(&(before.rotation.inverse() * next.rotation)) * fraction,
+                    (next.velocity_m_per_s - before.velocity_m_per_s) / interval_s,
+                    before.rate_rad_per_s + (next.rate_rad_per_s - before.rate_rad_per_s) * fraction,
+                )
+            }
+            None => {
+                let rate = before.rate_rad_per_s - self.bias.gyroscope_rad_per_s;
+                (rate * elapsed_s, before.rotation * before.force_m_per_s2, before.rate_rad_per_s)
+            }
+        };
+        let change = gyroscope_bias_rad_per_s - self.bias.gyroscope_rad_per_s;
+        RowMotion {
+            rotation: before.rotation * so3::exp(&rotation_vector) * so3::exp(&(change * -time_s)),
+            velocity_m_per_s: before.velocity_m_per_s + force * elapsed_s,
+            position_m: before.position_m + before.velocity_m_per_s * elapsed_s + force * (0.5 * elapsed_s * elapsed_s),
+            rate_rad_per_s: rate_rad_per_s - gyroscope_bias_rad_per_s,
+        }
+    }
+
+    /// Bytes on the heap.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        self.knots.capacity() * size_of::<ProfileKnot>()
+    }
+}

@@ -1,0 +1,136 @@
+//! Calibration columns that a running window gains, and which of them would explain its residuals.
+
+use std::sync::Arc;
+
+use nalgebra::DVector;
+
+use super::window_state::WindowState;
+use crate::estimator::setup::Setup;
+use crate::estimator::state::frame_state::{FrameState, Rates};
+use crate::estimator::window::frames;
+use crate::geometry::seconds_from_ns;
+use crate::gimbal::{ParameterId, Quantity};
+use crate::optimization::dense::Cholesky;
+use crate::sensors::ImuSample;
+
+/// Length of the motion after a stamp that frames of the window take from the samples before the next frame, in seconds.
+const MOTION_AFTER_S: f64 = 0.06;
+
+/// Smallest change of χ² that makes a parameter suspicious: ten standard deviations of the parameter.
+const SIGNIFICANT_CHI2: f64 = 100.0;
+
+/// A fixed parameter that would lower the cost of the window if it were estimated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SuspectedParameter {
+    pub(crate) parameter: ParameterId,
+    /// By how much χ² would fall, to first order.
+    pub(crate) chi2: f64,
+    /// Change of the parameter, to first order.
+    pub(crate) change: f64,
+}
+
+impl WindowState {
+    /// Adds the calibration columns that the setup estimates and the window does not have yet, at the values of the rig;
+    /// frames and prior follow.
+    pub(crate) fn add_columns(&mut self, setup: &Setup) {
+        let before = self.calibration.parameters();
+        let old = frames::layout(&self.frames, self.calibration.dof());
+        self.calibration = self.calibration.with_columns_of(&setup.given_calibration());
+        let profiles: Vec<Vec<ImuSample>> = (0..self.frames.len()).map(|slot| self.samples_after(slot)).collect();
+        for (frame, after) in self.frames.iter_mut().zip(&profiles) {
+            let bias = frame.state.navigation.bias;
+            let profile = setup.motion_profile(frame.motion.samples(), after, bias);
+            let motion = setup.initial_joint_motion(frame.encoder.as_ref(), frame.state.joints_rad.len());
+            let changed = |state: &mut FrameState| {
+                if state.joint_motion.is_empty() {
+                    state.joint_motion.clone_from(&motion);
+                }
+                if state.rates.profile.is_none() {
+                    state.rates = Arc::new(Rates { profile: profile.clone(), ..(*state.rates).clone() });
+                }
+            };
+            changed(&mut frame.state);
+            frame.first_estimate.iter_mut().for_each(changed);
+        }
+        let new = frames::layout(&self.frames, self.calibration.dof());
+        let after = self.calibration.parameters();
+        let places: Vec<usize> =
+            before.iter().filter_map(|known| after.iter().position(|parameter| parameter == known)).collect();
+        if let Some(prior) = &mut self.prior {
+            prior.move_columns(&old, &new, &places);
+        }
+    }
+
+    /// IMU samples from the stamp of a frame on, the first one at it, as far as the next frame has them.
+    fn samples_after(&self, slot: usize) -> Vec<ImuSample> {
+        let Some(next) = self.frames.get(slot + 1) else { return Vec::new() };
+        let stamp_ns = next.motion.samples().first().map_or(0, |first| first.stamp_ns);
+        let near = |sample: &&ImuSample| seconds_from_ns(sample.stamp_ns - stamp_ns) <= MOTION_AFTER_S;
+        next.motion.samples().iter().take_while(near).copied().collect()
+    }
+
+    /// The warning text of a rolling shutter that explains the residuals much better than a time offset does; `None`
+    /// otherwise.
+    pub(crate) fn suspected_shutter(&self, setup: &Setup) -> Option<String> {
+        if !setup.config.calibrate || setup.config.estimate_readout {
+            return None;
+        }
+        let suspected = self.suspected_clock(setup)?;
+        let is_shutter = suspected.parameter.quantity == Quantity::Readout && suspected.chi2 > SIGNIFICANT_CHI2;
+        let key = |camera: usize| {
+            let rigid = camera.checked_sub(1).and_then(|rigid| setup.config.rigid_cameras.get(rigid))?;
+            Some(rigid.key.clone())
+        };
+        is_shutter.then(|| suspected.text(key))
+    }
+
+    /// Of the clocks and the shutters that are not estimated, the parameter with which χ² of the window would fall the most,
+    /// each one tried alone with all that is estimated; `None` without any.
+    pub(crate) fn suspected_clock(&self, setup: &Setup) -> Option<SuspectedParameter> {
+        let mut wider = setup.clone();
+        (wider.config.estimate_timeshift, wider.config.estimate_readout) = (true, true);
+        let mut window = self.clone();
+        window.add_columns(&wider);
+        let active = window.active_tracks();
+        let landmarks = active.iter().map(|active| active.landmarks.clone()).collect();
+        let problem = window.problem(&wider, &active);
+        let equations = problem.linearize(&window.estimate(landmarks));
+        let (hessian, gradient) = equations.reduced(&problem.layout, &equations.eliminate(0.0));
+        let first = problem.layout.calibration().start;
+        let known = self.calibration.parameters();
+        let parameters = window.calibration.parameters();
+        let frozen = window.calibration.frozen_columns();
+        let estimated = |column: &usize| {
+            column.checked_sub(first).is_none_or(|place| known.contains(&parameters[place]) && !frozen.contains(&place))
+        };
+        let kept: Vec<usize> = (0..problem.layout.total()).filter(estimated).collect();
+        let tried = parameters.iter().enumerate().filter(|(_, parameter)| !known.contains(parameter));
+        let score = |(place, parameter): (usize, &ParameterId)| {
+            let columns: Vec<usize> = kept.iter().copied().chain([first + place]).collect();
+            let mut matrix = hessian.select_columns(&columns).select_rows(&columns);
+            (0..columns.len()).for_each(|index| matrix[(index, index)] += FLOOR);
+            let factor = Cholesky::new(&matrix)?;
+            let right = DVector::from_iterator(columns.len(), columns.iter().map(|column| -gradient[*column]));
+            let change = factor.solve(&right)[columns.len() - 1];
+            let variance = factor.trailing_covariance(1)[(0, 0)];
+            Some(SuspectedParameter { parameter: *parameter, chi2: change * change / variance, change })
+        };
+        tried.filter_map(score).max_by(|one, other| one.chi2.total_cmp(&other.chi2))
+    }
+}
+
+/// Added to the diagonal, as in the solver: unknowns without a factor do not move.
+const FLOOR: f64 = 1e-6;
+
+impl SuspectedParameter {
+    /// The cause and its remedy; `key` is the key of a rigid camera beside the main one by its number.
+    fn text(&self, key: impl Fn(usize) -> Option<String>) -> String {
+        let of = key(self.parameter.part.camera()).map_or_else(|| "the camera".to_owned(), |key| key);
+        format!(
+            "rolling shutter of {of} not modelled (a readout of about {:.0} ms would lower χ² by {:.0}): try readout=on, or set \
+             the readout in the rig",
+            1e3 * self.change,
+            self.chi2
+        )
+    }
+}
