@@ -5,7 +5,7 @@ use super::coarse::{self, CoarseAligner};
 use super::corners::{CornerDetector, CornerOptions, PointGrid};
 use super::lucas_kanade::{self, LucasKanadeOptions};
 use super::outliers::{self, BearingPair, Motion, OutlierOptions};
-use super::prediction::PredictedRotation;
+use super::prediction::{PredictedRotation, RowRotations};
 use super::pyramid::Pyramid;
 use super::reference::{ReferenceMatch, ReferenceOptions, ReferencePatch, ReferenceSearch};
 use super::tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
@@ -104,6 +104,8 @@ pub struct FrontEnd {
 
 /// Two predictions of a feature's position are both tried when they differ by more than this, in pixels.
 const DIFFERENT_GUESS_PX: f64 = 2.0;
+/// Steps towards the row in which a direction is seen; each leaves less than a tenth of the error.
+const ROW_STEPS: usize = 3;
 /// Minimum number of tracks from which the motion of lost ones is predicted.
 const MIN_TRACKS_FOR_GUESS: usize = 8;
 /// Ratio of the minimum distance below which the younger of two features is dropped.
@@ -157,7 +159,8 @@ impl FrontEnd {
         let mut statistics = FrontEndStatistics::default();
         let before = self.tracks.len();
         let expected = self.coarse.search_rotation(&self.previous, &self.now, predicted);
-        let steps = self.follow(expected.as_ref());
+        let rows = predicted.and_then(|predicted| predicted.rows);
+        let steps = self.follow(expected.as_ref(), rows.as_ref());
         statistics.lost = before - steps.len();
         let (steps, motion) = self.reject(steps, expected.as_ref(), predicted);
         let steps = self.thin_out(steps);
@@ -165,7 +168,7 @@ impl FrontEnd {
         statistics.rejected = before - statistics.lost - steps.len();
         statistics.median_flow_px =
             median(steps.iter().map(|step| (step.uv_px - step.previous_uv_px).norm())).unwrap_or(0.0);
-        statistics.mean_parallax_px = self.mean_parallax_px(&steps, &motion.rotation);
+        statistics.mean_parallax_px = self.mean_parallax_px(&steps, &motion.rotation, rows.as_ref());
 
         let mut features: Vec<TrackedFeature> = steps
             .iter()
@@ -205,16 +208,16 @@ impl FrontEnd {
     }
 
     /// Tracks every feature from its predicted position, then the lost ones from the motion of those found.
-    fn follow(&self, expected: Option<&UnitQuaternion<f64>>) -> Vec<Step> {
+    fn follow(&self, expected: Option<&UnitQuaternion<f64>>, rows: Option<&RowRotations>) -> Vec<Step> {
         let guesses: Vec<Vector2<f64>> = self
             .tracks
             .iter()
-            .map(|track| expected.map_or(track.uv_px, |rotation| self.rotated(track, rotation)))
+            .map(|track| expected.map_or(track.uv_px, |rotation| self.rotated(track, rotation, rows)))
             .collect();
         let mut buffers = Buffers { motion: lucas_kanade::Buffers::new(), search: ReferenceSearch::new() };
         let mut results: Vec<Option<Step>> =
             self.tracks.iter().zip(&guesses).map(|(track, guess)| self.track(track, guess, &mut buffers)).collect();
-        let found: Vec<BearingPair> = results.iter().flatten().map(pair_of).collect();
+        let found: Vec<BearingPair> = results.iter().flatten().map(|step| self.pair_of(step, rows)).collect();
         let lost = results.len() - found.len();
         if lost > 0 {
             let start = expected.copied().unwrap_or_else(UnitQuaternion::identity);
@@ -224,7 +227,7 @@ impl FrontEnd {
             let start_over = 2 * lost > results.len();
             for ((track, guess), result) in self.tracks.iter().zip(&guesses).zip(&mut results) {
                 let others = [
-                    observed.as_ref().map(|rotation| self.rotated(track, rotation)),
+                    observed.as_ref().map(|rotation| self.rotated(track, rotation, rows)),
                     start_over.then_some(track.uv_px),
                 ];
                 for other in others.into_iter().flatten() {
@@ -269,11 +272,43 @@ impl FrontEnd {
     }
 
     /// Pixel of a feature under a rotation of the camera alone; its previous pixel when that is out of view.
-    fn rotated(&self, track: &Track, rotation: &UnitQuaternion<f64>) -> Vector2<f64> {
-        self.camera
-            .project(&(rotation * track.bearing))
-            .filter(|uv_px| self.camera.contains(uv_px, 0.0))
-            .unwrap_or(track.uv_px)
+    fn rotated(&self, track: &Track, rotation: &UnitQuaternion<f64>, rows: Option<&RowRotations>) -> Vector2<f64> {
+        let rotated_px = match rows {
+            None => self.camera.project(&(rotation * track.bearing)),
+            Some(rows) => {
+                let middle = RowRotations::to_middle(&rows.previous_rad, self.row(&track.uv_px), &track.bearing);
+                self.at_its_row(&(rotation * middle), &rows.now_rad)
+            }
+        };
+        rotated_px.filter(|uv_px| self.camera.contains(uv_px, 0.0)).unwrap_or(track.uv_px)
+    }
+
+    /// Row of a pixel as a ratio of the image's height.
+    fn row(&self, uv_px: &Vector2<f64>) -> f64 {
+        uv_px.y / self.camera.resolution_px[1] as f64
+    }
+
+    /// Pixel of a direction in the camera at the middle row, in the row in which it is seen.
+    fn at_its_row(&self, middle: &Vector3<f64>, over_readout_rad: &Vector3<f64>) -> Option<Vector2<f64>> {
+        let mut uv_px = self.camera.project(middle)?;
+        for _ in 0..ROW_STEPS {
+            let bearing = RowRotations::from_middle(over_readout_rad, self.row(&uv_px), middle);
+            uv_px = self.camera.project(&bearing)?;
+        }
+        Some(uv_px)
+    }
+
+    /// The bearings of a feature in both images, in the cameras at the middle rows where the shutter rolls.
+    fn pair_of(&self, step: &Step, rows: Option<&RowRotations>) -> BearingPair {
+        let Some(rows) = rows else { return BearingPair { previous: step.previous_bearing, now: step.bearing } };
+        BearingPair {
+            previous: RowRotations::to_middle(
+                &rows.previous_rad,
+                self.row(&step.previous_uv_px),
+                &step.previous_bearing,
+            ),
+            now: RowRotations::to_middle(&rows.now_rad, self.row(&step.uv_px), &step.bearing),
+        }
     }
 
     /// Rejects features that do not move with the scene.
@@ -283,7 +318,8 @@ impl FrontEnd {
         expected: Option<&UnitQuaternion<f64>>,
         predicted: Option<&PredictedRotation>,
     ) -> (Vec<Step>, Motion) {
-        let pairs: Vec<BearingPair> = steps.iter().map(pair_of).collect();
+        let rows = predicted.and_then(|predicted| predicted.rows);
+        let pairs: Vec<BearingPair> = steps.iter().map(|step| self.pair_of(step, rows.as_ref())).collect();
         let start = expected.copied().unwrap_or_else(UnitQuaternion::identity);
         let focal_px = self.camera.focal_length_px();
         let motion = outliers::estimate_motion(&pairs, &start, predicted, focal_px, &self.options.outliers);
@@ -319,18 +355,18 @@ impl FrontEnd {
         }
     }
 
-    fn mean_parallax_px(&self, steps: &[Step], rotation: &UnitQuaternion<f64>) -> f64 {
+    fn mean_parallax_px(&self, steps: &[Step], rotation: &UnitQuaternion<f64>, rows: Option<&RowRotations>) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for step in steps {
-            if let Some(rotated) = self.camera.project(&(rotation * step.previous_bearing)) {
-                sum += (step.uv_px - rotated).norm();
+            let rotated_px = match rows {
+                None => self.camera.project(&(rotation * step.previous_bearing)),
+                Some(rows) => self.at_its_row(&(rotation * self.pair_of(step, Some(rows)).previous), &rows.now_rad),
+            };
+            if let Some(rotated_px) = rotated_px {
+                sum += (step.uv_px - rotated_px).norm();
                 count += 1;
             }
         }
         if count == 0 { 0.0 } else { sum / f64::from(count) }
     }
-}
-
-fn pair_of(step: &Step) -> BearingPair {
-    BearingPair { previous: step.previous_bearing, now: step.bearing }
 }

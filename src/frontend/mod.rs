@@ -15,6 +15,7 @@ pub mod lucas_kanade;
 pub mod outliers;
 mod prediction;
 mod pyramid;
+pub mod readout;
 mod reference;
 mod resample;
 mod responses;
@@ -23,7 +24,9 @@ mod tests;
 mod tracks;
 
 pub use front_end::{FrontEnd, FrontEndError, FrontEndOptions};
-pub use prediction::{ChainOrientation, PredictedRotation, PredictionNoise, predict_camera_rotation};
+pub use prediction::{
+    ChainOrientation, PredictedRotation, PredictionNoise, RowRotations, camera_rates, predict_camera_rotation,
+};
 pub use pyramid::Pyramid;
 pub use reference::ReferenceOptions;
 pub use tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};

@@ -60,10 +60,10 @@ pub struct BearingPair {
 
 /// A rotation with a direction of translation, and their cost.
 #[derive(Clone, Copy)]
-struct Hypothesis {
-    rotation: UnitQuaternion<f64>,
-    direction: Vector3<f64>,
-    cost: f64,
+pub(super) struct Hypothesis {
+    pub(super) rotation: UnitQuaternion<f64>,
+    pub(super) direction: Vector3<f64>,
+    pub(super) cost: f64,
 }
 
 /// Estimates the motion between two images and its inliers.
@@ -128,7 +128,7 @@ fn choose_model(
 /// Distance of a pair from the epipolar geometry as an angle, to first order (Sampson's), in radians.
 ///
 /// A point in front of both cameras moves towards `direction`; for one that moves the other way the distance is its motion.
-fn epipolar_distance(pair: &BearingPair, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>) -> f64 {
+pub(super) fn epipolar_distance(pair: &BearingPair, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>) -> f64 {
     let rotated = BearingPair { previous: rotation * pair.previous, now: pair.now };
     epipolar_distances(&rotated, direction)[0]
 }
@@ -385,7 +385,7 @@ const MIN_INFORMATION: f64 = 1e-9;
 /// The step is `[φ; δ]`: a right perturbation of the rotation, and two columns on the tangent plane of the direction.
 /// `prior` is the information of the prior rotation (3 × 3), `rotation_error` its error in the current camera
 /// frame, in radians; a step `φ` changes that error by `R·φ` to first order in the error.
-fn step_towards(
+pub(super) fn step_towards(
     pairs: &[BearingPair],
     at: &Hypothesis,
     scale: f64,

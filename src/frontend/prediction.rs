@@ -1,14 +1,16 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use crate::geometry::{seconds_from_ns, so3};
+use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 use crate::gimbal::ClassicalChain;
 use crate::sensors::ImuSample;
 
 /// Predicted rotation of a camera between two images, with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PredictedRotation {
-    /// `camera_now_from_camera_previous`.
+    /// `camera_now_from_camera_previous`, between the middle rows where the camera has a rolling shutter.
     pub rotation: UnitQuaternion<f64>,
+    /// How the camera rotates while it reads each of the images, `None` for a global shutter.
+    pub rows: Option<RowRotations>,
     /// Covariance (3 × 3, rad²) of its error `δ` in the current camera frame, true rotation = `Exp(δ)·rotation`.
     pub covariance_rad2: Matrix3<f64>,
 }
@@ -16,7 +18,19 @@ pub struct PredictedRotation {
 impl PredictedRotation {
     /// A prediction with the same standard deviation about every axis.
     pub fn isotropic(rotation: UnitQuaternion<f64>, sigma_rad: f64) -> Self {
-        Self { rotation, covariance_rad2: Matrix3::identity() * sigma_rad.powi(2) }
+        Self { rotation, rows: None, covariance_rad2: Matrix3::identity() * sigma_rad.powi(2) }
+    }
+
+    /// The same prediction, made for the first rows, for the middle rows of a camera with this readout that rotates at these
+    /// rates (rad/s, camera frame) during the previous image and this one.
+    #[must_use]
+    pub fn with_readout(self, readout_s: f64, rates_rad_per_s: [Vector3<f64>; 2]) -> Self {
+        if readout_s == 0.0 {
+            return self;
+        }
+        let [previous_rad, now_rad] = rates_rad_per_s.map(|rate| rate * readout_s);
+        let rotation = so3::exp(&(now_rad * -0.5)) * self.rotation * so3::exp(&(previous_rad * 0.5));
+        Self { rotation, rows: Some(RowRotations { previous_rad, now_rad }), ..self }
     }
 
     /// Largest standard deviation over all axes, in radians.
@@ -28,6 +42,28 @@ impl PredictedRotation {
     pub(super) fn information(&self) -> Matrix3<f64> {
         let floor = Matrix3::identity() * MIN_SIGMA_RAD.powi(2);
         (self.covariance_rad2 + floor).try_inverse().unwrap_or_else(Matrix3::zeros)
+    }
+}
+
+/// How a camera with a rolling shutter rotates while it reads two images: rotation vectors over the whole readout, in the
+/// camera frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RowRotations {
+    /// During the previous image.
+    pub previous_rad: Vector3<f64>,
+    /// During the current one.
+    pub now_rad: Vector3<f64>,
+}
+
+impl RowRotations {
+    /// A direction in the camera at a row of an image (as a ratio of its height), in the camera at the middle row.
+    pub(super) fn to_middle(over_readout_rad: &Vector3<f64>, row: f64, bearing: &Vector3<f64>) -> Vector3<f64> {
+        so3::exp(&(over_readout_rad * (row - 0.5))) * bearing
+    }
+
+    /// A direction in the camera at the middle row, in the camera at a row.
+    pub(super) fn from_middle(over_readout_rad: &Vector3<f64>, row: f64, bearing: &Vector3<f64>) -> Vector3<f64> {
+        so3::exp(&(over_readout_rad * (0.5 - row))) * bearing
     }
 }
 
@@ -52,6 +88,8 @@ pub struct ChainOrientation {
     imu_from_frame: Vec<UnitQuaternion<f64>>,
     /// Standard deviations of the joint angles, in radians.
     joint_sigmas_rad: Vec<f64>,
+    /// Angular rates of the joints in rad/s; those that are not known are missing.
+    joint_rates_rad_per_s: Vec<f64>,
 }
 
 impl ChainOrientation {
@@ -65,7 +103,21 @@ impl ChainOrientation {
         Self {
             imu_from_frame: frames.iter().map(|frame| frame.rotation).collect(),
             joint_sigmas_rad: joint_sigmas_rad.to_vec(),
+            joint_rates_rad_per_s: Vec::new(),
         }
+    }
+
+    /// The same orientations of joints that move at these rates.
+    #[must_use]
+    pub fn with_joint_rates(self, joint_rates_rad_per_s: &[f64]) -> Self {
+        Self { joint_rates_rad_per_s: joint_rates_rad_per_s.to_vec(), ..self }
+    }
+
+    /// Angular velocity of the camera in its own frame, in rad/s, when the IMU has this one.
+    fn camera_rate(&self, imu_rad_per_s: &Vector3<f64>) -> Vector3<f64> {
+        let joints = self.imu_from_frame.iter().zip(&self.joint_rates_rad_per_s);
+        let of_joints: Vector3<f64> = joints.map(|(frame, rate)| frame * (Vector3::z() * *rate)).sum();
+        self.imu_from_camera().inverse() * (imu_rad_per_s + of_joints)
     }
 
     /// Orientation `imu_from_camera`.
@@ -132,5 +184,32 @@ pub fn predict_camera_rotation(
         covariance_rad2 += by_error * by_error.transpose() * noise.chain_rotation_rad.powi(2);
     }
     let finite = rotation.coords.iter().chain(covariance_rad2.iter()).all(|value| value.is_finite());
-    finite.then_some(PredictedRotation { rotation, covariance_rad2 })
+    finite.then_some(PredictedRotation { rotation, rows: None, covariance_rad2 })
+}
+
+/// Angular velocities of the camera in its own frame (rad/s) while it reads the previous image and this one, for
+/// [`PredictedRotation::with_readout`]: the mean of the gyroscope over `readout_s` after the previous stamp and before this one
+/// (the rows of this image come after the samples), with the rates of the joints; arguments as in
+/// [`predict_camera_rotation`].
+pub fn camera_rates(
+    imu: &[ImuSample],
+    gyroscope_bias_rad_per_s: &Vector3<f64>,
+    previous: &ChainOrientation,
+    now: &ChainOrientation,
+    readout_s: f64,
+) -> [Vector3<f64>; 2] {
+    let reach_ns = ns_from_seconds(readout_s.abs());
+    let mean = |from_ns: i64, to_ns: i64| {
+        let near = imu.iter().filter(|sample| (from_ns..=to_ns).contains(&sample.stamp_ns));
+        let (sum, count) = near.fold((Vector3::zeros(), 0.0), |(sum, count), sample| {
+            (sum + sample.angular_velocity_rad_per_s, count + 1.0)
+        });
+        if count > 0.0 { sum / count - gyroscope_bias_rad_per_s } else { Vector3::zeros() }
+    };
+    let (Some(first), Some(last)) = (imu.first(), imu.last()) else { return [Vector3::zeros(); 2] };
+    let rates = [
+        previous.camera_rate(&mean(first.stamp_ns, first.stamp_ns + reach_ns)),
+        now.camera_rate(&mean(last.stamp_ns - reach_ns, last.stamp_ns)),
+    ];
+    rates.map(|rate| if rate.iter().all(|value| value.is_finite()) { rate } else { Vector3::zeros() })
 }

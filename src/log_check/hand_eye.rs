@@ -43,21 +43,24 @@ struct HandEye<'a> {
     survey: &'a Survey,
     imu_facts: &'a ImuFacts,
     camera: &'a CameraRig,
+    /// Time from a stamp to the exposure of the middle row: what all features of an image measure together.
+    middle_row_s: f64,
     rotations: Vec<&'a ImageRotation>,
 }
 
-/// Checks a camera's orientation and time offset by its image rotations, if there are any.
+/// Checks the orientation and time offset of a camera with a readout by its image rotations, if there are any.
 pub(super) fn check_against_gyroscope(
     survey: &Survey,
     rig: &Rig,
     camera: &CameraRig,
     imu_facts: &ImuFacts,
     rotations: &[ImageRotation],
+    readout_s: f64,
     findings: &mut Findings,
 ) {
     let rotations: Vec<_> = rotations.iter().filter(|rotation| rotation.camera_key == camera.key).collect();
     let Some(chain) = rig.chain_of_camera(&camera.key).filter(|_| rotations.len() >= MIN_ROTATIONS) else { return };
-    let hand_eye = HandEye { survey, imu_facts, camera, rotations };
+    let hand_eye = HandEye { survey, imu_facts, camera, middle_row_s: 0.5 * readout_s, rotations };
     let given = hand_eye.pairs(&chain, 0.0);
     let angles_rad: Vec<f64> = given.iter().map(|(_, measured)| measured.norm()).collect();
     if given.len() < MIN_ROTATIONS || median(&angles_rad) < MIN_ROTATION_RAD {
@@ -74,7 +77,7 @@ pub(super) fn check_against_gyroscope(
 impl HandEye<'_> {
     /// Predicted and measured rotation vectors, for a chain and an additional time offset.
     fn pairs(&self, chain: &ClassicalChain, offset_s: f64) -> Vec<Pair> {
-        let shift = ns_from_seconds(self.camera.timeshift_cam_imu_s + offset_s);
+        let shift = ns_from_seconds(self.camera.timeshift_cam_imu_s + self.middle_row_s + offset_s);
         let imu_from_camera = |stamp_ns: i64| {
             let angles_rad = if chain.links.is_empty() { Vec::new() } else { self.survey.joint_angles_at(stamp_ns)? };
             Some(chain.imu_from_camera(&angles_rad).rotation)

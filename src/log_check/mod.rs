@@ -11,6 +11,7 @@ mod imu_noise;
 mod imu_topics;
 mod joints;
 mod pictures;
+mod readout;
 mod render;
 mod rig_sanity;
 mod rotation;
@@ -34,6 +35,7 @@ use self::survey::Survey;
 use crate::flight_log::attitude::{VEHICLE_KINDS, gimbal_kinds, topic_field};
 use crate::flight_log::log::WarningKind;
 use crate::flight_log::{FlightLog, LogError, MessageKind, TopicInfo};
+use crate::frontend::readout::RowTrack;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{ImageMask, Rig};
 
@@ -121,6 +123,8 @@ pub struct ImageRotation {
     pub to_ns: i64,
     /// Rotates vectors from the camera frame of the first image to that of the second.
     pub second_from_first: UnitQuaternion<f64>,
+    /// The features of both images, for the readout; may be empty.
+    pub tracks: Vec<RowTrack>,
 }
 
 /// Result of [`check`].
@@ -156,7 +160,7 @@ pub struct ProposedMask {
 ///
 /// An error of reading the rig becomes a finding, and the checks that need no rig are run.
 /// `image_rotations` are optional: with them the extrinsic rotations and the time offset of the cameras are checked
-/// against the gyroscope.
+/// against the gyroscope, and their readouts are measured.
 pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[ImageRotation]) -> CheckReport {
     let mut survey = Survey::of(log, rig.ok());
     let mut findings = Findings::default();

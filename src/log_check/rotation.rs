@@ -3,6 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::imu_facts::ImuFacts;
+use super::readout::check_readout;
 use super::survey::Survey;
 use super::{Area, Findings, ImageRotation, Severity, hand_eye};
 use crate::geometry::{RigidTransform, seconds_from_ns};
@@ -19,7 +20,8 @@ pub(super) fn check_rotations(
     for camera in &rig.cameras {
         check_against_gravity(survey, rig, camera, imu_facts, findings);
         check_lever(camera, findings);
-        hand_eye::check_against_gyroscope(survey, rig, camera, imu_facts, rotations, findings);
+        let readout_s = check_readout(camera, imu_facts, rotations, findings);
+        hand_eye::check_against_gyroscope(survey, rig, camera, imu_facts, rotations, readout_s, findings);
     }
 }
 

@@ -255,18 +255,24 @@ impl Survey {
         entry.times.push(Times { log_time_ns, stamp_ns });
         if kind == MessageKind::Imu && self.imu_topic.as_deref() == Some(topic) {
             match messages::read_imu(data) {
-                Ok(imu) => self.imu.push(ImuSample {
-                    stamp_ns,
-                    angular_velocity_rad_per_s: imu.angular_velocity_rad_per_s,
-                    specific_force_m_per_s2: imu.specific_force_m_per_s2,
-                }),
+                Ok(imu) => {
+                    let measured = ImuSample {
+                        stamp_ns,
+                        angular_velocity_rad_per_s: imu.angular_velocity_rad_per_s,
+                        specific_force_m_per_s2: imu.specific_force_m_per_s2,
+                    };
+                    self.imu.push(rig.map_or(measured, |rig| rig.imu.intrinsics.correct(&measured)));
+                }
                 Err(error) => entry.refuse(error.to_string()),
             }
         }
         let Some(rig) = rig else { return };
         if rig.imu.accelerometer_topic.as_deref() == Some(topic) {
             match messages::read_imu(data) {
-                Ok(imu) => self.accelerometer.push((stamp_ns, imu.specific_force_m_per_s2)),
+                Ok(imu) => {
+                    let force = rig.imu.intrinsics.correct_specific_force(&imu.specific_force_m_per_s2);
+                    self.accelerometer.push((stamp_ns, force));
+                }
                 Err(error) => entry.refuse(error.to_string()),
             }
         }

@@ -330,6 +330,7 @@ fn a_mask_is_proposed_for_what_never_moves() {
         from_ns: index * 50 * MS,
         to_ns: (index + 1) * 50 * MS,
         second_from_first: UnitQuaternion::from_euler_angles(0.0, 0.01, 0.0),
+        tracks: Vec::new(),
     };
     let turns: Vec<ImageRotation> = (0..200).map(turn).collect();
     let flight = Flight { image: behind_a_frame, ..Flight::default() };
@@ -548,7 +549,13 @@ fn rotations(late_s: f64, error: UnitQuaternion<f64>) -> Vec<ImageRotation> {
             let second_from_first =
                 camera_from_imu * imu_rotation(from_s + late_s).inverse() * camera_from_imu.inverse();
             let from_ns = i64::from(number) * 50 * MS;
-            ImageRotation { camera_key: "cam0".into(), from_ns, to_ns: from_ns + 50 * MS, second_from_first }
+            ImageRotation {
+                camera_key: "cam0".into(),
+                from_ns,
+                to_ns: from_ns + 50 * MS,
+                second_from_first,
+                tracks: Vec::new(),
+            }
         })
         .collect()
 }

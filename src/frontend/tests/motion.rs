@@ -4,7 +4,8 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::homography::Dice;
 use crate::frontend::outliers::{BearingPair, OutlierOptions, estimate_motion, fit_rotation};
-use crate::frontend::{ChainOrientation, PredictedRotation, PredictionNoise, predict_camera_rotation};
+use crate::frontend::prediction::RowRotations;
+use crate::frontend::{ChainOrientation, PredictedRotation, PredictionNoise, camera_rates, predict_camera_rotation};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
 use crate::sensors::ImuSample;
@@ -212,5 +213,41 @@ fn no_rotation_is_predicted_from_broken_samples() {
         vec![good[0], sample(5_000_000, Vector3::new(f64::NAN, 0.0, 0.0))],
     ] {
         assert_eq!(predict_camera_rotation(&imu, &Vector3::zeros(), &extrinsics, &extrinsics, &NOISE), None);
+    }
+}
+
+#[test]
+fn rows_are_carried_to_the_middle_of_a_rolling_shutter() {
+    let (rate, readout_s) = (Vector3::new(0.7, -1.1, 0.4), 0.03);
+    let at = |time_s: f64, direction: &Vector3<f64>| so3::exp(&(rate * -time_s)) * direction;
+    let first_rows = PredictedRotation::isotropic(so3::exp(&(rate * -0.05)), 0.01);
+    assert_eq!(first_rows.with_readout(0.0, [rate; 2]), first_rows);
+    let predicted = first_rows.with_readout(readout_s, [rate; 2]);
+    let rows = predicted.rows.unwrap();
+    for [previous, now] in [[0.1, 0.2], [0.9, 0.6], [0.5, 0.5]] {
+        let direction = Vector3::new(0.3, -0.2, 1.0).normalize();
+        let (before, after) = (at(previous * readout_s, &direction), at(0.05 + now * readout_s, &direction));
+        let before_in_middle = RowRotations::to_middle(&rows.previous_rad, previous, &before);
+        let after_in_middle = RowRotations::to_middle(&rows.now_rad, now, &after);
+        assert!((predicted.rotation * before_in_middle - after_in_middle).norm() < 1e-9);
+        assert!((RowRotations::from_middle(&rows.now_rad, now, &after_in_middle) - after).norm() < 1e-12);
+    }
+}
+
+#[test]
+fn the_rate_of_a_camera_is_that_of_imu_and_joints() {
+    let (rate, joint_rate) = (Vector3::new(0.5, -1.0, 2.0), 0.8);
+    let imu: Vec<_> = (0..11).map(|k| sample(k * 5_000_000, rate)).collect();
+    let world_from_camera = |time_s: f64| {
+        let chain = chain().imu_from_camera(&[0.4 + joint_rate * time_s]);
+        so3::exp(&(rate * time_s)) * chain.rotation
+    };
+    let orientation = |time_s: f64| {
+        ChainOrientation::new(&chain(), &[0.4 + joint_rate * time_s], &[0.01]).with_joint_rates(&[joint_rate])
+    };
+    let found = camera_rates(&imu, &Vector3::zeros(), &orientation(0.0), &orientation(0.05), 0.02);
+    for (time_s, found) in [0.0, 0.05].into_iter().zip(found) {
+        let turned = world_from_camera(time_s - 1e-5).inverse() * world_from_camera(time_s + 1e-5);
+        assert!((so3::log(&turned) / 2e-5 - found).norm() < 1e-6, "{found}");
     }
 }

@@ -72,7 +72,7 @@ impl Video {
                 noise += Vector3::new(0.2, -0.1, 0.15);
             }
             let second_from_first = so3::exp(&(vector + noise));
-            ImageRotation { camera_key: "cam0".to_owned(), from_ns, to_ns, second_from_first }
+            ImageRotation { camera_key: "cam0".to_owned(), from_ns, to_ns, second_from_first, tracks: Vec::new() }
         };
         (0..self.count).map(rotation).collect()
     }

@@ -100,7 +100,7 @@ fn recorded(folder: &Path, delay_ms: i64, write: Recorded) -> (FlightLog, Vec<Im
         let second_from_first = (to_attitude * to_camera).inverse() * (from_attitude * from_camera);
         let (from_ns, to_ns) = (from as i64 * MS, (from as i64 + 50) * MS);
         let second_from_first = second_from_first * so3::exp(&(noise.vector() * IMAGE_NOISE_RAD));
-        ImageRotation { camera_key: "cam0".into(), from_ns, to_ns, second_from_first }
+        ImageRotation { camera_key: "cam0".into(), from_ns, to_ns, second_from_first, tracks: Vec::new() }
     };
     let rotations = (1000..11_000).step_by(50).map(rotation).collect();
     (FlightLog::open(&path).unwrap(), rotations)

@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use crate::estimator::initialization::relative_pose::{RotationPrior, relative_poses};
 use crate::flight_log::{FlightLog, FrameStream, ImageReader, LogError, MessageKind};
-use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions, TrackedFrame};
+use crate::frontend::readout::{RowObservation, RowTrack};
+use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions, TrackedFeature, TrackedFrame};
 use crate::geometry::seconds_from_ns;
 use crate::log_check::ImageRotation;
 use crate::sensors::{CameraRig, GrayImage, Rig};
@@ -110,11 +111,24 @@ fn between(camera: &CameraRig, images: impl Iterator<Item = (i64, Arc<GrayImage>
             && let Some(second_from_first) = rotation_between(before, &tracks, PIXEL_SIGMA_PX / focal_px)
         {
             let (camera_key, to_ns) = (camera.key.clone(), stamp_ns);
-            rotations.push(ImageRotation { camera_key, from_ns: *from_ns, to_ns, second_from_first });
+            let tracks = row_tracks(camera, before, &tracks);
+            rotations.push(ImageRotation { camera_key, from_ns: *from_ns, to_ns, second_from_first, tracks });
         }
         previous = Some((tracks, stamp_ns));
     }
     rotations
+}
+
+/// The features observed in both images with their rows.
+fn row_tracks(camera: &CameraRig, first: &TrackedFrame, second: &TrackedFrame) -> Vec<RowTrack> {
+    let height_px = camera.model.resolution_px[1] as f64;
+    let observation =
+        |feature: &TrackedFeature| RowObservation { bearing: feature.bearing, row: feature.uv_px.y / height_px };
+    let before: BTreeMap<FeatureId, RowObservation> =
+        first.features.iter().map(|feature| (feature.id, observation(feature))).collect();
+    let track =
+        |feature: &TrackedFeature| Some(RowTrack { previous: *before.get(&feature.id)?, now: observation(feature) });
+    second.features.iter().filter_map(track).collect()
 }
 
 /// Rotation `second_from_first` of the camera from the features observed in both images, `None` with too few inliers.

@@ -7,7 +7,9 @@ use nalgebra::Vector3;
 use super::step_inputs::OwnedStepInput;
 use super::stopwatch::Stopwatch;
 use crate::flight_log::{FlightLog, FrameStream, LogError, LogWarning, SensorFrame};
-use crate::frontend::{ChainOrientation, FrontEnd, FrontEndOptions, PredictionNoise, predict_camera_rotation};
+use crate::frontend::{
+    ChainOrientation, FrontEnd, FrontEndOptions, PredictionNoise, camera_rates, predict_camera_rotation,
+};
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, Rig};
 use crate::session::plan::SessionError;
@@ -18,6 +20,7 @@ pub(super) struct CameraTracker {
     front_end: FrontEnd,
     chain: ClassicalChain,
     noise: PredictionNoise,
+    readout_s: f64,
     previous_orientation: Option<ChainOrientation>,
 }
 
@@ -50,6 +53,7 @@ impl CameraTracker {
             front_end: FrontEnd::new(camera.model.clone(), FrontEndOptions::default()).with_mask(mask),
             chain: rig.chain_of_camera(camera_key).unwrap_or_default(),
             noise: prediction_noise(rig, &camera.mount),
+            readout_s: camera.readout_s,
             previous_orientation: None,
         })
     }
@@ -65,7 +69,11 @@ impl CameraTracker {
             let predicted = match (&self.previous_orientation, &orientation) {
                 // The gyroscope bias is not removed here: over one frame it rotates the image by two pixels at most.
                 (Some(previous), Some(now)) => {
-                    predict_camera_rotation(&frame.imu, &Vector3::zeros(), previous, now, &self.noise)
+                    let bias = Vector3::zeros();
+                    predict_camera_rotation(&frame.imu, &bias, previous, now, &self.noise).map(|predicted| {
+                        let rates = camera_rates(&frame.imu, &bias, previous, now, self.readout_s);
+                        predicted.with_readout(self.readout_s, rates)
+                    })
                 }
                 _ => None,
             };
@@ -91,13 +99,15 @@ impl CameraTracker {
 
     /// Orientation `imu_from_camera` from rig and encoders, `None` when a joint angle is missing.
     fn camera_orientation(&self, frame: &SensorFrame) -> Option<ChainOrientation> {
-        let (angles_rad, sigmas_rad) = match &frame.joint_angles {
+        match &frame.joint_angles {
             // Encoder readings of a gimbal rig do not concern its rigid camera.
-            _ if self.chain.links.is_empty() => (&[][..], &[][..]),
-            Some(angles) => (angles.angles_rad.as_slice(), angles.sigmas_rad.as_slice()),
-            None => return None,
-        };
-        Some(ChainOrientation::new(&self.chain, angles_rad, sigmas_rad))
+            _ if self.chain.links.is_empty() => Some(ChainOrientation::new(&self.chain, &[], &[])),
+            Some(angles) => Some(
+                ChainOrientation::new(&self.chain, &angles.angles_rad, &angles.sigmas_rad)
+                    .with_joint_rates(&angles.rates_rad_per_s),
+            ),
+            None => None,
+        }
     }
 }
 

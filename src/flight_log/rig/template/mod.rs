@@ -17,9 +17,14 @@ use thiserror::Error;
 use crate::camera::CameraModel;
 use crate::sensors::{
     AssumedField, AttitudeSource, BodyAxes, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuNoise,
-    ImuRig, Rig,
+    ImuRig, IntrinsicsSigma, Rig,
 };
 
+/// Standard deviations of intrinsics that follow from a field of view: of the focal length as a ratio (makers round, crop and
+/// stabilize), of the principal point as a ratio of the width, and of distortion coefficients.
+const ASSUMED_FOCAL_RATIO: f64 = 0.1;
+const ASSUMED_CENTRE_RATIO: f64 = 0.02;
+const ASSUMED_DISTORTION: f64 = 0.1;
 /// Standard deviation of a joint angle of a gimbal whose encoders nobody has measured, in radians (0.5°).
 const JOINT_SIGMA_RAD: f64 = 0.0087;
 /// The same of an attitude that a gimbal estimates with an IMU of its own (1°).
@@ -196,6 +201,17 @@ pub struct AttitudeTemplate {
     pub source: Sourced<AttitudeSource>,
 }
 
+impl CameraTemplate {
+    /// How wrong intrinsics from a field of view may be.
+    fn intrinsics_sigma(&self) -> IntrinsicsSigma {
+        IntrinsicsSigma {
+            focal_ratio: ASSUMED_FOCAL_RATIO,
+            centre_px: ASSUMED_CENTRE_RATIO * self.model.value.resolution_px[0] as f64,
+            distortion: ASSUMED_DISTORTION,
+        }
+    }
+}
+
 /// The gimbal of a template.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GimbalTemplate {
@@ -257,7 +273,7 @@ impl RigTemplate {
                 timeshift_cam_imu_s: self.camera.timeshift_cam_imu_s.value,
                 readout_s: 0.0,
                 readout_sigma_s: None,
-                intrinsics_sigma: None,
+                intrinsics_sigma: self.camera.model.assumed.is_some().then(|| self.camera.intrinsics_sigma()),
                 mask: None,
             }],
             gimbal: self.gimbal.as_ref().map(|gimbal| self.gimbal_rig(gimbal)),

@@ -39,6 +39,9 @@ impl RigTemplate {
                 "m/s²/√Hz, m/s³/√Hz, rad/s/√Hz, rad/s²/√Hz; larger than in the data sheet, since airframes vibrate."
             }
             "cam0.intrinsics" => "fx fy cx cy in pixels; a calibration with a target also gives the distortion.",
+            "cam0.intrinsics_sigma" => {
+                "How wrong they may be: ratio of fx and fy, pixels of cx and cy, each coefficient of the distortion."
+            }
             "cam0.timeshift_cam_imu" => "Seconds: t_imu = t_cam + shift. `dcvins check` measures it.",
             "cam0.T_cam_imu" => "Kalibr's direction: maps points from the IMU to the camera.",
             "gimbal.source" => "No joint angles: they follow from this attitude.",

@@ -1,0 +1,367 @@
+//! Readout of a rolling shutter, measured from feature tracks and the angular rate of the camera.
+//!
+//! Between two images the rotation of each row differs: row `s` (as a ratio of the height) sees the rotation from
+//! `t₁ + s₁·ρ` to `t₂ + s₂·ρ` with the readout `ρ`. Bearings are carried to the first row of their image by the rate; at the
+//! true readout all of them then obey one rotation and one direction of translation. Both are free for each pair of images,
+//! so that no error of gyroscope bias, extrinsics, encoders or clocks is taken for a readout: it is measured by how the
+//! motion varies over the rows, where the rate changes between two images or features move vertically.
+//!
+//! The rate comes from a gyroscope, or from the rotations of the images themselves by a cubic spline: for a camera that
+//! rotates smoothly, as on a gimbal, this is better than the sum of a gyroscope and the derivatives of encoder readings, whose
+//! noise would make the readout too small.
+
+mod pair_motion;
+mod rates;
+mod spline;
+
+pub use self::rates::AngularRates;
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use self::pair_motion::PairMotion;
+use super::outliers::BearingPair;
+use crate::geometry::{median, so3};
+
+/// One feature in one image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RowObservation {
+    /// Direction in the camera frame, unit length.
+    pub bearing: Vector3<f64>,
+    /// Row of its pixel as a ratio of the height: 0 in the first row.
+    pub row: f64,
+}
+
+/// One feature in two images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RowTrack {
+    /// In the previous image.
+    pub previous: RowObservation,
+    /// In the current one.
+    pub now: RowObservation,
+}
+
+/// The features that two images share.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ImagePair {
+    /// Times of the first rows of previous and current image by the camera's clock, in seconds.
+    pub stamps_s: [f64; 2],
+    /// Their features; wrong tracks are tolerated.
+    pub tracks: Vec<RowTrack>,
+}
+
+/// Options of [`measure_readout`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReadoutOptions {
+    /// Largest and smallest standard deviation of a bearing, in radians; in between it follows from the tracks.
+    pub bearing_sigmas_rad: [f64; 2],
+    /// Largest readout, either sign.
+    pub largest_s: f64,
+    /// Largest time offset between the clocks of camera and rates, either sign.
+    pub largest_offset_s: f64,
+    /// Most pairs of images that are used: those in which the rate changes most.
+    pub most_pairs: usize,
+}
+
+impl ReadoutOptions {
+    /// For a camera of this focal length, with tracks of a twentieth to half a pixel.
+    pub fn for_focal_length(focal_px: f64) -> Self {
+        const TRACK_SIGMAS_PX: [f64; 2] = [0.5, 0.05];
+        let bearing_sigmas_rad = TRACK_SIGMAS_PX.map(|sigma_px| sigma_px / focal_px);
+        Self { bearing_sigmas_rad, largest_s: 0.06, largest_offset_s: 0.1, most_pairs: 160 }
+    }
+}
+
+/// A measured readout.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReadoutMeasurement {
+    /// Time from the exposure of the first row to that of a row behind the last one, negative where rows are read upwards.
+    pub readout_s: f64,
+    /// Its standard deviation, from how stretches of a second disagree with each other.
+    pub sigma_s: f64,
+    /// Time to add to the camera's stamps (of first rows) for the clock of the gyroscope: 0 where the rotations do not show it,
+    /// and without a gyroscope.
+    pub time_offset_s: f64,
+    /// Number of image pairs with enough features and rates.
+    pub pairs: usize,
+    /// Distance from the motion of their pair below which nine of ten bearings lie, without a readout and with this one, in
+    /// radians.
+    pub misfits_rad: [f64; 2],
+}
+
+/// Quantile of the distances that a measurement reports.
+const MISFIT_QUANTILE: f64 = 0.9;
+/// Step of the search for a readout.
+const READOUT_STEP_S: f64 = 0.015;
+/// Least number of features that two images share.
+const MIN_TRACKS: usize = 20;
+/// Least number of pairs.
+const MIN_PAIRS: usize = 12;
+/// Gauss–Newton steps.
+const REFINEMENTS: usize = 3;
+/// Step of central differences.
+const DIFFERENCE_S: f64 = 2e-4;
+/// Length of the stretches whose disagreement gives the standard deviation.
+const STRETCH_S: f64 = 1.0;
+/// Rounds of time offset and readout in turn.
+const ROUNDS: usize = 2;
+/// Step of the search for a time offset.
+const OFFSET_STEP_S: f64 = 0.002;
+/// A time offset must lessen the squared misfit of the rotations by this ratio.
+const MIN_OFFSET_GAIN: f64 = 0.2;
+
+/// Measures a camera's readout from pairs of images, in the order of their times, and the camera's angular rate by a
+/// gyroscope (camera frame, the clock of the gyroscope; bias and errors of the axes do not matter).
+///
+/// Without a gyroscope the rate is that of the images, which then must be consecutive. Returns `None` with too few pairs, or
+/// without any information about the readout.
+pub fn measure_readout(
+    images: &[ImagePair],
+    gyroscope: Option<&AngularRates>,
+    options: &ReadoutOptions,
+) -> Option<ReadoutMeasurement> {
+    let mut search = Search::new(images, gyroscope, options);
+    if search.counting().count() < MIN_PAIRS {
+        return None;
+    }
+    search.take_rates(0.0);
+    let mut readout_s = search.coarse();
+    for _ in 0..ROUNDS {
+        search.fit(readout_s);
+        search.take_sigma(readout_s);
+        search.fit(readout_s);
+        search.take_rates(readout_s);
+        readout_s = search.refine(readout_s)?.0;
+    }
+    let (readout_s, sigma_s) = search.refine(readout_s)?;
+    let with = search.misfit_rad(readout_s, MISFIT_QUANTILE);
+    search.fit(0.0);
+    let without = search.misfit_rad(0.0, MISFIT_QUANTILE);
+    Some(ReadoutMeasurement {
+        readout_s,
+        sigma_s,
+        time_offset_s: if gyroscope.is_some() { search.offset_s } else { 0.0 },
+        pairs: search.counting().count(),
+        misfits_rad: [without, with],
+    })
+}
+
+/// A pair of images with its current motion.
+struct Pair<'a> {
+    images: &'a ImagePair,
+    motion: PairMotion,
+    /// Whether it counts; the others only give rates.
+    counts: bool,
+}
+
+struct Search<'a> {
+    /// Whether the rates are those of the images.
+    of_images: bool,
+    rates: AngularRates,
+    options: &'a ReadoutOptions,
+    /// Standard deviation of a bearing.
+    sigma_rad: f64,
+    pairs: Vec<Pair<'a>>,
+    /// Time to add to the stamps for the clock of the rates.
+    offset_s: f64,
+}
+
+impl<'a> Search<'a> {
+    fn new(images: &'a [ImagePair], gyroscope: Option<&AngularRates>, options: &'a ReadoutOptions) -> Self {
+        let usable = images.iter().filter(|pair| pair.tracks.len() >= MIN_TRACKS);
+        let unfitted =
+            |images| Pair { images, motion: PairMotion::of_rotation(UnitQuaternion::identity()), counts: true };
+        let mut search = Self {
+            of_images: gyroscope.is_none(),
+            rates: gyroscope.cloned().unwrap_or_default(),
+            options,
+            sigma_rad: options.bearing_sigmas_rad[0],
+            pairs: usable.map(unfitted).collect(),
+            offset_s: 0.0,
+        };
+        if let Some(gyroscope) = gyroscope {
+            for pair in &mut search.pairs {
+                let [from_s, to_s] = pair.images.stamps_s;
+                let angle = gyroscope.angle_between(from_s, to_s).unwrap_or_default();
+                pair.motion = PairMotion::of_rotation(so3::exp(&-angle));
+            }
+            search.select(options.largest_s + options.largest_offset_s);
+        } else {
+            search.fit(0.0);
+            search.take_rates(0.0);
+            search.select(options.largest_s);
+        }
+        search
+    }
+
+    /// Lets the pairs count of which all rows have rates under any hypothesis, and of these the ones in which the rate changes most.
+    fn select(&mut self, reach_s: f64) {
+        let change = |pair: &Pair<'_>| {
+            let [from_s, to_s] = pair.images.stamps_s;
+            self.rates.angle_between(from_s - reach_s, to_s + reach_s)?;
+            Some((self.rates.at(to_s)? - self.rates.at(from_s)?).norm())
+        };
+        let mut ranked: Vec<(f64, usize)> =
+            self.pairs.iter().enumerate().filter_map(|(index, pair)| Some((change(pair)?, index))).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        ranked.truncate(self.options.most_pairs);
+        for pair in &mut self.pairs {
+            pair.counts = false;
+        }
+        for (_, index) in ranked {
+            self.pairs[index].counts = true;
+        }
+        if !self.of_images {
+            self.pairs.retain(|pair| pair.counts);
+        }
+    }
+
+    /// Takes the standard deviation of the bearings from their distances to the motions: with one that is too large a small
+    /// parallax counts as noise.
+    fn take_sigma(&mut self, readout_s: f64) {
+        /// Standard deviation over the median of the absolute value of a normal variable.
+        const SIGMA_PER_MEDIAN: f64 = 1.4826;
+        let [largest, smallest] = self.options.bearing_sigmas_rad;
+        self.sigma_rad = (SIGMA_PER_MEDIAN * self.misfit_rad(readout_s, 0.5)).clamp(smallest, largest);
+    }
+
+    /// Takes the rates of the images at a readout, or the offset of their clock to that of the gyroscope.
+    fn take_rates(&mut self, readout_s: f64) {
+        if !self.of_images {
+            return self.find_offset(readout_s);
+        }
+        let angles =
+            self.pairs.iter().map(|pair| (pair.images.stamps_s, -so3::log(&self.of_middle_rows(pair, readout_s))));
+        self.rates = spline::rates_of(&angles.collect::<Vec<_>>());
+        // They count from the first rows, and are those of the middle ones.
+        self.offset_s = -0.5 * readout_s;
+    }
+
+    /// The rotation of a pair between its middle rows.
+    fn of_middle_rows(&self, pair: &Pair<'_>, readout_s: f64) -> UnitQuaternion<f64> {
+        let [previous, now] =
+            pair.images.stamps_s.map(|stamp_s| self.rates.sweep(stamp_s + self.offset_s, readout_s).at(0.5));
+        so3::exp(&-now) * pair.motion.rotation * so3::exp(&previous)
+    }
+
+    /// The bearings of a pair carried to the first rows.
+    fn carried(&self, images: &ImagePair, readout_s: f64) -> Vec<BearingPair> {
+        let [previous, now] = images.stamps_s.map(|stamp_s| self.rates.sweep(stamp_s + self.offset_s, readout_s));
+        let carried = |track: &RowTrack| BearingPair {
+            previous: so3::exp(&previous.at(track.previous.row)) * track.previous.bearing,
+            now: so3::exp(&now.at(track.now.row)) * track.now.bearing,
+        };
+        images.tracks.iter().map(carried).collect()
+    }
+
+    fn counting(&self) -> impl Iterator<Item = &Pair<'a>> {
+        self.pairs.iter().filter(|pair| pair.counts)
+    }
+
+    /// Fits the motion of every pair at a readout; returns their cost.
+    fn fit(&mut self, readout_s: f64) -> f64 {
+        let mut pairs = std::mem::take(&mut self.pairs);
+        let mut cost = 0.0;
+        for pair in &mut pairs {
+            let carried = self.carried(pair.images, readout_s);
+            pair.motion = pair.motion.fitted(&carried, self.sigma_rad);
+            cost += if pair.counts { pair.motion.cost } else { 0.0 };
+        }
+        self.pairs = pairs;
+        cost
+    }
+
+    /// The readout of least cost among those of a grid over the whole range.
+    fn coarse(&mut self) -> f64 {
+        let steps = (self.options.largest_s / READOUT_STEP_S).round() as i32;
+        let mut best = (f64::INFINITY, 0.0);
+        for step in -steps..=steps {
+            let readout_s = f64::from(step) * READOUT_STEP_S;
+            let cost = self.fit(readout_s);
+            if cost < best.0 {
+                best = (cost, readout_s);
+            }
+        }
+        best.1
+    }
+
+    /// Gauss–Newton from a readout; the readout with its standard deviation.
+    fn refine(&mut self, start_s: f64) -> Option<(f64, f64)> {
+        let mut readout_s = start_s;
+        for _ in 0..REFINEMENTS {
+            self.fit(readout_s);
+            let (gradient, information) =
+                self.equations(readout_s).iter().fold((0.0, 0.0), |sum, (_, g, i)| (sum.0 + g, sum.1 + i));
+            if information <= 0.0 {
+                return None;
+            }
+            let largest_s = self.options.largest_s;
+            readout_s = (readout_s - gradient / information).clamp(-largest_s, largest_s);
+        }
+        self.fit(readout_s);
+        let equations = self.equations(readout_s);
+        let information: f64 = equations.iter().map(|(_, _, information)| information).sum();
+        let mut stretches: Vec<(i64, f64)> = Vec::new();
+        for (time_s, gradient, _) in &equations {
+            let number = (time_s / STRETCH_S).floor() as i64;
+            match stretches.last_mut() {
+                Some((last, sum)) if *last == number => *sum += gradient,
+                _ => stretches.push((number, *gradient)),
+            }
+        }
+        let count = stretches.len() as f64;
+        let spread: f64 = stretches.iter().map(|(_, gradient)| gradient * gradient).sum();
+        // One stretch cannot disagree with itself.
+        let of_stretches_s = (spread * count / (count - 1.0).max(0.5)).sqrt() / information;
+        let of_noise_s = information.sqrt().recip();
+        Some((readout_s, of_stretches_s.max(of_noise_s)))
+    }
+
+    /// Time, gradient and information of each pair about the readout, its motion eliminated, in units of the bearings' noise.
+    fn equations(&self, readout_s: f64) -> Vec<(f64, f64, f64)> {
+        let of_pair = |pair: &Pair<'_>| {
+            let [before, at, after] =
+                [-DIFFERENCE_S, 0.0, DIFFERENCE_S].map(|step| self.carried(pair.images, readout_s + step));
+            let (gradient, information) =
+                pair.motion.eliminated(&at, [&before, &after], 2.0 * DIFFERENCE_S, self.sigma_rad)?;
+            Some((pair.images.stamps_s[0], gradient, information))
+        };
+        self.pairs.iter().filter(|pair| pair.counts).filter_map(of_pair).collect()
+    }
+
+    /// Finds the time offset at which the rates predict the rotations of the images best, up to a constant rate.
+    fn find_offset(&mut self, readout_s: f64) {
+        let middle_s = 0.5 * readout_s;
+        let of_pair = |pair: &Pair<'_>| {
+            let times_s = pair.images.stamps_s.map(|stamp_s| stamp_s + middle_s);
+            (times_s, so3::log(&self.of_middle_rows(pair, readout_s)))
+        };
+        let measured: Vec<([f64; 2], Vector3<f64>)> = self.pairs.iter().map(of_pair).collect();
+        let cost = |offset_s: f64| {
+            let differences: Vec<Vector3<f64>> = measured
+                .iter()
+                .filter_map(|([from_s, to_s], rotation)| {
+                    Some(rotation + self.rates.angle_between(from_s + offset_s, to_s + offset_s)?)
+                })
+                .collect();
+            let component = |axis: usize| median(differences.iter().map(|difference| difference[axis])).unwrap_or(0.0);
+            let middle = Vector3::from_fn(|axis, _| component(axis));
+            median(differences.iter().map(|difference| (difference - middle).norm_squared())).unwrap_or(f64::INFINITY)
+        };
+        let steps = (self.options.largest_offset_s / OFFSET_STEP_S).round() as i32;
+        let costs: Vec<(f64, f64)> = (-steps..=steps)
+            .map(|step| f64::from(step) * OFFSET_STEP_S)
+            .map(|offset_s| (offset_s, cost(offset_s)))
+            .collect();
+        let Some(best) = costs.iter().min_by(|a, b| a.1.total_cmp(&b.1)) else { return };
+        let unshifted = cost(0.0);
+        self.offset_s = if best.1 < (1.0 - MIN_OFFSET_GAIN) * unshifted { best.0 } else { 0.0 };
+    }
+
+    /// Quantile of the distances of all bearings from the motion of their pair, in radians.
+    fn misfit_rad(&self, readout_s: f64, quantile: f64) -> f64 {
+        let of_pair = |pair: &Pair<'_>| pair.motion.distances(&self.carried(pair.images, readout_s));
+        let mut distances: Vec<f64> = self.counting().flat_map(of_pair).collect();
+        distances.sort_by(f64::total_cmp);
+        distances.get((quantile * distances.len() as f64) as usize).copied().unwrap_or(0.0)
+    }
+}

@@ -1,0 +1,179 @@
+use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+
+use super::super::outliers::{BearingPair, Hypothesis, epipolar_distance, fit_rotation, step_towards};
+use crate::geometry::{so3, tangent_basis};
+
+/// Rotation and, with parallax, direction of translation between two images.
+#[derive(Clone, Debug)]
+pub(super) struct PairMotion {
+    /// `camera_now_from_camera_previous`.
+    pub(super) rotation: UnitQuaternion<f64>,
+    direction: Option<Vector3<f64>>,
+    /// Squared distances over the variance, truncated, plus the price of the unknowns.
+    pub(super) cost: f64,
+}
+
+/// A track costs at most this, as one of four standard deviations.
+const LARGEST_COST: f64 = 16.0;
+/// Price of an unknown (Akaike's): a direction of translation costs two, and each track its depth.
+const UNKNOWN_COST: f64 = 2.0;
+/// Residual in standard deviations at which the weight of a track is a quarter.
+const WEIGHT_SIGMAS: f64 = 3.0;
+/// Gauss–Newton steps from each start.
+const STEPS: usize = 4;
+/// Damping of the normal matrix relative to its trace.
+const DAMPING: f64 = 1e-9;
+
+impl PairMotion {
+    /// A rotation alone, not yet fitted.
+    pub(super) fn of_rotation(rotation: UnitQuaternion<f64>) -> Self {
+        Self { rotation, direction: None, cost: 0.0 }
+    }
+
+    /// The motion of some tracks, starting from this one.
+    pub(super) fn fitted(&self, pairs: &[BearingPair], sigma_rad: f64) -> Self {
+        let rotation = fit_rotation(pairs, &self.rotation, WEIGHT_SIGMAS * sigma_rad);
+        let mut best = Self { rotation, direction: None, cost: 0.0 };
+        best.cost = best.cost_of(pairs, sigma_rad);
+        let lines = pairs.iter().map(|pair| (rotation * pair.previous).cross(&pair.now));
+        let sum: Matrix3<f64> = lines.map(|normal| normal * normal.transpose()).sum();
+        let eigen = sum.symmetric_eigen();
+        let flattest: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        let starts = [self.direction.map(|direction| (self.rotation, direction)), Some((rotation, flattest))];
+        for (rotation, direction) in starts.into_iter().flatten() {
+            let mut at = Hypothesis { rotation, direction, cost: 0.0 };
+            for _ in 0..STEPS {
+                let scale = WEIGHT_SIGMAS * sigma_rad;
+                let Some(step) = step_towards(pairs, &at, scale, &Matrix3::zeros(), &Vector3::zeros()) else { break };
+                (at.rotation, at.direction) = step;
+            }
+            for direction in [at.direction, -at.direction] {
+                let mut found = Self { rotation: at.rotation, direction: Some(direction), cost: 0.0 };
+                found.cost = found.cost_of(pairs, sigma_rad);
+                if found.cost < best.cost {
+                    best = found;
+                }
+            }
+        }
+        best
+    }
+
+    fn cost_of(&self, pairs: &[BearingPair], sigma_rad: f64) -> f64 {
+        let unknowns = if self.direction.is_some() { UNKNOWN_COST } else { 0.0 };
+        let squares = self.distances(pairs).into_iter().map(|distance| (distance / sigma_rad).powi(2));
+        2.0 * unknowns + squares.map(|square| (square + unknowns).min(LARGEST_COST)).sum::<f64>()
+    }
+
+    /// Distance of each track from the motion, in radians.
+    pub(super) fn distances(&self, pairs: &[BearingPair]) -> Vec<f64> {
+        let distance = |pair: &BearingPair| match &self.direction {
+            Some(direction) => epipolar_distance(pair, &self.rotation, direction),
+            None => (pair.now - self.rotation * pair.previous).norm(),
+        };
+        pairs.iter().map(distance).collect()
+    }
+
+    /// Gradient and information of the tracks about a parameter of their bearings, the motion eliminated; `around` are the
+    /// bearings half a `step` of the parameter before and behind. `None` where the tracks do not constrain the motion.
+    pub(super) fn eliminated(
+        &self,
+        at: &[BearingPair],
+        around: [&[BearingPair]; 2],
+        step: f64,
+        sigma_rad: f64,
+    ) -> Option<(f64, f64)> {
+        let mut sums = Sums::default();
+        for ((pair, before), after) in at.iter().zip(around[0]).zip(around[1]) {
+            let change = [after.previous - before.previous, after.now - before.now].map(|change| change / step);
+            match &self.direction {
+                Some(direction) => sums.add_epipolar(pair, change, &self.rotation, direction, sigma_rad),
+                None => sums.add_rotation(pair, change, &self.rotation, sigma_rad),
+            }
+        }
+        sums.eliminated(if self.direction.is_some() { 5 } else { 3 })
+    }
+}
+
+/// Normal equations of a motion (rotation and direction) and one parameter.
+#[derive(Default)]
+struct Sums {
+    motion: SMatrix<f64, 5, 5>,
+    motion_right: SVector<f64, 5>,
+    mixed: SVector<f64, 5>,
+    parameter: f64,
+    parameter_right: f64,
+}
+
+impl Sums {
+    fn add(&mut self, by_motion: &SVector<f64, 5>, by_parameter: f64, residual: f64, weight: f64) {
+        self.motion += by_motion * by_motion.transpose() * weight;
+        self.motion_right += by_motion * (residual * weight);
+        self.mixed += by_motion * (by_parameter * weight);
+        self.parameter += by_parameter * by_parameter * weight;
+        self.parameter_right += by_parameter * residual * weight;
+    }
+
+    /// Both components of `now - R·previous`.
+    fn add_rotation(
+        &mut self,
+        pair: &BearingPair,
+        [previous, now]: [Vector3<f64>; 2],
+        rotation: &UnitQuaternion<f64>,
+        sigma_rad: f64,
+    ) {
+        let basis = tangent_basis(&pair.now);
+        let residual = basis.tr_mul(&(pair.now - rotation * pair.previous));
+        let by_rotation = basis.tr_mul(&(rotation.to_rotation_matrix().into_inner() * so3::hat(&pair.previous)));
+        let by_parameter = basis.tr_mul(&(now - rotation * previous));
+        let weight = weight_of(residual.norm(), sigma_rad);
+        for axis in 0..2 {
+            let mut by_motion = SVector::<f64, 5>::zeros();
+            by_motion.fixed_rows_mut::<3>(0).copy_from(&by_rotation.row(axis).transpose());
+            self.add(&by_motion, by_parameter[axis], residual[axis], weight);
+        }
+    }
+
+    /// Distance from the epipolar line.
+    fn add_epipolar(
+        &mut self,
+        pair: &BearingPair,
+        [previous, now]: [Vector3<f64>; 2],
+        rotation: &UnitQuaternion<f64>,
+        direction: &Vector3<f64>,
+        sigma_rad: f64,
+    ) {
+        let rotated = rotation * pair.previous;
+        let plane = direction.cross(&rotated);
+        let other_plane = pair.now.cross(direction);
+        let gap = pair.now.dot(&plane);
+        let spread = plane.norm_squared() + other_plane.norm_squared() - 2.0 * gap * gap;
+        if spread < 1e-12 {
+            return;
+        }
+        let scale = spread.sqrt().recip();
+        let by_rotation = rotation.inverse() * rotated.cross(&other_plane);
+        let by_direction = tangent_basis(direction).tr_mul(&rotated.cross(&pair.now));
+        let by_motion =
+            SVector::<f64, 5>::new(by_rotation.x, by_rotation.y, by_rotation.z, by_direction.x, by_direction.y);
+        let by_parameter = now.dot(&plane) + other_plane.dot(&(rotation * previous));
+        let weight = weight_of(gap * scale, sigma_rad);
+        self.add(&(by_motion * scale), by_parameter * scale, gap * scale, weight);
+    }
+
+    fn eliminated(mut self, unknowns: usize) -> Option<(f64, f64)> {
+        let damping = DAMPING * self.motion.trace() + f64::MIN_POSITIVE;
+        for k in 0..5 {
+            self.motion[(k, k)] += if k < unknowns { damping } else { 1.0 };
+        }
+        let factor = self.motion.cholesky()?;
+        let information = self.parameter - self.mixed.dot(&factor.solve(&self.mixed));
+        let gradient = self.parameter_right - self.mixed.dot(&factor.solve(&self.motion_right));
+        (information > 0.0 && gradient.is_finite()).then_some((gradient, information))
+    }
+}
+
+/// Weight of a residual over its variance, falling with its fourth power.
+fn weight_of(residual_rad: f64, sigma_rad: f64) -> f64 {
+    let ratio = (residual_rad / (WEIGHT_SIGMAS * sigma_rad)).powi(2);
+    1.0 / (sigma_rad * sigma_rad * (1.0 + ratio) * (1.0 + ratio))
+}

@@ -1,0 +1,80 @@
+//! Rolling shutters: the readout of each camera, measured from how the image motion varies over the rows.
+
+use super::imu_facts::ImuFacts;
+use super::{Area, Findings, ImageRotation, Severity};
+use crate::frontend::readout::{AngularRates, ImagePair, ReadoutMeasurement, ReadoutOptions, measure_readout};
+use crate::geometry::seconds_from_ns;
+use crate::sensors::{CameraMount, CameraRig};
+
+/// A readout is reported when it differs from the rig's by more standard deviations than this.
+const SIGNIFICANT_SIGMAS: f64 = 5.0;
+/// And by more than this: rows are then less than a millisecond from where the rig says.
+const TOLERANCE_S: f64 = 0.002;
+/// With a larger standard deviation nothing is known about a shutter.
+const USEFUL_SIGMA_S: f64 = 0.003;
+
+/// Checks a camera's readout by the features of consecutive images; returns the readout by which its rotations are to be
+/// understood.
+pub(super) fn check_readout(
+    camera: &CameraRig,
+    imu_facts: &ImuFacts,
+    rotations: &[ImageRotation],
+    findings: &mut Findings,
+) -> f64 {
+    let Some(found) = measured(camera, imu_facts, rotations) else { return camera.readout_s };
+    let key = &camera.key;
+    let ReadoutMeasurement { readout_s, sigma_s, misfits_rad, .. } = found;
+    let [without_px, with_px] = misfits_rad.map(|misfit_rad| misfit_rad * camera.model.focal_length_px());
+    let evidence = format!(
+        "readout {:+.1} ms ± {:.1} ms by {} image pairs; 90 % of the features are within {without_px:.2} px of the motion of \
+         their pair with all rows exposed at once, within {with_px:.2} px with this readout",
+        readout_s * 1e3,
+        sigma_s * 1e3,
+        found.pairs
+    );
+    let difference_s = (readout_s - camera.readout_s).abs();
+    let difference = difference_s > TOLERANCE_S && difference_s > SIGNIFICANT_SIGMAS * sigma_s;
+    if difference {
+        let title = if camera.readout_s == 0.0 {
+            format!("{key} has a rolling shutter: readout {:+.1} ms", readout_s * 1e3)
+        } else {
+            format!("the readout of {key} differs from the rig: {:+.1} ms", readout_s * 1e3)
+        };
+        let remedy = format!("set {key}.readout to {readout_s:.4} and {key}.readout_sigma to {:.4}", sigma_s.max(1e-4));
+        findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
+        return readout_s;
+    }
+    if sigma_s > USEFUL_SIGMA_S {
+        let title = format!("the readout of {key} is unobservable from its images");
+        findings.add(Severity::Note, Area::Time, title, evidence, "rotate faster, to and fro about all axes");
+    } else if camera.readout_s == 0.0 {
+        findings.good(Area::Time, format!("{key} exposes all rows at once"), evidence);
+    } else {
+        findings.good(Area::Time, format!("the readout of {key} agrees with the rig"), evidence);
+    }
+    camera.readout_s
+}
+
+fn measured(camera: &CameraRig, imu_facts: &ImuFacts, rotations: &[ImageRotation]) -> Option<ReadoutMeasurement> {
+    let of_camera = rotations.iter().filter(|rotation| rotation.camera_key == camera.key);
+    let images: Vec<ImagePair> = of_camera
+        .filter(|rotation| !rotation.tracks.is_empty())
+        .map(|rotation| ImagePair {
+            stamps_s: [rotation.from_ns, rotation.to_ns]
+                .map(|stamp_ns| seconds_from_ns(stamp_ns) + camera.timeshift_cam_imu_s),
+            tracks: rotation.tracks.clone(),
+        })
+        .collect();
+    let options = ReadoutOptions::for_focal_length(camera.model.focal_length_px());
+    let CameraMount::Static { imu_from_camera } = &camera.mount else {
+        return measure_readout(&images, None, &options);
+    };
+    let camera_from_imu = imu_from_camera.rotation.inverse();
+    let gyroscope = AngularRates::new(
+        imu_facts
+            .samples
+            .iter()
+            .map(|sample| (seconds_from_ns(sample.stamp_ns), camera_from_imu * sample.angular_velocity_rad_per_s)),
+    );
+    measure_readout(&images, Some(&gyroscope), &options)
+}
