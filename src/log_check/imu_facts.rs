@@ -11,9 +11,9 @@ use crate::sensors::{ImuSample, Rig};
 /// A norm of the specific force below this is that of messages that leave it unset.
 const NO_FORCE_M_PER_S2: f64 = 0.01;
 /// Length of the windows that are classified as stationary or not.
-const WINDOW_NS: i64 = 500_000_000;
+pub(super) const WINDOW_NS: i64 = 500_000_000;
 /// Half width of the Hann window by which motion is told from vibration and white noise: what is slower than 4 Hz remains.
-const SMOOTHING_NS: i64 = 125_000_000;
+pub(super) const SMOOTHING_NS: i64 = 125_000_000;
 /// Step of the smoothed signal.
 const SMOOTHED_STEP_NS: i64 = 31_250_000;
 /// Stationary: the standard deviation of the smoothed angular rate, white noise removed, is below this.
@@ -89,7 +89,7 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
 }
 
 /// A stamp with a vector in the IMU frame.
-type Stamped = (i64, Vector3<f64>);
+pub(super) type Stamped = (i64, Vector3<f64>);
 
 /// The windows of a log from its angular rates and specific forces, both in the order of their stamps.
 fn windows_of(rates: &[Stamped], forces: &[Stamped], spectra: &[Option<Spectrum>; 2]) -> Vec<Window> {
@@ -122,7 +122,7 @@ fn windows_of(rates: &[Stamped], forces: &[Stamped], spectra: &[Option<Spectrum>
 
 /// Variance of a smoothed vector of white noise of this density per axis. A Hann window of width `w` averages noise to a
 /// bandwidth of `1.5 / w`.
-fn smoothed_white(density: f64) -> f64 {
+pub(super) fn smoothed_white(density: f64) -> f64 {
     3.0 * density * density * 1.5 / seconds_from_ns(2 * SMOOTHING_NS)
 }
 
@@ -131,12 +131,12 @@ fn within(samples: &[Stamped], (start_ns, end_ns): (i64, i64)) -> &[Stamped] {
     samples.get(before(start_ns)..before(end_ns)).unwrap_or_default()
 }
 
-fn vectors_within(samples: &[Stamped], range: (i64, i64)) -> Vec<Vector3<f64>> {
+pub(super) fn vectors_within(samples: &[Stamped], range: (i64, i64)) -> Vec<Vector3<f64>> {
     within(samples, range).iter().map(|(_, vector)| *vector).collect()
 }
 
 /// Norm of the standard deviation of the smoothed signal within a range of time, infinite where there are no samples.
-fn smoothed_deviation(samples: &[Stamped], (start_ns, end_ns): (i64, i64)) -> f64 {
+pub(super) fn smoothed_deviation(samples: &[Stamped], (start_ns, end_ns): (i64, i64)) -> f64 {
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return f64::INFINITY };
     let mut smoothed = Vec::new();
     let mut centre_ns = start_ns.max(first.0 + SMOOTHING_NS);

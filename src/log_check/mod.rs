@@ -10,6 +10,7 @@ mod imu_facts;
 mod imu_noise;
 mod imu_topics;
 mod joints;
+mod noise;
 mod pictures;
 mod readout;
 mod render;
@@ -26,6 +27,10 @@ mod timing;
 
 pub use self::clock_alignment::{
     AlignmentError, AlignmentReference, ClockAlignment, OrientationSeries, align_camera, align_clocks,
+};
+
+pub use self::noise::{
+    AllanPoint, AllanReport, AxisNoise, GivenNoise, NoiseTerm, NoiseTerms, SensorNoise, measure_noise,
 };
 
 use nalgebra::UnitQuaternion;

@@ -1,0 +1,360 @@
+//! Noise of an IMU from the stationary stretches of a log, by the overlapping Allan deviation.
+
+mod allan;
+mod render;
+mod samples;
+mod stretches;
+mod terms;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use self::allan::{AllanVariance, NoiseKind, Phase, confidence, counts, degrees_of_freedom, overlapping};
+use self::samples::ImuSeries;
+use self::stretches::{evenly_sampled, stationary_stretches};
+use self::terms::Fit;
+use super::imu_facts::Stamped;
+use super::spectrum::{Spectrum, VibrationLine};
+use crate::flight_log::FlightLog;
+use crate::geometry::{ns_from_seconds, seconds_from_ns};
+use crate::sensors::Rig;
+
+/// Less than this is too short for the deviation: white noise would be known to worse than a few percent.
+const SHORTEST_TOTAL_S: f64 = 10.0;
+/// Points to which a vibration may contribute more than this part of the variance are left out of the fit.
+const VIBRATION_RATIO: f64 = 0.1;
+/// Standard deviations of a limit at 95 %, one-sided.
+const LIMIT_SIGMAS: f64 = 1.65;
+/// A random walk `K` beside white noise `N` is found in most stretches of this many `N/K` (tested).
+const STRETCH_PER_RATIO: f64 = 20.0;
+/// The minimum of the deviation of flicker noise of this bias instability, `√(2 ln 2/π)`.
+const FLICKER: f64 = 0.664;
+
+/// A noise term in its own unit, or why it is not known.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct NoiseTerm {
+    /// The value, `None` when it is not identified.
+    pub value: Option<f64>,
+    /// Its standard deviation.
+    pub sigma: Option<f64>,
+    /// What is not identified is smaller than this (95 %).
+    pub limit: Option<f64>,
+    /// Why it is not identified, and what would identify it; empty otherwise.
+    pub reason: String,
+}
+
+impl NoiseTerm {
+    fn identified(value: f64, sigma: f64) -> Self {
+        Self { value: Some(value), sigma: Some(sigma), ..Self::default() }
+    }
+}
+
+/// The terms of one axis, or of all axes of a sensor.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NoiseTerms {
+    /// Angle or velocity random walk `N`, which is the density of the white noise: unit/√Hz.
+    pub white: NoiseTerm,
+    /// Bias instability `B`, the minimum of the deviation divided by 0.664, in the unit of the samples.
+    pub bias_instability: NoiseTerm,
+    /// Rate or acceleration random walk `K`, the random walk of the bias: unit/s/√Hz.
+    pub random_walk: NoiseTerm,
+    /// Quantization `Q`, white noise of the integrated samples: unit·s.
+    pub quantization: NoiseTerm,
+}
+
+/// One point of an Allan deviation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AllanPoint {
+    /// Averaging time.
+    pub tau_s: f64,
+    /// The deviation, in the unit of the samples.
+    pub deviation: f64,
+    /// Its standard deviation, by the equivalent degrees of freedom.
+    pub sigma: f64,
+    /// Lower limit of the true deviation (68.3 % between the limits).
+    pub low: f64,
+    /// Upper limit.
+    pub high: f64,
+    /// The sum of the identified terms.
+    pub model: Option<f64>,
+    /// Whether vibration makes it useless; such points are not fitted.
+    pub vibration: bool,
+}
+
+/// The Allan deviation of one axis with its terms.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AxisNoise {
+    /// `x`, `y`, `z`.
+    pub axis: &'static str,
+    /// Ascending in the averaging time.
+    pub points: Vec<AllanPoint>,
+    /// Its terms.
+    pub terms: NoiseTerms,
+}
+
+/// Noise densities of a rig for one sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GivenNoise {
+    /// White noise.
+    pub white: f64,
+    /// Random walk of the bias.
+    pub random_walk: f64,
+}
+
+/// One sensor.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SensorNoise {
+    /// `gyroscope` or `accelerometer`.
+    pub sensor: &'static str,
+    /// Unit of the samples.
+    pub unit: &'static str,
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Time covered by the samples that are used.
+    pub covered_s: f64,
+    /// The axes.
+    pub axes: Vec<AxisNoise>,
+    /// The terms of the mean variance of the axes: what a rig states.
+    pub terms: NoiseTerms,
+    /// Lines of a vibration while stationary.
+    pub vibration: Vec<String>,
+    /// What the rig says.
+    pub given: Option<GivenNoise>,
+}
+
+/// The noise of an IMU while stationary.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AllanReport {
+    /// Path of the log.
+    pub log: String,
+    /// Name of the rig, `None` without one.
+    pub rig: Option<String>,
+    /// Topic of the IMU.
+    pub topic: String,
+    /// Start and end of the stationary stretches, in seconds since the log began.
+    pub stretches_s: Vec<(f64, f64)>,
+    /// Their length together.
+    pub stationary_s: f64,
+    /// Gyroscope and accelerometer; none when the stretches are too short.
+    pub sensors: Vec<SensorNoise>,
+}
+
+impl AllanReport {
+    /// Whether the stretches are long enough.
+    pub fn is_measured(&self) -> bool {
+        !self.sensors.is_empty()
+    }
+
+    /// Length of the longest stretch.
+    pub fn longest_s(&self) -> f64 {
+        self.stretches_s.iter().map(|(begin, end)| end - begin).fold(0.0, f64::max)
+    }
+}
+
+/// Measures the noise of a log's IMU in its stationary stretches between two times in seconds since the log began.
+///
+/// Without a rig it is the log's only IMU, or the first one by name; `None` without any.
+pub fn measure_noise(log: &FlightLog, rig: Option<&Rig>, span_s: (f64, f64)) -> Option<AllanReport> {
+    let series = ImuSeries::of(log, rig)?;
+    let report = measure(&series, rig, span_s);
+    Some(AllanReport { log: log.path().display().to_string(), ..report })
+}
+
+fn measure(series: &ImuSeries, rig: Option<&Rig>, (from_s, to_s): (f64, f64)) -> AllanReport {
+    let span_ns = (
+        ns_from_seconds(from_s).max(series.rates.first().map_or(0, |first| first.0)),
+        ns_from_seconds(to_s).min(series.rates.last().map_or(0, |last| last.0)),
+    );
+    let density = |samples: &[Stamped]| Spectrum::of(samples).map_or(0.0, |spectrum| spectrum.density);
+    let densities = [density(&series.rates), density(&series.forces)];
+    let stretches = stationary_stretches(&series.rates, &series.forces, densities, span_ns);
+    let seconds = |(begin, end): &(i64, i64)| (seconds_from_ns(*begin), seconds_from_ns(*end));
+    let stretches_s: Vec<(f64, f64)> = stretches.iter().map(seconds).collect();
+    let stationary_s: f64 = stretches_s.iter().map(|(begin, end)| end - begin).sum();
+    let noise = rig.map(|rig| rig.imu.noise);
+    let sensor = |name, unit, samples: &[Stamped], given| sensor_noise(name, unit, samples, &stretches, given);
+    let sensors = if stationary_s < SHORTEST_TOTAL_S {
+        Vec::new()
+    } else {
+        let gyroscope = noise
+            .map(|noise| GivenNoise { white: noise.gyroscope_noise_density, random_walk: noise.gyroscope_random_walk });
+        let accelerometer = noise.map(|noise| GivenNoise {
+            white: noise.accelerometer_noise_density,
+            random_walk: noise.accelerometer_random_walk,
+        });
+        vec![
+            sensor("gyroscope", "rad/s", &series.rates, gyroscope),
+            sensor("accelerometer", "m/s²", &series.forces, accelerometer),
+        ]
+    };
+    AllanReport {
+        log: String::new(),
+        rig: rig.map(|rig| rig.name.clone()),
+        topic: series.topic.clone(),
+        stretches_s,
+        stationary_s,
+        sensors,
+    }
+}
+
+fn sensor_noise(
+    sensor: &'static str,
+    unit: &'static str,
+    samples: &[Stamped],
+    stretches: &[(i64, i64)],
+    given: Option<GivenNoise>,
+) -> SensorNoise {
+    let (parts, period_s) = evenly_sampled(samples, stretches);
+    let phases = [0, 1, 2].map(|axis| {
+        let of_part = |part: &Vec<Vector3<f64>>| {
+            let values: Vec<f64> = part.iter().map(|vector| vector[axis]).collect();
+            Phase::of(&values, period_s)
+        };
+        parts.iter().map(of_part).collect::<Vec<_>>()
+    });
+    let longest = parts.iter().map(Vec::len).max().unwrap_or(0);
+    let variances = phases.each_ref().map(|phases| {
+        counts(longest).into_iter().filter_map(|count| overlapping(phases, count, period_s)).collect::<Vec<_>>()
+    });
+    let within = |(stamp_ns, _): &&Stamped| stretches.iter().any(|(from, to)| (*from..*to).contains(stamp_ns));
+    let still: Vec<Stamped> = samples.iter().filter(within).copied().collect();
+    let lines = Spectrum::of(&still).map_or_else(Vec::new, |spectrum| spectrum.lines);
+    let mean: Vec<AllanVariance> = (0..variances[0].len())
+        .map(|index| {
+            let sum: f64 = variances.iter().map(|axis| axis[index].variance).sum();
+            AllanVariance { variance: sum / 3.0, ..variances[0][index] }
+        })
+        .collect();
+    let shaken: Vec<bool> = mean.iter().map(|point| is_shaken(point, &lines)).collect();
+    let longest_s = longest as f64 * period_s;
+    let axes = ["x", "y", "z"].into_iter().zip(phases.iter().zip(&variances)).map(|(axis, (phases, variances))| {
+        let fit = Fit::of(variances, &shaken, phases, 1);
+        AxisNoise {
+            axis,
+            points: points(variances, &shaken, phases, fit.as_ref()),
+            terms: noise_terms(variances, fit.as_ref(), (phases, 1), longest_s, given),
+        }
+    });
+    let fit = Fit::of(&mean, &shaken, &phases[0], 3);
+    let line = |line: &VibrationLine| format!("{:.0} Hz ({:.2e} {unit} RMS)", line.frequency_hz, line.rms);
+    SensorNoise {
+        sensor,
+        unit,
+        rate_hz: if period_s > 0.0 { 1.0 / period_s } else { 0.0 },
+        covered_s: parts.iter().map(|part| part.len() as f64 * period_s).sum(),
+        axes: axes.collect(),
+        terms: noise_terms(&mean, fit.as_ref(), (&phases[0], 3), longest_s, given),
+        vibration: lines.iter().map(line).collect(),
+        given,
+    }
+}
+
+/// Whether lines of a vibration contribute to the mean variance of the axes at an averaging time: at most
+/// `2 rms²/(π f τ)²` of a sine of frequency `f`.
+fn is_shaken(point: &AllanVariance, lines: &[VibrationLine]) -> bool {
+    let most = |line: &VibrationLine| {
+        let periods = std::f64::consts::PI * line.frequency_hz * point.tau_s;
+        2.0 * (line.rms / periods.max(1.0)).powi(2)
+    };
+    lines.iter().map(most).sum::<f64>() > VIBRATION_RATIO * 3.0 * point.variance
+}
+
+fn points(variances: &[AllanVariance], shaken: &[bool], phases: &[Phase], fit: Option<&Fit>) -> Vec<AllanPoint> {
+    let point = |(variance, shaken): (&AllanVariance, &bool)| {
+        let kind = fit.map_or(NoiseKind::White, |fit| fit.dominant(variance.tau_s));
+        let freedom = degrees_of_freedom(phases, variance.count, kind).max(1.0);
+        let deviation = variance.variance.sqrt();
+        let (low, high) = confidence(deviation, freedom);
+        AllanPoint {
+            tau_s: variance.tau_s,
+            deviation,
+            sigma: deviation / (2.0 * freedom).sqrt(),
+            low,
+            high,
+            model: fit.map(|fit| fit.variance(variance.tau_s).sqrt()),
+            vibration: *shaken,
+        }
+    };
+    variances.iter().zip(shaken).map(point).collect()
+}
+
+/// The terms of a fit, and why others are missing.
+fn noise_terms(
+    variances: &[AllanVariance],
+    fit: Option<&Fit>,
+    (phases, axes): (&[Phase], usize),
+    longest_s: f64,
+    given: Option<GivenNoise>,
+) -> NoiseTerms {
+    let Some((fit, last)) = fit.zip(variances.last()) else {
+        let reason = "vibration covers all averaging times, or the stretches are too short".to_owned();
+        let missing = NoiseTerm { reason, ..NoiseTerm::default() };
+        return NoiseTerms {
+            white: missing.clone(),
+            bias_instability: missing.clone(),
+            random_walk: missing.clone(),
+            quantization: missing,
+        };
+    };
+    let identified = |kind: NoiseKind| fit.term(kind).map(|found| NoiseTerm::identified(found.value, found.sigma));
+    let freedom = |point: &AllanVariance| {
+        degrees_of_freedom(phases, point.count, fit.dominant(point.tau_s)).max(1.0) * axes as f64
+    };
+    let white = identified(NoiseKind::White).unwrap_or_else(|| NoiseTerm {
+        reason: "no averaging time at which the deviation falls with the slope −1/2".to_owned(),
+        ..NoiseTerm::default()
+    });
+    let high = |point: &AllanVariance| point.variance * (1.0 + LIMIT_SIGMAS * (2.0 / freedom(point)).sqrt());
+    let falls = format!(
+        "the deviation still falls at the longest averaging time ({:.2} s, a quarter of {longest_s:.0} s)",
+        last.tau_s
+    );
+    let random_walk = identified(NoiseKind::RandomWalk).unwrap_or_else(|| {
+        let other = fit.variance(last.tau_s);
+        let excess = (high(last) - other).max(high(last) - last.variance);
+        let limit = (3.0 * excess / last.tau_s).sqrt();
+        let wanted = |walk: f64| STRETCH_PER_RATIO * white.value.unwrap_or(0.0) / walk.max(f64::MIN_POSITIVE);
+        let need = match given {
+            Some(given) if wanted(given.random_walk) > longest_s => {
+                format!(
+                    "the rig's {:.1e} would show in one stretch of {:.0} s",
+                    given.random_walk,
+                    wanted(given.random_walk)
+                )
+            }
+            _ => format!("a stretch of {:.0} s would show a tenth of this limit", 10.0 * longest_s),
+        };
+        NoiseTerm {
+            limit: Some(limit),
+            reason: format!("no slope of +1/2 up to τ = {:.2} s; {need}", last.tau_s),
+            ..NoiseTerm::default()
+        }
+    });
+    let flattens = random_walk.value.is_some() || fit.term(NoiseKind::Flicker).is_some();
+    let lowest =
+        variances.iter().min_by(|a, b| fit.variance(a.tau_s).total_cmp(&fit.variance(b.tau_s))).unwrap_or(last);
+    let bias_instability = if flattens {
+        let value = fit.variance(lowest.tau_s).sqrt() / FLICKER;
+        NoiseTerm::identified(value, value / (2.0 * freedom(lowest)).sqrt())
+    } else {
+        let reason = format!("{falls}: {}", stretch_for_minimum(&white, given, longest_s));
+        NoiseTerm { limit: Some(high(last).sqrt() / FLICKER), reason, ..NoiseTerm::default() }
+    };
+    let quantization = identified(NoiseKind::Quantization).unwrap_or_else(|| NoiseTerm {
+        reason: "no slope of −1 at short averaging times: below the white noise".to_owned(),
+        ..NoiseTerm::default()
+    });
+    NoiseTerms { white, bias_instability, random_walk, quantization }
+}
+
+/// How long a stretch shows the minimum: four times the averaging time at which the rig's random walk equals white noise.
+fn stretch_for_minimum(white: &NoiseTerm, given: Option<GivenNoise>, longest_s: f64) -> String {
+    let minimum_s =
+        white.value.zip(given).map(|(white, given)| 3.0_f64.sqrt() * white / given.random_walk.max(f64::MIN_POSITIVE));
+    match minimum_s.map(|minimum_s| 2.0 * 4.0 * minimum_s).filter(|needed_s| *needed_s > longest_s) {
+        Some(needed_s) => format!("with the rig's random walk it takes one stretch of {needed_s:.0} s"),
+        None => format!("it takes a stretch longer than {longest_s:.0} s"),
+    }
+}

@@ -1,0 +1,59 @@
+//! The samples of an IMU, gyroscope and accelerometer each at its own stamps.
+
+use nalgebra::Vector3;
+
+use crate::flight_log::container::DecodedBlock;
+use crate::flight_log::log::relative_ns;
+use crate::flight_log::{FlightLog, messages, messages::MessageKind};
+use crate::log_check::imu_facts::Stamped;
+use crate::sensors::Rig;
+
+/// Finite samples in the order of their stamps.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ImuSeries {
+    pub(super) topic: String,
+    pub(super) rates: Vec<Stamped>,
+    pub(super) forces: Vec<Stamped>,
+}
+
+impl ImuSeries {
+    /// Reads the IMU of the rig, or the first one of the log; `None` without any.
+    pub(super) fn of(log: &FlightLog, rig: Option<&Rig>) -> Option<Self> {
+        let topics = log.topics_of(&[MessageKind::Imu]);
+        let named = rig.map(|rig| rig.imu.topic.clone()).filter(|topic| topics.contains(topic));
+        let topic = named.or_else(|| topics.first().cloned())?;
+        let apart = rig.and_then(|rig| rig.imu.accelerometer_topic.clone()).filter(|topic| topics.contains(topic));
+        let force_topic = apart.unwrap_or_else(|| topic.clone());
+        let mut series = Self { topic, ..Self::default() };
+        for block in &log.index().blocks {
+            let decoded = DecodedBlock::decode(log.file(), block);
+            for message in &decoded.messages {
+                let Some(channel) = log.index().channels.get(&message.channel_id) else { continue };
+                let (rate, force) = (channel.topic == series.topic, channel.topic == force_topic);
+                if !rate && !force {
+                    continue;
+                }
+                let Ok(imu) = messages::read_imu(decoded.bytes(&message.data)) else { continue };
+                let stamp_ns = relative_ns(imu.stamp_ns, log.epoch_ns());
+                if rate {
+                    series.rates.push((stamp_ns, imu.angular_velocity_rad_per_s));
+                }
+                if force {
+                    series.forces.push((stamp_ns, imu.specific_force_m_per_s2));
+                }
+            }
+        }
+        series.order();
+        Some(series)
+    }
+
+    /// Brings the samples into the order of their stamps; what is not finite or repeats a stamp is left out.
+    pub(super) fn order(&mut self) {
+        for samples in [&mut self.rates, &mut self.forces] {
+            let finite = |vector: &Vector3<f64>| vector.iter().all(|value| value.is_finite());
+            samples.retain(|(_, vector)| finite(vector));
+            samples.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+            samples.dedup_by_key(|(stamp_ns, _)| *stamp_ns);
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Stretches of a log in which the IMU does not move at all.
+
+use nalgebra::Vector3;
+
+use crate::geometry::seconds_from_ns;
+use crate::log_check::imu_facts::{
+    SMOOTHING_NS, Stamped, WINDOW_NS, smoothed_deviation, smoothed_white, vectors_within,
+};
+use crate::log_check::statistics::{mean, median};
+
+/// Largest standard deviation of the smoothed angular rate beside that of its noise; a hovering vehicle has more.
+const RATE_RAD_PER_S: f64 = 0.003;
+/// The same of the specific force.
+const FORCE_M_PER_S2: f64 = 0.03;
+/// Standard deviations by which smoothed noise may exceed its own.
+const NOISE_SIGMAS: f64 = 2.0;
+/// Largest change of the mean angular rate from window to window beside that of noise.
+const RATE_STEP_RAD_PER_S: f64 = 0.004;
+/// The same of the specific force: a tilt of 0.3°.
+const FORCE_STEP_M_PER_S2: f64 = 0.05;
+/// The mean angular rate, bias included, is below this.
+const LARGEST_BIAS_RAD_PER_S: f64 = 0.08;
+/// Shorter stretches are not used.
+const SHORTEST_NS: i64 = 3_000_000_000;
+/// A longer interval between two samples than this many periods is a gap.
+const GAP_PERIODS: f64 = 1.5;
+
+/// One stationary window of half a second.
+struct Window {
+    range_ns: (i64, i64),
+    mean_rate: Vector3<f64>,
+    mean_force: Vector3<f64>,
+}
+
+/// Start and end of the stretches in the order of time; the densities are those of white noise of both sensors.
+pub(super) fn stationary_stretches(
+    rates: &[Stamped],
+    forces: &[Stamped],
+    densities: [f64; 2],
+    (from_ns, to_ns): (i64, i64),
+) -> Vec<(i64, i64)> {
+    let limit = |still: f64, density: f64| still.hypot(NOISE_SIGMAS * smoothed_white(density).sqrt());
+    let (rate_limit, force_limit) = (limit(RATE_RAD_PER_S, densities[0]), limit(FORCE_M_PER_S2, densities[1]));
+    // The difference of two means of noise, per axis, at four standard deviations.
+    let step = |still: f64, density: f64| still.hypot(4.0 * density * (2.0 / seconds_from_ns(WINDOW_NS)).sqrt());
+    let (rate_step, force_step) = (step(RATE_STEP_RAD_PER_S, densities[0]), step(FORCE_STEP_M_PER_S2, densities[1]));
+    let mut stretches: Vec<Vec<Window>> = vec![Vec::new()];
+    let mut start_ns = from_ns;
+    while start_ns + WINDOW_NS <= to_ns {
+        let range_ns = (start_ns, start_ns + WINDOW_NS);
+        start_ns += WINDOW_NS;
+        let (mean_rate, mean_force) = (mean(&vectors_within(rates, range_ns)), mean(&vectors_within(forces, range_ns)));
+        let still = smoothed_deviation(rates, range_ns) < rate_limit
+            && smoothed_deviation(forces, range_ns) < force_limit
+            && mean_rate.norm() < LARGEST_BIAS_RAD_PER_S;
+        let follows = |before: &Window| {
+            (before.mean_rate - mean_rate).amax() < rate_step && (before.mean_force - mean_force).amax() < force_step
+        };
+        let last = stretches.last_mut().expect("there is always a last stretch");
+        if !still || last.last().is_some_and(|before| !follows(before)) {
+            stretches.push(Vec::new());
+        }
+        if still {
+            stretches.last_mut().expect("there is always a last stretch").push(Window {
+                range_ns,
+                mean_rate,
+                mean_force,
+            });
+        }
+    }
+    let ends = stretches.iter().filter_map(|windows| {
+        let (first, last) = (windows.first()?.range_ns.0, windows.last()?.range_ns.1);
+        // Motion may have begun within the window before or after.
+        let begin_ns = if first > from_ns { first + SMOOTHING_NS } else { first };
+        let end_ns = if last + WINDOW_NS <= to_ns { last - SMOOTHING_NS } else { last };
+        (end_ns - begin_ns >= SHORTEST_NS).then_some((begin_ns, end_ns))
+    });
+    ends.collect()
+}
+
+/// The samples of the stretches without gaps, and their period in seconds.
+pub(super) fn evenly_sampled(samples: &[Stamped], stretches: &[(i64, i64)]) -> (Vec<Vec<Vector3<f64>>>, f64) {
+    let within = |range: &(i64, i64)| {
+        let before = |time_ns: i64| samples.partition_point(|(stamp_ns, _)| *stamp_ns < time_ns);
+        samples.get(before(range.0)..before(range.1)).unwrap_or_default()
+    };
+    let steps: Vec<f64> = stretches
+        .iter()
+        .flat_map(|range| within(range).windows(2))
+        .map(|pair| seconds_from_ns(pair[1].0 - pair[0].0))
+        .collect();
+    let usual_s = median(&steps);
+    let mut parts: Vec<Vec<Vector3<f64>>> = Vec::new();
+    for range in stretches {
+        let mut last_ns: Option<i64> = None;
+        for (stamp_ns, vector) in within(range) {
+            let gap = last_ns.is_none_or(|last| seconds_from_ns(stamp_ns - last) > GAP_PERIODS * usual_s);
+            if gap {
+                parts.push(Vec::new());
+            }
+            if let Some(part) = parts.last_mut() {
+                part.push(*vector);
+            }
+            last_ns = Some(*stamp_ns);
+        }
+    }
+    parts.retain(|part| part.len() as f64 * usual_s >= 0.5 * seconds_from_ns(SHORTEST_NS));
+    // Stamps may jitter; the mean period is that of the clock.
+    let regular: Vec<f64> = steps.into_iter().filter(|step| *step <= GAP_PERIODS * usual_s).collect();
+    let period_s = regular.iter().sum::<f64>() / regular.len().max(1) as f64;
+    (parts, period_s)
+}
