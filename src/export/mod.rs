@@ -8,7 +8,9 @@ mod desktop;
 mod error;
 mod evaluation;
 mod existing;
+mod flight_noise;
 mod masks;
+mod noise_files;
 mod recent_files;
 mod report;
 mod results;
@@ -34,7 +36,9 @@ pub use existing::{
     check_calibration_folder, check_converted_log, check_report_folder, check_run_folders, check_screenshot,
     check_simulated_log, other_runs, write_new_rig,
 };
+pub use flight_noise::{DensityReport, FlightNoiseReport};
 pub use masks::write_masks;
+pub use noise_files::{write_allan, write_flight_noise};
 pub use recent_files::RecentFiles;
 pub use report::{ReportDrawing, ReportFigure, ReportOptions, write_report};
 pub use results::write_results;

@@ -1,6 +1,7 @@
 //! Panels, the 3D scene and the window: they read a recording at a cursor and push commands.
 
 mod accessible;
+pub mod allan;
 pub mod app;
 pub mod breakpoints;
 mod chain_values;

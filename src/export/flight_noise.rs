@@ -1,0 +1,138 @@
+//! Noise densities fitted to a flight, as a report and as lines of a rig.
+
+use std::fmt::{self, Display, Formatter};
+
+use serde::Serialize;
+
+use crate::calibration::{FittedDensity, FlightNoise, NoiseDensity};
+use crate::flight_log::printable;
+use crate::geometry::seconds_from_ns;
+
+/// One density of [`FlightNoiseReport`].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DensityReport {
+    /// Key in the rig's `imu0`.
+    pub key: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Value of the rig.
+    pub rig: f64,
+    /// Value with which the residuals agree with their degrees of freedom; the rig's where the flight does not show it.
+    pub found: f64,
+    /// Standard deviation; `None` where the flight does not show it.
+    pub sigma: Option<f64>,
+    /// Squared whitened residuals per degree of freedom with the rig's value.
+    pub nis_before: f64,
+    /// The same with the value found.
+    pub nis_after: f64,
+    /// Degrees of freedom.
+    pub degrees_of_freedom: f64,
+}
+
+/// Noise densities of a rig fitted to a flight.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FlightNoiseReport {
+    /// Path of the log.
+    pub log: String,
+    /// Name of the rig.
+    pub rig: String,
+    /// Key of the camera whose images were used.
+    pub camera: String,
+    /// Start and end of the flight that was used, in seconds since the log began.
+    pub span_s: (f64, f64),
+    /// Number of intervals between keyframes.
+    pub intervals: usize,
+    /// Their mean length.
+    pub mean_interval_s: f64,
+    /// Runs of the estimator.
+    pub runs: usize,
+    /// Whether the densities have converged.
+    pub converged: bool,
+    /// White noise of gyroscope and accelerometer, then the random walks of their biases.
+    pub densities: Vec<DensityReport>,
+}
+
+impl FlightNoiseReport {
+    /// The report of a fit on a log, by the names of log, rig and camera.
+    pub fn new(noise: &FlightNoise, [log, rig, camera]: [String; 3]) -> Self {
+        let density = |fitted: &FittedDensity| DensityReport {
+            key: fitted.density.key(),
+            unit: fitted.density.unit(),
+            rig: fitted.given,
+            found: fitted.found,
+            sigma: fitted.sigma,
+            nis_before: fitted.nis_before,
+            nis_after: fitted.nis_after,
+            degrees_of_freedom: fitted.degrees_of_freedom,
+        };
+        Self {
+            log,
+            rig,
+            camera,
+            span_s: (seconds_from_ns(noise.span_ns.0), seconds_from_ns(noise.span_ns.1)),
+            intervals: noise.intervals,
+            mean_interval_s: noise.mean_interval_s,
+            runs: noise.runs,
+            converged: noise.converged,
+            densities: noise.densities.iter().map(density).collect(),
+        }
+    }
+
+    /// The lines of a rig's `imu0`, in Kalibr's names.
+    pub fn rig_lines(&self) -> String {
+        let mut lines = String::from("imu0:\n");
+        let order = [
+            NoiseDensity::Accelerometer,
+            NoiseDensity::AccelerometerWalk,
+            NoiseDensity::Gyroscope,
+            NoiseDensity::GyroscopeWalk,
+        ];
+        for found in order.iter().filter_map(|density| self.densities.iter().find(|it| it.key == density.key())) {
+            let note = found
+                .sigma
+                .map_or_else(|| "as before: not seen in this flight".to_owned(), |sigma| format!("σ {sigma:.1e}"));
+            lines.push_str(&format!("  {}: {:.3e}  # {}, {note}\n", found.key, found.found, found.unit));
+        }
+        lines
+    }
+}
+
+impl Display for FlightNoiseReport {
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        writeln!(
+            out,
+            "{}: noise densities fitted to the flight from {:.1} to {:.1} s by {} ({} intervals of {:.2} s, {} runs{})",
+            printable(&self.log),
+            self.span_s.0,
+            self.span_s.1,
+            printable(&self.camera),
+            self.intervals,
+            self.mean_interval_s,
+            self.runs,
+            if self.converged { "" } else { "; not converged" }
+        )?;
+        writeln!(
+            out,
+            "  {:<40}{:>10}{:>22}{:>8}{:>14}{:>12}{:>8}",
+            "", "rig", "found ± σ", "ratio", "NIS/dof, rig", "NIS/dof", "dof"
+        )?;
+        for found in &self.densities {
+            let label = format!("{}, {}", found.key, found.unit);
+            let value = found.sigma.map_or_else(
+                || "not seen".to_owned(),
+                |sigma| {
+                    let scale = 10_f64.powf(found.found.log10().floor());
+                    let power = scale.log10().round();
+                    format!("({:.2} ± {:.2})e{power:.0}", found.found / scale, sigma / scale)
+                },
+            );
+            let ratio = found.sigma.map_or_else(String::new, |_| format!("{:.2}", found.found / found.rig));
+            writeln!(
+                out,
+                "  {label:<40}{:>10.2e}{value:>22}{ratio:>8}{:>14.2}{:>12.2}{:>8.0}",
+                found.rig, found.nis_before, found.nis_after, found.degrees_of_freedom
+            )?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,293 @@
+//! The Allan deviation of gyroscope and accelerometer as a figure: what the rig should say above each plot, in the plot the
+//! axes with their confidence, the fitted sum of terms, and the rig's densities.
+
+use egui::epaint::{Mesh, Vertex, WHITE_UV};
+use egui::{Align2, Color32, FontFamily, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, pos2, vec2};
+
+use crate::gui::plot::paint_ground;
+use crate::gui::theme::{CURVE_WIDTH, HAIRLINE_WIDTH, Theme, label_font, number_font};
+use crate::log_check::{AllanReport, NoiseTerm, SensorNoise};
+
+/// Space above a plot for the result, in points.
+const HEAD: f32 = 76.0;
+/// Space to the left of a plot for the values of its axis.
+const LEFT: f32 = 46.0;
+/// Space below a plot for the averaging times.
+const BELOW: f32 = 36.0;
+/// A rig's value agrees with a measured one within this factor.
+const AGREES: f64 = 1.5;
+/// Radius of a marker in points.
+const MARKER: f32 = 4.5;
+
+/// A plot with both axes logarithmic.
+struct LogLog {
+    rect: Rect,
+    /// Powers of ten at the edges.
+    x: (f64, f64),
+    y: (f64, f64),
+}
+
+impl LogLog {
+    /// Axes that hold all deviations of a sensor and its markers.
+    fn of(sensor: &SensorNoise, rect: Rect) -> Option<Self> {
+        let points = || sensor.axes.iter().flat_map(|axis| &axis.points);
+        let range = |values: &mut dyn Iterator<Item = f64>| {
+            values
+                .filter(|value| *value > 0.0)
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+        };
+        let x = range(&mut points().map(|point| point.tau_s).chain([1.0]));
+        let y = range(&mut points().flat_map(|point| [point.low, point.deviation]).chain(marks(sensor).map(|it| it.1)));
+        if !(x.0 < x.1 && y.0 <= y.1) {
+            return None;
+        }
+        let log = |(low, high): (f64, f64), room: f64| (low.log10() - room, high.log10() + room);
+        Some(Self { rect, x: log(x, 0.05), y: log(y, 0.12) })
+    }
+
+    fn at(&self, tau_s: f64, deviation: f64) -> Pos2 {
+        let place =
+            |value: f64, (low, high): (f64, f64)| ((value.log10() - low) / (high - low)).clamp(-2.0, 3.0) as f32;
+        pos2(
+            self.rect.left() + place(tau_s, self.x) * self.rect.width(),
+            self.rect.bottom() - place(deviation.max(1e-300), self.y) * self.rect.height(),
+        )
+    }
+
+    /// Decades with lines and values, and thinner lines at 2 and 5.
+    fn grid(&self, painter: &Painter, theme: &Theme) {
+        let stroke = |strong: bool| {
+            let color = if strong { theme.hatch } else { theme.grid };
+            Stroke::new(HAIRLINE_WIDTH, color)
+        };
+        let digits = |(low, high): (f64, f64)| {
+            (low.floor() as i32..=high.ceil() as i32)
+                .flat_map(|power| [1.0, 2.0, 5.0].map(|digit| (power, digit)))
+                .filter(move |(power, digit): &(i32, f64)| (low..=high).contains(&(f64::from(*power) + digit.log10())))
+        };
+        for (power, digit) in digits(self.x) {
+            let value = digit * 10_f64.powi(power);
+            let x = self.at(value, 1.0).x;
+            painter.vline(x, self.rect.y_range(), stroke(digit == 1.0));
+            if digit == 1.0 {
+                let text = if (-3..=4).contains(&power) { format!("{value}") } else { format!("1e{power}") };
+                painter.text(
+                    pos2(x, self.rect.bottom() + 3.0),
+                    Align2::CENTER_TOP,
+                    text,
+                    number_font(),
+                    theme.text_weak,
+                );
+            }
+        }
+        let few = self.y.1 - self.y.0 < 1.2;
+        for (power, digit) in digits(self.y) {
+            let y = self.at(1.0, digit * 10_f64.powi(power)).y;
+            painter.hline(self.rect.x_range(), y, stroke(digit == 1.0));
+            if digit == 1.0 || few {
+                let text = format!("{digit}e{power}");
+                painter.text(
+                    pos2(self.rect.left() - 4.0, y),
+                    Align2::RIGHT_CENTER,
+                    text,
+                    number_font(),
+                    theme.text_weak,
+                );
+            }
+        }
+    }
+}
+
+/// Where the terms of a sensor are read: white noise at 1 s, the minimum, the random walk at 3 s; with their letters.
+fn marks(sensor: &SensorNoise) -> impl Iterator<Item = (f64, f64, char)> + '_ {
+    let white = sensor.terms.white.value.map(|white| (1.0, white, 'N'));
+    let walk = sensor.terms.random_walk.value.map(|walk| (3.0, walk, 'K'));
+    let model = sensor.axes.first().map(|axis| &axis.points).into_iter().flatten();
+    let lowest = model
+        .filter_map(|point| Some((point.tau_s, point.model?)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(tau_s, _)| tau_s);
+    let bias = sensor.terms.bias_instability.value.zip(lowest).map(|(bias, tau_s)| (tau_s, 0.664 * bias, 'B'));
+    [white, bias, walk].into_iter().flatten()
+}
+
+/// Draws the report into all of the available space.
+pub fn allan_ui(ui: &mut Ui, theme: &Theme, report: &AllanReport) {
+    let (_, whole) = ui.allocate_space(ui.available_size());
+    let painter = ui.painter_at(whole);
+    painter.rect_filled(whole, 0.0, theme.background);
+    let name = report.log.rsplit(['/', '\\']).next().unwrap_or_default();
+    let title = format!(
+        "{name}: Allan deviation of {} while stationary, {:.0} s (longest stretch {:.0} s)",
+        report.topic,
+        report.stationary_s,
+        report.longest_s()
+    );
+    painter.text(whole.min + vec2(12.0, 8.0), Align2::LEFT_TOP, title, font(13.0), theme.text_weak);
+    let plots = Rect::from_min_max(whole.min + vec2(0.0, 26.0), whole.max - vec2(0.0, 24.0));
+    let width = plots.width() / report.sensors.len().max(1) as f32;
+    for (index, sensor) in report.sensors.iter().enumerate() {
+        let left = plots.left() + index as f32 * width;
+        let rect = Rect::from_min_max(pos2(left, plots.top()), pos2(left + width, plots.bottom()));
+        sensor_ui(&painter, theme, sensor, rect);
+    }
+    legend(&painter, theme, pos2(whole.left() + 12.0, whole.bottom() - 13.0));
+}
+
+fn font(size: f32) -> FontId {
+    FontId::new(size, FontFamily::Proportional)
+}
+
+fn sensor_ui(painter: &Painter, theme: &Theme, sensor: &SensorNoise, rect: Rect) {
+    head(painter, theme, sensor, rect);
+    let plot = Rect::from_min_max(rect.min + vec2(LEFT + 8.0, HEAD), rect.max - vec2(14.0, BELOW));
+    paint_ground(painter, theme, plot);
+    let Some(axes) = LogLog::of(sensor, plot) else { return };
+    axes.grid(painter, theme);
+    let below = pos2(plot.center().x, plot.bottom() + 18.0);
+    painter.text(below, Align2::CENTER_TOP, "averaging time τ, s", label_font(), theme.text_weak);
+    painter.text(
+        pos2(plot.left(), plot.top() - 3.0),
+        Align2::LEFT_BOTTOM,
+        format!("deviation, {}", sensor.unit),
+        label_font(),
+        theme.text_weak,
+    );
+    let inside = painter.with_clip_rect(plot);
+    let colors = [theme.axis_x, theme.axis_y, theme.axis_z];
+    for (axis, color) in sensor.axes.iter().zip(colors) {
+        let mut mesh = Mesh::default();
+        for point in &axis.points {
+            for value in [point.low, point.high] {
+                let pos = axes.at(point.tau_s, value);
+                mesh.vertices.push(Vertex { pos, uv: WHITE_UV, color: color.gamma_multiply(0.22) });
+            }
+        }
+        for corner in (2..mesh.vertices.len() as u32).step_by(2) {
+            mesh.add_triangle(corner - 2, corner - 1, corner);
+            mesh.add_triangle(corner - 1, corner, corner + 1);
+        }
+        inside.add(Shape::mesh(mesh));
+    }
+    for (axis, color) in sensor.axes.iter().zip(colors) {
+        let line: Vec<Pos2> = axis.points.iter().map(|point| axes.at(point.tau_s, point.deviation)).collect();
+        inside.add(Shape::line(line, Stroke::new(CURVE_WIDTH, color)));
+        for point in axis.points.iter().filter(|point| point.vibration) {
+            inside.circle_stroke(axes.at(point.tau_s, point.deviation), 2.5, Stroke::new(1.0, theme.text_weak));
+        }
+    }
+    given_line(&inside, theme, sensor, &axes);
+    model_line(&inside, theme, sensor, &axes);
+    for (tau_s, value, letter) in marks(sensor) {
+        let at = axes.at(tau_s, value);
+        inside.circle_filled(at, MARKER, theme.text_strong);
+        inside.circle_stroke(at, MARKER, Stroke::new(1.5, theme.plot_background));
+        label(&inside, theme, at + vec2(0.0, -9.0), &letter.to_string());
+    }
+}
+
+/// A label over the curves.
+fn label(painter: &Painter, theme: &Theme, at: Pos2, text: &str) {
+    let galley = painter.layout_no_wrap(text.to_owned(), font(14.0), theme.text_strong);
+    let rect = Align2::CENTER_BOTTOM.anchor_size(at, galley.size());
+    painter.rect_filled(rect.expand2(vec2(3.0, 0.0)), 2.0, theme.plot_background.gamma_multiply(0.8));
+    painter.galley(rect.min, galley, theme.text_strong);
+}
+
+/// The deviation that the rig's densities give: `√(N²/τ + K² τ/3)`.
+fn given_line(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &LogLog) {
+    let Some(given) = sensor.given else { return };
+    let steps = 80;
+    let line: Vec<Pos2> = (0..=steps)
+        .map(|step| {
+            let tau_s = 10_f64.powf(axes.x.0 + (axes.x.1 - axes.x.0) * f64::from(step) / f64::from(steps));
+            axes.at(tau_s, (given.white.powi(2) / tau_s + given.random_walk.powi(2) * tau_s / 3.0).sqrt())
+        })
+        .collect();
+    painter.extend(Shape::dashed_line(&line, Stroke::new(CURVE_WIDTH + 0.5, theme.warn), 7.0, 4.0));
+}
+
+/// The mean of the fitted axes.
+fn model_line(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &LogLog) {
+    let Some(first) = sensor.axes.first() else { return };
+    let line: Option<Vec<Pos2>> = (0..first.points.len())
+        .map(|index| {
+            let models = sensor.axes.iter().map(|axis| Some(axis.points.get(index)?.model?.powi(2)));
+            let sum: f64 = models.sum::<Option<f64>>()?;
+            Some(axes.at(first.points[index].tau_s, (sum / sensor.axes.len() as f64).sqrt()))
+        })
+        .collect();
+    if let Some(line) = line {
+        painter.add(Shape::line(line, Stroke::new(CURVE_WIDTH, theme.text_strong)));
+    }
+}
+
+/// What the rig should say, and whether it does.
+fn head(painter: &Painter, theme: &Theme, sensor: &SensorNoise, rect: Rect) {
+    let mut name = sensor.sensor.to_owned();
+    name[..1].make_ascii_uppercase();
+    let left = rect.left() + LEFT + 8.0;
+    painter.text(pos2(left, rect.top() + 2.0), Align2::LEFT_TOP, name, font(15.0), theme.text_strong);
+    let rows: [(&str, &NoiseTerm, Option<f64>, &str); 2] = [
+        ("N  noise density", &sensor.terms.white, sensor.given.map(|given| given.white), "/√Hz"),
+        ("K  random walk", &sensor.terms.random_walk, sensor.given.map(|given| given.random_walk), "/s/√Hz"),
+    ];
+    for (row, (name, term, given, unit)) in rows.into_iter().enumerate() {
+        let y = rect.top() + 22.0 + 18.0 * row as f32;
+        painter.text(pos2(left, y), Align2::LEFT_TOP, name, font(13.0), theme.text);
+        let value = match (term.value, term.sigma, term.limit) {
+            (Some(value), Some(sigma), _) => {
+                format!("{value:.2e} ± {:.0} % {}{unit}", 100.0 * sigma / value, sensor.unit)
+            }
+            (.., Some(limit)) => format!("< {limit:.1e} {}{unit}, not seen", sensor.unit),
+            _ => "not identified".to_owned(),
+        };
+        let end = painter.text(pos2(left + 118.0, y), Align2::LEFT_TOP, value, font(13.0), theme.text_strong);
+        let Some((text, color)) = given.and_then(|given| verdict(theme, term, given)) else { continue };
+        painter.text(pos2(end.right() + 14.0, y), Align2::LEFT_TOP, text, font(13.0), color);
+    }
+}
+
+/// A rig's value against a measured one.
+fn verdict(theme: &Theme, term: &NoiseTerm, given: f64) -> Option<(String, Color32)> {
+    let Some(value) = term.value else {
+        let limit = term.limit?;
+        return (given > limit).then(|| (format!("rig {given:.1e} is too large"), theme.warn));
+    };
+    let ratio = given / value;
+    Some(if ratio > 1.0 / AGREES && ratio < AGREES {
+        (format!("rig {given:.2e} agrees"), theme.ok)
+    } else if ratio < 1.0 {
+        (format!("rig {given:.2e} is {:.1} × too small", 1.0 / ratio), theme.error)
+    } else {
+        (format!("rig {given:.2e} is {ratio:.1} × too large"), theme.warn)
+    })
+}
+
+fn legend(painter: &Painter, theme: &Theme, at: Pos2) {
+    let entries = [
+        ("x", theme.axis_x, false),
+        ("y", theme.axis_y, false),
+        ("z (bands 68 %)", theme.axis_z, false),
+        ("fitted terms", theme.text_strong, false),
+        ("rig", theme.warn, true),
+    ];
+    let mut x = at.x;
+    for (name, color, dashed) in entries {
+        let line = [pos2(x, at.y), pos2(x + 24.0, at.y)];
+        if dashed {
+            painter.extend(Shape::dashed_line(&line, Stroke::new(CURVE_WIDTH + 0.5, color), 7.0, 4.0));
+        } else {
+            painter.line_segment(line, Stroke::new(CURVE_WIDTH + 0.5, color));
+        }
+        let text = painter.text(pos2(x + 30.0, at.y), Align2::LEFT_CENTER, name, font(12.0), theme.text);
+        x = text.right() + 18.0;
+    }
+    painter.text(
+        pos2(x, at.y),
+        Align2::LEFT_CENTER,
+        "N: white noise, read at 1 s    B: minimum / 0.664    K: random walk, read at 3 s    ○ vibration, not fitted",
+        label_font(),
+        theme.text_weak,
+    );
+}
