@@ -18,6 +18,7 @@ mod calibrate;
 mod chain_prior;
 mod error;
 mod frame_sets;
+mod imu_noise;
 mod input;
 mod landmark;
 mod observations;
@@ -36,6 +37,7 @@ mod visual;
 
 pub use calibrate::{CalibrationProgress, calibrate};
 pub use error::CalibrationError;
+pub use imu_noise::{FittedDensity, FlightNoise, ImuNoiseError, NoiseDensity, fit_imu_noise};
 pub use input::{CalibrationInput, GimbalCamera, StaticCamera, TrackedView};
 pub use options::CalibrationOptions;
 pub use outcome::{

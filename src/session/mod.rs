@@ -24,8 +24,8 @@ mod record;
 mod tests;
 
 pub use engine::{
-    BreakpointHit, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation, SnapshotUse, Stopwatch,
-    calibrate, camera_rotations, compute, compute_until, image_rotations,
+    BreakpointHit, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation, FlightNoiseError, SnapshotUse,
+    Stopwatch, calibrate, camera_rotations, compute, compute_until, fit_flight_noise, image_rotations,
 };
 pub use plan::{
     DEFAULT_MEMORY_BUDGET_BYTES, FORK_PARAMETERIZATIONS, ForkChanges, ForkError, MAX_RUNS, ParameterizationChoice,

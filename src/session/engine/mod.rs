@@ -10,6 +10,7 @@ mod calibrate;
 mod computation;
 mod compute;
 mod configuration;
+mod flight_noise;
 mod fork;
 mod history;
 mod image_rotations;
@@ -27,6 +28,7 @@ pub use computation::Computation;
 pub use compute::{BreakpointHit, compute, compute_until};
 #[cfg(test)]
 pub(in crate::session) use configuration::estimator_config;
+pub use flight_noise::{FlightNoiseError, fit_flight_noise};
 pub(in crate::session) use fork::apply_fork;
 pub(in crate::session) use history::History;
 pub use history::SnapshotUse;

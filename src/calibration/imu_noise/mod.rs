@@ -1,0 +1,210 @@
+//! Noise densities of an IMU fitted to a flight.
+//!
+//! The estimator runs over the tracked images; the densities of gyroscope and accelerometer are scaled until the squared
+//! residuals of their factors (NIS) equal their degrees of freedom ([`innovations`]), by Fisher scoring on the logarithm of
+//! each variance: `Δ ln σ² = (χ² − dof) / tr(R R)`. This is the estimation of variance components by restricted maximum
+//! likelihood (Förstner 1979; Koch 1986), and `tr(R R)/2` the information of `ln σ²`.
+
+mod innovations;
+#[cfg(test)]
+mod tests;
+
+use std::ops::ControlFlow;
+
+pub use self::innovations::NoiseDensity;
+use self::innovations::{Innovations, Sums};
+use super::input::TrackedView;
+use crate::estimator::{Estimator, EstimatorConfig, StepInput};
+use crate::geometry::seconds_from_ns;
+use crate::optimization::RobustLoss;
+use crate::sensors::ImuNoise;
+
+/// Largest number of runs.
+const MAX_RUNS: usize = 8;
+/// The densities are found when none changes by more than this part of its standard deviation.
+const CONVERGED_SIGMAS: f64 = 0.2;
+/// The same for the noise of the observations, as a ratio.
+const PIXEL_CONVERGED: f64 = 0.02;
+/// Largest change of the logarithm of a variance in one run.
+const LARGEST_STEP: f64 = 2.8;
+/// A density is fitted while its standard deviation is below this part of it.
+const LARGEST_RELATIVE_SIGMA: f64 = 0.5;
+/// Standard deviations of χ² that contradict a density.
+const CONTRADICTION_SIGMAS: f64 = 3.0;
+/// Loss of the observations: quadratic for noise, so that their information is that of their noise, which is fitted, too.
+const LOSS: RobustLoss = RobustLoss::Huber(3.0);
+/// One step in this many is looked at; an interval stays in the window for longer.
+const STRIDE: usize = 3;
+/// Fewer intervals say nothing.
+const FEWEST_INTERVALS: usize = 20;
+
+/// A density before and after the fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FittedDensity {
+    /// Which one.
+    pub density: NoiseDensity,
+    /// The given value.
+    pub given: f64,
+    /// The value with which the residuals agree with their degrees of freedom; the given one where the flight does not show
+    /// it.
+    pub found: f64,
+    /// Standard deviation of it; `None` where the flight does not show it.
+    pub sigma: Option<f64>,
+    /// Squared whitened residuals per degree of freedom with the given density.
+    pub nis_before: f64,
+    /// The same with the density found.
+    pub nis_after: f64,
+    /// Degrees of freedom of the residuals after the fit.
+    pub degrees_of_freedom: f64,
+}
+
+/// The result of [`fit_imu_noise`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct FlightNoise {
+    /// In the order of [`NoiseDensity::ALL`].
+    pub densities: [FittedDensity; 4],
+    /// Start and end of the intervals that were used, in nanoseconds since the log began.
+    pub span_ns: (i64, i64),
+    /// Number of intervals between two keyframes.
+    pub intervals: usize,
+    /// Their mean length.
+    pub mean_interval_s: f64,
+    /// Standard deviation of an observation that the residuals agree with, in pixels.
+    pub pixel_sigma_px: f64,
+    /// Runs of the estimator.
+    pub runs: usize,
+    /// Whether the last change was smaller than a fifth of each standard deviation.
+    pub converged: bool,
+}
+
+/// Why no densities were found.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ImuNoiseError {
+    /// The estimator never has enough frames with IMU samples between them.
+    #[error(
+        "the estimator has {intervals} intervals between keyframes with images on both sides, {FEWEST_INTERVALS} are needed"
+    )]
+    TooShort {
+        /// How many there are.
+        intervals: usize,
+    },
+    /// The caller broke.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// Fits the densities to a flight. `config` has the given ones; `on_progress` is called with a fraction from 0 to 1.
+///
+/// # Errors
+/// When the flight is too short, or `on_progress` breaks.
+pub fn fit_imu_noise(
+    config: &EstimatorConfig,
+    views: &[TrackedView],
+    on_progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<FlightNoise, ImuNoiseError> {
+    let mut noise = config.imu_noise;
+    let mut config = config.clone();
+    config.options.loss = LOSS;
+    let mut before = None;
+    let mut converged = false;
+    let mut run = 0;
+    let last = loop {
+        let found =
+            measure(&config, noise, views, &mut |fraction| on_progress((run as f64 + fraction) / MAX_RUNS as f64))?;
+        if found.intervals < FEWEST_INTERVALS {
+            return Err(ImuNoiseError::TooShort { intervals: found.intervals });
+        }
+        before.get_or_insert_with(|| found.sums);
+        run += 1;
+        if converged || run == MAX_RUNS {
+            break found;
+        }
+        let pixel_ratio = (found.visual.0 / found.visual.1.max(1.0)).clamp(0.05, 20.0).sqrt();
+        config.options.pixel_sigma_px *= pixel_ratio;
+        converged = (pixel_ratio - 1.0).abs() < PIXEL_CONVERGED;
+        for (density, sums) in NoiseDensity::ALL.into_iter().zip(&found.sums) {
+            if !is_shown(sums) && !is_wrong(sums) {
+                continue;
+            }
+            let step = ((sums.chi2 - sums.freedom) / sums.information.max(1e-9)).clamp(-LARGEST_STEP, LARGEST_STEP);
+            converged &= step.abs() < CONVERGED_SIGMAS * variance_sigma(sums);
+            *value(&mut noise, density) *= (0.5 * step).exp();
+        }
+    };
+    let before = before.unwrap_or_default();
+    let mut given = config.imu_noise;
+    let densities = [0, 1, 2, 3].map(|index| {
+        let density = NoiseDensity::ALL[index];
+        let (sums, found) = (&last.sums[index], *value(&mut noise, density));
+        FittedDensity {
+            density,
+            given: *value(&mut given, density),
+            found,
+            sigma: is_shown(sums).then(|| 0.5 * variance_sigma(sums) * found),
+            nis_before: before[index].chi2 / before[index].freedom,
+            nis_after: sums.chi2 / sums.freedom,
+            degrees_of_freedom: sums.freedom,
+        }
+    });
+    Ok(FlightNoise {
+        densities,
+        span_ns: last.span_ns.unwrap_or_default(),
+        intervals: last.intervals,
+        mean_interval_s: seconds_from_ns(last.length_ns) / last.intervals as f64,
+        pixel_sigma_px: config.options.pixel_sigma_px,
+        runs: run,
+        converged,
+    })
+}
+
+/// Standard deviation of the logarithm of a variance.
+fn variance_sigma(sums: &Sums) -> f64 {
+    (2.0 / sums.information.max(1e-9)).sqrt()
+}
+
+/// Whether a flight shows a density to better than half its value.
+fn is_shown(sums: &Sums) -> bool {
+    0.5 * variance_sigma(sums) < LARGEST_RELATIVE_SIGMA
+}
+
+/// Whether the residuals contradict a density although the flight hardly shows it, as when it is much too small.
+fn is_wrong(sums: &Sums) -> bool {
+    (sums.chi2 - sums.freedom).abs() > CONTRADICTION_SIGMAS * (2.0 * sums.information).sqrt()
+}
+
+fn value(noise: &mut ImuNoise, density: NoiseDensity) -> &mut f64 {
+    match density {
+        NoiseDensity::Gyroscope => &mut noise.gyroscope_noise_density,
+        NoiseDensity::Accelerometer => &mut noise.accelerometer_noise_density,
+        NoiseDensity::GyroscopeWalk => &mut noise.gyroscope_random_walk,
+        NoiseDensity::AccelerometerWalk => &mut noise.accelerometer_random_walk,
+    }
+}
+
+/// One run with these densities.
+fn measure(
+    config: &EstimatorConfig,
+    imu_noise: ImuNoise,
+    views: &[TrackedView],
+    on_progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Innovations, ImuNoiseError> {
+    let mut estimator = Estimator::new(EstimatorConfig { imu_noise, ..config.clone() });
+    estimator.set_keep_factor_rows();
+    let mut innovations = Innovations::default();
+    for (index, view) in views.iter().enumerate() {
+        if on_progress(index as f64 / views.len() as f64).is_break() {
+            return Err(ImuNoiseError::Interrupted);
+        }
+        estimator.set_keep_linearization(index % STRIDE == 0);
+        let report = estimator.step(&StepInput {
+            frame_index: view.frame_index,
+            stamp_ns: view.stamp_ns,
+            imu: &view.imu,
+            joint_angles: view.joint_angles.as_ref(),
+            tracks: &view.tracks,
+            rigid_tracks: &[],
+        });
+        innovations.take(&report);
+    }
+    Ok(innovations)
+}

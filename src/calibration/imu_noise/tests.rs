@@ -1,0 +1,57 @@
+//! Densities of synthetic flights, found again from wrong ones.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use super::{FlightNoise, fit_imu_noise};
+use crate::calibration::TrackedView;
+use crate::estimator::EstimatorConfig;
+use crate::gimbal::Parameterization;
+use crate::simulation::{SyntheticFlight, SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks};
+
+fn views(flight: &SyntheticFlight) -> Vec<TrackedView> {
+    let sigma_rad = flight.given_rig.gimbal.as_ref().and_then(|gimbal| gimbal.encoder_sigma_rad);
+    flight
+        .frames
+        .iter()
+        .map(|frame| TrackedView {
+            frame_index: frame.index,
+            stamp_ns: frame.stamp_ns,
+            imu: frame.imu.clone(),
+            joint_angles: sigma_rad.and_then(|sigma_rad| frame.encoder_angles(sigma_rad)),
+            tracks: Arc::new(frame.tracks.clone()),
+        })
+        .collect()
+}
+
+/// Fits a flight of `seconds` whose true densities are those of the rig times `factor`.
+fn fitted(seed: u64, factor: f64, seconds: f64) -> FlightNoise {
+    let flight = synthetic_tracks(&SyntheticOptions {
+        mount: SyntheticMount::Static,
+        motion: SyntheticMotion::Aggressive,
+        seed,
+        duration_s: seconds,
+        features: 80,
+        pixel_sigma_px: 0.25,
+        ..SyntheticOptions::default()
+    });
+    let mut config = EstimatorConfig::for_camera(&flight.given_rig, "cam0", Parameterization::Minimal).unwrap();
+    config.imu_noise.gyroscope_noise_density /= factor;
+    config.imu_noise.accelerometer_noise_density /= factor;
+    fit_imu_noise(&config, &views(&flight), &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+#[test]
+fn densities_of_a_flight_are_found_from_wrong_ones() {
+    let factor = 3.0;
+    let noise = fitted(2, factor, 10.0);
+    let [gyroscope, accelerometer, ..] = &noise.densities;
+    assert!(noise.converged, "{noise:?}");
+    assert!((noise.pixel_sigma_px / 0.25 - 1.0).abs() < 0.1, "{noise:?}");
+    for density in [gyroscope, accelerometer] {
+        let (sigma, truth) = (density.sigma.unwrap(), density.given * factor);
+        assert!((density.found - truth).abs() < 3.0 * sigma && sigma < 0.6 * truth, "{density:?}, true {truth:.2e}");
+        assert!((density.nis_after - 1.0).abs() < 0.1, "{density:?}");
+    }
+    assert!(gyroscope.nis_before > 1.5 && gyroscope.sigma.unwrap() < 0.12 * gyroscope.found, "{gyroscope:?}");
+}
