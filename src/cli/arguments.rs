@@ -8,6 +8,7 @@ use crate::cli::convert::ConvertArguments;
 use crate::cli::degeneracy::DegeneracyArguments;
 use crate::cli::evaluate::EvaluateArguments;
 use crate::cli::exit;
+use crate::cli::noise::NoiseArguments;
 use crate::cli::report::ReportArguments;
 use crate::cli::rig::RigArguments;
 use crate::cli::run::RunArguments;
@@ -47,6 +48,9 @@ pub(crate) enum Command {
     /// Check a log and its rig: content, timing, calibration, noise, each finding with evidence and remedy.
     #[command(after_help = exit::CHECK)]
     Check(CheckArguments),
+    /// Measure the noise densities of the IMU: Allan deviation of stationary stretches, or fitted to a flight.
+    #[command(after_help = exit::INTERRUPTIBLE)]
+    Noise(NoiseArguments),
     /// Write a rig for a recording that has none.
     Rig(RigArguments),
     /// Write a synthetic flight: the log, its rig and the ground truth.

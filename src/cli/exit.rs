@@ -34,7 +34,7 @@ pub(crate) const INTERRUPTED: u8 = 130;
 
 /// Exit codes of the commands that only do their work or fail, for `--help`.
 pub(crate) const PLAIN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use.";
-/// Those of `simulate`, `convert`, `calibrate` and `screenshot`.
+/// Those of `simulate`, `convert`, `calibrate`, `noise` and `screenshot`.
 pub(crate) const INTERRUPTIBLE: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 130 interrupted (Ctrl+C; files \
     that are not complete are not written; a second Ctrl+C ends at once).";
 /// Those of `run`.

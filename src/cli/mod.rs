@@ -11,6 +11,7 @@ mod evaluate;
 mod exit;
 mod interrupt;
 mod limit_arguments;
+mod noise;
 mod report;
 #[cfg(feature = "gui")]
 mod report_figures;
@@ -45,6 +46,7 @@ pub(crate) fn run() -> anyhow::Result<Outcome> {
         Command::Report(arguments) => report::report(&arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
         Command::Check(arguments) => check::check(&arguments),
+        Command::Noise(arguments) => noise::noise(&arguments),
         Command::Rig(arguments) => rig::rig(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Degeneracy(arguments) => done(degeneracy::degeneracy(&arguments)),

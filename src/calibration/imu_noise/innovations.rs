@@ -60,6 +60,10 @@ impl NoiseDensity {
         }
     }
 
+    pub(super) fn is_random_walk(self) -> bool {
+        matches!(self, Self::GyroscopeWalk | Self::AccelerometerWalk)
+    }
+
     fn rows(self) -> Range<usize> {
         match self {
             Self::Gyroscope => 0..3,

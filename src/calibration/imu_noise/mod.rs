@@ -20,7 +20,9 @@ use crate::optimization::RobustLoss;
 use crate::sensors::ImuNoise;
 
 /// Largest number of runs.
-const MAX_RUNS: usize = 8;
+const MAX_RUNS: usize = 12;
+/// From this run on random walks are fitted, too.
+const FIRST_WALK_RUN: usize = 4;
 /// The densities are found when none changes by more than this part of its standard deviation.
 const CONVERGED_SIGMAS: f64 = 0.2;
 /// The same for the noise of the observations, as a ratio.
@@ -121,9 +123,11 @@ pub fn fit_imu_noise(
         }
         let pixel_ratio = (found.visual.0 / found.visual.1.max(1.0)).clamp(0.05, 20.0).sqrt();
         config.options.pixel_sigma_px *= pixel_ratio;
-        converged = (pixel_ratio - 1.0).abs() < PIXEL_CONVERGED;
+        converged = (pixel_ratio - 1.0).abs() < PIXEL_CONVERGED && run >= FIRST_WALK_RUN;
         for (density, sums) in NoiseDensity::ALL.into_iter().zip(&found.sums) {
-            if !is_shown(sums) && !is_wrong(sums) {
+            // White noise that is far too small would be taken for a random walk.
+            let waits = density.is_random_walk() && run < FIRST_WALK_RUN;
+            if waits || !is_shown(sums) && (density.is_random_walk() || !is_wrong(sums)) {
                 continue;
             }
             let step = ((sums.chi2 - sums.freedom) / sums.information.max(1e-9)).clamp(-LARGEST_STEP, LARGEST_STEP);
