@@ -176,6 +176,7 @@ fn sensor_ui(painter: &Painter, theme: &Theme, sensor: &SensorNoise, rect: Rect)
             inside.circle_stroke(axes.at(point.tau_s, point.deviation), 2.5, Stroke::new(1.0, theme.text_weak));
         }
     }
+    asymptotes(&inside, theme, sensor, &axes);
     given_line(&inside, theme, sensor, &axes);
     model_line(&inside, theme, sensor, &axes);
     for (tau_s, value, letter) in marks(sensor) {
@@ -192,6 +193,18 @@ fn label(painter: &Painter, theme: &Theme, at: Pos2, text: &str) {
     let rect = Align2::CENTER_BOTTOM.anchor_size(at, galley.size());
     painter.rect_filled(rect.expand2(vec2(3.0, 0.0)), 2.0, theme.plot_background.gamma_multiply(0.8));
     painter.galley(rect.min, galley, theme.text_strong);
+}
+
+/// The slopes on which white noise and random walk are read.
+fn asymptotes(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &LogLog) {
+    let terms = [(&sensor.terms.white, -0.5, 1.0), (&sensor.terms.random_walk, 0.5, 3.0)];
+    for (value, slope, read_at_s) in terms.into_iter().filter_map(|(term, slope, at)| Some((term.value?, slope, at))) {
+        let ends = [axes.x.0, axes.x.1].map(|power| {
+            let tau_s = 10_f64.powf(power);
+            axes.at(tau_s, value * (tau_s / read_at_s).powf(slope))
+        });
+        painter.extend(Shape::dotted_line(&ends, theme.text_weak, 4.0, 0.8));
+    }
 }
 
 /// The deviation that the rig's densities give: `√(N²/τ + K² τ/3)`.
@@ -228,18 +241,23 @@ fn head(painter: &Painter, theme: &Theme, sensor: &SensorNoise, rect: Rect) {
     name[..1].make_ascii_uppercase();
     let left = rect.left() + LEFT + 8.0;
     painter.text(pos2(left, rect.top() + 2.0), Align2::LEFT_TOP, name, font(15.0), theme.text_strong);
-    let rows: [(&str, &NoiseTerm, Option<f64>, &str); 2] = [
-        ("N  noise density", &sensor.terms.white, sensor.given.map(|given| given.white), "/√Hz"),
-        ("K  random walk", &sensor.terms.random_walk, sensor.given.map(|given| given.random_walk), "/s/√Hz"),
+    let rows: [(&str, &NoiseTerm, Option<f64>, String); 2] = [
+        ("N  noise density", &sensor.terms.white, sensor.given.map(|given| given.white), sensor.density_unit()),
+        (
+            "K  random walk",
+            &sensor.terms.random_walk,
+            sensor.given.map(|given| given.random_walk),
+            sensor.walk_unit().to_owned(),
+        ),
     ];
     for (row, (name, term, given, unit)) in rows.into_iter().enumerate() {
         let y = rect.top() + 22.0 + 18.0 * row as f32;
         painter.text(pos2(left, y), Align2::LEFT_TOP, name, font(13.0), theme.text);
         let value = match (term.value, term.sigma, term.limit) {
             (Some(value), Some(sigma), _) => {
-                format!("{value:.2e} ± {:.0} % {}{unit}", 100.0 * sigma / value, sensor.unit)
+                format!("{value:.2e} ± {:.0} % {unit}", 100.0 * sigma / value)
             }
-            (.., Some(limit)) => format!("< {limit:.1e} {}{unit}, not seen", sensor.unit),
+            (.., Some(limit)) => format!("< {limit:.1e} {unit}, not seen"),
             _ => "not identified".to_owned(),
         };
         let end = painter.text(pos2(left + 118.0, y), Align2::LEFT_TOP, value, font(13.0), theme.text_strong);

@@ -58,7 +58,7 @@ pub struct NoiseTerms {
     pub white: NoiseTerm,
     /// Bias instability `B`, the minimum of the deviation divided by 0.664, in the unit of the samples.
     pub bias_instability: NoiseTerm,
-    /// Rate or acceleration random walk `K`, the random walk of the bias: unit/s/√Hz.
+    /// Rate or acceleration random walk `K`, the random walk of the bias: its unit is [`SensorNoise::walk_unit`].
     pub random_walk: NoiseTerm,
     /// Quantization `Q`, white noise of the integrated samples: unit·s.
     pub quantization: NoiseTerm,
@@ -122,6 +122,18 @@ pub struct SensorNoise {
     pub vibration: Vec<String>,
     /// What the rig says.
     pub given: Option<GivenNoise>,
+}
+
+impl SensorNoise {
+    /// Unit of the white noise density.
+    pub fn density_unit(&self) -> String {
+        format!("{}/√Hz", self.unit)
+    }
+
+    /// Unit of the random walk of the bias.
+    pub fn walk_unit(&self) -> &'static str {
+        if self.sensor == "gyroscope" { "rad/s²/√Hz" } else { "m/s³/√Hz" }
+    }
 }
 
 /// The noise of an IMU while stationary.

@@ -8,14 +8,14 @@ use crate::flight_log::printable;
 /// Stretches that are listed.
 const MAX_LISTED: usize = 6;
 
-/// A term by name, with its unit behind that of the samples.
-type NamedTerm = (&'static str, &'static str, fn(&NoiseTerms) -> &NoiseTerm);
+/// A term by name, with its unit.
+type NamedTerm = (&'static str, fn(&SensorNoise) -> String, fn(&NoiseTerms) -> &NoiseTerm);
 
 const TERMS: [NamedTerm; 4] = [
-    ("noise density", "/√Hz", |terms| &terms.white),
-    ("random walk of the bias", "/s/√Hz", |terms| &terms.random_walk),
-    ("bias instability", "", |terms| &terms.bias_instability),
-    ("quantization", "·s", |terms| &terms.quantization),
+    ("noise density", SensorNoise::density_unit, |terms| &terms.white),
+    ("random walk of the bias", |sensor| sensor.walk_unit().to_owned(), |terms| &terms.random_walk),
+    ("bias instability", |sensor| sensor.unit.to_owned(), |terms| &terms.bias_instability),
+    ("quantization", |sensor| format!("{}·s", sensor.unit), |terms| &terms.quantization),
 ];
 
 impl Display for AllanReport {
@@ -57,7 +57,7 @@ fn write_sensor(out: &mut Formatter<'_>, sensor: &SensorNoise) -> Result {
         }
     };
     for (name, unit, term) in TERMS {
-        let label = format!("{name}, {}{unit}", sensor.unit);
+        let label = format!("{name}, {}", unit(sensor));
         let mut line = format!("  {label:<37}");
         for axis in &sensor.axes {
             write!(line, "{:>10}", short(term(&axis.terms)))?;
@@ -105,12 +105,16 @@ impl AllanReport {
         let mut lines = String::from("imu0:\n");
         for sensor in self.sensors.iter().rev() {
             let fields = [
-                ("noise_density", "/√Hz", &sensor.terms.white, sensor.given.map(|given| given.white)),
-                ("random_walk", "/s/√Hz", &sensor.terms.random_walk, sensor.given.map(|given| given.random_walk)),
+                ("noise_density", sensor.density_unit(), &sensor.terms.white, sensor.given.map(|given| given.white)),
+                (
+                    "random_walk",
+                    sensor.walk_unit().to_owned(),
+                    &sensor.terms.random_walk,
+                    sensor.given.map(|given| given.random_walk),
+                ),
             ];
             for (name, unit, term, given) in fields {
                 let key = format!("{}_{name}", sensor.sensor);
-                let unit = format!("{}{unit}", sensor.unit);
                 let limit = term.limit.map_or_else(String::new, |limit| format!(" (below {limit:.1e})"));
                 let line = match (term.value, term.sigma, given) {
                     (Some(value), sigma, _) => {

@@ -126,7 +126,7 @@ fn a_term_that_does_not_show_is_limited_with_the_stretch_that_it_takes() {
     assert!(walk.reason.contains("the rig's 2.0e-6 would show in one stretch of "), "{}", walk.reason);
     assert!(report.sensors[0].terms.bias_instability.value.is_none());
     let lines = report.rig_lines();
-    assert!(lines.contains("gyroscope_random_walk: 2.000e-6  # rad/s/s/√Hz, as before"), "{lines}");
+    assert!(lines.contains("gyroscope_random_walk: 2.000e-6  # rad/s²/√Hz, as before"), "{lines}");
     assert!(lines.contains("accelerometer_random_walk: "), "{lines}");
 }
 
