@@ -204,6 +204,7 @@ fn measure(
             frame_index: view.frame_index,
             stamp_ns: view.stamp_ns,
             imu: &view.imu,
+            imu_after: &[],
             joint_angles: view.joint_angles.as_ref(),
             tracks: &view.tracks,
             rigid_tracks: &[],

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::samples::ImuSeries;
 use super::{AllanReport, NoiseTerm, measure};
 use crate::geometry::{SplitMix64, ns_from_seconds};
-use crate::sensors::{ImuNoise, ImuRig, Rig};
+use crate::sensors::{ImuIntrinsics, ImuNoise, ImuRig, Rig};
 
 const RATE_HZ: f64 = 100.0;
 
@@ -81,6 +81,7 @@ fn rig() -> Rig {
                 gyroscope_noise_density: 3e-4,
                 gyroscope_random_walk: 2e-6,
             },
+            intrinsics: ImuIntrinsics::default(),
         },
         cameras: Vec::new(),
         gimbal: None,
