@@ -8,7 +8,7 @@ use dcvins::estimator::{JointKnowledge, PoseKnowledge};
 use dcvins::gimbal::Parameterization;
 use dcvins::observability::laboratory::{
     Advice, Excitation, LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratoryReport, LaboratorySetup, Mechanism,
-    Situation, advise, excitation, survey,
+    SensorColumns, SensorExcitation, Situation, advise, excitation, sensor_excitation, survey,
 };
 use dcvins::sensors::Rig;
 
@@ -19,7 +19,7 @@ use crate::cli::terminal::{print, print_report};
 pub(crate) struct DegeneracyArguments {
     /// Compute ranks, losses and null directions of every scenario of docs/mathematics.md, section 7; the default without
     /// arguments.
-    #[arg(long, conflicts_with_all = ["mechanism", "rig", "forms", "motion", "freeze", "encoder_sigma_deg", "poses"])]
+    #[arg(long, conflicts_with_all = ["mechanism", "rig", "forms", "motion", "freeze", "encoder_sigma_deg", "poses", "columns"])]
     pub table: bool,
     /// A mechanism by name; `--list` prints all [default: yaw-roll-pitch-offset].
     #[arg(long, value_name = "NAME", conflicts_with = "rig")]
@@ -47,6 +47,10 @@ pub(crate) struct DegeneracyArguments {
     /// Source of the vehicle's poses [default: known].
     #[arg(long, value_enum)]
     pub poses: Option<PosesArgument>,
+    /// Columns of sensors beside those of the chain: readout, timeshift, intrinsics, imu-intrinsics, all; intrinsics of the
+    /// IMU need `--poses imu` [default: chain].
+    #[arg(long, value_name = "NAME,…")]
+    pub columns: Option<SensorColumns>,
     /// Number of frames, 0.25 s apart [default: 10].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=64))]
     pub frames: Option<u16>,
@@ -125,6 +129,8 @@ struct Advised {
     form: String,
     excitation: Option<Excitation>,
     advice: Advice,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sensors: Option<SensorExcitation>,
 }
 
 impl Advised {
@@ -136,6 +142,7 @@ impl Advised {
             form: form.name(),
             excitation: excitation(&setup.window(), &form.chain(&setup.mechanism), &names, &setup.mechanism.names),
             advice: advice.context("no candidate motion constrains this mechanism")?,
+            sensors: setup.columns.any().then(|| sensor_excitation(setup, form)).flatten(),
         })
     }
 }
@@ -145,6 +152,9 @@ impl std::fmt::Display for Advised {
         writeln!(out, "{}", self.experiment)?;
         if let Some(excitation) = &self.excitation {
             writeln!(out, "{excitation}")?;
+        }
+        if let Some(sensors) = &self.sensors {
+            writeln!(out, "{sensors}")?;
         }
         write!(out, "{}", self.advice)?;
         self.advice.sentence().map_or(Ok(()), |sentence| writeln!(out, "\n{}: {sentence}", self.form))
@@ -176,6 +186,7 @@ impl DegeneracyArguments {
                 && self.freeze.is_empty()
                 && self.encoder_sigma_deg.is_none()
                 && self.poses.is_none()
+                && self.columns.is_none()
                 && !self.advise
                 && self.frames.is_none()
                 && self.landmarks.is_none())
@@ -211,7 +222,13 @@ impl DegeneracyArguments {
         };
         setup.frames = self.frames.map_or(setup.frames, usize::from);
         setup.landmarks = self.landmarks.map_or(setup.landmarks, usize::from);
-        Ok(setup)
+        let columns = self.columns.unwrap_or_default();
+        if self.columns.is_some_and(|columns| columns.imu_intrinsics && columns != SensorColumns::ALL)
+            && setup.poses == PoseKnowledge::Known
+        {
+            bail!("--columns imu-intrinsics needs --poses imu: known poses leave the IMU without a measurement");
+        }
+        Ok(setup.with_columns(columns))
     }
 
     fn camera_key(&self, rig: &Rig) -> Result<String> {

@@ -147,6 +147,18 @@ pub(super) fn measured_block(linearization: &Linearization) -> Option<MeasuredBl
     Some(MeasuredBlock { structural_threshold: structural_threshold(linearization, &scale), block })
 }
 
+impl MeasuredBlock {
+    /// The same with some of the calibration columns of its linearization, the others being known.
+    pub(super) fn select(&self, linearization: &Linearization, columns: &[usize]) -> Self {
+        let scale = ScalingRule::Fixed.scale(&calibration_parameters(linearization));
+        let norms = linearization.calibration_column_norms.component_mul(&scale).select_rows(columns);
+        Self {
+            block: self.block.select_columns(columns),
+            structural_threshold: tolerance(linearization.jacobian.nrows(), columns.len()) * norms.norm(),
+        }
+    }
+}
+
 /// Frobenius norm of the columns before projection. It replaces the spectral norm, which needs more than the
 /// column norms, and exceeds it at most by the root of the number of columns.
 fn reference(linearization: &Linearization, scale: &DVector<f64>) -> f64 {

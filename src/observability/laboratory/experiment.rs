@@ -5,7 +5,8 @@ use serde::Serialize;
 
 use super::mechanism::Mechanism;
 use super::motion::{Flight, LaboratoryMotion};
-use crate::camera::CameraModel;
+use super::sensors::{READOUT_S, SensorColumns, linearize_sensors, with_lens};
+use crate::camera::{CameraModel, Distortion};
 use crate::estimator::{
     HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge, gravity_in_world,
 };
@@ -74,6 +75,10 @@ pub struct LaboratorySetup {
     pub frames: usize,
     /// Number of landmarks.
     pub landmarks: usize,
+    /// Columns of sensors beside those of the chain.
+    pub columns: SensorColumns,
+    /// Readout time of the camera's rolling shutter, in seconds, where there are columns of sensors.
+    pub readout_s: f64,
 }
 
 /// Time between two frames of an experiment.
@@ -114,7 +119,23 @@ impl LaboratorySetup {
             poses: PoseKnowledge::Known,
             frames: 10,
             landmarks: 100,
+            columns: SensorColumns::NONE,
+            readout_s: 0.0,
         }
+    }
+
+    /// The experiment with columns of sensors, with the readout time and the lens of docs/mathematics.md, section 11, where
+    /// it has none of its own.
+    #[must_use]
+    pub fn with_columns(mut self, columns: SensorColumns) -> Self {
+        self.columns = columns;
+        if columns.any() && self.readout_s == 0.0 {
+            self.readout_s = READOUT_S;
+        }
+        if columns.intrinsics && self.camera.distortion == Distortion::None {
+            self.camera = with_lens(&self.camera).unwrap_or(self.camera);
+        }
+        self
     }
 
     /// Runs the experiment in one parameterization; `None` when a value of the mechanism is not finite.
@@ -134,12 +155,19 @@ impl LaboratorySetup {
 
     /// [`Self::run_all`], passing on each result when it is ready; it stops when `each` returns `false`.
     pub fn run_each(&self, forms: &[LaboratoryForm], mut each: impl FnMut(LaboratoryResult) -> bool) {
-        let window = self.window();
-        let angles: Vec<&[f64]> = window.frames.iter().map(|frame| frame.joints_rad.as_slice()).collect();
-        let free = self.joints == JointKnowledge::Unknown && self.mechanism.chain.joint_count() > 0;
+        let window = (!self.columns.any()).then(|| self.window());
+        let flight = self.flight();
+        let angles: Vec<Vec<f64>> = (0..self.frames).map(|slot| flight.joints_rad(self.time_s(slot))).collect();
+        let free = self.joints_free();
         for form in forms {
             let chain = form.chain(&self.mechanism);
-            let linearization = window.linearize(&self.mechanism.chain, form.parameterization, form.joint_offsets);
+            let linearization = match &window {
+                Some(window) => {
+                    Some(window.linearize(&self.mechanism.chain, form.parameterization, form.joint_offsets))
+                }
+                None => linearize_sensors(self, *form),
+            };
+            let Some(linearization) = linearization else { continue };
             let Some(rank) = analyse(&linearization, &chain, &angles, free) else { continue };
             if !each(LaboratoryResult { form: *form, rank }) {
                 return;
@@ -152,12 +180,28 @@ impl LaboratorySetup {
         self.window_from(0)
     }
 
+    /// The motion of vehicle and joints.
+    pub(super) fn flight(&self) -> Flight<'_> {
+        let gravity_in_world = gravity_in_world(GRAVITY_M_PER_S2);
+        Flight { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world }
+    }
+
+    /// Time of a frame.
+    pub(super) fn time_s(&self, slot: usize) -> f64 {
+        slot as f64 * FRAME_PERIOD_S
+    }
+
+    /// Whether the joint angles are unknown.
+    pub(super) fn joints_free(&self) -> bool {
+        self.joints == JointKnowledge::Unknown && self.mechanism.chain.joint_count() > 0
+    }
+
     /// Hypothetical window that starts `first` frames after the start of the motion.
     pub(super) fn window_from(&self, first: usize) -> HypotheticalWindow {
-        let gravity_in_world = gravity_in_world(GRAVITY_M_PER_S2);
-        let flight = Flight { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world };
+        let flight = self.flight();
+        let gravity_in_world = flight.gravity_in_world;
         let imu_poses = matches!(self.poses, PoseKnowledge::Imu { .. });
-        let time_of = |slot: usize| (first + slot) as f64 * FRAME_PERIOD_S;
+        let time_of = |slot: usize| self.time_s(first + slot);
         let frames: Vec<HypotheticalFrame> = (0..self.frames)
             .map(|slot| HypotheticalFrame {
                 time_s: time_of(slot),
@@ -185,7 +229,7 @@ impl LaboratorySetup {
     }
 
     /// Landmarks drawn in the views of all frames in turn, anchored in the first frame that observes them.
-    fn landmarks_of(&self, frames: &[HypotheticalFrame]) -> Vec<HypotheticalLandmark> {
+    pub(super) fn landmarks_of(&self, frames: &[HypotheticalFrame]) -> Vec<HypotheticalLandmark> {
         let mut random = SplitMix64::new(1);
         let mut within = |low: f64, high: f64| low + (high - low) * random.next_unit();
         let cameras: Vec<_> = frames

@@ -12,6 +12,7 @@ mod experiments;
 mod mechanism;
 mod motion;
 mod report;
+mod sensors;
 mod situation;
 mod spurious;
 mod survey;
@@ -26,6 +27,10 @@ pub use experiment::{
 pub use mechanism::{LaboratoryJoint, Mechanism, UnknownMechanism};
 pub use motion::{LaboratoryMotion, UnknownMotion};
 pub use report::LaboratoryReport;
+pub use sensors::{
+    ParameterSigmas, SensorColumns, SensorExcitation, SensorSurveyEntry, SensorSurveyRow, SensorSurveySection,
+    UnknownColumns, sensor_excitation,
+};
 pub use situation::Situation;
 pub use spurious::SpuriousRow;
 pub use survey::{MinFramesRow, Survey, SurveyEntry, SurveyRow, SurveySection, survey};

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{DVector, UnitQuaternion, Vector3};
 use thiserror::Error;
 
 use super::mechanism::Mechanism;
@@ -21,6 +21,12 @@ pub enum LaboratoryMotion {
     Hover,
     /// Constant velocity without rotation.
     ConstantVelocity,
+    /// Constant acceleration without rotation.
+    ConstantAcceleration,
+    /// Rolls about the body's x axis and translates in space.
+    RollOnly,
+    /// Pitches about the body's y axis and translates in space.
+    PitchOnly,
     /// Yaws and translates in space, level.
     YawOnly,
     /// Yaws and translates in the horizontal plane, level.
@@ -33,6 +39,8 @@ pub enum LaboratoryMotion {
     RotationOnly,
     /// Rotates about all axes at constant velocity.
     ConstantVelocityRotation,
+    /// Turns about the vertical and climbs, angular rate and velocity constant in the body.
+    SteadyTurn,
     /// Rotates about all axes and accelerates on a straight line.
     StraightLine,
     /// The camera never rotates in the world while vehicle and joints move.
@@ -61,17 +69,21 @@ pub struct UnknownMotion {
 
 impl LaboratoryMotion {
     /// All motions, in the order of the manual.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 22] = [
         Self::Aggressive,
         Self::TranslationOnly,
         Self::Hover,
         Self::ConstantVelocity,
+        Self::ConstantAcceleration,
+        Self::RollOnly,
+        Self::PitchOnly,
         Self::YawOnly,
         Self::YawPlanar,
         Self::YawTilted,
         Self::YawInPlace,
         Self::RotationOnly,
         Self::ConstantVelocityRotation,
+        Self::SteadyTurn,
         Self::StraightLine,
         Self::Stabilized,
         Self::YawFollowing,
@@ -89,12 +101,16 @@ impl LaboratoryMotion {
             Self::TranslationOnly => "translation-only",
             Self::Hover => "hover",
             Self::ConstantVelocity => "constant-velocity",
+            Self::ConstantAcceleration => "constant-acceleration",
+            Self::RollOnly => "roll-only",
+            Self::PitchOnly => "pitch-only",
             Self::YawOnly => "yaw-only",
             Self::YawPlanar => "yaw-planar",
             Self::YawTilted => "yaw-tilted",
             Self::YawInPlace => "yaw-in-place",
             Self::RotationOnly => "rotation-only",
             Self::ConstantVelocityRotation => "constant-velocity-rotation",
+            Self::SteadyTurn => "steady-turn",
             Self::StraightLine => "straight-line",
             Self::Stabilized => "stabilized",
             Self::YawFollowing => "yaw-following",
@@ -113,12 +129,18 @@ impl LaboratoryMotion {
             Self::TranslationOnly => "the vehicle translates and never rotates",
             Self::Hover => "the vehicle neither translates nor rotates",
             Self::ConstantVelocity => "the vehicle moves at constant velocity without rotation",
+            Self::ConstantAcceleration => "the vehicle moves at constant acceleration without rotation",
+            Self::RollOnly => "the vehicle rotates about the IMU's x axis only and translates in space",
+            Self::PitchOnly => "the vehicle rotates about the IMU's y axis only and translates in space",
             Self::YawOnly => "the level vehicle yaws and translates in space",
             Self::YawPlanar => "the level vehicle yaws and translates in the horizontal plane",
             Self::YawTilted => "the tilted vehicle rotates about the vertical only and translates",
             Self::YawInPlace => "the vehicle yaws without translating",
             Self::RotationOnly => "the vehicle rotates about all axes without translating",
             Self::ConstantVelocityRotation => "the vehicle rotates about all axes at constant velocity",
+            Self::SteadyTurn => {
+                "the tilted vehicle turns about the vertical and climbs, angular rate and velocity constant in the body"
+            }
             Self::StraightLine => "the vehicle rotates and accelerates on a straight line",
             Self::Stabilized => "the camera never rotates in the world while vehicle and joints move",
             Self::YawFollowing => "the camera rotates about the vertical only while vehicle and joints move",
@@ -179,6 +201,12 @@ const ROTATION: [Sine; 3] = [sine(0.2, 2.8, 0.4), sine(0.25, 2.0, 1.3), sine(0.3
 const PATH: [Sine; 3] = [sine(1.2, 1.6, 0.0), sine(0.9, 2.4, 0.7), sine(0.7, 2.0, 1.9)];
 /// Its constant velocity, where it has one.
 const VELOCITY_M_PER_S: Vector3<f64> = Vector3::new(0.9, 0.4, -0.3);
+/// Its constant acceleration, where it has one.
+const ACCELERATION_M_PER_S2: Vector3<f64> = Vector3::new(0.5, -0.35, 0.2);
+/// Angular rate of a steady turn about the vertical.
+const TURN_RATE_RAD_PER_S: f64 = 0.6;
+/// Path of a steady turn: a circle that starts along x, with a constant climb.
+const TURN: [Sine; 2] = [sine(1.5, TURN_RATE_RAD_PER_S, 0.0), sine(1.5, TURN_RATE_RAD_PER_S, -0.25 * TAU)];
 /// Angles of the joints; further joints repeat them.
 const JOINTS: [Sine; 5] =
     [sine(0.4, 2.0, 0.1), sine(0.4, 3.2, 1.0), sine(0.4, 2.4, 2.0), sine(0.4, 2.8, 0.6), sine(0.4, 1.8, 1.5)];
@@ -186,6 +214,40 @@ const JOINTS: [Sine; 5] =
 const STEP_S: f64 = 1e-3;
 /// Largest amplitude of a joint as a fraction of the distance from its centre to the nearer limit.
 const ROOM_RATIO: f64 = 0.9;
+
+/// Pose, joint angles and their rates at one time of a motion.
+#[derive(Clone, Debug)]
+pub(super) struct Kinematics {
+    pub(super) world_from_imu: RigidTransform,
+    /// In the world.
+    pub(super) velocity_m_per_s: Vector3<f64>,
+    /// In the IMU frame.
+    pub(super) angular_velocity_rad_per_s: Vector3<f64>,
+    pub(super) joints_rad: Vec<f64>,
+    pub(super) joint_rates_rad_per_s: Vec<f64>,
+}
+
+/// Step of [`derivative`] and [`second_derivative`]: their errors of order 6 stay below rounding errors.
+const STENCIL_STEP_S: f64 = 2e-3;
+
+/// Derivative of a smooth function of time, to about 1e-13.
+fn derivative<T>(function: impl Fn(f64) -> T, time_s: f64) -> T
+where
+    T: std::ops::Sub<Output = T> + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
+{
+    let change = |steps: f64| function(time_s + steps * STENCIL_STEP_S) - function(time_s - steps * STENCIL_STEP_S);
+    (change(1.0) * 45.0 + change(2.0) * -9.0 + change(3.0)) * (1.0 / (60.0 * STENCIL_STEP_S))
+}
+
+/// Second derivative of a smooth function of time, to about 1e-10.
+fn second_derivative<T>(function: impl Fn(f64) -> T, time_s: f64) -> T
+where
+    T: std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
+{
+    let both = |steps: f64| function(time_s + steps * STENCIL_STEP_S) + function(time_s - steps * STENCIL_STEP_S);
+    (both(1.0) * 270.0 + both(2.0) * -27.0 + both(3.0) * 2.0 + function(time_s) * -490.0)
+        * (1.0 / (180.0 * STENCIL_STEP_S * STENCIL_STEP_S))
+}
 
 /// A mechanism in motion, some of its joints fixed.
 #[derive(Clone, Debug)]
@@ -230,6 +292,13 @@ impl Flight<'_> {
             | LaboratoryMotion::RotationOnly
             | LaboratoryMotion::StabilizedRotationOnly => Vector3::zeros(),
             LaboratoryMotion::ConstantVelocity | LaboratoryMotion::ConstantVelocityRotation => steady,
+            LaboratoryMotion::ConstantAcceleration => {
+                let power = [0.5 * time_s * time_s, time_s, 1.0];
+                steady + ACCELERATION_M_PER_S2 * power.get(derivative as usize).copied().unwrap_or(0.0)
+            }
+            LaboratoryMotion::SteadyTurn => {
+                Vector3::new(TURN[0].at(time_s, derivative), TURN[1].at(time_s, derivative), steady.z)
+            }
             LaboratoryMotion::StraightLine => VELOCITY_M_PER_S.normalize() * wave.x,
             LaboratoryMotion::YawPlanar => Vector3::new(wave.x, wave.y, 0.0),
             _ => wave,
@@ -246,7 +315,13 @@ impl Flight<'_> {
             LaboratoryMotion::TranslationOnly
             | LaboratoryMotion::Hover
             | LaboratoryMotion::ConstantVelocity
+            | LaboratoryMotion::ConstantAcceleration
             | LaboratoryMotion::StabilizedTranslationOnly => so3::exp(&rotation_vector(0.0)),
+            LaboratoryMotion::RollOnly => so3::exp(&(Vector3::x() * (2.0 * ROTATION[0].at(time_s, 0)))),
+            LaboratoryMotion::PitchOnly => so3::exp(&(Vector3::y() * (2.0 * ROTATION[1].at(time_s, 0)))),
+            LaboratoryMotion::SteadyTurn => {
+                so3::exp(&(Vector3::z() * (TURN_RATE_RAD_PER_S * time_s))) * so3::exp(&rotation_vector(0.0))
+            }
             LaboratoryMotion::YawOnly | LaboratoryMotion::YawPlanar | LaboratoryMotion::YawInPlace => yaw,
             LaboratoryMotion::YawTilted => yaw * so3::exp(&rotation_vector(0.0)),
             LaboratoryMotion::Stabilized
@@ -281,6 +356,47 @@ impl Flight<'_> {
             velocity_m_per_s: self.derivative_m(time_s, 1),
             bias: ImuBias::default(),
         }
+    }
+
+    /// Everything that the sensors measure at a time.
+    pub(super) fn kinematics(&self, time_s: f64) -> Kinematics {
+        let world_from_imu = self.world_from_imu(time_s);
+        let (joints_rad, joint_rates_rad_per_s) = self.joint_motion(time_s);
+        Kinematics {
+            velocity_m_per_s: if self.motion == LaboratoryMotion::CameraStationary {
+                derivative(|time_s| self.world_from_imu(time_s).translation_m, time_s)
+            } else {
+                self.path_m(time_s, 1)
+            },
+            angular_velocity_rad_per_s: self.angular_velocity(time_s, &world_from_imu.rotation),
+            world_from_imu,
+            joints_rad,
+            joint_rates_rad_per_s,
+        }
+    }
+
+    /// Joint angles and their rates, in radians and rad/s.
+    pub(super) fn joint_motion(&self, time_s: f64) -> (Vec<f64>, Vec<f64>) {
+        let rates = derivative(|time_s| DVector::from_vec(self.joints_rad(time_s)), time_s);
+        (self.joints_rad(time_s), rates.as_slice().to_vec())
+    }
+
+    /// Angular rate in rad/s and specific force in m/s² in the IMU frame, to about 1e-13 and, where the path depends on
+    /// the joints, 1e-10.
+    pub(super) fn rate_and_force(&self, time_s: f64) -> (Vector3<f64>, Vector3<f64>) {
+        let rotation = self.world_from_imu(time_s).rotation;
+        let acceleration = if self.motion == LaboratoryMotion::CameraStationary {
+            second_derivative(|time_s| self.world_from_imu(time_s).translation_m, time_s)
+        } else {
+            self.path_m(time_s, 2)
+        };
+        let force = rotation.inverse() * (acceleration - self.gravity_in_world);
+        (self.angular_velocity(time_s, &rotation), force)
+    }
+
+    fn angular_velocity(&self, time_s: f64, rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
+        let since = |time_s: f64| so3::log(&(rotation.inverse() * self.world_from_imu(time_s).rotation));
+        derivative(since, time_s)
     }
 
     /// First or second derivative of the position: exact, except for a path that depends on the joints.

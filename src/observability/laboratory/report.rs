@@ -34,6 +34,12 @@ pub struct LaboratoryReport {
     pub landmarks: usize,
     /// Standard deviation of a pixel.
     pub pixel_sigma_px: f64,
+    /// Sets of columns, where there are columns of sensors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub columns: Option<String>,
+    /// Readout time of the rolling shutter, where there are columns of sensors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub readout_s: Option<f64>,
     /// Parameterizations in the requested order.
     pub forms: Vec<FormReport>,
 }
@@ -137,6 +143,8 @@ impl LaboratoryReport {
             frame_period_s: FRAME_PERIOD_S,
             landmarks: setup.landmarks,
             pixel_sigma_px: PIXEL_SIGMA_PX,
+            columns: setup.columns.any().then(|| setup.columns.to_string()),
+            readout_s: setup.columns.any().then_some(setup.readout_s),
             forms: results.iter().map(|result| FormReport::new(result, &setup.mechanism.names)).collect(),
         }
     }
@@ -217,6 +225,9 @@ impl fmt::Display for LaboratoryReport {
             writeln!(out, "           {} fixed", self.frozen_joints.join(", "))?;
         }
         writeln!(out, "measured   joint angles {}, poses {}", self.joint_angles, self.poses)?;
+        if let Some(columns) = &self.columns {
+            writeln!(out, "columns    {columns}, readout {:.0} ms", 1e3 * self.readout_s.unwrap_or_default())?;
+        }
         writeln!(
             out,
             "window     {} frames every {} s, {} landmarks, pixel σ {} px; columns scaled by 10° and 3 cm\n",

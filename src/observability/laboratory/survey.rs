@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::experiments::{Experiment, MIN_FRAMES, SECTIONS};
+use super::sensors::{SensorSurveySection, survey_sensors};
 use super::spurious::{self, SpuriousRow};
 use super::{Deficit, LaboratoryForm, LaboratoryResult};
 use crate::gimbal::{ParameterNames, Parameterization};
@@ -21,6 +22,8 @@ pub struct Survey {
     pub sections: Vec<SurveySection>,
     /// Smallest numbers of frames with which the minimal parameterization has its full rank.
     pub least_frames: Vec<MinFramesRow>,
+    /// Experiments with columns of sensors.
+    pub sensors: Vec<SensorSurveySection>,
     /// Spurious information of two windows that are linearized at different values of the calibration.
     pub spurious: Vec<SpuriousRow>,
 }
@@ -81,7 +84,7 @@ pub struct MinFramesRow {
     pub frames: usize,
 }
 
-/// Runs every built-in experiment: the scenarios of docs/mathematics.md, section 7, and the cases of section 9.
+/// Runs every built-in experiment: the scenarios of docs/mathematics.md, sections 7 and 11, and the cases of section 9.
 pub fn survey() -> Survey {
     Survey {
         sections: SECTIONS
@@ -92,6 +95,7 @@ pub fn survey() -> Survey {
             })
             .collect(),
         least_frames: MIN_FRAMES.par_iter().filter_map(MinFramesRow::of).collect(),
+        sensors: survey_sensors(),
         spurious: spurious::measure(),
     }
 }
@@ -177,6 +181,14 @@ impl fmt::Display for Survey {
         writeln!(out, "\nSmallest number of frames for full rank, minimal parameterization (three joints, generic)")?;
         for MinFramesRow { scenario, columns, rank, frames } in &self.least_frames {
             writeln!(out, "  {scenario:<42}M {rank}/{columns} from {frames} frames")?;
+        }
+        writeln!(
+            out,
+            "\nStructural rank of the chain, null directions that sensor columns add to its own (timeshift: camera and encoders;\n\
+             IMU: scale and misalignment of both sensors, rotation between them), and the sensor columns that take part."
+        )?;
+        for section in &self.sensors {
+            write!(out, "\n{section}")?;
         }
         writeln!(out, "\n{}", spurious::title())?;
         for row in &self.spurious {

@@ -182,7 +182,7 @@ fn check(row: &SurveyRow, expected: &Expected) -> usize {
 
 #[test]
 fn ranks_losses_and_null_directions_match_the_expected_table() {
-    let Survey { sections, least_frames, spurious } = survey();
+    let Survey { sections, least_frames, spurious, sensors: _ } = survey();
     let mut compared = 0;
     assert_eq!(sections.len(), SECTIONS.len());
     for (section, (title, rows)) in sections.iter().zip(&SECTIONS) {

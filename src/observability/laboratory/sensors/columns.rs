@@ -1,0 +1,97 @@
+//! Which columns of sensors an experiment has beside those of the chain.
+
+use std::fmt;
+use std::str::FromStr;
+
+use thiserror::Error;
+
+use crate::gimbal::{ParameterId, ParameterPart, Quantity};
+
+/// Sets of sensor columns of an experiment; the chain's columns are always there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SensorColumns {
+    /// Readout time of the camera's rolling shutter.
+    pub readout: bool,
+    /// Time offset of the camera, and of the encoders where there are some.
+    pub timeshift: bool,
+    /// `fx fy cx cy k1 k2`, as far as the camera has them.
+    pub intrinsics: bool,
+    /// Scale and misalignment of gyroscope and accelerometer, and the gyroscope's rotation relative to the accelerometer.
+    pub imu_intrinsics: bool,
+}
+
+/// A name without a set of columns.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("unknown columns '{given}': expected chain or some of {}, separated by commas", SensorColumns::NAMES.join(", "))]
+pub struct UnknownColumns {
+    /// The given name.
+    pub given: String,
+}
+
+impl SensorColumns {
+    /// Names of the sets.
+    pub const NAMES: [&'static str; 4] = ["readout", "timeshift", "intrinsics", "imu-intrinsics"];
+    /// The chain alone.
+    pub const NONE: Self = Self { readout: false, timeshift: false, intrinsics: false, imu_intrinsics: false };
+    /// Every set.
+    pub const ALL: Self = Self { readout: true, timeshift: true, intrinsics: true, imu_intrinsics: true };
+
+    /// Whether there is any column but the chain's.
+    pub fn any(self) -> bool {
+        self != Self::NONE
+    }
+
+    const fn flags(self) -> [bool; 4] {
+        [self.readout, self.timeshift, self.intrinsics, self.imu_intrinsics]
+    }
+
+    /// Whether a parameter of a sensor belongs to one of the sets.
+    pub fn has(self, parameter: ParameterId) -> bool {
+        match (parameter.part, parameter.quantity) {
+            (_, Quantity::Readout) => self.readout,
+            (_, Quantity::Timeshift) => self.timeshift,
+            (ParameterPart::Camera(_), _) => self.intrinsics,
+            (ParameterPart::Gyroscope | ParameterPart::Accelerometer, _) => self.imu_intrinsics,
+            _ => false,
+        }
+    }
+}
+
+/// Every sensor column, in order: times, intrinsics of the camera, of the gyroscope, of the accelerometer.
+pub(super) fn all_parameters() -> Vec<ParameterId> {
+    let of = |part: ParameterPart| move |quantity: Quantity| ParameterId { part, quantity };
+    let mut parameters = vec![ParameterId::timeshift(0), ParameterId::readout(0), ParameterId::ENCODER_TIMESHIFT];
+    parameters.extend(Quantity::INTRINSICS.map(of(ParameterPart::Camera(0))));
+    parameters.extend(Quantity::SCALE_MISALIGNMENT.map(of(ParameterPart::Gyroscope)));
+    parameters.extend([Quantity::Rx, Quantity::Ry, Quantity::Rz].map(of(ParameterPart::Gyroscope)));
+    parameters.extend(Quantity::SCALE_MISALIGNMENT.map(of(ParameterPart::Accelerometer)));
+    parameters
+}
+
+impl FromStr for SensorColumns {
+    type Err = UnknownColumns;
+
+    fn from_str(names: &str) -> Result<Self, Self::Err> {
+        let mut columns = Self::NONE;
+        for name in names.split(',').map(str::trim) {
+            match name {
+                "chain" => {}
+                "readout" => columns.readout = true,
+                "timeshift" => columns.timeshift = true,
+                "intrinsics" => columns.intrinsics = true,
+                "imu-intrinsics" => columns.imu_intrinsics = true,
+                "all" => columns = Self::ALL,
+                _ => return Err(UnknownColumns { given: name.to_owned() }),
+            }
+        }
+        Ok(columns)
+    }
+}
+
+impl fmt::Display for SensorColumns {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names = Self::NAMES.into_iter().zip(self.flags());
+        let names: Vec<&str> = ["chain"].into_iter().chain(names.filter(|it| it.1).map(|it| it.0)).collect();
+        out.write_str(&names.join(","))
+    }
+}

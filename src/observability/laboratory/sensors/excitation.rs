@@ -1,0 +1,106 @@
+//! Which motion makes the columns of sensors observable.
+
+use std::fmt;
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::window::SensorWindow;
+use super::{LaboratoryForm, LaboratorySetup};
+use crate::gimbal::{ParameterGroup, ParameterId};
+use crate::observability::analysis::measured_block;
+use crate::observability::laboratory::LaboratoryMotion;
+
+/// Motions that are compared, each for the duration of the experiment.
+const MOTIONS: [LaboratoryMotion; 8] = [
+    LaboratoryMotion::Hover,
+    LaboratoryMotion::TranslationOnly,
+    LaboratoryMotion::RollOnly,
+    LaboratoryMotion::PitchOnly,
+    LaboratoryMotion::YawOnly,
+    LaboratoryMotion::RotationOnly,
+    LaboratoryMotion::Stabilized,
+    LaboratoryMotion::Aggressive,
+];
+/// Posterior σ over prior σ below which a parameter counts as known.
+const KNOWN: f64 = 0.3;
+
+/// Posterior σ of sensor columns after motions of the same duration.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SensorExcitation {
+    /// Names of the motions.
+    pub motions: Vec<String>,
+    /// Each sensor parameter.
+    pub parameters: Vec<ParameterSigmas>,
+}
+
+/// Posterior σ of one parameter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterSigmas {
+    /// Its name.
+    pub name: String,
+    /// Posterior σ after each motion in units of the column scale: 1 where the motion does not constrain it.
+    pub sigmas: Vec<f64>,
+    /// First motion that makes it known: the one that excites least.
+    pub suggested: Option<String>,
+}
+
+/// Posterior σ of an experiment's sensor columns after several motions, from a prior of the column scale; `None` when
+/// the experiment has no such column or a value is not finite.
+pub fn sensor_excitation(setup: &LaboratorySetup, form: LaboratoryForm) -> Option<SensorExcitation> {
+    let results: Vec<(Vec<ParameterId>, Vec<f64>)> =
+        MOTIONS.par_iter().map(|motion| sigmas(setup, form, *motion)).collect::<Option<_>>()?;
+    let (parameters, _) = results.first()?;
+    let sensors = parameters.iter().enumerate().filter(|(_, it)| it.group() != ParameterGroup::Chain);
+    let parameters: Vec<ParameterSigmas> = sensors
+        .map(|(column, parameter)| {
+            let sigmas: Vec<f64> = results.iter().map(|(_, sigmas)| sigmas[column]).collect();
+            let first = MOTIONS.iter().zip(&sigmas).find(|(_, sigma)| **sigma < KNOWN);
+            ParameterSigmas {
+                name: setup.mechanism.names.name(*parameter),
+                suggested: first.map(|(motion, _)| motion.name().to_owned()),
+                sigmas,
+            }
+        })
+        .collect();
+    let motions = MOTIONS.map(|motion| motion.name().to_owned()).into();
+    (!parameters.is_empty()).then_some(SensorExcitation { motions, parameters })
+}
+
+fn sigmas(
+    setup: &LaboratorySetup,
+    form: LaboratoryForm,
+    motion: LaboratoryMotion,
+) -> Option<(Vec<ParameterId>, Vec<f64>)> {
+    let setup = LaboratorySetup { motion, ..setup.clone() };
+    let mut window = SensorWindow::new(&setup, form);
+    window.columns.sensors.retain(|(_, parameter)| setup.columns.has(*parameter));
+    let linearization = window.linearization(&window.truth)?;
+    let block = measured_block(&linearization)?.block;
+    let count = block.ncols();
+    let covariance = (block.tr_mul(&block) + DMatrix::identity(count, count)).cholesky()?.inverse();
+    let parameters = linearization.columns.iter().filter_map(|block| block.id.parameter()).collect();
+    Some((parameters, covariance.diagonal().iter().map(|variance| variance.sqrt()).collect()))
+}
+
+impl fmt::Display for SensorExcitation {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const NAME: usize = 24;
+        writeln!(out, "σ of sensor columns after each motion, in units of the column scale (1: not constrained)")?;
+        let width = |name: &str| name.len().max(5) + 2;
+        write!(out, "  {:<NAME$}", "")?;
+        for name in &self.motions {
+            write!(out, "{name:>width$}", width = width(name))?;
+        }
+        writeln!(out, "  suggested")?;
+        for parameter in &self.parameters {
+            write!(out, "  {:<NAME$}", parameter.name)?;
+            for (name, sigma) in self.motions.iter().zip(&parameter.sigmas) {
+                write!(out, "{sigma:>width$.3}", width = width(name))?;
+            }
+            writeln!(out, "  {}", parameter.suggested.as_deref().unwrap_or("-"))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,147 @@
+//! Preintegration of a continuous IMU, with derivatives by its biases and intrinsics.
+//!
+//! The measured rate and force are functions of time, so that the integral, its derivatives and the poses between
+//! frames belong to one exact motion: a null direction of the motion is one of the window to rounding errors.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use super::values::{ACCELEROMETER_COLUMNS, GYROSCOPE_COLUMNS, SensorValues};
+use crate::estimator::ImuBias;
+use crate::geometry::so3;
+use crate::sensors::ImuNoise;
+
+/// Columns that the integral depends on: gyroscope bias and intrinsics, accelerometer bias and intrinsics.
+pub(super) const IMU_COLUMNS: usize = 3 + GYROSCOPE_COLUMNS + 3 + ACCELEROMETER_COLUMNS;
+/// Columns of the gyroscope's bias and intrinsics.
+const RATE_COLUMNS: usize = 3 + GYROSCOPE_COLUMNS;
+/// Largest step of the integration, in seconds: fourth order leaves about 1e-12.
+const STEP_S: f64 = 5e-3;
+
+/// Measured angular rate in rad/s and specific force in m/s² at one time, with the errors of the sensors but no bias.
+pub(super) type Measured = (Vector3<f64>, Vector3<f64>);
+
+/// Change of rotation, velocity and position from an instant on, in the IMU frame of that instant and without gravity.
+#[derive(Clone, Debug)]
+pub(super) struct Change {
+    pub(super) rotation: Matrix3<f64>,
+    pub(super) velocity: Vector3<f64>,
+    pub(super) position: Vector3<f64>,
+    /// Derivative of the rotation vector, right perturbation.
+    pub(super) rotation_by: SMatrix<f64, 3, IMU_COLUMNS>,
+    pub(super) velocity_by: SMatrix<f64, 3, IMU_COLUMNS>,
+    pub(super) position_by: SMatrix<f64, 3, IMU_COLUMNS>,
+    /// Covariance of rotation, velocity and position by white noise.
+    pub(super) covariance: SMatrix<f64, 9, 9>,
+}
+
+impl Change {
+    fn zero() -> Self {
+        Self {
+            rotation: Matrix3::identity(),
+            velocity: Vector3::zeros(),
+            position: Vector3::zeros(),
+            rotation_by: SMatrix::zeros(),
+            velocity_by: SMatrix::zeros(),
+            position_by: SMatrix::zeros(),
+            covariance: SMatrix::zeros(),
+        }
+    }
+
+    /// Integrates `measured` over `duration_s` from `start_s`, forwards or backwards; without noise the covariance
+    /// stays zero.
+    pub(super) fn integrate(
+        measured: &dyn Fn(f64) -> Measured,
+        (start_s, duration_s): (f64, f64),
+        values: &SensorValues,
+        biases: &ImuBias,
+        noise: Option<&ImuNoise>,
+    ) -> Self {
+        let steps = (duration_s.abs() / STEP_S).ceil();
+        let step_s = duration_s / steps.max(1.0);
+        let mut change = Self::zero();
+        let input = |time_s: f64| Input::new(&measured(time_s), values, biases);
+        let mut from = input(start_s);
+        for step in 0..steps as usize {
+            let time_s = start_s + step as f64 * step_s;
+            let (middle, to) = (input(time_s + 0.5 * step_s), input(time_s + step_s));
+            // Runge–Kutta of order four.
+            let first = change.rate(&from, noise);
+            let second = change.advanced(&first, 0.5 * step_s).rate(&middle, noise);
+            let third = change.advanced(&second, 0.5 * step_s).rate(&middle, noise);
+            let fourth = change.advanced(&third, step_s).rate(&to, noise);
+            change = change
+                .advanced(&first, step_s / 6.0)
+                .advanced(&second, step_s / 3.0)
+                .advanced(&third, step_s / 3.0)
+                .advanced(&fourth, step_s / 6.0);
+            from = to;
+        }
+        change
+    }
+
+    fn advanced(&self, rate: &Self, step_s: f64) -> Self {
+        Self {
+            rotation: self.rotation + rate.rotation * step_s,
+            velocity: self.velocity + rate.velocity * step_s,
+            position: self.position + rate.position * step_s,
+            rotation_by: self.rotation_by + rate.rotation_by * step_s,
+            velocity_by: self.velocity_by + rate.velocity_by * step_s,
+            position_by: self.position_by + rate.position_by * step_s,
+            covariance: self.covariance + rate.covariance * step_s,
+        }
+    }
+
+    /// Derivative by time.
+    fn rate(&self, input: &Input, noise: Option<&ImuNoise>) -> Self {
+        let (spin, force) = (so3::hat(&input.rate), so3::hat(&input.force));
+        Self {
+            rotation: self.rotation * spin,
+            velocity: self.rotation * input.force,
+            position: self.velocity,
+            rotation_by: input.rate_by - spin * self.rotation_by,
+            velocity_by: self.rotation * (input.force_by - force * self.rotation_by),
+            position_by: self.velocity_by,
+            covariance: noise.map_or_else(SMatrix::zeros, |noise| self.covariance_rate(&spin, &force, noise)),
+        }
+    }
+}
+
+impl Change {
+    fn covariance_rate(&self, spin: &Matrix3<f64>, force: &Matrix3<f64>, noise: &ImuNoise) -> SMatrix<f64, 9, 9> {
+        let mut by_error = SMatrix::<f64, 9, 9>::zeros();
+        by_error.fixed_view_mut::<3, 3>(0, 0).copy_from(&-spin);
+        by_error.fixed_view_mut::<3, 3>(3, 0).copy_from(&-(self.rotation * force));
+        by_error.fixed_view_mut::<3, 3>(6, 3).copy_from(&Matrix3::identity());
+        let densities = [noise.gyroscope_noise_density, noise.accelerometer_noise_density, 0.0];
+        let white = SVector::<f64, 9>::from_fn(|row, _| densities[row / 3] * densities[row / 3]);
+        let spread = by_error * self.covariance;
+        spread + spread.transpose() + SMatrix::from_diagonal(&white)
+    }
+}
+
+/// Corrected rate and force at a time, with their derivatives.
+struct Input {
+    rate: Vector3<f64>,
+    force: Vector3<f64>,
+    rate_by: SMatrix<f64, 3, IMU_COLUMNS>,
+    force_by: SMatrix<f64, 3, IMU_COLUMNS>,
+}
+
+impl Input {
+    fn new((rate, force): &Measured, values: &SensorValues, biases: &ImuBias) -> Self {
+        let (rate, by_gyroscope) = values.correct_rate(rate);
+        let (force, by_accelerometer) = values.correct_force(force);
+        let mut rate_by = SMatrix::<f64, 3, IMU_COLUMNS>::zeros();
+        let mut force_by = rate_by;
+        rate_by.fixed_view_mut::<3, 3>(0, 0).copy_from(&-Matrix3::identity());
+        rate_by.fixed_view_mut::<3, GYROSCOPE_COLUMNS>(0, 3).copy_from(&by_gyroscope);
+        force_by.fixed_view_mut::<3, 3>(0, RATE_COLUMNS).copy_from(&-Matrix3::identity());
+        force_by.fixed_view_mut::<3, ACCELEROMETER_COLUMNS>(0, RATE_COLUMNS + 3).copy_from(&by_accelerometer);
+        Self {
+            rate: rate - biases.gyroscope_rad_per_s,
+            force: force - biases.accelerometer_m_per_s2,
+            rate_by,
+            force_by,
+        }
+    }
+}

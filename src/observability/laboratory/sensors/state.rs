@@ -1,0 +1,110 @@
+//! Unknowns of a window with sensor columns.
+
+use nalgebra::{Vector3, Vector6};
+
+use super::values::SensorValues;
+use crate::camera::CameraError;
+use crate::estimator::{NavigationState, PoseKnowledge};
+use crate::gimbal::{Chain, ParameterId};
+
+/// Trajectory, joints, landmarks and calibration.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    pub(super) frames: Vec<FrameState>,
+    /// Positions in the world, in metres.
+    pub(super) landmarks: Vec<Vector3<f64>>,
+    pub(super) chain: Chain,
+    pub(super) sensors: SensorValues,
+}
+
+/// Unknowns of one frame.
+#[derive(Clone, Debug)]
+pub(super) struct FrameState {
+    pub(super) navigation: NavigationState,
+    pub(super) joints_rad: Vec<f64>,
+    /// Unknown only without encoders, which give them elsewhere.
+    pub(super) joint_rates_rad_per_s: Vec<f64>,
+}
+
+/// Columns of a window: calibration, then joints, poses, and velocities with biases of all frames. Landmarks have none:
+/// their rows are projected.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Columns {
+    /// Columns of the chain.
+    pub(super) chain: usize,
+    /// Sensor columns: place among all of them, and parameter.
+    pub(super) sensors: Vec<(usize, ParameterId)>,
+    pub(super) frames: usize,
+    /// Joint angles of a frame, and their rates.
+    pub(super) joints: usize,
+    /// 6, or 0 with known poses.
+    pub(super) pose: usize,
+    /// Velocity and biases: 9, 3 with known biases, or 0 with known poses.
+    pub(super) velocity_bias: usize,
+}
+
+impl Columns {
+    /// Numbers of columns of pose, and of velocity with biases.
+    pub(super) fn of_poses(poses: &PoseKnowledge) -> (usize, usize) {
+        match poses {
+            PoseKnowledge::Known => (0, 0),
+            PoseKnowledge::Imu { biases_known: true, .. } => (6, 3),
+            PoseKnowledge::Imu { biases_known: false, .. } => (6, 9),
+        }
+    }
+
+    pub(super) fn calibration(&self) -> usize {
+        self.chain + self.sensors.len()
+    }
+
+    pub(super) fn joints_at(&self, frame: usize) -> usize {
+        self.calibration() + frame * self.joints
+    }
+
+    pub(super) fn pose_at(&self, frame: usize) -> usize {
+        self.calibration() + self.frames * self.joints + frame * self.pose
+    }
+
+    pub(super) fn velocity_bias_at(&self, frame: usize) -> usize {
+        self.calibration() + self.frames * (self.joints + self.pose) + frame * self.velocity_bias
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.velocity_bias_at(self.frames)
+    }
+}
+
+impl State {
+    /// The state moved by one number per column.
+    pub(super) fn plus(&self, columns: &Columns, delta: &[f64]) -> Result<Self, CameraError> {
+        let mut by_sensor = [0.0; super::values::SENSOR_COLUMNS];
+        for (change, (place, _)) in delta[columns.chain..].iter().zip(&columns.sensors) {
+            by_sensor[*place] = *change;
+        }
+        let mut moved = Self {
+            chain: self.chain.plus_slice(&delta[..columns.chain]),
+            sensors: self.sensors.plus(&by_sensor)?,
+            ..self.clone()
+        };
+        for (index, frame) in moved.frames.iter_mut().enumerate() {
+            let joints = &delta[columns.joints_at(index)..][..columns.joints];
+            let angles_and_rates = frame.joints_rad.iter_mut().chain(&mut frame.joint_rates_rad_per_s);
+            for (value, change) in angles_and_rates.zip(joints) {
+                *value += change;
+            }
+            let navigation = &mut frame.navigation;
+            if columns.pose > 0 {
+                let pose = Vector6::from_column_slice(&delta[columns.pose_at(index)..][..6]);
+                navigation.world_from_imu = navigation.world_from_imu.plus(&pose);
+            }
+            let velocity_bias = &delta[columns.velocity_bias_at(index)..][..columns.velocity_bias];
+            let bias = &mut navigation.bias;
+            let parts =
+                [&mut navigation.velocity_m_per_s, &mut bias.gyroscope_rad_per_s, &mut bias.accelerometer_m_per_s2];
+            for (part, change) in parts.into_iter().zip(velocity_bias.chunks_exact(3)) {
+                *part += Vector3::from_column_slice(change);
+            }
+        }
+        Ok(moved)
+    }
+}

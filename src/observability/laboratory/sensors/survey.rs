@@ -1,0 +1,141 @@
+//! Rows of the survey with columns of sensors.
+
+use std::fmt;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::experiments::{SECTIONS, SensorExperiment};
+use super::table::{SetRank, set_ranks};
+use super::{LaboratoryForm, SensorColumns};
+use crate::gimbal::{ParameterGroup, ParameterNames, Parameterization};
+
+/// Experiments with columns of sensors under one heading.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SensorSurveySection {
+    /// The heading.
+    pub title: String,
+    /// One row per experiment.
+    pub rows: Vec<SensorSurveyRow>,
+}
+
+/// Ranks of one experiment for each set of columns, in the minimal parameterization.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SensorSurveyRow {
+    /// Name of the motion.
+    pub motion: String,
+    /// Each set of columns, the chain alone first.
+    pub sets: Vec<SensorSurveyEntry>,
+    /// Why sensor columns are lost, empty where none is.
+    pub cause: String,
+    /// Sensor parameters in the null directions of all columns together.
+    pub lost: Vec<String>,
+}
+
+/// Rank of one set of columns.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SensorSurveyEntry {
+    /// The sets of columns.
+    pub columns: String,
+    /// Number of columns, those of the chain included.
+    pub count: usize,
+    /// Structural rank.
+    pub rank: usize,
+    /// Null directions that the chain alone does not have.
+    pub added: usize,
+}
+
+/// Sets of the table with their headings.
+const SETS: [(&str, SensorColumns); 7] = [
+    ("chain", SensorColumns::NONE),
+    ("readout", SensorColumns { readout: true, ..SensorColumns::NONE }),
+    ("timeshift", SensorColumns { timeshift: true, ..SensorColumns::NONE }),
+    ("both times", SensorColumns { readout: true, timeshift: true, ..SensorColumns::NONE }),
+    ("intrinsics", SensorColumns { intrinsics: true, ..SensorColumns::NONE }),
+    ("IMU", SensorColumns { imu_intrinsics: true, ..SensorColumns::NONE }),
+    ("all", SensorColumns::ALL),
+];
+/// Smallest scaled weight that counts in a null direction.
+const TAKES_PART: f64 = 0.02;
+
+/// Runs every experiment with columns of sensors.
+pub(in crate::observability::laboratory) fn survey_sensors() -> Vec<SensorSurveySection> {
+    SECTIONS
+        .par_iter()
+        .map(|section| SensorSurveySection {
+            title: section.title.to_owned(),
+            rows: section.experiments.par_iter().filter_map(SensorSurveyRow::of).collect(),
+        })
+        .collect()
+}
+
+impl SensorSurveyRow {
+    fn of(experiment: &SensorExperiment) -> Option<Self> {
+        let sets = SETS.map(|(_, columns)| columns);
+        let form = LaboratoryForm::whole(Parameterization::Minimal);
+        let ranks = set_ranks(&experiment.setup()?, form, &sets)?;
+        let chain = ranks.first().map_or(0, SetRank::deficit);
+        Some(Self {
+            motion: experiment.motion.name().to_owned(),
+            cause: experiment.cause.to_owned(),
+            lost: ranks.last().map_or_else(Vec::new, lost),
+            sets: ranks
+                .iter()
+                .map(|rank| SensorSurveyEntry {
+                    columns: rank.columns.to_string(),
+                    count: rank.parameters.len(),
+                    rank: rank.rank,
+                    added: rank.deficit().saturating_sub(chain),
+                })
+                .collect(),
+        })
+    }
+}
+
+/// Names of the sensor parameters that take part in null directions.
+fn lost(rank: &SetRank) -> Vec<String> {
+    let takes_part = |column: usize| rank.null.iter().any(|direction| direction.weights[column].abs() > TAKES_PART);
+    let names = ParameterNames::default();
+    let parameters = rank.parameters.iter().enumerate();
+    let sensors = parameters.filter(|(_, parameter)| parameter.group() != ParameterGroup::Chain);
+    sensors.filter(|(column, _)| takes_part(*column)).map(|(_, parameter)| names.name(*parameter)).collect()
+}
+
+/// The names with the members of one sensor behind its name: `gyroscope.sx sy, readout`.
+fn grouped(names: &[String]) -> String {
+    let mut text = String::new();
+    let mut last = "";
+    for name in names {
+        let (part, quantity) = name.split_once('.').unwrap_or(("", name));
+        if !text.is_empty() {
+            text.push_str(if part == last && !part.is_empty() { " " } else { ", " });
+        }
+        text.push_str(if part == last && !part.is_empty() { quantity } else { name });
+        last = part;
+    }
+    text
+}
+
+impl fmt::Display for SensorSurveySection {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(out, "{} (minimal parameterization)", self.title)?;
+        write!(out, "  {:<28}{:<9}", "", "chain")?;
+        for (heading, _) in &SETS[1..] {
+            write!(out, "{heading:<11}")?;
+        }
+        writeln!(out)?;
+        for row in &self.rows {
+            let (chain, sensors) = match row.sets.split_first() {
+                Some((chain, sensors)) => (format!("{}/{}", chain.rank, chain.count), sensors),
+                None => (String::new(), &[][..]),
+            };
+            let cells: String = sensors.iter().map(|set| format!("{:<11}", format!("+{}", set.added))).collect();
+            let lost = grouped(&row.lost);
+            writeln!(out, "  {:<28}{chain:<9}{}", row.motion, format!("{cells}{lost}").trim_end())?;
+            if !row.cause.is_empty() {
+                writeln!(out, "  {:<28}{}", "", row.cause)?;
+            }
+        }
+        Ok(())
+    }
+}
