@@ -1,7 +1,7 @@
 //! Directions of the calibration in words.
 
 use super::CalibrationDirection;
-use crate::gimbal::{ParameterId, ParameterNames};
+use crate::gimbal::{ParameterGroup, ParameterId, ParameterNames, Quantity};
 
 /// The parameters with the largest weights in a direction, `L1.d - I.tx`, at most `max_count`.
 pub fn parameters_of(
@@ -43,10 +43,28 @@ pub fn parameters_of_weights(
     text
 }
 
+/// The parameter that a direction exchanges its leading one for, where one of the two belongs to the shutter, the
+/// intrinsics of a camera or those of the IMU: a change of both together changes little in the measurements.
+pub(super) fn trades_with(parameters: &[ParameterId], direction: &CalibrationDirection) -> Option<ParameterId> {
+    const SMALLEST_RATIO: f64 = 0.3;
+    let leading = direction.leading(parameters)?;
+    let weight_of = |wanted: ParameterId| {
+        parameters.iter().zip(&direction.weights).find(|(it, _)| **it == wanted).map_or(0.0, |(_, weight)| weight.abs())
+    };
+    let others = parameters.iter().copied().filter(|parameter| *parameter != leading);
+    let partner = others.max_by(|a, b| weight_of(*a).total_cmp(&weight_of(*b)))?;
+    let of_sensor = |parameter: ParameterId| {
+        matches!(parameter.group(), ParameterGroup::Camera | ParameterGroup::Imu)
+            || parameter.quantity == Quantity::Readout
+    };
+    let takes_part = weight_of(partner) >= SMALLEST_RATIO * weight_of(leading);
+    (takes_part && (of_sensor(leading) || of_sensor(partner))).then_some(partner)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gimbal::{ParameterPart, Quantity};
+    use crate::gimbal::ParameterPart;
 
     #[test]
     fn directions_are_named_by_their_largest_weights() {
@@ -60,5 +78,21 @@ mod tests {
             "L1.theta + L1.d and 2 others"
         );
         assert_eq!(parameters_of(&names, &parameters, &direction(&[0.0; 4]), 2), "");
+    }
+    #[test]
+    fn sensor_columns_name_what_they_trade_with() {
+        let chain = ParameterId { part: ParameterPart::Link(2), quantity: Quantity::D };
+        let other = ParameterId { part: ParameterPart::Link(2), quantity: Quantity::A };
+        let parameters = [chain, other, ParameterId::readout(0), ParameterId::timeshift(0)];
+        let partner = |weights: [f64; 4]| {
+            let direction = CalibrationDirection { singular_value: 0.1, structural: false, weights: weights.to_vec() };
+            trades_with(&parameters, &direction)
+        };
+        assert_eq!(partner([0.1, 0.0, -0.8, 0.6]), Some(ParameterId::timeshift(0)));
+        assert_eq!(partner([0.0, 0.0, 0.5, -0.9]), Some(ParameterId::readout(0)));
+        assert_eq!(partner([0.1, 0.0, 1.0, 0.1]), None);
+        // Names of runs without such columns stay as they are.
+        assert_eq!(partner([0.8, 0.6, 0.0, 0.0]), None);
+        assert_eq!(partner([0.8, 0.0, 0.0, 0.6]), None);
     }
 }

@@ -1,3 +1,4 @@
+use super::direction_words::trades_with;
 use super::{KnownDirection, PackedFactor};
 use crate::estimator::allocated_bytes;
 use crate::gimbal::{ParameterId, ParameterNames, Singularity};
@@ -67,7 +68,10 @@ impl RankReport {
         parts.extend(causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}")));
         parts.push(format!("informed rank {}", self.rank_informed));
         if let Some(parameter) = self.least_observable() {
-            parts.push(format!("least observable {}", names.name(parameter)));
+            let direction = self.least_observable_direction();
+            let partner = direction.and_then(|direction| trades_with(&self.parameters, direction));
+            let trade = partner.map_or_else(String::new, |it| format!(", which trades with {}", names.name(it)));
+            parts.push(format!("least observable {}{trade}", names.name(parameter)));
         }
         parts.join("; ")
     }

@@ -157,7 +157,7 @@ impl LaboratorySetup {
     pub fn run_each(&self, forms: &[LaboratoryForm], mut each: impl FnMut(LaboratoryResult) -> bool) {
         let window = (!self.columns.any()).then(|| self.window());
         let flight = self.flight();
-        let angles: Vec<Vec<f64>> = (0..self.frames).map(|slot| flight.joints_rad(self.time_s(slot))).collect();
+        let angles: Vec<Vec<f64>> = (0..self.frames).map(|slot| flight.joints_rad(Self::time_s(slot))).collect();
         let free = self.joints_free();
         for form in forms {
             let chain = form.chain(&self.mechanism);
@@ -187,7 +187,7 @@ impl LaboratorySetup {
     }
 
     /// Time of a frame.
-    pub(super) fn time_s(&self, slot: usize) -> f64 {
+    pub(super) fn time_s(slot: usize) -> f64 {
         slot as f64 * FRAME_PERIOD_S
     }
 
@@ -201,7 +201,7 @@ impl LaboratorySetup {
         let flight = self.flight();
         let gravity_in_world = flight.gravity_in_world;
         let imu_poses = matches!(self.poses, PoseKnowledge::Imu { .. });
-        let time_of = |slot: usize| self.time_s(first + slot);
+        let time_of = |slot: usize| Self::time_s(first + slot);
         let frames: Vec<HypotheticalFrame> = (0..self.frames)
             .map(|slot| HypotheticalFrame {
                 time_s: time_of(slot),

@@ -238,11 +238,6 @@ impl SensorWindow<'_> {
         rows
     }
 
-    /// Residuals (first column) with the Jacobian, the landmarks projected out; `None` as [`Self::rows`].
-    pub(super) fn reduced(&self, state: &State) -> Option<DMatrix<f64>> {
-        Some(stacked(&self.rows(state)?))
-    }
-
     /// The linearization at a state with all its columns, as [`crate::observability::analyse`] takes it.
     pub(super) fn linearization(&self, state: &State) -> Option<Linearization> {
         let rows = self.rows(state)?;
@@ -297,7 +292,7 @@ impl SensorWindow<'_> {
 }
 
 /// Residuals and Jacobians of all factors below each other, the landmarks projected out.
-fn stacked(rows: &[Rows]) -> DMatrix<f64> {
+pub(super) fn stacked(rows: &[Rows]) -> DMatrix<f64> {
     let parts: Vec<DMatrix<f64>> = rows.iter().map(Rows::without_landmark).collect();
     let count = parts.iter().map(DMatrix::nrows).sum();
     let mut whole = DMatrix::zeros(count, parts.first().map_or(1, DMatrix::ncols));

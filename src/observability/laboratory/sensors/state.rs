@@ -1,9 +1,8 @@
 //! Unknowns of a window with sensor columns.
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::Vector3;
 
 use super::values::SensorValues;
-use crate::camera::CameraError;
 use crate::estimator::{NavigationState, PoseKnowledge};
 use crate::gimbal::{Chain, ParameterId};
 
@@ -71,40 +70,5 @@ impl Columns {
 
     pub(super) fn count(&self) -> usize {
         self.velocity_bias_at(self.frames)
-    }
-}
-
-impl State {
-    /// The state moved by one number per column.
-    pub(super) fn plus(&self, columns: &Columns, delta: &[f64]) -> Result<Self, CameraError> {
-        let mut by_sensor = [0.0; super::values::SENSOR_COLUMNS];
-        for (change, (place, _)) in delta[columns.chain..].iter().zip(&columns.sensors) {
-            by_sensor[*place] = *change;
-        }
-        let mut moved = Self {
-            chain: self.chain.plus_slice(&delta[..columns.chain]),
-            sensors: self.sensors.plus(&by_sensor)?,
-            ..self.clone()
-        };
-        for (index, frame) in moved.frames.iter_mut().enumerate() {
-            let joints = &delta[columns.joints_at(index)..][..columns.joints];
-            let angles_and_rates = frame.joints_rad.iter_mut().chain(&mut frame.joint_rates_rad_per_s);
-            for (value, change) in angles_and_rates.zip(joints) {
-                *value += change;
-            }
-            let navigation = &mut frame.navigation;
-            if columns.pose > 0 {
-                let pose = Vector6::from_column_slice(&delta[columns.pose_at(index)..][..6]);
-                navigation.world_from_imu = navigation.world_from_imu.plus(&pose);
-            }
-            let velocity_bias = &delta[columns.velocity_bias_at(index)..][..columns.velocity_bias];
-            let bias = &mut navigation.bias;
-            let parts =
-                [&mut navigation.velocity_m_per_s, &mut bias.gyroscope_rad_per_s, &mut bias.accelerometer_m_per_s2];
-            for (part, change) in parts.into_iter().zip(velocity_bias.chunks_exact(3)) {
-                *part += Vector3::from_column_slice(change);
-            }
-        }
-        Ok(moved)
     }
 }

@@ -129,9 +129,14 @@ impl fmt::Display for SensorSurveySection {
                 Some((chain, sensors)) => (format!("{}/{}", chain.rank, chain.count), sensors),
                 None => (String::new(), &[][..]),
             };
-            let cells: String = sensors.iter().map(|set| format!("{:<11}", format!("+{}", set.added))).collect();
-            let lost = grouped(&row.lost);
-            writeln!(out, "  {:<28}{chain:<9}{}", row.motion, format!("{cells}{lost}").trim_end())?;
+            write!(out, "  {:<28}{chain:<9}", row.motion)?;
+            for (place, set) in sensors.iter().enumerate() {
+                let added = format!("+{}", set.added);
+                // Nothing follows the last one where nothing is lost.
+                let width = if place + 1 == sensors.len() && row.lost.is_empty() { 0 } else { 11 };
+                write!(out, "{added:<width$}")?;
+            }
+            writeln!(out, "{}", grouped(&row.lost))?;
             if !row.cause.is_empty() {
                 writeln!(out, "  {:<28}{}", "", row.cause)?;
             }

@@ -2,11 +2,9 @@
 
 use nalgebra::{Matrix3, Matrix3xX, Rotation3, Vector3};
 
-use crate::camera::{CameraError, CameraModel};
+use crate::camera::CameraModel;
 use crate::geometry::so3;
 
-/// Number of sensor columns, in the order of [`super::columns::all_parameters`].
-pub(super) const SENSOR_COLUMNS: usize = 24;
 /// Columns of the gyroscope: scale and misalignment, then rotation.
 pub(super) const GYROSCOPE_COLUMNS: usize = 9;
 /// Columns of the accelerometer: scale and misalignment.
@@ -38,28 +36,6 @@ pub(super) struct SensorValues {
 }
 
 impl SensorValues {
-    /// The values moved by one number per sensor column.
-    pub(super) fn plus(&self, delta: &[f64]) -> Result<Self, CameraError> {
-        let mut intrinsics = self.camera.intrinsics();
-        for (value, change) in intrinsics.iter_mut().zip(&delta[INTRINSICS..]) {
-            *value += change;
-        }
-        let mut moved = Self {
-            timeshift_s: self.timeshift_s + delta[0],
-            readout_s: self.readout_s + delta[1],
-            encoder_timeshift_s: self.encoder_timeshift_s + delta[2],
-            camera: self.camera.with_intrinsics(intrinsics)?,
-            ..self.clone()
-        };
-        for (value, change) in moved.gyroscope.iter_mut().zip(&delta[GYROSCOPE..]) {
-            *value += change;
-        }
-        for (value, change) in moved.accelerometer.iter_mut().zip(&delta[ACCELEROMETER..]) {
-            *value += change;
-        }
-        Ok(moved)
-    }
-
     /// `R·U·ω` of a measured angular rate, and its derivative by the nine columns.
     pub(super) fn correct_rate(&self, measured: &Vector3<f64>) -> (Vector3<f64>, Matrix3xX<f64>) {
         let [sx, sy, sz, mxy, mxz, myz, rx, ry, rz] = self.gyroscope;

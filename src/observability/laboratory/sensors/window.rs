@@ -90,7 +90,7 @@ impl<'a> SensorWindow<'a> {
     pub(super) fn new(setup: &'a LaboratorySetup, form: LaboratoryForm) -> Self {
         let flight = setup.flight();
         let chain = form.chain(&setup.mechanism);
-        let times_s: Vec<f64> = (0..setup.frames).map(|slot| setup.time_s(slot)).collect();
+        let times_s: Vec<f64> = (0..setup.frames).map(|slot| LaboratorySetup::time_s(slot)).collect();
         let frames = times_s.iter().map(|time_s| frame_at(&flight.kinematics(*time_s))).collect();
         let sensors = SensorValues {
             timeshift_s: 0.0,
@@ -149,20 +149,28 @@ impl<'a> SensorWindow<'a> {
 
     /// The observation of a position in one frame; `None` outside the image.
     fn observation(&self, position: &Vector3<f64>, frame: usize, height: f64) -> Option<Observation> {
+        let readout_s = self.truth.sensors.readout_s;
         let mut row_ratio = 0.5;
-        let mut uv_px = Vector2::zeros();
         for _ in 0..ROW_ITERATIONS {
-            uv_px = self.predict(&self.truth, position, frame, row_ratio)?.uv_px;
-            let change = uv_px.y / height - row_ratio;
+            let pixel = self.true_pixel(position, self.times_s[frame] + row_ratio * readout_s)?;
+            let change = pixel.y / height - row_ratio;
             row_ratio += change;
             if !(-1.0..=2.0).contains(&row_ratio) {
                 return None;
             }
-            if change.abs() < ROW_TOLERANCE || self.truth.sensors.readout_s == 0.0 {
+            if change.abs() < ROW_TOLERANCE || readout_s == 0.0 {
                 break;
             }
         }
+        let uv_px = self.predict(&self.truth, position, frame, row_ratio)?.uv_px;
         self.truth.sensors.camera.contains(&uv_px, 0.0).then_some(Observation { frame, uv_px, row_ratio })
+    }
+
+    /// Pixel of a position at a time of the true motion.
+    fn true_pixel(&self, position: &Vector3<f64>, time_s: f64) -> Option<Vector2<f64>> {
+        let imu_from_camera = self.truth.chain.imu_from_camera(&self.flight.joints_rad(time_s));
+        let world_from_camera = self.flight.world_from_imu(time_s) * imu_from_camera;
+        self.truth.sensors.camera.project(&world_from_camera.inverse().transform(position))
     }
 
     /// What the IMU measures at a time.

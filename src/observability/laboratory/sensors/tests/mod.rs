@@ -2,5 +2,6 @@
 
 mod derivatives;
 mod golden;
+mod moves;
 mod symmetries;
 mod table;
