@@ -19,6 +19,34 @@ pub enum InterventionError {
     FixedCalibration,
 }
 
+/// Calibration columns beside the chain that are switched on together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum SensorColumns {
+    /// Time offsets of cameras and encoders.
+    Timeshift,
+    /// Readout times of rolling shutters.
+    Readout,
+    /// Intrinsics of the cameras.
+    Intrinsics,
+    /// Intrinsics of the IMU.
+    ImuIntrinsics,
+}
+
+impl SensorColumns {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Timeshift, Self::Readout, Self::Intrinsics, Self::ImuIntrinsics];
+
+    /// Key of a run's specification.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Timeshift => "timeshift",
+            Self::Readout => "readout",
+            Self::Intrinsics => "intrinsics",
+            Self::ImuIntrinsics => "imu-intrinsics",
+        }
+    }
+}
+
 impl Estimator {
     /// Switches the parameterization of the chain: the calibration stays, and so does its prior, as far as the new
     /// columns can represent it.
@@ -41,6 +69,28 @@ impl Estimator {
     /// The parameters of the calibration, estimated or not, in the order of their columns.
     pub fn parameters(&self) -> Vec<ParameterId> {
         self.calibration().parameters()
+    }
+
+    /// Estimates further sensor parameters from the next solve on, starting at the values of the rig; the frames of the window
+    /// and the marginalization prior stay.
+    pub fn estimate_sensors(&mut self, columns: SensorColumns) -> Result<(), InterventionError> {
+        let config = &mut self.setup.config;
+        if !config.calibrate {
+            return Err(InterventionError::FixedCalibration);
+        }
+        match columns {
+            SensorColumns::Timeshift => config.estimate_timeshift = true,
+            SensorColumns::Readout => config.estimate_readout = true,
+            SensorColumns::Intrinsics => config.estimate_intrinsics = true,
+            SensorColumns::ImuIntrinsics => config.estimate_imu_intrinsics = true,
+        }
+        match &mut self.phase {
+            PhaseState::Tracking(window) => window.state.add_columns(&self.setup),
+            PhaseState::Initializing(initializer) => {
+                initializer.calibration = initializer.calibration.with_columns_of(&self.setup.given_calibration());
+            }
+        }
+        Ok(())
     }
 
     /// Fixes a parameter at its present value from the next solve on.

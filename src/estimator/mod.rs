@@ -22,7 +22,7 @@ pub use config::{CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidC
 pub use estimator::Estimator;
 pub use factors::{imu_factor, preintegration};
 pub use hypothetical::{HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge};
-pub use interventions::InterventionError;
+pub use interventions::{InterventionError, SensorColumns};
 pub use options::{EstimatorOptions, TrackContinuation};
 pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
 pub use report::{

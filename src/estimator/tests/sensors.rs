@@ -1,5 +1,7 @@
 //! Rolling shutters, wrong intrinsics, and IMUs with scale errors.
 
+use std::collections::BTreeSet;
+
 use super::fixture;
 use super::flight::{chain_error, run_flight_by_rows, trajectory_error_m};
 use crate::estimator::{EstimatorConfig, EstimatorOptions, StepReport};
@@ -18,6 +20,22 @@ fn run(flight: &SyntheticFlight, change: impl Fn(&mut EstimatorConfig)) -> (f64,
     (error_m, chain_m, reports.pop().expect("a flight has frames"))
 }
 
+/// Position error in metres and all different warnings of a run with the given rig as it is.
+fn ignored(flight: &SyntheticFlight) -> (f64, BTreeSet<String>) {
+    let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
+    let (_, reports) = run_flight_by_rows(&flight.frames, config);
+    let (error_m, _) = trajectory_error_m(&flight.frames, &reports);
+    (error_m, reports.into_iter().flat_map(|report| report.warnings).collect())
+}
+
+#[test]
+fn a_late_camera_is_not_taken_for_a_rolling_shutter() {
+    let flight =
+        synthetic_tracks(&SyntheticOptions { clock_offsets_s: [0.01, 0.0], ..options(SyntheticMount::Static, 1) });
+    let (_, warnings) = ignored(&flight);
+    assert!(!warnings.is_empty() && !warnings.iter().any(|warning| warning.contains("readout")), "{warnings:?}");
+}
+
 /// Value and standard deviation of a parameter by its name.
 fn value(report: &StepReport, name: &str) -> (f64, f64) {
     let id: ParameterId = ParameterNames::default().parse(name).expect("a known name");
@@ -31,9 +49,10 @@ fn options(mount: SyntheticMount, seed: u64) -> SyntheticOptions {
 }
 
 #[test]
-fn the_readout_of_a_rigid_camera_is_estimated() {
+fn the_readout_of_a_rigid_camera_is_estimated_and_named_where_it_is_ignored() {
     let flight = synthetic_tracks(&SyntheticOptions { readout_s: READOUT_S, ..options(SyntheticMount::Static, 1) });
-    let (ignored_m, _, _) = run(&flight, |_| {});
+    let (ignored_m, warnings) = ignored(&flight);
+    assert!(warnings.iter().any(|warning| warning.contains("try readout=on")), "{warnings:?}");
     let (known_m, _, _) = run(&flight, |config| config.sensor.readout_s = READOUT_S);
     let (estimated_m, chain_m, report) = run(&flight, |config| config.estimate_readout = true);
     let (readout_s, sigma_s) = value(&report, "readout");

@@ -28,6 +28,9 @@ pub(in crate::session) fn apply_fork(
         };
         estimator.use_parameterization(parameterization, auto_parameterize);
     }
+    for columns in &changes.estimated {
+        estimator.estimate_sensors(*columns)?;
+    }
     let names = rig.parameter_names();
     let known = estimator.parameters();
     let parameter = |name: &String| {

@@ -5,15 +5,17 @@ use std::collections::BTreeSet;
 use thiserror::Error;
 
 use super::run_spec::{ParameterizationChoice, RunSpec};
-use crate::estimator::InterventionError;
+use crate::estimator::{InterventionError, SensorColumns};
 
 /// The changes of a fork against its parent run.
 ///
-/// Syntax: `classical,freeze=yaw.alpha+yaw.d,set=pitch.a:30mm,drop=12+15,joint-noise=0.5deg,imu-noise=2`.
+/// Syntax: `classical,estimate=readout,freeze=yaw.alpha+yaw.d,set=pitch.a:30mm,drop=12+15,joint-noise=0.5deg,imu-noise=2`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForkChanges {
     /// Another parameterization of the same chain.
     pub parameterization: Option<ParameterizationChoice>,
+    /// Sensor parameters that are estimated from here on (`estimate=readout+intrinsics`).
+    pub estimated: BTreeSet<SensorColumns>,
     /// Names of parameters that are fixed at their values (`freeze=`).
     pub frozen: Vec<String>,
     /// Names and new values of parameters, in radians or metres (`set=`).
@@ -38,6 +40,7 @@ impl Default for ForkChanges {
     fn default() -> Self {
         Self {
             parameterization: None,
+            estimated: BTreeSet::new(),
             frozen: Vec::new(),
             values: Vec::new(),
             dropped: BTreeSet::new(),
@@ -117,6 +120,8 @@ impl ForkChanges {
         let parameterization = self.parameterization.unwrap_or(parent.parameterization);
         let name = self.parameterization.map_or(&*parent.label, |choice| choice.name());
         let encoder = parent.encoder && !self.encoder_off;
-        RunSpec { label: format!("{name}-{time_s:.2}s"), parameterization, encoder, ..parent.clone() }
+        let mut spec = RunSpec { label: format!("{name}-{time_s:.2}s"), parameterization, encoder, ..parent.clone() };
+        self.estimated.iter().for_each(|columns| *spec.estimates_mut(*columns) = true);
+        spec
     }
 }

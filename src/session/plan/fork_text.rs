@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use super::fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError, OTHER_CAMERA};
 use super::run_spec::ParameterizationChoice;
+use crate::estimator::SensorColumns;
 
 impl FromStr for ForkChanges {
     type Err = ForkError;
@@ -37,6 +38,14 @@ impl FromStr for ForkChanges {
             };
             let several = || value.split('+').map(str::trim).filter(|name| !name.is_empty());
             match key.trim() {
+                "estimate" => {
+                    for name in several() {
+                        let columns = SensorColumns::ALL.into_iter().find(|columns| columns.key() == name);
+                        let known = SensorColumns::ALL.map(SensorColumns::key).join(", ");
+                        let expected = || bad(format!("estimate is '{name}', expected one of {known}"));
+                        changes.estimated.insert(columns.ok_or_else(expected)?);
+                    }
+                }
                 "freeze" => changes.frozen.extend(several().map(str::to_owned)),
                 "set" => {
                     for one in several_values(value) {
@@ -73,8 +82,7 @@ impl FromStr for ForkChanges {
                 "pixel-noise" => changes.pixel_noise = factor(value)?,
                 "encoder-noise" => changes.encoder_noise = factor(value)?,
                 _ => {
-                    let known =
-                        "freeze, set, drop, without, encoder, joint-noise, imu-noise, pixel-noise, encoder-noise";
+                    let known = "estimate, freeze, set, drop, without, encoder, joint-noise, imu-noise, pixel-noise, encoder-noise";
                     return Err(bad(format!("unknown key '{key}', expected one of {known}")));
                 }
             }
@@ -112,6 +120,10 @@ impl fmt::Display for ForkChanges {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let standard = Self::default();
         let mut items: Vec<String> = self.parameterization.iter().map(|choice| choice.name().to_owned()).collect();
+        if !self.estimated.is_empty() {
+            let keys: Vec<&str> = self.estimated.iter().map(|columns| columns.key()).collect();
+            items.push(format!("estimate={}", keys.join("+")));
+        }
         if !self.frozen.is_empty() {
             items.push(format!("freeze={}", self.frozen.join("+")));
         }
@@ -161,7 +173,15 @@ mod tests {
         assert_eq!(read.dropped.iter().copied().collect::<Vec<_>>(), [12, 15]);
         assert!((read.joint_noise_rad - 0.5_f64.to_radians()).abs() < 1e-15);
         assert_eq!((read.imu_noise, read.pixel_noise), (2.0, 1.0));
-        for text in [text, "", "poe", "without=cam1,encoder=off", "pixel-noise=0.5,encoder-noise=3", "set=L1.d:-0.25"] {
+        for text in [
+            text,
+            "",
+            "poe",
+            "estimate=readout+intrinsics",
+            "without=cam1,encoder=off",
+            "pixel-noise=0.5,encoder-noise=3",
+            "set=L1.d:-0.25",
+        ] {
             assert_eq!(changes(&changes(text).to_string()), changes(text), "{text}");
         }
     }
@@ -178,6 +198,7 @@ mod tests {
         check("encoder=on", &["'on'", "joint offsets", "add a run with encoder=on"]);
         check("set=yaw.alpha", &["no value", "set=yaw.alpha:1deg"]);
         check("set=yaw.alpha:far", &["'far'", "number"]);
+        check("estimate=shutter", &["'shutter'", "readout", "imu-intrinsics"]);
         check("drop=some", &["'some'", "feature"]);
         check("imu-noise=0", &["'0'", "factor"]);
         check("joint-noise=-1", &["'-1'", "0 or more"]);

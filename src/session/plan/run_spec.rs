@@ -3,6 +3,8 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
+use crate::estimator::SensorColumns;
+
 use crate::sensors::Rig;
 
 /// The parameterization in which a run estimates.
@@ -132,14 +134,24 @@ pub enum RunSpecError {
 }
 
 impl RunSpec {
-    /// The keys that add groups of columns beside the chain's, and whether they are on.
-    fn estimated_sensors(&self) -> [(&'static str, bool); 4] {
-        [
-            ("timeshift", self.timeshift),
-            ("readout", self.readout),
-            ("intrinsics", self.intrinsics),
-            ("imu-intrinsics", self.imu_intrinsics),
-        ]
+    /// Whether these columns are estimated beside the chain's.
+    pub fn estimates(&self, columns: SensorColumns) -> bool {
+        match columns {
+            SensorColumns::Timeshift => self.timeshift,
+            SensorColumns::Readout => self.readout,
+            SensorColumns::Intrinsics => self.intrinsics,
+            SensorColumns::ImuIntrinsics => self.imu_intrinsics,
+        }
+    }
+
+    /// [`Self::estimates`] to be changed.
+    pub(super) fn estimates_mut(&mut self, columns: SensorColumns) -> &mut bool {
+        match columns {
+            SensorColumns::Timeshift => &mut self.timeshift,
+            SensorColumns::Readout => &mut self.readout,
+            SensorColumns::Intrinsics => &mut self.intrinsics,
+            SensorColumns::ImuIntrinsics => &mut self.imu_intrinsics,
+        }
     }
 }
 
@@ -159,21 +171,14 @@ impl FromStr for RunSpec {
             let (key, value) = option
                 .split_once('=')
                 .ok_or_else(|| bad(format!("option '{option}' has no value; expected key=value, as in encoder=off")))?;
+            if let Some(columns) = SensorColumns::ALL.into_iter().find(|columns| columns.key() == key) {
+                *run.estimates_mut(columns) = on_or_off(value).map_err(|problem| bad(format!("{key}: {problem}")))?;
+                continue;
+            }
             match key {
                 "encoder" => run.encoder = on_or_off(value).map_err(|problem| bad(format!("encoder: {problem}")))?,
                 "calibrate" => {
                     run.calibrate = on_or_off(value).map_err(|problem| bad(format!("calibrate: {problem}")))?;
-                }
-                "timeshift" => {
-                    run.timeshift = on_or_off(value).map_err(|problem| bad(format!("timeshift: {problem}")))?;
-                }
-                "readout" => run.readout = on_or_off(value).map_err(|problem| bad(format!("readout: {problem}")))?,
-                "intrinsics" => {
-                    run.intrinsics = on_or_off(value).map_err(|problem| bad(format!("intrinsics: {problem}")))?;
-                }
-                "imu-intrinsics" => {
-                    run.imu_intrinsics =
-                        on_or_off(value).map_err(|problem| bad(format!("imu-intrinsics: {problem}")))?;
                 }
                 "first-estimates" => {
                     run.first_estimates =
@@ -197,8 +202,9 @@ impl FromStr for RunSpec {
                 }
             }
         }
-        if let Some((key, _)) = run.estimated_sensors().into_iter().find(|(_, on)| *on && !run.calibrate) {
-            return Err(bad(format!("{key}=on requires calibrate=on")));
+        let estimated = SensorColumns::ALL.into_iter().find(|columns| run.estimates(*columns) && !run.calibrate);
+        if let Some(columns) = estimated {
+            return Err(bad(format!("{}=on requires calibrate=on", columns.key())));
         }
         Ok(run)
     }
@@ -214,9 +220,8 @@ impl fmt::Display for RunSpec {
         if !self.calibrate {
             options.push("calibrate=off".to_owned());
         }
-        for (key, on) in self.estimated_sensors() {
-            options.extend(on.then(|| format!("{key}=on")));
-        }
+        let estimated = SensorColumns::ALL.into_iter().filter(|columns| self.estimates(*columns));
+        options.extend(estimated.map(|columns| format!("{}=on", columns.key())));
         if !self.first_estimates {
             options.push("first-estimates=off".to_owned());
         }

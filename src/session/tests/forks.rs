@@ -101,6 +101,30 @@ fn a_fork_goes_on_in_another_parameterization() {
 }
 
 #[test]
+fn sensor_parameters_are_estimated_from_the_fork_on() {
+    let parent = simulated_run("classical");
+    let fork = parent.forked(FORK_AT, "estimate=readout+intrinsics+imu-intrinsics+timeshift").unwrap();
+    for (step, parent) in fork.iter().zip(&parent.steps[FORK_AT..]) {
+        assert_eq!(step.report.restarts, 0);
+        assert!(
+            position_difference_m(step, parent) < 0.02,
+            "{} m from the parent",
+            position_difference_m(step, parent)
+        );
+    }
+    let last = fork.last().unwrap();
+    let (readout_s, sigma_s) = parameter(last, "readout");
+    assert!(readout_s.abs() < 0.005 && sigma_s > 0.0 && sigma_s < 0.005, "a global shutter: {readout_s} ± {sigma_s} s");
+    let (fx_px, sigma_px) = parameter(last, "fx");
+    let given_px = parent.flight.given_rig.cameras[0].model.intrinsics_px[0];
+    assert!((fx_px - given_px).abs() < 0.02 * given_px && sigma_px < 5.0, "{fx_px} ± {sigma_px} of {given_px} px");
+    let known = parent.steps[FORK_AT].report.calibration.parameters.len();
+    assert!(last.report.calibration.parameters.len() >= known + 1 + 4 + 15 + 1);
+    let problem = simulated_run("auto:calibrate=off").forked(FORK_AT, "estimate=readout").unwrap_err();
+    assert!(problem.to_string().contains("calibrate=off"), "{problem}");
+}
+
+#[test]
 fn frozen_parameters_stay_and_changed_ones_start_at_their_values() {
     let parent = simulated_run("auto");
     let before = &parent.steps[FORK_AT - 1];

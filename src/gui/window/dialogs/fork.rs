@@ -3,6 +3,7 @@
 use egui::{ComboBox, DragValue, Grid, RichText, TextEdit, Ui, vec2};
 
 use super::modal::{Modal, accept_or_cancel_ui};
+use crate::estimator::SensorColumns;
 use crate::gui::PanelContext;
 use crate::gui::units::seconds;
 use crate::session::{Command, FORK_PARAMETERIZATIONS, ForkChanges, RunSpec};
@@ -15,6 +16,7 @@ const AS_BEFORE: &str = "unchanged";
 pub(super) struct ForkDialog {
     /// Index in the list, 0 for the parent's parameterization.
     choice: usize,
+    estimated: String,
     frozen: String,
     values: String,
     dropped: String,
@@ -31,6 +33,7 @@ impl Default for ForkDialog {
     fn default() -> Self {
         Self {
             choice: 0,
+            estimated: String::new(),
             frozen: String::new(),
             values: String::new(),
             dropped: String::new(),
@@ -53,7 +56,12 @@ impl ForkDialog {
             parts.push(choice.name().to_owned());
         }
         let list = |text: &str| text.split([',', ' ', '+']).filter(|it| !it.is_empty()).collect::<Vec<_>>().join("+");
-        for (key, text) in [("freeze", &self.frozen), ("drop", &self.dropped), ("without", &self.without)] {
+        for (key, text) in [
+            ("estimate", &self.estimated),
+            ("freeze", &self.frozen),
+            ("drop", &self.dropped),
+            ("without", &self.without),
+        ] {
             if !text.trim().is_empty() {
                 parts.push(format!("{key}={}", list(text)));
             }
@@ -129,9 +137,11 @@ impl ForkDialog {
             ui.end_row();
             let parameter = selected.0.map_or_else(|| "yaw.alpha".to_owned(), |parameter| ctx.names().name(parameter));
             let feature = selected.1.map_or_else(|| "12 15".to_owned(), |id| id.0.to_string());
+            let sensors = SensorColumns::ALL.map(SensorColumns::key).join(" ");
             let value = format!("{parameter}=1deg");
             let camera = second_camera(ctx).unwrap_or_else(|| "cluster runs only: one of the two cameras".to_owned());
             for (label, text, hint) in [
+                ("Estimate sensors", &mut self.estimated, &sensors),
                 ("Freeze parameters", &mut self.frozen, &parameter),
                 ("Set parameters", &mut self.values, &value),
                 ("Drop features", &mut self.dropped, &feature),
