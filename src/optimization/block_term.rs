@@ -6,8 +6,8 @@ use super::Reprojection;
 
 /// Residual of one observation with its derivatives by the landmark and by blocks of six unknowns named by `K`.
 ///
-/// A global shutter has one block per camera pose; a rolling shutter has two, the poses of the first and of the last
-/// row. The intrinsics of a camera are one more block, which all its observations share.
+/// A global shutter has one block per camera pose; a rolling shutter has three, the poses of the first, the middle and
+/// the last row. The intrinsics of a camera are one more block, which all its observations share.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlockTerm<K> {
     /// Predicted minus measured (2), whitened.
@@ -22,8 +22,11 @@ pub(crate) struct BlockTerm<K> {
     pub(crate) shared: Option<(K, Matrix2x6<f64>)>,
 }
 
-/// Derivatives by the blocks of one camera pose, at most two.
-pub(crate) type PoseBlocksOf<K> = [Option<(K, Matrix2x6<f64>)>; 2];
+/// Derivatives by the blocks of one camera pose, at most three.
+pub(crate) type PoseBlocksOf<K> = [Option<(K, Matrix2x6<f64>)>; MAX_POSE_BLOCKS];
+
+/// Largest number of blocks of one camera pose.
+pub(crate) const MAX_POSE_BLOCKS: usize = 3;
 
 impl<K: Copy + PartialEq> BlockTerm<K> {
     /// A term with one block per camera pose; the anchor's own observation (`anchor` equals `pose`) has none.
@@ -32,8 +35,8 @@ impl<K: Copy + PartialEq> BlockTerm<K> {
         Self {
             residual: term.residual,
             by_landmark: term.by_landmark,
-            anchor: [anchor.filter(|_| apart).map(|anchor| (anchor, term.by_anchor)), None],
-            observer: [apart.then_some((pose, term.by_observer)), None],
+            anchor: [anchor.filter(|_| apart).map(|anchor| (anchor, term.by_anchor)), None, None],
+            observer: [apart.then_some((pose, term.by_observer)), None, None],
             shared: None,
         }
     }

@@ -1,7 +1,7 @@
 //! Normal equations of reprojection residuals, the landmarks eliminated by their Schur complement.
 //!
 //! Six columns per camera pose hold whatever a camera observes, however many joints and parameters move it: the landmarks
-//! are eliminated there, and only the result is carried on to the states. A rolling shutter has two poses per image
+//! are eliminated there, and only the result is carried on to the states. A rolling shutter has three poses per image
 //! ([`BlockTerm`]), and the intrinsics of the camera are one more block of six.
 //!
 //! ```text
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
-use super::{BlockTerm, PoseBlocks, Reprojection};
+use super::{BlockTerm, MAX_POSE_BLOCKS, PoseBlocks, Reprojection};
 
 /// Hessian and gradient over camera poses; of the Hessian the blocks `(row, column)` with `row ≤ column`.
 pub(crate) trait PoseEquations: Clone {
@@ -127,14 +127,14 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         terms: impl Iterator<Item = (P::Pose, Reprojection)>,
     ) {
         let terms = terms.map(|(pose, term)| BlockTerm::of_poses(anchor, pose, &term));
-        self.add_landmark_by_blocks([anchor, None], None, observations, terms);
+        self.add_landmark_by_blocks([anchor, None, None], None, observations, terms);
     }
 
     /// [`Self::add_landmark`] by terms that may have several blocks: those of the anchor rise and come before those of the
     /// observers, which rise as well; the shared one comes after all.
     pub(crate) fn add_landmark_by_blocks(
         &mut self,
-        anchor: [Option<P::Pose>; 2],
+        anchor: [Option<P::Pose>; MAX_POSE_BLOCKS],
         shared: Option<P::Pose>,
         observations: usize,
         terms: impl Iterator<Item = BlockTerm<P::Pose>>,
@@ -145,14 +145,14 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
             couplings: Vec::with_capacity(observations + 1),
         };
         // The anchor's blocks and the shared one have a part of nearly every term: summed here first.
-        let common = [anchor[0], anchor[1], shared];
-        let mut hessians = [[Matrix6::zeros(); 3]; 3];
-        let mut gradients = [Vector6::zeros(); 3];
-        let mut couplings = [Matrix6x3::zeros(); 3];
+        let common = [anchor[0], anchor[1], anchor[2], shared];
+        let mut hessians = [[Matrix6::zeros(); MAX_POSE_BLOCKS + 1]; MAX_POSE_BLOCKS + 1];
+        let mut gradients = [Vector6::zeros(); MAX_POSE_BLOCKS + 1];
+        let mut couplings = [Matrix6x3::zeros(); MAX_POSE_BLOCKS + 1];
         for term in terms {
             block.hessian += term.by_landmark.tr_mul(&term.by_landmark);
             block.gradient += term.by_landmark.tr_mul(&term.residual);
-            let of_common = [&term.anchor[0], &term.anchor[1], &term.shared];
+            let of_common = [&term.anchor[0], &term.anchor[1], &term.anchor[2], &term.shared];
             for (place, observed) in term.observer.iter().enumerate() {
                 let Some((pose, by_pose)) = observed else { continue };
                 for (other, by_other) in term.observer[place..].iter().flatten() {
@@ -187,7 +187,7 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         }
         let anchors = anchor.iter().enumerate().filter_map(|(row, anchor)| Some(((*anchor)?, couplings[row])));
         block.couplings.splice(0..0, anchors);
-        block.couplings.extend(shared.map(|shared| (shared, couplings[2])));
+        block.couplings.extend(shared.map(|shared| (shared, couplings[MAX_POSE_BLOCKS])));
         self.landmarks.push(block);
     }
 

@@ -6,8 +6,8 @@ use crate::camera::CameraModel;
 use crate::estimator::options::EstimatorOptions;
 use crate::estimator::state::camera_view::{CameraView, RelativeTo};
 use crate::optimization::{
-    BlockTerm, DensePoseEquations, Landmark, LandmarkModel, ReducedEquations, Reprojection, ReprojectionEquations,
-    RobustLoss, reprojection,
+    BlockTerm, DensePoseEquations, Landmark, LandmarkModel, MAX_POSE_BLOCKS, ReducedEquations, Reprojection,
+    ReprojectionEquations, RobustLoss, reprojection,
 };
 
 /// An observation of a feature: slot of the frame and pixel.
@@ -93,7 +93,8 @@ pub(crate) fn equations(
     for (track, landmark) in tracks.iter().zip(landmarks) {
         // Observations come in the order of the slots and the anchor is the first of them.
         let anchor = track.observations.first().map(|first| Anchor::new(current, linearized, first));
-        let blocks = anchor.as_ref().map_or([None; 2], |anchor| current.blocks_of(anchor.observation.slot));
+        let blocks =
+            anchor.as_ref().map_or([None; MAX_POSE_BLOCKS], |anchor| current.blocks_of(anchor.observation.slot));
         let terms = track
             .observations
             .iter()
@@ -161,7 +162,7 @@ pub(crate) fn whitened(
     };
     let by_blocks = |observation: &TrackObservation, by_pose| anchor.linearized.by_blocks(observation, by_pose);
     let (anchor, observer) = if in_anchor {
-        ([None; 2], [None; 2])
+        ([None; MAX_POSE_BLOCKS], [None; MAX_POSE_BLOCKS])
     } else {
         (by_blocks(anchor.observation, &term.by_anchor), by_blocks(observation, &term.by_observer))
     };

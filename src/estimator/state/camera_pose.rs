@@ -12,6 +12,9 @@ use crate::geometry::so3;
 use crate::gimbal::{Chain, ChainLinearization};
 use crate::optimization::CameraPose;
 
+/// Rows of a rolling shutter whose poses have a block of unknowns: the first, the middle and the last one.
+pub(crate) const ROLLING_ROWS: [f64; 3] = [0.0, 0.5, 1.0];
+
 /// Extrinsics, clock and shutter of a camera.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraSensor<'a> {
@@ -53,7 +56,7 @@ impl CameraSensor<'_> {
 
     /// Rows whose poses have a block of unknowns.
     pub(crate) fn block_rows(&self) -> &'static [f64] {
-        if self.rolling { &[0.0, 1.0] } else { &[0.0] }
+        if self.rolling { &ROLLING_ROWS } else { &[0.0] }
     }
 }
 
@@ -93,7 +96,7 @@ pub(crate) fn when_seen(state: &FrameState, shift_s: f64) -> Cow<'_, FrameState>
 }
 
 /// Derivatives of the blocks of a camera with respect to the unknowns: `[φ; δt]` of `world_from_camera` by frame (with a
-/// rolling shutter of the first row and of the last one), then the intrinsics where they are estimated.
+/// rolling shutter of the first, the middle and the last row), then the intrinsics where they are estimated.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraMaps {
     /// 6 × columns of [`Layout::camera`], with respect to the unknowns of the block's frame; 6 × 0 for the intrinsics.

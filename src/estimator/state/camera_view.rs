@@ -5,16 +5,16 @@ use std::borrow::Cow;
 use nalgebra::{Matrix2x6, Vector2, Vector3};
 
 use super::calibration::Calibration;
-use super::camera_pose::{self, CameraSensor};
+use super::camera_pose::{self, CameraSensor, ROLLING_ROWS};
 use crate::camera::CameraModel;
 use crate::estimator::factors::visual::TrackObservation;
 use crate::estimator::state::frame_state::FrameState;
-use crate::optimization::{CameraPose, PoseBlocksOf, RelativePose, RelativePoses};
+use crate::optimization::{CameraPose, MAX_POSE_BLOCKS, PoseBlocksOf, RelativePose, RelativePoses};
 
 /// A camera with its intrinsics and poses at an estimate.
 ///
-/// Derivatives are by blocks of six: one per frame with a global shutter, the pose `[φ; δt]` of `world_from_camera`; two
-/// per frame with a rolling shutter, the poses of the first and of the last row; and after all frames the intrinsics, where
+/// Derivatives are by blocks of six: one per frame with a global shutter, the pose `[φ; δt]` of `world_from_camera`; three
+/// per frame with a rolling shutter, the poses of the first, the middle and the last row; and after all frames the intrinsics, where
 /// they are estimated. [`camera_pose::CameraMaps`] has the same blocks.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraView<'a> {
@@ -34,8 +34,8 @@ enum Poses<'a> {
     Rolling {
         frames: Cow<'a, [FrameState]>,
         sensor: CameraSensor<'a>,
-        /// Of the first and the last row, by slot.
-        ends: Vec<[CameraPose; 2]>,
+        /// Of the first, the middle and the last row, by slot.
+        rows: Vec<[CameraPose; 3]>,
     },
 }
 
@@ -66,8 +66,8 @@ impl<'a> CameraView<'a> {
     ) -> Self {
         let count = frames.len();
         let poses = if sensor.rolling {
-            let ends = |state: &FrameState| [0.0, 1.0].map(|row| camera_pose::at_row(state, &sensor, row));
-            Poses::Rolling { ends: frames.iter().map(ends).collect(), frames, sensor }
+            let rows = |state: &FrameState| ROLLING_ROWS.map(|row| camera_pose::at_row(state, &sensor, row));
+            Poses::Rolling { rows: frames.iter().map(rows).collect(), frames, sensor }
         } else {
             let poses: Vec<CameraPose> = frames.iter().map(|state| camera_pose::at_row(state, &sensor, 0.0)).collect();
             Poses::Global { relative: RelativePoses::new(&poses), poses }
@@ -101,7 +101,7 @@ impl<'a> CameraView<'a> {
     pub(crate) fn blocks_per_frame(&self) -> usize {
         match self.poses {
             Poses::Global { .. } => 1,
-            Poses::Rolling { .. } => 2,
+            Poses::Rolling { .. } => ROLLING_ROWS.len(),
         }
     }
 
@@ -120,11 +120,11 @@ impl<'a> CameraView<'a> {
         self.has_intrinsics.then(|| self.frames * self.blocks_per_frame())
     }
 
-    /// Blocks of the pose of a frame, the second one only with a rolling shutter.
-    pub(crate) fn blocks_of(&self, slot: usize) -> [Option<usize>; 2] {
+    /// Blocks of the pose of a frame, the second and the third one only with a rolling shutter.
+    pub(crate) fn blocks_of(&self, slot: usize) -> [Option<usize>; MAX_POSE_BLOCKS] {
         match self.poses {
-            Poses::Global { .. } => [Some(slot), None],
-            Poses::Rolling { .. } => [Some(2 * slot), Some(2 * slot + 1)],
+            Poses::Global { .. } => [Some(slot), None, None],
+            Poses::Rolling { .. } => [0, 1, 2].map(|row| Some(ROLLING_ROWS.len() * slot + row)),
         }
     }
 
@@ -142,7 +142,7 @@ impl<'a> CameraView<'a> {
     pub(crate) fn first_row(&self, slot: usize) -> CameraPose {
         match &self.poses {
             Poses::Global { poses, .. } => poses[slot],
-            Poses::Rolling { ends, .. } => ends[slot][0],
+            Poses::Rolling { rows, .. } => rows[slot][0],
         }
     }
 
@@ -158,21 +158,25 @@ impl<'a> CameraView<'a> {
 
     /// Derivatives by the blocks of a frame from those by the pose at an observation's row (2 × 6).
     ///
-    /// Between the first and the last row, a change of the pose is interpolated linearly, rotations in world axes. It is
-    /// exact for changes of pose, velocity and readout; for the others it neglects how far their axes rotate during the
-    /// readout, to second order.
+    /// Between the first, the middle and the last row, a change of the pose is interpolated by a parabola, rotations in world
+    /// axes. It is exact for changes of pose, velocity, readout, joint rates and joint accelerations but for the rotation of
+    /// their axes during the readout, which it follows to second order.
     pub(crate) fn by_blocks(&self, observation: &TrackObservation, by_pose: &Matrix2x6<f64>) -> PoseBlocksOf<usize> {
         let slot = observation.slot;
-        let Poses::Rolling { ends, .. } = &self.poses else { return [Some((slot, *by_pose)), None] };
+        let Poses::Rolling { rows, .. } = &self.poses else { return [Some((slot, *by_pose)), None, None] };
         let fraction = self.row_fraction(&observation.uv_px);
         let world_from_row = self.pose(slot, &observation.uv_px).rotation;
         let by_world = by_pose.fixed_columns::<3>(0) * world_from_row.transpose();
-        let part = |end: usize, weight: f64| {
-            let mut by_end = by_pose * weight;
-            by_end.fixed_columns_mut::<3>(0).copy_from(&(by_world * ends[slot][end].rotation * weight));
-            Some((2 * slot + end, by_end))
-        };
-        [part(0, 1.0 - fraction), part(1, fraction)]
+        let weights = [
+            (2.0 * fraction - 1.0) * (fraction - 1.0),
+            4.0 * fraction * (1.0 - fraction),
+            fraction * (2.0 * fraction - 1.0),
+        ];
+        [0, 1, 2].map(|row| {
+            let mut by_row = by_pose * weights[row];
+            by_row.fixed_columns_mut::<3>(0).copy_from(&(by_world * rows[slot][row].rotation * weights[row]));
+            Some((ROLLING_ROWS.len() * slot + row, by_row))
+        })
     }
 }
 

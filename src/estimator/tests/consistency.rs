@@ -21,7 +21,7 @@ fn reported(mean_squares: impl IntoIterator<Item = f64>) -> Vec<usize> {
     let mut watch = ConsistencyMonitor::default();
     let (mut reported, mut first) = (Vec::new(), None);
     for (step, value) in mean_squares.into_iter().enumerate() {
-        let warnings = watch.observe(step as i64 * 50_000_000, &encoder(value), &config, || None);
+        let warnings = watch.observe(step as i64 * 50_000_000, &encoder(value), &config, Vec::new);
         if let [warning] = warnings.as_slice() {
             assert!(warning.starts_with("Encoder readings inconsistent"), "{warning}");
             assert!(warning.contains("> 1.60 over 4 s") && warning.ends_with("try timeshift=on"), "{warning}");
@@ -56,7 +56,7 @@ fn only_fixed_parameters_are_suggested_for_estimation() {
     let mut config = EstimatorConfig { estimate_timeshift: true, calibrate: false, ..config() };
     let warning = |config: &EstimatorConfig| {
         let mut watch = ConsistencyMonitor::default();
-        (0..100).find_map(|step| watch.observe(step * 50_000_000, &encoder(5.0), config, || None).pop()).unwrap()
+        (0..100).find_map(|step| watch.observe(step * 50_000_000, &encoder(5.0), config, Vec::new).pop()).unwrap()
     };
     assert!(warning(&config).ends_with("try calibrate=on"));
     config.calibrate = true;

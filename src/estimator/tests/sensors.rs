@@ -65,7 +65,8 @@ fn the_readout_of_a_rigid_camera_is_estimated_and_named_where_it_is_ignored() {
 #[test]
 fn the_readout_of_a_gimballed_camera_is_estimated_with_the_motion_of_its_joints() {
     let flight = synthetic_tracks(&SyntheticOptions { readout_s: READOUT_S, ..options(SyntheticMount::Gimbal, 2) });
-    let (ignored_m, _, _) = run(&flight, |_| {});
+    let (ignored_m, warnings) = ignored(&flight);
+    assert!(warnings.iter().any(|warning| warning.contains("try readout=on")), "{warnings:?}");
     let (estimated_m, _, report) = run(&flight, |config| config.estimate_readout = true);
     let (readout_s, sigma_s) = value(&report, "readout");
     assert!((readout_s - READOUT_S).abs() < 0.0015, "{readout_s} ± {sigma_s} s");

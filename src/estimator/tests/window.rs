@@ -72,8 +72,7 @@ fn the_gradient_of_every_factor_meets_central_differences() {
             let up = problem.costs(&problem.stepped(&estimate, &delta, &still)).total();
             let down = problem.costs(&problem.stepped(&estimate, &-delta, &still)).total();
             let numeric = (up - down) / (2.0 * step);
-            // Rows of poe's prior are taken as flat; between the first and the last row of a rolling shutter a change of the
-            // pose is interpolated.
+            // Rows of poe's prior are taken as flat; between rows of a rolling shutter a change of the pose is interpolated.
             let tolerance = match name {
                 "poe" => 2e-2,
                 name if name.ends_with("rolling") => 2e-3,

@@ -9,24 +9,35 @@ use crate::estimator::setup::Setup;
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::window::frames;
 use crate::geometry::seconds_from_ns;
-use crate::gimbal::{ParameterId, Quantity};
+use crate::gimbal::ParameterId;
 use crate::optimization::dense::Cholesky;
 use crate::sensors::ImuSample;
 
 /// Length of the motion after a stamp that frames of the window take from the samples before the next frame, in seconds.
 const MOTION_AFTER_S: f64 = 0.06;
 
-/// Smallest change of χ² that makes a parameter suspicious: ten standard deviations of the parameter.
-const SIGNIFICANT_CHI2: f64 = 100.0;
-
-/// A fixed parameter that would lower the cost of the window if it were estimated.
+/// A fixed parameter, and what it would be if it were estimated: to first order, from one window or from several.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SuspectedParameter {
     pub(crate) parameter: ParameterId,
-    /// By how much χ² would fall, to first order.
-    pub(crate) chi2: f64,
-    /// Change of the parameter, to first order.
+    /// Change from the value of the rig.
     pub(crate) change: f64,
+    /// Inverse of its variance.
+    pub(crate) information: f64,
+}
+
+impl SuspectedParameter {
+    /// By how much χ² would fall.
+    pub(crate) fn chi2(&self) -> f64 {
+        self.change * self.change * self.information
+    }
+
+    /// Adds what another window says about the same parameter.
+    pub(crate) fn add(&mut self, other: &Self) {
+        let information = self.information + other.information;
+        self.change = (self.change * self.information + other.change * other.information) / information;
+        self.information = information;
+    }
 }
 
 impl WindowState {
@@ -69,24 +80,12 @@ impl WindowState {
         next.motion.samples().iter().take_while(near).copied().collect()
     }
 
-    /// The warning text of a rolling shutter that explains the residuals much better than a time offset does; `None`
-    /// otherwise.
-    pub(crate) fn suspected_shutter(&self, setup: &Setup) -> Option<String> {
-        if !setup.config.calibrate || setup.config.estimate_readout {
-            return None;
+    /// How much each clock and each shutter that is not estimated would lower χ² of the window, each one tried alone with all
+    /// that is estimated; none with a fixed calibration.
+    pub(crate) fn clock_scores(&self, setup: &Setup) -> Vec<SuspectedParameter> {
+        if !setup.config.calibrate {
+            return Vec::new();
         }
-        let suspected = self.suspected_clock(setup)?;
-        let is_shutter = suspected.parameter.quantity == Quantity::Readout && suspected.chi2 > SIGNIFICANT_CHI2;
-        let key = |camera: usize| {
-            let rigid = camera.checked_sub(1).and_then(|rigid| setup.config.rigid_cameras.get(rigid))?;
-            Some(rigid.key.clone())
-        };
-        is_shutter.then(|| suspected.text(key))
-    }
-
-    /// Of the clocks and the shutters that are not estimated, the parameter with which χ² of the window would fall the most,
-    /// each one tried alone with all that is estimated; `None` without any.
-    pub(crate) fn suspected_clock(&self, setup: &Setup) -> Option<SuspectedParameter> {
         let mut wider = setup.clone();
         (wider.config.estimate_timeshift, wider.config.estimate_readout) = (true, true);
         let mut window = self.clone();
@@ -113,24 +112,11 @@ impl WindowState {
             let right = DVector::from_iterator(columns.len(), columns.iter().map(|column| -gradient[*column]));
             let change = factor.solve(&right)[columns.len() - 1];
             let variance = factor.trailing_covariance(1)[(0, 0)];
-            Some(SuspectedParameter { parameter: *parameter, chi2: change * change / variance, change })
+            Some(SuspectedParameter { parameter: *parameter, change, information: variance.recip() })
         };
-        tried.filter_map(score).max_by(|one, other| one.chi2.total_cmp(&other.chi2))
+        tried.filter_map(score).collect()
     }
 }
 
 /// Added to the diagonal, as in the solver: unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
-
-impl SuspectedParameter {
-    /// The cause and its remedy; `key` is the key of a rigid camera beside the main one by its number.
-    fn text(&self, key: impl Fn(usize) -> Option<String>) -> String {
-        let of = key(self.parameter.part.camera()).map_or_else(|| "the camera".to_owned(), |key| key);
-        format!(
-            "rolling shutter of {of} not modelled (a readout of about {:.0} ms would lower χ² by {:.0}): try readout=on, or set \
-             the readout in the rig",
-            1e3 * self.change,
-            self.chi2
-        )
-    }
-}

@@ -4,12 +4,18 @@
 //! absorbs the error in trajectory and calibration. The encoder residuals and the residuals of the marginalization prior
 //! then stay too large.
 
+use super::column_groups::SuspectedParameter;
 use crate::estimator::{EstimatorConfig, FactorKind, ResidualSummary};
 use crate::geometry::seconds_from_ns;
+use crate::gimbal::Quantity;
 
 /// Averaging time of the squared residuals, in nanoseconds. No warning is given earlier: single images, stops and shocks
 /// are no inconsistency, and the values of the first window are inaccurate by nature.
 const AVERAGED_NS: i64 = 4_000_000_000;
+/// Interval of the windows that are asked for clocks and shutters while a mean exceeds its limit.
+const SAMPLED_NS: i64 = 250_000_000;
+/// Smallest change of χ² that makes a rolling shutter the cause of an inconsistency: five standard deviations of its readout.
+const SIGNIFICANT_CHI2: f64 = 25.0;
 /// Hysteresis: a warning ends when the mean falls to this fraction of its limit.
 const RELEASE: f64 = 0.8;
 
@@ -42,6 +48,10 @@ const MONITORED: [MonitoredFactor; 2] = [
 pub(crate) struct ConsistencyMonitor {
     last_ns: Option<i64>,
     means: [Mean; MONITORED.len()],
+    /// Clocks and shutters that are not estimated, over the windows since a mean exceeds its limit.
+    suspected: Vec<SuspectedParameter>,
+    /// Stamp of the last of these windows.
+    sampled_ns: Option<i64>,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -64,16 +74,32 @@ impl Mean {
 }
 
 impl ConsistencyMonitor {
-    /// Adds the residuals of a solved window and returns the warnings that hold in this step; `cause` names what explains an
-    /// inconsistency that starts, if anything does.
+    /// Whether a mean exceeds its limit.
+    fn is_suspicious(&self) -> bool {
+        MONITORED.iter().zip(&self.means).any(|(monitored, mean)| mean.value > monitored.limit)
+    }
+
+    /// Adds the residuals of a solved window and returns the warnings that hold in this step; `scores` is what the
+    /// window says about clocks and shutters that are not estimated.
     pub(crate) fn observe(
         &mut self,
         stamp_ns: i64,
         residuals: &[ResidualSummary],
         config: &EstimatorConfig,
-        cause: impl Fn() -> Option<String>,
+        scores: impl Fn() -> Vec<SuspectedParameter>,
     ) -> Vec<String> {
         let Some(last_ns) = self.last_ns.replace(stamp_ns) else { return Vec::new() };
+        if !self.is_suspicious() {
+            self.suspected.clear();
+        } else if self.sampled_ns.is_none_or(|sampled_ns| stamp_ns - sampled_ns >= SAMPLED_NS) {
+            self.sampled_ns = Some(stamp_ns);
+            for score in scores() {
+                match self.suspected.iter_mut().find(|known| known.parameter == score.parameter) {
+                    Some(known) => known.add(&score),
+                    None => self.suspected.push(score),
+                }
+            }
+        }
         let mut warnings = Vec::new();
         for (monitored, mean) in MONITORED.iter().zip(&mut self.means) {
             let summary = residuals.iter().find(|summary| summary.factor == monitored.factor);
@@ -86,11 +112,27 @@ impl ConsistencyMonitor {
                 mean.cause = None;
                 continue;
             };
-            let cause = mean.cause.get_or_insert_with(|| cause().unwrap_or_else(|| usual_causes(config)));
+            let suspected = &self.suspected;
+            let cause = mean.cause.get_or_insert_with(|| cause(suspected, config));
             warnings.push(warning_text(monitored, value, cause));
         }
         warnings
     }
+}
+
+/// The cause of an inconsistency: a rolling shutter where it explains the windows better than any clock, else what may be wrong
+/// in general.
+fn cause(suspected: &[SuspectedParameter], config: &EstimatorConfig) -> String {
+    let strongest = suspected.iter().max_by(|one, other| one.chi2().total_cmp(&other.chi2()));
+    let is_shutter =
+        |it: &&SuspectedParameter| it.parameter.quantity == Quantity::Readout && it.chi2() > SIGNIFICANT_CHI2;
+    let Some(shutter) = strongest.filter(is_shutter) else { return usual_causes(config) };
+    let rigid = shutter.parameter.part.camera().checked_sub(1).and_then(|rigid| config.rigid_cameras.get(rigid));
+    let camera = rigid.map_or("the camera", |rigid| &rigid.key);
+    format!(
+        "rolling shutter of {camera} not modelled (a readout explains the residuals better than a time offset does): try \
+         readout=on, or set the readout in the rig, which check measures"
+    )
 }
 
 /// What may be wrong where no single parameter explains an inconsistency, and the options that may remove it.

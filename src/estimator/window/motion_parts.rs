@@ -59,10 +59,11 @@ pub(crate) fn motion_parts(
         body_parts(&to_newest, &there, &mut put);
         joint_parts(calibration, &newest.joints_rad, &frame.joints_rad, &mut put);
     }
-    let shift = sensor.shift_column.map(|column| (column, [1.0, 1.0]));
-    let readout = sensor.readout_column.map(|column| (column, [0.0, 1.0]));
-    for (column, factors) in shift.into_iter().chain(readout) {
-        clock_parts(&frames, maps, column, &factors[..rows.len()], &mut parts);
+    if let Some(column) = sensor.shift_column {
+        clock_parts(&frames, maps, column, &[1.0], &mut parts);
+    }
+    if let Some(column) = sensor.readout_column {
+        clock_parts(&frames, maps, column, rows, &mut parts);
     }
     parts
 }
