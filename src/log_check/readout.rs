@@ -21,8 +21,17 @@ pub(super) fn check_readout(
     rotations: &[ImageRotation],
     findings: &mut Findings,
 ) -> f64 {
-    let Some(found) = measured(camera, imu_facts, rotations) else { return camera.readout_s };
     let key = &camera.key;
+    let images = image_pairs(camera, rotations);
+    if images.is_empty() {
+        return camera.readout_s;
+    }
+    let Some(found) = measured(camera, &images, imu_facts) else {
+        let title = format!("the readout of {key} is unobservable from its images");
+        let evidence = format!("{} image pairs, with too little rotation for rows to differ", images.len());
+        findings.add(Severity::Note, Area::Time, title, evidence, ROTATE);
+        return camera.readout_s;
+    };
     let ReadoutMeasurement { readout_s, sigma_s, misfits_rad, .. } = found;
     let [without_px, with_px] = misfits_rad.map(|misfit_rad| misfit_rad * camera.model.focal_length_px());
     let evidence = format!(
@@ -46,7 +55,7 @@ pub(super) fn check_readout(
     }
     if sigma_s > USEFUL_SIGMA_S {
         let title = format!("the readout of {key} is unobservable from its images");
-        findings.add(Severity::Note, Area::Time, title, evidence, "rotate faster, to and fro about all axes");
+        findings.add(Severity::Note, Area::Time, title, evidence, ROTATE);
     } else if camera.readout_s == 0.0 {
         findings.good(Area::Time, format!("{key} exposes all rows at once"), evidence);
     } else {
@@ -55,19 +64,25 @@ pub(super) fn check_readout(
     camera.readout_s
 }
 
-fn measured(camera: &CameraRig, imu_facts: &ImuFacts, rotations: &[ImageRotation]) -> Option<ReadoutMeasurement> {
+const ROTATE: &str = "rotate faster, to and fro about all axes";
+
+/// The features of a camera's consecutive images, by the clock of the IMU as far as the rig has it.
+fn image_pairs(camera: &CameraRig, rotations: &[ImageRotation]) -> Vec<ImagePair> {
     let of_camera = rotations.iter().filter(|rotation| rotation.camera_key == camera.key);
-    let images: Vec<ImagePair> = of_camera
+    of_camera
         .filter(|rotation| !rotation.tracks.is_empty())
         .map(|rotation| ImagePair {
             stamps_s: [rotation.from_ns, rotation.to_ns]
                 .map(|stamp_ns| seconds_from_ns(stamp_ns) + camera.timeshift_cam_imu_s),
             tracks: rotation.tracks.clone(),
         })
-        .collect();
+        .collect()
+}
+
+fn measured(camera: &CameraRig, images: &[ImagePair], imu_facts: &ImuFacts) -> Option<ReadoutMeasurement> {
     let options = ReadoutOptions::for_focal_length(camera.model.focal_length_px());
     let CameraMount::Static { imu_from_camera } = &camera.mount else {
-        return measure_readout(&images, None, &options);
+        return measure_readout(images, None, &options);
     };
     let camera_from_imu = imu_from_camera.rotation.inverse();
     let gyroscope = AngularRates::new(
@@ -76,5 +91,5 @@ fn measured(camera: &CameraRig, imu_facts: &ImuFacts, rotations: &[ImageRotation
             .iter()
             .map(|sample| (seconds_from_ns(sample.stamp_ns), camera_from_imu * sample.angular_velocity_rad_per_s)),
     );
-    measure_readout(&images, Some(&gyroscope), &options)
+    measure_readout(images, Some(&gyroscope), &options)
 }

@@ -143,7 +143,7 @@ impl ImuIntrinsics {
 
     /// The matrices of Kalibr's file, the gyroscope's `M` lower triangular as Kalibr has it; `None` where a correction cannot
     /// be inverted.
-    pub fn to_kalibr(&self) -> Option<KalibrImuMatrices> {
+    pub fn to_kalibr(self) -> Option<KalibrImuMatrices> {
         let measured_from_true = self.gyroscope_correction.try_inverse()?;
         // `A = L · Q` from the transpose, `Aᵀ = Qᵀ · Lᵀ`.
         let (rotation, upper) = rotation_and_upper(&measured_from_true.transpose());

@@ -88,6 +88,14 @@ pub struct ReadoutMeasurement {
     pub misfits_rad: [f64; 2],
 }
 
+/// Half the time over which the gyroscope's rates are averaged.
+const SMOOTHING_S: f64 = 0.01;
+/// A usual readout, and how far a row usually is from the mean row: by these a pair's rows differ.
+const USUAL_READOUT_S: f64 = 0.03;
+const USUAL_ROW: f64 = 0.25;
+/// Least such difference, as a ratio of the largest standard deviation of a bearing: errors of the lens model and drifts of
+/// tracks are a twentieth of a pixel.
+const MIN_EFFECT_RATIO: f64 = 0.14;
 /// Quantile of the distances that a measurement reports.
 const MISFIT_QUANTILE: f64 = 0.9;
 /// Step of the search for a readout.
@@ -113,7 +121,7 @@ const MIN_OFFSET_GAIN: f64 = 0.2;
 /// gyroscope (camera frame, the clock of the gyroscope; bias and errors of the axes do not matter).
 ///
 /// Without a gyroscope the rate is that of the images, which then must be consecutive. Returns `None` with too few pairs, or
-/// without any information about the readout.
+/// with so little rotation that the rows hardly differ.
 pub fn measure_readout(
     images: &[ImagePair],
     gyroscope: Option<&AngularRates>,
@@ -133,6 +141,9 @@ pub fn measure_readout(
         readout_s = search.refine(readout_s)?.0;
     }
     let (readout_s, sigma_s) = search.refine(readout_s)?;
+    if search.row_effect_rad() < MIN_EFFECT_RATIO * options.bearing_sigmas_rad[0] {
+        return None;
+    }
     let with = search.misfit_rad(readout_s, MISFIT_QUANTILE);
     search.fit(0.0);
     let without = search.misfit_rad(0.0, MISFIT_QUANTILE);
@@ -157,7 +168,7 @@ struct Search<'a> {
     /// Whether the rates are those of the images.
     of_images: bool,
     rates: AngularRates,
-    options: &'a ReadoutOptions,
+    options: ReadoutOptions,
     /// Standard deviation of a bearing.
     sigma_rad: f64,
     pairs: Vec<Pair<'a>>,
@@ -166,13 +177,16 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(images: &'a [ImagePair], gyroscope: Option<&AngularRates>, options: &'a ReadoutOptions) -> Self {
+    fn new(images: &'a [ImagePair], gyroscope: Option<&AngularRates>, options: &ReadoutOptions) -> Self {
+        // An image is read before the next one begins.
+        let intervals_s = images.iter().map(|pair| pair.stamps_s[1] - pair.stamps_s[0]);
+        let options = ReadoutOptions { largest_s: intervals_s.fold(options.largest_s, f64::min), ..*options };
         let usable = images.iter().filter(|pair| pair.tracks.len() >= MIN_TRACKS);
         let unfitted =
             |images| Pair { images, motion: PairMotion::of_rotation(UnitQuaternion::identity()), counts: true };
         let mut search = Self {
             of_images: gyroscope.is_none(),
-            rates: gyroscope.cloned().unwrap_or_default(),
+            rates: gyroscope.map(|gyroscope| gyroscope.smoothed(SMOOTHING_S)).unwrap_or_default(),
             options,
             sigma_rad: options.bearing_sigmas_rad[0],
             pairs: usable.map(unfitted).collect(),
@@ -251,6 +265,15 @@ impl<'a> Search<'a> {
             now: so3::exp(&now.at(track.now.row)) * track.now.bearing,
         };
         images.tracks.iter().map(carried).collect()
+    }
+
+    /// How much the bearings of different rows differ in a pair by a usual readout, the median over pairs, in radians.
+    fn row_effect_rad(&self) -> f64 {
+        let change = |pair: &Pair<'_>| {
+            let [from_s, to_s] = pair.images.stamps_s.map(|stamp_s| stamp_s + self.offset_s);
+            Some((self.rates.at(to_s)? - self.rates.at(from_s)?).norm())
+        };
+        median(self.counting().filter_map(change)).unwrap_or(0.0) * USUAL_READOUT_S * USUAL_ROW
     }
 
     fn counting(&self) -> impl Iterator<Item = &Pair<'a>> {

@@ -38,6 +38,14 @@ impl AngularRates {
         rates
     }
 
+    /// The mean rates over `half_s` to either side of each sample: without vibration, which averages out over the readout.
+    #[must_use]
+    pub(super) fn smoothed(&self, half_s: f64) -> Self {
+        let mean =
+            |time_s: &f64| Some((*time_s, self.angle_between(time_s - half_s, time_s + half_s)? / (2.0 * half_s)));
+        Self::new(self.times_s.iter().filter_map(mean))
+    }
+
     /// Index of the sample before a time and the fraction of the way to the next one.
     fn place(&self, time_s: f64) -> Option<(usize, f64)> {
         let after = self.times_s.partition_point(|sample_s| *sample_s <= time_s).clamp(1, self.times_s.len().max(1));

@@ -60,7 +60,7 @@ fn knot_rates(pairs: &[([f64; 2], Vector3<f64>)], lengths_s: &[f64]) -> Vec<Vect
     let (mut above, mut right) = (Vec::with_capacity(count), Vec::<Vector3<f64>>::with_capacity(count));
     for knot in 0..count {
         let (below, diagonal, over, value) = row(knot);
-        let before = knot.checked_sub(1).map_or((0.0, Vector3::zeros()), |index| (above[index], right[index]));
+        let before = knot.checked_sub(1).map_or_else(|| (0.0, Vector3::zeros()), |index| (above[index], right[index]));
         let pivot = diagonal - below * before.0;
         above.push(over / pivot);
         right.push((value - before.1 * below) / pivot);

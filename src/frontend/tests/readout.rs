@@ -131,7 +131,7 @@ fn a_readout_is_measured_with_and_without_parallax() {
 fn an_offset_of_the_clocks_is_no_readout() {
     for time_offset_s in [-0.04, 0.03] {
         for readout_s in [0.0, 0.03] {
-            let flight = Flight { time_offset_s, readout_s, ..Flight::default() };
+            let flight = Flight { readout_s, time_offset_s, ..Flight::default() };
             check("offset", &flight, 2e-3);
             let (images, rates) = flight.images(99);
             let found = measure_readout(&images, Some(&rates), &ReadoutOptions::for_focal_length(FOCAL_PX)).unwrap();
@@ -145,7 +145,7 @@ fn without_rotation_the_readout_is_not_known() {
     let flight = Flight { rotation: 0.01, speed_m_per_s: 0.2, ..Flight::default() };
     let (images, rates) = flight.images(5);
     let found = measure_readout(&images, Some(&rates), &ReadoutOptions::for_focal_length(FOCAL_PX));
-    assert!(found.is_none_or(|found| found.sigma_s > 0.003), "{found:?}");
+    assert_eq!(found, None);
     let (images, rates) = Flight::default().images(5);
     let options = ReadoutOptions::for_focal_length(FOCAL_PX);
     assert_eq!(measure_readout(&images[..8], Some(&rates), &options), None);
