@@ -12,6 +12,7 @@ mod classification;
 mod direction_words;
 mod directions;
 mod elimination;
+mod estimability;
 mod factor;
 mod information;
 pub mod laboratory;
@@ -26,6 +27,7 @@ mod tests;
 
 pub use analysis::{ScalingRule, analyse, analyse_with_scaling};
 pub use direction_words::{parameters_of, parameters_of_weights};
+pub use estimability::{Estimability, ParameterEstimability, count_of, estimability};
 pub use factor::PackedFactor;
 pub use information::{InformationRate, ParameterRate, information_rate};
 pub use parameter_state::{ParameterState, parameter_states};
