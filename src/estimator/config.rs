@@ -1,6 +1,7 @@
 //! Configuration of an estimator.
 
 use super::options::EstimatorOptions;
+use super::state::imu_errors::{self, ImuErrors};
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, ClassicalChain, ParameterId, Parameterization};
@@ -97,6 +98,18 @@ pub fn rigid_columns(camera: u8, imu_from_camera: &RigidTransform) -> Vec<(Param
     let chain = Chain::from_classical(&rigid_chain(imu_from_camera), Parameterization::Minimal);
     let parameters = chain.parameters().into_iter().map(|parameter| parameter.of_camera(camera));
     parameters.zip(chain.values().iter().copied()).collect()
+}
+
+/// Parameters and values of the 15 columns of the intrinsics of an IMU, those of the gyroscope first.
+pub fn imu_columns(intrinsics: &ImuIntrinsics) -> Vec<(ParameterId, f64)> {
+    imu_errors::parameters().into_iter().zip(imu_errors::of_intrinsics(intrinsics).iter().copied()).collect()
+}
+
+/// The intrinsics of an IMU with these values of [`imu_columns`]; a column that is not among them is zero.
+pub fn imu_intrinsics(columns: &[(ParameterId, f64)]) -> ImuIntrinsics {
+    let value_of = |parameter| columns.iter().find(|(known, _)| *known == parameter).map_or(0.0, |(_, value)| *value);
+    let values = ImuErrors::from_iterator(imu_errors::parameters().into_iter().map(value_of));
+    imu_errors::intrinsics(&values)
 }
 
 /// Chain without joints: the extrinsics of a rigid camera.

@@ -18,7 +18,9 @@ mod step_input;
 mod tests;
 mod window;
 
-pub use config::{CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidCamera, rigid_columns};
+pub use config::{
+    CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidCamera, imu_columns, imu_intrinsics, rigid_columns,
+};
 pub use estimator::Estimator;
 pub use factors::{imu_factor, preintegration};
 pub use hypothetical::{HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge};

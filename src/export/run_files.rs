@@ -10,8 +10,6 @@ use super::summary::{RunSummary, summarize, to_json};
 use super::tables::{calibration_csv, frames_csv, information_csv, rank_csv};
 use super::trajectory::{euroc_of_run, tum_of_run};
 use crate::flight_log::output::OutputSet;
-use crate::gimbal::ParameterPart;
-use crate::sensors::{CameraMount, Rig};
 use crate::session::{Recording, RunRecord};
 
 /// The trajectory as a table like EuRoC's.
@@ -67,7 +65,7 @@ pub(super) fn stage_run(
     let summary = summarize(recording, run, options.timing);
     let json = to_json(&summary)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("summary.json") })?;
-    let mut rig = calibrated_rig(recording, run);
+    let mut rig = run.calibrated_rig(&recording.rig);
     let masks = masks::beside(&mut rig)?;
     // The summary says of which log the files are, and comes first.
     let mut files = vec![
@@ -105,37 +103,4 @@ pub(super) fn remove_unwritten(folder: &Path, options: RunFileOptions) -> Result
         }
     }
     Ok(())
-}
-
-/// The rig with the final calibration of the run.
-fn calibrated_rig(recording: &Recording, run: &RunRecord) -> Rig {
-    let mut rig = (*recording.rig).clone();
-    let Some(last) = run.steps.last() else { return rig };
-    let calibration = &last.report.calibration;
-    for (key, pose) in &calibration.rigid_cameras {
-        let camera = rig.cameras.iter_mut().find(|camera| camera.key == *key);
-        if let Some(CameraMount::Static { imu_from_camera }) = camera.map(|camera| &mut camera.mount) {
-            *imu_from_camera = *pose;
-        }
-    }
-    let keys: Vec<&String> =
-        std::iter::once(&run.camera_key).chain(calibration.rigid_cameras.iter().map(|(key, _)| key)).collect();
-    for (parameter, shift_s) in calibration.parameters.iter().zip(&calibration.values) {
-        let ParameterPart::Camera(camera) = parameter.part else { continue };
-        let key = keys.get(usize::from(camera));
-        if let Some(camera) = rig.cameras.iter_mut().find(|camera| Some(&&camera.key) == key) {
-            camera.timeshift_cam_imu_s = *shift_s;
-        }
-    }
-    let chain = &calibration.classical;
-    let Some(camera) = rig.cameras.iter_mut().find(|camera| camera.key == run.camera_key) else { return rig };
-    match &mut camera.mount {
-        CameraMount::Gimbal => {
-            if let Some(gimbal) = &mut rig.gimbal {
-                gimbal.set_chain(chain.clone());
-            }
-        }
-        CameraMount::Static { imu_from_camera } => *imu_from_camera = chain.imu_from_camera(&[]),
-    }
-    rig
 }

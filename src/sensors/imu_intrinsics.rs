@@ -111,6 +111,18 @@ impl ImuIntrinsics {
         })
     }
 
+    /// The same correction in the IMU frame of `given`, as [`Self::parameters`] may rotate it: what is then left after `given`
+    /// has an upper triangular matrix of the accelerometer. `None` where a matrix of `given` is singular.
+    pub fn in_frame_of(&self, given: &Self) -> Option<Self> {
+        let left = self.left_after(given)?;
+        let (own_from_given, _) = rotation_and_upper(&left.accelerometer_correction);
+        let given_from_own = own_from_given.transpose();
+        Some(Self {
+            gyroscope_correction: given_from_own * self.gyroscope_correction,
+            accelerometer_correction: given_from_own * self.accelerometer_correction,
+        })
+    }
+
     /// From the independent parameters.
     pub fn from_parameters(parameters: &ImuIntrinsicsParameters) -> Self {
         let rotation = so3::exp(&parameters.gyroscope_rotation_rad).to_rotation_matrix().into_inner();
@@ -253,5 +265,10 @@ mod tests {
         assert!((rotation.transpose() * rotation - Matrix3::identity()).amax() < 1e-14);
         assert!((rotation - Matrix3::identity()).amax() > 0.01);
         assert!((rotation * intrinsics.gyroscope_correction - again.gyroscope_correction).amax() < 1e-14);
+        // What a calibration of corrected samples finds leads back to the frame of the given intrinsics.
+        let whole = ImuIntrinsics::from_parameters(&some()).after(&intrinsics);
+        let rotated = ImuIntrinsics::from_parameters(&whole.parameters());
+        assert!((rotated.accelerometer_correction - whole.accelerometer_correction).amax() > 0.01);
+        check_near(&rotated.in_frame_of(&intrinsics).unwrap(), &whole);
     }
 }

@@ -2,6 +2,7 @@
 //! depend on the source of the data (log, simulation, driver).
 
 mod attitude_source;
+mod camera_values;
 mod gray_image;
 mod image_mask;
 mod imu;

@@ -21,7 +21,7 @@ mod plan;
 mod playback;
 mod record;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use engine::{
     BreakpointHit, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation, FlightNoiseError, SnapshotUse,

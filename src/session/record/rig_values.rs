@@ -1,13 +1,13 @@
-//! The rig's values of the calibration parameters that a run estimates.
+//! The rig's values of the calibration parameters that a run estimates, and a rig with the estimated ones.
 
 use super::run::RunRecord;
-use crate::estimator::{CalibrationEstimate, rigid_columns};
-use crate::gimbal::{Chain, NearestForm, ParameterId, Parameterization};
-use crate::sensors::Rig;
+use crate::estimator::{CalibrationEstimate, imu_columns, imu_intrinsics, rigid_columns};
+use crate::gimbal::{Chain, NearestForm, ParameterGroup, ParameterId, ParameterPart, Parameterization};
+use crate::sensors::{CameraMount, Rig};
 
 impl RunRecord {
-    /// The rig's values of the run's calibration parameters in the parameterization of `estimate`, in radians, metres
-    /// and seconds; angles lie in (−π, π]. Returns `None` when the rig does not have the cameras.
+    /// The rig's values of the run's calibration parameters in the parameterization of `estimate`, each in the unit of its
+    /// dimension; angles lie in (−π, π]. Returns `None` when the rig does not have the cameras.
     ///
     /// The classical parameterization has several equivalent values; the result has those nearest to `given`, the rig
     /// of the run's prior, because the run estimates near those.
@@ -16,18 +16,67 @@ impl RunRecord {
         let conversion = self.conversion_for(given, estimate, estimate.parameterization)?;
         let chain = conversion.of(&Chain::from_classical(&main, Parameterization::Classical));
         let mut values: Vec<_> = chain.parameters().into_iter().zip(chain.values().iter().copied()).collect();
-        let mut clocks = vec![(ParameterId::timeshift(0), self.camera_key.as_str())];
         for (camera, (key, _)) in (1..).zip(&estimate.rigid_cameras) {
             values.extend(rigid_columns(camera, &rig.chain_of_camera(key)?.imu_from_camera(&[])));
-            clocks.push((ParameterId::timeshift(camera), key));
         }
-        for (clock, key) in clocks.into_iter().filter(|(clock, _)| estimate.parameters.contains(clock)) {
-            values.push((clock, rig.camera(key).ok()?.timeshift_cam_imu_s));
+        let keys = self.camera_keys(estimate);
+        for parameter in &estimate.parameters {
+            let ParameterPart::Camera(camera) = parameter.part else { continue };
+            let camera = rig.camera(keys.get(usize::from(camera))?).ok()?;
+            values.extend(camera.value(parameter.quantity).map(|value| (*parameter, value)));
+        }
+        if has_imu_columns(estimate) {
+            values.extend(imu_columns(&rig.imu.intrinsics));
         }
         for (parameter, value) in &mut values {
             *value = parameter.principal_value(*value);
         }
         Some(values)
+    }
+
+    /// The rig of the run's prior with the final calibration of the run.
+    pub fn calibrated_rig(&self, given: &Rig) -> Rig {
+        let mut rig = given.clone();
+        let Some(last) = self.steps.last() else { return rig };
+        let calibration = &last.report.calibration;
+        for (key, pose) in &calibration.rigid_cameras {
+            let camera = rig.cameras.iter_mut().find(|camera| camera.key == *key);
+            if let Some(CameraMount::Static { imu_from_camera }) = camera.map(|camera| &mut camera.mount) {
+                *imu_from_camera = *pose;
+            }
+        }
+        let values = calibration.values.iter().copied();
+        let columns: Vec<(ParameterId, f64)> = calibration.parameters.iter().copied().zip(values).collect();
+        for (number, key) in self.camera_keys(calibration).into_iter().enumerate() {
+            let of_camera = columns.iter().filter(|(parameter, _)| {
+                matches!(parameter.part, ParameterPart::Camera(camera) if usize::from(camera) == number)
+            });
+            let values: Vec<_> = of_camera.map(|(parameter, value)| (parameter.quantity, *value)).collect();
+            if let Some(camera) = rig.cameras.iter_mut().find(|camera| camera.key == key) {
+                camera.set_values(&values);
+            }
+        }
+        if has_imu_columns(calibration) {
+            let intrinsics = imu_intrinsics(&columns);
+            rig.imu.intrinsics = intrinsics.in_frame_of(&given.imu.intrinsics).unwrap_or(intrinsics);
+        }
+        let chain = &calibration.classical;
+        let Some(camera) = rig.cameras.iter_mut().find(|camera| camera.key == self.camera_key) else { return rig };
+        match &mut camera.mount {
+            CameraMount::Gimbal => {
+                if let Some(gimbal) = &mut rig.gimbal {
+                    gimbal.set_chain(chain.clone());
+                }
+            }
+            CameraMount::Static { imu_from_camera } => *imu_from_camera = chain.imu_from_camera(&[]),
+        }
+        rig
+    }
+
+    /// Keys of the cameras by the number that their parameters have, the main camera first.
+    pub fn camera_keys<'a>(&'a self, estimate: &'a CalibrationEstimate) -> Vec<&'a str> {
+        let rigid = estimate.rigid_cameras.iter().map(|(key, _)| key.as_str());
+        std::iter::once(self.camera_key.as_str()).chain(rigid).collect()
     }
 
     /// The conversion of mechanisms to a parameterization. Of several equivalent values it returns those nearest to the
@@ -48,4 +97,8 @@ impl RunRecord {
         };
         Some(NearestForm::new(near, &scales.into()))
     }
+}
+
+fn has_imu_columns(estimate: &CalibrationEstimate) -> bool {
+    estimate.parameters.iter().any(|parameter| parameter.group() == ParameterGroup::Imu)
 }

@@ -22,7 +22,7 @@ pub(in crate::session) fn input_of(frame: &SyntheticFrame, encoder_sigma_rad: f6
     }
 }
 
-pub(in crate::session) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
+pub(crate) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
     recorded_with(flight, spec, None)
 }
 

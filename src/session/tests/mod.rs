@@ -1,4 +1,5 @@
 mod forks;
-pub(super) mod memory;
+pub(crate) mod memory;
 mod plan;
+mod rig_values;
 mod warnings;

@@ -1,0 +1,53 @@
+//! A rig's values of estimated parameters, and a run's values in a rig.
+
+use super::memory::recorded;
+use crate::gimbal::tests::parameter;
+use crate::gimbal::{ParameterGroup, ParameterId, Quantity};
+use crate::observability::{Estimability, estimability};
+use crate::simulation::{IntrinsicsError, SyntheticOptions, synthetic_tracks};
+
+#[test]
+fn every_estimated_parameter_has_a_value_in_a_rig_and_leads_back_to_it() {
+    let intrinsics_error = IntrinsicsError { focal_ratio: 0.01, ..IntrinsicsError::default() };
+    let flight = synthetic_tracks(&SyntheticOptions {
+        duration_s: 5.0,
+        features: 60,
+        readout_s: 0.02,
+        intrinsics_error,
+        imu_intrinsics_error: [0.01, 0.01],
+        ..SyntheticOptions::default()
+    });
+    let run = recorded(&flight, "auto:readout=on,intrinsics=on,imu-intrinsics=on");
+    let estimate = &run.steps.last().unwrap().report.calibration;
+    let groups = ParameterGroup::ALL.map(|group| estimate.parameters.iter().filter(|id| id.group() == group).count());
+    assert_eq!(groups[2..], [15, 1], "{groups:?}");
+    assert!(groups[0] == 18 && groups[1] >= 4, "{groups:?}");
+
+    let truth = run.values_in(&flight.true_rig, &flight.given_rig, estimate).unwrap();
+    let of = |values: &[(ParameterId, f64)], wanted: ParameterId| {
+        values.iter().find(|(id, _)| *id == wanted).map(|(_, value)| *value)
+    };
+    assert!(estimate.parameters.iter().all(|id| of(&truth, *id).is_some()), "{truth:?}");
+    let camera = &flight.true_rig.cameras[0];
+    assert_eq!(of(&truth, parameter("readout")), Some(0.02));
+    assert_eq!(of(&truth, parameter("fx")), Some(camera.model.intrinsics_px[0]));
+    let imu = flight.true_rig.imu.intrinsics.parameters();
+    assert_eq!(of(&truth, parameter("gyroscope.ry")), Some(imu.gyroscope_rotation_rad.y));
+    assert_eq!(of(&truth, parameter("accelerometer.mxz")), Some(imu.accelerometer.misalignment.y));
+    assert!(imu.accelerometer.misalignment.y != 0.0);
+
+    let calibrated = run.calibrated_rig(&flight.given_rig);
+    let written = run.values_in(&calibrated, &calibrated, estimate).unwrap();
+    for (id, value) in estimate.parameters.iter().zip(&estimate.values) {
+        let (found, expected) = (of(&written, *id).unwrap(), id.principal_value(*value));
+        assert!((found - expected).abs() < 1e-9 * id.scale(), "{id:?}: {found} and {expected}");
+    }
+    assert!(calibrated.cameras[0].value(Quantity::Readout) != Some(0.0) && !calibrated.imu.intrinsics.is_identity());
+
+    let rank = run.steps.iter().rev().find_map(|step| step.rank.as_ref());
+    let rows = estimability(estimate, rank, &flight.given_rig.parameter_names());
+    assert_eq!(rows.len(), estimate.parameters.len());
+    assert!(rows.is_sorted_by_key(|row| row.parameter.group()));
+    let known = rows.iter().find(|row| row.parameter == parameter("readout")).unwrap();
+    assert!(known.estimability == Estimability::Known && known.sigma < 0.002, "{known:?}");
+}
