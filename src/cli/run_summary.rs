@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dcvins::export::{self, RunSummary};
-use dcvins::observability::MIN_SPURIOUS_GAIN;
+use dcvins::observability::{Estimability, MIN_SPURIOUS_GAIN};
 
 /// The text of a run's summary for the terminal.
 pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
@@ -41,6 +41,7 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
             calibration.parameterization
         ));
     }
+    lines.extend(estimability_lines(&calibration.estimability));
     if let Some(rank) = &summary.rank {
         lines.push(format!(
             "  rank         structural {} of {}, informed {}; deficit: {} parameterization, {} joints, {} absorbed, {} motion\n",
@@ -83,6 +84,18 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
     }
     lines.push(format!("  files        {}\n", folder.display()));
     lines.concat()
+}
+
+/// The parameters by verdict, those of a group together.
+fn estimability_lines(parameters: &[export::EstimabilitySummary]) -> Vec<String> {
+    let verdicts = [Estimability::Known, Estimability::Weak, Estimability::NotFromThisFlight, Estimability::Fixed];
+    let line = |verdict: Estimability| {
+        let of = parameters.iter().filter(|parameter| parameter.estimability == verdict);
+        let names: Vec<&str> = of.map(|parameter| parameter.name.as_str()).collect();
+        (!names.is_empty()).then(|| format!("{} ({}): {}\n", verdict.name(), names.len(), names.join(", ")))
+    };
+    let lines = verdicts.into_iter().filter_map(line).enumerate();
+    lines.map(|(place, text)| format!("  {:<13}{text}", if place == 0 { "calibration" } else { "" })).collect()
 }
 
 /// Spurious information of the priors along the unobservable directions.

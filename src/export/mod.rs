@@ -6,6 +6,7 @@ mod csv_table;
 #[cfg(feature = "gui")]
 mod desktop;
 mod error;
+mod estimability;
 mod evaluation;
 mod existing;
 mod flight_noise;
@@ -31,6 +32,7 @@ pub use calibration_report::{CalibrationReport, report_calibration};
 #[cfg(feature = "gui")]
 pub use desktop::Machine;
 pub use error::ExportError;
+pub use estimability::EstimabilitySummary;
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 pub use existing::{
     check_calibration_folder, check_converted_log, check_report_folder, check_run_folders, check_screenshot,

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::estimability::{EstimabilitySummary, sensor_estimability};
 use super::evaluation::alignment_name;
 use super::structure::{KnownLossSummary, known_losses};
 use crate::estimator::{EventKind, Phase, StageTimes};
@@ -108,6 +109,9 @@ pub struct CalibrationSummary {
     pub columns: usize,
     /// The parameters in column order.
     pub parameters: Vec<ParameterSummary>,
+    /// What the flight determines of them, for a run that estimates more than chain and time offsets.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub estimability: Vec<EstimabilitySummary>,
     /// Final error of the whole chain against ground truth.
     pub chain_error: Option<ChainError>,
     /// Initial error of the whole chain, with the values of the rig.
@@ -328,6 +332,7 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
             parameterization: run.spec.parameterization.name().to_owned(),
             columns: 0,
             parameters: Vec::new(),
+            estimability: Vec::new(),
             chain_error: None,
             chain_error_initial: None,
         };
@@ -367,6 +372,7 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
         parameterization: last.parameterization.to_string(),
         columns: last.parameters.len(),
         parameters,
+        estimability: sensor_estimability(recording, run),
         chain_error: chain_error(&last.classical),
         chain_error_initial: given.as_ref().and_then(chain_error),
     }

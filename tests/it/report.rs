@@ -49,6 +49,18 @@ fn check_verdict(page: &str, report: &Value) {
                 "{parameter}"
             );
         }
+        let estimability = run["estimability"].as_array().expect("a list");
+        assert_eq!(estimability.len(), parameters.len());
+        for parameter in estimability {
+            let ratio = parameter["ratio"].as_f64().expect("a number");
+            let verdict = match ratio {
+                ..0.3 => "known",
+                0.3..0.9 => "weakly known",
+                _ => "not from this flight",
+            };
+            assert_eq!(parameter["verdict"], verdict, "{parameter}");
+        }
+        assert!(page.contains(&format!("What the flight determines, run {}", run["label"].as_str().expect("a text"))));
     }
     assert!(page.contains("Suggested excitation: "));
     assert!(page.find(report["log_verdict"]["text"].as_str().expect("a text")).expect("it is in the page") < figures);

@@ -8,6 +8,7 @@ use super::ReportOptions;
 use super::inputs::InputFile;
 use super::rank_intervals::{RankInterval, rank_intervals};
 use super::verdict::{RunVerdict, Statement, log_statement};
+use crate::export::estimability::{EstimabilitySummary, estimability_summary};
 use crate::export::summary::{RunSummary, log_name};
 use crate::geometry::seconds_from_ns;
 use crate::log_check::CheckReport;
@@ -35,6 +36,8 @@ pub(super) struct RunContent {
     pub(super) verdict: RunVerdict,
     /// The summary, as in `summary.json`.
     pub(super) summary: RunSummary,
+    /// What the flight determines of the calibration, in groups.
+    pub(super) estimability: Vec<EstimabilitySummary>,
     /// Intervals of constant rank.
     #[serde(rename = "rank_story")]
     pub(super) rank_intervals: Vec<RankInterval>,
@@ -84,6 +87,7 @@ impl ReportContent {
                 label: run.spec.label.clone(),
                 verdict: RunVerdict::new(recording, run, &summary, pose),
                 summary,
+                estimability: estimability_summary(recording, run),
                 rank_intervals: rank_intervals(run, &recording.rig),
                 events,
                 frequent_events,

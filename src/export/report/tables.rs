@@ -5,6 +5,7 @@ use maud::{Markup, html};
 use super::content::{ReportContent, RunContent};
 use super::html::{list, number, table};
 use super::verdict::ParameterVerdict;
+use crate::export::estimability::EstimabilitySummary;
 use crate::export::summary::ParameterSummary;
 use crate::geometry::Dimension;
 use crate::log_check::{CheckReport, Severity};
@@ -105,6 +106,33 @@ pub(super) fn calibration(run: &RunContent) -> Markup {
     let rows: Vec<Vec<String>> = parameters.iter().zip(&run.verdict.parameters).map(row).collect();
     let caption =
         format!("Calibration of run {}, parameterization {}", run.label, run.summary.calibration.parameterization);
+    table(&caption, &header, &rows)
+}
+
+/// Which parameters the flight of one run determines, in groups.
+pub(super) fn estimability(run: &RunContent) -> Markup {
+    let header = ["parameter", "group", "unit", "final", "± σ", "prior ± σ", "σ / prior", "verdict", "reason"];
+    let row = |parameter: &EstimabilitySummary| {
+        let (unit, scale, decimals) = shown_unit(parameter.dimension);
+        let sigma = |sigma: Option<f64>| sigma.map_or_else(String::new, |sigma| number(sigma * scale, decimals));
+        vec![
+            parameter.name.clone(),
+            parameter.group.to_owned(),
+            unit.to_owned(),
+            number(parameter.value * scale, decimals),
+            sigma(parameter.sigma),
+            sigma(parameter.prior_sigma),
+            parameter.ratio.map_or_else(String::new, |ratio| number(ratio, 3)),
+            parameter.verdict.to_owned(),
+            parameter.reason.clone(),
+        ]
+    };
+    let rows: Vec<Vec<String>> = run.estimability.iter().map(row).collect();
+    let caption = format!(
+        "What the flight determines, run {}: known with σ below 0.3 of the prior, not from this flight from 0.9 on; \
+         directions are those of the last window",
+        run.label
+    );
     table(&caption, &header, &rows)
 }
 
