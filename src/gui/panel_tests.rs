@@ -109,6 +109,20 @@ fn the_jacobian_is_drawn_in_every_case() {
 }
 
 #[test]
+fn parameters_of_sensors_are_drawn_in_groups() {
+    let recording = super::samples::sensor_recording();
+    let end_ns = recording.last_stamp_ns();
+    let selection = Selection { parameter: Some(parameter("readout")), ..Selection::default() };
+    let mut rank = super::rank::RankPanel::default();
+    let mut jacobian = super::jacobian::JacobianPanel::default();
+    let draw = |name: &str, show: &mut dyn FnMut(&mut Ui, &mut PanelContext<'_>)| {
+        screenshot(name, &recording, end_ns, [1366, 768], ThemeName::Dark, &selection, show);
+    };
+    draw("rank-groups", &mut |ui, ctx| rank.ui(ui, ctx));
+    draw("jacobian-groups", &mut |ui, ctx| jacobian.ui(ui, ctx));
+}
+
+#[test]
 fn residuals_are_drawn_in_every_case() {
     check("residuals", [480, 420], super::residuals::ResidualsPanel::ui);
 }

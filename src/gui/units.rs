@@ -1,6 +1,7 @@
 //! Display of numbers: degrees and millimetres on the screen, radians and metres in the data.
 
 use crate::geometry::Dimension;
+use crate::gimbal::{ParameterGroup, ParameterId};
 
 /// Conversion of a stored unit to the shown one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +21,14 @@ impl Shown {
             Dimension::Time => Self { factor: 1000.0, unit: " ms" },
             Dimension::Pixel => Self { factor: 1.0, unit: " px" },
             Dimension::Ratio => Self { factor: 1.0, unit: "" },
+        }
+    }
+
+    /// The conversion for a parameter: that of its dimension, and percent for scale and misalignment of the IMU.
+    pub(crate) fn of_parameter(parameter: ParameterId) -> Self {
+        match (parameter.group(), parameter.dimension()) {
+            (ParameterGroup::Imu, Dimension::Ratio) => Self { factor: 100.0, unit: " %" },
+            (_, dimension) => Self::of(dimension),
         }
     }
 
@@ -85,6 +94,7 @@ pub(crate) fn counted(count: usize, noun: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gimbal::tests::parameter;
 
     #[test]
     fn values_are_as_precise_as_their_sigma() {
@@ -96,6 +106,8 @@ mod tests {
         assert_eq!(angle.sigma(f64::NAN), "–");
         assert_eq!(Shown::of(Dimension::Time).value(-0.01, 0.0002), "-10.00 ms");
         assert_eq!(Shown::of(Dimension::Ratio).value(0.25, 0.01), "0.250");
+        let value = |name: &str| Shown::of_parameter(parameter(name)).value(0.0125, 0.001);
+        assert_eq!(["gyroscope.sx", "k1", "fx"].map(value), ["1.25 %", "0.0125", "0.0125 px"]);
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use egui::{Rect, pos2, vec2};
 
-use super::names::{ChainPart, part_of};
-use crate::gimbal::ParameterId;
+use super::names::{CalibrationPart, part_of};
+use crate::gimbal::{ParameterGroup, ParameterId};
 
 /// Minimum height of a legible plot in points, its title included.
 const MIN_CELL_HEIGHT: f32 = 52.0;
@@ -13,14 +13,18 @@ const MIN_CELL_WIDTH: f32 = 118.0;
 const GAP: f32 = 5.0;
 /// Width of the headings beside the rows.
 pub(crate) const HEADING_WIDTH: f32 = 46.0;
+/// Height of the headings above groups.
+const GROUP_HEIGHT: f32 = 17.0;
 
 /// Rectangles of the plots.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Layout {
-    /// One cell per parameter, in order.
+    /// One cell per parameter that is shown, in order.
     pub(crate) cells: Vec<Rect>,
-    /// Rows by part of the chain, with the rectangle of the heading; empty in the flowing layout.
-    pub(crate) headings: Vec<(ChainPart, Rect)>,
+    /// The heading of each group, in the layout by groups.
+    pub(crate) groups: Vec<(ParameterGroup, Rect)>,
+    /// Rows by part of the calibration, with the rectangle of the heading; empty in the flowing layout.
+    pub(crate) headings: Vec<(CalibrationPart, Rect)>,
     /// The largest free rectangle of the layout by rows.
     pub(crate) legend: Option<Rect>,
     /// Total height, more than available if it has to be scrolled.
@@ -33,7 +37,7 @@ pub(crate) fn lay_out(parameters: &[ParameterId], available: Rect) -> Layout {
 }
 
 fn by_part(parameters: &[ParameterId], available: Rect) -> Option<Layout> {
-    let mut rows: Vec<(ChainPart, usize)> = Vec::new();
+    let mut rows: Vec<(CalibrationPart, usize)> = Vec::new();
     for parameter in parameters {
         let part = part_of(*parameter);
         match rows.last_mut() {
@@ -59,7 +63,8 @@ fn by_part(parameters: &[ParameterId], available: Rect) -> Option<Layout> {
         let top = available.top() + first as f32 * (height + GAP);
         Rect::from_min_size(pos2(available.right() - size.x - GAP, top), size)
     });
-    let mut layout = Layout { cells: Vec::new(), headings: Vec::new(), legend, height: available.height() };
+    let mut layout =
+        Layout { cells: Vec::new(), groups: Vec::new(), headings: Vec::new(), legend, height: available.height() };
     for (row, (part, count)) in rows.into_iter().enumerate() {
         let top = available.top() + row as f32 * (height + GAP);
         let heading = Rect::from_min_size(pos2(available.left(), top), vec2(HEADING_WIDTH, height));
@@ -111,7 +116,41 @@ fn flowing(count: usize, available: Rect) -> Layout {
         })
         .collect();
     let bottom = cells.last().map_or_else(|| available.top(), |cell| cell.bottom());
-    Layout { cells, headings: Vec::new(), legend: None, height: bottom - available.top() }
+    Layout { cells, groups: Vec::new(), headings: Vec::new(), legend: None, height: bottom - available.top() }
+}
+
+/// Lays out groups below each other, each with a heading and cells on one common grid; a folded group, of no cells, is its
+/// heading only.
+pub(crate) fn by_group(groups: &[(ParameterGroup, usize)], available: Rect) -> Layout {
+    let largest = groups.iter().map(|(_, count)| *count).max().unwrap_or(0).max(1);
+    let max_columns = (((available.width() + GAP) / (MIN_CELL_WIDTH + GAP)) as usize).clamp(1, largest);
+    let rows_of = |columns: usize| groups.iter().map(|(_, count)| count.div_ceil(columns)).sum::<usize>();
+    // As few columns as give the smallest number of rows: the plots are as wide as possible.
+    let fewest = rows_of(max_columns);
+    let columns = (1..=max_columns).find(|columns| rows_of(*columns) == fewest).unwrap_or(max_columns);
+    let width = (available.width() - GAP * (columns as f32 - 1.0)) / columns as f32;
+    let room = available.height() - groups.len() as f32 * GROUP_HEIGHT;
+    let height = (room / fewest.max(1) as f32 - GAP).max(MIN_CELL_HEIGHT);
+    let mut layout = Layout {
+        cells: Vec::new(),
+        groups: Vec::new(),
+        headings: Vec::new(),
+        legend: None,
+        height: available.height(),
+    };
+    let mut top = available.top();
+    for (group, count) in groups {
+        let heading = Rect::from_min_size(pos2(available.left(), top), vec2(available.width(), GROUP_HEIGHT));
+        layout.groups.push((*group, heading));
+        top += GROUP_HEIGHT;
+        layout.cells.extend((0..*count).map(|index| {
+            let corner = vec2((index % columns) as f32 * (width + GAP), (index / columns) as f32 * (height + GAP));
+            Rect::from_min_size(pos2(available.left(), top) + corner, vec2(width.max(1.0), height))
+        }));
+        top += count.div_ceil(columns) as f32 * (height + GAP);
+    }
+    layout.height = top - available.top();
+    layout
 }
 
 #[cfg(test)]
@@ -136,6 +175,36 @@ mod tests {
             assert!(layout.cells[..index].iter().all(|other| !other.shrink(0.1).intersects(cell.shrink(0.1))));
         }
         layout
+    }
+
+    #[test]
+    fn groups_follow_each_other_and_folded_ones_leave_their_room() {
+        use ParameterGroup::{Camera, Chain, Clocks, Imu};
+        let available = Rect::from_min_size(pos2(20.0, 30.0), vec2(1340.0, 560.0));
+        let check = |groups: &[(ParameterGroup, usize)]| {
+            let layout = by_group(groups, available);
+            assert_eq!(layout.cells.len(), groups.iter().map(|(_, count)| count).sum::<usize>());
+            let headings: Vec<_> = layout.groups.iter().map(|(_, heading)| *heading).collect();
+            let all: Vec<Rect> = layout.cells.iter().chain(&headings).map(|rect| rect.shrink(0.1)).collect();
+            for (index, rect) in all.iter().enumerate() {
+                assert!(all[..index].iter().all(|other| !other.intersects(*rect)), "{rect:?}");
+                assert!(available.expand(0.5).x_range().contains(rect.right()), "{rect:?}");
+            }
+            let mut before = 0;
+            for ((_, count), pair) in groups.iter().zip(layout.groups.windows(2)) {
+                let cells = &layout.cells[before..before + count];
+                before += count;
+                assert!(cells.iter().all(|cell| cell.top() > pair[0].1.top() && cell.bottom() < pair[1].1.bottom()));
+            }
+            layout
+        };
+        let all = check(&[(Chain, 24), (Camera, 6), (Imu, 15), (Clocks, 2)]);
+        assert!(all.height <= 560.5 && all.cells[0].height() >= 60.0, "{} {:?}", all.height, all.cells[0]);
+        let folded = check(&[(Chain, 0), (Camera, 6), (Imu, 0), (Clocks, 2)]);
+        assert!(folded.height <= 560.5 && folded.cells[0].height() > 2.0 * all.cells[0].height());
+        let narrow = Rect::from_min_size(pos2(0.0, 0.0), vec2(300.0, 200.0));
+        assert!(by_group(&[(Chain, 24), (Imu, 15)], narrow).height > 900.0);
+        assert!(by_group(&[], narrow).cells.is_empty());
     }
 
     #[test]

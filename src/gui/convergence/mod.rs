@@ -1,21 +1,26 @@
-//! The convergence panel: one small plot per calibration parameter, along the chain.
+//! The convergence panel: one small plot per calibration parameter, along the chain and in groups.
 
 mod csv;
+mod groups;
 mod layout;
 mod model;
 pub(crate) mod names;
 mod paint;
 mod range;
+mod table;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 
 use egui::{Rect, RichText, ScrollArea, Ui, vec2};
 
+use self::groups::{View, groups_of};
 use self::model::{CalibrationHistory, ConvertedHistory};
 use super::PanelContext;
 use super::chain_values::{ParameterValues, true_values};
 use super::plot::{BandCurve, Curve, StateCurve, Wheel};
-use crate::gimbal::ParameterId;
+use crate::gimbal::{ParameterGroup, ParameterId};
 
 /// Height in points of the legend above the plots of a figure.
 const LEGEND_ROW_HEIGHT: f32 = 18.0;
@@ -37,6 +42,9 @@ pub struct ConvergencePanel {
     converted: Vec<ConvertedHistory>,
     /// By run and parameter.
     curves: BTreeMap<(usize, ParameterId), ParameterCurves>,
+    /// What is shown of a calibration with more than one group.
+    view: View,
+    folded: Vec<ParameterGroup>,
 }
 
 impl ConvergencePanel {
@@ -83,17 +91,58 @@ impl ConvergencePanel {
             ui.advance_cursor_after_rect(row);
             available = below.with_min_y(ui.cursor().top());
         }
-        let layout = layout::lay_out(&parameters, available);
+        let groups = groups_of(&parameters);
+        if groups.len() > 1 && !ctx.presentation.is_figure() {
+            groups::choice_ui(ui, &mut self.view, &groups);
+            if self.view == View::Table {
+                let recording = ctx.recording;
+                table::table_ui(ui, ctx, &recording.runs[shown]);
+                return;
+            }
+            available = available.with_min_y(ui.cursor().top());
+        }
+        let chosen = match self.view {
+            View::Group(chosen) => groups.iter().any(|(group, _)| *group == chosen).then_some(chosen),
+            View::All | View::Table => None,
+        };
+        if let Some(chosen) = chosen {
+            parameters.retain(|parameter| parameter.group() == chosen);
+        }
+        let by_group = chosen.is_none() && groups.len() > 1;
+        if by_group {
+            parameters.retain(|parameter| !self.folded.contains(&parameter.group()));
+        }
+        let open = groups.iter().map(|(group, count)| (*group, if self.folded.contains(group) { 0 } else { *count }));
+        let open: Vec<_> = open.collect();
+        let lay_out = |parameters: &[ParameterId], available: Rect| match by_group {
+            true => layout::by_group(&open, available),
+            false => layout::lay_out(parameters, available),
+        };
+        let layout = lay_out(&parameters, available);
         if layout.height > available.height() + 1.0 {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 let top = ui.available_rect_before_wrap().min;
                 let narrow = Rect::from_min_size(top, vec2(available.width() - 10.0, available.height()));
-                let layout = layout::lay_out(&parameters, narrow);
+                let layout = lay_out(&parameters, narrow);
                 ui.allocate_space(vec2(1.0, layout.height));
+                self.headings_ui(ui, ctx, &groups, &layout);
                 self.cells_ui(ui, ctx, (shown, Wheel::Scrolls), &parameters, &ground_truth, &layout);
             });
         } else {
+            self.headings_ui(ui, ctx, &groups, &layout);
             self.cells_ui(ui, ctx, (shown, Wheel::Zooms), &parameters, &ground_truth, &layout);
+        }
+    }
+
+    fn headings_ui(
+        &mut self,
+        ui: &Ui,
+        ctx: &PanelContext<'_>,
+        groups: &[(ParameterGroup, usize)],
+        layout: &layout::Layout,
+    ) {
+        for (group, (_, rect)) in groups.iter().zip(&layout.groups) {
+            groups::heading_ui(ui, ctx, &mut self.folded, *group, *rect);
         }
     }
 

@@ -1,38 +1,56 @@
 //! Order of the parameters along the chain, and their meanings.
 
-use crate::gimbal::{ParameterId, ParameterPart, Quantity};
+use crate::gimbal::{ParameterGroup, ParameterId, ParameterPart, Quantity};
 use crate::sensors::Rig;
 
-/// The part of the chain that a parameter belongs to.
+/// The part of the calibration that a parameter belongs to, in the order of [`ParameterGroup::ALL`].
+///
+/// [`ParameterGroup::ALL`]: crate::gimbal::ParameterGroup::ALL
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum ChainPart {
+pub(crate) enum CalibrationPart {
     /// Between the IMU and the first joint.
     Base,
     /// A link, counted from 1.
     Link(usize),
-    /// Between the last joint and the camera, and time offsets.
+    /// Between the last joint and the camera.
     End,
     /// The extrinsics of a second, rigid camera.
     Rigid,
+    /// The intrinsics of a camera by its number.
+    Camera(u8),
+    /// The intrinsics of the gyroscope.
+    Gyroscope,
+    /// The intrinsics of the accelerometer.
+    Accelerometer,
+    /// Time offsets and readout times.
+    Clocks,
 }
 
-/// The part of the chain that a parameter belongs to.
-pub(crate) fn part_of(parameter: ParameterId) -> ChainPart {
-    match parameter.part {
-        ParameterPart::ImuFromBase | ParameterPart::Base => ChainPart::Base,
-        ParameterPart::Link(link) => ChainPart::Link(usize::from(link) + 1),
-        part if part.camera() > 0 => ChainPart::Rigid,
-        _ => ChainPart::End,
+/// The part of the calibration that a parameter belongs to.
+pub(crate) fn part_of(parameter: ParameterId) -> CalibrationPart {
+    match (parameter.group(), parameter.part) {
+        (ParameterGroup::Clocks, _) => CalibrationPart::Clocks,
+        (_, ParameterPart::Camera(camera)) => CalibrationPart::Camera(camera),
+        (_, ParameterPart::Gyroscope) => CalibrationPart::Gyroscope,
+        (_, ParameterPart::Accelerometer) => CalibrationPart::Accelerometer,
+        (_, ParameterPart::ImuFromBase | ParameterPart::Base) => CalibrationPart::Base,
+        (_, ParameterPart::Link(link)) => CalibrationPart::Link(usize::from(link) + 1),
+        (_, part) if part.camera() > 0 => CalibrationPart::Rigid,
+        _ => CalibrationPart::End,
     }
 }
 
-/// A short heading for a part of the chain.
-pub(crate) fn heading_of(part: ChainPart, rig: &Rig) -> String {
+/// A short heading for a part of the calibration.
+pub(crate) fn heading_of(part: CalibrationPart, rig: &Rig) -> String {
     match part {
-        ChainPart::Base => "base".to_owned(),
-        ChainPart::Link(number) => joint_name(number, rig).unwrap_or("link").to_owned(),
-        ChainPart::End => "camera".to_owned(),
-        ChainPart::Rigid => "rigid".to_owned(),
+        CalibrationPart::Base => "base".to_owned(),
+        CalibrationPart::Link(number) => joint_name(number, rig).unwrap_or("link").to_owned(),
+        CalibrationPart::End | CalibrationPart::Camera(0) => "camera".to_owned(),
+        CalibrationPart::Rigid => "rigid".to_owned(),
+        CalibrationPart::Camera(camera) => rig.parameter_names().part(ParameterPart::Camera(camera)),
+        CalibrationPart::Gyroscope => "gyro".to_owned(),
+        CalibrationPart::Accelerometer => "accel".to_owned(),
+        CalibrationPart::Clocks => "clocks".to_owned(),
     }
 }
 
@@ -67,25 +85,27 @@ pub(crate) fn meaning_of(parameter: ParameterId, rig: &Rig) -> String {
         Quantity::Cy => "principal point in y",
         Quantity::K1 => "first coefficient of the lens distortion",
         Quantity::K2 => "second coefficient of the lens distortion",
-        Quantity::Sx | Quantity::Sy | Quantity::Sz => "scale error of an axis",
-        Quantity::Mxy | Quantity::Mxz | Quantity::Myz => "misalignment of two axes",
+        Quantity::Sx => "scale error of the x axis",
+        Quantity::Sy => "scale error of the y axis",
+        Quantity::Sz => "scale error of the z axis",
+        Quantity::Mxy => "misalignment, part of the measured y in x",
+        Quantity::Mxz => "misalignment, part of the measured z in x",
+        Quantity::Myz => "misalignment, part of the measured z in y",
     };
-    let place = match part {
-        _ if parameter == ParameterId::ENCODER_TIMESHIFT => "joint encoders".to_owned(),
-        _ if matches!(parameter.part, ParameterPart::Gyroscope) => "gyroscope".to_owned(),
-        _ if matches!(parameter.part, ParameterPart::Accelerometer) => "accelerometer".to_owned(),
-        ChainPart::Rigid if matches!(parameter.part, ParameterPart::Camera(_)) => {
-            rig.parameter_names().part(parameter.part)
-        }
-        _ if matches!(parameter.part, ParameterPart::Camera(_)) => "camera".to_owned(),
-        ChainPart::Base => "IMU to gimbal base".to_owned(),
-        ChainPart::Link(number) => match joint_name(number, rig) {
+    let names = rig.parameter_names();
+    let place = match (part, parameter.part) {
+        (_, ParameterPart::Encoder) => "joint encoders".to_owned(),
+        (_, ParameterPart::Gyroscope) => "gyroscope".to_owned(),
+        (_, ParameterPart::Accelerometer) => "accelerometer".to_owned(),
+        (_, part @ ParameterPart::Camera(_)) => names.part(part),
+        (CalibrationPart::Base, _) => "IMU to gimbal base".to_owned(),
+        (CalibrationPart::Link(number), _) => match joint_name(number, rig) {
             Some(joint) => format!("link {number}, joint {joint}"),
             None => format!("link {number}"),
         },
-        ChainPart::End if parameter.part == ParameterPart::EffectorFromCamera => "end effector to camera".to_owned(),
-        ChainPart::End => "end of the chain".to_owned(),
-        ChainPart::Rigid => format!("IMU to rigid {}", rig.parameter_names().part(parameter.part)),
+        (_, ParameterPart::EffectorFromCamera) => "end effector to camera".to_owned(),
+        (CalibrationPart::Rigid, part) => format!("IMU to rigid {}", names.part(part)),
+        _ => "end of the chain".to_owned(),
     };
     format!("{kind} ({place})")
 }
@@ -105,6 +125,11 @@ mod tests {
         let mut names = ["EC.rx", "L2.a", "L10.d", "IB.tx", "L3.beta"];
         names.sort_by_key(|name| part_of(id(name)));
         assert_eq!(names, ["IB.tx", "L2.a", "L3.beta", "L10.d", "EC.rx"]);
+        let mut names = ["readout", "accelerometer.sx", "cam1.fx", "gyroscope.rx", "fx", "cam1.tx", "L1.d", "IB.tx"];
+        names.sort_by_key(|name| part_of(id(name)));
+        let groups = names.map(|name| id(name).group());
+        assert!(groups.is_sorted(), "{names:?}");
+        assert_eq!(names[2..], ["cam1.tx", "fx", "cam1.fx", "gyroscope.rx", "accelerometer.sx", "readout"]);
     }
 
     #[test]
@@ -114,5 +139,11 @@ mod tests {
         assert_eq!(meaning_of(id("L7.d"), &rig), "DH offset d along the joint axis (link 7)");
         assert_eq!(heading_of(part_of(id("I.rx")), &rig), "base");
         assert_eq!(meaning_of(id("timeshift"), &rig), "time offset, t_imu = t_sensor + timeshift (camera)");
+        assert_eq!(
+            meaning_of(id("accelerometer.mxz"), &rig),
+            "misalignment, part of the measured z in x (accelerometer)"
+        );
+        assert_eq!(meaning_of(id("gyroscope.rx"), &rig), "rotation about x (gyroscope)");
+        assert_eq!(heading_of(part_of(id("fx")), &rig), "camera");
     }
 }

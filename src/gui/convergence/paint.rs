@@ -6,7 +6,7 @@ use egui::{Align2, Color32, Pos2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::ParameterCurves;
 use super::model::{CalibrationHistory, ConvertedHistory};
-use super::names::{ChainPart, heading_of, meaning_of};
+use super::names::{CalibrationPart, heading_of, meaning_of};
 use super::range::{paint_outside, value_range};
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
@@ -35,7 +35,7 @@ pub(super) const MARKED: [ParameterState; 3] =
     [ParameterState::Weak, ParameterState::Unobservable, ParameterState::Waiting];
 
 /// The heading of a row.
-pub(super) fn heading(ui: &Ui, ctx: &PanelContext<'_>, part: ChainPart, rect: Rect) {
+pub(super) fn heading(ui: &Ui, ctx: &PanelContext<'_>, part: CalibrationPart, rect: Rect) {
     let painter = ui.painter();
     let theme = ctx.theme;
     painter.vline(rect.right(), rect.y_range(), Stroke::new(1.0, theme.outline));
@@ -165,7 +165,7 @@ pub(super) fn cell_ui(
     let shown_run = data.shown;
     let Some(history) = data.histories.get(shown_run) else { return };
     let Some(parameter) = history.parameter(id) else { return };
-    let shown = Shown::of(id.dimension());
+    let shown = Shown::of_parameter(id);
     let name = &ctx.names().name(id);
     let theme = *ctx.theme;
     let (begin_ns, end_ns) = visible_range(ctx);

@@ -135,7 +135,7 @@ pub(super) fn block_ui(
         ui.label(RichText::new("No such block in this step").color(ctx.theme.text_weak));
         return;
     };
-    let shown = Shown::of(parameter.dimension());
+    let shown = Shown::of_parameter(parameter);
     let unit = shown.unit.trim();
     let known = [block::FRAME, block::RESIDUAL_U, block::RESIDUAL_V, block::CHI2];
     let slopes = [block::SLOPE_U, block::SLOPE_V].map(|term| (format!("{}, px/{unit}", term.name), term));

@@ -22,7 +22,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
         return;
     };
     let entry = |values: &[f64]| values.get(index).copied().unwrap_or(f64::NAN);
-    let shown = Shown::of(parameter.dimension());
+    let shown = Shown::of_parameter(parameter);
     let (value, sigma, prior) =
         (entry(&calibration.values), entry(&calibration.sigmas), entry(&calibration.prior_sigmas));
     let mut rows = vec![

@@ -3,7 +3,7 @@
 use egui::{Label, RichText, ScrollArea, Ui, vec2};
 
 use super::factors;
-use super::model::{JacobianModel, cameras, name_of, unit_text};
+use super::model::{JacobianModel, cameras, joint_columns, name_of, per, unit_text};
 use super::numbers_table::numbers_ui;
 use crate::estimator::{ColumnBlock, ColumnId, FeatureRows, FrameId, JacobianFactor};
 use crate::frontend::FeatureId;
@@ -22,7 +22,7 @@ pub(super) fn headline(model: &JacobianModel, row: usize, column: usize) -> Stri
     if norm == 0.0 {
         return format!("{name}: zero ({size})");
     }
-    format!("{name}: {} {} ({size})", significant(f64::from(norm)), unit_text(block.id))
+    format!("{name}: {} {} ({size})", significant(f64::from(norm)), unit_text(block, model.joint_count))
 }
 
 /// The values of the selected row, column or block.
@@ -61,7 +61,7 @@ fn strongest_columns(model: &JacobianModel, row: usize) -> String {
         .collect();
     norms.sort_by(|a, b| b.1.total_cmp(&a.1));
     let shown = norms.iter().take(SHOWN).map(|(column, norm)| {
-        let words = unit_text(model.jacobian.columns[*column].id);
+        let words = unit_text(&model.jacobian.columns[*column], model.joint_count);
         format!("{} {} {words}", model.columns.strips[*column].name, significant(f64::from(*norm)))
     });
     let shown = shown.collect::<Vec<_>>().join(", ");
@@ -136,7 +136,7 @@ fn observations_ui(
 ) {
     let block = &model.jacobian.columns[column];
     let Some(feature) = step.report.features.iter().find(|feature| feature.id == id) else { return };
-    let parts = scalar_columns(block);
+    let parts = scalar_columns(block, model.joint_count);
     let known = [terms::FRAME, terms::U, terms::V, terms::RESIDUAL_U, terms::RESIDUAL_V, terms::WEIGHT];
     let slopes = parts.iter().flat_map(|(name, _)| [format!("∂u{name}"), format!("∂v{name}")]);
     let heads: Vec<(String, Term)> = known
@@ -201,14 +201,20 @@ fn readings_ui(
 }
 
 /// The scalar columns of a block: the label of each, and its shown units per stored unit.
-fn scalar_columns(block: &ColumnBlock) -> Vec<(String, f64)> {
+fn scalar_columns(block: &ColumnBlock, joint_count: usize) -> Vec<(String, f64)> {
     let shown = |name: &str, dimension: Dimension| {
         let shown = Shown::of(dimension);
         (format!("{name}, px/{}", shown.unit.trim()), shown.factor)
     };
     match block.id {
-        ColumnId::Calibration(parameter) => vec![shown("", parameter.dimension())],
-        ColumnId::Joints(_) => (1..=block.len).map(|joint| shown(&format!(" q{joint}"), Dimension::Angle)).collect(),
+        ColumnId::Calibration(parameter) => {
+            let shown = Shown::of_parameter(parameter);
+            vec![(format!(", {}", per("px", shown)), shown.factor)]
+        }
+        ColumnId::Joints(_) => joint_columns(block.len, joint_count)
+            .into_iter()
+            .map(|(name, unit)| (format!(" {name}, px/{unit}"), 1_f64.to_degrees()))
+            .collect(),
         ColumnId::Pose(_) => {
             let parts = [" rx", " ry", " rz"].map(|part| shown(part, Dimension::Angle)).into_iter();
             parts.chain([" tx", " ty", " tz"].map(|part| shown(part, Dimension::Length))).collect()

@@ -3,7 +3,7 @@
 
 use egui::{RichText, Ui};
 
-use super::model::JacobianModel;
+use super::model::{JacobianModel, joint_columns, per};
 use super::numbers_table::numbers_ui;
 use crate::estimator::{ColumnBlock, ColumnId, FactorRows, JacobianFactor};
 use crate::geometry::Dimension;
@@ -52,7 +52,7 @@ pub(super) fn block_ui(
     if block.start + block.len > residuals {
         return;
     }
-    let parts = scalar_columns(block);
+    let parts = scalar_columns(block, model.joint_count);
     let own = rows.columns(block.start, block.len);
     let mut order: Vec<usize> = (0..rows.nrows()).filter(|row| own.row(*row).amax() > 0.0).collect();
     let count = order.len();
@@ -81,7 +81,7 @@ pub(super) fn block_ui(
 
 /// The scalar columns of a block: the label of the derivative with respect to each, and its shown units per stored
 /// unit.
-fn scalar_columns(block: &ColumnBlock) -> Vec<(String, f64)> {
+fn scalar_columns(block: &ColumnBlock, joint_count: usize) -> Vec<(String, f64)> {
     let shown = |name: &str, dimension: Dimension| {
         let shown = Shown::of(dimension);
         (format!("∂{name}, σ/{}", shown.unit.trim()), shown.factor)
@@ -90,8 +90,14 @@ fn scalar_columns(block: &ColumnBlock) -> Vec<(String, f64)> {
         |names: [&str; 3], unit: &'static str, factor: f64| names.map(|name| (format!("∂{name}, σ/{unit}"), factor));
     let degrees = 1_f64.to_degrees();
     match block.id {
-        ColumnId::Calibration(parameter) => vec![shown("", parameter.dimension())],
-        ColumnId::Joints(_) => (1..=block.len).map(|joint| shown(&format!("q{joint}"), Dimension::Angle)).collect(),
+        ColumnId::Calibration(parameter) => {
+            let shown = Shown::of_parameter(parameter);
+            vec![(format!("∂, {}", per("σ", shown)), shown.factor)]
+        }
+        ColumnId::Joints(_) => joint_columns(block.len, joint_count)
+            .into_iter()
+            .map(|(name, unit)| (format!("∂{name}, σ/{unit}"), degrees))
+            .collect(),
         ColumnId::Pose(_) => {
             let rotations = ["rx", "ry", "rz"].map(|part| shown(part, Dimension::Angle)).into_iter();
             rotations.chain(["tx", "ty", "tz"].map(|part| shown(part, Dimension::Length))).collect()

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use crate::camera::CameraModel;
-use crate::estimator::{ColumnId, JacobianFactor, StepJacobian};
+use crate::estimator::{ColumnBlock, ColumnId, JacobianFactor, StepJacobian};
 use crate::geometry::Dimension;
-use crate::gimbal::ParameterNames;
-use crate::gui::units::counted;
+use crate::gimbal::{ParameterGroup, ParameterId, ParameterNames};
+use crate::gui::units::{Shown, counted};
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
@@ -39,6 +39,8 @@ pub(super) struct JacobianModel {
     pub(super) columns: Axis,
     /// Exponents of the norms with the first and last colour.
     pub(super) decades: (f64, f64),
+    /// Number of joints of the chain.
+    pub(super) joint_count: usize,
 }
 
 /// The cameras of a run in the order of its features, the main camera first.
@@ -73,6 +75,7 @@ impl JacobianModel {
             columns: columns_of(&jacobian, names),
             jacobian,
             decades: (low, high),
+            joint_count: step.report.newest().map_or(0, |newest| newest.joint_angles_rad.len()),
         })
     }
 
@@ -92,17 +95,20 @@ impl JacobianModel {
 impl Axis {
     /// Index of the row or column at a fraction of the axis.
     pub(super) fn at(&self, fraction: f32) -> Option<usize> {
-        let after = self.strips.partition_point(|strip| strip.begin <= fraction);
-        after.checked_sub(1).filter(|index| fraction < self.strips[*index].end)
+        self.strips.iter().position(|strip| strip.begin <= fraction && fraction < strip.end)
     }
 
-    /// Lays out rows or columns in sequence, given name, group and weight of each.
+    /// Lays out rows or columns, given name, group and weight of each: group after group, within a group in sequence.
     fn lay_out(strips: impl Iterator<Item = (String, usize, f32)>, group_names: &[String]) -> Self {
         let strips: Vec<_> = strips.collect();
         let total: f32 = strips.iter().map(|(_, _, weight)| weight).sum();
+        let mut order: Vec<usize> = (0..strips.len()).collect();
+        order.sort_by_key(|index| strips[*index].1);
         let mut axis = Self::default();
+        axis.strips = strips.iter().map(|(name, _, _)| Strip { name: name.clone(), begin: 0.0, end: 0.0 }).collect();
         let mut at = 0.0;
-        for (name, group, weight) in strips {
+        for index in order {
+            let (_, group, weight) = strips[index];
             let (begin, end) = (at, at + weight / total);
             at = end;
             let group_name = group_names.get(group).cloned().unwrap_or_default();
@@ -110,7 +116,7 @@ impl Axis {
                 Some(last) => last.end = end,
                 None => axis.groups.push(Strip { name: group_name, begin, end }),
             }
-            axis.strips.push(Strip { name, begin, end });
+            (axis.strips[index].begin, axis.strips[index].end) = (begin, end);
         }
         axis
     }
@@ -155,16 +161,26 @@ fn rows_of(jacobian: &StepJacobian) -> Axis {
     Axis::lay_out(strips, &names)
 }
 
-/// Calibration columns are wide, so that they can be read one by one; states of the frames are narrow.
-fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> Axis {
-    let groups = ["calibration", "joints", "poses", "velocities, biases", "depth"].map(str::to_owned);
+/// Calibration columns are wide, so that they can be read one by one; states of the frames are narrow. The calibration is
+/// split by the group of its parameters where it has several.
+pub(super) fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> Axis {
+    let mut groups = ParameterGroup::ALL.map(|group| group.name().to_owned()).to_vec();
+    groups.extend(["joints", "poses", "velocities, biases", "depth"].map(str::to_owned));
+    let parameters = || jacobian.columns.iter().filter_map(|block| block.id.parameter());
+    if parameters().all(|parameter| Some(parameter.group()) == parameters().next().map(ParameterId::group)) {
+        groups[..ParameterGroup::ALL.len()].fill("calibration".to_owned());
+    }
+    let states = ParameterGroup::ALL.len();
     let strips = jacobian.columns.iter().map(|block| {
         let (group, weight) = match block.id {
-            ColumnId::Calibration(_) => (0, 3.0),
-            ColumnId::Joints(_) => (1, 1.0),
-            ColumnId::Pose(_) => (2, 1.2),
-            ColumnId::VelocityBias(_) => (3, 1.2),
-            ColumnId::InverseDepth => (4, 4.0),
+            ColumnId::Calibration(parameter) => {
+                let place = ParameterGroup::ALL.iter().position(|group| *group == parameter.group());
+                (place.unwrap_or(0), 3.0)
+            }
+            ColumnId::Joints(_) => (states, 1.0),
+            ColumnId::Pose(_) => (states + 1, 1.2),
+            ColumnId::VelocityBias(_) => (states + 2, 1.2),
+            ColumnId::InverseDepth => (states + 3, 4.0),
         };
         (column_name(block.id, names), group, weight)
     });
@@ -182,16 +198,35 @@ pub(in crate::gui) fn column_name(id: ColumnId, names: &ParameterNames) -> Strin
     }
 }
 
+/// Names and shown units of the columns of a block of joints: angles, then with a rolling shutter rates and accelerations.
+pub(super) fn joint_columns(columns: usize, joint_count: usize) -> Vec<(String, &'static str)> {
+    let joints = joint_count.clamp(1, columns.max(1));
+    let derivatives = [("", "°"), ("'", "(°/s)"), ("''", "(°/s²)")];
+    let of = |column: usize| {
+        let (mark, unit) = derivatives.get(column / joints).copied().unwrap_or_default();
+        (format!("q{}{mark}", column % joints + 1), unit)
+    };
+    (0..columns).map(of).collect()
+}
+
+/// A unit per shown unit, `px/mm`; per one where a number has no unit.
+pub(super) fn per(unit: &str, shown: Shown) -> String {
+    format!("{unit}/{}", if shown.unit.is_empty() { "1" } else { shown.unit.trim() })
+}
+
 /// The unit of a column in which the norms are given.
-pub(super) fn unit_text(id: ColumnId) -> &'static str {
-    match id {
-        ColumnId::Calibration(parameter) => match parameter.dimension() {
-            Dimension::Angle => "σ per 10°",
-            Dimension::Length => "σ per 3 cm",
-            Dimension::Time => "σ per 20 ms",
-            Dimension::Pixel => "σ per 10 px",
-            Dimension::Ratio => "σ per 0.1",
+pub(super) fn unit_text(block: &ColumnBlock, joint_count: usize) -> &'static str {
+    match block.id {
+        ColumnId::Calibration(parameter) => match (parameter.group(), parameter.dimension()) {
+            (ParameterGroup::Imu, Dimension::Angle) => "σ per 0.01 rad",
+            (ParameterGroup::Imu, _) => "σ per 1 %",
+            (_, Dimension::Angle) => "σ per 10°",
+            (_, Dimension::Length) => "σ per 3 cm",
+            (_, Dimension::Time) => "σ per 20 ms",
+            (_, Dimension::Pixel) => "σ per 10 px",
+            (_, Dimension::Ratio) => "σ per 0.1",
         },
+        ColumnId::Joints(_) if block.len > joint_count => "σ per 10°, 10 °/s and 10 °/s²",
         ColumnId::Joints(_) => "σ per 10°",
         ColumnId::Pose(_) => "σ per 10° and 3 cm",
         ColumnId::VelocityBias(_) => "σ per 0.1 m/s, 1 °/s and 0.1 m/s²",

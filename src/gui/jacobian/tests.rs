@@ -6,7 +6,7 @@ use egui_kittest::kittest::Queryable as _;
 
 use super::model::JacobianModel;
 use super::{JacobianPanel, PanZoom, rect_of};
-use crate::estimator::{ColumnGroup, JacobianFactor};
+use crate::estimator::{ColumnBlock, ColumnGroup, ColumnId, JacobianFactor};
 use crate::gimbal::tests::parameter;
 use crate::gui::Selection;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
@@ -78,6 +78,31 @@ fn axes_are_whole_and_in_order() {
     assert_eq!(model.columns.strips.len(), model.jacobian.columns.len());
     let names: Vec<&str> = model.columns.groups.iter().map(|group| group.name.as_str()).collect();
     assert_eq!(names, ["calibration", "joints", "poses", "velocities, biases", "depth"]);
+}
+
+#[test]
+fn columns_are_in_groups_and_joints_have_rates() {
+    let mut jacobian = model().jacobian;
+    // A clock between the columns of the chain, as that of the main camera before a rigid one.
+    let place = 4;
+    for (column, name) in [(place, "readout"), (place + 1, "gyroscope.sx"), (place + 2, "fx")] {
+        jacobian.columns[column].id = ColumnId::Calibration(parameter(name));
+    }
+    let columns = super::model::columns_of(&jacobian, &crate::gimbal::ParameterNames::default());
+    let names: Vec<&str> = columns.groups.iter().map(|group| group.name.as_str()).collect();
+    assert_eq!(names[..4], ["chain", "camera", "IMU", "clocks"]);
+    let begin = |column: usize| columns.strips[column].begin;
+    assert!(
+        begin(place + 3) < begin(place + 2) && begin(place + 2) < begin(place + 1) && begin(place + 1) < begin(place)
+    );
+    for (index, strip) in columns.strips.iter().enumerate() {
+        assert_eq!(columns.at(0.5 * (strip.begin + strip.end)), Some(index));
+    }
+    let labels = |count: usize| super::model::joint_columns(count, 3).into_iter().map(|(name, _)| name);
+    assert_eq!(labels(3).collect::<Vec<_>>(), ["q1", "q2", "q3"]);
+    assert_eq!(labels(9).skip(3).collect::<Vec<_>>(), ["q1'", "q2'", "q3'", "q1''", "q2''", "q3''"]);
+    let block = ColumnBlock { id: ColumnId::Calibration(parameter("accelerometer.mxy")), start: 0, len: 1 };
+    assert_eq!(super::model::unit_text(&block, 3), "σ per 1 %");
 }
 
 #[test]

@@ -1,10 +1,10 @@
 //! Several rank reports side by side: causes of lost rank, spectra on one axis, and null and weak directions in one
 //! heat map with a common order of rows.
 
-use egui::{Align2, Color32, Grid, Label, Rect, RichText, Role, Stroke, Ui, WidgetInfo};
+use egui::{Align2, Color32, Grid, Label, Rangef, Rect, RichText, Role, Stroke, Ui, WidgetInfo};
 use egui::{StrokeKind, pos2, vec2};
 
-use super::spectrum;
+use super::{groups, spectrum};
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::{meaning_of, part_of};
@@ -137,6 +137,7 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
     const HEADER: f32 = 14.0;
     let theme = *ctx.theme;
     let parameters = parameters_of(columns);
+    let strip_width = groups::strip_width(&parameters);
     let room = (bottom - ui.cursor().top() - HEADER - 4.0).max(0.0);
     let row_height = (room / parameters.len().max(1) as f32).clamp(MIN_ROW_HEIGHT, MAX_ROW_HEIGHT);
     let size = vec2(ui.available_width(), HEADER + row_height * parameters.len() as f32);
@@ -170,7 +171,13 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
     for (row, parameter) in parameters.iter().enumerate() {
         let top = whole.top() + HEADER + row as f32 * row_height;
         let line = Rect::from_min_size(pos2(whole.left(), top), vec2(whole.width(), row_height));
-        name_ui(ui, ctx, *parameter, line);
+        name_ui(ui, ctx, *parameter, line, strip_width);
+    }
+    if strip_width > 0.0 {
+        let top = |row: usize| whole.top() + HEADER + row as f32 * row_height;
+        let rows = parameters.iter().enumerate();
+        let rows = rows.map(|(row, parameter)| (parameter.group(), Rangef::new(top(row), top(row + 1))));
+        groups::paint_groups(ui.painter(), &theme, &rows.collect::<Vec<_>>(), whole.x_range());
     }
     if omitted > 0 {
         let text = format!("Not shown: {}", counted(omitted, "more observable direction"));
@@ -205,12 +212,13 @@ fn cell_ui(ui: &Ui, theme: &Theme, direction: &CalibrationDirection, entry: usiz
     painter.text(cell.center(), Align2::CENTER_CENTER, text, theme::number_font(), Theme::text_on(ground));
 }
 
-fn name_ui(ui: &Ui, ctx: &mut PanelContext<'_>, parameter: ParameterId, line: Rect) {
+fn name_ui(ui: &Ui, ctx: &mut PanelContext<'_>, parameter: ParameterId, line: Rect, indent: f32) {
     let name = ctx.names().name(parameter);
     let theme = *ctx.theme;
     let selected = ctx.selection.parameter == Some(parameter);
     let color = if selected { theme.accent } else { theme.text };
-    ui.painter().text(line.left_center(), Align2::LEFT_CENTER, &name, theme::label_font(), color);
+    let place = line.left_center() + vec2(indent, 0.0);
+    ui.painter().text(place, Align2::LEFT_CENTER, &name, theme::label_font(), color);
     let (sense, role) = ctx.presentation.clickable(Role::Label);
     let response = ui.interact(line, ui.unique_id().with(("side by side", &name)), sense);
     response.widget_info(|| WidgetInfo::selected(role, true, selected, format!("{name} in all columns")));

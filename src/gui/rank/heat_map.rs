@@ -1,8 +1,9 @@
 //! Null and weak directions by parameter name: a heat map with the signed weights as text.
 
 use egui::epaint::TextShape;
-use egui::{Align2, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
+use egui::{Align2, Rangef, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
+use super::groups;
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::accessible::describe;
@@ -46,7 +47,8 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, hei
         ui.painter().layout_no_wrap(names.name(*parameter), theme::label_font(), theme.text).size().x
     };
     let widest = rank.parameters.iter().map(name_width).fold(0.0, f32::max);
-    let name_width = (widest + 8.0).clamp(*NAME_WIDTHS.start(), *NAME_WIDTHS.end());
+    let strip_width = groups::strip_width(&rank.parameters);
+    let name_width = strip_width + (widest + 8.0).clamp(*NAME_WIDTHS.start(), *NAME_WIDTHS.end());
     let width = ui.available_width();
     let room = (width - name_width).max(MIN_COLUMN_WIDTH);
     let count = rank.directions.len().min((room / MIN_COLUMN_WIDTH) as usize).max(1);
@@ -65,7 +67,14 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, hei
     for (place, row) in rows.iter().enumerate() {
         let top = rect.top() + header_height + place as f32 * row_height;
         let line = Rect::from_min_size(pos2(rect.left(), top), vec2(name_width + pitch * count as f32, row_height));
-        row_ui(ui, ctx, rank.parameters[*row], *row, directions, line, [name_width, pitch]);
+        row_ui(ui, ctx, rank.parameters[*row], *row, directions, line, [strip_width, name_width, pitch]);
+    }
+    if strip_width > 0.0 {
+        let top = |place: usize| rect.top() + header_height + place as f32 * row_height;
+        let range = |place: usize| Rangef::new(top(place), top(place + 1));
+        let rows = rows.iter().enumerate().map(|(place, row)| (rank.parameters[*row].group(), range(place)));
+        let across = Rangef::new(rect.left(), rect.left() + name_width + pitch * count as f32);
+        groups::paint_groups(ui.painter(), &theme, &rows.collect::<Vec<_>>(), across);
     }
     let mut notes = Vec::new();
     if let Some(largest) = omitted {
@@ -185,14 +194,15 @@ fn row_ui(
     row: usize,
     directions: &[CalibrationDirection],
     line: Rect,
-    [name_width, pitch]: [f32; 2],
+    [strip_width, name_width, pitch]: [f32; 3],
 ) {
     let theme = *ctx.theme;
     let name = ctx.names().name(parameter);
     let painter = ui.painter();
     let selected = ctx.selection.parameter == Some(parameter);
     let color = if selected { theme.accent } else { theme.text };
-    painter.text(line.left_center(), Align2::LEFT_CENTER, &name, theme::label_font(), color);
+    let place = line.left_center() + vec2(strip_width, 0.0);
+    painter.text(place, Align2::LEFT_CENTER, &name, theme::label_font(), color);
     for (column, direction) in directions.iter().enumerate() {
         let weight = direction.weights.get(row).copied().unwrap_or(0.0);
         let left = line.left() + name_width + column as f32 * pitch;

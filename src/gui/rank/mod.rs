@@ -4,6 +4,7 @@ mod advice;
 pub(super) mod columns;
 mod compare;
 mod csv;
+mod groups;
 mod heat_map;
 mod information;
 mod slider;

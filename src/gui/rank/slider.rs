@@ -140,7 +140,7 @@ fn outcome_ui(ui: &mut Ui, ctx: &PanelContext<'_>, slide: &ChainSlide, parameter
     let scaled = |column: &usize| (slide.changes[*column] / parameters[*column].scale()).abs();
     moved.sort_by(|a, b| scaled(b).total_cmp(&scaled(a)));
     let changes = moved.iter().take(CHANGES_SHOWN).filter(|column| scaled(column) > 1e-3).map(|column| {
-        let shown = Shown::of(parameters[*column].dimension());
+        let shown = Shown::of_parameter(parameters[*column]);
         format!("{} {}{}", names.name(parameters[*column]), signed(slide.changes[*column] * shown.factor), shown.unit)
     });
     let text = changes.collect::<Vec<_>>().join(", ");

@@ -13,8 +13,9 @@ use crate::flight_log::LogWarning;
 use crate::gimbal::{Chain, Parameterization, auto_parameterization};
 use crate::observability::analyse;
 use crate::sensors::Rig;
+use crate::session::tests::memory::recorded;
 use crate::session::{Recording, RunRecord, StepRecord};
-use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
+use crate::simulation::{IntrinsicsError, SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 /// Period of the images in nanoseconds (20 Hz).
 pub(crate) const FRAME_PERIOD_NS: i64 = 50_000_000;
@@ -76,6 +77,23 @@ pub(crate) fn rigid_recording() -> Recording {
         recording_of(&flight_of(&options), &["static"])
     });
     RIGID.clone()
+}
+
+/// A run that also estimates the shutter and the intrinsics of camera and IMU, which the rig has wrong.
+pub(crate) fn sensor_recording() -> Recording {
+    static SENSORS: LazyLock<Recording> = LazyLock::new(|| {
+        let flight = flight_of(&SyntheticOptions {
+            duration_s: 6.0,
+            features: 70,
+            readout_s: 0.02,
+            intrinsics_error: IntrinsicsError { focal_ratio: 0.01, ..IntrinsicsError::default() },
+            imu_intrinsics_error: [0.01, 0.01],
+            ..SyntheticOptions::default()
+        });
+        let run = recorded(&flight, "auto:timeshift=on,readout=on,intrinsics=on,imu-intrinsics=on");
+        Recording { runs: vec![run], ..recording_of(&flight, &[]) }
+    });
+    SENSORS.clone()
 }
 
 /// A flight whose first frame has stamp 0, so that frame `k` has `k` periods.

@@ -5,5 +5,6 @@ mod images;
 
 pub(crate) use self::flight::{
     FRAME_PERIOD_NS, SAMPLE_FRAMES, first_tracked_frame, rigid_recording, sample_recording, sample_recording_of,
+    sensor_recording,
 };
 pub(crate) use self::images::sample_images;

@@ -128,7 +128,7 @@ fn convergence_lines(step: &StepRecord, names: &ParameterNames) -> Vec<String> {
     let reductions = reductions(step);
     let line = |(index, ratio): (usize, f64)| {
         let parameter = calibration.parameters[index];
-        let shown = Shown::of(parameter.dimension());
+        let shown = Shown::of_parameter(parameter);
         let [sigma, prior] = [&calibration.sigmas, &calibration.prior_sigmas].map(|column| shown.sigma(column[index]));
         format!("{}, σ {prior} → {sigma} ({} %)", names.name(parameter), fixed(100.0 * ratio, 0))
     };
