@@ -28,9 +28,8 @@ use crate::session::{RunRecord, StepRecord};
 
 /// Maximum magnification of the matrix.
 const MAX_ZOOM: f32 = 40.0;
-/// Width of the row names on the left and height of the column names above, in points.
+/// Width of the row names on the left in points.
 const ROW_NAMES: f32 = 104.0;
-const COLUMN_NAMES: f32 = 68.0;
 /// Height of the legend below the matrix in points.
 const LEGEND: f32 = 18.0;
 /// Panel height from which the values of the selected block are shown, and their ratio of it.
@@ -90,7 +89,7 @@ impl JacobianPanel {
         };
         let size = vec2(ui.available_width(), height - below - LEGEND - 2.0 * ui.spacing().item_spacing.y);
         let (_, whole) = ui.allocate_space(size.max(Vec2::splat(8.0)));
-        let area = Rect::from_min_max(whole.min + vec2(ROW_NAMES, COLUMN_NAMES), whole.max);
+        let area = Rect::from_min_max(whole.min + vec2(ROW_NAMES, paint::column_names_height(ui, model)), whole.max);
         if area.width() < 8.0 || area.height() < 8.0 {
             return;
         }

@@ -13,6 +13,9 @@ use crate::session::{RunRecord, StepRecord};
 /// Maximum number of decades of the colour map.
 const MAX_DECADES: f64 = 6.0;
 
+/// Label of the calibration columns when they are of one group.
+pub(super) const ONE_GROUP: &str = "calibration";
+
 /// A row or a column of blocks, or a group of them.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Strip {
@@ -168,7 +171,7 @@ pub(super) fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> Axi
     groups.extend(["joints", "poses", "velocities, biases", "depth"].map(str::to_owned));
     let parameters = || jacobian.columns.iter().filter_map(|block| block.id.parameter());
     if parameters().all(|parameter| Some(parameter.group()) == parameters().next().map(ParameterId::group)) {
-        groups[..ParameterGroup::ALL.len()].fill("calibration".to_owned());
+        groups[..ParameterGroup::ALL.len()].fill(ONE_GROUP.to_owned());
     }
     let states = ParameterGroup::ALL.len();
     let strips = jacobian.columns.iter().map(|block| {

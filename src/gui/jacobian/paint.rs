@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::epaint::{Mesh, TextShape};
 use egui::{Align2, Color32, Painter, Rect, Shape, Stroke, StrokeKind, Ui, pos2, vec2};
 
-use super::model::{Axis, JacobianModel, Strip};
+use super::model::{Axis, JacobianModel, ONE_GROUP, Strip};
 use super::rect_of;
 use crate::gui::plot::paint_ground;
 use crate::gui::theme::{Theme, ThemeName, label_font};
@@ -59,6 +59,26 @@ fn mesh_of(theme: &Theme, area: Rect, place: Rect, model: &JacobianModel) -> Mes
         }
     }
     mesh
+}
+
+/// Height of the column names in points: that of the names of a chain, and more for longer names of sensors.
+pub(super) fn column_names_height(ui: &Ui, model: &JacobianModel) -> f32 {
+    /// Height with the columns of a chain, and that of the names of groups.
+    const OF_CHAIN: f32 = 68.0;
+    const GROUP: f32 = 20.0;
+    if model.columns.groups.first().is_none_or(|group| group.name == ONE_GROUP) {
+        return OF_CHAIN;
+    }
+    let width = |strip: &Strip| {
+        let name = short_name(strip).to_owned();
+        ui.painter().layout_no_wrap(name, label_font(), Color32::PLACEHOLDER).size().x
+    };
+    OF_CHAIN.max(GROUP + model.columns.strips.iter().map(width).fold(0.0, f32::max))
+}
+
+/// Name of a column under that of its group: frames are labelled by their number.
+fn short_name(strip: &Strip) -> &str {
+    strip.name.rsplit(' ').next().unwrap_or(&strip.name)
 }
 
 /// The names on both axes, and the selection.
@@ -143,9 +163,7 @@ fn column_names(painter: &Painter, theme: &Theme, top: Rect, place: Rect, column
             continue;
         }
         let color = if chosen { theme.accent } else { theme.text };
-        // Frames are labelled by their number under the name of the group.
-        let name = strip.name.rsplit(' ').next().unwrap_or(&strip.name);
-        let galley = painter.layout_no_wrap(name.to_owned(), small.clone(), color);
+        let galley = painter.layout_no_wrap(short_name(strip).to_owned(), small.clone(), color);
         let foot = pos2(range.center() - 0.5 * galley.size().y, top.bottom() - 3.0);
         if chosen {
             let ground =

@@ -53,7 +53,8 @@ impl SliderUi {
                 SlideDirection::Known(loss) if is_other(direction, rank) => return format!("{} only", loss.name()),
                 SlideDirection::Known(_) => "closed form".to_owned(),
             };
-            format!("{kind}: {}", parameters_of_weights(&names, &parameters, &weights, 2))
+            let moved = parameters_of_weights(&names, &parameters, &weights, 2);
+            format!("{kind}: {}", if moved.is_empty() { "no parameter of the chain" } else { &moved })
         };
 
         let mut direction = position.as_ref().map_or(first, |position| position.direction);
