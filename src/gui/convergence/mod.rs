@@ -114,9 +114,8 @@ impl ConvergencePanel {
         }
         let open = groups.iter().map(|(group, count)| (*group, if self.folded.contains(group) { 0 } else { *count }));
         let open: Vec<_> = open.collect();
-        let lay_out = |parameters: &[ParameterId], available: Rect| match by_group {
-            true => layout::by_group(&open, available),
-            false => layout::lay_out(parameters, available),
+        let lay_out = |parameters: &[ParameterId], available: Rect| {
+            if by_group { layout::by_group(&open, available) } else { layout::lay_out(parameters, available) }
         };
         let layout = lay_out(&parameters, available);
         if layout.height > available.height() + 1.0 {

@@ -107,8 +107,8 @@ impl Axis {
         let total: f32 = strips.iter().map(|(_, _, weight)| weight).sum();
         let mut order: Vec<usize> = (0..strips.len()).collect();
         order.sort_by_key(|index| strips[*index].1);
-        let mut axis = Self::default();
-        axis.strips = strips.iter().map(|(name, _, _)| Strip { name: name.clone(), begin: 0.0, end: 0.0 }).collect();
+        let placed = strips.iter().map(|(name, _, _)| Strip { name: name.clone(), begin: 0.0, end: 0.0 });
+        let mut axis = Self { strips: placed.collect(), groups: Vec::new() };
         let mut at = 0.0;
         for index in order {
             let (_, group, weight) = strips[index];
