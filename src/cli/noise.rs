@@ -65,7 +65,7 @@ pub(crate) fn noise(arguments: &NoiseArguments) -> Result<Outcome> {
     if let (Err(error), true) = (&rig, arguments.rig.is_some()) {
         bail!("{error}");
     }
-    let end_s = arguments.duration.map_or(f64::from(u32::MAX), |duration_s| arguments.start + duration_s);
+    let end_s = arguments.duration.map_or_else(|| f64::from(u32::MAX), |duration_s| arguments.start + duration_s);
     let stationary = match arguments.method {
         Method::Flight => None,
         Method::Auto | Method::Allan => log_check::measure_noise(&log, rig.as_ref().ok(), (arguments.start, end_s)),

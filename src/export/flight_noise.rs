@@ -1,6 +1,6 @@
 //! Noise densities fitted to a flight, as a report and as lines of a rig.
 
-use std::fmt::{self, Display, Formatter};
+use std::fmt::{self, Display, Formatter, Write as _};
 
 use serde::Serialize;
 
@@ -91,7 +91,7 @@ impl FlightNoiseReport {
             let note = found
                 .sigma
                 .map_or_else(|| "as before: not seen in this flight".to_owned(), |sigma| format!("σ {sigma:.1e}"));
-            lines.push_str(&format!("  {}: {:.3e}  # {}, {note}\n", found.key, found.found, found.unit));
+            let _infallible = writeln!(lines, "  {}: {:.3e}  # {}, {note}", found.key, found.found, found.unit);
         }
         lines
     }

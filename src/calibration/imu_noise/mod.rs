@@ -80,7 +80,7 @@ pub struct FlightNoise {
 }
 
 /// Why no densities were found.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ImuNoiseError {
     /// The estimator never has enough frames with IMU samples between them.
     #[error(
@@ -116,7 +116,7 @@ pub fn fit_imu_noise(
         if found.intervals < FEWEST_INTERVALS {
             return Err(ImuNoiseError::TooShort { intervals: found.intervals });
         }
-        before.get_or_insert_with(|| found.sums);
+        before.get_or_insert(found.sums);
         run += 1;
         if converged || run == MAX_RUNS {
             break found;

@@ -40,7 +40,7 @@ impl ProjectedRows {
         let columns = BLOCK * current.blocks() + 1;
         // Grouped by the first block of the first observing slot, from its columns on.
         let capacity = |block: usize| {
-            let starts = block % per_frame == 0 && block / per_frame < frames;
+            let starts = block.is_multiple_of(per_frame) && block / per_frame < frames;
             if starts { height_of(tracks, block / per_frame) * (columns - BLOCK * block) } else { 0 }
         };
         let mut rows: Vec<Vec<f64>> = (0..current.blocks()).map(|block| Vec::with_capacity(capacity(block))).collect();

@@ -6,8 +6,8 @@ use crate::camera::CameraModel;
 use crate::estimator::options::EstimatorOptions;
 use crate::estimator::state::camera_view::{CameraView, RelativeTo};
 use crate::optimization::{
-    BlockTerm, DensePoseEquations, Landmark, LandmarkModel, MAX_POSE_BLOCKS, ReducedEquations, Reprojection,
-    ReprojectionEquations, RobustLoss, reprojection,
+    BlockTerm, DensePoseEquations, Landmark, LandmarkModel, MAX_POSE_BLOCKS, ReducedEquations, ReprojectionEquations,
+    RobustLoss, reprojection,
 };
 
 /// An observation of a feature: slot of the frame and pixel.
@@ -148,7 +148,7 @@ pub(crate) fn whitened(
         reprojection::linearize(camera, &relative, &linearized, landmark, &observation.uv_px)?
     };
     let weight = known_weight.unwrap_or_else(|| term.robust_weight(model.sigma_px, model.loss));
-    let mut term: Reprojection = term.weighted(model.sigma_px, weight);
+    let mut term = term.weighted(model.sigma_px, weight);
     if !model.measures_in_anchor() {
         term.by_landmark.fixed_view_mut::<2, 2>(0, 0).fill(0.0);
     }

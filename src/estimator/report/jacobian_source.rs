@@ -178,13 +178,11 @@ impl JacobianSource {
 
     /// Whether these are the parameters of its calibration columns.
     pub(crate) fn describes(&self, parameters: &[ParameterId]) -> bool {
-        match &self.exact {
-            Some(exact) => exact.linearized.1.parameters() == parameters,
-            None => {
-                let clocks: usize = self.clocks.iter().map(|clocks| clocks.count).sum();
-                self.chains.iter().map(Chain::dof).sum::<usize>() + clocks == parameters.len()
-            }
+        if let Some(exact) = &self.exact {
+            return exact.linearized.1.parameters() == parameters;
         }
+        let clocks: usize = self.clocks.iter().map(|clocks| clocks.count).sum();
+        self.chains.iter().map(Chain::dof).sum::<usize>() + clocks == parameters.len()
     }
 
     /// States by slot, for frames with this number of joints; velocities and rates only with estimated time

@@ -16,7 +16,7 @@ pub(crate) const MAIN: usize = 0;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Calibrations {
     cameras: Vec<Calibration>,
-    imu: Option<ImuCalibration>,
+    imu: Option<Box<ImuCalibration>>,
 }
 
 impl Calibrations {
@@ -27,7 +27,7 @@ impl Calibrations {
 
     /// Adds the intrinsics of the IMU.
     pub(crate) fn with_imu(self, imu: Option<ImuCalibration>) -> Self {
-        Self { imu, ..self }
+        Self { imu: imu.map(Box::new), ..self }
     }
 
     /// These calibrations with all columns that others have.
@@ -41,12 +41,12 @@ impl Calibrations {
 
     /// Intrinsics of the IMU, `None` where they are not estimated.
     pub(crate) fn imu(&self) -> Option<&ImuCalibration> {
-        self.imu.as_ref()
+        self.imu.as_deref()
     }
 
     /// Correction of the IMU's samples beyond that of the rig, `None` where it is not estimated.
     pub(crate) fn imu_errors(&self) -> Option<&ImuErrors> {
-        self.imu.as_ref().map(ImuCalibration::errors)
+        self.imu().map(ImuCalibration::errors)
     }
 
     /// Range of the IMU's columns, empty where its intrinsics are not estimated.
@@ -126,7 +126,7 @@ impl Calibrations {
             self.cameras[camera].frozen_columns().into_iter().map(move |column| start + column)
         };
         let first = self.imu_columns().start;
-        let of_imu = self.imu.iter().flat_map(ImuCalibration::frozen_columns).map(|column| first + column);
+        let of_imu = self.imu().into_iter().flat_map(ImuCalibration::frozen_columns).map(|column| first + column);
         (0..self.cameras()).flat_map(of_camera).chain(of_imu).collect()
     }
 
@@ -145,14 +145,14 @@ impl Calibrations {
         let cameras = self.cameras.iter().enumerate();
         Self {
             cameras: cameras.map(|(camera, one)| one.stepped(&delta[self.columns(camera)])).collect(),
-            imu: self.imu.as_ref().map(|imu| imu.stepped(&delta[self.imu_columns()])),
+            imu: self.imu().map(|imu| Box::new(imu.stepped(&delta[self.imu_columns()]))),
         }
     }
 
     /// Returns `x ⊟ x₀` (free columns), zero for a camera without a first estimate; `None` when no camera has one.
     pub(crate) fn first_estimate_offset(&self) -> Option<DVector<f64>> {
         let offsets: Vec<_> = self.cameras.iter().map(Calibration::first_estimate_offset).collect();
-        let imu = self.imu.as_ref().and_then(ImuCalibration::first_estimate_offset);
+        let imu = self.imu().and_then(ImuCalibration::first_estimate_offset);
         if imu.is_none() && offsets.iter().all(Option::is_none) {
             return None;
         }
@@ -173,7 +173,7 @@ impl Calibrations {
     pub(crate) fn at_first_estimate(&self) -> Self {
         Self {
             cameras: self.cameras.iter().map(Calibration::at_first_estimate).collect(),
-            imu: self.imu.as_ref().map(ImuCalibration::at_first_estimate),
+            imu: self.imu().map(|imu| Box::new(imu.at_first_estimate())),
         }
     }
 
@@ -193,7 +193,7 @@ impl Calibrations {
     /// Whitened prior residuals of all cameras.
     pub(crate) fn prior_residual(&self) -> DVector<f64> {
         let offsets: Vec<DVector<f64>> = self.free().map(|(_, one)| one.prior_residual()).collect();
-        let imu: Vec<ImuErrors> = self.imu.iter().map(ImuCalibration::prior_residual).collect();
+        let imu: Vec<ImuErrors> = self.imu().into_iter().map(ImuCalibration::prior_residual).collect();
         let values = offsets.iter().flat_map(DVector::iter).chain(imu.iter().flat_map(ImuErrors::iter));
         DVector::from_iterator(self.dof(), values.copied())
     }

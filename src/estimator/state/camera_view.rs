@@ -33,7 +33,7 @@ enum Poses<'a> {
     },
     Rolling {
         frames: Cow<'a, [FrameState]>,
-        sensor: CameraSensor<'a>,
+        sensor: Box<CameraSensor<'a>>,
         /// Of the first, the middle and the last row, by slot.
         rows: Vec<[CameraPose; 3]>,
     },
@@ -67,7 +67,7 @@ impl<'a> CameraView<'a> {
         let count = frames.len();
         let poses = if sensor.rolling {
             let rows = |state: &FrameState| ROLLING_ROWS.map(|row| camera_pose::at_row(state, &sensor, row));
-            Poses::Rolling { rows: frames.iter().map(rows).collect(), frames, sensor }
+            Poses::Rolling { rows: frames.iter().map(rows).collect(), frames, sensor: Box::new(sensor) }
         } else {
             let poses: Vec<CameraPose> = frames.iter().map(|state| camera_pose::at_row(state, &sensor, 0.0)).collect();
             Poses::Global { relative: RelativePoses::new(&poses), poses }

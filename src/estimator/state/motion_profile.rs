@@ -107,20 +107,17 @@ impl MotionProfile {
         let next = self.knots.iter().position(|knot| knot.time_s > time_s).unwrap_or(self.knots.len());
         let before = self.knots[next.saturating_sub(1)];
         let elapsed_s = time_s - before.time_s;
-        let (rotation_vector, force, rate_rad_per_s) = match self.knots.get(next).filter(|_| next > 0) {
-            Some(next) => {
-                let interval_s = next.time_s - before.time_s;
-                let fraction = elapsed_s / interval_s;
-                (
-                    so3::log(&(before.rotation.inverse() * next.rotation)) * fraction,
-                    (next.velocity_m_per_s - before.velocity_m_per_s) / interval_s,
-                    before.rate_rad_per_s + (next.rate_rad_per_s - before.rate_rad_per_s) * fraction,
-                )
-            }
-            None => {
-                let rate = before.rate_rad_per_s - self.bias.gyroscope_rad_per_s;
-                (rate * elapsed_s, before.rotation * before.force_m_per_s2, before.rate_rad_per_s)
-            }
+        let (rotation_vector, force, rate_rad_per_s) = if let Some(next) = self.knots.get(next).filter(|_| next > 0) {
+            let interval_s = next.time_s - before.time_s;
+            let fraction = elapsed_s / interval_s;
+            (
+                so3::log(&(before.rotation.inverse() * next.rotation)) * fraction,
+                (next.velocity_m_per_s - before.velocity_m_per_s) / interval_s,
+                before.rate_rad_per_s + (next.rate_rad_per_s - before.rate_rad_per_s) * fraction,
+            )
+        } else {
+            let rate = before.rate_rad_per_s - self.bias.gyroscope_rad_per_s;
+            (rate * elapsed_s, before.rotation * before.force_m_per_s2, before.rate_rad_per_s)
         };
         let change = gyroscope_bias_rad_per_s - self.bias.gyroscope_rad_per_s;
         RowMotion {

@@ -90,7 +90,7 @@ impl<'a> SensorWindow<'a> {
     pub(super) fn new(setup: &'a LaboratorySetup, form: LaboratoryForm) -> Self {
         let flight = setup.flight();
         let chain = form.chain(&setup.mechanism);
-        let times_s: Vec<f64> = (0..setup.frames).map(|slot| LaboratorySetup::time_s(slot)).collect();
+        let times_s: Vec<f64> = (0..setup.frames).map(LaboratorySetup::time_s).collect();
         let frames = times_s.iter().map(|time_s| frame_at(&flight.kinematics(*time_s))).collect();
         let sensors = SensorValues {
             timeshift_s: 0.0,

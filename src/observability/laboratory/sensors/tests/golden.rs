@@ -152,5 +152,7 @@ fn null_spaces_of_sensor_columns_are_those_of_the_golden_file() {
 #[ignore = "writes the golden file"]
 fn write_sensor_nulls() {
     let golden: BTreeMap<String, Golden> = CASES.par_iter().map(|case| (case.name(), computed(case))).collect();
-    std::fs::write(path(), serde_json::to_string_pretty(&golden).unwrap() + "\n").unwrap();
+    let mut text = serde_json::to_string_pretty(&golden).unwrap();
+    text.push('\n');
+    std::fs::write(path(), text).unwrap();
 }

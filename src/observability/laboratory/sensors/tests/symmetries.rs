@@ -19,7 +19,7 @@ const ZERO: f64 = 1e-10;
 /// The least change of all columns with the smallest linearized residual; `fixed` columns keep the change given in `delta`.
 fn step(reduced: &DMatrix<f64>, delta: &DVector<f64>, fixed: usize) -> DVector<f64> {
     let jacobian = reduced.columns_range(1..);
-    let target = -(reduced.column(0) + &jacobian * delta);
+    let target = -(reduced.column(0) + jacobian * delta);
     let mut open = jacobian.columns_range(fixed..).into_owned();
     // A column of rounding errors stays zero.
     let largest = open.column_iter().map(|column| column.norm()).fold(0.0, f64::max);
