@@ -139,12 +139,12 @@ pub fn fit_imu_noise(
     let mut given = config.imu_noise;
     let densities = [0, 1, 2, 3].map(|index| {
         let density = NoiseDensity::ALL[index];
-        let (sums, found) = (&last.sums[index], *value(&mut noise, density));
+        let (sums, found, given) = (&last.sums[index], *value(&mut noise, density), *value(&mut given, density));
         FittedDensity {
             density,
-            given: *value(&mut given, density),
+            given,
             found,
-            sigma: is_shown(sums).then(|| 0.5 * variance_sigma(sums) * found),
+            sigma: (is_shown(sums) || found != given).then(|| 0.5 * variance_sigma(sums) * found),
             nis_before: before[index].chi2 / before[index].freedom,
             nis_after: sums.chi2 / sums.freedom,
             degrees_of_freedom: sums.freedom,
