@@ -76,6 +76,7 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame, encoder_sigma_rad: f6
         frame_index: frame.index,
         stamp_ns: frame.stamp_ns,
         imu: &frame.imu,
+        imu_after: &[],
         joint_angles: joint_angles.as_ref(),
         tracks: &frame.tracks,
         rigid_tracks: &[],
