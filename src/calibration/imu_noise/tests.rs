@@ -1,28 +1,15 @@
 //! Densities of synthetic flights, found again from wrong ones.
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
 
 use super::{FlightNoise, fit_imu_noise};
-use crate::calibration::TrackedView;
+use crate::calibration::tests::fixture::views;
 use crate::estimator::EstimatorConfig;
 use crate::gimbal::Parameterization;
-use crate::simulation::{SyntheticFlight, SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks};
+use crate::simulation::{SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
-fn views(flight: &SyntheticFlight) -> Vec<TrackedView> {
-    let sigma_rad = flight.given_rig.gimbal.as_ref().and_then(|gimbal| gimbal.encoder_sigma_rad);
-    flight
-        .frames
-        .iter()
-        .map(|frame| TrackedView {
-            frame_index: frame.index,
-            stamp_ns: frame.stamp_ns,
-            imu: frame.imu.clone(),
-            joint_angles: sigma_rad.and_then(|sigma_rad| frame.encoder_angles(sigma_rad)),
-            tracks: Arc::new(frame.tracks.clone()),
-        })
-        .collect()
-}
+/// Standard deviation of encoder readings, which a rigid camera does not have.
+const NO_ENCODERS: f64 = 1.0;
 
 /// Fits a flight of `seconds` whose true densities are those of the rig times `factor`.
 fn fitted(seed: u64, factor: f64, seconds: f64) -> FlightNoise {
@@ -38,7 +25,7 @@ fn fitted(seed: u64, factor: f64, seconds: f64) -> FlightNoise {
     let mut config = EstimatorConfig::for_camera(&flight.given_rig, "cam0", Parameterization::Minimal).unwrap();
     config.imu_noise.gyroscope_noise_density /= factor;
     config.imu_noise.accelerometer_noise_density /= factor;
-    fit_imu_noise(&config, &views(&flight), &mut |_| ControlFlow::Continue(())).unwrap()
+    fit_imu_noise(&config, &views(&flight, NO_ENCODERS), &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
 #[test]

@@ -37,7 +37,8 @@ pub(super) fn mount(rig: &Rig) -> RigidTransform {
     }
 }
 
-fn views(flight: &SyntheticFlight, encoder_sigma_rad: f64) -> Vec<TrackedView> {
+/// Tracked images of a flight; without encoders the standard deviation of their readings is not used.
+pub(in crate::calibration) fn views(flight: &SyntheticFlight, encoder_sigma_rad: f64) -> Vec<TrackedView> {
     flight
         .frames
         .iter()

@@ -2,6 +2,6 @@
 
 mod algebra;
 mod derivatives;
-mod fixture;
+pub(super) mod fixture;
 mod flights;
 mod loops;

@@ -26,8 +26,8 @@ pub struct JacobianSource {
     pub(crate) clocks: Box<[ClockColumns]>,
     /// By slot, with estimated time offsets: rates of the body's rotation and position, then of the joints.
     pub(crate) rates: Box<[f32]>,
-    /// States and calibrations where rows of the images have poses of their own or intrinsics are estimated, which the
-    /// fields above do not describe.
+    /// States and calibrations where rows of the images have poses of their own or intrinsics of a camera or of the IMU are
+    /// estimated, which the fields above do not describe.
     pub(crate) exact: Option<Box<ExactSource>>,
     /// Whether the calibration has columns.
     pub(crate) calibrated: bool,

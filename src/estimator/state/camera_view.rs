@@ -1,6 +1,7 @@
 //! A camera in a window at one estimate: its model, and its pose at each observation.
 
 use std::borrow::Cow;
+use std::cell::OnceCell;
 
 use nalgebra::{Matrix2x6, Vector2, Vector3};
 
@@ -29,7 +30,8 @@ enum Poses<'a> {
     Global {
         /// By slot.
         poses: Vec<CameraPose>,
-        relative: RelativePoses,
+        /// Made at first use: most callers need poses alone.
+        relative: OnceCell<RelativePoses>,
     },
     Rolling {
         frames: Cow<'a, [FrameState]>,
@@ -70,16 +72,20 @@ impl<'a> CameraView<'a> {
             Poses::Rolling { rows: frames.iter().map(rows).collect(), frames, sensor: Box::new(sensor) }
         } else {
             let poses: Vec<CameraPose> = frames.iter().map(|state| camera_pose::at_row(state, &sensor, 0.0)).collect();
-            Poses::Global { relative: RelativePoses::new(&poses), poses }
+            Poses::Global { relative: OnceCell::new(), poses }
         };
         Self { model, has_intrinsics, frames: count, poses }
     }
 
     /// A camera at given poses by slot, with a global shutter.
     pub(crate) fn of_poses(poses: Vec<CameraPose>, model: &'a CameraModel) -> Self {
-        let relative = RelativePoses::new(&poses);
         let frames = poses.len();
-        Self { model: Cow::Borrowed(model), has_intrinsics: false, frames, poses: Poses::Global { poses, relative } }
+        Self {
+            model: Cow::Borrowed(model),
+            has_intrinsics: false,
+            frames,
+            poses: Poses::Global { poses, relative: OnceCell::new() },
+        }
     }
 
     /// The camera model with the estimated intrinsics.
@@ -192,7 +198,9 @@ impl RelativeTo<'_> {
     /// `observer_from_anchor` at the rows of both observations.
     pub(crate) fn get(&self, observation: &TrackObservation) -> RelativePose {
         match &self.view.poses {
-            Poses::Global { relative, .. } => *relative.get(self.slot, observation.slot),
+            Poses::Global { poses, relative } => {
+                *relative.get_or_init(|| RelativePoses::new(poses)).get(self.slot, observation.slot)
+            }
             Poses::Rolling { .. } => {
                 RelativePose::new(&self.pose, &self.view.pose(observation.slot, &observation.uv_px))
             }

@@ -73,8 +73,8 @@ impl WindowState {
             })
             .collect();
         let any = clocks.iter().any(|clocks| clocks.count > 0);
-        let views = (0..calibration.cameras()).map(|camera| problem.view(camera, &frames, &calibration));
-        let exact = layout.moving_rows || views.into_iter().any(|view| view.intrinsics_block().is_some());
+        let has_intrinsics = |camera| !calibration.of(camera).intrinsics_columns().is_empty();
+        let exact = layout.moving_rows || calibration.imu().is_some() || (0..calibration.cameras()).any(has_intrinsics);
         let exact = exact.then(|| {
             Box::new(ExactSource {
                 linearized: (frames.clone(), calibration.clone()),
