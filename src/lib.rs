@@ -19,6 +19,7 @@
 //! | [`calibration`] | a whole flight of both cameras in, the offline calibration of extrinsics and gimbal out | logs, files |
 //! | `log_check` | what is wrong with a log, with evidence and remedy | the estimator |
 //! | `session` | a cursor over a log, runs side by side, stored reports | pixels on a screen |
+//! | `study` | the runs that a plan asks for, the tables of their results and the comparison of two of them | files, processes, screens |
 //! | `gui` | panels, 3D scene, theme: reads reports, sends commands | the inside of the estimator |
 //! | `export` | the same tables and panels without a window | windows |
 //!
@@ -96,3 +97,5 @@ pub mod sensors;
 #[cfg(feature = "logs")]
 pub mod session;
 pub mod simulation;
+#[cfg(feature = "logs")]
+pub mod study;

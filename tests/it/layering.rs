@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Folders from the first to the last; each may use those before it. The table in `src/lib.rs` says what each promises.
-const ORDER: [&str; 17] = [
+const ORDER: [&str; 18] = [
     "geometry",
     "camera",
     "gimbal",
@@ -18,6 +18,7 @@ const ORDER: [&str; 17] = [
     "calibration",
     "log_check",
     "session",
+    "study",
     "gui",
     "export",
     "cli",
