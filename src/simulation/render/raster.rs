@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::view::{Grid, Workspace};
 use crate::geometry::RigidTransform;
-use crate::simulation::world::{Affine, World};
+use crate::simulation::world::{Affine, Bounds, World};
 
 /// Marks a sample that sees the sky.
 pub(super) const SKY: u32 = u32::MAX;
@@ -47,6 +47,35 @@ impl Eye {
     }
 }
 
+/// What some rows of the sample grid show: the space in front of the near plane and between four planes through the centre of
+/// the camera, in its frame.
+struct Frustum {
+    /// Unit normals that point outwards.
+    sides: [Vector3<f64>; 4],
+}
+
+impl Frustum {
+    /// Two samples wider than the rows on every side.
+    fn new(grid: &Grid, shown: &Range<usize>) -> Self {
+        let ray = |axis: usize, sample: f64| grid.origin[axis] + sample * grid.step[axis];
+        let [left, right] = [ray(0, -2.0), ray(0, grid.columns as f64 + 2.0)];
+        let [top, bottom] = [ray(1, shown.start as f64 - 2.0), ray(1, shown.end as f64 + 2.0)];
+        let sides = [
+            Vector3::new(-1.0, 0.0, left),
+            Vector3::new(1.0, 0.0, -right),
+            Vector3::new(0.0, -1.0, top),
+            Vector3::new(0.0, 1.0, -bottom),
+        ];
+        Self { sides: sides.map(|side| side.normalize()) }
+    }
+
+    /// Whether a sphere may be seen in part.
+    fn may_show(&self, bounds: &Bounds, eye: &Eye) -> bool {
+        let centre_m = eye.camera_from_world * (bounds.centre_m - eye.centre_m);
+        centre_m.z + bounds.radius_m > NEAR_M && self.sides.iter().all(|side| side.dot(&centre_m) <= bounds.radius_m)
+    }
+}
+
 /// A face's outline in the sample grid, ready to be drawn band by band.
 #[derive(Clone, Debug)]
 pub(super) struct Shape {
@@ -68,7 +97,12 @@ impl Workspace {
         self.prepared.clear();
         self.shapes.clear();
         self.outlines.clear();
+        let frustum = Frustum::new(grid, shown);
         for face in &world.faces {
+            // Most faces lie elsewhere, above all where a rolling shutter has a pose for every other row.
+            if !frustum.may_show(&face.bounds, eye) {
+                continue;
+            }
             // How far the camera's centre stands before the face.
             let before_m = face.normal.dot(&eye.centre_m) - face.distance;
             if before_m <= 1e-4 {

@@ -40,6 +40,7 @@ impl Affine {
 #[derive(Clone, Debug)]
 pub(crate) struct Face {
     pub(crate) corners: Vec<Vector3<f64>>,
+    pub(crate) bounds: Bounds,
     /// Outward unit normal and its distance: `normal · point = distance`.
     pub(crate) normal: Vector3<f64>,
     pub(crate) distance: f64,
@@ -48,6 +49,21 @@ pub(crate) struct Face {
     /// How squarely the sun meets the surface, 0 to 1.
     pub(crate) sun: Affine,
     pub(crate) material: MaterialId,
+}
+
+/// A sphere around a face.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bounds {
+    pub(crate) centre_m: Vector3<f64>,
+    pub(crate) radius_m: f64,
+}
+
+impl Bounds {
+    fn of(corners: &[Vector3<f64>]) -> Self {
+        let centre_m = corners.iter().sum::<Vector3<f64>>() / corners.len().max(1) as f64;
+        let radius_m = corners.iter().map(|corner| (corner - centre_m).norm()).fold(0.0, f64::max);
+        Self { centre_m, radius_m }
+    }
 }
 
 /// A world: faces, materials, textures, sun and sky.
@@ -105,6 +121,7 @@ impl World {
         let Some(normal) = normal.try_normalize(1e-12) else { return };
         let sun = normal.dot(&self.to_sun).max(0.0);
         self.faces.push(Face {
+            bounds: Bounds::of(&corners),
             distance: normal.dot(&origin),
             normal,
             texture_m: [Affine::along(right, &origin, start_m[0]), Affine::along(down, &origin, start_m[1])],

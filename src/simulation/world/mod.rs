@@ -10,7 +10,7 @@ mod surface;
 mod texture;
 mod town;
 
-pub(crate) use mesh::{Affine, World};
+pub(crate) use mesh::{Affine, Bounds, World};
 pub(crate) use texture::Footprints;
 
 use super::experiment::Environment;
