@@ -4,6 +4,7 @@
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::imu_facts::ImuFacts;
+use super::readout::between_first_rows;
 use super::statistics::median;
 use super::survey::Survey;
 use super::{Area, Findings, ImageRotation, Severity};
@@ -43,9 +44,7 @@ struct HandEye<'a> {
     survey: &'a Survey,
     imu_facts: &'a ImuFacts,
     camera: &'a CameraRig,
-    /// Time from a stamp to the exposure of the middle row: what all features of an image measure together.
-    middle_row_s: f64,
-    rotations: Vec<&'a ImageRotation>,
+    rotations: Vec<ImageRotation>,
 }
 
 /// Checks the orientation and time offset of a camera with a readout by its image rotations, if there are any.
@@ -58,9 +57,9 @@ pub(super) fn check_against_gyroscope(
     readout_s: f64,
     findings: &mut Findings,
 ) {
-    let rotations: Vec<_> = rotations.iter().filter(|rotation| rotation.camera_key == camera.key).collect();
+    let rotations = between_first_rows(camera, rotations, readout_s);
     let Some(chain) = rig.chain_of_camera(&camera.key).filter(|_| rotations.len() >= MIN_ROTATIONS) else { return };
-    let hand_eye = HandEye { survey, imu_facts, camera, middle_row_s: 0.5 * readout_s, rotations };
+    let hand_eye = HandEye { survey, imu_facts, camera, rotations };
     let given = hand_eye.pairs(&chain, 0.0);
     let angles_rad: Vec<f64> = given.iter().map(|(_, measured)| measured.norm()).collect();
     if given.len() < MIN_ROTATIONS || median(&angles_rad) < MIN_ROTATION_RAD {
@@ -77,12 +76,12 @@ pub(super) fn check_against_gyroscope(
 impl HandEye<'_> {
     /// Predicted and measured rotation vectors, for a chain and an additional time offset.
     fn pairs(&self, chain: &ClassicalChain, offset_s: f64) -> Vec<Pair> {
-        let shift = ns_from_seconds(self.camera.timeshift_cam_imu_s + self.middle_row_s + offset_s);
+        let shift = ns_from_seconds(self.camera.timeshift_cam_imu_s + offset_s);
         let imu_from_camera = |stamp_ns: i64| {
             let angles_rad = if chain.links.is_empty() { Vec::new() } else { self.survey.joint_angles_at(stamp_ns)? };
             Some(chain.imu_from_camera(&angles_rad).rotation)
         };
-        let pair = |rotation: &&ImageRotation| {
+        let pair = |rotation: &ImageRotation| {
             let (from_ns, to_ns) = (rotation.from_ns + shift, rotation.to_ns + shift);
             let rotation_of_imu = imu_rotation(self.imu_facts, from_ns, to_ns)?;
             let predicted =

@@ -2,8 +2,10 @@
 
 use super::imu_facts::ImuFacts;
 use super::{Area, Findings, ImageRotation, Severity};
-use crate::frontend::readout::{AngularRates, ImagePair, ReadoutMeasurement, ReadoutOptions, measure_readout};
-use crate::geometry::seconds_from_ns;
+use crate::frontend::readout::{
+    AngularRates, ImagePair, ReadoutMeasurement, ReadoutOptions, measure_readout, rotations_of_first_rows,
+};
+use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig};
 
 /// A readout is reported when it differs from the rig's by more standard deviations than this.
@@ -75,6 +77,32 @@ fn image_pairs(camera: &CameraRig, rotations: &[ImageRotation]) -> Vec<ImagePair
             stamps_s: [rotation.from_ns, rotation.to_ns]
                 .map(|stamp_ns| seconds_from_ns(stamp_ns) + camera.timeshift_cam_imu_s),
             tracks: rotation.tracks.clone(),
+        })
+        .collect()
+}
+
+/// A camera's rotations between the first rows of its images, which is what their stamps say; those of images whose features
+/// are too few are left out.
+pub(super) fn between_first_rows(
+    camera: &CameraRig,
+    rotations: &[ImageRotation],
+    readout_s: f64,
+) -> Vec<ImageRotation> {
+    let of_camera = rotations.iter().filter(|rotation| rotation.camera_key == camera.key);
+    if readout_s == 0.0 {
+        return of_camera.cloned().collect();
+    }
+    let options = ReadoutOptions::for_focal_length(camera.model.focal_length_px());
+    let corrected = rotations_of_first_rows(&image_pairs(camera, rotations), readout_s, &options);
+    let stamp_ns = |time_s: f64| ns_from_seconds(time_s - camera.timeshift_cam_imu_s);
+    corrected
+        .into_iter()
+        .map(|found| ImageRotation {
+            camera_key: camera.key.clone(),
+            from_ns: stamp_ns(found.stamps_s[0]),
+            to_ns: stamp_ns(found.stamps_s[1]),
+            second_from_first: found.rotation,
+            tracks: Vec::new(),
         })
         .collect()
 }
