@@ -86,9 +86,10 @@ pub(crate) fn noise(arguments: &NoiseArguments) -> Result<Outcome> {
 }
 
 fn too_short(report: &AllanReport) -> String {
+    // Adding zero turns −0 into 0.
     format!(
         "{:.1} s of stationary stretches in the log, at least 10 s of stretches of 3 s are needed for an Allan deviation",
-        report.stationary_s
+        report.stationary_s + 0.0
     )
 }
 

@@ -120,6 +120,8 @@ pub struct SensorNoise {
     pub terms: NoiseTerms,
     /// Lines of a vibration while stationary.
     pub vibration: Vec<String>,
+    /// Shorter averaging times are not fitted: a low-pass filter of the sensor bends the mean deviation there.
+    pub filtered_below_s: Option<f64>,
     /// What the rig says.
     pub given: Option<GivenNoise>,
 }
@@ -259,6 +261,7 @@ fn sensor_noise(
         axes: axes.collect(),
         terms: noise_terms(&mean, fit.as_ref(), (&phases[0], 3), longest_s, given),
         vibration: lines.iter().map(line).collect(),
+        filtered_below_s: fit.as_ref().and_then(|fit| fit.filtered_below_s),
         given,
     }
 }

@@ -76,6 +76,13 @@ fn write_sensor(out: &mut Formatter<'_>, sensor: &SensorNoise) -> Result {
             writeln!(out, "  {name} not identified: {}", all.reason)?;
         }
     }
+    if let Some(filtered_s) = sensor.filtered_below_s {
+        writeln!(
+            out,
+            "  averaging times below {:.0} ms left out: a low-pass filter of the sensor bends the deviation there",
+            filtered_s * 1e3
+        )?;
+    }
     if !sensor.vibration.is_empty() {
         writeln!(out, "  vibration left out: {}", sensor.vibration.join(", "))?;
     }

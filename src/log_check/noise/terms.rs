@@ -15,6 +15,11 @@ const MODEL_ERROR: f64 = 0.02;
 const SIGNIFICANT: f64 = 4.0;
 /// Quantization must make up this part of the variance at the shortest τ: filters of a sensor bend the curve there.
 const QUANTIZATION_RATIO: f64 = 0.3;
+/// The sum of terms never falls more steeply at a longer averaging time. Where the slope of the variance does by more than this
+/// (and by more than chance), the shorter averaging times belong to a low-pass filter.
+const FILTER_BEND: f64 = 0.35;
+/// Slopes with a larger standard deviation do not show a filter.
+const CLEAR_SLOPE: f64 = 0.15;
 /// Factor on the standard deviations of flicker noise and random walk: the estimates of adjacent octaves are correlated there
 /// (found by simulation, tested).
 const CORRELATED: f64 = 1.4;
@@ -37,10 +42,14 @@ pub(super) struct Coefficient {
 /// The fitted sum of terms.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Fit {
-    /// `3 Q²`, `N²`, `0.664² B²` and `K²/3` with their standard deviations; `None` for terms that are not significant.
+    /// `3 Q²`, `N²`, `0.664² B²` and `K²/3` with their standard deviations; `None` for terms that are not significant. Behind
+    /// a filter the first one is negative: white noise through a low-pass filter has the variance `N²/τ − c/τ²` where τ is
+    /// long against its response, with `c = 1.5 N² T` for one of first order with the time constant `T`.
     pub(super) coefficients: [Option<Coefficient>; 4],
     /// Which points were used, by their index.
     pub(super) used: Vec<usize>,
+    /// Averaging times below this one were left out: a filter of the sensor bends the curve there.
+    pub(super) filtered_below_s: Option<f64>,
 }
 
 fn power(kind: usize, tau_s: f64) -> f64 {
@@ -67,7 +76,7 @@ impl Fit {
     /// A term in its own unit: `Q`, `N`, `B` or `K`.
     pub(super) fn term(&self, kind: NoiseKind) -> Option<Coefficient> {
         let index = KINDS.iter().position(|known| *known == kind)?;
-        let Coefficient { value, sigma } = self.coefficients[index]?;
+        let Coefficient { value, sigma } = self.coefficients[index].filter(|found| found.value > 0.0)?;
         let factor = [3.0, 1.0, FLICKER_FACTOR, 1.0 / 3.0][index];
         let term = (value / factor).sqrt();
         Some(Coefficient { value: term, sigma: 0.5 * sigma / (factor * term) })
@@ -84,10 +93,13 @@ impl Fit {
                 next = 2 * point.count;
             }
         }
+        let filtered = filtered_points(points, &used, stretches, axes);
+        let filtered_below_s = used.get(filtered).filter(|_| filtered > 0).map(|index| points[*index].tau_s);
+        used.drain(..filtered);
         if used.len() < 2 {
             return None;
         }
-        let mut fit = Self { coefficients: [None; 4], used };
+        let mut fit = Self { coefficients: [None; 4], used, filtered_below_s };
         // Few points do not separate four terms.
         let mut kinds = match fit.used.len() {
             2 => vec![1],
@@ -99,6 +111,11 @@ impl Fit {
             (fit, kinds) = (reduced, left);
         }
         Some(fit)
+    }
+
+    /// Sign of a coefficient.
+    fn sign(&self, kind: usize) -> f64 {
+        if kind == 0 && self.filtered_below_s.is_some() { -1.0 } else { 1.0 }
     }
 
     /// Solves with weights that follow the model.
@@ -127,7 +144,7 @@ impl Fit {
             reduced.refine(points, stretches, &left)?;
             let part = self.coefficients[*kind]?.value * power(*kind, shortest);
             // Without curvature of its own at the shortest τ it is a filter's.
-            let is_filter = *kind == 0 && part < QUANTIZATION_RATIO * self.variance(shortest);
+            let is_filter = *kind == 0 && part >= 0.0 && part < QUANTIZATION_RATIO * self.variance(shortest);
             let chi2 = |model: &Self| -> f64 {
                 let score = |index: &usize| {
                     let point = &points[*index];
@@ -148,7 +165,7 @@ impl Fit {
         self.variance(point.tau_s).max(0.05 * point.variance) * (2.0 / freedom + (2.0 * MODEL_ERROR).powi(2)).sqrt()
     }
 
-    /// One weighted least-squares solution over some terms, none of them negative.
+    /// One weighted least-squares solution over some terms, all of them with the right sign.
     fn solve(
         &mut self,
         points: &[AllanVariance],
@@ -168,7 +185,7 @@ impl Fit {
                 self.sigma(point, (stretches, axes))
             };
             for (column, kind) in kinds.iter().enumerate() {
-                design[(row, column)] = power(*kind, point.tau_s) / sigma;
+                design[(row, column)] = self.sign(*kind) * power(*kind, point.tau_s) / sigma;
             }
             target[row] = point.variance / sigma;
         }
@@ -177,10 +194,28 @@ impl Fit {
         for (column, kind) in kinds.iter().enumerate() {
             let correlated = if *kind >= 2 { CORRELATED } else { 1.0 };
             let sigma = correlated * covariance[(column, column)].sqrt();
-            self.coefficients[*kind] = Some(Coefficient { value: solution[column], sigma });
+            self.coefficients[*kind] = Some(Coefficient { value: self.sign(*kind) * solution[column], sigma });
         }
         Some(())
     }
+}
+
+/// How many of the used points, the shortest first, come before a steeper part of the curve.
+fn filtered_points(points: &[AllanVariance], used: &[usize], stretches: &[Phase], axes: usize) -> usize {
+    let relative_variance = |point: &AllanVariance| {
+        2.0 / (degrees_of_freedom(stretches, point.count, NoiseKind::White).max(1.0) * axes as f64)
+    };
+    let slope = |pair: &[usize]| {
+        let [from, to] = [pair[0], pair[1]].map(|index| &points[index]);
+        let octaves = (to.tau_s / from.tau_s).ln();
+        let sigma = (relative_variance(from) + relative_variance(to)).sqrt() / octaves;
+        ((to.variance / from.variance).ln() / octaves, sigma)
+    };
+    let slopes: Vec<(f64, f64)> = used.windows(2).map(slope).take_while(|(_, sigma)| *sigma < CLEAR_SLOPE).collect();
+    let Some(steepest) = (0..slopes.len()).min_by(|a, b| slopes[*a].0.total_cmp(&slopes[*b].0)) else { return 0 };
+    let (least, least_sigma) = slopes[steepest];
+    let bends = |(slope, sigma): &(f64, f64)| slope - least > FILTER_BEND + SIGNIFICANT * sigma.hypot(least_sigma);
+    slopes[..steepest].iter().rposition(bends).map_or(0, |last| last + 1)
 }
 
 /// Least squares without negative unknowns: the best of all subsets of the columns whose solution is not negative. The

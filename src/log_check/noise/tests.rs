@@ -15,17 +15,18 @@ pub(super) fn normal(random: &mut SplitMix64) -> f64 {
     radius * (std::f64::consts::TAU * random.next_unit()).cos()
 }
 
-/// White noise, random walk, quantization step and a line of 30 Hz of one sensor.
+/// White noise, random walk, quantization step, a line of 30 Hz and the time constant of a low-pass filter of one sensor.
 #[derive(Clone, Copy, Default)]
 struct Truth {
     white: f64,
     walk: f64,
     step: f64,
     line: f64,
+    filter_s: f64,
 }
 
-const GYROSCOPE: Truth = Truth { white: 3e-4, walk: 2e-4, step: 0.0, line: 0.0 };
-const ACCELEROMETER: Truth = Truth { white: 4e-3, walk: 2e-3, step: 0.0, line: 0.0 };
+const GYROSCOPE: Truth = Truth { white: 3e-4, walk: 2e-4, step: 0.0, line: 0.0, filter_s: 0.0 };
+const ACCELEROMETER: Truth = Truth { white: 4e-3, walk: 2e-3, step: 0.0, line: 0.0, filter_s: 0.0 };
 
 fn series(seed: u64, parts_s: &[(f64, f64)], moving: bool, gyroscope: Truth, accelerometer: Truth) -> ImuSeries {
     let mut random = SplitMix64::new(seed);
@@ -33,6 +34,7 @@ fn series(seed: u64, parts_s: &[(f64, f64)], moving: bool, gyroscope: Truth, acc
     let end_s = parts_s.last().unwrap().1;
     let mut biases = [Vector3::zeros(); 2];
     let mut sums = [Vector3::zeros(); 2];
+    let mut filtered = [Vector3::zeros(); 2];
     for index in 0..(end_s * RATE_HZ) as i64 {
         let time_s = index as f64 / RATE_HZ;
         let still = parts_s.iter().any(|(from, to)| (*from..*to).contains(&time_s));
@@ -42,7 +44,10 @@ fn series(seed: u64, parts_s: &[(f64, f64)], moving: bool, gyroscope: Truth, acc
             *bias += Vector3::from_fn(|_, _| normal(&mut random)) * (truth.walk / RATE_HZ.sqrt());
             let white = Vector3::from_fn(|_, _| normal(&mut random)) * (truth.white * RATE_HZ.sqrt());
             let line = Vector3::repeat(truth.line * (std::f64::consts::TAU * 30.0 * time_s).sin());
-            let mut value = *bias + white + line + Vector3::repeat(motion);
+            let passed = if truth.filter_s > 0.0 { 1.0 - (-1.0 / (RATE_HZ * truth.filter_s)).exp() } else { 1.0 };
+            let noise: &mut Vector3<f64> = &mut filtered[sensor];
+            *noise += (white - *noise) * passed;
+            let mut value = *bias + *noise + line + Vector3::repeat(motion);
             if truth.step > 0.0 {
                 // The integral in whole steps, as sensors that sum up deliver it.
                 let sum: &mut Vector3<f64> = &mut sums[sensor];
@@ -148,7 +153,7 @@ fn the_stretch_that_is_asked_for_shows_the_random_walk() {
 fn quantization_is_a_slope_of_minus_one() {
     // Well below the increments between samples the errors of two sums would be correlated.
     let step = 6e-5;
-    let coarse = Truth { white: 3e-4, walk: 0.0, step, line: 0.0 };
+    let coarse = Truth { white: 3e-4, walk: 0.0, step, ..Truth::default() };
     let report = report(5, 120.0, coarse, ACCELEROMETER);
     // Uniform over a step: σ = step/√12.
     let found = report.sensors[0].terms.quantization.value.unwrap();
@@ -166,6 +171,22 @@ fn vibration_does_not_count_as_noise() {
     assert!(accelerometer.axes[0].points[0].vibration && !accelerometer.axes[0].points.last().unwrap().vibration);
     let white = accelerometer.terms.white.value.unwrap();
     assert!((white / ACCELEROMETER.white - 1.0).abs() < 0.2, "{white}");
+}
+
+#[test]
+fn a_low_pass_filter_is_no_bias_instability() {
+    let smooth = Truth { filter_s: 0.06, walk: 1e-5, ..GYROSCOPE };
+    for seed in 1..=4 {
+        let report = report(seed, 120.0, smooth, ACCELEROMETER);
+        let [gyroscope, accelerometer] = &report.sensors[..] else { panic!("{:?}", report.sensors) };
+        assert!(gyroscope.filtered_below_s.is_some_and(|below_s| below_s < 1.0), "{:?}", gyroscope.filtered_below_s);
+        assert_eq!(accelerometer.filtered_below_s, None);
+        let white = gyroscope.terms.white.value.unwrap();
+        assert!((white / smooth.white - 1.0).abs() < 0.1, "{white}");
+        let lowest = gyroscope.axes[0].points.iter().map(|point| point.deviation).fold(f64::MAX, f64::min);
+        let instability = &gyroscope.terms.bias_instability;
+        assert!(instability.value.or(instability.limit).unwrap() < 4.0 * lowest, "{instability:?}, {lowest}");
+    }
 }
 
 #[test]
