@@ -111,8 +111,8 @@ const REFINEMENTS: usize = 3;
 const DIFFERENCE_S: f64 = 2e-4;
 /// Length of the stretches whose disagreement gives the standard deviation.
 const STRETCH_S: f64 = 1.0;
-/// Error that all stretches share, as a ratio of the readout: rendered flights with 10 to 30 ms come out 1 to 4 % off.
-const SYSTEMATIC_RATIO: f64 = 0.03;
+/// Error that all stretches share, as a ratio of the readout: rendered flights with 30 ms come out 1 to 3 % off.
+const SYSTEMATIC_RATIO: f64 = 0.02;
 /// Rounds of time offset and readout in turn.
 const ROUNDS: usize = 2;
 /// Step of the search for a time offset.
