@@ -3,7 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{CalibrationDirection, ParameterState, RankReport, parameter_states};
+use super::{CalibrationDirection, ParameterState, RankReport, exciting_motion, parameter_states};
 use crate::estimator::CalibrationEstimate;
 use crate::gimbal::{ParameterId, ParameterNames};
 
@@ -49,8 +49,8 @@ pub struct ParameterEstimability {
     pub prior_sigma: f64,
     /// The verdict.
     pub estimability: Estimability,
-    /// Why it is not known: the null or weak direction of the last window or the correlation that it belongs to; empty
-    /// without one.
+    /// Why it is not known: the null or weak direction of the last window or the correlation that it belongs to, and for a sensor
+    /// the motion that determines it; empty without any.
     pub reason: String,
 }
 
@@ -106,7 +106,12 @@ pub fn estimability(
         };
         row.estimability = row.verdict(states.get(parameter).copied());
         if let (Some(rank), Estimability::Weak | Estimability::NotFromThisFlight) = (rank, row.estimability) {
-            row.reason = reason(rank, correlations.as_ref(), *parameter, names).unwrap_or_default();
+            let reason = reason(rank, correlations.as_ref(), *parameter, names);
+            let parts: Vec<String> = reason
+                .into_iter()
+                .chain(exciting_motion(*parameter).map(|motion| format!("to know it, {motion}")))
+                .collect();
+            row.reason = parts.join("; ");
         }
         rows.push(row);
     }

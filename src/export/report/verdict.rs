@@ -10,7 +10,7 @@ use crate::export::summary::{Accuracy, ChainError, RunSummary};
 use crate::geometry::{Dimension, seconds_from_ns};
 use crate::log_check::{CheckReport, Severity};
 use crate::observability::laboratory::{Situation, advise};
-use crate::observability::{ParameterState, RankReport, parameter_states, parameters_of};
+use crate::observability::{ParameterState, RankReport, exciting_motion, parameter_states, parameters_of};
 use crate::session::{LostSince, PoseUncertainty, Recording, RunRecord, StepRecord};
 
 /// A parameter counts as informed when its posterior σ is at most this ratio of its prior σ: the measurements then
@@ -258,6 +258,11 @@ fn observability(recording: &Recording, run: &RunRecord) -> Option<Statement> {
     {
         let at_s = number(seconds_from_ns(stamp_ns), 2);
         details.push(format!("Largest informed rank of the run: {most} at {at_s} s."));
+    }
+    if let Some((parameter, motion)) =
+        rank.least_observable().and_then(|parameter| Some((parameter, exciting_motion(parameter)?)))
+    {
+        details.push(format!("Suggested excitation for {}: {motion}.", names.name(parameter)));
     }
     if rank.rank_informed < columns
         && let Some(advice) =

@@ -6,9 +6,11 @@ use egui::{RichText, Ui};
 
 use super::{fact_ui, section_ui};
 use crate::geometry::seconds_from_ns;
+use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::step_work::{REPAINT, StepWork};
 use crate::gui::theme::ROW_HEIGHT;
+use crate::observability::exciting_motion;
 use crate::observability::laboratory::{Advice, Situation, advise};
 use crate::session::{LostSince, RunRecord, StepRecord};
 
@@ -93,8 +95,11 @@ impl AdviceUi {
         } else {
             format!(" at {:.2} s", seconds_from_ns(of.report.stamp_ns))
         };
-        if of.rank.is_some() {
-            advice_ui(ui, ctx, results.and_then(|results| results.advice.as_ref()), &time);
+        let Some(rank) = &of.rank else { return };
+        let advice = results.and_then(|results| results.advice.as_ref());
+        match rank.least_observable().and_then(|parameter| Some((parameter, exciting_motion(parameter)?))) {
+            Some((parameter, motion)) => sensor_advice_ui(ui, ctx, parameter, motion, advice, &time),
+            None => advice_ui(ui, ctx, advice, &time),
         }
     }
 
@@ -165,6 +170,21 @@ fn advice_ui(ui: &mut Ui, ctx: &PanelContext<'_>, advice: Option<&Advice>, time:
         advice.duration_s,
         alternatives(advice).join("\n")
     ));
+}
+
+/// The motion for a sensor's parameter that is least observable, and the suggested excitation of the chain.
+fn sensor_advice_ui(
+    ui: &mut Ui,
+    ctx: &PanelContext<'_>,
+    parameter: ParameterId,
+    motion: &str,
+    advice: Option<&Advice>,
+    time: &str,
+) {
+    let name = ctx.names().name(parameter);
+    let chain = advice.and_then(Advice::sentence).map_or_else(String::new, |chain| format!("; for the chain {chain}"));
+    let label = format!("Suggested excitation{time}: ");
+    fact_ui(ui, ctx.theme, &label, &format!("for {name} {motion}{chain}"), ctx.theme.text_strong);
 }
 
 /// The motions after the best one, one line each.

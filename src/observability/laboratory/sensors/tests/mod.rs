@@ -1,6 +1,7 @@
 //! Columns of sensors: derivatives, ranks and null directions.
 
 mod derivatives;
+mod excitation;
 mod golden;
 mod moves;
 mod symmetries;
