@@ -77,7 +77,7 @@ pub struct AllanPoint {
     pub low: f64,
     /// Upper limit.
     pub high: f64,
-    /// The sum of the identified terms.
+    /// The sum of the identified terms; `None` without any, and where a filter bends the curve.
     pub model: Option<f64>,
     /// Whether vibration makes it useless; such points are not fitted.
     pub vibration: bool,
@@ -288,7 +288,7 @@ fn points(variances: &[AllanVariance], shaken: &[bool], phases: &[Phase], fit: O
             sigma: deviation / (2.0 * freedom).sqrt(),
             low,
             high,
-            model: fit.map(|fit| fit.variance(variance.tau_s).sqrt()),
+            model: fit.filter(|fit| fit.covers(variance.tau_s)).map(|fit| fit.variance(variance.tau_s).sqrt()),
             vibration: *shaken,
         }
     };
@@ -348,8 +348,8 @@ fn noise_terms(
         }
     });
     let flattens = random_walk.value.is_some() || fit.term(NoiseKind::Flicker).is_some();
-    let lowest =
-        variances.iter().min_by(|a, b| fit.variance(a.tau_s).total_cmp(&fit.variance(b.tau_s))).unwrap_or(last);
+    let covered = variances.iter().filter(|point| fit.covers(point.tau_s));
+    let lowest = covered.min_by(|a, b| fit.variance(a.tau_s).total_cmp(&fit.variance(b.tau_s))).unwrap_or(last);
     let bias_instability = if flattens {
         let value = fit.variance(lowest.tau_s).sqrt() / FLICKER;
         NoiseTerm::identified(value, value / (2.0 * freedom(lowest)).sqrt())

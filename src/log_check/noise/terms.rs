@@ -66,6 +66,11 @@ impl Fit {
             .sum()
     }
 
+    /// Whether the model holds at an averaging time.
+    pub(super) fn covers(&self, tau_s: f64) -> bool {
+        self.filtered_below_s.is_none_or(|below_s| tau_s >= below_s)
+    }
+
     /// The term that dominates at an averaging time; white noise without any.
     pub(super) fn dominant(&self, tau_s: f64) -> NoiseKind {
         let size = |kind: usize| self.coefficients[kind].map_or(0.0, |found| found.value * power(kind, tau_s));

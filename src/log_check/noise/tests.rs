@@ -184,6 +184,9 @@ fn a_low_pass_filter_is_no_bias_instability() {
         let white = gyroscope.terms.white.value.unwrap();
         assert!((white / smooth.white - 1.0).abs() < 0.1, "{white}");
         let lowest = gyroscope.axes[0].points.iter().map(|point| point.deviation).fold(f64::MAX, f64::min);
+        let models: Vec<f64> =
+            gyroscope.axes.iter().flat_map(|axis| &axis.points).filter_map(|point| point.model).collect();
+        assert!(models.iter().all(|model| *model > 0.0) && !models.is_empty(), "{models:?}");
         let instability = &gyroscope.terms.bias_instability;
         assert!(instability.value.or(instability.limit).unwrap() < 4.0 * lowest, "{instability:?}, {lowest}");
     }
