@@ -33,7 +33,8 @@ fn a_late_camera_is_not_taken_for_a_rolling_shutter() {
     let flight =
         synthetic_tracks(&SyntheticOptions { clock_offsets_s: [0.01, 0.0], ..options(SyntheticMount::Static, 1) });
     let (_, warnings) = ignored(&flight);
-    assert!(!warnings.is_empty() && !warnings.iter().any(|warning| warning.contains("readout")), "{warnings:?}");
+    let names_another = |warning: &String| warning.contains("readout") || warning.contains("intrinsics");
+    assert!(!warnings.is_empty() && !warnings.iter().any(names_another), "{warnings:?}");
 }
 
 /// Value and standard deviation of a parameter by its name.
@@ -88,6 +89,17 @@ fn a_focal_length_with_an_error_of_a_percent_is_corrected() {
     assert!((fx - true_fx).abs() < 0.001 * true_fx && sigma < 0.5, "{fx} ± {sigma} px of {true_fx}");
     assert!(estimated_m < 1.2 * reference_m, "{estimated_m} m, {reference_m} m with the true focal length");
     assert!(chain_m < 0.3 * ignored_chain_m, "{ignored_chain_m} m, estimated {chain_m} m");
+}
+
+#[test]
+fn a_wrong_focal_length_is_named_in_the_warning() {
+    let flight = synthetic_tracks(&SyntheticOptions {
+        intrinsics_error: IntrinsicsError { focal_ratio: 0.03, ..IntrinsicsError::default() },
+        ..options(SyntheticMount::Static, 1)
+    });
+    let (_, warnings) = ignored(&flight);
+    assert!(warnings.iter().any(|warning| warning.contains("try intrinsics=on")), "{warnings:?}");
+    assert!(!warnings.iter().any(|warning| warning.contains("readout=on")), "{warnings:?}");
 }
 
 #[test]

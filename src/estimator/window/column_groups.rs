@@ -80,14 +80,15 @@ impl WindowState {
         next.motion.samples().iter().take_while(near).copied().collect()
     }
 
-    /// How much each clock and each shutter that is not estimated would lower χ² of the window, each one tried alone with all
-    /// that is estimated; none with a fixed calibration.
-    pub(crate) fn clock_scores(&self, setup: &Setup) -> Vec<SuspectedParameter> {
+    /// How much each clock, each shutter and each parameter of the cameras' intrinsics that is not estimated would lower χ² of the
+    /// window, each one tried alone with all that is estimated; none with a fixed calibration.
+    pub(crate) fn sensor_scores(&self, setup: &Setup) -> Vec<SuspectedParameter> {
         if !setup.config.calibrate {
             return Vec::new();
         }
         let mut wider = setup.clone();
         (wider.config.estimate_timeshift, wider.config.estimate_readout) = (true, true);
+        wider.config.estimate_intrinsics = true;
         let mut window = self.clone();
         window.add_columns(&wider);
         let active = window.active_tracks();

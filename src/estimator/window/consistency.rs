@@ -12,9 +12,9 @@ use crate::gimbal::Quantity;
 /// Averaging time of the squared residuals, in nanoseconds. No warning is given earlier: single images, stops and shocks
 /// are no inconsistency, and the values of the first window are inaccurate by nature.
 const AVERAGED_NS: i64 = 4_000_000_000;
-/// Interval of the windows that are asked for clocks and shutters while a mean exceeds its limit.
+/// Interval of the windows that are asked for parameters of sensors while a mean exceeds its limit.
 const SAMPLED_NS: i64 = 250_000_000;
-/// Smallest change of χ² that makes a rolling shutter the cause of an inconsistency: five standard deviations of its readout.
+/// Smallest change of χ² that makes a sensor's parameter the cause of an inconsistency: five of its standard deviations.
 const SIGNIFICANT_CHI2: f64 = 25.0;
 /// Hysteresis: a warning ends when the mean falls to this fraction of its limit.
 const RELEASE: f64 = 0.8;
@@ -48,7 +48,7 @@ const MONITORED: [MonitoredFactor; 2] = [
 pub(crate) struct ConsistencyMonitor {
     last_ns: Option<i64>,
     means: [Mean; MONITORED.len()],
-    /// Clocks and shutters that are not estimated, over the windows since a mean exceeds its limit.
+    /// Parameters of sensors that are not estimated, over the windows since a mean exceeds its limit.
     suspected: Vec<SuspectedParameter>,
     /// Stamp of the last of these windows.
     sampled_ns: Option<i64>,
@@ -80,7 +80,7 @@ impl ConsistencyMonitor {
     }
 
     /// Adds the residuals of a solved window and returns the warnings that hold in this step; `scores` is what the
-    /// window says about clocks and shutters that are not estimated.
+    /// window says about clocks, shutters and intrinsics that are not estimated.
     pub(crate) fn observe(
         &mut self,
         stamp_ns: i64,
@@ -120,18 +120,28 @@ impl ConsistencyMonitor {
     }
 }
 
-/// The cause of an inconsistency: a rolling shutter where it explains the windows better than any clock, else what may be wrong
-/// in general.
+/// The cause of an inconsistency: a rolling shutter or wrong intrinsics where they explain the windows better than any clock,
+/// else what may be wrong in general.
 fn cause(suspected: &[SuspectedParameter], config: &EstimatorConfig) -> String {
     let strongest = suspected.iter().max_by(|one, other| one.chi2().total_cmp(&other.chi2()));
-    let is_shutter =
-        |it: &&SuspectedParameter| it.parameter.quantity == Quantity::Readout && it.chi2() > SIGNIFICANT_CHI2;
-    let Some(shutter) = strongest.filter(is_shutter) else { return usual_causes(config) };
-    let rigid = shutter.parameter.part.camera().checked_sub(1).and_then(|rigid| config.rigid_cameras.get(rigid));
+    let Some(found) = strongest.filter(|it| it.chi2() > SIGNIFICANT_CHI2) else { return usual_causes(config) };
+    let rigid = found.parameter.part.camera().checked_sub(1).and_then(|rigid| config.rigid_cameras.get(rigid));
     let camera = rigid.map_or("the camera", |rigid| &rigid.key);
+    let intrinsics = match found.parameter.quantity {
+        Quantity::Readout => {
+            return format!(
+                "rolling shutter of {camera} not modelled (a readout explains the residuals better than a time offset does): \
+                 try readout=on, or set the readout in the rig, which check measures"
+            );
+        }
+        Quantity::Fx | Quantity::Fy => "focal length",
+        Quantity::Cx | Quantity::Cy => "principal point",
+        Quantity::K1 | Quantity::K2 => "distortion",
+        _ => return usual_causes(config),
+    };
     format!(
-        "rolling shutter of {camera} not modelled (a readout explains the residuals better than a time offset does): try \
-         readout=on, or set the readout in the rig, which check measures"
+        "intrinsics of {camera} inconsistent with its images (another {intrinsics} explains the residuals better than a time \
+         offset or a readout does): try intrinsics=on"
     )
 }
 

@@ -80,7 +80,7 @@ impl SlidingWindow {
 
         let mut report = self.report(setup, input, &mut solved);
         let marginalizing_ms = setup.clock_ms();
-        let scores = || self.state.clock_scores(setup);
+        let scores = || self.state.sensor_scores(setup);
         let warnings = self.consistency.observe(report.stamp_ns, &report.residuals, &setup.config, scores);
         self.state.drop_rejected(&solved, options, &mut events);
         events.extend(self.switch_near_singularity(setup));
