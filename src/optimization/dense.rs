@@ -67,28 +67,37 @@ pub(crate) fn triangularize(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     triangularized(as_faer(matrix).to_owned())
 }
 
-/// [`triangularize`] of rows that begin with zeros, without the rows that would begin behind the columns of the groups.
+/// Rows that begin with the same columns.
+#[derive(Clone, Debug)]
+pub(crate) struct ColumnGroup {
+    /// Number of columns before those of the next group.
+    pub(crate) columns: usize,
+    /// Row-major, from the first of these columns to the last one of all; the zeros before are left out.
+    pub(crate) rows: Vec<f64>,
+}
+
+/// [`triangularize`] of rows in groups, without the rows that would begin behind the columns of the groups.
 ///
-/// Of the rows in `groups[k]` the first `k` times `stride` entries are zero and left out; they are row-major. Each group
-/// joins when its first column is at hand, so that the zeros are not worked on.
-pub(crate) fn triangularize_groups(groups: &[Vec<f64>], stride: usize, columns: usize) -> DMatrix<f64> {
-    let mut upper = DMatrix::zeros(groups.len() * stride, columns);
+/// Each group joins when its first column is at hand, so that the zeros before it are not worked on.
+pub(crate) fn triangularize_groups(groups: &[ColumnGroup], columns: usize) -> DMatrix<f64> {
+    let mut upper = DMatrix::zeros(groups.iter().map(|group| group.columns).sum(), columns);
     let mut height = 0;
+    let mut first = 0;
     // What is left below the rows that are done.
     let mut left = DMatrix::zeros(0, columns);
-    for (index, group) in groups.iter().enumerate() {
-        let first = index * stride;
+    for group in groups {
         let width = columns - first;
-        let (above, joining) = (left.nrows(), group.len() / width);
+        let (above, joining) = (left.nrows(), group.rows.len() / width);
         let mut matrix = Mat::zeros(above + joining, width);
         let (mut top, mut bottom) = matrix.as_mut().split_at_row_mut(above);
         top.copy_from(as_faer(&left));
-        bottom.copy_from(MatRef::from_row_major_slice(group, joining, width));
+        bottom.copy_from(MatRef::from_row_major_slice(&group.rows, joining, width));
         let factor = triangularized(matrix);
-        let done = factor.nrows().min(stride);
+        let done = factor.nrows().min(group.columns);
         upper.view_mut((height, first), (done, width)).copy_from(&factor.rows(0, done));
         height += done;
-        left = factor.view((done, stride), (factor.nrows() - done, width - stride)).into_owned();
+        left = factor.view((done, group.columns), (factor.nrows() - done, width - group.columns)).into_owned();
+        first += group.columns;
     }
     upper.resize_vertically(height, 0.0)
 }

@@ -5,7 +5,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimator::factors::visual::{Anchor, Track, VisualModel, whitened};
 use crate::estimator::state::camera_view::CameraView;
-use crate::optimization::{Landmark, LandmarkRows, PoseBlocks, dense};
+use crate::optimization::dense::{self, ColumnGroup};
+use crate::optimization::{Landmark, LandmarkRows, PoseBlocks};
 
 /// Columns of a landmark.
 const LANDMARK: usize = 3;
@@ -38,12 +39,14 @@ impl ProjectedRows {
         let newest = frames.saturating_sub(1);
         let mut blocks = PoseBlocks::new(current.blocks());
         let columns = BLOCK * current.blocks() + 1;
-        // Grouped by the first block of the first observing slot, from its columns on.
-        let capacity = |block: usize| {
-            let starts = block.is_multiple_of(per_frame) && block / per_frame < frames;
-            if starts { height_of(tracks, block / per_frame) * (columns - BLOCK * block) } else { 0 }
+        // Grouped by the first observing slot, from its columns on; none begin with the intrinsics.
+        let width = BLOCK * per_frame;
+        let of_slot = |slot: usize| ColumnGroup {
+            columns: width,
+            rows: Vec::with_capacity(height_of(tracks, slot) * (columns - width * slot)),
         };
-        let mut rows: Vec<Vec<f64>> = (0..current.blocks()).map(|block| Vec::with_capacity(capacity(block))).collect();
+        let mut groups: Vec<ColumnGroup> = (0..frames).map(of_slot).collect();
+        groups.extend(current.intrinsics_block().map(|_| ColumnGroup { columns: BLOCK, rows: Vec::new() }));
         let mut newest_rows = Vec::new();
         let mut local = LandmarkRows::default();
         for (track, landmark) in tracks.iter().zip(landmarks) {
@@ -64,11 +67,11 @@ impl ProjectedRows {
             } else {
                 local.eliminate();
             }
-            let first = per_frame * first_slot(track).unwrap_or(first.slot);
-            local.append_to(&mut rows[first], columns, first, local.remaining());
+            let slot = first_slot(track).unwrap_or(first.slot);
+            local.append_to(&mut groups[slot].rows, columns, per_frame * slot, local.remaining());
         }
         // Without a row of the residual alone, which no unknown can change.
-        let rows = dense::triangularize_groups(&rows, BLOCK, columns);
+        let rows = dense::triangularize_groups(&groups, columns);
         let newest_rows = DMatrix::from_row_slice(newest_rows.len() / columns, columns, &newest_rows);
         Self { rows, newest_rows, blocks }
     }
