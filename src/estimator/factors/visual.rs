@@ -138,13 +138,13 @@ pub(crate) fn whitened(
     let camera = anchor.current.model();
     let in_anchor = observation.slot == anchor.observation.slot;
     let relative = anchor.to_current.get(observation);
+    let (linearized, pose) = anchor.to_linearized.with_pose(observation);
     let term = if in_anchor {
         if !model.measures_in_anchor() {
             return None;
         }
         reprojection::linearize_in_anchor(camera, landmark, &observation.uv_px)?
     } else {
-        let linearized = anchor.to_linearized.get(observation);
         reprojection::linearize(camera, &relative, &linearized, landmark, &observation.uv_px)?
     };
     let weight = known_weight.unwrap_or_else(|| term.robust_weight(model.sigma_px, model.loss));
@@ -160,11 +160,14 @@ pub(crate) fn whitened(
             Some((block, by_intrinsics * (weight.sqrt() / model.sigma_px)))
         }
     };
-    let by_blocks = |observation: &TrackObservation, by_pose| anchor.linearized.by_blocks(observation, by_pose);
+    let view = anchor.linearized;
     let (anchor, observer) = if in_anchor {
         ([None; MAX_POSE_BLOCKS], [None; MAX_POSE_BLOCKS])
     } else {
-        (by_blocks(anchor.observation, &term.by_anchor), by_blocks(observation, &term.by_observer))
+        (
+            view.by_blocks(anchor.observation, &anchor.to_linearized.pose, &term.by_anchor),
+            view.by_blocks(observation, &pose, &term.by_observer),
+        )
     };
     Some(BlockTerm { residual: term.residual, by_landmark: term.by_landmark, anchor, observer, shared })
 }

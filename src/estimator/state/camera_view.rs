@@ -162,17 +162,21 @@ impl<'a> CameraView<'a> {
         uv_px.y / self.model.resolution_px[1] as f64
     }
 
-    /// Derivatives by the blocks of a frame from those by the pose at an observation's row (2 × 6).
+    /// Derivatives by the blocks of a frame from those by the pose at an observation's row (2 × 6), which is `pose`.
     ///
     /// Between the first, the middle and the last row, a change of the pose is interpolated by a parabola, rotations in world
     /// axes. It is exact for changes of pose, velocity, readout, joint rates and joint accelerations but for the rotation of
     /// their axes during the readout, which it follows to second order.
-    pub(crate) fn by_blocks(&self, observation: &TrackObservation, by_pose: &Matrix2x6<f64>) -> PoseBlocksOf<usize> {
+    pub(crate) fn by_blocks(
+        &self,
+        observation: &TrackObservation,
+        pose: &CameraPose,
+        by_pose: &Matrix2x6<f64>,
+    ) -> PoseBlocksOf<usize> {
         let slot = observation.slot;
         let Poses::Rolling { rows, .. } = &self.poses else { return [Some((slot, *by_pose)), None, None] };
         let fraction = self.row_fraction(&observation.uv_px);
-        let world_from_row = self.pose(slot, &observation.uv_px).rotation;
-        let by_world = by_pose.fixed_columns::<3>(0) * world_from_row.transpose();
+        let by_world = by_pose.fixed_columns::<3>(0) * pose.rotation.transpose();
         let weights = [
             (2.0 * fraction - 1.0) * (fraction - 1.0),
             4.0 * fraction * (1.0 - fraction),
@@ -191,19 +195,25 @@ impl<'a> CameraView<'a> {
 pub(crate) struct RelativeTo<'a> {
     view: &'a CameraView<'a>,
     slot: usize,
-    pose: CameraPose,
+    /// At the row of the anchor's observation.
+    pub(crate) pose: CameraPose,
 }
 
 impl RelativeTo<'_> {
     /// `observer_from_anchor` at the rows of both observations.
     pub(crate) fn get(&self, observation: &TrackObservation) -> RelativePose {
-        match &self.view.poses {
+        self.with_pose(observation).0
+    }
+
+    /// [`Self::get`] with the pose at the row of the observation.
+    pub(crate) fn with_pose(&self, observation: &TrackObservation) -> (RelativePose, CameraPose) {
+        let pose = self.view.pose(observation.slot, &observation.uv_px);
+        let relative = match &self.view.poses {
             Poses::Global { poses, relative } => {
                 *relative.get_or_init(|| RelativePoses::new(poses)).get(self.slot, observation.slot)
             }
-            Poses::Rolling { .. } => {
-                RelativePose::new(&self.pose, &self.view.pose(observation.slot, &observation.uv_px))
-            }
-        }
+            Poses::Rolling { .. } => RelativePose::new(&self.pose, &pose),
+        };
+        (relative, pose)
     }
 }
