@@ -8,6 +8,7 @@ use crate::cli::convert::ConvertArguments;
 use crate::cli::degeneracy::DegeneracyArguments;
 use crate::cli::evaluate::EvaluateArguments;
 use crate::cli::exit;
+use crate::cli::export::ExportArguments;
 use crate::cli::noise::NoiseArguments;
 use crate::cli::report::ReportArguments;
 use crate::cli::rig::RigArguments;
@@ -65,4 +66,7 @@ pub(crate) enum Command {
     /// Compare a trajectory with a reference: absolute and relative errors, as evo computes them.
     #[command(after_help = exit::PLAIN)]
     Evaluate(EvaluateArguments),
+    /// Write a rig as the configuration of Kalibr, VINS-Fusion, OpenVINS, Basalt or ORB-SLAM3.
+    #[command(after_help = exit::PLAIN)]
+    Export(ExportArguments),
 }

@@ -9,6 +9,7 @@ mod degeneracy;
 mod estimation_arguments;
 mod evaluate;
 mod exit;
+mod export;
 mod interrupt;
 mod limit_arguments;
 mod noise;
@@ -52,6 +53,7 @@ pub(crate) fn run() -> anyhow::Result<Outcome> {
         Command::Degeneracy(arguments) => done(degeneracy::degeneracy(&arguments)),
         Command::Convert(arguments) => convert::convert(&arguments),
         Command::Evaluate(arguments) => done(evaluate::evaluate(&arguments)),
+        Command::Export(arguments) => done(export::export(&arguments)),
     }
 }
 

@@ -33,7 +33,8 @@ pub(super) fn beside(rig: &mut Rig) -> Result<Vec<(String, Vec<u8>)>, ExportErro
     Ok(files)
 }
 
-fn png(mask: &ImageMask) -> Result<Vec<u8>, ExportError> {
+/// A mask as an 8-bit PNG, white where it is masked.
+pub(super) fn png(mask: &ImageMask) -> Result<Vec<u8>, ExportError> {
     let image = mask.to_image();
     let failed = |source: image::ImageError| ExportError::Write {
         source: std::io::Error::other(source.to_string()),

@@ -12,6 +12,7 @@ mod existing;
 mod flight_noise;
 mod masks;
 mod noise_files;
+mod other_estimators;
 mod recent_files;
 mod report;
 mod results;
@@ -41,6 +42,9 @@ pub use existing::{
 pub use flight_noise::{DensityReport, FlightNoiseReport};
 pub use masks::write_masks;
 pub use noise_files::{write_allan, write_flight_noise};
+pub use other_estimators::{
+    AngleOrigin, Configuration, ConfigurationError, FixedJointAngles, OtherEstimator, configure, write_configuration,
+};
 pub use recent_files::RecentFiles;
 pub use report::{ReportDrawing, ReportFigure, ReportOptions, write_report};
 pub use results::write_results;

@@ -27,6 +27,7 @@ pub(crate) mod tests;
 mod text;
 pub(crate) mod video;
 mod writer;
+pub(crate) mod yaml;
 
 pub use error::LogError;
 pub use image_reader::ImageReader;

@@ -123,6 +123,27 @@ impl ImuIntrinsics {
         })
     }
 
+    /// The same correction in the frame in which the accelerometer's matrix is lower triangular, which is Kalibr's IMU frame,
+    /// after the rotation `triangle_from_imu`; the identity, and the same bits, where it is lower triangular already. The
+    /// matrix must have a positive determinant.
+    pub fn in_lower_triangular_frame(&self) -> (UnitQuaternion<f64>, Self) {
+        let c = &self.accelerometer_correction;
+        let is_lower = [(0, 1), (0, 2), (1, 2)].iter().all(|entry| c[*entry] == 0.0);
+        let Some(inverse) = c.try_inverse().filter(|_| !is_lower) else { return (UnitQuaternion::identity(), *self) };
+        // `C = Qᵀ · L` from `C⁻ᵀ = Qᵀ · L⁻ᵀ`, whose second factor is upper triangular.
+        let (imu_from_triangle, _) = rotation_and_upper(&inverse.transpose());
+        let triangle_from_imu = imu_from_triangle.transpose();
+        let mut lower = triangle_from_imu * c;
+        for entry in [(0, 1), (0, 2), (1, 2)] {
+            lower[entry] = 0.0;
+        }
+        let rotated = Self {
+            gyroscope_correction: triangle_from_imu * self.gyroscope_correction,
+            accelerometer_correction: lower,
+        };
+        (UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(triangle_from_imu)), rotated)
+    }
+
     /// From the independent parameters.
     pub fn from_parameters(parameters: &ImuIntrinsicsParameters) -> Self {
         let rotation = so3::exp(&parameters.gyroscope_rotation_rad).to_rotation_matrix().into_inner();
@@ -249,6 +270,26 @@ mod tests {
         let left = whole.left_after(&first).unwrap();
         check_near(&left, &ImuIntrinsics { accelerometer_correction: Matrix3::identity(), ..whole });
         check_near(&left.after(&first), &whole);
+    }
+
+    #[test]
+    fn kalibrs_frame_has_a_lower_triangular_accelerometer() {
+        let intrinsics = ImuIntrinsics::from_parameters(&some());
+        let (triangle_from_imu, rotated) = intrinsics.in_lower_triangular_frame();
+        let rotation = triangle_from_imu.to_rotation_matrix().into_inner();
+        check_near(
+            &rotated,
+            &ImuIntrinsics {
+                gyroscope_correction: rotation * intrinsics.gyroscope_correction,
+                accelerometer_correction: rotation * intrinsics.accelerometer_correction,
+            },
+        );
+        assert_eq!([(0, 1), (0, 2), (1, 2)].map(|entry| rotated.accelerometer_correction[entry]), [0.0; 3]);
+        assert!(triangle_from_imu.angle() > 0.005);
+        // Kalibr's M is lower triangular as well, and nothing is left to rotate.
+        let kalibr = rotated.to_kalibr().unwrap();
+        assert!([(0, 1), (0, 2), (1, 2)].iter().all(|entry| kalibr.accelerometer_m[*entry].abs() < 1e-16));
+        assert_eq!(rotated.in_lower_triangular_frame(), (UnitQuaternion::identity(), rotated));
     }
 
     #[test]

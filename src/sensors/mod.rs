@@ -3,6 +3,7 @@
 
 mod attitude_source;
 mod camera_values;
+mod fixed_gimbal;
 mod gray_image;
 mod image_mask;
 mod imu;

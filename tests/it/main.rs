@@ -10,6 +10,7 @@ mod evaluate;
 mod hostile_logs;
 mod layering;
 mod masks;
+mod other_estimators;
 mod outputs;
 #[cfg(feature = "gui")]
 mod pictures;

@@ -2,6 +2,7 @@ use std::fmt::Write as _;
 
 use nalgebra::SMatrix;
 
+use super::super::yaml::{number, numbers, text};
 use super::attitude;
 use crate::geometry::RigidTransform;
 use crate::gimbal::DhLink;
@@ -160,27 +161,4 @@ fn line(out: &mut String, depth: usize, key: &str, value: &str) {
     let space = if value.is_empty() { "" } else { " " };
     // Writing to a string cannot fail.
     let _infallible = writeln!(out, "{:width$}{key}:{space}{value}", "", width = 2 * depth);
-}
-
-/// The shortest decimal that reads back as the same number, in the notation of YAML 1.1 (`PyYAML`), which requires a
-/// point before an exponent, and a sign in it.
-fn number(value: f64) -> String {
-    let written = format!("{value:?}");
-    let Some((mantissa, exponent)) = written.split_once('e') else { return written };
-    let point = if mantissa.contains('.') { "" } else { ".0" };
-    let sign = if exponent.starts_with('-') { "" } else { "+" };
-    format!("{mantissa}{point}e{sign}{exponent}")
-}
-
-fn numbers(values: &[f64]) -> String {
-    format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
-}
-
-/// A plain scalar where YAML reads it as a string, else a quoted one.
-fn text(value: &str) -> String {
-    let plain = value.starts_with(|first: char| first.is_ascii_alphabetic() || first == '/')
-        && value.chars().all(|letter| letter.is_ascii_alphanumeric() || "/_-.".contains(letter))
-        && !["true", "false", "null", "yes", "no", "on", "off", "y", "n"]
-            .contains(&value.to_ascii_lowercase().as_str());
-    if plain { value.to_owned() } else { serde_json::Value::from(value).to_string() }
 }

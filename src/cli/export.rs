@@ -1,0 +1,131 @@
+//! `dcvins export`: a rig as the configuration of another program.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use dcvins::export::{FixedJointAngles, OtherEstimator, configure, write_configuration};
+use dcvins::flight_log::FlightLog;
+use dcvins::sensors::Rig;
+use serde::Serialize;
+
+use crate::cli::limit_arguments::LimitArguments;
+use crate::cli::terminal::{print, print_json};
+use crate::cli::value_parsers::seconds;
+
+/// `dcvins export`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ExportArguments {
+    /// The rig, or a log (.mcap) with its rig beside it or attached to it.
+    pub rig: PathBuf,
+    /// The program.
+    #[arg(long = "to", value_enum, value_name = "PROGRAM")]
+    pub program: ProgramArgument,
+    /// Folder for the files.
+    #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
+    pub out: PathBuf,
+    /// A camera of the rig, in the order of the program's cameras [default: all; the first for vins-fusion and orb-slam3].
+    #[arg(long = "camera", value_name = "KEY")]
+    pub cameras: Vec<String>,
+    /// Angles in degrees at which the gimbal is taken to stay, as in yaw=10,pitch=-30; other joints stay neutral, at 0 or at
+    /// the limit nearest to it.
+    #[arg(long, value_name = "NAME=DEG,…", value_delimiter = ',', value_parser = joint_angle, conflicts_with = "at")]
+    pub joints: Vec<(String, f64)>,
+    /// Take the joint angles that the log measures at this time.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub at: Option<f64>,
+    /// The log for --at, and for intrinsics and rates that the rig does not give.
+    #[arg(long, value_name = "LOG")]
+    pub log: Option<PathBuf>,
+    /// Overwrite files that this command has not written.
+    #[arg(long)]
+    pub force: bool,
+    /// Print paths and notes as JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// Limits on the log.
+    #[command(flatten)]
+    pub limits: LimitArguments,
+}
+
+/// Values of `--to`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ProgramArgument {
+    /// Camera chain and IMU.
+    Kalibr,
+    /// Configuration with one camera, or with two as a stereo pair.
+    VinsFusion,
+    /// Estimator, camera chain and IMU.
+    #[value(name = "openvins")]
+    OpenVins,
+    /// Calibration.
+    Basalt,
+    /// Settings for one camera and the IMU.
+    #[value(name = "orb-slam3")]
+    OrbSlam3,
+}
+
+impl From<ProgramArgument> for OtherEstimator {
+    fn from(argument: ProgramArgument) -> Self {
+        match argument {
+            ProgramArgument::Kalibr => Self::Kalibr,
+            ProgramArgument::VinsFusion => Self::VinsFusion,
+            ProgramArgument::OpenVins => Self::OpenVins,
+            ProgramArgument::Basalt => Self::Basalt,
+            ProgramArgument::OrbSlam3 => Self::OrbSlam3,
+        }
+    }
+}
+
+fn joint_angle(text: &str) -> Result<(String, f64), String> {
+    let parts = text.split_once('=');
+    let angle_deg = parts.and_then(|(_, angle)| angle.trim().parse::<f64>().ok()).filter(|angle| angle.is_finite());
+    let name = parts.map(|(name, _)| name.trim()).filter(|name| !name.is_empty());
+    name.zip(angle_deg)
+        .map(|(name, angle_deg)| (name.to_owned(), angle_deg))
+        .ok_or_else(|| "expected a joint and its angle in degrees, as in pitch=-30".to_owned())
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Written<'a> {
+    program: &'static str,
+    joint_angles_rad: &'a [f64],
+    files: Vec<String>,
+    notes: &'a [String],
+}
+
+/// Runs `dcvins export`.
+pub(crate) fn export(arguments: &ExportArguments) -> Result<()> {
+    let is_log = arguments.rig.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
+    let log_path = arguments.log.as_ref().or_else(|| is_log.then_some(&arguments.rig));
+    let limits = arguments.limits.limits();
+    let log = log_path.map(|path| FlightLog::open_with(path, &limits)).transpose()?.map(Arc::new);
+    let rig_path = Some(arguments.rig.as_path()).filter(|_| !is_log);
+    let rig = match (&log, rig_path) {
+        (Some(log), rig_path) => Rig::for_log(log, rig_path)?,
+        (None, _) => Rig::from_file(&arguments.rig)?,
+    };
+    let angles = match (arguments.at, &log) {
+        (Some(time_s), Some(log)) => FixedJointAngles::measured(log, &rig, time_s)?,
+        (Some(_), None) => anyhow::bail!("--at needs a log: give it with --log LOG"),
+        (None, _) if arguments.joints.is_empty() => FixedJointAngles::neutral(&rig),
+        (None, _) => FixedJointAngles::given(&rig, &arguments.joints)?,
+    };
+    let program = OtherEstimator::from(arguments.program);
+    let configuration = configure(&rig, program, &arguments.cameras, &angles)?;
+    let paths = write_configuration(&configuration, &arguments.out, arguments.force)?;
+    let files: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+    if arguments.json {
+        return print_json(&Written {
+            program: program.title(),
+            joint_angles_rad: &angles.angles_rad,
+            files,
+            notes: &configuration.notes,
+        });
+    }
+    let files: String = files.iter().map(|file| format!("{file}\n")).collect();
+    let notes: String = configuration.notes.iter().map(|note| format!("  {note}\n")).collect();
+    print(&format!("{files}notes, also at the head of the files:\n{notes}"))
+}

@@ -1,0 +1,127 @@
+//! What the files of several programs share: the lines at their head, matrices, masks.
+
+use std::fmt::Write as _;
+
+use nalgebra::SMatrix;
+
+use super::OtherEstimator;
+use crate::flight_log::printable;
+use crate::flight_log::yaml::{number, numbers};
+use crate::geometry::RigidTransform;
+use crate::sensors::{CameraMount, CameraRig, GrayImage, ImageMask, Rig};
+
+/// In the first line of every file, by which it is known as one of this program.
+pub(super) const MARK: &str = "Written by dcvins export";
+
+/// The first lines of every file.
+pub(super) fn head(program: OtherEstimator, rig: &str, notes: &[String]) -> Vec<String> {
+    let mut head = vec![format!("{MARK} for {} from the rig '{}'.", program.title(), printable(rig))];
+    head.extend(notes.iter().map(|note| {
+        let mut letters = note.chars();
+        let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+        // A key of a camera stays as it is written in the rig.
+        let first = if note.starts_with("cam") { note.chars().take(1).collect() } else { first };
+        format!("{}.", printable(&format!("{first}{}", letters.as_str())))
+    }));
+    head
+}
+
+/// The head as comments of YAML.
+pub(super) fn comments(head: &[String]) -> String {
+    head.iter().map(|line| format!("# {line}\n")).collect()
+}
+
+/// The head of a YAML file that `OpenCV` reads, which requires the version in the first line.
+pub(super) fn opencv_comments(head: &[String]) -> String {
+    format!("%YAML:1.0\n{}", comments(head))
+}
+
+/// `imu_from_camera` of a camera whose gimbal is fixed.
+pub(super) fn imu_from_camera(camera: &CameraRig) -> RigidTransform {
+    match &camera.mount {
+        CameraMount::Static { imu_from_camera } => *imu_from_camera,
+        // A rig with a fixed gimbal has none.
+        CameraMount::Gimbal => RigidTransform::identity(),
+    }
+}
+
+/// A matrix as a list of rows behind its key, which is indented by `depth` steps.
+pub(super) fn rows<const N: usize>(depth: usize, key: &str, matrix: &SMatrix<f64, N, N>) -> String {
+    let indentation = " ".repeat(2 * depth);
+    let mut out = format!("{indentation}{key}:\n");
+    for row in matrix.row_iter() {
+        let row: Vec<f64> = row.iter().copied().collect();
+        // Writing to a string cannot fail.
+        let _infallible = writeln!(out, "{indentation}  - {}", numbers(&row));
+    }
+    out
+}
+
+/// A 4 × 4 matrix as `OpenCV` writes it; `kind` is `d` for doubles, `f` for floats.
+pub(super) fn opencv_matrix(key: &str, transform: &RigidTransform, kind: char) -> String {
+    let matrix = transform.to_matrix();
+    let rows: Vec<String> =
+        matrix.row_iter().map(|row| row.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", ")).collect();
+    let data = rows.join(",\n          ");
+    format!("{key}: !!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: {kind}\n   data: [{data}]\n")
+}
+
+/// Text in double quotes with escapes, as JSON and YAML have them.
+pub(super) fn quoted(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}
+
+/// `key: value` lines.
+pub(super) fn entries(entries: &[(&str, String)]) -> String {
+    entries.iter().map(|(key, value)| format!("{key}: {value}\n")).collect()
+}
+
+/// Whether the centre of one camera's image lies in the image of the other, for things far away.
+pub(super) fn overlap(one: &CameraRig, other: &CameraRig) -> bool {
+    let sees_centre_of = |camera: &CameraRig, other: &CameraRig| {
+        let camera_from_other = imu_from_camera(camera).inverse() * imu_from_camera(other);
+        let [width, height] = other.model.resolution_px;
+        let centre = nalgebra::Vector2::new(width as f64 - 1.0, height as f64 - 1.0) / 2.0;
+        let bearing = other.model.unproject(&centre).map(|bearing| camera_from_other.rotation * bearing);
+        let pixel = bearing.and_then(|bearing| camera.model.project(&bearing));
+        pixel.is_some_and(|pixel| camera.model.contains(&pixel, 0.0))
+    };
+    sees_centre_of(one, other) || sees_centre_of(other, one)
+}
+
+/// Numbers of the cameras that overlap with one, as a list in brackets.
+pub(super) fn overlaps(rig: &Rig, number: usize) -> String {
+    let camera = &rig.cameras[number];
+    let others = rig.cameras.iter().enumerate().filter(|(other, _)| *other != number);
+    let numbers: Vec<String> =
+        others.filter(|(_, other)| overlap(camera, other)).map(|(other, _)| other.to_string()).collect();
+    format!("[{}]", numbers.join(", "))
+}
+
+/// Name of a camera's mask.
+pub(super) fn mask_name(program: OtherEstimator, number: usize) -> String {
+    if program == OtherEstimator::OpenVins { format!("mask{number}.png") } else { format!("cam{number}.mask.png") }
+}
+
+/// The masks that go with the files. OpenVINS wants one of every camera or none: cameras without one get an empty mask.
+pub(super) fn masks(program: OtherEstimator, rig: &Rig) -> Vec<(String, ImageMask)> {
+    let any = rig.cameras.iter().any(|camera| camera.mask.is_some());
+    let of_camera = |(number, camera): (usize, &CameraRig)| {
+        let image = match &camera.mask {
+            Some(mask) => mask.image.clone(),
+            None if any && program == OtherEstimator::OpenVins => empty_mask(camera.model.resolution_px),
+            None => return None,
+        };
+        Some((mask_name(program, number), image))
+    };
+    rig.cameras.iter().enumerate().filter_map(of_camera).collect()
+}
+
+fn empty_mask([width, height]: [usize; 2]) -> ImageMask {
+    ImageMask::from_image(&GrayImage { width, height, pixels: vec![0; width * height] })
+}
+
+/// The matrix with zeros above its diagonal, where rounding may have left something else.
+pub(super) fn lower_triangle(matrix: &nalgebra::Matrix3<f64>) -> nalgebra::Matrix3<f64> {
+    matrix.lower_triangle()
+}
