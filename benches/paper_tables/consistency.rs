@@ -1,7 +1,8 @@
 //! Tables of consistency: normalized squared errors of poses and calibration against their χ² bounds.
 
+use crate::drive::PoseSquares;
 use crate::flights::Flight;
-use crate::samples::{CalibrationErrors, PoseSquares};
+use crate::samples::CalibrationErrors;
 use crate::table::{Table, chi2_quantile, number};
 
 /// The normal quantile of the two-sided 95 % bounds.

@@ -6,16 +6,18 @@ use std::path::Path;
 use anyhow::Result;
 use dcvins::estimator::{EstimatorConfig, EventKind, FactorKind};
 use dcvins::export::{RunSummary, summarize};
-use dcvins::geometry::RigidTransform;
 use dcvins::session::{self, Recording, RunRecord, SessionPlan, SessionRequest};
 use serde::{Deserialize, Serialize};
 
 use crate::logs::Log;
-use crate::samples::{CalibrationErrors, PoseSquares, calibration_sample, pose_sample};
+use crate::samples::{CalibrationErrors, calibration_sample};
 
 /// Frames between two samples of the covariances: about as long as a window, so that samples hardly share
 /// measurements.
 const SAMPLED_FRAMES: usize = 60;
+
+/// Squared error of a pose over its covariance (NEES), of all six components, of the rotation and of the translation.
+pub(crate) type PoseSquares = [f64; 3];
 
 /// One estimator over a log.
 #[derive(Clone)]
@@ -127,10 +129,8 @@ fn plan(log: &Log, rig_path: Option<&Path>, variants: &[Variant]) -> Result<Sess
 }
 
 fn driven(recording: &Recording, run: &RunRecord) -> Driven {
-    let truths: BTreeMap<i64, RigidTransform> =
-        run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.ground_truth?))).collect();
-    let samples = run.steps.iter().filter_map(|step| pose_sample(&step.report));
-    let poses = samples.filter_map(|sample| sample.judged(&truths)).collect();
+    let poses =
+        run.pose_consistency().iter().map(|sample| [sample.pose, sample.rotation, sample.translation]).collect();
     let ground_truth = recording.ground_truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
     let last = run.steps.iter().rev().find_map(|step| calibration_sample(&step.report));
 

@@ -1,29 +1,13 @@
-//! Poses and calibrations of steps with their covariances, and their squared errors against the ground truth.
-//!
-//! Poses are judged relative to each other, newest against oldest frame of a window: that difference does not depend on
-//! the four unobservable directions (position, yaw), and needs no alignment.
-
-use std::collections::BTreeMap;
+//! Calibrations of steps with their covariances, and their squared errors against the ground truth.
 
 use dcvins::estimator::{ColumnGroup, Linearization, StepReport};
-use dcvins::geometry::{RigidTransform, so3};
 use dcvins::gimbal::{Chain, ClassicalChain, ParameterNames, Parameterization};
-use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix};
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// Information that all poses are given about the absolute position and orientation, so that the matrix can be inverted:
 /// a hundred metres, a hundred radians. It does not act on differences.
 const WEAK_INFORMATION: f64 = 1e-4;
-
-/// The pose of a window's newest frame in its oldest one.
-pub(crate) struct PoseSample {
-    stamps_ns: [i64; 2],
-    oldest_from_newest: RigidTransform,
-    covariance: Matrix6<f64>,
-}
-
-/// Squared error of a pose over its covariance, of all six components, of the rotation and of the translation.
-pub(crate) type PoseSquares = [f64; 3];
 
 /// The calibration at one step with its covariance.
 pub(crate) struct CalibrationSample {
@@ -59,47 +43,6 @@ fn information(linearization: &Linearization) -> DMatrix<f64> {
         }
     }
     information
-}
-
-/// The relative pose of a step's window; `None` before the window is there.
-pub(crate) fn pose_sample(report: &StepReport) -> Option<PoseSample> {
-    let linearization = report.linearization.as_ref()?;
-    let poses = || linearization.columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose);
-    let (first, last) = (poses().next()?.start, poses().next_back()?.start);
-    let [oldest, .., newest] = report.window.as_slice() else { return None };
-    let relative = oldest.world_from_imu.inverse() * newest.world_from_imu;
-    // From the perturbation rule: rotation on the right, translation added.
-    let mut change: SMatrix<f64, 6, 12> = SMatrix::zeros();
-    let oldest_from_world = oldest.world_from_imu.rotation_matrix().transpose();
-    change.fixed_view_mut::<3, 3>(0, 0).copy_from(&-relative.rotation_matrix().transpose());
-    change.fixed_view_mut::<3, 3>(0, 6).copy_from(&Matrix3::identity());
-    change.fixed_view_mut::<3, 3>(3, 0).copy_from(&so3::hat(&relative.translation_m));
-    change.fixed_view_mut::<3, 3>(3, 3).copy_from(&-oldest_from_world);
-    change.fixed_view_mut::<3, 3>(3, 9).copy_from(&oldest_from_world);
-
-    let information = information(linearization);
-    let mut right = DMatrix::zeros(information.nrows(), 6);
-    for (place, start) in [(0, first), (6, last)] {
-        right.rows_mut(start, 6).copy_from(&change.fixed_columns::<6>(place).transpose());
-    }
-    let solved = information.cholesky()?.solve(&right);
-    let covariance = Matrix6::from_iterator((right.transpose() * solved).iter().copied());
-    let stamps_ns = [oldest.stamp_ns, newest.stamp_ns];
-    Some(PoseSample { stamps_ns, oldest_from_newest: relative, covariance })
-}
-
-impl PoseSample {
-    /// The sample held against the true poses; `None` when they are not known.
-    pub(crate) fn judged(&self, truths: &BTreeMap<i64, RigidTransform>) -> Option<PoseSquares> {
-        let [Some(oldest), Some(newest)] = self.stamps_ns.map(|stamp_ns| truths.get(&stamp_ns)) else { return None };
-        let error = self.oldest_from_newest.minus(&(oldest.inverse() * *newest));
-        let whole = error.dot(&self.covariance.cholesky()?.solve(&error));
-        let part = |start: usize| {
-            let error = error.fixed_rows::<3>(start).into_owned();
-            Some(error.dot(&self.covariance.fixed_view::<3, 3>(start, start).into_owned().cholesky()?.solve(&error)))
-        };
-        Some([whole, part(0)?, part(3)?])
-    }
 }
 
 /// The calibration of a step with its covariance; `None` when nothing is calibrated.

@@ -28,10 +28,10 @@ pub use interventions::{InterventionError, SensorColumns};
 pub use options::{EstimatorOptions, TrackContinuation};
 pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
 pub use report::{
-    CalibrationEstimate, ColumnBlock, ColumnGroup, ColumnId, Event, EventKind, FactorKind, FactorRows, FeatureCounts,
-    FeatureReport, FeatureRows, FrameId, FrameStateReport, InformationGain, IterationReport, JacobianFactor,
-    JacobianRow, JacobianSource, LandmarkReport, Linearization, Motion, ObservationReport, Observations, Phase,
-    ReportBytes, ResidualSummary, StageTimes, StepJacobian, StepReport, allocated_bytes,
+    CalibrationEstimate, ColumnBlock, ColumnGroup, ColumnId, Event, EventKind, FactorKind, FactorRows, FailureCause,
+    FeatureCounts, FeatureReport, FeatureRows, FrameId, FrameStateReport, InformationGain, IterationReport,
+    JacobianFactor, JacobianRow, JacobianSource, LandmarkReport, Linearization, Motion, ObservationReport,
+    Observations, Phase, ReportBytes, ResidualSummary, StageTimes, StepJacobian, StepReport, allocated_bytes,
 };
 pub use setup::gravity_in_world;
 pub use step_input::StepInput;

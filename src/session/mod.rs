@@ -36,7 +36,7 @@ pub use playback::{
     SavedSessionError, Session,
 };
 pub use record::{
-    ChainDistance, Comparison, Divergence, ForkOrigin, LostSince, PoseUncertainty, Quantity, RELATIVE_LENGTHS_M,
-    Recording, RelativeAccuracy, RunMemory, RunRecord, RunWarning, SolverPosition, SolverTrace, StepFactorRows,
-    StepRecord, TrajectoryAccuracy,
+    ChainDistance, Comparison, Divergence, ForkOrigin, LostSince, PoseConsistency, PoseUncertainty, Quantity,
+    RELATIVE_LENGTHS_M, Recording, RelativeAccuracy, RunMemory, RunRecord, RunWarning, SolverPosition, SolverTrace,
+    StepFactorRows, StepRecord, TrajectoryAccuracy,
 };

@@ -72,6 +72,7 @@ impl Initializer {
                         message: "stationary: gyroscope bias measured, waiting for motion".to_owned(),
                         value: Some(bias),
                         threshold: None,
+                        cause: None,
                     });
                     self.stationary = Some(stationary);
                 }

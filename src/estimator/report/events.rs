@@ -54,6 +54,23 @@ impl EventKind {
     }
 }
 
+/// The criterion by which the estimator has failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum FailureCause {
+    /// The accelerometer bias is out of bounds.
+    AccelerometerBias,
+    /// The gyroscope bias is out of bounds.
+    GyroscopeBias,
+    /// The velocity is out of bounds.
+    Velocity,
+    /// The solve has moved the newest position too far.
+    Correction,
+    /// Too few observed landmarks for too long.
+    Features,
+    /// IMU samples are missing between two images.
+    Imu,
+}
+
 /// An event of a step with its deciding value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
@@ -65,16 +82,23 @@ pub struct Event {
     pub value: Option<f64>,
     /// Threshold of the value.
     pub threshold: Option<f64>,
+    /// The criterion, of a [`EventKind::Failure`].
+    pub cause: Option<FailureCause>,
 }
 
 impl Event {
     /// Returns an event without a value.
     pub(crate) fn new(kind: EventKind, message: impl Into<String>) -> Self {
-        Self { kind, message: message.into(), value: None, threshold: None }
+        Self { kind, message: message.into(), value: None, threshold: None, cause: None }
     }
 
     /// Returns an event with the deciding value and its threshold.
     pub(crate) fn decided(kind: EventKind, message: impl Into<String>, value: f64, threshold: f64) -> Self {
-        Self { kind, message: message.into(), value: Some(value), threshold: Some(threshold) }
+        Self { kind, message: message.into(), value: Some(value), threshold: Some(threshold), cause: None }
+    }
+
+    /// Returns the failure by a criterion, with the deciding value and its threshold.
+    pub(crate) fn failure(cause: FailureCause, message: impl Into<String>, value: f64, threshold: f64) -> Self {
+        Self { cause: Some(cause), ..Self::decided(EventKind::Failure, message, value, threshold) }
     }
 }

@@ -17,7 +17,7 @@ mod step;
 
 pub use allocation::allocated_bytes;
 pub use columns::{ColumnBlock, ColumnGroup, ColumnId, FrameId};
-pub use events::{Event, EventKind};
+pub use events::{Event, EventKind, FailureCause};
 pub use features::{FeatureCounts, FeatureReport, LandmarkReport, ObservationReport};
 pub use footprint::ReportBytes;
 pub use information_gain::{InformationGain, Motion};

@@ -5,7 +5,7 @@ use super::frames::Frame;
 use super::window_state::WindowState;
 use crate::estimator::options::EstimatorOptions;
 use crate::estimator::state::navigation::NavigationState;
-use crate::estimator::{Event, EventKind};
+use crate::estimator::{Event, EventKind, FailureCause};
 use crate::geometry::seconds_from_ns;
 
 /// Monitors the number of observed landmarks.
@@ -58,21 +58,39 @@ pub(crate) fn failure(
     let state = newest.state.navigation;
     let checks = [
         (
+            FailureCause::AccelerometerBias,
             "accelerometer bias out of bounds, m/s²",
             state.bias.accelerometer_m_per_s2.norm(),
             options.max_accelerometer_bias,
         ),
-        ("gyroscope bias out of bounds, rad/s", state.bias.gyroscope_rad_per_s.norm(), options.max_gyroscope_bias),
-        ("velocity out of bounds, m/s", state.velocity_m_per_s.norm(), options.max_velocity_m_per_s),
         (
+            FailureCause::GyroscopeBias,
+            "gyroscope bias out of bounds, rad/s",
+            state.bias.gyroscope_rad_per_s.norm(),
+            options.max_gyroscope_bias,
+        ),
+        (
+            FailureCause::Velocity,
+            "velocity out of bounds, m/s",
+            state.velocity_m_per_s.norm(),
+            options.max_velocity_m_per_s,
+        ),
+        (
+            FailureCause::Correction,
             "correction of the newest position too large, m",
             (state.world_from_imu.translation_m - predicted.world_from_imu.translation_m).norm(),
             options.max_position_correction_m,
         ),
-        ("time with too few observed landmarks too long, s", landmarks.blind_s(newest.stamp_ns), options.max_blind_s),
+        (
+            FailureCause::Features,
+            "time with too few observed landmarks too long, s",
+            landmarks.blind_s(newest.stamp_ns),
+            options.max_blind_s,
+        ),
     ];
-    let (reason, value, limit) = checks.into_iter().find(|(_, value, limit)| !value.is_finite() || value > limit)?;
-    Some(Event::decided(EventKind::Failure, format!("{reason}: {value:.3} (limit {limit:.3})"), value, limit))
+    let (cause, reason, value, limit) =
+        checks.into_iter().find(|(_, _, value, limit)| !value.is_finite() || value > limit)?;
+    Some(Event::failure(cause, format!("{reason}: {value:.3} (limit {limit:.3})"), value, limit))
 }
 
 /// Returns an event for saturated IMU samples in the newest interval.

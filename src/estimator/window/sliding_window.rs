@@ -10,7 +10,7 @@ use super::solve::SolvedWindow;
 use super::stationary::{Observed, StationaryDetector};
 use super::window_state::WindowState;
 use crate::estimator::factors::preintegration::Preintegration;
-use crate::estimator::report::{Event, EventKind, Phase, StepReport};
+use crate::estimator::report::{Event, EventKind, FailureCause, Phase, StepReport};
 use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::frame_state::{FrameState, Rates};
@@ -136,7 +136,7 @@ impl SlidingWindow {
         let covered = motion.duration_s();
         if covered < 0.5 * interval_s || interval_s <= 0.0 {
             let message = format!("IMU samples cover {covered:.3} s of the {interval_s:.3} s since the last image");
-            return Err(Event::decided(EventKind::Failure, message, covered, 0.5 * interval_s));
+            return Err(Event::failure(FailureCause::Imu, message, covered, 0.5 * interval_s));
         }
         let navigation = motion.predict(&last.state.navigation, &setup.gravity_in_world);
         let encoder = setup.encoder_reading(input, window.calibration.of(MAIN).joint_count());

@@ -136,6 +136,7 @@ impl StationaryDetector {
             ),
             value: Some(parallax_rad),
             threshold: Some(MAX_PARALLAX_RAD),
+            cause: None,
         };
         let velocity_sigma_m_per_s = position_sigma_m / seconds_from_ns(QUIET_NS);
         Some((Stationary { since_ns, position_sigma_m, velocity_sigma_m_per_s }, event))

@@ -41,8 +41,13 @@ fn steps() -> [StepRecord; 2] {
         accepted,
     };
     report.iterations = vec![iteration(100.0, 60.0, true), iteration(60.0, 75.0, false), iteration(60.0, 50.0, true)];
-    report.events =
-        vec![Event { kind: EventKind::OldestMarginalized, message: String::new(), value: None, threshold: None }];
+    report.events = vec![Event {
+        kind: EventKind::OldestMarginalized,
+        message: String::new(),
+        value: None,
+        threshold: None,
+        cause: None,
+    }];
     let sigma = report.calibration.parameters.iter().position(|known| *known == parameter("L1.alpha")).unwrap();
     report.calibration.sigmas[sigma] = 0.01;
     let rank: &mut RankReport = step.rank.as_mut().unwrap();

@@ -2,6 +2,7 @@
 
 mod comparison;
 mod lost_since;
+mod pose_consistency;
 mod pose_uncertainty;
 mod recording;
 mod rig_values;
@@ -14,6 +15,7 @@ mod warnings;
 
 pub use comparison::{Comparison, Divergence, Quantity};
 pub use lost_since::LostSince;
+pub use pose_consistency::PoseConsistency;
 pub use pose_uncertainty::PoseUncertainty;
 pub use recording::Recording;
 pub use run::{ForkOrigin, RunMemory, RunRecord};

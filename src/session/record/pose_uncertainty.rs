@@ -1,5 +1,6 @@
 //! Covariance of the newest pose of a window.
 
+use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::estimator::{ColumnGroup, Linearization};
@@ -24,14 +25,7 @@ impl PoseUncertainty {
     pub fn of(linearization: &Linearization) -> Option<Self> {
         let poses = || linearization.columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose);
         let newest = poses().next_back()?.start;
-        let (measured, prior) = (&linearization.jacobian, &linearization.prior_jacobian);
-        let mut information = measured.tr_mul(measured);
-        if prior.nrows() > 0 {
-            information += prior.tr_mul(prior);
-        }
-        for column in poses().flat_map(|block| block.start..block.start + block.len) {
-            information[(column, column)] += WEAK_INFORMATION;
-        }
+        let information = information(linearization);
         let size = information.nrows();
         let mut unit = nalgebra::DMatrix::zeros(size, 6);
         for component in 0..6 {
@@ -45,6 +39,20 @@ impl PoseUncertainty {
         let found = Self { attitude_rad: sigma(0), position_m: sigma(3) };
         (found.attitude_rad.is_finite() && found.position_m.is_finite()).then_some(found)
     }
+}
+
+/// Information of all columns of a step, of the measurements and the priors, with [`WEAK_INFORMATION`] on poses.
+pub(super) fn information(linearization: &Linearization) -> DMatrix<f64> {
+    let (measured, prior) = (&linearization.jacobian, &linearization.prior_jacobian);
+    let mut information = measured.tr_mul(measured);
+    if prior.nrows() > 0 {
+        information += prior.tr_mul(prior);
+    }
+    let poses = linearization.columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose);
+    for column in poses.flat_map(|block| block.start..block.start + block.len) {
+        information[(column, column)] += WEAK_INFORMATION;
+    }
+    information
 }
 
 #[cfg(test)]

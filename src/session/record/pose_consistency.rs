@@ -1,0 +1,75 @@
+//! Consistency of poses: their errors against ground truth over their covariances.
+//!
+//! Poses are compared relative to each other, newest against oldest frame of a window: that difference does not depend on
+//! the four unobservable directions (position, yaw) and needs no alignment.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix};
+
+use super::pose_uncertainty::information;
+use super::run::RunRecord;
+use crate::estimator::{ColumnGroup, StepReport};
+use crate::geometry::{RigidTransform, so3};
+
+/// Normalized estimation error squared (NEES) of the newest pose of a window in its oldest one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseConsistency {
+    /// Of all six components; 6 on average for a consistent estimator.
+    pub pose: f64,
+    /// Of the rotation; 3 on average.
+    pub rotation: f64,
+    /// Of the translation; 3 on average.
+    pub translation: f64,
+}
+
+impl RunRecord {
+    /// The consistency at every step that keeps its linearization and has ground truth; see
+    /// [`SessionPlan::keep_linearization_every`](crate::session::SessionPlan::keep_linearization_every).
+    pub fn pose_consistency(&self) -> Vec<PoseConsistency> {
+        let truths: BTreeMap<i64, RigidTransform> =
+            self.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.ground_truth?))).collect();
+        self.steps.iter().filter_map(|step| consistency(&step.report, &truths)).collect()
+    }
+}
+
+/// The consistency of one step; `truths` are `world_from_imu` by stamp.
+fn consistency(report: &StepReport, truths: &BTreeMap<i64, RigidTransform>) -> Option<PoseConsistency> {
+    let [oldest, .., newest] = report.window.as_slice() else { return None };
+    let (true_oldest, true_newest) = (truths.get(&oldest.stamp_ns)?, truths.get(&newest.stamp_ns)?);
+    let oldest_from_newest = oldest.world_from_imu.inverse() * newest.world_from_imu;
+    let error = oldest_from_newest.minus(&(true_oldest.inverse() * *true_newest));
+    let covariance = relative_covariance(report, &oldest_from_newest)?;
+    let part = |start: usize| {
+        let error = error.fixed_rows::<3>(start).into_owned();
+        Some(error.dot(&covariance.fixed_view::<3, 3>(start, start).into_owned().cholesky()?.solve(&error)))
+    };
+    Some(PoseConsistency {
+        pose: error.dot(&covariance.cholesky()?.solve(&error)),
+        rotation: part(0)?,
+        translation: part(3)?,
+    })
+}
+
+/// Covariance of `oldest_from_newest` in the perturbation rule, rotation first; all other unknowns marginalized.
+fn relative_covariance(report: &StepReport, oldest_from_newest: &RigidTransform) -> Option<Matrix6<f64>> {
+    let linearization = report.linearization.as_ref()?;
+    let poses = || linearization.columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose);
+    let (first, last) = (poses().next()?.start, poses().next_back()?.start);
+    let oldest = report.window.first()?;
+    let mut change: SMatrix<f64, 6, 12> = SMatrix::zeros();
+    let oldest_from_world = oldest.world_from_imu.rotation_matrix().transpose();
+    change.fixed_view_mut::<3, 3>(0, 0).copy_from(&-oldest_from_newest.rotation_matrix().transpose());
+    change.fixed_view_mut::<3, 3>(0, 6).copy_from(&Matrix3::identity());
+    change.fixed_view_mut::<3, 3>(3, 0).copy_from(&so3::hat(&oldest_from_newest.translation_m));
+    change.fixed_view_mut::<3, 3>(3, 3).copy_from(&-oldest_from_world);
+    change.fixed_view_mut::<3, 3>(3, 9).copy_from(&oldest_from_world);
+
+    let information = information(linearization);
+    let mut right = DMatrix::zeros(information.nrows(), 6);
+    for (place, start) in [(0, first), (6, last)] {
+        right.rows_mut(start, 6).copy_from(&change.fixed_columns::<6>(place).transpose());
+    }
+    let solved = information.cholesky()?.solve(&right);
+    Some(Matrix6::from_iterator((right.transpose() * solved).iter().copied()))
+}
