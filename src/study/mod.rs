@@ -3,10 +3,32 @@
 //! Everything here is plain data and computation on it; files are read and written by `export/study/`, processes are
 //! started by the command line.
 //!
-//! - `table`: columns of numbers, integers, texts and booleans with units and descriptions.
+//! - `plan/`: the TOML text of a plan as typed values; every error names line and key.
+//! - `recipe`, `perturbation`: simulated flights and errors of a rig.
+//! - `job`: the jobs of a plan and their keys.
+//! - `comparison`, `statistics`: a study against a baseline, paired and with intervals.
+//! - `table`, `schema`: columns with units and descriptions, and those of the tables of a study.
 
+mod comparison;
+mod job;
+mod perturbation;
+mod plan;
+mod recipe;
+mod schema;
+mod statistics;
 mod table;
 #[cfg(test)]
 mod tests;
 
+pub use comparison::{
+    ComparisonError, Direction, MetricComparison, SUCCESS, StudyComparison, Verdict, WorstPair, compare,
+};
+pub use job::{JobLog, KeyedJob, RecordedLog, SimulatedFlight, StudyJob, expand, hex, shard};
+pub use perturbation::{
+    Distribution, MagnitudeDimension, PerturbationError, PerturbationStart, RigChange, RigPerturbation, RigQuantity,
+};
+pub use plan::{DisturbanceSet, JobLimits, LogSource, PlanError, SlurmOptions, StudyOutput, StudyPlan};
+pub use recipe::{EncoderNoise, FlightRecipe};
+pub use schema::{PAIRING_COLUMNS, frames_table, parameters_table, runs_table};
+pub use statistics::MeanInterval;
 pub use table::{Cell, ColumnType, ColumnValues, StudyColumn, StudyTable, TableError};

@@ -1,1 +1,5 @@
+mod comparison;
+mod job;
+mod perturbation;
+mod plan;
 mod table;

@@ -93,3 +93,14 @@ fn rows_are_grouped_by_the_text_of_a_cell() {
     assert_eq!(varying, ["log", "seed", "ate_rmse_m", "initialized"]);
     assert_eq!(table.select(&[2]).varying_columns().count(), 0);
 }
+
+#[test]
+fn the_documents_list_every_column() {
+    let document = include_str!("../../../docs/formats.md");
+    let tables = [crate::study::runs_table(), crate::study::parameters_table(), crate::study::frames_table()];
+    for column in tables.iter().flat_map(StudyTable::columns) {
+        let StudyColumn { name, unit, description, values } = column;
+        let row = format!("| `{name}` | {} | {unit} | {description} |", values.column_type().name());
+        assert!(document.contains(&row), "docs/formats.md lacks: {row}");
+    }
+}

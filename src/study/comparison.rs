@@ -1,0 +1,345 @@
+//! Comparison of two studies: whether a metric got worse, beyond its tolerance and beyond its noise.
+//!
+//! Runs are paired by log, disturbance, perturbation, seed and specification. The difference of a pair is the logarithm of
+//! the ratio of its two values, so that easy and hard flights count alike; of all pairs the mean and its 95 % interval
+//! (Student's t) are computed. A metric is worse when its mean ratio is beyond the tolerance and the interval excludes 1.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::Serialize;
+use thiserror::Error;
+
+use super::schema::PAIRING_COLUMNS;
+use super::statistics::MeanInterval;
+use super::table::{Cell, StudyTable};
+
+/// The metric that compares how many runs have a result.
+pub const SUCCESS: &str = "success";
+/// Fewest pairs from which a metric is judged.
+const LEAST_PAIRS: usize = 3;
+
+/// Which change of a metric is worse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Direction {
+    /// A larger value.
+    Larger,
+    /// A smaller value.
+    Smaller,
+    /// Any change: a consistent estimator has an expected value, and an optimistic one may come from both sides.
+    Either,
+}
+
+impl Direction {
+    /// The direction of a column.
+    fn of(column: &str) -> Self {
+        match column {
+            "pose_nees" | "parameter_error_sigma" => Self::Either,
+            "estimated" | "keyframes" | "length_m" | "rank_structural" | "rank_informed" | "real_time_factor" => {
+                Self::Smaller
+            }
+            _ => Self::Larger,
+        }
+    }
+}
+
+/// The judgement of a metric.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Within the tolerance, or not distinguishable from noise.
+    Unchanged,
+    /// Better beyond the tolerance and the noise.
+    Better,
+    /// Worse beyond the tolerance and the noise.
+    Worse,
+    /// Too few pairs to tell.
+    TooFewPairs,
+}
+
+impl Verdict {
+    /// Its name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Unchanged => "unchanged",
+            Self::Better => "better",
+            Self::Worse => "worse",
+            Self::TooFewPairs => "too few pairs",
+        }
+    }
+}
+
+/// One metric over all pairs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MetricComparison {
+    /// Column of the table of runs, or [`SUCCESS`].
+    pub metric: String,
+    /// Which change is worse.
+    pub direction: Direction,
+    /// Allowed relative change.
+    pub tolerance: f64,
+    /// Pairs with a positive value in both studies.
+    pub pairs: usize,
+    /// Geometric mean of new over old.
+    pub ratio: Option<f64>,
+    /// Its 95 % interval.
+    pub interval: Option<[f64; 2]>,
+    /// The pair whose ratio is farthest in the worse direction, for people who look for it.
+    pub worst_pair: Option<WorstPair>,
+    /// The judgement.
+    pub verdict: Verdict,
+}
+
+/// One pair of runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WorstPair {
+    /// Log, levels, seed and specification.
+    pub run: String,
+    /// Value in the baseline.
+    pub old: f64,
+    /// Value in the new study.
+    pub new: f64,
+}
+
+/// The result of a comparison.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StudyComparison {
+    /// Runs of the baseline.
+    pub old_runs: usize,
+    /// Runs of the new study.
+    pub new_runs: usize,
+    /// Runs that both have.
+    pub pairs: usize,
+    /// Pairs of which only the baseline has a result.
+    pub newly_failed: Vec<String>,
+    /// Pairs of which only the new study has a result.
+    pub newly_succeeded: Vec<String>,
+    /// Pairs on logs of different content.
+    pub other_logs: usize,
+    /// The metrics in the order of their names, [`SUCCESS`] last.
+    pub metrics: Vec<MetricComparison>,
+}
+
+/// The reason why two studies cannot be compared.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum ComparisonError {
+    /// A tolerance names no numeric column.
+    #[error("tolerance '{name}': the table of runs has no column of numbers of that name; it has {}", known.join(", "))]
+    NoMetric {
+        /// The name.
+        name: String,
+        /// The columns that it may name.
+        known: Vec<String>,
+    },
+    /// A column by which runs are paired is missing.
+    #[error("the {which} has no column '{column}': it is no table of runs of a study (results.parquet)")]
+    NoPairing {
+        /// Baseline or new study.
+        which: &'static str,
+        /// The column.
+        column: &'static str,
+    },
+    /// No run of the new study is in the baseline.
+    #[error("no run of the study is in the baseline: they are paired by log, disturbance, perturbation, seed and run")]
+    NoPairs,
+}
+
+/// Compares a study with a baseline; `tolerances` are relative changes by column. [`SUCCESS`] is always compared, and the
+/// rows of a table that occur twice count once.
+///
+/// # Errors
+/// For a tolerance of an unknown column, and when no runs can be paired.
+pub fn compare(
+    old: &StudyTable,
+    new: &StudyTable,
+    tolerances: &BTreeMap<String, f64>,
+) -> Result<StudyComparison, ComparisonError> {
+    for (which, table) in [("baseline", old), ("study", new)] {
+        if let Some(column) = PAIRING_COLUMNS.into_iter().find(|column| table.place(column).is_none()) {
+            return Err(ComparisonError::NoPairing { which, column });
+        }
+    }
+    let metrics = tolerances.iter().filter(|(name, _)| *name != SUCCESS);
+    for (name, _) in metrics.clone() {
+        check_metric(new, name)?;
+    }
+    let old_rows: BTreeMap<String, usize> = (0..old.rows()).map(|row| (pairing(old, row), row)).collect();
+    let new_rows: BTreeMap<String, usize> = (0..new.rows()).map(|row| (pairing(new, row), row)).collect();
+    let pairs: Vec<(&String, usize, usize)> =
+        new_rows.iter().filter_map(|(name, new)| Some((name, *old_rows.get(name)?, *new))).collect();
+    if pairs.is_empty() {
+        return Err(ComparisonError::NoPairs);
+    }
+    let ok = |table: &StudyTable, row: usize| table.text(row, "status") == Some("ok");
+    let changed = |was: bool| -> Vec<String> {
+        let of = pairs.iter().filter(|(_, o, n)| ok(old, *o) == was && ok(new, *n) != was);
+        of.map(|(name, ..)| (*name).clone()).collect()
+    };
+    let (newly_failed, newly_succeeded) = (changed(true), changed(false));
+    let other_logs = pairs.iter().filter(|(_, o, n)| old.text(*o, "log_sha256") != new.text(*n, "log_sha256")).count();
+    let mut compared: Vec<MetricComparison> = metrics
+        .map(|(name, tolerance)| {
+            let values = pairs.iter().filter(|(_, o, n)| ok(old, *o) && ok(new, *n));
+            let values =
+                values.filter_map(|(run, o, n)| Some((run.as_str(), old.number(*o, name)?, new.number(*n, name)?)));
+            compare_metric(name, *tolerance, &values.collect::<Vec<_>>())
+        })
+        .collect();
+    let tolerance = tolerances.get(SUCCESS).copied().unwrap_or(0.0);
+    compared.push(compare_success(tolerance, pairs.len(), newly_failed.len(), newly_succeeded.len()));
+    Ok(StudyComparison {
+        old_runs: old.rows(),
+        new_runs: new.rows(),
+        pairs: pairs.len(),
+        newly_failed,
+        newly_succeeded,
+        other_logs,
+        metrics: compared,
+    })
+}
+
+fn check_metric(table: &StudyTable, name: &str) -> Result<(), ComparisonError> {
+    use super::table::ColumnType::{Integer, Number};
+    let numeric = |column: &&super::table::StudyColumn| {
+        matches!(column.values.column_type(), Number | Integer) && !PAIRING_COLUMNS.contains(&column.name.as_str())
+    };
+    if table.column(name).as_ref().is_some_and(numeric) {
+        return Ok(());
+    }
+    let known = table.columns().iter().filter(numeric).map(|column| column.name.clone());
+    Err(ComparisonError::NoMetric { name: name.to_owned(), known: known.chain([SUCCESS.to_owned()]).collect() })
+}
+
+/// Log, levels, seed and specification of a row as one text.
+fn pairing(table: &StudyTable, row: usize) -> String {
+    let cells = PAIRING_COLUMNS.iter().map(|column| match table.cell(row, column) {
+        Cell::Integer(seed) => format!("seed {seed}"),
+        other => other.to_string(),
+    });
+    cells.filter(|text| !text.is_empty() && text != "none").collect::<Vec<_>>().join(", ")
+}
+
+/// Compares one metric; `values` are the run, the old and the new value of each pair.
+fn compare_metric(name: &str, tolerance: f64, values: &[(&str, f64, f64)]) -> MetricComparison {
+    let direction = Direction::of(name);
+    // Ratios of values that are zero or negative mean nothing.
+    let positive: Vec<_> = values.iter().filter(|(_, old, new)| *old > 0.0 && *new > 0.0).collect();
+    let ratios: Vec<f64> = positive.iter().map(|(_, old, new)| (new / old).ln()).collect();
+    let badness = |ratio: f64| match direction {
+        Direction::Larger => ratio,
+        Direction::Smaller => -ratio,
+        Direction::Either => ratio.abs(),
+    };
+    let worst = positive.iter().zip(&ratios).max_by(|a, b| badness(*a.1).total_cmp(&badness(*b.1)));
+    let worst_pair = worst.map(|((run, old, new), _)| WorstPair { run: (*run).to_owned(), old: *old, new: *new });
+    let interval = MeanInterval::of(&ratios).filter(|interval| interval.pairs >= LEAST_PAIRS);
+    let verdict = interval.map_or(Verdict::TooFewPairs, |interval| judge(&interval, direction, tolerance));
+    MetricComparison {
+        metric: name.to_owned(),
+        direction,
+        tolerance,
+        pairs: ratios.len(),
+        ratio: interval.map(|interval| interval.mean.exp()),
+        interval: interval.map(|interval| [interval.low.exp(), interval.high.exp()]),
+        worst_pair,
+        verdict,
+    }
+}
+
+/// The judgement of an interval of log-ratios.
+fn judge(interval: &MeanInterval, direction: Direction, tolerance: f64) -> Verdict {
+    let limit = (1.0 + tolerance).ln();
+    let rises = interval.mean > limit && interval.low > 0.0;
+    let falls = interval.mean < -limit && interval.high < 0.0;
+    match (direction, rises, falls) {
+        (_, false, false) => Verdict::Unchanged,
+        (Direction::Either, ..) | (Direction::Larger, true, _) | (Direction::Smaller, _, true) => Verdict::Worse,
+        (Direction::Larger | Direction::Smaller, ..) => Verdict::Better,
+    }
+}
+
+/// Compares how many runs have a result: a run that had one and has none any more counts, whatever the others do.
+fn compare_success(tolerance: f64, pairs: usize, failed: usize, succeeded: usize) -> MetricComparison {
+    let allowed = tolerance * pairs as f64;
+    let change = failed as f64 - succeeded as f64;
+    let verdict = match change {
+        change if change > allowed => Verdict::Worse,
+        change if change < -allowed => Verdict::Better,
+        _ => Verdict::Unchanged,
+    };
+    MetricComparison {
+        metric: SUCCESS.to_owned(),
+        direction: Direction::Smaller,
+        tolerance,
+        pairs,
+        ratio: None,
+        interval: None,
+        worst_pair: None,
+        verdict,
+    }
+}
+
+impl StudyComparison {
+    /// Whether a metric got worse, or could not be judged: a guard that cannot decide does not pass.
+    pub fn fails(&self) -> bool {
+        self.metrics.iter().any(|metric| matches!(metric.verdict, Verdict::Worse | Verdict::TooFewPairs))
+    }
+}
+
+/// Markdown for the summary of a CI job.
+impl fmt::Display for StudyComparison {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = if self.fails() { "**worse than the baseline**" } else { "not worse than the baseline" };
+        writeln!(out, "Study: {verdict}\n")?;
+        writeln!(
+            out,
+            "{} of {} runs paired with {} runs of the baseline.\n",
+            self.pairs, self.new_runs, self.old_runs
+        )?;
+        writeln!(
+            out,
+            "| metric | worse when | tolerance | pairs | new / old | 95 % interval | verdict | worst pair |"
+        )?;
+        writeln!(out, "| --- | --- | --- | --- | --- | --- | --- | --- |")?;
+        for metric in &self.metrics {
+            let worse = match metric.direction {
+                Direction::Larger => "larger",
+                Direction::Smaller => "smaller",
+                Direction::Either => "changed",
+            };
+            let (ratio, interval) = if metric.metric == SUCCESS {
+                (format!("−{} +{}", self.newly_failed.len(), self.newly_succeeded.len()), String::new())
+            } else {
+                let ratio = metric.ratio.map_or_else(String::new, |ratio| format!("{ratio:.3}"));
+                (ratio, metric.interval.map_or_else(String::new, |[low, high]| format!("{low:.3} to {high:.3}")))
+            };
+            let pair = metric.worst_pair.as_ref().map_or_else(String::new, |WorstPair { run, old, new }| {
+                format!("{}: {old:.4} → {new:.4}", run.replace('|', "/"))
+            });
+            writeln!(
+                out,
+                "| `{}` | {worse} | {:.0} % | {} | {ratio} | {interval} | {} | {pair} |",
+                metric.metric,
+                100.0 * metric.tolerance,
+                metric.pairs,
+                metric.verdict.name()
+            )?;
+        }
+        for (title, runs) in
+            [("Without a result now", &self.newly_failed), ("With a result now", &self.newly_succeeded)]
+        {
+            if !runs.is_empty() {
+                writeln!(out, "\n{title}: {}", runs.join("; "))?;
+            }
+        }
+        if self.other_logs > 0 {
+            writeln!(out, "\n{} pairs are on logs of different content (`log_sha256`).", self.other_logs)?;
+        }
+        writeln!(
+            out,
+            "\nnew / old: geometric mean over the pairs, with Student's t interval of the mean log-ratio. Worse: beyond \
+             the tolerance, and the interval excludes 1."
+        )
+    }
+}

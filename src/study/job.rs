@@ -1,0 +1,264 @@
+//! The jobs of a plan: one estimator run each, named by the hash of its inputs.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+
+use super::perturbation::RigPerturbation;
+use super::plan::StudyPlan;
+use super::recipe::FlightRecipe;
+use crate::session::RunSpec;
+
+/// Number of the rules by which keys are made; another number gives other keys.
+const KEY_RULES: u32 = 1;
+
+/// A recorded log of a job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecordedLog {
+    /// Name in the tables.
+    pub name: String,
+    /// The log.
+    pub path: PathBuf,
+    /// SHA-256 of its content, in hexadecimal.
+    pub sha256: String,
+    /// The rig, when it is not beside the log or in it.
+    pub rig: Option<PathBuf>,
+    /// SHA-256 of the rig file that is used, with its masks; empty when the rig is in the log.
+    pub rig_sha256: String,
+    /// The ground-truth rig, when it is not beside the log or in it.
+    pub truth: Option<PathBuf>,
+    /// SHA-256 of the ground-truth file that is used; empty when it is in the log or not known.
+    pub truth_sha256: String,
+    /// Seconds to skip at the start.
+    pub start_s: f64,
+    /// Seconds to process from there, `None` for the rest.
+    pub duration_s: Option<f64>,
+    /// Length of the log in seconds, to estimate the time of a job.
+    pub length_s: f64,
+}
+
+/// A simulated flight of a job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SimulatedFlight {
+    /// The recipe.
+    pub recipe: FlightRecipe,
+    /// Disturbances beside the recipe's.
+    pub disturb: Vec<String>,
+    /// Seed of the simulation.
+    pub seed: u64,
+}
+
+impl SimulatedFlight {
+    /// Name of its folder: the hash of everything that decides about its bytes.
+    pub fn id(&self) -> String {
+        let text = serde_json::to_string(self).expect("plain values have a JSON text");
+        hex(&Sha256::digest(format!("flight {KEY_RULES} {text}"))[..8])
+    }
+}
+
+/// The log of a job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JobLog {
+    /// A recorded one.
+    Recorded(Box<RecordedLog>),
+    /// A simulated one, which is rendered once for all jobs.
+    Simulated(Box<SimulatedFlight>),
+}
+
+impl JobLog {
+    /// Name in the tables.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Recorded(log) => &log.name,
+            Self::Simulated(flight) => &flight.recipe.name,
+        }
+    }
+
+    /// Seconds that are processed, where it is known before the log exists.
+    pub fn duration_s(&self) -> Option<f64> {
+        match self {
+            Self::Recorded(log) => {
+                let rest_s = (log.length_s - log.start_s).max(0.0);
+                Some(log.duration_s.map_or(rest_s, |duration_s| duration_s.min(rest_s)))
+            }
+            Self::Simulated(flight) => flight.recipe.duration_s,
+        }
+    }
+}
+
+/// One run of one specification on one log.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StudyJob {
+    /// Name of the study.
+    pub study: String,
+    /// The log.
+    pub log: JobLog,
+    /// Name of the disturbances.
+    pub disturbance: String,
+    /// Errors of the rig.
+    pub perturbation: RigPerturbation,
+    /// The seed, `None` where nothing is random.
+    pub seed: Option<u64>,
+    /// The run.
+    #[serde(with = "spec_text")]
+    pub spec: RunSpec,
+}
+
+/// A run specification as its normalized text.
+mod spec_text {
+    use serde::{Deserialize as _, Deserializer, Serializer, de::Error as _};
+
+    use crate::session::RunSpec;
+
+    pub(super) fn serialize<S: Serializer>(spec: &RunSpec, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(spec)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<RunSpec, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(D::Error::custom)
+    }
+}
+
+/// The inputs of a job that decide about its results, without paths.
+#[derive(Serialize)]
+struct KeyInputs<'a> {
+    rules: u32,
+    program: &'a str,
+    log: &'a str,
+    content: [&'a str; 3],
+    span: Option<(f64, Option<f64>)>,
+    disturbance: &'a str,
+    perturbation: &'a RigPerturbation,
+    seed: Option<u64>,
+    spec: String,
+}
+
+impl StudyJob {
+    /// SHA-256 of the inputs, in hexadecimal: content of log and rig, normalized specification, perturbation, seed and
+    /// program; not where the files lie.
+    pub fn key(&self, program: &str) -> String {
+        let flight;
+        let (content, span) = match &self.log {
+            JobLog::Recorded(log) => {
+                ([log.sha256.as_str(), &log.rig_sha256, &log.truth_sha256], Some((log.start_s, log.duration_s)))
+            }
+            JobLog::Simulated(simulated) => {
+                flight = simulated.id();
+                ([flight.as_str(), "", ""], None)
+            }
+        };
+        let inputs = KeyInputs {
+            rules: KEY_RULES,
+            program,
+            log: self.log.name(),
+            content,
+            span,
+            disturbance: &self.disturbance,
+            perturbation: &self.perturbation,
+            seed: self.seed,
+            spec: self.spec.to_string(),
+        };
+        let text = serde_json::to_string(&inputs).expect("plain values have a JSON text");
+        hex(&Sha256::digest(text))
+    }
+
+    /// One line for a person: log, levels, seed and specification.
+    pub fn describe(&self) -> String {
+        let mut parts = vec![self.log.name().to_owned()];
+        let levels = [&self.disturbance, &self.perturbation.name];
+        parts.extend(levels.into_iter().filter(|name| *name != "none").cloned());
+        parts.extend(self.seed.map(|seed| format!("seed {seed}")));
+        parts.push(self.spec.to_string());
+        parts.join(", ")
+    }
+}
+
+/// Bytes in hexadecimal.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
+}
+
+/// A job with its key.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeyedJob {
+    /// [`StudyJob::key`].
+    pub key: String,
+    /// The job.
+    pub job: StudyJob,
+}
+
+/// The jobs of a plan in the order of its tables: logs as found, then flights; of each the disturbances, perturbations,
+/// seeds and specifications.
+///
+/// Recorded logs are run without disturbances. Where neither the log nor the perturbation is random there is one job
+/// without a seed instead of one for each seed.
+pub fn expand(plan: &StudyPlan, logs: &[RecordedLog], program: &str) -> Vec<KeyedJob> {
+    let mut jobs = Vec::new();
+    let recorded = logs.iter().map(|log| JobLog::Recorded(Box::new(log.clone())));
+    let undisturbed = plan.disturbances.iter().find(|level| level.disturb.is_empty());
+    let undisturbed = undisturbed.map_or("none", |level| level.name.as_str());
+    for log in recorded {
+        for perturbation in &plan.perturbations {
+            let seeds: Vec<Option<u64>> =
+                if perturbation.is_random() { plan.seeds.iter().copied().map(Some).collect() } else { vec![None] };
+            for seed in seeds {
+                add_specs(&mut jobs, plan, &log, undisturbed, perturbation, seed);
+            }
+        }
+    }
+    for recipe in &plan.flights {
+        for level in &plan.disturbances {
+            for perturbation in &plan.perturbations {
+                for seed in &plan.seeds {
+                    let (recipe, disturb) = (recipe.clone(), level.disturb.clone());
+                    let flight = JobLog::Simulated(Box::new(SimulatedFlight { recipe, disturb, seed: *seed }));
+                    add_specs(&mut jobs, plan, &flight, &level.name, perturbation, Some(*seed));
+                }
+            }
+        }
+    }
+    let mut known = BTreeMap::new();
+    let keyed = jobs.into_iter().map(|job| KeyedJob { key: job.key(program), job });
+    keyed.filter(|job| known.insert(job.key.clone(), ()).is_none()).collect()
+}
+
+fn add_specs(
+    jobs: &mut Vec<StudyJob>,
+    plan: &StudyPlan,
+    log: &JobLog,
+    disturbance: &str,
+    perturbation: &RigPerturbation,
+    seed: Option<u64>,
+) {
+    jobs.extend(plan.specs.iter().map(|spec| StudyJob {
+        study: plan.name.clone(),
+        log: log.clone(),
+        disturbance: disturbance.to_owned(),
+        perturbation: perturbation.clone(),
+        seed,
+        spec: spec.clone(),
+    }));
+}
+
+/// The jobs of one shard: every `count`-th flight with all its jobs, from number `index` (from 1) on.
+///
+/// Jobs on one flight stay together, so that it is rendered by one shard; the shards' shares differ by at most one flight.
+pub fn shard(jobs: Vec<KeyedJob>, index: usize, count: usize) -> Vec<KeyedJob> {
+    let mut flights: BTreeMap<String, usize> = BTreeMap::new();
+    let mut groups = 0;
+    let mut in_shard = move |job: &KeyedJob| {
+        let mut next = || {
+            groups += 1;
+            groups - 1
+        };
+        let group = match &job.job.log {
+            JobLog::Simulated(flight) => *flights.entry(flight.id()).or_insert_with(next),
+            JobLog::Recorded(_) => next(),
+        };
+        group % count == index - 1
+    };
+    jobs.into_iter().filter(|job| in_shard(job)).collect()
+}

@@ -1,0 +1,101 @@
+//! A simulated flight of a plan, as plain values from which the options of the simulation follow.
+
+use serde::{Deserialize, Serialize};
+
+use crate::sensors::ChainPrior;
+use crate::simulation::{Experiment, Lens, SimulationError, SimulationOptions};
+
+/// Noise of the simulated encoders.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EncoderNoise {
+    /// As in the experiment.
+    OfExperiment,
+    /// No encoders in the log.
+    None,
+    /// White noise of this standard deviation, in degrees.
+    Degrees(f64),
+}
+
+/// A simulated flight, but for its seed and the disturbances of the plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FlightRecipe {
+    /// Name in the tables.
+    pub name: String,
+    /// Name of the experiment, `T1` to `T4`.
+    pub experiment: String,
+    /// Duration in seconds, `None` for the experiment's.
+    pub duration_s: Option<f64>,
+    /// Noise of the encoders.
+    pub encoder: EncoderNoise,
+    /// Width and height of the images in pixels.
+    pub size_px: [usize; 2],
+    /// Frame rate of the cameras.
+    pub rate_hz: f64,
+    /// Whether the static camera is recorded as well.
+    pub static_camera: bool,
+    /// Disturbances of every flight of this recipe, as `dcvins simulate --disturb` takes them.
+    pub disturb: Vec<String>,
+    /// Bound of the error of each translation of the given chain in metres, `None` for the experiment's.
+    pub start_error_m: Option<f64>,
+    /// Bound of the error of each angle of the given chain in degrees, `None` for the experiment's.
+    pub start_error_deg: Option<f64>,
+    /// Factor of the IMU's noise and biases.
+    pub imu_noise_scale: f64,
+    /// `pinhole` or `radtan`.
+    pub lens: String,
+}
+
+impl FlightRecipe {
+    /// Checks names and ranges; the error has the key and the problem.
+    pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
+        if self.experiment().is_none() {
+            return Err(("experiment", format!("is '{}', expected T1, T2, T3 or T4", self.experiment)));
+        }
+        if self.lens().is_none() {
+            return Err(("lens", format!("is '{}', expected pinhole or radtan", self.lens)));
+        }
+        let options = self.options(1, &[]).map_err(|error| ("disturb", error.to_string()))?;
+        options.check().map_err(|error| ("disturb", error.to_string()))
+    }
+
+    fn experiment(&self) -> Option<Experiment> {
+        Experiment::ALL.into_iter().find(|experiment| experiment.name() == self.experiment)
+    }
+
+    fn lens(&self) -> Option<Lens> {
+        match self.lens.as_str() {
+            "pinhole" => Some(Lens::Pinhole),
+            "radtan" => Some(Lens::Radtan),
+            _ => None,
+        }
+    }
+
+    /// The options of the simulation with a seed and further disturbances.
+    ///
+    /// # Errors
+    /// For a disturbance that cannot be read.
+    pub fn options(&self, seed: u64, disturb: &[String]) -> Result<SimulationOptions, SimulationError> {
+        let mut options = SimulationOptions::new(self.experiment().unwrap_or(Experiment::T3));
+        options.seed = seed;
+        options.duration_s = self.duration_s;
+        match self.encoder {
+            EncoderNoise::OfExperiment => {}
+            EncoderNoise::None => options.encoder_sigma_rad = None,
+            EncoderNoise::Degrees(sigma_deg) => options.encoder_sigma_rad = Some(sigma_deg.to_radians()),
+        }
+        options.start_error = ChainPrior {
+            translation_bound_m: self.start_error_m.unwrap_or(options.start_error.translation_bound_m),
+            rotation_bound_rad: self.start_error_deg.map_or(options.start_error.rotation_bound_rad, f64::to_radians),
+        };
+        options.imu_noise_scale = self.imu_noise_scale;
+        options.lens = self.lens().unwrap_or(Lens::Pinhole);
+        options.resolution_px = self.size_px;
+        options.camera_rate_hz = self.rate_hz;
+        options.static_camera = self.static_camera;
+        for text in self.disturb.iter().chain(disturb) {
+            options.disturbances.set(text)?;
+        }
+        Ok(options)
+    }
+}
