@@ -16,6 +16,7 @@ use crate::cli::run::RunArguments;
 #[cfg(feature = "gui")]
 use crate::cli::screenshot::ScreenshotArguments;
 use crate::cli::simulate::SimulateArguments;
+use crate::cli::sweep::{SweepArguments, SweepJobArguments};
 use crate::cli::view::ViewArguments;
 
 /// Debugger for visual-inertial navigation with a camera on a gimbal.
@@ -57,6 +58,12 @@ pub(crate) enum Command {
     /// Write a synthetic flight: the log, its rig and the ground truth.
     #[command(after_help = exit::INTERRUPTIBLE)]
     Simulate(SimulateArguments),
+    /// Run a plan of many runs (logs × runs × rig errors × seeds), here or on a cluster, and write tables of the results.
+    #[command(after_help = exit::SWEEP)]
+    Sweep(SweepArguments),
+    /// Run one job of a study; started by sweep.
+    #[command(hide = true)]
+    SweepJob(SweepJobArguments),
     /// Compute which calibration parameters are observable with a mechanism, a parameterization and a motion, without a log.
     #[command(after_help = exit::PLAIN)]
     Degeneracy(DegeneracyArguments),

@@ -13,6 +13,8 @@ pub(crate) enum Outcome {
     ErrorsFound,
     /// The condition of `--break` became true.
     BreakHit,
+    /// Jobs of a study have no result; the others have.
+    JobsFailed,
     /// Ended by Ctrl+C; what was computed is written.
     Interrupted,
 }
@@ -24,6 +26,7 @@ impl From<Outcome> for ExitCode {
             Outcome::NeverInitialized => 3,
             Outcome::ErrorsFound => 4,
             Outcome::BreakHit => 5,
+            Outcome::JobsFailed => JOBS_FAILED,
             Outcome::Interrupted => INTERRUPTED,
         })
     }
@@ -31,6 +34,9 @@ impl From<Outcome> for ExitCode {
 
 /// Exit code of an interrupted command, as of a shell's.
 pub(crate) const INTERRUPTED: u8 = 130;
+
+/// Exit code of a sweep some of whose jobs have no result.
+pub(crate) const JOBS_FAILED: u8 = 6;
 
 /// Exit codes of the commands that only do their work or fail, for `--help`.
 pub(crate) const PLAIN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use.";
@@ -43,6 +49,10 @@ pub(crate) const RUN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 3 a
 /// Those of `report`.
 pub(crate) const REPORT: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 3 a run never initialized, 130 \
     interrupted (Ctrl+C; the steps so far are written; a second Ctrl+C ends at once).";
+/// Those of `sweep`.
+pub(crate) const SWEEP: &str = "Exit codes: 0 success, 1 failure, worse than the baseline, or jobs that have not run, 2 wrong \
+    use, 6 jobs without a result (their rows say why), 130 interrupted (Ctrl+C; the next sweep goes on; a second Ctrl+C ends \
+    at once).";
 /// Those of `check`.
 pub(crate) const CHECK: &str =
     "Exit codes: 0 no errors found (warnings and notes may be), 1 failure, 2 wrong use, 4 errors found.";

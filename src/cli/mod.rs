@@ -22,6 +22,7 @@ mod run_summary;
 #[cfg(feature = "gui")]
 mod screenshot;
 mod simulate;
+mod sweep;
 mod terminal;
 mod value_parsers;
 mod view;
@@ -50,6 +51,8 @@ pub(crate) fn run() -> anyhow::Result<Outcome> {
         Command::Noise(arguments) => noise::noise(&arguments),
         Command::Rig(arguments) => rig::rig(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
+        Command::Sweep(arguments) => sweep::sweep(&arguments),
+        Command::SweepJob(arguments) => sweep::sweep_job(&arguments),
         Command::Degeneracy(arguments) => done(degeneracy::degeneracy(&arguments)),
         Command::Convert(arguments) => convert::convert(&arguments),
         Command::Evaluate(arguments) => done(evaluate::evaluate(&arguments)),

@@ -23,6 +23,7 @@ mod sample_flight;
 mod screenshot;
 mod session_file;
 mod structure;
+pub mod study;
 mod summary;
 mod tables;
 pub mod trajectory;

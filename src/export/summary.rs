@@ -386,6 +386,16 @@ pub(super) fn difference(dimension: Dimension, value: f64, reference: f64) -> f6
     }
 }
 
+/// Root mean square of error over σ of the parameters that have both; `None` without any.
+pub(super) fn difference_sigmas(parameters: &[ParameterSummary]) -> Option<f64> {
+    let ratios = parameters.iter().filter_map(|parameter| {
+        let sigma = parameter.sigma.filter(|sigma| *sigma > 0.0)?;
+        Some((parameter.error? / sigma).powi(2))
+    });
+    let squares: Vec<f64> = ratios.collect();
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
 fn chain_error(run: &RunRecord, chain: &ClassicalChain, ground_truth: &ClassicalChain) -> Option<ChainError> {
     let distance = run.chain_distance(chain, ground_truth)?;
     Some(ChainError {

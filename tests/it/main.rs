@@ -22,4 +22,7 @@ mod rig_template;
 mod sample_log;
 #[cfg(feature = "gui")]
 mod screenshots;
+#[cfg(unix)]
+mod slurm;
+mod sweep;
 mod time_travel;

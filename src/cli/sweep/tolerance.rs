@@ -1,0 +1,52 @@
+//! `--tolerance KEY=RATIO`.
+
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
+use dcvins::study::StudyPlan;
+
+/// Metrics that are compared when neither the plan nor the command line names one.
+const STANDARD: [(&str, f64); 1] = [("ate_rmse_m", 0.1)];
+
+/// Allowed relative change of a metric.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Tolerance {
+    metric: String,
+    ratio: f64,
+}
+
+impl FromStr for Tolerance {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once('=').and_then(|(metric, ratio)| Some((metric, ratio.parse::<f64>().ok()?)));
+        let valid = parts.filter(|(metric, ratio)| !metric.is_empty() && ratio.is_finite() && *ratio >= 0.0);
+        valid
+            .map(|(metric, ratio)| Self { metric: metric.to_owned(), ratio })
+            .ok_or_else(|| "expected COLUMN=RATIO with a ratio from 0 up, as in ate_rmse_m=0.1".to_owned())
+    }
+}
+
+/// The tolerances of the command line, else of the plan, else the standard ones.
+pub(super) fn tolerances(plan: &StudyPlan, given: &[Tolerance]) -> BTreeMap<String, f64> {
+    let standard = || STANDARD.map(|(metric, ratio)| (metric.to_owned(), ratio)).into();
+    match (given, plan.tolerances.is_empty()) {
+        ([], true) => standard(),
+        ([], false) => plan.tolerances.clone(),
+        _ => given.iter().map(|tolerance| (tolerance.metric.clone(), tolerance.ratio)).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tolerance_is_a_column_and_a_ratio() {
+        let tolerance: Tolerance = "ate_rmse_m=0.1".parse().unwrap();
+        assert_eq!((tolerance.metric.as_str(), tolerance.ratio), ("ate_rmse_m", 0.1));
+        for wrong in ["ate_rmse_m", "=0.1", "ate_rmse_m=-0.1", "ate_rmse_m=a", "ate_rmse_m=inf"] {
+            assert!(wrong.parse::<Tolerance>().is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! One job: the estimator on its log with its rig, and the rows of its result.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::error::StudyFileError;
+use super::folder::{StudyFolder, StudyTables};
+use super::inputs::rig_sha256;
+use super::rows::{JobCosts, JobStatus, add_frames, failed_rows, run_rows};
+use crate::export::ExportError;
+use crate::export::masks;
+use crate::export::run_files::{RunFileOptions, write_run};
+use crate::export::summary::summarize;
+use crate::flight_log::output::OutputSet;
+use crate::flight_log::{FlightLog, LogError};
+use crate::sensors::Rig;
+use crate::session::{self, SessionError, SessionPlan, SessionRequest, Stopwatch};
+use crate::study::{JobLog, KeyedJob, StudyJob, StudyOutput, TableError};
+
+/// Frames between two samples of the consistency of poses: longer than a window, so that samples hardly share measurements.
+const CONSISTENCY_EVERY: usize = 60;
+/// Memory of the record of a job: beyond it only the summaries of steps are kept, from which the rows are made.
+const RECORD_BYTES: usize = 64 << 20;
+
+/// The reason why a job has no result.
+#[derive(Debug, thiserror::Error)]
+pub enum JobError {
+    /// The log cannot be opened, or has no camera for the run.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// A file could not be read or written.
+    #[error(transparent)]
+    File(#[from] StudyFileError),
+    /// The files of the run could not be written.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+    /// The log cannot be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The rows do not fit into the tables.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// The estimator has stopped early.
+    #[error("{0}")]
+    Estimator(String),
+    /// The simulated flight of the job is not there.
+    #[error("the flight of the job is not rendered: {}", .0.display())]
+    NoFlight(PathBuf),
+    /// No image of the log could be used.
+    #[error("no image of the log could be used; reasons: 'dcvins check {}'", .0.display())]
+    NoImage(PathBuf),
+}
+
+/// Files of a job.
+struct JobFiles {
+    log: PathBuf,
+    rig: Option<PathBuf>,
+    truth: Option<PathBuf>,
+}
+
+impl StudyFolder {
+    fn files_of(&self, job: &StudyJob) -> JobFiles {
+        match &job.log {
+            JobLog::Recorded(log) => JobFiles { log: log.path.clone(), rig: log.rig.clone(), truth: log.truth.clone() },
+            JobLog::Simulated(flight) => JobFiles { log: self.flight_log(flight), rig: None, truth: None },
+        }
+    }
+
+    /// Runs a job in this process and writes its rows; returns its status.
+    ///
+    /// # Errors
+    /// When the log or its rig cannot be read, the estimator stops early, or the rows cannot be written.
+    pub fn run_job(
+        &self,
+        key: &str,
+        program: &str,
+        attempts: usize,
+        output: StudyOutput,
+    ) -> Result<JobStatus, JobError> {
+        let stopwatch = Stopwatch::start();
+        let job = self.read_job(key)?;
+        let mut files = self.files_of(&job);
+        let log_sha256 = match &job.log {
+            JobLog::Recorded(log) => log.sha256.clone(),
+            JobLog::Simulated(flight) => {
+                self.rendered(flight).ok_or_else(|| JobError::NoFlight(files.log.clone()))?.sha256
+            }
+        };
+        if !job.perturbation.is_none() {
+            files.rig = Some(self.write_perturbed_rig(key, &job, &files)?);
+        }
+        let (start_s, duration_s) = match &job.log {
+            JobLog::Recorded(log) => (log.start_s, log.duration_s),
+            JobLog::Simulated(_) => (0.0, None),
+        };
+        let mut plan = SessionPlan::open(&SessionRequest {
+            log_path: files.log.clone(),
+            rig_path: files.rig.clone(),
+            ground_truth_path: files.truth.clone(),
+            specs: vec![job.spec.clone()],
+            start_s,
+            duration_s,
+            ..SessionRequest::default()
+        })?;
+        plan.keep_linearization_every = Some(CONSISTENCY_EVERY);
+        plan.memory_budget_bytes = RECORD_BYTES;
+        let recording = session::compute(&plan, None, &mut |_| ())?.into_recording();
+        plan.log.require_unshortened()?;
+        let run = recording.runs.first().ok_or_else(|| JobError::NoImage(files.log.clone()))?;
+        if let Some(error) = &run.error {
+            return Err(JobError::Estimator(error.clone()));
+        }
+        if run.steps.is_empty() {
+            return Err(JobError::NoImage(files.log));
+        }
+        let summary = summarize(&recording, run, true);
+        let costs = JobCosts {
+            log_sha256: Some(log_sha256),
+            rig_sha256: Some(rig_sha256(&plan.rig)),
+            wall_s: stopwatch.elapsed_ms() * 1e-3,
+            peak_memory_bytes: peak_memory_bytes(),
+            ..self.costs(&files, program, attempts)
+        };
+        let mut tables = run_rows(key, &job, &costs, &recording, run, &summary)?;
+        if output.frames {
+            add_frames(&mut tables, key, run)?;
+        }
+        if output.files {
+            write_run(&recording, run, &self.job(key), RunFileOptions::default())?;
+        }
+        self.write_rows(key, &tables, output)?;
+        Ok(if summary.frames.initialized_at_s.is_some() { JobStatus::Ok } else { JobStatus::NotInitialized })
+    }
+
+    fn costs(&self, files: &JobFiles, program: &str, attempts: usize) -> JobCosts {
+        let relative = |path: &Option<PathBuf>| path.as_ref().map(|path| self.relative(path));
+        JobCosts {
+            log_path: self.relative(&files.log),
+            rig_path: relative(&files.rig),
+            truth_path: relative(&files.truth),
+            program: program.to_owned(),
+            attempts,
+            ..JobCosts::default()
+        }
+    }
+
+    /// Writes the row of a job without a result.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write_failure(
+        &self,
+        KeyedJob { key, job }: &KeyedJob,
+        status: JobStatus,
+        message: &str,
+        costs: &JobCosts,
+        output: StudyOutput,
+    ) -> Result<(), JobError> {
+        let mut costs =
+            JobCosts { wall_s: costs.wall_s, ..self.costs(&self.files_of(job), &costs.program, costs.attempts) };
+        costs.log_sha256 = match &job.log {
+            JobLog::Recorded(log) => Some(log.sha256.clone()),
+            JobLog::Simulated(flight) => self.rendered(flight).map(|rendered| rendered.sha256),
+        };
+        let tables: StudyTables = failed_rows(key, job, status, message, &costs)?;
+        Ok(self.write_rows(key, &tables, output)?)
+    }
+
+    /// Writes the rig of a job with its errors, and the masks beside it.
+    fn write_perturbed_rig(&self, key: &str, job: &StudyJob, files: &JobFiles) -> Result<PathBuf, JobError> {
+        let log = FlightLog::open(&files.log)?;
+        let given = Rig::for_log(&log, files.rig.as_deref())?;
+        let truth = Rig::ground_truth_for_log(&log, files.truth.as_deref())?;
+        let seed = job.seed.unwrap_or(0);
+        let mut rig = job.perturbation.apply(&given, truth.as_ref(), seed).map_err(StudyFileError::from)?;
+        let folder = self.job(key);
+        fs::create_dir_all(&folder).map_err(StudyFileError::write(&folder))?;
+        let mut outputs = OutputSet::default();
+        for (name, png) in masks::beside(&mut rig)? {
+            let path = folder.join(name);
+            outputs.write(&path, &png).map_err(StudyFileError::write(&path))?;
+        }
+        let path = folder.join("perturbed.rig.yaml");
+        outputs.write(&path, rig.to_yaml().as_bytes()).map_err(StudyFileError::write(&path))?;
+        outputs.commit().map_err(StudyFileError::commit)?;
+        Ok(path)
+    }
+}
+
+/// Largest resident memory of this process so far, where the system says it.
+fn peak_memory_bytes() -> Option<u64> {
+    let status = fs::read_to_string(Path::new("/proc/self/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kibibytes * 1024)
+}
