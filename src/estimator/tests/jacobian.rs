@@ -4,11 +4,11 @@ use super::fixture;
 use super::flight::run_flight;
 use crate::camera::CameraModel;
 use crate::estimator::{
-    ColumnGroup, ColumnId, EstimatorOptions, FactorKind, FactorRows, FrameId, JacobianFactor, Linearization,
-    StepJacobian, StepReport,
+    ColumnBlock, ColumnGroup, ColumnId, EstimatorOptions, FactorKind, FactorRows, FrameId, JacobianFactor,
+    Linearization, StepJacobian, StepReport,
 };
 use crate::geometry::Dimension;
-use crate::gimbal::Parameterization;
+use crate::gimbal::{ParameterGroup, Parameterization};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
 /// Compares a report's Jacobian with its linearization: by the norms of the calibration columns before the
@@ -136,5 +136,25 @@ fn blocks_are_those_of_the_linearization() {
         assert_eq!(report.jacobian(&[]), None);
         assert_eq!(reports[0].jacobian(&[&camera]), None);
         assert_eq!(report.feature_rows(&[&camera], crate::frontend::FeatureId(u64::MAX)), None);
+    }
+}
+
+#[test]
+fn intrinsics_of_the_imu_alone_have_blocks_in_its_factors() {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 5.0, features: 60, ..SyntheticOptions::default() });
+    let options = EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() };
+    let mut config = fixture::config(&flight.given_rig, Parameterization::Minimal, options);
+    config.estimate_imu_intrinsics = true;
+    let camera = config.camera.clone();
+    let (_, reports) = run_flight(&flight.frames, config);
+    let jacobian = reports.last().unwrap().jacobian(&[&camera]).expect("its source is kept");
+    let of_imu =
+        |block: &&ColumnBlock| block.id.parameter().is_some_and(|parameter| parameter.group() == ParameterGroup::Imu);
+    assert_eq!(jacobian.columns.iter().filter(of_imu).count(), 15);
+    for (number, block) in jacobian.columns.iter().enumerate().filter(|(_, block)| of_imu(block)) {
+        let imu_rows = jacobian.rows.iter().filter(|row| matches!(row.factor, JacobianFactor::Imu { .. }));
+        let norms =
+            imu_rows.flat_map(|row| &row.norms).filter(|(column, norm)| usize::from(*column) == number && *norm > 0.0);
+        assert!(norms.count() > 0, "{block:?}");
     }
 }
