@@ -126,7 +126,7 @@ pub struct StudyComparison {
 pub enum ComparisonError {
     /// A tolerance names no numeric column.
     #[error("tolerance '{name}': the table of runs has no column of numbers of that name; it has {}", known.join(", "))]
-    NoMetric {
+    UnknownMetric {
         /// The name.
         name: String,
         /// The columns that it may name.
@@ -134,7 +134,7 @@ pub enum ComparisonError {
     },
     /// A column by which runs are paired is missing.
     #[error("the {which} has no column '{column}': it is no table of runs of a study (results.parquet)")]
-    NoPairing {
+    MissingColumn {
         /// Baseline or new study.
         which: &'static str,
         /// The column.
@@ -142,7 +142,7 @@ pub enum ComparisonError {
     },
     /// No run of the new study is in the baseline.
     #[error("no run of the study is in the baseline: they are paired by log, disturbance, perturbation, seed and run")]
-    NoPairs,
+    Unpaired,
 }
 
 /// Compares a study with a baseline; `tolerances` are relative changes by column. [`SUCCESS`] is always compared, and the
@@ -157,7 +157,7 @@ pub fn compare(
 ) -> Result<StudyComparison, ComparisonError> {
     for (which, table) in [("baseline", old), ("study", new)] {
         if let Some(column) = PAIRING_COLUMNS.into_iter().find(|column| table.place(column).is_none()) {
-            return Err(ComparisonError::NoPairing { which, column });
+            return Err(ComparisonError::MissingColumn { which, column });
         }
     }
     let metrics = tolerances.iter().filter(|(name, _)| *name != SUCCESS);
@@ -169,7 +169,7 @@ pub fn compare(
     let pairs: Vec<(&String, usize, usize)> =
         new_rows.iter().filter_map(|(name, new)| Some((name, *old_rows.get(name)?, *new))).collect();
     if pairs.is_empty() {
-        return Err(ComparisonError::NoPairs);
+        return Err(ComparisonError::Unpaired);
     }
     let ok = |table: &StudyTable, row: usize| table.text(row, "status") == Some("ok");
     let changed = |was: bool| -> Vec<String> {
@@ -208,7 +208,7 @@ fn check_metric(table: &StudyTable, name: &str) -> Result<(), ComparisonError> {
         return Ok(());
     }
     let known = table.columns().iter().filter(numeric).map(|column| column.name.clone());
-    Err(ComparisonError::NoMetric { name: name.to_owned(), known: known.chain([SUCCESS.to_owned()]).collect() })
+    Err(ComparisonError::UnknownMetric { name: name.to_owned(), known: known.chain([SUCCESS.to_owned()]).collect() })
 }
 
 /// Log, levels, seed and specification of a row as one text.
@@ -249,7 +249,7 @@ fn compare_metric(name: &str, tolerance: f64, values: &[(&str, f64, f64)]) -> Me
 
 /// The judgement of an interval of log-ratios.
 fn judge(interval: &MeanInterval, direction: Direction, tolerance: f64) -> Verdict {
-    let limit = (1.0 + tolerance).ln();
+    let limit = tolerance.ln_1p();
     let rises = interval.mean > limit && interval.low > 0.0;
     let falls = interval.mean < -limit && interval.high < 0.0;
     match (direction, rises, falls) {

@@ -1,6 +1,6 @@
 //! The jobs of a plan: one estimator run each, named by the hash of its inputs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
@@ -220,9 +220,9 @@ pub fn expand(plan: &StudyPlan, logs: &[RecordedLog], program: &str) -> Vec<Keye
             }
         }
     }
-    let mut known = BTreeMap::new();
+    let mut known = BTreeSet::new();
     let keyed = jobs.into_iter().map(|job| KeyedJob { key: job.key(program), job });
-    keyed.filter(|job| known.insert(job.key.clone(), ()).is_none()).collect()
+    keyed.filter(|job| known.insert(job.key.clone())).collect()
 }
 
 fn add_specs(

@@ -65,7 +65,7 @@ fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     let front = (ln_gamma(a + b) - ln_gamma(a) - ln_gamma(b) + a * x.ln() + b * (1.0 - x).ln()).exp() / a;
     let term = |m: usize| {
         let k = (m / 2) as f64;
-        if m % 2 == 0 {
+        if m.is_multiple_of(2) {
             k * (b - k) * x / ((a + 2.0 * k - 1.0) * (a + 2.0 * k))
         } else {
             -(a + k) * (a + b + k) * x / ((a + 2.0 * k) * (a + 2.0 * k + 1.0))

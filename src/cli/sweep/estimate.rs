@@ -164,7 +164,7 @@ fn estimate(sweep: &Sweep, limits: &PoolLimits, measured: &Measured) -> Estimate
     let render_per_s = per(measured.rendering_s, measured.rendered_log_s);
     let render_s: f64 =
         flights.values().map(|duration_s| duration_s.map_or(render_mean_s, |seconds| seconds * render_per_s)).sum();
-    let by_memory = if measured.memory_bytes > 0 { limits.memory_bytes / measured.memory_bytes } else { u64::MAX };
+    let by_memory = limits.memory_bytes.checked_div(measured.memory_bytes).unwrap_or(u64::MAX);
     let at_once = limits.jobs.min(usize::try_from(by_memory).unwrap_or(usize::MAX)).clamp(1, left.len().max(1));
     Estimate {
         jobs: left.len(),

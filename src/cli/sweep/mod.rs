@@ -60,7 +60,7 @@ pub(crate) struct SweepArguments {
     #[arg(long, value_name = "OLD.parquet", conflicts_with = "dry_run")]
     pub baseline: Option<PathBuf>,
     /// Allowed relative change of a column of the table of runs, or of "success"; may be given several times
-    /// [default: the plan's, else ate_rmse_m=0.1].
+    /// [default: the plan's, else 10 % of the ATE].
     #[arg(long, value_name = "KEY=RATIO", requires = "baseline")]
     pub tolerance: Vec<Tolerance>,
     /// Write the comparison as Markdown into this file instead of standard output.
@@ -248,7 +248,7 @@ fn finish(
 }
 
 fn baseline_name(arguments: &SweepArguments) -> String {
-    arguments.baseline.as_deref().unwrap_or(Path::new("")).display().to_string()
+    arguments.baseline.as_deref().unwrap_or_else(|| Path::new("")).display().to_string()
 }
 
 /// Rows of jobs without a result.

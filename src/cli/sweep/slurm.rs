@@ -114,7 +114,8 @@ fn script(sweep: &Sweep, plan: &Path, program: &Path, tasks: usize) -> String {
         word(plan),
         word(sweep.folder.root()),
     ));
-    lines.join("\n") + "\n"
+    lines.push(String::new());
+    lines.join("\n")
 }
 
 /// Memory in GiB as `sbatch --mem` takes it: a number of MiB, or with a unit K, M, G or T.

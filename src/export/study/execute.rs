@@ -17,8 +17,9 @@ use crate::sensors::Rig;
 use crate::session::{self, SessionError, SessionPlan, SessionRequest, Stopwatch};
 use crate::study::{JobLog, KeyedJob, StudyJob, StudyOutput, TableError};
 
-/// Frames between two samples of the consistency of poses: longer than a window, so that samples hardly share measurements.
-const CONSISTENCY_EVERY: usize = 60;
+/// Frames between two samples of the consistency of poses: about as long as a window, so that samples share few
+/// measurements.
+const CONSISTENCY_EVERY: usize = 30;
 /// Memory of the record of a job: beyond it only the summaries of steps are kept, from which the rows are made.
 const RECORD_BYTES: usize = 64 << 20;
 
@@ -30,7 +31,7 @@ pub enum JobError {
     Session(#[from] SessionError),
     /// A file could not be read or written.
     #[error(transparent)]
-    File(#[from] StudyFileError),
+    File(Box<StudyFileError>),
     /// The files of the run could not be written.
     #[error(transparent)]
     Export(#[from] ExportError),
@@ -49,6 +50,12 @@ pub enum JobError {
     /// No image of the log could be used.
     #[error("no image of the log could be used; reasons: 'dcvins check {}'", .0.display())]
     NoImage(PathBuf),
+}
+
+impl From<StudyFileError> for JobError {
+    fn from(error: StudyFileError) -> Self {
+        Self::File(Box::new(error))
+    }
 }
 
 /// Files of a job.

@@ -124,5 +124,11 @@ pub enum FlightError {
     Simulation(#[from] SimulationError),
     /// A file could not be written.
     #[error(transparent)]
-    File(#[from] StudyFileError),
+    File(Box<StudyFileError>),
+}
+
+impl From<StudyFileError> for FlightError {
+    fn from(error: StudyFileError) -> Self {
+        Self::File(Box::new(error))
+    }
 }

@@ -209,21 +209,21 @@ impl<'a> Section<'a> {
     }
 
     /// A list of tables.
-    pub(super) fn sections(&self, name: &str) -> Result<Vec<Section<'a>>, PlanError> {
+    pub(super) fn sections(&self, name: &str) -> Result<Vec<Self>, PlanError> {
         let expected = format!("tables, each under [[{}]]", self.key(name));
         let entries = self.list(name, &expected)?;
         entries.iter().map(|entry| self.section_of(entry, &expected)).collect()
     }
 
     /// A table.
-    pub(super) fn section(&self, name: &str) -> Result<Option<Section<'a>>, PlanError> {
+    pub(super) fn section(&self, name: &str) -> Result<Option<Self>, PlanError> {
         let expected = format!("a table under [{}]", self.key(name));
         self.entry(name).map(|entry| self.section_of(&entry, &expected)).transpose()
     }
 
-    fn section_of(&self, entry: &Entry<'a>, expected: &str) -> Result<Section<'a>, PlanError> {
+    fn section_of(&self, entry: &Entry<'a>, expected: &str) -> Result<Self, PlanError> {
         let DeValue::Table(table) = entry.value.get_ref() else { return Err(self.expected(entry, expected)) };
-        Ok(Section { text: self.text, path: entry.key.clone(), span: entry.value.span(), table })
+        Ok(Self { text: self.text, path: entry.key.clone(), span: entry.value.span(), table })
     }
 
     /// All keys of this table with their numbers, each within a range.
