@@ -125,7 +125,7 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<()> {
             notes: &configuration.notes,
         });
     }
-    let files: String = files.iter().map(|file| format!("{file}\n")).collect();
-    let notes: String = configuration.notes.iter().map(|note| format!("  {note}\n")).collect();
+    let files = files.iter().map(|file| format!("{file}\n")).collect::<Vec<_>>().concat();
+    let notes = configuration.notes.iter().map(|note| format!("  {note}\n")).collect::<Vec<_>>().concat();
     print(&format!("{files}notes, also at the head of the files:\n{notes}"))
 }

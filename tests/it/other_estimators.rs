@@ -13,7 +13,7 @@ fn sample(name: &str) -> String {
 /// Exit code and what was printed.
 fn dcvins(arguments: &[&str]) -> (i32, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_dcvins")).args(arguments).output().expect("the program runs");
-    let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    let text = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned()).concat();
     (output.status.code().unwrap_or(-1), text)
 }
 
@@ -42,7 +42,7 @@ fn every_program_gets_its_files() {
 
 /// The extrinsics of cam0 in an exported chain.
 fn exported(folder: &Path) -> dcvins::geometry::RigidTransform {
-    let rig = Rig::from_file(&folder.join("camchain-imucam.yaml")).unwrap();
+    let rig = Rig::from_file(&folder.join("camchain-imucam.yaml")).expect("our reader takes the files of Kalibr");
     match &rig.cameras[0].mount {
         CameraMount::Static { imu_from_camera } => *imu_from_camera,
         CameraMount::Gimbal => panic!("an exported camera is static"),

@@ -49,13 +49,13 @@ impl Cluster {
     fn start() -> Self {
         let folder = tempfile::tempdir().expect("a folder can be made");
         let at = |name: &str| folder.path().join(name).display().to_string();
-        fs::create_dir(at("state")).unwrap();
-        fs::create_dir(at("spool")).unwrap();
-        fs::write(at("munge.key"), [7_u8; 1024]).unwrap();
+        fs::create_dir(at("state")).expect("a folder in a new one");
+        fs::create_dir(at("spool")).expect("a folder in a new one");
+        fs::write(at("munge.key"), [7_u8; 1024]).expect("a file in a new folder");
         for (path, mode) in [(at("munge.key"), "400"), (folder.path().display().to_string(), "755")] {
-            assert!(Command::new("chmod").args([mode, &path]).status().unwrap().success());
+            assert!(Command::new("chmod").args([mode, &path]).status().expect("chmod runs").success());
         }
-        fs::write(at("slurm.conf"), configuration(&at)).unwrap();
+        fs::write(at("slurm.conf"), configuration(&at)).expect("a file in a new folder");
         let mut cluster = Self { daemons: Vec::new(), folder };
         let (key, socket) = (cluster.path("munge.key"), cluster.path("munge.socket"));
         let files = ["pid", "log", "seed"]
@@ -68,7 +68,7 @@ impl Cluster {
         cluster.daemon("slurmctld", &["-D", "-f", &configuration]);
         cluster.daemon("slurmd", &["-D", "-N", "localhost", "-f", &configuration]);
         for _ in 0..60 {
-            let state = cluster.command("sinfo").args(["-h", "-o", "%T"]).output().unwrap();
+            let state = cluster.command("sinfo").args(["-h", "-o", "%T"]).output().expect("sinfo runs");
             if String::from_utf8_lossy(&state.stdout).trim() == "idle" {
                 return cluster;
             }

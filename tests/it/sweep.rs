@@ -38,8 +38,8 @@ fn folder(plan: &str) -> tempfile::TempDir {
     for name in ["garden.mcap", "garden.rig.yaml", "garden.truth.yaml"] {
         fs::copy(samples.join(name), folder.path().join(name)).expect("the sample can be copied");
     }
-    fs::write(folder.path().join("broken.mcap"), "this is no log").unwrap();
-    fs::write(folder.path().join("plan.toml"), plan).unwrap();
+    fs::write(folder.path().join("broken.mcap"), "this is no log").expect("a file in a new folder");
+    fs::write(folder.path().join("plan.toml"), plan).expect("a file in a new folder");
     folder
 }
 

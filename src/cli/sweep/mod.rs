@@ -6,7 +6,7 @@ mod pool;
 mod slurm;
 mod tolerance;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
@@ -248,7 +248,7 @@ fn finish(
 }
 
 fn baseline_name(arguments: &SweepArguments) -> String {
-    arguments.baseline.as_deref().unwrap_or_else(|| Path::new("")).display().to_string()
+    arguments.baseline.as_deref().map_or_else(String::new, |path| path.display().to_string())
 }
 
 /// Rows of jobs without a result.

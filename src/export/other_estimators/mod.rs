@@ -134,7 +134,7 @@ pub fn write_configuration(
     let replaces = force || configuration.files.first().is_some_and(|(name, _)| ours(&folder.join(name)));
     for (name, _) in &configuration.files {
         let path = folder.join(name);
-        let is_text = !name.ends_with(".png");
+        let is_text = path.extension().is_none_or(|extension| extension != "png");
         if path.exists() && !(force || replaces && !is_text || is_text && ours(&path)) {
             return Err(ExportError::Existing {
                 problem: "the file exists and is none that 'dcvins export' wrote".to_owned(),

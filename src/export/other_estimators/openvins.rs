@@ -1,5 +1,7 @@
 //! OpenVINS: estimator, camera chain and IMU.
 
+use std::fmt::Write as _;
+
 use nalgebra::Matrix3;
 
 use super::text::{self, imu_from_camera};
@@ -113,7 +115,8 @@ fn estimator(rig: &Rig, head: &[String]) -> String {
         ("use_mask", has_masks.to_string()),
     ]));
     for (number, _) in rig.cameras.iter().enumerate().filter(|_| has_masks) {
-        out.push_str(&format!("mask{number}: \"{}\"\n", text::mask_name(OtherEstimator::OpenVins, number)));
+        let name = text::mask_name(OtherEstimator::OpenVins, number);
+        let _infallible = writeln!(out, "mask{number}: \"{name}\"");
     }
     out.push_str(&text::entries(&[
         ("relative_config_imu", "\"kalibr_imu_chain.yaml\"".to_owned()),
@@ -121,7 +124,7 @@ fn estimator(rig: &Rig, head: &[String]) -> String {
     ]));
     out.push_str("# OpenVINS's usual values.\n");
     for (key, value) in SETTINGS {
-        out.push_str(&format!("{key}: {value}\n"));
+        let _infallible = writeln!(out, "{key}: {value}");
     }
     out
 }

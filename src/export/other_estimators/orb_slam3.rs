@@ -1,5 +1,7 @@
 //! ORB-SLAM3: settings of a monocular-inertial system, file version 1.0.
 
+use std::fmt::Write as _;
+
 use super::text::{self, imu_from_camera};
 use crate::camera::Distortion;
 use crate::flight_log::yaml::number;
@@ -36,7 +38,7 @@ pub(super) fn files(rig: &Rig, head: &[String]) -> Vec<(String, Vec<u8>)> {
         ("Camera1.cy", number(cy)),
     ]));
     for (key, value) in lens {
-        out.push_str(&format!("Camera1.{key}: {}\n", number(value)));
+        let _infallible = writeln!(out, "Camera1.{key}: {}", number(value));
     }
     out.push_str(&text::entries(&[
         ("Camera.width", width.to_string()),

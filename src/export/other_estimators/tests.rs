@@ -87,7 +87,7 @@ fn text_of<'a>(configuration: &'a Configuration, file: &str) -> &'a str {
 /// A file as its program's parser sees it: plain YAML, YAML of `OpenCV` (version, then types in exclamation marks), or JSON.
 fn parsed(configuration: &Configuration, file: &str) -> Value {
     let text = text_of(configuration, file);
-    if file.ends_with(".json") {
+    if Path::new(file).extension().is_some_and(|extension| extension == "json") {
         return serde_json::from_str(text).unwrap();
     }
     match text.strip_prefix("%YAML:1.0\n") {

@@ -28,7 +28,7 @@ pub(super) fn head(program: OtherEstimator, rig: &str, notes: &[String]) -> Vec<
 
 /// The head as comments of YAML.
 pub(super) fn comments(head: &[String]) -> String {
-    head.iter().map(|line| format!("# {line}\n")).collect()
+    head.iter().map(|line| format!("# {line}\n")).collect::<Vec<_>>().concat()
 }
 
 /// The head of a YAML file that `OpenCV` reads, which requires the version in the first line.
@@ -73,7 +73,7 @@ pub(super) fn quoted(text: &str) -> String {
 
 /// `key: value` lines.
 pub(super) fn entries(entries: &[(&str, String)]) -> String {
-    entries.iter().map(|(key, value)| format!("{key}: {value}\n")).collect()
+    entries.iter().map(|(key, value)| format!("{key}: {value}\n")).collect::<Vec<_>>().concat()
 }
 
 /// Whether the centre of one camera's image lies in the image of the other, for things far away.

@@ -1,5 +1,7 @@
 //! VINS-Fusion: its configuration and one camodocal file per camera.
 
+use std::fmt::Write as _;
+
 use super::text::{self, imu_from_camera};
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::flight_log::yaml::number;
@@ -130,7 +132,7 @@ fn camodocal(model: &CameraModel) -> String {
         out.push_str(group);
         out.push_str(":\n");
         for (key, value) in values {
-            out.push_str(&format!("   {key}: {}\n", number(value)));
+            let _infallible = writeln!(out, "   {key}: {}", number(value));
         }
     }
     out

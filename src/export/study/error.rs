@@ -40,7 +40,7 @@ pub enum StudyFileError {
     #[error("{source}: {path}")]
     Plan {
         /// The problem with its line.
-        source: PlanError,
+        source: Box<PlanError>,
         /// Path of the plan.
         path: PathBuf,
     },
@@ -56,7 +56,7 @@ pub enum StudyFileError {
     },
     /// The rig of a job cannot be perturbed.
     #[error(transparent)]
-    Perturbation(#[from] PerturbationError),
+    Perturbation(Box<PerturbationError>),
     /// A log or a rig cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
@@ -72,7 +72,7 @@ pub enum StudyFileError {
     #[error("the tables of two jobs differ: {source}: {path}")]
     Table {
         /// The difference.
-        source: TableError,
+        source: Box<TableError>,
         /// Path of the second one.
         path: PathBuf,
     },
@@ -84,6 +84,12 @@ pub enum StudyFileError {
         /// The folder.
         path: PathBuf,
     },
+}
+
+impl From<PerturbationError> for StudyFileError {
+    fn from(error: PerturbationError) -> Self {
+        Self::Perturbation(Box::new(error))
+    }
 }
 
 impl StudyFileError {

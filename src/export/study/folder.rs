@@ -230,7 +230,7 @@ impl StudyFolder {
             for (name, all, _) in wanted.into_iter().filter(|(_, _, wanted)| *wanted) {
                 let path = folder.join(format!("{name}.parquet"));
                 let rows = read_parquet(&path)?;
-                all.append(&rows).map_err(|source| StudyFileError::Table { source, path })?;
+                all.append(&rows).map_err(|source| StudyFileError::Table { source: Box::new(source), path })?;
             }
         }
         Ok((tables, missing))

@@ -28,8 +28,8 @@ pub fn read_plan(path: &Path) -> Result<StudyPlan, StudyFileError> {
     let mut text = String::new();
     let file = File::open(path).map_err(StudyFileError::read(path))?;
     file.take(LARGEST_PLAN_BYTES).read_to_string(&mut text).map_err(StudyFileError::read(path))?;
-    let mut plan =
-        StudyPlan::from_toml(&text).map_err(|source| StudyFileError::Plan { source, path: path.to_owned() })?;
+    let mut plan = StudyPlan::from_toml(&text)
+        .map_err(|source| StudyFileError::Plan { source: Box::new(source), path: path.to_owned() })?;
     if plan.name.is_empty() {
         plan.name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     }

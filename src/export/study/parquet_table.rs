@@ -1,4 +1,4 @@
-//! Tables of studies as Apache Parquet, which DuckDB, pandas and polars read.
+//! Tables of studies as Apache Parquet, which `DuckDB`, pandas and polars read.
 //!
 //! All columns are optional `DOUBLE`, `INT64`, `BYTE_ARRAY (STRING)` or `BOOLEAN`, under Zstandard. Units and descriptions
 //! are the file's metadata `dcvins.columns`, a JSON list of objects with `name`, `unit` and `description`.
