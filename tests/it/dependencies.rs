@@ -10,12 +10,13 @@ use serde_json::Value;
 use spdx::{Expression, LicenseId, ParseMode, license_id};
 
 /// Licences that allow the program to be distributed under Apache-2.0, with their notices kept.
-const LICENCES: [&str; 13] = [
+const LICENCES: [&str; 14] = [
     "0BSD",
     "Apache-2.0",
     "BSD-2-Clause",
     "BSD-3-Clause",
     "BSL-1.0",
+    "CC0-1.0", // no rights reserved
     "ISC",
     "MIT",
     "MPL-2.0", // per file, and no file of it is changed here
@@ -27,7 +28,7 @@ const LICENCES: [&str; 13] = [
 ];
 
 /// Crates in more than one version, with those that need the older ones.
-const SEVERAL_VERSIONS: [(&str, &str); 15] = [
+const SEVERAL_VERSIONS: [(&str, &str); 16] = [
     ("equator", "nano-gemm"),
     ("equator-macro", "equator of nano-gemm"),
     ("foldhash", "hashbrown 0.15"),
@@ -37,6 +38,7 @@ const SEVERAL_VERSIONS: [(&str, &str); 15] = [
     ("itertools", "criterion"),
     ("linux-raw-sys", "rustix 0.38"),
     ("miniz_oxide", "png"),
+    ("num-bigint", "num-rational"),
     ("pollster", "rfd"),
     ("rustc-hash", "naga, wgpu-core"),
     ("rustix", "winit, calloop"),
