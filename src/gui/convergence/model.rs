@@ -158,6 +158,13 @@ impl ConvertedHistory {
 }
 
 impl ParameterHistory {
+    /// An angle plus the multiple of 2π with which it is nearest to the last value: the values of a history are continuous and
+    /// may leave (−π, π]. Other quantities stay as they are.
+    pub(super) fn on_same_turn(&self, parameter: ParameterId, value: f64) -> f64 {
+        let last = self.values.iter().rev().find(|known| known.is_finite());
+        last.map_or(value, |last| last + parameter.principal_value(value - last))
+    }
+
     fn pad(&mut self, rows: usize) {
         for column in [&mut self.values, &mut self.sigmas, &mut self.lower, &mut self.upper] {
             column.resize(rows.max(column.len()), f64::NAN);
@@ -209,6 +216,17 @@ mod tests {
         converted.read(&recording.runs[1], &recording.rig, Parameterization::Classical);
         assert_ne!(converted.epoch, epoch);
         assert!(converted.values.contains_key(&id("IB.rz")));
+    }
+
+    /// A chain that is given beyond ±180° while the true one is on this side.
+    #[test]
+    fn the_ground_truth_is_shown_on_the_turn_of_the_values() {
+        let history = ParameterHistory { values: vec![-3.145, -3.15, f64::NAN], ..ParameterHistory::default() };
+        let shown = history.on_same_turn(id("I.rx"), 3.13);
+        assert!((shown - (3.13 - std::f64::consts::TAU)).abs() < 1e-12, "{shown}");
+        let length = ParameterHistory { values: vec![-3.15], ..ParameterHistory::default() };
+        assert!((length.on_same_turn(id("I.tx"), 3.13) - 3.13).abs() < 1e-12);
+        assert_eq!(ParameterHistory::default().on_same_turn(id("I.rx"), 3.13), 3.13);
     }
 
     #[test]
