@@ -1,10 +1,11 @@
-//! Rotations, rigid transforms and the perturbation rule; tangent plane of a direction, median.
+//! Rotations, rigid transforms and the perturbation rule; tangent plane of a direction, median, quantiles of χ².
 //!
 //! The rule is written here once: a perturbation is `[φ; δt]`, rotation first, with `R ← R·Exp(φ)` (right, local) and
 //! `t ← t + δt` (a vector in the outer frame).
 //! The paper's Eqs. 12–14 print the left form; `φ_left = R·φ_right`.
 
 mod angle;
+mod chi_square;
 pub mod dense;
 mod dimension;
 mod median;
@@ -16,6 +17,7 @@ mod tangent;
 mod tests;
 
 pub use angle::{principal_angle, wrap_angle};
+pub use chi_square::mean_square_quantile;
 pub use dimension::Dimension;
 pub use median::median;
 pub use rigid_transform::RigidTransform;

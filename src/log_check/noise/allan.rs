@@ -6,6 +6,8 @@
 
 use std::collections::BTreeSet;
 
+use crate::geometry::mean_square_quantile;
+
 /// Averaging times per octave.
 const PER_OCTAVE: f64 = 4.0;
 /// Averaging times reach to this fraction of the longest stretch, where the estimate has two degrees of freedom.
@@ -113,14 +115,10 @@ fn of_one_stretch(n: f64, m: f64, kind: NoiseKind) -> f64 {
     }
 }
 
-/// Limits of the true deviation (68.3 %) from a deviation with these degrees of freedom, by the χ² distribution
-/// (quantiles of Wilson and Hilferty).
+/// Limits of the true deviation (68.3 %) from a deviation with these degrees of freedom, by the χ² distribution.
 pub(super) fn confidence(deviation: f64, degrees_of_freedom: f64) -> (f64, f64) {
-    let quantile = |normal: f64| {
-        let ninth = 2.0 / (9.0 * degrees_of_freedom);
-        degrees_of_freedom * (1.0 - ninth + normal * ninth.sqrt()).max(0.05).powi(3)
-    };
-    let limit = |normal: f64| deviation * (degrees_of_freedom / quantile(normal)).sqrt();
+    const SMALLEST: f64 = 1e-4;
+    let limit = |normal: f64| deviation / mean_square_quantile(degrees_of_freedom, normal).max(SMALLEST).sqrt();
     (limit(1.0), limit(-1.0))
 }
 
