@@ -13,7 +13,7 @@ use crate::cli::value_parsers::seconds;
 /// `dcvins evaluate`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct EvaluateArguments {
-    /// The estimated trajectory: t x y z qx qy qz qw.
+    /// The estimated trajectory: TUM (t x y z qx qy qz qw) or a table of EuRoC.
     pub estimate: PathBuf,
     /// The reference trajectory.
     pub reference: PathBuf,

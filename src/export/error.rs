@@ -44,16 +44,6 @@ pub enum ExportError {
     /// An MCAP file could not be written.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// A line of a trajectory is not `t x y z qx qy qz qw`.
-    #[error("line {line} {problem}; expected 't x y z qx qy qz qw': {path}")]
-    TrajectoryLine {
-        /// Line number, from 1.
-        line: usize,
-        /// The problem.
-        problem: String,
-        /// Path of the file.
-        path: PathBuf,
-    },
     /// Two trajectories cannot be compared.
     #[error("{problem}")]
     NotComparable {

@@ -1,4 +1,4 @@
-//! `dcvins evaluate`: absolute and relative trajectory errors of one TUM file against another.
+//! `dcvins evaluate`: absolute and relative trajectory errors of one trajectory file against another.
 
 use std::fmt;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::error::ExportError;
-use super::trajectory::read_tum;
+use super::trajectory::read_trajectory;
 use crate::session::accuracy::{
     Alignment, ErrorStatistics, RelativeDelta, absolute_errors_m, align, associate, path_length_m, relative_errors,
 };
@@ -88,14 +88,14 @@ pub(super) fn alignment_name(alignment: Alignment) -> &'static str {
     }
 }
 
-/// Compares two TUM files.
+/// Compares two trajectory files.
 pub fn evaluate(
     estimate: &Path,
     reference: &Path,
     options: &EvaluationOptions,
 ) -> Result<EvaluationReport, ExportError> {
-    let estimate_poses = read_tum(estimate)?;
-    let reference_poses = read_tum(reference)?;
+    let estimate_poses = read_trajectory(estimate)?;
+    let reference_poses = read_trajectory(reference)?;
     let pairs = associate(&estimate_poses, &reference_poses, options.max_difference_s);
     let not_comparable = |problem: String| ExportError::NotComparable { problem };
     if pairs.is_empty() {

@@ -1,19 +1,16 @@
-//! Trajectories in TUM's format: `t x y z qx qy qz qw`, seconds and metres.
+//! Trajectories as TUM writes them (`t x y z qx qy qz qw`, seconds and metres) and as tables of EuRoC.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
+use nalgebra::Vector4;
 
 use super::csv_table::CsvTable;
 use super::error::ExportError;
-use crate::geometry::RigidTransform;
-use crate::session::RunRecord;
+use crate::flight_log::{BATCH_REFERENCE, LogError, RecordedPose, read_trajectory_file};
+use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::session::accuracy::StampedPose;
-
-/// Maximum deviation of a quaternion's norm from 1.
-const QUATERNION_TOLERANCE: f64 = 1e-2;
+use crate::session::{CalibrationRun, RunRecord};
 
 /// Absolute header stamp in seconds with nanosecond resolution.
 fn absolute_seconds(epoch_ns: i64, stamp_ns: i64) -> String {
@@ -26,12 +23,22 @@ fn absolute_seconds(epoch_ns: i64, stamp_ns: i64) -> String {
 /// The trajectory of a run, one line per estimated frame: pose of the IMU in the estimator's world at the stamp of the
 /// step.
 pub fn tum_of_run(run: &RunRecord, epoch_ns: i64) -> String {
+    let newest = run.steps.iter().filter_map(|step| step.report.newest());
+    tum(newest.map(|newest| (newest.stamp_ns, newest.world_from_imu)), epoch_ns)
+}
+
+/// The trajectory of an offline calibration, marked by its first line as a reference.
+pub(super) fn tum_of_calibration(run: &CalibrationRun) -> String {
+    let poses = run.outcome.trajectory.iter().map(|pose| (pose.stamp_ns, pose.world_from_imu));
+    format!("{BATCH_REFERENCE} by dcvins calibrate: t x y z qx qy qz qw\n{}", tum(poses, run.epoch_ns))
+}
+
+fn tum(poses: impl Iterator<Item = (i64, RigidTransform)>, epoch_ns: i64) -> String {
     let mut text = String::new();
-    for step in &run.steps {
-        let Some(newest) = step.report.newest() else { continue };
-        let position = newest.world_from_imu.translation_m;
-        let rotation = newest.world_from_imu.rotation.quaternion();
-        let stamp = absolute_seconds(epoch_ns, newest.stamp_ns);
+    for (stamp_ns, pose) in poses {
+        let position = pose.translation_m;
+        let rotation = pose.rotation.quaternion();
+        let stamp = absolute_seconds(epoch_ns, stamp_ns);
         let numbers = [position.x, position.y, position.z, rotation.i, rotation.j, rotation.k, rotation.w];
         text.push_str(&stamp);
         for number in numbers {
@@ -76,38 +83,23 @@ pub fn euroc_of_run(run: &RunRecord, epoch_ns: i64) -> String {
     table.into_text()
 }
 
-/// Reads a TUM trajectory; lines that begin with `#` are comments.
-pub fn read_tum(path: &Path) -> Result<Vec<StampedPose>, ExportError> {
-    let text = fs::read_to_string(path).map_err(|source| ExportError::Read { source, path: path.to_owned() })?;
-    let mut poses = Vec::new();
-    for (index, line) in text.lines().enumerate() {
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
-            continue;
-        }
-        let bad = |problem: String| ExportError::TrajectoryLine { line: index + 1, problem, path: path.to_owned() };
-        let numbers = line
-            .split_whitespace()
-            .map(|word| {
-                word.parse::<f64>()
-                    .ok()
-                    .filter(|number| number.is_finite())
-                    .ok_or_else(|| bad(format!("holds '{word}', which is not a finite number")))
-            })
-            .collect::<Result<Vec<f64>, _>>()?;
-        let &[stamp_s, x, y, z, qx, qy, qz, qw] = numbers.as_slice() else {
-            return Err(bad(format!("holds {} numbers", numbers.len())));
-        };
-        let quaternion = Quaternion::new(qw, qx, qy, qz);
-        if (quaternion.norm() - 1.0).abs() > QUATERNION_TOLERANCE {
-            return Err(bad(format!("has a quaternion of norm {:.4}, not 1", quaternion.norm())));
-        }
-        let rotation = UnitQuaternion::new_normalize(quaternion);
-        poses.push(StampedPose { stamp_s, pose: RigidTransform::new(rotation, Vector3::new(x, y, z)) });
-    }
-    if poses.is_empty() {
-        return Err(ExportError::NotComparable { problem: format!("no pose in the trajectory: {}", path.display()) });
-    }
-    poses.sort_by(|a, b| a.stamp_s.total_cmp(&b.stamp_s));
-    Ok(poses)
+/// Reads a trajectory in TUM's or EuRoC's format, see [`read_trajectory_file`]. Every pose must have an attitude.
+///
+/// # Errors
+/// When the file cannot be read, or a line is no pose.
+pub fn read_trajectory(path: &Path) -> Result<Vec<StampedPose>, ExportError> {
+    let recorded = read_trajectory_file(path).map_err(|error| match error {
+        LogError::Io { source, path, .. } => ExportError::Read { source, path },
+        other => ExportError::Log(other),
+    })?;
+    let stamped = |pose: &RecordedPose| {
+        let rotation = pose.rotation?;
+        // Whole seconds and their fraction apart: a double resolves the sum to 240 ns only.
+        let whole_s = pose.stamp_ns.div_euclid(1_000_000_000) as f64;
+        let stamp_s = whole_s + seconds_from_ns(pose.stamp_ns.rem_euclid(1_000_000_000));
+        Some(StampedPose { stamp_s, pose: RigidTransform::new(rotation, pose.position_m) })
+    };
+    recorded.iter().map(stamped).collect::<Option<Vec<_>>>().ok_or_else(|| ExportError::NotComparable {
+        problem: format!("the trajectory has positions without attitudes: {}", path.display()),
+    })
 }

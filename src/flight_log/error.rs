@@ -54,6 +54,24 @@ pub enum LogError {
         /// The log.
         path: PathBuf,
     },
+    /// A trajectory cannot be used.
+    #[error("cannot use the trajectory: {problem}: {}", path.display())]
+    Trajectory {
+        /// What is wrong with it.
+        problem: String,
+        /// The file, or the log.
+        path: PathBuf,
+    },
+    /// A line of a trajectory is no pose.
+    #[error("line {line} {problem}; expected 't x y z qx qy qz qw': {}", path.display())]
+    TrajectoryLine {
+        /// Line number, from 1.
+        line: usize,
+        /// The problem.
+        problem: String,
+        /// The file.
+        path: PathBuf,
+    },
     /// The rig names a topic that is not in the log.
     #[error(
         "{field} names the topic '{topic}', which is not in the log; its topics of type {expected} are {}; name one of them in \

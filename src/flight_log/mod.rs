@@ -9,6 +9,7 @@ pub(crate) mod container;
 pub mod convert;
 mod error;
 mod file;
+mod geodesy;
 pub(crate) mod image_decoding;
 mod image_reader;
 pub(crate) mod imu_merge;
@@ -25,6 +26,7 @@ pub(crate) mod stream;
 #[cfg(test)]
 pub(crate) mod tests;
 mod text;
+mod trajectory;
 pub(crate) mod video;
 mod writer;
 pub(crate) mod yaml;
@@ -38,7 +40,8 @@ pub use rig::template as rig_template;
 pub use sensor_frame::{LogWarning, SensorFrame};
 pub use stream::FrameStream;
 pub use text::{edit_distance, nearest_name, printable, printable_lines, shortened};
+pub use trajectory::{BATCH_REFERENCE, RecordedPose, is_batch_reference, read_trajectory_file};
 pub use writer::{
     CircleAnnotation, LinesAnnotation, LogCompression, LogLevel, LogWriter, LogWriterOptions, MessageTimes,
-    MessageType, NamedTransform, Rgba,
+    MessageType, NamedTransform, Odometry, Rgba,
 };

@@ -310,7 +310,7 @@ fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     if let Some(topic) = rig.vehicle_topic() {
         require("gimbal.source.vehicle".into(), topic, &VEHICLE_KINDS, Severity::Error);
     }
-    if let Some(topic) = &rig.ground_truth_topic {
+    if let Some(topic) = rig.ground_truth_topic.as_ref().filter(|topic| !log.is_position_topic(topic)) {
         require("ground_truth.rostopic".into(), topic, &POSES, Severity::Note);
     }
     if named > 0 {
@@ -320,6 +320,9 @@ fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
 
 /// Use of a topic by the rig.
 fn role_of(topic: &str, kind: Option<MessageKind>, rig: Option<&Rig>) -> String {
+    if rig.is_some_and(|rig| rig.ground_truth_topic.as_deref() == Some(topic)) {
+        return "ground truth".into();
+    }
     let Some(kind) = kind else { return "ignored".into() };
     if let Some(rig) = rig {
         if topic == rig.imu.topic {
@@ -336,9 +339,6 @@ fn role_of(topic: &str, kind: Option<MessageKind>, rig: Option<&Rig>) -> String 
         }
         if rig.vehicle_topic() == Some(topic) {
             return "vehicle".into();
-        }
-        if rig.ground_truth_topic.as_deref() == Some(topic) {
-            return "ground truth".into();
         }
     }
     if kind == MessageKind::CameraInfo { "intrinsics".into() } else { "not in the rig".into() }

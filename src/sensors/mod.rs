@@ -22,7 +22,7 @@ pub use imu::{ImuNoise, ImuSample};
 pub use imu_intrinsics::{ImuIntrinsics, ImuIntrinsicsParameters, KalibrImuMatrices, ScaleMisalignment};
 pub use joints::{JointAngles, JointMotionFit, JointSample};
 pub use named_axes::{BodyAxes, NamedAxes};
-pub use pose::PoseSample;
+pub use pose::{LeverArm, MAX_LEVER_ARM_M, NEAREST_POSE_NS, PoseSample, PoseTrack, PositionSample};
 pub use rig::{
     AssumedField, CameraMask, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, IntrinsicsSigma, Joint, Rig,
     UnknownCamera,

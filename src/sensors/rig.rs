@@ -4,7 +4,7 @@ use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, InverseChain, ParameterNames};
 
-use super::{AttitudeFrame, AttitudeSource, ImageMask, ImuIntrinsics, ImuNoise};
+use super::{AttitudeFrame, AttitudeSource, ImageMask, ImuIntrinsics, ImuNoise, LeverArm};
 
 /// The rig has no camera with this key.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -202,8 +202,10 @@ pub struct Rig {
     pub cameras: Vec<CameraRig>,
     /// The gimbal, when there is one.
     pub gimbal: Option<GimbalRig>,
-    /// Topic of the true pose of the IMU in the world.
+    /// Topic of the true pose of the IMU in the world, or of the true position of an antenna.
     pub ground_truth_topic: Option<String>,
+    /// Where that antenna is, `None` when the rig does not say.
+    pub ground_truth_lever_arm: Option<LeverArm>,
     /// Fields that nobody has measured yet.
     pub assumed: Vec<AssumedField>,
 }

@@ -147,6 +147,7 @@ pub(super) fn rig_of(
         cameras: described,
         gimbal: None,
         ground_truth_topic,
+        ground_truth_lever_arm: None,
         assumed: Vec::new(),
     }))
 }

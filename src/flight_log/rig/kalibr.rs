@@ -52,6 +52,7 @@ pub(super) fn read_camera_chain(
         cameras,
         gimbal: None,
         ground_truth_topic: None,
+        ground_truth_lever_arm: None,
         assumed: Vec::new(),
     })
 }

@@ -100,7 +100,7 @@ const SOURCE: Keys = Keys {
 const CHAIN: Keys = Keys { read: &["T_I_B", "links", "T_E_C"], unused: &[] };
 const PRIOR: Keys = Keys { read: &["translation_bound", "rotation_bound"], unused: &[] };
 const LINK: Keys = Keys { read: &["joint", "theta_offset", "d", "a", "alpha", "limits"], unused: &[] };
-const GROUND_TRUTH: Keys = Keys { read: &["rostopic"], unused: &["frame_id"] };
+const GROUND_TRUTH: Keys = Keys { read: &["rostopic", "lever_arm"], unused: &["frame_id"] };
 
 /// What a document holds beyond the keys that are read.
 #[derive(Default)]

@@ -1,3 +1,5 @@
+use nalgebra::Vector3;
+
 use super::super::LogError;
 use super::super::text::shortened;
 use super::attitude;
@@ -6,7 +8,10 @@ use super::mask;
 use super::sensor;
 use crate::camera::{CameraError, CameraModel};
 use crate::gimbal::{ClassicalChain, DhLink, InverseChain};
-use crate::sensors::{AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, Rig};
+use crate::sensors::{
+    AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, LeverArm, MAX_LEVER_ARM_M,
+    Rig,
+};
 
 /// The version of the schema that is read and written.
 const RIG_VERSION: u64 = 1;
@@ -79,8 +84,23 @@ pub(super) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraF
     let ground_truth = root.field("ground_truth").optional();
     let ground_truth_topic = ground_truth.and_then(|ground_truth| ground_truth.field("rostopic").optional());
     let ground_truth_topic = ground_truth_topic.map(|topic| topic.text("a topic").map(str::to_owned)).transpose()?;
+    let ground_truth_lever_arm = read_lever_arm(root.field("ground_truth").field("lever_arm"))?;
     let assumed = read_assumed(root)?;
-    Ok(Rig { name, gravity_m_per_s2, imu, cameras, gimbal, ground_truth_topic, assumed })
+    Ok(Rig { name, gravity_m_per_s2, imu, cameras, gimbal, ground_truth_topic, ground_truth_lever_arm, assumed })
+}
+
+/// Where the antenna of the ground truth is.
+fn read_lever_arm(field: Field<'_>) -> Result<Option<LeverArm>, LogError> {
+    const EXPECTED: &str = "3 numbers (x y z of the antenna in the IMU frame, in m), or estimate";
+    let Some(field) = field.optional() else { return Ok(None) };
+    if let Ok(text) = field.text(EXPECTED) {
+        return if text == "estimate" { Ok(Some(LeverArm::Estimated)) } else { Err(field.unexpected(EXPECTED)) };
+    }
+    let lever_arm_m = Vector3::from(field.exactly::<3>(EXPECTED)?);
+    if lever_arm_m.amax() > MAX_LEVER_ARM_M {
+        return Err(field.unexpected("metres, at most 100 in each direction"));
+    }
+    Ok(Some(LeverArm::Known(lever_arm_m)))
 }
 
 /// The fields that are only assumed, each of which must be there.

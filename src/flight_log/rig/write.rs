@@ -6,7 +6,7 @@ use super::super::yaml::{number, numbers, text};
 use super::attitude;
 use crate::geometry::RigidTransform;
 use crate::gimbal::DhLink;
-use crate::sensors::{AssumedField, CameraMount, CameraRig, GimbalRig, ImuIntrinsics, Rig};
+use crate::sensors::{AssumedField, CameraMount, CameraRig, GimbalRig, ImuIntrinsics, LeverArm, Rig};
 
 impl Rig {
     /// The rig as a YAML file, its chain in the classical parameterization. Numbers are written so that they read back
@@ -34,9 +34,16 @@ impl Rig {
         if let Some(gimbal) = &self.gimbal {
             write_gimbal(&mut out, gimbal);
         }
-        if let Some(topic) = &self.ground_truth_topic {
+        if self.ground_truth_topic.is_some() || self.ground_truth_lever_arm.is_some() {
             line(&mut out, 0, "ground_truth", "");
+        }
+        if let Some(topic) = &self.ground_truth_topic {
             line(&mut out, 1, "rostopic", &text(topic));
+        }
+        match &self.ground_truth_lever_arm {
+            Some(LeverArm::Known(position_m)) => line(&mut out, 1, "lever_arm", &numbers(position_m.as_slice())),
+            Some(LeverArm::Estimated) => line(&mut out, 1, "lever_arm", "estimate"),
+            None => {}
         }
         if !self.assumed.is_empty() {
             line(&mut out, 0, "assumed", "");

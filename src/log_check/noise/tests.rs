@@ -91,6 +91,7 @@ fn rig() -> Rig {
         cameras: Vec::new(),
         gimbal: None,
         ground_truth_topic: None,
+        ground_truth_lever_arm: None,
         assumed: Vec::new(),
     }
 }

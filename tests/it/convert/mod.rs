@@ -12,7 +12,7 @@ use std::path::Path;
 
 use dcvins::camera::{CameraModel, Distortion, Projection};
 use dcvins::flight_log::convert::{ConversionReport, ConvertError, ConvertedTopic, convert};
-use dcvins::flight_log::{LogWriter, LogWriterOptions, MessageTimes};
+use dcvins::flight_log::{LogWriter, LogWriterOptions, MessageTimes, Odometry};
 use dcvins::geometry::RigidTransform;
 use nalgebra::{UnitQuaternion, Vector3};
 use ros1::{Compression, Message, bag, f64_sequence, f64s, header, text};
@@ -48,13 +48,15 @@ fn write_directly(path: &Path) {
     let (pose, rate, force) = values();
     let joints = ["yaw".to_owned(), "roll".to_owned()];
     let pixels: Vec<u8> = (0..16 * 12).map(|index| index as u8).collect();
+    let odometry =
+        Odometry { linear_m_per_s: force, angular_rad_per_s: rate, ..Odometry::at_rest("world", "imu", pose) };
     let written = [
         log.write_imu("/imu", "imu", times(0), &rate, &force),
         log.write_raw_image("/cam/image_raw", "camera", times(1), [16, 12], "mono8", &pixels),
         log.write_compressed_image("/cam/compressed", "cam", times(2), "jpeg", &[1, 2, 3, 4, 5]),
         log.write_camera_info("/cam/camera_info", "camera", times(3), &camera()),
         log.write_joints("/joints", times(4), &joints, &[0.5, -1.25]),
-        log.write_odometry("/truth/odometry", "world", "imu", times(5), &pose, &force, &rate),
+        log.write_odometry("/truth/odometry", times(5), &odometry),
         log.write_pose("/truth/pose", "odd", times(6), &pose),
         log.write_transform("/truth/transform", "world", "imu", times(7), &pose),
         log.write_imu("/imu", "imu", times(8), &force, &rate),

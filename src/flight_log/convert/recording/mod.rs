@@ -3,7 +3,6 @@
 mod attitude;
 mod damage;
 mod dataflash;
-mod geodesy;
 mod gpmf;
 mod mavlink_gimbal;
 mod mp4;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use super::geodesy::Geodetic;
+use crate::flight_log::geodesy::Geodetic;
 
 /// Standard gravity (ISO 80000-3), the unit of accelerations in g.
 pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.80665;

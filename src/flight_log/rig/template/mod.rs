@@ -278,6 +278,7 @@ impl RigTemplate {
             }],
             gimbal: self.gimbal.as_ref().map(|gimbal| self.gimbal_rig(gimbal)),
             ground_truth_topic: self.ground_truth_topic.clone(),
+            ground_truth_lever_arm: None,
             assumed: self.assumed_fields(),
         }
     }

@@ -9,8 +9,8 @@ use nalgebra::UnitQuaternion;
 use super::super::super::file::LogFile;
 use super::super::ConvertError;
 use super::super::sink::Sink;
-use super::geodesy::Geodetic;
 use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, finite, from_euler, nanoseconds};
+use crate::flight_log::geodesy::Geodetic;
 use records::Record;
 pub(super) use records::START;
 

@@ -1,10 +1,10 @@
 //! What a `GoPro` Karma drone adds to the telemetry of its camera, about four times a second.
 
-use super::super::geodesy::Geodetic;
 use super::super::mp4::Payload;
 use super::super::recorded::{Recorded, STANDARD_GRAVITY_M_PER_S2, finite, from_euler, nanoseconds};
 use super::Properties;
 use super::items::Item;
+use crate::flight_log::geodesy::Geodetic;
 
 /// What a drone measured, by its own clock, and what that says of the video's clock.
 #[derive(Debug)]

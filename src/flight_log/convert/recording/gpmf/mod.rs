@@ -7,9 +7,9 @@ mod karma;
 
 use nalgebra::Vector3;
 
-use super::geodesy::Geodetic;
 use super::mp4::Payload;
 use super::recorded::{Recorded, finite, nanoseconds};
+use crate::flight_log::geodesy::Geodetic;
 use clock::{Mark, sample_times_ns};
 use items::{Item, items};
 use karma::Karma;

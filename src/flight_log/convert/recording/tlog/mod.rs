@@ -10,12 +10,12 @@ use nalgebra::Vector3;
 use super::super::super::file::LogFile;
 use super::super::ConvertError;
 use super::super::sink::Sink;
-use super::geodesy::Geodetic;
 use super::mavlink_gimbal::gimbal_attitude;
 use super::recorded::{
     GimbalAttitude, GimbalFrame, Recorded, STANDARD_GRAVITY_M_PER_S2, finite, from_euler, nanoseconds, rotation,
 };
 use super::scalar::Scalar;
+use crate::flight_log::geodesy::Geodetic;
 pub(super) use frames::is_telemetry;
 use frames::{Frame, Frames};
 

@@ -7,15 +7,15 @@ const FLATTENING: f64 = 1.0 / 298.257_223_563;
 
 /// A place on the earth, WGS 84.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Geodetic {
-    pub(super) latitude_rad: f64,
-    pub(super) longitude_rad: f64,
-    pub(super) altitude_m: f64,
+pub(in crate::flight_log) struct Geodetic {
+    pub(in crate::flight_log) latitude_rad: f64,
+    pub(in crate::flight_log) longitude_rad: f64,
+    pub(in crate::flight_log) altitude_m: f64,
 }
 
 impl Geodetic {
     /// From degrees and metres; `None` beyond a sphere's range, and at 0° 0°, which receivers give without a fix.
-    pub(super) fn from_deg(latitude_deg: f64, longitude_deg: f64, altitude_m: f64) -> Option<Self> {
+    pub(in crate::flight_log) fn from_deg(latitude_deg: f64, longitude_deg: f64, altitude_m: f64) -> Option<Self> {
         let valid = latitude_deg.abs() <= 90.0
             && longitude_deg.abs() <= 180.0
             && altitude_m.abs() < 1e6
@@ -39,7 +39,7 @@ impl Geodetic {
     }
 
     /// In the tangent plane at an origin: east, north, up, in metres.
-    pub(super) fn east_north_up_m(self, origin: Self) -> Vector3<f64> {
+    pub(in crate::flight_log) fn east_north_up_m(self, origin: Self) -> Vector3<f64> {
         let (sin_latitude, cos_latitude) = origin.latitude_rad.sin_cos();
         let (sin_longitude, cos_longitude) = origin.longitude_rad.sin_cos();
         let plane_from_earth = Matrix3::new(

@@ -1,0 +1,131 @@
+//! Trajectory files: TUM (`t x y z qx qy qz qw`) and EuRoC's tables (`stamp in ns, x, y, z, qw, qx, qy, qz, …`).
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use super::super::LogError;
+use super::super::text::shortened;
+use super::RecordedPose;
+
+/// Largest file; a pose in 1 ms steps takes about 100 bytes, so that this is an hour of them.
+const MAX_BYTES: u64 = 512 << 20;
+/// Maximum deviation of a quaternion's norm from 1.
+const QUATERNION_TOLERANCE: f64 = 1e-2;
+
+/// How the first line of a trajectory begins that an offline calibration found: it is no independent ground truth.
+pub const BATCH_REFERENCE: &str = "# batch reference";
+
+/// Whether a trajectory file is the reference of an offline calibration; `false` of a file that cannot be read.
+pub fn is_batch_reference(path: &Path) -> bool {
+    let mut begin = [0; BATCH_REFERENCE.len()];
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut begin));
+    read.is_ok() && begin == BATCH_REFERENCE.as_bytes()
+}
+
+/// Poses of a trajectory file in the order of their stamps, of several with one stamp the first.
+///
+/// Lines with commas are a table of EuRoC: stamps in nanoseconds, the quaternion's w first, further columns ignored. Others
+/// are TUM: stamps in seconds, the quaternion's w last. Lines without a quaternion, or with one of zeros, are positions.
+/// Lines that begin with `#` are comments.
+///
+/// # Errors
+/// When the file cannot be read, a line is no pose, or there is none.
+pub fn read_trajectory_file(path: &Path) -> Result<Vec<RecordedPose>, LogError> {
+    let failed = |source| LogError::Io { action: "read the trajectory", source, path: path.to_owned() };
+    let mut bytes = Vec::new();
+    File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes)).map_err(failed)?;
+    let unusable = |problem: String| LogError::Trajectory { problem, path: path.to_owned() };
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(unusable(format!(
+            "more than {} MiB, expected a trajectory in TUM's or EuRoC's format",
+            MAX_BYTES >> 20
+        )));
+    }
+    let no_text = "no text, expected 't x y z qx qy qz qw' on each line (TUM) or a table of EuRoC";
+    let text = String::from_utf8(bytes).map_err(|_binary| unusable(no_text.to_owned()))?;
+    let mut poses = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let pose = if line.contains(',') { euroc_pose(line) } else { tum_pose(line) };
+        poses.push(pose.map_err(|problem| LogError::TrajectoryLine {
+            line: index + 1,
+            problem,
+            path: path.to_owned(),
+        })?);
+    }
+    if poses.is_empty() {
+        return Err(unusable("no pose in it".to_owned()));
+    }
+    poses.sort_by_key(|pose| pose.stamp_ns);
+    poses.dedup_by_key(|pose| pose.stamp_ns);
+    Ok(poses)
+}
+
+fn number(word: &str) -> Result<f64, String> {
+    let value = word.parse::<f64>().ok().filter(|number| number.is_finite());
+    value.ok_or_else(|| format!("holds '{}', which is not a finite number", shortened(word, 40)))
+}
+
+fn tum_pose(line: &str) -> Result<RecordedPose, String> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let numbers = words.iter().map(|word| number(word)).collect::<Result<Vec<f64>, _>>()?;
+    let stamp_ns = ns_of_seconds(words[0]);
+    match numbers.as_slice() {
+        &[_, x, y, z] => Ok(RecordedPose { stamp_ns, position_m: Vector3::new(x, y, z), rotation: None }),
+        &[_, x, y, z, qx, qy, qz, qw] => {
+            let rotation = rotation_of(Quaternion::new(qw, qx, qy, qz))?;
+            Ok(RecordedPose { stamp_ns, position_m: Vector3::new(x, y, z), rotation })
+        }
+        numbers => Err(format!("holds {} numbers", numbers.len())),
+    }
+}
+
+fn euroc_pose(line: &str) -> Result<RecordedPose, String> {
+    let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+    let stamp_ns = cells[0].parse::<i64>();
+    let stamp_ns = stamp_ns.map_err(|_not_whole| {
+        format!("begins with '{}', expected a stamp in whole nanoseconds as in EuRoC's tables", shortened(cells[0], 40))
+    })?;
+    let numbers = cells[1..].iter().take(7).map(|cell| number(cell)).collect::<Result<Vec<f64>, _>>()?;
+    match *numbers.as_slice() {
+        [x, y, z] => Ok(RecordedPose { stamp_ns, position_m: Vector3::new(x, y, z), rotation: None }),
+        [x, y, z, qw, qx, qy, qz] => {
+            let rotation = rotation_of(Quaternion::new(qw, qx, qy, qz))?;
+            Ok(RecordedPose { stamp_ns, position_m: Vector3::new(x, y, z), rotation })
+        }
+        _ => Err(format!("holds {} cells, expected a stamp, x, y, z and qw, qx, qy, qz", cells.len())),
+    }
+}
+
+/// The attitude, `None` of a quaternion of zeros.
+fn rotation_of(quaternion: Quaternion<f64>) -> Result<Option<UnitQuaternion<f64>>, String> {
+    let norm = quaternion.norm();
+    if norm == 0.0 {
+        return Ok(None);
+    }
+    if (norm - 1.0).abs() > QUATERNION_TOLERANCE {
+        return Err(format!("has a quaternion of norm {norm:.4}, not 1"));
+    }
+    Ok(Some(UnitQuaternion::new_normalize(quaternion)))
+}
+
+/// Nanoseconds of seconds in decimal digits, exact where there are at most nine decimals: a double of today's Unix time
+/// resolves 240 ns only. The text is a finite number.
+fn ns_of_seconds(text: &str) -> i64 {
+    let exact = || {
+        let (sign, digits) = text.strip_prefix('-').map_or((1, text), |digits| (-1, digits));
+        let (whole, decimals) = digits.split_once('.').unwrap_or((digits, ""));
+        let whole: i64 = whole.parse().ok().filter(|whole| (0..9_000_000_000).contains(whole))?;
+        let plain = decimals.bytes().all(|byte| byte.is_ascii_digit());
+        let nine: String = decimals.chars().chain("000000000".chars()).take(9).collect();
+        let decimals: i64 = nine.parse().ok().filter(|_| plain)?;
+        Some(sign * (whole * 1_000_000_000 + decimals))
+    };
+    exact().unwrap_or_else(|| (text.parse::<f64>().unwrap_or(0.0) * 1e9).round() as i64)
+}

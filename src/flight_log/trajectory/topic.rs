@@ -1,0 +1,107 @@
+//! Poses and positions on a topic of a log.
+
+use nalgebra::Vector3;
+
+use super::super::cdr::{CdrError, CdrReader};
+use super::super::geodesy::Geodetic;
+use super::super::messages::{self, MessageKind};
+use super::super::{FlightLog, LogError};
+use super::RecordedPose;
+
+/// What is read of a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Content {
+    Pose(MessageKind),
+    /// `geometry_msgs/msg/PointStamped`.
+    Point,
+    /// `sensor_msgs/msg/NavSatFix`.
+    Fix,
+}
+
+/// Names of the message types that are read.
+const TYPES: &str = "nav_msgs/msg/Odometry, geometry_msgs/msg/PoseStamped, geometry_msgs/msg/TransformStamped, \
+    geometry_msgs/msg/PointStamped, sensor_msgs/msg/NavSatFix";
+
+impl FlightLog {
+    /// Whether a topic has positions without attitudes.
+    pub fn is_position_topic(&self, topic: &str) -> bool {
+        let content = self.topic(topic).and_then(|info| content_of(&info.schema, info.kind));
+        matches!(content, Some(Content::Point | Content::Fix))
+    }
+
+    /// Poses or positions of a topic in the order of their header stamps, of several with one stamp the first. Fixes of a
+    /// satellite receiver are metres east, north and up of the first one. Messages that are no pose are passed over.
+    ///
+    /// # Errors
+    /// When the log has no such topic, its type is another one, or no message can be used.
+    pub fn read_trajectory_topic(&self, topic: &str) -> Result<Vec<RecordedPose>, LogError> {
+        let unusable = |problem: String| LogError::Trajectory { problem, path: self.path().to_owned() };
+        let info = self.topic(topic).ok_or_else(|| {
+            let candidates = self.topics().iter().filter(|info| content_of(&info.schema, info.kind).is_some());
+            let names: Vec<&str> = candidates.map(|info| info.topic.as_str()).collect();
+            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            unusable(format!("no topic '{topic}' in the log; topics with poses or positions: {names}"))
+        })?;
+        let content = content_of(&info.schema, info.kind)
+            .ok_or_else(|| unusable(format!("topic '{topic}' is of type {}, expected one of {TYPES}", info.schema)))?;
+        let mut origin = None;
+        let mut poses: Vec<RecordedPose> = Vec::new();
+        self.for_each_message(topic, |_, data| {
+            poses.extend(read(content, data, &mut origin).ok().flatten());
+            true
+        });
+        if poses.is_empty() {
+            return Err(unusable(format!("topic '{topic}' has no message with a usable pose or position")));
+        }
+        poses.sort_by_key(|pose| pose.stamp_ns);
+        poses.dedup_by_key(|pose| pose.stamp_ns);
+        Ok(poses)
+    }
+}
+
+fn content_of(schema: &str, kind: Option<MessageKind>) -> Option<Content> {
+    match (kind, schema) {
+        (Some(kind @ (MessageKind::Odometry | MessageKind::PoseStamped | MessageKind::TransformStamped)), _) => {
+            Some(Content::Pose(kind))
+        }
+        (_, "geometry_msgs/msg/PointStamped") => Some(Content::Point),
+        (_, "sensor_msgs/msg/NavSatFix") => Some(Content::Fix),
+        _ => None,
+    }
+}
+
+/// The pose of a message; `origin` is the first fix of a receiver.
+fn read(content: Content, data: &[u8], origin: &mut Option<Geodetic>) -> Result<Option<RecordedPose>, CdrError> {
+    let finite = |position_m: &Vector3<f64>| position_m.iter().all(|value| value.is_finite());
+    match content {
+        Content::Pose(kind) => {
+            let message = messages::read_pose(kind, data)?;
+            Ok(message.pose.map(|pose| RecordedPose {
+                stamp_ns: message.stamp_ns,
+                position_m: pose.translation_m,
+                rotation: Some(pose.rotation),
+            }))
+        }
+        Content::Point => {
+            let mut reader = CdrReader::new(data)?;
+            let header = messages::read_header(&mut reader)?;
+            let position_m = Vector3::from(reader.read_f64s::<3>()?);
+            let pose = RecordedPose { stamp_ns: header.stamp_ns, position_m, rotation: None };
+            Ok(finite(&position_m).then_some(pose))
+        }
+        Content::Fix => {
+            let mut reader = CdrReader::new(data)?;
+            let header = messages::read_header(&mut reader)?;
+            // −1: no fix.
+            let status = reader.read_u8()?.cast_signed();
+            let _service = reader.read_u16()?;
+            let [latitude_deg, longitude_deg, altitude_m] = reader.read_f64s::<3>()?;
+            let place = Geodetic::from_deg(latitude_deg, longitude_deg, altitude_m).filter(|_| status >= 0);
+            let Some(place) = place else { return Ok(None) };
+            let origin = *origin.get_or_insert(place);
+            let position_m = place.east_north_up_m(origin);
+            let pose = RecordedPose { stamp_ns: header.stamp_ns, position_m, rotation: None };
+            Ok(finite(&position_m).then_some(pose))
+        }
+    }
+}
