@@ -31,7 +31,8 @@ pub use report::{
     CalibrationEstimate, ColumnBlock, ColumnGroup, ColumnId, Event, EventKind, FactorKind, FactorRows, FailureCause,
     FeatureCounts, FeatureReport, FeatureRows, FrameId, FrameStateReport, InformationGain, IterationReport,
     JacobianFactor, JacobianRow, JacobianSource, LandmarkReport, Linearization, Motion, ObservationReport,
-    Observations, Phase, ReportBytes, ResidualSummary, StageTimes, StepJacobian, StepReport, allocated_bytes,
+    Observations, Phase, PoseCovariance, ReportBytes, ResidualSummary, StageTimes, StepJacobian, StepReport,
+    allocated_bytes,
 };
 pub use setup::gravity_in_world;
 pub use step_input::StepInput;

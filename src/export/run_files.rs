@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::covariance::covariance_csv;
 use super::error::ExportError;
 use super::masks;
 use super::results::stage_results;
@@ -71,6 +72,7 @@ pub(super) fn stage_run(
     let mut files = vec![
         ("summary.json", json),
         ("trajectory.tum", tum_of_run(run, recording.epoch_ns)),
+        ("covariance.csv", covariance_csv(run)),
         ("calibration.csv", calibration_csv(run, &recording.rig)),
         ("rank.csv", rank_csv(run, &recording.rig.parameter_names())),
         ("information.csv", information_csv(run, &recording.rig)),

@@ -8,7 +8,7 @@ use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
 /// Seconds since the log began with nanosecond resolution.
-fn seconds_text(stamp_ns: i64) -> String {
+pub(super) fn seconds_text(stamp_ns: i64) -> String {
     format!("{:.9}", seconds_from_ns(stamp_ns))
 }
 
@@ -48,7 +48,7 @@ pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
     table.into_text()
 }
 
-fn optional_cell(number: Option<&f64>) -> String {
+pub(super) fn optional_cell(number: Option<&f64>) -> String {
     number.map_or_else(String::new, |number| number_cell(*number))
 }
 

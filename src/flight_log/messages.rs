@@ -153,7 +153,7 @@ pub(crate) struct Header<'a> {
     pub(crate) frame_id: &'a str,
 }
 
-fn read_header<'a>(reader: &mut CdrReader<'a>) -> Result<Header<'a>, CdrError> {
+pub(in crate::flight_log) fn read_header<'a>(reader: &mut CdrReader<'a>) -> Result<Header<'a>, CdrError> {
     let seconds = i64::from(reader.read_i32()?);
     let nanoseconds = i64::from(reader.read_u32()?);
     let frame_id = reader.read_string()?;

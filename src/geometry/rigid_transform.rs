@@ -76,6 +76,13 @@ impl RigidTransform {
         self.rotation * position + self.translation_m
     }
 
+    /// The pose at a fraction (0 to 1) of the way to another one: positions along a line, rotations at a constant rate.
+    pub fn interpolate(&self, to: &Self, fraction: f64) -> Self {
+        // Two attitudes 180° apart have no shortest rotation between them; the earlier one is kept.
+        let rotation = self.rotation.try_slerp(&to.rotation, fraction, 1e-9).unwrap_or(self.rotation);
+        Self::new(rotation, self.translation_m.lerp(&to.translation_m, fraction))
+    }
+
     /// `x ⊞ [φ; δt]` by the perturbation rule of this module.
     #[must_use]
     pub fn plus(&self, delta: &Vector6<f64>) -> Self {

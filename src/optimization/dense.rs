@@ -1,9 +1,11 @@
 //! Dense algebra on the window: nalgebra keeps the matrices, faer factors them.
 
+use std::ops::Range;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
 use faer::linalg::solvers::Solve as _;
-use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Mat, MatMut, MatRef, Par, Side};
 use nalgebra::{DMatrix, DVector};
 
@@ -39,6 +41,20 @@ impl Cholesky {
             Par::Seq,
         );
         response
+    }
+
+    /// Covariance of some consecutive unknowns: their block of `(L Lᵀ)⁻¹`, the others marginalized.
+    pub(crate) fn covariance_of(&self, unknowns: Range<usize>) -> DMatrix<f64> {
+        // L is zero above the diagonal, so that the solution begins at the first of these unknowns.
+        let (first, count) = (unknowns.start, unknowns.len());
+        let rows = self.0.L().nrows() - first;
+        let mut inverse = DMatrix::identity(rows, count);
+        solve_lower_triangular_in_place(
+            self.0.L().submatrix(first, first, rows, rows),
+            MatMut::from_column_major_slice_mut(inverse.as_mut_slice(), rows, count),
+            Par::Seq,
+        );
+        inverse.tr_mul(&inverse)
     }
 
     /// Covariance of the last `count` unknowns: `(L₂₂ L₂₂ᵀ)⁻¹`, the others marginalized.

@@ -113,6 +113,7 @@ impl Equipment {
             cameras,
             gimbal,
             ground_truth_topic: Some("/ground_truth/odometry".to_owned()),
+            ground_truth_lever_arm: None,
             assumed: Vec::new(),
         }
     }

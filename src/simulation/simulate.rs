@@ -21,7 +21,7 @@ use super::trajectory::{AIR_DRAG_PER_S, Trajectory, VehicleLimits};
 use super::vibration::shake;
 use super::world;
 use crate::flight_log::output::OutputSet;
-use crate::flight_log::{LogError, LogWriter, LogWriterOptions, MessageTimes};
+use crate::flight_log::{LogError, LogWriter, LogWriterOptions, MessageTimes, Odometry};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 use crate::sensors::{CameraRig, ImuSample, JointSample};
 
@@ -232,10 +232,14 @@ fn write_messages(
             Message::Truth(index) => {
                 let stamp_ns = recordings.imu[index].stamp_ns;
                 let ground_truth = scenario.trajectory.at(seconds_from_ns(stamp_ns));
-                let velocity = ground_truth.world_from_imu.rotation.inverse() * ground_truth.velocity_m_per_s;
+                let pose = ground_truth.world_from_imu;
+                let odometry = Odometry {
+                    linear_m_per_s: pose.rotation.inverse() * ground_truth.velocity_m_per_s,
+                    angular_rad_per_s: ground_truth.angular_velocity_rad_per_s,
+                    ..Odometry::at_rest("world", "imu", pose)
+                };
                 let topic = rig.ground_truth_topic.as_deref().unwrap_or("/ground_truth/odometry");
-                let (pose, rate) = (&ground_truth.world_from_imu, &ground_truth.angular_velocity_rad_per_s);
-                log.write_odometry(topic, "world", "imu", times(stamp_ns), pose, &velocity, rate)?;
+                log.write_odometry(topic, times(stamp_ns), &odometry)?;
             }
             Message::Joints(index) => {
                 let sample = &recordings.joints[index];

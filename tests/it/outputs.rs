@@ -53,8 +53,16 @@ fn results_of_the_same_log_are_replaced_and_nothing_else() {
     let out = folder.path().join("out/auto");
     assert!(out.join("results.mcap").is_file() && out.join("trajectory.euroc.csv").is_file());
     run(&[], 3, &[]);
-    let expected =
-        ["calibration.csv", "frames.csv", "information.csv", "rank.csv", "rig.yaml", "summary.json", "trajectory.tum"];
+    let expected = [
+        "calibration.csv",
+        "covariance.csv",
+        "frames.csv",
+        "information.csv",
+        "rank.csv",
+        "rig.yaml",
+        "summary.json",
+        "trajectory.tum",
+    ];
     assert_eq!(names(&out), expected, "what this run does not write is gone");
     run(&["--run", "static"], 3, &["also holds runs of earlier commands: auto"]);
 

@@ -9,7 +9,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use dcvins::camera::{CameraModel, Distortion, Projection};
-use dcvins::flight_log::{LogCompression, LogWriter, LogWriterOptions, MessageKind, MessageTimes, MessageType};
+use dcvins::flight_log::{
+    LogCompression, LogWriter, LogWriterOptions, MessageKind, MessageTimes, MessageType, Odometry,
+};
 use dcvins::geometry::RigidTransform;
 use dcvins::sensors::Rig;
 use dcvins_fuzz::{EUROC_FILES, RIG, SOURCES, recordings, rig_with_source, topic_of};
@@ -48,6 +50,8 @@ fn write_log(path: &Path, options: &LogWriterOptions) -> Result<(), Failed> {
     };
     let pose = RigidTransform::identity();
     let (rate, force) = (Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.0, 0.1, 9.8));
+    let odometry =
+        Odometry { linear_m_per_s: force, angular_rad_per_s: rate, ..Odometry::at_rest("world", "imu", pose) };
     let joints = ["yaw".to_owned(), "pitch".to_owned()];
     log.write_camera_info("/gimbal_camera/camera_info", "gimbal_camera", times(0), &camera)?;
     for index in 0..100 {
@@ -73,8 +77,7 @@ fn write_log(path: &Path, options: &LogWriterOptions) -> Result<(), Failed> {
             // A keyframe and a picture that depends on it.
             let picture = if index % 20 == 0 { &VIDEO[..KEYFRAME_BYTES] } else { &VIDEO[KEYFRAME_BYTES..PICTURE_END] };
             log.write_compressed_video(topic_of(MessageKind::CompressedVideo), "video", times(index), "h264", picture)?;
-            let odometry = topic_of(MessageKind::Odometry);
-            log.write_odometry(odometry, "world", "imu", times(index), &pose, &force, &rate)?;
+            log.write_odometry(topic_of(MessageKind::Odometry), times(index), &odometry)?;
             log.write_pose(topic_of(MessageKind::PoseStamped), "world", times(index), &pose)?;
             log.write_transform(topic_of(MessageKind::TransformStamped), "world", "imu", times(index), &pose)?;
             write_attitudes(&mut log, times(index))?;

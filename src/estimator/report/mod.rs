@@ -12,6 +12,7 @@ mod jacobian;
 pub(crate) mod jacobian_source;
 pub(crate) mod linearization;
 mod observations;
+mod pose_covariance;
 mod residuals;
 mod step;
 
@@ -25,5 +26,6 @@ pub use jacobian::{FeatureRows, StepJacobian};
 pub use jacobian_source::{FactorRows, JacobianFactor, JacobianRow, JacobianSource};
 pub use linearization::Linearization;
 pub use observations::Observations;
+pub use pose_covariance::PoseCovariance;
 pub use residuals::{FactorKind, IterationReport, ResidualSummary};
 pub use step::{CalibrationEstimate, FrameStateReport, Phase, StageTimes, StepReport};

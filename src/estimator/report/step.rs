@@ -7,6 +7,7 @@ use super::features::{FeatureCounts, FeatureReport, LandmarkReport};
 use super::information_gain::InformationGain;
 use super::jacobian_source::{FactorRows, JacobianSource};
 use super::linearization::Linearization;
+use super::pose_covariance::PoseCovariance;
 use super::residuals::{IterationReport, ResidualSummary};
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization, Singularity};
@@ -117,6 +118,8 @@ pub struct StepReport {
     pub events: Vec<Event>,
     /// The frames of the window after the solve, oldest first; empty while initializing.
     pub window: Vec<FrameStateReport>,
+    /// Covariance of the newest pose, `None` while initializing.
+    pub newest_pose_covariance: Option<PoseCovariance>,
     /// The static calibration (the given one while initializing).
     pub calibration: CalibrationEstimate,
     /// Features of the solve.

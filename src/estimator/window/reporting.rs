@@ -8,7 +8,7 @@ use super::window_state::WindowState;
 use crate::estimator::factors::prior::{Prior, StartPrior};
 use crate::estimator::report::{
     CalibrationEstimate, FactorKind, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport,
-    Phase, ResidualSummary, StageTimes, StepReport,
+    Phase, PoseCovariance, ResidualSummary, StageTimes, StepReport,
 };
 use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::MAIN;
@@ -31,6 +31,7 @@ pub(crate) fn empty_report(
         effective_pixel_sigma_px: setup.config.options.pixel_sigma_px,
         events: Vec::new(),
         window: Vec::new(),
+        newest_pose_covariance: None,
         calibration,
         features: Vec::new(),
         counts: FeatureCounts::default(),
@@ -63,6 +64,7 @@ impl WindowState {
         let mut report = empty_report(setup, input, Phase::Tracking, calibration);
         report.window = self.window_report();
         report.keyframe = self.frames.newest().keyframe;
+        report.newest_pose_covariance = solved.solution.newest_pose_covariance.map(PoseCovariance);
         report.features = self.feature_reports(setup, solved);
         report.counts = FeatureCounts::of(&report.features);
         report.effective_pixel_sigma_px = effective_sigma(report.pixel_sigma_px, &report.features);

@@ -1,6 +1,6 @@
 //! Levenberg–Marquardt on the window with landmarks eliminated.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix6};
 
 use super::problem::{Costs, Estimate, NormalEquations, Problem};
 use crate::estimator::IterationReport;
@@ -25,6 +25,9 @@ pub(crate) struct Solution {
     pub(crate) iterations: Vec<IterationReport>,
     /// Posterior covariance of the calibration at the last linearization; empty without calibration.
     pub(crate) calibration_covariance: DMatrix<f64>,
+    /// Posterior covariance of the newest pose at the last linearization, rotation first; `None` where the information is not
+    /// positive definite.
+    pub(crate) newest_pose_covariance: Option<Matrix6<f64>>,
 }
 
 impl Solution {
@@ -42,8 +45,13 @@ const FLOOR: f64 = 1e-6;
 pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits) -> Solution {
     let first = problem.layout.calibration().start;
     let fixed = start.calibration.frozen_columns().into_iter().map(|column| first + column).collect();
-    let mut window =
-        DampedWindow { problem, fixed, step_norms: Vec::new(), calibration_covariance: DMatrix::zeros(0, 0) };
+    let mut window = DampedWindow {
+        problem,
+        fixed,
+        step_norms: Vec::new(),
+        calibration_covariance: DMatrix::zeros(0, 0),
+        hessian: DMatrix::zeros(0, 0),
+    };
     let start = window.evaluated(start);
     let costs_before = start.costs;
     let options = DampedOptions {
@@ -64,6 +72,7 @@ pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits
     };
     Solution {
         iterations: solution.iterations.iter().zip(&window.step_norms).map(report).collect(),
+        newest_pose_covariance: window.newest_pose_covariance(),
         calibration_covariance: window.calibration_covariance,
         costs_before,
         costs_after: solution.estimate.costs,
@@ -80,6 +89,8 @@ struct DampedWindow<'a> {
     step_norms: Vec<f64>,
     /// Posterior covariance of the calibration at the last solved step.
     calibration_covariance: DMatrix<f64>,
+    /// Information of the last solved step without damping, landmarks marginalized.
+    hessian: DMatrix<f64>,
 }
 
 /// An estimate and its costs.
@@ -103,6 +114,16 @@ impl DampedWindow<'_> {
             covariance.column_mut(column).fill(0.0);
         }
         covariance
+    }
+
+    /// Posterior covariance of the newest pose without damping, which would act as information about position and yaw.
+    fn newest_pose_covariance(&self) -> Option<Matrix6<f64>> {
+        let newest = self.problem.layout.pose(self.problem.layout.frames.checked_sub(1)?);
+        if self.hessian.nrows() < newest.end {
+            return None;
+        }
+        let covariance = Cholesky::new(&damped(&self.hessian, 0.0))?.covariance_of(newest);
+        covariance.iter().all(|entry| entry.is_finite()).then(|| Matrix6::from_column_slice(covariance.as_slice()))
     }
 }
 
@@ -128,6 +149,7 @@ impl DampedProblem for DampedWindow<'_> {
         let landmarks = equations.landmark_steps(layout, &reduced, &step);
         self.step_norms.push(step.norm());
         self.calibration_covariance = self.covariance(&factor);
+        self.hessian = hessian;
         Some(self.evaluated(self.problem.stepped(&evaluated.estimate, &step, &landmarks)))
     }
 }

@@ -11,14 +11,12 @@ use super::joint_angles::JointAngleStream;
 use super::joint_topic::JointSamples;
 use super::ordered::{Decoder, Lookup, MessageSource, OrderedSamples, ReadContext, Refusal};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
-use crate::sensors::{CameraRig, GrayImage, ImuSample, PoseSample, Rig};
+use crate::sensors::{CameraRig, GrayImage, ImuSample, NEAREST_POSE_NS, PoseSample, Rig};
 
 /// Length of the IMU samples before the first frame.
 const FIRST_FRAME_IMU_NS: i64 = 2_000_000_000;
 /// Largest delay of log times after header stamps; reading starts that much earlier.
 const SEEK_MARGIN_NS: i64 = 1_000_000_000;
-/// Largest distance of a ground-truth pose from the image's stamp.
-const NEAREST_NS: i64 = 100_000_000;
 /// Longer gaps between IMU samples, in periods, are reported.
 const IMU_GAP_PERIODS: f64 = 3.5;
 /// Longer gaps between images, in periods, are reported.
@@ -270,10 +268,10 @@ impl FrameSource {
             return Some(from.world_from_imu);
         }
         let (to_ns, to) = after?;
-        if (stamp_ns - from_ns).min(to_ns - stamp_ns) > NEAREST_NS {
+        if (stamp_ns - from_ns).min(to_ns - stamp_ns) > NEAREST_POSE_NS {
             return None;
         }
-        Some(interpolate_pose(&from.world_from_imu, &to.world_from_imu, fraction_at(*from_ns, *to_ns, stamp_ns)))
+        Some(from.world_from_imu.interpolate(&to.world_from_imu, fraction_at(*from_ns, *to_ns, stamp_ns)))
     }
 
     fn warn_of_skipped_images(&mut self) {
@@ -368,12 +366,6 @@ fn interpolate_imu(from: &ImuSample, to: &ImuSample, stamp_ns: i64) -> ImuSample
     }
 }
 
-fn interpolate_pose(from: &RigidTransform, to: &RigidTransform, fraction: f64) -> RigidTransform {
-    // Two samples 180° apart have no shortest rotation between them; the earlier one is kept.
-    let rotation = from.rotation.try_slerp(&to.rotation, fraction, 1e-9).unwrap_or(from.rotation);
-    RigidTransform::new(rotation, from.translation_m.lerp(&to.translation_m, fraction))
-}
-
 /// What is wrong with an image of a camera.
 fn problem_text(problem: ImageProblem, resolution_px: [usize; 2], key: &str) -> String {
     match problem {
@@ -433,7 +425,8 @@ fn ground_truth_samples(
     from_ns: i64,
     context: &mut ReadContext,
 ) -> Option<OrderedSamples<PoseSample>> {
-    let topic = rig.ground_truth_topic.as_ref()?;
+    // Positions are no poses of the IMU: they are compared with whole trajectories.
+    let topic = rig.ground_truth_topic.as_ref().filter(|topic| !log.is_position_topic(topic))?;
     let kinds = [MessageKind::Odometry, MessageKind::PoseStamped, MessageKind::TransformStamped];
     let kind = match log.require_topic("ground_truth.rostopic", topic, &kinds) {
         Ok(info) => info.kind?,

@@ -299,8 +299,8 @@ fn attitudes_relative_to_the_levelled_vehicle_or_the_earth_return_the_joint_angl
 fn the_flags_of_mavlink_messages_decide_the_frame_of_each() {
     let mavros = Recording {
         vehicle: |writer, times, attitude| {
-            let (zero, pose) = (Vector3::zeros(), RigidTransform::new(attitude, Vector3::zeros()));
-            writer.write_odometry("/vehicle", "map", "base_link", times, &pose, &zero, &zero).unwrap();
+            let pose = RigidTransform::new(attitude, Vector3::zeros());
+            writer.write_odometry("/vehicle", times, &Odometry::at_rest("map", "base_link", pose)).unwrap();
         },
         ..Recording::of(|writer, times, rotation, attitude| {
             let (flags, earth) = flags_at(times.stamp_ns);

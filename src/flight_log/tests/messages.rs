@@ -147,9 +147,8 @@ fn compressed_images_are_known_by_their_bytes() {
 #[test]
 fn poses_of_every_kind_read_back() {
     let pose = true_pose(700 * MS);
-    let zero = Vector3::zeros();
     let messages = [
-        (MessageKind::Odometry, encode::odometry(EPOCH_NS, "world", "imu", &pose, &zero, &zero)),
+        (MessageKind::Odometry, encode::odometry(EPOCH_NS, &encode::Odometry::at_rest("world", "imu", pose))),
         (MessageKind::PoseStamped, encode::pose_stamped(EPOCH_NS, "world", &pose)),
         (MessageKind::TransformStamped, encode::transform_stamped(EPOCH_NS, "world", "imu", &pose)),
     ];

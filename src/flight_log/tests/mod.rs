@@ -14,7 +14,8 @@ use nalgebra::Vector3;
 use tempfile::TempDir;
 
 use super::{
-    FlightLog, FrameStream, LogCompression, LogWarning, LogWriter, LogWriterOptions, MessageTimes, SensorFrame,
+    FlightLog, FrameStream, LogCompression, LogWarning, LogWriter, LogWriterOptions, MessageTimes, Odometry,
+    SensorFrame,
 };
 use crate::geometry::{RigidTransform, so3};
 use crate::sensors::{GrayImage, Rig};
@@ -100,9 +101,8 @@ impl Flight {
                 writer.write_joints("/joints", times(stamp_ns, 1), &names, &[0.1, yaw_rad(stamp_ns)]).unwrap();
             }
             if millisecond % 10 == 2 {
-                let zero = Vector3::zeros();
-                let pose = true_pose(stamp_ns);
-                writer.write_odometry("/truth", "world", "imu", times(stamp_ns, 1), &pose, &zero, &zero).unwrap();
+                let odometry = Odometry::at_rest("world", "imu", true_pose(stamp_ns));
+                writer.write_odometry("/truth", times(stamp_ns, 1), &odometry).unwrap();
             }
             if millisecond % 50 == 27 {
                 let (mut at, mut size) = (stamp_ns, [WIDTH, HEIGHT]);

@@ -1,6 +1,6 @@
 //! The messages of a log as CDR.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 
 use super::super::cdr::CdrWriter;
 use crate::camera::{CameraModel, Distortion};
@@ -115,22 +115,47 @@ pub(in super::super) fn joint_state(stamp_ns: i64, names: &[String], positions_r
     out.finish()
 }
 
-/// `nav_msgs/msg/Odometry` with zero covariances.
-pub(in super::super) fn odometry(
-    stamp_ns: i64,
-    frame_id: &str,
-    child_frame_id: &str,
-    pose: &RigidTransform,
-    linear_m_per_s: &Vector3<f64>,
-    angular_rad_per_s: &Vector3<f64>,
-) -> Vec<u8> {
-    let mut out = with_header(stamp_ns, frame_id);
-    out.string(child_frame_id);
-    out.f64s(pose.translation_m.as_slice());
-    put_rotation(&mut out, &pose.rotation);
-    out.f64s(&[0.0; 36]);
-    out.f64s(linear_m_per_s.as_slice());
-    out.f64s(angular_rad_per_s.as_slice());
+/// A pose of a frame in another one with its velocity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Odometry<'a> {
+    /// The frame of the pose.
+    pub frame_id: &'a str,
+    /// The frame that has this pose.
+    pub child_frame_id: &'a str,
+    /// The pose `frame_from_child`.
+    pub pose: RigidTransform,
+    /// Covariance of the pose: position (m), then rotations about the axes of `frame_id` (rad); zero when unknown.
+    pub pose_covariance: Matrix6<f64>,
+    /// Velocity in the child frame, in m/s.
+    pub linear_m_per_s: Vector3<f64>,
+    /// Angular velocity in the child frame, in rad/s.
+    pub angular_rad_per_s: Vector3<f64>,
+}
+
+impl<'a> Odometry<'a> {
+    /// A pose at rest, of unknown covariance.
+    pub fn at_rest(frame_id: &'a str, child_frame_id: &'a str, pose: RigidTransform) -> Self {
+        Self {
+            frame_id,
+            child_frame_id,
+            pose,
+            pose_covariance: Matrix6::zeros(),
+            linear_m_per_s: Vector3::zeros(),
+            angular_rad_per_s: Vector3::zeros(),
+        }
+    }
+}
+
+/// `nav_msgs/msg/Odometry` with a zero covariance of the velocities.
+pub(in super::super) fn odometry(stamp_ns: i64, odometry: &Odometry<'_>) -> Vec<u8> {
+    let mut out = with_header(stamp_ns, odometry.frame_id);
+    out.string(odometry.child_frame_id);
+    out.f64s(odometry.pose.translation_m.as_slice());
+    put_rotation(&mut out, &odometry.pose.rotation);
+    // The matrix is symmetric, so that the order of rows and columns is the same.
+    out.f64s(odometry.pose_covariance.as_slice());
+    out.f64s(odometry.linear_m_per_s.as_slice());
+    out.f64s(odometry.angular_rad_per_s.as_slice());
     out.f64s(&[0.0; 36]);
     out.finish()
 }

@@ -4,6 +4,7 @@ mod encode;
 mod results;
 mod schemas;
 
+pub use encode::Odometry;
 pub use results::{CircleAnnotation, LinesAnnotation, LogLevel, NamedTransform, Rgba};
 
 use std::borrow::Cow;
@@ -234,21 +235,14 @@ impl LogWriter {
         self.write(topic, MessageKind::JointState, times, &encode::joint_state(times.stamp_ns, names, positions_rad))
     }
 
-    /// Writes a pose of `child_frame_id` in `frame_id` with its linear and angular velocity in the child frame.
-    #[expect(clippy::too_many_arguments, reason = "the fields of the message, each once")]
+    /// Writes a pose with its covariance and velocity.
     pub fn write_odometry(
         &mut self,
         topic: &str,
-        frame_id: &str,
-        child_frame_id: &str,
         times: MessageTimes,
-        pose: &RigidTransform,
-        linear_m_per_s: &Vector3<f64>,
-        angular_rad_per_s: &Vector3<f64>,
+        odometry: &Odometry<'_>,
     ) -> Result<(), LogError> {
-        let message =
-            encode::odometry(times.stamp_ns, frame_id, child_frame_id, pose, linear_m_per_s, angular_rad_per_s);
-        self.write(topic, MessageKind::Odometry, times, &message)
+        self.write(topic, MessageKind::Odometry, times, &encode::odometry(times.stamp_ns, odometry))
     }
 
     /// Writes a pose alone, in `frame_id`.

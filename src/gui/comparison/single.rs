@@ -2,8 +2,10 @@
 
 use egui::{Button, Label, Rect, RichText, ScrollArea, Ui, UiBuilder, WidgetInfo, vec2};
 
+use nalgebra::Vector3;
+
 use super::numbers;
-use super::row::{Line, MIN_HEIGHT, Row, row_ui};
+use super::row::{Bound, Line, MIN_HEIGHT, Row, row_ui};
 use super::scores::Scores;
 use crate::estimator::StepReport;
 use crate::geometry::{RigidTransform, so3, wrap_angle};
@@ -21,9 +23,20 @@ const MIN_WIDTH_FOR_BOTH: f32 = 700.0;
 const HEIGHTS: std::ops::RangeInclusive<f32> = MIN_HEIGHT..=120.0;
 
 /// A value over time: name, shown unit, factor from the stored unit, meaning.
-const ROWS: [(&str, &str, f64, &str); 7] = [
-    ("position error", "m", 1.0, "Distance to the ground truth after alignment in yaw and position"),
+const ROWS: [(&str, &str, f64, &str); 8] = [
+    (
+        "position error",
+        "m",
+        1.0,
+        "Distance to the ground truth after alignment in yaw and position; dashed: 3σ relative to the first estimated frame",
+    ),
     ("attitude error", "°", DEGREES, "Angle to the attitude of the ground truth after alignment in yaw"),
+    (
+        "tilt error",
+        "°",
+        DEGREES,
+        "Angle between the verticals of estimate and ground truth (roll and pitch), which needs no alignment; dashed: 3σ",
+    ),
     ("extrinsics error", "mm", 1e3, "Translation error of imu_from_camera at the joint angles of the frame"),
     ("extrinsics error", "°", DEGREES, "Rotation error of imu_from_camera at the joint angles of the frame"),
     ("joint angles − encoders", "°", DEGREES, "Largest difference of an estimated joint angle from its encoder"),
@@ -55,6 +68,9 @@ pub(super) struct Single {
     stamps_ns: Vec<i64>,
     columns: [Vec<f64>; ROWS.len()],
     curves: [Curve; ROWS.len()],
+    /// 3σ of the rows that have one, by frame.
+    bounds: [Vec<f64>; ROWS.len()],
+    bound_curves: [Curve; ROWS.len()],
 }
 
 impl Single {
@@ -101,8 +117,12 @@ impl Single {
     }
 
     fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, height: f32) {
-        let with_ground_truth = is_known(&self.columns[0]) || is_known(&self.columns[2]);
-        let title = if with_ground_truth { "Errors over time, against the ground truth" } else { "Values over time" };
+        let with_ground_truth = is_known(&self.columns[0]) || is_known(&self.columns[3]);
+        let title = if with_ground_truth {
+            format!("Errors over time, against the {}", ctx.recording.truth_name())
+        } else {
+            "Values over time".to_owned()
+        };
         ui.label(RichText::new(title).color(ctx.theme.text_strong));
         ui.spacing_mut().item_spacing.y = 3.0;
         let row_at = run.index_at(ctx.cursor_ns);
@@ -112,17 +132,28 @@ impl Single {
                 continue;
             }
             let value = row_at.and_then(|row| column.get(row)).copied().filter(|value| value.is_finite());
-            let text = value.map(|value| {
+            let with_unit = |value: f64| {
                 let decimals = unit.is_empty();
                 let number = if decimals { fixed(value, 0) } else { significant(value * factor) };
                 let space = if unit.starts_with('°') || unit.is_empty() { "" } else { " " };
                 format!("{number}{space}{unit}")
+            };
+            let text = value.map(with_unit);
+            let values = &self.bounds[index];
+            let bound = is_known(values).then(|| Bound {
+                values,
+                curve: &mut self.bound_curves[index],
+                text: row_at
+                    .and_then(|row| values.get(row))
+                    .filter(|value| value.is_finite())
+                    .map(|value| format!("3σ {}", with_unit(*value))),
             });
             let row = Row {
                 name,
                 unit,
                 factor,
                 threshold: None,
+                bound,
                 min_high: 1e-9,
                 steps: unit.is_empty(),
                 id: index,
@@ -137,7 +168,7 @@ impl Single {
                 text,
                 mark_ns: None,
             };
-            row_ui(ui, ctx, &row, &[line], std::slice::from_mut(&mut self.curves[index]), height);
+            row_ui(ui, ctx, row, &[line], std::slice::from_mut(&mut self.curves[index]), height);
         }
     }
 
@@ -149,7 +180,7 @@ impl Single {
         self.of = of;
         self.epoch += 1;
         self.stamps_ns.clear();
-        self.columns.iter_mut().for_each(Vec::clear);
+        self.columns.iter_mut().chain(&mut self.bounds).for_each(Vec::clear);
         let true_rig = ctx.recording.ground_truth_rig.as_ref();
         let true_chain = true_rig.and_then(|rig| rig.chain_of_camera(&run.camera_key));
         for step in &run.steps {
@@ -158,8 +189,19 @@ impl Single {
             for (column, value) in self.columns.iter_mut().zip(values) {
                 column.push(value.unwrap_or(f64::NAN));
             }
+            for (bounds, bound) in self.bounds.iter_mut().zip(bounds_of(step)) {
+                bounds.push(bound.unwrap_or(f64::NAN));
+            }
         }
     }
+}
+
+/// 3σ of a step in the order of [`ROWS`], `None` where a row has none.
+fn bounds_of(step: &StepRecord) -> [Option<f64>; ROWS.len()] {
+    let pose = step.report.newest().zip(step.report.newest_pose_covariance);
+    let position_m = pose.map(|(_, covariance)| 3.0 * covariance.position_sigma_m());
+    let tilt_rad = pose.map(|(newest, covariance)| 3.0 * covariance.tilt_sigma_rad(&newest.world_from_imu.rotation));
+    [position_m, None, tilt_rad, None, None, None, None, None]
 }
 
 fn is_known(column: &[f64]) -> bool {
@@ -176,7 +218,9 @@ fn values_of(
     let pose = newest.zip(alignment).zip(step.ground_truth).map(|((newest, alignment), ground_truth)| {
         let aligned = *alignment * newest.world_from_imu;
         let rotation = ground_truth.rotation.inverse() * aligned.rotation;
-        ((aligned.translation_m - ground_truth.translation_m).norm(), so3::log(&rotation).norm())
+        let vertical = |pose: &RigidTransform| pose.rotation.inverse() * Vector3::z();
+        let tilt_rad = vertical(&aligned).cross(&vertical(&ground_truth)).norm().min(1.0).asin();
+        [(aligned.translation_m - ground_truth.translation_m).norm(), so3::log(&rotation).norm(), tilt_rad]
     });
     let matching = newest.zip(true_chain).filter(|(newest, chain)| newest.joint_angles_rad.len() == chain.links.len());
     let chain = matching.map(|(newest, chain)| {
@@ -184,8 +228,9 @@ fn values_of(
         (error.translation_m.norm(), so3::log(&error.rotation).norm())
     });
     [
-        pose.map(|(position_m, _)| position_m),
-        pose.map(|(_, attitude_rad)| attitude_rad),
+        pose.map(|[position_m, ..]| position_m),
+        pose.map(|[_, attitude_rad, _]| attitude_rad),
+        pose.map(|[.., tilt_rad]| tilt_rad),
         chain.map(|(translation_m, _)| translation_m),
         chain.map(|(_, rotation_rad)| rotation_rad),
         encoder_difference_rad(&step.report),
@@ -262,9 +307,13 @@ mod tests {
         let aligned = run.alignment.unwrap() * newest.world_from_imu;
         let error_m = (aligned.translation_m - step.ground_truth.unwrap().translation_m).norm();
         assert_eq!(values[0], Some(error_m));
-        assert!(values[2].unwrap() > 0.0 && values[5] == Some(step.report.reprojection_rms_after_px));
+        assert!(values[3].unwrap() > 0.0 && values[6] == Some(step.report.reprojection_rms_after_px));
+        // The tilt is a part of the attitude error, and within its 3σ.
+        let bounds = bounds_of(step);
+        assert!(values[2].unwrap() <= values[1].unwrap() && values[2] < bounds[2], "{values:?} {bounds:?}");
+        assert!(bounds[0].unwrap() > 0.0 && bounds[1].is_none());
         let alone = values_of(step, None, None);
-        assert!(alone[..4].iter().all(Option::is_none) && alone[5].is_some());
+        assert!(alone[..5].iter().all(Option::is_none) && alone[6].is_some());
 
         for (text, _) in OFFERS {
             assert!(text.parse::<RunSpec>().is_ok(), "{text}");

@@ -15,6 +15,7 @@ mod overlay;
 mod pipelines;
 #[cfg(test)]
 mod tests;
+mod tube;
 mod world;
 
 use egui::{Rect, Response, Role, Sense, Ui, Vec2, WidgetInfo, pos2, vec2};
@@ -26,7 +27,7 @@ pub use self::canvas::SceneBackend;
 use self::chain::{ChainModel, ChainPose};
 use self::layout::lay_out;
 use self::overlay::LegendLine;
-use self::world::{RunView, Trajectories, WorldBuilder, WorldOptions, framing_points_m, ground_height_m};
+use self::world::{LaneView, RunView, Trajectories, WorldBuilder, WorldOptions, framing_points_m, ground_height_m};
 use super::accessible::describe;
 use super::help::terms::{Term, window};
 use super::{PanelContext, slide};
@@ -69,6 +70,8 @@ pub struct ScenePanel {
     pub image: bool,
     /// Show the close-up of the gimbal's chain.
     pub chain: bool,
+    /// Show three standard deviations of the position around the trajectory of the selected run.
+    pub tube: bool,
     world: Orbit,
     /// Viewpoint of the close-up, `None` before the user has rotated it.
     close_up: Option<Orbit>,
@@ -85,6 +88,7 @@ impl Default for ScenePanel {
             keyframes: true,
             image: true,
             chain: true,
+            tube: true,
             world: default_world_orbit(),
             close_up: None,
             world_canvas: Canvas::new("world"),
@@ -101,22 +105,23 @@ fn default_world_orbit() -> Orbit {
 impl ScenePanel {
     /// A panel with the same view and no texture of a window.
     pub(in crate::gui) fn view_copy(&self) -> Self {
-        let Self { follow, landmarks, keyframes, image, chain, world, close_up, .. } = *self;
-        Self { follow, landmarks, keyframes, image, chain, world, close_up, ..Self::default() }
+        let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, .. } = *self;
+        Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, ..Self::default() }
     }
 
     /// Copies options and viewpoint of another panel.
     pub(in crate::gui) fn follow(&mut self, other: &Self) {
-        let Self { follow, landmarks, keyframes, image, chain, world, close_up, .. } = *other;
+        let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, .. } = *other;
         (self.follow, self.world, self.close_up) = (follow, world, close_up);
-        (self.landmarks, self.keyframes, self.image, self.chain) = (landmarks, keyframes, image, chain);
+        (self.landmarks, self.keyframes, self.image) = (landmarks, keyframes, image);
+        (self.chain, self.tube) = (chain, tube);
     }
 
     /// Whether it has options and viewpoint of another panel.
     pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
         let look = |panel: &Self| {
-            let Self { follow, landmarks, keyframes, image, chain, world, close_up, .. } = *panel;
-            (follow, landmarks, keyframes, image, chain, world, close_up)
+            let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, .. } = *panel;
+            (follow, landmarks, keyframes, image, chain, tube, world, close_up)
         };
         look(self) == look(other)
     }
@@ -157,6 +162,8 @@ impl ScenePanel {
                 .on_hover_text("Landmarks of the shown run, coloured by height");
             ui.checkbox(&mut self.keyframes, "Keyframes").on_hover_text("Camera frusta of the keyframes in the window");
             ui.checkbox(&mut self.image, "Image").on_hover_text("The image of the shown run inside of its frustum");
+            ui.checkbox(&mut self.tube, "±3σ")
+                .on_hover_text("Three standard deviations of the position around the trajectory of the shown run, relative to its first frame");
             ui.checkbox(&mut self.chain, "Chain").on_hover_text("The gimbal chain as an inset");
         });
     }
@@ -175,9 +182,13 @@ impl ScenePanel {
         let runs = context.recording.runs.iter().zip(places).enumerate();
         let views: Vec<RunView<'_>> =
             runs.map(|(number, (run, places))| RunView::new(number, run, places, context.cursor_ns)).collect();
-        let points = framing_points_m(&views);
-        // The legend in the upper left corner: a line per run, one for the ground truth, one for the landmarks.
-        let key = overlay::LINE_HEIGHT * (views.len() + 2) as f32;
+        let first = context.recording.runs.first();
+        let lanes = context.recording.trajectories.iter().enumerate();
+        let lanes: Vec<LaneView<'_>> =
+            lanes.map(|(number, lane)| LaneView::new(number, lane, first, context.cursor_ns)).collect();
+        let points = framing_points_m(&views, &lanes);
+        // The legend in the upper left corner: a line per run and trajectory, one for the ground truth, one for the landmarks.
+        let key = overlay::LINE_HEIGHT * (views.len() + lanes.len() + 2) as f32;
         let viewport = world_viewport(area, close_up, key.min(0.22 * area.height()), scale);
         let mut framing = frame(&points, self.world.towards, &viewport);
         if self.follow == Follow::Vehicle
@@ -186,16 +197,27 @@ impl ScenePanel {
             framing = OrbitCamera { target_m: at, distance_m: framing.distance_m * VEHICLE_DISTANCE_RATIO, ..framing };
         }
         let view = View::new(self.world.applied(framing), viewport);
-        let lines = legend_lines(&views, theme);
+        let mut lines = legend_lines(&views, &lanes, context.cursor_ns, context.recording.truth_name(), theme);
+        if context.recording.position_truth.is_some() {
+            let text = "ground truth, positions of the antenna".to_owned();
+            lines.push(LegendLine { style: theme.ground_truth_style(), text });
+        }
         describe(response, &lines.iter().map(|line| line.text.as_str()).collect::<Vec<_>>().join(", "));
         navigate(ui, response, &mut self.world, default_world_orbit(), &view);
         let view = View::new(self.world.applied(framing), viewport);
 
-        let options = WorldOptions { landmarks: self.landmarks, keyframes: self.keyframes, image: self.image };
+        let options =
+            WorldOptions { landmarks: self.landmarks, keyframes: self.keyframes, image: self.image, tube: self.tube };
         let mut builder = WorldBuilder::new(theme, options, view.camera.distance_m);
         let spacing_m = builder.ground(&points);
         if let Some(first) = views.first() {
             builder.ground_truth(first);
+        }
+        if let Some(truth) = &context.recording.position_truth {
+            builder.true_positions(truth, context.cursor_ns);
+        }
+        for lane in &lanes {
+            builder.lane(lane);
         }
         for run in &views {
             let camera = camera_of(&context.recording.rig, run.run);
@@ -276,14 +298,23 @@ fn explain(ui: &Ui, rect: Rect, name: &str, term: Term) {
     ui.interact(rect, ui.scope_id().with(name), Sense::hover()).on_hover_text(term.meaning);
 }
 
-/// The runs in order, then the ground truth.
-fn legend_lines(views: &[RunView<'_>], theme: &super::theme::Theme) -> Vec<LegendLine> {
+/// The runs in order, then the trajectories, then the ground truth.
+fn legend_lines(
+    views: &[RunView<'_>],
+    lanes: &[LaneView<'_>],
+    cursor_ns: i64,
+    truth_name: &str,
+    theme: &super::theme::Theme,
+) -> Vec<LegendLine> {
     let mut lines: Vec<LegendLine> = views
         .iter()
         .map(|view| {
             let label = &view.run.spec.label;
             let text = match (view.error_m(), view.newest(), view.run.alignment) {
-                (Some(error_m), ..) => format!("{label}, position error {error_m:.2} m"),
+                (Some(error_m), ..) => match view.sigma_m() {
+                    Some(sigma_m) => format!("{label}, position error {error_m:.2} m, 3σ {:.2} m", 3.0 * sigma_m),
+                    None => format!("{label}, position error {error_m:.2} m"),
+                },
                 (None, None, _) => format!("{label}, initializing"),
                 (None, Some(_), None) if view.has_ground_truth() => format!("{label}, not aligned with ground truth"),
                 _ => label.clone(),
@@ -291,8 +322,14 @@ fn legend_lines(views: &[RunView<'_>], theme: &super::theme::Theme) -> Vec<Legen
             LegendLine { style: theme.run(view.number), text }
         })
         .collect();
+    lines.extend(lanes.iter().map(|view| {
+        let label = &view.lane.label;
+        let error = view.lane.error_m(cursor_ns);
+        let text = error.map_or_else(|| label.clone(), |error_m| format!("{label}, position error {error_m:.2} m"));
+        LegendLine { style: theme.trajectory(view.number), text }
+    }));
     if views.first().is_some_and(RunView::has_ground_truth) {
-        lines.push(LegendLine { style: theme.ground_truth_style(), text: "ground truth".to_owned() });
+        lines.push(LegendLine { style: theme.ground_truth_style(), text: truth_name.to_owned() });
     }
     lines
 }

@@ -3,18 +3,19 @@
 use std::sync::Arc;
 
 use egui::Color32;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::camera::round_length;
 use super::chain::axis_colors;
 use super::model::{Dot, ImageQuad, SceneModel};
+use super::tube;
 use crate::camera::CameraModel;
 use crate::estimator::{FrameStateReport, LandmarkReport};
 use crate::geometry::RigidTransform;
 use crate::gui::follow::{RunTables, StepTable};
 use crate::gui::theme::{Theme, mix};
 use crate::sensors::GrayImage;
-use crate::session::{Recording, RunRecord};
+use crate::session::{PositionTruth, Recording, RunRecord, TrajectoryLane};
 
 /// Maximum number of points of a drawn trajectory.
 const MAX_TRAJECTORY_POINTS: usize = 4000;
@@ -29,14 +30,17 @@ pub(super) struct WorldOptions {
     pub(super) landmarks: bool,
     pub(super) keyframes: bool,
     pub(super) image: bool,
+    pub(super) tube: bool,
 }
 
-/// Columns of a run's table: estimated position, then ground-truth position; NaN where unknown.
-const PLACES: usize = 6;
+/// Columns of a run's table: estimated position, ground-truth position, then the upper triangle of the covariance of the
+/// estimated position; NaN where unknown.
+const PLACES: usize = 12;
 const ESTIMATE: usize = 0;
 const GROUND_TRUTH: usize = 3;
+const COVARIANCE: usize = 6;
 
-/// Estimated and ground-truth positions of each run, read step by step, so that a long recording is not read again for
+/// Estimated and ground-truth positions of each run with their covariances, read step by step, so that a long recording is not read again for
 /// every frame.
 #[derive(Debug, Default)]
 pub(super) struct Trajectories {
@@ -51,10 +55,21 @@ impl Trajectories {
             let ground_truth = step.ground_truth.map(|pose| pose.translation_m);
             let [estimate, ground_truth] =
                 [estimate, ground_truth].map(|at| at.unwrap_or_else(|| Vector3::repeat(f64::NAN)));
-            [estimate.x, estimate.y, estimate.z, ground_truth.x, ground_truth.y, ground_truth.z]
+            let covariance = step.report.newest_pose_covariance.map(|covariance| covariance.position_m2());
+            let covariance = covariance.unwrap_or_else(|| Matrix3::repeat(f64::NAN));
+            let mut row = [f64::NAN; PLACES];
+            row[ESTIMATE..GROUND_TRUTH].copy_from_slice(estimate.as_slice());
+            row[GROUND_TRUTH..COVARIANCE].copy_from_slice(ground_truth.as_slice());
+            for (cell, place) in row[COVARIANCE..].iter_mut().zip(UPPER) {
+                *cell = covariance[place];
+            }
+            row
         })
     }
 }
+
+/// Rows and columns of the upper triangle.
+const UPPER: [(usize, usize); PLACES - COVARIANCE] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
 /// A run of the recording up to the cursor, aligned with the ground truth.
 pub(super) struct RunView<'a> {
@@ -88,11 +103,14 @@ impl<'a> RunView<'a> {
         self.step()?.report.newest()
     }
 
-    /// Distance between aligned estimate and ground truth at the cursor in metres.
+    /// Distance between the aligned run and the ground truth at the cursor in metres.
     pub(super) fn error_m(&self) -> Option<f64> {
-        let step = self.step()?;
-        let estimate = self.run.alignment? * step.report.newest()?.world_from_imu;
-        Some((estimate.translation_m - step.ground_truth?.translation_m).norm())
+        self.run.position_error_m(self.step()?)
+    }
+
+    /// Standard deviation of the position at the cursor in metres, relative to the first estimated frame.
+    pub(super) fn sigma_m(&self) -> Option<f64> {
+        self.step()?.report.newest_pose_covariance.map(|covariance| covariance.position_sigma_m())
     }
 
     /// Aligned position of the vehicle at the cursor.
@@ -114,9 +132,46 @@ impl<'a> RunView<'a> {
         broken_line(self.shown, |step| self.place(GROUND_TRUTH, step))
     }
 
+    /// Aligned positions with their covariances in m², of the estimated frames.
+    pub(super) fn uncertain_places(&self) -> impl Iterator<Item = (Vector3<f64>, Matrix3<f64>)> {
+        let rotation = self.aligned.rotation.to_rotation_matrix();
+        let stamps = &self.places.stamps_ns[..self.shown];
+        (0..stamps.len()).map(move |step| {
+            let mut covariance = Matrix3::zeros();
+            for (column, (row, other)) in UPPER.into_iter().enumerate() {
+                let value = self.places.columns[COVARIANCE + column][step];
+                (covariance[(row, other)], covariance[(other, row)]) = (value, value);
+            }
+            let turned = rotation.matrix() * covariance * rotation.matrix().transpose();
+            (self.aligned.transform(&self.place(ESTIMATE, step)), turned)
+        })
+    }
+
     fn place(&self, column: usize, step: usize) -> Vector3<f64> {
         let [x, y, z] = [0, 1, 2].map(|axis| self.places.columns[column + axis][step]);
         Vector3::new(x, y, z)
+    }
+}
+
+/// A trajectory beside the runs up to the cursor, in the world of the scene.
+pub(super) struct LaneView<'a> {
+    pub(super) number: usize,
+    pub(super) lane: &'a TrajectoryLane,
+    /// Number of its poses at or before the cursor.
+    shown: usize,
+    world_from_own: RigidTransform,
+}
+
+impl<'a> LaneView<'a> {
+    /// `run` is the first one of the recording, whose world is that of the scene where there is no ground truth.
+    pub(super) fn new(number: usize, lane: &'a TrajectoryLane, run: Option<&RunRecord>, cursor_ns: i64) -> Self {
+        let shown = lane.track.samples().partition_point(|sample| sample.stamp_ns <= cursor_ns);
+        Self { number, lane, shown, world_from_own: lane.world_from_own(run) }
+    }
+
+    fn lines_m(&self, count: usize) -> Vec<Vec<Vector3<f64>>> {
+        let samples = self.lane.track.samples();
+        broken_line(count, |index| self.world_from_own.transform(&samples[index].world_from_imu.translation_m))
     }
 }
 
@@ -144,9 +199,10 @@ fn broken_line(steps: usize, position: impl Fn(usize) -> Vector3<f64>) -> Vec<Ve
 }
 
 /// Points that a view of the flight must contain: all trajectories over the whole recording.
-pub(super) fn framing_points_m(views: &[RunView<'_>]) -> Vec<Vector3<f64>> {
+pub(super) fn framing_points_m(views: &[RunView<'_>], lanes: &[LaneView<'_>]) -> Vec<Vector3<f64>> {
     let whole = views.iter().map(RunView::whole);
     let lines = whole.flat_map(|run| run.trajectory_m().into_iter().chain(run.ground_truth_m()));
+    let lines = lines.chain(lanes.iter().flat_map(|lane| lane.lines_m(lane.lane.track.samples().len())));
     let mut points: Vec<Vector3<f64>> = lines.flatten().collect();
     if let Some((low, high)) = bounds(&points) {
         // A short trajectory, such as hover, still gets a view of some metres.
@@ -212,6 +268,15 @@ impl<'a> WorldBuilder<'a> {
         }
     }
 
+    /// The positions of the antenna up to the cursor, where these are the ground truth.
+    pub(super) fn true_positions(&mut self, truth: &PositionTruth, cursor_ns: i64) {
+        let shown = truth.samples.partition_point(|sample| sample.stamp_ns <= cursor_ns);
+        let style = self.theme.ground_truth_style();
+        for line in broken_line(shown, |index| truth.samples[index].position_m) {
+            self.scene.line(line, style.color, 1.5, style.dashes);
+        }
+    }
+
     /// A run's trajectory and its newest camera.
     pub(super) fn run(&mut self, view: &RunView<'_>, camera: Option<&CameraModel>, image: Option<Arc<GrayImage>>) {
         let style = self.theme.run(view.number);
@@ -228,6 +293,19 @@ impl<'a> WorldBuilder<'a> {
             let image = image.filter(|_| self.options.image);
             self.frustum(&world_from_camera, camera, depth_m, style.color, 1.8, image);
         }
+    }
+
+    /// A trajectory beside the runs with its newest pose.
+    pub(super) fn lane(&mut self, view: &LaneView<'_>) {
+        let style = self.theme.trajectory(view.number);
+        for line in view.lines_m(view.shown) {
+            self.scene.line(line, style.color, 2.0, style.dashes);
+        }
+        let newest = view.shown.checked_sub(1).and_then(|index| view.lane.track.samples().get(index));
+        let Some(newest) = newest else { return };
+        let world_from_imu = view.world_from_own * newest.world_from_imu;
+        self.scene.label(world_from_imu.translation_m, view.lane.label.clone(), style.color);
+        self.scene.axes(&world_from_imu, 0.03 * self.view_distance_m, axis_colors(self.theme), 1.5);
     }
 
     /// Details of the selected run: window, landmarks, height above the ground.
@@ -248,6 +326,11 @@ impl<'a> WorldBuilder<'a> {
                     let pose = world_from_imu * frame.imu_from_camera;
                     self.frustum(&pose, camera, 0.03 * self.view_distance_m, faint, 1.0, None);
                 }
+            }
+        }
+        if self.options.tube {
+            for line in tube::outline(view.uncertain_places()) {
+                self.scene.line(line, faint, 1.0, &[]);
             }
         }
         if let Some(frame) = view.newest() {

@@ -7,10 +7,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix};
 
-use super::pose_uncertainty::information;
 use super::run::RunRecord;
-use crate::estimator::{ColumnGroup, StepReport};
+use crate::estimator::{ColumnGroup, Linearization, StepReport};
 use crate::geometry::{RigidTransform, so3};
+
+/// Information that all poses are given about their absolute position and orientation, in 1/m² and 1/rad², so that the
+/// matrix can be inverted: σ of a hundred metres and a hundred radians.
+const WEAK_INFORMATION: f64 = 1e-4;
 
 /// Normalized estimation error squared (NEES) of the newest pose of a window in its oldest one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,4 +75,18 @@ fn relative_covariance(report: &StepReport, oldest_from_newest: &RigidTransform)
     }
     let solved = information.cholesky()?.solve(&right);
     Some(Matrix6::from_iterator((right.transpose() * solved).iter().copied()))
+}
+
+/// Information of all columns of a step, of the measurements and the priors, with [`WEAK_INFORMATION`] on poses.
+fn information(linearization: &Linearization) -> DMatrix<f64> {
+    let (measured, prior) = (&linearization.jacobian, &linearization.prior_jacobian);
+    let mut information = measured.tr_mul(measured);
+    if prior.nrows() > 0 {
+        information += prior.tr_mul(prior);
+    }
+    let poses = linearization.columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose);
+    for column in poses.flat_map(|block| block.start..block.start + block.len) {
+        information[(column, column)] += WEAK_INFORMATION;
+    }
+    information
 }

@@ -11,13 +11,15 @@ const NEWEST_KEPT: usize = 64;
 
 impl StepRecord {
     /// The step without features, older frames of the window, and (except in every fourth step) landmarks, which only
-    /// drawings of this step need. A kept linearization keeps the window, to whose frames its columns belong.
+    /// drawings of this step need. A kept linearization keeps the window, to whose frames its columns belong, and so does the
+    /// first step after an initialization, whose oldest frame all poses and their covariances are relative to.
     ///
     /// All values that are plotted over time or written to tables stay: events, χ², iterations, calibration, ranks.
     pub(in crate::session) fn summary(&self, number: usize) -> Self {
         let report = &self.report;
         let keeps_landmarks = number.is_multiple_of(LANDMARKS_EVERY);
-        let keeps_window = report.linearization.is_some();
+        let initialized = report.events.iter().any(|event| event.kind.initializes_window());
+        let keeps_window = report.linearization.is_some() || initialized;
         let first_frame = if keeps_window { 0 } else { report.window.len().saturating_sub(1) };
         Self {
             report: StepReport {
@@ -29,6 +31,7 @@ impl StepRecord {
                 effective_pixel_sigma_px: report.effective_pixel_sigma_px,
                 events: report.events.clone(),
                 window: report.window[first_frame..].to_vec(),
+                newest_pose_covariance: report.newest_pose_covariance,
                 calibration: report.calibration.clone(),
                 features: Vec::new(),
                 counts: report.counts,

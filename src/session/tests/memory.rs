@@ -27,7 +27,11 @@ pub(crate) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
 }
 
 /// A recorded run of which one report in this many frames keeps its linearization.
-fn recorded_with(flight: &SyntheticFlight, spec: &str, keep_linearization_every: Option<usize>) -> RunRecord {
+pub(super) fn recorded_with(
+    flight: &SyntheticFlight,
+    spec: &str,
+    keep_linearization_every: Option<usize>,
+) -> RunRecord {
     let spec: crate::session::RunSpec = spec.parse().unwrap();
     let config = estimator_config(&flight.given_rig, &spec).unwrap();
     let sigma_rad = config.encoder_sigma_rad.unwrap();
@@ -71,5 +75,9 @@ fn a_summary_with_a_linearization_keeps_the_frames_of_its_columns() {
         let poses = columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose).count();
         assert!(poses > 1 && poses == summary.report.window.len(), "{poses} poses");
     }
-    assert!(plain.iter().all(|summary| summary.report.window.len() == 1));
+    // The window of the initialization stays too: all poses are relative to its oldest frame.
+    let initialized =
+        plain.iter().position(|summary| summary.report.events.iter().any(|event| event.kind.initializes_window()));
+    let whole: Vec<usize> = (0..plain.len()).filter(|place| plain[*place].report.window.len() > 1).collect();
+    assert_eq!(whole, Vec::from_iter(initialized));
 }

@@ -1,3 +1,4 @@
+mod covariance;
 mod forks;
 pub(crate) mod memory;
 mod plan;

@@ -1,0 +1,85 @@
+//! Covariance of an estimated pose.
+
+use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector6};
+
+/// Covariance of a pose `world_from_imu`.
+///
+/// The origin of the world and the direction of its axes are those of the first frame after the initialization, where the
+/// variances of position and yaw are nearly zero; they grow from then on. Calibration, velocities, biases, joint angles and
+/// landmarks are marginalized.
+///
+/// Rows and columns: rotation vector in the IMU frame (`R exp(δφ)`, rad), then position in the world (m).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseCovariance(pub Matrix6<f64>);
+
+impl PoseCovariance {
+    /// Root of the summed variances of the three coordinates of the position, in metres.
+    pub fn position_sigma_m(&self) -> f64 {
+        self.position_m2().trace().sqrt()
+    }
+
+    /// Root of the summed variances of the three components of the rotation, in radians.
+    pub fn attitude_sigma_rad(&self) -> f64 {
+        self.0.fixed_view::<3, 3>(0, 0).trace().sqrt()
+    }
+
+    /// Root of the summed variances of the rotations about the two horizontal axes of the world, in radians, of a pose with
+    /// this rotation `world_from_imu`.
+    pub fn tilt_sigma_rad(&self, world_from_imu: &UnitQuaternion<f64>) -> f64 {
+        let in_world = self.in_world(world_from_imu);
+        (in_world[(3, 3)] + in_world[(4, 4)]).sqrt()
+    }
+
+    /// Covariance of the position in the world, in m².
+    pub fn position_m2(&self) -> Matrix3<f64> {
+        self.0.fixed_view::<3, 3>(3, 3).into_owned()
+    }
+
+    /// The covariance with the position first and rotations about the axes of the world, as ROS messages have it, of a pose
+    /// with this rotation `world_from_imu`.
+    pub fn in_world(&self, world_from_imu: &UnitQuaternion<f64>) -> Matrix6<f64> {
+        let rotation = world_from_imu.to_rotation_matrix();
+        let mut change = Matrix6::zeros();
+        change.fixed_view_mut::<3, 3>(0, 3).copy_from(&Matrix3::identity());
+        change.fixed_view_mut::<3, 3>(3, 0).copy_from(rotation.matrix());
+        let turned = change * self.0 * change.transpose();
+        0.5 * (turned + turned.transpose())
+    }
+
+    /// Normalized error squared (NEES) of an error of the same rows; 6 on average for a consistent estimator. `None` for a
+    /// matrix that is not positive definite.
+    pub fn nees(&self, error: &Vector6<f64>) -> Option<f64> {
+        Some(error.dot(&self.0.cholesky()?.solve(error)))
+    }
+
+    /// The same of the rotation alone, 3 on average.
+    pub fn rotation_nees(&self, error: &Vector6<f64>) -> Option<f64> {
+        let error = error.fixed_rows::<3>(0).into_owned();
+        Some(error.dot(&self.0.fixed_view::<3, 3>(0, 0).into_owned().cholesky()?.solve(&error)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    #[test]
+    fn axes_of_the_world_and_of_the_imu_are_told_apart() {
+        // Rotations about the x axis of the IMU are uncertain; a yaw of 90° makes that the y axis of the world.
+        let covariance = PoseCovariance(Matrix6::from_diagonal(&Vector6::new(0.04, 1e-4, 1e-4, 1.0, 4.0, 4.0)));
+        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2);
+        let found = covariance.in_world(&yaw);
+        let expected = Matrix6::from_diagonal(&Vector6::new(1.0, 4.0, 4.0, 1e-4, 0.04, 1e-4));
+        assert!((found - expected).norm() < 1e-12, "{found}");
+        assert!((covariance.position_sigma_m() - 3.0).abs() < 1e-12);
+        assert!((covariance.tilt_sigma_rad(&yaw) - 0.0401_f64.sqrt()).abs() < 1e-12);
+        assert!((covariance.attitude_sigma_rad() - 0.0402_f64.sqrt()).abs() < 1e-12);
+        let error = Vector6::new(0.2, 0.0, 0.0, 1.0, 0.0, 0.0);
+        assert!((covariance.nees(&error).unwrap() - 2.0).abs() < 1e-12);
+        assert!((covariance.rotation_nees(&error).unwrap() - 1.0).abs() < 1e-12);
+    }
+}

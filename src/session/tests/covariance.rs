@@ -1,0 +1,51 @@
+//! Covariances of poses: against the window's own rows, and against the errors of many flights.
+
+use super::memory::{recorded, recorded_with};
+use crate::estimator::{ColumnGroup, Linearization};
+use crate::session::record::PoseError;
+use crate::simulation::{SyntheticOptions, synthetic_tracks};
+
+/// Standard deviations of the newest pose from the rows of a step, by a dense inverse.
+fn sigmas_of_rows(linearization: &Linearization) -> Vec<f64> {
+    let (measured, prior) = (&linearization.jacobian, &linearization.prior_jacobian);
+    let covariance = (measured.tr_mul(measured) + prior.tr_mul(prior)).try_inverse().unwrap();
+    let mut poses = linearization.columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose);
+    let newest = poses.next_back().unwrap().start;
+    (newest..newest + 6).map(|column| covariance[(column, column)].sqrt()).collect()
+}
+
+#[test]
+fn covariances_are_those_of_the_rows_of_the_window() {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 6.0, ..SyntheticOptions::default() });
+    for spec in ["auto", "auto:encoder=off"] {
+        let run = recorded_with(&flight, spec, Some(20));
+        let kept = run.steps.iter().filter_map(|step| Some((step, step.report.linearization.as_ref()?)));
+        let mut compared = 0;
+        for (step, linearization) in kept {
+            let covariance = step.report.newest_pose_covariance.unwrap().0;
+            for (place, expected) in sigmas_of_rows(linearization).into_iter().enumerate() {
+                // The covariance is that of the linearization before the last iteration.
+                let ratio = covariance[(place, place)].sqrt() / expected;
+                assert!((ratio - 1.0).abs() < 0.02, "{spec} {} component {place}: {ratio}", step.report.stamp_ns);
+            }
+            compared += 1;
+        }
+        assert!(compared >= 2, "{compared} steps");
+    }
+}
+
+#[test]
+fn errors_agree_with_covariances_that_grow_from_the_first_frame_on() {
+    let mut nees = Vec::new();
+    for seed in 1..=6 {
+        let flight = synthetic_tracks(&SyntheticOptions { seed, duration_s: 10.0, ..SyntheticOptions::default() });
+        let errors = recorded(&flight, "auto").pose_errors();
+        let [first, last] = [errors.first(), errors.last()].map(|error| error.unwrap().covariance);
+        assert!(first.position_sigma_m() < 0.03, "{} m", first.position_sigma_m());
+        assert!(last.position_sigma_m() > first.position_sigma_m());
+        nees.push(PoseError::mean_nees(&errors).unwrap());
+    }
+    // Errors of one flight are correlated in time: the six flights count as about six samples of six components.
+    let mean = nees.iter().sum::<f64>() / nees.len() as f64;
+    assert!((3.0..10.0).contains(&mean), "NEES {mean}: {nees:?}");
+}
