@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::Llt;
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::{Reborrow as _, ReborrowMut as _};
 use faer::{Accum, MatMut, MatRef, Par, Side};
 use nalgebra::{DMatrix, DVector};
@@ -100,6 +100,57 @@ impl Band {
         true
     }
 
+    /// Replaces the factor `L` by the entries of `(L Lᵀ)⁻¹` within the band, both triangles of its diagonal blocks.
+    ///
+    /// An entry of the inverse depends on those of the columns behind it within the band alone (Erisman and Tinney, *On
+    /// Computing Certain Elements of the Inverse of a Sparse Matrix*, CACM 1975), here by blocks from the last column on. Sums
+    /// have a fixed order for any number of threads.
+    fn invert(&mut self) {
+        let (width, reach) = (self.width(), self.reach);
+        let mut rows: Vec<&mut [f64]> = self.entries.chunks_exact_mut(BLOCK * width).collect();
+        let mut ratios = vec![0.0; reach * BLOCK * BLOCK];
+        let mut inverse = vec![0.0; reach * BLOCK * BLOCK];
+        for column in (0..rows.len()).rev() {
+            let end = rows.len().min(column + reach + 1);
+            let [own, below @ ..] = &mut rows[column..end] else { break };
+            let mut own = MatMut::from_row_major_slice_mut(own, BLOCK, width).subcols_mut(reach * BLOCK, BLOCK);
+            let pivot = own.to_owned();
+            let count = below.len();
+            let ratios = &mut ratios[..count * BLOCK * BLOCK];
+            let inverse = &mut inverse[..count * BLOCK * BLOCK];
+            // Rows of `L₂₁ L₁₁⁻¹`.
+            below.par_iter().zip(ratios.par_chunks_exact_mut(BLOCK * BLOCK)).enumerate().for_each(
+                |(place, (rows, ratio))| {
+                    let mut ratio = MatMut::from_row_major_slice_mut(ratio, BLOCK, BLOCK);
+                    ratio.copy_from(block_of(rows, width, reach - 1 - place));
+                    solve_upper_triangular_in_place(pivot.transpose(), ratio.rb_mut().transpose_mut(), Par::Seq);
+                },
+            );
+            inverse.par_chunks_exact_mut(BLOCK * BLOCK).enumerate().for_each(|(row, target)| {
+                let mut target = MatMut::from_row_major_slice_mut(target, BLOCK, BLOCK);
+                target.fill(0.0);
+                for (other, ratio) in ratios.chunks_exact(BLOCK * BLOCK).enumerate() {
+                    let ratio = MatRef::from_row_major_slice(ratio, BLOCK, BLOCK);
+                    let known = block_of(below[row.max(other)], width, reach - row.abs_diff(other));
+                    let known = if row >= other { known } else { known.transpose() };
+                    matmul(target.rb_mut(), Accum::Add, known, ratio, -1.0, Par::Seq);
+                }
+            });
+            own.fill(0.0);
+            own.rb_mut().diagonal_mut().fill(1.0);
+            solve_lower_triangular_in_place(pivot.as_ref(), own.rb_mut(), Par::Seq);
+            solve_upper_triangular_in_place(pivot.transpose(), own.rb_mut(), Par::Seq);
+            for (place, rows) in below.iter_mut().enumerate() {
+                let part = place * BLOCK * BLOCK..(place + 1) * BLOCK * BLOCK;
+                let ratio = MatRef::from_row_major_slice(&ratios[part.clone()], BLOCK, BLOCK);
+                let found = MatRef::from_row_major_slice(&inverse[part], BLOCK, BLOCK);
+                matmul(own.rb_mut(), Accum::Add, ratio.transpose(), found, -1.0, Par::Seq);
+                let target = MatMut::from_row_major_slice_mut(rows, BLOCK, width);
+                target.subcols_mut((reach - 1 - place) * BLOCK, BLOCK).copy_from(found);
+            }
+        }
+    }
+
     /// Computes `L⁻¹ x` in place.
     fn forward(&self, vector: &mut [f64]) {
         for row in 0..self.len {
@@ -120,6 +171,11 @@ impl Band {
             }
         }
     }
+}
+
+/// A block of the stored columns of a block of rows.
+fn block_of(rows: &[f64], width: usize, place: usize) -> MatRef<'_, f64> {
+    MatRef::from_row_major_slice(rows, BLOCK, width).subcols(place * BLOCK, BLOCK)
 }
 
 /// Factors the diagonal block at the end of its rows and returns the factor.
@@ -200,6 +256,26 @@ impl ArrowFactor {
     /// Information matrix of the border's unknowns with the band eliminated (borders × borders).
     pub(super) fn border_information(&self) -> &DMatrix<f64> {
         &self.corner
+    }
+
+    /// Covariances of ranges of consecutive unknowns of the band within its width, all others eliminated; `None` when the
+    /// border's Schur complement is not positive definite.
+    pub(super) fn covariances(self, ranges: &[Range<usize>]) -> Option<Vec<DMatrix<f64>>> {
+        let Self { mut band, mut border, corner } = self;
+        // From `L⁻¹Cᵀ` to `A⁻¹Cᵀ`, with which the uncertainty of the border adds to that of the band.
+        border.par_iter_mut().for_each(|row| band.backward(row));
+        band.invert();
+        let shared = if corner.is_empty() { corner } else { corner.cholesky()?.inverse() };
+        let covariance = |range: &Range<usize>| {
+            let response =
+                DMatrix::from_fn(border.len(), range.len(), |unknown, place| border[unknown][range.start + place]);
+            let by_border = response.tr_mul(&(&shared * &response));
+            DMatrix::from_fn(range.len(), range.len(), |row, column| {
+                let (later, earlier) = (range.start + row.max(column), range.start + row.min(column));
+                band.entries[band.index(later, earlier)] + by_border[(row, column)]
+            })
+        };
+        Some(ranges.iter().map(covariance).collect())
     }
 
     /// Solves for band and border; `None` when the border's Schur complement is not positive definite.

@@ -4,9 +4,10 @@ use std::ops::ControlFlow;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
+use super::batch::batch_trajectory;
 use super::bundle::{Priors, gimbal_view};
 use super::chain_prior::ChainTerm;
-use super::frame_sets::{FrameSet, frame_sets};
+use super::frame_sets::{FrameSet, ImuBuffer, frame_sets};
 use super::outcome::{
     CalibratedParameter, CalibrationOutcome, ExtrinsicsReport, ImuResidualReport, PixelReport, PoseLoopReport,
 };
@@ -16,7 +17,7 @@ use super::segments::{self, Segment, SegmentCounts};
 use super::state::{Camera, Columns, Estimate};
 use super::statistics::Statistics;
 use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
-use crate::estimator::{ColumnBlock, ColumnId, Linearization, gravity_in_world, imu_factor};
+use crate::estimator::{ColumnBlock, ColumnId, Linearization, NavigationState, gravity_in_world, imu_factor};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::Chain;
 use crate::observability::{RankReport, analyse};
@@ -72,6 +73,7 @@ pub fn calibrate(
         gravity_in_world: gravity_in_world(input.gravity_m_per_s2),
         priors: &priors,
         options,
+        pose_covariances: options.pose_covariances && name == BOTH,
     };
     let joints = input.gimbal_camera.chain.joint_count();
     let first = Estimate {
@@ -150,6 +152,14 @@ pub fn calibrate(
         iterations: [alone.iterations, both.iterations],
         imu: imu_residual_report(input, &frame_sets, &both.estimate).ok_or_else(|| singular(BOTH))?,
         rank: rank(&both, &visited_rad),
+        trajectory: batch_trajectory(
+            &ImuBuffer::new(&input.static_camera.views),
+            input.imu_noise,
+            &gravity_in_world(input.gravity_m_per_s2),
+            &frame_sets,
+            &both.estimate.navigation,
+            &both.pose_covariances,
+        ),
         warnings: warnings(counts, &segments, &frame_sets),
         visited_rad,
     })
@@ -215,11 +225,7 @@ fn check_measurements(
     })
 }
 
-fn priors(
-    input: &CalibrationInput,
-    options: &CalibrationOptions,
-    navigation: &[crate::estimator::NavigationState],
-) -> Priors {
+fn priors(input: &CalibrationInput, options: &CalibrationOptions, navigation: &[NavigationState]) -> Priors {
     Priors {
         chain: ChainTerm::new(&input.gimbal_camera.chain, &input.gimbal_camera.prior),
         extrinsics: input.static_camera.imu_from_camera,

@@ -109,7 +109,8 @@ impl ImuBuffer {
         samples
     }
 
-    fn integrated(&self, noise: ImuNoise, bias: ImuBias, from_ns: i64, to_ns: i64) -> Preintegration {
+    /// Preintegrated samples of an interval.
+    pub(super) fn integrated(&self, noise: ImuNoise, bias: ImuBias, from_ns: i64, to_ns: i64) -> Preintegration {
         Preintegration::from_samples(noise, bias, &self.between(from_ns, to_ns))
     }
 }

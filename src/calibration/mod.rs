@@ -13,6 +13,7 @@
 //! The chain has its best minimal parameterization, in which every column is observable under sufficient excitation.
 
 mod arrow;
+mod batch;
 mod bundle;
 mod calibrate;
 mod chain_prior;
@@ -35,6 +36,7 @@ mod tests;
 mod trajectory;
 mod visual;
 
+pub use batch::BatchPose;
 pub use calibrate::{CalibrationProgress, calibrate};
 pub use error::CalibrationError;
 pub use imu_noise::{FittedDensity, FlightNoise, ImuNoiseError, NoiseDensity, fit_imu_noise};

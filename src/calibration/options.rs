@@ -23,6 +23,8 @@ pub struct CalibrationOptions {
     pub min_measurements: usize,
     /// Smallest standard deviation of the angle of a moving joint, in radians.
     pub min_joint_motion_rad: f64,
+    /// Whether to compute the covariance of every pose of the trajectory.
+    pub pose_covariances: bool,
     /// Prior standard deviation of a camera's time offset, in seconds.
     pub time_shift_sigma_s: f64,
     /// Prior standard deviations of the first biases about zero, in rad/s and m/s².
@@ -43,6 +45,7 @@ impl Default for CalibrationOptions {
             segment_views: 16,
             min_measurements: 39,
             min_joint_motion_rad: 1.5_f64.to_radians(),
+            pose_covariances: false,
             time_shift_sigma_s: 0.01,
             bias_sigmas: (0.05, 0.5),
         }

@@ -1,5 +1,6 @@
 //! Result of a calibration as plain numbers.
 
+use super::batch::BatchPose;
 use super::statistics::Statistics;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization};
@@ -112,6 +113,8 @@ pub struct CalibrationOutcome {
     pub rank: Option<RankReport>,
     /// Estimated joint angles of all measurements, in radians.
     pub visited_rad: Vec<Vec<f64>>,
+    /// The adjusted trajectory.
+    pub trajectory: Vec<BatchPose>,
     /// Problems that did not stop the calibration.
     pub warnings: Vec<String>,
 }

@@ -4,11 +4,12 @@ use nalgebra::{DMatrix, Vector3};
 
 use super::bundle::{Bundle, Priors};
 use super::frame_sets::FrameSet;
-use super::solver::{adjust, border_covariance};
+use super::solver::{Covariances, adjust, covariances};
 use super::state::{Camera, Columns, Estimate};
 use super::visual::{PixelModel, Track};
 use super::{CalibrationError, CalibrationOptions, observations};
 use crate::camera::CameraModel;
+use crate::estimator::PoseCovariance;
 use crate::geometry::median;
 use crate::optimization::RobustLoss;
 
@@ -30,6 +31,8 @@ pub(super) struct Stage<'a> {
     pub(super) gravity_in_world: Vector3<f64>,
     pub(super) priors: &'a Priors,
     pub(super) options: &'a CalibrationOptions,
+    /// Whether to compute the covariances of the poses.
+    pub(super) pose_covariances: bool,
 }
 
 /// Result of a stage.
@@ -42,6 +45,8 @@ pub(super) struct StageResult {
     pub(super) iterations: usize,
     /// Covariance of the border's unknowns (borders × borders).
     pub(super) covariance: DMatrix<f64>,
+    /// Covariance of the pose of each frame set; empty where the stage does not compute them.
+    pub(super) pose_covariances: Vec<PoseCovariance>,
     /// Information matrix of the priors on the border (borders × borders).
     pub(super) prior_information: DMatrix<f64>,
     /// Lengths of the reprojection residuals of each camera, in pixels.
@@ -122,13 +127,23 @@ impl Stage<'_> {
             kept = tracks;
         }
         let bundle = self.bundle(frame_sets, columns, &kept, sigma_px);
-        let covariance = border_covariance(&bundle, &estimate).ok_or_else(singular)?;
+        let found = covariances(&bundle, &estimate, self.pose_covariances).ok_or_else(singular)?;
+        let Covariances { border: covariance, poses: pose_covariances } = found;
         let poses = bundle.poses(&estimate);
         let residuals_px = [Camera::Static, Camera::Gimbal].map(|camera| {
             observations::residual_lengths_px(&kept, &estimate.landmarks, &poses, &bundle.pixels, camera)
         });
         let prior_information = bundle.border_prior_information(&estimate);
-        Ok(StageResult { estimate, tracks: kept, sigma_px, iterations, covariance, prior_information, residuals_px })
+        Ok(StageResult {
+            estimate,
+            tracks: kept,
+            sigma_px,
+            iterations,
+            covariance,
+            pose_covariances,
+            prior_information,
+            residuals_px,
+        })
     }
 
     fn reintegrate(frame_sets: &mut [FrameSet], estimate: &Estimate) {

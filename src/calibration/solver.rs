@@ -1,10 +1,13 @@
 //! Levenberg–Marquardt on the bundle.
 
-use nalgebra::DMatrix;
+use std::ops::Range;
+
+use nalgebra::{DMatrix, Matrix6};
 
 use super::CalibrationOptions;
 use super::bundle::{Bundle, BundleEquations};
-use super::state::Estimate;
+use super::state::{Columns, Estimate};
+use crate::estimator::PoseCovariance;
 use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
 
 /// Added to the diagonal so that unknowns without a factor do not move.
@@ -59,11 +62,30 @@ impl DampedProblem for DampedBundle<'_> {
     }
 }
 
-/// Covariance of the border's unknowns (borders × borders), all other unknowns eliminated.
-pub(super) fn border_covariance(bundle: &Bundle<'_>, estimate: &Estimate) -> Option<DMatrix<f64>> {
+/// Covariances at an estimate, all other unknowns eliminated.
+pub(super) struct Covariances {
+    /// Of the border's unknowns (borders × borders).
+    pub(super) border: DMatrix<f64>,
+    /// Of the pose of each frame set; empty where they were not asked for.
+    pub(super) poses: Vec<PoseCovariance>,
+}
+
+/// The covariances of the border and, where asked for, of the poses.
+pub(super) fn covariances(bundle: &Bundle<'_>, estimate: &Estimate, of_poses: bool) -> Option<Covariances> {
     let equations = bundle.linearize(estimate);
     let reduced = equations.visual().eliminate(0.0);
     let (mut matrix, _, _) = bundle.assemble(&equations, &reduced);
     matrix.damp(0.0, FLOOR);
-    Some(matrix.factor()?.border_information().clone().cholesky()?.inverse())
+    let factor = matrix.factor()?;
+    let border = factor.border_information().clone().cholesky()?.inverse();
+    let poses = if of_poses {
+        let columns = &bundle.columns;
+        let starts = (0..columns.frame_sets).map(|frame_set| frame_set * columns.block());
+        let ranges: Vec<Range<usize>> = starts.map(|start| start..start + Columns::POSE).collect();
+        let found = factor.covariances(&ranges)?;
+        found.iter().map(|matrix| PoseCovariance(Matrix6::from_column_slice(matrix.as_slice()))).collect()
+    } else {
+        Vec::new()
+    };
+    Some(Covariances { border, poses })
 }

@@ -69,6 +69,8 @@ pub(super) struct Columns {
 }
 
 impl Columns {
+    /// Number of columns of a pose, which come first in a frame set's block.
+    pub(super) const POSE: usize = 6;
     pub(super) const EXTRINSICS: usize = 0;
     pub(super) const STATIC_SHIFT: usize = 6;
     pub(super) const CHAIN: usize = 7;

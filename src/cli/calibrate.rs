@@ -34,7 +34,11 @@ pub(crate) struct CalibrateArguments {
     /// Duration to process from there.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub duration: Option<f64>,
-    /// Overwrite rig.yaml, calibration.json and report.txt whatever they are. Without it only a calibration of a log of the
+    /// Also write the trajectory that the calibration finds, with covariances: trajectory.tum, a reference for runs
+    /// (--truth-trajectory), and covariance.csv.
+    #[arg(long)]
+    pub trajectory: bool,
+    /// Overwrite the files whatever they are. Without it only a calibration of a log of the
     /// same name is replaced.
     #[arg(long)]
     pub force: bool,
@@ -59,7 +63,8 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<Outcome> {
     };
     let interrupt = Interrupt::watch()?;
     let progress = Progress::new();
-    let run = session::calibrate(&request, &CalibrationOptions::default(), &mut |at| {
+    let options = CalibrationOptions { pose_covariances: arguments.trajectory, ..CalibrationOptions::default() };
+    let run = session::calibrate(&request, &options, &mut |at| {
         progress.show(at.fraction, || at.stage.to_owned());
         interrupt.control_flow()
     });
@@ -72,7 +77,7 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<Outcome> {
         run => run?,
     };
     let report = export::report_calibration(&run);
-    export::write_calibration(&run, &report, &arguments.out)?;
+    export::write_calibration(&run, &report, &arguments.out, arguments.trajectory)?;
     if arguments.json {
         print_json(&report)?;
     } else {

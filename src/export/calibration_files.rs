@@ -4,26 +4,41 @@ use std::fs;
 use std::path::Path;
 
 use super::calibration_report::{CalibrationReport, ParameterReport};
+use super::covariance::covariance_of_calibration;
 use super::error::ExportError;
 use super::masks;
+use super::trajectory::tum_of_calibration;
 use crate::flight_log::output::OutputSet;
 use crate::session::CalibrationRun;
 
-/// Writes `rig.yaml`, `calibration.json` and `report.txt` into a folder.
+/// Names of the files of a trajectory.
+pub(super) const TRAJECTORY_FILES: [&str; 2] = ["trajectory.tum", "covariance.csv"];
+
+/// Writes `rig.yaml`, `calibration.json` and `report.txt` into a folder, and where it was asked for the trajectory with its
+/// covariances.
 ///
 /// # Errors
 /// When a file or the folder cannot be written.
-pub fn write_calibration(run: &CalibrationRun, report: &CalibrationReport, folder: &Path) -> Result<(), ExportError> {
+pub fn write_calibration(
+    run: &CalibrationRun,
+    report: &CalibrationReport,
+    folder: &Path,
+    trajectory: bool,
+) -> Result<(), ExportError> {
     fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     let json = serde_json::to_string_pretty(report)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("calibration.json") })?;
     let mut rig = run.rig.clone();
     let masks = masks::beside(&mut rig)?;
-    let files = [
+    let mut files = vec![
         ("calibration.json", format!("{json}\n")),
         ("rig.yaml", format!("{}{}", rig.to_yaml(), sigmas_yaml(report))),
         ("report.txt", report.to_string()),
     ];
+    if trajectory {
+        let texts = [tum_of_calibration(run), covariance_of_calibration(run)];
+        files.extend(TRAJECTORY_FILES.into_iter().zip(texts));
+    }
     let mut outputs = OutputSet::default();
     for (name, text) in files {
         let path = folder.join(name);
@@ -33,7 +48,14 @@ pub fn write_calibration(run: &CalibrationRun, report: &CalibrationReport, folde
         let path = folder.join(name);
         outputs.write(&path, &png).map_err(ExportError::write(&path))?;
     }
-    outputs.commit().map_err(ExportError::commit)
+    outputs.commit().map_err(ExportError::commit)?;
+    for name in TRAJECTORY_FILES.into_iter().filter(|_| !trajectory) {
+        let path = folder.join(name);
+        if path.is_file() {
+            fs::remove_file(&path).map_err(ExportError::write(&path))?;
+        }
+    }
+    Ok(())
 }
 
 /// The standard deviations as an additional entry of the rig file, which readers of rigs ignore.

@@ -44,8 +44,15 @@ fn check(len: usize, half_width: usize, borders: usize) {
     let (band, shared) = factor.solve(&right.as_slice()[..len], &border).unwrap();
     let found: Vec<f64> = band.into_iter().chain(shared.iter().copied()).collect();
     assert!((DVector::from_vec(found) - expected).amax() < 1e-12, "{len} {half_width} {borders}");
+    let inverse = dense.try_inverse().unwrap();
+    let size = len.min(6).min(half_width + 1);
+    let ranges: Vec<_> = (0..=len - size).step_by(size).map(|start| start..start + size).collect();
+    for (range, found) in ranges.iter().zip(factor.clone().covariances(&ranges).unwrap()) {
+        let expected = inverse.view((range.start, range.start), (size, size));
+        assert!((found - expected).amax() < 1e-14, "{len} {half_width} {borders}: {range:?}");
+    }
     if borders > 0 {
-        let covariance = dense.try_inverse().unwrap().view((len, len), (borders, borders)).into_owned();
+        let covariance = inverse.view((len, len), (borders, borders)).into_owned();
         let information = factor.border_information().clone().try_inverse().unwrap();
         assert!((covariance - information).amax() < 1e-12);
     }

@@ -1,10 +1,15 @@
 //! Whole synthetic flights against their ground truth.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
-use super::fixture::flight;
-use crate::calibration::{CalibrationError, CalibrationOptions, calibrate, chain_distance, transform_distance};
-use crate::geometry::{Dimension, wrap_angle};
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::fixture::{flight, true_states};
+use crate::calibration::{
+    CalibrationError, CalibrationOptions, Statistics, calibrate, chain_distance, transform_distance,
+};
+use crate::geometry::{Dimension, RigidTransform, wrap_angle};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::sensors::ChainPrior;
 use crate::simulation::SyntheticOptions;
@@ -112,4 +117,48 @@ fn a_calibration_ends_at_the_stage_in_which_it_is_interrupted() {
     let images = flight.input.static_camera.views.len();
     assert_eq!(stage_at(0), CalibrationError::Interrupted { stage: "processing the static camera" });
     assert_eq!(stage_at(images), CalibrationError::Interrupted { stage: "calibrating the static camera" });
+}
+
+/// The trajectory of the bundle against the true one: errors agree with the covariances, and the poses between the adjusted
+/// ones are as good.
+#[test]
+fn the_batch_trajectory_is_within_its_sigmas() {
+    let mut nees = Vec::new();
+    for seed in 1..=3 {
+        let flight = flight(&options(seed));
+        let asked = CalibrationOptions { pose_covariances: true, ..CalibrationOptions::default() };
+        let outcome = calibrate(&flight.input, &asked, &mut |_| ControlFlow::Continue(())).unwrap();
+        let stamps_ns = flight.input.static_camera.views.iter().map(|view| view.stamp_ns);
+        let truths: BTreeMap<i64, RigidTransform> =
+            stamps_ns.zip(true_states(&flight)).map(|(stamp_ns, state)| (stamp_ns, state.world_from_imu)).collect();
+        let first = &outcome.trajectory[0];
+        let true_first = truths[&first.stamp_ns];
+        let turn = first.world_from_imu.rotation * true_first.rotation.inverse();
+        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * turn.k.atan2(turn.w));
+        let moved = first.world_from_imu.translation_m - yaw * true_first.translation_m;
+        let world_from_true = RigidTransform::new(yaw, moved);
+        let errors = outcome.trajectory.iter().filter_map(|pose| {
+            let truth = world_from_true * *truths.get(&pose.stamp_ns)?;
+            Some((pose, pose.world_from_imu.minus(&truth)))
+        });
+        let [mut adjusted_m, mut between_m] = [Vec::new(), Vec::new()];
+        for (pose, error) in errors {
+            let of = if pose.covariance.is_some() { &mut adjusted_m } else { &mut between_m };
+            of.push(error.fixed_rows::<3>(3).norm());
+            nees.extend(pose.covariance.and_then(|covariance| covariance.nees(&error)));
+        }
+        let [adjusted, between] = [&adjusted_m, &between_m].map(|errors| Statistics::of(errors).unwrap());
+        let sigmas: Vec<f64> =
+            outcome.trajectory.iter().filter_map(|pose| Some(pose.covariance?.position_sigma_m())).collect();
+        let sigma_m = Statistics::of(&sigmas).unwrap().mean;
+        assert!(adjusted.mean < 2.0 * sigma_m && sigma_m < 0.05, "seed {seed}: {} m, σ {sigma_m} m", adjusted.mean);
+        assert!(
+            (between.mean / adjusted.mean - 1.0).abs() < 0.05,
+            "seed {seed}: {} and {} m",
+            between.mean,
+            adjusted.mean
+        );
+    }
+    let mean = nees.iter().sum::<f64>() / nees.len() as f64;
+    assert!((2.0..14.0).contains(&mean), "NEES {mean} of {} poses", nees.len());
 }

@@ -86,6 +86,8 @@ pub struct CalibrationRequest {
 pub struct CalibrationRun {
     /// Path of the log.
     pub log_path: PathBuf,
+    /// Time of the log's first message, to which stamps are relative, in nanoseconds.
+    pub epoch_ns: i64,
     /// The rig before the calibration, which gave the initial values.
     pub given_rig: Rig,
     /// The rig with the calibrated values and a prior from their standard deviations.
@@ -127,6 +129,7 @@ pub fn calibrate(
     .map_err(|reason| CalibrationRunError::Calibration { reason, path: request.log_path.clone() })?;
     Ok(CalibrationRun {
         log_path: request.log_path.clone(),
+        epoch_ns: log.epoch_ns(),
         rig: calibrated(&given_rig, &entries, &outcome),
         static_camera: entries.static_camera.key.clone(),
         gimbal_camera: entries.gimbal_camera.key.clone(),
