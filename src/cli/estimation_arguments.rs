@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use dcvins::session::{RunSpec, SessionRequest};
+use dcvins::sensors::LeverArm;
+use dcvins::session::{RunSpec, SessionRequest, TrajectorySource, TrajectorySpec};
 
 use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::value_parsers::seconds;
@@ -13,15 +14,27 @@ use crate::cli::value_parsers::seconds;
 pub(crate) struct EstimationArguments {
     /// A run over the log: NAME[:key=value,…], NAME one of auto, minimal, minimal-swapped, classical, poe, static,
     /// cluster; keys encoder=on|off, calibrate=on|off, timeshift=on|off, readout=on|off, intrinsics=on|off,
-    /// imu-intrinsics=on|off, first-estimates=on|off, window=N, camera=KEY, name=LABEL. Up to four.
+    /// imu-intrinsics=on|off, first-estimates=on|off, window=N, pixel-noise=F, imu-noise=F, encoder-noise=F,
+    /// loss=none|huber-K|cauchy-K, iterations=N, camera=KEY, name=LABEL. Up to four.
     #[arg(long = "run", value_name = "SPEC")]
     pub runs: Vec<RunSpec>,
+    /// A trajectory of another program beside the runs, aligned and evaluated like them: FILE[:LABEL] in TUM's or EuRoC's format
+    /// with header stamps of the log, or topic:NAME[:LABEL] for a topic of odometry, stamped poses or transforms. Up to four.
+    #[arg(long = "trajectory", value_name = "FILE[:LABEL]")]
+    pub trajectories: Vec<TrajectorySpec>,
     /// The rig, when it is not beside the log (LOG with .rig.yaml) or attached to it.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
     /// The ground truth of the rig, when it is not beside the log (LOG with .truth.yaml).
     #[arg(long = "truth", value_name = "FILE")]
     pub ground_truth: Option<PathBuf>,
+    /// Ground truth of the trajectory instead of the rig's topic: a file in TUM's or EuRoC's format, or topic:NAME. Poses of
+    /// the IMU, or positions of an antenna (without attitudes, stamped points, satellite fixes).
+    #[arg(long, value_name = "FILE", value_parser = truth_trajectory)]
+    pub truth_trajectory: Option<TrajectorySource>,
+    /// Where the antenna is whose positions are the ground truth: X,Y,Z in metres in the IMU frame, or estimate.
+    #[arg(long, value_name = "X,Y,Z|estimate", value_parser = lever_arm, allow_hyphen_values = true)]
+    pub lever_arm: Option<LeverArm>,
     /// Skip this many seconds at the start of the log.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     pub start: f64,
@@ -33,6 +46,14 @@ pub(crate) struct EstimationArguments {
     pub limits: LimitArguments,
 }
 
+fn truth_trajectory(text: &str) -> Result<TrajectorySource, String> {
+    text.parse::<TrajectorySource>().map_err(|problem| problem.to_string())
+}
+
+fn lever_arm(text: &str) -> Result<LeverArm, String> {
+    text.parse::<LeverArm>()
+}
+
 impl EstimationArguments {
     /// The session request with these arguments.
     pub(crate) fn request(&self, log_path: PathBuf) -> SessionRequest {
@@ -41,6 +62,9 @@ impl EstimationArguments {
             rig_path: self.rig.clone(),
             ground_truth_path: self.ground_truth.clone(),
             specs: self.runs.clone(),
+            trajectories: self.trajectories.clone(),
+            truth_trajectory: self.truth_trajectory.clone(),
+            lever_arm: self.lever_arm,
             start_s: self.start,
             duration_s: self.duration,
             limits: self.limits.limits(),

@@ -13,7 +13,7 @@ use crate::cli::compute::{compute, compute_until};
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::Outcome;
 use crate::cli::interrupt::Interrupt;
-use crate::cli::run_summary::describe;
+use crate::cli::run_summary::{describe, describe_trajectory};
 use crate::cli::terminal::{notify, print, print_json};
 
 /// `dcvins run`.
@@ -88,6 +88,9 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Outcome> {
     } else {
         for (folder, summary) in &summaries {
             print(&describe(folder, summary))?;
+        }
+        for lane in summaries.first().iter().flat_map(|(_, summary)| &summary.trajectories) {
+            print(&describe_trajectory(lane))?;
         }
         if let Some(condition) = &arguments.break_at {
             print(&describe_break(condition, hit.as_ref()))?;

@@ -2,8 +2,38 @@
 
 use std::path::Path;
 
-use dcvins::export::{self, RunSummary};
+use dcvins::export::{self, Accuracy, AntennaSummary, RunSummary, TrajectorySummary};
 use dcvins::observability::{Estimability, MIN_SPURIOUS_GAIN};
+
+/// The text of a trajectory beside the runs for the terminal.
+pub(crate) fn describe_trajectory(lane: &TrajectorySummary) -> String {
+    let accuracy = match (&lane.accuracy, &lane.accuracy_missing) {
+        (Some(accuracy), _) => accuracy_text(accuracy, lane.length_m),
+        (None, Some(reason)) => format!("not available: {reason}"),
+        (None, None) => "not available".to_owned(),
+    };
+    format!("trajectory {} ({}, {} poses)\n  accuracy     {accuracy}\n", lane.label, lane.source, lane.poses)
+}
+
+/// Errors of a trajectory in one line.
+fn accuracy_text(accuracy: &Accuracy, length_m: f64) -> String {
+    let antenna = accuracy.antenna.as_ref().map_or_else(String::new, |antenna| format!(", {}", antenna_text(antenna)));
+    format!(
+        "ATE {:.3} m RMSE, {:.3} m max (alignment {}), {:.2} % of {length_m:.1} m{antenna}",
+        accuracy.ate_rmse_m, accuracy.ate_max_m, accuracy.alignment, accuracy.ate_percent_of_length,
+    )
+}
+
+/// The lever arm of the antenna whose positions are the ground truth.
+fn antenna_text(antenna: &AntennaSummary) -> String {
+    let [x, y, z] = antenna.lever_arm_m;
+    match antenna.lever_arm_sigma_m {
+        None => format!("of the antenna at ({x:.3}, {y:.3}, {z:.3}) m"),
+        Some([sx, sy, sz]) => {
+            format!("of the antenna, estimated at ({x:.3} ± {sx:.3}, {y:.3} ± {sy:.3}, {z:.3} ± {sz:.3}) m")
+        }
+    }
+}
 
 /// The text of a run's summary for the terminal.
 pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
@@ -17,14 +47,7 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
         frames.estimated, frames.total, frames.keyframes, frames.restarts
     ));
     if let Some(accuracy) = &summary.accuracy {
-        lines.push(format!(
-            "  accuracy     ATE {:.3} m RMSE, {:.3} m max (alignment {}), {:.2} % of {:.1} m\n",
-            accuracy.ate_rmse_m,
-            accuracy.ate_max_m,
-            accuracy.alignment,
-            accuracy.ate_percent_of_length,
-            summary.length_m
-        ));
+        lines.push(format!("  accuracy     {}\n", accuracy_text(accuracy, summary.length_m)));
     } else if let Some(reason) = &summary.accuracy_missing {
         lines.push(format!("  accuracy     not available: {reason}\n"));
     }

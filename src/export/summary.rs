@@ -13,7 +13,7 @@ use crate::gimbal::{ClassicalChain, ParameterId};
 use crate::observability::{ParameterRate, information_rate};
 use crate::sensors::Rig;
 use crate::session::accuracy::{Alignment, path_length_m};
-use crate::session::{Recording, RunRecord, RunWarning, TrajectoryAccuracy};
+use crate::session::{Recording, RunRecord, RunWarning, TrajectoryAccuracy, TrajectoryLane};
 
 /// Frame counts of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -60,8 +60,20 @@ pub struct Accuracy {
     pub ate_max_m: f64,
     /// Root mean square of the absolute position error in percent of the path length.
     pub ate_percent_of_length: f64,
-    /// Relative errors by path length.
+    /// Relative errors by path length; none where the ground truth is positions.
     pub rpe: Vec<RelativeError>,
+    /// The antenna whose positions are the ground truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub antenna: Option<AntennaSummary>,
+}
+
+/// The lever arm of an antenna.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AntennaSummary {
+    /// Position in the IMU frame in metres.
+    pub lever_arm_m: [f64; 3],
+    /// Standard deviations, where it was estimated.
+    pub lever_arm_sigma_m: Option<[f64; 3]>,
 }
 
 /// One calibration parameter, initial and final.
@@ -241,24 +253,52 @@ pub struct RunSummary {
     pub real_time_factor: Option<f64>,
     /// Warnings about the log and of the run.
     pub warnings: Vec<String>,
+    /// Trajectories of other programs beside the runs, evaluated like them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub trajectories: Vec<TrajectorySummary>,
+}
+
+/// A trajectory of another program.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TrajectorySummary {
+    /// Its name.
+    pub label: String,
+    /// The file or the topic that it was read from.
+    pub source: String,
+    /// Number of its poses within the time of the session.
+    pub poses: usize,
+    /// Path length in metres, of the ground truth at its stamps where there is one, else its own.
+    pub length_m: f64,
+    /// Errors against ground truth.
+    pub accuracy: Option<Accuracy>,
+    /// The reason why there is no accuracy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy_missing: Option<String>,
+}
+
+impl TrajectorySummary {
+    fn of(lane: &TrajectoryLane) -> Self {
+        Self {
+            label: lane.label.clone(),
+            source: lane.source.clone(),
+            poses: lane.track.samples().len(),
+            length_m: lane.length_m,
+            accuracy: lane.evaluation.accuracy.as_ref().map(accuracy_summary),
+            accuracy_missing: lane.accuracy_missing.clone(),
+        }
+    }
 }
 
 /// The summary of one run of a recording.
 pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSummary {
     let estimated: Vec<_> = run.steps.iter().filter(|step| step.report.newest().is_some()).collect();
-    let pairs = run.pairs_with_ground_truth();
     let positions: Vec<_> = estimated.iter().filter_map(|step| step.report.newest()).collect();
-    let length_m = if pairs.is_empty() {
-        path_length_m(positions.iter().map(|frame| &frame.world_from_imu.translation_m))
-    } else {
-        path_length_m(pairs.iter().map(|(_, ground_truth)| &ground_truth.pose.translation_m))
-    };
-    let accuracy = TrajectoryAccuracy::of(&pairs).map(|accuracy| accuracy_summary(&accuracy));
-    let accuracy_missing = match (&accuracy, estimated.is_empty(), pairs.is_empty()) {
-        (Some(_), _, _) => None,
-        (None, true, _) => Some(never_initialized(run)),
-        (None, false, true) => Some("no ground truth for the estimated frames in the log".to_owned()),
-        (None, false, false) => Some("too few frames with ground truth to align".to_owned()),
+    let own_length_m = || path_length_m(positions.iter().map(|frame| &frame.world_from_imu.translation_m));
+    let length_m = run.true_length_m().unwrap_or_else(own_length_m);
+    let (accuracy, accuracy_missing) = match run.accuracy() {
+        Ok(accuracy) => (Some(accuracy_summary(&accuracy)), None),
+        Err(_) if estimated.is_empty() => (None, Some(never_initialized(run))),
+        Err(reason) => (None, Some(reason)),
     };
     RunSummary {
         log: log_name(&recording.log_path),
@@ -279,6 +319,7 @@ pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSum
         timing_ms: if timing { timing_summary(run) } else { None },
         real_time_factor: if timing { real_time_factor(run) } else { None },
         warnings: warnings(recording, run),
+        trajectories: recording.trajectories.iter().map(|lane| TrajectorySummary::of(lane)).collect(),
     }
 }
 
@@ -307,7 +348,7 @@ fn never_initialized(run: &RunRecord) -> String {
 }
 
 fn accuracy_summary(accuracy: &TrajectoryAccuracy) -> Accuracy {
-    let TrajectoryAccuracy { length_m, absolute_m: errors, relative } = accuracy;
+    let TrajectoryAccuracy { length_m, absolute_m: errors, relative, antenna } = accuracy;
     let rpe = relative.iter().map(|over| RelativeError {
         delta_m: over.delta_m,
         pairs: over.translation_m.count,
@@ -323,6 +364,10 @@ fn accuracy_summary(accuracy: &TrajectoryAccuracy) -> Accuracy {
         ate_max_m: errors.max,
         ate_percent_of_length: if *length_m > 0.0 { 100.0 * errors.rmse / length_m } else { 0.0 },
         rpe: rpe.collect(),
+        antenna: antenna.as_ref().map(|antenna| AntennaSummary {
+            lever_arm_m: antenna.lever_arm_m.into(),
+            lever_arm_sigma_m: antenna.lever_arm_sigma_m.map(Into::into),
+        }),
     }
 }
 

@@ -1,6 +1,15 @@
 //! Motions that make the calibration of sensors observable.
 
+use super::RankReport;
 use crate::gimbal::{ParameterId, ParameterPart, Quantity};
+
+impl RankReport {
+    /// The least observable parameter with the motion that determines it, where it belongs to a sensor.
+    pub fn sensor_excitation(&self) -> Option<(ParameterId, &'static str)> {
+        let parameter = self.least_observable()?;
+        Some((parameter, exciting_motion(parameter)?))
+    }
+}
 
 /// The motion that determines a parameter of a sensor, in words; `None` for the chain, whose excitation depends on its state
 /// ([`super::laboratory::advise`]).

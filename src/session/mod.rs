@@ -6,6 +6,7 @@
 //! A folder uses those above it in this list and none below it:
 //!
 //! - [`accuracy`]: trajectory errors against ground truth.
+//! - [`antenna`]: the same against positions of an antenna, with its lever arm.
 //! - `plan/`: the definition of a session: log, rig, runs, and the changes of a fork.
 //! - `record/`: the reports of every step as plain data; no threads, and nothing that runs an estimator.
 //! - [`breakpoints`]: conditions on those reports.
@@ -15,6 +16,7 @@
 //!   record.
 
 pub mod accuracy;
+pub mod antenna;
 pub mod breakpoints;
 mod engine;
 mod plan;
@@ -28,15 +30,16 @@ pub use engine::{
     Stopwatch, calibrate, camera_rotations, compute, compute_until, fit_flight_noise, image_rotations,
 };
 pub use plan::{
-    DEFAULT_MEMORY_BUDGET_BYTES, FORK_PARAMETERIZATIONS, ForkChanges, ForkError, MAX_RUNS, ParameterizationChoice,
-    RunSpec, RunSpecError, SessionError, SessionPlan, SessionRequest,
+    DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, ForkChanges, ForkError, LoadedPositions,
+    LoadedTrajectory, MAX_RUNS, MAX_TRAJECTORIES, ParameterizationChoice, RunSpec, RunSpecError, SessionError,
+    SessionPlan, SessionRequest, TrajectorySource, TrajectorySpec, TrajectorySpecError,
 };
 pub use playback::{
     Command, Cursor, FrameImage, MoveOutcome, Moved, PlaybackSpeed, SavedBreakpoint, SavedFork, SavedLog, SavedSession,
     SavedSessionError, Session,
 };
 pub use record::{
-    ChainDistance, Comparison, Divergence, ForkOrigin, LostSince, PoseConsistency, PoseUncertainty, Quantity,
+    ChainDistance, Comparison, Divergence, ForkOrigin, LostSince, PoseConsistency, PoseError, PositionTruth, Quantity,
     RELATIVE_LENGTHS_M, Recording, RelativeAccuracy, RunMemory, RunRecord, RunWarning, SolverPosition, SolverTrace,
-    StepFactorRows, StepRecord, TrajectoryAccuracy,
+    StepFactorRows, StepRecord, TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane, evaluate_trajectory,
 };

@@ -6,8 +6,16 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-const FILES: [&str; 7] =
-    ["trajectory.tum", "calibration.csv", "rank.csv", "information.csv", "frames.csv", "rig.yaml", "summary.json"];
+const FILES: [&str; 8] = [
+    "trajectory.tum",
+    "covariance.csv",
+    "calibration.csv",
+    "rank.csv",
+    "information.csv",
+    "frames.csv",
+    "rig.yaml",
+    "summary.json",
+];
 
 fn sample(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs").join(name)

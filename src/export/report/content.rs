@@ -80,12 +80,11 @@ impl ReportContent {
         inputs: Vec<InputFile>,
         options: &ReportOptions,
     ) -> Self {
-        let runs = recording.runs.iter().zip(summaries).enumerate().map(|(number, (run, summary))| {
-            let pose = options.pose_uncertainties.get(number).copied().flatten();
+        let runs = recording.runs.iter().zip(summaries).map(|(run, summary)| {
             let (events, frequent_events) = events(run);
             RunContent {
                 label: run.spec.label.clone(),
-                verdict: RunVerdict::new(recording, run, &summary, pose),
+                verdict: RunVerdict::new(recording, run, &summary),
                 summary,
                 estimability: estimability_summary(recording, run),
                 rank_intervals: rank_intervals(run, &recording.rig),

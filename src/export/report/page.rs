@@ -32,6 +32,9 @@ pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String 
                 h2 #accuracy { "Accuracy" }
                 (tables::accuracy(content))
                 (tables::frames(content))
+                @if let Some(trajectories) = tables::trajectories(content) {
+                    (trajectories)
+                }
                 @for (index, run) in content.runs.iter().enumerate() {
                     (run_section(index, run))
                 }
@@ -52,7 +55,7 @@ pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String 
                 (tables::inputs(content))
                 p {
                     "Version: " (content.program) ". The same files, command and version give the same bytes. Files beside \
-                     this page: report.json and, for each run, trajectory.tum, calibration.csv, rank.csv, information.csv, \
+                     this page: report.json and, for each run, trajectory.tum, covariance.csv, calibration.csv, rank.csv, information.csv, \
                      frames.csv, rig.yaml and summary.json."
                 }
             }

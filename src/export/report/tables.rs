@@ -6,7 +6,7 @@ use super::content::{ReportContent, RunContent};
 use super::html::{list, number, table};
 use super::verdict::ParameterVerdict;
 use crate::export::estimability::EstimabilitySummary;
-use crate::export::summary::ParameterSummary;
+use crate::export::summary::{ParameterSummary, TrajectorySummary};
 use crate::geometry::Dimension;
 use crate::log_check::{CheckReport, Severity};
 
@@ -41,29 +41,32 @@ pub(super) fn frames(content: &ReportContent) -> Markup {
     table("Frames and path length", &header, &rows)
 }
 
-/// Trajectory errors of each run.
+/// Trajectory errors of each run, and of each trajectory beside the runs.
 pub(super) fn accuracy(content: &ReportContent) -> Markup {
     let mut header =
         ["run", "ATE RMSE, m", "mean, m", "median, m", "max, m", "RMSE, % of length"].map(str::to_owned).to_vec();
     // All runs have relative errors over the same lengths, as far as their paths are long enough.
     let mut lengths_m: Vec<f64> = Vec::new();
-    for relative in content.runs.iter().filter_map(|run| run.summary.accuracy.as_ref()).flat_map(|found| &found.rpe) {
+    // Every summary has the trajectories.
+    let trajectories = content.runs.first().map_or(&[][..], |run| &run.summary.trajectories);
+    let of_runs = content.runs.iter().map(|run| (&run.label, &run.summary.accuracy, &run.summary.accuracy_missing));
+    let of_trajectories = trajectories.iter().map(|lane| (&lane.label, &lane.accuracy, &lane.accuracy_missing));
+    let all: Vec<_> = of_runs.chain(of_trajectories).collect();
+    for relative in all.iter().filter_map(|&(_, accuracy, _)| accuracy.as_ref()).flat_map(|found| &found.rpe) {
         if !lengths_m.contains(&relative.delta_m) {
             lengths_m.push(relative.delta_m);
         }
     }
     lengths_m.sort_by(f64::total_cmp);
     header.extend(lengths_m.iter().map(|length_m| format!("RPE over {length_m} m")));
-    let rows: Vec<Vec<String>> = content
-        .runs
-        .iter()
-        .map(|run| {
-            let Some(accuracy) = &run.summary.accuracy else {
-                let reason = run.summary.accuracy_missing.clone().unwrap_or_default();
-                return vec![run.label.clone(), reason];
+    let rows: Vec<Vec<String>> = all
+        .into_iter()
+        .map(|(label, accuracy, missing)| {
+            let Some(accuracy) = accuracy else {
+                return vec![label.clone(), missing.clone().unwrap_or_default()];
             };
             let mut row = vec![
-                run.label.clone(),
+                label.clone(),
                 number(accuracy.ate_rmse_m, 4),
                 number(accuracy.ate_mean_m, 4),
                 number(accuracy.ate_median_m, 4),
@@ -84,6 +87,17 @@ pub(super) fn accuracy(content: &ReportContent) -> Markup {
         &header,
         &rows,
     )
+}
+
+/// The trajectories of other programs, `None` without one.
+pub(super) fn trajectories(content: &ReportContent) -> Option<Markup> {
+    let lanes = &content.runs.first()?.summary.trajectories;
+    let row = |lane: &TrajectorySummary| {
+        vec![lane.label.clone(), lane.source.clone(), lane.poses.to_string(), number(lane.length_m, 1)]
+    };
+    let rows: Vec<Vec<String>> = lanes.iter().map(row).collect();
+    let caption = "Trajectories of other programs: poses only, without calibration, features and residuals";
+    (!rows.is_empty()).then(|| table(caption, &["trajectory", "file or topic", "poses", "path length, m"], &rows))
 }
 
 /// Calibration of one run in degrees, millimetres and milliseconds.

@@ -10,8 +10,8 @@ use crate::export::summary::{Accuracy, ChainError, RunSummary};
 use crate::geometry::{Dimension, seconds_from_ns};
 use crate::log_check::{CheckReport, Severity};
 use crate::observability::laboratory::{Situation, advise};
-use crate::observability::{ParameterState, RankReport, exciting_motion, parameter_states, parameters_of};
-use crate::session::{LostSince, PoseUncertainty, Recording, RunRecord, StepRecord};
+use crate::observability::{ParameterState, RankReport, parameter_states, parameters_of};
+use crate::session::{LostSince, PoseError, Recording, RunRecord, StepRecord};
 
 /// A parameter counts as informed when its posterior σ is at most this ratio of its prior σ: the measurements then
 /// contribute at least as much information as the prior.
@@ -76,15 +76,10 @@ pub(super) struct RunVerdict {
 }
 
 impl RunVerdict {
-    /// The verdict on a run; `pose` is the standard deviation of its last pose.
-    pub(super) fn new(
-        recording: &Recording,
-        run: &RunRecord,
-        summary: &RunSummary,
-        pose: Option<PoseUncertainty>,
-    ) -> Self {
+    /// The verdict on a run.
+    pub(super) fn new(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Self {
         let parameters = parameters(recording, run);
-        let mut statements = vec![accuracy(run, summary, pose)];
+        let mut statements = vec![accuracy(recording, run, summary)];
         statements.push(calibration(&parameters, summary));
         statements.extend(observability(recording, run));
         statements.push(estimation(run, summary));
@@ -97,15 +92,23 @@ fn statement(topic: &'static str, mark: Mark, text: String, details: Vec<String>
 }
 
 /// Errors against the ground truth, without one the covariance of the last pose.
-fn accuracy(run: &RunRecord, summary: &RunSummary, pose: Option<PoseUncertainty>) -> Statement {
-    let last = run.steps.iter().rev().find(|step| step.report.newest().is_some());
-    let uncertainty = last.zip(pose).map(|(last, pose)| {
-        format!(
+fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Statement {
+    let nees = PoseError::mean_nees(&run.pose_errors());
+    let last = run.steps.iter().rev().find_map(|step| Some((step, step.report.newest_pose_covariance?)));
+    let uncertainty = last.map(|(last, covariance)| {
+        let text = format!(
             "at {} s position ±{}, attitude ±{}° (1σ, relative to the first estimated frame)",
             number(seconds_from_ns(last.report.stamp_ns), 2),
-            length(pose.position_m),
-            number(pose.attitude_rad.to_degrees(), 2)
-        )
+            length(covariance.position_sigma_m()),
+            number(covariance.attitude_sigma_rad().to_degrees(), 2)
+        );
+        match nees {
+            Some(nees) => format!(
+                "{text}; squared error over covariance {} on average (NEES, 6 when consistent)",
+                number(nees, 1)
+            ),
+            None => text,
+        }
     });
     match (&summary.accuracy, uncertainty) {
         (Some(found), uncertainty) => {
@@ -127,6 +130,10 @@ fn accuracy(run: &RunRecord, summary: &RunSummary, pose: Option<PoseUncertainty>
             });
             let relative: Vec<String> = relative.collect();
             let mut details = Vec::new();
+            if recording.truth_is_batch {
+                let of = "The errors are distances to the batch reference (dcvins calibrate --trajectory), which is from the same measurements and no independent ground truth.";
+                details.push(of.to_owned());
+            }
             if !relative.is_empty() {
                 details.push(format!("Relative pose error (RPE, RMSE): {}.", relative.join("; ")));
             }
@@ -259,9 +266,7 @@ fn observability(recording: &Recording, run: &RunRecord) -> Option<Statement> {
         let at_s = number(seconds_from_ns(stamp_ns), 2);
         details.push(format!("Largest informed rank of the run: {most} at {at_s} s."));
     }
-    if let Some((parameter, motion)) =
-        rank.least_observable().and_then(|parameter| Some((parameter, exciting_motion(parameter)?)))
-    {
+    if let Some((parameter, motion)) = rank.sensor_excitation() {
         details.push(format!("Suggested excitation for {}: {motion}.", names.name(parameter)));
     }
     if rank.rank_informed < columns

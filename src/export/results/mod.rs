@@ -10,7 +10,7 @@ mod series;
 use std::path::Path;
 
 use crate::flight_log::output::StagedFile;
-use crate::flight_log::{LogError, LogLevel, LogWriter, LogWriterOptions, MessageTimes, NamedTransform};
+use crate::flight_log::{LogError, LogLevel, LogWriter, LogWriterOptions, MessageTimes, NamedTransform, Odometry};
 use crate::frontend::FeatureId;
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
@@ -105,10 +105,13 @@ impl Results {
         let transforms = self.transforms(&report.calibration.classical, step);
         self.log.write_transforms("/tf", times, &transforms)?;
         let pose = newest.world_from_imu;
-        let velocity = pose.rotation.inverse() * newest.velocity_m_per_s;
-        let angular_rate = nalgebra::Vector3::zeros();
-        let odometry = self.names.topic("odometry");
-        self.log.write_odometry(&odometry, &run_world, &imu, times, &pose, &velocity, &angular_rate)?;
+        let covariance = report.newest_pose_covariance.map(|covariance| covariance.in_world(&pose.rotation));
+        let odometry = Odometry {
+            pose_covariance: covariance.unwrap_or_default(),
+            linear_m_per_s: pose.rotation.inverse() * newest.velocity_m_per_s,
+            ..Odometry::at_rest(&run_world, &imu, pose)
+        };
+        self.log.write_odometry(&self.names.topic("odometry"), times, &odometry)?;
         let points: Vec<_> =
             report.landmarks.iter().map(|landmark| (short_id(landmark.id), landmark.position_m)).collect();
         self.log.write_points(&self.names.topic("landmarks"), &run_world, times, &points)?;

@@ -1,6 +1,6 @@
 //! The comparison of all runs as a long table, one value per row.
 
-use super::ComparisonPanel;
+use super::{ComparisonPanel, label_of};
 use crate::gui::PanelContext;
 use crate::gui::csv_table::{CsvTable, Table, number, seconds};
 use crate::session::Quantity;
@@ -9,9 +9,8 @@ impl CsvTable for ComparisonPanel {
     /// Accuracy of all runs, their first divergences from the reference, and the differences of every common frame.
     /// Differences are in stored units (radians, metres), accuracy in the units of the panel.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
-        let runs = &ctx.recording.runs;
         let mut table = Table::new(["kind", "run", "reference", "quantity", "unit", "t_s", "value"]);
-        let label = |run: usize| runs.get(run).map_or_else(String::new, |run| run.spec.label.clone());
+        let label = |index: usize| label_of(ctx.recording, index).to_owned();
         let comparisons = self.comparisons(ctx).to_vec();
         for row in self.scores().rows() {
             for (run, value) in row.values.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! The comparison panel: one run against the ground truth, or up to four runs at one cursor, as tables, as differences over time, and as images and scenes
-//! side by side.
+//! The comparison panel: one run against the ground truth, or up to four runs at one cursor, as tables, as differences over
+//! time, and as images and scenes side by side.
 
 mod csv;
 mod numbers;
@@ -13,6 +13,7 @@ mod tests;
 
 use egui::{ComboBox, Rect, RichText, ScrollArea, Ui, UiBuilder, Vec2, vec2};
 
+pub(in crate::gui) use self::numbers::POSES_ONLY;
 use self::over_time::OverTime;
 use self::scores::Scores;
 use self::side_by_side::{Images, Scenes};
@@ -21,7 +22,8 @@ use super::PanelContext;
 use super::convergence::empty_ui;
 use super::rank;
 use super::window::Dialog;
-use crate::session::Comparison;
+use crate::gui::theme::{RunStyle, Theme};
+use crate::session::{Comparison, Recording};
 
 /// Panel size from which all views are shown at once.
 const MIN_SIZE_FOR_ALL: Vec2 = vec2(960.0, 430.0);
@@ -84,7 +86,7 @@ impl ComparisonPanel {
             return;
         }
         self.read(ctx);
-        if runs.len() == 1 {
+        if runs.len() == 1 && ctx.recording.trajectories.is_empty() {
             self.asked = self.single.ui(ui, ctx, &self.scores);
             return;
         }
@@ -100,19 +102,23 @@ impl ComparisonPanel {
         }
     }
 
-    /// Comparisons of all runs with the reference, by run index; the reference's own is empty.
+    /// Comparisons of all runs and then all trajectories with the reference; the reference's own is empty.
     pub(in crate::gui) fn comparisons(&mut self, ctx: &PanelContext<'_>) -> &[Comparison] {
         self.read(ctx);
         &self.comparisons
     }
 
     fn read(&mut self, ctx: &PanelContext<'_>) {
-        let runs = &ctx.recording.runs;
+        let (runs, trajectories) = (&ctx.recording.runs, &ctx.recording.trajectories);
         self.reference = self.reference.min(runs.len().saturating_sub(1));
-        self.comparisons.resize_with(runs.len(), Comparison::default);
+        self.comparisons.resize_with(runs.len() + trajectories.len(), Comparison::default);
         if let Some(reference) = runs.get(self.reference) {
-            for (comparison, run) in self.comparisons.iter_mut().zip(runs) {
+            let (of_runs, of_trajectories) = self.comparisons.split_at_mut(runs.len());
+            for (comparison, run) in of_runs.iter_mut().zip(runs) {
                 comparison.read(reference, run);
+            }
+            for (comparison, lane) in of_trajectories.iter_mut().zip(trajectories) {
+                comparison.read_trajectory(reference, lane);
             }
         }
         self.scores.read(ctx.recording);
@@ -201,4 +207,19 @@ impl ComparisonPanel {
     pub(in crate::gui) fn scores(&self) -> &Scores {
         &self.scores
     }
+}
+
+/// Label of a column of the panel: of a run, then of a trajectory.
+fn label_of(recording: &Recording, index: usize) -> &str {
+    let lane = |index: usize| recording.trajectories.get(index).map_or("", |lane| lane.label.as_str());
+    match recording.runs.get(index) {
+        Some(run) => &run.spec.label,
+        None => lane(index - recording.runs.len()),
+    }
+}
+
+/// Style of a column of the panel: of a run, then of a trajectory.
+fn style_of(recording: &Recording, theme: &Theme, index: usize) -> RunStyle {
+    let runs = recording.runs.len();
+    if index < runs { theme.run(index) } else { theme.trajectory(index - runs) }
 }

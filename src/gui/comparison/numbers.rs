@@ -3,6 +3,7 @@
 use egui::{Button, Grid, RichText, Ui, WidgetInfo, vec2};
 
 use super::scores::Scores;
+use super::{label_of, style_of};
 use crate::gui::PanelContext;
 use crate::gui::help::terms::divergence;
 use crate::gui::theme::ROW_HEIGHT;
@@ -27,7 +28,10 @@ pub(super) fn difference_text(quantity: Quantity, apart: f64) -> String {
     format!("{number}{space}{unit}")
 }
 
-/// Accuracy of all runs; the best value of a row is marked.
+/// What a trajectory beside the runs has.
+pub(in crate::gui) const POSES_ONLY: &str = "A trajectory has poses only: scene, timeline and comparison show it, panels of calibration, features and residuals do not";
+
+/// Accuracy of all runs and trajectories; the best value of a row is marked.
 pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scores) {
     let theme = *ctx.theme;
     let runs = &ctx.recording.runs;
@@ -52,12 +56,16 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
                 ctx.selection.run = number;
             }
         }
+        for (number, lane) in ctx.recording.trajectories.iter().enumerate() {
+            let text = RichText::new(&lane.label).strong().color(theme.trajectory(number).color);
+            ui.label(text).on_hover_text(format!("{}\n{POSES_ONLY}", lane.source));
+        }
         ui.end_row();
         for row in scores.rows() {
             let best = row.best();
             ui.label(RichText::new(&row.name).color(theme.text)).on_hover_text(row.meaning);
             ui.label(RichText::new(row.unit).color(theme.text_weak)).on_hover_text(row.meaning);
-            for run in 0..runs.len() {
+            for run in 0..row.values.len() {
                 let text = row.text(run);
                 let text = if best == Some(run) { format!("{text} ✔") } else { text };
                 let color = if best == Some(run) { theme.ok } else { theme.text_strong };
@@ -66,7 +74,8 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
             ui.end_row();
         }
     });
-    if !ctx.recording.runs.iter().any(|run| run.alignment.is_some()) {
+    let evaluated = ctx.recording.trajectories.iter().any(|lane| lane.evaluation.accuracy.is_some());
+    if !evaluated && !ctx.recording.runs.iter().any(|run| run.alignment.is_some()) {
         let text = "No trajectory errors: no ground truth in the log, or too few processed frames with ground truth";
         ui.label(RichText::new(text).color(theme.text_weak));
     }
@@ -76,14 +85,16 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
 pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference: usize, comparisons: &[Comparison]) {
     let theme = *ctx.theme;
     let Some(base) = ctx.recording.runs.get(reference) else { return };
-    for (number, (run, comparison)) in ctx.recording.runs.iter().zip(comparisons).enumerate() {
+    for (number, comparison) in comparisons.iter().enumerate() {
         if number == reference {
             continue;
         }
-        let (own, other) = (&run.spec.label, &base.spec.label);
+        // The stamps of a comparison with a trajectory are those of the reference.
+        let run = ctx.recording.runs.get(number).unwrap_or(base);
+        let (own, other) = (label_of(ctx.recording, number), &base.spec.label);
         ui.horizontal_wrapped(|ui| {
             let text = RichText::new(format!("{own} vs. {other}")).strong();
-            ui.label(text.color(theme.run(number).color));
+            ui.label(text.color(style_of(ctx.recording, &theme, number).color));
             if comparison.stamps_ns.is_empty() {
                 ui.label(RichText::new("no common frames").color(theme.text_weak));
             } else if comparison.first_exact().is_none() {

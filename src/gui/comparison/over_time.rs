@@ -2,6 +2,7 @@
 
 use egui::{ScrollArea, Ui};
 
+use super::label_of;
 use super::numbers::{difference_text, shown};
 use super::row::{Line, MIN_HEIGHT, Row, row_ui};
 use crate::gui::PanelContext;
@@ -67,7 +68,7 @@ impl OverTime {
             .enumerate()
             .map(|(run, comparison)| {
                 let apart = comparison.at(quantity, ctx.cursor_ns).filter(|_| run != reference);
-                let label = ctx.recording.runs.get(run).map_or("", |run| run.spec.label.as_str());
+                let label = label_of(ctx.recording, run);
                 Line {
                     run,
                     epoch: comparison.epoch,
@@ -85,12 +86,13 @@ impl OverTime {
             unit,
             factor,
             threshold: Some(quantity.notable()),
+            bound: None,
             min_high: 0.1 * quantity.notable(),
             steps: quantity.unit().is_empty(),
             id: index,
             label: &format!("Difference in {} over time", quantity.name()),
             hover: &format!("{}\nTriangle: first difference ≥ {threshold}", quantity.meaning()),
         };
-        row_ui(ui, ctx, &row, &lines, curves, height);
+        row_ui(ui, ctx, row, &lines, curves, height);
     }
 }

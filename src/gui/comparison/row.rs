@@ -2,15 +2,18 @@
 
 use egui::{Align2, Rect, Shape, Stroke, Ui, pos2, vec2};
 
+use super::style_of;
 use crate::gui::PanelContext;
 use crate::gui::plot::{
     Clicks, Curve, Interaction, PlotArea, Wheel, navigate, paint_cursor, paint_curve, paint_ground, paint_steps,
     paint_value_grid, visible_range,
 };
-use crate::gui::theme::{self, CURVE_WIDTH};
+use crate::gui::theme::{self, CURVE_WIDTH, RunStyle};
 
 /// Width of names and values on the left.
 const NAMES: f32 = 158.0;
+/// Dashes of a bound.
+const BOUND_DASHES: &[f32] = &[4.0, 3.0];
 
 /// Minimum height of a row in points; a list of rows that are so low may scroll.
 pub(super) const MIN_HEIGHT: f32 = 46.0;
@@ -26,6 +29,8 @@ pub(super) struct Row<'a> {
     pub(super) threshold: Option<f64>,
     /// The axis reaches at least this value, so that rounding errors are not magnified.
     pub(super) min_high: f64,
+    /// A bound of the values over time, with the stamps of the first line.
+    pub(super) bound: Option<Bound<'a>>,
     /// Whether values are constant until the next one.
     pub(super) steps: bool,
     /// Unique in the panel.
@@ -36,9 +41,17 @@ pub(super) struct Row<'a> {
     pub(super) hover: &'a str,
 }
 
+/// What the values of a row should stay below, by frame.
+pub(super) struct Bound<'a> {
+    pub(super) values: &'a [f64],
+    pub(super) curve: &'a mut Curve,
+    /// The bound at the cursor.
+    pub(super) text: Option<String>,
+}
+
 /// The values of one run in a row.
 pub(super) struct Line<'a> {
-    /// Index of the run, for its colour and dashes.
+    /// Index of the run, or behind the runs of the trajectory, for colour and dashes.
     pub(super) run: usize,
     pub(super) epoch: u64,
     pub(super) stamps_ns: &'a [i64],
@@ -53,7 +66,7 @@ pub(super) struct Line<'a> {
 pub(super) fn row_ui(
     ui: &mut Ui,
     ctx: &mut PanelContext<'_>,
-    row: &Row<'_>,
+    mut row: Row<'_>,
     lines: &[Line<'_>],
     curves: &mut [Curve],
     height: f32,
@@ -67,6 +80,12 @@ pub(super) fn row_ui(
     for (line, curve) in lines.iter().zip(curves.iter_mut()) {
         curve.update(&area, line.epoch, line.stamps_ns, line.values);
         max_value = max_value.max(curve.extent.map_or(0.0, |(_, max_value)| max_value));
+    }
+    if let (Some(bound), Some(line)) = (&mut row.bound, lines.first()) {
+        bound.curve.update(&area, line.epoch, line.stamps_ns, bound.values);
+        // A bound far above all values does not flatten their curves.
+        let most = bound.curve.extent.map_or(0.0, |(_, max_value)| max_value);
+        max_value = max_value.max(most.min(3.0 * max_value));
     }
     area = area.with_values(0.0, 1.15 * max_value.max(row.min_high));
     let painter = ui.painter_at(whole);
@@ -82,8 +101,12 @@ pub(super) fn row_ui(
     let mut at = whole.left_top() + vec2(2.0, 0.0);
     names.text(at, Align2::LEFT_TOP, name, theme::label_font(), theme.text);
     let inner = painter.with_clip_rect(rect);
+    if let Some(bound) = &row.bound {
+        let style = RunStyle { color: theme.text_weak, dashes: BOUND_DASHES };
+        paint_curve(&inner, &area, bound.curve, style, 0.8 * CURVE_WIDTH);
+    }
     for (line, curve) in lines.iter().zip(curves.iter()) {
-        let style = theme.run(line.run);
+        let style = style_of(ctx.recording, &theme, line.run);
         if row.steps {
             paint_steps(&inner, &area, curve, style, CURVE_WIDTH);
         } else {
@@ -98,6 +121,10 @@ pub(super) fn row_ui(
             at.y += 13.0;
             names.text(at, Align2::LEFT_TOP, text, theme::label_font(), style.color);
         }
+    }
+    if let Some(text) = row.bound.as_ref().and_then(|bound| bound.text.as_ref()) {
+        at.y += 13.0;
+        names.text(at, Align2::LEFT_TOP, text, theme::label_font(), theme.text_weak);
     }
     paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
     let id = ui.unique_id().with(("row over time", row.id));

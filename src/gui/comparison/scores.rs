@@ -3,7 +3,7 @@
 use crate::estimator::Phase;
 use crate::geometry::seconds_from_ns;
 use crate::gui::units::{fixed, significant};
-use crate::session::{ChainDistance, RELATIVE_LENGTHS_M, Recording, RunRecord, TrajectoryAccuracy};
+use crate::session::{ChainDistance, RELATIVE_LENGTHS_M, Recording, RunRecord, TrajectoryAccuracy, TrajectoryLane};
 
 /// Number of new steps after which a run's accuracy is computed again.
 const UPDATE_PERIOD_STEPS: usize = 20;
@@ -16,14 +16,15 @@ struct RunScore {
     finished: bool,
     accuracy: Option<TrajectoryAccuracy>,
     chain: Option<ChainDistance>,
-    estimated: usize,
     initialized_s: Option<f64>,
-    restarts: usize,
-    columns: usize,
+    /// `None` of a trajectory, as what follows.
+    estimated: Option<usize>,
+    restarts: Option<usize>,
+    columns: Option<usize>,
     informed: Option<usize>,
 }
 
-/// The values of all runs, cached until a run has new steps.
+/// The values of all runs and then of all trajectories, cached until a run has new steps.
 #[derive(Debug, Default)]
 pub(crate) struct Scores {
     runs: Vec<RunScore>,
@@ -38,7 +39,7 @@ pub(crate) struct ScoreRow {
     pub(super) meaning: &'static str,
     /// Shown unit, empty for counts.
     pub(crate) unit: &'static str,
-    /// Values by run, in the shown unit.
+    /// Values by run and then by trajectory, in the shown unit.
     pub(crate) values: Vec<Option<f64>>,
     /// Whether smaller is better; `None` where the value is no measure of quality.
     pub(super) less_is_better: Option<bool>,
@@ -72,8 +73,14 @@ impl ScoreRow {
 impl Scores {
     /// Updates the values.
     pub(super) fn read(&mut self, recording: &Recording) {
-        self.runs.resize_with(recording.runs.len(), RunScore::default);
-        for (score, run) in self.runs.iter_mut().zip(&recording.runs) {
+        self.runs.resize_with(recording.runs.len() + recording.trajectories.len(), RunScore::default);
+        let (of_runs, of_trajectories) = self.runs.split_at_mut(recording.runs.len());
+        for (score, lane) in of_trajectories.iter_mut().zip(&recording.trajectories) {
+            if score.id != lane.id {
+                *score = RunScore::of_trajectory(lane);
+            }
+        }
+        for (score, run) in of_runs.iter_mut().zip(&recording.runs) {
             let count = run.steps.len();
             let grown = count < score.count || count >= score.count + UPDATE_PERIOD_STEPS;
             if score.id != run.id || grown || run.finished && !(score.finished && score.count == count) {
@@ -139,7 +146,7 @@ impl Scores {
             with("Processed frames", row("frames", "", None, Some(0), &|score| Some(score.count as f64))),
             with(
                 "Frames with an estimated pose",
-                row("estimated frames", "", Some(false), Some(0), &|score| Some(score.estimated as f64)),
+                row("estimated frames", "", Some(false), Some(0), &|score| score.estimated.map(|count| count as f64)),
             ),
             with(
                 "Stamp of the first frame with an estimated pose",
@@ -147,11 +154,11 @@ impl Scores {
             ),
             with(
                 "Re-initializations after a failure",
-                row("restarts", "", less, Some(0), &|score| Some(score.restarts as f64)),
+                row("restarts", "", less, Some(0), &|score| score.restarts.map(|count| count as f64)),
             ),
             with(
                 "Estimated calibration parameters of the last step",
-                row("calibration columns", "", None, Some(0), &|score| Some(score.columns as f64)),
+                row("calibration columns", "", None, Some(0), &|score| score.columns.map(|count| count as f64)),
             ),
             with(
                 "Informed rank of the last step with a calibration",
@@ -176,13 +183,25 @@ impl RunScore {
             id: run.id,
             count: run.steps.len(),
             finished: run.finished,
-            accuracy: TrajectoryAccuracy::of(&run.pairs_with_ground_truth()),
+            accuracy: run.accuracy().ok(),
             chain,
-            estimated: run.steps.iter().filter(tracking).count(),
+            estimated: Some(run.steps.iter().filter(tracking).count()),
             initialized_s: first.map(|step| seconds_from_ns(step.report.stamp_ns)),
-            restarts: last.map_or(0, |last| last.report.restarts),
-            columns: last.map_or(0, |last| last.report.calibration.parameters.len()),
+            restarts: Some(last.map_or(0, |last| last.report.restarts)),
+            columns: Some(last.map_or(0, |last| last.report.calibration.parameters.len())),
             informed: run.steps.iter().rev().find_map(|step| step.rank.as_ref()).map(|rank| rank.rank_informed),
+        }
+    }
+
+    fn of_trajectory(lane: &TrajectoryLane) -> Self {
+        let samples = lane.track.samples();
+        Self {
+            id: lane.id,
+            count: samples.len(),
+            finished: true,
+            accuracy: lane.evaluation.accuracy.clone(),
+            initialized_s: samples.first().map(|sample| seconds_from_ns(sample.stamp_ns)),
+            ..Self::default()
         }
     }
 }

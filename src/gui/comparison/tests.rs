@@ -156,3 +156,49 @@ fn sides_of_the_solve_and_selection_are_shared_by_all_images() {
     let at = harness.state().cursor_ns;
     assert_eq!(harness.state().panel.comparisons[1].at(Quantity::Tracks, at), Some(0.0));
 }
+
+/// A trajectory of another program: the first run's in another world, 5 cm too high or too low in turns.
+fn with_trajectory(recording: &mut Recording) {
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use crate::geometry::RigidTransform;
+    use crate::sensors::{PoseSample, PoseTrack};
+    use crate::session::TrajectoryLane;
+
+    let world =
+        RigidTransform::new(UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.8), Vector3::new(20.0, -4.0, 1.0));
+    let steps = &recording.runs[0].steps;
+    let samples = steps.iter().enumerate().filter_map(|(number, step)| {
+        let mut pose = step.ground_truth?;
+        pose.translation_m.z += if number % 2 == 0 { 0.05 } else { -0.05 };
+        Some(PoseSample { stamp_ns: step.report.stamp_ns, world_from_imu: world * pose })
+    });
+    let actual = steps
+        .iter()
+        .filter_map(|step| Some(PoseSample { stamp_ns: step.report.stamp_ns, world_from_imu: step.ground_truth? }));
+    let (track, actual) = (PoseTrack::new(samples.collect()), PoseTrack::new(actual.collect()));
+    let lane = TrajectoryLane::new("VINS".into(), "vins.csv".into(), track, Some(&actual));
+    recording.trajectories = vec![std::sync::Arc::new(lane)];
+}
+
+#[test]
+fn a_trajectory_stands_beside_a_single_run() {
+    let mut harness = bench(&["auto"], [1500.0, 900.0]);
+    with_trajectory(&mut harness.state_mut().recording);
+    harness.run_steps(3);
+    assert!(harness.query_by_label_contains("Nothing to compare yet").is_none());
+    let rows = harness.state().panel.scores.rows();
+    let value = |name: &str| rows.iter().find(|row| row.name == name).unwrap().values[1];
+    assert!((value("ATE RMS").unwrap() - 0.05).abs() < 1e-3);
+    assert!(value("restarts").is_none() && value("calibration columns").is_none());
+    for label in ["VINS", "VINS vs. auto", "Difference in position over time"] {
+        assert!(harness.query_by_label(label).is_some(), "{label}");
+    }
+    let comparison = &harness.state().panel.comparisons[1];
+    assert!(comparison.column(Quantity::Position).iter().any(|apart| apart.is_finite()));
+    assert!(comparison.column(Quantity::RankInformed).iter().all(|apart| apart.is_nan()));
+    for view in ["Numbers", "Differences", "Images", "Scenes", "Directions"] {
+        harness.get_by_label(view).click();
+        harness.run_steps(3);
+    }
+}

@@ -10,7 +10,6 @@ use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::step_work::{REPAINT, StepWork};
 use crate::gui::theme::ROW_HEIGHT;
-use crate::observability::exciting_motion;
 use crate::observability::laboratory::{Advice, Situation, advise};
 use crate::session::{LostSince, RunRecord, StepRecord};
 
@@ -97,7 +96,7 @@ impl AdviceUi {
         };
         let Some(rank) = &of.rank else { return };
         let advice = results.and_then(|results| results.advice.as_ref());
-        match rank.least_observable().and_then(|parameter| Some((parameter, exciting_motion(parameter)?))) {
+        match rank.sensor_excitation() {
             Some((parameter, motion)) => sensor_advice_ui(ui, ctx, parameter, motion, advice, &time),
             None => advice_ui(ui, ctx, advice, &time),
         }

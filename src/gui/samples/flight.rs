@@ -118,6 +118,9 @@ fn recording_of(flight: &SyntheticFlight, runs: &[&str]) -> Recording {
         start_ns: 0,
         epoch_ns: 1_718_451_937_250_000_000,
         runs: runs.par_iter().map(|name| run_on(flight, name)).collect(),
+        truth_is_batch: false,
+        position_truth: None,
+        trajectories: Vec::new(),
         warnings: vec![LogWarning {
             stamp_ns: 6_000_000_000,
             message: "no IMU sample for 0.034 s at 6.00 s; bridged by interpolation".to_owned(),

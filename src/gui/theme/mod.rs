@@ -75,6 +75,10 @@ const RUN_DASHES: [&[f32]; 4] = [&[], &[11.0, 4.0], &[8.0, 3.0, 2.0, 3.0], &[4.0
 /// Dash and gap of the ground truth.
 const GROUND_TRUTH_DASHES: &[f32] = &[5.0, 4.0];
 
+/// Dashes and gaps of trajectories beside the runs: each has dots.
+const TRAJECTORY_DASHES: [&[f32]; 4] =
+    [&[1.5, 3.0], &[1.5, 3.0, 7.0, 3.0], &[1.5, 3.0, 1.5, 3.0, 7.0, 3.0], &[1.5, 7.0]];
+
 /// Maximum number of distinguishable runs.
 pub const MAX_RUNS: usize = RUN_DASHES.len();
 
@@ -140,6 +144,8 @@ pub struct Theme {
     pub error: Color32,
     /// Runs 0 to 3 (Okabe–Ito).
     pub runs: [Color32; MAX_RUNS],
+    /// Trajectories 0 to 3 beside the runs.
+    pub trajectories: [Color32; TRAJECTORY_DASHES.len()],
     /// Colours of −1, 0 and +1 in the diverging map.
     diverging: [Color32; 3],
 }
@@ -176,6 +182,7 @@ impl Theme {
                 warn: rgb(0xf0b429),
                 error: rgb(0xf0655b),
                 runs: [rgb(0x56b4e9), rgb(0xe69f00), rgb(0x1fb88a), rgb(0xcc79a7)],
+                trajectories: [rgb(0xf0e442), rgb(0xf28e6b), rgb(0xa6a2f2), rgb(0xd9d9d9)],
                 diverging: [rgb(0x3f9ae0), rgb(0x23272e), rgb(0xf07a35)],
             },
             ThemeName::Light => Self {
@@ -200,6 +207,7 @@ impl Theme {
                 warn: rgb(0x9a6700),
                 error: rgb(0xc4261d),
                 runs: [rgb(0x0072b2), rgb(0xd55e00), rgb(0x009e73), rgb(0xb5578c)],
+                trajectories: [rgb(0x8a7400), rgb(0x8c3b1e), rgb(0x5e52b8), rgb(0x3f3f3f)],
                 diverging: [rgb(0x2f86cf), rgb(0xf1f3f5), rgb(0xe06520)],
             },
             ThemeName::Print => Self {
@@ -228,6 +236,12 @@ impl Theme {
     /// Style of run `index`; indices past the last repeat.
     pub fn run(&self, index: usize) -> RunStyle {
         RunStyle { color: self.runs[index % MAX_RUNS], dashes: RUN_DASHES[index % MAX_RUNS] }
+    }
+
+    /// Style of trajectory `index` beside the runs; indices past the last repeat.
+    pub fn trajectory(&self, index: usize) -> RunStyle {
+        let index = index % TRAJECTORY_DASHES.len();
+        RunStyle { color: self.trajectories[index], dashes: TRAJECTORY_DASHES[index] }
     }
 
     /// Style of the ground truth.
@@ -287,7 +301,12 @@ mod tests {
             for text in [theme.text, theme.text_strong, theme.text_weak, theme.ok, theme.warn, theme.error] {
                 assert!(contrast(text, theme.surface) >= 4.5, "{name:?} {text:?}");
             }
-            for line in theme.runs.into_iter().chain([theme.ground_truth, theme.axis_x, theme.axis_y, theme.axis_z]) {
+            for line in theme.runs.into_iter().chain(theme.trajectories).chain([
+                theme.ground_truth,
+                theme.axis_x,
+                theme.axis_y,
+                theme.axis_z,
+            ]) {
                 assert!(contrast(line, theme.plot_background) >= 3.0, "{name:?} {line:?}");
             }
             for fraction in [0.0, 0.5, 1.0] {

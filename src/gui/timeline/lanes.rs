@@ -11,6 +11,7 @@ use crate::gui::events::{Mark, look_of, paint_mark};
 use crate::gui::plot::{Curve, PlotArea, paint_curve, paint_hatch, paint_steps, paint_value_grid, visible_segments};
 use crate::gui::theme::{self, RunStyle, Theme};
 use crate::gui::units::fixed;
+use crate::sensors::{NEAREST_POSE_NS, PoseTrack};
 
 /// Maximum height of the bar of a run in points.
 const MAX_BAR_HEIGHT: f32 = 24.0;
@@ -22,6 +23,8 @@ const MIN_HEIGHT_WITH_SCALE: f32 = 28.0;
 pub(crate) enum Lane {
     /// Phases and keyframes of a run.
     Run(usize),
+    /// The time of a trajectory beside the runs.
+    Trajectory(usize),
     /// Hits of breakpoints.
     Breakpoints,
     /// Infrequent events of all runs.
@@ -43,6 +46,9 @@ impl Lane {
     pub(crate) fn name(self, ctx: &PanelContext<'_>) -> String {
         match self {
             Self::Run(run) => ctx.recording.runs.get(run).map_or_else(String::new, |run| run.spec.label.clone()),
+            Self::Trajectory(number) => {
+                ctx.recording.trajectories.get(number).map_or_else(String::new, |lane| lane.label.clone())
+            }
             Self::Breakpoints => "breakpoints".to_owned(),
             Self::Events => "events".to_owned(),
             Self::Rank => "informed rank".to_owned(),
@@ -57,6 +63,10 @@ impl Lane {
     pub(super) const fn meaning(self) -> &'static str {
         match self {
             Self::Run(_) => "Phases of the run: hatched while initializing, filled while tracking; ticks: keyframes",
+            Self::Trajectory(_) => {
+                "Time with poses of a trajectory of another program; it has poses only, so that the lanes of rank, features \
+                 and reprojection do not show it"
+            }
             Self::Breakpoints => "Breakpoint hits of all runs",
             Self::Events => "Events of all runs (column events of frames.csv)",
             Self::Rank => "Informed rank of the calibration (rank.csv)",
@@ -75,7 +85,9 @@ impl Lane {
             Self::Rank => lanes.at(INFORMED, cursor_ns).map(|value| fixed(value, 0)),
             Self::Features => lanes.at(FEATURES, cursor_ns).map(|value| fixed(value, 0)),
             Self::Reprojection => lanes.at(RMS, cursor_ns).map(|value| fixed(value, 2)),
-            Self::Run(_) | Self::Breakpoints | Self::Events | Self::Outliers | Self::Warnings => None,
+            Self::Run(_) | Self::Trajectory(_) | Self::Breakpoints | Self::Events | Self::Outliers | Self::Warnings => {
+                None
+            }
         }
     }
 
@@ -85,7 +97,9 @@ impl Lane {
             Self::Rank => Some(INFORMED),
             Self::Features => Some(FEATURES),
             Self::Reprojection => Some(RMS),
-            Self::Run(_) | Self::Breakpoints | Self::Events | Self::Outliers | Self::Warnings => None,
+            Self::Run(_) | Self::Trajectory(_) | Self::Breakpoints | Self::Events | Self::Outliers | Self::Warnings => {
+                None
+            }
         }
     }
 }
@@ -113,6 +127,16 @@ pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &Run
     each_pixel(area, lanes.keyframes_ns.iter().copied(), |x| {
         painter.vline(x, bar.bottom() - 4.0..=bar.bottom(), tick);
     });
+}
+
+/// The time of a trajectory as a bar, interrupted where its poses are too far apart to be interpolated.
+pub(super) fn trajectory(painter: &Painter, area: &PlotArea, track: &PoseTrack, style: RunStyle) {
+    let bar = area.rect.shrink2(vec2(0.0, (0.5 * (area.rect.height() - MAX_BAR_HEIGHT)).max(4.0)));
+    let stamps_ns: Vec<i64> = track.samples().iter().map(|sample| sample.stamp_ns).collect();
+    let goes_on = |row: usize| stamps_ns.get(row + 1).is_some_and(|next| next - stamps_ns[row] <= 2 * NEAREST_POSE_NS);
+    for segment in visible_segments(area, &stamps_ns, goes_on) {
+        painter.rect_filled(Rect::from_x_y_ranges(segment, bar.y_range()), 0.0, style.color.gamma_multiply(0.4));
+    }
 }
 
 /// Calls `paint` for each stamp in range, once per pixel column.

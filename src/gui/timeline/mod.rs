@@ -43,9 +43,9 @@ pub struct TimelinePanel {
 }
 
 impl TimelinePanel {
-    /// Height in points of the transport and of all lanes for this number of runs.
-    pub fn height_for(runs: usize) -> f32 {
-        transport::HEIGHT + RULER_HEIGHT + LANE_HEIGHT * (runs + 7) as f32 + 10.0
+    /// Height in points of the transport and of all lanes for this number of runs and trajectories.
+    pub fn height_for(lanes: usize) -> f32 {
+        transport::HEIGHT + RULER_HEIGHT + LANE_HEIGHT * (lanes + 7) as f32 + 10.0
     }
 
     /// Draws transport, lanes and cursor.
@@ -72,6 +72,7 @@ impl TimelinePanel {
         let breaks = !ctx.playback.breakpoints.list().is_empty();
         let shown: Vec<Lane> = (0..self.runs.len())
             .map(Lane::Run)
+            .chain((0..ctx.recording.trajectories.len()).map(Lane::Trajectory))
             .chain(breaks.then_some(Lane::Breakpoints))
             .chain([Lane::Events, Lane::Rank, Lane::Features, Lane::Reprojection, Lane::Outliers, Lane::Warnings])
             .collect();
@@ -105,8 +106,14 @@ impl TimelinePanel {
     fn label_width(&self, ui: &Ui, ctx: &PanelContext<'_>) -> f32 {
         /// Space around a name.
         const MARGIN: f32 = 10.0;
-        let width = |run: usize| lanes::name_width(ui, ctx, Lane::Run(run)) + MARGIN;
-        (0..self.runs.len()).map(width).fold(LANE_LABEL_WIDTH, f32::max).min(MAX_LABEL_WIDTH)
+        let width = |lane: Lane| lanes::name_width(ui, ctx, lane) + MARGIN;
+        let trajectories = (0..ctx.recording.trajectories.len()).map(Lane::Trajectory);
+        (0..self.runs.len())
+            .map(Lane::Run)
+            .chain(trajectories)
+            .map(width)
+            .fold(LANE_LABEL_WIDTH, f32::max)
+            .min(MAX_LABEL_WIDTH)
     }
 
     fn lane(&mut self, ui: &Ui, ctx: &PanelContext<'_>, lane: Lane, area: PlotArea, label_rect: Rect) {
@@ -118,6 +125,11 @@ impl TimelinePanel {
             Lane::Run(run) => {
                 if let Some(lanes) = self.runs.get(run) {
                     lanes::run(&inner, &theme, &area, lanes, theme.run(run));
+                }
+            }
+            Lane::Trajectory(number) => {
+                if let Some(lane) = ctx.recording.trajectories.get(number) {
+                    lanes::trajectory(&inner, &area, &lane.track, theme.trajectory(number));
                 }
             }
             Lane::Breakpoints => lanes::breakpoints(&inner, &theme, &area, ctx),
@@ -135,6 +147,7 @@ impl TimelinePanel {
         let value = self.runs.get(selected).and_then(|run| lane.value(run, ctx.cursor_ns));
         let color = match lane {
             Lane::Run(run) => theme.run(run).color,
+            Lane::Trajectory(number) => theme.trajectory(number).color,
             _ => theme.text_weak,
         };
         lanes::label(&painter, &theme, label_rect, &lane.name(ctx), value.clone(), color);

@@ -1,17 +1,18 @@
-//! The runs with their colours, dashes and accuracy.
+//! The runs, and the trajectories beside them, with their colours, dashes and accuracy.
 
 use std::sync::Arc;
 
 use egui::text::{LayoutJob, TextWrapping};
-use egui::{Align2, Color32, Galley, Sense, Stroke, StrokeKind, TextStyle, Ui, WidgetInfo, pos2, vec2};
+use egui::{Align2, Color32, Galley, Painter, Rect, Sense, Stroke, StrokeKind, TextStyle, Ui, WidgetInfo, pos2, vec2};
 
 use crate::geometry::RigidTransform;
 use crate::gui::PanelContext;
+use crate::gui::comparison::POSES_ONLY;
 use crate::gui::plot::paint_line;
-use crate::gui::theme::{self, CURVE_WIDTH};
+use crate::gui::theme::{self, CURVE_WIDTH, RunStyle, Theme};
 use crate::gui::units::fixed;
 use crate::session::accuracy::ErrorStatistics;
-use crate::session::{Command, RunRecord, StepRecord};
+use crate::session::{Command, RunRecord, StepRecord, TrajectoryLane};
 
 /// The accuracy of one run, and the number of steps it was computed from.
 #[derive(Debug, Default)]
@@ -34,22 +35,28 @@ impl RunLegend {
         self.update(ctx);
         [true, false].map(|accuracy| {
             let runs = ctx.recording.runs.iter().zip(&self.runs);
-            let entries = runs.map(|(run, known)| {
-                let text = known.text().filter(|_| accuracy);
-                Entry::new(ui, ctx, run, text, f32::INFINITY, ctx.theme.text).width + ui.spacing().item_spacing.x
+            let runs = runs.map(|(run, known)| (run.spec.label.as_str(), known.text()));
+            let lanes = ctx.recording.trajectories.iter().map(|lane| (lane.label.as_str(), text_of_lane(lane)));
+            let entries = runs.chain(lanes).map(|(label, text)| {
+                let text = text.filter(|_| accuracy);
+                Entry::new(ui, ctx, label, text, f32::INFINITY, ctx.theme.text).width + ui.spacing().item_spacing.x
             });
             entries.sum()
         })
     }
 
-    /// Draws one entry per run in a total `width`; a click selects the run. Long names are shortened.
+    /// Draws one entry per run, then one per trajectory, in a total `width`; a click selects the run. Long names are
+    /// shortened.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, accuracy: bool, width: f32) {
         self.update(ctx);
-        let count = self.runs.len().max(1) as f32;
+        let count = (self.runs.len() + ctx.recording.trajectories.len()).max(1) as f32;
         let enough = self.widths(ui, ctx)[usize::from(!accuracy)] <= width + 0.5;
         let max_width = if enough { f32::INFINITY } else { width / count - ui.spacing().item_spacing.x };
         for (number, (run, known)) in ctx.recording.runs.iter().zip(&self.runs).enumerate() {
             entry_ui(ui, ctx, number, run, known, accuracy, max_width);
+        }
+        for (number, lane) in ctx.recording.trajectories.iter().enumerate() {
+            lane_ui(ui, ctx, number, lane, accuracy, max_width);
         }
     }
 
@@ -64,7 +71,7 @@ impl RunLegend {
 impl RunAccuracy {
     /// The absolute trajectory error as a text.
     fn text(&self) -> Option<String> {
-        self.statistics.as_ref().map(|statistics| format!("ATE {} m", fixed(statistics.rmse, 3)))
+        self.statistics.as_ref().map(ate_text)
     }
 
     fn update(&mut self, run: &RunRecord) {
@@ -75,22 +82,18 @@ impl RunAccuracy {
             self.count = run.steps.len();
             self.last = run.steps.last().cloned();
             self.alignment = run.alignment;
-            self.statistics = run.alignment.and_then(|alignment| position_errors(run, &alignment));
+            self.statistics = ErrorStatistics::of(&run.position_errors_m());
         }
     }
 }
 
-/// Distances between aligned estimate and ground truth in metres, over the estimated frames.
-fn position_errors(run: &RunRecord, alignment: &RigidTransform) -> Option<ErrorStatistics> {
-    let errors_m: Vec<f64> = run
-        .steps
-        .iter()
-        .filter_map(|step| {
-            let estimate = alignment.transform(&step.report.newest()?.world_from_imu.translation_m);
-            Some((estimate - step.ground_truth?.translation_m).norm())
-        })
-        .collect();
-    ErrorStatistics::of(&errors_m)
+fn ate_text(errors: &ErrorStatistics) -> String {
+    format!("ATE {} m", fixed(errors.rmse, 3))
+}
+
+/// The absolute trajectory error of a trajectory as a text.
+fn text_of_lane(lane: &TrajectoryLane) -> Option<String> {
+    lane.evaluation.accuracy.as_ref().map(|accuracy| ate_text(&accuracy.absolute_m))
 }
 
 /// The laid out texts of an entry.
@@ -108,7 +111,7 @@ impl Entry {
     fn new(
         ui: &Ui,
         ctx: &PanelContext<'_>,
-        run: &RunRecord,
+        label: &str,
         accuracy: Option<String>,
         max_width: f32,
         color: Color32,
@@ -118,11 +121,24 @@ impl Entry {
             accuracy.map(|text| ui.painter().layout_no_wrap(text, theme::number_font(), ctx.theme.text_weak));
         let beside = accuracy.as_ref().map_or(0.0, |galley| galley.size().x + Self::MARGIN);
         let room = (max_width - Self::LINE - Self::MARGIN - beside).max(12.0);
-        let mut job = LayoutJob::simple_singleline(run.spec.label.clone(), font, color);
+        let mut job = LayoutJob::simple_singleline(label.to_owned(), font, color);
         job.wrap = TextWrapping::truncate_at_width(room);
         let label = ui.painter().layout_job(job);
         let width = Self::LINE + label.size().x + beside + Self::MARGIN;
         Self { label, accuracy, width }
+    }
+
+    /// Paints a sample of the line, the label and the accuracy.
+    fn paint(self, painter: &Painter, rect: Rect, theme: &Theme, style: RunStyle, text_color: Color32) {
+        let middle = rect.center().y;
+        let line = [pos2(rect.left() + 5.0, middle), pos2(rect.left() + 29.0, middle)];
+        paint_line(painter, &line, style, CURVE_WIDTH + 0.5);
+        let place = Align2::LEFT_CENTER.anchor_size(pos2(rect.left() + Self::LINE, middle), self.label.size());
+        painter.galley(place.min, self.label, text_color);
+        if let Some(galley) = self.accuracy {
+            let place = Align2::LEFT_CENTER.anchor_size(pos2(place.right() + Self::MARGIN, middle), galley.size());
+            painter.galley(place.min, galley, theme.text_weak);
+        }
     }
 }
 
@@ -138,7 +154,7 @@ fn entry_ui(
     let theme = *ctx.theme;
     let shown = ctx.selection.run == number;
     let text_color = if shown { theme.text_strong } else { theme.text };
-    let entry = Entry::new(ui, ctx, run, known.text().filter(|_| accuracy), max_width, text_color);
+    let entry = Entry::new(ui, ctx, &run.spec.label, known.text().filter(|_| accuracy), max_width, text_color);
     let (rect, response) = ui.allocate_exact_size(vec2(entry.width, 22.0), Sense::click());
     let name = format!("Run {} {}", run.spec.label, known.text().unwrap_or_default());
     response.widget_info(|| WidgetInfo::selected(egui::Role::Button, true, shown, name.trim_end()));
@@ -150,15 +166,7 @@ fn entry_ui(
     if shown {
         painter.rect_stroke(rect, 3.0, Stroke::new(1.0, theme.run(number).color), StrokeKind::Inside);
     }
-    let middle = rect.center().y;
-    let line = [pos2(rect.left() + 5.0, middle), pos2(rect.left() + 29.0, middle)];
-    paint_line(&painter, &line, theme.run(number), CURVE_WIDTH + 0.5);
-    let place = Align2::LEFT_CENTER.anchor_size(pos2(rect.left() + Entry::LINE, middle), entry.label.size());
-    painter.galley(place.min, entry.label, text_color);
-    if let Some(galley) = entry.accuracy {
-        let place = Align2::LEFT_CENTER.anchor_size(pos2(place.right() + Entry::MARGIN, middle), galley.size());
-        painter.galley(place.min, galley, theme.text_weak);
-    }
+    entry.paint(&painter, rect, &theme, theme.run(number), text_color);
 
     if response.clicked() {
         ctx.selection.run = number;
@@ -175,6 +183,20 @@ fn entry_ui(
     });
 }
 
+/// A trajectory beside the runs: it cannot be selected, as it has no calibration and no features.
+fn lane_ui(ui: &mut Ui, ctx: &PanelContext<'_>, number: usize, lane: &TrajectoryLane, accuracy: bool, max_width: f32) {
+    let theme = *ctx.theme;
+    let text = text_of_lane(lane);
+    let name = format!("Trajectory {} {}", lane.label, text.as_deref().unwrap_or_default());
+    let entry = Entry::new(ui, ctx, &lane.label, text.filter(|_| accuracy), max_width, theme.text);
+    let (rect, response) = ui.allocate_exact_size(vec2(entry.width, 22.0), Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(egui::Role::Label, true, name.trim_end()));
+    entry.paint(&ui.painter_at(rect), rect, &theme, theme.trajectory(number), theme.text);
+    let missing = lane.accuracy_missing.iter().map(String::as_str);
+    let lines: Vec<&str> = [lane.source.as_str(), POSES_ONLY].into_iter().chain(missing).collect();
+    response.on_hover_text(lines.join("\n"));
+}
+
 /// Specification and accuracy of a run.
 fn details(run: &RunRecord, statistics: Option<&ErrorStatistics>) -> String {
     let mut lines = vec![format!("--run {}", run.spec), format!("camera {}", run.camera_key)];
@@ -184,6 +206,13 @@ fn details(run: &RunRecord, statistics: Option<&ErrorStatistics>) -> String {
     }
     if let Some(last) = run.steps.last() {
         lines.push(format!("parameterization {}", last.report.calibration.parameterization));
+        if let Some(covariance) = last.report.newest_pose_covariance {
+            let [position, attitude] = [covariance.position_sigma_m(), covariance.attitude_sigma_rad().to_degrees()];
+            let [position, attitude] = [fixed(position, 3), fixed(attitude, 2)];
+            lines.push(format!(
+                "position ±{position} m, attitude ±{attitude}° (1σ, relative to the first estimated frame)"
+            ));
+        }
         let tracked = run.steps.iter().filter(|step| !step.report.window.is_empty()).count();
         lines.push(format!(
             "frames: {}, of these estimated: {tracked}, restarts: {}",

@@ -107,6 +107,8 @@ pub struct WindowState {
     pub progress: Option<Progress>,
     /// The log that is being opened while another one is shown.
     pub opening: Option<PathBuf>,
+    /// Name of the study from which the session was opened.
+    pub study: Option<String>,
     /// "What is this?" and the manual.
     pub(crate) help: Help,
     /// Recently opened logs and sessions, newest first, for the menu.
@@ -279,7 +281,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     notices::banner_ui(ui, ctx);
 
     // The panels are drawn before the timeline below them: the Tab key follows the order of drawing.
-    let wanted = TimelinePanel::height_for(ctx.recording.runs.len());
+    let wanted = TimelinePanel::height_for(ctx.recording.runs.len() + ctx.recording.trajectories.len());
     let wanted = wanted.min(0.25 * (ui.available_height() - STATUS_HEIGHT));
     let below = state.below_height.unwrap_or(wanted + STATUS_HEIGHT);
     let rest = ui.available_rect_before_wrap();

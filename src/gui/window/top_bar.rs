@@ -23,6 +23,9 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
         ui.spacing_mut().item_spacing.x = 4.0;
         menu::ui(ui, state, ctx, actions);
         ui.separator();
+        if let Some(study) = &state.study {
+            study_button(ui, study, actions);
+        }
         let log = log_name(ctx.recording);
         let rig = format!("rig: {}", ctx.recording.rig.name);
         let widths = Widths {
@@ -146,6 +149,15 @@ fn action_button(ui: &mut Ui, text: &str, action: Action, enabled: bool, actions
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, enabled, text));
     if response.on_hover_text(format!("{name} ({keys})")).clicked() {
         actions.push(action);
+    }
+}
+
+/// The button that closes the session and goes back to its study.
+fn study_button(ui: &mut Ui, study: &str, actions: &mut Vec<Action>) {
+    let response = ui.add(Button::new("◀ Study"));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Back to the study"));
+    if response.on_hover_text(format!("Back to the study {study} (Ctrl+W)")).clicked() {
+        actions.push(Action::CloseLog);
     }
 }
 

@@ -7,9 +7,7 @@ use super::history::{History, SnapshotUse};
 use super::message::EngineMessage;
 use super::recompute::{Detail, RecomputeRequest, Recomputed};
 use crate::session::plan::SessionPlan;
-use crate::session::record::{
-    PoseUncertainty, Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord,
-};
+use crate::session::record::{Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord};
 
 /// Inverse of the ratio of the memory budget that estimator snapshots may take.
 const SNAPSHOT_BUDGET_DIVISOR: usize = 4;
@@ -168,14 +166,6 @@ impl Computation {
         }
         let (_, record) = self.recompute(run, number, 1).pop()?;
         Some(Arc::new(record))
-    }
-
-    /// Standard deviation of the last estimated pose of a run, from its step recomputed from the nearest snapshot of the
-    /// estimator.
-    pub fn last_pose_uncertainty(&self, run: usize) -> Option<PoseUncertainty> {
-        let steps = &self.recording.runs.get(run)?.steps;
-        let last = steps.iter().rposition(|step| step.report.newest().is_some())?;
-        PoseUncertainty::of(&self.history(run)?.linearization(last)?)
     }
 
     /// The states of the solver in a step: before its first iteration, after each iteration. The last one is the step

@@ -10,7 +10,7 @@ use parking_lot::Mutex;
 
 use super::run_engine::RunEngine;
 use super::step_inputs::{OwnedStepInput, StepInputs};
-use crate::estimator::{FactorRows, Linearization};
+use crate::estimator::FactorRows;
 use crate::session::record::StepRecord;
 
 /// Steps between two snapshots while the budget allows all of them.
@@ -176,12 +176,6 @@ impl History {
         let (mut engine, input) = (self.engine_before(step)?, self.inputs.get(step)?);
         engine.estimator_mut().set_keep_factor_rows();
         engine.step(&input).report.factor_rows
-    }
-
-    /// The linearization of a step, recomputed; `None` for a step that has not been computed or has no solved window.
-    pub(in crate::session) fn linearization(&self, step: usize) -> Option<Linearization> {
-        let (mut engine, input) = (self.engine_before(step)?, self.inputs.get(step)?);
-        engine.linearization(&input)
     }
 
     /// The states of the solver in a step as records: before the first iteration and after each iteration. The last one

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use super::altered_measurements::AlteredMeasurements;
 use super::step_inputs::OwnedStepInput;
 use super::stopwatch::Stopwatch;
-use crate::estimator::{Estimator, EstimatorConfig, Linearization, StepInput, StepReport};
+use crate::estimator::{Estimator, EstimatorConfig, StepInput, StepReport};
 use crate::frontend::TrackedFrame;
 use crate::gimbal::{Chain, ParameterGroup, ParameterId};
 use crate::observability::{RankReport, analyse};
@@ -86,12 +86,6 @@ impl RunEngine {
         self.estimator.set_keep_linearization(false);
         drop(self.estimate(input));
         self.estimator.set_keep_linearization(keep);
-    }
-
-    /// Runs the same step and returns its linearization, `None` for a step without a solved window.
-    pub(in crate::session) fn linearization(&mut self, input: &OwnedStepInput) -> Option<Linearization> {
-        self.estimator.set_keep_linearization(true);
-        self.estimate(input).linearization
     }
 
     /// Limits the iterations of the solver from the next step on.

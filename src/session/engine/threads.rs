@@ -71,10 +71,7 @@ impl Engine {
                 queues.entry(&camera.key).or_default().push(queue);
                 frames.push((camera.key.clone(), receiver));
             }
-            let mut config = estimator_config(&plan.rig, spec)?;
-            if let Some(change) = plan.changes.get(run) {
-                change(&mut config);
-            }
+            let config = estimator_config(&plan.rig, spec)?;
             let engine = RunEngine::new(config, plan.keep_linearization_every);
             let results = sender.clone();
             let Some(history) = computation.history(run).cloned() else { continue };
@@ -84,7 +81,8 @@ impl Engine {
         }
         for (camera_key, queues) in queues {
             let tracker =
-                CameraTracker::new(Arc::clone(&plan.log), &plan.rig, camera_key, plan.start_s, plan.duration_s)?;
+                CameraTracker::new(Arc::clone(&plan.log), &plan.rig, camera_key, plan.start_s, plan.duration_s)?
+                    .with_ground_truth(plan.replaced_ground_truth());
             let results = sender.clone();
             let cancelled = Arc::clone(&self.cancelled);
             self.threads.push(spawn(format!("tracker {camera_key}"), move || {

@@ -4,9 +4,15 @@ mod fork_changes;
 mod fork_text;
 mod run_spec;
 mod session_plan;
+mod trajectories;
+mod trajectory_spec;
+mod tuning;
 
 pub use fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError};
-pub(in crate::session) use run_spec::distinct_labels;
 pub use run_spec::{ParameterizationChoice, RunSpec, RunSpecError};
+pub(in crate::session) use run_spec::{distinct_label, distinct_labels};
 pub use session_plan::{DEFAULT_MEMORY_BUDGET_BYTES, MAX_RUNS, SessionError, SessionPlan, SessionRequest};
 pub(in crate::session) use session_plan::{RunCameras, cameras_of_run, check_start};
+pub use trajectories::{LoadedPositions, LoadedTrajectory};
+pub use trajectory_spec::{MAX_TRAJECTORIES, TrajectorySource, TrajectorySpec, TrajectorySpecError};
+pub use tuning::EstimatorTuning;

@@ -7,12 +7,15 @@ use std::sync::atomic::AtomicBool;
 
 use thiserror::Error;
 
-use super::run_spec::{ParameterizationChoice, RunSpec, distinct_labels};
-use crate::estimator::{EstimatorConfig, rigid_columns};
-use crate::flight_log::{FlightLog, LogError, LogLimits};
+use super::distinct_labels;
+use super::run_spec::{ParameterizationChoice, RunSpec};
+use super::trajectories::{self, LoadedPositions, LoadedTrajectory, LoadedTruth};
+use super::trajectory_spec::{MAX_TRAJECTORIES, TrajectorySource, TrajectorySpec};
+use crate::estimator::rigid_columns;
+use crate::flight_log::{FlightLog, LogError, LogLimits, is_batch_reference};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::{Chain, ParameterId, Parameterization};
-use crate::sensors::{CameraMount, CameraRig, Rig};
+use crate::sensors::{CameraMount, CameraRig, LeverArm, PoseTrack, Rig};
 
 /// Maximum number of runs of a session.
 pub const MAX_RUNS: usize = 4;
@@ -40,6 +43,20 @@ pub enum SessionError {
     TooManyRuns {
         /// Requested number of runs.
         count: usize,
+    },
+    /// More than [`MAX_TRAJECTORIES`] trajectories.
+    #[error("{count} trajectories requested, at most {MAX_TRAJECTORIES} are possible")]
+    TooManyTrajectories {
+        /// Requested number of trajectories.
+        count: usize,
+    },
+    /// A trajectory does not belong to the log.
+    #[error("cannot use the trajectory '{source_name}': {problem}")]
+    Trajectory {
+        /// The file or topic.
+        source_name: String,
+        /// What is wrong with it, and what to do.
+        problem: String,
     },
     /// The part of the log that is to be read begins behind its end.
     #[error("--start {start_s} s is after the end of the log ({end_s:.3} s): {}", path.display())]
@@ -70,6 +87,12 @@ pub struct SessionRequest {
     pub ground_truth_path: Option<PathBuf>,
     /// The runs; none means one `auto`.
     pub specs: Vec<RunSpec>,
+    /// Trajectories of other programs beside the runs.
+    pub trajectories: Vec<TrajectorySpec>,
+    /// Ground truth of the trajectory, poses or positions, instead of the rig's topic.
+    pub truth_trajectory: Option<TrajectorySource>,
+    /// Where the antenna is whose positions are the ground truth, instead of the rig's `ground_truth.lever_arm`.
+    pub lever_arm: Option<LeverArm>,
     /// Seconds to skip at the start of the log.
     pub start_s: f64,
     /// Seconds to read from there, `None` for the rest of the log.
@@ -95,12 +118,20 @@ pub struct SessionPlan {
     pub ground_truth_rig: Option<Arc<Rig>>,
     /// The runs, each with the key of its main camera.
     pub runs: Vec<(RunSpec, String)>,
+    /// Trajectories of other programs beside the runs.
+    pub trajectories: Vec<LoadedTrajectory>,
+    /// Ground truth of the trajectory that was asked for, and the lever arm.
+    pub truth_request: (Option<TrajectorySource>, Option<LeverArm>),
+    /// Poses that are the ground truth, over the whole log; `None` where nothing needs them.
+    pub ground_truth_track: Option<Arc<PoseTrack>>,
+    /// Whether the ground truth is the reference of an offline calibration.
+    pub truth_is_batch: bool,
+    /// Positions of an antenna that are the ground truth.
+    pub position_truth: Option<LoadedPositions>,
     /// Seconds to skip at the start of the log.
     pub start_s: f64,
     /// Seconds to read from there, `None` for the rest of the log.
     pub duration_s: Option<f64>,
-    /// Changes to the runs' configurations beyond their specifications, by run; used by benches to try options.
-    pub changes: Vec<fn(&mut EstimatorConfig)>,
     /// One report in this many frames keeps its linearization, from which covariances are computed; `None` keeps none.
     pub keep_linearization_every: Option<usize>,
     /// Memory budget of record and histories in bytes. Beyond it, only summaries of steps are kept, and steps at the
@@ -132,7 +163,29 @@ impl SessionPlan {
             .into_iter()
             .map(|spec| cameras_of_run(&rig, &spec).map(|cameras| (spec, cameras.main.key.clone())))
             .collect::<Result<Vec<_>, _>>()?;
+        let labels: Vec<&str> = runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
+        let span = (request.start_s, request.duration_s);
+        let trajectories = trajectories::load(&log, &request.trajectories, &labels, span)?;
+        let truth_request = (request.truth_trajectory.clone(), request.lever_arm);
+        let positions_in_log = rig.ground_truth_topic.as_deref().is_some_and(|topic| log.is_position_topic(topic));
+        let needed = truth_request != (None, None) || positions_in_log || !trajectories.is_empty();
+        let truth = if needed {
+            trajectories::ground_truth(&log, &rig, truth_request.0.as_ref(), truth_request.1)?
+        } else {
+            None
+        };
+        let (ground_truth_track, position_truth) = match truth {
+            None => (None, None),
+            Some(LoadedTruth::Poses(track)) => (Some(Arc::new(track)), None),
+            Some(LoadedTruth::Positions(positions)) => (None, Some(positions)),
+        };
+        let truth_is_batch = matches!(&truth_request.0, Some(TrajectorySource::File(path)) if is_batch_reference(path));
         Ok(Self {
+            trajectories,
+            truth_is_batch,
+            truth_request,
+            ground_truth_track,
+            position_truth,
             log,
             log_path: request.log_path.clone(),
             rig_path: request.rig_path.clone(),
@@ -142,11 +195,16 @@ impl SessionPlan {
             runs,
             start_s: request.start_s,
             duration_s: request.duration_s,
-            changes: Vec::new(),
             keep_linearization_every: None,
             memory_budget_bytes: DEFAULT_MEMORY_BUDGET_BYTES,
             interrupted: Arc::default(),
         })
+    }
+
+    /// Ground truth that stands in for that of the log's frames, without a pose where it is positions; `None` to keep
+    /// the log's.
+    pub(in crate::session) fn replaced_ground_truth(&self) -> Option<Arc<PoseTrack>> {
+        self.truth_request.0.as_ref().map(|_| self.ground_truth_track.clone().unwrap_or_default())
     }
 
     /// The calibration parameters of its runs, in all parameterizations.

@@ -261,6 +261,9 @@ mod tests {
                 start_ns: 0,
                 epoch_ns: 0,
                 runs: vec![run],
+                truth_is_batch: false,
+                position_truth: None,
+                trajectories: Vec::new(),
                 warnings: Vec::new(),
                 memory_budget_bytes: usize::MAX,
             }

@@ -7,7 +7,7 @@ use super::saved::{
 };
 use super::session::Session;
 use crate::session::breakpoints::Condition;
-use crate::session::plan::{ForkChanges, SessionPlan};
+use crate::session::plan::{ForkChanges, SessionPlan, TrajectorySource, TrajectorySpec};
 
 impl SavedSession {
     /// Opens the log and starts the runs. Forks are started when their parents reach the fork's first step, and the
@@ -67,9 +67,12 @@ impl Session {
             log: SavedLog { path: absolute(&self.plan.log_path), bytes: log.size_bytes(), crc32: log.checksum() },
             rig: self.plan.rig_path.as_ref().map(absolute),
             ground_truth: self.plan.ground_truth_path.as_ref().map(absolute),
+            truth_trajectory: self.plan.truth_request.0.as_ref().map(|source| absolute_source(source).to_string()),
+            lever_arm: self.plan.truth_request.1.map(|lever_arm| lever_arm.to_string()),
             start_s: self.plan.start_s,
             duration_s: self.plan.duration_s,
             runs: recording.runs.iter().filter(|run| run.origin.is_none()).map(|run| run.spec.to_string()).collect(),
+            trajectories: self.plan.trajectories.iter().map(|loaded| saved_spec(&loaded.spec)).collect(),
             forks: forks.chain(pending).collect(),
             breakpoints: breakpoints.collect(),
             markers_ns: self.markers_ns().to_vec(),
@@ -125,6 +128,21 @@ impl Session {
             self.pending.cursor_ns = None;
             self.cursor = self.cursor.seek(&recording, cursor_ns);
         }
+    }
+}
+
+/// A trajectory as text, with the absolute path of its file.
+fn saved_spec(spec: &TrajectorySpec) -> String {
+    TrajectorySpec { source: absolute_source(&spec.source), label: spec.label.clone() }.to_string()
+}
+
+/// The source with the absolute path of its file.
+fn absolute_source(source: &TrajectorySource) -> TrajectorySource {
+    match source {
+        TrajectorySource::File(path) => {
+            TrajectorySource::File(std::path::absolute(path).unwrap_or_else(|_| path.clone()))
+        }
+        topic @ TrajectorySource::Topic(_) => topic.clone(),
     }
 }
 

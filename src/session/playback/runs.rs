@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::session::Session;
 use crate::geometry::seconds_from_ns;
 use crate::session::engine::{Computation, History, apply_fork};
-use crate::session::plan::{ForkChanges, ForkError, MAX_RUNS, RunSpec, SessionError, cameras_of_run, distinct_labels};
+use crate::session::plan::{ForkChanges, ForkError, MAX_RUNS, RunSpec, SessionError, cameras_of_run, distinct_label};
 use crate::session::record::RunRecord;
 
 impl Session {
@@ -21,7 +21,9 @@ impl Session {
         let camera_key = cameras_of_run(&self.plan.rig, &spec)?.main.key.clone();
         self.plan.runs.push((spec.clone(), camera_key.clone()));
         let history = Arc::new(History::new(self.plan.memory_budget_bytes));
-        self.shared.change(|computation| computation.add_run(RunRecord::new(spec, camera_key), history));
+        let truth = self.recording().position_truth.clone();
+        let run = RunRecord::new(spec, camera_key).with_position_truth(truth);
+        self.shared.change(|computation| computation.add_run(run, history));
         self.engine.start_runs(&self.plan, &self.computation(), &[self.plan.runs.len() - 1])
     }
 
@@ -60,11 +62,14 @@ impl Session {
         if count > MAX_RUNS { Err(SessionError::TooManyRuns { count }) } else { Ok(()) }
     }
 
-    /// The specification with a label that no run has.
+    /// The specification with a label that no run and no trajectory has.
     fn distinct(&self, spec: RunSpec) -> RunSpec {
-        let mut specs: Vec<RunSpec> = self.plan.runs.iter().map(|(spec, _)| spec.clone()).chain([spec]).collect();
-        distinct_labels(&mut specs);
-        specs.swap_remove(specs.len() - 1)
+        let recording = self.recording();
+        let is_taken = |label: &str| {
+            self.plan.runs.iter().any(|(run, _)| run.label == label)
+                || recording.trajectories.iter().any(|lane| lane.label == label)
+        };
+        RunSpec { label: distinct_label(&spec.label, is_taken), ..spec }
     }
 
     /// Removes the last run. An earlier run cannot be removed, because the indices of the others would change.

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::flight_log::LogLimits;
-use crate::session::plan::{ForkChanges, RunSpec, SessionError, SessionRequest};
+use crate::sensors::LeverArm;
+use crate::session::plan::{ForkChanges, RunSpec, SessionError, SessionRequest, TrajectorySource, TrajectorySpec};
 
 /// The version of the format that this program writes.
 pub(super) const VERSION: u32 = 1;
@@ -54,12 +55,21 @@ pub struct SavedSession {
     /// Path of the ground-truth rig file, when it was given.
     #[serde(default, rename = "truth", with = "super::saved_path::optional")]
     pub ground_truth: Option<PathBuf>,
+    /// Ground truth of the trajectory, as on the command line.
+    #[serde(default)]
+    pub truth_trajectory: Option<String>,
+    /// Where the antenna is whose positions are the ground truth, as on the command line.
+    #[serde(default)]
+    pub lever_arm: Option<String>,
     /// Seconds to skip at the start of the log.
     pub start_s: f64,
     /// Seconds to read from there, `None` for the rest of the log.
     pub duration_s: Option<f64>,
     /// Specifications of the runs that are not forks, as on the command line.
     pub runs: Vec<String>,
+    /// Trajectories of other programs, as on the command line.
+    #[serde(default)]
+    pub trajectories: Vec<String>,
     /// The forks, each after its parent.
     pub forks: Vec<SavedFork>,
     /// Conditions of the breakpoints.
@@ -128,11 +138,17 @@ impl SavedSession {
     /// The request that opens its log and runs.
     pub fn request(&self) -> Result<SessionRequest, SavedSessionError> {
         let specs: Result<Vec<RunSpec>, _> = self.runs.iter().map(|run| run.parse()).collect();
+        let trajectories: Result<Vec<TrajectorySpec>, _> = self.trajectories.iter().map(|text| text.parse()).collect();
+        let truth = self.truth_trajectory.as_ref().map(|text| text.parse::<TrajectorySource>());
+        let lever_arm = self.lever_arm.as_ref().map(|text| text.parse::<LeverArm>());
         Ok(SessionRequest {
+            truth_trajectory: truth.transpose().map_err(entry_error)?,
+            lever_arm: lever_arm.transpose().map_err(entry_error)?,
             log_path: self.log.path.clone(),
             rig_path: self.rig.clone(),
             ground_truth_path: self.ground_truth.clone(),
             specs: specs.map_err(entry_error)?,
+            trajectories: trajectories.map_err(entry_error)?,
             start_s: self.start_s,
             duration_s: self.duration_s,
             limits: LogLimits::default(),
@@ -167,9 +183,12 @@ mod tests {
             log: SavedLog { path: path(b"/logs/\xff.mcap"), bytes: 1, crc32: 2 },
             rig: Some(path(b"/logs/\xfe.rig.yaml")),
             ground_truth: Some(path(b"/logs/plain.yaml")),
+            truth_trajectory: None,
+            lever_arm: None,
             start_s: 0.0,
             duration_s: None,
             runs: Vec::new(),
+            trajectories: Vec::new(),
             forks: Vec::new(),
             breakpoints: Vec::new(),
             markers_ns: Vec::new(),

@@ -107,6 +107,11 @@ impl Session {
         &self.cursor
     }
 
+    /// Moves the cursor to a position as soon as all runs have reached it.
+    pub fn seek_when_computed(&mut self, stamp_ns: i64) {
+        self.pending.cursor_ns = Some(stamp_ns);
+    }
+
     /// The cursor's position in nanoseconds since the log began.
     pub fn cursor_ns(&self) -> i64 {
         self.cursor.stamp_ns

@@ -6,6 +6,7 @@ use nalgebra::UnitQuaternion;
 
 use super::run::RunRecord;
 use super::step::StepRecord;
+use super::trajectory_lane::{TrajectoryLane, yaw_and_position};
 use crate::estimator::{FrameStateReport, Phase};
 use crate::geometry::{RigidTransform, so3, wrap_angle};
 
@@ -245,24 +246,60 @@ impl Comparison {
         }
     }
 
-    fn push(&mut self, a: &StepRecord, b: &StepRecord) {
-        let stamp_ns = a.report.stamp_ns;
-        self.stamps_ns.push(stamp_ns);
-        if self.gauge.is_none()
-            && let (Some(a), Some(b)) = (a.report.newest(), b.report.newest())
-        {
-            self.gauge = Some(yaw_and_position(&a.world_from_imu, &b.world_from_imu));
+    /// Compares a trajectory with a run at the stamps of the run's steps, in position and attitude: a trajectory has nothing
+    /// else. Only the new steps are read; restarts when one of them was replaced.
+    pub fn read_trajectory(&mut self, reference: &RunRecord, lane: &TrajectoryLane) {
+        let ids = Some((reference.id, lane.id));
+        if self.runs != ids || self.read.0 > reference.steps.len() {
+            *self = Self { runs: ids, epoch: self.epoch + 1, ..Self::default() };
         }
+        while let Some(step) = reference.steps.get(self.read.0) {
+            self.read.0 += 1;
+            let Some(pose) = lane.track.at(step.report.stamp_ns) else { continue };
+            let own = step.report.newest().map(|newest| newest.world_from_imu);
+            self.align_at(own.as_ref(), Some(&pose));
+            let differences = |gauge: &RigidTransform, quantity: Quantity| match (own, quantity) {
+                (Some(own), Quantity::Position) => {
+                    Some((gauge.transform(&pose.translation_m) - own.translation_m).norm())
+                }
+                (Some(own), Quantity::Attitude) => Some(angle(&own.rotation, &(gauge.rotation * pose.rotation))),
+                _ => None,
+            };
+            self.push_row(step.report.stamp_ns, differences);
+        }
+    }
+
+    fn push(&mut self, a: &StepRecord, b: &StepRecord) {
+        let [own, other] = [a, b].map(|step| step.report.newest().map(|newest| &newest.world_from_imu));
+        self.align_at(own, other);
+        let same_camera = self.same_camera;
+        self.push_row(a.report.stamp_ns, |gauge, quantity| {
+            let comparable = same_camera || quantity.is_of_the_vehicle();
+            quantity.difference(a, b, gauge).filter(|_| comparable)
+        });
+    }
+
+    /// Aligns the worlds at the first stamp at which both have a pose.
+    fn align_at(&mut self, own: Option<&RigidTransform>, other: Option<&RigidTransform>) {
+        if self.gauge.is_none()
+            && let (Some(own), Some(other)) = (own, other)
+        {
+            self.gauge = Some(yaw_and_position(own, other));
+        }
+    }
+
+    /// Appends the differences at a stamp, as functions of the alignment of the other world.
+    fn push_row(&mut self, stamp_ns: i64, difference: impl Fn(&RigidTransform, Quantity) -> Option<f64>) {
+        self.stamps_ns.push(stamp_ns);
         let gauge = self.gauge.unwrap_or_default();
         for (index, quantity) in Quantity::ALL.into_iter().enumerate() {
-            let comparable = self.same_camera || quantity.is_of_the_vehicle();
-            let apart = quantity.difference(a, b, &gauge).filter(|_| comparable);
+            let apart = difference(&gauge, quantity);
             self.columns[index].push(apart.unwrap_or(f64::NAN));
             let Some(apart) = apart else { continue };
             let divergence = &mut self.divergences[index];
             // Without the gauge transform, whose rounding errors are no difference between the runs.
             if divergence.exact_ns.is_none() {
-                let as_they_are = quantity.difference(a, b, &RigidTransform::default());
+                let as_they_are = difference(&RigidTransform::default(), quantity);
                 divergence.exact_ns = as_they_are.filter(|apart| *apart != 0.0).map(|_| stamp_ns);
             }
             if apart >= quantity.notable() {
@@ -306,18 +343,6 @@ impl Comparison {
             .filter_map(|(divergence, quantity)| Some((of(divergence)?, quantity)))
             .min_by_key(|(stamp_ns, _)| *stamp_ns)
     }
-}
-
-/// The rotation about the vertical and the translation that align pose `from` with pose `onto`; the identity for equal
-/// poses.
-fn yaw_and_position(onto: &RigidTransform, from: &RigidTransform) -> RigidTransform {
-    if onto == from {
-        return RigidTransform::default();
-    }
-    let rotation = onto.rotation * from.rotation.inverse();
-    let yaw = 2.0 * rotation.k.atan2(rotation.w);
-    let rotation = UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), yaw);
-    RigidTransform::new(rotation, onto.translation_m - rotation * from.translation_m)
 }
 
 #[cfg(test)]
@@ -369,6 +394,32 @@ mod tests {
         let epoch = comparison.epoch;
         comparison.read(&run, &run);
         assert!(comparison.epoch > epoch && comparison.first_exact().is_none());
+    }
+
+    #[test]
+    fn a_trajectory_is_compared_in_position_and_attitude() {
+        use crate::sensors::{PoseSample, PoseTrack};
+
+        let run = recorded(&flight(), "auto");
+        let world = RigidTransform::new(
+            UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), -0.7),
+            nalgebra::Vector3::new(1.0, 2.0, 3.0),
+        );
+        let last = run.steps.len() - 1;
+        let samples = run.steps.iter().enumerate().filter_map(|(number, step)| {
+            let mut pose = step.report.newest()?.world_from_imu;
+            pose.translation_m.y += if number == last { 0.5 } else { 0.0 };
+            Some(PoseSample { stamp_ns: step.report.stamp_ns, world_from_imu: world * pose })
+        });
+        let lane = TrajectoryLane::new("a".into(), "a.tum".into(), PoseTrack::new(samples.collect()), None);
+        let mut comparison = Comparison::default();
+        comparison.read_trajectory(&run, &lane);
+        comparison.read_trajectory(&run, &lane);
+        let end_ns = run.steps[last].report.stamp_ns;
+        assert_eq!(comparison.first_notable(), Some((end_ns, Quantity::Position)));
+        assert!((comparison.at(Quantity::Position, end_ns).unwrap() - 0.5).abs() < 1e-9);
+        assert!(comparison.at(Quantity::Attitude, end_ns).unwrap() < 1e-9);
+        assert!(comparison.column(Quantity::Velocity).iter().all(|apart| apart.is_nan()));
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! Stored reports of every step of every run, and values derived from them without running an estimator.
 
+mod antenna_record;
 mod comparison;
 mod lost_since;
 mod pose_consistency;
-mod pose_uncertainty;
+mod pose_errors;
 mod recording;
 mod rig_values;
 mod run;
@@ -11,18 +12,21 @@ mod run_accuracy;
 mod solver_trace;
 mod step;
 mod summary;
+mod trajectory_lane;
 mod warnings;
 
+pub use antenna_record::PositionTruth;
 pub use comparison::{Comparison, Divergence, Quantity};
 pub use lost_since::LostSince;
 pub use pose_consistency::PoseConsistency;
-pub use pose_uncertainty::PoseUncertainty;
+pub use pose_errors::PoseError;
 pub use recording::Recording;
 pub use run::{ForkOrigin, RunMemory, RunRecord};
 pub use run_accuracy::{ChainDistance, RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};
 pub use solver_trace::{SolverPosition, SolverTrace};
 pub(in crate::session) use step::tracks_bytes;
 pub use step::{StepFactorRows, StepRecord};
+pub use trajectory_lane::{TrajectoryEvaluation, TrajectoryLane, evaluate_trajectory};
 pub use warnings::RunWarning;
 #[cfg(test)]
 pub(in crate::session) use warnings::warnings_of;

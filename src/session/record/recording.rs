@@ -2,11 +2,13 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::antenna_record::PositionTruth;
 use super::run::RunRecord;
+use super::trajectory_lane::TrajectoryLane;
 use crate::flight_log::LogWarning;
 use crate::geometry::ns_from_seconds;
 use crate::sensors::Rig;
-use crate::session::plan::SessionPlan;
+use crate::session::plan::{LoadedTrajectory, RunSpec, SessionPlan};
 
 /// The reports of all runs on one log so far.
 #[derive(Clone, Debug)]
@@ -25,6 +27,12 @@ pub struct Recording {
     pub epoch_ns: i64,
     /// The runs in the order of the request; added runs and forks follow.
     pub runs: Vec<RunRecord>,
+    /// Whether the ground truth of the trajectory is the reference of an offline calibration of the same log.
+    pub truth_is_batch: bool,
+    /// Positions of an antenna that are the ground truth instead of poses.
+    pub position_truth: Option<Arc<PositionTruth>>,
+    /// Trajectories of other programs beside the runs.
+    pub trajectories: Vec<Arc<TrajectoryLane>>,
     /// Warnings about the log so far, in time order.
     pub warnings: Vec<LogWarning>,
     /// Memory budget in bytes.
@@ -34,6 +42,21 @@ pub struct Recording {
 impl Recording {
     /// The runs of a plan before their first step.
     pub fn new(plan: &SessionPlan) -> Self {
+        let position_truth = plan.position_truth.as_ref().map(|loaded| {
+            let (source, samples) = (loaded.source.clone(), loaded.samples.clone());
+            Arc::new(PositionTruth { source, samples, lever_arm: loaded.lever_arm })
+        });
+        let run = |spec: &RunSpec, camera_key: &String| {
+            RunRecord::new(spec.clone(), camera_key.clone()).with_position_truth(position_truth.clone())
+        };
+        let lane = |loaded: &LoadedTrajectory| {
+            let (label, source) = (loaded.spec.label.clone(), loaded.spec.source.to_string());
+            let track = loaded.track.clone();
+            match &position_truth {
+                Some(truth) => TrajectoryLane::against_positions(label, source, track, truth),
+                None => TrajectoryLane::new(label, source, track, plan.ground_truth_track.as_deref()),
+            }
+        };
         let mut recording = Self {
             log_path: plan.log_path.clone(),
             rig: Arc::clone(&plan.rig),
@@ -41,12 +64,20 @@ impl Recording {
             duration_ns: plan.log.duration_ns(),
             start_ns: ns_from_seconds(plan.start_s),
             epoch_ns: plan.log.epoch_ns(),
-            runs: plan.runs.iter().map(|(spec, camera_key)| RunRecord::new(spec.clone(), camera_key.clone())).collect(),
+            runs: plan.runs.iter().map(|(spec, camera_key)| run(spec, camera_key)).collect(),
+            truth_is_batch: plan.truth_is_batch,
+            position_truth: position_truth.clone(),
+            trajectories: plan.trajectories.iter().map(|loaded| Arc::new(lane(loaded))).collect(),
             warnings: Vec::new(),
             memory_budget_bytes: plan.memory_budget_bytes,
         };
         recording.add_warnings(plan.log.warnings().to_vec());
         recording
+    }
+
+    /// What the trajectories are compared with, in words.
+    pub fn truth_name(&self) -> &'static str {
+        if self.truth_is_batch { "batch reference" } else { "ground truth" }
     }
 
     /// Adds warnings about the log in time order without duplicates: two cameras read the same log and find the same

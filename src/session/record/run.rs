@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use super::antenna_record::{AntennaRecord, PositionTruth};
 use super::solver_trace::SolverTrace;
 use super::step::{StepFactorRows, StepRecord};
 use super::summary::SummaryOrder;
@@ -15,8 +16,8 @@ use crate::session::plan::{ForkChanges, RunSpec};
 /// Maximum number of recomputed steps that a run keeps beside their summaries.
 const MAX_RECOMPUTED: usize = 96;
 
-/// Id of the next run.
-static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+/// Id of the next run or trajectory.
+pub(super) static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 
 /// Memory of a run in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,6 +63,10 @@ pub struct RunRecord {
     pub alignment: Option<RigidTransform>,
     /// Running sums over the frames with ground truth, from which `alignment` is computed.
     pub alignment_sums: AlignmentSums,
+    /// Positions of an antenna that are the ground truth instead of poses.
+    pub position_truth: Option<Arc<PositionTruth>>,
+    /// The run at the stamps of these positions.
+    pub(super) antenna: AntennaRecord,
     /// Warnings of its steps, each message once.
     pub warnings: Vec<RunWarning>,
     /// Memory of its steps and its history.
@@ -90,6 +95,8 @@ impl RunRecord {
             error: None,
             alignment: None,
             alignment_sums: AlignmentSums::default(),
+            position_truth: None,
+            antenna: AntennaRecord::default(),
             warnings: Vec::new(),
             memory: RunMemory::default(),
             recomputed: BTreeMap::new(),
@@ -101,10 +108,17 @@ impl RunRecord {
         }
     }
 
+    /// The run with positions of an antenna as its ground truth; it must have no step yet.
+    #[must_use]
+    pub fn with_position_truth(mut self, truth: Option<Arc<PositionTruth>>) -> Self {
+        self.position_truth = truth;
+        self
+    }
+
     /// A fork before its first own step; the steps before are the parent's.
     pub(in crate::session) fn fork(parent: &Self, spec: RunSpec, step: usize, changes: ForkChanges) -> Self {
         let stamp_ns = parent.steps.get(step).map_or(0, |step| step.report.stamp_ns);
-        let mut fork = Self::new(spec, parent.camera_key.clone());
+        let mut fork = Self::new(spec, parent.camera_key.clone()).with_position_truth(parent.position_truth.clone());
         fork.origin = Some(ForkOrigin { parent: parent.id, step, stamp_ns, changes });
         fork.steps = parent.steps[..step].to_vec();
         // The parent counts the bytes of the shared steps; tracks are counted once for all runs.
@@ -119,6 +133,10 @@ impl RunRecord {
         if let (Some(newest), Some(ground_truth)) = (record.report.newest(), &record.ground_truth) {
             self.alignment_sums.add(&newest.world_from_imu.translation_m, &ground_truth.translation_m);
             self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);
+        }
+        if let (Some(newest), Some(truth)) = (record.report.newest(), &self.position_truth) {
+            self.antenna.push(truth, newest.stamp_ns, newest.world_from_imu);
+            self.alignment = self.antenna.alignment.map(|alignment| alignment.true_from_estimate);
         }
         self.memory.own += record.own_bytes();
         self.memory.tracks += record.tracks_bytes();
@@ -155,6 +173,13 @@ impl RunRecord {
             }
         }
         self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);
+        if let Some(truth) = &self.position_truth {
+            self.antenna = AntennaRecord::default();
+            for newest in self.steps.iter().filter_map(|step| step.report.newest()) {
+                self.antenna.push(truth, newest.stamp_ns, newest.world_from_imu);
+            }
+            self.alignment = self.antenna.alignment.map(|alignment| alignment.true_from_estimate);
+        }
     }
 
     /// Index of the last step at or before a stamp.

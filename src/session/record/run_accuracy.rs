@@ -1,11 +1,18 @@
 //! Errors of a run's trajectory and chain against ground truth.
 
 use super::run::RunRecord;
+use super::step::StepRecord;
 use crate::geometry::{seconds_from_ns, so3};
 use crate::gimbal::ClassicalChain;
 use crate::session::accuracy::{
     Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, path_length_m, relative_errors,
 };
+use crate::session::antenna::{AntennaAlignment, AntennaPair, align_antenna, antenna_errors_m, antenna_statistics};
+
+const NO_GROUND_TRUTH: &str = "no ground truth for the estimated frames in the log";
+
+/// Largest age of a position of the antenna beside a pose, in nanoseconds.
+pub(super) const MAX_POSITION_AGE_NS: i64 = 500_000_000;
 
 /// Path lengths of the relative errors, in metres.
 pub const RELATIVE_LENGTHS_M: [f64; 3] = [5.0, 10.0, 25.0];
@@ -17,8 +24,10 @@ pub struct TrajectoryAccuracy {
     pub length_m: f64,
     /// Absolute position errors in metres.
     pub absolute_m: ErrorStatistics,
-    /// Relative errors by path length, for lengths that the trajectory has.
+    /// Relative errors by path length, for lengths that the trajectory has; none against positions of an antenna.
     pub relative: Vec<RelativeAccuracy>,
+    /// The lever arm of the antenna whose positions the ground truth is, `None` of poses of the IMU.
+    pub antenna: Option<AntennaAlignment>,
 }
 
 /// Relative errors over sub-trajectories of one path length.
@@ -57,11 +66,72 @@ impl TrajectoryAccuracy {
             length_m: path_length_m(pairs.iter().map(|(_, ground_truth)| &ground_truth.pose.translation_m)),
             absolute_m: ErrorStatistics::of(&absolute_errors_m(pairs, &transform))?,
             relative: relative.collect(),
+            antenna: None,
         })
+    }
+
+    /// Errors of the position of an antenna, `None` without a pair.
+    pub fn of_antenna(pairs: &[AntennaPair], alignment: &AntennaAlignment) -> Option<Self> {
+        let (absolute_m, length_m) = antenna_statistics(pairs, alignment)?;
+        Some(Self { length_m, absolute_m, relative: Vec::new(), antenna: Some(*alignment) })
     }
 }
 
 impl RunRecord {
+    /// Errors of the trajectory: of the poses of the IMU, or of the positions of the antenna where these are the ground
+    /// truth.
+    ///
+    /// # Errors
+    /// The reason in words, when there is no ground truth or it does not determine the alignment.
+    pub fn accuracy(&self) -> Result<TrajectoryAccuracy, String> {
+        let Some(truth) = &self.position_truth else {
+            let pairs = self.pairs_with_ground_truth();
+            let reason = if pairs.is_empty() { NO_GROUND_TRUTH } else { "too few frames with ground truth to align" };
+            return TrajectoryAccuracy::of(&pairs).ok_or_else(|| reason.to_owned());
+        };
+        let pairs = &self.antenna.pairs;
+        let alignment = align_antenna(pairs, truth.lever_arm).map_err(|error| error.to_string())?;
+        TrajectoryAccuracy::of_antenna(pairs, &alignment).ok_or_else(|| NO_GROUND_TRUTH.to_owned())
+    }
+
+    /// Distances in metres between the aligned run and the ground truth at the estimated frames, or at the positions of the
+    /// antenna where these are the ground truth; none before the alignment.
+    pub fn position_errors_m(&self) -> Vec<f64> {
+        if self.position_truth.is_some() {
+            let errors_m = |alignment| antenna_errors_m(&self.antenna.pairs, alignment);
+            return self.antenna.alignment.as_ref().map(errors_m).unwrap_or_default();
+        }
+        self.steps.iter().filter_map(|step| self.pose_error_m(step)).collect()
+    }
+
+    /// The same distance at one step: at its frame, or at the last position of the antenna at or before it that is at most
+    /// 0.5 s old.
+    pub fn position_error_m(&self, step: &StepRecord) -> Option<f64> {
+        if self.position_truth.is_none() {
+            return self.pose_error_m(step);
+        }
+        let alignment = self.antenna.alignment.as_ref()?;
+        let stamp_ns = step.report.newest()?.stamp_ns;
+        let last = self.antenna.pairs.partition_point(|pair| pair.stamp_ns <= stamp_ns).checked_sub(1)?;
+        let pair = self.antenna.pairs.get(last).filter(|pair| stamp_ns - pair.stamp_ns <= MAX_POSITION_AGE_NS)?;
+        antenna_errors_m(std::slice::from_ref(pair), alignment).first().copied()
+    }
+
+    fn pose_error_m(&self, step: &StepRecord) -> Option<f64> {
+        let estimate = self.alignment?.transform(&step.report.newest()?.world_from_imu.translation_m);
+        Some((estimate - step.ground_truth?.translation_m).norm())
+    }
+
+    /// Length of the path in metres over the frames with ground truth, of the ground truth; `None` without ground truth.
+    pub fn true_length_m(&self) -> Option<f64> {
+        if self.position_truth.is_some() && !self.antenna.pairs.is_empty() {
+            return Some(path_length_m(self.antenna.pairs.iter().map(|pair| &pair.antenna_m)));
+        }
+        let pairs = self.pairs_with_ground_truth();
+        (!pairs.is_empty())
+            .then(|| path_length_m(pairs.iter().map(|(_, ground_truth)| &ground_truth.pose.translation_m)))
+    }
+
     /// Estimated and ground-truth `world_from_imu` of each frame that has both.
     pub fn pairs_with_ground_truth(&self) -> Vec<(StampedPose, StampedPose)> {
         self.steps

@@ -1,5 +1,6 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
+use crate::optimization::RobustLoss;
 use crate::sensors::{CameraRig, Rig};
 use crate::session::accuracy::{Alignment, AlignmentSums};
 use crate::session::engine::estimator_config;
@@ -24,10 +25,42 @@ fn run_specifications_are_read_and_written() {
         "classical:encoder=off,window=8,name=left",
         "poe:camera=cam1",
         "auto:timeshift=on,first-estimates=off",
+        "auto:pixel-noise=2,imu-noise=0.5,encoder-noise=3,loss=huber-1.5,iterations=12",
+        "static:loss=none,name=quadratic",
     ] {
         let run = parse(text).unwrap();
         assert_eq!(parse(&run.to_string()).unwrap(), run, "{text} is written as {run}");
     }
+}
+
+#[test]
+fn specifications_of_one_meaning_have_one_text_of_settings() {
+    let check = |text: &str, settings: &str, written: &str| {
+        let run = parse(text).unwrap();
+        assert_eq!((run.settings().as_str(), run.to_string().as_str()), (settings, written), "{text}");
+    };
+    check("auto", "auto", "auto");
+    check("auto:window=10", "auto", "auto:name=auto-window-10");
+    check("auto:encoder=on,pixel-noise=1.0,name=auto", "auto", "auto");
+    check(
+        "auto:imu-noise=2.0,window=8",
+        "auto:window=8,imu-noise=2",
+        "auto:window=8,imu-noise=2,name=auto-imu-noise-2.0-window-8",
+    );
+    check("poe:loss=cauchy-2,name=robust", "poe:loss=cauchy-2", "poe:loss=cauchy-2,name=robust");
+}
+
+#[test]
+fn tuning_changes_the_configuration() {
+    let rig = synthetic_tracks(&SyntheticOptions { duration_s: 0.1, ..SyntheticOptions::default() }).given_rig;
+    let config = |text: &str| estimator_config(&rig, &parse(text).unwrap()).unwrap();
+    let (standard, tuned) =
+        (config("auto"), config("auto:pixel-noise=2,imu-noise=3,encoder-noise=4,loss=huber-1.5,iterations=12"));
+    assert_eq!(tuned.options.pixel_sigma_px, 2.0 * standard.options.pixel_sigma_px);
+    assert_eq!(tuned.options.imu_noise_factor, 3.0 * standard.options.imu_noise_factor);
+    assert_eq!(tuned.encoder_sigma_rad, standard.encoder_sigma_rad.map(|sigma_rad| 4.0 * sigma_rad));
+    assert!(standard.encoder_sigma_rad.is_some());
+    assert_eq!((tuned.options.loss, tuned.options.iterations), (RobustLoss::Huber(1.5), 12));
 }
 
 #[test]
@@ -41,6 +74,9 @@ fn rejected_specifications_report_what_was_expected() {
     check("auto:window=2", &["window", "'2'", "4 to 30"]);
     check("auto:speed=3", &["unknown key 'speed'", "calibrate"]);
     check("auto:encoder", &["no value"]);
+    check("auto:pixel-noise=0", &["pixel-noise", "'0'", "0.001 to 1000"]);
+    check("auto:loss=tukey-2", &["loss", "'tukey-2'", "huber-K"]);
+    check("auto:iterations=0", &["iterations", "1 to 100"]);
     check("auto:name=../x", &["name", "letters"]);
 }
 

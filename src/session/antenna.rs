@@ -1,0 +1,280 @@
+//! Trajectory errors against positions of an antenna: ground truth without attitudes, beside the IMU by a lever arm.
+
+use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
+use thiserror::Error;
+
+use super::accuracy::{Alignment, AlignmentSums, ErrorStatistics, path_length_m};
+use crate::geometry::{RigidTransform, so3};
+use crate::sensors::{LeverArm, PoseTrack, PositionSample};
+
+/// Weakest mean excitation of the lever arm by rotations, in degrees: below it, the arm follows from the noise.
+const MIN_EXCITATION_DEG: f64 = 5.0;
+/// Gauss–Newton steps of the estimated lever arm; a handful do.
+const MAX_STEPS: usize = 30;
+/// A step this small ends them, in metres and radians.
+const STEP_TOLERANCE: f64 = 1e-12;
+/// Fewest pairs.
+const MIN_PAIRS: usize = 10;
+/// Largest correlation of consecutive residuals that is believed.
+const MAX_CORRELATION: f64 = 0.999;
+
+/// An estimated pose of the IMU at the stamp of an antenna's position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AntennaPair {
+    /// Stamp in nanoseconds since the log began.
+    pub stamp_ns: i64,
+    /// `world_from_imu` in the world of the estimate.
+    pub pose: RigidTransform,
+    /// Position of the antenna in the world of the ground truth, in metres.
+    pub antenna_m: Vector3<f64>,
+}
+
+/// What maps an estimated trajectory onto the positions of an antenna.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AntennaAlignment {
+    /// `true_from_estimate`, a rotation about the vertical and a translation.
+    pub true_from_estimate: RigidTransform,
+    /// Position of the antenna in the IMU frame, in metres.
+    pub lever_arm_m: Vector3<f64>,
+    /// Standard deviation of each of its coordinates, where it was estimated.
+    pub lever_arm_sigma_m: Option<Vector3<f64>>,
+}
+
+/// Why a trajectory cannot be aligned with the positions of an antenna.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum AntennaError {
+    /// Too few pairs, or all at one place.
+    #[error("{pairs} poses with a position of the antenna do not determine the alignment")]
+    NotDetermined {
+        /// Number of pairs.
+        pairs: usize,
+    },
+    /// The rotations of the flight do not determine the lever arm.
+    #[error(
+        "the lever arm cannot be estimated: along ({:.2}, {:.2}, {:.2}) of the IMU the rotations of the flight excite it by \
+         {excitation_deg:.1}° only, {MIN_EXCITATION_DEG}° are needed; measure it with a ruler and give it as \
+         ground_truth.lever_arm or --lever-arm X,Y,Z",
+        direction.x, direction.y, direction.z
+    )]
+    NotExcited {
+        /// Direction in the IMU frame along which it is least determined.
+        direction: Vector3<f64>,
+        /// How much the rotations excite it.
+        excitation_deg: f64,
+    },
+}
+
+/// The estimate at the stamps of the positions, interpolated between its poses.
+pub fn antenna_pairs(estimate: &PoseTrack, positions: &[PositionSample]) -> Vec<AntennaPair> {
+    let pair = |sample: &PositionSample| {
+        let pose = estimate.at(sample.stamp_ns)?;
+        Some(AntennaPair { stamp_ns: sample.stamp_ns, pose, antenna_m: sample.position_m })
+    };
+    positions.iter().filter_map(pair).collect()
+}
+
+/// Aligns an estimate with the positions of an antenna by yaw and position, together with the lever arm where it is to be
+/// estimated (least squares).
+///
+/// # Errors
+/// When the pairs do not determine the alignment, or the rotations do not determine the lever arm.
+pub fn align_antenna(pairs: &[AntennaPair], lever_arm: LeverArm) -> Result<AntennaAlignment, AntennaError> {
+    match lever_arm {
+        LeverArm::Known(lever_arm_m) => {
+            let true_from_estimate = aligned(pairs, &lever_arm_m)?;
+            Ok(AntennaAlignment { true_from_estimate, lever_arm_m, lever_arm_sigma_m: None })
+        }
+        LeverArm::Estimated => with_lever_arm(pairs),
+    }
+}
+
+/// Distances between the estimated and the true positions of the antenna, in metres.
+pub fn antenna_errors_m(pairs: &[AntennaPair], alignment: &AntennaAlignment) -> Vec<f64> {
+    pairs.iter().map(|pair| residual(pair, &alignment.true_from_estimate, &alignment.lever_arm_m).norm()).collect()
+}
+
+/// Statistics of these distances, and the length of the antenna's path in metres.
+pub fn antenna_statistics(pairs: &[AntennaPair], alignment: &AntennaAlignment) -> Option<(ErrorStatistics, f64)> {
+    let statistics = ErrorStatistics::of(&antenna_errors_m(pairs, alignment))?;
+    Some((statistics, path_length_m(pairs.iter().map(|pair| &pair.antenna_m))))
+}
+
+/// The alignment with a known lever arm.
+fn aligned(pairs: &[AntennaPair], lever_arm_m: &Vector3<f64>) -> Result<RigidTransform, AntennaError> {
+    let mut sums = AlignmentSums::default();
+    for pair in pairs {
+        sums.add(&pair.pose.transform(lever_arm_m), &pair.antenna_m);
+    }
+    let solved = sums.solve(Alignment::YawPosition).filter(|_| pairs.len() >= MIN_PAIRS);
+    solved.map(|transform| transform.rigid).ok_or(AntennaError::NotDetermined { pairs: pairs.len() })
+}
+
+/// Estimated minus true position of the antenna.
+fn residual(pair: &AntennaPair, true_from_estimate: &RigidTransform, lever_arm_m: &Vector3<f64>) -> Vector3<f64> {
+    true_from_estimate.transform(&pair.pose.transform(lever_arm_m)) - pair.antenna_m
+}
+
+/// Columns of the least-squares problem: yaw, translation, lever arm.
+const GAUGE: usize = 4;
+const COLUMNS: usize = GAUGE + 3;
+
+fn with_lever_arm(pairs: &[AntennaPair]) -> Result<AntennaAlignment, AntennaError> {
+    let not_determined = AntennaError::NotDetermined { pairs: pairs.len() };
+    let mut lever_arm_m = Vector3::zeros();
+    let mut true_from_estimate = aligned(pairs, &lever_arm_m)?;
+    let mut lever_information = Matrix3::zeros();
+    for _ in 0..MAX_STEPS {
+        let (normal, gradient) = normal_equations(pairs, &true_from_estimate, &lever_arm_m);
+        let gauge = Cholesky::new(normal.fixed_view::<GAUGE, GAUGE>(0, 0).into_owned()).ok_or(not_determined)?;
+        let mixed = normal.fixed_view::<GAUGE, 3>(0, GAUGE).into_owned();
+        lever_information = normal.fixed_view::<3, 3>(GAUGE, GAUGE) - mixed.transpose() * gauge.solve(&mixed);
+        check_excitation(&lever_information, pairs.len())?;
+        let step = -Cholesky::new(normal).ok_or(not_determined)?.solve(&gradient);
+        let rotation = so3::exp(&Vector3::new(0.0, 0.0, step[0]));
+        true_from_estimate.rotation = rotation * true_from_estimate.rotation;
+        true_from_estimate.translation_m =
+            rotation * true_from_estimate.translation_m + step.fixed_rows::<3>(1).into_owned();
+        lever_arm_m += step.fixed_rows::<3>(GAUGE);
+        if step.amax() < STEP_TOLERANCE {
+            break;
+        }
+    }
+    let residuals: Vec<Vector3<f64>> =
+        pairs.iter().map(|pair| residual(pair, &true_from_estimate, &lever_arm_m)).collect();
+    let sigmas = lever_information.try_inverse().map(|covariance| (covariance * variance_of(&residuals)).diagonal());
+    let lever_arm_sigma_m = sigmas.map(|variances| variances.map(f64::sqrt));
+    Ok(AntennaAlignment { true_from_estimate, lever_arm_m, lever_arm_sigma_m })
+}
+
+/// `JᵀJ` and `Jᵀr` of all residuals; a step of the yaw rotates about the origin of the true world.
+fn normal_equations(
+    pairs: &[AntennaPair],
+    true_from_estimate: &RigidTransform,
+    lever_arm_m: &Vector3<f64>,
+) -> (SMatrix<f64, COLUMNS, COLUMNS>, SVector<f64, COLUMNS>) {
+    let mut normal = SMatrix::zeros();
+    let mut gradient = SVector::zeros();
+    for pair in pairs {
+        let residual = residual(pair, true_from_estimate, lever_arm_m);
+        let mut jacobian = SMatrix::<f64, 3, COLUMNS>::zeros();
+        jacobian.set_column(0, &Vector3::z().cross(&(residual + pair.antenna_m)));
+        jacobian.fixed_view_mut::<3, 3>(0, 1).copy_from(&Matrix3::identity());
+        let rotation = true_from_estimate.rotation * pair.pose.rotation;
+        jacobian.fixed_view_mut::<3, 3>(0, GAUGE).copy_from(&rotation.to_rotation_matrix().into_inner());
+        normal += jacobian.transpose() * jacobian;
+        gradient += jacobian.transpose() * residual;
+    }
+    (normal, gradient)
+}
+
+/// Refuses a lever arm that the rotations leave undetermined. The information per pair, without what alignment can take up,
+/// is the mean square of the sine of the rotations that excite a direction.
+fn check_excitation(lever_information: &Matrix3<f64>, pairs: usize) -> Result<(), AntennaError> {
+    let eigen = SymmetricEigen::new(lever_information / pairs.max(1) as f64);
+    let weakest = eigen.eigenvalues.imin();
+    let excitation_deg = eigen.eigenvalues[weakest].clamp(0.0, 1.0).sqrt().asin().to_degrees();
+    if excitation_deg >= MIN_EXCITATION_DEG {
+        return Ok(());
+    }
+    let direction: Vector3<f64> = eigen.eigenvectors.column(weakest).into_owned();
+    // The sign of an eigenvector is arbitrary: its largest coordinate is positive.
+    let direction = if direction[direction.iamax()] < 0.0 { -direction } else { direction };
+    Err(AntennaError::NotExcited { direction, excitation_deg })
+}
+
+/// Variance of one coordinate of the residuals in m², larger by what their correlation in time takes of their number: errors
+/// of a trajectory drift, so that consecutive residuals are nearly one measurement.
+fn variance_of(residuals: &[Vector3<f64>]) -> f64 {
+    let freedom = (3 * residuals.len()).saturating_sub(COLUMNS).max(1) as f64;
+    let squares: f64 = residuals.iter().map(Vector3::norm_squared).sum();
+    let products: f64 = residuals.windows(2).map(|pair| pair[0].dot(&pair[1])).sum();
+    let correlation = if squares > 0.0 { (products / squares).clamp(0.0, MAX_CORRELATION) } else { 0.0 };
+    squares / freedom * (1.0 + correlation) / (1.0 - correlation)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+    use crate::geometry::SplitMix64;
+    use crate::sensors::PoseSample;
+
+    /// 60 s at 20 Hz that turn, roll and pitch by `tilt_rad`, and a world of their own.
+    fn estimate(tilt_rad: f64) -> PoseTrack {
+        let sample = |frame: i64| {
+            let time_s = frame as f64 * 0.05;
+            let roll = tilt_rad * (0.9 * time_s).sin();
+            let pitch = tilt_rad * (0.7 * time_s).cos();
+            let rotation = UnitQuaternion::from_euler_angles(roll, pitch, 0.3 * time_s);
+            let position_m = Vector3::new(8.0 * (0.25 * time_s).cos(), 6.0 * (0.3 * time_s).sin(), 0.1 * time_s);
+            PoseSample { stamp_ns: frame * 50_000_000, world_from_imu: RigidTransform::new(rotation, position_m) }
+        };
+        PoseTrack::new((0..1200).map(sample).collect())
+    }
+
+    const LEVER_ARM_M: [f64; 3] = [0.12, -0.05, 0.31];
+
+    /// Positions of the antenna at 5 Hz in another world, between the frames, wrong by white noise.
+    fn positions(estimate: &PoseTrack, sigma_m: f64) -> Vec<PositionSample> {
+        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.1);
+        let true_from_estimate = RigidTransform::new(yaw, Vector3::new(100.0, -40.0, 7.0));
+        let mut random = SplitMix64::new(3);
+        // Nearly normal: the sum of twelve uniform numbers has a variance of 1.
+        let mut normal = move || (0..12).map(|_| random.next_unit()).sum::<f64>() - 6.0;
+        (1..290_i64)
+            .map(|number| {
+                let stamp_ns = number * 200_000_000 + 25_000_000;
+                let pose = true_from_estimate * estimate.at(stamp_ns).unwrap();
+                let error = Vector3::from_fn(|_, _| sigma_m * normal());
+                PositionSample { stamp_ns, position_m: pose.transform(&LEVER_ARM_M.into()) + error }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_lever_arm_is_estimated_with_its_sigma() {
+        let estimate = estimate(0.3);
+        for sigma_m in [0.0, 0.02] {
+            let pairs = antenna_pairs(&estimate, &positions(&estimate, sigma_m));
+            assert_eq!(pairs.len(), 289);
+            let found = align_antenna(&pairs, LeverArm::Estimated).unwrap();
+            let error = found.lever_arm_m - Vector3::from(LEVER_ARM_M);
+            let sigma = found.lever_arm_sigma_m.unwrap();
+            if sigma_m == 0.0 {
+                assert!(error.amax() < 1e-9, "{error}");
+            } else {
+                assert!(sigma.iter().all(|sigma| (0.001..0.02).contains(sigma)), "{sigma}");
+                assert!(error.component_div(&sigma).amax() < 3.0, "{error} {sigma}");
+            }
+            let (statistics, length_m) = antenna_statistics(&pairs, &found).unwrap();
+            assert!((statistics.rmse - sigma_m * 3.0_f64.sqrt()).abs() < 0.1 * sigma_m + 1e-9, "{statistics:?}");
+            assert!(length_m > 80.0);
+        }
+    }
+
+    #[test]
+    fn a_known_lever_arm_counts_and_a_missing_one_is_an_error() {
+        let estimate = estimate(0.3);
+        let pairs = antenna_pairs(&estimate, &positions(&estimate, 0.0));
+        let rmse = |lever_arm_m: Vector3<f64>| {
+            let alignment = align_antenna(&pairs, LeverArm::Known(lever_arm_m)).unwrap();
+            antenna_statistics(&pairs, &alignment).unwrap().0.rmse
+        };
+        assert!(rmse(LEVER_ARM_M.into()) < 1e-9);
+        assert!(rmse(Vector3::zeros()) > 0.05);
+    }
+
+    #[test]
+    fn rotations_that_do_not_excite_the_lever_arm_are_refused() {
+        // Level flight: what is above the IMU is the same as a height.
+        let estimate = estimate(0.01);
+        let pairs = antenna_pairs(&estimate, &positions(&estimate, 0.0));
+        let refused = align_antenna(&pairs, LeverArm::Estimated).unwrap_err();
+        let AntennaError::NotExcited { direction, excitation_deg } = refused else { panic!("{refused}") };
+        assert!(direction.z > 0.99 && excitation_deg < 1.0, "{direction} {excitation_deg}");
+        assert!(refused.to_string().contains("measure it with a ruler"), "{refused}");
+        let few = align_antenna(&pairs[..5], LeverArm::Known(Vector3::zeros())).unwrap_err();
+        assert_eq!(few, AntennaError::NotDetermined { pairs: 5 });
+    }
+}

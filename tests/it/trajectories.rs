@@ -1,0 +1,149 @@
+//! Trajectories of other programs beside the runs: evaluated like a run, in summary, report and pictures.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use dcvins::flight_log::FlightLog;
+use serde_json::Value;
+
+fn sample_log() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap")
+}
+
+fn dcvins(arguments: &[&str]) -> (i32, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_dcvins")).args(arguments).output().expect("the program runs");
+    let text = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    (output.status.code().unwrap_or(-1), text)
+}
+
+/// The ground truth of the sample log as a EuRoC table, with a height that is wrong by a constant amount up and down.
+fn write_trajectory(path: &Path, error_m: f64) {
+    let log = FlightLog::open(&sample_log()).expect("the sample log");
+    let mut text = "#timestamp [ns],p x,p y,p z,q w,q x,q y,q z\n".to_owned();
+    for (index, pose) in log
+        .read_trajectory_topic("/ground_truth/odometry")
+        .expect("the topic of its ground truth")
+        .iter()
+        .step_by(10)
+        .enumerate()
+    {
+        let (p, q) = (pose.position_m, pose.rotation.expect("poses have attitudes"));
+        let z = p.z + if index % 2 == 0 { error_m } else { -error_m };
+        writeln!(text, "{},{},{},{},{},{},{},{}", pose.stamp_ns, p.x, p.y, z, q.w, q.i, q.j, q.k)
+            .expect("writing into a string cannot fail");
+    }
+    std::fs::write(path, text).expect("a file in a new folder");
+}
+
+#[test]
+fn a_trajectory_is_evaluated_like_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (log, results) = (sample_log().to_str().unwrap().to_owned(), at("results"));
+    write_trajectory(Path::new(&at("other.csv")), 0.05);
+    let (file, topic) = (format!("{}:Other", at("other.csv")), "topic:/ground_truth/odometry:Truth");
+    let run = ["run", &log, "--duration", "6", "--out", &results, "--trajectory", &file, "--trajectory", topic];
+    let (code, text) = dcvins(&run);
+    assert_eq!(code, 0, "{text}");
+    assert!(text.contains("trajectory Other (") && text.contains("ATE 0.050 m RMSE"), "{text}");
+    let summary = std::fs::read_to_string(folder.path().join("results/auto/summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    let lanes = summary["trajectories"].as_array().unwrap();
+    assert_eq!((lanes[0]["label"].as_str(), lanes[1]["label"].as_str()), (Some("Other"), Some("Truth")));
+    let ate_m = |lane: &Value| lane["accuracy"]["ate_rmse_m"].as_f64().unwrap();
+    assert!((ate_m(&lanes[0]) - 0.05).abs() < 1e-3 && ate_m(&lanes[1]) < 1e-9, "{lanes:?}");
+    assert!(lanes[0]["accuracy"]["rpe"].as_array().is_some_and(|rpe| !rpe.is_empty()), "{lanes:?}");
+    assert_eq!(lanes[1]["source"], "topic:/ground_truth/odometry");
+
+    // The run's own trajectory is evaluated like the run.
+    let own = format!("{}:own", at("results/auto/trajectory.tum"));
+    let again = at("again");
+    let (code, text) = dcvins(&["run", &log, "--duration", "6", "--out", &again, "--trajectory", &own]);
+    assert_eq!(code, 0, "{text}");
+    let summary: Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("again/auto/summary.json")).unwrap()).unwrap();
+    let of_run = summary["accuracy"]["ate_rmse_m"].as_f64().unwrap();
+    assert!((ate_m(&summary["trajectories"][0]) - of_run).abs() < 1e-6, "{summary}");
+
+    let report = at("report");
+    let (code, text) = dcvins(&["report", &log, "--duration", "6", "-o", &report, "--trajectory", &file]);
+    assert_eq!(code, 0, "{text}");
+    let page = std::fs::read_to_string(folder.path().join("report/report.html")).unwrap();
+    assert!(page.contains("Trajectories of other programs") && page.contains("Other"), "the page lists it");
+}
+
+#[test]
+fn what_does_not_belong_to_the_log_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = sample_log().to_str().unwrap().to_owned();
+    let out = folder.path().join("results").to_str().unwrap().to_owned();
+    let file = folder.path().join("other.tum").to_str().unwrap().to_owned();
+    let check = |content: &str, trajectory: &str, expected: &str| {
+        std::fs::write(&file, content).unwrap();
+        let (code, text) = dcvins(&["run", &log, "--duration", "1", "--out", &out, "--trajectory", trajectory]);
+        assert!(code == 1 && text.contains(expected), "{code}: {text}");
+    };
+    check(
+        "1.0 0 0 0 0 0 0 1\n",
+        &file,
+        "no pose with an attitude within the time of the log: its stamps are 1.000 to 1.000 s",
+    );
+    check("1.0 0 0 0\n", &file, "it has positions without attitudes");
+    check("1.0 0 0\n", &file, "line 1 holds 3 numbers; expected 't x y z qx qy qz qw'");
+    check("", "topic:/vins", "no topic '/vins' in the log; topics with poses or positions: /ground_truth/odometry");
+    check("", "topic:/imu", "topic '/imu' is of type sensor_msgs/msg/Imu, expected one of nav_msgs/msg/Odometry");
+}
+
+/// Positions of an antenna at 5 Hz from the ground truth of the sample log, as TUM with quaternions of zeros.
+fn write_positions(path: &Path, lever_arm_m: [f64; 3]) {
+    let log = FlightLog::open(&sample_log()).expect("the sample log");
+    let mut text = String::new();
+    let poses = log.read_trajectory_topic("/ground_truth/odometry").expect("the topic of its ground truth");
+    for pose in poses.iter().step_by(20) {
+        let at = pose.position_m + pose.rotation.expect("poses have attitudes") * nalgebra::Vector3::from(lever_arm_m);
+        let (seconds, rest) = (pose.stamp_ns / 1_000_000_000, pose.stamp_ns % 1_000_000_000);
+        writeln!(text, "{seconds}.{rest:09} {} {} {} 0 0 0 0", at.x, at.y, at.z)
+            .expect("writing into a string cannot fail");
+    }
+    std::fs::write(path, text).expect("a file in a new folder");
+}
+
+#[test]
+fn positions_of_an_antenna_are_ground_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let log = sample_log().to_str().unwrap().to_owned();
+    let lever_arm_m = [0.12, -0.05, 0.31];
+    let positions = at("rtk.tum");
+    write_positions(Path::new(&positions), lever_arm_m);
+    let accuracy = |name: &str, options: &[&str]| -> Value {
+        let out = at(name);
+        let (code, text) = dcvins(&[&["run", &log, "--out", &out], options].concat());
+        assert_eq!(code, 0, "{text}");
+        let summary = std::fs::read_to_string(folder.path().join(name).join("auto/summary.json")).unwrap();
+        let summary: Value = serde_json::from_str(&summary).unwrap();
+        summary["accuracy"].clone()
+    };
+    let ate_m = |accuracy: &Value| accuracy["ate_rmse_m"].as_f64().unwrap();
+    let poses = accuracy("poses", &[]);
+    let known = accuracy("known", &["--truth-trajectory", &positions, "--lever-arm", "0.12,-0.05,0.31"]);
+    assert!((ate_m(&known) - ate_m(&poses)).abs() < 0.3 * ate_m(&poses) + 1e-3, "{known} {poses}");
+    assert_eq!(known["rpe"].as_array().map(Vec::len), Some(0));
+    let none = accuracy("none", &["--truth-trajectory", &positions]);
+    assert!(ate_m(&none) > 1.5 * ate_m(&known), "{none} {known}");
+    let estimated = accuracy("estimated", &["--truth-trajectory", &positions, "--lever-arm", "estimate"]);
+    let numbers = |key: &str| -> Vec<f64> {
+        estimated["antenna"][key].as_array().unwrap().iter().filter_map(Value::as_f64).collect()
+    };
+    for ((found, sigma), actual) in numbers("lever_arm_m").iter().zip(numbers("lever_arm_sigma_m")).zip(lever_arm_m) {
+        assert!((found - actual).abs() < 4.0 * sigma && sigma < 0.1, "{estimated}");
+    }
+    assert!(ate_m(&estimated) < 1.1 * ate_m(&known), "{estimated} {known}");
+
+    let poses_file = at("poses/auto/trajectory.tum");
+    let out = at("refused");
+    let refused = ["run", &log, "--out", &out, "--truth-trajectory", &poses_file, "--lever-arm", "estimate"];
+    let (code, text) = dcvins(&refused);
+    assert!(code == 1 && text.contains("it has attitudes, and a lever arm belongs to positions"), "{text}");
+}
