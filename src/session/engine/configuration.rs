@@ -27,7 +27,7 @@ pub(in crate::session) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<
         first_estimate_reach_rad: if spec.first_estimates { standard.first_estimate_reach_rad } else { 0.0 },
         ..standard
     };
-    Ok(EstimatorConfig {
+    let mut config = EstimatorConfig {
         auto_parameterize: !chain.links.is_empty() && spec.parameterization.switches_parameterization(rig),
         use_encoder: spec.encoder && configuration.use_encoder,
         calibrate: spec.calibrate,
@@ -39,5 +39,7 @@ pub(in crate::session) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<
         options,
         clock_ms,
         ..configuration
-    })
+    };
+    spec.tuning.apply(&mut config);
+    Ok(config)
 }

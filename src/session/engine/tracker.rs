@@ -11,7 +11,7 @@ use crate::frontend::{
     ChainOrientation, FrontEnd, FrontEndOptions, PredictionNoise, camera_rates, predict_camera_rotation,
 };
 use crate::gimbal::ClassicalChain;
-use crate::sensors::{CameraMount, Rig};
+use crate::sensors::{CameraMount, PoseTrack, Rig};
 use crate::session::plan::SessionError;
 
 /// Reads a camera's stream and tracks its features.
@@ -22,6 +22,8 @@ pub(super) struct CameraTracker {
     noise: PredictionNoise,
     readout_s: f64,
     previous_orientation: Option<ChainOrientation>,
+    /// Ground truth instead of that of the log.
+    ground_truth: Option<Arc<PoseTrack>>,
 }
 
 /// Standard deviation of a gyroscope's turn-on bias, in rad/s (1.1°/s, a small MEMS IMU).
@@ -55,7 +57,13 @@ impl CameraTracker {
             noise: prediction_noise(rig, &camera.mount),
             readout_s: camera.readout_s,
             previous_orientation: None,
+            ground_truth: None,
         })
+    }
+
+    /// With ground truth instead of that of the log, `None` to keep it.
+    pub(super) fn with_ground_truth(self, ground_truth: Option<Arc<PoseTrack>>) -> Self {
+        Self { ground_truth, ..self }
     }
 
     /// The next step input of this camera and the new warnings about the log, `None` at the end of the stream. An image
@@ -64,6 +72,10 @@ impl CameraTracker {
         let mut rejected = Vec::new();
         loop {
             let mut frame = self.stream.next_frame()?;
+            if let Some(track) = &self.ground_truth {
+                // The last IMU sample is at the stamp of the image on the IMU's clock.
+                frame.ground_truth = frame.imu.last().and_then(|last| track.at(last.stamp_ns));
+            }
             let watch = Stopwatch::start();
             let orientation = self.camera_orientation(&frame);
             let predicted = match (&self.previous_orientation, &orientation) {

@@ -3,8 +3,8 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
+use super::tuning::EstimatorTuning;
 use crate::estimator::SensorColumns;
-
 use crate::sensors::Rig;
 
 /// The parameterization in which a run estimates.
@@ -94,6 +94,8 @@ pub struct RunSpec {
     /// Key of the main camera (`camera=cam1`). `None` means the gimballed camera, or the first rigid one for `static`
     /// and for rigs without a gimbal. A `cluster` also uses the first rigid camera.
     pub camera_key: Option<String>,
+    /// Deviations from the estimator's standard options.
+    pub tuning: EstimatorTuning,
 }
 
 impl Default for RunSpec {
@@ -110,6 +112,7 @@ impl Default for RunSpec {
             first_estimates: true,
             window: DEFAULT_WINDOW,
             camera_key: None,
+            tuning: EstimatorTuning::default(),
         }
     }
 }
@@ -142,6 +145,31 @@ impl RunSpec {
             SensorColumns::Intrinsics => self.intrinsics,
             SensorColumns::ImuIntrinsics => self.imu_intrinsics,
         }
+    }
+
+    /// What decides about the results, as text without the name: keys with their standard value are left out and the others
+    /// have one order, so that two specifications of one meaning have one text.
+    pub fn settings(&self) -> String {
+        let standard = Self::default();
+        let mut options = Vec::new();
+        if !self.encoder {
+            options.push("encoder=off".to_owned());
+        }
+        if !self.calibrate {
+            options.push("calibrate=off".to_owned());
+        }
+        let estimated = SensorColumns::ALL.into_iter().filter(|columns| self.estimates(*columns));
+        options.extend(estimated.map(|columns| format!("{}=on", columns.key())));
+        if !self.first_estimates {
+            options.push("first-estimates=off".to_owned());
+        }
+        if self.window != standard.window {
+            options.push(format!("window={}", self.window));
+        }
+        options.extend(self.tuning.options());
+        options.extend(self.camera_key.iter().map(|key| format!("camera={key}")));
+        let name = self.parameterization.name();
+        if options.is_empty() { name.to_owned() } else { format!("{name}:{}", options.join(",")) }
     }
 
     /// [`Self::estimates`] to be changed.
@@ -191,6 +219,7 @@ impl FromStr for RunSpec {
                             bad(format!("window is '{value}', expected a number from {low} to {high}"))
                         })?;
                 }
+                tuned if EstimatorTuning::KEYS.contains(&tuned) => run.tuning.set(tuned, value).map_err(bad)?,
                 "camera" => run.camera_key = Some(value.to_owned()),
                 "name" if folder_name(value) == value && !value.is_empty() => run.label = value.to_owned(),
                 "name" => {
@@ -198,7 +227,8 @@ impl FromStr for RunSpec {
                 }
                 _ => {
                     let known = "encoder, calibrate, timeshift, readout, intrinsics, imu-intrinsics, first-estimates, window, camera, name";
-                    return Err(bad(format!("unknown key '{key}', expected one of {known}")));
+                    let tuning = EstimatorTuning::KEYS.join(", ");
+                    return Err(bad(format!("unknown key '{key}', expected one of {known}, {tuning}")));
                 }
             }
         }
@@ -210,31 +240,16 @@ impl FromStr for RunSpec {
     }
 }
 
+/// The normalized text: [`RunSpec::settings`], and the name where it is not the standard one.
 impl fmt::Display for RunSpec {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let standard = Self::default();
-        let mut options = Vec::new();
-        if !self.encoder {
-            options.push("encoder=off".to_owned());
+        let settings = self.settings();
+        formatter.write_str(&settings)?;
+        if self.label == folder_name(&settings) {
+            return Ok(());
         }
-        if !self.calibrate {
-            options.push("calibrate=off".to_owned());
-        }
-        let estimated = SensorColumns::ALL.into_iter().filter(|columns| self.estimates(*columns));
-        options.extend(estimated.map(|columns| format!("{}=on", columns.key())));
-        if !self.first_estimates {
-            options.push("first-estimates=off".to_owned());
-        }
-        if self.window != standard.window {
-            options.push(format!("window={}", self.window));
-        }
-        options.extend(self.camera_key.iter().map(|key| format!("camera={key}")));
-        let name = self.parameterization.name();
-        let written = if options.is_empty() { name.to_owned() } else { format!("{name}:{}", options.join(",")) };
-        if self.label != folder_name(&written) {
-            options.push(format!("name={}", self.label));
-        }
-        if options.is_empty() { formatter.write_str(name) } else { write!(formatter, "{name}:{}", options.join(",")) }
+        let separator = if settings.contains(':') { ',' } else { ':' };
+        write!(formatter, "{separator}name={}", self.label)
     }
 }
 
@@ -258,11 +273,14 @@ fn on_or_off(value: &str) -> Result<bool, String> {
 /// Makes the labels of several runs unique by appending numbers.
 pub(in crate::session) fn distinct_labels(specs: &mut [RunSpec]) {
     for index in 1..specs.len() {
-        let wanted = specs[index].label.clone();
-        let mut number = 2;
-        while specs[..index].iter().any(|earlier| earlier.label == specs[index].label) {
-            specs[index].label = format!("{wanted}-{number}");
-            number += 1;
-        }
+        let (earlier, later) = specs.split_at_mut(index);
+        later[0].label = distinct_label(&later[0].label, |label| earlier.iter().any(|spec| spec.label == label));
     }
+}
+
+/// The wanted label, with a number appended where it is taken.
+pub(in crate::session) fn distinct_label(wanted: &str, is_taken: impl Fn(&str) -> bool) -> String {
+    let numbered = (2..).map(|number| format!("{wanted}-{number}"));
+    let mut candidates = std::iter::once(wanted.to_owned()).chain(numbered);
+    candidates.find(|label| !is_taken(label)).unwrap_or_default()
 }
