@@ -7,6 +7,8 @@
 //! `--frames 12000` measures a long flight by a short log. What a recording may remember is as much less as the log is
 //! shorter, so that the same share of steps is kept in outline and snapshots lie as far apart. For the pictures the steps
 //! are repeated until there are so many, each a copy of its own with later stamps.
+//!
+//! `--study 10000` measures the view of a made-up study of so many runs instead.
 
 mod figures;
 mod frames;
@@ -14,6 +16,9 @@ mod long;
 mod opening;
 #[path = "../shared/mod.rs"]
 mod shared;
+mod study;
+#[path = "../../tests/it/study_sample.rs"]
+mod study_sample;
 mod travel;
 
 use std::path::PathBuf;
@@ -35,6 +40,8 @@ struct Arguments {
     budget_mib: Option<usize>,
     /// Frames of the long flight that is measured.
     frames: Option<usize>,
+    /// Runs of the study that is measured instead.
+    study: Option<usize>,
 }
 
 impl Arguments {
@@ -43,6 +50,7 @@ impl Arguments {
         let mut runs = Vec::new();
         let mut budget_mib = None;
         let mut frames = None;
+        let mut study = None;
         let mut words = words;
         while let Some(word) = words.next() {
             let mut value = |what: &str| words.next().with_context(|| format!("{word} needs {what}"));
@@ -51,10 +59,13 @@ impl Arguments {
                 "--bench" => {}
                 "--run" => runs.push(value("the name of a run")?.parse()?),
                 "--budget-mib" => budget_mib = Some(value("a number of MiB")?.parse()?),
+                "--study" => study = Some(value("a number of runs")?.parse()?),
                 "--frames" => frames = Some(value("a number of frames")?.parse()?),
                 path if !path.starts_with('-') && log.is_none() => log = Some(PathBuf::from(path)),
                 other => {
-                    bail!("'{other}' is not understood: expected LOG.mcap, --run SPEC, --budget-mib N or --frames N")
+                    bail!(
+                        "'{other}' is not understood: expected LOG.mcap, --run SPEC, --budget-mib N, --frames N or --study N"
+                    )
                 }
             }
         }
@@ -62,7 +73,7 @@ impl Arguments {
             runs = ["auto", "classical"].map(str::parse).into_iter().collect::<Result<_, _>>()?;
         }
         let sample = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
-        Ok(Self { log: log.unwrap_or_else(sample), runs, budget_mib, frames })
+        Ok(Self { log: log.unwrap_or_else(sample), runs, budget_mib, frames, study })
     }
 
     fn plan(&self) -> Result<SessionPlan> {
@@ -83,6 +94,10 @@ impl Arguments {
 #[expect(clippy::print_stdout, reason = "a bench prints what it measured")]
 fn main() -> Result<()> {
     let arguments = Arguments::read(std::env::args().skip(1))?;
+    if let Some(runs) = arguments.study {
+        println!("{}", study::measure(runs)?);
+        return Ok(());
+    }
     println!("{}", opening::measure(&arguments)?);
 
     let plan = arguments.plan()?;

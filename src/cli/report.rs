@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use dcvins::export::{self, ReportOptions, write_report};
 use dcvins::log_check::{self, CheckReport};
-use dcvins::session::{SessionPlan, image_rotations};
+use dcvins::session::{SessionPlan, TrajectorySource, image_rotations};
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
@@ -15,13 +15,17 @@ use crate::cli::interrupt::Interrupt;
 #[cfg(feature = "gui")]
 use crate::cli::report_figures;
 use crate::cli::run::{interrupted, is_initialized};
+#[cfg(feature = "gui")]
+use crate::cli::study_arguments::StudyArguments;
+#[cfg(feature = "gui")]
+use crate::cli::study_report::study_report;
 use crate::cli::terminal::{Progress, notify, print};
 use crate::cli::value_parsers::seconds;
 
 /// `dcvins report`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ReportArguments {
-    /// The log.
+    /// The log, or the folder of a study.
     pub log: PathBuf,
     /// Folder for report.html, report.json and the files of each run.
     #[arg(short, long, visible_alias = "out", value_name = "DIR")]
@@ -33,12 +37,21 @@ pub(crate) struct ReportArguments {
     /// Overwrite whatever is in the folder. Without it a report replaces only a report on a log of the same name and its runs.
     #[arg(long)]
     pub force: bool,
+    #[cfg(feature = "gui")]
+    #[command(flatten)]
+    pub study: StudyArguments,
     #[command(flatten)]
     pub estimation: EstimationArguments,
 }
 
 /// Runs `dcvins report`.
 pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
+    #[cfg(feature = "gui")]
+    if export::is_study(&arguments.log) {
+        return of_study(arguments);
+    }
+    #[cfg(feature = "gui")]
+    arguments.study.require_none(&arguments.log)?;
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
     let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
     export::check_report_folder(&arguments.output, &labels, &arguments.log, arguments.force)?;
@@ -55,14 +68,8 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     let figures = Vec::new();
     // The verdict needs the complete last steps.
     computation.fill_in(computation.recording().last_stamp_ns());
-    let runs = 0..computation.recording().runs.len();
-    let options = ReportOptions {
-        command: command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned())),
-        check: Some(check(&plan)),
-        inputs: inputs(arguments),
-        figures,
-        pose_uncertainties: runs.map(|run| computation.last_pose_uncertainty(run)).collect(),
-    };
+    let options =
+        ReportOptions { command: own_command_line(), check: Some(check(&plan)), inputs: inputs(arguments), figures };
     let recording = computation.recording();
     let page = write_report(recording, &arguments.output, &options)?;
     print(&format!("{}\n", page.display()))?;
@@ -77,6 +84,23 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     Ok(if recording.runs.iter().all(is_initialized) { Outcome::Success } else { Outcome::NeverInitialized })
 }
 
+/// The report of a study.
+#[cfg(feature = "gui")]
+fn of_study(arguments: &ReportArguments) -> Result<Outcome> {
+    if !arguments.at.is_empty() || !arguments.estimation.runs.is_empty() {
+        anyhow::bail!("{} is a study: leave --at and --run out", arguments.log.display());
+    }
+    let study = export::OpenedStudy::read(&arguments.log)?;
+    let view = arguments.study.options();
+    study_report(&study, &view, &arguments.output, own_command_line(), arguments.force)?;
+    Ok(Outcome::Success)
+}
+
+/// The command line of this process.
+fn own_command_line() -> String {
+    command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
+}
+
 /// Findings about the log and its rig.
 fn check(plan: &SessionPlan) -> CheckReport {
     let _progress = Progress::spinner("checking the log");
@@ -84,7 +108,7 @@ fn check(plan: &SessionPlan) -> CheckReport {
     log_check::check(&plan.log, Ok(&plan.rig), &rotations)
 }
 
-/// Paths of the log, and of the rig and its ground truth where they are separate files.
+/// Paths of the log, of the rig and its ground truth where they are separate files, and of trajectories.
 fn inputs(arguments: &ReportArguments) -> Vec<PathBuf> {
     let beside = |given: Option<&PathBuf>, extension: &str| {
         let beside = || Some(arguments.log.with_extension(extension)).filter(|path| path.is_file());
@@ -92,7 +116,11 @@ fn inputs(arguments: &ReportArguments) -> Vec<PathBuf> {
     };
     let rig = beside(arguments.estimation.rig.as_ref(), "rig.yaml");
     let ground_truth = beside(arguments.estimation.ground_truth.as_ref(), "truth.yaml");
-    [Some(arguments.log.clone()), rig, ground_truth].into_iter().flatten().collect()
+    let trajectories = arguments.estimation.trajectories.iter().filter_map(|spec| match &spec.source {
+        TrajectorySource::File(path) => Some(path.clone()),
+        TrajectorySource::Topic(_) => None,
+    });
+    [Some(arguments.log.clone()), rig, ground_truth].into_iter().flatten().chain(trajectories).collect()
 }
 
 /// The command line in a form that can be typed again, with the program's name without its folder.

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
+use clap::error::ErrorKind;
 use clap::{Args, ValueEnum};
 use dcvins::export::{
-    PANEL_NAMES, Renderer, ScreenshotOptions, check_screenshot, draw_panel, draw_panel_svg, is_session, log_name,
-    panel_csv, read_session, write_csv, write_png, write_svg,
+    OpenedStudy, PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_screenshot, draw_panel,
+    draw_panel_svg, is_session, is_study, log_name, panel_csv, read_session, write_csv, write_png, write_svg,
 };
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
@@ -21,17 +22,18 @@ use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::Outcome;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::study_arguments::{StudyArguments, StudyPicture, write_study_picture};
 use crate::cli::terminal::{notify, print};
 use crate::cli::value_parsers::{seconds, sides};
 
 /// `dcvins screenshot`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ScreenshotArguments {
-    /// The log, or a saved session (LOG.session.json) with its forks and breakpoints.
+    /// The log, a saved session (LOG.session.json) with its forks and breakpoints, or the folder of a study.
     pub log: PathBuf,
     /// Seconds since the first message of the log; may be given several times. The time is then part of
-    /// the file names.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, required_unless_present = "every")]
+    /// the file names. Needed for a log unless --every is given.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub at: Vec<f64>,
     /// Period of the screenshots, from the start to the end of the log (or from --start, for --duration).
     #[arg(long, value_name = "SECONDS", value_parser = period)]
@@ -74,6 +76,8 @@ pub(crate) struct ScreenshotArguments {
     /// Overwrite whatever has the name of the screenshot. Without it only PNG, SVG and CSV files are replaced.
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub study: StudyArguments,
     #[command(flatten)]
     pub estimation: EstimationArguments,
 }
@@ -126,6 +130,14 @@ const MAX_SCREENSHOTS: usize = 100_000;
 
 /// Runs `dcvins screenshot`.
 pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
+    if is_study(&arguments.log) {
+        return of_study(arguments);
+    }
+    arguments.study.require_none(&arguments.log)?;
+    if arguments.at.is_empty() && arguments.every.is_none() {
+        let text = "a screenshot of a log needs a time: --at SECONDS or --every SECONDS (a study has none)";
+        clap::Command::new("dcvins screenshot").error(ErrorKind::MissingRequiredArgument, text).exit();
+    }
     if !PANEL_NAMES.contains(&arguments.panel.as_str()) {
         bail!("unknown panel '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
     }
@@ -184,24 +196,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
         }
         None => None,
     };
-    let options = ScreenshotOptions {
-        size_px: arguments.size.map(|side| side as u32),
-        pixels_per_point: arguments.scale,
-        theme: match arguments.theme {
-            ThemeArgument::Light => ThemeName::Light,
-            ThemeArgument::Dark => ThemeName::Dark,
-            ThemeArgument::Print => ThemeName::Print,
-        },
-        renderer: match arguments.renderer {
-            RendererArgument::Cpu => Renderer::Cpu,
-            RendererArgument::Wgpu => Renderer::Wgpu,
-        },
-        run: 0,
-        slide,
-        layout: Preset::ALL.get(usize::from(arguments.layout) - 1).copied().unwrap_or_default(),
-        playback: shown.playback(),
-        presentation: if arguments.controls { Presentation::Interactive } else { Presentation::Figure },
-    };
+    let options = ScreenshotOptions { slide, playback: shown.playback(), ..drawing_options(arguments) };
     for (number, cursor_ns) in stamps_ns.iter().copied().enumerate() {
         if interrupt.is_set() {
             return stopped(number);
@@ -228,6 +223,48 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
             print(&format!("{}\n", path.display()))?;
         }
     }
+    Ok(Outcome::Success)
+}
+
+/// Size, theme and renderer.
+fn drawing_options(arguments: &ScreenshotArguments) -> ScreenshotOptions {
+    ScreenshotOptions {
+        size_px: arguments.size.map(|side| side as u32),
+        pixels_per_point: arguments.scale,
+        theme: match arguments.theme {
+            ThemeArgument::Light => ThemeName::Light,
+            ThemeArgument::Dark => ThemeName::Dark,
+            ThemeArgument::Print => ThemeName::Print,
+        },
+        renderer: match arguments.renderer {
+            RendererArgument::Cpu => Renderer::Cpu,
+            RendererArgument::Wgpu => Renderer::Wgpu,
+        },
+        layout: Preset::ALL.get(usize::from(arguments.layout) - 1).copied().unwrap_or_default(),
+        presentation: if arguments.controls { Presentation::Interactive } else { Presentation::Figure },
+        ..ScreenshotOptions::default()
+    }
+}
+
+/// A panel of a study, or its whole view.
+fn of_study(arguments: &ScreenshotArguments) -> Result<Outcome> {
+    if !arguments.at.is_empty() || arguments.every.is_some() || !arguments.estimation.runs.is_empty() {
+        bail!("{} is a study: leave --at, --every and --run out", arguments.log.display());
+    }
+    if !STUDY_PANEL_NAMES.contains(&arguments.panel.as_str()) {
+        bail!("unknown panel '{}' of a study: expected one of {}", arguments.panel, STUDY_PANEL_NAMES.join(", "));
+    }
+    if arguments.csv && arguments.panel == "all" {
+        bail!("--csv writes the values of one panel: name the panel with --panel");
+    }
+    let svg = format_of(arguments)? == FormatArgument::Svg;
+    check_screenshot(&arguments.output, arguments.force)?;
+    if arguments.csv {
+        check_screenshot(&arguments.output.with_extension("csv"), arguments.force)?;
+    }
+    let study = OpenedStudy::read(&arguments.log)?;
+    let picture = StudyPicture { panel: &arguments.panel, svg, csv: arguments.csv, output: &arguments.output };
+    write_study_picture(&study, &arguments.study.options(), &drawing_options(arguments), &picture)?;
     Ok(Outcome::Success)
 }
 

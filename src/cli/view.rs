@@ -9,7 +9,7 @@ use crate::cli::estimation_arguments::EstimationArguments;
 /// `dcvins view`.
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct ViewArguments {
-    /// The log or the saved session; without one the window lists the sample logs and the recent files.
+    /// The log, the saved session or the folder of a study; without one the window lists the sample logs and the recent files.
     pub log: Option<PathBuf>,
     /// Folder of the screenshots when there is no display [default: dcvins-output/NAME].
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
@@ -37,11 +37,12 @@ mod window {
 
     use anyhow::Result;
     use dcvins::export::{
-        self, Machine, PANEL_NAMES, RunFileOptions, ScreenshotOptions, draw_panel, is_session, read_session, write_png,
+        self, Machine, OpenedStudy, PANEL_NAMES, RunFileOptions, ScreenshotOptions, draw_panel, is_session, is_study,
+        read_session, write_png,
     };
     use dcvins::flight_log::ImageReader;
-    use dcvins::gui::app::PlayingLog;
     use dcvins::gui::app::run_window::{WindowError, WindowOptions, run_window};
+    use dcvins::gui::app::{PlayingLog, StudySource};
     use dcvins::gui::theme::ThemeName;
     use dcvins::session::{Session, SessionPlan};
     use parking_lot::Mutex;
@@ -49,6 +50,7 @@ mod window {
     use super::ViewArguments;
     use crate::cli::compute::compute;
     use crate::cli::run_summary::describe;
+    use crate::cli::study_arguments::write_study_pictures;
     use crate::cli::terminal::{notify, print};
 
     /// Opens the window, or writes screenshots where there is no display.
@@ -56,7 +58,11 @@ mod window {
         // Errors of the log or its rig are reported here, before a window opens.
         let request = |log: &Path| arguments.estimation.request(log.to_owned());
         let given = arguments.log.as_deref();
-        let plan = given.filter(|path| !is_session(path)).map(|log| SessionPlan::open(&request(log))).transpose()?;
+        let study = given.filter(|path| is_study(path)).map(OpenedStudy::read).transpose()?.map(Arc::new);
+        let plan = given
+            .filter(|path| !is_session(path) && !is_study(path))
+            .map(|log| SessionPlan::open(&request(log)))
+            .transpose()?;
         if let Some(path) = given.filter(|path| is_session(path)) {
             read_session(path)?;
         }
@@ -76,18 +82,42 @@ mod window {
             };
             Ok(Box::new(session.map_err(|error| error.to_string())?) as Box<dyn PlayingLog>)
         };
+        let first_study = Mutex::new(study.clone().zip(arguments.log.clone()));
+        let open_study = move |path: &Path| {
+            // The study of the command line is read already.
+            let read = first_study.lock().take().filter(|(_, of)| of == path);
+            let shown = |study: Arc<OpenedStudy>| study as Arc<dyn StudySource>;
+            if let Some((study, _)) = read {
+                return Some(Ok(shown(study)));
+            }
+            let opened = is_study(path).then(|| OpenedStudy::read(path));
+            opened.map(|opened| opened.map(|study| shown(Arc::new(study))).map_err(|error| error.to_string()))
+        };
         let options = WindowOptions {
             log: None,
             log_path: arguments.log.clone(),
             open_log: Arc::new(open_log),
+            open_study: Arc::new(open_study),
             desktop: Arc::new(Machine::new()),
             theme: ThemeName::Light,
             tour: arguments.tour,
         };
-        match (run_window(options), &plan) {
-            (Err(WindowError::NoDisplay), Some(plan)) => write_screenshots(plan, arguments.out.as_deref()),
-            (result, _) => Ok(result?),
+        match (run_window(options), &plan, &study) {
+            (Err(WindowError::NoDisplay), Some(plan), _) => write_screenshots(plan, arguments.out.as_deref()),
+            (Err(WindowError::NoDisplay), _, Some(study)) => write_study(study, arguments.out.as_deref()),
+            (result, ..) => Ok(result?),
         }
+    }
+
+    /// Writes a screenshot of every panel of a study.
+    fn write_study(study: &OpenedStudy, out: Option<&Path>) -> Result<()> {
+        let name = study.folder().file_name().unwrap_or_else(|| study.folder().as_os_str());
+        let folder = out.map_or_else(|| Path::new("dcvins-output").join(name), Path::to_path_buf);
+        notify(&format!("dcvins: there is no display, so screenshots are written to {}", folder.display()));
+        for path in write_study_pictures(study.study(), &folder)? {
+            print(&format!("{path}\n"))?;
+        }
+        Ok(())
     }
 
     /// Writes a screenshot of every panel at the end of the log, and the files of each run.

@@ -11,6 +11,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use super::calibration_files::TRAJECTORY_FILES;
 use super::error::ExportError;
 use super::masks::is_mask_name;
 use super::summary::log_name;
@@ -18,9 +19,10 @@ use crate::flight_log::output;
 use crate::flight_log::{FlightLog, shortened};
 
 /// Names of all files that a run can write.
-pub(super) const RUN_FILES: [&str; 9] = [
+pub(super) const RUN_FILES: [&str; 10] = [
     "summary.json",
     "trajectory.tum",
+    "covariance.csv",
     "calibration.csv",
     "rank.csv",
     "information.csv",
@@ -30,7 +32,8 @@ pub(super) const RUN_FILES: [&str; 9] = [
     "results.mcap",
 ];
 const REPORT_FILES: [&str; 2] = ["report.json", "report.html"];
-const CALIBRATION_FILES: [&str; 3] = ["calibration.json", "rig.yaml", "report.txt"];
+const CALIBRATION_FILES: [&str; 5] =
+    ["calibration.json", "rig.yaml", "report.txt", TRAJECTORY_FILES[0], TRAJECTORY_FILES[1]];
 /// Largest file that is read for the name of its log.
 const LARGEST_INDEX_BYTES: u64 = 64 << 20;
 

@@ -35,9 +35,9 @@ impl RecentFiles {
         Self { file: Some(file) }
     }
 
-    /// Logs that still exist, newest first.
+    /// Logs, sessions and studies that still exist, newest first.
     pub fn list(&self) -> Vec<PathBuf> {
-        self.read().into_iter().filter(|path| path.is_file()).collect()
+        self.read().into_iter().filter(|path| path.exists()).collect()
     }
 
     fn read(&self) -> Vec<PathBuf> {

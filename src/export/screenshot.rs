@@ -94,6 +94,18 @@ pub enum ScreenshotError {
         /// The name as written.
         name: String,
     },
+    /// There is no panel of that name in the view of a study.
+    #[error("unknown panel '{name}' of a study: expected one of {}", super::STUDY_PANEL_NAMES.join(", "))]
+    UnknownStudyPanel {
+        /// The name as written.
+        name: String,
+    },
+    /// Filter, groups or metric of a study cannot be used.
+    #[error("{problem}")]
+    StudyOptions {
+        /// What is wrong and what was expected.
+        problem: String,
+    },
     /// The size is out of range.
     #[error("a screenshot of {width}×{height} pixels cannot be drawn: expected 16 to {MAX_SIDE_PX} each way")]
     Size {
@@ -216,7 +228,7 @@ fn with_panel<T>(
     draw(HeadlessOptions { size_px, pixels_per_point, theme }, &mut ui)
 }
 
-fn check(options: &ScreenshotOptions) -> Result<(), ScreenshotError> {
+pub(super) fn check(options: &ScreenshotOptions) -> Result<(), ScreenshotError> {
     let [width, height] = options.size_px;
     if [width, height].iter().any(|side| !(16..=MAX_SIDE_PX).contains(side)) {
         return Err(ScreenshotError::Size { width, height });

@@ -30,6 +30,7 @@ pub(crate) mod samples;
 pub mod scene;
 mod slide;
 mod step_work;
+pub mod study;
 #[cfg(test)]
 pub(crate) mod tests;
 pub mod theme;

@@ -7,6 +7,7 @@ mod html;
 mod inputs;
 mod page;
 mod rank_intervals;
+mod study;
 mod tables;
 mod verdict;
 
@@ -17,13 +18,14 @@ use content::ReportContent;
 use inputs::InputFile;
 use rank_intervals::RankInterval;
 use serde_json::Value;
+pub use study::{StudyReport, check_study_report, write_study_report};
 
 use super::error::ExportError;
 use super::existing::{RUN_FILES, check_run_folder, read_index};
 use super::run_files::{RunFileOptions, remove_unwritten, stage_run};
 use crate::flight_log::output::OutputSet;
 use crate::log_check::CheckReport;
-use crate::session::{PoseUncertainty, Recording};
+use crate::session::Recording;
 
 /// A figure of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,8 +60,6 @@ pub struct ReportOptions {
     pub figures: Vec<ReportFigure>,
     /// Findings of `check` about the log and its rig.
     pub check: Option<CheckReport>,
-    /// Standard deviation of the last pose of each run, as far as known.
-    pub pose_uncertainties: Vec<Option<PoseUncertainty>>,
 }
 
 /// Writes `report.html`, `report.json` and a folder for each run as `run --no-timing` does; returns the HTML's path.

@@ -108,14 +108,19 @@ impl App {
         }
     }
 
-    /// Ends the session, with its threads, and shows the welcome view.
+    /// Ends the session and shows the study from which it was opened, or else the welcome view.
     fn close_log(&mut self) {
+        self.close_session();
+        self.welcome = Welcome::new(Arc::clone(&self.desktop));
+    }
+
+    /// Ends the session with its threads.
+    pub(super) fn close_session(&mut self) {
         self.log = None;
         self.opening = None;
         self.selection = Selection::default();
         self.departure = Departure::default();
         self.state.close_everything();
-        self.welcome = Welcome::new(Arc::clone(&self.desktop));
     }
 }
 

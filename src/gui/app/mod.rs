@@ -12,6 +12,9 @@ mod session_log;
 #[cfg(test)]
 mod session_tests;
 mod software_window;
+mod study;
+#[cfg(test)]
+mod study_tests;
 #[cfg(test)]
 mod tests;
 mod welcome;
@@ -26,6 +29,8 @@ use self::kept_window::{KeptWindow, WindowKeeper};
 use self::leaving::{Departure, Leaving, Work};
 use self::playing_log::{Images, go_to_first_frame};
 pub use self::playing_log::{OpenLog, PlayingLog};
+use self::study::ShownStudy;
+pub use self::study::{OpenStudy, StudySource};
 use self::welcome::Welcome;
 use crate::gui::desktop::Desktop;
 use crate::gui::theme::{Theme, ThemeName};
@@ -42,10 +47,20 @@ const POLL_PERIOD_MS: u64 = 60;
 /// Period in seconds at which the process's memory is read.
 const MEMORY_PERIOD_S: f64 = 1.0;
 
-/// A log that is being opened on its own thread.
+/// What has been opened on a thread.
+enum Opened {
+    /// A log or a saved session.
+    Log(Box<dyn PlayingLog>),
+    /// A study.
+    Study(Arc<dyn StudySource>),
+    /// A run of the open study, with the runs beside it.
+    RunOfStudy(Box<dyn PlayingLog>),
+}
+
+/// A log or a study that is being opened on its own thread.
 struct Opening {
     path: PathBuf,
-    result: Receiver<Result<Box<dyn PlayingLog>, String>>,
+    result: Receiver<Result<Opened, String>>,
 }
 
 /// The application of the window.
@@ -53,6 +68,10 @@ pub struct App {
     open_log: OpenLog,
     desktop: Arc<dyn Desktop>,
     log: Option<Box<dyn PlayingLog>>,
+    /// Opens studies, where the program can.
+    open_study: Option<OpenStudy>,
+    /// The open study; its runs are shown in front of it.
+    study: Option<ShownStudy>,
     /// Whether the cursor has been moved to the first frame of the log.
     at_first_frame: bool,
     opening: Option<Opening>,
@@ -92,6 +111,8 @@ impl App {
             open_log,
             desktop,
             log: None,
+            open_study: None,
+            study: None,
             at_first_frame: false,
             opening: None,
             tour_of: None,
@@ -108,13 +129,20 @@ impl App {
         }
     }
 
-    /// Starts to open a log; the current one stays until the new one is open.
+    /// Starts to open a log or a study; the current one stays until the new one is open.
     pub fn open(&mut self, path: PathBuf) {
+        let (open_log, open_study, target) = (Arc::clone(&self.open_log), self.open_study.clone(), path.clone());
+        self.open_on_thread(path, move || match open_study.and_then(|open_study| open_study(&target)) {
+            Some(study) => study.map(Opened::Study),
+            None => open_log(&target).map(Opened::Log),
+        });
+    }
+
+    fn open_on_thread(&mut self, path: PathBuf, open: impl FnOnce() -> Result<Opened, String> + Send + 'static) {
         let (sender, result) = channel();
-        let (open_log, target) = (Arc::clone(&self.open_log), path.clone());
         let thread = std::thread::Builder::new().name("open-log".to_owned()).spawn(move || {
             // The receiver is gone when another log was requested meanwhile.
-            drop(sender.send(open_log(&target)));
+            drop(sender.send(open()));
         });
         match thread {
             Ok(_) => self.opening = Some(Opening { path, result }),
@@ -126,9 +154,15 @@ impl App {
 
     /// Shows an open session. `path` is the path that was opened if it differs from the log's (a saved session).
     pub fn show(&mut self, log: Box<dyn PlayingLog>, path: Option<&Path>) {
-        let mut log = log;
         self.desktop.remember_log(path.unwrap_or(&log.recording().log_path));
         self.state.recent_logs = self.desktop.recent_logs();
+        self.study = None;
+        self.show_session(log);
+    }
+
+    /// Shows an open session in front of the study, if there is one.
+    fn show_session(&mut self, log: Box<dyn PlayingLog>) {
+        let mut log = log;
         log.apply(Command::SetMemoryBudget(self.state.settings.memory_bytes()));
         log.apply(Command::SetSpeed(PlaybackSpeed(self.state.settings.speed)));
         if let Some(layout) = log.layout() {
@@ -157,6 +191,8 @@ impl App {
         self.read_memory(ui);
         if self.log.is_some() {
             self.session_ui(ui);
+        } else if self.study.is_some() {
+            self.study_ui(ui);
         } else {
             self.welcome_ui(ui);
         }
@@ -231,6 +267,7 @@ impl App {
         let (recording, playback, generation) = (log.recording(), log.playback(), log.generation());
         self.state.progress = self.progress.read(&recording, Some(now_s));
         self.state.opening = self.opening.as_ref().map(|opening| opening.path.clone());
+        self.state.study = self.study.as_ref().map(ShownStudy::name);
         self.state.panels.timeline.pace.frame(playback.playing, now_s, log.cursor_ns());
         let mut commands = Vec::new();
         let mut context = PanelContext {
@@ -261,9 +298,13 @@ impl App {
     fn take_opened(&mut self) {
         let Some(opening) = &self.opening else { return };
         match opening.result.try_recv() {
-            Ok(Ok(log)) => {
+            Ok(Ok(opened)) => {
                 let path = self.opening.take().map(|opening| opening.path);
-                self.show(log, path.as_deref());
+                match opened {
+                    Opened::Log(log) => self.show(log, path.as_deref()),
+                    Opened::Study(study) => self.show_study(study, path.clone().unwrap_or_default()),
+                    Opened::RunOfStudy(log) => self.show_session(log),
+                }
                 if self.tour_of.take().is_some_and(|of| Some(of) == path) {
                     self.state.start_tour();
                 }
@@ -304,14 +345,12 @@ impl App {
 
     /// Sets the title of the window to the name of the log.
     fn update_title(&mut self, ui: &Ui) {
-        let title = self.log.as_ref().map_or_else(
-            || "dcvins".to_owned(),
-            |log| {
-                let path = log.recording().log_path.clone();
-                let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-                format!("{name} – dcvins")
-            },
-        );
+        let of_log = self.log.as_ref().map(|log| {
+            let path = log.recording().log_path.clone();
+            path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+        });
+        let name = of_log.or_else(|| self.study.as_ref().map(ShownStudy::name));
+        let title = name.map_or_else(|| "dcvins".to_owned(), |name| format!("{name} – dcvins"));
         if title != self.title {
             ui.ctx().send_viewport_cmd(ViewportCommand::Title(title.clone()));
             self.title = title;

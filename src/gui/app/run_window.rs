@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::kept_window::{KeptWindow, move_inside_screen};
 use super::software_window::SoftwareWindow;
-use crate::gui::app::{App, OpenLog, PlayingLog};
+use crate::gui::app::{App, OpenLog, OpenStudy, PlayingLog};
 use crate::gui::desktop::Desktop;
 use crate::gui::scene::SceneBackend;
 use crate::gui::theme::ThemeName;
@@ -47,6 +47,8 @@ pub struct WindowOptions {
     pub log_path: Option<PathBuf>,
     /// Opens the logs that the user selects.
     pub open_log: OpenLog,
+    /// Opens the studies among them.
+    pub open_study: OpenStudy,
     /// Access to files and memory of the machine.
     pub desktop: Arc<dyn Desktop>,
     /// The initial theme.
@@ -79,7 +81,8 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
                 if let Some(window) = creation.winit_window() {
                     move_inside_screen(window);
                 }
-                let mut app = App::new(options.open_log, options.desktop, options.theme);
+                let mut app =
+                    App::new(options.open_log, options.desktop, options.theme).with_studies(options.open_study);
                 if let Some(log) = options.log {
                     app.show(log, None);
                 }

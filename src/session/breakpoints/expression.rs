@@ -1,5 +1,6 @@
 //! The syntax tree of a condition.
 
+use std::cmp::Ordering;
 use std::fmt;
 
 use thiserror::Error;
@@ -41,9 +42,9 @@ impl fmt::Display for Condition {
 
 /// Range of characters in the text, from 0; `end` is exclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Span {
-    pub(super) begin: usize,
-    pub(super) end: usize,
+pub(crate) struct Span {
+    pub(crate) begin: usize,
+    pub(crate) end: usize,
 }
 
 /// A numerical sub-expression.
@@ -88,7 +89,7 @@ pub(super) enum Predicate {
 
 /// A comparison operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Comparison {
+pub(crate) enum Comparison {
     Less,
     LessOrEqual,
     Greater,
@@ -98,7 +99,7 @@ pub(super) enum Comparison {
 }
 
 impl Comparison {
-    pub(super) fn holds(self, left: f64, right: f64) -> bool {
+    pub(crate) fn holds(self, left: f64, right: f64) -> bool {
         match self {
             Self::Less => left < right,
             Self::LessOrEqual => left <= right,
@@ -106,6 +107,18 @@ impl Comparison {
             Self::GreaterOrEqual => left >= right,
             Self::Equal => left == right,
             Self::Unequal => left != right,
+        }
+    }
+
+    /// Whether it holds for two values in this order.
+    pub(crate) fn holds_for(self, order: Ordering) -> bool {
+        match self {
+            Self::Less => order.is_lt(),
+            Self::LessOrEqual => order.is_le(),
+            Self::Greater => order.is_gt(),
+            Self::GreaterOrEqual => order.is_ge(),
+            Self::Equal => order.is_eq(),
+            Self::Unequal => order.is_ne(),
         }
     }
 }

@@ -4,7 +4,7 @@ use super::expression::{Comparison, ConditionProblem, Span};
 
 /// A token of the text.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Token {
+pub(crate) enum Token {
     Number(f64),
     Name(String),
     /// A quoted name.
@@ -49,6 +49,15 @@ const SIGNS: [(&str, Token); 19] = [
 
 /// The tokens with their positions; the last one is [`Token::End`].
 pub(super) fn tokens(text: &str) -> Result<Vec<(Token, Span)>, ConditionProblem> {
+    scan(text, false)
+}
+
+/// The same tokens, where a single `=` compares, too.
+pub(crate) fn tokens_with_single_equals(text: &str) -> Result<Vec<(Token, Span)>, ConditionProblem> {
+    scan(text, true)
+}
+
+fn scan(text: &str, single_equals: bool) -> Result<Vec<(Token, Span)>, ConditionProblem> {
     let characters: Vec<char> = text.chars().collect();
     let problem = |at: usize, message: String| ConditionProblem { text: text.to_owned(), column: at + 1, message };
     let mut tokens = Vec::new();
@@ -80,7 +89,9 @@ pub(super) fn tokens(text: &str) -> Result<Vec<(Token, Span)>, ConditionProblem>
             Token::Quoted(characters[begin + 1..at - 1].iter().collect())
         } else {
             let rest: String = characters[at..].iter().take(2).collect();
-            let Some((sign, token)) = SIGNS.iter().find(|(sign, _)| rest.starts_with(sign)) else {
+            let single = ("=", Token::Compare(Comparison::Equal));
+            let signs = SIGNS.iter().chain(single_equals.then_some(&single));
+            let Some((sign, token)) = signs.into_iter().find(|(sign, _)| rest.starts_with(sign)) else {
                 let hint = if *character == '=' { ": write == to compare" } else { "" };
                 return Err(problem(begin, format!("'{character}' has no meaning here{hint}")));
             };

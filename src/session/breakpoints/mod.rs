@@ -13,6 +13,10 @@ mod quantities;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use expression::{Comparison, Span};
+pub(crate) use lexer::{Token, tokens_with_single_equals};
+pub(crate) use parser::factor_of_unit;
+
 pub use evaluate::{NamedValue, StepContext};
 pub use expression::{Condition, ConditionProblem};
 pub use list::{Breakpoint, Breakpoints, Hit};

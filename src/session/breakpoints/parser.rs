@@ -29,6 +29,11 @@ const UNITS: [(&str, f64); 11] = [
     ("s", 1.0),
     ("px", 1.0),
 ];
+/// Factor of a unit suffix to radians, metres, seconds or pixels.
+pub(crate) fn factor_of_unit(unit: &str) -> Option<f64> {
+    UNITS.iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor)
+}
+
 /// Functions that return numbers.
 const FUNCTIONS: [&str; 5] = ["singular", "rise", "abs", "min", "max"];
 

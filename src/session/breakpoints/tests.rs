@@ -205,6 +205,9 @@ fn recording_of(ranks: &[usize]) -> Recording {
         start_ns: 0,
         epoch_ns: 0,
         runs: vec![run],
+        truth_is_batch: false,
+        position_truth: None,
+        trajectories: Vec::new(),
         warnings: Vec::new(),
         memory_budget_bytes: usize::MAX,
     }

@@ -1,0 +1,105 @@
+//! A study in the window: its view, and the runs that are opened from it.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use egui::Ui;
+
+use super::{App, Opened, PlayingLog};
+use crate::gui::study::{StudyOptions, StudyRequest, StudyState, study_ui};
+use crate::gui::theme::MAX_RUNS;
+use crate::gui::window::NoticeLevel;
+use crate::study::view::{Study, rows_beside};
+
+/// A study on the disk: its tables, and its runs as sessions.
+pub trait StudySource: Send + Sync {
+    /// The tables.
+    fn study(&self) -> Arc<Study>;
+    /// A session over the log of the first row, with the runs of all rows; its cursor goes to the worst frame of the first
+    /// row as soon as that is computed. The message of an error has its cause and remedy.
+    ///
+    /// # Errors
+    /// When the log or the rig cannot be read any more.
+    fn open_runs(&self, rows: &[usize]) -> Result<Box<dyn PlayingLog>, String>;
+}
+
+/// Opens a study; `None` for a path that is no study.
+pub type OpenStudy = Arc<dyn Fn(&Path) -> Option<Result<Arc<dyn StudySource>, String>> + Send + Sync>;
+
+/// The study of the window.
+pub(super) struct ShownStudy {
+    source: Arc<dyn StudySource>,
+    pub(super) state: StudyState,
+    path: PathBuf,
+}
+
+impl ShownStudy {
+    /// Name of its folder.
+    pub(super) fn name(&self) -> String {
+        let name = self.path.file_name().unwrap_or(self.path.as_os_str());
+        name.to_string_lossy().into_owned()
+    }
+}
+
+impl App {
+    /// The same window, which opens studies as well.
+    #[must_use]
+    pub fn with_studies(mut self, open_study: OpenStudy) -> Self {
+        self.open_study = Some(open_study);
+        self
+    }
+
+    /// Shows a study that has been opened from `path`; an open session is closed.
+    pub(super) fn show_study(&mut self, source: Arc<dyn StudySource>, path: PathBuf) {
+        match StudyState::new(source.study(), &StudyOptions::default()) {
+            Ok(state) => {
+                self.close_session();
+                self.desktop.remember_log(&path);
+                self.state.recent_logs = self.desktop.recent_logs();
+                self.welcome.stop();
+                self.study = Some(ShownStudy { source, state, path });
+            }
+            Err(problem) => {
+                let text = format!("{problem}: {}", path.display());
+                self.state.notices.show_message(NoticeLevel::Error, text);
+            }
+        }
+    }
+
+    /// Whether a study is open, behind the session or in front.
+    pub fn has_study(&self) -> bool {
+        self.study.is_some()
+    }
+
+    /// Draws the study and executes its requests.
+    pub(super) fn study_ui(&mut self, ui: &mut Ui) {
+        let Some(study) = &mut self.study else { return };
+        study_ui(ui, &mut study.state, &self.theme);
+        let requests = std::mem::take(&mut study.state.requests);
+        self.state.help.welcome_ui(ui, &self.theme);
+        self.state.focus_ring_ui(ui, &self.theme);
+        self.state.notices.toasts_ui(ui, &self.theme);
+        for request in requests {
+            ui.ctx().request_repaint();
+            match request {
+                StudyRequest::OpenRun(row) => self.open_run(row),
+                StudyRequest::Copy(text, what) => {
+                    ui.copy_text(text);
+                    self.state.notices.show_message(NoticeLevel::Info, format!("Copied the table of {what} (CSV)"));
+                }
+                StudyRequest::Close => self.study = None,
+            }
+        }
+    }
+
+    /// Starts to open a run with those beside it, on its own thread; a second click while one opens has no effect.
+    fn open_run(&mut self, row: usize) {
+        let Some(study) = self.study.as_ref().filter(|_| self.opening.is_none()) else { return };
+        let table = study.state.study();
+        let rows = rows_beside(&table.runs, row, MAX_RUNS);
+        let title = table.title_of(row);
+        let source = Arc::clone(&study.source);
+        self.state.notices.show_message(NoticeLevel::Info, format!("Opening {title}"));
+        self.open_on_thread(PathBuf::from(title), move || source.open_runs(&rows).map(Opened::RunOfStudy));
+    }
+}

@@ -1,0 +1,38 @@
+//! What the study view shows, without a window: filters, order and groups of the rows, distributions, paired
+//! differences, success rates and errors against σ.
+//!
+//! - `study`: the tables of one study, and the names of the columns that the view relies on.
+//! - `filter`: conditions on rows, `ate_rmse_m < 0.1 and run = auto`.
+//! - `arrange`: rows that pass, their order and their groups.
+//! - `metric`: columns of numbers with their shown unit; ranges of values and axes.
+//! - `spread`, `success`, `paired`: quantiles, Wilson intervals, differences between groups on equal inputs.
+//! - `summary`: the groups in numbers.
+//! - `parallel`: rows as lines over several axes.
+//! - `parameters`: errors of calibration parameters against their σ.
+//! - `beside`: the runs that are opened together with a run.
+
+mod arrange;
+mod beside;
+mod filter;
+mod metric;
+mod paired;
+mod parallel;
+mod parameters;
+mod spread;
+mod study;
+mod success;
+mod summary;
+#[cfg(test)]
+pub(crate) mod tests;
+
+pub use arrange::{Arranged, RowGroup, SortKey, arrange, group_columns};
+pub use beside::rows_beside;
+pub use filter::RowFilter;
+pub use metric::{Metric, ValueAxis, metrics};
+pub use paired::{GroupDifference, PairedDifference, paired_differences};
+pub use parallel::{AxisScale, ParallelAxis, default_axes, parallel_axis};
+pub use parameters::{ParameterErrors, ParameterPoint, SigmaVerdict, parameter_errors};
+pub use spread::Spread;
+pub use study::{Study, columns};
+pub use success::{SuccessRate, success_rate};
+pub use summary::{GroupSummary, summarize_groups};

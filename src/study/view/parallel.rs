@@ -1,0 +1,81 @@
+//! Rows as lines over parallel axes.
+
+use super::arrange::group_columns;
+use super::metric::{Metric, ValueAxis, metrics};
+use super::study::columns;
+use crate::study::{ColumnType, StudyTable};
+
+/// The scale of a parallel axis.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AxisScale {
+    /// Numbers.
+    Values(ValueAxis),
+    /// Texts, each at its own place, from below in this order.
+    Names(Vec<String>),
+}
+
+/// One axis with the positions of rows on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParallelAxis {
+    /// Name of the column.
+    pub column: String,
+    /// Its title, with the shown unit.
+    pub title: String,
+    /// Its scale.
+    pub scale: AxisScale,
+    /// Position of each row that was asked for in 0 to 1 from below; `None` for an empty cell.
+    pub positions: Vec<Option<f64>>,
+}
+
+/// Most texts on an axis; beyond them names cannot be read.
+const MAX_NAMES: usize = 40;
+
+/// The axis of a column with the positions of `rows`; `None` for an unknown column, and for too many different texts.
+pub fn parallel_axis(table: &StudyTable, column: &str, rows: &[usize]) -> Option<ParallelAxis> {
+    let found = table.column(column)?;
+    if matches!(found.values.column_type(), ColumnType::Text | ColumnType::Bool) || column == columns::SEED {
+        let texts: Vec<Option<String>> = rows
+            .iter()
+            .map(|row| table.cell(*row, column))
+            .map(|cell| cell.column_type().map(|_| cell.to_string()))
+            .collect();
+        let mut names: Vec<String> = texts.iter().flatten().cloned().collect();
+        names.sort_by(|a, b| natural(a).cmp(&natural(b)));
+        names.dedup();
+        if names.len() > MAX_NAMES {
+            return None;
+        }
+        let place = |name: &String| names.iter().position(|known| known == name);
+        let position = |place: usize| (place as f64 + 0.5) / names.len() as f64;
+        let positions = texts.iter().map(|text| text.as_ref().and_then(place).map(position)).collect();
+        return Some(ParallelAxis {
+            column: column.to_owned(),
+            title: column.to_owned(),
+            scale: AxisScale::Names(names),
+            positions,
+        });
+    }
+    let metric = Metric::of(found)?;
+    let values: Vec<Option<f64>> = rows.iter().map(|row| metric.value(table, *row)).collect();
+    let axis = ValueAxis::over(values.iter().flatten().copied());
+    let positions = values.iter().map(|value| value.map(|value| axis.position(value))).collect();
+    Some(ParallelAxis { column: column.to_owned(), title: metric.title(), scale: AxisScale::Values(axis), positions })
+}
+
+/// Numbers before texts, by value.
+fn natural(text: &str) -> (Option<i64>, &str) {
+    (text.parse().ok(), text)
+}
+
+/// The axes that are shown at first: inputs that vary, then the most important results with values.
+pub fn default_axes(table: &StudyTable) -> Vec<String> {
+    const INPUTS: [&str; 4] = [columns::RUN, columns::LOG, columns::DISTURBANCE, columns::PERTURBATION];
+    const RESULTS: [&str; 6] =
+        [columns::ATE, "rpe_10m_translation_m", "pose_nees", "chain_error_m", "reprojection_rms_px", "rank_informed"];
+    const MOST: usize = 7;
+    let grouped = group_columns(table);
+    let few = |name: &&str| grouped.iter().any(|known| known == name);
+    let known = metrics(table);
+    let results = RESULTS.into_iter().filter(|name| known.iter().any(|metric| metric.column == *name));
+    INPUTS.into_iter().filter(few).chain(results).take(MOST).map(str::to_owned).collect()
+}

@@ -1,0 +1,122 @@
+//! Errors of calibration parameters against their standard deviations.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::metric::Metric;
+use super::study::{Study, columns};
+use crate::geometry::mean_square_quantile;
+
+/// One parameter of one run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterPoint {
+    /// Row of the run.
+    pub row: usize,
+    /// Standard deviation at the end, in the shown unit.
+    pub sigma: f64,
+    /// Final minus true value, in the shown unit.
+    pub error: f64,
+}
+
+/// A parameter over many runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterErrors {
+    /// Name of the parameter.
+    pub name: String,
+    /// The shown unit.
+    pub unit: &'static str,
+    /// Runs with a ground truth and a σ above zero.
+    #[serde(skip)]
+    pub points: Vec<ParameterPoint>,
+    /// Root mean square of error over σ; 1 when consistent.
+    pub ratio_rms: f64,
+    /// Mean of error over σ; 0 without a bias.
+    pub ratio_mean: f64,
+    /// Ratio of points within 1 σ, 0.683 when consistent.
+    pub within_1: f64,
+    /// Ratio of points within 3 σ, 0.997 when consistent.
+    pub within_3: f64,
+    /// Root mean square of the errors, in the shown unit.
+    pub error_rms: f64,
+    /// Median σ, in the shown unit.
+    pub sigma_median: f64,
+}
+
+/// Whether the standard deviations of a parameter agree with its errors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SigmaVerdict {
+    /// The errors are larger than σ says.
+    TooSmall,
+    /// They agree.
+    Consistent,
+    /// The errors are smaller than σ says.
+    TooLarge,
+}
+
+impl ParameterErrors {
+    /// Whether the ratio of error to σ is between 0.5 and 1.5, or what as many runs give by chance (99 %).
+    pub fn verdict(&self) -> SigmaVerdict {
+        const NORMAL_QUANTILE: f64 = 2.58;
+        let by_chance = |normal: f64| mean_square_quantile(self.points.len().max(1) as f64, normal).sqrt();
+        if self.ratio_rms > by_chance(NORMAL_QUANTILE).max(1.5) {
+            SigmaVerdict::TooSmall
+        } else if self.ratio_rms < by_chance(-NORMAL_QUANTILE).min(0.5) {
+            SigmaVerdict::TooLarge
+        } else {
+            SigmaVerdict::Consistent
+        }
+    }
+}
+
+/// The parameters of `rows` in the order of the table of parameters; `run_of` is the result of
+/// [`Study::run_of_parameter_rows`].
+pub fn parameter_errors(study: &Study, run_of: &[Option<usize>], rows: &[usize]) -> Vec<ParameterErrors> {
+    let mut shown = vec![false; study.runs.rows()];
+    for row in rows {
+        shown[*row] = true;
+    }
+    let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut all: Vec<(&str, &'static str, Vec<ParameterPoint>)> = Vec::new();
+    let table = &study.parameters;
+    for (place, run) in run_of.iter().enumerate() {
+        let Some(run) = run.filter(|run| shown[*run]) else { continue };
+        let values = (table.number(place, columns::SIGMA), table.number(place, columns::ERROR));
+        let (Some(name), (Some(sigma), Some(error))) = (table.text(place, columns::PARAMETER), values) else {
+            continue;
+        };
+        if sigma <= 0.0 {
+            continue;
+        }
+        let unit = table.text(place, columns::UNIT).unwrap_or_default();
+        let (factor, unit) = match unit {
+            "s" => (1e3, "ms"),
+            unit => Metric::shown_unit(unit, true),
+        };
+        let at = *places.entry(name).or_insert_with(|| {
+            all.push((name, unit, Vec::new()));
+            all.len() - 1
+        });
+        all[at].2.push(ParameterPoint { row: run, sigma: sigma * factor, error: error * factor });
+    }
+    all.into_iter().map(|(name, unit, points)| summarized(name, unit, points)).collect()
+}
+
+fn summarized(name: &str, unit: &'static str, points: Vec<ParameterPoint>) -> ParameterErrors {
+    let count = points.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&ParameterPoint) -> f64| points.iter().map(of).sum::<f64>() / count;
+    let within = |limit: f64| mean(&|point| f64::from(u8::from(point.error.abs() <= limit * point.sigma)));
+    let mut sigmas: Vec<f64> = points.iter().map(|point| point.sigma).collect();
+    sigmas.sort_by(f64::total_cmp);
+    ParameterErrors {
+        name: name.to_owned(),
+        unit,
+        ratio_rms: mean(&|point| (point.error / point.sigma).powi(2)).sqrt(),
+        ratio_mean: mean(&|point| point.error / point.sigma),
+        within_1: within(1.0),
+        within_3: within(3.0),
+        error_rms: mean(&|point| point.error.powi(2)).sqrt(),
+        sigma_median: sigmas.get(sigmas.len() / 2).copied().unwrap_or(f64::NAN),
+        points,
+    }
+}
