@@ -22,6 +22,10 @@ mod run_summary;
 #[cfg(feature = "gui")]
 mod screenshot;
 mod simulate;
+#[cfg(feature = "gui")]
+mod study_arguments;
+#[cfg(feature = "gui")]
+mod study_report;
 mod sweep;
 mod terminal;
 mod value_parsers;

@@ -2,6 +2,7 @@
 
 mod calibration_files;
 mod calibration_report;
+mod covariance;
 mod csv_table;
 #[cfg(feature = "gui")]
 mod desktop;
@@ -24,6 +25,9 @@ mod screenshot;
 mod session_file;
 mod structure;
 pub mod study;
+#[cfg(feature = "gui")]
+mod study_screenshot;
+mod study_source;
 mod summary;
 mod tables;
 pub mod trajectory;
@@ -47,7 +51,9 @@ pub use other_estimators::{
     AngleOrigin, Configuration, ConfigurationError, FixedJointAngles, OtherEstimator, configure, write_configuration,
 };
 pub use recent_files::RecentFiles;
-pub use report::{ReportDrawing, ReportFigure, ReportOptions, write_report};
+pub use report::{
+    ReportDrawing, ReportFigure, ReportOptions, StudyReport, check_study_report, write_report, write_study_report,
+};
 pub use results::write_results;
 pub use run_files::{RunFileOptions, write_run};
 #[cfg(feature = "gui")]
@@ -57,5 +63,11 @@ pub use screenshot::{
 };
 pub use session_file::{is_session, read_session};
 pub use structure::KnownLossSummary;
-pub use summary::{CalibrationSummary, RunSummary, StageSummary, TimingSummary, log_name, summarize};
+#[cfg(feature = "gui")]
+pub use study_screenshot::{STUDY_PANEL_NAMES, draw_study_panel, draw_study_panel_svg, study_panel_csv};
+pub use study_source::{OpenedStudy, StudySourceError, is_study};
+pub use summary::{
+    Accuracy, AntennaSummary, CalibrationSummary, RunSummary, StageSummary, TimingSummary, TrajectorySummary, log_name,
+    summarize,
+};
 pub use video_alignment::{VideoAlignment, VideoAlignmentError, align_video, write_alignment_plot};

@@ -1,7 +1,7 @@
 //! Comparison of two studies: whether a metric got worse, beyond its tolerance and beyond its noise.
 //!
-//! Runs are paired by log, disturbance, perturbation, seed and specification. The difference of a pair is the logarithm of
-//! the ratio of its two values, so that easy and hard flights count alike; of all pairs the mean and its 95 % interval
+//! Runs are paired by log, disturbance, perturbation, seed and settings, see [`super::pairing`]. The difference of a pair is
+//! the logarithm of the ratio of its two values, so that easy and hard flights count alike; of all pairs the mean and its 95 % interval
 //! (Student's t) are computed. A metric is worse when its mean ratio is beyond the tolerance and the interval excludes 1.
 
 use std::collections::BTreeMap;
@@ -10,9 +10,10 @@ use std::fmt;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::pairing::{RunPair, pair_runs};
 use super::schema::PAIRING_COLUMNS;
 use super::statistics::MeanInterval;
-use super::table::{Cell, StudyTable};
+use super::table::StudyTable;
 
 /// The metric that compares how many runs have a result.
 pub const SUCCESS: &str = "success";
@@ -117,6 +118,8 @@ pub struct StudyComparison {
     pub newly_succeeded: Vec<String>,
     /// Pairs on logs of different content.
     pub other_logs: usize,
+    /// Pairs of runs of one name with different settings.
+    pub other_settings: usize,
     /// The metrics in the order of their names, [`SUCCESS`] last.
     pub metrics: Vec<MetricComparison>,
 }
@@ -141,7 +144,10 @@ pub enum ComparisonError {
         column: &'static str,
     },
     /// No run of the new study is in the baseline.
-    #[error("no run of the study is in the baseline: they are paired by log, disturbance, perturbation, seed and run")]
+    #[error(
+        "no run of the study is in the baseline: they are paired by log, disturbance, perturbation, seed and the settings or \
+         the name of the run"
+    )]
     Unpaired,
 }
 
@@ -164,25 +170,25 @@ pub fn compare(
     for (name, _) in metrics.clone() {
         check_metric(new, name)?;
     }
-    let old_rows: BTreeMap<String, usize> = (0..old.rows()).map(|row| (pairing(old, row), row)).collect();
-    let new_rows: BTreeMap<String, usize> = (0..new.rows()).map(|row| (pairing(new, row), row)).collect();
-    let pairs: Vec<(&String, usize, usize)> =
-        new_rows.iter().filter_map(|(name, new)| Some((name, *old_rows.get(name)?, *new))).collect();
+    let pairs = pair_runs(old, new);
     if pairs.is_empty() {
         return Err(ComparisonError::Unpaired);
     }
     let ok = |table: &StudyTable, row: usize| table.text(row, "status") == Some("ok");
     let changed = |was: bool| -> Vec<String> {
-        let of = pairs.iter().filter(|(_, o, n)| ok(old, *o) == was && ok(new, *n) != was);
-        of.map(|(name, ..)| (*name).clone()).collect()
+        let of = pairs.iter().filter(|pair| ok(old, pair.old) == was && ok(new, pair.new) != was);
+        of.map(|pair| pair.name.clone()).collect()
     };
     let (newly_failed, newly_succeeded) = (changed(true), changed(false));
-    let other_logs = pairs.iter().filter(|(_, o, n)| old.text(*o, "log_sha256") != new.text(*n, "log_sha256")).count();
+    let other_log = |pair: &&RunPair| old.text(pair.old, "log_sha256") != new.text(pair.new, "log_sha256");
+    let other_logs = pairs.iter().filter(other_log).count();
+    let other_settings = pairs.iter().filter(|pair| !pair.same_settings).count();
     let mut compared: Vec<MetricComparison> = metrics
         .map(|(name, tolerance)| {
-            let values = pairs.iter().filter(|(_, o, n)| ok(old, *o) && ok(new, *n));
-            let values =
-                values.filter_map(|(run, o, n)| Some((run.as_str(), old.number(*o, name)?, new.number(*n, name)?)));
+            let values = pairs.iter().filter(|pair| ok(old, pair.old) && ok(new, pair.new));
+            let values = values.filter_map(|pair| {
+                Some((pair.name.as_str(), old.number(pair.old, name)?, new.number(pair.new, name)?))
+            });
             compare_metric(name, *tolerance, &values.collect::<Vec<_>>())
         })
         .collect();
@@ -195,6 +201,7 @@ pub fn compare(
         newly_failed,
         newly_succeeded,
         other_logs,
+        other_settings,
         metrics: compared,
     })
 }
@@ -209,15 +216,6 @@ fn check_metric(table: &StudyTable, name: &str) -> Result<(), ComparisonError> {
     }
     let known = table.columns().iter().filter(numeric).map(|column| column.name.clone());
     Err(ComparisonError::UnknownMetric { name: name.to_owned(), known: known.chain([SUCCESS.to_owned()]).collect() })
-}
-
-/// Log, levels, seed and specification of a row as one text.
-fn pairing(table: &StudyTable, row: usize) -> String {
-    let cells = PAIRING_COLUMNS.iter().map(|column| match table.cell(row, column) {
-        Cell::Integer(seed) => format!("seed {seed}"),
-        other => other.to_string(),
-    });
-    cells.filter(|text| !text.is_empty() && text != "none").collect::<Vec<_>>().join(", ")
 }
 
 /// Compares one metric; `values` are the run, the old and the new value of each pair.
@@ -335,6 +333,10 @@ impl fmt::Display for StudyComparison {
         }
         if self.other_logs > 0 {
             writeln!(out, "\n{} pairs are on logs of different content (`log_sha256`).", self.other_logs)?;
+        }
+        if self.other_settings > 0 {
+            let count = self.other_settings;
+            writeln!(out, "\n{count} pairs are of runs with one name and different settings (`run`, `label`).")?;
         }
         writeln!(
             out,

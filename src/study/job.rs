@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::perturbation::RigPerturbation;
-use super::plan::StudyPlan;
+use super::plan::{Exclusion, StudyPlan};
 use super::recipe::FlightRecipe;
 use crate::session::RunSpec;
 
@@ -193,7 +193,7 @@ pub struct KeyedJob {
 /// The jobs of a plan in the order of its tables: logs as found, then flights; of each the disturbances, perturbations,
 /// seeds and specifications.
 ///
-/// Recorded logs are run without disturbances. Where neither the log nor the perturbation is random there is one job
+/// Recorded logs are run without disturbances, and what the plan excludes is left out. Where neither the log nor the perturbation is random there is one job
 /// without a seed instead of one for each seed.
 pub fn expand(plan: &StudyPlan, logs: &[RecordedLog], program: &str) -> Vec<KeyedJob> {
     let mut jobs = Vec::new();
@@ -220,9 +220,22 @@ pub fn expand(plan: &StudyPlan, logs: &[RecordedLog], program: &str) -> Vec<Keye
             }
         }
     }
+    jobs.retain(|job| !plan.exclusions.iter().any(|exclusion| exclusion.has(job)));
     let mut known = BTreeSet::new();
     let keyed = jobs.into_iter().map(|job| KeyedJob { key: job.key(program), job });
     keyed.filter(|job| known.insert(job.key.clone())).collect()
+}
+
+impl Exclusion {
+    /// Whether a job is in each list that is not empty.
+    fn has(&self, job: &StudyJob) -> bool {
+        let named = |names: &[String], name: &str| names.is_empty() || names.iter().any(|known| known == name);
+        named(&self.logs, job.log.name())
+            && named(&self.disturbances, &job.disturbance)
+            && named(&self.perturbations, &job.perturbation.name)
+            && named(&self.specs, &job.spec.label)
+            && (self.seeds.is_empty() || job.seed.is_some_and(|seed| self.seeds.contains(&seed)))
+    }
 }
 
 fn add_specs(

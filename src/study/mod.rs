@@ -6,20 +6,27 @@
 //! - `plan/`: the TOML text of a plan as typed values; every error names line and key.
 //! - `recipe`, `perturbation`: simulated flights and errors of a rig.
 //! - `job`: the jobs of a plan and their keys.
-//! - `comparison`, `statistics`: a study against a baseline, paired and with intervals.
+//! - `baseline`, `comparison`, `pairing`, `statistics`: a study against a baseline, paired and with intervals.
+//! - `summary_table`: statistics of groups of runs as Markdown.
 //! - `table`, `schema`: columns with units and descriptions, and those of the tables of a study.
+//! - `view/`: what the study view shows: filters, groups, distributions, differences.
 
+mod baseline;
 mod comparison;
 mod job;
+mod pairing;
 mod perturbation;
 mod plan;
 mod recipe;
 mod schema;
 mod statistics;
+mod summary_table;
 mod table;
 #[cfg(test)]
 mod tests;
+pub mod view;
 
+pub use baseline::baseline_table;
 pub use comparison::{
     ComparisonError, Direction, MetricComparison, SUCCESS, StudyComparison, Verdict, WorstPair, compare,
 };
@@ -27,8 +34,9 @@ pub use job::{JobLog, KeyedJob, RecordedLog, SimulatedFlight, StudyJob, expand, 
 pub use perturbation::{
     Distribution, MagnitudeDimension, PerturbationError, PerturbationStart, RigChange, RigPerturbation, RigQuantity,
 };
-pub use plan::{DisturbanceSet, JobLimits, LogSource, PlanError, SlurmOptions, StudyOutput, StudyPlan};
+pub use plan::{DisturbanceSet, Exclusion, JobLimits, LogSource, PlanError, SlurmOptions, StudyOutput, StudyPlan};
 pub use recipe::{EncoderNoise, FlightRecipe};
-pub use schema::{PAIRING_COLUMNS, frames_table, parameters_table, runs_table};
+pub use schema::{PAIRING_COLUMNS, frames_table, parameters_table, relative_error_columns, runs_table};
 pub use statistics::MeanInterval;
+pub use summary_table::{ReferenceValue, Statistic, SummaryColumn, SummaryTable};
 pub use table::{Cell, ColumnType, ColumnValues, StudyColumn, StudyTable, TableError};

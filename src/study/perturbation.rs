@@ -201,6 +201,8 @@ pub enum PerturbationStart {
     Rig,
     /// The ground-truth rig of the log, with the noise and the prior of the log's rig.
     Truth,
+    /// The rig that the offline calibration finds from the log itself.
+    Calibrated,
 }
 
 /// A named set of errors, one level of that factor of a study.
@@ -296,14 +298,15 @@ impl RigPerturbation {
         self.changes.is_empty() && self.start == PerturbationStart::Rig
     }
 
-    /// The rig with the errors that a seed draws.
+    /// The rig with the errors that a seed draws. `given` is the rig of the log, or that of its offline calibration for
+    /// [`PerturbationStart::Calibrated`].
     ///
     /// # Errors
     /// When the rig has nothing that a change names, when a camera would have impossible intrinsics, and without the
     /// ground truth that the perturbation starts from.
     pub fn apply(&self, given: &Rig, truth: Option<&Rig>, seed: u64) -> Result<Rig, PerturbationError> {
         let mut rig = match self.start {
-            PerturbationStart::Rig => given.clone(),
+            PerturbationStart::Rig | PerturbationStart::Calibrated => given.clone(),
             PerturbationStart::Truth => {
                 let missing = || PerturbationError::NoGroundTruth { perturbation: self.name.clone() };
                 with_values_of(given, truth.ok_or_else(missing)?)

@@ -1,12 +1,13 @@
 //! Columns of the tables of a study; docs/formats.md lists them too.
 
 use super::table::{ColumnType, StudyColumn, StudyTable};
+use crate::session::RELATIVE_LENGTHS_M;
 use ColumnType::{Bool, Integer, Number, Text};
 
 /// Name, type, unit and description of a column.
 type Column = (&'static str, ColumnType, &'static str, &'static str);
 
-/// One row per run.
+/// One row per run: inputs, frames and absolute errors.
 const RUNS: &[Column] = &[
     ("key", Text, "", "SHA-256 of the job's inputs; name of its folder under jobs/"),
     ("study", Text, "", "name of the study"),
@@ -61,12 +62,10 @@ const RUNS: &[Column] = &[
     ("ate_median_m", Number, "m", "the same, median"),
     ("ate_max_m", Number, "m", "the same, maximum"),
     ("ate_percent", Number, "%", "ate_rmse_m over length_m"),
-    ("rpe_5m_translation_m", Number, "m", "relative error over 5 m of path, root mean square of the translation"),
-    ("rpe_5m_rotation_rad", Number, "rad", "the same, rotation"),
-    ("rpe_10m_translation_m", Number, "m", "relative error over 10 m of path, root mean square of the translation"),
-    ("rpe_10m_rotation_rad", Number, "rad", "the same, rotation"),
-    ("rpe_25m_translation_m", Number, "m", "relative error over 25 m of path, root mean square of the translation"),
-    ("rpe_25m_rotation_rad", Number, "rad", "the same, rotation"),
+];
+
+/// One row per run, behind the relative errors: consistency, calibration and times.
+const RUNS_REST: &[Column] = &[
     (
         "pose_nees",
         Number,
@@ -100,6 +99,21 @@ const RUNS: &[Column] = &[
         "",
         "root mean square of error over σ of the calibration parameters; 1 when consistent",
     ),
+    (
+        "offline_static_alone_px",
+        Number,
+        "px",
+        "mean reprojection error of the offline calibration that the rig comes from, static camera and IMU alone",
+    ),
+    ("offline_static_px", Number, "px", "the same, static camera in the bundle of both cameras"),
+    ("offline_gimbal_px", Number, "px", "the same, gimbal camera"),
+    (
+        "offline_static_alone_error_m",
+        Number,
+        "m",
+        "position error of the static camera on the IMU after the stage of that calibration with these two alone",
+    ),
+    ("offline_static_alone_error_rad", Number, "rad", "the same, angle"),
     ("rank_structural", Integer, "", "structural rank at the last step"),
     ("rank_informed", Integer, "", "informed rank at the last step"),
     ("deficit_parameterization", Integer, "", "rank deficit by redundant parameters"),
@@ -158,23 +172,38 @@ const FRAMES: &[Column] = &[
 /// Columns by which runs of two studies are paired.
 pub const PAIRING_COLUMNS: [&str; 5] = ["log", "disturbance", "perturbation", "seed", "run"];
 
-fn table(columns: &[Column]) -> StudyTable {
-    let column =
-        |(name, column_type, unit, description): &Column| StudyColumn::new(name, *column_type, unit, description);
-    StudyTable::new(columns.iter().map(column).collect()).expect("columns are empty and have different names")
+/// Columns of the relative error over a length: translation and rotation.
+pub fn relative_error_columns(length_m: f64) -> [String; 2] {
+    [format!("rpe_{length_m}m_translation_m"), format!("rpe_{length_m}m_rotation_rad")]
+}
+
+fn columns(columns: &[Column]) -> impl Iterator<Item = StudyColumn> {
+    columns.iter().map(|(name, column_type, unit, description)| StudyColumn::new(name, *column_type, unit, description))
+}
+
+fn table(columns: impl Iterator<Item = StudyColumn>) -> StudyTable {
+    StudyTable::new(columns.collect()).expect("columns are empty and have different names")
 }
 
 /// An empty table of runs.
 pub fn runs_table() -> StudyTable {
-    table(RUNS)
+    let relative = RELATIVE_LENGTHS_M.into_iter().flat_map(|length_m| {
+        let [translation, rotation] = relative_error_columns(length_m);
+        let meaning = format!("relative error over {length_m} m of path, root mean square of the translation");
+        [
+            StudyColumn::new(&translation, Number, "m", &meaning),
+            StudyColumn::new(&rotation, Number, "rad", "the same, rotation"),
+        ]
+    });
+    table(columns(RUNS).chain(relative).chain(columns(RUNS_REST)))
 }
 
 /// An empty table of parameters.
 pub fn parameters_table() -> StudyTable {
-    table(PARAMETERS)
+    table(columns(PARAMETERS))
 }
 
 /// An empty table of frames.
 pub fn frames_table() -> StudyTable {
-    table(FRAMES)
+    table(columns(FRAMES))
 }

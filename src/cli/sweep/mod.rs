@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use dcvins::export;
-use dcvins::export::study::{StudyFolder, find_logs, program_identity, read_parquet, read_plan};
+use dcvins::export::study::{StudyFolder, find_logs, program_identity, read_parquet, read_plan, write_parquet};
 use dcvins::study::{self, KeyedJob, StudyPlan, StudyTable};
 use serde::Serialize;
 
@@ -63,6 +63,9 @@ pub(crate) struct SweepArguments {
     /// [default: the plan's, else 10 % of the ATE].
     #[arg(long, value_name = "KEY=RATIO", requires = "baseline")]
     pub tolerance: Vec<Tolerance>,
+    /// Write the table of runs without paths, program, times and memory, as a baseline of later sweeps.
+    #[arg(long, value_name = "NEW.parquet", conflicts_with_all = ["dry_run", "shard"])]
+    pub write_baseline: Option<PathBuf>,
     /// Write the comparison as Markdown into this file instead of standard output.
     #[arg(long, value_name = "FILE.md", requires = "baseline")]
     pub summary: Option<PathBuf>,
@@ -226,11 +229,18 @@ fn finish(
     report.missing = missing;
     report.failed = failed_rows(&tables.runs);
     report.files = sweep.folder.write_tables(&tables, &sweep.plan)?;
+    if let Some(path) = arguments.write_baseline.as_ref().filter(|_| missing == 0) {
+        write_parquet(&study::baseline_table(&tables.runs)?, path)?;
+        report.files.push(path.clone());
+    }
     if let Some(baseline) = baseline {
         let tolerances = tolerance::tolerances(&sweep.plan, &arguments.tolerance);
         report.comparison = Some(study::compare(baseline, &tables.runs, &tolerances)?);
     }
     print_sweep(&report, arguments.json)?;
+    if !sweep.plan.tables.is_empty() && !arguments.json {
+        print(&format!("\n{}", sweep.plan.tables_text(&tables.runs)))?;
+    }
     if let Some(comparison) = &report.comparison {
         match &arguments.summary {
             Some(path) => export::study::write_text(path, &comparison.to_string())?,

@@ -1,21 +1,27 @@
 //! One job: the estimator on its log with its rig, and the rows of its result.
 
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::error::StudyFileError;
 use super::folder::{StudyFolder, StudyTables};
 use super::inputs::rig_sha256;
 use super::rows::{JobCosts, JobStatus, add_frames, failed_rows, run_rows};
+use crate::calibration::CalibrationOptions;
 use crate::export::ExportError;
+use crate::export::calibration_files::write_calibration;
+use crate::export::calibration_report::{CalibrationReport, report_calibration};
 use crate::export::masks;
 use crate::export::run_files::{RunFileOptions, write_run};
 use crate::export::summary::summarize;
 use crate::flight_log::output::OutputSet;
 use crate::flight_log::{FlightLog, LogError};
 use crate::sensors::Rig;
-use crate::session::{self, SessionError, SessionPlan, SessionRequest, Stopwatch};
-use crate::study::{JobLog, KeyedJob, StudyJob, StudyOutput, TableError};
+use crate::session::{
+    self, CalibrationRequest, CalibrationRunError, SessionError, SessionPlan, SessionRequest, Stopwatch,
+};
+use crate::study::{JobLog, KeyedJob, PerturbationStart, StudyJob, StudyOutput, TableError};
 
 /// Frames between two samples of the consistency of poses: about as long as a window, so that samples share few
 /// measurements.
@@ -35,6 +41,9 @@ pub enum JobError {
     /// The files of the run could not be written.
     #[error(transparent)]
     Export(#[from] ExportError),
+    /// The offline calibration that the job starts from failed.
+    #[error(transparent)]
+    Calibration(Box<CalibrationRunError>),
     /// The log cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
@@ -50,6 +59,12 @@ pub enum JobError {
     /// No image of the log could be used.
     #[error("no image of the log could be used; reasons: 'dcvins check {}'", .0.display())]
     NoImage(PathBuf),
+}
+
+impl From<CalibrationRunError> for JobError {
+    fn from(error: CalibrationRunError) -> Self {
+        Self::Calibration(Box::new(error))
+    }
 }
 
 impl From<StudyFileError> for JobError {
@@ -93,13 +108,15 @@ impl StudyFolder {
                 self.rendered(flight).ok_or_else(|| JobError::NoFlight(files.log.clone()))?.sha256
             }
         };
+        let offline = if job.perturbation.start == PerturbationStart::Calibrated {
+            Some(self.calibrate(key, &job, &mut files)?)
+        } else {
+            None
+        };
         if !job.perturbation.is_none() {
             files.rig = Some(self.write_perturbed_rig(key, &job, &files)?);
         }
-        let (start_s, duration_s) = match &job.log {
-            JobLog::Recorded(log) => (log.start_s, log.duration_s),
-            JobLog::Simulated(_) => (0.0, None),
-        };
+        let (start_s, duration_s) = span(&job);
         let mut plan = SessionPlan::open(&SessionRequest {
             log_path: files.log.clone(),
             rig_path: files.rig.clone(),
@@ -128,7 +145,7 @@ impl StudyFolder {
             peak_memory_bytes: peak_memory_bytes(),
             ..self.costs(&files, program, attempts)
         };
-        let mut tables = run_rows(key, &job, &costs, &recording, run, &summary)?;
+        let mut tables = run_rows(key, &job, &costs, &recording, run, &summary, offline.as_ref())?;
         if output.frames {
             add_frames(&mut tables, key, run)?;
         }
@@ -173,6 +190,25 @@ impl StudyFolder {
         Ok(self.write_rows(key, &tables, output)?)
     }
 
+    /// Calibrates offline from the log of a job, writes the files of `dcvins calibrate` into its folder, and makes the
+    /// result its rig.
+    fn calibrate(&self, key: &str, job: &StudyJob, files: &mut JobFiles) -> Result<CalibrationReport, JobError> {
+        let (start_s, duration_s) = span(job);
+        let request = CalibrationRequest {
+            log_path: files.log.clone(),
+            rig_path: files.rig.clone(),
+            ground_truth_path: files.truth.clone(),
+            start_s,
+            duration_s,
+            ..CalibrationRequest::default()
+        };
+        let run = session::calibrate(&request, &CalibrationOptions::default(), &mut |_| ControlFlow::Continue(()))?;
+        let (report, folder) = (report_calibration(&run), self.job(key));
+        write_calibration(&run, &report, &folder, false)?;
+        files.rig = Some(folder.join("rig.yaml"));
+        Ok(report)
+    }
+
     /// Writes the rig of a job with its errors, and the masks beside it.
     fn write_perturbed_rig(&self, key: &str, job: &StudyJob, files: &JobFiles) -> Result<PathBuf, JobError> {
         let log = FlightLog::open(&files.log)?;
@@ -191,6 +227,14 @@ impl StudyFolder {
         outputs.write(&path, rig.to_yaml().as_bytes()).map_err(StudyFileError::write(&path))?;
         outputs.commit().map_err(StudyFileError::commit)?;
         Ok(path)
+    }
+}
+
+/// Start in the log and duration of a job, in seconds.
+fn span(job: &StudyJob) -> (f64, Option<f64>) {
+    match &job.log {
+        JobLog::Recorded(log) => (log.start_s, log.duration_s),
+        JobLog::Simulated(_) => (0.0, None),
     }
 }
 

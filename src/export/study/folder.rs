@@ -3,7 +3,7 @@
 //! ```text
 //! DIR/study.json            what the folder is
 //! DIR/plan.toml             copy of the plan
-//! DIR/results.parquet, results.csv, parameters.parquet, parameters.csv, frames.parquet
+//! DIR/results.parquet, results.csv, parameters.parquet, parameters.csv, frames.parquet, tables.md
 //! DIR/flights/ID/           a simulated flight with its rig and ground truth
 //! DIR/jobs/KEY/job.json     inputs of a job
 //! DIR/jobs/KEY/stderr.txt   what its last attempt wrote to standard error
@@ -30,6 +30,8 @@ const RUNS: &str = "results";
 const PARAMETERS: &str = "parameters";
 /// The table of frames.
 const FRAMES: &str = "frames";
+/// The tables for people.
+const SUMMARY: &str = "tables.md";
 
 /// Content of [`INDEX`].
 #[derive(Debug, Serialize, Deserialize)]
@@ -252,6 +254,11 @@ impl StudyFolder {
         if plan.output.frames {
             let path = self.root.join(format!("{FRAMES}.parquet"));
             outputs.add(stage_parquet(&tables.frames, &path)?);
+            paths.push(path);
+        }
+        if !plan.tables.is_empty() {
+            let path = self.root.join(SUMMARY);
+            outputs.write(&path, plan.tables_text(&tables.runs).as_bytes()).map_err(StudyFileError::write(&path))?;
             paths.push(path);
         }
         outputs.commit().map_err(StudyFileError::commit)?;

@@ -2,10 +2,11 @@
 
 use super::folder::StudyTables;
 use crate::estimator::{EventKind, FailureCause};
+use crate::export::calibration_report::CalibrationReport;
 use crate::export::summary::{RunSummary, difference_sigmas};
 use crate::geometry::{median, seconds_from_ns, so3};
 use crate::session::{Recording, RunRecord};
-use crate::study::{Cell, JobLog, StudyJob, TableError};
+use crate::study::{Cell, JobLog, StudyJob, TableError, relative_error_columns};
 
 /// How a job ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -132,7 +133,7 @@ pub(super) fn failed_rows(
     Ok(tables)
 }
 
-/// The rows of a job with results.
+/// The rows of a job with results; `offline` is the calibration that its rig comes from.
 pub(super) fn run_rows(
     key: &str,
     job: &StudyJob,
@@ -140,6 +141,7 @@ pub(super) fn run_rows(
     recording: &Recording,
     run: &RunRecord,
     summary: &RunSummary,
+    offline: Option<&CalibrationReport>,
 ) -> Result<StudyTables, TableError> {
     let mut tables = StudyTables::default();
     let initialized = summary.frames.initialized_at_s.is_some();
@@ -152,7 +154,10 @@ pub(super) fn run_rows(
     cells.extend(accuracy(run, summary));
     cells.extend(calibration(summary));
     cells.extend(times(summary));
-    tables.runs.push(cells)?;
+    cells.extend(offline.map(offline_calibration).unwrap_or_default());
+    let relative = relative_errors(summary);
+    let relative = relative.iter().map(|(name, value)| (name.as_str(), Cell::from(*value)));
+    tables.runs.push(cells.into_iter().chain(relative))?;
     for parameter in &summary.calibration.parameters {
         let mut cells = pairing(key, job);
         cells.extend([
@@ -217,17 +222,6 @@ fn accuracy(run: &RunRecord, summary: &RunSummary) -> Cells {
             ("ate_max_m", accuracy.ate_max_m.into()),
             ("ate_percent", accuracy.ate_percent_of_length.into()),
         ]);
-        let names = [
-            (5.0, "rpe_5m_translation_m", "rpe_5m_rotation_rad"),
-            (10.0, "rpe_10m_translation_m", "rpe_10m_rotation_rad"),
-            (25.0, "rpe_25m_translation_m", "rpe_25m_rotation_rad"),
-        ];
-        for (delta_m, translation, rotation) in names {
-            if let Some(over) = accuracy.rpe.iter().find(|over| over.delta_m == delta_m) {
-                cells.push((translation, over.translation_rmse_m.into()));
-                cells.push((rotation, over.rotation_rmse_deg.to_radians().into()));
-            }
-        }
     }
     let samples = run.pose_consistency();
     let nees = samples.iter().map(|sample| sample.pose).sum::<f64>() / samples.len() as f64;
@@ -237,6 +231,16 @@ fn accuracy(run: &RunRecord, summary: &RunSummary) -> Cells {
     cells.push(("reprojection_rms_px", median(reprojections).into()));
     cells.extend(worst_frame(run));
     cells
+}
+
+/// Relative errors by column.
+fn relative_errors(summary: &RunSummary) -> Vec<(String, f64)> {
+    let errors = summary.accuracy.iter().flat_map(|accuracy| &accuracy.rpe);
+    let columns = errors.flat_map(|over| {
+        let values = [over.translation_rmse_m, over.rotation_rmse_deg.to_radians()];
+        relative_error_columns(over.delta_m).into_iter().zip(values)
+    });
+    columns.collect()
 }
 
 /// The frame with the largest position error, or without ground truth with the largest reprojection RMS.
@@ -297,6 +301,20 @@ fn calibration(summary: &RunSummary) -> Cells {
             ("deficit_absorbed", rank.deficit.absorbed.into()),
             ("deficit_motion", rank.deficit.motion.into()),
         ]);
+    }
+    cells
+}
+
+/// Residuals of the offline calibration, and the error of its first stage.
+fn offline_calibration(report: &CalibrationReport) -> Cells {
+    let mut cells: Cells = vec![("offline_static_alone_px", report.camera_imu_reprojection.error_px.mean.into())];
+    for (column, camera) in ["offline_static_px", "offline_gimbal_px"].into_iter().zip(&report.reprojection) {
+        cells.push((column, camera.error_px.mean.into()));
+    }
+    if let Some(truth) = &report.ground_truth {
+        let error = &truth.static_camera_imu;
+        cells.push(("offline_static_alone_error_m", error.translation_mean_m.into()));
+        cells.push(("offline_static_alone_error_rad", error.rotation_mean_rad.into()));
     }
     cells
 }

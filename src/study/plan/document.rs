@@ -104,6 +104,11 @@ impl<'a> Section<'a> {
         Some(Entry { key: self.key(name), value })
     }
 
+    /// The keys of this table.
+    pub(super) fn keys(&self) -> impl Iterator<Item = &'a str> {
+        self.table.keys().map(|key| key.get_ref().as_ref())
+    }
+
     /// Whether there is such a key.
     pub(super) fn has(&self, name: &str) -> bool {
         self.entry(name).is_some()

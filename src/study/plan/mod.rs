@@ -2,6 +2,7 @@
 
 mod document;
 mod read;
+mod tables;
 
 use std::collections::BTreeMap;
 
@@ -11,6 +12,8 @@ pub use document::PlanError;
 
 use super::perturbation::RigPerturbation;
 use super::recipe::FlightRecipe;
+use super::summary_table::SummaryTable;
+use super::table::StudyTable;
 use crate::session::RunSpec;
 
 /// Recorded logs of a plan: every file that a pattern matches.
@@ -37,6 +40,21 @@ pub struct DisturbanceSet {
     pub name: String,
     /// Disturbances as `dcvins simulate --disturb` takes them, in addition to the flight's own.
     pub disturb: Vec<String>,
+}
+
+/// Combinations of levels that a plan leaves out: those that are in each list that is not empty.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Exclusion {
+    /// Names of logs and flights.
+    pub logs: Vec<String>,
+    /// Names of disturbances.
+    pub disturbances: Vec<String>,
+    /// Names of rig errors.
+    pub perturbations: Vec<String>,
+    /// Names of runs.
+    pub specs: Vec<String>,
+    /// Seeds.
+    pub seeds: Vec<u64>,
 }
 
 /// Limits on one job.
@@ -86,7 +104,8 @@ impl Default for SlurmOptions {
     }
 }
 
-/// A plan: every combination of logs, disturbances, perturbations, seeds and specifications is one run.
+/// A plan: every combination of logs, disturbances, perturbations, seeds and specifications is one run, but for those left
+/// out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StudyPlan {
     /// Name of the study.
@@ -103,6 +122,8 @@ pub struct StudyPlan {
     pub disturbances: Vec<DisturbanceSet>,
     /// Seeds of simulated flights and of random perturbations.
     pub seeds: Vec<u64>,
+    /// Combinations that are left out.
+    pub exclusions: Vec<Exclusion>,
     /// Limits on one job.
     pub limits: JobLimits,
     /// What is written beside the tables.
@@ -111,6 +132,8 @@ pub struct StudyPlan {
     pub slurm: SlurmOptions,
     /// Tolerances of the comparison with a baseline, by column.
     pub tolerances: BTreeMap<String, f64>,
+    /// Tables for people.
+    pub tables: Vec<SummaryTable>,
 }
 
 impl StudyPlan {
@@ -121,5 +144,10 @@ impl StudyPlan {
     /// logs or with two levels of one name.
     pub fn from_toml(text: &str) -> Result<Self, PlanError> {
         read::plan(text)
+    }
+
+    /// Its tables for people of a table of runs, as Markdown.
+    pub fn tables_text(&self, runs: &StudyTable) -> String {
+        self.tables.iter().map(|table| table.markdown(runs)).collect::<Vec<_>>().join("\n")
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::document::{PlanError, Section, parse};
+use super::tables;
 use super::{DisturbanceSet, JobLimits, LogSource, SlurmOptions, StudyOutput, StudyPlan};
 use crate::session::RunSpec;
 use crate::simulation::Disturbances;
@@ -11,7 +12,7 @@ use crate::study::perturbation::{
 };
 use crate::study::recipe::{EncoderNoise, FlightRecipe};
 
-const PLAN_KEYS: [&str; 11] = [
+const PLAN_KEYS: [&str; 13] = [
     "name",
     "seeds",
     "specs",
@@ -19,13 +20,15 @@ const PLAN_KEYS: [&str; 11] = [
     "flights",
     "disturbances",
     "perturbations",
+    "exclude",
     "limits",
     "output",
     "slurm",
     "tolerance",
+    "tables",
 ];
 /// Range of seeds: integers that every reader of the tables represents.
-const SEEDS: std::ops::RangeInclusive<u64> = 0..=i64::MAX as u64;
+pub(super) const SEEDS: std::ops::RangeInclusive<u64> = 0..=i64::MAX as u64;
 /// Range of times in a plan, in seconds.
 const SECONDS: std::ops::RangeInclusive<f64> = 0.0..=1e6;
 
@@ -45,6 +48,8 @@ pub(super) fn plan(text: &str) -> Result<StudyPlan, PlanError> {
         limits: root.section("limits")?.as_ref().map_or_else(|| Ok(JobLimits::default()), limits)?,
         output: root.section("output")?.as_ref().map_or_else(|| Ok(StudyOutput::default()), output)?,
         slurm: root.section("slurm")?.as_ref().map_or_else(|| Ok(SlurmOptions::default()), slurm)?,
+        exclusions: tables::exclusions(&root)?,
+        tables: tables::tables(&root)?,
         tolerances: root.section("tolerance")?.as_ref().map_or_else(|| Ok(BTreeMap::new()), tolerances)?,
     };
     if plan.logs.is_empty() && plan.flights.is_empty() {
@@ -59,6 +64,7 @@ pub(super) fn plan(text: &str) -> Result<StudyPlan, PlanError> {
     distinct(&root, "perturbations", plan.perturbations.iter().map(|level| level.name.as_str()))?;
     distinct(&root, "disturbances", plan.disturbances.iter().map(|level| level.name.as_str()))?;
     distinct(&root, "specs", plan.specs.iter().map(|spec| spec.label.as_str()))?;
+    tables::check_exclusions(&root, &plan)?;
     Ok(plan)
 }
 
@@ -191,8 +197,10 @@ fn perturbation(section: &Section<'_>) -> Result<RigPerturbation, PlanError> {
     let start = match section.text("start")?.as_deref() {
         None | Some("rig") => PerturbationStart::Rig,
         Some("truth") => PerturbationStart::Truth,
+        Some("calibrated") => PerturbationStart::Calibrated,
         Some(other) => {
-            return Err(section.error_at("start", &format!("is '{other}', expected \"rig\" or \"truth\"")));
+            let problem = format!("is '{other}', expected \"rig\", \"truth\" or \"calibrated\"");
+            return Err(section.error_at("start", &problem));
         }
     };
     let match_prior = match section.text("prior")?.as_deref() {

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use crate::geometry::SplitMix64;
-use crate::study::{Cell, SUCCESS, StudyTable, Verdict, compare, runs_table};
+use crate::study::{Cell, SUCCESS, StudyTable, Verdict, baseline_table, compare, runs_table};
 
 /// A study of 4 logs × 5 seeds: errors differ between logs by a factor of ten, and between two studies by noise of this
 /// relative size, all times `factor`.
@@ -109,4 +109,50 @@ fn what_cannot_be_compared_is_said() {
     let two = old.select(&[0, 1]);
     let few = compare(&two, &two, &tolerances(&["ate_rmse_m"])).unwrap();
     assert_eq!((few.metrics[0].verdict, few.fails()), (Verdict::TooFewPairs, true));
+}
+
+/// A table with one run of each specification, whose ATE is 1 m times its number.
+fn runs(specs: &[&str]) -> StudyTable {
+    let mut table = runs_table();
+    for (place, spec) in specs.iter().enumerate() {
+        let ate_m = Cell::Number(1.0 + place as f64);
+        let cells = [("log", "a".into()), ("run", (*spec).into()), ("status", "ok".into()), ("ate_rmse_m", ate_m)];
+        table.push(cells).unwrap();
+    }
+    table
+}
+
+#[test]
+fn runs_are_paired_by_the_meaning_of_their_settings_and_then_by_name() {
+    let check = |old: &[&str], new: &[&str], pairs: usize, other_settings: usize| {
+        let found = compare(&runs(old), &runs(new), &tolerances(&[])).unwrap();
+        assert_eq!((found.pairs, found.other_settings), (pairs, other_settings), "{old:?} {new:?}");
+    };
+    let normalized = |text: &str| text.parse::<crate::session::RunSpec>().unwrap().to_string();
+    check(&["auto"], &[&normalized("auto:window=10")], 1, 0);
+    check(&["auto:name=before"], &["auto:name=after"], 1, 0);
+    check(&["auto:encoder=off,window=8"], &["auto:window=8,encoder=off"], 1, 0);
+    check(&["auto"], &["auto:pixel-noise=2,name=auto"], 1, 1);
+    // A run is in one pair; equal settings come before equal names.
+    check(&["auto", "auto:window=8"], &["auto:window=8,name=auto", "auto:name=a"], 2, 0);
+    check(&["auto"], &["auto", "auto:name=a"], 1, 0);
+    // What this version cannot read is paired as it stands.
+    check(&["neural:depth=3"], &["neural:depth=3"], 1, 0);
+    let unpaired = compare(&runs(&["auto"]), &runs(&["auto:window=8"]), &tolerances(&[])).unwrap_err();
+    assert!(unpaired.to_string().contains("the settings or the name of the run"), "{unpaired}");
+    let other = compare(&runs(&["auto"]), &runs(&["auto:pixel-noise=2,name=auto"]), &tolerances(&[])).unwrap();
+    assert!(other.to_string().contains("1 pairs are of runs with one name and different settings"), "{other}");
+}
+
+#[test]
+fn a_baseline_is_compared_and_names_no_machine() {
+    let mut random = SplitMix64::new(1);
+    let runs = study(0.1, 1.0, &mut random);
+    let baseline = baseline_table(&runs).unwrap();
+    for column in ["key", "log_path", "program", "wall_s", "step_ms", "step_p95_ms", "real_time_factor", "message"] {
+        assert!(runs.column(column).is_some() && baseline.column(column).is_none(), "{column}");
+    }
+    assert_eq!((baseline.rows(), baseline.number(3, "pose_nees")), (runs.rows(), runs.number(3, "pose_nees")));
+    let same = compare(&baseline, &runs, &tolerances(&["ate_rmse_m", "pose_nees"])).unwrap();
+    assert_eq!((same.pairs, same.fails(), same.other_logs), (20, false, 0));
 }

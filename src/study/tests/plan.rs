@@ -1,4 +1,4 @@
-use crate::study::{Distribution, EncoderNoise, PerturbationStart, RigQuantity, StudyPlan};
+use crate::study::{Distribution, EncoderNoise, PerturbationStart, RigQuantity, Statistic, StudyPlan};
 
 /// A plan with every key.
 pub(super) const WHOLE: &str = r#"
@@ -71,6 +71,22 @@ options = ["--account=lab"]
 [tolerance]
 ate_rmse_m = 0.1
 pose_nees = 0.5
+
+[[exclude]]
+perturbations = ["5 mm, 1°"]
+specs = ["no-encoder"]
+seeds = [3]
+
+[[tables]]
+title = "Position error"
+rows = ["log", "label"]
+only = { disturbance = ["none"], perturbation = ["none"] }
+against = { label = "auto" }
+columns = [
+  { column = "ate_rmse_m", title = "ATE, mm", factor = 1000, digits = 1 },
+  { column = "ate_rmse_m", title = "ratio", statistic = "ratio" },
+]
+references = [{ title = "paper", row = ["town", "auto"], value = "180" }]
 "#;
 
 #[test]
@@ -93,6 +109,12 @@ fn every_key_is_read() {
     assert!(plan.output.frames && plan.output.files);
     assert_eq!((plan.slurm.tasks, plan.slurm.cpus_per_task), (8, 2));
     assert_eq!(plan.tolerances.get("pose_nees"), Some(&0.5));
+    assert_eq!((plan.exclusions.len(), plan.exclusions[0].seeds.as_slice()), (1, [3].as_slice()));
+    let [table] = plan.tables.as_slice() else { panic!("one table") };
+    assert_eq!((table.rows.len(), table.only.len(), table.references[0].value.as_str()), (2, 2, "180"));
+    let [ate, ratio] = table.columns.as_slice() else { panic!("two columns") };
+    assert_eq!((ate.title.as_str(), ate.factor, ate.digits, ate.statistic), ("ATE, mm", 1e3, 1, Statistic::Median));
+    assert_eq!((ratio.factor, ratio.digits, ratio.statistic), (1.0, 3, Statistic::Ratio));
 }
 
 #[test]
@@ -151,8 +173,51 @@ fn errors_name_line_key_and_what_is_allowed() {
     check(&format!("{}[slurm]\noptions = [\"-A lab\"]", flight("")), "expected an option of sbatch");
     check(&format!("{}[slurm]\npartition = \"a b\"", flight("")), "expected one word without blanks");
     check(&format!("{}[tolerance]\nate_rmse_m = \"10 %\"", flight("")), "'tolerance.ate_rmse_m' is the text '10 %'");
+    let exclude = |lists: &str| flight(&format!("[[exclude]]\n{lists}"));
+    check(&exclude(""), "line 3: 'exclude[1]' excludes nothing: expected lists of logs");
+    check(&exclude("specs = [\"static\"]"), "'exclude[1].specs' names 'static', expected some of auto");
+    check(&exclude("logs = [\"t1\"]"), "'exclude[1].logs' names 't1', expected some of t3");
+    let table = |keys: &str| flight(&format!("[[tables]]\ntitle = \"a\"\n{keys}"));
+    check(&table(""), "'tables[1]' lacks the key 'rows'");
+    check(
+        &table("rows = [\"experiment\"]"),
+        "'tables[1].rows[1]' is 'experiment': expected a column of the table of runs",
+    );
+    let column = |keys: &str| table(&format!("rows = [\"log\"]\ncolumns = [{{ {keys} }}]"));
+    check(&column("column = \"status\""), "is 'status', expected a column of numbers of the table of runs");
+    check(&column("column = \"ate_rmse_m\", statistic = \"mode\""), "expected median, mean, sum or ratio");
+    check(&column("column = \"ate_rmse_m\", statistic = \"ratio\""), "has a ratio and no 'against'");
+    let references = "rows = [\"log\"]\nreferences = [{ title = \"a\", row = [], value = \"1\" }]";
+    check(&table(references), "has 0 names, expected one for each of 'rows'");
     check(
         "[[logs]]\npath = \"a\"\n[[disturbances]]\nname = \"fog\"\ndisturb = [\"blank=1,1\"]",
         "line 3: 'disturbances' disturb simulated flights, and there are none",
     );
+}
+
+#[test]
+fn plans_of_the_documents_and_benches_are_read() {
+    let document = include_str!("../../../docs/commands.md");
+    let (_, rest) = document.split_once("```toml\nname = \"encoders\"").unwrap();
+    let (example, _) = rest.split_once("```").unwrap();
+    let plan = StudyPlan::from_toml(&format!("name = \"encoders\"{example}")).unwrap();
+    assert_eq!((plan.exclusions.len(), plan.tables.len()), (1, 1));
+    let check = |name: &str, text: &str| {
+        let plan = StudyPlan::from_toml(text).unwrap_or_else(|error| panic!("{name}: {error}"));
+        for table in &plan.tables {
+            let known = |names: &[String], row: &str| names.iter().any(|name| name == row);
+            let flights: Vec<String> = plan.flights.iter().map(|flight| flight.name.clone()).collect();
+            let of_logs = table.rows.first().is_some_and(|column| column == "log");
+            for reference in table.references.iter().filter(|_| of_logs) {
+                assert!(known(&flights, &reference.row[0]), "{name}: {:?}", reference.row);
+            }
+        }
+    };
+    check("accuracy", include_str!("../../../benches/paper_tables/accuracy.toml"));
+    check("short", include_str!("../../../benches/paper_tables/short.toml"));
+    check("speed", include_str!("../../../benches/paper_tables/speed.toml"));
+    check("encoders", include_str!("../../../benches/paper_tables/encoders.toml"));
+    check("robustness", include_str!("../../../benches/paper_tables/robustness.toml"));
+    check("ablation", include_str!("../../../benches/paper_tables/ablation.toml"));
+    check("regression", include_str!("../../../benches/regression/plan.toml"));
 }
