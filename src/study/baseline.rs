@@ -1,0 +1,19 @@
+//! What is kept of a study for later comparisons.
+
+use super::table::{StudyTable, TableError};
+
+/// Columns that name files and programs.
+const OF_FILES: [&str; 7] = ["key", "message", "attempts", "log_path", "rig_path", "truth_path", "program"];
+/// Columns of measured time and memory, beside those whose names end in `_ms`.
+const OF_COSTS: [&str; 3] = ["wall_s", "peak_memory_bytes", "real_time_factor"];
+
+/// The table of runs without what differs between two machines: paths, the program, times and memory.
+///
+/// The same results give the same table wherever they were computed, so that a baseline can be committed.
+///
+/// # Errors
+/// Never for a table, whose columns have one length and different names.
+pub fn baseline_table(runs: &StudyTable) -> Result<StudyTable, TableError> {
+    let kept = |name: &str| !OF_FILES.contains(&name) && !OF_COSTS.contains(&name) && !name.ends_with("_ms");
+    StudyTable::new(runs.columns().iter().filter(|column| kept(&column.name)).cloned().collect())
+}
