@@ -19,10 +19,16 @@ mod renderers;
 mod report;
 mod results;
 mod rig_template;
+mod sample_folder;
 mod sample_log;
 #[cfg(feature = "gui")]
 mod screenshots;
 #[cfg(unix)]
 mod slurm;
+#[cfg(feature = "gui")]
+mod studies;
+#[cfg(feature = "gui")]
+mod study_sample;
 mod sweep;
 mod time_travel;
+mod trajectories;

@@ -10,6 +10,8 @@ use dcvins::export::study::read_parquet;
 use dcvins::study::StudyTable;
 use serde_json::Value;
 
+use crate::sample_folder;
+
 /// Five seconds of the sample log with and without errors of the rig, and a file that is no log.
 const PLAN: &str = r#"
 name = "garden"
@@ -34,12 +36,8 @@ changes = [{ quantity = "gimbal.translation", magnitude = "5 mm" }]
 
 fn folder(plan: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder can be made");
-    let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs");
-    for name in ["garden.mcap", "garden.rig.yaml", "garden.truth.yaml"] {
-        fs::copy(samples.join(name), folder.path().join(name)).expect("the sample can be copied");
-    }
+    sample_folder::fill(folder.path(), plan);
     fs::write(folder.path().join("broken.mcap"), "this is no log").expect("a file in a new folder");
-    fs::write(folder.path().join("plan.toml"), plan).expect("a file in a new folder");
     folder
 }
 
