@@ -10,21 +10,25 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, LazyLock};
 
-use dcvins::export::{ScreenshotOptions, draw_panel};
+use dcvins::export::{ScreenshotOptions, draw_panel, draw_study_panel};
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::ns_from_seconds;
 use dcvins::gui::app::{App, OpenLog};
 use dcvins::gui::desktop::{Desktop, PanelExport, PathEntry, SampleProgress};
 use dcvins::gui::rendering::headless::{self, Headless, HeadlessOptions};
 use dcvins::gui::rendering::painter::Painter;
+use dcvins::gui::study::{StudyOptions, StudyPanel};
 use dcvins::gui::theme::{Theme, ThemeName};
 use dcvins::gui::window::{Dialog, PanelName, Preset, WindowState, window_ui};
 use dcvins::gui::{PanelContext, Playback, Presentation, Selection};
 use dcvins::session::breakpoints::Breakpoints;
 use dcvins::session::{self, Recording, SessionPlan, SessionRequest};
+use dcvins::study::view::Study;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{DynamicImage, Rgba, RgbaImage};
 use rayon::prelude::*;
+
+use crate::study_sample;
 
 /// Cursor of all pictures in seconds: the flight is under way, and directions are still weak.
 const AT_S: f64 = 6.0;
@@ -47,6 +51,8 @@ enum Subject {
     Dialog(Dialog),
     Shortcuts,
     Welcome,
+    /// A panel of a study, `None` for the whole view.
+    Study(Option<StudyPanel>),
 }
 
 /// All pictures.
@@ -55,7 +61,8 @@ fn subjects() -> Vec<Subject> {
     let panels = PanelName::ALL.into_iter().map(Subject::Panel);
     let layouts = Preset::ALL.into_iter().map(Subject::Layout);
     let dialogs = dialogs.into_iter().map(Subject::Dialog);
-    panels.chain(layouts).chain(dialogs).chain([Subject::Shortcuts, Subject::Welcome]).collect()
+    let study = StudyPanel::ALL.into_iter().map(Some).chain([None]).map(Subject::Study);
+    panels.chain(layouts).chain(dialogs).chain([Subject::Shortcuts, Subject::Welcome]).chain(study).collect()
 }
 
 impl Subject {
@@ -68,12 +75,13 @@ impl Subject {
             Self::Dialog(dialog) => name("dialog", &format!("{dialog:?}")),
             Self::Shortcuts => name("dialog", "shortcuts"),
             Self::Welcome => "welcome.png".to_owned(),
+            Self::Study(panel) => name("study", panel.map_or("all", StudyPanel::as_str)),
         }
     }
 
     fn size_px(self) -> [u32; 2] {
         match self {
-            Self::Panel(PanelName::Image) => [640, 550],
+            Self::Panel(PanelName::Image) => [560, 480],
             Self::Panel(PanelName::Scene) => [800, 500],
             Self::Panel(PanelName::Convergence) => [1200, 480],
             Self::Panel(PanelName::Rank) => [480, 860],
@@ -84,9 +92,10 @@ impl Subject {
             Self::Panel(PanelName::Comparison) => [1200, 800],
             Self::Panel(PanelName::Breakpoints) => [480, 160],
             Self::Panel(PanelName::Timeline) => [1200, 210],
-            Self::Layout(Preset::Overview) => [1600, 900],
-            Self::Layout(_) | Self::Dialog(_) | Self::Shortcuts => [1366, 768],
+            Self::Layout(_) | Self::Dialog(_) | Self::Shortcuts | Self::Study(None) => [1366, 768],
             Self::Welcome => [1000, 640],
+            Self::Study(Some(StudyPanel::Runs | StudyPanel::Parallel)) => [900, 400],
+            Self::Study(Some(_)) => [760, 320],
         }
     }
 
@@ -134,6 +143,17 @@ impl Subject {
                 let open: OpenLog = Arc::new(|path: &Path| Err(format!("{} is not opened here", path.display())));
                 let mut app = App::new(open, Arc::new(Paper), options.theme);
                 headless::draw(options, |ui| app.ui(ui))
+            }
+            Self::Study(panel) => {
+                let options = ScreenshotOptions {
+                    size_px,
+                    presentation: Presentation::Interactive,
+                    ..ScreenshotOptions::default()
+                };
+                let [runs, parameters] = study_sample::tables(study_sample::SEEDS);
+                let study = Arc::new(Study { name: "gimbal-mounts".to_owned(), runs, parameters });
+                let name = panel.map_or("all", StudyPanel::as_str);
+                draw_study_panel(name, &study, &StudyOptions::default(), &options).expect("the picture is drawn")
             }
         }
     }
