@@ -36,6 +36,11 @@ pub(super) struct Appearance {
 impl Appearance {
     /// From a window with one more pixel on every side, row by row; `None` when it has no texture.
     pub(super) fn new(pixels: &[[f32; SIDE]; SIDE]) -> Option<Self> {
+        Arch::new().dispatch(Preparation { pixels })
+    }
+
+    #[inline(always)]
+    fn prepare(pixels: &[[f32; SIDE]; SIDE]) -> Option<Self> {
         let mut grey = [[0.0_f32; LANES + 2]; SIDE];
         for (row, source) in grey.iter_mut().zip(pixels) {
             row[..SIDE].copy_from_slice(source);
@@ -122,6 +127,20 @@ impl Appearance {
     }
 }
 
+/// [`Appearance::new`], compiled for every width of vector registers.
+struct Preparation<'a> {
+    pixels: &'a [[f32; SIDE]; SIDE],
+}
+
+impl NullaryFnOnce for Preparation<'_> {
+    type Output = Option<Appearance>;
+
+    #[inline(always)]
+    fn call(self) -> Option<Appearance> {
+        Appearance::prepare(self.pixels)
+    }
+}
+
 /// The sums that comparing a window needs, compiled for every width of vector registers.
 struct Comparison<'a> {
     appearance: &'a Appearance,
@@ -176,6 +195,7 @@ struct Moments {
     slopes: [f32; 6],
 }
 
+#[inline(always)]
 fn dot(a: &Rows, b: &Rows) -> f32 {
     let mut sums = [0.0_f32; LANES];
     for (a, b) in a.iter().zip(b) {

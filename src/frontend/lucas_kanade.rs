@@ -80,6 +80,8 @@ struct Template {
 #[derive(Clone, Debug)]
 pub(super) struct Buffers {
     template: Template,
+    /// Pixels of the first image that the patch is interpolated from.
+    pixels: [[f32; PATCH_WIDTH + 4]; PATCH_HEIGHT + 3],
     /// The first image about the window.
     patch: Patch,
     /// Its gradient; surplus columns and rows are zero.
@@ -91,6 +93,7 @@ impl Buffers {
     pub(super) fn new() -> Box<Self> {
         Box::new(Self {
             template: Template { x: [0; STRIDE * WINDOW], y: [0; STRIDE * WINDOW], hessian: [0.0; 3] },
+            pixels: [[0.0; PATCH_WIDTH + 4]; PATCH_HEIGHT + 3],
             patch: [[0.0; PATCH_WIDTH]; PATCH_HEIGHT],
             gradient: [[[0.0; LANES]; 2]; WINDOW],
             search: [[0; STRIDE]; SEARCH_HEIGHT],
@@ -170,7 +173,7 @@ impl NullaryFnOnce for Filling<'_> {
     #[inline(always)]
     fn call(self) -> bool {
         let Self { buffers, image, at, guess, options } = self;
-        let Buffers { template, patch, gradient, .. } = buffers;
+        let Buffers { template, pixels, patch, gradient, .. } = buffers;
         let columns = [visible(at[0], image.width, 1.0), visible(guess[0], image.width, 0.0)];
         let rows = [visible(at[1], image.height, 1.0), visible(guess[1], image.height, 0.0)];
         let (first_column, last_column) = (columns[0].0.max(columns[1].0), columns[0].1.min(columns[1].1));
@@ -179,7 +182,7 @@ impl NullaryFnOnce for Filling<'_> {
         if area < options.min_visible as f32 * (WINDOW * WINDOW) as f32 {
             return false;
         }
-        interpolate(image, at, patch);
+        interpolate(image, at, pixels, patch);
         let rows = first_row as usize..last_row as usize + 1;
         let mut mask = [0.0; LANES];
         mask[first_column as usize..=last_column as usize].fill(1.0);
@@ -320,17 +323,21 @@ fn floor(value: f32) -> i32 {
     towards_zero - i32::from(towards_zero as f32 > value)
 }
 
-/// The pixels around `at` by cubic convolution, one more on every side than the window.
+/// The pixels around `at` by cubic convolution, one more on every side than the window; `pixels` is a buffer.
 #[inline(always)]
-fn interpolate(image: &GrayImage, at: [f32; 2], patch: &mut Patch) {
+fn interpolate(
+    image: &GrayImage,
+    at: [f32; 2],
+    pixels: &mut [[f32; PATCH_WIDTH + 4]; PATCH_HEIGHT + 3],
+    patch: &mut Patch,
+) {
     let corner = at.map(floor);
     let reach = (WINDOW / 2 + 2) as i32;
     if corner.map(|t| t as f32) == at {
         cut_out(image, [corner[0] - reach + 1, corner[1] - reach + 1], patch, f32::from);
         return;
     }
-    let mut pixels = [[0.0_f32; PATCH_WIDTH + 4]; PATCH_HEIGHT + 3];
-    cut_out(image, [corner[0] - reach, corner[1] - reach], &mut pixels, f32::from);
+    cut_out(image, [corner[0] - reach, corner[1] - reach], pixels, f32::from);
     let (along, down) = (cubic_weights(at[0] - corner[0] as f32), cubic_weights(at[1] - corner[1] as f32));
     for (y, line) in patch.iter_mut().enumerate() {
         let mut column_sums = [0.0; PATCH_WIDTH + 4];

@@ -119,18 +119,19 @@ impl Patch {
         let unit = FRACTIONS as f64;
         let corner = Vector2::new(self.first[0] as f64, self.first[1] as f64);
         let step = [warp[(0, 0)], warp[(1, 0)]].map(|step| (step * unit) as f32);
+        // Written anew for each row.
+        let mut places = [[0; LANES]; 3];
+        let mut products = [[0.0_f32; 4]; LANES];
         for (row, line) in window.iter_mut().enumerate() {
             let down = row as f64 - CENTRE as f64;
             let start = middle - corner + warp * Vector2::new(-(CENTRE as f64), down);
             let start = [(start.x * unit) as f32, (start.y * unit) as f32];
-            let mut places = [[0; LANES]; 3];
             for c in 0..LANES {
                 let [x, y] = [0, 1].map(|k| rounded(start[k] + c as f32 * step[k]));
                 places[0][c] = y / FRACTIONS as u32 * STRIDE as u32 + x / FRACTIONS as u32;
                 places[1][c] = x % FRACTIONS as u32;
                 places[2][c] = y % FRACTIONS as u32;
             }
-            let mut products = [[0.0_f32; 4]; LANES];
             for (c, products) in products[..WINDOW].iter_mut().enumerate() {
                 // One row and one column before the pixel; the remainder tells the compiler that it lies within.
                 let first = (places[0][c] as usize).wrapping_sub(STRIDE + 1) % (STRIDE * HEIGHT);
@@ -142,7 +143,7 @@ impl Patch {
                     products[i] = along[i] * sum;
                 }
             }
-            for (value, [a, b, c, d]) in line[..WINDOW].iter_mut().zip(products) {
+            for (value, [a, b, c, d]) in line[..WINDOW].iter_mut().zip(&products) {
                 *value = ((a + b) + (c + d)) - level;
             }
         }
