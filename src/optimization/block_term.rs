@@ -6,41 +6,40 @@ use super::Reprojection;
 
 /// Residual of one observation with its derivatives by the landmark and by blocks of six unknowns named by `K`.
 ///
-/// A global shutter has one block per camera pose; a rolling shutter has three, the poses of the first, the middle and
-/// the last row. The intrinsics of a camera are one more block, which all its observations share.
+/// `N` blocks per camera pose: a global shutter has one; a rolling shutter has three, the poses of the first, the middle
+/// and the last row. The intrinsics of a camera are one more block, which all its observations share.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct BlockTerm<K> {
+pub(crate) struct BlockTerm<K, const N: usize> {
     /// Predicted minus measured (2), whitened.
     pub(crate) residual: Vector2<f64>,
     /// By [`super::Landmark::plus`].
     pub(crate) by_landmark: Matrix2x3<f64>,
     /// By the blocks of the anchor's camera pose; none in the anchor's own observation.
-    pub(crate) anchor: PoseBlocksOf<K>,
+    pub(crate) anchor: Option<PoseBlocksOf<K, N>>,
     /// By the blocks of the observing camera pose; none in the anchor's own observation.
-    pub(crate) observer: PoseBlocksOf<K>,
+    pub(crate) observer: Option<PoseBlocksOf<K, N>>,
     /// By the block that all observations share.
     pub(crate) shared: Option<(K, Matrix2x6<f64>)>,
 }
 
-/// Derivatives by the blocks of one camera pose, at most three.
-pub(crate) type PoseBlocksOf<K> = [Option<(K, Matrix2x6<f64>)>; MAX_POSE_BLOCKS];
+/// Derivatives by the blocks of one camera pose.
+pub(crate) type PoseBlocksOf<K, const N: usize> = [(K, Matrix2x6<f64>); N];
 
-/// Largest number of blocks of one camera pose.
-pub(crate) const MAX_POSE_BLOCKS: usize = 3;
-
-impl<K: Copy + PartialEq> BlockTerm<K> {
+impl<K: Copy + PartialEq> BlockTerm<K, 1> {
     /// A term with one block per camera pose; the anchor's own observation (`anchor` equals `pose`) has none.
     pub(crate) fn of_poses(anchor: Option<K>, pose: K, term: &Reprojection) -> Self {
         let apart = anchor != Some(pose);
         Self {
             residual: term.residual,
             by_landmark: term.by_landmark,
-            anchor: [anchor.filter(|_| apart).map(|anchor| (anchor, term.by_anchor)), None, None],
-            observer: [apart.then_some((pose, term.by_observer)), None, None],
+            anchor: anchor.filter(|_| apart).map(|anchor| [(anchor, term.by_anchor)]),
+            observer: apart.then_some([(pose, term.by_observer)]),
             shared: None,
         }
     }
+}
 
+impl<K, const N: usize> BlockTerm<K, N> {
     /// All blocks with their derivatives.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = &(K, Matrix2x6<f64>)> + Clone {
         self.anchor.iter().flatten().chain(&self.shared).chain(self.observer.iter().flatten())

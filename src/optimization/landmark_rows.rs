@@ -49,7 +49,7 @@ impl LandmarkRows {
     }
 
     /// Adds the two rows of an observation.
-    pub(crate) fn push(&mut self, term: &BlockTerm<usize>) {
+    pub(crate) fn push<const N: usize>(&mut self, term: &BlockTerm<usize, N>) {
         let observers = self.blocks.len();
         self.blocks.extend(term.observer.iter().flatten().map(|(block, _)| *block));
         for axis in 0..2 {

@@ -18,7 +18,7 @@ mod schur;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use block_term::{BlockTerm, MAX_POSE_BLOCKS, PoseBlocksOf};
+pub(crate) use block_term::{BlockTerm, PoseBlocksOf};
 pub(crate) use landmark::Landmark;
 pub use landmark::LandmarkModel;
 pub(crate) use landmark_rows::LandmarkRows;

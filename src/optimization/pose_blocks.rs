@@ -37,7 +37,7 @@ impl PoseBlocks {
     }
 
     /// Adds the `JᵀJ` of one observation.
-    pub(crate) fn add(&mut self, term: &BlockTerm<usize>) {
+    pub(crate) fn add<const N: usize>(&mut self, term: &BlockTerm<usize, N>) {
         let mut blocks = term.blocks();
         while let Some((block, by_block)) = blocks.next() {
             *self.block_mut(*block, *block) += by_block.tr_mul(by_block);

@@ -13,9 +13,9 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
+use nalgebra::{ArrayStorage, Matrix2x6, Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
-use super::{BlockTerm, MAX_POSE_BLOCKS, PoseBlocks, Reprojection};
+use super::{BlockTerm, PoseBlocks, Reprojection};
 
 /// Hessian and gradient over camera poses; of the Hessian the blocks `(row, column)` with `row ≤ column`.
 pub(crate) trait PoseEquations: Clone {
@@ -127,67 +127,74 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         terms: impl Iterator<Item = (P::Pose, Reprojection)>,
     ) {
         let terms = terms.map(|(pose, term)| BlockTerm::of_poses(anchor, pose, &term));
-        self.add_landmark_by_blocks([anchor, None, None], None, observations, terms);
+        self.add_landmark_by_blocks(anchor.map(|anchor| [anchor]), None, observations, terms);
     }
 
     /// [`Self::add_landmark`] by terms that may have several blocks: those of the anchor rise and come before those of the
     /// observers, which rise as well; the shared one comes after all.
-    pub(crate) fn add_landmark_by_blocks(
+    pub(crate) fn add_landmark_by_blocks<const N: usize>(
         &mut self,
-        anchor: [Option<P::Pose>; MAX_POSE_BLOCKS],
+        anchor: Option<[P::Pose; N]>,
         shared: Option<P::Pose>,
         observations: usize,
-        terms: impl Iterator<Item = BlockTerm<P::Pose>>,
+        terms: impl Iterator<Item = BlockTerm<P::Pose, N>>,
     ) {
         let mut block = LandmarkBlock {
             hessian: Matrix3::zeros(),
             gradient: Vector3::zeros(),
-            couplings: Vec::with_capacity(observations + 1),
+            couplings: Vec::with_capacity(N + observations + 1),
         };
+        block.couplings.extend(anchor.iter().flatten().map(|pose| (*pose, Matrix6x3::zeros())));
         // The anchor's blocks and the shared one have a part of nearly every term: summed here first.
-        let common = [anchor[0], anchor[1], anchor[2], shared];
-        let mut hessians = [[Matrix6::zeros(); MAX_POSE_BLOCKS + 1]; MAX_POSE_BLOCKS + 1];
-        let mut gradients = [Vector6::zeros(); MAX_POSE_BLOCKS + 1];
-        let mut couplings = [Matrix6x3::zeros(); MAX_POSE_BLOCKS + 1];
+        let mut of_anchor = [CommonBlock::<N>::ZERO; N];
+        let mut of_shared = CommonBlock::<N>::ZERO;
         for term in terms {
             block.hessian += term.by_landmark.tr_mul(&term.by_landmark);
             block.gradient += term.by_landmark.tr_mul(&term.residual);
-            let of_common = [&term.anchor[0], &term.anchor[1], &term.anchor[2], &term.shared];
-            for (place, observed) in term.observer.iter().enumerate() {
-                let Some((pose, by_pose)) = observed else { continue };
-                for (other, by_other) in term.observer[place..].iter().flatten() {
-                    *self.poses.hessian_mut(*pose, *other) += by_pose.tr_mul(by_other);
+            let observers = term.observer.as_ref().map_or(&[][..], |blocks| blocks);
+            for (place, (pose, by_pose)) in observers.iter().enumerate() {
+                for (other, by_other) in &observers[place..] {
+                    add_product(self.poses.hessian_mut(*pose, *other), by_pose, by_other);
                 }
                 *self.poses.gradient_mut(*pose) += by_pose.tr_mul(&term.residual);
                 block.couplings.push((*pose, by_pose.tr_mul(&term.by_landmark)));
                 for (anchor, by_anchor) in term.anchor.iter().flatten() {
-                    *self.poses.hessian_mut(*anchor, *pose) += by_anchor.tr_mul(by_pose);
+                    add_product(self.poses.hessian_mut(*anchor, *pose), by_anchor, by_pose);
                 }
                 if let Some((shared, by_shared)) = &term.shared {
-                    *self.poses.hessian_mut(*pose, *shared) += by_pose.tr_mul(by_shared);
+                    add_product(self.poses.hessian_mut(*pose, *shared), by_pose, by_shared);
                 }
             }
-            for (row, left) in of_common.iter().enumerate() {
-                let Some((_, left)) = left else { continue };
-                gradients[row] += left.tr_mul(&term.residual);
-                couplings[row] += left.tr_mul(&term.by_landmark);
-                for (column, right) in of_common.iter().enumerate().skip(row) {
-                    let Some((_, right)) = right else { continue };
-                    hessians[row][column] += left.tr_mul(right);
+            let anchors = term.anchor.as_ref().map_or(&[][..], |blocks| blocks);
+            for (row, (sum, (_, left))) in of_anchor.iter_mut().zip(anchors).enumerate() {
+                sum.add(&term, left);
+                for (column, (_, right)) in anchors.iter().enumerate().skip(row) {
+                    add_product(&mut sum.with_anchor[column], left, right);
+                }
+                if let Some((_, right)) = &term.shared {
+                    add_product(&mut sum.with_shared, left, right);
                 }
             }
-        }
-        for (row, first) in common.iter().enumerate() {
-            let Some(first) = first else { continue };
-            *self.poses.gradient_mut(*first) += gradients[row];
-            for (column, second) in common.iter().enumerate().skip(row) {
-                let Some(second) = second else { continue };
-                *self.poses.hessian_mut(*first, *second) += hessians[row][column];
+            if let Some((_, by_shared)) = &term.shared {
+                of_shared.add(&term, by_shared);
+                add_product(&mut of_shared.with_shared, by_shared, by_shared);
             }
         }
-        let anchors = anchor.iter().enumerate().filter_map(|(row, anchor)| Some(((*anchor)?, couplings[row])));
-        block.couplings.splice(0..0, anchors);
-        block.couplings.extend(shared.map(|shared| (shared, couplings[MAX_POSE_BLOCKS])));
+        for (row, (first, sum)) in anchor.iter().flatten().zip(&of_anchor).enumerate() {
+            *self.poses.gradient_mut(*first) += sum.gradient;
+            block.couplings[row].1 = sum.coupling;
+            for (second, hessian) in anchor.iter().flatten().zip(&sum.with_anchor).skip(row) {
+                *self.poses.hessian_mut(*first, *second) += hessian;
+            }
+            if let Some(shared) = shared {
+                *self.poses.hessian_mut(*first, shared) += sum.with_shared;
+            }
+        }
+        if let Some(shared) = shared {
+            *self.poses.gradient_mut(shared) += of_shared.gradient;
+            *self.poses.hessian_mut(shared, shared) += of_shared.with_shared;
+            block.couplings.push((shared, of_shared.coupling));
+        }
         self.landmarks.push(block);
     }
 
@@ -228,6 +235,40 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
                 inverse * right
             })
             .collect()
+    }
+}
+
+/// Sums over the terms of a landmark for a block that most of them have: one of its anchor's, or the shared one.
+#[derive(Clone, Copy)]
+struct CommonBlock<const N: usize> {
+    gradient: Vector6<f64>,
+    coupling: Matrix6x3<f64>,
+    /// Hessian with the anchor's blocks from this one on.
+    with_anchor: [Matrix6<f64>; N],
+    with_shared: Matrix6<f64>,
+}
+
+impl<const N: usize> CommonBlock<N> {
+    const ZERO: Self = Self {
+        gradient: Vector6::from_array_storage(ArrayStorage([[0.0; 6]; 1])),
+        coupling: Matrix6x3::from_array_storage(ArrayStorage([[0.0; 6]; 3])),
+        with_anchor: [Matrix6::from_array_storage(ArrayStorage([[0.0; 6]; 6])); N],
+        with_shared: Matrix6::from_array_storage(ArrayStorage([[0.0; 6]; 6])),
+    };
+
+    /// Adds a term to gradient and coupling.
+    fn add<K>(&mut self, term: &BlockTerm<K, N>, by_block: &Matrix2x6<f64>) {
+        self.gradient += by_block.tr_mul(&term.residual);
+        self.coupling += by_block.tr_mul(&term.by_landmark);
+    }
+}
+
+/// Adds `leftᵀ · right` to `block`, without a matrix in between.
+fn add_product(block: &mut Matrix6<f64>, left: &Matrix2x6<f64>, right: &Matrix2x6<f64>) {
+    for (target, [x, y]) in block.data.0.iter_mut().zip(&right.data.0) {
+        for (entry, [a, b]) in target.iter_mut().zip(&left.data.0) {
+            *entry += a * x + b * y;
+        }
     }
 }
 

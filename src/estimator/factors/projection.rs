@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimator::factors::visual::{Anchor, Track, VisualModel, whitened};
-use crate::estimator::state::camera_view::CameraView;
+use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS};
 use crate::optimization::dense::{self, ColumnGroup};
 use crate::optimization::{Landmark, LandmarkRows, PoseBlocks};
 
@@ -35,12 +35,27 @@ impl ProjectedRows {
         landmarks: &[Landmark],
         apart: NewestRows,
     ) -> Self {
-        let (frames, per_frame) = (current.frames(), current.blocks_per_frame());
+        match current.blocks_per_frame() {
+            1 => Self::by_blocks::<1>(model, current, linearized, tracks, landmarks, apart),
+            _ => Self::by_blocks::<ROLLING_BLOCKS>(model, current, linearized, tracks, landmarks, apart),
+        }
+    }
+
+    /// [`Self::new`] for a camera with `N` blocks per frame.
+    fn by_blocks<const N: usize>(
+        model: &VisualModel<'_>,
+        current: &CameraView<'_>,
+        linearized: &CameraView<'_>,
+        tracks: &[Track],
+        landmarks: &[Landmark],
+        apart: NewestRows,
+    ) -> Self {
+        let frames = current.frames();
         let newest = frames.saturating_sub(1);
         let mut blocks = PoseBlocks::new(current.blocks());
         let columns = BLOCK * current.blocks() + 1;
         // Grouped by the first observing slot, from its columns on; none begin with the intrinsics.
-        let width = BLOCK * per_frame;
+        let width = BLOCK * N;
         let of_slot = |slot: usize| ColumnGroup {
             columns: width,
             rows: Vec::with_capacity(height_of(tracks, slot) * (columns - width * slot)),
@@ -52,15 +67,14 @@ impl ProjectedRows {
         for (track, landmark) in tracks.iter().zip(landmarks) {
             let Some(first) = track.observations.first() else { continue };
             let anchor = Anchor::new(current, linearized, first);
-            let observers = per_frame * (track.observations.len() - 1);
-            local.begin(current.blocks_of(first.slot).into_iter().flatten(), current.intrinsics_block(), observers);
+            let observers = N * (track.observations.len() - 1);
+            local.begin(CameraView::blocks_of::<N>(first.slot), current.intrinsics_block(), observers);
             for observation in &track.observations {
-                let Some(term) = whitened(model, &anchor, landmark, observation, None) else { continue };
+                let Some(term) = whitened::<N>(model, &anchor, landmark, observation, None) else { continue };
                 blocks.add(&term);
                 local.push(&term);
             }
-            let seen_last =
-                first.slot != newest && local.last_observer().map(|block| block / per_frame) == Some(newest);
+            let seen_last = first.slot != newest && local.last_observer().map(|block| block / N) == Some(newest);
             if apart == NewestRows::Apart && seen_last {
                 local.eliminate_last_apart();
                 local.append_to(&mut newest_rows, columns, 0, local.added_by_last());
@@ -68,7 +82,7 @@ impl ProjectedRows {
                 local.eliminate();
             }
             let slot = first_slot(track).unwrap_or(first.slot);
-            local.append_to(&mut groups[slot].rows, columns, per_frame * slot, local.remaining());
+            local.append_to(&mut groups[slot].rows, columns, N * slot, local.remaining());
         }
         // Without a row of the residual alone, which no unknown can change.
         let rows = dense::triangularize_groups(&groups, columns);

@@ -4,10 +4,10 @@ use nalgebra::Vector2;
 
 use crate::camera::CameraModel;
 use crate::estimator::options::EstimatorOptions;
-use crate::estimator::state::camera_view::{CameraView, RelativeTo};
+use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS, RelativeTo};
 use crate::optimization::{
-    BlockTerm, DensePoseEquations, Landmark, LandmarkModel, MAX_POSE_BLOCKS, ReducedEquations, ReprojectionEquations,
-    RobustLoss, reprojection,
+    BlockTerm, DensePoseEquations, Landmark, LandmarkModel, ReducedEquations, ReprojectionEquations, RobustLoss,
+    reprojection,
 };
 
 /// An observation of a feature: slot of the frame and pixel.
@@ -89,12 +89,25 @@ pub(crate) fn equations(
     tracks: &[Track],
     landmarks: &[Landmark],
 ) -> VisualEquations {
+    match current.blocks_per_frame() {
+        1 => equations_by_blocks::<1>(model, current, linearized, tracks, landmarks),
+        _ => equations_by_blocks::<ROLLING_BLOCKS>(model, current, linearized, tracks, landmarks),
+    }
+}
+
+/// [`equations`] of a camera with `N` blocks per frame.
+fn equations_by_blocks<const N: usize>(
+    model: &VisualModel<'_>,
+    current: &CameraView<'_>,
+    linearized: &CameraView<'_>,
+    tracks: &[Track],
+    landmarks: &[Landmark],
+) -> VisualEquations {
     let mut equations = ReprojectionEquations::new(DensePoseEquations::new(current.blocks()), tracks.len());
     for (track, landmark) in tracks.iter().zip(landmarks) {
         // Observations come in the order of the slots and the anchor is the first of them.
         let anchor = track.observations.first().map(|first| Anchor::new(current, linearized, first));
-        let blocks =
-            anchor.as_ref().map_or([None; MAX_POSE_BLOCKS], |anchor| current.blocks_of(anchor.observation.slot));
+        let blocks = anchor.as_ref().map(|anchor| CameraView::blocks_of::<N>(anchor.observation.slot));
         let terms = track
             .observations
             .iter()
@@ -126,15 +139,15 @@ impl<'a> Anchor<'a> {
     }
 }
 
-/// Linearizes one observation by the blocks of the camera, divided by sigma and multiplied by the root of its robust
+/// Linearizes one observation by the `N` blocks of the camera per frame, divided by sigma and multiplied by the root of its robust
 /// weight: that of its residual, unless given.
-pub(crate) fn whitened(
+pub(crate) fn whitened<const N: usize>(
     model: &VisualModel<'_>,
     anchor: &Anchor<'_>,
     landmark: &Landmark,
     observation: &TrackObservation,
     known_weight: Option<f64>,
-) -> Option<BlockTerm<usize>> {
+) -> Option<BlockTerm<usize, N>> {
     let camera = anchor.current.model();
     let in_anchor = observation.slot == anchor.observation.slot;
     let relative = anchor.to_current.get(observation);
@@ -162,11 +175,11 @@ pub(crate) fn whitened(
     };
     let view = anchor.linearized;
     let (anchor, observer) = if in_anchor {
-        ([None; MAX_POSE_BLOCKS], [None; MAX_POSE_BLOCKS])
+        (None, None)
     } else {
         (
-            view.by_blocks(anchor.observation, &anchor.to_linearized.pose, &term.by_anchor),
-            view.by_blocks(observation, &pose, &term.by_observer),
+            Some(view.by_blocks(anchor.observation, &anchor.to_linearized.pose, &term.by_anchor)),
+            Some(view.by_blocks(observation, &pose, &term.by_observer)),
         )
     };
     Some(BlockTerm { residual: term.residual, by_landmark: term.by_landmark, anchor, observer, shared })

@@ -10,7 +10,7 @@ use super::linearization::column_blocks;
 use crate::camera::CameraModel;
 use crate::estimator::factors::visual::{Anchor, TrackObservation, VisualModel, whitened};
 use crate::estimator::state::camera_pose::{self, CameraMaps, CameraSensor};
-use crate::estimator::state::camera_view::CameraView;
+use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS};
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{Layout, POSE, VELOCITY_BIAS};
 use crate::estimator::{
@@ -141,10 +141,14 @@ impl<'a> Writer<'a> {
             let observation = TrackObservation { slot, uv_px: seen.measured_px };
             // Stored residuals are rounded: the robust weight of the step is used instead of a recomputed one.
             let weight = seen.residual_after_px.map(|_| seen.robust_weight);
-            let Some(term) = whitened(&camera.model, &anchor, &landmark, &observation, weight) else { continue };
             let mut target = rows.rows_mut(2 * frames.len(), 2);
-            self.write(&mut target, camera, &term);
-            frames.push(FrameId(seen.frame_index));
+            let written = match camera.current.blocks_per_frame() {
+                1 => self.write::<1>(&mut target, camera, &anchor, &landmark, &observation, weight),
+                _ => self.write::<ROLLING_BLOCKS>(&mut target, camera, &anchor, &landmark, &observation, weight),
+            };
+            if written.is_some() {
+                frames.push(FrameId(seen.frame_index));
+            }
         }
         let height = 2 * frames.len();
         Some(FeatureRows { frames, rows: rows.resize_vertically(height, 0.0) })
@@ -199,7 +203,17 @@ impl<'a> Writer<'a> {
         self.columns.iter().enumerate().find(|(_, block)| block.id == id)
     }
 
-    fn write(&self, rows: &mut nalgebra::DMatrixViewMut<'_, f64>, camera: &WindowCamera<'_>, term: &BlockTerm<usize>) {
+    /// Writes the rows of an observation by a camera with `N` blocks per frame; `None` where it has none.
+    fn write<const N: usize>(
+        &self,
+        rows: &mut nalgebra::DMatrixViewMut<'_, f64>,
+        camera: &WindowCamera<'_>,
+        anchor: &Anchor<'_>,
+        landmark: &Landmark,
+        observation: &TrackObservation,
+        weight: Option<f64>,
+    ) -> Option<()> {
+        let term: BlockTerm<usize, N> = whitened(&camera.model, anchor, landmark, observation, weight)?;
         rows.column_mut(rows.ncols() - 1).copy_from(&term.by_landmark.column(2));
         let layout = &self.layout;
         let (joints, count) = (layout.calibration, layout.joint_block());
@@ -222,6 +236,7 @@ impl<'a> Writer<'a> {
             add(joints + count * slot, POSE, count);
             add(velocities + VELOCITY_BIAS * slot, POSE + count, of_frame.len() - POSE - count);
         }
+        Some(())
     }
 
     fn row_of(&self, feature: &FeatureReport, written: &FeatureRows) -> JacobianRow {

@@ -10,7 +10,10 @@ use super::camera_pose::{self, CameraSensor, ROLLING_ROWS};
 use crate::camera::CameraModel;
 use crate::estimator::factors::visual::TrackObservation;
 use crate::estimator::state::frame_state::FrameState;
-use crate::optimization::{CameraPose, MAX_POSE_BLOCKS, PoseBlocksOf, RelativePose, RelativePoses};
+use crate::optimization::{CameraPose, PoseBlocksOf, RelativePose, RelativePoses};
+
+/// Blocks per frame of a rolling shutter.
+pub(crate) const ROLLING_BLOCKS: usize = ROLLING_ROWS.len();
 
 /// A camera with its intrinsics and poses at an estimate.
 ///
@@ -107,7 +110,7 @@ impl<'a> CameraView<'a> {
     pub(crate) fn blocks_per_frame(&self) -> usize {
         match self.poses {
             Poses::Global { .. } => 1,
-            Poses::Rolling { .. } => ROLLING_ROWS.len(),
+            Poses::Rolling { .. } => ROLLING_BLOCKS,
         }
     }
 
@@ -126,12 +129,9 @@ impl<'a> CameraView<'a> {
         self.has_intrinsics.then(|| self.frames * self.blocks_per_frame())
     }
 
-    /// Blocks of the pose of a frame, the second and the third one only with a rolling shutter.
-    pub(crate) fn blocks_of(&self, slot: usize) -> [Option<usize>; MAX_POSE_BLOCKS] {
-        match self.poses {
-            Poses::Global { .. } => [Some(slot), None, None],
-            Poses::Rolling { .. } => [0, 1, 2].map(|row| Some(ROLLING_ROWS.len() * slot + row)),
-        }
+    /// Blocks of the pose of a frame, `N` per frame ([`Self::blocks_per_frame`]).
+    pub(crate) fn blocks_of<const N: usize>(slot: usize) -> [usize; N] {
+        std::array::from_fn(|row| N * slot + row)
     }
 
     /// Pose at the row of a pixel.
@@ -165,16 +165,16 @@ impl<'a> CameraView<'a> {
     /// Derivatives by the blocks of a frame from those by the pose at an observation's row (2 × 6), which is `pose`.
     ///
     /// Between the first, the middle and the last row, a change of the pose is interpolated by a parabola, rotations in world
-    /// axes. It is exact for changes of pose, velocity, readout, joint rates and joint accelerations but for the rotation of
+    /// axes; `N` is [`Self::blocks_per_frame`]. It is exact for changes of pose, velocity, readout, joint rates and joint accelerations but for the rotation of
     /// their axes during the readout, which it follows to second order.
-    pub(crate) fn by_blocks(
+    pub(crate) fn by_blocks<const N: usize>(
         &self,
         observation: &TrackObservation,
         pose: &CameraPose,
         by_pose: &Matrix2x6<f64>,
-    ) -> PoseBlocksOf<usize> {
+    ) -> PoseBlocksOf<usize, N> {
         let slot = observation.slot;
-        let Poses::Rolling { rows, .. } = &self.poses else { return [Some((slot, *by_pose)), None, None] };
+        let Poses::Rolling { rows, .. } = &self.poses else { return [(slot, *by_pose); N] };
         let fraction = self.row_fraction(&observation.uv_px);
         let by_world = by_pose.fixed_columns::<3>(0) * pose.rotation.transpose();
         let weights = [
@@ -182,10 +182,10 @@ impl<'a> CameraView<'a> {
             4.0 * fraction * (1.0 - fraction),
             fraction * (2.0 * fraction - 1.0),
         ];
-        [0, 1, 2].map(|row| {
+        std::array::from_fn(|row| {
             let mut by_row = by_pose * weights[row];
             by_row.fixed_columns_mut::<3>(0).copy_from(&(by_world * rows[slot][row].rotation * weights[row]));
-            Some((ROLLING_ROWS.len() * slot + row, by_row))
+            (N * slot + row, by_row)
         })
     }
 }
