@@ -81,12 +81,11 @@ impl Subject {
 
     fn size_px(self) -> [u32; 2] {
         match self {
-            Self::Panel(PanelName::Image) => [560, 480],
             Self::Panel(PanelName::Scene) => [800, 500],
             Self::Panel(PanelName::Convergence) => [1200, 480],
             Self::Panel(PanelName::Rank) => [480, 860],
             Self::Panel(PanelName::Jacobian) => [900, 560],
-            Self::Panel(PanelName::Residuals) => [560, 480],
+            Self::Panel(PanelName::Image | PanelName::Residuals) => [560, 480],
             Self::Panel(PanelName::Inspector) => [440, 480],
             Self::Panel(PanelName::Laboratory) => [1100, 760],
             Self::Panel(PanelName::Comparison) => [1200, 800],
