@@ -31,11 +31,17 @@ pub(super) fn difference_text(quantity: Quantity, apart: f64) -> String {
 /// What a trajectory beside the runs has.
 pub(in crate::gui) const POSES_ONLY: &str = "A trajectory has poses only: scene, timeline and comparison show it, panels of calibration, features and residuals do not";
 
+/// Stands below the heading of the accuracy where the truth is the trajectory of an offline calibration.
+pub(super) const AGAINST_BATCH: &str = "Against the batch reference, not ground truth";
+
 /// Accuracy of all runs and trajectories; the best value of a row is marked.
 pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scores) {
     let theme = *ctx.theme;
     let runs = &ctx.recording.runs;
     ui.label(RichText::new("Accuracy over all processed frames").color(theme.text_strong));
+    if ctx.recording.truth_is_batch {
+        ui.label(RichText::new(AGAINST_BATCH).color(theme.text_weak));
+    }
     let grid = Grid::new("accuracy").striped(true).min_row_height(ROW_HEIGHT).spacing(vec2(14.0, 2.0));
     grid.show(ui, |ui| {
         ui.label("");

@@ -4,6 +4,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
 use super::ComparisonPanel;
+use super::numbers::AGAINST_BATCH;
 use super::scores::ScoreRow;
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
@@ -89,6 +90,10 @@ fn a_single_run_and_an_equal_run_are_reported() {
     for label in ["Accuracy over all processed frames", "position error over time", "Nothing to compare yet"] {
         assert!(harness.query_by_label_contains(label).is_some(), "{label}");
     }
+    assert!(harness.query_by_label(AGAINST_BATCH).is_none());
+    harness.state_mut().recording.truth_is_batch = true;
+    harness.run_steps(2);
+    assert!(harness.query_by_label(AGAINST_BATCH).is_some());
     assert!(harness.query_by_label("Add run auto").is_none(), "the run itself is not offered");
     harness.get_by_label("Add run classical").click();
     harness.run_steps(2);
