@@ -98,15 +98,20 @@ mod sessions {
     use super::{Arc, OpenedStudy, Study, columns};
     use crate::geometry::ns_from_seconds;
     use crate::gui::app::{PlayingLog, StudySource};
-    use crate::session::{RunSpec, Session, SessionRequest};
+    use crate::session::{MAX_TRAJECTORIES, RunSpec, Session, SessionRequest, TrajectorySource, TrajectorySpec};
 
     /// Column with the path of the log, relative to the folder of the study where it lies in it.
     const LOG_PATH: &str = "log_path";
+    /// Column with the file of a trajectory, likewise, or its topic.
+    const TRAJECTORY_PATH: &str = "trajectory_path";
+    /// Column with the name of a run or of a trajectory.
+    const LABEL: &str = "label";
     /// Folder of the simulated flights of a study, which are processed whole.
     const FLIGHTS: &str = "flights";
 
     impl OpenedStudy {
-        /// The request that opens the log of the first row with the rig of its job and the runs of all rows.
+        /// The request that opens the log of the first row with the rig of its job, the runs and the trajectories of all
+        /// rows.
         fn request(&self, rows: &[usize]) -> Result<SessionRequest, String> {
             let table = &self.study.runs;
             let first = rows.first().copied().unwrap_or_default();
@@ -119,7 +124,17 @@ mod sessions {
                 let text = table.text(*row, columns::RUN).unwrap_or_default();
                 text.parse().map_err(|problem| format!("run '{text}' of the study: {problem}"))
             };
-            let mut specs = vec![spec(&first)?];
+            let trajectory = |row: &usize| -> Option<TrajectorySpec> {
+                let source: TrajectorySource = table.text(*row, TRAJECTORY_PATH)?.parse().ok()?;
+                let source = match source {
+                    TrajectorySource::File(path) => TrajectorySource::File(self.root.join(path)),
+                    topic @ TrajectorySource::Topic(_) => topic,
+                };
+                Some(TrajectorySpec { source, label: table.text(*row, LABEL)?.to_owned() })
+            };
+            let mut trajectories: Vec<TrajectorySpec> = rows.iter().filter_map(trajectory).collect();
+            trajectories.truncate(MAX_TRAJECTORIES);
+            let mut specs = if trajectory(&first).is_some() { Vec::new() } else { vec![spec(&first)?] };
             // A run beside it that this version does not know is left out.
             specs.extend(rows.iter().skip(1).filter_map(|row| spec(row).ok()));
             let whole = log_path.starts_with(self.root.join(FLIGHTS));
@@ -127,6 +142,7 @@ mod sessions {
                 rig_path: path("rig_path"),
                 ground_truth_path: path("truth_path"),
                 specs,
+                trajectories,
                 start_s: table.number(first, "start_s").filter(|_| !whole).unwrap_or(0.0),
                 duration_s: table.number(first, "duration_s").filter(|_| !whole),
                 log_path,

@@ -277,7 +277,8 @@ pub struct TrajectorySummary {
 }
 
 impl TrajectorySummary {
-    fn of(lane: &TrajectoryLane) -> Self {
+    /// The summary of a trajectory beside the runs.
+    pub(super) fn of(lane: &TrajectoryLane) -> Self {
         Self {
             label: lane.label.clone(),
             source: lane.source.clone(),

@@ -3,7 +3,8 @@
 use super::table::{StudyTable, TableError};
 
 /// Columns that name files and programs.
-const OF_FILES: [&str; 7] = ["key", "message", "attempts", "log_path", "rig_path", "truth_path", "program"];
+const OF_FILES: [&str; 8] =
+    ["key", "message", "attempts", "log_path", "rig_path", "truth_path", "trajectory_path", "program"];
 /// Columns of measured time and memory, beside those whose names end in `_ms`.
 const OF_COSTS: [&str; 3] = ["wall_s", "peak_memory_bytes", "real_time_factor"];
 

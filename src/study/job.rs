@@ -1,6 +1,7 @@
-//! The jobs of a plan: one estimator run each, named by the hash of its inputs.
+//! The jobs of a plan: one run of the estimator, or one trajectory of another program, each; named by the hash of its inputs.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
@@ -9,7 +10,7 @@ use sha2::{Digest as _, Sha256};
 use super::perturbation::RigPerturbation;
 use super::plan::{Exclusion, StudyPlan};
 use super::recipe::FlightRecipe;
-use crate::session::RunSpec;
+use crate::session::{RunSpec, TrajectorySpec};
 
 /// Number of the rules by which keys are made; another number gives other keys.
 const KEY_RULES: u32 = 1;
@@ -37,6 +38,19 @@ pub struct RecordedLog {
     pub duration_s: Option<f64>,
     /// Length of the log in seconds, to estimate the time of a job.
     pub length_s: f64,
+    /// Trajectories of other programs on this log.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trajectories: Vec<StudyTrajectory>,
+}
+
+/// A trajectory of another program on a recorded log.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StudyTrajectory {
+    /// Where it is, and its name in the tables.
+    #[serde(with = "as_text")]
+    pub spec: TrajectorySpec,
+    /// SHA-256 of its file; empty for a topic of the log.
+    pub sha256: String,
 }
 
 /// A simulated flight of a job.
@@ -89,7 +103,45 @@ impl JobLog {
     }
 }
 
-/// One run of one specification on one log.
+/// What a job evaluates on its log.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JobSubject {
+    /// A run of the estimator.
+    Run(#[serde(with = "as_text")] RunSpec),
+    /// A trajectory of another program.
+    Trajectory(StudyTrajectory),
+}
+
+impl JobSubject {
+    /// Name in the tables.
+    pub fn label(&self) -> &str {
+        match self {
+            Self::Run(spec) => &spec.label,
+            Self::Trajectory(trajectory) => &trajectory.spec.label,
+        }
+    }
+
+    /// The specification of the run, `None` for a trajectory.
+    pub fn run(&self) -> Option<&RunSpec> {
+        match self {
+            Self::Run(spec) => Some(spec),
+            Self::Trajectory(_) => None,
+        }
+    }
+}
+
+/// The normalized specification of a run, or `trajectory:LABEL`, which no run has.
+impl fmt::Display for JobSubject {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Run(spec) => spec.fmt(formatter),
+            Self::Trajectory(trajectory) => write!(formatter, "trajectory:{}", trajectory.spec.label),
+        }
+    }
+}
+
+/// One run of one specification on one log, or one trajectory of another program on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StudyJob {
     /// Name of the study.
@@ -102,22 +154,26 @@ pub struct StudyJob {
     pub perturbation: RigPerturbation,
     /// The seed, `None` where nothing is random.
     pub seed: Option<u64>,
-    /// The run.
-    #[serde(with = "spec_text")]
-    pub spec: RunSpec,
+    /// The run, or the trajectory.
+    pub subject: JobSubject,
 }
 
-/// A run specification as its normalized text.
-mod spec_text {
+/// A specification as its normalized text.
+mod as_text {
+    use std::fmt::Display;
+    use std::str::FromStr;
+
     use serde::{Deserialize as _, Deserializer, Serializer, de::Error as _};
 
-    use crate::session::RunSpec;
-
-    pub(super) fn serialize<S: Serializer>(spec: &RunSpec, serializer: S) -> Result<S::Ok, S::Error> {
+    pub(super) fn serialize<T: Display, S: Serializer>(spec: &T, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(spec)
     }
 
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<RunSpec, D::Error> {
+    pub(super) fn deserialize<'de, T, D>(deserializer: D) -> Result<T, D::Error>
+    where
+        T: FromStr<Err: Display>,
+        D: Deserializer<'de>,
+    {
         String::deserialize(deserializer)?.parse().map_err(D::Error::custom)
     }
 }
@@ -134,6 +190,8 @@ struct KeyInputs<'a> {
     perturbation: &'a RigPerturbation,
     seed: Option<u64>,
     spec: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trajectory: Option<String>,
 }
 
 impl StudyJob {
@@ -159,7 +217,14 @@ impl StudyJob {
             disturbance: &self.disturbance,
             perturbation: &self.perturbation,
             seed: self.seed,
-            spec: self.spec.to_string(),
+            spec: self.subject.to_string(),
+            trajectory: match &self.subject {
+                JobSubject::Run(_) => None,
+                JobSubject::Trajectory(StudyTrajectory { spec, sha256 }) if sha256.is_empty() => {
+                    Some(spec.source.to_string())
+                }
+                JobSubject::Trajectory(StudyTrajectory { sha256, .. }) => Some(sha256.clone()),
+            },
         };
         let text = serde_json::to_string(&inputs).expect("plain values have a JSON text");
         hex(&Sha256::digest(text))
@@ -171,7 +236,7 @@ impl StudyJob {
         let levels = [&self.disturbance, &self.perturbation.name];
         parts.extend(levels.into_iter().filter(|name| *name != "none").cloned());
         parts.extend(self.seed.map(|seed| format!("seed {seed}")));
-        parts.push(self.spec.to_string());
+        parts.push(self.subject.to_string());
         parts.join(", ")
     }
 }
@@ -191,9 +256,9 @@ pub struct KeyedJob {
 }
 
 /// The jobs of a plan in the order of its tables: logs as found, then flights; of each the disturbances, perturbations,
-/// seeds and specifications.
+/// seeds and specifications, and of a recorded log its trajectories.
 ///
-/// Recorded logs are run without disturbances, and what the plan excludes is left out. Where neither the log nor the perturbation is random there is one job
+/// Recorded logs are run without disturbances, their trajectories are evaluated once, and what the plan excludes is left out. Where neither the log nor the perturbation is random there is one job
 /// without a seed instead of one for each seed.
 pub fn expand(plan: &StudyPlan, logs: &[RecordedLog], program: &str) -> Vec<KeyedJob> {
     let mut jobs = Vec::new();
@@ -207,6 +272,16 @@ pub fn expand(plan: &StudyPlan, logs: &[RecordedLog], program: &str) -> Vec<Keye
             for seed in seeds {
                 add_specs(&mut jobs, plan, &log, undisturbed, perturbation, seed);
             }
+        }
+        if let JobLog::Recorded(recorded) = &log {
+            jobs.extend(recorded.trajectories.iter().map(|trajectory| StudyJob {
+                study: plan.name.clone(),
+                log: log.clone(),
+                disturbance: undisturbed.to_owned(),
+                perturbation: RigPerturbation { name: "none".to_owned(), ..RigPerturbation::default() },
+                seed: None,
+                subject: JobSubject::Trajectory(trajectory.clone()),
+            }));
         }
     }
     for recipe in &plan.flights {
@@ -233,7 +308,7 @@ impl Exclusion {
         named(&self.logs, job.log.name())
             && named(&self.disturbances, &job.disturbance)
             && named(&self.perturbations, &job.perturbation.name)
-            && named(&self.specs, &job.spec.label)
+            && named(&self.specs, job.subject.label())
             && (self.seeds.is_empty() || job.seed.is_some_and(|seed| self.seeds.contains(&seed)))
     }
 }
@@ -252,7 +327,7 @@ fn add_specs(
         disturbance: disturbance.to_owned(),
         perturbation: perturbation.clone(),
         seed,
-        spec: spec.clone(),
+        subject: JobSubject::Run(spec.clone()),
     }));
 }
 

@@ -30,11 +30,15 @@ pub use baseline::baseline_table;
 pub use comparison::{
     ComparisonError, Direction, MetricComparison, SUCCESS, StudyComparison, Verdict, WorstPair, compare,
 };
-pub use job::{JobLog, KeyedJob, RecordedLog, SimulatedFlight, StudyJob, expand, hex, shard};
+pub use job::{
+    JobLog, JobSubject, KeyedJob, RecordedLog, SimulatedFlight, StudyJob, StudyTrajectory, expand, hex, shard,
+};
 pub use perturbation::{
     Distribution, MagnitudeDimension, PerturbationError, PerturbationStart, RigChange, RigPerturbation, RigQuantity,
 };
-pub use plan::{DisturbanceSet, Exclusion, JobLimits, LogSource, PlanError, SlurmOptions, StudyOutput, StudyPlan};
+pub use plan::{
+    DisturbanceSet, Exclusion, JobLimits, LOG_PLACE, LogSource, PlanError, SlurmOptions, StudyOutput, StudyPlan,
+};
 pub use recipe::{EncoderNoise, FlightRecipe};
 pub use schema::{PAIRING_COLUMNS, frames_table, parameters_table, relative_error_columns, runs_table};
 pub use statistics::MeanInterval;

@@ -4,8 +4,14 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use dcvins::export::OpenedStudy;
+use dcvins::export::study::read_parquet;
 use dcvins::flight_log::FlightLog;
+use dcvins::gui::app::StudySource;
+use dcvins::study::view::rows_beside;
 use serde_json::Value;
+
+use crate::sample_folder;
 
 fn sample_log() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap")
@@ -71,6 +77,51 @@ fn a_trajectory_is_evaluated_like_a_run() {
     assert_eq!(code, 0, "{text}");
     let page = std::fs::read_to_string(folder.path().join("report/report.html")).unwrap();
     assert!(page.contains("Trajectories of other programs") && page.contains("Other"), "the page lists it");
+}
+
+/// A sweep has a row for each trajectory, with the errors that the run of the same poses has.
+#[test]
+fn a_sweep_evaluates_trajectories_beside_its_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let plan = "seeds = [1, 2]\nspecs = [\"auto\"]\n[[logs]]\npath = \"garden.mcap\"\nduration_s = 5\n\
+                trajectories = [\"other/{log}.csv:Other\", \"topic:/ground_truth/odometry:Truth\"]\n\
+                [[perturbations]]\nname = \"none\"\n[[perturbations]]\nname = \"5 mm\"\nstart = \"truth\"\n\
+                changes = [{ quantity = \"gimbal.translation\", magnitude = \"5 mm\" }]\n";
+    sample_folder::fill(folder.path(), plan);
+    std::fs::create_dir(folder.path().join("other")).unwrap();
+    write_trajectory(Path::new(&at("other/garden.csv")), 0.05);
+    let sweep = ["sweep", &at("plan.toml"), "-o", &at("study")];
+    let (code, text) = dcvins(&sweep);
+    assert_eq!(code, 0, "{text}");
+    let table = read_parquet(&folder.path().join("study/results.parquet")).unwrap();
+    // One run without errors and two with errors; trajectories once.
+    let labels: Vec<&str> = (0..table.rows()).map(|row| table.text(row, "label").unwrap()).collect();
+    assert_eq!(labels, ["auto", "auto", "auto", "Other", "Truth"]);
+    let number = |row: usize, column: &str| table.number(row, column).unwrap();
+    assert!((number(3, "ate_rmse_m") - 0.05).abs() < 1e-3 && number(4, "ate_rmse_m") < 1e-9);
+    assert!((number(3, "worst_frame_m") - 0.05).abs() < 2e-3 && number(3, "rpe_5m_translation_m") > 0.01);
+    assert!((number(3, "length_m") - number(4, "length_m")).abs() < 0.05);
+    assert_eq!(table.text(3, "run"), Some("trajectory:Other"));
+    assert_eq!((table.text(3, "status"), table.text(3, "parameterization")), (Some("ok"), None));
+    assert_eq!(table.text(4, "trajectory_path"), Some("topic:/ground_truth/odometry"));
+    // A row of a trajectory opens the run on the same log, with both trajectories beside it.
+    let study = OpenedStudy::read(&folder.path().join("study")).unwrap();
+    let rows = rows_beside(&study.study().runs, 3, 4);
+    assert_eq!(rows, [3, 0, 4]);
+    let opened = StudySource::open_runs(&study, &rows).unwrap();
+    let recording = opened.recording();
+    let lanes: Vec<&str> = recording.trajectories.iter().map(|lane| lane.label.as_str()).collect();
+    assert_eq!((recording.runs.len(), lanes), (1, vec!["Other", "Truth"]));
+    // Again: nothing to do, also from another place of the file.
+    std::fs::rename(folder.path().join("other"), folder.path().join("moved")).unwrap();
+    std::fs::write(at("plan.toml"), plan.replace("other/", "moved/")).unwrap();
+    let (code, text) = dcvins(&sweep);
+    assert!(code == 0 && text.contains("0 done now, 5 done before"), "{text}");
+    // A file that is not there is named.
+    std::fs::remove_dir_all(folder.path().join("moved")).unwrap();
+    let (code, text) = dcvins(&sweep);
+    assert!(code != 0 && text.contains("moved/garden.csv"), "{code}: {text}");
 }
 
 #[test]

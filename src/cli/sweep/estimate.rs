@@ -116,6 +116,10 @@ fn measure(sweep: &Sweep) -> Result<Measured> {
         if let JobLog::Simulated(flight) = &job.job.log {
             flights.insert(flight.id(), flight);
         }
+        // Trajectories of other programs are read in no time.
+        if job.job.subject.run().is_none() {
+            continue;
+        }
         let Some(row) = sweep.folder.run_of(&job.key)? else { continue };
         let ran = matches!(row.text(0, "status"), Some("ok" | "not-initialized"));
         let Some(wall_s) = row.number(0, "wall_s").filter(|_| ran) else { continue };
@@ -157,6 +161,7 @@ fn estimate(sweep: &Sweep, limits: &PoolLimits, measured: &Measured) -> Estimate
     let mean_s = per(measured.wall_s, measured.jobs as f64);
     let per_log_s = per(measured.wall_s, measured.log_s);
     let job_s = |job: &&KeyedJob| match log_s(sweep, job) {
+        _ if job.job.subject.run().is_none() => 0.0,
         known_s if known_s > 0.0 && per_log_s > 0.0 => known_s * per_log_s,
         _ => mean_s,
     };

@@ -337,9 +337,12 @@ impl<'a> Pool<'a> {
         Ok(())
     }
 
-    /// Learns the memory of a job from its row.
+    /// Learns the memory of a run from its row; a trajectory of another program says nothing about those of its log.
     fn measure(&mut self, job: usize) -> Result<()> {
         let keyed = &self.jobs[job];
+        if keyed.job.subject.run().is_none() {
+            return Ok(());
+        }
         let row = self.folder.run_of(&keyed.key)?;
         let measured =
             row.and_then(|row| row.integer(0, "peak_memory_bytes")).and_then(|bytes| u64::try_from(bytes).ok());

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::error::StudyFileError;
 use super::folder::{StudyFolder, StudyTables};
 use super::inputs::rig_sha256;
-use super::rows::{JobCosts, JobStatus, add_frames, failed_rows, run_rows};
+use super::rows::{JobCosts, JobStatus, add_frames, failed_rows, run_rows, trajectory_rows};
 use crate::calibration::CalibrationOptions;
 use crate::export::ExportError;
 use crate::export::calibration_files::write_calibration;
@@ -19,9 +19,10 @@ use crate::flight_log::output::OutputSet;
 use crate::flight_log::{FlightLog, LogError};
 use crate::sensors::Rig;
 use crate::session::{
-    self, CalibrationRequest, CalibrationRunError, SessionError, SessionPlan, SessionRequest, Stopwatch,
+    self, CalibrationRequest, CalibrationRunError, Recording, SessionError, SessionPlan, SessionRequest, Stopwatch,
+    TrajectorySource, TrajectorySpec,
 };
-use crate::study::{JobLog, KeyedJob, PerturbationStart, StudyJob, StudyOutput, TableError};
+use crate::study::{JobLog, JobSubject, KeyedJob, PerturbationStart, StudyJob, StudyOutput, TableError};
 
 /// Frames between two samples of the consistency of poses: about as long as a window, so that samples share few
 /// measurements.
@@ -101,6 +102,12 @@ impl StudyFolder {
     ) -> Result<JobStatus, JobError> {
         let stopwatch = Stopwatch::start();
         let job = self.read_job(key)?;
+        let spec = match &job.subject {
+            JobSubject::Run(spec) => spec.clone(),
+            JobSubject::Trajectory(trajectory) => {
+                return self.evaluate_trajectory(key, &job, &trajectory.spec, program, attempts, output);
+            }
+        };
         let mut files = self.files_of(&job);
         let log_sha256 = match &job.log {
             JobLog::Recorded(log) => log.sha256.clone(),
@@ -121,7 +128,7 @@ impl StudyFolder {
             log_path: files.log.clone(),
             rig_path: files.rig.clone(),
             ground_truth_path: files.truth.clone(),
-            specs: vec![job.spec.clone()],
+            specs: vec![spec],
             start_s,
             duration_s,
             ..SessionRequest::default()
@@ -143,7 +150,7 @@ impl StudyFolder {
             rig_sha256: Some(rig_sha256(&plan.rig)),
             wall_s: stopwatch.elapsed_ms() * 1e-3,
             peak_memory_bytes: peak_memory_bytes(),
-            ..self.costs(&files, program, attempts)
+            ..self.costs(&job, &files, program, attempts)
         };
         let mut tables = run_rows(key, &job, &costs, &recording, run, &summary, offline.as_ref())?;
         if output.frames {
@@ -156,9 +163,56 @@ impl StudyFolder {
         Ok(if summary.frames.initialized_at_s.is_some() { JobStatus::Ok } else { JobStatus::NotInitialized })
     }
 
-    fn costs(&self, files: &JobFiles, program: &str, attempts: usize) -> JobCosts {
+    /// Evaluates a trajectory of another program against the ground truth of its log and writes its row.
+    fn evaluate_trajectory(
+        &self,
+        key: &str,
+        job: &StudyJob,
+        spec: &TrajectorySpec,
+        program: &str,
+        attempts: usize,
+        output: StudyOutput,
+    ) -> Result<JobStatus, JobError> {
+        let stopwatch = Stopwatch::start();
+        let files = self.files_of(job);
+        let (start_s, duration_s) = span(job);
+        let plan = SessionPlan::open(&SessionRequest {
+            log_path: files.log.clone(),
+            rig_path: files.rig.clone(),
+            ground_truth_path: files.truth.clone(),
+            trajectories: vec![spec.clone()],
+            start_s,
+            duration_s,
+            ..SessionRequest::default()
+        })?;
+        let recording = Recording::new(&plan);
+        plan.log.require_unshortened()?;
+        let costs = JobCosts {
+            rig_sha256: Some(rig_sha256(&plan.rig)),
+            log_sha256: match &job.log {
+                JobLog::Recorded(log) => Some(log.sha256.clone()),
+                JobLog::Simulated(_) => None,
+            },
+            wall_s: stopwatch.elapsed_ms() * 1e-3,
+            peak_memory_bytes: peak_memory_bytes(),
+            ..self.costs(job, &files, program, attempts)
+        };
+        let tables = trajectory_rows(key, job, &costs, &recording.trajectories[0])?;
+        self.write_rows(key, &tables, output)?;
+        Ok(JobStatus::Ok)
+    }
+
+    fn costs(&self, job: &StudyJob, files: &JobFiles, program: &str, attempts: usize) -> JobCosts {
         let relative = |path: &Option<PathBuf>| path.as_ref().map(|path| self.relative(path));
+        let trajectory_path = match &job.subject {
+            JobSubject::Run(_) => None,
+            JobSubject::Trajectory(trajectory) => Some(match &trajectory.spec.source {
+                TrajectorySource::File(path) => self.relative(path),
+                topic @ TrajectorySource::Topic(_) => topic.to_string(),
+            }),
+        };
         JobCosts {
+            trajectory_path,
             log_path: self.relative(&files.log),
             rig_path: relative(&files.rig),
             truth_path: relative(&files.truth),
@@ -181,7 +235,7 @@ impl StudyFolder {
         output: StudyOutput,
     ) -> Result<(), JobError> {
         let mut costs =
-            JobCosts { wall_s: costs.wall_s, ..self.costs(&self.files_of(job), &costs.program, costs.attempts) };
+            JobCosts { wall_s: costs.wall_s, ..self.costs(job, &self.files_of(job), &costs.program, costs.attempts) };
         costs.log_sha256 = match &job.log {
             JobLog::Recorded(log) => Some(log.sha256.clone()),
             JobLog::Simulated(flight) => self.rendered(flight).map(|rendered| rendered.sha256),

@@ -13,7 +13,8 @@ use super::error::StudyFileError;
 use crate::flight_log::{FlightLog, output};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
-use crate::study::{LogSource, RecordedLog, StudyPlan, hex};
+use crate::session::{TrajectorySource, TrajectorySpec};
+use crate::study::{LOG_PLACE, LogSource, RecordedLog, StudyPlan, StudyTrajectory, hex};
 
 /// Bytes that are hashed at once.
 const BLOCK_BYTES: usize = 1 << 20;
@@ -166,8 +167,30 @@ fn recorded(
         duration_s: source.duration_s,
         // A log that cannot be opened fails in its job, with the reason.
         length_s: log.map_or(0.0, |log| seconds_from_ns(log.duration_ns())),
+        trajectories: trajectories(source, folder, &path, hashes)?,
         path,
     })
+}
+
+/// The trajectories of a log with the hashes of their files.
+fn trajectories(
+    source: &LogSource,
+    folder: &Path,
+    log: &Path,
+    hashes: &mut HashCache,
+) -> Result<Vec<StudyTrajectory>, StudyFileError> {
+    let stem = log.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let found = |spec: &TrajectorySpec| {
+        let TrajectorySource::File(path) = &spec.source else {
+            return Ok(StudyTrajectory { spec: spec.clone(), sha256: String::new() });
+        };
+        let named = folder.join(path.to_string_lossy().replace(LOG_PLACE, &stem));
+        let path = fs::canonicalize(&named).map_err(StudyFileError::read(&named))?;
+        let sha256 = hashes.sha256(&path)?;
+        let spec = TrajectorySpec { source: TrajectorySource::File(path), label: spec.label.clone() };
+        Ok(StudyTrajectory { spec, sha256 })
+    };
+    source.trajectories.iter().map(found).collect()
 }
 
 /// SHA-256 of a rig as the estimator sees it, with the pixels of its masks.

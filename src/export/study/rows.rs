@@ -3,9 +3,10 @@
 use super::folder::StudyTables;
 use crate::estimator::{EventKind, FailureCause};
 use crate::export::calibration_report::CalibrationReport;
-use crate::export::summary::{RunSummary, difference_sigmas};
+use crate::export::summary::{Accuracy, RunSummary, TrajectorySummary, difference_sigmas};
 use crate::geometry::{median, seconds_from_ns, so3};
-use crate::session::{Recording, RunRecord};
+use crate::session::accuracy::StampedPose;
+use crate::session::{Recording, RunRecord, TrajectoryLane};
 use crate::study::{Cell, JobLog, StudyJob, TableError, relative_error_columns};
 
 /// How a job ended.
@@ -57,6 +58,8 @@ pub struct JobCosts {
     pub rig_path: Option<String>,
     /// Path of the ground-truth rig, where it is not the log's own.
     pub truth_path: Option<String>,
+    /// File of the trajectory, or its topic; `None` for a run.
+    pub trajectory_path: Option<String>,
     /// Version and SHA-256 of the program.
     pub program: String,
     /// Number of times that the job was started.
@@ -72,7 +75,7 @@ type Cells = Vec<(&'static str, Cell)>;
 
 /// Inputs, status and costs of a job.
 fn inputs(key: &str, job: &StudyJob, status: JobStatus, message: &str, costs: &JobCosts) -> Cells {
-    let spec = &job.spec;
+    let spec = job.subject.run();
     let (start_s, duration_s) = match &job.log {
         JobLog::Recorded(log) => (log.start_s, log.duration_s),
         JobLog::Simulated(flight) => (0.0, flight.recipe.duration_s),
@@ -80,17 +83,17 @@ fn inputs(key: &str, job: &StudyJob, status: JobStatus, message: &str, costs: &J
     let mut cells: Cells = pairing(key, job);
     cells.extend([
         ("study", job.study.as_str().into()),
-        ("label", spec.label.as_str().into()),
-        ("parameterization", spec.parameterization.name().into()),
-        ("encoder", spec.encoder.into()),
-        ("calibrate", spec.calibrate.into()),
-        ("timeshift", spec.timeshift.into()),
-        ("readout", spec.readout.into()),
-        ("intrinsics", spec.intrinsics.into()),
-        ("imu_intrinsics", spec.imu_intrinsics.into()),
-        ("first_estimates", spec.first_estimates.into()),
-        ("window", spec.window.into()),
-        ("camera", spec.camera_key.clone().into()),
+        ("label", job.subject.label().into()),
+        ("parameterization", spec.map(|spec| spec.parameterization.name()).into()),
+        ("encoder", spec.map(|spec| spec.encoder).into()),
+        ("calibrate", spec.map(|spec| spec.calibrate).into()),
+        ("timeshift", spec.map(|spec| spec.timeshift).into()),
+        ("readout", spec.map(|spec| spec.readout).into()),
+        ("intrinsics", spec.map(|spec| spec.intrinsics).into()),
+        ("imu_intrinsics", spec.map(|spec| spec.imu_intrinsics).into()),
+        ("first_estimates", spec.map(|spec| spec.first_estimates).into()),
+        ("window", spec.map(|spec| spec.window).into()),
+        ("camera", spec.and_then(|spec| spec.camera_key.clone()).into()),
         ("status", status.name().into()),
         ("message", Some(message).filter(|text| !text.is_empty()).into()),
         ("attempts", costs.attempts.into()),
@@ -99,6 +102,7 @@ fn inputs(key: &str, job: &StudyJob, status: JobStatus, message: &str, costs: &J
         ("log_path", costs.log_path.as_str().into()),
         ("rig_path", costs.rig_path.clone().into()),
         ("truth_path", costs.truth_path.clone().into()),
+        ("trajectory_path", costs.trajectory_path.clone().into()),
         ("start_s", start_s.into()),
         ("duration_s", duration_s.into()),
         ("program", costs.program.as_str().into()),
@@ -116,7 +120,7 @@ fn pairing(key: &str, job: &StudyJob) -> Cells {
         ("disturbance", job.disturbance.as_str().into()),
         ("perturbation", job.perturbation.name.as_str().into()),
         ("seed", job.seed.and_then(|seed| i64::try_from(seed).ok()).into()),
-        ("run", job.spec.to_string().into()),
+        ("run", job.subject.to_string().into()),
     ]
 }
 
@@ -155,7 +159,7 @@ pub(super) fn run_rows(
     cells.extend(calibration(summary));
     cells.extend(times(summary));
     cells.extend(offline.map(offline_calibration).unwrap_or_default());
-    let relative = relative_errors(summary);
+    let relative = relative_errors(summary.accuracy.as_ref());
     let relative = relative.iter().map(|(name, value)| (name.as_str(), Cell::from(*value)));
     tables.runs.push(cells.into_iter().chain(relative))?;
     for parameter in &summary.calibration.parameters {
@@ -171,6 +175,33 @@ pub(super) fn run_rows(
         ]);
         tables.parameters.push(cells)?;
     }
+    Ok(tables)
+}
+
+/// The row of a trajectory of another program.
+pub(super) fn trajectory_rows(
+    key: &str,
+    job: &StudyJob,
+    costs: &JobCosts,
+    lane: &TrajectoryLane,
+) -> Result<StudyTables, TableError> {
+    let mut tables = StudyTables::default();
+    let summary = TrajectorySummary::of(lane);
+    let mut cells = inputs(key, job, JobStatus::Ok, summary.accuracy_missing.as_deref().unwrap_or_default(), costs);
+    cells.extend([("estimated", summary.poses.into()), ("length_m", summary.length_m.into())]);
+    cells.extend(summary.accuracy.as_ref().map(absolute_errors).unwrap_or_default());
+    if let Some(alignment) = lane.evaluation.alignment {
+        let error_m = |(estimate, actual): &(StampedPose, StampedPose)| {
+            let apart = alignment.transform(&estimate.pose.translation_m) - actual.pose.translation_m;
+            (estimate.stamp_s, apart.norm())
+        };
+        if let Some((worst_s, worst_m)) = lane.evaluation.pairs.iter().map(error_m).max_by(|a, b| a.1.total_cmp(&b.1)) {
+            cells.extend([("worst_frame_s", worst_s.into()), ("worst_frame_m", worst_m.into())]);
+        }
+    }
+    let relative = relative_errors(summary.accuracy.as_ref());
+    let relative = relative.iter().map(|(name, value)| (name.as_str(), Cell::from(*value)));
+    tables.runs.push(cells.into_iter().chain(relative))?;
     Ok(tables)
 }
 
@@ -211,18 +242,20 @@ fn lost_s(run: &RunRecord) -> Option<f64> {
     Some(seconds_from_ns(lost_ns))
 }
 
+/// Absolute errors of a trajectory.
+fn absolute_errors(accuracy: &Accuracy) -> Cells {
+    vec![
+        ("ate_rmse_m", accuracy.ate_rmse_m.into()),
+        ("ate_mean_m", accuracy.ate_mean_m.into()),
+        ("ate_median_m", accuracy.ate_median_m.into()),
+        ("ate_max_m", accuracy.ate_max_m.into()),
+        ("ate_percent", accuracy.ate_percent_of_length.into()),
+    ]
+}
+
 /// Errors of the trajectory, consistency, and the worst frame.
 fn accuracy(run: &RunRecord, summary: &RunSummary) -> Cells {
-    let mut cells: Cells = Vec::new();
-    if let Some(accuracy) = &summary.accuracy {
-        cells.extend([
-            ("ate_rmse_m", accuracy.ate_rmse_m.into()),
-            ("ate_mean_m", accuracy.ate_mean_m.into()),
-            ("ate_median_m", accuracy.ate_median_m.into()),
-            ("ate_max_m", accuracy.ate_max_m.into()),
-            ("ate_percent", accuracy.ate_percent_of_length.into()),
-        ]);
-    }
+    let mut cells = summary.accuracy.as_ref().map(absolute_errors).unwrap_or_default();
     let samples = run.pose_consistency();
     let nees = samples.iter().map(|sample| sample.pose).sum::<f64>() / samples.len() as f64;
     cells.extend([("pose_nees", nees.into()), ("pose_nees_samples", samples.len().into())]);
@@ -234,8 +267,8 @@ fn accuracy(run: &RunRecord, summary: &RunSummary) -> Cells {
 }
 
 /// Relative errors by column.
-fn relative_errors(summary: &RunSummary) -> Vec<(String, f64)> {
-    let errors = summary.accuracy.iter().flat_map(|accuracy| &accuracy.rpe);
+fn relative_errors(accuracy: Option<&Accuracy>) -> Vec<(String, f64)> {
+    let errors = accuracy.into_iter().flat_map(|accuracy| &accuracy.rpe);
     let columns = errors.flat_map(|over| {
         let values = [over.translation_rmse_m, over.rotation_rmse_deg.to_radians()];
         relative_error_columns(over.delta_m).into_iter().zip(values)

@@ -14,7 +14,7 @@ use super::perturbation::RigPerturbation;
 use super::recipe::FlightRecipe;
 use super::summary_table::SummaryTable;
 use super::table::StudyTable;
-use crate::session::RunSpec;
+use crate::session::{RunSpec, TrajectorySpec};
 
 /// Recorded logs of a plan: every file that a pattern matches.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +31,13 @@ pub struct LogSource {
     pub start_s: f64,
     /// Seconds to process from there, `None` for the rest.
     pub duration_s: Option<f64>,
+    /// Trajectories of other programs on these logs; in paths, which are relative to the folder of the plan, [`LOG_PLACE`]
+    /// stands for the name of a log's file without its extension.
+    pub trajectories: Vec<TrajectorySpec>,
 }
+
+/// Stands for the name of a log's file without its extension in the path of a trajectory.
+pub const LOG_PLACE: &str = "{log}";
 
 /// A named set of disturbances, one level of that factor; only simulated flights have them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

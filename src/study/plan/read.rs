@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::document::{PlanError, Section, parse};
 use super::tables;
-use super::{DisturbanceSet, JobLimits, LogSource, SlurmOptions, StudyOutput, StudyPlan};
-use crate::session::RunSpec;
+use super::{DisturbanceSet, JobLimits, LOG_PLACE, LogSource, SlurmOptions, StudyOutput, StudyPlan};
+use crate::session::{RunSpec, TrajectorySpec, TrajectorySpecError};
 use crate::simulation::Disturbances;
 use crate::study::perturbation::{
     Distribution, MagnitudeError, PerturbationStart, RigChange, RigPerturbation, RigQuantity,
@@ -64,6 +64,12 @@ pub(super) fn plan(text: &str) -> Result<StudyPlan, PlanError> {
     distinct(&root, "perturbations", plan.perturbations.iter().map(|level| level.name.as_str()))?;
     distinct(&root, "disturbances", plan.disturbances.iter().map(|level| level.name.as_str()))?;
     distinct(&root, "specs", plan.specs.iter().map(|spec| spec.label.as_str()))?;
+    for trajectory in plan.logs.iter().flat_map(|log| &log.trajectories) {
+        if plan.specs.iter().any(|spec| spec.label == trajectory.label) {
+            let problem = format!("a trajectory and a run are named '{}', expected different names", trajectory.label);
+            return Err(root.error_at("specs", &problem));
+        }
+    }
     tables::check_exclusions(&root, &plan)?;
     Ok(plan)
 }
@@ -107,7 +113,7 @@ fn level_name(section: &Section<'_>) -> Result<String, PlanError> {
 }
 
 fn log(section: &Section<'_>) -> Result<LogSource, PlanError> {
-    section.allow(&["path", "name", "rig", "truth", "start_s", "duration_s"])?;
+    section.allow(&["path", "name", "rig", "truth", "start_s", "duration_s", "trajectories"])?;
     let name = section.has("name").then(|| level_name(section)).transpose()?;
     Ok(LogSource {
         pattern: section.required_text("path")?,
@@ -116,7 +122,25 @@ fn log(section: &Section<'_>) -> Result<LogSource, PlanError> {
         truth: section.text("truth")?,
         start_s: section.number("start_s", SECONDS)?.unwrap_or(0.0),
         duration_s: section.number("duration_s", 0.1..=1e6)?,
+        trajectories: trajectories(section)?,
     })
+}
+
+/// Trajectories of other programs, each with a name of its own.
+fn trajectories(section: &Section<'_>) -> Result<Vec<TrajectorySpec>, PlanError> {
+    let trajectories = section.texts("trajectories", |text| {
+        let spec: TrajectorySpec = text.parse().map_err(|problem: TrajectorySpecError| problem.to_string())?;
+        if spec.label.contains(LOG_PLACE) {
+            return Err(format!("'{text}' has no label: expected one name for all logs, as in \"{text}:vins\""));
+        }
+        Ok(spec)
+    })?;
+    let mut known = BTreeSet::new();
+    if let Some(twice) = trajectories.iter().find(|spec| !known.insert(spec.label.as_str())) {
+        let problem = format!("has two entries named '{}', expected different names", twice.label);
+        return Err(section.error_at("trajectories", &problem));
+    }
+    Ok(trajectories)
 }
 
 fn flight(section: &Section<'_>) -> Result<FlightRecipe, PlanError> {

@@ -2,7 +2,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use super::plan::WHOLE;
-use crate::study::{JobLog, RecordedLog, StudyJob, StudyPlan, expand, shard};
+use crate::study::{JobLog, JobSubject, RecordedLog, StudyJob, StudyPlan, StudyTrajectory, expand, shard};
 
 fn log(name: &str) -> RecordedLog {
     RecordedLog {
@@ -16,6 +16,7 @@ fn log(name: &str) -> RecordedLog {
         start_s: 1.0,
         duration_s: None,
         length_s: 12.0,
+        trajectories: Vec::new(),
     }
 }
 
@@ -60,9 +61,9 @@ fn a_key_is_that_of_the_inputs_and_not_of_the_place() {
     assert_eq!(recorded(|log| log.path = PathBuf::from("/elsewhere/a.mcap")), job.key);
     assert_eq!(key(&|job| job.study = "other".to_owned()), job.key);
     assert_eq!(
-        key(&|job| job.spec = "auto:window=10,encoder=on,name=a".parse().unwrap()),
+        key(&|job| job.subject = JobSubject::Run("auto:window=10,encoder=on,name=a".parse().unwrap())),
         key(&|job| {
-            job.spec = "auto:encoder=on,name=a,window=10".parse().unwrap();
+            job.subject = JobSubject::Run("auto:encoder=on,name=a,window=10".parse().unwrap());
         })
     );
     let others = [
@@ -72,7 +73,7 @@ fn a_key_is_that_of_the_inputs_and_not_of_the_place() {
         recorded(|log| log.start_s = 2.0),
         recorded(|log| log.duration_s = Some(2.0)),
         key(&|job| job.seed = Some(1)),
-        key(&|job| job.spec = "auto:window=12".parse().unwrap()),
+        key(&|job| job.subject = JobSubject::Run("auto:window=12".parse().unwrap())),
         key(&|job| job.perturbation.name = "other".to_owned()),
         key(&|job| job.disturbance = "other".to_owned()),
         job.job.key("0.2.1"),
@@ -81,10 +82,44 @@ fn a_key_is_that_of_the_inputs_and_not_of_the_place() {
     assert_eq!(distinct.len(), others.len() + 1);
 }
 
+/// A log with a trajectory in a file and one in a topic.
+fn log_with_trajectories(name: &str) -> RecordedLog {
+    let trajectory =
+        |text: &str, sha256: &str| StudyTrajectory { spec: text.parse().unwrap(), sha256: sha256.to_owned() };
+    let trajectories = vec![trajectory("/data/vins.tum:vins", "hash"), trajectory("topic:/ov/odometry:OpenVINS", "")];
+    RecordedLog { trajectories, ..log(name) }
+}
+
+#[test]
+fn trajectories_are_evaluated_once_for_each_log() {
+    let plan = StudyPlan::from_toml(WHOLE).unwrap();
+    let of = |log: RecordedLog| -> Vec<_> {
+        let jobs = expand(&plan, &[log], "0.2.0").into_iter();
+        jobs.filter(|job| job.job.subject.run().is_none()).collect()
+    };
+    let jobs = of(log_with_trajectories("a"));
+    let described: Vec<String> = jobs.iter().map(|job| job.job.describe()).collect();
+    assert_eq!(described, ["a, trajectory:vins", "a, trajectory:OpenVINS"]);
+    assert!(jobs.iter().all(|job| job.job.seed.is_none() && job.job.perturbation.is_none()));
+    let changed = |change: &dyn Fn(&mut StudyTrajectory)| {
+        let mut log = log_with_trajectories("a");
+        change(&mut log.trajectories[0]);
+        of(log)[0].key.clone()
+    };
+    // Neither the place of a file nor the other trajectories of the log matter, its content does.
+    assert_eq!(changed(&|it| it.spec = "/elsewhere/vins.csv:vins".parse().unwrap()), jobs[0].key);
+    assert_ne!(changed(&|it| it.sha256 = "other".to_owned()), jobs[0].key);
+    let runs = |log: RecordedLog| -> Vec<String> {
+        let jobs = expand(&plan, &[log], "0.2.0").into_iter();
+        jobs.filter(|job| job.job.subject.run().is_some()).map(|job| job.key).collect()
+    };
+    assert_eq!(runs(log_with_trajectories("a")), runs(log("a")));
+}
+
 #[test]
 fn a_job_comes_back_from_its_text() {
     let plan = StudyPlan::from_toml(WHOLE).unwrap();
-    for job in expand(&plan, &[log("a")], "0.2.0") {
+    for job in expand(&plan, &[log("a"), log_with_trajectories("b")], "0.2.0") {
         let text = serde_json::to_string(&job.job).unwrap();
         let read: StudyJob = serde_json::from_str(&text).unwrap();
         assert_eq!((read.key("0.2.0"), &read.log), (job.key, &job.job.log));

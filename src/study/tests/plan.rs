@@ -152,6 +152,15 @@ fn errors_name_line_key_and_what_is_allowed() {
     check("[[logs]]\npth = \"a\"", "line 2: unknown key 'logs[1].pth', expected one of path, name");
     check("[[logs]]\nname = \"a\"", "line 1: 'logs[1]' lacks the key 'path'");
     check("[[logs]]\npath = \"a\"\nstart_s = -1", "line 3: 'logs[1].start_s' is -1, expected a number from 0");
+    let trajectories = |list: &str| format!("[[logs]]\npath = \"a\"\ntrajectories = [{list}]");
+    check(&trajectories("\":vins\""), "line 3: 'logs[1].trajectories[1]' is ':vins': ");
+    check(&trajectories("\"{log}.tum\""), "'{log}.tum' has no label: expected one name for all logs");
+    check(
+        &trajectories("\"a.tum:vins\", \"b.tum:vins\""),
+        "line 3: 'logs[1].trajectories' has two entries named 'vins'",
+    );
+    let twice = format!("specs = [\"auto\"]\n{}", trajectories("\"a.tum:auto\""));
+    check(&twice, "line 1: 'specs' a trajectory and a run are named 'auto', expected different names");
     check("[[flights]]\nexperiment = \"T9\"", "line 2: 'flights[1].experiment' is 'T9', expected T1, T2, T3 or T4");
     check(&flight("encoder_sigma_deg = \"no\""), "expected degrees, a number above 0 and up to 90, or \"none\"");
     check(&flight("size_px = [640]"), "'flights[1].size_px' expected width and height");
