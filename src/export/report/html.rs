@@ -2,13 +2,32 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use maud::{Markup, PreEscaped, html};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::verdict::Mark;
 use super::{ReportDrawing, ReportFigure};
 
 /// Tables with at most so many rows are not split between printed pages.
 const MAX_UNBROKEN_ROWS: usize = 14;
+/// Style sheet for screens and for paper, where rows of tables and figures are not split between pages.
+const STYLE: &str = include_str!("../../../assets/report/style.css");
+
+/// A whole page.
+pub(super) fn document(title: &str, body: &Markup) -> String {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body { (body) }
+        }
+    };
+    page.into_string()
+}
 
 /// An unordered list of texts, nothing for none.
 pub(super) fn list(items: &[String]) -> Markup {

@@ -1,67 +1,53 @@
 //! The HTML page of a report, from its content and figures.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use super::ReportFigure;
 use super::content::{ReportContent, RunContent};
-use super::html::{figure, icon, list, number, unbroken};
+use super::html::{document, figure, icon, list, number, unbroken};
 use super::verdict::Statement;
 use super::{RankInterval, tables};
-
-/// Style sheet for screens and for paper, where rows of tables and figures are not split between pages.
-const STYLE: &str = include_str!("../../../assets/report/style.css");
 
 /// The whole page.
 pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String {
     let title = format!("Flight report: {}", content.log);
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (title) }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                h1 { (title) }
-                p.lead { (lead(content)) }
-                (contents(content))
-                (verdict_section(content))
-                (grouped(figures))
-                h2 #accuracy { "Accuracy" }
-                (tables::accuracy(content))
-                (tables::frames(content))
-                @if let Some(trajectories) = tables::trajectories(content) {
-                    (trajectories)
-                }
-                @for (index, run) in content.runs.iter().enumerate() {
-                    (run_section(index, run))
-                }
-                @if has_log_section(content) {
-                    h2 #log { "Log and rig" }
-                }
-                @if let Some(check) = &content.check {
-                    (tables::findings(check))
-                    (tables::topics(check))
-                }
-                @if !content.log_warnings.is_empty() {
-                    h3 { "Warnings of the log reader" }
-                    (list(&content.log_warnings))
-                }
-                h2 #origin { "Reproduction" }
-                p { "Command" }
-                pre { (content.command) }
-                (tables::inputs(content))
-                p {
-                    "Version: " (content.program) ". The same files, command and version give the same bytes. Files beside \
-                     this page: report.json and, for each run, trajectory.tum, covariance.csv, calibration.csv, rank.csv, information.csv, \
-                     frames.csv, rig.yaml and summary.json."
-                }
-            }
+    let body = html! {
+        h1 { (title) }
+        p.lead { (lead(content)) }
+        (contents(content))
+        (verdict_section(content))
+        (grouped(figures))
+        h2 #accuracy { "Accuracy" }
+        (tables::accuracy(content))
+        (tables::frames(content))
+        @if let Some(trajectories) = tables::trajectories(content) {
+            (trajectories)
+        }
+        @for (index, run) in content.runs.iter().enumerate() {
+            (run_section(index, run))
+        }
+        @if has_log_section(content) {
+            h2 #log { "Log and rig" }
+        }
+        @if let Some(check) = &content.check {
+            (tables::findings(check))
+            (tables::topics(check))
+        }
+        @if !content.log_warnings.is_empty() {
+            h3 { "Warnings of the log reader" }
+            (list(&content.log_warnings))
+        }
+        h2 #origin { "Reproduction" }
+        p { "Command" }
+        pre { (content.command) }
+        (tables::inputs(content))
+        p {
+            "Version: " (content.program) ". The same files, command and version give the same bytes. Files beside \
+             this page: report.json and, for each run, trajectory.tum, covariance.csv, calibration.csv, rank.csv, information.csv, \
+             frames.csv, rig.yaml and summary.json."
         }
     };
-    format!("{}\n", page.into_string())
+    format!("{}\n", document(&title, &body))
 }
 
 fn has_log_section(content: &ReportContent) -> bool {

@@ -3,18 +3,16 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 use serde::Serialize;
 
 use super::ReportFigure;
-use super::html::{figure, number, table};
+use super::html::{document, figure, number, table};
 use crate::export::error::ExportError;
 use crate::export::existing::read_index;
 use crate::flight_log::output::{self, OutputSet};
 use crate::study::view::{GroupSummary, ParameterErrors};
 
-/// Style sheet, as that of a report on a log.
-const STYLE: &str = include_str!("../../../assets/report/style.css");
 /// The file by which the report of a study is recognized.
 const INDEX: &str = "report.json";
 
@@ -94,41 +92,30 @@ pub fn write_study_report(report: &StudyReport, folder: &Path) -> Result<PathBuf
 
 fn page(report: &StudyReport) -> String {
     let title = format!("Study report: {}", report.study);
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (title) }
-                style { (PreEscaped(STYLE)) }
+    let body = html! {
+        h1 { (title) }
+        p.lead { (lead(report)) }
+        h2 { "Groups" }
+        (groups(report))
+        @for (number, shown) in (1..).zip(&report.figures) {
+            @if number == 1 || report.figures[number - 2].heading != shown.heading {
+                h2 { (shown.heading) }
             }
-            body {
-                h1 { (title) }
-                p.lead { (lead(report)) }
-                h2 { "Groups" }
-                (groups(report))
-                @for (number, shown) in (1..).zip(&report.figures) {
-                    @if number == 1 || report.figures[number - 2].heading != shown.heading {
-                        h2 { (shown.heading) }
-                    }
-                    (figure(number, shown))
-                }
-                @if !report.parameters.is_empty() {
-                    h2 { "Calibration parameters" }
-                    (parameters(report))
-                }
-                h2 { "Reproduction" }
-                p { "Command" }
-                pre { (report.command) }
-                p {
-                    "Version: " (report.program) ". The same tables, command and version give the same bytes. Files beside \
-                     this page: report.json and, for each figure, a table of its values (CSV)."
-                }
-            }
+            (figure(number, shown))
+        }
+        @if !report.parameters.is_empty() {
+            h2 { "Calibration parameters" }
+            (parameters(report))
+        }
+        h2 { "Reproduction" }
+        p { "Command" }
+        pre { (report.command) }
+        p {
+            "Version: " (report.program) ". The same tables, command and version give the same bytes. Files beside \
+             this page: report.json and, for each figure, a table of its values (CSV)."
         }
     };
-    page.into_string()
+    document(&title, &body)
 }
 
 fn lead(report: &StudyReport) -> String {
