@@ -109,12 +109,7 @@ impl StudyFolder {
             }
         };
         let mut files = self.files_of(&job);
-        let log_sha256 = match &job.log {
-            JobLog::Recorded(log) => log.sha256.clone(),
-            JobLog::Simulated(flight) => {
-                self.rendered(flight).ok_or_else(|| JobError::NoFlight(files.log.clone()))?.sha256
-            }
-        };
+        let log_sha256 = self.log_sha256(&job).ok_or_else(|| JobError::NoFlight(files.log.clone()))?;
         let offline = if job.perturbation.start == PerturbationStart::Calibrated {
             Some(self.calibrate(key, &job, &mut files)?)
         } else {
@@ -189,10 +184,7 @@ impl StudyFolder {
         plan.log.require_unshortened()?;
         let costs = JobCosts {
             rig_sha256: Some(rig_sha256(&plan.rig)),
-            log_sha256: match &job.log {
-                JobLog::Recorded(log) => Some(log.sha256.clone()),
-                JobLog::Simulated(_) => None,
-            },
+            log_sha256: self.log_sha256(job),
             wall_s: stopwatch.elapsed_ms() * 1e-3,
             peak_memory_bytes: peak_memory_bytes(),
             ..self.costs(job, &files, program, attempts)
@@ -200,6 +192,14 @@ impl StudyFolder {
         let tables = trajectory_rows(key, job, &costs, &recording.trajectories[0])?;
         self.write_rows(key, &tables, output)?;
         Ok(JobStatus::Ok)
+    }
+
+    /// SHA-256 of the log of a job, `None` for a flight that is not rendered.
+    fn log_sha256(&self, job: &StudyJob) -> Option<String> {
+        match &job.log {
+            JobLog::Recorded(log) => Some(log.sha256.clone()),
+            JobLog::Simulated(flight) => self.rendered(flight).map(|rendered| rendered.sha256),
+        }
     }
 
     fn costs(&self, job: &StudyJob, files: &JobFiles, program: &str, attempts: usize) -> JobCosts {
@@ -234,11 +234,10 @@ impl StudyFolder {
         costs: &JobCosts,
         output: StudyOutput,
     ) -> Result<(), JobError> {
-        let mut costs =
-            JobCosts { wall_s: costs.wall_s, ..self.costs(job, &self.files_of(job), &costs.program, costs.attempts) };
-        costs.log_sha256 = match &job.log {
-            JobLog::Recorded(log) => Some(log.sha256.clone()),
-            JobLog::Simulated(flight) => self.rendered(flight).map(|rendered| rendered.sha256),
+        let costs = JobCosts {
+            log_sha256: self.log_sha256(job),
+            wall_s: costs.wall_s,
+            ..self.costs(job, &self.files_of(job), &costs.program, costs.attempts)
         };
         let tables: StudyTables = failed_rows(key, job, status, message, &costs)?;
         Ok(self.write_rows(key, &tables, output)?)

@@ -5,7 +5,6 @@ use crate::estimator::{EventKind, FailureCause};
 use crate::export::calibration_report::CalibrationReport;
 use crate::export::summary::{Accuracy, RunSummary, TrajectorySummary, difference_sigmas};
 use crate::geometry::{median, seconds_from_ns, so3};
-use crate::session::accuracy::StampedPose;
 use crate::session::{Recording, RunRecord, TrajectoryLane};
 use crate::study::{Cell, JobLog, StudyJob, TableError, relative_error_columns};
 
@@ -159,9 +158,7 @@ pub(super) fn run_rows(
     cells.extend(calibration(summary));
     cells.extend(times(summary));
     cells.extend(offline.map(offline_calibration).unwrap_or_default());
-    let relative = relative_errors(summary.accuracy.as_ref());
-    let relative = relative.iter().map(|(name, value)| (name.as_str(), Cell::from(*value)));
-    tables.runs.push(cells.into_iter().chain(relative))?;
+    push_run(&mut tables, cells, summary.accuracy.as_ref())?;
     for parameter in &summary.calibration.parameters {
         let mut cells = pairing(key, job);
         cells.extend([
@@ -190,19 +187,20 @@ pub(super) fn trajectory_rows(
     let mut cells = inputs(key, job, JobStatus::Ok, summary.accuracy_missing.as_deref().unwrap_or_default(), costs);
     cells.extend([("estimated", summary.poses.into()), ("length_m", summary.length_m.into())]);
     cells.extend(summary.accuracy.as_ref().map(absolute_errors).unwrap_or_default());
-    if let Some(alignment) = lane.evaluation.alignment {
-        let error_m = |(estimate, actual): &(StampedPose, StampedPose)| {
-            let apart = alignment.transform(&estimate.pose.translation_m) - actual.pose.translation_m;
-            (estimate.stamp_s, apart.norm())
-        };
-        if let Some((worst_s, worst_m)) = lane.evaluation.pairs.iter().map(error_m).max_by(|a, b| a.1.total_cmp(&b.1)) {
-            cells.extend([("worst_frame_s", worst_s.into()), ("worst_frame_m", worst_m.into())]);
-        }
+    let errors = (0..lane.evaluation.pairs.len()).filter_map(|pair| Some((pair, lane.evaluation.error_m(pair)?)));
+    if let Some((pair, worst_m)) = errors.max_by(|a, b| a.1.total_cmp(&b.1)) {
+        let worst_s = lane.evaluation.pairs[pair].0.stamp_s;
+        cells.extend([("worst_frame_s", worst_s.into()), ("worst_frame_m", worst_m.into())]);
     }
-    let relative = relative_errors(summary.accuracy.as_ref());
-    let relative = relative.iter().map(|(name, value)| (name.as_str(), Cell::from(*value)));
-    tables.runs.push(cells.into_iter().chain(relative))?;
+    push_run(&mut tables, cells, summary.accuracy.as_ref())?;
     Ok(tables)
+}
+
+/// Adds the row of a run or of a trajectory, with its relative errors.
+fn push_run(tables: &mut StudyTables, cells: Cells, accuracy: Option<&Accuracy>) -> Result<(), TableError> {
+    let relative = relative_errors(accuracy);
+    let relative = relative.iter().map(|(name, value)| (name.as_str(), Cell::from(*value)));
+    tables.runs.push(cells.into_iter().chain(relative))
 }
 
 /// Counts of frames, failures by cause and warnings.

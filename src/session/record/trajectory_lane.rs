@@ -22,6 +22,14 @@ pub struct TrajectoryEvaluation {
     pub accuracy: Option<TrajectoryAccuracy>,
 }
 
+impl TrajectoryEvaluation {
+    /// Distance between the aligned pose and the ground truth of a pair in metres, `None` without an alignment.
+    pub fn error_m(&self, pair: usize) -> Option<f64> {
+        let (estimate, actual) = self.pairs.get(pair)?;
+        Some((self.alignment?.transform(&estimate.pose.translation_m) - actual.pose.translation_m).norm())
+    }
+}
+
 /// Evaluates a trajectory against ground truth as a run is evaluated: ground truth interpolated at the stamps of the
 /// trajectory, aligned by yaw and position.
 pub fn evaluate_trajectory(estimate: &[PoseSample], ground_truth: &PoseTrack) -> TrajectoryEvaluation {
@@ -110,13 +118,11 @@ impl TrajectoryLane {
     /// Distance between the aligned pose and the ground truth in metres, at its last pose with ground truth at or before a
     /// stamp; `None` without one within 0.5 s.
     pub fn error_m(&self, stamp_ns: i64) -> Option<f64> {
-        let alignment = self.evaluation.alignment?;
         let now_s = seconds_from_ns(stamp_ns);
         // Stamps in seconds are rounded the same way as those of the pairs.
         let index = self.evaluation.pairs.partition_point(|(estimate, _)| estimate.stamp_s <= now_s).checked_sub(1)?;
-        let (estimate, actual) = self.evaluation.pairs.get(index)?;
-        let recent = now_s - estimate.stamp_s <= seconds_from_ns(MAX_POSITION_AGE_NS);
-        recent.then(|| (alignment.transform(&estimate.pose.translation_m) - actual.pose.translation_m).norm())
+        let recent = now_s - self.evaluation.pairs[index].0.stamp_s <= seconds_from_ns(MAX_POSITION_AGE_NS);
+        self.evaluation.error_m(index).filter(|_| recent)
     }
 }
 
