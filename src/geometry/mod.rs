@@ -15,6 +15,7 @@ mod split_mix;
 mod tangent;
 #[cfg(test)]
 mod tests;
+pub(crate) mod triangular_factor;
 
 pub use angle::{principal_angle, wrap_angle};
 pub use chi_square::mean_square_quantile;

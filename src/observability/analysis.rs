@@ -1,24 +1,21 @@
+use std::cmp::Reverse;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimator::{ColumnGroup, Linearization};
 use crate::geometry::dense;
+use crate::geometry::triangular_factor::TriangularFactor;
 use crate::gimbal::{Chain, ParameterId};
 
 use super::classification::{classify, tolerance};
 use super::directions::weak_directions;
-use super::elimination::{Rows, column_norms};
+use super::elimination::{column_norms, project_out};
 use super::structure::{Measured, known_losses};
 use super::{PackedFactor, RankReport};
 
 /// Scaled singular values below this are uninformed: the posterior standard deviation exceeds 0.71 of the scale.
 const INFORMED_THRESHOLD: f64 = 1.0;
-
-/// Velocities and biases are projected out this many columns at a time, three frames: fewer cost calls, more
-/// cost zeros between frames that are not neighbours (measured with windows of 11 frames: 1.0 ms against 1.6
-/// and 1.2).
-const BANDED_COLUMNS: usize = 27;
 
 /// Units of the calibration columns, so that angles and lengths are comparable.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -186,62 +183,40 @@ impl Projected {
             return None;
         }
         let columns = calibration_parameters(linearization).len();
-        let norms = column_norms(measurements, priors);
-        // Blocks without a prior are projected out once for both results.
-        let fixed_parameters = |block: &Range<usize>| {
+        let all_norms = column_norms(measurements, priors);
+        let has_prior = |block: &Range<usize>| {
             priors.nrows() > 0 && priors.columns_range(block.clone()).iter().any(|entry| *entry != 0.0)
         };
-        let (fixed_parameters, free): (Vec<_>, Vec<_>) =
-            nuisance_blocks(linearization).into_iter().partition(fixed_parameters);
-        let mut rows = Rows::new(measurements);
-        for block in merged(free) {
-            rows.project_out(&block, &norms);
-        }
-        let mut with_priors = rows.stacked_on(priors);
-        for block in merged(fixed_parameters) {
-            rows.project_out(&block, &norms);
-            with_priors.project_out(&block, &norms);
-        }
-        let padded = |block: DMatrix<f64>| {
-            let height = block.nrows().max(columns);
-            block.resize_vertically(height, 0.0)
-        };
+        // Blocks without a prior come first: they are projected out once for both results.
+        let (with_prior, free): (Vec<_>, Vec<_>) = nuisance_blocks(linearization).into_iter().partition(has_prior);
+        let first_with_prior = free.iter().map(ExactSizeIterator::len).sum();
+        let order: Vec<usize> = free.into_iter().chain(with_prior).flatten().chain(0..columns).collect();
+        let norms: Vec<f64> = order.iter().map(|column| all_norms[*column]).collect();
+        let nuisance = order.len() - columns;
+        let mut factor = TriangularFactor::new(order.len());
+        factor.merge_rows(measurements, &order);
+        let mut constrained = factor.trailing(first_with_prior);
+        constrained.merge_rows(priors, &order[first_with_prior..]);
         Some(Self {
-            measurements: padded(rows.leading_columns(columns)),
-            with_priors: padded(with_priors.leading_columns(columns)),
+            measurements: project_out(&factor, nuisance, &norms),
+            with_priors: project_out(&constrained, nuisance - first_with_prior, &norms[first_with_prior..]),
         })
     }
 }
 
-/// Blocks of the other unknowns in an efficient order of elimination: velocities and biases from the newest
-/// frame back, which couple neighbours only, then depths and joints, then poses, which couple everything.
+/// Blocks of the other unknowns in an efficient order of elimination, from the newest frame back: velocities and biases,
+/// which couple neighbours only, then depths, then joints and poses, which couple everything.
 fn nuisance_blocks(linearization: &Linearization) -> Vec<Range<usize>> {
-    let of = |group: ColumnGroup| {
-        let blocks = linearization.columns.iter().filter(move |block| block.id.group() == group);
-        blocks.map(|block| block.start..block.start + block.len)
+    let of = |groups: &'static [ColumnGroup]| {
+        let blocks = linearization.columns.iter().filter(move |block| groups.contains(&block.id.group()));
+        let mut blocks: Vec<_> = blocks.collect();
+        blocks.sort_by_key(|block| (Reverse(block.id.frame()), block.start));
+        blocks.into_iter().map(|block| block.start..block.start + block.len)
     };
-    let mut blocks: Vec<_> = of(ColumnGroup::VelocityBias).collect();
-    blocks.reverse();
-    blocks.extend(of(ColumnGroup::InverseDepth));
-    blocks.extend(of(ColumnGroup::Joints));
-    blocks.extend(of(ColumnGroup::Pose));
+    let mut blocks: Vec<_> = of(&[ColumnGroup::VelocityBias]).collect();
+    blocks.extend(of(&[ColumnGroup::InverseDepth]));
+    blocks.extend(of(&[ColumnGroup::Joints, ColumnGroup::Pose]));
     blocks
-}
-
-/// Merges neighbouring blocks: ascending ones (joints, poses: dense in their rows) without limit, descending
-/// ones (velocities and biases: banded) up to [`BANDED_COLUMNS`].
-fn merged(blocks: impl IntoIterator<Item = Range<usize>>) -> Vec<Range<usize>> {
-    let mut merged: Vec<Range<usize>> = Vec::new();
-    for block in blocks {
-        match merged.last_mut() {
-            Some(last) if last.end == block.start => last.end = block.end,
-            Some(last) if block.end == last.start && last.len() + block.len() <= BANDED_COLUMNS => {
-                last.start = block.start;
-            }
-            _ => merged.push(block),
-        }
-    }
-    merged
 }
 
 fn scaled(mut block: DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {

@@ -2,14 +2,12 @@
 
 use std::ops::Range;
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
 use faer::linalg::solvers::Solve as _;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
-use faer::{Mat, MatMut, MatRef, Par, Side};
+use faer::{MatMut, MatRef, Par, Side};
 use nalgebra::{DMatrix, DVector};
 
-use crate::geometry::dense::as_faer;
+use crate::geometry::triangular_factor::{TriangularFactor, skip_dependent_columns};
 
 /// A lower Cholesky factor.
 #[derive(Clone, Debug)]
@@ -76,61 +74,12 @@ impl Cholesky {
     }
 }
 
-/// The upper echelon factor `R` of `matrix = Q R` (Householder), at most as many rows as columns; `matrixᵀ matrix = Rᵀ R`.
-///
-/// Dependent columns leave explicit zeros, so that a row's first non-zero entry tells which column it belongs to.
+/// The upper triangular factor `R` of `matrix = Q R` (Householder): `matrixᵀ matrix = Rᵀ R`.
 pub(crate) fn triangularize(matrix: &DMatrix<f64>) -> DMatrix<f64> {
-    triangularized(as_faer(matrix).to_owned())
-}
-
-/// Rows that begin with the same columns.
-#[derive(Clone, Debug)]
-pub(crate) struct ColumnGroup {
-    /// Number of columns before those of the next group.
-    pub(crate) columns: usize,
-    /// Row-major, from the first of these columns to the last one of all; the zeros before are left out.
-    pub(crate) rows: Vec<f64>,
-}
-
-/// [`triangularize`] of rows in groups, without the rows that would begin behind the columns of the groups.
-///
-/// Each group joins when its first column is at hand, so that the zeros before it are not worked on.
-pub(crate) fn triangularize_groups(groups: &[ColumnGroup], columns: usize) -> DMatrix<f64> {
-    let mut upper = DMatrix::zeros(groups.iter().map(|group| group.columns).sum(), columns);
-    let mut height = 0;
-    let mut first = 0;
-    // What is left below the rows that are done.
-    let mut left = DMatrix::zeros(0, columns);
-    for group in groups {
-        let width = columns - first;
-        let (above, joining) = (left.nrows(), group.rows.len() / width);
-        let mut matrix = Mat::zeros(above + joining, width);
-        let (mut top, mut bottom) = matrix.as_mut().split_at_row_mut(above);
-        top.copy_from(as_faer(&left));
-        bottom.copy_from(MatRef::from_row_major_slice(&group.rows, joining, width));
-        let factor = triangularized(matrix);
-        let done = factor.nrows().min(group.columns);
-        upper.view_mut((height, first), (done, width)).copy_from(&factor.rows(0, done));
-        height += done;
-        left = factor.view((done, group.columns), (factor.nrows() - done, width - group.columns)).into_owned();
-        first += group.columns;
-    }
-    upper.resize_vertically(height, 0.0)
-}
-
-fn triangularized(mut factors: Mat<f64>) -> DMatrix<f64> {
-    let (rows, columns) = factors.shape();
-    if rows == 0 || columns == 0 {
-        return DMatrix::zeros(0, columns);
-    }
-    let height = rows.min(columns);
-    let block = recommended_block_size::<f64>(rows, columns);
-    let mut coefficients = Mat::zeros(block, height);
-    let scratch = qr_in_place_scratch::<f64>(rows, columns, block, Par::Seq, Default::default());
-    let mut memory = MemBuffer::new(scratch);
-    let stack = MemStack::new(&mut memory);
-    qr_in_place(factors.as_mut(), coefficients.as_mut(), Par::Seq, stack, Default::default());
-    DMatrix::from_fn(height, columns, |row, column| if row <= column { factors[(row, column)] } else { 0.0 })
+    let order: Vec<usize> = (0..matrix.ncols()).collect();
+    let mut factor = TriangularFactor::new(matrix.ncols());
+    factor.merge_rows(matrix, &order);
+    factor.to_matrix()
 }
 
 /// A column of a factor depends on those before it when no more than this fraction of it is independent.
@@ -152,35 +101,7 @@ pub(crate) struct Echelon {
 pub(crate) fn echelon(matrix: &DMatrix<f64>, leading: usize) -> Echelon {
     let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
     let mut upper = triangularize(matrix);
-    let (height, last) = (upper.nrows(), upper.ncols() - 1);
-    let (mut rank, mut leading_rank) = (0, 0);
-    for column in 0..last {
-        // Below this the triangle is empty, and dependent columns have left it one row deeper each.
-        let end = (column + 1).min(height);
-        if rank == end {
-            break;
-        }
-        let mut axis = upper.view((rank, column), (end - rank, 1)).column(0).into_owned();
-        let norm = axis.norm();
-        upper.view_mut((rank, column), (end - rank, 1)).fill(0.0);
-        if norm <= DEPENDENT * norms[column] {
-            continue;
-        }
-        // A reflection onto the first row; a row alone needs none.
-        let pivot = if end - rank == 1 { axis[0] } else { -norm.copysign(axis[0]) };
-        axis[0] -= pivot;
-        if axis[0] != 0.0 {
-            let scale = 2.0 / axis.norm_squared();
-            for mut later in upper.view_mut((rank, column + 1), (end - rank, last - column)).column_iter_mut() {
-                let along = scale * axis.dot(&later);
-                later.axpy(-along, &axis, 1.0);
-            }
-        }
-        upper[(rank, column)] = pivot;
-        rank += 1;
-        if column < leading {
-            leading_rank = rank;
-        }
-    }
-    Echelon { rows: upper.rows(0, rank).into_owned(), leading_rank }
+    let independent = skip_dependent_columns(&mut upper, matrix.ncols() - 1, &norms, DEPENDENT);
+    let leading_rank = independent.iter().filter(|column| **column < leading).count();
+    Echelon { rows: upper.rows(0, independent.len()).into_owned(), leading_rank }
 }

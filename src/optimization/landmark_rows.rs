@@ -1,19 +1,31 @@
 //! Elimination of a landmark by QR: the rows of its observations are projected orthogonally onto the complement of the
 //! landmark's columns, no normal equations are formed, so that what is exactly unobservable stays exactly so.
 
+#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+
 use std::ops::Range;
 
 use nalgebra::Matrix2x6;
+use pulp::{Arch, NullaryFnOnce};
 
 use super::BlockTerm;
 
 /// Columns of a landmark.
 const LANDMARK: usize = 3;
+/// Columns before those of the blocks: the landmark's and the residual.
+const LEADING: usize = LANDMARK + 1;
 /// Columns of a block.
 const BLOCK: usize = 6;
+/// Rows of an observation.
+const OBSERVATION: usize = 2;
+/// A column of the landmark depends on those before it when no more than this fraction of it is independent.
+const DEPENDENT: f64 = 1e-12;
 
-/// The whitened rows of one landmark's observations, `[landmark 3 | anchor | shared | observers | residual 1]`, six columns
+/// The whitened rows of one landmark's observations, `[landmark 3 | residual 1 | anchor | shared | observers]`, six columns
 /// a block: of the blocks only those that its observations depend on.
+///
+/// The landmark is eliminated from one observation after the other: the rows that an observation adds depend on the blocks
+/// of the observations up to this one only, and are conditioned on the landmark's posterior from those before.
 #[derive(Debug, Default)]
 pub(crate) struct LandmarkRows {
     /// Row-major.
@@ -23,12 +35,18 @@ pub(crate) struct LandmarkRows {
     blocks: Vec<usize>,
     /// Number of blocks before those of the observers.
     common: usize,
-    /// Rows that the landmark still fills after the projection.
-    used: usize,
-    /// Rows behind them that the last observation adds to the others.
-    added: usize,
-    reflector: Vec<f64>,
+    /// By observation, in order.
+    added: Vec<AddedRows>,
     products: Vec<f64>,
+}
+
+/// The rows that an observation adds.
+#[derive(Clone, Debug)]
+struct AddedRows {
+    /// After the elimination; the landmark still fills the rows behind those of the last observation.
+    rows: Range<usize>,
+    /// How many of the blocks they depend on.
+    blocks: usize,
 }
 
 impl LandmarkRows {
@@ -40,28 +58,25 @@ impl LandmarkRows {
         self.blocks.extend(shared);
         self.common = self.blocks.len();
         self.entries.clear();
-        self.width = LANDMARK + BLOCK * (self.common + observers) + 1;
-        (self.used, self.added) = (0, 0);
-    }
-
-    fn height(&self) -> usize {
-        self.entries.len() / self.width
+        self.added.clear();
+        self.width = LEADING + BLOCK * (self.common + observers);
     }
 
     /// Adds the two rows of an observation.
     pub(crate) fn push<const N: usize>(&mut self, term: &BlockTerm<usize, N>) {
         let observers = self.blocks.len();
         self.blocks.extend(term.observer.iter().flatten().map(|(block, _)| *block));
-        for axis in 0..2 {
+        for axis in 0..OBSERVATION {
             let begin = self.entries.len();
             self.entries.resize(begin + self.width, 0.0);
             let row = &mut self.entries[begin..];
             for k in 0..LANDMARK {
                 row[k] = term.by_landmark[(axis, k)];
             }
+            row[LANDMARK] = term.residual[axis];
             let mut write = |place: usize, by_block: &Matrix2x6<f64>| {
                 for k in 0..BLOCK {
-                    row[LANDMARK + BLOCK * place + k] = by_block[(axis, k)];
+                    row[LEADING + BLOCK * place + k] = by_block[(axis, k)];
                 }
             };
             for (place, (_, by_block)) in term.anchor.iter().flatten().enumerate() {
@@ -73,8 +88,9 @@ impl LandmarkRows {
             for (place, (_, by_block)) in (observers..).zip(term.observer.iter().flatten()) {
                 write(place, by_block);
             }
-            row[self.width - 1] = term.residual[axis];
         }
+        let height = self.entries.len() / self.width;
+        self.added.push(AddedRows { rows: height - OBSERVATION..height, blocks: self.blocks.len() });
     }
 
     /// The last block of the newest observation, `None` before any but the anchor's.
@@ -84,88 +100,99 @@ impl LandmarkRows {
 
     /// Eliminates the landmark from all rows.
     pub(crate) fn eliminate(&mut self) {
-        self.project_out_landmark(self.height());
+        Arch::new().dispatch(Elimination(self));
     }
 
-    /// Eliminates the landmark from the rows before the last observation first, and then from what is left of it there
-    /// together with the last observation.
-    pub(crate) fn eliminate_last_apart(&mut self) {
-        const OBSERVATION: usize = 2;
-        let older = self.height() - OBSERVATION;
-        self.project_out_landmark(older);
-        let landmark = self.used;
-        // The last observation goes right behind what is left of the landmark.
-        self.entries[landmark * self.width..].rotate_right(OBSERVATION * self.width);
-        self.used = 0;
-        self.project_out_landmark(landmark + OBSERVATION);
-        self.added = landmark + OBSERVATION - self.used;
+    /// The rows of each observation without the landmark, with the blocks that they depend on; after the elimination.
+    pub(crate) fn added(&self) -> impl DoubleEndedIterator<Item = (Range<usize>, &[usize])> {
+        self.added.iter().map(|added| (added.rows.clone(), &self.blocks[..added.blocks]))
     }
 
-    /// Householder reflections of the first `height` rows that clear the landmark's columns below as many rows (fewer for
-    /// dependent columns).
-    fn project_out_landmark(&mut self, height: usize) {
-        let width = self.width;
-        for column in 0..LANDMARK {
-            if self.used >= height {
-                break;
-            }
-            let entry = |row: usize| self.entries[row * width + column];
-            let norm = (0..height).map(|row| entry(row) * entry(row)).sum::<f64>().sqrt();
-            let tail = (self.used..height).map(|row| entry(row) * entry(row)).sum::<f64>().sqrt();
-            if tail <= 1e-12 * norm.max(1e-300) {
-                continue;
-            }
-            self.reflector.clear();
-            self.reflector.extend((self.used..height).map(entry));
-            self.reflector[0] += if self.reflector[0] > 0.0 { tail } else { -tail };
-            let factor = 2.0 / self.reflector.iter().map(|entry| entry * entry).sum::<f64>();
-            self.reflect(factor, height);
-            self.used += 1;
-        }
-    }
-
-    /// `A ← A − factor·v·(vᵀA)` on the rows from `used` to `height`.
-    fn reflect(&mut self, factor: f64, height: usize) {
-        let rows = &mut self.entries[self.used * self.width..height * self.width];
-        self.products.clear();
-        self.products.resize(self.width, 0.0);
-        for (row, weight) in rows.chunks_exact(self.width).zip(&self.reflector) {
-            for (product, entry) in self.products.iter_mut().zip(row) {
-                *product += weight * entry;
-            }
-        }
-        for (row, weight) in rows.chunks_exact_mut(self.width).zip(&self.reflector) {
-            let weight = factor * weight;
-            for (entry, product) in row.iter_mut().zip(&self.products) {
-                *entry -= weight * product;
-            }
-        }
-    }
-
-    /// The rows without the landmark, after the elimination.
-    pub(crate) fn remaining(&self) -> Range<usize> {
-        self.used..self.height()
-    }
-
-    /// Of [`Self::remaining`], those that the last observation adds to the others; only after
-    /// [`Self::eliminate_last_apart`].
-    pub(crate) fn added_by_last(&self) -> Range<usize> {
-        self.used..self.used + self.added
-    }
-
-    /// Appends some rows, row-major, as `[blocks from first on, 6 each | residual]`; `columns` counts those of all blocks and
-    /// the residual.
-    pub(crate) fn append_to(&self, rows: &mut Vec<f64>, columns: usize, first: usize, range: Range<usize>) {
-        let width = columns - BLOCK * first;
+    /// Appends some rows, row-major, as `[blocks, 6 columns each | residual]` of `width` columns; `place` is the first column
+    /// of a block.
+    pub(crate) fn append_to(
+        &self,
+        rows: &mut Vec<f64>,
+        width: usize,
+        range: Range<usize>,
+        blocks: &[usize],
+        place: impl Fn(usize) -> usize,
+    ) {
         for row in self.entries.chunks_exact(self.width).skip(range.start).take(range.len()) {
             let begin = rows.len();
             rows.resize(begin + width, 0.0);
             let target = &mut rows[begin..];
-            for (number, block) in self.blocks.iter().zip(row[LANDMARK..].chunks_exact(BLOCK)) {
-                let place = BLOCK * (number - first);
-                target[place..place + BLOCK].copy_from_slice(block);
+            for (block, entries) in blocks.iter().zip(row[LEADING..].chunks_exact(BLOCK)) {
+                let place = place(*block);
+                target[place..place + BLOCK].copy_from_slice(entries);
             }
-            target[width - 1] = row[self.width - 1];
+            target[width - 1] = row[LANDMARK];
+        }
+    }
+}
+
+/// The elimination of a landmark, compiled for every width of vector registers.
+struct Elimination<'a>(&'a mut LandmarkRows);
+
+impl NullaryFnOnce for Elimination<'_> {
+    type Output = ();
+
+    /// Householder reflections of the rows that the landmark fills so far and of those of the next observation.
+    #[inline(always)]
+    fn call(self) {
+        let LandmarkRows { entries, width, added, products, .. } = self.0;
+        let width = *width;
+        let mut squares = [0.0; LANDMARK];
+        let mut filled = 0;
+        for AddedRows { rows, blocks } in added {
+            let columns = LEADING + BLOCK * *blocks;
+            for row in entries[rows.start * width..rows.end * width].chunks_exact(width) {
+                for (square, entry) in squares.iter_mut().zip(row) {
+                    *square += entry * entry;
+                }
+            }
+            let begin = rows.start - filled;
+            let part = &mut entries[begin * width..rows.end * width];
+            filled = 0;
+            for column in 0..LANDMARK {
+                let left = &mut part[filled * width..];
+                let tail = left.chunks_exact(width).map(|row| row[column] * row[column]).sum::<f64>().sqrt();
+                if tail <= DEPENDENT * squares[column].sqrt().max(1e-300) {
+                    continue;
+                }
+                reflect(left, width, columns, column, tail, products);
+                filled += 1;
+                if filled * width == part.len() {
+                    break;
+                }
+            }
+            // The rows of the landmark go right before those of the next observation.
+            part.rotate_left(filled * width);
+            *rows = begin..rows.end - filled;
+        }
+    }
+}
+
+/// Reflects some rows so that a column becomes zero below the first one; `norm` is that of the column.
+#[inline(always)]
+fn reflect(rows: &mut [f64], width: usize, columns: usize, column: usize, norm: f64, products: &mut Vec<f64>) {
+    // I − v·vᵀ / (norm·|v₀|)
+    let first = rows[column];
+    let pivot = if first > 0.0 { -norm } else { norm };
+    let factor = (norm * (first - pivot).abs()).recip();
+    let weight = |row: usize, entry: f64| if row == 0 { first - pivot } else { entry };
+    products.clear();
+    products.resize(columns, 0.0);
+    for (index, row) in rows.chunks_exact(width).enumerate() {
+        let weight = weight(index, row[column]);
+        for (product, entry) in products.iter_mut().zip(row) {
+            *product += weight * entry;
+        }
+    }
+    for (index, row) in rows.chunks_exact_mut(width).enumerate() {
+        let weight = factor * weight(index, row[column]);
+        for (entry, product) in row.iter_mut().zip(&*products) {
+            *entry -= weight * product;
         }
     }
 }

@@ -144,20 +144,18 @@ fn elimination_by_qr_equals_the_schur_complement() {
         let reduced = equations.eliminate(0.0).poses;
 
         let columns = 6 * poses + 1;
-        for apart in [false, true] {
+        {
             let mut local = LandmarkRows::default();
             local.begin([0], None, poses - 1);
             for (observer, term) in &terms {
                 local.push(&BlockTerm::of_poses(Some(0), *observer, term));
             }
-            if apart {
-                local.eliminate_last_apart();
-            } else {
-                local.eliminate();
-            }
-            assert_eq!(local.remaining().len(), 2 * poses - 3);
+            local.eliminate();
             let mut rows = Vec::new();
-            local.append_to(&mut rows, columns, 0, local.remaining());
+            for (number, (added, blocks)) in local.added().enumerate() {
+                assert_eq!(blocks.len(), number + 1);
+                local.append_to(&mut rows, columns, added, blocks, |block| 6 * block);
+            }
             let rows = DMatrix::from_row_slice(2 * poses - 3, columns, &rows);
             let squared = rows.tr_mul(&rows);
             let scale = squared.amax();

@@ -5,18 +5,17 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimator::factors::visual::{Anchor, Track, VisualModel, whitened};
 use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS};
-use crate::optimization::dense::{self, ColumnGroup};
+use crate::geometry::triangular_factor::{PORTION, TriangularFactor};
 use crate::optimization::{Landmark, LandmarkRows, PoseBlocks};
 
-/// Columns of a landmark.
-const LANDMARK: usize = 3;
 /// Columns of a block of the camera: a pose, or its intrinsics.
 const BLOCK: usize = 6;
 
 /// The whitened rows of some tracks.
 #[derive(Clone, Debug)]
 pub(crate) struct ProjectedRows {
-    /// `[blocks of the camera, 6 each | residual]`, compressed to its upper echelon factor.
+    /// `[blocks of the camera, 6 each | residual]`, compressed to as many rows as columns at most; rows begin with the newest frame that
+    /// they depend on, so that they are triangular from the newest frame back.
     pub(crate) rows: DMatrix<f64>,
     /// Rows of the newest frame's observations, conditioned on the landmarks' posterior from all other
     /// observations, in the same columns. They are included in `rows`.
@@ -54,14 +53,13 @@ impl ProjectedRows {
         let newest = frames.saturating_sub(1);
         let mut blocks = PoseBlocks::new(current.blocks());
         let columns = BLOCK * current.blocks() + 1;
-        // Grouped by the first observing slot, from its columns on; none begin with the intrinsics.
-        let width = BLOCK * N;
-        let of_slot = |slot: usize| ColumnGroup {
-            columns: width,
-            rows: Vec::with_capacity(height_of(tracks, slot) * (columns - width * slot)),
+        // The newest frame comes first in the triangular factor: rows begin with the newest frame that they depend on, and
+        // those of older observations are short. The intrinsics come after all frames.
+        let place = |block: usize| {
+            let (slot, row) = (block / N, block % N);
+            BLOCK * if slot < frames { N * (newest - slot) + row } else { block }
         };
-        let mut groups: Vec<ColumnGroup> = (0..frames).map(of_slot).collect();
-        groups.extend(current.intrinsics_block().map(|_| ColumnGroup { columns: BLOCK, rows: Vec::new() }));
+        let mut groups = vec![Vec::new(); frames];
         let mut newest_rows = Vec::new();
         let mut local = LandmarkRows::default();
         for (track, landmark) in tracks.iter().zip(landmarks) {
@@ -74,18 +72,40 @@ impl ProjectedRows {
                 blocks.add(&term);
                 local.push(&term);
             }
+            local.eliminate();
             let seen_last = first.slot != newest && local.last_observer().map(|block| block / N) == Some(newest);
-            if apart == NewestRows::Apart && seen_last {
-                local.eliminate_last_apart();
-                local.append_to(&mut newest_rows, columns, 0, local.added_by_last());
-            } else {
-                local.eliminate();
+            if apart == NewestRows::Apart
+                && seen_last
+                && let Some((added, of_added)) = local.added().next_back()
+            {
+                local.append_to(&mut newest_rows, columns, added, of_added, |block| BLOCK * block);
             }
-            let slot = first_slot(track).unwrap_or(first.slot);
-            local.append_to(&mut groups[slot].rows, columns, N * slot, local.remaining());
+            for (added, of_added) in local.added() {
+                let slots = of_added.iter().map(|block| block / N).filter(|slot| *slot < frames);
+                let begin = newest - slots.max().unwrap_or(first.slot);
+                let skipped = BLOCK * N * begin;
+                local.append_to(&mut groups[begin], columns - skipped, added, of_added, |block| place(block) - skipped);
+            }
+        }
+        let mut factor = TriangularFactor::new(columns);
+        for (begin, rows) in groups.iter().enumerate() {
+            let skipped = BLOCK * N * begin;
+            let width = columns - skipped;
+            for portion in rows.chunks(PORTION * width) {
+                factor.merge(skipped, portion.len() / width, |column, entries| {
+                    for (entry, row) in entries.iter_mut().zip(portion.chunks_exact(width)) {
+                        *entry = row[column - skipped];
+                    }
+                });
+            }
         }
         // Without a row of the residual alone, which no unknown can change.
-        let rows = dense::triangularize_groups(&groups, columns);
+        let by_place = factor.leading_rows(columns - 1);
+        let mut rows = DMatrix::zeros(by_place.nrows(), columns);
+        for block in 0..current.blocks() {
+            rows.fixed_columns_mut::<BLOCK>(BLOCK * block).copy_from(&by_place.fixed_columns::<BLOCK>(place(block)));
+        }
+        rows.set_column(columns - 1, &by_place.column(columns - 1));
         let newest_rows = DMatrix::from_row_slice(newest_rows.len() / columns, columns, &newest_rows);
         Self { rows, newest_rows, blocks }
     }
@@ -94,17 +114,6 @@ impl ProjectedRows {
     pub(crate) fn squared_column_norms(&self, columns: &[DMatrix<f64>]) -> DVector<f64> {
         self.blocks.squared_norms(columns)
     }
-}
-
-/// The anchor need not be the first observing frame.
-fn first_slot(track: &Track) -> Option<usize> {
-    track.observations.iter().map(|observation| observation.slot).min()
-}
-
-/// Largest number of rows that start in a slot.
-fn height_of(tracks: &[Track], slot: usize) -> usize {
-    let beginning = tracks.iter().filter(|track| first_slot(track) == Some(slot));
-    beginning.map(|track| (2 * track.observations.len()).saturating_sub(LANDMARK)).sum()
 }
 
 /// Treatment of the newest frame's rows.

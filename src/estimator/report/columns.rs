@@ -65,6 +65,14 @@ impl ColumnId {
         }
     }
 
+    /// Its frame, if it is a block of one.
+    pub const fn frame(self) -> Option<FrameId> {
+        match self {
+            Self::Joints(frame) | Self::Pose(frame) | Self::VelocityBias(frame) => Some(frame),
+            Self::Calibration(_) | Self::InverseDepth => None,
+        }
+    }
+
     /// Unit of the column `place` within the block, so that columns are comparable: [`Dimension::scale`] for
     /// angles, lengths, time offsets and the ratio of the inverse depth, 0.1 m/s, 1 °/s and 0.1 m/s².
     pub const fn scale(self, place: usize) -> f64 {
