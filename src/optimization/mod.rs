@@ -7,6 +7,7 @@
 //! unknowns, and hands itself to `damped::minimize`.
 
 mod block_term;
+mod cholesky;
 pub(crate) mod damped;
 pub(crate) mod dense;
 mod landmark;
@@ -19,6 +20,7 @@ mod schur;
 mod tests;
 
 pub(crate) use block_term::{BlockTerm, PoseBlocksOf};
+pub(crate) use cholesky::Cholesky;
 pub(crate) use landmark::Landmark;
 pub use landmark::LandmarkModel;
 pub(crate) use landmark_rows::LandmarkRows;

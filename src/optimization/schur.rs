@@ -11,9 +11,12 @@
 //!
 //! `H_ll` is block-diagonal, 3 × 3 a landmark.
 
+#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+
 use std::collections::BTreeMap;
 
 use nalgebra::{ArrayStorage, Matrix2x6, Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
+use pulp::{Arch, NullaryFnOnce};
 
 use super::{BlockTerm, PoseBlocks, Reprojection};
 
@@ -203,16 +206,12 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         let mut reduced =
             ReducedEquations { poses: self.poses.clone(), inverses: Vec::with_capacity(self.landmarks.len()) };
         let mut weighted: Vec<Matrix6x3<f64>> = Vec::new();
+        let architecture = Arch::new();
         for block in &self.landmarks {
             let inverse = damped_inverse(&block.hessian, damping);
             weighted.clear();
             weighted.extend(block.couplings.iter().map(|(_, coupling)| coupling * inverse));
-            for (first, (row, _)) in block.couplings.iter().enumerate() {
-                *reduced.poses.gradient_mut(*row) -= weighted[first] * block.gradient;
-                for (column, coupling) in &block.couplings[first..] {
-                    subtract_product(reduced.poses.hessian_mut(*row, *column), &weighted[first], coupling);
-                }
-            }
+            architecture.dispatch(Elimination { poses: &mut reduced.poses, block, weighted: &weighted });
             reduced.inverses.push(inverse);
         }
         reduced
@@ -235,6 +234,29 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
                 inverse * right
             })
             .collect()
+    }
+}
+
+/// What the elimination of a landmark takes off the equations of the poses, compiled for every width of vector registers.
+struct Elimination<'a, P: PoseEquations> {
+    poses: &'a mut P,
+    block: &'a LandmarkBlock<P::Pose>,
+    /// Couplings times the inverse of the landmark's block.
+    weighted: &'a [Matrix6x3<f64>],
+}
+
+impl<P: PoseEquations> NullaryFnOnce for Elimination<'_, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { poses, block, weighted } = self;
+        for (first, (row, _)) in block.couplings.iter().enumerate() {
+            *poses.gradient_mut(*row) -= weighted[first] * block.gradient;
+            for (column, coupling) in &block.couplings[first..] {
+                subtract_product(poses.hessian_mut(*row, *column), &weighted[first], coupling);
+            }
+        }
     }
 }
 
@@ -273,6 +295,7 @@ fn add_product(block: &mut Matrix6<f64>, left: &Matrix2x6<f64>, right: &Matrix2x
 }
 
 /// Takes `left · rightᵀ` off `block`, without a matrix in between: most of an elimination's time goes here.
+#[inline(always)]
 fn subtract_product(block: &mut Matrix6<f64>, left: &Matrix6x3<f64>, right: &Matrix6x3<f64>) {
     let [a, b, c] = &left.data.0;
     let [x, y, z] = &right.data.0;

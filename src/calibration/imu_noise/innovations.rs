@@ -14,7 +14,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use crate::estimator::{FactorRows, FrameId, JacobianFactor, StepReport};
-use crate::optimization::dense::Cholesky;
+use crate::optimization::Cholesky;
 
 /// Rows of an IMU factor.
 const ROWS: usize = 15;

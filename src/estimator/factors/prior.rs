@@ -78,7 +78,7 @@ impl Prior {
     }
 
     fn new(columns: Vec<PriorColumn>, jacobian: DMatrix<f64>, residual: DVector<f64>) -> Self {
-        let hessian = jacobian.tr_mul(&jacobian);
+        let hessian = jacobian.transpose() * &jacobian;
         let gradient = jacobian.tr_mul(&residual);
         Self { columns, jacobian, residual, hessian, gradient }
     }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use nalgebra::{DMatrix, Matrix3, Matrix6x3, Matrix6xX, Vector3};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6x3, Matrix6xX, Vector3};
 
 use super::calibration::Calibration;
 use super::layout::{Layout, POSE, ROW_MOTION};
@@ -139,6 +139,45 @@ impl CameraMaps {
         maps
     }
 
+    /// Adds the information of the blocks to that of the unknowns (lower triangle).
+    ///
+    /// `calibration` are the columns of the camera's calibration; `information` returns the 6 × 6 block of a row and a column.
+    pub(crate) fn add_information(
+        &self,
+        layout: &Layout,
+        calibration: &Range<usize>,
+        information: impl Fn(usize, usize) -> Matrix6<f64>,
+        hessian: &mut DMatrix<f64>,
+    ) {
+        let mut by_calibration = vec![0.0; 6 * calibration.len()];
+        let mut by_own = Vec::new();
+        for row in 0..self.blocks() {
+            let of_row = self.columns(layout, row);
+            by_calibration.fill(0.0);
+            for column in 0..self.blocks() {
+                let block = information(row, column);
+                add_product(&mut by_calibration, &block, self.calibration[column].as_slice());
+                if column > row {
+                    continue;
+                }
+                // Lower triangle: the frame of `row` below the frame of `column`. Two blocks of one frame make a block on the
+                // diagonal, with its transpose.
+                let of_column = self.columns(layout, column);
+                by_own.clear();
+                by_own.resize(6 * of_column.len(), 0.0);
+                add_product(&mut by_own, &block, self.own[column].as_slice());
+                let own = self.own[row].as_slice();
+                add_transposed_product(hessian, &of_row, &of_column, own, &by_own);
+                if column < row && of_column == of_row {
+                    add_transposed_product(hessian, &of_column, &of_row, &by_own, own);
+                }
+            }
+            add_transposed_product(hessian, calibration, &of_row, &by_calibration, self.own[row].as_slice());
+            let own = self.calibration[row].as_slice();
+            add_transposed_product(hessian, calibration, calibration, own, &by_calibration);
+        }
+    }
+
     /// Number of blocks.
     pub(crate) fn blocks(&self) -> usize {
         self.own.len()
@@ -148,6 +187,34 @@ impl CameraMaps {
     pub(crate) fn columns(&self, layout: &Layout, block: usize) -> Range<usize> {
         let slot = block / self.blocks_per_frame;
         if slot < self.frames { layout.camera(slot) } else { 0..0 }
+    }
+}
+
+/// Adds `block · right` (6 × n, column-major).
+fn add_product(target: &mut [f64], block: &Matrix6<f64>, right: &[f64]) {
+    for (target, right) in target.chunks_exact_mut(6).zip(right.chunks_exact(6)) {
+        for (factor, column) in right.iter().zip(&block.data.0) {
+            if *factor != 0.0 {
+                for (entry, of_block) in target.iter_mut().zip(column) {
+                    *entry += of_block * factor;
+                }
+            }
+        }
+    }
+}
+
+/// Adds `leftᵀ · right` (6 rows each, column-major) to a part of a matrix.
+fn add_transposed_product(
+    matrix: &mut DMatrix<f64>,
+    rows: &Range<usize>,
+    columns: &Range<usize>,
+    left: &[f64],
+    right: &[f64],
+) {
+    for (column, right) in columns.clone().zip(right.chunks_exact(6)) {
+        for (row, left) in rows.clone().zip(left.chunks_exact(6)) {
+            matrix[(row, column)] += left.iter().zip(right).map(|(a, b)| a * b).sum::<f64>();
+        }
     }
 }
 

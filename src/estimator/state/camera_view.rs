@@ -199,21 +199,23 @@ pub(crate) struct RelativeTo<'a> {
     pub(crate) pose: CameraPose,
 }
 
-impl RelativeTo<'_> {
+impl<'a> RelativeTo<'a> {
     /// `observer_from_anchor` at the rows of both observations.
-    pub(crate) fn get(&self, observation: &TrackObservation) -> RelativePose {
+    pub(crate) fn get(&self, observation: &TrackObservation) -> Cow<'a, RelativePose> {
         self.with_pose(observation).0
     }
 
     /// [`Self::get`] with the pose at the row of the observation.
-    pub(crate) fn with_pose(&self, observation: &TrackObservation) -> (RelativePose, CameraPose) {
-        let pose = self.view.pose(observation.slot, &observation.uv_px);
-        let relative = match &self.view.poses {
+    pub(crate) fn with_pose(&self, observation: &TrackObservation) -> (Cow<'a, RelativePose>, Cow<'a, CameraPose>) {
+        match &self.view.poses {
             Poses::Global { poses, relative } => {
-                *relative.get_or_init(|| RelativePoses::new(poses)).get(self.slot, observation.slot)
+                let relative = relative.get_or_init(|| RelativePoses::new(poses)).get(self.slot, observation.slot);
+                (Cow::Borrowed(relative), Cow::Borrowed(&poses[observation.slot]))
             }
-            Poses::Rolling { .. } => RelativePose::new(&self.pose, &pose),
-        };
-        (relative, pose)
+            Poses::Rolling { .. } => {
+                let pose = self.view.pose(observation.slot, &observation.uv_px);
+                (Cow::Owned(RelativePose::new(&self.pose, &pose)), Cow::Owned(pose))
+            }
+        }
     }
 }

@@ -71,6 +71,14 @@ impl Layout {
         start..start + self.calibration
     }
 
+    /// All columns in an order that suits an elimination: velocities and biases from the newest frame back, which are
+    /// coupled with their neighbours only, then poses and joints, then the calibration.
+    pub(crate) fn elimination_order(&self) -> Vec<usize> {
+        let velocities = (0..self.frames).rev().flat_map(|slot| self.velocity_bias(slot));
+        let poses = (0..self.frames).flat_map(|slot| self.pose(slot).start..self.joint_motion(slot).end);
+        velocities.chain(poses).chain(self.calibration()).collect()
+    }
+
     pub(crate) fn total(&self) -> usize {
         self.frames * self.frame_len() + self.calibration
     }

@@ -9,7 +9,7 @@ use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepReport};
 use crate::frontend::FeatureId;
 use crate::gimbal::{Parameterization, transport_covariance};
-use crate::optimization::dense::Cholesky;
+use crate::optimization::Cholesky;
 use crate::sensors::ImuSample;
 use crate::simulation::{
     Experiment, SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks,

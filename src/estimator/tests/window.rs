@@ -12,7 +12,7 @@ use crate::estimator::window::rows::stack;
 use crate::estimator::window::solver::{self, SolverLimits};
 use crate::gimbal::Parameterization;
 use crate::optimization::RobustLoss;
-use crate::optimization::dense::{self, Cholesky};
+use crate::optimization::{Cholesky, dense};
 
 fn quadratic() -> EstimatorOptions {
     EstimatorOptions { loss: RobustLoss::None, ..EstimatorOptions::default() }

@@ -10,7 +10,7 @@ use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::window::frames;
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::ParameterId;
-use crate::optimization::dense::Cholesky;
+use crate::optimization::Cholesky;
 use crate::sensors::ImuSample;
 
 /// Length of the motion after a stamp that frames of the window take from the samples before the next frame, in seconds.

@@ -18,7 +18,7 @@ use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::Layout;
 use crate::estimator::window::problem::{Estimate, Problem};
 use crate::geometry::seconds_from_ns;
-use crate::optimization::dense::Cholesky;
+use crate::optimization::Cholesky;
 
 /// Added to the diagonals, as in the solver: unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
@@ -40,7 +40,7 @@ impl CameraInformation {
         let poses = 6 * maps.blocks();
         let squared = |rows: &DMatrix<f64>| {
             let rows = rows.columns(0, poses);
-            rows.tr_mul(&rows)
+            rows.transpose() * rows
         };
         let with = squared(&projected.rows);
         let without = &with - squared(&projected.newest_rows);
@@ -58,17 +58,13 @@ struct Answer {
 }
 
 impl Answer {
-    /// The first `states` unknowns are those of the frames.
-    fn new(hessian: &DMatrix<f64>, states: usize, free: &[usize]) -> Option<Self> {
-        let kept: Vec<usize> = (0..states).chain(free.iter().copied()).collect();
-        let mut matrix = hessian.select_columns(&kept).select_rows(&kept);
-        for index in 0..matrix.nrows() {
-            matrix[(index, index)] += FLOOR;
-        }
-        let factor = Cholesky::new(&matrix)?;
-        let follows = factor.leading_response(free.len());
-        let mut response = DMatrix::zeros(hessian.nrows(), free.len());
-        response.rows_mut(0, states).copy_from(&follows);
+    /// Of the calibration, the columns `free` are unknown.
+    fn new(hessian: &DMatrix<f64>, layout: &Layout, free: &[usize]) -> Option<Self> {
+        let mut order = layout.elimination_order();
+        order.truncate(layout.calibration().start);
+        order.extend_from_slice(free);
+        let factor = Cholesky::ordered(hessian, order, |diagonal| diagonal + FLOOR)?;
+        let mut response = factor.leading_response(free.len(), hessian.nrows());
         for (index, column) in free.iter().enumerate() {
             response[(*column, index)] = 1.0;
         }
@@ -86,15 +82,16 @@ impl Problem<'_> {
     ) -> Option<InformationGain> {
         let layout = self.layout;
         let (interval_s, free) = self.newest_interval(estimate)?;
-        let (newest, first) = (layout.frames - 1, layout.calibration().start);
+        let newest = layout.frames - 1;
         let frames = self.linearization_frames(estimate);
         let answer = |slots: usize| {
             let (mut hessian, _) = self.other_equations(estimate, &frames, slots);
             for (camera, information) in cameras.iter().enumerate() {
                 let poses = if slots == layout.frames { &information.with } else { &information.without };
-                self.carry(camera, &information.maps, poses, &mut hessian);
+                let block = |row: usize, column: usize| poses.fixed_view::<6, 6>(6 * row, 6 * column).into_owned();
+                information.maps.add_information(&layout, &self.cameras[camera].columns, block, &mut hessian);
             }
-            Answer::new(&hessian, first, &free)
+            Answer::new(&hessian, &layout, &free)
         };
         let (with, without) = (answer(layout.frames)?, answer(newest)?);
         let covariance = &with.covariance;
@@ -133,33 +130,6 @@ impl Problem<'_> {
         let frozen = estimate.calibration.frozen_columns();
         let free: Vec<usize> = self.layout.calibration().filter(|column| !frozen.contains(&(column - first))).collect();
         (!free.is_empty() && interval_s > 0.0).then_some((interval_s, free))
-    }
-
-    /// Adds the information of a camera's poses to the unknowns (lower triangle).
-    fn carry(&self, camera: usize, maps: &CameraMaps, poses: &DMatrix<f64>, hessian: &mut DMatrix<f64>) {
-        let layout = self.layout;
-        let calibration = self.cameras[camera].columns.clone();
-        for row in 0..maps.blocks() {
-            let of_row = maps.columns(&layout, row);
-            let mut by_calibration = DMatrix::zeros(6, calibration.len());
-            for column in 0..maps.blocks() {
-                let block = poses.fixed_view::<6, 6>(6 * row, 6 * column);
-                by_calibration += block * &maps.calibration[column];
-                if column <= row {
-                    let carried = maps.own[row].tr_mul(&(block * &maps.own[column]));
-                    let of_column = maps.columns(&layout, column);
-                    let mut place = hessian.view_range_mut(of_row.clone(), of_column.clone());
-                    place += &carried;
-                    if column < row && of_column == of_row {
-                        place += carried.transpose();
-                    }
-                }
-            }
-            let mut coupling = hessian.view_range_mut(calibration.clone(), of_row);
-            coupling += by_calibration.tr_mul(&maps.own[row]);
-            let mut corner = hessian.view_range_mut(calibration.clone(), calibration.clone());
-            corner += maps.calibration[row].tr_mul(&by_calibration);
-        }
     }
 
     /// Diagonals of `P·Gm·P` (motions × free parameters).

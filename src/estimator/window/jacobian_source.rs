@@ -106,7 +106,12 @@ fn norms_of(jacobian: &DMatrix<f64>, columns: &[ColumnBlock], scales: &[f64]) ->
     let mut norms: Vec<(u16, f32)> = Vec::new();
     for (number, block) in columns.iter().enumerate() {
         let range = block.start..block.start + block.len;
-        let squared: f64 = range.map(|column| (jacobian.column(column) * scales[column]).norm_squared()).sum();
+        let squared: f64 = range
+            .map(|column| {
+                let entries = jacobian.column(column);
+                entries.iter().map(|entry| (entry * scales[column]).powi(2)).sum::<f64>()
+            })
+            .sum();
         if squared > 0.0 {
             norms.push((number as u16, squared.sqrt() as f32));
         }

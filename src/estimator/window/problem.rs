@@ -19,6 +19,9 @@ use crate::estimator::window::joints::measured_joint_motion;
 use crate::geometry::wrap_angle;
 use crate::optimization::Landmark;
 
+/// Columns of a frame's state in an IMU factor, `[φ, p, v, b_g, b_a]`.
+const STATE: usize = POSE + VELOCITY_BIAS;
+
 /// Values of all unknowns.
 #[derive(Clone, Debug)]
 pub(crate) struct Estimate {
@@ -381,40 +384,46 @@ impl Problem<'_> {
         hessian: &mut DMatrix<f64>,
         gradient: &mut DVector<f64>,
     ) {
-        let pose_blocks = [
-            (self.layout.pose(slot - 1).start, by_from.fixed_columns::<POSE>(0).into_owned()),
-            (self.layout.pose(slot).start, by_to.fixed_columns::<POSE>(0).into_owned()),
-        ];
-        let velocity_bias_blocks = [
-            (self.layout.velocity_bias(slot - 1).start, by_from.fixed_columns::<VELOCITY_BIAS>(POSE).into_owned()),
-            (self.layout.velocity_bias(slot).start, by_to.fixed_columns::<VELOCITY_BIAS>(POSE).into_owned()),
-        ];
-        for (row, left) in &pose_blocks {
-            add_vector(gradient, *row, &left.tr_mul(residual));
-            for (column, right) in &pose_blocks {
-                add_block(hessian, *row, *column, &left.tr_mul(right));
-            }
-            for (column, right) in &velocity_bias_blocks {
-                let block: SMatrix<f64, POSE, VELOCITY_BIAS> = left.tr_mul(right);
-                add_block(hessian, *row, *column, &block);
-                add_block(hessian, *column, *row, &block.transpose());
+        // One row of all columns after the other, so that the sums run along the columns.
+        let mut rows = SMatrix::<f64, { 2 * STATE }, STATE>::zeros();
+        rows.fixed_rows_mut::<STATE>(0).copy_from(&by_from.transpose());
+        rows.fixed_rows_mut::<STATE>(STATE).copy_from(&by_to.transpose());
+        let mut sums = SMatrix::<f64, { 2 * STATE }, { 2 * STATE }>::zeros();
+        for row in &rows.data.0 {
+            for (column, sum) in sums.data.0.iter_mut().enumerate() {
+                for index in column..2 * STATE {
+                    sum[index] += row[index] * row[column];
+                }
             }
         }
-        for (row, left) in &velocity_bias_blocks {
-            add_vector(gradient, *row, &left.tr_mul(residual));
-            for (column, right) in &velocity_bias_blocks {
-                add_block(hessian, *row, *column, &left.tr_mul(right));
+        let places = [
+            (0, self.layout.pose(slot - 1)),
+            (POSE, self.layout.velocity_bias(slot - 1)),
+            (STATE, self.layout.pose(slot)),
+            (STATE + POSE, self.layout.velocity_bias(slot)),
+        ];
+        let by_columns = rows * residual;
+        for (index, (begin, place)) in places.iter().enumerate() {
+            let mut part = gradient.rows_range_mut(place.clone());
+            part += by_columns.rows(*begin, place.len());
+            for (column, target) in place.clone().enumerate() {
+                for (later, rows) in &places[index..] {
+                    let skipped = if later == begin { column } else { 0 };
+                    for (row, of_row) in rows.clone().enumerate().skip(skipped) {
+                        hessian[(of_row, target)] += sums[(later + row, begin + column)];
+                    }
+                }
             }
         }
         let Some(by_intrinsics) = by_intrinsics else { return };
         let row = intrinsics.start;
         add_vector(gradient, row, &by_intrinsics.tr_mul(residual));
         add_block(hessian, row, row, &by_intrinsics.tr_mul(by_intrinsics));
-        for (column, right) in &pose_blocks {
-            add_block(hessian, row, *column, &by_intrinsics.tr_mul(right));
-        }
-        for (column, right) in &velocity_bias_blocks {
-            add_block(hessian, row, *column, &by_intrinsics.tr_mul(right));
+        for (begin, place) in &places {
+            let by_place = if *begin < STATE { by_from } else { by_to };
+            let block = by_intrinsics.tr_mul(&by_place.columns(begin % STATE, place.len()));
+            let mut target = hessian.view_range_mut(intrinsics.clone(), place.clone());
+            target += block;
         }
     }
 
@@ -487,34 +496,12 @@ impl CameraEquations {
         hessian: &mut DMatrix<f64>,
         gradient: &mut DVector<f64>,
     ) {
-        let calibration = self.columns.clone();
-        let blocks = self.maps.blocks();
-        for row in 0..blocks {
-            let of_row = self.maps.columns(layout, row);
-            let mut by_cameras: DMatrix<f64> = DMatrix::zeros(6, calibration.len());
-            for column in 0..blocks {
-                let block = visual.poses.hessian.symmetric_block(row, column);
-                by_cameras += block * &self.maps.calibration[column];
-                if column <= row {
-                    // Lower triangle: the frame of `row` below the frame of `column`. Two blocks of one frame make a block
-                    // on the diagonal, with its transpose.
-                    let carried = self.maps.own[row].tr_mul(&(block * &self.maps.own[column]));
-                    let of_column = self.maps.columns(layout, column);
-                    let mut place = hessian.view_range_mut(of_row.clone(), of_column.clone());
-                    place += &carried;
-                    if column < row && of_column == of_row {
-                        place += carried.transpose();
-                    }
-                }
-            }
-            let mut coupling = hessian.view_range_mut(calibration.clone(), of_row.clone());
-            coupling += by_cameras.tr_mul(&self.maps.own[row]);
-            let mut corner = hessian.view_range_mut(calibration.clone(), calibration.clone());
-            corner += self.maps.calibration[row].tr_mul(&by_cameras);
-            let camera_gradient = &visual.poses.gradient[row];
-            let mut part = gradient.rows_range_mut(of_row);
+        let block = |row: usize, column: usize| visual.poses.hessian.symmetric_block(row, column);
+        self.maps.add_information(layout, &self.columns, block, hessian);
+        for (row, camera_gradient) in visual.poses.gradient.iter().enumerate() {
+            let mut part = gradient.rows_range_mut(self.maps.columns(layout, row));
             part += self.maps.own[row].tr_mul(camera_gradient);
-            let mut part = gradient.rows_range_mut(calibration.clone());
+            let mut part = gradient.rows_range_mut(self.columns.clone());
             part += self.maps.calibration[row].tr_mul(camera_gradient);
         }
     }

@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DVector, Matrix6};
 
 use super::problem::{Costs, Estimate, NormalEquations, Problem};
 use crate::estimator::IterationReport;
+use crate::optimization::Cholesky;
 use crate::optimization::damped::{DampedOptions, DampedProblem, Iteration, minimize};
-use crate::optimization::dense::Cholesky;
 
 /// Limits of a solve.
 #[derive(Clone, Copy, Debug)]
@@ -45,13 +45,7 @@ const FLOOR: f64 = 1e-6;
 pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits) -> Solution {
     let first = problem.layout.calibration().start;
     let fixed = start.calibration.frozen_columns().into_iter().map(|column| first + column).collect();
-    let mut window = DampedWindow {
-        problem,
-        fixed,
-        step_norms: Vec::new(),
-        calibration_covariance: DMatrix::zeros(0, 0),
-        hessian: DMatrix::zeros(0, 0),
-    };
+    let mut window = DampedWindow { problem, fixed, step_norms: Vec::new(), solved: None };
     let start = window.evaluated(start);
     let costs_before = start.costs;
     let options = DampedOptions {
@@ -73,7 +67,7 @@ pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits
     Solution {
         iterations: solution.iterations.iter().zip(&window.step_norms).map(report).collect(),
         newest_pose_covariance: window.newest_pose_covariance(),
-        calibration_covariance: window.calibration_covariance,
+        calibration_covariance: window.calibration_covariance(),
         costs_before,
         costs_after: solution.estimate.costs,
         estimate: solution.estimate.estimate,
@@ -87,10 +81,15 @@ struct DampedWindow<'a> {
     fixed: Vec<usize>,
     /// Norm of each solved step.
     step_norms: Vec<f64>,
-    /// Posterior covariance of the calibration at the last solved step.
-    calibration_covariance: DMatrix<f64>,
-    /// Information of the last solved step without damping, landmarks marginalized.
+    solved: Option<SolvedStep>,
+}
+
+/// Equations of the last solved step, landmarks marginalized.
+struct SolvedStep {
+    /// Information without damping.
     hessian: DMatrix<f64>,
+    /// Factor of the damped information.
+    factor: Cholesky,
 }
 
 /// An estimate and its costs.
@@ -104,10 +103,12 @@ impl DampedWindow<'_> {
         Evaluated { costs: self.problem.costs(&estimate), estimate }
     }
 
-    /// Posterior covariance of the calibration, other unknowns marginalized; zero for fixed parameters.
-    fn covariance(&self, factor: &Cholesky) -> DMatrix<f64> {
+    /// Posterior covariance of the calibration at the last solved step, other unknowns marginalized; zero for fixed
+    /// parameters, empty without a solved step.
+    fn calibration_covariance(&self) -> DMatrix<f64> {
         let layout = &self.problem.layout;
-        let mut covariance = factor.trailing_covariance(layout.calibration);
+        let Some(solved) = &self.solved else { return DMatrix::zeros(0, 0) };
+        let mut covariance = solved.factor.trailing_covariance(layout.calibration);
         for column in &self.fixed {
             let column = column - layout.calibration().start;
             covariance.row_mut(column).fill(0.0);
@@ -116,13 +117,15 @@ impl DampedWindow<'_> {
         covariance
     }
 
+    fn factor(&self, hessian: &DMatrix<f64>, damping: f64) -> Option<Cholesky> {
+        let raised = |diagonal: f64| diagonal + (damping * diagonal + FLOOR);
+        Cholesky::ordered(hessian, self.problem.layout.elimination_order(), raised)
+    }
+
     /// Posterior covariance of the newest pose without damping, which would act as information about position and yaw.
     fn newest_pose_covariance(&self) -> Option<Matrix6<f64>> {
         let newest = self.problem.layout.pose(self.problem.layout.frames.checked_sub(1)?);
-        if self.hessian.nrows() < newest.end {
-            return None;
-        }
-        let covariance = Cholesky::new(&damped(&self.hessian, 0.0))?.covariance_of(newest);
+        let covariance = self.factor(&self.solved.as_ref()?.hessian, 0.0)?.covariance_of(newest);
         covariance.iter().all(|entry| entry.is_finite()).then(|| Matrix6::from_column_slice(covariance.as_slice()))
     }
 }
@@ -144,12 +147,11 @@ impl DampedProblem for DampedWindow<'_> {
         let reduced = equations.eliminate(damping);
         let (mut hessian, mut gradient) = equations.reduced(layout, &reduced);
         fix(&self.fixed, &mut hessian, &mut gradient);
-        let factor = Cholesky::new(&damped(&hessian, damping))?;
+        let factor = self.factor(&hessian, damping)?;
         let step = -factor.solve(&gradient);
         let landmarks = equations.landmark_steps(layout, &reduced, &step);
         self.step_norms.push(step.norm());
-        self.calibration_covariance = self.covariance(&factor);
-        self.hessian = hessian;
+        self.solved = Some(SolvedStep { hessian, factor });
         Some(self.evaluated(self.problem.stepped(&evaluated.estimate, &step, &landmarks)))
     }
 }
@@ -162,12 +164,4 @@ fn fix(fixed: &[usize], hessian: &mut DMatrix<f64>, gradient: &mut DVector<f64>)
         hessian[(*column, *column)] = 1.0;
         gradient[*column] = 0.0;
     }
-}
-
-fn damped(hessian: &DMatrix<f64>, damping: f64) -> DMatrix<f64> {
-    let mut damped = hessian.clone();
-    for k in 0..damped.nrows() {
-        damped[(k, k)] += damping * hessian[(k, k)] + FLOOR;
-    }
-    damped
 }

@@ -1,0 +1,267 @@
+//! Cholesky factorization of a symmetric matrix that leaves out zeros.
+
+#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+
+use nalgebra::{DMatrix, DVector};
+use pulp::{Arch, NullaryFnOnce};
+
+/// Columns that are eliminated together.
+const PANEL: usize = 8;
+
+/// A lower Cholesky factor `L` of a matrix whose unknowns are eliminated in a given order.
+///
+/// Rows that are zero in all columns of a panel are left out of its elimination: an order that begins with unknowns that
+/// are coupled with few others is cheaper.
+#[derive(Clone, Debug)]
+pub(crate) struct Cholesky {
+    /// Index in the matrix of each unknown.
+    order: Vec<usize>,
+    /// Column-major, n × n.
+    lower: Vec<f64>,
+}
+
+impl Cholesky {
+    /// Factors a symmetric matrix of which the lower triangle is read; `None` when it is not positive definite.
+    pub(crate) fn new(matrix: &DMatrix<f64>) -> Option<Self> {
+        Self::ordered(matrix, (0..matrix.nrows()).collect(), |diagonal| diagonal)
+    }
+
+    /// [`Self::new`] of the unknowns in `order` alone, eliminated in that order, with another diagonal.
+    pub(crate) fn ordered(matrix: &DMatrix<f64>, order: Vec<usize>, diagonal: impl Fn(f64) -> f64) -> Option<Self> {
+        let count = order.len();
+        let mut lower = vec![0.0; count * count];
+        for (column, of_column) in order.iter().enumerate() {
+            let target = &mut lower[column * count..(column + 1) * count];
+            for (entry, of_row) in target.iter_mut().zip(&order).skip(column) {
+                *entry = matrix[((*of_row).max(*of_column), (*of_row).min(*of_column))];
+            }
+            target[column] = diagonal(target[column]);
+        }
+        Arch::new().dispatch(Factorization { lower: &mut lower, count }).then_some(Self { order, lower })
+    }
+
+    fn count(&self) -> usize {
+        self.order.len()
+    }
+
+    /// A column of `L` from the diagonal on.
+    fn column(&self, column: usize) -> &[f64] {
+        &self.lower[column * self.count() + column..(column + 1) * self.count()]
+    }
+
+    /// Solves `A x = b`.
+    pub(crate) fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
+        let mut solution: Vec<f64> = self.order.iter().map(|index| right[*index]).collect();
+        self.solve_lower(0, &mut solution);
+        self.solve_upper(self.count(), &mut solution);
+        let mut ordered = right.clone();
+        for (index, value) in self.order.iter().zip(solution) {
+            ordered[*index] = value;
+        }
+        ordered
+    }
+
+    /// Solves `L₂₂ y = b` of the unknowns from `first` on in the order of elimination, in place.
+    fn solve_lower(&self, first: usize, right: &mut [f64]) {
+        for column in 0..right.len() {
+            let (pivot, below) = self.column(first + column).split_first().expect("a column has its diagonal");
+            let (value, rest) = right[column..].split_first_mut().expect("the column is one of them");
+            *value /= pivot;
+            if *value != 0.0 {
+                for (entry, factor) in rest.iter_mut().zip(below) {
+                    *entry -= factor * *value;
+                }
+            }
+        }
+    }
+
+    /// Solves `L₁₁ᵀ x = b` of the first `count` unknowns in the order of elimination, in place.
+    fn solve_upper(&self, count: usize, right: &mut [f64]) {
+        for column in (0..count).rev() {
+            let (pivot, below) = self.column(column).split_first().expect("a column has its diagonal");
+            let (value, rest) = right[column..count].split_first_mut().expect("the column is one of them");
+            *value = (*value - dot(below, rest)) / pivot;
+        }
+    }
+
+    /// Response of the other unknowns to the last `count` ones, `−A₁₁⁻¹ A₁₂`: rows as in the matrix, of which those of the
+    /// last ones and of the unknowns that are not in the order are zero.
+    pub(crate) fn leading_response(&self, count: usize, rows: usize) -> DMatrix<f64> {
+        let first = self.count() - count;
+        let mut response = DMatrix::zeros(rows, count);
+        let mut solution = vec![0.0; first];
+        for (column, mut target) in response.column_iter_mut().enumerate() {
+            for (row, value) in solution.iter_mut().enumerate() {
+                *value = -self.lower[row * self.count() + first + column];
+            }
+            self.solve_upper(first, &mut solution);
+            for (index, value) in self.order.iter().zip(&solution) {
+                target[*index] = *value;
+            }
+        }
+        response
+    }
+
+    /// Covariance of some unknowns: their block of `(L Lᵀ)⁻¹`, the others marginalized.
+    pub(crate) fn covariance_of(&self, unknowns: impl Iterator<Item = usize>) -> DMatrix<f64> {
+        let place = |unknown: usize| self.order.iter().position(|index| *index == unknown);
+        let places: Vec<usize> = unknowns.filter_map(place).collect();
+        // L is zero above the diagonal, so that the solution begins at the first of these unknowns.
+        let first = places.iter().min().copied().unwrap_or(0);
+        let mut inverse = DMatrix::zeros(self.count() - first, places.len());
+        for (mut column, place) in inverse.column_iter_mut().zip(&places) {
+            column[place - first] = 1.0;
+            self.solve_lower(first, column.as_mut_slice());
+        }
+        inverse.tr_mul(&inverse)
+    }
+
+    /// Covariance of the last `count` unknowns: `(L₂₂ L₂₂ᵀ)⁻¹`, the others marginalized.
+    pub(crate) fn trailing_covariance(&self, count: usize) -> DMatrix<f64> {
+        self.covariance_of(self.order[self.count() - count..].iter().copied())
+    }
+}
+
+/// Product of two vectors, the longer one cut off.
+fn dot(left: &[f64], right: &[f64]) -> f64 {
+    const SUMS: usize = 8;
+    let count = left.len().min(right.len());
+    let (left, right) = (&left[..count], &right[..count]);
+    let mut sums = [0.0; SUMS];
+    let (left_parts, right_parts) = (left.chunks_exact(SUMS), right.chunks_exact(SUMS));
+    let (left_rest, right_rest) = (left_parts.remainder(), right_parts.remainder());
+    for (a, b) in left_parts.zip(right_parts) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    let rest: f64 = left_rest.iter().zip(right_rest).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
+}
+
+/// The factorization in place, compiled for every width of vector registers; `false` when a pivot is not positive.
+struct Factorization<'a> {
+    lower: &'a mut [f64],
+    count: usize,
+}
+
+impl NullaryFnOnce for Factorization<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn call(self) -> bool {
+        let Self { lower, count } = self;
+        let mut panel = Vec::new();
+        // Consecutive rows with entries in the panel: the first one, and the one behind the last one.
+        let mut runs: Vec<(usize, usize)> = Vec::new();
+        let mut begin = 0;
+        while begin < count {
+            let width = PANEL.min(count - begin);
+            runs.clear();
+            runs.push((begin, begin + width));
+            for row in begin + width..count {
+                let mut is_zero = true;
+                for column in begin..begin + width {
+                    is_zero &= lower[column * count + row] == 0.0;
+                }
+                if is_zero {
+                    continue;
+                }
+                match runs.last_mut() {
+                    Some((_, end)) if *end == row => *end += 1,
+                    _ => runs.push((row, row + 1)),
+                }
+            }
+            let mut height = 0;
+            for (first, end) in &runs {
+                height += end - first;
+            }
+            panel.clear();
+            panel.resize(PANEL * height, 0.0);
+            for column in 0..width {
+                let mut place = column * height;
+                for (first, end) in &runs {
+                    let source = &lower[(begin + column) * count..][*first..*end];
+                    panel[place..place + source.len()].copy_from_slice(source);
+                    place += source.len();
+                }
+            }
+            if !factor_panel(&mut panel, height, width) {
+                return false;
+            }
+            for column in 0..width {
+                let mut place = column * height;
+                for (first, end) in &runs {
+                    let target = &mut lower[(begin + column) * count..][*first..*end];
+                    target.copy_from_slice(&panel[place..place + target.len()]);
+                    place += target.len();
+                }
+            }
+            // The rows behind the panel, minus its products.
+            let mut place = width;
+            for (index, (first, end)) in runs.iter().enumerate() {
+                for column in (begin + width).max(*first)..*end {
+                    let mut factors = [0.0; PANEL];
+                    for k in 0..PANEL {
+                        factors[k] = panel[k * height + place];
+                    }
+                    let mut source = place;
+                    let mut row = column;
+                    for (later_first, later_end) in &runs[index..] {
+                        row = row.max(*later_first);
+                        let target = &mut lower[column * count + row..column * count + later_end];
+                        subtract(target, &panel, height, source, &factors);
+                        source += target.len();
+                    }
+                    place += 1;
+                }
+            }
+            begin += width;
+        }
+        true
+    }
+}
+
+/// Factors the columns of a panel, of which the first rows are those of the diagonal.
+#[inline(always)]
+fn factor_panel(panel: &mut [f64], height: usize, width: usize) -> bool {
+    for column in 0..width {
+        let (own, later) = panel[column * height..].split_at_mut(height);
+        let pivot = own[column];
+        // A pivot that is not a number is not positive either.
+        if !(pivot > 0.0 && pivot.is_finite()) {
+            return false;
+        }
+        let root = pivot.sqrt();
+        let inverse = root.recip();
+        own[column] = root;
+        for entry in &mut own[column + 1..] {
+            *entry *= inverse;
+        }
+        for (offset, target) in later.chunks_exact_mut(height).take(width - column - 1).enumerate() {
+            let row = column + 1 + offset;
+            let factor = own[row];
+            for (entry, source) in target[row..].iter_mut().zip(&own[row..]) {
+                *entry -= factor * source;
+            }
+        }
+    }
+    true
+}
+
+/// Takes the products of a panel's rows from `source` on with the factors off some rows of a column.
+#[inline(always)]
+fn subtract(target: &mut [f64], panel: &[f64], height: usize, source: usize, factors: &[f64; PANEL]) {
+    let count = target.len();
+    let mut columns: [&[f64]; PANEL] = [&[]; PANEL];
+    for k in 0..PANEL {
+        columns[k] = &panel[k * height + source..][..count];
+    }
+    for row in 0..count {
+        let first = columns[0][row] * factors[0] + columns[1][row] * factors[1];
+        let second = columns[2][row] * factors[2] + columns[3][row] * factors[3];
+        let third = columns[4][row] * factors[4] + columns[5][row] * factors[5];
+        let fourth = columns[6][row] * factors[6] + columns[7][row] * factors[7];
+        target[row] -= (first + second) + (third + fourth);
+    }
+}
