@@ -3,6 +3,7 @@ use nalgebra::{Matrix3x2, Vector3};
 /// An orthonormal basis of the plane tangent to the unit sphere at a unit vector, one basis vector a column (3 × 2).
 ///
 /// With `direction` as third column the two form a right-handed frame: `first × second = direction`.
+#[inline]
 pub fn tangent_basis(direction: &Vector3<f64>) -> Matrix3x2<f64> {
     // The helper axis must not be parallel to the direction.
     let helper = if direction.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };

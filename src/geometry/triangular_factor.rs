@@ -127,7 +127,7 @@ impl TriangularFactor {
         let mut reflection = Reflection { tau: 0.0, top: f64::from(u8::from(merges)), taken: None };
         let mut beta = alpha;
         if square > 0.0 {
-            beta = -alpha.hypot(square.sqrt()).copysign(alpha);
+            beta = -(alpha * alpha + square).sqrt().copysign(alpha);
             reflection.tau = (beta - alpha) / beta;
             let scale = (alpha - beta).recip();
             for entry in &mut *vector {
@@ -175,15 +175,20 @@ impl TriangularFactor {
     /// Adds the rows of a matrix; column `k` of the factor is column `order[k]` of the matrix.
     pub(crate) fn merge_rows(&mut self, matrix: &DMatrix<f64>, order: &[usize]) {
         let mut begins = vec![order.len(); matrix.nrows()];
+        // Rows that have not begun yet, and those that have.
+        let mut open: Vec<usize> = (0..matrix.nrows()).collect();
+        let mut rows = Vec::with_capacity(open.len());
         for (place, column) in order.iter().enumerate() {
-            for (begin, entry) in begins.iter_mut().zip(&matrix.column(*column)) {
-                if *entry != 0.0 {
-                    *begin = place.min(*begin);
+            let entries = matrix.column(*column);
+            open.retain(|row| {
+                let begins_here = entries[*row] != 0.0;
+                if begins_here {
+                    begins[*row] = place;
+                    rows.push(*row);
                 }
-            }
+                !begins_here
+            });
         }
-        let mut rows: Vec<usize> = (0..matrix.nrows()).filter(|row| begins[*row] < order.len()).collect();
-        rows.sort_by_key(|row| begins[*row]);
         let mut rest = rows.as_slice();
         while let Some(row) = rest.first() {
             let first = begins[*row];

@@ -5,8 +5,8 @@
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, NullaryFnOnce};
 
-/// Columns that are eliminated together.
-const PANEL: usize = 8;
+/// Columns that are eliminated together: those of the velocity and the biases of a frame.
+const PANEL: usize = 9;
 
 /// A lower Cholesky factor `L` of a matrix whose unknowns are eliminated in a given order.
 ///
@@ -29,13 +29,28 @@ impl Cholesky {
     /// [`Self::new`] of the unknowns in `order` alone, eliminated in that order, with another diagonal.
     pub(crate) fn ordered(matrix: &DMatrix<f64>, order: Vec<usize>, diagonal: impl Fn(f64) -> f64) -> Option<Self> {
         let count = order.len();
+        let mut places = vec![None; matrix.nrows()];
+        for (place, index) in order.iter().enumerate() {
+            places[*index] = Some(place);
+        }
         let mut lower = vec![0.0; count * count];
-        for (column, of_column) in order.iter().enumerate() {
-            let target = &mut lower[column * count..(column + 1) * count];
-            for (entry, of_row) in target.iter_mut().zip(&order).skip(column) {
-                *entry = matrix[((*of_row).max(*of_column), (*of_row).min(*of_column))];
+        for (column, of_column) in places.iter().enumerate() {
+            let Some(of_column) = *of_column else { continue };
+            let below = &matrix.column(column).data.into_slice()[column..];
+            for (entries, places) in below.chunks(PANEL).zip(places[column..].chunks(PANEL)) {
+                if entries.iter().all(|entry| *entry == 0.0) {
+                    continue;
+                }
+                for (entry, of_row) in entries.iter().zip(places) {
+                    if let Some(of_row) = *of_row {
+                        lower[of_row.min(of_column) * count + of_row.max(of_column)] = *entry;
+                    }
+                }
             }
-            target[column] = diagonal(target[column]);
+        }
+        for place in 0..count {
+            let entry = &mut lower[place * count + place];
+            *entry = diagonal(*entry);
         }
         Arch::new().dispatch(Factorization { lower: &mut lower, count }).then_some(Self { order, lower })
     }
@@ -152,6 +167,8 @@ impl NullaryFnOnce for Factorization<'_> {
     fn call(self) -> bool {
         let Self { lower, count } = self;
         let mut panel = Vec::new();
+        // Sums of the absolute entries of each row in the panel.
+        let mut sizes = Vec::new();
         // Consecutive rows with entries in the panel: the first one, and the one behind the last one.
         let mut runs: Vec<(usize, usize)> = Vec::new();
         let mut begin = 0;
@@ -159,14 +176,19 @@ impl NullaryFnOnce for Factorization<'_> {
             let width = PANEL.min(count - begin);
             runs.clear();
             runs.push((begin, begin + width));
-            for row in begin + width..count {
-                let mut is_zero = true;
-                for column in begin..begin + width {
-                    is_zero &= lower[column * count + row] == 0.0;
+            sizes.clear();
+            sizes.resize(count - begin - width, 0.0);
+            for column in begin..begin + width {
+                let below = &lower[column * count + begin + width..(column + 1) * count];
+                for (size, entry) in sizes.iter_mut().zip(below) {
+                    *size += entry.abs();
                 }
-                if is_zero {
+            }
+            for (offset, size) in sizes.iter().enumerate() {
+                if *size == 0.0 {
                     continue;
                 }
+                let row = begin + width + offset;
                 match runs.last_mut() {
                     Some((_, end)) if *end == row => *end += 1,
                     _ => runs.push((row, row + 1)),
@@ -262,6 +284,6 @@ fn subtract(target: &mut [f64], panel: &[f64], height: usize, source: usize, fac
         let second = columns[2][row] * factors[2] + columns[3][row] * factors[3];
         let third = columns[4][row] * factors[4] + columns[5][row] * factors[5];
         let fourth = columns[6][row] * factors[6] + columns[7][row] * factors[7];
-        target[row] -= (first + second) + (third + fourth);
+        target[row] -= (first + second) + (third + fourth) + columns[8][row] * factors[8];
     }
 }

@@ -26,5 +26,6 @@ pub use landmark::LandmarkModel;
 pub(crate) use landmark_rows::LandmarkRows;
 pub(crate) use pose_blocks::PoseBlocks;
 pub(crate) use reprojection::{CameraPose, RelativePose, RelativePoses, Reprojection};
+pub(crate) use robust_loss::LossSum;
 pub use robust_loss::RobustLoss;
 pub(crate) use schur::{DensePoseEquations, ReducedEquations, ReprojectionEquations, SparsePoseEquations};

@@ -15,11 +15,11 @@
 //! Extrinsics, joint angles and time offsets change a residual only through the poses of the two cameras, parameters of
 //! the camera model only through `π`: [`linearize`] is the one place where a new sensor model adds its derivative.
 
-use nalgebra::{Matrix2, Matrix2x3, Matrix2x6, Matrix3, Vector2, Vector3};
+use nalgebra::{ArrayStorage, Matrix2, Matrix2x3, Matrix2x6, Matrix3, Vector2, Vector3};
 
 use super::{Landmark, RobustLoss};
 use crate::camera::CameraModel;
-use crate::geometry::{RigidTransform, so3, tangent_basis};
+use crate::geometry::{RigidTransform, tangent_basis};
 
 /// Pose of a camera in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,6 +164,7 @@ impl Reprojection {
     }
 
     /// [`Self::whitened`] with a given robust weight.
+    #[inline]
     pub(crate) fn weighted(&self, sigma: f64, weight: f64) -> Self {
         let scale = weight.sqrt() / sigma;
         Self {
@@ -190,6 +191,7 @@ pub(crate) fn residual(
 ///
 /// `relative` holds the current poses; `linearized` the ones at which the derivatives by the poses are taken (first
 /// estimates): the derivative of the projection and the landmark stay at the current estimate, as in Basalt.
+#[inline]
 pub(crate) fn linearize(
     projection: &impl Projection,
     relative: &RelativePose,
@@ -200,24 +202,29 @@ pub(crate) fn linearize(
     let direction = relative.direction(landmark);
     let (predicted, by_direction) = projection.project_with_jacobian(&direction)?;
     let by_shift = by_direction * linearized.observer_from_world * landmark.inverse_distance;
-    let by_anchor_rotation = by_direction * linearized.rotation * so3::hat(&landmark.bearing) * -1.0;
-    let by_observer_rotation = by_direction * so3::hat(&linearized.direction(landmark));
-
-    let mut by_anchor = Matrix2x6::zeros();
-    by_anchor.fixed_view_mut::<2, 3>(0, 0).copy_from(&by_anchor_rotation);
-    by_anchor.fixed_view_mut::<2, 3>(0, 3).copy_from(&by_shift);
-    let mut by_observer = Matrix2x6::zeros();
-    by_observer.fixed_view_mut::<2, 3>(0, 0).copy_from(&by_observer_rotation);
-    by_observer.fixed_view_mut::<2, 3>(0, 3).copy_from(&-by_shift);
+    let by_anchor_rotation = times_hat(&(by_direction * linearized.rotation), &-landmark.bearing);
+    let by_observer_rotation = times_hat(&by_direction, &linearized.direction(landmark));
     Some(Reprojection {
         residual: predicted - measured,
-        by_anchor,
-        by_observer,
+        by_anchor: beside(&by_anchor_rotation, &by_shift),
+        by_observer: beside(&by_observer_rotation, &-by_shift),
         by_landmark: landmark_columns(
             &(by_direction * relative.rotation * tangent_basis(&landmark.bearing)),
             &(by_direction * relative.translation_m),
         ),
     })
+}
+
+/// `rows · [v]×` (2 × 3).
+fn times_hat(rows: &Matrix2x3<f64>, v: &Vector3<f64>) -> Matrix2x3<f64> {
+    let [a, b, c] = [rows.column(0), rows.column(1), rows.column(2)];
+    Matrix2x3::from_columns(&[b * v.z - c * v.y, c * v.x - a * v.z, a * v.y - b * v.x])
+}
+
+/// The columns of one matrix before those of another (2 × 6).
+fn beside(left: &Matrix2x3<f64>, right: &Matrix2x3<f64>) -> Matrix2x6<f64> {
+    let ([a, b, c], [d, e, f]) = (left.data.0, right.data.0);
+    Matrix2x6::from_array_storage(ArrayStorage([a, b, c, d, e, f]))
 }
 
 /// The anchor's own observation of its landmark: only the bearing changes it.

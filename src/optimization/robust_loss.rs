@@ -41,3 +41,47 @@ impl RobustLoss {
         self.cost_and_weight(squared).0
     }
 }
+
+/// Sum of [`RobustLoss::cost_of`] over residuals with one standard deviation.
+///
+/// The logarithms of Cauchy's loss are taken of products, of many residuals at once.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LossSum {
+    loss: RobustLoss,
+    sigma: f64,
+    sum: f64,
+    /// Product of `1 + s/c²`, whose logarithm is not in the sum yet.
+    product: f64,
+}
+
+/// A larger product goes into the sum.
+const MAX_PRODUCT: f64 = 1e150;
+
+impl LossSum {
+    /// The sum over no residuals.
+    pub(crate) fn new(loss: RobustLoss, sigma: f64) -> Self {
+        Self { loss, sigma, sum: 0.0, product: 1.0 }
+    }
+
+    /// Adds a residual.
+    pub(crate) fn add(&mut self, residual: Option<Vector2<f64>>) {
+        let RobustLoss::Cauchy(scale) = self.loss else {
+            self.sum += self.loss.cost_of(residual, self.sigma);
+            return;
+        };
+        let squared = residual.map_or(UNSEEN_SQUARED, |residual| residual.norm_squared() / (self.sigma * self.sigma));
+        self.product *= 1.0 + squared / (scale * scale);
+        if self.product > MAX_PRODUCT {
+            *self = Self { sum: self.get(), product: 1.0, ..*self };
+        }
+    }
+
+    /// The sum.
+    pub(crate) fn get(&self) -> f64 {
+        let of_product = match self.loss {
+            RobustLoss::Cauchy(scale) => scale * scale * self.product.ln(),
+            RobustLoss::None | RobustLoss::Huber(_) => 0.0,
+        };
+        self.sum + of_product
+    }
+}

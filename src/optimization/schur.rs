@@ -209,9 +209,8 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         let architecture = Arch::new();
         for block in &self.landmarks {
             let inverse = damped_inverse(&block.hessian, damping);
-            weighted.clear();
-            weighted.extend(block.couplings.iter().map(|(_, coupling)| coupling * inverse));
-            architecture.dispatch(Elimination { poses: &mut reduced.poses, block, weighted: &weighted });
+            let poses = &mut reduced.poses;
+            architecture.dispatch(Elimination { poses, block, inverse: &inverse, weighted: &mut weighted });
             reduced.inverses.push(inverse);
         }
         reduced
@@ -241,8 +240,10 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
 struct Elimination<'a, P: PoseEquations> {
     poses: &'a mut P,
     block: &'a LandmarkBlock<P::Pose>,
-    /// Couplings times the inverse of the landmark's block.
-    weighted: &'a [Matrix6x3<f64>],
+    /// Inverse of the landmark's block.
+    inverse: &'a Matrix3<f64>,
+    /// Couplings times that inverse.
+    weighted: &'a mut Vec<Matrix6x3<f64>>,
 }
 
 impl<P: PoseEquations> NullaryFnOnce for Elimination<'_, P> {
@@ -250,7 +251,19 @@ impl<P: PoseEquations> NullaryFnOnce for Elimination<'_, P> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { poses, block, weighted } = self;
+        let Self { poses, block, inverse, weighted } = self;
+        weighted.clear();
+        for (_, coupling) in &block.couplings {
+            let [a, b, c] = &coupling.data.0;
+            let mut product = [[0.0; 6]; 3];
+            for (column, target) in product.iter_mut().enumerate() {
+                let [x, y, z] = inverse.data.0[column];
+                for row in 0..6 {
+                    target[row] = a[row] * x + b[row] * y + c[row] * z;
+                }
+            }
+            weighted.push(Matrix6x3::from_array_storage(ArrayStorage(product)));
+        }
         for (first, (row, _)) in block.couplings.iter().enumerate() {
             *poses.gradient_mut(*row) -= weighted[first] * block.gradient;
             for (column, coupling) in &block.couplings[first..] {

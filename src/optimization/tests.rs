@@ -3,7 +3,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3, Vector6};
 use super::damped::{DampedOptions, DampedProblem, StopReason, minimize};
 use super::reprojection::{self, Projection, TangentPlane};
 use super::{
-    BlockTerm, CameraPose, DensePoseEquations, Landmark, LandmarkRows, RelativePose, Reprojection,
+    BlockTerm, CameraPose, DensePoseEquations, Landmark, LandmarkRows, LossSum, RelativePose, Reprojection,
     ReprojectionEquations, RobustLoss,
 };
 use crate::camera::{self, CameraModel, Distortion};
@@ -112,6 +112,11 @@ fn loss_weights_are_the_slopes_of_the_cost() {
             assert!((slope - loss.cost_and_weight(squared).1).abs() < 1e-7, "{loss:?} at {squared}");
         }
         assert_eq!(loss.cost_of(None, 0.3), loss.cost_and_weight(1e4).0);
+        let residuals = (0..500).map(|index| (index % 7 > 0).then(|| Vector2::new(0.01 * f64::from(index), 0.3)));
+        let mut sum = LossSum::new(loss, 0.3);
+        residuals.clone().for_each(|residual| sum.add(residual));
+        let expected: f64 = residuals.map(|residual| loss.cost_of(residual, 0.3)).sum();
+        assert!((sum.get() - expected).abs() < 1e-12 * expected, "{loss:?}: {} for {expected}", sum.get());
     }
 }
 

@@ -150,8 +150,9 @@ impl Prior {
         let indices: Vec<usize> = self.columns.iter().map(|column| column.index(layout)).collect();
         for (column, global_column) in indices.iter().enumerate() {
             gradient[*global_column] += local[column];
-            for (row, global_row) in indices.iter().enumerate() {
-                hessian[(*global_row, *global_column)] += self.hessian[(row, column)];
+            let mut target = hessian.column_mut(*global_column);
+            for (entry, global_row) in self.hessian.column(column).iter().zip(&indices) {
+                target[*global_row] += entry;
             }
         }
     }

@@ -6,8 +6,8 @@ use crate::camera::CameraModel;
 use crate::estimator::options::EstimatorOptions;
 use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS, RelativeTo};
 use crate::optimization::{
-    BlockTerm, DensePoseEquations, Landmark, LandmarkModel, ReducedEquations, ReprojectionEquations, RobustLoss,
-    reprojection,
+    BlockTerm, DensePoseEquations, Landmark, LandmarkModel, LossSum, ReducedEquations, ReprojectionEquations,
+    RobustLoss, reprojection,
 };
 
 /// An observation of a feature: slot of the frame and pixel.
@@ -60,7 +60,7 @@ pub(crate) fn observation_residual_px(
 
 /// Robust cost (half the sum of losses) of all reprojection factors.
 pub(crate) fn cost(model: &VisualModel<'_>, view: &CameraView<'_>, tracks: &[Track], landmarks: &[Landmark]) -> f64 {
-    let mut total = 0.0;
+    let mut total = LossSum::new(model.loss, model.sigma_px);
     for (track, landmark) in tracks.iter().zip(landmarks) {
         let Some(first) = track.observations.first() else { continue };
         let anchor = view.relative_to(first);
@@ -69,10 +69,10 @@ pub(crate) fn cost(model: &VisualModel<'_>, view: &CameraView<'_>, tracks: &[Tra
                 continue;
             }
             let residual = observation_residual_px(view, &anchor, landmark, observation);
-            total += 0.5 * model.loss.cost_of(residual, model.sigma_px);
+            total.add(residual);
         }
     }
-    total
+    0.5 * total.get()
 }
 
 /// Normal equations of the reprojection factors of one camera over the blocks of its [`CameraView`].
@@ -141,6 +141,7 @@ impl<'a> Anchor<'a> {
 
 /// Linearizes one observation by the `N` blocks of the camera per frame, divided by sigma and multiplied by the root of its robust
 /// weight: that of its residual, unless given.
+#[inline]
 pub(crate) fn whitened<const N: usize>(
     model: &VisualModel<'_>,
     anchor: &Anchor<'_>,
