@@ -11,8 +11,8 @@ use pulp::{Arch, Simd, WithSimd};
 const PANEL: usize = 4;
 /// Rows of a portion are padded with zeros to a multiple of this, so that they fill vector registers.
 const LANES: usize = 8;
-/// Rows that are merged together at most: with all their columns they stay in the nearest cache.
-pub(crate) const PORTION: usize = 64;
+/// Rows that are merged together at most, so that they stay in the nearest caches.
+pub(crate) const PORTION: usize = 128;
 
 /// The upper triangular factor `R` (n × n) of rows `A`: `RᵀR = AᵀA`.
 ///

@@ -3,7 +3,7 @@
 #![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
 
 use nalgebra::{DMatrix, DVector};
-use pulp::{Arch, NullaryFnOnce};
+use pulp::{Arch, Simd, WithSimd};
 
 /// Columns that are eliminated together: those of the velocity and the biases of a frame.
 const PANEL: usize = 9;
@@ -160,11 +160,11 @@ struct Factorization<'a> {
     count: usize,
 }
 
-impl NullaryFnOnce for Factorization<'_> {
+impl WithSimd for Factorization<'_> {
     type Output = bool;
 
     #[inline(always)]
-    fn call(self) -> bool {
+    fn with_simd<S: Simd>(self, simd: S) -> bool {
         let Self { lower, count } = self;
         let mut panel = Vec::new();
         // Sums of the absolute entries of each row in the panel.
@@ -232,7 +232,7 @@ impl NullaryFnOnce for Factorization<'_> {
                     for (later_first, later_end) in &runs[index..] {
                         row = row.max(*later_first);
                         let target = &mut lower[column * count + row..column * count + later_end];
-                        subtract(target, &panel, height, source, &factors);
+                        subtract(simd, target, &panel, height, source, &factors);
                         source += target.len();
                     }
                     place += 1;
@@ -273,17 +273,30 @@ fn factor_panel(panel: &mut [f64], height: usize, width: usize) -> bool {
 
 /// Takes the products of a panel's rows from `source` on with the factors off some rows of a column.
 #[inline(always)]
-fn subtract(target: &mut [f64], panel: &[f64], height: usize, source: usize, factors: &[f64; PANEL]) {
+fn subtract<S: Simd>(simd: S, target: &mut [f64], panel: &[f64], height: usize, source: usize, factors: &[f64; PANEL]) {
     let count = target.len();
-    let mut columns: [&[f64]; PANEL] = [&[]; PANEL];
+    let (vectors, rest) = S::as_mut_simd_f64s(target);
+    let first_of_rest = count - rest.len();
+    let mut columns: [&[S::f64s]; PANEL] = [&[]; PANEL];
+    let mut weights = [simd.splat_f64s(0.0); PANEL];
     for k in 0..PANEL {
-        columns[k] = &panel[k * height + source..][..count];
+        columns[k] = &S::as_simd_f64s(&panel[k * height + source..][..count]).0[..vectors.len()];
+        weights[k] = simd.splat_f64s(-factors[k]);
     }
-    for row in 0..count {
-        let first = columns[0][row] * factors[0] + columns[1][row] * factors[1];
-        let second = columns[2][row] * factors[2] + columns[3][row] * factors[3];
-        let third = columns[4][row] * factors[4] + columns[5][row] * factors[5];
-        let fourth = columns[6][row] * factors[6] + columns[7][row] * factors[7];
-        target[row] -= (first + second) + (third + fourth) + columns[8][row] * factors[8];
+    for (place, vector) in vectors.iter_mut().enumerate() {
+        // Two sums: each product waits for the one before it in the same sum.
+        let mut sum = *vector;
+        let mut other = simd.splat_f64s(0.0);
+        for k in 0..PANEL / 2 {
+            sum = simd.mul_add_e_f64s(columns[2 * k][place], weights[2 * k], sum);
+            other = simd.mul_add_e_f64s(columns[2 * k + 1][place], weights[2 * k + 1], other);
+        }
+        sum = simd.mul_add_e_f64s(columns[PANEL - 1][place], weights[PANEL - 1], sum);
+        *vector = simd.add_f64s(sum, other);
+    }
+    for (row, entry) in (first_of_rest..).zip(rest) {
+        for k in 0..PANEL {
+            *entry -= panel[k * height + source + row] * factors[k];
+        }
     }
 }

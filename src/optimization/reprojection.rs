@@ -216,12 +216,19 @@ pub(crate) fn linearize(
 }
 
 /// `rows · [v]×` (2 × 3).
+#[inline]
 fn times_hat(rows: &Matrix2x3<f64>, v: &Vector3<f64>) -> Matrix2x3<f64> {
-    let [a, b, c] = [rows.column(0), rows.column(1), rows.column(2)];
-    Matrix2x3::from_columns(&[b * v.z - c * v.y, c * v.x - a * v.z, a * v.y - b * v.x])
+    let [a, b, c] = &rows.data.0;
+    let column = |p: &[f64; 2], x: f64, q: &[f64; 2], y: f64| [p[0] * x - q[0] * y, p[1] * x - q[1] * y];
+    Matrix2x3::from_array_storage(ArrayStorage([
+        column(b, v.z, c, v.y),
+        column(c, v.x, a, v.z),
+        column(a, v.y, b, v.x),
+    ]))
 }
 
 /// The columns of one matrix before those of another (2 × 6).
+#[inline]
 fn beside(left: &Matrix2x3<f64>, right: &Matrix2x3<f64>) -> Matrix2x6<f64> {
     let ([a, b, c], [d, e, f]) = (left.data.0, right.data.0);
     Matrix2x6::from_array_storage(ArrayStorage([a, b, c, d, e, f]))

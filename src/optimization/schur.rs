@@ -14,6 +14,7 @@
 #![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use nalgebra::{ArrayStorage, Matrix2x6, Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 use pulp::{Arch, NullaryFnOnce};
@@ -90,18 +91,23 @@ impl<K: Copy + Ord> PoseEquations for SparsePoseEquations<K> {
 
 /// One landmark's part of the normal equations.
 #[derive(Clone, Debug)]
-struct LandmarkBlock<K> {
+struct LandmarkBlock {
     hessian: Matrix3<f64>,
     gradient: Vector3<f64>,
-    /// Blocks of `H_pl`, poses rising.
-    couplings: Vec<(K, Matrix6x3<f64>)>,
+    /// Its blocks of `H_pl` among those of all landmarks.
+    couplings: Range<usize>,
 }
+
+/// A block of `H_pl`.
+type Coupling<K> = (K, Matrix6x3<f64>);
 
 /// Normal equations of whitened reprojection residuals: camera poses on one side, landmarks on the other.
 #[derive(Clone, Debug)]
 pub(crate) struct ReprojectionEquations<P: PoseEquations> {
     poses: P,
-    landmarks: Vec<LandmarkBlock<P::Pose>>,
+    landmarks: Vec<LandmarkBlock>,
+    /// Landmark by landmark, the poses of each rising.
+    couplings: Vec<Coupling<P::Pose>>,
 }
 
 /// The equations of the camera poses after the landmarks were eliminated.
@@ -116,7 +122,7 @@ pub(crate) struct ReducedEquations<P> {
 impl<P: PoseEquations> ReprojectionEquations<P> {
     /// Equations without a residual, over these poses.
     pub(crate) fn new(poses: P, landmarks: usize) -> Self {
-        Self { poses, landmarks: Vec::with_capacity(landmarks) }
+        Self { poses, landmarks: Vec::with_capacity(landmarks), couplings: Vec::new() }
     }
 
     /// Adds one landmark by the whitened terms of its observations, poses rising.
@@ -142,12 +148,11 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         observations: usize,
         terms: impl Iterator<Item = BlockTerm<P::Pose, N>>,
     ) {
-        let mut block = LandmarkBlock {
-            hessian: Matrix3::zeros(),
-            gradient: Vector3::zeros(),
-            couplings: Vec::with_capacity(N + observations + 1),
-        };
-        block.couplings.extend(anchor.iter().flatten().map(|pose| (*pose, Matrix6x3::zeros())));
+        let first = self.couplings.len();
+        let mut block =
+            LandmarkBlock { hessian: Matrix3::zeros(), gradient: Vector3::zeros(), couplings: first..first };
+        self.couplings.reserve(N + observations + 1);
+        self.couplings.extend(anchor.iter().flatten().map(|pose| (*pose, Matrix6x3::zeros())));
         // The anchor's blocks and the shared one have a part of nearly every term: summed here first.
         let mut of_anchor = [CommonBlock::<N>::ZERO; N];
         let mut of_shared = CommonBlock::<N>::ZERO;
@@ -160,7 +165,7 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
                     add_product(self.poses.hessian_mut(*pose, *other), by_pose, by_other);
                 }
                 *self.poses.gradient_mut(*pose) += by_pose.tr_mul(&term.residual);
-                block.couplings.push((*pose, by_pose.tr_mul(&term.by_landmark)));
+                self.couplings.push((*pose, by_pose.tr_mul(&term.by_landmark)));
                 for (anchor, by_anchor) in term.anchor.iter().flatten() {
                     add_product(self.poses.hessian_mut(*anchor, *pose), by_anchor, by_pose);
                 }
@@ -185,7 +190,7 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         }
         for (row, (first, sum)) in anchor.iter().flatten().zip(&of_anchor).enumerate() {
             *self.poses.gradient_mut(*first) += sum.gradient;
-            block.couplings[row].1 = sum.coupling;
+            self.couplings[block.couplings.start + row].1 = sum.coupling;
             for (second, hessian) in anchor.iter().flatten().zip(&sum.with_anchor).skip(row) {
                 *self.poses.hessian_mut(*first, *second) += hessian;
             }
@@ -196,8 +201,9 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         if let Some(shared) = shared {
             *self.poses.gradient_mut(shared) += of_shared.gradient;
             *self.poses.hessian_mut(shared, shared) += of_shared.with_shared;
-            block.couplings.push((shared, of_shared.coupling));
+            self.couplings.push((shared, of_shared.coupling));
         }
+        block.couplings.end = self.couplings.len();
         self.landmarks.push(block);
     }
 
@@ -209,8 +215,13 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         let architecture = Arch::new();
         for block in &self.landmarks {
             let inverse = damped_inverse(&block.hessian, damping);
-            let poses = &mut reduced.poses;
-            architecture.dispatch(Elimination { poses, block, inverse: &inverse, weighted: &mut weighted });
+            architecture.dispatch(Elimination::<P> {
+                poses: &mut reduced.poses,
+                gradient: &block.gradient,
+                couplings: &self.couplings[block.couplings.clone()],
+                inverse: &inverse,
+                weighted: &mut weighted,
+            });
             reduced.inverses.push(inverse);
         }
         reduced
@@ -227,7 +238,7 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
             .zip(&reduced.inverses)
             .map(|(block, inverse)| {
                 let mut right = -block.gradient;
-                for (pose, coupling) in &block.couplings {
+                for (pose, coupling) in &self.couplings[block.couplings.clone()] {
                     right -= coupling.tr_mul(&pose_step(*pose));
                 }
                 inverse * right
@@ -239,7 +250,8 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
 /// What the elimination of a landmark takes off the equations of the poses, compiled for every width of vector registers.
 struct Elimination<'a, P: PoseEquations> {
     poses: &'a mut P,
-    block: &'a LandmarkBlock<P::Pose>,
+    gradient: &'a Vector3<f64>,
+    couplings: &'a [Coupling<P::Pose>],
     /// Inverse of the landmark's block.
     inverse: &'a Matrix3<f64>,
     /// Couplings times that inverse.
@@ -251,9 +263,9 @@ impl<P: PoseEquations> NullaryFnOnce for Elimination<'_, P> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { poses, block, inverse, weighted } = self;
+        let Self { poses, gradient, couplings, inverse, weighted } = self;
         weighted.clear();
-        for (_, coupling) in &block.couplings {
+        for (_, coupling) in couplings {
             let [a, b, c] = &coupling.data.0;
             let mut product = [[0.0; 6]; 3];
             for (column, target) in product.iter_mut().enumerate() {
@@ -264,9 +276,9 @@ impl<P: PoseEquations> NullaryFnOnce for Elimination<'_, P> {
             }
             weighted.push(Matrix6x3::from_array_storage(ArrayStorage(product)));
         }
-        for (first, (row, _)) in block.couplings.iter().enumerate() {
-            *poses.gradient_mut(*row) -= weighted[first] * block.gradient;
-            for (column, coupling) in &block.couplings[first..] {
+        for (first, (row, _)) in couplings.iter().enumerate() {
+            *poses.gradient_mut(*row) -= weighted[first] * gradient;
+            for (column, coupling) in &couplings[first..] {
                 subtract_product(poses.hessian_mut(*row, *column), &weighted[first], coupling);
             }
         }

@@ -363,9 +363,9 @@ impl Problem<'_> {
             estimate.calibration.imu_errors(),
         );
         Some(ImuBlocks {
-            by_from: information * by_from,
-            by_to: information * by_to,
-            by_intrinsics: estimate.calibration.imu().map(|_| information * by_intrinsics),
+            by_from: sparse_product(information, &by_from),
+            by_to: sparse_product(information, &by_to),
+            by_intrinsics: estimate.calibration.imu().map(|_| sparse_product(information, &by_intrinsics)),
             residual,
         })
     }
@@ -516,6 +516,21 @@ impl CameraEquations {
             })
             .collect()
     }
+}
+
+/// `left · right`, where most entries of the right matrix are zero.
+fn sparse_product(left: &Matrix15, right: &Matrix15) -> Matrix15 {
+    let mut product = Matrix15::zeros();
+    for (target, factors) in product.data.0.iter_mut().zip(&right.data.0) {
+        for (column, factor) in left.data.0.iter().zip(factors) {
+            if *factor != 0.0 {
+                for (entry, source) in target.iter_mut().zip(column) {
+                    *entry += source * factor;
+                }
+            }
+        }
+    }
+    product
 }
 
 fn add_block<const R: usize, const C: usize>(
