@@ -149,30 +149,28 @@ fn elimination_by_qr_equals_the_schur_complement() {
         let reduced = equations.eliminate(0.0).poses;
 
         let columns = 6 * poses + 1;
-        {
-            let mut local = LandmarkRows::default();
-            local.begin([0], None, poses - 1);
-            for (observer, term) in &terms {
-                local.push(&BlockTerm::of_poses(Some(0), *observer, term));
-            }
-            local.eliminate();
-            let mut rows = Vec::new();
-            for (number, (added, blocks)) in local.added().enumerate() {
-                assert_eq!(blocks.len(), number + 1);
-                local.append_to(&mut rows, columns, added, blocks, |block| 6 * block);
-            }
-            let rows = DMatrix::from_row_slice(2 * poses - 3, columns, &rows);
-            let squared = rows.tr_mul(&rows);
-            let scale = squared.amax();
-            for row in 0..poses {
-                let gradient = squared.view((6 * row, columns - 1), (6, 1)).into_owned();
-                let expected = DVector::from_column_slice(reduced.gradient[row].as_slice());
-                assert!((gradient - expected).amax() < 1e-6 * scale, "{poses} poses, gradient");
-                for column in row..poses {
-                    let block = squared.fixed_view::<6, 6>(6 * row, 6 * column);
-                    let expected = reduced.hessian.block(row, column);
-                    assert!((block - expected).amax() < 1e-6 * scale, "{poses} poses, block {row} {column}");
-                }
+        let mut local = LandmarkRows::default();
+        local.begin([0], None, poses - 1);
+        for (observer, term) in &terms {
+            local.push(&BlockTerm::of_poses(Some(0), *observer, term));
+        }
+        local.eliminate();
+        let mut rows = Vec::new();
+        for (number, (added, blocks)) in local.added().enumerate() {
+            assert_eq!(blocks.len(), number + 1);
+            local.append_to(&mut rows, columns, added, blocks, |block| 6 * block);
+        }
+        let rows = DMatrix::from_row_slice(2 * poses - 3, columns, &rows);
+        let squared = rows.tr_mul(&rows);
+        let scale = squared.amax();
+        for row in 0..poses {
+            let gradient = squared.view((6 * row, columns - 1), (6, 1)).into_owned();
+            let expected = DVector::from_column_slice(reduced.gradient[row].as_slice());
+            assert!((gradient - expected).amax() < 1e-6 * scale, "{poses} poses, gradient");
+            for column in row..poses {
+                let block = squared.fixed_view::<6, 6>(6 * row, 6 * column);
+                let expected = reduced.hessian.block(row, column);
+                assert!((block - expected).amax() < 1e-6 * scale, "{poses} poses, block {row} {column}");
             }
         }
     }
