@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 
-use super::responses::{Responses, TILE};
+use super::responses::{Peak, Responses, TILE};
 use crate::sensors::{GrayImage, ImageMask};
 
 /// Options of corner detection.
@@ -47,7 +47,7 @@ struct Tile {
 #[derive(Clone, Debug, Default)]
 pub struct CornerDetector {
     candidates: Vec<Candidate>,
-    in_tile: Vec<Candidate>,
+    in_tile: Vec<Peak>,
     responses: Responses,
     /// Tiles that have not been searched yet.
     tiles: Vec<Tile>,
@@ -141,21 +141,21 @@ impl CornerDetector {
     fn search(&mut self, image: &GrayImage, tile: &Tile, options: &CornerOptions, mask: Option<&ImageMask>) {
         self.responses.compute(image, [tile.left, tile.top], options.min_eigenvalue as f32);
         self.in_tile.clear();
-        for peak in self.responses.peaks(tile.width, tile.height) {
-            let [x, y] = peak.pixel;
-            let uv_px = Vector2::new((tile.left + x) as f64, (tile.top + y) as f64) + peak.shift;
-            if self.taken.is_free(&uv_px) && !mask.is_some_and(|mask| mask.covers(&uv_px)) {
-                self.in_tile.push(Candidate { uv_px, response: peak.response });
-            }
-        }
+        self.in_tile.extend(self.responses.peaks(tile.width, tile.height));
         self.in_tile.sort_by(|a, b| b.response.total_cmp(&a.response));
         let first = self.candidates.len();
-        for candidate in &self.in_tile {
-            let apart = self.candidates[first..]
-                .iter()
-                .all(|other| (other.uv_px - candidate.uv_px).norm() >= options.min_distance_px);
-            if apart && self.candidates.len() < first + CORNERS_PER_TILE {
-                self.candidates.push(*candidate);
+        for peak in &self.in_tile {
+            if self.candidates.len() == first + CORNERS_PER_TILE {
+                break;
+            }
+            let [x, y] = peak.pixel;
+            let uv_px = Vector2::new((tile.left + x) as f64, (tile.top + y) as f64) + self.responses.peak_shift(peak);
+            let is_apart = |other: &Candidate| (other.uv_px - uv_px).norm() >= options.min_distance_px;
+            let usable = self.candidates[first..].iter().all(is_apart)
+                && self.taken.is_free(&uv_px)
+                && !mask.is_some_and(|mask| mask.covers(&uv_px));
+            if usable {
+                self.candidates.push(Candidate { uv_px, response: peak.response });
             }
         }
     }

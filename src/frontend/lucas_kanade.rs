@@ -7,6 +7,7 @@ use std::ops::Range;
 use nalgebra::Vector2;
 use pulp::{Arch, NullaryFnOnce};
 
+use super::products::sums_of_products;
 use super::pyramid::{Pyramid, cut_out};
 use crate::sensors::GrayImage;
 
@@ -18,7 +19,7 @@ const LANES: usize = 24;
 const CENTRE: f32 = (WINDOW / 2) as f32;
 /// Elements from one row to the next, of the weights and of the region of the second image: with one stride for both, a sum
 /// over the window is a single loop.
-const STRIDE: usize = 32;
+pub(super) const STRIDE: usize = 32;
 /// Rows of the region of the second image, so that the window can move within it.
 const SEARCH_HEIGHT: usize = 34;
 /// Largest first column and row of a window of which also the neighbours one and two further fit in.
@@ -29,7 +30,7 @@ const LARGEST_WEIGHT: f32 = 16383.0;
 
 /// Region of the second image, row by row, grey levels less 128.
 type Search = [[i16; STRIDE]; SEARCH_HEIGHT];
-type Weights = [i16; STRIDE * WINDOW];
+pub(super) type Weights = [i16; STRIDE * WINDOW];
 
 /// Options of the tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -282,32 +283,12 @@ impl Template {
     /// Adds up `Σ g'·J` for the window whose first pixel is `(column, row)` of `search` and its neighbours to the right,
     /// below and both; `[dy][dx]` are the sums with the x and the y component of `g'`.
     fn correlate(&self, search: &Search, column: usize, row: usize) -> [[[f32; 2]; 2]; 2] {
-        const LENGTH: usize = STRIDE * WINDOW;
-        let shifted = |offset: usize| -> &[i16; LENGTH] {
-            search.as_flattened()[row * STRIDE + column + offset..]
-                .first_chunk()
-                .expect("callers keep within the search")
-        };
-        let sums = |offset| {
-            let pixels = shifted(offset);
-            [dot(&self.x, pixels) as f32, dot(&self.y, pixels) as f32]
-        };
-        [[sums(0), sums(1)], [sums(STRIDE), sums(STRIDE + 1)]]
+        let pixels = search.as_flattened()[row * STRIDE + column..].first_chunk();
+        let pixels = pixels.expect("callers keep within the search");
+        let [here, right, below, both] =
+            sums_of_products([&self.x, &self.y], pixels).map(|sums| sums.map(|sum| sum as f32));
+        [[here, right], [below, both]]
     }
-}
-
-/// A sum of products.
-///
-/// A separate function over eight partial sums, which the compiler vectorizes.
-#[inline(never)]
-fn dot(weights: &Weights, pixels: &Weights) -> i32 {
-    let mut sums = [0_i32; 8];
-    for (weights, pixels) in weights.as_chunks::<8>().0.iter().zip(pixels.as_chunks::<8>().0) {
-        for lane in 0..8 {
-            sums[lane] += i32::from(weights[lane]) * i32::from(pixels[lane]);
-        }
-    }
-    sums.iter().sum()
 }
 
 /// The nearest integer of a value far below 2²²: adding 1.5·2²³ leaves it in the low bits, where vector units reach it
@@ -428,6 +409,22 @@ enum Kernel {
     Cubic,
 }
 
+/// Copies a region of the second image, compiled for every width of vector registers.
+struct Cutting<'a> {
+    image: &'a GrayImage,
+    corner: [i32; 2],
+    search: &'a mut Search,
+}
+
+impl NullaryFnOnce for Cutting<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        cut_out(self.image, self.corner, self.search, |pixel| i16::from(pixel) - 128);
+    }
+}
+
 /// Whether a position is finite and small enough for integer pixels.
 fn is_sane(at: [f32; 2]) -> bool {
     at.iter().all(|t| t.abs() < 1e5)
@@ -456,7 +453,7 @@ fn seek(
         };
         let [left, top] = origin.filter(|corner| fits(*corner)).unwrap_or_else(|| {
             let corner = [first[0] - LAST_COLUMN / 2, first[1] - LAST_ROW / 2];
-            cut_out(image, corner, search, |pixel| i16::from(pixel) - 128);
+            Arch::new().dispatch(Cutting { image, corner, search });
             corner
         });
         origin = Some([left, top]);

@@ -14,6 +14,7 @@ mod front_end;
 pub mod lucas_kanade;
 pub mod outliers;
 mod prediction;
+mod products;
 mod pyramid;
 pub mod readout;
 mod reference;

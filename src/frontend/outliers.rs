@@ -218,6 +218,9 @@ impl Prior {
     }
 }
 
+/// Pairs that are summed between two comparisons of a cost with its limit.
+const PAIRS_BETWEEN_CHECKS: usize = 16;
+
 /// The search for a rotation and a direction of translation.
 struct Search<'a> {
     pairs: &'a [BearingPair],
@@ -270,8 +273,9 @@ impl Search<'_> {
                 (trial.rotation, trial.direction) = step;
             }
             for direction in [trial.direction, -trial.direction] {
-                let cost = self.cost(&trial.rotation, &direction, threshold);
-                if best.is_none_or(|best| cost < best.cost) {
+                let limit = best.map_or(f64::INFINITY, |best| best.cost);
+                let cost = self.cost(&trial.rotation, &direction, threshold, limit);
+                if cost < limit {
                     best = Some(Hypothesis { direction, cost, ..trial });
                 }
             }
@@ -283,7 +287,7 @@ impl Search<'_> {
     fn settle(&self, start: Hypothesis, scale: f64) -> Hypothesis {
         let (mut best, mut at) = (start, start);
         for _ in 0..REFINEMENTS {
-            let Some(refined) = self.refine(&at, scale) else { break };
+            let Some(refined) = self.refine(&at, scale, best.cost) else { break };
             at = refined;
             if at.cost < best.cost {
                 best = at;
@@ -298,11 +302,9 @@ impl Search<'_> {
         for stage in STAGES {
             let scale = stage * threshold;
             if best.cost.is_finite() {
-                best.cost = self.cost(&best.rotation, &best.direction, scale);
+                best.cost = self.cost(&best.rotation, &best.direction, scale, f64::INFINITY);
             }
-            if let Some(drawn) = self.draw(&best.rotation, scale)
-                && drawn.cost < best.cost
-            {
+            if let Some(drawn) = self.draw(&best.rotation, scale, best.cost) {
                 best = drawn;
             }
             if best.cost.is_finite() {
@@ -312,8 +314,8 @@ impl Search<'_> {
         best.cost.is_finite().then_some(best)
     }
 
-    /// The best direction among those of random pairs of tracks, with a fixed rotation.
-    fn draw(&mut self, rotation: &UnitQuaternion<f64>, scale: f64) -> Option<Hypothesis> {
+    /// The best direction among those of random pairs of tracks, with a fixed rotation; `None` when no cost is below `below`.
+    fn draw(&mut self, rotation: &UnitQuaternion<f64>, scale: f64, mut below: f64) -> Option<Hypothesis> {
         self.rotated.clear();
         self.rotated
             .extend(self.pairs.iter().map(|pair| BearingPair { previous: rotation * pair.previous, now: pair.now }));
@@ -326,39 +328,52 @@ impl Search<'_> {
                 pair.previous.cross(&pair.now)
             });
             let Some(axis) = normals[0].cross(&normals[1]).try_normalize(1e-14) else { continue };
-            let [forward, backward] = self.costs(&axis, scale).map(|cost| cost + pull);
+            let [forward, backward] = self.costs(&axis, scale, pull, below);
             let (direction, cost) = if forward <= backward { (axis, forward) } else { (-axis, backward) };
-            if best.is_none_or(|best| cost < best.cost) {
+            if cost < below {
+                below = cost;
                 best = Some(Hypothesis { rotation: *rotation, direction, cost });
             }
         }
         best
     }
 
-    /// Sums of squared distances of the rotated pairs for a direction and for the opposite one, each distance over `scale`
-    /// and no larger than one.
-    fn costs(&self, direction: &Vector3<f64>, scale: f64) -> [f64; 2] {
+    /// Costs of a direction and of the opposite one with the rotated pairs: the sum of squared distances, each over `scale`
+    /// and no larger than one, plus the cost of the prior, `pull`.
+    ///
+    /// Sums only until both costs reach `limit`; costs below it are complete.
+    fn costs(&self, direction: &Vector3<f64>, scale: f64, pull: f64, limit: f64) -> [f64; 2] {
         let mut sums = [0.0; 2];
-        for pair in &self.rotated {
-            let distances = epipolar_distances(pair, direction);
-            for (sum, distance) in sums.iter_mut().zip(distances) {
-                *sum += (distance / scale).powi(2).min(1.0);
+        for pairs in self.rotated.chunks(PAIRS_BETWEEN_CHECKS) {
+            for pair in pairs {
+                let distances = epipolar_distances(pair, direction);
+                for (sum, distance) in sums.iter_mut().zip(distances) {
+                    *sum += (distance / scale).powi(2).min(1.0);
+                }
+            }
+            if sums.iter().all(|sum| sum + pull >= limit) {
+                break;
             }
         }
-        sums
+        sums.map(|sum| sum + pull)
     }
 
     /// Sum of squared distances over `scale`, each truncated at one, plus the cost of the prior.
-    fn cost(&self, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>, scale: f64) -> f64 {
-        let sum: f64 = self
-            .pairs
-            .iter()
-            .map(|pair| {
+    ///
+    /// Sums only until the cost reaches `limit`; a cost below it is complete.
+    fn cost(&self, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>, scale: f64, limit: f64) -> f64 {
+        let pull = self.prior_cost(rotation, scale);
+        let mut sum = 0.0;
+        for pairs in self.pairs.chunks(PAIRS_BETWEEN_CHECKS) {
+            for pair in pairs {
                 let distance = epipolar_distance(pair, rotation, direction) / scale;
-                (distance * distance).min(1.0)
-            })
-            .sum();
-        sum + self.prior_cost(rotation, scale)
+                sum += (distance * distance).min(1.0);
+            }
+            if sum + pull >= limit {
+                break;
+            }
+        }
+        sum + pull
     }
 
     /// Cost of the prior at a rotation, in the unit of [`Self::cost`].
@@ -367,11 +382,12 @@ impl Search<'_> {
         rotation_vector.dot(&(information * rotation_vector))
     }
 
-    /// One Gauss–Newton step on rotation and direction, with weights that reject outliers.
-    fn refine(&self, at: &Hypothesis, scale: f64) -> Option<Hypothesis> {
+    /// One Gauss–Newton step on rotation and direction, with weights that reject outliers; its cost as [`Self::cost`] with this
+    /// limit.
+    fn refine(&self, at: &Hypothesis, scale: f64, limit: f64) -> Option<Hypothesis> {
         let (information, rotation_error) = self.prior.at(&at.rotation, scale);
         let (rotation, direction) = step_towards(self.pairs, at, scale, &information, &rotation_error)?;
-        let cost = self.cost(&rotation, &direction, scale);
+        let cost = self.cost(&rotation, &direction, scale, limit);
         Some(Hypothesis { rotation, direction, cost })
     }
 }

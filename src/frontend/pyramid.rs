@@ -1,3 +1,5 @@
+#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+
 use crate::sensors::GrayImage;
 
 /// Mirrored pixels that the smoothing needs on either side.
@@ -57,7 +59,7 @@ pub(super) fn mirrored(index: i32, count: usize) -> usize {
 }
 
 /// Copies the pixels from `first` (column, row) on, which may be outside the image.
-#[inline]
+#[inline(always)]
 pub(super) fn cut_out<T, const WIDTH: usize>(
     image: &GrayImage,
     first: [i32; 2],
@@ -66,6 +68,17 @@ pub(super) fn cut_out<T, const WIDTH: usize>(
 ) {
     let [left, top] = first;
     let inside = left >= 0 && left as usize + WIDTH <= image.width;
+    if inside && top >= 0 && top as usize + window.len() <= image.height {
+        let rows = image.pixels[top as usize * image.width + left as usize..].chunks(image.width);
+        for (target, source) in window.iter_mut().zip(rows) {
+            let Some(source) = source.first_chunk::<WIDTH>() else { continue };
+            for (value, pixel) in target.iter_mut().zip(source) {
+                *value = convert(*pixel);
+            }
+        }
+        return;
+    }
+    let columns: [usize; WIDTH] = std::array::from_fn(|x| mirrored(left + x as i32, image.width));
     for (y, target) in window.iter_mut().enumerate() {
         let source = &image.pixels[mirrored(top + y as i32, image.height) * image.width..][..image.width];
         if inside && let Some(source) = source[left as usize..].first_chunk::<WIDTH>() {
@@ -73,8 +86,9 @@ pub(super) fn cut_out<T, const WIDTH: usize>(
                 *value = convert(*pixel);
             }
         } else {
-            for (x, value) in target.iter_mut().enumerate() {
-                *value = convert(source[mirrored(left + x as i32, image.width)]);
+            let pixels = columns.map(|column| source[column]);
+            for (value, pixel) in target.iter_mut().zip(pixels) {
+                *value = convert(pixel);
             }
         }
     }

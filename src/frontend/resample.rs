@@ -1,6 +1,9 @@
 //! Resampling of an image at the pixels of an affinely warped window.
 
+#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+
 use nalgebra::{Matrix2, Vector2};
+use pulp::{Arch, NullaryFnOnce};
 
 use super::reference::{CENTRE, LANES, Rows, WINDOW};
 use crate::sensors::GrayImage;
@@ -106,12 +109,8 @@ impl Patch {
             self.clear();
             return false;
         }
-        for (y, row) in self.pixels.chunks_exact_mut(STRIDE).take(height).enumerate() {
-            let source = &image.pixels[(top + y) * image.width + left..][..width];
-            for (value, pixel) in row.iter_mut().zip(source) {
-                *value = f32::from(*pixel);
-            }
-        }
+        let rows = &image.pixels[top * image.width + left..];
+        Arch::new().dispatch(Cutting { rows, image_width: image.width, size: self.size, pixels: &mut self.pixels });
         true
     }
 
@@ -145,6 +144,30 @@ impl Patch {
             }
             for (value, [a, b, c, d]) in line[..WINDOW].iter_mut().zip(&products) {
                 *value = ((a + b) + (c + d)) - level;
+            }
+        }
+    }
+}
+
+/// Copies a region of an image, compiled for every width of vector registers.
+struct Cutting<'a> {
+    /// The image from the region's first pixel on.
+    rows: &'a [u8],
+    image_width: usize,
+    /// Columns and rows of the region.
+    size: [usize; 2],
+    pixels: &'a mut [f32; STRIDE * HEIGHT + SURPLUS],
+}
+
+impl NullaryFnOnce for Cutting<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { rows, image_width, size: [width, height], pixels } = self;
+        for (row, source) in pixels.chunks_exact_mut(STRIDE).zip(rows.chunks(image_width)).take(height) {
+            for (value, pixel) in row[..width].iter_mut().zip(&source[..width]) {
+                *value = f32::from(*pixel);
             }
         }
     }

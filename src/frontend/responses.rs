@@ -21,11 +21,15 @@ const UNIT: f32 = 1.0 / (32.0 * 32.0 * (BLOCK * BLOCK) as f32);
 const RESPONSES: usize = TILE + 2;
 const GRADIENTS: usize = RESPONSES + 2 * BLOCK_RADIUS;
 const PIXELS: usize = GRADIENTS + 2;
+/// Columns rounded up to whole vector registers; the surplus ones are computed and not used.
+const RESPONSE_LANES: usize = 40;
+const GRADIENT_LANES: usize = 48;
+const PIXEL_LANES: usize = GRADIENT_LANES + 2;
 
 /// The smaller eigenvalues of a tile and one pixel around it, and their local maxima.
 #[derive(Clone, Debug)]
 pub(super) struct Responses {
-    values: Box<[[f32; RESPONSES]; RESPONSES]>,
+    values: Box<[[f32; RESPONSE_LANES]; RESPONSES]>,
     is_peak: Box<[[bool; TILE]; TILE]>,
 }
 
@@ -34,39 +38,33 @@ pub(super) struct Responses {
 pub(super) struct Peak {
     /// Column and row in the tile.
     pub(super) pixel: [usize; 2],
-    /// From there to the top of the parabolas through it and its neighbours, in pixels.
-    pub(super) shift: Vector2<f64>,
     pub(super) response: f32,
 }
 
 impl Default for Responses {
     fn default() -> Self {
-        Self { values: Box::new([[0.0; RESPONSES]; RESPONSES]), is_peak: Box::new([[false; TILE]; TILE]) }
+        Self { values: Box::new([[0.0; RESPONSE_LANES]; RESPONSES]), is_peak: Box::new([[false; TILE]; TILE]) }
     }
 }
 
 impl Responses {
     /// Computes the tile of `image` at `first` (column, row); responses below `min_response` are no peaks.
     pub(super) fn compute(&mut self, image: &GrayImage, first: [usize; 2], min_response: f32) {
-        let mut pixels = [[0.0_f32; PIXELS]; PIXELS];
-        cut_out(image, first.map(|t| t as i32 - (BLOCK_RADIUS + 2) as i32), &mut pixels, f32::from);
-        Arch::new().dispatch(Computation { pixels: &pixels, min_response, responses: self });
+        let first = first.map(|t| t as i32 - (BLOCK_RADIUS + 2) as i32);
+        Arch::new().dispatch(Computation { image, first, min_response, responses: self });
     }
 
     /// The peaks among the tile's first columns and rows, row by row.
     pub(super) fn peaks(&self, width: usize, height: usize) -> impl Iterator<Item = Peak> {
         self.is_peak[..height].iter().enumerate().flat_map(move |(y, row)| {
             let columns = row[..width].iter().enumerate().filter(|(_, is_peak)| **is_peak);
-            columns.map(move |(x, _)| Peak {
-                pixel: [x, y],
-                shift: self.peak_shift(x + 1, y + 1),
-                response: self.values[y + 1][x + 1],
-            })
+            columns.map(move |(x, _)| Peak { pixel: [x, y], response: self.values[y + 1][x + 1] })
         })
     }
 
-    /// From a maximum to the top of the parabolas through it and its neighbours, in pixels.
-    fn peak_shift(&self, x: usize, y: usize) -> Vector2<f64> {
+    /// From a peak's pixel to the top of the parabolas through it and its neighbours, in pixels.
+    pub(super) fn peak_shift(&self, peak: &Peak) -> Vector2<f64> {
+        let [x, y] = peak.pixel.map(|t| t + 1);
         let top = |before: f32, here: f32, after: f32| {
             let curvature = before - 2.0 * here + after;
             if curvature < 0.0 { f64::from(0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
@@ -79,7 +77,9 @@ impl Responses {
 
 /// Filling [`Responses`], compiled for every width of vector registers.
 struct Computation<'a> {
-    pixels: &'a [[f32; PIXELS]; PIXELS],
+    image: &'a GrayImage,
+    /// Column and row of the first pixel whose gradient is needed, less one.
+    first: [i32; 2],
     min_response: f32,
     responses: &'a mut Responses,
 }
@@ -89,8 +89,10 @@ impl NullaryFnOnce for Computation<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { pixels, min_response, responses: Responses { values, is_peak } } = self;
-        smaller_eigenvalues(pixels, values);
+        let Self { image, first, min_response, responses: Responses { values, is_peak } } = self;
+        let mut pixels = [[0.0; PIXEL_LANES]; PIXELS];
+        cut_out(image, first, &mut pixels, f32::from);
+        smaller_eigenvalues(&pixels, values);
         for y in 0..TILE {
             let (above, row, below) = (&values[y], &values[y + 1], &values[y + 2]);
             for x in 0..TILE {
@@ -105,39 +107,32 @@ impl NullaryFnOnce for Computation<'_> {
 }
 
 #[inline(always)]
-#[expect(clippy::large_stack_arrays, reason = "18 KiB that stay in the nearest cache")]
-fn smaller_eigenvalues(pixels: &[[f32; PIXELS]; PIXELS], values: &mut [[f32; RESPONSES]; RESPONSES]) {
-    let mut products = [[[0.0_f32; GRADIENTS]; GRADIENTS]; 3];
+#[expect(clippy::large_stack_arrays, reason = "22 KiB that stay in the nearest cache")]
+fn smaller_eigenvalues(pixels: &[[f32; PIXEL_LANES]; PIXELS], values: &mut [[f32; RESPONSE_LANES]; RESPONSES]) {
+    let mut products = [[[0.0_f32; GRADIENT_LANES]; 3]; GRADIENTS];
     for y in 0..GRADIENTS {
         let (above, here, below) = (&pixels[y], &pixels[y + 1], &pixels[y + 2]);
-        for x in 0..GRADIENTS {
+        for x in 0..GRADIENT_LANES {
             // Scharr's derivative.
             let along = 3.0 * (above[x + 2] - above[x] + below[x + 2] - below[x]) + 10.0 * (here[x + 2] - here[x]);
             let down = 3.0 * (below[x] - above[x] + below[x + 2] - above[x + 2]) + 10.0 * (below[x + 1] - above[x + 1]);
-            products[0][y][x] = along * along;
-            products[1][y][x] = along * down;
-            products[2][y][x] = down * down;
+            products[y][0][x] = along * along;
+            products[y][1][x] = along * down;
+            products[y][2][x] = down * down;
         }
     }
-    let mut sums = [[[0.0_f32; RESPONSES]; RESPONSES]; 3];
-    for (product, sums) in products.iter().zip(&mut sums) {
-        for y in 0..RESPONSES {
-            let mut column_sums = [0.0_f32; GRADIENTS];
-            for line in &product[y..y + BLOCK] {
-                for x in 0..GRADIENTS {
-                    column_sums[x] += line[x];
-                }
-            }
-            for offset in 0..BLOCK {
-                for x in 0..RESPONSES {
-                    sums[y][x] += column_sums[x + offset] * UNIT;
-                }
-            }
-        }
-    }
+    let mut column_means = [[0.0_f32; GRADIENT_LANES]; 3];
     for y in 0..RESPONSES {
-        for x in 0..RESPONSES {
-            values[y][x] = smaller_eigenvalue([sums[0][y][x], sums[1][y][x], sums[2][y][x]]);
+        for (k, means) in column_means.iter_mut().enumerate() {
+            let lines: [&[f32; GRADIENT_LANES]; BLOCK] = std::array::from_fn(|row| &products[y + row][k]);
+            for x in 0..GRADIENT_LANES {
+                means[x] = (lines[0][x] + lines[1][x] + lines[2][x] + lines[3][x] + lines[4][x]) * UNIT;
+            }
+        }
+        for x in 0..RESPONSE_LANES {
+            let mean =
+                |means: &[f32; GRADIENT_LANES]| means[x] + means[x + 1] + means[x + 2] + means[x + 3] + means[x + 4];
+            values[y][x] = smaller_eigenvalue([mean(&column_means[0]), mean(&column_means[1]), mean(&column_means[2])]);
         }
     }
 }
