@@ -208,12 +208,19 @@ pub(crate) struct BlockCache {
     /// The most recently used block is the last.
     entries: Vec<(usize, Arc<DecodedBlock>)>,
     capacity: usize,
+    /// More than two blocks are kept only within so many bytes.
+    capacity_bytes: u64,
 }
 
 impl BlockCache {
     /// A cache of `capacity` blocks.
     pub(crate) fn new(capacity: usize) -> Self {
-        Self { entries: Vec::with_capacity(capacity + 1), capacity }
+        Self { entries: Vec::with_capacity(capacity + 1), capacity, capacity_bytes: u64::MAX }
+    }
+
+    /// The same cache that keeps more than two blocks only within so many bytes.
+    pub(crate) fn with_capacity_bytes(self, capacity_bytes: u64) -> Self {
+        Self { capacity_bytes, ..self }
     }
 
     /// The block with a number, decoded now or before. The oldest ones make room, by number and by bytes.
@@ -228,7 +235,11 @@ impl BlockCache {
         let held = |entries: &[(usize, Arc<DecodedBlock>)]| -> u64 {
             entries.iter().map(|(_, block)| block.records.len() as u64).sum()
         };
-        while !self.entries.is_empty() && (self.entries.len() == self.capacity || held(&self.entries) > budget) {
+        let is_full = |entries: &[(usize, Arc<DecodedBlock>)]| {
+            let bytes = held(entries);
+            entries.len() == self.capacity || bytes > budget || (entries.len() > 1 && bytes > self.capacity_bytes)
+        };
+        while !self.entries.is_empty() && is_full(&self.entries) {
             self.entries.remove(0);
         }
         let decoded = Arc::new(DecodedBlock::decode(file, blocks.get(number)?));

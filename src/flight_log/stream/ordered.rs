@@ -12,6 +12,8 @@ use crate::geometry::seconds_from_ns;
 const HORIZON_NS: i64 = 100_000_000;
 /// Number of cached blocks: one per topic, and one ahead for topics whose messages are in the next block already.
 const BLOCKS: usize = 8;
+/// Bytes of cached blocks: the topics of a frame lie in one or two blocks, and large ones hold many frames.
+const BLOCK_BYTES: u64 = 10 << 20;
 
 /// The log and the warnings that all topics of a stream share.
 #[derive(Debug)]
@@ -26,7 +28,12 @@ pub(super) struct ReadContext {
 
 impl ReadContext {
     pub(super) fn new(log: Arc<FlightLog>) -> Self {
-        Self { log, cache: BlockCache::new(BLOCKS), reported: BTreeSet::new(), warnings: Vec::new() }
+        Self {
+            log,
+            cache: BlockCache::new(BLOCKS).with_capacity_bytes(BLOCK_BYTES),
+            reported: BTreeSet::new(),
+            warnings: Vec::new(),
+        }
     }
 
     pub(super) fn warn(&mut self, stamp_ns: i64, message: String) {
