@@ -53,13 +53,19 @@ fn condition(text: &str) -> Result<Condition, String> {
     text.parse::<Condition>().map_err(|problem| problem.to_string())
 }
 
+/// Memory budget where only tables are written: beyond it the steps are kept as summaries.
+const SUMMARY_BUDGET_BYTES: usize = 16 << 20;
+
 /// Runs `dcvins run`.
 pub(crate) fn run(arguments: &RunArguments) -> Result<Outcome> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
     let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
     export::check_run_folders(&arguments.out, &labels, &arguments.log, arguments.force)?;
     let interrupt = Interrupt::watch()?;
-    let plan = SessionPlan { interrupted: interrupt.flag(), ..plan.clone() };
+    // Whole steps are needed for results.mcap and for the conditions of `--break`; all other files are made of summaries.
+    let needs_whole_steps = arguments.mcap || arguments.break_at.is_some();
+    let memory_budget_bytes = if needs_whole_steps { plan.memory_budget_bytes } else { SUMMARY_BUDGET_BYTES };
+    let plan = SessionPlan { interrupted: interrupt.flag(), memory_budget_bytes, ..plan.clone() };
     let (recording, hit) = match &arguments.break_at {
         Some(condition) => compute_until(&plan, condition)?,
         None => (compute(&plan, None)?.into_recording(), None),
