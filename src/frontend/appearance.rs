@@ -5,7 +5,7 @@
 use nalgebra::{Matrix6, Vector6};
 use pulp::{Arch, NullaryFnOnce};
 
-use super::reference::{CENTRE, LANES, Rows, SIDE, WINDOW};
+use super::reference::{CENTRE, LANES, REGISTER, Rows, SIDE, WINDOW};
 
 /// Minimum variance of a window, in squared grey levels.
 const MIN_VARIANCE: f32 = 4.0;
@@ -155,19 +155,28 @@ impl NullaryFnOnce for Comparison<'_> {
         let Self { appearance, window } = self;
         let [mut sum, mut square, mut common] = [[0.0_f32; LANES]; 3];
         let [mut x, mut x_down, mut y, mut y_down] = [[0.0_f32; LANES]; 4];
-        for row in 0..WINDOW {
-            let (value, along_x, along_y) =
-                (&appearance.value[row], &appearance.along_x[row], &appearance.along_y[row]);
-            let grey = &window[row];
-            let down = row as f32 - CENTRE as f32;
-            for c in 0..LANES {
-                sum[c] += grey[c];
-                square[c] += grey[c] * grey[c];
-                common[c] += value[c] * grey[c];
-                x[c] += along_x[c] * grey[c];
-                x_down[c] += down * along_x[c] * grey[c];
-                y[c] += along_y[c] * grey[c];
-                y_down[c] += down * along_y[c] * grey[c];
+        // The sums of all columns at once do not fit into the registers.
+        for first in (0..LANES).step_by(REGISTER) {
+            let mut sums = [[0.0_f32; REGISTER]; 7];
+            for row in 0..WINDOW {
+                let lanes = |rows: &Rows| -> [f32; REGISTER] { std::array::from_fn(|c| rows[row][first + c]) };
+                let (value, along_x, along_y) =
+                    (lanes(&appearance.value), lanes(&appearance.along_x), lanes(&appearance.along_y));
+                let grey = lanes(window);
+                let down = row as f32 - CENTRE as f32;
+                for c in 0..REGISTER {
+                    sums[0][c] += grey[c];
+                    sums[1][c] += grey[c] * grey[c];
+                    sums[2][c] += value[c] * grey[c];
+                    sums[3][c] += along_x[c] * grey[c];
+                    sums[4][c] += down * along_x[c] * grey[c];
+                    sums[5][c] += along_y[c] * grey[c];
+                    sums[6][c] += down * along_y[c] * grey[c];
+                }
+            }
+            let all = [&mut sum, &mut square, &mut common, &mut x, &mut x_down, &mut y, &mut y_down];
+            for (all, sums) in all.into_iter().zip(sums) {
+                all[first..first + REGISTER].copy_from_slice(&sums);
             }
         }
         let across = |lanes: &[f32; LANES]| -> f32 {

@@ -91,12 +91,15 @@ impl CoarseAligner {
         let Some(coarsest) = self.levels.first() else { return fallback };
         let Some(view) = View::new(&self.camera, coarsest, previous, now, predicted) else { return fallback };
         let identity = UnitQuaternion::identity();
-        let unrotated = view.fit_brightness(&identity);
+        let unrotated_levels = view.observe(&identity);
+        let unrotated = view.fit_brightness(&identity, &unrotated_levels);
         let mut starts = vec![unrotated];
         let mut prior = predicted;
         if let Some(predicted) = predicted {
-            let expected = view.fit_brightness(&predicted.rotation);
-            let consistent = view.misfit(&expected) <= view.misfit(&unrotated) + WORSE_BY;
+            let expected_levels = view.observe(&predicted.rotation);
+            let expected = view.fit_brightness(&predicted.rotation, &expected_levels);
+            let consistent =
+                view.misfit(&expected, &expected_levels) <= view.misfit(&unrotated, &unrotated_levels) + WORSE_BY;
             if consistent && predicted.sigma_rad() * self.camera.focal_length_px() <= ACCURATE_SIGMA_PX {
                 return fallback;
             }
@@ -203,11 +206,16 @@ impl<'a> View<'a> {
         Some((1.0 - down) * line(y) + down * line(y + 1))
     }
 
-    /// Initial fit at a rotation: gain 1 and the mean offset of brightness.
-    fn fit_brightness(&self, rotation: &UnitQuaternion<f64>) -> Fit {
+    /// [`Self::observed`] of every sample.
+    fn observe(&self, rotation: &UnitQuaternion<f64>) -> Vec<Option<f64>> {
+        self.samples.iter().map(|sample| self.observed(sample, rotation)).collect()
+    }
+
+    /// Initial fit at a rotation with its observed grey levels: gain 1 and the mean offset of brightness.
+    fn fit_brightness(&self, rotation: &UnitQuaternion<f64>, observed: &[Option<f64>]) -> Fit {
         let (mut sum, mut count) = (0.0, 0.0);
-        for sample in self.samples {
-            if let Some(value) = self.observed(sample, rotation) {
+        for (sample, value) in self.samples.iter().zip(observed) {
+            if let Some(value) = value {
                 sum += value - grey(self.previous, sample.x, sample.y);
                 count += 1.0;
             }
@@ -215,13 +223,14 @@ impl<'a> View<'a> {
         Fit { rotation: *rotation, gain: 1.0, offset: if count > 0.0 { sum / count } else { 0.0 }, cost: f64::INFINITY }
     }
 
-    /// Mean cost of a sample, from 0 (all fit) to 1.
-    fn misfit(&self, fit: &Fit) -> f64 {
+    /// Mean cost of a sample, from 0 (all fit) to 1, with the grey levels observed at the rotation of the fit.
+    fn misfit(&self, fit: &Fit, observed: &[Option<f64>]) -> f64 {
         let sum: f64 = self
             .samples
             .iter()
-            .map(|sample| {
-                let Some(value) = self.observed(sample, &fit.rotation) else { return OUTSIDE_COST };
+            .zip(observed)
+            .map(|(sample, value)| {
+                let Some(value) = value else { return OUTSIDE_COST };
                 let residual = value - fit.gain * grey(self.previous, sample.x, sample.y) - fit.offset;
                 let ratio = (residual / self.scale).powi(2);
                 ratio / (1.0 + ratio)

@@ -15,6 +15,8 @@ use crate::sensors::GrayImage;
 const WINDOW: usize = 21;
 /// Its columns rounded up to whole vector registers; the surplus ones weigh nothing.
 const LANES: usize = 24;
+/// Columns in a vector register.
+const REGISTER: usize = 8;
 /// From the first column or row of the window to its centre.
 const CENTRE: f32 = (WINDOW / 2) as f32;
 /// Elements from one row to the next, of the weights and of the region of the second image: with one stride for both, a sum
@@ -223,29 +225,35 @@ fn differentiate(patch: &Patch, rows: Range<usize>, mask: &[f32; LANES], gradien
     for row in (0..rows.start).chain(rows.end..WINDOW) {
         gradient[row] = [[0.0; LANES]; 2];
     }
-    let mut sums = [[0.0_f32; LANES]; 6];
-    for row in rows {
-        let (above, here, below) = (&patch[row], &patch[row + 1], &patch[row + 2]);
-        let (mut along_x, mut along_y) = ([0.0_f32; LANES], [0.0_f32; LANES]);
-        for c in 0..LANES {
-            // Scharr's derivative.
-            let x = 3.0 * (above[c + 2] - above[c] + below[c + 2] - below[c]) + 10.0 * (here[c + 2] - here[c]);
-            let y = 3.0 * (below[c] - above[c] + below[c + 2] - above[c + 2]) + 10.0 * (below[c + 1] - above[c + 1]);
-            along_x[c] = x * mask[c] * (1.0 / 32.0);
-            along_y[c] = y * mask[c] * (1.0 / 32.0);
+    let mut all = [[0.0_f32; LANES]; 6];
+    // The sums of all columns at once do not fit into the registers.
+    for first in (0..LANES).step_by(REGISTER) {
+        let mut sums = [[0.0_f32; REGISTER]; 6];
+        for row in rows.clone() {
+            let (above, here, below) = (&patch[row], &patch[row + 1], &patch[row + 2]);
+            for lane in 0..REGISTER {
+                let c = first + lane;
+                // Scharr's derivative.
+                let x = 3.0 * (above[c + 2] - above[c] + below[c + 2] - below[c]) + 10.0 * (here[c + 2] - here[c]);
+                let y =
+                    3.0 * (below[c] - above[c] + below[c + 2] - above[c + 2]) + 10.0 * (below[c + 1] - above[c + 1]);
+                let (x, y) = (x * mask[c] * (1.0 / 32.0), y * mask[c] * (1.0 / 32.0));
+                let value = here[c + 1] * mask[c];
+                sums[0][lane] += value;
+                sums[1][lane] += value * value;
+                sums[2][lane] += x;
+                sums[3][lane] += y;
+                sums[4][lane] += x * value;
+                sums[5][lane] += y * value;
+                gradient[row][0][c] = x;
+                gradient[row][1][c] = y;
+            }
         }
-        for c in 0..LANES {
-            let value = here[c + 1] * mask[c];
-            sums[0][c] += value;
-            sums[1][c] += value * value;
-            sums[2][c] += along_x[c];
-            sums[3][c] += along_y[c];
-            sums[4][c] += along_x[c] * value;
-            sums[5][c] += along_y[c] * value;
+        for (all, sums) in all.iter_mut().zip(sums) {
+            all[first..first + REGISTER].copy_from_slice(&sums);
         }
-        gradient[row] = [along_x, along_y];
     }
-    sums.map(|lanes| lanes.iter().sum())
+    all.map(|lanes| lanes.iter().sum())
 }
 
 /// Subtracts `offsets + slopes·T` from the gradient; returns its sums of products `xx, xy, yy` and its largest entry.

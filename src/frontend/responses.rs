@@ -22,8 +22,8 @@ const RESPONSES: usize = TILE + 2;
 const GRADIENTS: usize = RESPONSES + 2 * BLOCK_RADIUS;
 const PIXELS: usize = GRADIENTS + 2;
 /// Columns rounded up to whole vector registers; the surplus ones are computed and not used.
-const RESPONSE_LANES: usize = 40;
-const GRADIENT_LANES: usize = 48;
+const RESPONSE_LANES: usize = 36;
+const GRADIENT_LANES: usize = 40;
 const PIXEL_LANES: usize = GRADIENT_LANES + 2;
 
 /// The smaller eigenvalues of a tile and one pixel around it, and their local maxima.
