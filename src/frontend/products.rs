@@ -22,7 +22,7 @@ pub(super) fn sums_of_products(weights: [&Weights; 2], pixels: &Pixels) -> [[i32
 ///
 /// A separate function over eight partial sums, which the compiler vectorizes.
 #[inline(never)]
-fn dot(weights: &Weights, pixels: &[i16]) -> i32 {
+pub(super) fn dot(weights: &Weights, pixels: &[i16]) -> i32 {
     let mut sums = [0_i32; 8];
     for (weights, pixels) in weights.as_chunks::<8>().0.iter().zip(pixels.as_chunks::<8>().0) {
         for lane in 0..8 {
@@ -46,7 +46,6 @@ impl pulp::NullaryFnOnce for PairedProducts<'_> {
     type Output = [[i32; 2]; 4];
 
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
     fn call(self) -> Self::Output {
         const LANES: usize = 16;
         let Self { simd, weights: [x, y], pixels } = self;
