@@ -1,5 +1,8 @@
 //! Configuration of an estimator.
 
+use std::sync::Arc;
+
+use super::earlier_pass::EarlierPass;
 use super::options::EstimatorOptions;
 use super::state::imu_errors::{self, ImuErrors};
 use crate::camera::CameraModel;
@@ -47,6 +50,9 @@ pub struct EstimatorConfig {
     pub timeshift_s: f64,
     /// Rigid cameras beside the main one.
     pub rigid_cameras: Vec<RigidCamera>,
+    /// What an earlier pass over the same measurements found: start and prior of the calibration in place of the given
+    /// chains' above, and prior of the biases.
+    pub earlier_pass: Option<Arc<EarlierPass>>,
     /// Options of the estimator.
     pub options: EstimatorOptions,
     /// Monotonic clock in milliseconds, for the stage times of the reports.
@@ -166,6 +172,7 @@ impl EstimatorConfig {
             sensor: CameraSensorPrior::of_rig(camera),
             timeshift_s: camera.timeshift_cam_imu_s,
             rigid_cameras: Vec::new(),
+            earlier_pass: None,
             options: EstimatorOptions::default(),
             clock_ms: || 0.0,
         })

@@ -3,6 +3,7 @@
 //! It processes a [`StepInput`] per image and returns a [`StepReport`].
 
 mod config;
+mod earlier_pass;
 #[expect(clippy::module_inception, reason = "the type that the folder is about")]
 mod estimator;
 mod factors;
@@ -21,6 +22,7 @@ mod window;
 pub use config::{
     CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidCamera, imu_columns, imu_intrinsics, rigid_columns,
 };
+pub use earlier_pass::{BiasPrior, EarlierPass};
 pub use estimator::Estimator;
 pub use factors::{imu_factor, preintegration};
 pub use hypothetical::{HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge};

@@ -3,8 +3,10 @@
 use nalgebra::Vector3;
 
 use super::config::{EstimatorConfig, rigid_chain};
-use super::state::calibration::{Calibration, GivenSigmas};
+use super::earlier_pass::BiasPrior;
+use super::state::calibration::Calibration;
 use super::state::calibrations::{Calibrations, MAIN};
+use super::state::given_chain::GivenSigmas;
 use super::state::imu_calibration::ImuCalibration;
 use super::state::motion_profile::MotionProfile;
 use super::state::navigation::ImuBias;
@@ -47,8 +49,17 @@ impl Setup {
         (self.config.clock_ms)()
     }
 
-    /// Given calibration of the rig.
+    /// Calibration at which the estimator starts: that of an earlier pass, or else of the rig.
     pub(crate) fn given_calibration(&self) -> Calibrations {
+        let rig = self.rig_calibration();
+        match &self.config.earlier_pass {
+            Some(earlier) => rig.with_found(&earlier.cameras),
+            None => rig,
+        }
+    }
+
+    /// Given calibration of the rig.
+    pub(crate) fn rig_calibration(&self) -> Calibrations {
         let config = &self.config;
         let given = |camera: usize| {
             let (translation_m, rotation_rad) = config.extrinsics_sigmas(camera);
@@ -65,6 +76,11 @@ impl Setup {
         });
         let estimated = config.calibrate && config.estimate_imu_intrinsics;
         Calibrations::new(main, rigid).with_imu(estimated.then(|| ImuCalibration::new(config.imu_intrinsics)))
+    }
+
+    /// Prior of the biases that an earlier pass has found.
+    pub(crate) fn found_bias(&self) -> Option<BiasPrior> {
+        self.config.earlier_pass.as_ref().map(|earlier| earlier.bias)
     }
 
     /// Adds the estimated clocks, shutter and intrinsics of a camera.

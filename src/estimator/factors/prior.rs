@@ -212,10 +212,10 @@ pub(crate) struct StartPrior {
     pub(crate) reference: FrameState,
     /// Most likely biases.
     pub(crate) bias: ImuBias,
-    /// Standard deviation of each accelerometer bias, in m/s².
-    pub(crate) accelerometer_bias_sigma: f64,
-    /// Standard deviation of each gyroscope bias, in rad/s.
-    pub(crate) gyroscope_bias_sigma: f64,
+    /// Standard deviation of the accelerometer's bias by axis, in m/s².
+    pub(crate) accelerometer_bias_sigma: Vector3<f64>,
+    /// Standard deviation of the gyroscope's bias by axis, in rad/s.
+    pub(crate) gyroscope_bias_sigma: Vector3<f64>,
 }
 
 /// Standard deviation of the first position, in metres: it only fixes the origin.
@@ -242,15 +242,15 @@ impl StartPrior {
             jacobian[(1 + axis, 3 + axis)] = 1.0 / ORIGIN_SIGMA_M;
             residual[1 + axis] = (pose.translation_m[axis] - reference.translation_m[axis]) / ORIGIN_SIGMA_M;
             let gyroscope = POSE + joints + 3 + axis;
-            jacobian[(4 + axis, gyroscope)] = 1.0 / self.gyroscope_bias_sigma;
+            jacobian[(4 + axis, gyroscope)] = 1.0 / self.gyroscope_bias_sigma[axis];
             residual[4 + axis] = (state.navigation.bias.gyroscope_rad_per_s[axis]
                 - self.bias.gyroscope_rad_per_s[axis])
-                / self.gyroscope_bias_sigma;
+                / self.gyroscope_bias_sigma[axis];
             let accelerometer = POSE + joints + 6 + axis;
-            jacobian[(7 + axis, accelerometer)] = 1.0 / self.accelerometer_bias_sigma;
+            jacobian[(7 + axis, accelerometer)] = 1.0 / self.accelerometer_bias_sigma[axis];
             residual[7 + axis] = (state.navigation.bias.accelerometer_m_per_s2[axis]
                 - self.bias.accelerometer_m_per_s2[axis])
-                / self.accelerometer_bias_sigma;
+                / self.accelerometer_bias_sigma[axis];
         }
         (jacobian, residual)
     }

@@ -96,13 +96,16 @@ fn from_motion(
     stationary: Option<&StationaryEstimate>,
     checklist: &mut Checklist,
 ) -> Option<InitializationSolution> {
-    let gyroscope_prior = match stationary {
-        Some(stationary) => VectorPrior {
-            mean: stationary.gyroscope_bias_rad_per_s,
-            sigma: stationary.gyroscope_bias_sigma_rad_per_s.max(5e-4),
-        },
-        None => VectorPrior { mean: Vector3::zeros(), sigma: options.gyroscope_bias_sigma_rad_per_s },
-    };
+    let at_rest = stationary.map(|stationary| VectorPrior {
+        mean: stationary.gyroscope_bias_rad_per_s,
+        sigma: stationary.gyroscope_bias_sigma_rad_per_s.max(5e-4),
+    });
+    let found = input
+        .bias
+        .map(|bias| VectorPrior { mean: bias.mean.gyroscope_rad_per_s, sigma: bias.gyroscope_sigma_rad_per_s.max() });
+    let known = [at_rest, found].into_iter().flatten().min_by(|one, other| one.sigma.total_cmp(&other.sigma));
+    let gyroscope_prior =
+        known.unwrap_or(VectorPrior { mean: Vector3::zeros(), sigma: options.gyroscope_bias_sigma_rad_per_s });
     let rotations = guessed_rotations(input.frames, &gyroscope_prior.mean);
     let selected = select_views(input.frames, &rotations, options);
     let count = selected.len() as f64;
@@ -263,7 +266,12 @@ impl Problem<'_> {
     }
 
     fn accelerometer_prior(&self) -> VectorPrior {
-        VectorPrior { mean: Vector3::zeros(), sigma: self.options.accelerometer_bias_sigma_m_per_s2 }
+        match &self.input.bias {
+            Some(bias) => {
+                VectorPrior { mean: bias.mean.accelerometer_m_per_s2, sigma: bias.accelerometer_sigma_m_per_s2.max() }
+            }
+            None => VectorPrior { mean: Vector3::zeros(), sigma: self.options.accelerometer_bias_sigma_m_per_s2 },
+        }
     }
 
     fn alignment_input<'b>(

@@ -7,6 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::extrinsics_fit::fit_extrinsics;
 use super::waiting_frame::WaitingFrame;
 use super::{InitializationOrigin, InitializationSolution};
+use crate::estimator::BiasPrior;
 use crate::estimator::factors::preintegration::Preintegration;
 use crate::estimator::factors::prior::StartPrior;
 use crate::estimator::report::{Event, EventKind, StepReport};
@@ -99,14 +100,19 @@ impl<'a> FirstWindow<'a> {
         if leading == MAIN {
             fit_extrinsics(calibration.of_mut(MAIN), &mut frames, &extrinsics);
         }
-        let start = StartPrior {
-            reference: frames.oldest().state.clone(),
-            bias: ImuBias {
+        let bias = setup.found_bias().unwrap_or_else(|| BiasPrior {
+            mean: ImuBias {
                 gyroscope_rad_per_s: solution.bias.gyroscope_rad_per_s,
                 accelerometer_m_per_s2: Vector3::zeros(),
             },
-            accelerometer_bias_sigma: options.accelerometer_bias_sigma,
-            gyroscope_bias_sigma: options.gyroscope_bias_sigma,
+            gyroscope_sigma_rad_per_s: Vector3::repeat(options.gyroscope_bias_sigma),
+            accelerometer_sigma_m_per_s2: Vector3::repeat(options.accelerometer_bias_sigma),
+        });
+        let start = StartPrior {
+            reference: frames.oldest().state.clone(),
+            bias: bias.mean,
+            accelerometer_bias_sigma: bias.accelerometer_sigma_m_per_s2,
+            gyroscope_bias_sigma: bias.gyroscope_sigma_rad_per_s,
         };
         let state = WindowState { frames, features, calibration, prior: None, start: Some(start) };
         Some(Self { solution, window: SlidingWindow::new(state), observed })

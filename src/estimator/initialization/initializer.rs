@@ -156,13 +156,22 @@ impl Initializer {
     fn options(&self, setup: &Setup) -> InitializationOptions {
         let options = &setup.config.options;
         let camera = self.calibration.leading();
-        let (translation_m, rotation_rad) = setup.config.extrinsics_sigmas(camera);
+        let calibration = self.calibration.of(camera);
         let base = InitializationOptions {
             accelerometer_bias_sigma_m_per_s2: options.accelerometer_bias_sigma,
             ..InitializationOptions::default()
         }
         .for_camera(setup.config.model(camera).focal_length_px(), options.pixel_sigma_px);
-        let joints = self.calibration.of(camera).joint_count();
+        let joints = calibration.joint_count();
+        let joints_rad = self.waiting.back().map_or_else(Vec::new, |newest| newest.initial_joints_rad(joints));
+        if let Some((translation_m, rotation_rad)) = calibration.found_extrinsics_sigmas(&joints_rad) {
+            return if joints == 0 {
+                base.for_rigid_camera(rotation_rad, translation_m)
+            } else {
+                base.for_gimbal_with(rotation_rad, translation_m, self.largest_encoder_sigma_rad())
+            };
+        }
+        let (translation_m, rotation_rad) = setup.config.extrinsics_sigmas(camera);
         if joints == 0 {
             return base.for_rigid_camera(rotation_rad, translation_m);
         }
@@ -211,6 +220,7 @@ impl Initializer {
             gravity_m_per_s2: setup.config.gravity_m_per_s2,
             imu_noise: setup.imu_noise,
             stationary: self.stationary,
+            bias: setup.found_bias(),
         };
         try_initialize(&input, options)
     }

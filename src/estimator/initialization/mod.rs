@@ -53,7 +53,7 @@ pub use stationary::StationaryEstimate;
 
 use nalgebra::Vector3;
 
-use crate::estimator::ImuBias;
+use crate::estimator::{BiasPrior, ImuBias};
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::RigidTransform;
 use crate::sensors::{ImuNoise, ImuSample};
@@ -84,6 +84,8 @@ pub struct InitializationInput<'a> {
     pub imu_noise: ImuNoise,
     /// Last estimate of a stationary vehicle, if there was one ([`InitializationOutcome::Waiting`] has it).
     pub stationary: Option<StationaryEstimate>,
+    /// Biases that an earlier pass over the log has found.
+    pub bias: Option<BiasPrior>,
 }
 
 /// Result of an attempt.

@@ -122,15 +122,26 @@ impl InitializationOptions {
     /// Sets the errors of the extrinsics for a gimbal with `joints` joints: bounds of the chain's uniform errors,
     /// and the noise of an encoder reading (`None` without encoders: the rotation is then hardly known).
     #[must_use]
-    pub fn for_gimbal(mut self, prior: &ChainPrior, joints: usize, encoder_sigma_rad: Option<f64>) -> Self {
+    pub fn for_gimbal(self, prior: &ChainPrior, joints: usize, encoder_sigma_rad: Option<f64>) -> Self {
         // A uniform error of bound b has standard deviation b/√3; errors of base, links and end add up along the chain.
         let parts = (joints + 2) as f64;
         let rotation = prior.rotation_bound_rad / 3.0_f64.sqrt();
         let translation = prior.translation_bound_m / 3.0_f64.sqrt();
+        self.for_gimbal_with(rotation * parts.sqrt(), translation * parts.sqrt(), encoder_sigma_rad)
+    }
+
+    /// Sets the errors of the extrinsics for a gimbal whose chain has these standard deviations altogether.
+    #[must_use]
+    pub(super) fn for_gimbal_with(
+        mut self,
+        rotation_sigma_rad: f64,
+        translation_sigma_m: f64,
+        encoder_sigma_rad: Option<f64>,
+    ) -> Self {
         // A part of the common error rotates with the joints and so differs from frame to frame.
-        let wandering = 0.5 * rotation * parts.sqrt();
-        self.extrinsics_rotation_sigma_rad = (rotation * parts.sqrt()).max(1e-3);
-        self.extrinsics_translation_sigma_m = (translation * parts.sqrt()).max(1e-3);
+        let wandering = 0.5 * rotation_sigma_rad;
+        self.extrinsics_rotation_sigma_rad = rotation_sigma_rad.max(1e-3);
+        self.extrinsics_translation_sigma_m = translation_sigma_m.max(1e-3);
         if let Some(sigma) = encoder_sigma_rad {
             self.extrinsics_rotation_noise_rad = sigma.hypot(wandering).max(1e-3);
         } else {

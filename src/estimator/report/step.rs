@@ -70,7 +70,7 @@ pub struct CalibrationEstimate {
     pub values: Vec<f64>,
     /// Posterior standard deviation of each (NaN before the first solve).
     pub sigmas: Vec<f64>,
-    /// Prior standard deviation of each.
+    /// Standard deviation of each by the rig, before any measurement.
     pub prior_sigmas: Vec<f64>,
     /// The whole chain in the classical form.
     pub classical: ClassicalChain,

@@ -7,31 +7,14 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::given_chain::{EarlierPrior, GivenChain, GivenSigmas};
 use super::sensor_columns::SensorColumn;
 use crate::camera::CameraModel;
+use crate::estimator::earlier_pass::FoundCamera;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{
-    Chain, ChainLinearization, ClassicalChain, NearestForm, ParameterId, ParameterPart, Parameterization, Quantity,
-    transport,
+    Chain, ChainLinearization, ClassicalChain, ParameterId, ParameterPart, Parameterization, Quantity, transport,
 };
-
-/// Prior standard deviations of the given chain, for every parameter of its classical form.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct GivenSigmas {
-    pub(crate) translation_m: f64,
-    pub(crate) rotation_rad: f64,
-}
-
-/// Given chain with its prior.
-#[derive(Clone, Debug, PartialEq)]
-struct GivenChain {
-    classical: ClassicalChain,
-    chain: Chain,
-    sigmas: GivenSigmas,
-    prior_sigmas: DVector<f64>,
-    /// `W` with `WᵀW` the inverse of the prior covariance.
-    square_root_information: DMatrix<f64>,
-}
 
 /// Estimated values.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,8 +99,85 @@ impl Calibration {
             values: of_columns(&self.values),
             first_estimate: self.first_estimate.as_ref().map(of_columns),
             sensors: Arc::clone(&wanted.sensors),
+            given: match wanted.given.earlier() {
+                None => Arc::clone(&self.given),
+                Some(_) => {
+                    let offsets = !self.chain().hides_joint_offsets();
+                    Arc::new(wanted.given.in_parameterization(self.chain().parameterization(), offsets))
+                }
+            },
             ..self.clone()
         }
+    }
+
+    /// This calibration at the values of an earlier pass, with their covariance as its prior.
+    pub(crate) fn with_found(self, found: &FoundCamera) -> Self {
+        if !self.free {
+            return self;
+        }
+        let offsets = !self.chain().hides_joint_offsets();
+        let chain = GivenChain::form(&found.chain, found.parameterization, offsets);
+        let rig = Arc::new(self.given.in_parameterization(found.parameterization, offsets));
+        // Columns that the earlier pass did not have keep the rig's prior.
+        let columns = chain.dof();
+        let place_of = |column: &SensorColumn| {
+            let place = found.sensors.iter().position(|(parameter, _)| *parameter == column.parameter);
+            place.map(|place| columns + place)
+        };
+        let places: Vec<Option<usize>> = (0..columns).map(Some).chain(self.sensors.iter().map(place_of)).collect();
+        let entry = |row: usize, column: usize| match (places[row], places[column]) {
+            (Some(from), Some(to)) => found.covariance[(from, to)],
+            _ if row == column => self.sensors[row - columns].sigma.powi(2),
+            _ => 0.0,
+        };
+        let covariance = DMatrix::from_fn(places.len(), places.len(), entry);
+        let expected =
+            places[columns..].iter().map(|place| place.map_or(0.0, |place| found.sensors[place - columns].1));
+        let expected = DVector::from_iterator(self.sensors.len(), expected);
+        let earlier = EarlierPrior { covariance, expected: expected.clone(), rig };
+        Self {
+            values: Values { chain: chain.clone(), sensors: expected },
+            given: Arc::new(GivenChain::of_earlier_pass(&found.chain, chain, earlier)),
+            ..self
+        }
+    }
+
+    /// What the next pass over the same measurements starts from: the present values, and of the information behind
+    /// `covariance` the rig's prior whole and this share of the rest; `rig` is the calibration before any pass. `None` where
+    /// the covariance is not positive definite.
+    pub(crate) fn found(&self, covariance: &DMatrix<f64>, share: f64, rig: &Self) -> Option<FoundCamera> {
+        let chain = self.chain().dof();
+        let carried = if self.free {
+            let offsets = !self.chain().hides_joint_offsets();
+            let rig = rig.given.in_parameterization(self.chain().parameterization(), offsets);
+            let mut of_rig = rig.square_root_information.tr_mul(&rig.square_root_information);
+            of_rig.resize_mut(self.dof(), self.dof(), 0.0);
+            for (place, column) in self.sensors.iter().enumerate() {
+                of_rig[(chain + place, chain + place)] = column.sigma.powi(-2);
+            }
+            let information = covariance.clone().cholesky()?.inverse() * share + of_rig * (1.0 - share);
+            information.cholesky()?.inverse()
+        } else {
+            DMatrix::zeros(0, 0)
+        };
+        let sensors = self.sensors.iter().zip(self.values.sensors.iter());
+        Some(FoundCamera {
+            chain: self.chain().to_classical(),
+            parameterization: self.chain().parameterization(),
+            covariance: carried,
+            sensors: sensors.map(|(column, change)| (column.parameter, *change)).collect(),
+        })
+    }
+
+    /// Standard deviations of `imu_from_camera` at these joint angles by the prior of an earlier pass, the worst axes: of the
+    /// translation in metres and of the rotation in radians. `None` where the prior is the rig's.
+    pub(crate) fn found_extrinsics_sigmas(&self, joints_rad: &[f64]) -> Option<(f64, f64)> {
+        let earlier = self.given.earlier()?;
+        let by_parameters = self.chain().linearize(self.own(joints_rad)).by_parameters;
+        let covariance = earlier.covariance.view((0, 0), (by_parameters.ncols(), by_parameters.ncols()));
+        let variances = (&by_parameters * covariance * by_parameters.transpose()).diagonal();
+        let worst = |start: usize| variances.fixed_rows::<3>(start).max().max(0.0).sqrt();
+        Some((worst(3), worst(0)))
     }
 
     /// Readout time of the rig, in seconds; zero for a global shutter.
@@ -304,6 +364,10 @@ impl Calibration {
 
     /// Whitened prior residual: difference from the rig's values; one row per column.
     pub(crate) fn prior_residual(&self) -> DVector<f64> {
+        if let Some(earlier) = self.given.earlier() {
+            let expected = Values { chain: self.given.chain.clone(), sensors: earlier.expected.clone() };
+            return &self.given.square_root_information * self.values.minus(&expected);
+        }
         let chain = &self.given.square_root_information * self.chain().minus(&self.given.chain);
         let sensors = self.values.sensors.iter().zip(self.sensors.iter()).map(|(change, column)| change / column.sigma);
         DVector::from_iterator(self.values.dof(), chain.iter().copied().chain(sensors))
@@ -316,8 +380,10 @@ impl Calibration {
     pub(crate) fn prior_jacobian(&self) -> DMatrix<f64> {
         let (all, chain) = (self.values.dof(), self.chain().dof());
         let mut jacobian = self.given.square_root_information.clone().resize(all, all, 0.0);
-        for (place, column) in (chain..all).zip(self.sensors.iter()) {
-            jacobian[(place, place)] = column.sigma.recip();
+        if self.given.earlier().is_none() {
+            for (place, column) in (chain..all).zip(self.sensors.iter()) {
+                jacobian[(place, place)] = column.sigma.recip();
+            }
         }
         let starts: &[usize] = match self.chain().parameterization() {
             Parameterization::Classical => &[0, chain - 6],
@@ -342,10 +408,10 @@ impl Calibration {
         jacobian
     }
 
-    /// Prior standard deviation of each column.
+    /// Standard deviation of each column by the rig, before any measurement.
     pub(crate) fn prior_sigmas(&self) -> impl Iterator<Item = f64> + '_ {
         let sensors = self.sensors.iter().map(|column| column.sigma);
-        self.given.prior_sigmas.iter().copied().chain(sensors)
+        self.given.rig_sigmas().iter().copied().chain(sensors)
     }
 
     /// Sets the ground truth in a test.
@@ -359,7 +425,7 @@ impl Calibration {
     pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
         let offsets = !self.chain().hides_joint_offsets();
         let old = &self.first_estimate.as_ref().unwrap_or(&self.values).chain;
-        let given = GivenChain::new(&self.given.classical, parameterization, self.given.sigmas, offsets);
+        let given = self.given.in_parameterization(parameterization, offsets);
         let new = given.form_of(old);
         let chain = transport(&new, old);
         let sensors = self.values.sensors.len();
@@ -371,39 +437,5 @@ impl Calibration {
         self.values.chain = given.form_of(&self.values.chain);
         self.given = Arc::new(given);
         old_from_new
-    }
-}
-
-impl GivenChain {
-    /// Converts a mechanism to the given chain's parameterization.
-    ///
-    /// The classical form has many values for the same mechanism. The values nearest to the given ones are used, in
-    /// units of their standard deviations: at any others the rig's prior would pull.
-    fn form_of(&self, mechanism: &Chain) -> Chain {
-        NearestForm::new(self.chain.clone(), &self.prior_sigmas).of(mechanism)
-    }
-
-    fn new(
-        classical: &ClassicalChain,
-        parameterization: Parameterization,
-        sigmas: GivenSigmas,
-        joint_offsets: bool,
-    ) -> Self {
-        let whole = Chain::from_classical(classical, parameterization);
-        let chain = if joint_offsets { whole } else { whole.without_joint_offsets() };
-        let covariance = chain.prior_covariance(classical, sigmas.translation_m, sigmas.rotation_rad);
-        let prior_sigmas = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
-        // A column that the prior fixes would make the covariance singular.
-        let floor = 1e-12;
-        let mut regular = covariance;
-        for k in 0..regular.nrows() {
-            regular[(k, k)] += floor;
-        }
-        let dof = chain.dof();
-        let square_root_information = regular
-            .cholesky()
-            .and_then(|factor| factor.l().solve_lower_triangular(&DMatrix::identity(dof, dof)))
-            .unwrap_or_else(|| DMatrix::from_diagonal(&prior_sigmas.map(|sigma| 1.0 / sigma.max(1e-6))));
-        Self { classical: classical.clone(), chain, sigmas, prior_sigmas, square_root_information }
     }
 }

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::calibration::Calibration;
 use super::imu_calibration::ImuCalibration;
 use super::imu_errors::{self, ImuErrors};
+use crate::estimator::earlier_pass::FoundCamera;
 use crate::gimbal::{ParameterId, Parameterization};
 
 /// Index of the main camera, which may have joints. Its image is shown, its calibration has the first columns.
@@ -28,6 +29,12 @@ impl Calibrations {
     /// Adds the intrinsics of the IMU.
     pub(crate) fn with_imu(self, imu: Option<ImuCalibration>) -> Self {
         Self { imu: imu.map(Box::new), ..self }
+    }
+
+    /// These calibrations at the values of an earlier pass, by camera.
+    pub(crate) fn with_found(self, found: &[FoundCamera]) -> Self {
+        let cameras = self.cameras.into_iter().zip(found).map(|(camera, found)| camera.with_found(found));
+        Self { cameras: cameras.collect(), ..self }
     }
 
     /// These calibrations with all columns that others have.

@@ -7,6 +7,7 @@ pub(crate) mod calibrations;
 pub(crate) mod camera_pose;
 pub(crate) mod camera_view;
 pub(crate) mod frame_state;
+pub(crate) mod given_chain;
 pub(crate) mod imu_calibration;
 pub(crate) mod imu_errors;
 pub(crate) mod layout;

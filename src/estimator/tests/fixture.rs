@@ -1,6 +1,6 @@
 //! Windows and estimators made from synthetic flights.
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 
 use super::Noise;
 use crate::estimator::estimator::PhaseState;
@@ -212,8 +212,8 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
     let start = StartPrior {
         reference: frames.oldest().state.clone(),
         bias: ImuBias::default(),
-        accelerometer_bias_sigma: 0.5,
-        gyroscope_bias_sigma: 0.02,
+        accelerometer_bias_sigma: Vector3::repeat(0.5),
+        gyroscope_bias_sigma: Vector3::repeat(0.02),
     };
     let mut window = WindowState { frames, features, calibration, prior: None, start: Some(start) };
     window.triangulate_new(&setup);

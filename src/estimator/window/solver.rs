@@ -3,7 +3,9 @@
 use nalgebra::{DMatrix, DVector, Matrix6};
 
 use super::problem::{Costs, Estimate, NormalEquations, Problem};
+use super::window_state::WindowState;
 use crate::estimator::IterationReport;
+use crate::estimator::setup::Setup;
 use crate::optimization::Cholesky;
 use crate::optimization::damped::{DampedOptions, DampedProblem, Iteration, minimize};
 
@@ -40,6 +42,8 @@ impl Solution {
 
 /// Added to the diagonal so that unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
+/// Length of a velocity, before the biases in its block.
+const VELOCITY: usize = 3;
 
 /// Minimizes the cost from `start`.
 pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits) -> Solution {
@@ -154,6 +158,32 @@ impl DampedProblem for DampedWindow<'_> {
         self.solved = Some(SolvedStep { hessian, factor });
         Some(self.evaluated(self.problem.stepped(&evaluated.estimate, &step, &landmarks)))
     }
+}
+
+/// Posterior covariances of a window at its present estimate, all other unknowns marginalized.
+#[derive(Clone, Debug)]
+pub(crate) struct WindowCovariances {
+    /// Of the calibration's columns.
+    pub(crate) calibration: DMatrix<f64>,
+    /// Of the newest frame's biases, gyroscope first.
+    pub(crate) newest_bias: Matrix6<f64>,
+}
+
+/// Linearizes a window at its present estimate; `None` where the information is not positive definite.
+pub(crate) fn covariances(setup: &Setup, window: &WindowState) -> Option<WindowCovariances> {
+    let active = window.active_tracks();
+    let problem = window.problem(setup, &active);
+    let estimate = window.estimate(active.iter().map(|active| active.landmarks.clone()).collect());
+    let equations = problem.linearize(&estimate);
+    let layout = &problem.layout;
+    let (hessian, _) = equations.reduced(layout, &equations.eliminate(0.0));
+    let factor = Cholesky::ordered(&hessian, layout.elimination_order(), |diagonal| diagonal + FLOOR)?;
+    let newest = layout.velocity_bias(layout.frames.checked_sub(1)?);
+    let newest_bias = factor.covariance_of(newest.start + VELOCITY..newest.end);
+    let calibration = factor.trailing_covariance(layout.calibration);
+    let finite = newest_bias.iter().chain(calibration.iter()).all(|entry| entry.is_finite());
+    let newest_bias = Matrix6::from_column_slice(newest_bias.as_slice());
+    finite.then_some(WindowCovariances { calibration, newest_bias })
 }
 
 /// Removes unknowns from the normal equations: their steps become zero.

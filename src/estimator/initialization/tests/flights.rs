@@ -45,7 +45,7 @@ fn attempt(
         })
         .collect();
     try_initialize(
-        &InitializationInput { frames: &frames, gravity_m_per_s2: GRAVITY, imu_noise: noise(), stationary },
+        &InitializationInput { frames: &frames, gravity_m_per_s2: GRAVITY, imu_noise: noise(), stationary, bias: None },
         options,
     )
 }

@@ -1,0 +1,144 @@
+//! The chain that an estimator starts from, with its prior: of the rig, or of an earlier pass over the same measurements.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::gimbal::{Chain, ClassicalChain, NearestForm, Parameterization, transport, transport_covariance};
+
+/// Prior standard deviations of the given chain, for every parameter of its classical form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct GivenSigmas {
+    pub(crate) translation_m: f64,
+    pub(crate) rotation_rad: f64,
+}
+
+/// Given chain with its prior.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct GivenChain {
+    classical: ClassicalChain,
+    pub(super) chain: Chain,
+    uncertainty: Uncertainty,
+    /// Standard deviations of the rows of `square_root_information`.
+    prior_sigmas: DVector<f64>,
+    /// `W` with `WᵀW` the inverse of the prior covariance: of the chain's columns, after an earlier pass of all columns.
+    pub(super) square_root_information: DMatrix<f64>,
+}
+
+/// How well the given chain is known.
+#[derive(Clone, Debug, PartialEq)]
+enum Uncertainty {
+    /// As the rig says.
+    Rig(GivenSigmas),
+    /// As an earlier pass has found.
+    Earlier(EarlierPrior),
+}
+
+/// What an earlier pass has found.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct EarlierPrior {
+    /// Covariance of all columns.
+    pub(super) covariance: DMatrix<f64>,
+    /// Values of the columns after the chain's, relative to the rig's.
+    pub(super) expected: DVector<f64>,
+    /// The rig's chain and prior.
+    pub(super) rig: Arc<GivenChain>,
+}
+
+impl EarlierPrior {
+    /// The same for another form `to` of the chain `from`.
+    fn transported(&self, from: &Chain, to: &Chain, rig: GivenChain) -> Self {
+        let (old, new, sensors) = (from.dof(), to.dof(), self.expected.len());
+        let part = |start: (usize, usize), size: (usize, usize)| self.covariance.view(start, size).into_owned();
+        let chain = transport_covariance(from, &part((0, 0), (old, old)), to);
+        let chain_by_sensors = transport(from, to) * part((0, old), (old, sensors));
+        let mut covariance = DMatrix::zeros(new + sensors, new + sensors);
+        covariance.view_mut((0, 0), (new, new)).copy_from(&chain);
+        covariance.view_mut((0, new), (new, sensors)).copy_from(&chain_by_sensors);
+        covariance.view_mut((new, 0), (sensors, new)).copy_from(&chain_by_sensors.transpose());
+        covariance.view_mut((new, new), (sensors, sensors)).copy_from(&part((old, old), (sensors, sensors)));
+        Self { covariance, expected: self.expected.clone(), rig: Arc::new(rig) }
+    }
+}
+
+impl GivenChain {
+    /// The chain of a rig.
+    pub(super) fn new(
+        classical: &ClassicalChain,
+        parameterization: Parameterization,
+        sigmas: GivenSigmas,
+        joint_offsets: bool,
+    ) -> Self {
+        let chain = Self::form(classical, parameterization, joint_offsets);
+        let covariance = chain.prior_covariance(classical, sigmas.translation_m, sigmas.rotation_rad);
+        Self::with_covariance(classical, chain, Uncertainty::Rig(sigmas), covariance)
+    }
+
+    /// The chain of an earlier pass.
+    pub(super) fn of_earlier_pass(classical: &ClassicalChain, chain: Chain, earlier: EarlierPrior) -> Self {
+        let covariance = earlier.covariance.clone();
+        Self::with_covariance(classical, chain, Uncertainty::Earlier(earlier), covariance)
+    }
+
+    fn with_covariance(
+        classical: &ClassicalChain,
+        chain: Chain,
+        uncertainty: Uncertainty,
+        covariance: DMatrix<f64>,
+    ) -> Self {
+        let prior_sigmas = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
+        // A column that the prior fixes would make the covariance singular.
+        let floor = 1e-12;
+        let mut regular = covariance;
+        for k in 0..regular.nrows() {
+            regular[(k, k)] += floor;
+        }
+        let rows = regular.nrows();
+        let square_root_information = regular
+            .cholesky()
+            .and_then(|factor| factor.l().solve_lower_triangular(&DMatrix::identity(rows, rows)))
+            .unwrap_or_else(|| DMatrix::from_diagonal(&prior_sigmas.map(|sigma| 1.0 / sigma.max(1e-6))));
+        Self { classical: classical.clone(), chain, uncertainty, prior_sigmas, square_root_information }
+    }
+
+    /// A chain in a parameterization; without encoders its joint offsets are fixed.
+    pub(super) fn form(classical: &ClassicalChain, parameterization: Parameterization, joint_offsets: bool) -> Chain {
+        let whole = Chain::from_classical(classical, parameterization);
+        if joint_offsets { whole } else { whole.without_joint_offsets() }
+    }
+
+    /// The same chain and what is known of it in another parameterization.
+    pub(super) fn in_parameterization(&self, parameterization: Parameterization, joint_offsets: bool) -> Self {
+        match &self.uncertainty {
+            Uncertainty::Rig(sigmas) => Self::new(&self.classical, parameterization, *sigmas, joint_offsets),
+            Uncertainty::Earlier(earlier) => {
+                let chain = Self::form(&self.classical, parameterization, joint_offsets);
+                let rig = earlier.rig.in_parameterization(parameterization, joint_offsets);
+                let earlier = earlier.transported(&self.chain, &chain, rig);
+                Self::of_earlier_pass(&self.classical, chain, earlier)
+            }
+        }
+    }
+
+    /// What an earlier pass has found, `None` where the chain is the rig's.
+    pub(super) fn earlier(&self) -> Option<&EarlierPrior> {
+        match &self.uncertainty {
+            Uncertainty::Rig(_) => None,
+            Uncertainty::Earlier(earlier) => Some(earlier),
+        }
+    }
+
+    /// Standard deviations of the chain's columns by the rig.
+    pub(super) fn rig_sigmas(&self) -> &DVector<f64> {
+        self.earlier().map_or(&self.prior_sigmas, |earlier| &earlier.rig.prior_sigmas)
+    }
+
+    /// Converts a mechanism to the given chain's parameterization.
+    ///
+    /// The classical form has many values for the same mechanism. The values nearest to the given ones are used, in
+    /// units of their standard deviations: at any others the rig's prior would pull.
+    pub(super) fn form_of(&self, mechanism: &Chain) -> Chain {
+        let sigmas = self.prior_sigmas.rows(0, self.chain.dof()).into_owned();
+        NearestForm::new(self.chain.clone(), &sigmas).of(mechanism)
+    }
+}
