@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 use dcvins::geometry::seconds_from_ns;
 use dcvins::session::breakpoints::Condition;
-use dcvins::session::{self, BreakpointHit, Computation, Recording, SessionPlan};
+use dcvins::session::{self, BreakpointHit, Computation, Recording, RunRecord, SessionPlan};
 
 use crate::cli::terminal::Progress;
 
@@ -15,8 +15,8 @@ pub(crate) fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Compu
     let end_s = until_ns.map_or(end_s, |until_ns| end_s.min(seconds_from_ns(until_ns)));
     let progress = Progress::new();
     let computation = session::compute(plan, until_ns, &mut |recording| {
-        let now_s = seconds_from_ns(recording.computed_ns());
-        progress.show((now_s - begin_s) / (end_s - begin_s).max(1e-3), || format!("{now_s:.1} of {end_s:.1} s"));
+        let (pass, now_s) = progress_of(recording);
+        progress.show((now_s - begin_s) / (end_s - begin_s).max(1e-3), || format!("{pass}{now_s:.1} of {end_s:.1} s"));
     })?;
     plan.log.require_unshortened()?;
     Ok(computation)
@@ -33,9 +33,20 @@ pub(crate) fn compute_until(plan: &SessionPlan, condition: &Condition) -> Result
     let end_s = seconds_from_ns(plan.log.duration_ns());
     let progress = Progress::new();
     let (computation, hit) = session::compute_until(plan, condition, &mut |recording| {
-        let now_s = seconds_from_ns(recording.computed_ns());
-        progress.show(now_s / end_s.max(1e-3), || format!("{now_s:.1} s, looking for {condition}"));
+        let (pass, now_s) = progress_of(recording);
+        progress.show(now_s / end_s.max(1e-3), || format!("{pass}{now_s:.1} s, looking for {condition}"));
     })?;
     plan.log.require_unshortened()?;
     Ok((computation.into_recording(), hit))
+}
+
+/// The pass of the run that is furthest behind, for a run with several, and the time of the log that it has reached.
+fn progress_of(recording: &Recording) -> (String, f64) {
+    let open = recording.runs.iter().filter(|run| !run.finished);
+    let behind = open.min_by(|one, other| {
+        let fraction = |run: &RunRecord| run.computed_fraction(recording.duration_ns);
+        fraction(one).total_cmp(&fraction(other))
+    });
+    let reached_ns = behind.map_or_else(|| recording.last_stamp_ns(), RunRecord::reached_ns);
+    (behind.map_or_else(String::new, RunRecord::pass_text), seconds_from_ns(reached_ns))
 }

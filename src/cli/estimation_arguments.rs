@@ -14,8 +14,8 @@ use crate::cli::value_parsers::seconds;
 pub(crate) struct EstimationArguments {
     /// A run over the log: NAME[:key=value,…], NAME one of auto, minimal, minimal-swapped, classical, poe, static,
     /// cluster; keys encoder=on|off, calibrate=on|off, timeshift=on|off, readout=on|off, intrinsics=on|off,
-    /// imu-intrinsics=on|off, first-estimates=on|off, window=N, pixel-noise=F, imu-noise=F, encoder-noise=F,
-    /// loss=none|huber-K|cauchy-K, iterations=N, camera=KEY, name=LABEL. Up to four.
+    /// imu-intrinsics=on|off, first-estimates=on|off, window=N, passes=N, pixel-noise=F, imu-noise=F,
+    /// encoder-noise=F, loss=none|huber-K|cauchy-K, iterations=N, camera=KEY, name=LABEL. Up to four.
     #[arg(long = "run", value_name = "SPEC")]
     pub runs: Vec<RunSpec>,
     /// A trajectory of another program beside the runs, aligned and evaluated like them: FILE[:LABEL] in TUM's or EuRoC's format

@@ -39,7 +39,8 @@ pub use playback::{
     SavedSessionError, Session,
 };
 pub use record::{
-    ChainDistance, Comparison, Divergence, ForkOrigin, LostSince, PoseConsistency, PoseError, PositionTruth, Quantity,
-    RELATIVE_LENGTHS_M, Recording, RelativeAccuracy, RunMemory, RunRecord, RunWarning, SolverPosition, SolverTrace,
-    StepFactorRows, StepRecord, TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane, evaluate_trajectory,
+    ChainDistance, Comparison, Divergence, ForkOrigin, LostSince, PassProgress, PoseConsistency, PoseError,
+    PositionTruth, Quantity, RELATIVE_LENGTHS_M, Recording, RelativeAccuracy, RunMemory, RunRecord, RunWarning,
+    SolverPosition, SolverTrace, StepFactorRows, StepRecord, TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane,
+    evaluate_trajectory,
 };

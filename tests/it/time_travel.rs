@@ -40,7 +40,7 @@ fn check_step(run: &RunRecord, number: usize, again: &StepRecord) {
 #[test]
 fn every_recomputed_step_is_the_step_that_was_recorded() {
     const AT_ONCE: usize = 20;
-    let computation = straight(&["auto", "cluster"]);
+    let computation = straight(&["auto", "cluster", "auto:passes=2"]);
     for (index, run) in computation.recording().runs.iter().enumerate() {
         let mut end = run.steps.len();
         while end > 0 {

@@ -153,7 +153,6 @@ fn pace_ui(ui: &mut Ui, ctx: &PanelContext<'_>, pace: Reading) {
 /// The progress of each run, until all are finished.
 fn progress_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     let theme = ctx.theme;
-    let duration_ns = ctx.recording.duration_ns.max(1);
     let lines: Vec<(usize, [String; 3])> = ctx
         .recording
         .runs
@@ -161,10 +160,10 @@ fn progress_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
         .enumerate()
         .filter(|(_, run)| !run.finished)
         .map(|(number, run)| {
-            let computed_ns = run.steps.last().map_or(0, |step| step.report.stamp_ns);
-            let percent = fixed(100.0 * (computed_ns as f64 / duration_ns as f64).clamp(0.0, 1.0), 0);
+            let computed_ns = run.reached_ns();
+            let percent = fixed(100.0 * run.computed_fraction(ctx.recording.duration_ns), 0);
             let (label, computed_s) = (&run.spec.label, fixed(computed_ns as f64 * 1e-9, 1));
-            let long = format!("{label} computed to {computed_s} s ({percent} %)");
+            let long = format!("{label} {}computed to {computed_s} s ({percent} %)", run.pass_text());
             (number, [long, format!("{label} {percent} %"), format!("{percent} %")])
         })
         .collect();

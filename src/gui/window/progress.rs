@@ -29,10 +29,7 @@ impl ProgressMeter {
     /// Reads a recording at a time of the wall clock; `None` when all steps are computed.
     pub fn read(&mut self, recording: &Recording, now_s: Option<f64>) -> Option<Progress> {
         let open = recording.runs.iter().filter(|run| !run.finished && run.error.is_none());
-        let duration_ns = recording.duration_ns.max(1) as f64;
-        let fractions: Vec<f64> = open
-            .map(|run| run.steps.last().map_or(0.0, |step| (step.report.stamp_ns as f64 / duration_ns).clamp(0.0, 1.0)))
-            .collect();
+        let fractions: Vec<f64> = open.map(|run| run.computed_fraction(recording.duration_ns)).collect();
         if fractions.is_empty() {
             *self = Self::default();
             return None;

@@ -77,6 +77,11 @@ impl Computation {
                 }
                 self.keep_within_budget();
             }
+            EngineMessage::Pass { run, progress } => {
+                if let Some(run) = self.recording_mut().runs.get_mut(run) {
+                    run.earlier_pass = Some(progress);
+                }
+            }
             EngineMessage::Finished { run, error } => {
                 if let Some(run) = self.recording_mut().runs.get_mut(run) {
                     run.finished = true;

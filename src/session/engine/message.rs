@@ -1,5 +1,5 @@
 use crate::flight_log::LogWarning;
-use crate::session::record::StepRecord;
+use crate::session::record::{PassProgress, StepRecord};
 
 /// A message from a thread of the engine to the collector.
 #[derive(Debug)]
@@ -10,6 +10,13 @@ pub(in crate::session) enum EngineMessage {
         run: usize,
         /// The step.
         record: Box<StepRecord>,
+    },
+    /// A run with several passes is at a stamp of a pass before the last one.
+    Pass {
+        /// Index of the run.
+        run: usize,
+        /// The pass and the stamp.
+        progress: PassProgress,
     },
     /// A run has reached the end of the log, or has failed without a possible restart.
     Finished {

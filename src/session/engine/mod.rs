@@ -15,6 +15,7 @@ mod fork;
 mod history;
 mod image_rotations;
 mod message;
+mod passes;
 mod recompute;
 mod run_engine;
 mod step_inputs;
@@ -34,6 +35,8 @@ pub(in crate::session) use history::History;
 pub use history::SnapshotUse;
 pub use image_rotations::{camera_rotations, image_rotations};
 pub(in crate::session) use message::EngineMessage;
+#[cfg(test)]
+pub(in crate::session) use passes::EarlierPasses;
 pub(in crate::session) use recompute::{Detail, RecomputeRequest, RecomputeThread, Recomputed, STEPS_AT_ONCE};
 #[cfg(test)]
 pub(in crate::session) use run_engine::RunEngine;

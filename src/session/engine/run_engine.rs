@@ -45,6 +45,11 @@ impl RunEngine {
         &mut self.estimator
     }
 
+    /// The estimator.
+    pub(super) fn estimator(&self) -> &Estimator {
+        &self.estimator
+    }
+
     /// Number of cameras of the estimator.
     pub(in crate::session) fn cameras(&self) -> usize {
         1 + self.estimator.config().rigid_cameras.len()

@@ -4,7 +4,6 @@
 //! scheduling of threads. A run with two cameras receives inputs from two trackers.
 
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -14,10 +13,12 @@ use super::computation::Computation;
 use super::configuration::estimator_config;
 use super::history::History;
 use super::message::EngineMessage;
+use super::passes::{EarlierPasses, PassFailure, guarded};
 use super::run_engine::RunEngine;
 use super::step_inputs::OwnedStepInput;
 use super::synchronized_frames::SynchronizedFrames;
 use super::tracker::CameraTracker;
+use crate::estimator::EstimatorConfig;
 use crate::session::plan::{SessionError, SessionPlan, cameras_of_run};
 
 /// Capacity in frames of the queue between a tracker and an estimator.
@@ -72,11 +73,12 @@ impl Engine {
                 frames.push((camera.key.clone(), receiver));
             }
             let config = estimator_config(&plan.rig, spec)?;
-            let engine = RunEngine::new(config, plan.keep_linearization_every);
+            let (passes, keep_linearization_every) = (spec.passes, plan.keep_linearization_every);
             let results = sender.clone();
             let Some(history) = computation.history(run).cloned() else { continue };
             self.threads.push(spawn(format!("estimator {run}"), move || {
-                run_thread(run, engine, SynchronizedFrames::new(frames), &history, &results);
+                let run = RunOverLog { run, passes, config, keep_linearization_every, history, results };
+                run.start(SynchronizedFrames::new(frames));
             })?);
         }
         for (camera_key, queues) in queues {
@@ -163,23 +165,54 @@ fn track_thread(
     }
 }
 
-/// Runs an estimator over the synchronized frame sets, stores each set in the history, and reports each step.
-fn run_thread(
+/// A run from the start of the log.
+struct RunOverLog {
     run: usize,
-    engine: RunEngine,
-    mut frames: SynchronizedFrames,
-    history: &History,
-    results: &SyncSender<EngineMessage>,
-) {
-    let inputs = std::iter::from_fn(|| match frames.next() {
-        Ok(input) => input.map(|input| {
-            history.inputs().push(Arc::clone(&input));
-            Ok(input)
-        }),
-        Err(reason) => Some(Err(reason.to_string())),
-    });
-    run_steps(run, engine, inputs, history, results);
-    history.inputs().end();
+    passes: usize,
+    config: EstimatorConfig,
+    keep_linearization_every: Option<usize>,
+    history: Arc<History>,
+    results: SyncSender<EngineMessage>,
+}
+
+impl RunOverLog {
+    /// Runs its passes over the synchronized frame sets, stores each set in the history, and reports each step of the last
+    /// pass.
+    fn start(self, mut frames: SynchronizedFrames) {
+        let history = &self.history;
+        let tracked = std::iter::from_fn(|| match frames.next() {
+            Ok(input) => input.map(|input| {
+                history.inputs().push(Arc::clone(&input));
+                Ok(input)
+            }),
+            Err(reason) => Some(Err(reason.to_string())),
+        });
+        let again = || (0..).map_while(|step| history.inputs().get(step)).map(Ok);
+        if self.passes == 1 {
+            self.last_pass(self.config.clone(), tracked);
+            history.inputs().end();
+            return;
+        }
+        let earlier = EarlierPasses { run: self.run, results: &self.results };
+        let mut config = earlier.run(1, &self.config, tracked);
+        history.inputs().end();
+        for number in 2..self.passes {
+            config = config.and_then(|config| earlier.run(number, &config, again()));
+        }
+        match config {
+            Ok(config) => self.last_pass(config, again()),
+            // The receiver is gone when the session was closed.
+            Err(PassFailure::Closed) => {}
+            Err(PassFailure::Failed(reason)) => {
+                drop(self.results.send(EngineMessage::Finished { run: self.run, error: Some(reason) }));
+            }
+        }
+    }
+
+    fn last_pass(&self, config: EstimatorConfig, inputs: impl Iterator<Item = Result<Arc<OwnedStepInput>, String>>) {
+        let engine = RunEngine::new(config, self.keep_linearization_every);
+        run_steps(self.run, engine, inputs, &self.history, &self.results);
+    }
 }
 
 /// Computes and reports a step for each input.
@@ -200,10 +233,12 @@ fn run_steps(
             }
         };
         history.before_step(step, &engine, &input);
-        let Ok(record) = catch_unwind(AssertUnwindSafe(|| engine.step(&input))) else {
-            let time_s = crate::geometry::seconds_from_ns(input.stamp_ns);
-            error = Some(format!("internal error in the estimator at {time_s:.3} s; please report it with the log"));
-            break;
+        let record = match guarded(input.stamp_ns, || engine.step(&input)) {
+            Ok(record) => record,
+            Err(reason) => {
+                error = Some(reason);
+                break;
+            }
         };
         if results.send(EngineMessage::Step { run, record: Box::new(record) }).is_err() {
             // The receiver is gone when the session was closed.

@@ -91,6 +91,9 @@ pub struct RunSpec {
     pub first_estimates: bool,
     /// Number of keyframes in the window (`window=10`).
     pub window: usize,
+    /// Number of passes over the log (`passes=2`): each starts with what the one before found of calibration and biases. The
+    /// last one is recorded.
+    pub passes: usize,
     /// Key of the main camera (`camera=cam1`). `None` means the gimballed camera, or the first rigid one for `static`
     /// and for rigs without a gimbal. A `cluster` also uses the first rigid camera.
     pub camera_key: Option<String>,
@@ -111,6 +114,7 @@ impl Default for RunSpec {
             imu_intrinsics: false,
             first_estimates: true,
             window: DEFAULT_WINDOW,
+            passes: 1,
             camera_key: None,
             tuning: EstimatorTuning::default(),
         }
@@ -137,6 +141,9 @@ pub enum RunSpecError {
 }
 
 impl RunSpec {
+    /// Range of the number of passes: more than three change little.
+    pub const PASSES: std::ops::RangeInclusive<usize> = 1..=3;
+
     /// Whether these columns are estimated beside the chain's.
     pub fn estimates(&self, columns: SensorColumns) -> bool {
         match columns {
@@ -165,6 +172,9 @@ impl RunSpec {
         }
         if self.window != standard.window {
             options.push(format!("window={}", self.window));
+        }
+        if self.passes != standard.passes {
+            options.push(format!("passes={}", self.passes));
         }
         options.extend(self.tuning.options());
         options.extend(self.camera_key.iter().map(|key| format!("camera={key}")));
@@ -219,6 +229,13 @@ impl FromStr for RunSpec {
                             bad(format!("window is '{value}', expected a number from {low} to {high}"))
                         })?;
                 }
+                "passes" => {
+                    run.passes =
+                        value.parse().ok().filter(|passes| RunSpec::PASSES.contains(passes)).ok_or_else(|| {
+                            let (low, high) = (RunSpec::PASSES.start(), RunSpec::PASSES.end());
+                            bad(format!("passes is '{value}', expected a number from {low} to {high}"))
+                        })?;
+                }
                 tuned if EstimatorTuning::KEYS.contains(&tuned) => run.tuning.set(tuned, value).map_err(bad)?,
                 "camera" => run.camera_key = Some(value.to_owned()),
                 "name" if folder_name(value) == value && !value.is_empty() => run.label = value.to_owned(),
@@ -226,7 +243,7 @@ impl FromStr for RunSpec {
                     return Err(bad(format!("name is '{value}', expected letters, digits, '-', '_' and '.' only")));
                 }
                 _ => {
-                    let known = "encoder, calibrate, timeshift, readout, intrinsics, imu-intrinsics, first-estimates, window, camera, name";
+                    let known = "encoder, calibrate, timeshift, readout, intrinsics, imu-intrinsics, first-estimates, window, passes, camera, name";
                     let tuning = EstimatorTuning::KEYS.join(", ");
                     return Err(bad(format!("unknown key '{key}', expected one of {known}, {tuning}")));
                 }

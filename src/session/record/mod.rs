@@ -3,6 +3,7 @@
 mod antenna_record;
 mod comparison;
 mod lost_since;
+mod pass_progress;
 mod pose_consistency;
 mod pose_errors;
 mod recording;
@@ -18,6 +19,7 @@ mod warnings;
 pub use antenna_record::PositionTruth;
 pub use comparison::{Comparison, Divergence, Quantity};
 pub use lost_since::LostSince;
+pub use pass_progress::PassProgress;
 pub use pose_consistency::PoseConsistency;
 pub use pose_errors::PoseError;
 pub use recording::Recording;

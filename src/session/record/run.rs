@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::antenna_record::{AntennaRecord, PositionTruth};
+use super::pass_progress::PassProgress;
 use super::solver_trace::SolverTrace;
 use super::step::{StepFactorRows, StepRecord};
 use super::summary::SummaryOrder;
@@ -56,6 +57,8 @@ pub struct RunRecord {
     pub steps: Vec<Arc<StepRecord>>,
     /// Whether it has reached the end of the log, or has failed.
     pub finished: bool,
+    /// The pass before the last one that runs or ran last, for runs with several.
+    pub earlier_pass: Option<PassProgress>,
     /// The reason of an early end.
     pub error: Option<String>,
     /// `true_from_estimate`: the yaw rotation and translation that align the estimated trajectory with the ground
@@ -92,6 +95,7 @@ impl RunRecord {
             camera_key,
             steps: Vec::new(),
             finished: false,
+            earlier_pass: None,
             error: None,
             alignment: None,
             alignment_sums: AlignmentSums::default(),

@@ -1,6 +1,7 @@
 mod covariance;
 mod forks;
 pub(crate) mod memory;
+mod passes;
 mod plan;
 mod rig_values;
 mod warnings;

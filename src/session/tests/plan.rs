@@ -27,6 +27,7 @@ fn run_specifications_are_read_and_written() {
         "auto:timeshift=on,first-estimates=off",
         "auto:pixel-noise=2,imu-noise=0.5,encoder-noise=3,loss=huber-1.5,iterations=12",
         "static:loss=none,name=quadratic",
+        "cluster:window=8,passes=2,iterations=12",
     ] {
         let run = parse(text).unwrap();
         assert_eq!(parse(&run.to_string()).unwrap(), run, "{text} is written as {run}");
@@ -47,6 +48,7 @@ fn specifications_of_one_meaning_have_one_text_of_settings() {
         "auto:window=8,imu-noise=2",
         "auto:window=8,imu-noise=2,name=auto-imu-noise-2.0-window-8",
     );
+    check("auto:passes=1", "auto", "auto:name=auto-passes-1");
     check("poe:loss=cauchy-2,name=robust", "poe:loss=cauchy-2", "poe:loss=cauchy-2,name=robust");
 }
 
@@ -73,6 +75,7 @@ fn rejected_specifications_report_what_was_expected() {
     check("auto:encoder=maybe", &["encoder", "maybe", "on or off"]);
     check("auto:window=2", &["window", "'2'", "4 to 30"]);
     check("auto:speed=3", &["unknown key 'speed'", "calibrate"]);
+    check("auto:passes=0", &["passes", "'0'", "1 to 3"]);
     check("auto:encoder", &["no value"]);
     check("auto:pixel-noise=0", &["pixel-noise", "'0'", "0.001 to 1000"]);
     check("auto:loss=tukey-2", &["loss", "'tukey-2'", "huber-K"]);

@@ -26,6 +26,7 @@ pub(super) struct AddRunDialog {
     timeshift: bool,
     first_estimates: bool,
     window: usize,
+    passes: usize,
     name: String,
 }
 
@@ -39,6 +40,7 @@ impl Default for AddRunDialog {
             timeshift: standard.timeshift,
             first_estimates: standard.first_estimates,
             window: standard.window,
+            passes: standard.passes,
             name: String::new(),
         }
     }
@@ -62,6 +64,9 @@ impl AddRunDialog {
         }
         if self.window != RunSpec::default().window {
             options.push(format!("window={}", self.window));
+        }
+        if self.passes != RunSpec::default().passes {
+            options.push(format!("passes={}", self.passes));
         }
         if !self.name.trim().is_empty() {
             options.push(format!("name={}", self.name.trim()));
@@ -125,6 +130,11 @@ impl AddRunDialog {
             let name = ui.label("Keyframes in the window");
             ui.add(egui::DragValue::new(&mut self.window).range(4..=30)).labelled_by(name.id);
             ui.end_row();
+            let name = ui.label("Passes over the log");
+            ui.add(egui::DragValue::new(&mut self.passes).range(RunSpec::PASSES)).labelled_by(name.id).on_hover_text(
+                "Each pass starts with the calibration and the biases that the one before found; the last one is shown",
+            );
+            ui.end_row();
             let name = ui.label("Name");
             let edit = TextEdit::singleline(&mut self.name).hint_text("automatic").desired_width(260.0);
             ui.add(edit).labelled_by(name.id);
@@ -140,11 +150,11 @@ mod tests {
     #[test]
     fn every_choice_is_understood() {
         for (choice, (name, _)) in CHOICES.iter().enumerate() {
-            let dialog = AddRunDialog { choice, encoder: false, window: 12, ..AddRunDialog::default() };
+            let dialog = AddRunDialog { choice, encoder: false, window: 12, passes: 2, ..AddRunDialog::default() };
             let spec: RunSpec = dialog.written().parse().unwrap();
             assert_eq!(spec.parameterization.name(), *name);
             assert!(!spec.encoder && spec.calibrate);
-            assert_eq!(spec.window, 12);
+            assert_eq!((spec.window, spec.passes), (12, 2));
         }
     }
 }

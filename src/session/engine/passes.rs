@@ -1,0 +1,79 @@
+//! Several passes of a run over the log (`passes=2`): what one finds of calibration and biases is the prior of the next.
+//!
+//! Only the last pass is recorded. The others run over the same inputs without the observability analysis.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
+
+use super::message::EngineMessage;
+use super::run_engine::RunEngine;
+use super::step_inputs::OwnedStepInput;
+use crate::estimator::{EarlierPass, EstimatorConfig};
+use crate::geometry::seconds_from_ns;
+use crate::session::record::PassProgress;
+
+/// Steps between two readings of the biases and two reports of the progress.
+const STEPS_BETWEEN_READINGS: usize = 20;
+
+/// The passes of a run before its last one.
+pub(in crate::session) struct EarlierPasses<'a> {
+    /// Index of the run.
+    pub(in crate::session) run: usize,
+    /// Receives the progress.
+    pub(in crate::session) results: &'a SyncSender<EngineMessage>,
+}
+
+/// Why there is no result of a pass.
+pub(in crate::session) enum PassFailure {
+    /// The session was closed.
+    Closed,
+    /// An input or a step failed; the reason for the record.
+    Failed(String),
+}
+
+impl EarlierPasses<'_> {
+    /// Runs pass `number`, counted from 1, and returns the configuration of the next one. A pass without a window
+    /// leaves it as it was.
+    pub(in crate::session) fn run(
+        &self,
+        number: usize,
+        config: &EstimatorConfig,
+        inputs: impl Iterator<Item = Result<Arc<OwnedStepInput>, String>>,
+    ) -> Result<EstimatorConfig, PassFailure> {
+        let mut engine = RunEngine::new(config.clone(), None);
+        let (mut begin_ns, mut newest_ns) = (None, 0);
+        let mut found: Option<EarlierPass> = None;
+        for (step, input) in inputs.enumerate() {
+            let input = input.map_err(PassFailure::Failed)?;
+            newest_ns = input.stamp_ns;
+            begin_ns.get_or_insert(newest_ns);
+            guarded(newest_ns, || engine.step_without_rank(&input)).map_err(PassFailure::Failed)?;
+            if step.is_multiple_of(STEPS_BETWEEN_READINGS) {
+                found = newer(found, &engine, begin_ns, newest_ns);
+                let progress = PassProgress { number, reached_ns: newest_ns };
+                self.results.send(EngineMessage::Pass { run: self.run, progress }).map_err(|_| PassFailure::Closed)?;
+            }
+        }
+        let found = newer(found, &engine, begin_ns, newest_ns).map(Arc::new);
+        Ok(EstimatorConfig { earlier_pass: found.or_else(|| config.earlier_pass.clone()), ..config.clone() })
+    }
+}
+
+/// What an engine has found by now since the start of the log, with the best biases so far; what was found before where it
+/// has no window.
+fn newer(before: Option<EarlierPass>, engine: &RunEngine, begin_ns: Option<i64>, now_ns: i64) -> Option<EarlierPass> {
+    let now = begin_ns.and_then(|begin_ns| engine.estimator().findings(seconds_from_ns(now_ns - begin_ns)));
+    match (now, before) {
+        (Some(now), Some(before)) => Some(now.with_best_bias(&before)),
+        (now, before) => now.or(before),
+    }
+}
+
+/// A step whose panic ends the run with a message instead of the program.
+pub(super) fn guarded<T>(stamp_ns: i64, step: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(step)).map_err(|_| {
+        let time_s = seconds_from_ns(stamp_ns);
+        format!("internal error in the estimator at {time_s:.3} s; please report it with the log")
+    })
+}

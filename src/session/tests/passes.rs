@@ -1,0 +1,116 @@
+//! Runs of several passes: the next one starts from what the one before found, and its σ stay those of one flight.
+
+use std::sync::Arc;
+use std::sync::mpsc::sync_channel;
+
+use super::memory::input_of;
+use crate::estimator::Phase;
+use crate::session::engine::{EarlierPasses, EngineMessage, OwnedStepInput, RunEngine, estimator_config};
+use crate::session::record::{PoseError, RunRecord};
+use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
+
+/// Degrees and metres by which the chain of a mechanism that was measured with a ruler is wrong.
+const RULER: crate::sensors::ChainPrior =
+    crate::sensors::ChainPrior { translation_bound_m: 0.03, rotation_bound_rad: 0.17 };
+
+/// The last of several passes, and the progress that the others reported.
+fn recorded_in_passes(flight: &SyntheticFlight, text: &str) -> (RunRecord, Vec<EngineMessage>) {
+    let spec: crate::session::RunSpec = text.parse().unwrap();
+    let mut config = estimator_config(&flight.given_rig, &spec).unwrap();
+    let sigma_rad = config.encoder_sigma_rad.unwrap();
+    let inputs: Vec<Arc<OwnedStepInput>> =
+        flight.frames.iter().map(|frame| Arc::new(input_of(frame, sigma_rad))).collect();
+    let (results, progress) = sync_channel(inputs.len());
+    let earlier = EarlierPasses { run: 3, results: &results };
+    for number in 1..spec.passes {
+        config = earlier.run(number, &config, inputs.iter().cloned().map(Ok)).ok().expect("the pass ends");
+    }
+    let mut engine = RunEngine::new(config, None);
+    let mut run = RunRecord::new(spec, "cam0".to_owned());
+    inputs.iter().for_each(|input| run.push(engine.step(input)));
+    drop(results);
+    (run, progress.into_iter().collect())
+}
+
+/// Largest tilt of the first second after the initialization, in radians.
+fn first_tilt_rad(run: &RunRecord) -> f64 {
+    let tilts = run.steps.iter().filter_map(|step| {
+        let up = |pose: &crate::geometry::RigidTransform| pose.rotation.inverse() * nalgebra::Vector3::z();
+        Some(up(&step.report.newest()?.world_from_imu).angle(&up(step.ground_truth.as_ref()?)))
+    });
+    tilts.take(20).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_second_pass_starts_upright_and_follows_the_truth_more_closely() {
+    let (mut tilts, mut errors, mut nees) = ([0.0_f64; 2], [0.0_f64; 2], 0.0);
+    const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
+    for seed in SEEDS {
+        let start_error = RULER;
+        let options = SyntheticOptions { seed, duration_s: 10.0, start_error, ..SyntheticOptions::default() };
+        let flight = synthetic_tracks(&options);
+        for (place, spec) in ["auto", "auto:passes=2"].into_iter().enumerate() {
+            let (run, _) = recorded_in_passes(&flight, spec);
+            tilts[place] += first_tilt_rad(&run);
+            errors[place] += run.accuracy().expect("there is ground truth").absolute_m.rmse.ln();
+            if place == 1 {
+                nees += PoseError::mean_nees(&run.pose_errors()).unwrap();
+            }
+        }
+    }
+    let count = SEEDS.count() as f64;
+    let ratio = ((errors[1] - errors[0]) / count).exp();
+    println!("tilt {tilts:?} rad summed, ATE ratio {ratio:.3}, NEES {:.2}", nees / count);
+    assert!(tilts[1] < 0.5 * tilts[0], "{tilts:?}");
+    assert!(ratio < 0.9, "{ratio}");
+    assert!((2.0..10.0).contains(&(nees / count)), "NEES {}", nees / count);
+}
+
+#[test]
+fn sigmas_of_the_last_pass_are_near_those_of_one_pass_and_priors_are_the_rigs() {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 7.0, ..SyntheticOptions::default() });
+    let last = |spec: &str| {
+        let (run, _) = recorded_in_passes(&flight, spec);
+        run.steps.last().unwrap().report.calibration.clone()
+    };
+    // The sensor columns are carried over with the chain's, whatever the parameterization.
+    for columns in ["auto:timeshift=on", "classical", "poe"] {
+        let separator = if columns.contains(':') { ',' } else { ':' };
+        let [one, two, three] = [1, 2, 3].map(|passes| last(&format!("{columns}{separator}passes={passes}")));
+        assert_eq!(one.parameters, two.parameters);
+        for (index, parameter) in one.parameters.iter().enumerate() {
+            assert_eq!(one.prior_sigmas[index], two.prior_sigmas[index], "{columns} {parameter:?}");
+            for later in [&two, &three] {
+                let ratio = later.sigmas[index] / one.sigmas[index];
+                assert!((0.7..1.2).contains(&ratio), "{columns} {parameter:?}: {ratio}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pass_reports_its_progress_and_one_that_never_initializes_changes_nothing() {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 6.0, ..SyntheticOptions::default() });
+    let (run, progress) = recorded_in_passes(&flight, "auto:passes=2");
+    let reached: Vec<i64> = progress
+        .iter()
+        .map(|message| match message {
+            EngineMessage::Pass { run: 3, progress } if progress.number == 1 => progress.reached_ns,
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert!(reached.len() == 6 && reached.is_sorted(), "{reached:?}");
+    assert!(run.steps.iter().any(|step| step.report.phase == Phase::Tracking));
+
+    // Too short for a window.
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 0.5, ..SyntheticOptions::default() });
+    let [one, two] = ["auto", "auto:passes=2"].map(|spec| recorded_in_passes(&flight, spec).0);
+    let steps = one.steps.iter().zip(&two.steps);
+    assert!(steps.clone().count() >= 9);
+    for (one, two) in steps {
+        assert_eq!(
+            (one.report.phase, &one.report.calibration.values),
+            (Phase::Initializing, &two.report.calibration.values)
+        );
+    }
+}
