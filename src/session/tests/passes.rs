@@ -68,13 +68,14 @@ fn a_second_pass_starts_upright_and_follows_the_truth_more_closely() {
 
 #[test]
 fn sigmas_of_the_last_pass_are_near_those_of_one_pass_and_priors_are_the_rigs() {
-    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 7.0, ..SyntheticOptions::default() });
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 9.0, ..SyntheticOptions::default() });
     let last = |spec: &str| {
         let (run, _) = recorded_in_passes(&flight, spec);
         run.steps.last().unwrap().report.calibration.clone()
     };
-    // The sensor columns are carried over with the chain's, whatever the parameterization.
-    for columns in ["auto:timeshift=on", "classical", "poe"] {
+    // The sensor columns are carried over with the chain's. Not `poe`: the σ of its inner columns depend on the values at which
+    // a pass is linearized (0.75, 0.38 and 0.53 of the prior in three passes over 7 s).
+    for columns in ["auto:timeshift=on", "classical"] {
         let separator = if columns.contains(':') { ',' } else { ':' };
         let [one, two, three] = [1, 2, 3].map(|passes| last(&format!("{columns}{separator}passes={passes}")));
         assert_eq!(one.parameters, two.parameters);
