@@ -44,7 +44,8 @@ pub(crate) struct SimulateArguments {
     #[arg(long)]
     pub force: bool,
     /// A disturbance, in seconds and SI units; may be given several times: camera-offset=S, joint-lag=S,
-    /// joint-start=S, image-gap=START,LENGTH, exposure=S, gyroscope-range=RAD/S, accelerometer-range=M/S²,
+    /// joint-start=S, image-gap=START,LENGTH, exposure=S, image-noise=GREY, jpeg=QUALITY, vignetting=RATIO,
+    /// exposure-drift=RATIO, gyroscope-range=RAD/S, accelerometer-range=M/S²,
     /// light=START,FACTOR, blank=START,LENGTH, slew=START,LENGTH, spin=START,LENGTH,RAD/S, hold-joint=NUMBER,START,LENGTH,
     /// hover=START,LENGTH, stabilize=START,LENGTH, vibration=HZ,RAD/S,M/S².
     #[arg(long, value_name = "KEY=VALUE[,VALUE…]")]

@@ -29,6 +29,15 @@ pub struct Disturbances {
     pub image_gap_s: Option<[f64; 2]>,
     /// Exposure time: images are blurred by the motion during it.
     pub exposure_s: f64,
+    /// Standard deviation of the images' noise in grey values, instead of that of the options.
+    pub image_noise: Option<f64>,
+    /// Quality of the JPEG images, 1 to 100, instead of that of the options.
+    pub jpeg_quality: Option<f64>,
+    /// Ratio by which the farthest corner is darker than the middle, instead of [`VIGNETTING`].
+    pub vignetting: Option<f64>,
+    /// Amplitude of the slow drift of the exposure as a ratio of its mean, as of an automatic exposure, instead of
+    /// [`EXPOSURE_DRIFT`].
+    pub exposure_drift: Option<f64>,
     /// Largest rate that the gyroscope can measure, in rad/s.
     pub gyroscope_range_rad_per_s: Option<f64>,
     /// Largest specific force that the accelerometer can measure, in m/s².
@@ -54,6 +63,10 @@ pub struct Disturbances {
     pub vibration: Option<Vibration>,
 }
 
+/// Ratio by which the farthest corner of an image is darker than the middle, unless a disturbance says otherwise.
+pub(crate) const VIGNETTING: f64 = 0.12;
+/// Slow drift of the exposure as a ratio of its mean, unless a disturbance says otherwise.
+pub(crate) const EXPOSURE_DRIFT: f64 = 0.05;
 /// Time constant of the cameras' automatic exposure.
 const AUTO_EXPOSURE_S: f64 = 0.4;
 /// Grey of what the cameras see while there is nothing to see.
@@ -61,7 +74,8 @@ pub(crate) const BLANK_GREY: f32 = 150.0;
 
 /// What [`Disturbances::set`] reads, for messages and help.
 const KEYS: &str = "camera-offset=S, readout=S, focal=RATIO, imu-intrinsics=SCALE,RAD, accelerometer-drift=M/S²,S, \
-                    joint-lag=S, joint-start=S, image-gap=START,LENGTH, exposure=S, gyroscope-range=RAD/S, accelerometer-range=M/S², light=START,FACTOR, blank=START,LENGTH, \
+                    joint-lag=S, joint-start=S, image-gap=START,LENGTH, exposure=S, image-noise=GREY, jpeg=QUALITY, vignetting=RATIO, exposure-drift=RATIO, \
+                    gyroscope-range=RAD/S, accelerometer-range=M/S², light=START,FACTOR, blank=START,LENGTH, \
                     slew=START,LENGTH, spin=START,LENGTH,RAD/S, hold-joint=NUMBER,START,LENGTH, hover=START,LENGTH, \
                     stabilize=START,LENGTH or vibration=HZ,RAD/S,M/S²";
 
@@ -93,6 +107,10 @@ impl Disturbances {
             "joint-start" => self.joint_start_s = one()?,
             "image-gap" => self.image_gap_s = Some(two()?),
             "exposure" => self.exposure_s = one()?,
+            "image-noise" => self.image_noise = Some(one()?),
+            "jpeg" => self.jpeg_quality = Some(one()?),
+            "vignetting" => self.vignetting = Some(one()?),
+            "exposure-drift" => self.exposure_drift = Some(one()?),
             "gyroscope-range" => self.gyroscope_range_rad_per_s = Some(one()?),
             "accelerometer-range" => self.accelerometer_range_m_per_s2 = Some(one()?),
             "light" => self.light_change = Some(two()?),
@@ -128,6 +146,10 @@ impl Disturbances {
         within("joint lag in seconds", self.joint_lag_s, 0.0, 10.0)?;
         within("start of the joint angles in seconds", self.joint_start_s, 0.0, 3600.0)?;
         within("exposure in seconds", self.exposure_s, 0.0, 0.2)?;
+        within("image noise in grey values", self.image_noise.unwrap_or(0.0), 0.0, 100.0)?;
+        within("JPEG quality", self.jpeg_quality.unwrap_or(1.0), 1.0, 100.0)?;
+        within("vignetting as a ratio", self.vignetting.unwrap_or(0.0), 0.0, 1.0)?;
+        within("drift of the exposure as a ratio", self.exposure_drift.unwrap_or(0.0), 0.0, 0.9)?;
         within("range of the gyroscope in rad/s", self.gyroscope_range_rad_per_s.unwrap_or(1.0), 1e-3, 1e3)?;
         within("range of the accelerometer in m/s²", self.accelerometer_range_m_per_s2.unwrap_or(1.0), 1e-3, 1e4)?;
         within("factor of the light", self.light_change.map_or(1.0, |[_, factor]| factor), 0.01, 100.0)?;

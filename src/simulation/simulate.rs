@@ -9,7 +9,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder as _};
 use rayon::prelude::*;
 
-use super::disturbances::BLANK_GREY;
+use super::disturbances::{BLANK_GREY, EXPOSURE_DRIFT, VIGNETTING};
 use super::equipment::{Equipment, IntrinsicsError};
 use super::experiment::Experiment;
 use super::interval::during;
@@ -339,7 +339,12 @@ struct Studio<'a> {
 
 impl<'a> Studio<'a> {
     fn new(options: &'a SimulationOptions, scenario: &'a Scenario, world: &'a world::World) -> Self {
-        let sensor = SensorOptions { noise: options.image_noise, exposure_drift: 0.05, vignetting: 0.12 };
+        let disturbances = &options.disturbances;
+        let sensor = SensorOptions {
+            noise: disturbances.image_noise.unwrap_or(options.image_noise),
+            exposure_drift: disturbances.exposure_drift.unwrap_or(EXPOSURE_DRIFT),
+            vignetting: disturbances.vignetting.unwrap_or(VIGNETTING),
+        };
         let cameras = scenario.true_rig.cameras.iter().enumerate().map(|(index, camera)| {
             let view = View::new(&camera.model);
             let seed = RandomStream::new(options.seed, stream::IMAGES + 1000 * (index as u64 + 1)).next_u64();
@@ -399,7 +404,8 @@ impl<'a> Studio<'a> {
         }
         let image = sensor.expose(radiance, shot.frame_index, time_s);
         let mut jpeg = Vec::with_capacity(image.pixels.len() / 4);
-        JpegEncoder::new_with_quality(&mut jpeg, self.options.jpeg_quality)
+        let quality = disturbances.jpeg_quality.map_or(self.options.jpeg_quality, |quality| quality.round() as u8);
+        JpegEncoder::new_with_quality(&mut jpeg, quality)
             .write_image(&image.pixels, image.width as u32, image.height as u32, ExtendedColorType::L8)
             .map_err(|error| SimulationError::Image { problem: error.to_string() })?;
         Ok(jpeg)

@@ -113,6 +113,10 @@ fn disturbances_are_read_as_they_are_written_on_the_command_line() {
         "imu-intrinsics=0.01,0.005",
         "accelerometer-drift=0.02,30",
         "image-gap=3,0.5",
+        "image-noise=7",
+        "jpeg=40",
+        "vignetting=0.5",
+        "exposure-drift=0.3",
         "light=4,0.5",
         "blank=5,1.5",
         "slew=6,2",
@@ -130,6 +134,10 @@ fn disturbances_are_read_as_they_are_written_on_the_command_line() {
         imu_intrinsics: [0.01, 0.005],
         accelerometer_drift: Some([0.02, 30.0]),
         image_gap_s: Some([3.0, 0.5]),
+        image_noise: Some(7.0),
+        jpeg_quality: Some(40.0),
+        vignetting: Some(0.5),
+        exposure_drift: Some(0.3),
         light_change: Some([4.0, 0.5]),
         blank_s: Some([5.0, 1.5]),
         gimbal_slew_s: Some([6.0, 2.0]),
@@ -189,6 +197,50 @@ fn a_row_shows_what_is_there_at_its_time() {
             assert!(near.iter().zip(far).all(|(near, far)| *near < 4.0 && far > 2.0 && far > 4.0 * near), "{case}");
         }
     }
+}
+
+#[test]
+fn noise_compression_vignetting_and_exposure_drift_change_images() {
+    let folder = tempfile::tempdir().unwrap();
+    let images = |disturbance: &str| {
+        let mut options = small(Experiment::T1);
+        options.disturbances.set(disturbance).unwrap();
+        let log = Arc::new(FlightLog::open(&write(&options, folder.path()).log).unwrap());
+        let rig = Rig::for_log(&log, None).unwrap();
+        let frames = FrameStream::new(log, &rig, "cam0", 0.0, None).unwrap();
+        frames.map(|frame| frame.image).collect::<Vec<_>>()
+    };
+    // Without an effect: the images as they are without disturbances.
+    let plain = images("exposure-drift=0");
+    let difference = |images: &[crate::sensors::GrayImage]| {
+        let pixels = |images: &[crate::sensors::GrayImage]| -> Vec<f64> {
+            images.iter().flat_map(|image| image.pixels.iter().map(|pixel| f64::from(*pixel))).collect()
+        };
+        let (one, other) = (pixels(images), pixels(&plain));
+        let squares = one.iter().zip(&other).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        (squares / one.len() as f64).sqrt()
+    };
+    let corner_over_middle = |images: &[crate::sensors::GrayImage]| {
+        let near = |image: &crate::sensors::GrayImage, column: usize, row: usize| -> f64 {
+            let rows = (row..row + 8).flat_map(|y| (column..column + 8).map(move |x| y * image.width + x));
+            rows.map(|index| f64::from(image.pixels[index])).sum()
+        };
+        let sums = images.iter().fold((0.0, 0.0), |(corners, middles), image| {
+            let (middle_x, middle_y) = (image.width / 2 - 4, image.height / 2 - 4);
+            (corners + near(image, 0, 0) + near(image, image.width - 8, 0), middles + near(image, middle_x, middle_y))
+        });
+        sums.0 / sums.1
+    };
+    let noisy = difference(&images("image-noise=12"));
+    assert!((8.0..16.0).contains(&noisy), "{noisy} grey values");
+    assert!((1.0..20.0).contains(&difference(&images("jpeg=10"))));
+    assert!((5.0..80.0).contains(&difference(&images("exposure-drift=0.8"))));
+    let darker = corner_over_middle(&images("vignetting=0.6")) / corner_over_middle(&plain);
+    assert!((darker - 0.4 / 0.88).abs() < 0.1, "{darker}");
+    let mut options = small(Experiment::T1);
+    options.disturbances.set("jpeg=0").unwrap();
+    let refused = simulate(&options, &folder.path().join("refused.mcap"), &mut |_| {});
+    assert!(format!("{refused:?}").contains("JPEG quality"), "{refused:?}");
 }
 
 #[test]
