@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use dcvins::export::{self, ReportOptions, write_report};
 use dcvins::log_check::{self, CheckReport};
-use dcvins::session::{SessionPlan, TrajectorySource, image_rotations};
+use dcvins::session::{Computation, SessionPlan, TrajectorySource, image_rotations};
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
@@ -57,7 +57,8 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     export::check_report_folder(&arguments.output, &labels, &arguments.log, arguments.force)?;
     let interrupt = Interrupt::watch()?;
     let plan = SessionPlan { interrupted: interrupt.flag(), ..plan.clone() };
-    let mut computation = compute(&plan, None)?;
+    let (computation, checked) = computed_and_checked(&plan);
+    let mut computation = computation?;
     if interrupt.is_set() && computation.recording().runs.iter().all(|run| run.steps.is_empty()) {
         notify("dcvins: interrupted before the first step; nothing is written");
         return Ok(Outcome::Interrupted);
@@ -69,7 +70,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     // The verdict needs the complete last steps.
     computation.fill_in(computation.recording().last_stamp_ns());
     let options =
-        ReportOptions { command: own_command_line(), check: Some(check(&plan)), inputs: inputs(arguments), figures };
+        ReportOptions { command: own_command_line(), check: Some(checked), inputs: inputs(arguments), figures };
     let recording = computation.recording();
     let page = write_report(recording, &arguments.output, &options)?;
     print(&format!("{}\n", page.display()))?;
@@ -101,11 +102,17 @@ fn own_command_line() -> String {
     command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
 }
 
-/// Findings about the log and its rig.
-fn check(plan: &SessionPlan) -> CheckReport {
-    let _progress = Progress::spinner("checking the log");
-    let rotations = image_rotations(&plan.log, &plan.rig);
-    log_check::check(&plan.log, Ok(&plan.rig), &rotations)
+/// Runs the estimators and, at the same time, checks the log and its rig.
+fn computed_and_checked(plan: &SessionPlan) -> (Result<Computation>, CheckReport) {
+    std::thread::scope(|scope| {
+        let checking = scope.spawn(|| {
+            let rotations = image_rotations(&plan.log, &plan.rig);
+            log_check::check(&plan.log, Ok(&plan.rig), &rotations)
+        });
+        let computation = compute(plan, None);
+        let _progress = Progress::spinner("checking the log");
+        (computation, checking.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    })
 }
 
 /// Paths of the log, of the rig and its ground truth where they are separate files, and of trajectories.
