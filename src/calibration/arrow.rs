@@ -1,6 +1,8 @@
 //! Symmetric positive definite systems with a band and a border: states in time order, then the unknowns that
 //! all states share.
 
+#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+
 use std::ops::Range;
 
 use faer::linalg::matmul::matmul;
@@ -9,10 +11,13 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use faer::prelude::{Reborrow as _, ReborrowMut as _};
 use faer::{Accum, MatMut, MatRef, Par, Side};
 use nalgebra::{DMatrix, DVector};
+use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 
 /// Block size of the band's factorization, in rows and columns.
 const BLOCK: usize = 64;
+/// Rows of the border that are solved for at once.
+const FORWARD_ROWS: usize = 3;
 
 /// Lower triangle of `[band Cᵀ; C corner]`.
 #[derive(Clone, Debug)]
@@ -28,7 +33,7 @@ pub(super) struct ArrowMatrix {
 /// The stored rows of a block of [`BLOCK`] start at the same column, so that blocks are matrices. Entries left
 /// of the first column or behind the last row are zero.
 #[derive(Clone, Debug)]
-struct Band {
+pub(super) struct Band {
     len: usize,
     /// Blocks left of the diagonal that are stored.
     reach: usize,
@@ -56,6 +61,22 @@ impl Band {
     /// Index of an entry of the lower triangle in the storage.
     fn index(&self, row: usize, column: usize) -> usize {
         row * self.width() + self.reach * BLOCK + column - row / BLOCK * BLOCK
+    }
+
+    /// Adds to an entry of the lower triangle; entries above the diagonal are ignored.
+    pub(super) fn add(&mut self, row: usize, column: usize, value: f64) {
+        if column <= row {
+            debug_assert!(column >= self.stored(row).0.start, "within the band");
+            let index = self.index(row, column);
+            self.entries[index] += value;
+        }
+    }
+
+    /// Columns of a row up to its diagonal.
+    pub(super) fn row_mut(&mut self, row: usize, columns: Range<usize>) -> &mut [f64] {
+        debug_assert!(columns.start >= self.stored(row).0.start && columns.end <= row + 1, "within the band");
+        let first = self.index(row, columns.start);
+        &mut self.entries[first..first + columns.len()]
     }
 
     fn diagonal(&mut self, row: usize) -> &mut f64 {
@@ -151,13 +172,9 @@ impl Band {
         }
     }
 
-    /// Computes `L⁻¹ x` in place.
-    fn forward(&self, vector: &mut [f64]) {
-        for row in 0..self.len {
-            let (columns, places) = self.stored(row);
-            let product = dot(&self.entries[places.clone()], &vector[columns]);
-            vector[row] = (vector[row] - product) / self.entries[places.end];
-        }
+    /// Computes `L⁻¹ x` in place for each of some vectors: what is read of the factor serves all of them.
+    fn forward(&self, vectors: &mut [Vec<f64>]) {
+        Arch::new().dispatch(Forward { band: self, vectors });
     }
 
     /// Computes `L⁻ᵀ x` in place.
@@ -168,6 +185,29 @@ impl Band {
             let value = vector[row];
             for (entry, coupling) in vector[columns].iter_mut().zip(&self.entries[places]) {
                 *entry -= value * coupling;
+            }
+        }
+    }
+}
+
+/// [`Band::forward`], compiled for every width of vector registers.
+struct Forward<'a> {
+    band: &'a Band,
+    vectors: &'a mut [Vec<f64>],
+}
+
+impl NullaryFnOnce for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { band, vectors } = self;
+        for row in 0..band.len {
+            let (columns, places) = band.stored(row);
+            let (entries, diagonal) = (&band.entries[places.clone()], band.entries[places.end]);
+            for vector in &mut *vectors {
+                let product = dot(entries, &vector[columns.clone()]);
+                vector[row] = (vector[row] - product) / diagonal;
             }
         }
     }
@@ -198,16 +238,17 @@ impl ArrowMatrix {
 
     /// Adds to an entry of the band's lower triangle; entries above the diagonal are ignored.
     pub(super) fn add(&mut self, row: usize, column: usize, value: f64) {
-        if column <= row {
-            debug_assert!(column >= self.band.stored(row).0.start, "within the band");
-            let index = self.band.index(row, column);
-            self.band.entries[index] += value;
-        }
+        self.band.add(row, column, value);
     }
 
     /// Adds to the coupling between a border unknown and a band unknown.
     pub(super) fn add_border(&mut self, border: usize, column: usize, value: f64) {
         self.border[border][column] += value;
+    }
+
+    /// Band, rows of the border, and the block of the border, to be added to at the same time.
+    pub(super) fn parts_mut(&mut self) -> (&mut Band, &mut [Vec<f64>], &mut DMatrix<f64>) {
+        (&mut self.band, &mut self.border, &mut self.corner)
     }
 
     /// Block of the border (borders × borders, both triangles).
@@ -232,10 +273,16 @@ impl ArrowMatrix {
         if !band.factor() {
             return None;
         }
-        border.par_iter_mut().for_each(|row| band.forward(row));
-        for row in 0..border.len() {
-            for column in 0..=row {
-                let product = dot(&border[row], &border[column]);
+        border.par_chunks_mut(FORWARD_ROWS).for_each(|rows| band.forward(rows));
+        let products: Vec<Vec<f64>> = border
+            .par_iter()
+            .enumerate()
+            .map(|(row, of_row)| {
+                border[..=row].iter().map(|of_column| Arch::new().dispatch(Dot(of_row, of_column))).collect()
+            })
+            .collect();
+        for (row, products) in products.iter().enumerate() {
+            for (column, product) in products.iter().enumerate() {
                 corner[(row, column)] -= product;
                 corner[(column, row)] = corner[(row, column)];
             }
@@ -280,8 +327,9 @@ impl ArrowFactor {
 
     /// Solves for band and border; `None` when the border's Schur complement is not positive definite.
     pub(super) fn solve(&self, band: &[f64], border: &DVector<f64>) -> Option<(Vec<f64>, DVector<f64>)> {
-        let mut solution = band.to_vec();
+        let mut solution = [band.to_vec()];
         self.band.forward(&mut solution);
+        let [mut solution] = solution;
         let mut reduced = border.clone();
         for (entry, row) in reduced.iter_mut().zip(&self.border) {
             *entry -= dot(row, &solution);
@@ -297,7 +345,20 @@ impl ArrowFactor {
     }
 }
 
+/// [`dot`], compiled for every width of vector registers.
+struct Dot<'a>(&'a [f64], &'a [f64]);
+
+impl NullaryFnOnce for Dot<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        dot(self.0, self.1)
+    }
+}
+
 /// Scalar product, summed in eight accumulators in a fixed order.
+#[inline(always)]
 fn dot(left: &[f64], right: &[f64]) -> f64 {
     let mut strands = [0.0; 8];
     let (left_chunks, right_chunks) = (left.chunks_exact(8), right.chunks_exact(8));

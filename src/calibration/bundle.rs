@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Vector3, Vector6};
 
 use super::arrow::ArrowMatrix;
 use super::chain_prior::ChainTerm;
 use super::frame_sets::FrameSet;
+use super::pairs::{ViewPair, ViewRows, add_pairs};
 use super::state::{Camera, Columns, Estimate, ViewId, ViewMap};
 use super::visual::{self, PixelModel, ReducedVisualEquations, Track, VisualEquations};
 use crate::estimator::preintegration::Vector15;
@@ -276,59 +277,24 @@ impl Bundle<'_> {
                 matrix.add(self.navigation_column(0, a), self.navigation_column(0, b), hessian[(a, b)]);
             }
         }
-        for (view, gradient) in &reduced.poses.gradient {
-            let map = &equations.maps[view];
+        for (view, gradient) in reduced.poses.gradients() {
+            let map = &equations.maps[&view];
             let start = view.frame_set() * columns.block();
             for (offset, value) in map.own.tr_mul(gradient).iter().enumerate() {
                 band[start + offset] -= value;
             }
             border -= map.shared.tr_mul(gradient);
         }
-        for ((first, second), block) in &reduced.poses.hessian {
-            self.add_pair(&mut matrix, (*first, &equations.maps[first]), (*second, &equations.maps[second]), block);
-        }
+        let starts = |view: ViewId| view.frame_set() * columns.block();
+        let carried: BTreeMap<ViewId, ViewRows<'_>> =
+            equations.maps.iter().map(|(view, map)| (*view, ViewRows::new(map, starts(*view)))).collect();
+        let pairs: Vec<ViewPair<'_>> = reduced
+            .poses
+            .blocks()
+            .map(|(first, second, block)| ViewPair { first: &carried[&first], second: &carried[&second], block })
+            .collect();
+        add_pairs(&mut matrix, &pairs);
         (matrix, band, border)
-    }
-
-    /// Adds the block of two view poses (6 × 6, `first ≤ second`) to the columns of the unknowns.
-    fn add_pair(
-        &self,
-        matrix: &mut ArrowMatrix,
-        (first, first_map): (ViewId, &ViewMap),
-        (second, second_map): (ViewId, &ViewMap),
-        block: &Matrix6<f64>,
-    ) {
-        let size = self.columns.block();
-        let (at_first, at_second) = (first.frame_set() * size, second.frame_set() * size);
-        let right = block * &second_map.own;
-        let own = first_map.own.tr_mul(&right);
-        let shared_right = block * &second_map.shared;
-        let corner = first_map.shared.tr_mul(&shared_right);
-        let by_second = first_map.shared.tr_mul(&right);
-        let by_first = first_map.own.tr_mul(&shared_right);
-        for a in 0..own.nrows() {
-            for b in 0..own.ncols() {
-                // Rows of the later frame set; within one frame set the lower triangle, both orders of a mixed pair.
-                matrix.add(at_second + b, at_first + a, own[(a, b)]);
-                if first != second && at_first == at_second {
-                    matrix.add(at_first + a, at_second + b, own[(a, b)]);
-                }
-            }
-        }
-        for border in 0..by_second.nrows() {
-            for b in 0..by_second.ncols() {
-                matrix.add_border(border, at_second + b, by_second[(border, b)]);
-            }
-            if first != second {
-                for a in 0..by_first.nrows() {
-                    matrix.add_border(border, at_first + a, by_first[(a, border)]);
-                }
-            }
-        }
-        *matrix.corner_mut() += &corner;
-        if first != second {
-            *matrix.corner_mut() += corner.transpose();
-        }
     }
 
     /// Returns the steps `[φ; δt]` of the view poses for a step of the unknowns.

@@ -25,6 +25,7 @@ mod landmark;
 mod observations;
 mod options;
 mod outcome;
+mod pairs;
 mod pose_loop;
 mod rounds;
 mod segments;

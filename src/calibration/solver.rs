@@ -52,7 +52,7 @@ impl DampedProblem for DampedBundle<'_> {
 
     fn step(&mut self, estimate: &Estimate, equations: &BundleEquations, damping: f64) -> Option<Estimate> {
         let bundle = self.0;
-        let reduced = equations.visual().eliminate(damping);
+        let reduced = equations.visual().eliminate_by_parts(damping);
         let (mut matrix, band, border) = bundle.assemble(equations, &reduced);
         matrix.damp(damping, FLOOR);
         let (band, border) = matrix.factor()?.solve(&band, &border)?;
@@ -73,7 +73,7 @@ pub(super) struct Covariances {
 /// The covariances of the border and, where asked for, of the poses.
 pub(super) fn covariances(bundle: &Bundle<'_>, estimate: &Estimate, of_poses: bool) -> Option<Covariances> {
     let equations = bundle.linearize(estimate);
-    let reduced = equations.visual().eliminate(0.0);
+    let reduced = equations.visual().eliminate_by_parts(0.0);
     let (mut matrix, _, _) = bundle.assemble(&equations, &reduced);
     matrix.damp(0.0, FLOOR);
     let factor = matrix.factor()?;

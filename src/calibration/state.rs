@@ -42,6 +42,12 @@ impl ViewId {
     }
 }
 
+impl From<ViewId> for usize {
+    fn from(view: ViewId) -> Self {
+        view.0
+    }
+}
+
 /// Values of all unknowns.
 #[derive(Clone, Debug)]
 pub(super) struct Estimate {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Vector2, Vector3};
+use rayon::prelude::*;
 
 use super::landmark::AnchoredLandmark;
 use super::state::ViewId;
@@ -59,14 +60,15 @@ impl PixelModel<'_> {
         tracks: &[Track],
         landmarks: &[AnchoredLandmark],
     ) -> f64 {
-        let mut cost = 0.0;
-        for (track, landmark) in tracks.iter().zip(landmarks) {
-            for observation in &track.observations {
+        let costs = tracks.par_iter().zip(landmarks).map(|(track, landmark)| {
+            let cost = |observation: &Observation| {
                 let sigma = self.sigma_px[Self::camera_index(observation.view)];
-                cost += self.loss.cost_of(self.residual_px(poses, landmark, observation), sigma);
-            }
-        }
-        cost
+                self.loss.cost_of(self.residual_px(poses, landmark, observation), sigma)
+            };
+            track.observations.iter().map(cost).collect::<Vec<f64>>()
+        });
+        // Summed in the order of the observations, for any number of threads.
+        costs.collect::<Vec<_>>().iter().flatten().fold(0.0, |sum, cost| sum + cost)
     }
 }
 
@@ -84,16 +86,22 @@ pub(super) fn equations(
     landmarks: &[AnchoredLandmark],
 ) -> VisualEquations {
     let mut equations = ReprojectionEquations::new(SparsePoseEquations::new(), tracks.len());
-    for (track, anchored) in tracks.iter().zip(landmarks) {
-        let terms = track.observations.iter().filter_map(|observation| {
+    let terms_of = |(track, anchored): (&Track, &AnchoredLandmark)| {
+        let term = |observation: &Observation| {
             let relative = RelativePose::new(&anchored.anchor, poses.get(&observation.view)?);
             let camera_index = PixelModel::camera_index(observation.view);
             let camera = model.cameras[camera_index];
             let term = reprojection::linearize(camera, &relative, &relative, &anchored.landmark, &observation.uv_px)?;
             Some((observation.view, term.whitened(model.sigma_px[camera_index], model.loss)))
-        });
+        };
+        let mut terms = Vec::with_capacity(track.observations.len());
+        terms.extend(track.observations.iter().filter_map(term));
+        terms
+    };
+    let terms: Vec<_> = tracks.par_iter().zip(landmarks).map(terms_of).collect();
+    for terms in terms {
         // Anchors are fixed: only observing views have columns.
-        equations.add_landmark(None, track.observations.len(), terms);
+        equations.add_landmark(None, terms.len(), terms.into_iter());
     }
     equations
 }

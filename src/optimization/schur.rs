@@ -13,12 +13,14 @@
 
 #![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
 
-use std::collections::BTreeMap;
+mod sparse;
+
 use std::ops::Range;
 
 use nalgebra::{ArrayStorage, Matrix2x6, Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 use pulp::{Arch, NullaryFnOnce};
 
+pub(crate) use self::sparse::SparsePoseEquations;
 use super::{BlockTerm, PoseBlocks, Reprojection};
 
 /// Hessian and gradient over camera poses; of the Hessian the blocks `(row, column)` with `row ≤ column`.
@@ -58,34 +60,6 @@ impl PoseEquations for DensePoseEquations {
 
     fn gradient_mut(&mut self, pose: usize) -> &mut Vector6<f64> {
         &mut self.gradient[pose]
-    }
-}
-
-/// Equations of many poses of which each is coupled with few others, as over a whole flight.
-#[derive(Clone, Debug)]
-pub(crate) struct SparsePoseEquations<K> {
-    /// Blocks that are not zero, by `(row, column)`.
-    pub(crate) hessian: BTreeMap<(K, K), Matrix6<f64>>,
-    /// By pose.
-    pub(crate) gradient: BTreeMap<K, Vector6<f64>>,
-}
-
-impl<K> SparsePoseEquations<K> {
-    /// Zeros.
-    pub(crate) fn new() -> Self {
-        Self { hessian: BTreeMap::new(), gradient: BTreeMap::new() }
-    }
-}
-
-impl<K: Copy + Ord> PoseEquations for SparsePoseEquations<K> {
-    type Pose = K;
-
-    fn hessian_mut(&mut self, row: K, column: K) -> &mut Matrix6<f64> {
-        self.hessian.entry((row, column)).or_insert_with(Matrix6::zeros)
-    }
-
-    fn gradient_mut(&mut self, pose: K) -> &mut Vector6<f64> {
-        self.gradient.entry(pose).or_insert_with(Vector6::zeros)
     }
 }
 
@@ -265,17 +239,7 @@ impl<P: PoseEquations> NullaryFnOnce for Elimination<'_, P> {
     fn call(self) {
         let Self { poses, gradient, couplings, inverse, weighted } = self;
         weighted.clear();
-        for (_, coupling) in couplings {
-            let [a, b, c] = &coupling.data.0;
-            let mut product = [[0.0; 6]; 3];
-            for (column, target) in product.iter_mut().enumerate() {
-                let [x, y, z] = inverse.data.0[column];
-                for row in 0..6 {
-                    target[row] = a[row] * x + b[row] * y + c[row] * z;
-                }
-            }
-            weighted.push(Matrix6x3::from_array_storage(ArrayStorage(product)));
-        }
+        weighted.extend(couplings.iter().map(|(_, coupling)| times_inverse(coupling, inverse)));
         for (first, (row, _)) in couplings.iter().enumerate() {
             *poses.gradient_mut(*row) -= weighted[first] * gradient;
             for (column, coupling) in &couplings[first..] {
@@ -317,6 +281,20 @@ fn add_product(block: &mut Matrix6<f64>, left: &Matrix2x6<f64>, right: &Matrix2x
             *entry += a * x + b * y;
         }
     }
+}
+
+/// A coupling times the inverse of its landmark's block.
+#[inline(always)]
+fn times_inverse(coupling: &Matrix6x3<f64>, inverse: &Matrix3<f64>) -> Matrix6x3<f64> {
+    let [a, b, c] = &coupling.data.0;
+    let mut product = [[0.0; 6]; 3];
+    for (column, target) in product.iter_mut().enumerate() {
+        let [x, y, z] = inverse.data.0[column];
+        for row in 0..6 {
+            target[row] = a[row] * x + b[row] * y + c[row] * z;
+        }
+    }
+    Matrix6x3::from_array_storage(ArrayStorage(product))
 }
 
 /// Takes `left · rightᵀ` off `block`, without a matrix in between: most of an elimination's time goes here.

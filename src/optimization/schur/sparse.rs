@@ -1,0 +1,125 @@
+//! Equations of many poses of which each is coupled with few others, as over a whole flight.
+
+use nalgebra::{Matrix3, Matrix6, Vector6};
+use pulp::{Arch, NullaryFnOnce};
+use rayon::prelude::*;
+
+use super::{PoseEquations, ReducedEquations, ReprojectionEquations, damped_inverse, subtract_product, times_inverse};
+
+/// Parts of the poses into which landmarks are eliminated at the same time: some more than processors, because parts take
+/// different times.
+const PARTS: usize = 16;
+
+/// Hessian and gradient over poses whose names count up from 0.
+#[derive(Clone, Debug)]
+pub(crate) struct SparsePoseEquations<K> {
+    /// By pose; `None` where there is no observation.
+    rows: Vec<Option<PoseRow<K>>>,
+}
+
+/// What belongs to one pose.
+#[derive(Clone, Debug)]
+struct PoseRow<K> {
+    gradient: Vector6<f64>,
+    /// Blocks of the Hessian with this pose and those behind it, by how far they are behind it; `None` where they are zero.
+    blocks: Vec<Option<(K, Matrix6<f64>)>>,
+}
+
+impl<K> PoseRow<K> {
+    const ZERO: Self = Self { gradient: Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), blocks: Vec::new() };
+
+    /// The block with a pose so far behind this one.
+    fn block_mut(&mut self, behind: usize, column: K) -> &mut Matrix6<f64> {
+        if self.blocks.len() <= behind {
+            self.blocks.resize_with(behind + 1, || None);
+        }
+        &mut self.blocks[behind].get_or_insert_with(|| (column, Matrix6::zeros())).1
+    }
+}
+
+impl<K: Copy + Into<usize>> SparsePoseEquations<K> {
+    /// Zeros.
+    pub(crate) fn new() -> Self {
+        Self { rows: Vec::new() }
+    }
+
+    fn row_mut(&mut self, pose: K) -> &mut PoseRow<K> {
+        let place = pose.into();
+        if self.rows.len() <= place {
+            self.rows.resize_with(place + 1, || None);
+        }
+        self.rows[place].get_or_insert(PoseRow::ZERO)
+    }
+
+    /// The gradient by each pose with an observation, poses rising.
+    pub(crate) fn gradients(&self) -> impl Iterator<Item = (K, &Vector6<f64>)> {
+        self.rows.iter().flatten().filter_map(|row| Some((row.blocks.first()?.as_ref()?.0, &row.gradient)))
+    }
+
+    /// The upper blocks of the Hessian that are not zero, rows rising, then columns.
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = (K, K, &Matrix6<f64>)> {
+        self.rows.iter().flatten().flat_map(|row| {
+            let first = row.blocks.first().and_then(|block| Some(block.as_ref()?.0));
+            row.blocks.iter().flatten().filter_map(move |(column, block)| Some((first?, *column, block)))
+        })
+    }
+}
+
+impl<K: Copy + PartialEq + Into<usize>> PoseEquations for SparsePoseEquations<K> {
+    type Pose = K;
+
+    fn hessian_mut(&mut self, row: K, column: K) -> &mut Matrix6<f64> {
+        self.row_mut(row).block_mut(column.into() - row.into(), column)
+    }
+
+    fn gradient_mut(&mut self, pose: K) -> &mut Vector6<f64> {
+        &mut self.row_mut(pose).gradient
+    }
+}
+
+impl<K: Copy + PartialEq + Into<usize> + Send + Sync> ReprojectionEquations<SparsePoseEquations<K>> {
+    /// [`Self::eliminate`] by all threads.
+    ///
+    /// Each part of the poses takes the landmarks in their order: the sums are the same for any number of threads.
+    pub(crate) fn eliminate_by_parts(&self, damping: f64) -> ReducedEquations<SparsePoseEquations<K>> {
+        let inverses: Vec<Matrix3<f64>> =
+            self.landmarks.par_iter().map(|block| damped_inverse(&block.hessian, damping)).collect();
+        let mut poses = self.poses.clone();
+        let len = poses.rows.len().div_ceil(PARTS).max(1);
+        poses.rows.par_chunks_mut(len).enumerate().for_each(|(part, rows)| {
+            Arch::new().dispatch(PartOfElimination { equations: self, inverses: &inverses, rows, first: part * len });
+        });
+        ReducedEquations { poses, inverses }
+    }
+}
+
+/// What the elimination of all landmarks takes off the rows of some poses, compiled for every width of vector registers.
+struct PartOfElimination<'a, K: Copy + PartialEq + Into<usize>> {
+    equations: &'a ReprojectionEquations<SparsePoseEquations<K>>,
+    inverses: &'a [Matrix3<f64>],
+    rows: &'a mut [Option<PoseRow<K>>],
+    /// The pose of the first row.
+    first: usize,
+}
+
+impl<K: Copy + PartialEq + Into<usize>> NullaryFnOnce for PartOfElimination<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { equations, inverses, rows, first } = self;
+        for (landmark, inverse) in equations.landmarks.iter().zip(inverses) {
+            let couplings = &equations.couplings[landmark.couplings.clone()];
+            for (place, (pose, coupling)) in couplings.iter().enumerate() {
+                let pose: usize = (*pose).into();
+                let Some(slot) = pose.checked_sub(first).and_then(|place| rows.get_mut(place)) else { continue };
+                let row = slot.get_or_insert(PoseRow::ZERO);
+                let weighted = times_inverse(coupling, inverse);
+                row.gradient -= weighted * landmark.gradient;
+                for (column, other) in &couplings[place..] {
+                    subtract_product(row.block_mut((*column).into() - pose, *column), &weighted, other);
+                }
+            }
+        }
+    }
+}
