@@ -16,6 +16,7 @@ use super::rounds::{Stage, StageResult};
 use super::segments::{self, Segment, SegmentCounts};
 use super::state::{Camera, Columns, Estimate};
 use super::statistics::Statistics;
+use super::trajectory::InitialTrajectory;
 use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
 use crate::estimator::{ColumnBlock, ColumnId, Linearization, NavigationState, gravity_in_world, imu_factor};
 use crate::geometry::seconds_from_ns;
@@ -53,15 +54,26 @@ pub fn calibrate(
     options: &CalibrationOptions,
     on_progress: &mut dyn FnMut(CalibrationProgress) -> ControlFlow<()>,
 ) -> Result<CalibrationOutcome, CalibrationError> {
-    let mut report_progress =
-        |stage: &'static str, fraction: f64| match on_progress(CalibrationProgress { stage, fraction }) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(CalibrationError::Interrupted { stage }),
-        };
     let images = input.static_camera.views.len().max(1) as f64;
-    let states = trajectory::estimate_trajectory(&input.static_camera, &input.estimator, &mut |place| {
-        report_progress("processing the static camera", 0.5 * place as f64 / images)
+    let trajectory = trajectory::estimate_trajectory(&input.static_camera, &input.estimator, &mut |place| {
+        report(on_progress, "processing the static camera", 0.5 * place as f64 / images)
     })?;
+    calibrate_along(input, trajectory, options, on_progress)
+}
+
+/// [`calibrate`] with the trajectory over all images of the static camera estimated before.
+///
+/// # Errors
+///
+/// As [`calibrate`].
+pub fn calibrate_along(
+    input: &CalibrationInput,
+    trajectory: InitialTrajectory,
+    options: &CalibrationOptions,
+    on_progress: &mut dyn FnMut(CalibrationProgress) -> ControlFlow<()>,
+) -> Result<CalibrationOutcome, CalibrationError> {
+    let mut report_progress = |stage: &'static str, fraction: f64| report(on_progress, stage, fraction);
+    let states = trajectory.states(&input.static_camera.key)?;
     let (mut frame_sets, navigation) = frame_sets(input, options, &states);
     let stretch_ns = stretch(&frame_sets);
     check_joint_motion(input, options, &frame_sets, stretch_ns)?;
@@ -163,6 +175,18 @@ pub fn calibrate(
         warnings: warnings(counts, &segments, &frame_sets),
         visited_rad,
     })
+}
+
+/// Reports progress; an error where that breaks.
+fn report(
+    on_progress: &mut dyn FnMut(CalibrationProgress) -> ControlFlow<()>,
+    stage: &'static str,
+    fraction: f64,
+) -> Result<(), CalibrationError> {
+    match on_progress(CalibrationProgress { stage, fraction }) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(CalibrationError::Interrupted { stage }),
+    }
 }
 
 fn stretch(frame_sets: &[FrameSet]) -> (i64, i64) {

@@ -38,7 +38,7 @@ mod trajectory;
 mod visual;
 
 pub use batch::BatchPose;
-pub use calibrate::{CalibrationProgress, calibrate};
+pub use calibrate::{CalibrationProgress, calibrate, calibrate_along};
 pub use error::CalibrationError;
 pub use imu_noise::{FittedDensity, FlightNoise, ImuNoiseError, NoiseDensity, fit_imu_noise};
 pub use input::{CalibrationInput, GimbalCamera, StaticCamera, TrackedView};
@@ -48,3 +48,4 @@ pub use outcome::{
     chain_distance, transform_distance,
 };
 pub use statistics::Statistics;
+pub use trajectory::InitialTrajectory;

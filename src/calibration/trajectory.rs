@@ -3,26 +3,37 @@
 use std::collections::BTreeMap;
 
 use super::CalibrationError;
-use super::input::StaticCamera;
+use super::input::{StaticCamera, TrackedView};
 use crate::estimator::{Estimator, EstimatorConfig, EventKind, ImuBias, NavigationState, StepInput};
 
-/// Returns the last estimated state of every image of the static camera, `None` where the estimator was not
-/// running. A restart leaves a gap of one image between the intervals. An error of `on_image`, called before each image, ends
-/// the estimation.
-pub(super) fn estimate_trajectory(
-    camera: &StaticCamera,
-    config: &EstimatorConfig,
-    on_image: &mut dyn FnMut(usize) -> Result<(), CalibrationError>,
-) -> Result<Vec<Option<NavigationState>>, CalibrationError> {
-    let mut estimator = Estimator::new(config.clone());
-    let places: BTreeMap<usize, usize> =
-        camera.views.iter().enumerate().map(|(place, view)| (view.frame_index, place)).collect();
-    let mut states = vec![None; camera.views.len()];
-    let mut restarts = 0;
-    let mut waits = "no image reached the estimator".to_owned();
-    for (place, view) in camera.views.iter().enumerate() {
-        on_image(place)?;
-        let report = estimator.step(&StepInput {
+/// The estimation of the initial trajectory, image by image as they are tracked.
+pub struct InitialTrajectory {
+    estimator: Estimator,
+    /// Place of an image among all, by the number of its frame.
+    places: BTreeMap<usize, usize>,
+    states: Vec<Option<NavigationState>>,
+    restarts: usize,
+    /// Why there is no state yet.
+    waits: String,
+}
+
+impl InitialTrajectory {
+    /// Before the first image.
+    pub fn new(config: EstimatorConfig) -> Self {
+        Self {
+            estimator: Estimator::new(config),
+            places: BTreeMap::new(),
+            states: Vec::new(),
+            restarts: 0,
+            waits: "no image reached the estimator".to_owned(),
+        }
+    }
+
+    /// Processes the next image of the static camera.
+    pub fn step(&mut self, view: &TrackedView) {
+        self.places.insert(view.frame_index, self.states.len());
+        self.states.push(None);
+        let report = self.estimator.step(&StepInput {
             frame_index: view.frame_index,
             stamp_ns: view.stamp_ns,
             imu: &view.imu,
@@ -32,15 +43,15 @@ pub(super) fn estimate_trajectory(
             rigid_tracks: &[],
         });
         for event in report.events.iter().filter(|event| event.kind == EventKind::InitializationWaits) {
-            waits.clone_from(&event.message);
+            self.waits.clone_from(&event.message);
         }
-        if report.restarts > restarts {
-            restarts = report.restarts;
-            continue;
+        if report.restarts > self.restarts {
+            self.restarts = report.restarts;
+            return;
         }
         for frame in &report.window {
-            if let Some(place) = places.get(&frame.frame_index) {
-                states[*place] = Some(NavigationState {
+            if let Some(place) = self.places.get(&frame.frame_index) {
+                self.states[*place] = Some(NavigationState {
                     world_from_imu: frame.world_from_imu,
                     velocity_m_per_s: frame.velocity_m_per_s,
                     bias: ImuBias {
@@ -51,8 +62,28 @@ pub(super) fn estimate_trajectory(
             }
         }
     }
-    if states.iter().all(Option::is_none) {
-        return Err(CalibrationError::NoTrajectory { camera: camera.key.clone(), reason: waits });
+
+    /// The last estimated state of every image, `None` where the estimator was not running. A restart leaves a gap of one
+    /// image between the intervals.
+    pub(super) fn states(self, camera_key: &str) -> Result<Vec<Option<NavigationState>>, CalibrationError> {
+        if self.states.iter().all(Option::is_none) {
+            return Err(CalibrationError::NoTrajectory { camera: camera_key.to_owned(), reason: self.waits });
+        }
+        Ok(self.states)
     }
-    Ok(states)
+}
+
+/// The trajectory over all images of the static camera. An error of `on_image`, called before each image, ends the
+/// estimation.
+pub(super) fn estimate_trajectory(
+    camera: &StaticCamera,
+    config: &EstimatorConfig,
+    on_image: &mut dyn FnMut(usize) -> Result<(), CalibrationError>,
+) -> Result<InitialTrajectory, CalibrationError> {
+    let mut trajectory = InitialTrajectory::new(config.clone());
+    for (place, view) in camera.views.iter().enumerate() {
+        on_image(place)?;
+        trajectory.step(view);
+    }
+    Ok(trajectory)
 }

@@ -85,8 +85,22 @@ impl<K: Copy + PartialEq + Into<usize> + Send + Sync> ReprojectionEquations<Spar
         let inverses: Vec<Matrix3<f64>> =
             self.landmarks.par_iter().map(|block| damped_inverse(&block.hessian, damping)).collect();
         let mut poses = self.poses.clone();
+        let mut reaches = vec![0; poses.rows.len()];
+        for landmark in &self.landmarks {
+            let couplings = &self.couplings[landmark.couplings.clone()];
+            let Some((last, _)) = couplings.last() else { continue };
+            for (pose, _) in couplings {
+                let place = (*pose).into();
+                reaches[place] = (*last).into().saturating_sub(place).max(reaches[place]);
+            }
+        }
         let len = poses.rows.len().div_ceil(PARTS).max(1);
-        poses.rows.par_chunks_mut(len).enumerate().for_each(|(part, rows)| {
+        poses.rows.par_chunks_mut(len).zip(reaches.par_chunks(len)).enumerate().for_each(|(part, (rows, reaches))| {
+            for (row, reach) in rows.iter_mut().zip(reaches) {
+                // At once instead of block by block.
+                let blocks = &mut row.get_or_insert(PoseRow::ZERO).blocks;
+                blocks.reserve_exact((reach + 1).saturating_sub(blocks.len()));
+            }
             Arch::new().dispatch(PartOfElimination { equations: self, inverses: &inverses, rows, first: part * len });
         });
         ReducedEquations { poses, inverses }

@@ -2,8 +2,8 @@
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
 
 use thiserror::Error;
 
@@ -11,7 +11,7 @@ use super::configuration::estimator_config;
 use super::tracker::CameraTracker;
 use crate::calibration::{
     self, CalibrationError, CalibrationInput, CalibrationOptions, CalibrationOutcome, CalibrationProgress,
-    GimbalCamera, StaticCamera, TrackedView,
+    GimbalCamera, InitialTrajectory, StaticCamera, TrackedView,
 };
 use crate::flight_log::{FlightLog, LogError, LogLimits, LogWarning};
 use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, seconds_from_ns};
@@ -119,8 +119,8 @@ pub fn calibrate(
     let given_rig = Rig::for_log(&log, request.rig_path.as_deref())?;
     let ground_truth_rig = Rig::ground_truth_for_log(&log, request.ground_truth_path.as_deref())?;
     let entries = CalibratedEntries::of(&given_rig, request)?;
-    let (input, warnings) = track(&log, &given_rig, &entries, request, on_progress)?;
-    let outcome = calibration::calibrate(&input, options, &mut |progress| {
+    let (input, trajectory, warnings) = track(&log, &given_rig, &entries, request, on_progress)?;
+    let outcome = calibration::calibrate_along(&input, trajectory, options, &mut |progress| {
         on_progress(CalibrationProgress {
             fraction: TRACKING_RATIO + (1.0 - TRACKING_RATIO) * progress.fraction,
             ..progress
@@ -185,14 +185,23 @@ impl CalibratedEntries {
     }
 }
 
-/// Tracks the features of both cameras, each on its own thread.
+/// Tracks the features of both cameras, each on its own thread; on a third one the static camera's trajectory is estimated as
+/// its images are tracked.
 fn track(
     log: &Arc<FlightLog>,
     rig: &Rig,
     entries: &CalibratedEntries,
     request: &CalibrationRequest,
     on_progress: &mut dyn FnMut(CalibrationProgress) -> ControlFlow<()>,
-) -> Result<(CalibrationInput, Vec<LogWarning>), CalibrationRunError> {
+) -> Result<(CalibrationInput, InitialTrajectory, Vec<LogWarning>), CalibrationRunError> {
+    let spec = RunSpec {
+        parameterization: ParameterizationChoice::Static,
+        camera_key: Some(entries.static_camera.key.clone()),
+        ..RunSpec::default()
+    };
+    let mut estimator = estimator_config(rig, &spec)?;
+    estimator.options.keep_linearization = false;
+    let mut trajectory = InitialTrajectory::new(estimator.clone());
     let tracker =
         |camera: &CameraRig| CameraTracker::new(Arc::clone(log), rig, &camera.key, request.start_s, request.duration_s);
     let (mut of_static, mut of_gimbal) = (tracker(&entries.static_camera)?, tracker(&entries.gimbal_camera)?);
@@ -205,12 +214,21 @@ fn track(
                 if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
         });
-        let rigid = views(&mut of_static, &entries.static_camera, &mut |stamp_ns| {
-            let fraction = TRACKING_RATIO * (seconds_from_ns(stamp_ns) - request.start_s) / length_s;
+        let (tracked, to_estimate) = mpsc::channel::<TrackedView>();
+        let (trajectory, interrupted) = (&mut trajectory, &interrupted);
+        scope.spawn(move || {
+            let wanted = |_: &TrackedView| !interrupted.load(Ordering::Relaxed);
+            to_estimate.into_iter().take_while(wanted).for_each(|view| trajectory.step(&view));
+        });
+        let rigid = views(&mut of_static, &entries.static_camera, &mut |view| {
+            let fraction = TRACKING_RATIO * (seconds_from_ns(view.stamp_ns) - request.start_s) / length_s;
             let flow = on_progress(CalibrationProgress { stage: TRACKING, fraction });
             interrupted.fetch_or(flow.is_break(), Ordering::Relaxed);
+            // Only a thread that has panicked does not receive; the scope then panics, too.
+            drop(tracked.send(view.clone()));
             flow
         });
+        drop(tracked);
         (rigid, gimbal.join())
     });
     if interrupted.into_inner() {
@@ -226,13 +244,6 @@ fn track(
     warnings.extend(log.warnings().iter().cloned());
     warnings.sort_by(|a, b| (a.stamp_ns, &a.message).cmp(&(b.stamp_ns, &b.message)));
     warnings.dedup();
-    let spec = RunSpec {
-        parameterization: ParameterizationChoice::Static,
-        camera_key: Some(entries.static_camera.key.clone()),
-        ..RunSpec::default()
-    };
-    let mut estimator = estimator_config(rig, &spec)?;
-    estimator.options.keep_linearization = false;
     let input = CalibrationInput {
         static_camera: StaticCamera {
             key: entries.static_camera.key.clone(),
@@ -253,29 +264,30 @@ fn track(
         gravity_m_per_s2: rig.gravity_m_per_s2,
         estimator,
     };
-    Ok((input, warnings))
+    Ok((input, trajectory, warnings))
 }
 
 /// The tracked images of a camera, up to the image at which `on_image` breaks, with the warnings of the reader.
 fn views(
     tracker: &mut CameraTracker,
     camera: &CameraRig,
-    on_image: &mut dyn FnMut(i64) -> ControlFlow<()>,
+    on_image: &mut dyn FnMut(&TrackedView) -> ControlFlow<()>,
 ) -> (Vec<TrackedView>, Vec<LogWarning>) {
     let shift_ns = ns_from_seconds(camera.timeshift_cam_imu_s);
     let (mut views, mut warnings) = (Vec::new(), Vec::new());
     while let Some((input, of_input)) = tracker.next_input() {
-        if on_image(input.stamp_ns).is_break() {
-            break;
-        }
-        warnings.extend(of_input);
-        views.push(TrackedView {
+        let view = TrackedView {
             frame_index: input.frame_index,
             stamp_ns: input.stamp_ns.saturating_add(shift_ns),
             tracks: Arc::clone(input.main_tracks()),
             imu: input.imu,
             joint_angles: input.joint_angles,
-        });
+        };
+        if on_image(&view).is_break() {
+            break;
+        }
+        warnings.extend(of_input);
+        views.push(view);
     }
     warnings.extend_from_slice(tracker.remaining_warnings());
     (views, warnings)
