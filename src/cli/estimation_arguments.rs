@@ -1,6 +1,6 @@
 //! Arguments of all sub-commands that run the estimator.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dcvins::sensors::LeverArm;
@@ -55,6 +55,21 @@ fn lever_arm(text: &str) -> Result<LeverArm, String> {
 }
 
 impl EstimationArguments {
+    /// Paths of the log, of the rig and its ground truth where they are separate files, and of trajectories.
+    pub(crate) fn input_files(&self, log: &Path) -> Vec<PathBuf> {
+        let beside = |given: Option<&PathBuf>, extension: &str| {
+            let beside = || Some(log.with_extension(extension)).filter(|path| path.is_file());
+            given.cloned().or_else(beside)
+        };
+        let rig = beside(self.rig.as_ref(), "rig.yaml");
+        let ground_truth = beside(self.ground_truth.as_ref(), "truth.yaml");
+        let trajectories = self.trajectories.iter().filter_map(|spec| match &spec.source {
+            TrajectorySource::File(path) => Some(path.clone()),
+            TrajectorySource::Topic(_) => None,
+        });
+        [Some(log.to_owned()), rig, ground_truth].into_iter().flatten().chain(trajectories).collect()
+    }
+
     /// The session request with these arguments.
     pub(crate) fn request(&self, log_path: PathBuf) -> SessionRequest {
         SessionRequest {

@@ -16,6 +16,7 @@ mod noise;
 mod report;
 #[cfg(feature = "gui")]
 mod report_figures;
+mod result_cache;
 mod rig;
 mod run;
 mod run_summary;

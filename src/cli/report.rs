@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
-use dcvins::export::{self, ReportOptions, write_report};
+use dcvins::export::{self, ReportOptions, write_known_report, write_report};
 use dcvins::log_check::{self, CheckReport};
-use dcvins::session::{Computation, SessionPlan, TrajectorySource, image_rotations};
+use dcvins::session::{Computation, SessionPlan, image_rotations};
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
@@ -14,6 +14,7 @@ use crate::cli::exit::Outcome;
 use crate::cli::interrupt::Interrupt;
 #[cfg(feature = "gui")]
 use crate::cli::report_figures;
+use crate::cli::result_cache::{CacheArguments, CachedResult};
 use crate::cli::run::{interrupted, is_initialized};
 #[cfg(feature = "gui")]
 use crate::cli::study_arguments::StudyArguments;
@@ -42,6 +43,8 @@ pub(crate) struct ReportArguments {
     pub study: StudyArguments,
     #[command(flatten)]
     pub estimation: EstimationArguments,
+    #[command(flatten)]
+    pub cache: CacheArguments,
 }
 
 /// Runs `dcvins report`.
@@ -56,6 +59,12 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
     export::check_report_folder(&arguments.output, &labels, &arguments.log, arguments.force)?;
     let interrupt = Interrupt::watch()?;
+    let cached = arguments.cache.result_of(&own_command_line(), &arguments.log, &arguments.estimation, &plan);
+    if let Some(files) = cached.as_ref().and_then(CachedResult::load) {
+        write_known_report(&files, &arguments.output, &labels, &export::log_name(&arguments.log))?;
+        print(&format!("{}\n", page_of(arguments).display()))?;
+        return Ok(Outcome::Success);
+    }
     let plan = SessionPlan { interrupted: interrupt.flag(), ..plan.clone() };
     let (computation, checked) = computed_and_checked(&plan);
     let mut computation = computation?;
@@ -69,11 +78,15 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     let figures = Vec::new();
     // The verdict needs the complete last steps.
     computation.fill_in(computation.recording().last_stamp_ns());
-    let options =
-        ReportOptions { command: own_command_line(), check: Some(checked), inputs: inputs(arguments), figures };
+    let options = ReportOptions {
+        command: own_command_line(),
+        check: Some(checked),
+        inputs: arguments.estimation.input_files(&arguments.log),
+        figures,
+    };
     let recording = computation.recording();
-    let page = write_report(recording, &arguments.output, &options)?;
-    print(&format!("{}\n", page.display()))?;
+    let written = write_report(recording, &arguments.output, &options)?;
+    print(&format!("{}\n", page_of(arguments).display()))?;
     let failed: Vec<&str> = recording.runs.iter().filter_map(|run| run.error.as_deref()).collect();
     if !failed.is_empty() {
         anyhow::bail!("{}", failed.join("; "));
@@ -82,7 +95,27 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
         notify(&interrupted(recording));
         return Ok(Outcome::Interrupted);
     }
-    Ok(if recording.runs.iter().all(is_initialized) { Outcome::Success } else { Outcome::NeverInitialized })
+    if !recording.runs.iter().all(is_initialized) {
+        return Ok(Outcome::NeverInitialized);
+    }
+    if let Some(mut cached) = cached
+        && written.iter().all(|path| add_written(&mut cached, path, &arguments.output).is_some())
+    {
+        cached.store();
+    }
+    Ok(Outcome::Success)
+}
+
+/// Path of the page.
+fn page_of(arguments: &ReportArguments) -> PathBuf {
+    arguments.output.join("report.html")
+}
+
+/// Notes a written file for the cache; `None` when it lies elsewhere, behind a link, or cannot be read again.
+fn add_written(cached: &mut CachedResult, path: &Path, folder: &Path) -> Option<()> {
+    let name = path.strip_prefix(folder).ok()?.to_str()?;
+    cached.add(name.to_owned(), std::fs::read(path).ok()?);
+    Some(())
 }
 
 /// The report of a study.
@@ -113,21 +146,6 @@ fn computed_and_checked(plan: &SessionPlan) -> (Result<Computation>, CheckReport
         let _progress = Progress::spinner("checking the log");
         (computation, checking.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     })
-}
-
-/// Paths of the log, of the rig and its ground truth where they are separate files, and of trajectories.
-fn inputs(arguments: &ReportArguments) -> Vec<PathBuf> {
-    let beside = |given: Option<&PathBuf>, extension: &str| {
-        let beside = || Some(arguments.log.with_extension(extension)).filter(|path| path.is_file());
-        given.cloned().or_else(beside)
-    };
-    let rig = beside(arguments.estimation.rig.as_ref(), "rig.yaml");
-    let ground_truth = beside(arguments.estimation.ground_truth.as_ref(), "truth.yaml");
-    let trajectories = arguments.estimation.trajectories.iter().filter_map(|spec| match &spec.source {
-        TrajectorySource::File(path) => Some(path.clone()),
-        TrajectorySource::Topic(_) => None,
-    });
-    [Some(arguments.log.clone()), rig, ground_truth].into_iter().flatten().chain(trajectories).collect()
 }
 
 /// The command line in a form that can be typed again, with the program's name without its folder.

@@ -8,7 +8,7 @@ use clap::error::ErrorKind;
 use clap::{Args, ValueEnum};
 use dcvins::export::{
     OpenedStudy, PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_screenshot, draw_panel,
-    draw_panel_svg, is_session, is_study, log_name, panel_csv, read_session, write_csv, write_png, write_svg,
+    draw_panel_svg, is_session, is_study, log_name, panel_csv, png_bytes, read_session, write_screenshot,
 };
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
@@ -22,6 +22,7 @@ use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::Outcome;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::result_cache::{CacheArguments, CachedResult};
 use crate::cli::study_arguments::{StudyArguments, StudyPicture, write_study_picture};
 use crate::cli::terminal::{notify, print};
 use crate::cli::value_parsers::{seconds, sides};
@@ -80,6 +81,8 @@ pub(crate) struct ScreenshotArguments {
     pub study: StudyArguments,
     #[command(flatten)]
     pub estimation: EstimationArguments,
+    #[command(flatten)]
+    pub cache: CacheArguments,
 }
 
 /// Values of `--format`.
@@ -179,6 +182,21 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
         notify(&format!("dcvins: interrupted; {written} of {} screenshots are written", stamps_ns.len()));
         Ok(Outcome::Interrupted)
     };
+    let mut cached = shown.cached(arguments, format);
+    if let Some(files) = cached.as_ref().and_then(CachedResult::load) {
+        let mut files = files.iter();
+        for cursor_ns in &stamps_ns {
+            let path = path_at(*cursor_ns);
+            let table = arguments.csv.then(|| path.with_extension("csv"));
+            for (path, (_, content)) in [Some(&path), table.as_ref()].into_iter().flatten().zip(&mut files) {
+                write_screenshot(content, path)?;
+            }
+            if several {
+                print(&format!("{}\n", path.display()))?;
+            }
+        }
+        return Ok(Outcome::Success);
+    }
     let mut computation = shown.compute(last_ns, &interrupt)?;
     if interrupt.is_set() {
         return stopped(0);
@@ -205,23 +223,32 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
         let recording = computation.recording();
         let path = path_at(cursor_ns);
         let panel = &arguments.panel;
-        match format {
-            FormatArgument::Png => {
-                write_png(&draw_panel(panel, recording, cursor_ns, shown.images(), &options)?, &path)?;
-            }
+        let picture = match format {
+            FormatArgument::Png => png_bytes(&draw_panel(panel, recording, cursor_ns, shown.images(), &options)?)?,
             FormatArgument::Svg => {
                 let title =
                     format!("{panel} of {} at {:.3} s", log_name(&recording.log_path), seconds_from_ns(cursor_ns));
                 let naming = ["clip", &title];
-                write_svg(&draw_panel_svg(panel, recording, cursor_ns, shown.images(), &options, naming)?, &path)?;
+                draw_panel_svg(panel, recording, cursor_ns, shown.images(), &options, naming)?.into_bytes()
             }
-        }
+        };
+        let mut written = vec![(path.clone(), picture)];
         if arguments.csv {
-            write_csv(&panel_csv(panel, recording, cursor_ns, shown.images(), &options)?, &path.with_extension("csv"))?;
+            let table = panel_csv(panel, recording, cursor_ns, shown.images(), &options)?;
+            written.push((path.with_extension("csv"), table.into_bytes()));
+        }
+        for (path, content) in written {
+            write_screenshot(&content, &path)?;
+            if let Some(cached) = &mut cached {
+                cached.add(log_name(&path), content);
+            }
         }
         if several {
             print(&format!("{}\n", path.display()))?;
         }
+    }
+    if let Some(cached) = cached {
+        cached.store();
     }
     Ok(Outcome::Success)
 }
@@ -325,6 +352,19 @@ impl Shown {
             Source::Saved(session) => session.recording().duration_ns,
         };
         Ok(Self { source, log_end_ns, start_s, duration_s })
+    }
+
+    /// The place of the pictures in the cache; `None` for a saved session, and for a graphics adapter, whose pictures differ from
+    /// those of others.
+    fn cached(&self, arguments: &ScreenshotArguments, format: FormatArgument) -> Option<CachedResult> {
+        let Source::Log(plan, _) = &self.source else { return None };
+        if arguments.renderer == RendererArgument::Wgpu {
+            return None;
+        }
+        // Where the pictures are written does not matter.
+        let options =
+            ScreenshotArguments { output: PathBuf::new(), format: Some(format), force: false, ..arguments.clone() };
+        arguments.cache.result_of(&format!("{options:?}"), &arguments.log, &arguments.estimation, plan)
     }
 
     /// Computes the runs up to a stamp; those of a saved session to their end.

@@ -16,6 +16,7 @@ mod noise_files;
 mod other_estimators;
 mod recent_files;
 mod report;
+mod result_cache;
 mod results;
 mod run_files;
 #[cfg(feature = "gui")]
@@ -52,14 +53,16 @@ pub use other_estimators::{
 };
 pub use recent_files::RecentFiles;
 pub use report::{
-    ReportDrawing, ReportFigure, ReportOptions, StudyReport, check_study_report, write_report, write_study_report,
+    ReportDrawing, ReportFigure, ReportOptions, StudyReport, check_study_report, write_known_report, write_report,
+    write_study_report,
 };
+pub use result_cache::{CachedFile, ResultCache, ResultKey, ResultKeyBuilder};
 pub use results::write_results;
 pub use run_files::{RunFileOptions, write_run};
 #[cfg(feature = "gui")]
 pub use screenshot::{
     PANEL_NAMES, Renderer, ScreenshotError, ScreenshotOptions, draw_panel, draw_panel_svg, panel_csv, panel_names,
-    png_bytes, write_csv, write_png, write_svg,
+    png_bytes, write_csv, write_png, write_screenshot, write_svg,
 };
 pub use session_file::{is_session, read_session};
 pub use structure::KnownLossSummary;

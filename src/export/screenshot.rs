@@ -250,20 +250,21 @@ pub fn png_bytes(screenshot: &RgbaImage) -> Result<Vec<u8>, ScreenshotError> {
 
 /// Writes an image as PNG and creates its folder if necessary.
 pub fn write_png(screenshot: &RgbaImage, path: &Path) -> Result<(), ScreenshotError> {
-    write_bytes(&png_bytes(screenshot)?, path)
+    write_screenshot(&png_bytes(screenshot)?, path)
 }
 
 /// Writes a drawing as SVG and creates its folder if necessary.
 pub fn write_svg(drawing: &str, path: &Path) -> Result<(), ScreenshotError> {
-    write_bytes(drawing.as_bytes(), path)
+    write_screenshot(drawing.as_bytes(), path)
 }
 
 /// Writes a table of comma-separated values and creates its folder if necessary.
 pub fn write_csv(table: &str, path: &Path) -> Result<(), ScreenshotError> {
-    write_bytes(table.as_bytes(), path)
+    write_screenshot(table.as_bytes(), path)
 }
 
-fn write_bytes(bytes: &[u8], path: &Path) -> Result<(), ScreenshotError> {
+/// Writes an encoded picture, or its table, and creates its folder if necessary.
+pub fn write_screenshot(bytes: &[u8], path: &Path) -> Result<(), ScreenshotError> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     }

@@ -109,6 +109,11 @@ impl OutputSet {
         self.0.push(staged);
     }
 
+    /// The paths that the files will have, in the order in which they were added.
+    pub fn paths(&self) -> Vec<PathBuf> {
+        self.0.iter().map(|staged| staged.path().to_owned()).collect()
+    }
+
     /// Gives all files their names, in the order in which they were added.
     ///
     /// # Errors

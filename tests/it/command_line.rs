@@ -4,7 +4,11 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 fn dcvins(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_dcvins")).args(arguments).output().expect("the program starts")
+    Command::new(env!("CARGO_BIN_EXE_dcvins"))
+        .env("DCVINS_CACHE_DIR", "")
+        .args(arguments)
+        .output()
+        .expect("the program starts")
 }
 
 /// Runs the program and checks its exit code and that its complaint holds every word.

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 fn dcvins(arguments: &[&str], threads: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.env("DCVINS_CACHE_DIR", "");
     command.arg("degeneracy").args(arguments).env("RAYON_NUM_THREADS", threads);
     command.output().expect("the program starts")
 }

@@ -146,7 +146,8 @@ fn the_readme_is_short() {
 
 /// What `dcvins COMMAND --help` prints; without a command, the list of the commands.
 fn help(command: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_dcvins")).args(command).arg("--help").output();
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_dcvins")).env("DCVINS_CACHE_DIR", "").args(command).arg("--help").output();
     String::from_utf8(output.expect("the program runs").stdout).expect("help is text")
 }
 

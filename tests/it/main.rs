@@ -17,6 +17,7 @@ mod pictures;
 #[cfg(feature = "gui")]
 mod renderers;
 mod report;
+mod result_cache;
 mod results;
 mod rig_template;
 mod sample_folder;

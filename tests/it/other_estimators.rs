@@ -12,7 +12,11 @@ fn sample(name: &str) -> String {
 
 /// Exit code and what was printed.
 fn dcvins(arguments: &[&str]) -> (i32, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_dcvins")).args(arguments).output().expect("the program runs");
+    let output = Command::new(env!("CARGO_BIN_EXE_dcvins"))
+        .env("DCVINS_CACHE_DIR", "")
+        .args(arguments)
+        .output()
+        .expect("the program runs");
     let text = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned()).concat();
     (output.status.code().unwrap_or(-1), text)
 }

@@ -11,6 +11,7 @@ fn sample(name: &str) -> PathBuf {
 /// Runs the program in a folder.
 fn dcvins(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.env("DCVINS_CACHE_DIR", "");
     command.current_dir(folder).args(arguments).output().expect("the program starts")
 }
 
@@ -133,6 +134,7 @@ fn an_interrupt_and_a_kill_leave_no_part_of_a_file() {
     let folder = folder();
     for (signal, code) in [("-INT", Some(130)), ("-KILL", None)] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+        command.env("DCVINS_CACHE_DIR", "");
         command.current_dir(folder.path()).args(["simulate", "T1", "-o", "k.mcap", "--size", "64x48"]);
         let mut process = command.spawn().expect("the program starts");
         let temporary = || names(folder.path()).iter().any(|name| name.starts_with(".k.mcap.dcvins-"));

@@ -119,6 +119,7 @@ fn without_an_adapter_the_error_names_the_cpu_renderer() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("picture.png");
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.env("DCVINS_CACHE_DIR", "");
     command.args(["screenshot", "--at", "0.5", "--panel", "timeline", "--renderer", "wgpu", "--size", "320x200", "-o"]);
     command.arg(&picture).arg(sample_log());
     // No Vulkan driver can be found.

@@ -14,6 +14,7 @@ fn report(folder: &Path, threads: &str) -> (String, String) {
         fs::copy(sample, folder.join(name)).expect("the sample can be copied");
     }
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.env("DCVINS_CACHE_DIR", "");
     command.current_dir(folder).env("RAYON_NUM_THREADS", threads);
     command.args(["report", "garden.mcap", "-o", "out", "--duration", "5", "--at", "4.2"]);
     command.args(["--run", "auto", "--run", "classical:name=old"]);

@@ -11,6 +11,7 @@ use mcap::MessageStream;
 fn fly(out: &Path, threads: &str) -> (Vec<u8>, String, String) {
     let log = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.env("DCVINS_CACHE_DIR", "");
     command.arg("run").arg(log).arg("--out").arg(out).env("RAYON_NUM_THREADS", threads);
     command.args(["--mcap", "--euroc", "--no-timing", "--duration", "4.5", "--run", "auto:name=9.lives"]);
     let output = command.output().expect("the program starts");

@@ -23,6 +23,7 @@ fn sample(name: &str) -> PathBuf {
 
 fn dcvins(arguments: &[&str], threads: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.env("DCVINS_CACHE_DIR", "");
     command.args(arguments).env("RAYON_NUM_THREADS", threads).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
     command.output().expect("the program starts")
 }

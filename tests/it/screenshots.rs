@@ -8,6 +8,7 @@ use std::process::Command;
 fn draw(folder: &Path, arguments: &[&str]) -> (Option<i32>, Vec<String>) {
     let log = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.env("DCVINS_CACHE_DIR", "");
     command.arg("screenshot").arg(log).args(["--panel", "timeline", "--size", "640x200", "-o"]);
     command.arg(folder.join("line.png")).args(arguments);
     let output = command.output().expect("the program starts");
@@ -25,6 +26,7 @@ fn a_name_that_no_screenshot_has_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let log = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.env("DCVINS_CACHE_DIR", "");
     let output =
         command.arg("screenshot").arg(log).args(["--at", "0.5", "-o"]).arg(folder.path().join("line.csv")).output();
     let output = output.expect("the program starts");

@@ -10,7 +10,11 @@ use dcvins::export::{OpenedStudy, is_study};
 use crate::study_sample;
 
 fn dcvins(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_dcvins")).args(arguments).output().expect("the program starts")
+    Command::new(env!("CARGO_BIN_EXE_dcvins"))
+        .env("DCVINS_CACHE_DIR", "")
+        .args(arguments)
+        .output()
+        .expect("the program starts")
 }
 
 /// Writes the tables as Parquet or as CSV.

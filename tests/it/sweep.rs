@@ -43,6 +43,7 @@ fn folder(plan: &str) -> tempfile::TempDir {
 
 fn sweep(folder: &Path, out: &str, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.env("DCVINS_CACHE_DIR", "");
     command.current_dir(folder).args(["sweep", "plan.toml", "-o", out]).args(more);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command

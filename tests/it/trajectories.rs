@@ -18,7 +18,11 @@ fn sample_log() -> PathBuf {
 }
 
 fn dcvins(arguments: &[&str]) -> (i32, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_dcvins")).args(arguments).output().expect("the program runs");
+    let output = Command::new(env!("CARGO_BIN_EXE_dcvins"))
+        .env("DCVINS_CACHE_DIR", "")
+        .args(arguments)
+        .output()
+        .expect("the program runs");
     let text = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     (output.status.code().unwrap_or(-1), text)
 }

@@ -22,10 +22,14 @@ pub use study::{StudyReport, check_study_report, write_study_report};
 
 use super::error::ExportError;
 use super::existing::{RUN_FILES, check_run_folder, read_index};
+use super::result_cache::CachedFile;
 use super::run_files::{RunFileOptions, remove_unwritten, stage_run};
 use crate::flight_log::output::OutputSet;
 use crate::log_check::CheckReport;
 use crate::session::Recording;
+
+/// The files of each run, without measured times.
+const RUN_OPTIONS: RunFileOptions = RunFileOptions { timing: false, mcap: false, euroc_trajectory: false };
 
 /// A figure of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,18 +66,21 @@ pub struct ReportOptions {
     pub check: Option<CheckReport>,
 }
 
-/// Writes `report.html`, `report.json` and a folder for each run as `run --no-timing` does; returns the HTML's path.
+/// Writes `report.html`, `report.json` and a folder for each run as `run --no-timing` does; returns the paths of all files,
+/// that of the HTML last.
 ///
 /// # Errors
 /// When a file cannot be read or written.
-pub fn write_report(recording: &Recording, folder: &Path, options: &ReportOptions) -> Result<PathBuf, ExportError> {
+pub fn write_report(
+    recording: &Recording,
+    folder: &Path,
+    options: &ReportOptions,
+) -> Result<Vec<PathBuf>, ExportError> {
     fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
-    let run_options = RunFileOptions { timing: false, ..RunFileOptions::default() };
     let mut outputs = OutputSet::default();
-    let (mut folders, mut summaries) = (Vec::new(), Vec::new());
+    let mut summaries = Vec::new();
     for run in &recording.runs {
-        let (folder, summary) = stage_run(recording, run, folder, run_options, &mut outputs)?;
-        folders.push(folder);
+        let (_, summary) = stage_run(recording, run, folder, RUN_OPTIONS, &mut outputs)?;
         summaries.push(summary);
     }
     let inputs = options.inputs.iter().map(|path| InputFile::read(path)).collect::<Result<Vec<_>, _>>()?;
@@ -86,14 +93,48 @@ pub fn write_report(recording: &Recording, folder: &Path, options: &ReportOption
     let path = folder.join("report.html");
     let page = page::page(&content, &options.figures);
     outputs.write(&path, page.as_bytes()).map_err(ExportError::write(&path))?;
+    let paths = outputs.paths();
     outputs.commit().map_err(ExportError::commit)?;
-    for folder in &folders {
-        remove_unwritten(folder, run_options)?;
+    let labels: Vec<&str> = recording.runs.iter().map(|run| run.spec.label.as_str()).collect();
+    remove_earlier(folder, &labels, &earlier_runs, &content.log)?;
+    Ok(paths)
+}
+
+/// Writes the files of a report of which all is known: paths relative to the folder with their contents, for runs of these
+/// labels; otherwise as [`write_report`].
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write_known_report(
+    files: &[CachedFile],
+    folder: &Path,
+    labels: &[&str],
+    log: &str,
+) -> Result<Vec<PathBuf>, ExportError> {
+    let earlier_runs = labels_in(&folder.join("report.json"));
+    let mut outputs = OutputSet::default();
+    for (name, content) in files {
+        let path = folder.join(name);
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
+        }
+        outputs.write(&path, content).map_err(ExportError::write(&path))?;
     }
-    for label in earlier_runs.iter().filter(|label| recording.runs.iter().all(|run| run.spec.label != **label)) {
-        remove_run(&folder.join(label), &content.log)?;
+    let paths = outputs.paths();
+    outputs.commit().map_err(ExportError::commit)?;
+    remove_earlier(folder, labels, &earlier_runs, log)?;
+    Ok(paths)
+}
+
+/// Removes what a report written before has and this one, with runs of these labels, has not.
+fn remove_earlier(folder: &Path, labels: &[&str], earlier_runs: &[String], log: &str) -> Result<(), ExportError> {
+    for label in labels {
+        remove_unwritten(&folder.join(label), RUN_OPTIONS)?;
     }
-    Ok(path)
+    for label in earlier_runs.iter().filter(|label| !labels.contains(&label.as_str())) {
+        remove_run(&folder.join(label), log)?;
+    }
+    Ok(())
 }
 
 /// The labels of the runs of a report that was written before, where they are plain names of folders.

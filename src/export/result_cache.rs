@@ -1,0 +1,292 @@
+//! Finished pictures and reports of earlier commands, so that the same command on the same files is done at once.
+//!
+//! An entry is named by the SHA-256 of everything that its content depends on: the program itself, the content of the input
+//! files and the options. It holds the files that the command wrote, and is checked by its own SHA-256 when it is read.
+
+use std::fs::{self, File};
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use directories::ProjectDirs;
+use sha2::{Digest as _, Sha256};
+use tempfile::NamedTempFile;
+
+use crate::flight_log::output;
+
+/// Bytes that are hashed at a time.
+const BLOCK_BYTES: usize = 1 << 20;
+/// Most bytes of all entries; those unused for longest go first.
+const MAX_BYTES: u64 = 256 << 20;
+/// Ending of an entry's file.
+const ENDING: &str = "result";
+/// Bytes of a SHA-256.
+const HASH_BYTES: usize = 32;
+
+/// The folder of the entries.
+#[derive(Clone, Debug)]
+pub struct ResultCache {
+    folder: PathBuf,
+    max_bytes: u64,
+}
+
+/// A file of an entry: its path relative to the command's output, and its content.
+pub type CachedFile = (String, Vec<u8>);
+
+/// Collects what a result depends on.
+#[derive(Clone, Debug)]
+pub struct ResultKeyBuilder {
+    hash: Sha256,
+    inputs: Vec<InputState>,
+}
+
+/// Name of an entry.
+#[derive(Clone, Debug)]
+pub struct ResultKey {
+    name: String,
+    inputs: Vec<InputState>,
+}
+
+/// An input file as it was when its content was hashed.
+type InputState = (PathBuf, Option<(u64, SystemTime)>);
+
+fn state_of(path: &Path) -> Option<(u64, SystemTime)> {
+    let metadata = fs::metadata(path).ok()?;
+    Some((metadata.len(), metadata.modified().ok()?))
+}
+
+impl ResultKeyBuilder {
+    /// With the program itself, so that another build has entries of its own.
+    ///
+    /// # Errors
+    /// When the program cannot be read.
+    pub fn new() -> io::Result<Self> {
+        let mut builder = Self { hash: Sha256::new(), inputs: Vec::new() };
+        builder.add_file(&std::env::current_exe()?)?;
+        Ok(builder)
+    }
+
+    /// Adds an option.
+    pub fn add_text(&mut self, text: &str) {
+        self.hash.update((text.len() as u64).to_le_bytes());
+        self.hash.update(text);
+    }
+
+    /// Adds the content of a file.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn add_file(&mut self, path: &Path) -> io::Result<()> {
+        self.inputs.push((path.to_owned(), state_of(path)));
+        let mut file = File::open(path)?;
+        let mut block = vec![0; BLOCK_BYTES];
+        let mut bytes = 0;
+        loop {
+            let count = file.read(&mut block)?;
+            if count == 0 {
+                break;
+            }
+            self.hash.update(&block[..count]);
+            bytes += count as u64;
+        }
+        // Behind the content, so that the ends of files cannot be mistaken for each other's beginnings.
+        self.hash.update(bytes.to_le_bytes());
+        Ok(())
+    }
+
+    /// The name of what depends on all this.
+    pub fn finish(self) -> ResultKey {
+        let name: Vec<String> = self.hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+        ResultKey { name: name.concat(), inputs: self.inputs }
+    }
+}
+
+impl ResultCache {
+    /// That of the user, in a folder of the program's own: `$XDG_CACHE_HOME/dcvins` or `~/.cache/dcvins` on Linux; `None` for a
+    /// user without a home folder.
+    pub fn of_user() -> Option<Self> {
+        let folders = ProjectDirs::from("", "", "dcvins")?;
+        Some(Self::in_folder(folders.cache_dir().join("results")))
+    }
+
+    /// In a folder, which need not exist yet.
+    pub fn in_folder(folder: PathBuf) -> Self {
+        Self { folder, max_bytes: MAX_BYTES }
+    }
+
+    fn path_of(&self, key: &ResultKey) -> PathBuf {
+        self.folder.join(format!("{}.{ENDING}", key.name))
+    }
+
+    /// The files of an entry; `None` where there is none.
+    ///
+    /// # Errors
+    /// When the entry is damaged, in one sentence; it is removed.
+    pub fn load(&self, key: &ResultKey) -> Result<Option<Vec<CachedFile>>, String> {
+        let path = self.path_of(key);
+        let Ok(bytes) = fs::read(&path) else { return Ok(None) };
+        let Some(files) = files_of(&bytes) else {
+            drop(fs::remove_file(&path));
+            return Err(format!("a damaged entry of the cache is made anew: {}", path.display()));
+        };
+        // From now on it is the one used last; where that cannot be written it only goes earlier.
+        drop(self.touch(&path));
+        Ok(Some(files))
+    }
+
+    /// Gives a file the present time of its file system.
+    fn touch(&self, path: &Path) -> io::Result<()> {
+        let now = NamedTempFile::new_in(&self.folder)?.as_file().metadata()?.modified()?;
+        File::options().append(true).open(path)?.set_modified(now)
+    }
+
+    /// Keeps the files of a result, unless one of its inputs has changed since it was hashed.
+    ///
+    /// # Errors
+    /// When the entry cannot be written.
+    pub fn store(&self, key: &ResultKey, files: &[CachedFile]) -> io::Result<()> {
+        if key.inputs.iter().any(|(path, state)| state.is_none() || state_of(path) != *state) {
+            return Ok(());
+        }
+        let bytes = bytes_of(files);
+        if bytes.len() as u64 > self.max_bytes {
+            return Ok(());
+        }
+        fs::create_dir_all(&self.folder)?;
+        self.make_room(bytes.len() as u64)?;
+        output::write_file(&self.path_of(key), &bytes)
+    }
+
+    /// Removes the entries unused for longest until so many bytes fit.
+    fn make_room(&self, bytes: u64) -> io::Result<()> {
+        let mut entries = Vec::new();
+        for entry in fs::read_dir(&self.folder)? {
+            let path = entry?.path();
+            if path.extension().is_some_and(|ending| ending == ENDING)
+                && let Some((bytes, used)) = state_of(&path)
+            {
+                entries.push((used, path, bytes));
+            }
+        }
+        entries.sort();
+        let mut total: u64 = entries.iter().map(|(.., bytes)| bytes).sum();
+        for (_, path, of_entry) in entries {
+            if total + bytes <= self.max_bytes {
+                break;
+            }
+            // Another process may have removed it.
+            drop(fs::remove_file(&path));
+            total -= of_entry;
+        }
+        Ok(())
+    }
+}
+
+/// SHA-256 of what follows, then for each file the lengths of name and content, name and content.
+fn bytes_of(files: &[CachedFile]) -> Vec<u8> {
+    let mut body = Vec::new();
+    for (name, content) in files {
+        for part in [name.as_bytes(), content] {
+            body.extend_from_slice(&(part.len() as u64).to_le_bytes());
+            body.extend_from_slice(part);
+        }
+    }
+    let mut bytes = Sha256::digest(&body).to_vec();
+    bytes.extend_from_slice(&body);
+    bytes
+}
+
+/// The files of an entry, `None` when it is not as it was written.
+fn files_of(bytes: &[u8]) -> Option<Vec<CachedFile>> {
+    let (hash, mut rest) = bytes.split_at_checked(HASH_BYTES)?;
+    if Sha256::digest(rest).as_slice() != hash {
+        return None;
+    }
+    let mut part = || -> Option<&[u8]> {
+        let (len, behind) = rest.split_first_chunk::<8>()?;
+        let (part, behind) = behind.split_at_checked(usize::try_from(u64::from_le_bytes(*len)).ok()?)?;
+        rest = behind;
+        Some(part)
+    };
+    let mut files = Vec::new();
+    while let Some(name) = part() {
+        files.push((String::from_utf8(name.to_vec()).ok()?, part()?.to_vec()));
+    }
+    Some(files)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn key(input: &Path, option: &str) -> ResultKey {
+        let mut builder = ResultKeyBuilder::new().unwrap();
+        builder.add_file(input).unwrap();
+        builder.add_text(option);
+        builder.finish()
+    }
+
+    #[test]
+    fn an_entry_belongs_to_its_input_and_options_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = ResultCache::in_folder(folder.path().join("cache"));
+        let input = folder.path().join("log");
+        fs::write(&input, "one").unwrap();
+        let files = vec![("a.png".to_owned(), vec![1, 2, 3]), ("b/c.csv".to_owned(), Vec::new())];
+        let first = key(&input, "--at 1");
+        assert_eq!(cache.load(&first), Ok(None));
+        cache.store(&first, &files).unwrap();
+        assert_eq!(cache.load(&key(&input, "--at 1")), Ok(Some(files.clone())));
+        assert_eq!(cache.load(&key(&input, "--at 2")), Ok(None));
+        fs::write(&input, "two").unwrap();
+        assert_eq!(cache.load(&key(&input, "--at 1")), Ok(None));
+        // A file that changed while the result was computed.
+        let before = key(&input, "--at 1");
+        fs::write(&input, "three").unwrap();
+        cache.store(&before, &files).unwrap();
+        assert_eq!(cache.load(&before), Ok(None));
+    }
+
+    #[test]
+    fn a_damaged_entry_is_told_and_made_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = ResultCache::in_folder(folder.path().join("cache"));
+        let input = folder.path().join("log");
+        fs::write(&input, "one").unwrap();
+        let key = key(&input, "");
+        let files = vec![("a.png".to_owned(), vec![1, 2, 3])];
+        cache.store(&key, &files).unwrap();
+        let whole = fs::read(cache.path_of(&key)).unwrap();
+        let mut turned = whole.clone();
+        *turned.last_mut().unwrap() ^= 1;
+        for damaged in [&turned[..], &whole[..whole.len() - 1], &whole[..5], &[]] {
+            fs::write(cache.path_of(&key), damaged).unwrap();
+            assert!(cache.load(&key).unwrap_err().contains("damaged entry"));
+            assert_eq!(cache.load(&key), Ok(None));
+        }
+        cache.store(&key, &files).unwrap();
+        assert_eq!(cache.load(&key), Ok(Some(files)));
+    }
+
+    #[test]
+    fn the_entries_unused_for_longest_go_first() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = ResultCache { folder: folder.path().join("cache"), max_bytes: 3000 };
+        let input = folder.path().join("log");
+        fs::write(&input, "one").unwrap();
+        let files = vec![("a.png".to_owned(), vec![7; 1000])];
+        let keys = ["1", "2", "3"].map(|option| key(&input, option));
+        let at = |seconds: u64| SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(seconds);
+        for (key, seconds) in keys.iter().zip([10, 20]) {
+            cache.store(key, &files).unwrap();
+            File::options().append(true).open(cache.path_of(key)).unwrap().set_modified(at(seconds)).unwrap();
+        }
+        assert!(cache.load(&keys[0]).unwrap().is_some());
+        cache.store(&keys[2], &files).unwrap();
+        let kept = keys.each_ref().map(|key| cache.load(key).unwrap().is_some());
+        assert_eq!(kept, [true, false, true]);
+        let too_large = vec![("a.png".to_owned(), vec![7; 4000])];
+        cache.store(&keys[1], &too_large).unwrap();
+        assert_eq!(keys.each_ref().map(|key| cache.load(key).unwrap().is_some()), kept);
+    }
+}
