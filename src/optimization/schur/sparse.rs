@@ -137,3 +137,46 @@ impl<K: Copy + PartialEq + Into<usize>> NullaryFnOnce for PartOfElimination<'_, 
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix2x3, Matrix2x6, Vector2};
+
+    use super::*;
+    use crate::geometry::SplitMix64;
+    use crate::optimization::Reprojection;
+
+    /// Landmarks that every third pose of a stretch observes.
+    fn example(poses: usize) -> ReprojectionEquations<SparsePoseEquations<usize>> {
+        let mut numbers = SplitMix64::new(7);
+        let mut equations = ReprojectionEquations::new(SparsePoseEquations::new(), 4 * poses);
+        for landmark in 0..4 * poses {
+            let first = landmark % poses;
+            let observers: Vec<usize> = (first..poses.min(first + 20)).step_by(3).collect();
+            let terms: Vec<(usize, Reprojection)> = observers
+                .iter()
+                .map(|pose| {
+                    let mut random = || numbers.next_unit() - 0.5;
+                    let residual = Vector2::from_fn(|_, _| random());
+                    let by_observer = Matrix2x6::from_fn(|_, _| random());
+                    let by_landmark = Matrix2x3::from_fn(|_, _| random());
+                    (*pose, Reprojection { residual, by_anchor: Matrix2x6::zeros(), by_observer, by_landmark })
+                })
+                .collect();
+            equations.add_landmark(None, terms.len(), terms.into_iter());
+        }
+        equations
+    }
+
+    #[test]
+    fn elimination_by_parts_gives_the_same_bits() {
+        for poses in [1, 5, 40, 131] {
+            let equations = example(poses);
+            let (whole, parts) = (equations.eliminate(1e-3), equations.eliminate_by_parts(1e-3));
+            assert!(whole.poses.gradients().eq(parts.poses.gradients()), "{poses}");
+            assert!(whole.poses.blocks().eq(parts.poses.blocks()), "{poses}");
+            assert_eq!(whole.poses.gradients().count(), poses);
+            assert_eq!(whole.inverses, parts.inverses);
+        }
+    }
+}
