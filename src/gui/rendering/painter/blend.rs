@@ -13,19 +13,33 @@ pub(in crate::gui) const fn unpack(pixel: u32) -> [u8; 4] {
     pixel.to_le_bytes()
 }
 
+/// The four channels of a pixel, each with room for carries.
+const CHANNELS: u64 = 0x00ff_00ff_00ff_00ff;
+
+/// Spreads a pixel over four channels: red, blue, green, alpha from the lowest.
+#[inline]
+pub(super) fn spread(pixel: u32) -> u64 {
+    let pixel = u64::from(pixel);
+    (pixel | pixel << 24) & CHANNELS
+}
+
+/// Packs four spread channels.
+#[inline]
+pub(super) fn gathered(channels: u64) -> u32 {
+    (channels | channels >> 24) as u32
+}
+
 /// `source + below · (1 − source alpha)`, each channel rounded and limited to 255.
 #[inline]
 pub(super) fn over(below: u32, source: u32) -> u32 {
-    let keep = 255 - (source >> 24);
-    let red_blue = (source & LANES) + scale_lanes(below & LANES, keep);
-    let green_alpha = ((source >> 8) & LANES) + scale_lanes((below >> 8) & LANES, keep);
-    saturate(red_blue) | (saturate(green_alpha) << 8)
+    let keep = u64::from(255 - (source >> 24));
+    gathered(saturated(spread(source) + scaled(spread(below), keep)))
 }
 
 /// Each channel times `factor / 255`, rounded.
 #[inline]
 pub(super) fn scale(pixel: u32, factor: u32) -> u32 {
-    scale_lanes(pixel & LANES, factor) | (scale_lanes((pixel >> 8) & LANES, factor) << 8)
+    gathered(scaled(spread(pixel), u64::from(factor)))
 }
 
 /// Channel-wise `a · b / 255`, rounded.
@@ -40,14 +54,11 @@ pub(super) fn multiply(a: u32, b: u32) -> u32 {
     pack(product)
 }
 
-/// `a + (b − a) · weight / 256` for each channel, rounded; `weight` is 0 to 256.
+/// `a + (b − a) · weight / 256` for each spread channel, rounded; `weight` is 0 to 256.
 #[inline]
-pub(super) fn mix(a: u32, b: u32, weight: u32) -> u32 {
-    const HALF: u32 = 0x0080_0080;
-    let rest = 256 - weight;
-    let red_blue = ((a & LANES) * rest + (b & LANES) * weight + HALF) >> 8;
-    let green_alpha = ((a >> 8) & LANES) * rest + ((b >> 8) & LANES) * weight + HALF;
-    (red_blue & LANES) | (green_alpha & !LANES)
+pub(super) fn mixed(a: u64, b: u64, weight: u32) -> u64 {
+    const HALF: u64 = 0x0080_0080_0080_0080;
+    ((a * u64::from(256 - weight) + b * u64::from(weight) + HALF) >> 8) & CHANNELS
 }
 
 /// The mean of four pixels, rounded.
@@ -58,18 +69,18 @@ pub(in crate::gui) fn average(pixels: [u32; 4]) -> u32 {
     (((sum(0) + TWO) >> 2) & LANES) | ((((sum(8) + TWO) >> 2) & LANES) << 8)
 }
 
-/// Two lanes times `factor / 255`, rounded exactly.
+/// Spread channels times `factor / 255`, rounded exactly.
 #[inline]
-fn scale_lanes(lanes: u32, factor: u32) -> u32 {
-    let exact = lanes * factor + 0x0080_0080;
-    ((exact + ((exact >> 8) & LANES)) >> 8) & LANES
+fn scaled(channels: u64, factor: u64) -> u64 {
+    let exact = channels * factor + 0x0080_0080_0080_0080;
+    ((exact + ((exact >> 8) & CHANNELS)) >> 8) & CHANNELS
 }
 
-/// Limits each of two lanes (at most 510) to 255.
+/// Limits spread channels (at most 510) to 255.
 #[inline]
-fn saturate(lanes: u32) -> u32 {
-    let carry = lanes & 0x0100_0100;
-    (lanes | (carry - (carry >> 8))) & LANES
+fn saturated(channels: u64) -> u64 {
+    let carry = channels & 0x0100_0100_0100_0100;
+    (channels | (carry - (carry >> 8))) & CHANNELS
 }
 
 #[cfg(test)]
@@ -109,8 +120,9 @@ mod tests {
     #[test]
     fn mix_hits_both_ends() {
         let (a, b) = (pack([0, 10, 250, 255]), pack([255, 20, 50, 0]));
-        assert_eq!(mix(a, b, 0), a);
-        assert_eq!(mix(a, b, 256), b);
-        assert_eq!(unpack(mix(a, b, 128)), [128, 15, 150, 128]);
+        let mix = |weight: u32| gathered(mixed(spread(a), spread(b), weight));
+        assert_eq!(mix(0), a);
+        assert_eq!(mix(256), b);
+        assert_eq!(unpack(mix(128)), [128, 15, 150, 128]);
     }
 }

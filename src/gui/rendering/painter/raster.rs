@@ -150,11 +150,11 @@ impl<'a> PreparedMesh<'a> {
                     if pixels.is_empty() {
                         return;
                     }
-                    let (mut color, step) = gradient.start(left, row, skipped);
+                    let mut color = gradient.start(left, row, skipped);
                     for pixel in pixels {
                         *pixel = blend::over(*pixel, pack_fixed(color));
                         for channel in 0..4 {
-                            color[channel] = color[channel].wrapping_add(step[channel]);
+                            color[channel] = color[channel].wrapping_add(gradient.step[channel]);
                         }
                     }
                 });
@@ -175,14 +175,14 @@ impl<'a> PreparedMesh<'a> {
                         if pixels.is_empty() {
                             return;
                         }
-                        let (mut color, step) = gradient.start(left, row, skipped);
+                        let mut color = gradient.start(left, row, skipped);
                         let [mut u, mut v] = place.at(left, row, skipped);
                         for pixel in pixels {
                             let source = blend::multiply(self.texture.sample(u, v), pack_fixed(color));
                             *pixel = blend::over(*pixel, source);
                             (u, v) = (u.wrapping_add(place.step[0]), v.wrapping_add(place.step[1]));
                             for channel in 0..4 {
-                                color[channel] = color[channel].wrapping_add(step[channel]);
+                                color[channel] = color[channel].wrapping_add(gradient.step[channel]);
                             }
                         }
                     });
@@ -204,8 +204,12 @@ impl<'a> PreparedMesh<'a> {
         const ONE: i64 = 1 << TEXEL_BITS;
         const HALF: i64 = ONE / 2;
         let texture = self.texture;
+        // An image in its own colours hides what is below it.
+        let covers = texture.kind == TexelKind::Opaque && color == u32::MAX;
         let put = |pixel: &mut u32, texel: u32| {
-            if texel != 0 {
+            if covers {
+                *pixel = texel;
+            } else if texel != 0 {
                 *pixel = blend::over(*pixel, tinted(texture.kind, texel, color));
             }
         };

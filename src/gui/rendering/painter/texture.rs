@@ -199,11 +199,12 @@ impl Texture {
         let column = u >> TEXEL_BITS;
         let (left, right) = (self.column(column), self.column(column + 1));
         let across = weight(u);
-        let top = blend::mix(upper[left], upper[right], across);
+        let mixed = |row: &[u32]| blend::mixed(blend::spread(row[left]), blend::spread(row[right]), across);
+        let top = mixed(upper);
         if down == 0 {
-            return top;
+            return blend::gathered(top);
         }
-        blend::mix(top, blend::mix(lower[left], lower[right], across), down)
+        blend::gathered(blend::mixed(top, mixed(lower), down))
     }
 }
 

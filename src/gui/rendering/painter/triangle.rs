@@ -178,28 +178,46 @@ impl Plane {
 }
 
 /// Four linear channels.
-pub(super) struct Gradient([Plane; 4]);
+pub(super) struct Gradient {
+    at_corner: [f64; 4],
+    per_column: [f64; 4],
+    per_row: [f64; 4],
+    /// The increment per pixel, in fixed point.
+    pub(super) step: [i32; 4],
+}
 
 /// Fractional bits of a channel along a span.
 const CHANNEL_BITS: u32 = 16;
+/// One unit of a channel in fixed point.
+const CHANNEL_ONE: f64 = (1 << CHANNEL_BITS) as f64;
 
 impl Gradient {
     pub(super) fn of_colors(points: [[i32; 2]; 3], colors: [u32; 3]) -> Option<Self> {
         let colors = colors.map(blend::unpack);
         let slopes = Slopes::of(points)?;
-        Some(Self([0, 1, 2, 3].map(|channel| slopes.plane(colors.map(|color| f64::from(color[channel]))))))
+        let planes = [0, 1, 2, 3].map(|channel| slopes.plane(colors.map(|color| f64::from(color[channel]))));
+        Some(Self {
+            at_corner: planes.map(|plane| plane.at_corner),
+            per_column: planes.map(|plane| plane.per_column),
+            per_row: planes.map(|plane| plane.per_row),
+            step: planes.map(|plane| (plane.per_column.clamp(-255.0, 255.0) * CHANNEL_ONE) as i32),
+        })
     }
 
-    /// Value at the pixel `steps` to the right of a span's first one, and the increment per pixel, in fixed point.
+    /// Value at the pixel `steps` to the right of a span's first one, in fixed point.
     #[inline]
-    pub(super) fn start(&self, column: i32, row: i32, steps: i32) -> ([i32; 4], [i32; 4]) {
-        const ONE: f64 = (1 << CHANNEL_BITS) as f64;
-        let step = self.0.map(|plane| (plane.per_column.clamp(-255.0, 255.0) * ONE) as i32);
-        let mut start = self.0.map(|plane| ((plane.at(column, row).clamp(0.0, 255.0) + 0.5) * ONE) as i32);
+    pub(super) fn start(&self, column: i32, row: i32, steps: i32) -> [i32; 4] {
+        let (x_px, y_px) = (f64::from(column) + 0.5, f64::from(row) + 0.5);
+        let mut exact = [0.0; 4];
         for channel in 0..4 {
-            start[channel] = start[channel].wrapping_add(step[channel].wrapping_mul(steps));
+            let value = self.at_corner[channel] + self.per_column[channel] * x_px + self.per_row[channel] * y_px;
+            exact[channel] = (value.clamp(0.0, 255.0) + 0.5) * CHANNEL_ONE;
         }
-        (start, step)
+        let mut start = exact.map(|value| value as i32);
+        for channel in 0..4 {
+            start[channel] = start[channel].wrapping_add(self.step[channel].wrapping_mul(steps));
+        }
+        start
     }
 }
 
