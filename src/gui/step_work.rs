@@ -1,10 +1,12 @@
 //! A slow computation from the report of one step: on its own thread, or while the caller waits. No estimator runs
 //! here: results of an estimator are requested from the session by a command.
 
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::sync::{Arc, OnceLock};
 use std::thread::Builder;
 use std::time::Duration;
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::session::StepRecord;
 
@@ -77,10 +79,33 @@ where
 {
     let (sender, receiver) = channel();
     let (later, given) = (sender.clone(), work.clone());
-    let background = move || drop(later.send(given()));
+    let background = move || drop(later.send(apart(given)));
     if !(in_background && Builder::new().name(thread_name.to_owned()).spawn(background).is_ok()) {
         // The receiver belongs to this value alone.
         drop(sender.send(work()));
     }
     receiver
+}
+
+/// Does work on one thread apart from those that paint: a picture never waits for a part of it.
+fn apart<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    static APART: OnceLock<Option<ThreadPool>> = OnceLock::new();
+    let pool = APART.get_or_init(|| ThreadPoolBuilder::new().num_threads(1).build().ok());
+    match pool {
+        Some(pool) => pool.install(work),
+        None => work(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_in_the_background_leaves_the_other_threads_to_the_painter() {
+        assert_eq!(apart(rayon::current_num_threads), 1);
+        // Parts of it stay there, too.
+        let names = apart(|| rayon::join(rayon::current_thread_index, rayon::current_thread_index));
+        assert_eq!(names, (Some(0), Some(0)));
+    }
 }
