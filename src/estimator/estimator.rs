@@ -13,7 +13,8 @@ use crate::gimbal::ClassicalChain;
 /// A sliding-window visual-inertial estimator for a camera on a gimbal or a rigid camera, and for further rigid
 /// cameras.
 ///
-/// It is a plain value: a clone is a snapshot, and the same steps from it give the same bits.
+/// It is a plain value: a clone is a snapshot, and the same steps from it give the same bits. [`Estimator::packed`] makes
+/// a smaller one.
 #[derive(Clone, Debug)]
 pub struct Estimator {
     pub(super) setup: Setup,
@@ -21,7 +22,7 @@ pub struct Estimator {
     /// Number of failures of the window.
     pub(super) restarts: usize,
     /// Last pose before the last failure.
-    resume_at: Option<RigidTransform>,
+    pub(super) resume_at: Option<RigidTransform>,
 }
 
 /// Data of each [`Phase`].
@@ -92,16 +93,6 @@ impl Estimator {
         report.restarts = self.restarts;
         report.times.step_ms = self.setup.clock_ms() - begin_ms;
         report
-    }
-
-    /// Memory of a snapshot in bytes: frames with their IMU samples, features, prior and waiting frames; data
-    /// shared by all snapshots counts with its inline size.
-    pub fn bytes(&self) -> usize {
-        size_of::<Self>()
-            + match &self.phase {
-                PhaseState::Initializing(initializer) => initializer.heap_bytes(),
-                PhaseState::Tracking(window) => size_of::<SlidingWindow>() + window.heap_bytes(),
-            }
     }
 
     pub(super) fn calibration(&self) -> &Calibrations {

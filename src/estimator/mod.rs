@@ -11,6 +11,7 @@ mod hypothetical;
 pub mod initialization;
 mod interventions;
 mod options;
+mod packed;
 mod report;
 mod setup;
 mod state;
@@ -28,6 +29,7 @@ pub use factors::{imu_factor, preintegration};
 pub use hypothetical::{HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge};
 pub use interventions::{InterventionError, SensorColumns};
 pub use options::{EstimatorOptions, TrackContinuation};
+pub use packed::{PackedEstimator, StepMeasurements};
 pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
 pub use report::{
     CalibrationEstimate, ColumnBlock, ColumnGroup, ColumnId, Event, EventKind, FactorKind, FactorRows, FailureCause,

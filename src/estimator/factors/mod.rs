@@ -4,6 +4,7 @@
 //! the window.
 
 pub mod imu_factor;
+pub(crate) mod packed_prior;
 pub mod preintegration;
 pub(crate) mod prior;
 pub(crate) mod projection;

@@ -138,10 +138,7 @@ impl Preintegration {
     /// are skipped.
     pub fn extend(&mut self, samples: &[ImuSample]) {
         for sample in samples {
-            let finite = sample.angular_velocity_rad_per_s.iter().all(|x| x.is_finite())
-                && sample.specific_force_m_per_s2.iter().all(|x| x.is_finite());
-            let later = self.samples.last().is_none_or(|last| sample.stamp_ns > last.stamp_ns);
-            if !finite || !later {
+            if !Self::takes(self.samples.last(), sample) {
                 continue;
             }
             if let Some(last) = self.samples.last().copied() {
@@ -149,6 +146,13 @@ impl Preintegration {
             }
             self.samples.push(*sample);
         }
+    }
+
+    /// Whether a sample is integrated after the last one: it is later and finite.
+    pub(crate) fn takes(last: Option<&ImuSample>, sample: &ImuSample) -> bool {
+        let finite = sample.angular_velocity_rad_per_s.iter().all(|x| x.is_finite())
+            && sample.specific_force_m_per_s2.iter().all(|x| x.is_finite());
+        finite && last.is_none_or(|last| sample.stamp_ns > last.stamp_ns)
     }
 
     /// Reintegrates the samples with another bias.
@@ -167,6 +171,16 @@ impl Preintegration {
     /// The samples.
     pub fn samples(&self) -> &[ImuSample] {
         &self.samples
+    }
+
+    /// Noise of the integration.
+    pub(crate) fn noise(&self) -> &ImuNoise {
+        &self.noise
+    }
+
+    /// Intrinsics of the integration.
+    pub(crate) fn intrinsics(&self) -> Option<&ImuErrors> {
+        self.intrinsics.as_ref().map(|intrinsics| &intrinsics.errors)
     }
 
     /// Bias of the integration.

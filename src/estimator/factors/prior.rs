@@ -77,7 +77,7 @@ impl Prior {
         Some(Self::new(columns, jacobian, residual))
     }
 
-    fn new(columns: Vec<PriorColumn>, jacobian: DMatrix<f64>, residual: DVector<f64>) -> Self {
+    pub(super) fn new(columns: Vec<PriorColumn>, jacobian: DMatrix<f64>, residual: DVector<f64>) -> Self {
         let hessian = jacobian.transpose() * &jacobian;
         let gradient = jacobian.tr_mul(&residual);
         Self { columns, jacobian, residual, hessian, gradient }
@@ -127,10 +127,19 @@ impl Prior {
         self.residual.len()
     }
 
-    /// Bytes on the heap.
-    pub(crate) fn heap_bytes(&self) -> usize {
-        let numbers = self.jacobian.len() + self.residual.len() + self.hessian.len() + self.gradient.len();
-        self.columns.capacity() * size_of::<PriorColumn>() + numbers * size_of::<f64>()
+    /// The unknowns of the columns.
+    pub(super) fn columns(&self) -> &[PriorColumn] {
+        &self.columns
+    }
+
+    /// `J`.
+    pub(super) fn jacobian(&self) -> &DMatrix<f64> {
+        &self.jacobian
+    }
+
+    /// `r`, the residual at `x₀`.
+    pub(super) fn offset(&self) -> &DVector<f64> {
+        &self.residual
     }
 
     /// The residuals at an estimate; `first_estimate_offset` is `x ⊟ x₀` in the window's layout.

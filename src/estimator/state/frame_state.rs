@@ -7,6 +7,7 @@ use nalgebra::{DVector, Vector3};
 use super::layout::{POSE, VELOCITY_BIAS};
 use super::motion_profile::{MotionProfile, RowMotion};
 use super::navigation::{NavigationState, Vector15};
+use crate::estimator::allocated_bytes;
 use crate::geometry::{so3, wrap_angle};
 use crate::sensors::{ImuSample, JointAngles};
 
@@ -45,6 +46,13 @@ impl Rates {
             joints_rad_per_s: if joints.iter().all(|rate| rate.is_finite()) { joints } else { Vec::new() },
             profile,
         })
+    }
+
+    /// Bytes with the heap.
+    pub(crate) fn bytes(&self) -> usize {
+        allocated_bytes(size_of::<Self>())
+            + allocated_bytes(self.joints_rad_per_s.capacity() * size_of::<f64>())
+            + self.profile.as_ref().map_or(0, MotionProfile::heap_bytes)
     }
 
     /// Rate of one joint, in rad/s; zero without a measurement.
@@ -123,6 +131,12 @@ impl FrameState {
     /// [`Self::motion_at`] the stamp.
     pub(crate) fn motion(&self) -> DVector<f64> {
         self.motion_at(0.0)
+    }
+
+    /// Bytes on the heap without the rates, which the states of a frame share.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        let of_vec = |numbers: &Vec<f64>| allocated_bytes(numbers.capacity() * size_of::<f64>());
+        of_vec(&self.joints_rad) + of_vec(&self.joint_motion)
     }
 
     fn body_rate_rad_per_s(&self) -> Vector3<f64> {

@@ -8,6 +8,7 @@ mod fixture;
 mod flight;
 mod gain;
 mod jacobian;
+mod packed;
 mod preintegration;
 mod sensors;
 mod stationary;

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use crate::estimator::allocated_bytes;
 use crate::estimator::options::EstimatorOptions;
 use crate::estimator::state::camera_view::CameraView;
 use crate::frontend::{FeatureId, TrackedFeature};
@@ -154,14 +153,4 @@ pub(crate) fn compensated_parallax(
         .collect();
     let mean = if angles.is_empty() { 0.0 } else { angles.iter().sum::<f64>() / angles.len() as f64 };
     (mean, angles.len())
-}
-
-/// Estimated heap memory of a camera's features in bytes: a tree node has up to eleven entries and is two
-/// thirds full on average.
-pub(crate) fn heap_bytes(features: &FeatureMap) -> usize {
-    const SLOTS_PER_ENTRY: f64 = 1.5;
-    let entry = size_of::<FeatureId>() + size_of::<Feature>();
-    let observations =
-        features.values().map(|feature| allocated_bytes(feature.observations.capacity() * size_of::<Observation>()));
-    (features.len() as f64 * entry as f64 * SLOTS_PER_ENTRY) as usize + observations.sum::<usize>()
 }

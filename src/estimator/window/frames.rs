@@ -2,14 +2,12 @@
 
 use std::ops::{Deref, DerefMut};
 
-use crate::estimator::allocated_bytes;
 use crate::estimator::factors::preintegration::Preintegration;
 use crate::estimator::factors::zero_velocity::Stationary;
 use crate::estimator::options::EstimatorOptions;
-use crate::estimator::state::frame_state::{FrameState, Rates};
+use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::imu_errors::ImuErrors;
 use crate::estimator::state::layout::Layout;
-use crate::estimator::state::motion_profile::MotionProfile;
 use crate::estimator::state::navigation::Matrix15;
 use crate::sensors::JointAngles;
 
@@ -45,19 +43,6 @@ impl Frame {
     /// attitude and joint angles, else `current`.
     pub(crate) fn linearization_point<'a>(&'a self, current: &'a FrameState, reach_rad: f64) -> &'a FrameState {
         self.first_estimate.as_ref().filter(|first| current.rotation_from_rad(first) <= reach_rad).unwrap_or(current)
-    }
-
-    fn bytes(&self) -> usize {
-        let encoder = self.encoder.as_ref().map_or(0, JointAngles::heap_bytes);
-        let states = 1 + usize::from(self.first_estimate.is_some());
-        let of_vec = |numbers: &Vec<f64>| allocated_bytes(numbers.capacity() * size_of::<f64>());
-        size_of::<Self>()
-            + allocated_bytes(size_of_val(self.motion.samples()))
-            + states * (of_vec(&self.state.joints_rad) + of_vec(&self.state.joint_motion))
-            + allocated_bytes(size_of::<Rates>())
-            + of_vec(&self.state.rates.joints_rad_per_s)
-            + self.state.rates.profile.as_ref().map_or(0, MotionProfile::heap_bytes)
-            + encoder
     }
 }
 
@@ -131,11 +116,6 @@ impl Frames {
                 frame.motion_information = frame.motion.square_root_information();
             }
         }
-    }
-
-    /// Memory of the frames in bytes, heap included.
-    pub(crate) fn bytes(&self) -> usize {
-        self.0.iter().map(Frame::bytes).sum()
     }
 }
 

@@ -18,6 +18,8 @@ pub(crate) mod linearization;
 pub(crate) mod make_room;
 pub(crate) mod marginalization;
 pub(crate) mod motion_parts;
+pub(crate) mod packed_features;
+pub(crate) mod packed_window;
 pub(crate) mod problem;
 pub(crate) mod reporting;
 pub(crate) mod rows;

@@ -9,6 +9,7 @@ use super::reporting::empty_report;
 use super::solve::SolvedWindow;
 use super::stationary::{Observed, StationaryDetector};
 use super::window_state::WindowState;
+use crate::estimator::allocated_bytes;
 use crate::estimator::factors::preintegration::Preintegration;
 use crate::estimator::report::{Event, EventKind, FailureCause, Phase, StepReport};
 use crate::estimator::setup::Setup;
@@ -27,6 +28,12 @@ const FARTHEST_USUAL_M: f64 = 100.0;
 #[derive(Clone, Debug)]
 pub(crate) struct SlidingWindow {
     pub(crate) state: WindowState,
+    pub(super) monitors: Monitors,
+}
+
+/// What a window remembers beside its problem.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Monitors {
     /// Posterior standard deviations of the calibration's columns after the last solve.
     calibration_sigmas: Vec<f64>,
     stationary: StationaryDetector,
@@ -46,13 +53,7 @@ pub(crate) struct WindowFailure {
 impl SlidingWindow {
     /// A window that starts from these frames.
     pub(crate) fn new(state: WindowState) -> Self {
-        Self {
-            state,
-            calibration_sigmas: Vec::new(),
-            stationary: StationaryDetector::default(),
-            consistency: ConsistencyMonitor::default(),
-            landmarks: LandmarkWatch::default(),
-        }
+        Self { state, monitors: Monitors::default() }
     }
 
     /// Processes the tracks of an image with the IMU samples before it.
@@ -70,8 +71,8 @@ impl SlidingWindow {
         events.extend(self.detect_stationary(setup, input));
         let predicted = self.state.frames.newest().state.navigation;
         let mut solved = self.state.solve(setup, options.iterations);
-        events.extend(self.landmarks.observe(&self.state, options));
-        if let Some(failure) = failure(self.state.frames.newest(), &predicted, &self.landmarks, options) {
+        events.extend(self.monitors.landmarks.observe(&self.state, options));
+        if let Some(failure) = failure(self.state.frames.newest(), &predicted, &self.monitors.landmarks, options) {
             events.push(failure);
             return Err(self.failed(input, events));
         }
@@ -81,7 +82,7 @@ impl SlidingWindow {
         let mut report = self.report(setup, input, &mut solved);
         let marginalizing_ms = setup.clock_ms();
         let scores = || self.state.sensor_scores(setup);
-        let warnings = self.consistency.observe(report.stamp_ns, &report.residuals, &setup.config, scores);
+        let warnings = self.monitors.consistency.observe(report.stamp_ns, &report.residuals, &setup.config, scores);
         self.state.drop_rejected(&solved, options, &mut events);
         events.extend(self.switch_near_singularity(setup));
         self.state.make_room(setup, &mut events);
@@ -94,19 +95,14 @@ impl SlidingWindow {
 
     /// The report of a solved window.
     pub(crate) fn report(&mut self, setup: &Setup, input: &StepInput<'_>, solved: &mut SolvedWindow) -> StepReport {
-        self.calibration_sigmas = solved.solution.calibration_sigmas();
-        let calibration = calibration_estimate(setup, &self.state.calibration, &self.calibration_sigmas);
+        self.monitors.calibration_sigmas = solved.solution.calibration_sigmas();
+        let calibration = calibration_estimate(setup, &self.state.calibration, &self.monitors.calibration_sigmas);
         self.state.report(setup, input, solved, calibration)
-    }
-
-    /// Bytes on the heap.
-    pub(crate) fn heap_bytes(&self) -> usize {
-        self.state.heap_bytes()
     }
 
     /// Skips an image that is not later than the newest one.
     fn skip(&self, setup: &Setup, input: &StepInput<'_>, newest_stamp_ns: i64) -> StepReport {
-        let calibration = calibration_estimate(setup, &self.state.calibration, &self.calibration_sigmas);
+        let calibration = calibration_estimate(setup, &self.state.calibration, &self.monitors.calibration_sigmas);
         let mut report = empty_report(setup, input, Phase::Tracking, calibration);
         report.window = self.state.window_report();
         let stamp_s = seconds_from_ns(input.stamp_ns);
@@ -182,7 +178,7 @@ impl SlidingWindow {
             imu_from_camera: self.state.calibration.of(camera).imu_from_camera(&newest.state.joints_rad).rotation,
             distance_m: usual_distance_m(&self.state.features),
         };
-        let (stationary, event) = self.stationary.observe(input, &observed)?;
+        let (stationary, event) = self.monitors.stationary.observe(input, &observed)?;
         self.state.frames.newest_mut().stationary = Some(stationary);
         Some(event)
     }
@@ -199,6 +195,13 @@ impl SlidingWindow {
         let message =
             format!("parameterization switched to {better}: singularity margin {margin:.2} < {SWITCH_MARGIN:.2}");
         Some(Event::decided(EventKind::ParameterizationSwitched, message, margin, SWITCH_MARGIN))
+    }
+}
+
+impl Monitors {
+    /// Bytes on the heap.
+    pub(super) fn heap_bytes(&self) -> usize {
+        allocated_bytes(self.calibration_sigmas.capacity() * size_of::<f64>()) + self.stationary.heap_bytes()
     }
 }
 

@@ -142,6 +142,12 @@ impl StationaryDetector {
         Some((Stationary { since_ns, position_sigma_m, velocity_sigma_m_per_s }, event))
     }
 
+    /// Bytes on the heap.
+    pub(super) fn heap_bytes(&self) -> usize {
+        let bearings = self.reference.as_ref().map_or(0, |reference| reference.bearings.capacity());
+        self.intervals.capacity() * size_of::<Interval>() + bearings * size_of::<(FeatureId, Vector3<f64>)>()
+    }
+
     fn take_interval(&mut self, input: &StepInput<'_>) {
         let finite = |vector: &Vector3<f64>| vector.iter().all(|x| x.is_finite());
         let samples: Vec<_> = input

@@ -94,11 +94,4 @@ impl WindowState {
             prior.transport_calibration(&old_from_new, first_estimate_offsets.as_ref(), &layout);
         }
     }
-
-    /// Bytes on the heap.
-    pub(crate) fn heap_bytes(&self) -> usize {
-        self.frames.bytes()
-            + self.features.iter().map(features::heap_bytes).sum::<usize>()
-            + self.prior.as_ref().map_or(0, Prior::heap_bytes)
-    }
 }

@@ -9,8 +9,9 @@ use super::recompute::{Detail, RecomputeRequest, Recomputed};
 use crate::session::plan::SessionPlan;
 use crate::session::record::{Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord};
 
-/// Inverse of the ratio of the memory budget that estimator snapshots may take.
-const SNAPSHOT_BUDGET_DIVISOR: usize = 4;
+/// Inverse of the ratio of the memory budget that estimator snapshots may take. They go before whole steps: with them any
+/// step is recomputed soon, and a whole step only helps where the cursor is.
+const SNAPSHOT_BUDGET_DIVISOR: usize = 2;
 
 /// The runs of a session as far as they are computed: their record, and for each run the history from which any of its
 /// steps can be recomputed to the same bits.
@@ -138,8 +139,15 @@ impl Computation {
                 let history = self.histories.get(&run.id);
                 history.is_some_and(|history| run.summarize_one(history.begin(), history.spacing()))
             });
-            if !summarized {
+            // Without a step left to summarize the snapshots give way, down to half of their share.
+            let least_bytes =
+                recording.memory_budget_bytes / (2 * SNAPSHOT_BUDGET_DIVISOR) / recording.runs.len().max(1);
+            let evicted = !summarized && self.histories.values().any(|history| history.evict_above(least_bytes));
+            if !summarized && !evicted {
                 return;
+            }
+            for run in recording.runs.iter_mut().filter(|_| evicted) {
+                run.memory.history = self.histories.get(&run.id).map_or(0, |history| history.bytes());
             }
         }
     }

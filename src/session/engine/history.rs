@@ -8,13 +8,15 @@ use std::sync::Arc;
 
 use parking_lot::Mutex;
 
-use super::run_engine::RunEngine;
+use super::run_engine::{PackedEngine, RunEngine};
 use super::step_inputs::{OwnedStepInput, StepInputs};
 use crate::estimator::FactorRows;
 use crate::session::record::StepRecord;
 
 /// Steps between two snapshots while the budget allows all of them.
-const MIN_SPACING: usize = 16;
+const MIN_SPACING: usize = 5;
+/// Number of steps before a snapshot among which it finds its measurements again: ten seconds and more.
+const PAST: usize = 256;
 
 /// Number and memory of the kept estimator snapshots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,7 +25,7 @@ pub struct SnapshotUse {
     pub count: usize,
     /// Bytes of all snapshots.
     pub bytes: usize,
-    /// Steps between two snapshots.
+    /// Steps between two snapshots, in the newer part of the run; in the older part up to twice as many.
     pub spacing: usize,
 }
 
@@ -41,7 +43,7 @@ pub(in crate::session) struct History {
 /// Snapshots by the index of the step before which they were taken.
 #[derive(Debug)]
 struct Snapshots {
-    kept: BTreeMap<usize, (Arc<RunEngine>, usize)>,
+    kept: BTreeMap<usize, (Arc<PackedEngine>, usize)>,
     spacing: usize,
     bytes: usize,
     budget_bytes: usize,
@@ -84,10 +86,18 @@ impl History {
         if step != self.begin && !step.is_multiple_of(snapshots.spacing) {
             return;
         }
-        let bytes = engine.bytes();
+        drop(snapshots);
+        let packed = engine.packed(&self.past(step));
+        let bytes = packed.bytes();
+        let mut snapshots = self.snapshots.lock();
         snapshots.bytes += bytes;
-        snapshots.kept.insert(step, (Arc::new(engine.clone()), bytes));
+        snapshots.kept.insert(step, (Arc::new(packed), bytes));
         snapshots.keep_within_budget(self.begin);
+    }
+
+    /// The inputs of the steps before one, in which its snapshot finds measurements.
+    fn past(&self, step: usize) -> Vec<Arc<OwnedStepInput>> {
+        self.inputs.range(step.saturating_sub(PAST)..step)
     }
 
     /// Sets the memory budget of the snapshots in bytes.
@@ -97,13 +107,19 @@ impl History {
         snapshots.keep_within_budget(self.begin);
     }
 
+    /// Evicts one more snapshot; returns whether there was one, and more than so many bytes of them.
+    pub(super) fn evict_above(&self, least_bytes: usize) -> bool {
+        let mut snapshots = self.snapshots.lock();
+        snapshots.bytes > least_bytes && snapshots.evict_one(self.begin)
+    }
+
     /// Steps between two snapshots.
     pub(in crate::session) fn spacing(&self) -> usize {
         self.snapshots.lock().spacing
     }
 
     /// Number and memory of the snapshots of this run's own steps.
-    pub(super) fn snapshots(&self) -> SnapshotUse {
+    pub(in crate::session) fn snapshots(&self) -> SnapshotUse {
         let snapshots = self.snapshots.lock();
         SnapshotUse { count: snapshots.kept.len(), bytes: snapshots.bytes, spacing: snapshots.spacing }
     }
@@ -119,47 +135,45 @@ impl History {
         if step < self.begin {
             return self.parent.as_ref()?.engine_before(step);
         }
-        let (at, snapshot) = self.snapshot_before(step)?;
-        let mut engine = RunEngine::clone(&snapshot);
+        let (at, mut engine) = self.snapshot_before(step)?;
         for number in at..step {
             engine.step_without_rank(&*self.inputs.get(number)?);
         }
         Some(engine)
     }
 
-    fn snapshot_before(&self, step: usize) -> Option<(usize, Arc<RunEngine>)> {
+    /// The last snapshot that helps to compute a step, and the step before which it was taken.
+    fn snapshot_before(&self, step: usize) -> Option<(usize, RunEngine)> {
         let snapshots = self.snapshots.lock();
-        let (at, (engine, _)) = snapshots.kept.range(..=step).next_back()?;
-        Some((*at, Arc::clone(engine)))
+        let (at, packed) =
+            snapshots.kept.range(..=step).next_back().map(|(at, (packed, _))| (*at, Arc::clone(packed)))?;
+        drop(snapshots);
+        Some((at, packed.unpacked(&self.past(at))))
     }
 
     /// Recomputes the steps up to `last` from the snapshot before it. Returns the last `max_count` of them with their
     /// indices; empty for a step that has not been computed.
     pub(in crate::session) fn recompute(&self, last: usize, max_count: usize) -> Vec<(usize, StepRecord)> {
-        self.recompute_while(last, max_count, &|| true).unwrap_or_default()
+        self.recompute_while(last, max_count, &|| true)
     }
 
-    /// As [`History::recompute`], but returns `None` as soon as `wanted` returns false.
+    /// As [`History::recompute`], but ends as soon as `wanted` returns false, with the steps so far.
     pub(in crate::session) fn recompute_while(
         &self,
         last: usize,
         max_count: usize,
         wanted: &dyn Fn() -> bool,
-    ) -> Option<Vec<(usize, StepRecord)>> {
+    ) -> Vec<(usize, StepRecord)> {
         if last < self.begin {
-            return self
-                .parent
-                .as_ref()
-                .map_or_else(|| Some(Vec::new()), |it| it.recompute_while(last, max_count, wanted));
+            return self.parent.as_ref().map_or_else(Vec::new, |it| it.recompute_while(last, max_count, wanted));
         }
-        let Some((at, snapshot)) = self.snapshot_before(last) else { return Some(Vec::new()) };
+        let Some((at, mut engine)) = self.snapshot_before(last) else { return Vec::new() };
         let first = (last + 1).saturating_sub(max_count.max(1)).max(at);
-        let mut engine = RunEngine::clone(&snapshot);
         let mut steps = Vec::new();
         for number in at..=last {
             let Some(input) = self.inputs.get(number) else { break };
             if !wanted() {
-                return None;
+                break;
             }
             if number < first {
                 engine.step_without_rank(&input);
@@ -167,7 +181,7 @@ impl History {
                 steps.push((number, engine.step(&input)));
             }
         }
-        Some(steps)
+        steps
     }
 
     /// The linearized rows of a step's factors other than reprojection, recomputed; `None` for a step that has not been
@@ -201,14 +215,23 @@ impl History {
 }
 
 impl Snapshots {
-    /// Evicts every other snapshot until the rest fits into the budget. The first one stays: every recomputation could
-    /// need it.
+    /// Evicts every other snapshot, the oldest first, until the rest fits into the budget. The first one of all stays:
+    /// every recomputation could need it.
     fn keep_within_budget(&mut self, begin: usize) {
-        while self.bytes > self.budget_bytes && self.kept.len() > 1 {
-            self.spacing *= 2;
-            let spacing = self.spacing;
-            self.kept.retain(|step, _| *step == begin || step.is_multiple_of(spacing));
-            self.bytes = self.kept.values().map(|(_, bytes)| bytes).sum();
+        while self.bytes > self.budget_bytes && self.evict_one(begin) {}
+    }
+
+    /// Evicts the next snapshot; returns whether there was one beside the first.
+    fn evict_one(&mut self, begin: usize) -> bool {
+        while self.kept.len() > 1 {
+            let doubled = 2 * self.spacing;
+            let evicted = self.kept.keys().copied().find(|step| *step != begin && !step.is_multiple_of(doubled));
+            if let Some((_, bytes)) = evicted.and_then(|step| self.kept.remove(&step)) {
+                self.bytes -= bytes;
+                return true;
+            }
+            self.spacing = doubled;
         }
+        false
     }
 }

@@ -4,6 +4,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
 
 use parking_lot::{Condvar, Mutex};
 
@@ -12,8 +13,11 @@ use crate::estimator::FactorRows;
 use crate::session::plan::SessionError;
 use crate::session::record::{SolverPosition, StepRecord};
 
-/// Steps up to the requested one that are recomputed with it, because users often step back.
+/// Steps before the cursor, or behind it while it plays, that are recomputed ahead of need.
 pub(in crate::session) const STEPS_AT_ONCE: usize = 32;
+
+/// The window first draws what was delivered, on a processor that a prefetch would take.
+const PREFETCHED_AFTER: Duration = Duration::from_millis(80);
 
 /// The requested data of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +39,8 @@ pub(in crate::session) struct RecomputeRequest {
     pub(in crate::session) history: Arc<History>,
     /// Index of the step.
     pub(in crate::session) step: usize,
+    /// Number of steps up to this one whose complete records are requested.
+    pub(in crate::session) count: usize,
     /// The requested data.
     pub(in crate::session) detail: Detail,
     /// Whether it is a prefetch, which is cancelled by a request at the cursor.
@@ -71,10 +77,10 @@ struct Queue {
 
 impl Queue {
     /// Whether the request in progress is still requested and, if it is a prefetch, no request at the cursor waits.
-    fn is_wanted(&self, request: &RecomputeRequest) -> bool {
-        let at_cursor = self.working.as_ref().is_some_and(|working| working == request && !working.prefetch);
+    fn is_wanted(&self) -> bool {
+        let at_cursor = self.working.as_ref().is_some_and(|working| !working.prefetch);
         let others = self.waiting.iter().any(|waiting| !waiting.prefetch);
-        !self.closed && (at_cursor || self.working_wanted && !others)
+        !self.closed && self.working_wanted && (at_cursor || !others)
     }
 
     fn has_work_at_cursor(&self) -> bool {
@@ -106,6 +112,9 @@ impl RecomputeThread {
             loop {
                 let mut queue = seen.queue.lock();
                 seen.changed.wait_while(&mut queue, |queue| queue.waiting.is_empty() && !queue.closed);
+                if !queue.has_work_at_cursor() && !queue.closed {
+                    seen.changed.wait_for(&mut queue, PREFETCHED_AFTER);
+                }
                 if queue.closed {
                     return;
                 }
@@ -115,22 +124,15 @@ impl RecomputeThread {
                 drop(queue);
                 let recomputed = match request.detail {
                     Detail::Step => {
-                        let still_wanted = || !request.prefetch || seen.queue.lock().is_wanted(&request);
-                        request
-                            .history
-                            .recompute_while(request.step, STEPS_AT_ONCE, &still_wanted)
-                            .map(Recomputed::Steps)
+                        let wanted = || seen.queue.lock().is_wanted();
+                        Recomputed::Steps(request.history.recompute_while(request.step, request.count, &wanted))
                     }
-                    Detail::SolverStates(_) => {
-                        Some(Recomputed::SolverStates(request.history.solver_states(request.step)))
-                    }
-                    Detail::FactorRows => Some(Recomputed::FactorRows(request.history.factor_rows(request.step))),
+                    Detail::SolverStates(_) => Recomputed::SolverStates(request.history.solver_states(request.step)),
+                    Detail::FactorRows => Recomputed::FactorRows(request.history.factor_rows(request.step)),
                 };
-                if let Some(recomputed) = recomputed {
-                    // The shown solver state may have changed meanwhile.
-                    let request = seen.queue.lock().working.clone().unwrap_or(request);
-                    deliver(&request, recomputed);
-                }
+                // The shown solver state may have changed meanwhile.
+                let request = seen.queue.lock().working.clone().unwrap_or(request);
+                deliver(&request, recomputed);
                 seen.queue.lock().working = None;
                 seen.changed.notify_all();
             }
@@ -166,6 +168,13 @@ impl RecomputeThread {
         self.shared.changed.wait_while(&mut queue, |queue| !queue.closed && queue.has_work_at_cursor());
     }
 
+    /// As [`Self::settle`], but for no longer than this.
+    pub(in crate::session) fn settle_within(&self, time: Duration) {
+        let mut queue = self.shared.queue.lock();
+        let waits = |queue: &mut Queue| !queue.closed && queue.has_work_at_cursor();
+        self.shared.changed.wait_while_for(&mut queue, waits, time);
+    }
+
     /// Whether a request at the cursor is waiting or in progress.
     pub(in crate::session) fn is_busy(&self) -> bool {
         self.shared.queue.lock().has_work_at_cursor()
@@ -193,14 +202,15 @@ mod tests {
             run: 1,
             history: Arc::clone(&history),
             step,
+            count: 1,
             detail: Detail::Step,
             prefetch,
         };
         let mut queue = Queue { working: Some(request(7, true)), working_wanted: true, ..Queue::default() };
-        assert!(!queue.has_work_at_cursor() && queue.is_wanted(&request(7, true)));
+        assert!(!queue.has_work_at_cursor() && queue.is_wanted());
         // A request at the cursor cancels the prefetch.
         queue.waiting.push_back(request(90, false));
-        assert!(queue.has_work_at_cursor() && !queue.is_wanted(&request(7, true)));
+        assert!(queue.has_work_at_cursor() && !queue.is_wanted());
         // The cursor has reached the prefetched step.
         let thread = RecomputeThread {
             shared: Arc::new(Shared { queue: Mutex::new(queue), ..Shared::default() }),
@@ -208,7 +218,7 @@ mod tests {
         };
         thread.request(vec![request(7, false), request(3, true)]);
         let queue = thread.shared.queue.lock();
-        assert!(queue.is_wanted(&request(7, true)) && queue.has_work_at_cursor());
+        assert!(queue.is_wanted() && queue.has_work_at_cursor());
         assert_eq!(queue.waiting.iter().map(|request| request.step).collect::<Vec<_>>(), [3]);
     }
 }

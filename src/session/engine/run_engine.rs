@@ -4,7 +4,7 @@ use std::sync::Arc;
 use super::altered_measurements::AlteredMeasurements;
 use super::step_inputs::OwnedStepInput;
 use super::stopwatch::Stopwatch;
-use crate::estimator::{Estimator, EstimatorConfig, StepInput, StepReport};
+use crate::estimator::{Estimator, EstimatorConfig, PackedEstimator, StepInput, StepMeasurements, StepReport};
 use crate::frontend::TrackedFrame;
 use crate::gimbal::{Chain, ParameterGroup, ParameterId};
 use crate::observability::{RankReport, analyse};
@@ -23,6 +23,39 @@ pub(in crate::session) struct RunEngine {
     keep_linearization_every: Option<usize>,
     /// Changes of a fork to the measurements.
     altered_measurements: AlteredMeasurements,
+}
+
+/// A snapshot of a [`RunEngine`] with a packed estimator.
+#[derive(Clone, Debug)]
+pub(super) struct PackedEngine {
+    estimator: PackedEstimator,
+    has_joints: bool,
+    joints_free: bool,
+    keep_linearization_every: Option<usize>,
+    altered_measurements: AlteredMeasurements,
+}
+
+impl PackedEngine {
+    /// The engine as it was; `past` are the steps that it was packed with.
+    pub(super) fn unpacked(&self, past: &[Arc<OwnedStepInput>]) -> RunEngine {
+        RunEngine {
+            estimator: self.estimator.unpacked(&measurements(past)),
+            has_joints: self.has_joints,
+            joints_free: self.joints_free,
+            keep_linearization_every: self.keep_linearization_every,
+            altered_measurements: self.altered_measurements.clone(),
+        }
+    }
+
+    /// Memory in bytes.
+    pub(super) fn bytes(&self) -> usize {
+        size_of::<Self>() - size_of::<PackedEstimator>() + self.estimator.bytes()
+    }
+}
+
+/// The steps as the estimator reads them.
+fn measurements(past: &[Arc<OwnedStepInput>]) -> Vec<&dyn StepMeasurements> {
+    past.iter().map(|step| &**step as &dyn StepMeasurements).collect()
 }
 
 impl RunEngine {
@@ -98,9 +131,15 @@ impl RunEngine {
         self.estimator.set_iterations(iterations);
     }
 
-    /// Memory of a snapshot in bytes.
-    pub(in crate::session) fn bytes(&self) -> usize {
-        size_of::<Self>() - size_of::<Estimator>() + self.estimator.bytes()
+    /// A snapshot; `past` are steps before the next one, the newest last.
+    pub(super) fn packed(&self, past: &[Arc<OwnedStepInput>]) -> PackedEngine {
+        PackedEngine {
+            estimator: self.estimator.packed(&measurements(past)),
+            has_joints: self.has_joints,
+            joints_free: self.joints_free,
+            keep_linearization_every: self.keep_linearization_every,
+            altered_measurements: self.altered_measurements.clone(),
+        }
     }
 
     fn estimate(&mut self, input: &OwnedStepInput) -> StepReport {

@@ -1,12 +1,13 @@
 //! The inputs of a run's steps, kept for recomputation.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use parking_lot::{Condvar, Mutex};
 
-use crate::estimator::allocated_bytes;
+use crate::estimator::{StepMeasurements, allocated_bytes};
 use crate::flight_log::SensorFrame;
-use crate::frontend::TrackedFrame;
+use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::RigidTransform;
 use crate::sensors::{ImuSample, JointAngles};
 use crate::session::record::tracks_bytes;
@@ -79,6 +80,20 @@ impl OwnedStepInput {
     }
 }
 
+impl StepMeasurements for OwnedStepInput {
+    fn stamp_ns(&self) -> i64 {
+        self.stamp_ns
+    }
+
+    fn imu(&self) -> &[ImuSample] {
+        &self.imu
+    }
+
+    fn features(&self, camera: usize) -> &[TrackedFeature] {
+        self.tracks.get(camera).map_or(&[], |tracks| &tracks.features)
+    }
+}
+
 /// The inputs of a run's steps so far, shared with its forks.
 #[derive(Debug, Default)]
 pub(in crate::session) struct StepInputs {
@@ -108,6 +123,13 @@ impl StepInputs {
     /// The input of a step, `None` if it has not been computed.
     pub(in crate::session) fn get(&self, step: usize) -> Option<Arc<OwnedStepInput>> {
         self.state.lock().steps.get(step).cloned()
+    }
+
+    /// The inputs of these steps; fewer where they have not been computed.
+    pub(super) fn range(&self, steps: Range<usize>) -> Vec<Arc<OwnedStepInput>> {
+        let state = self.state.lock();
+        let end = steps.end.min(state.steps.len());
+        state.steps[steps.start.min(end)..end].to_vec()
     }
 
     /// The input of a step. Waits until it is there; `None` behind the last one.

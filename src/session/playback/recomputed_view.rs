@@ -1,10 +1,14 @@
 //! Recomputation of steps for the view at the cursor.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::session::{FactorRowsView, Session};
 use crate::session::engine::{Detail, RecomputeRequest, STEPS_AT_ONCE};
 use crate::session::record::RunRecord;
+
+/// Longest time that a window waits for a recomputed step.
+const WINDOW_WAITS: Duration = Duration::from_millis(25);
 
 impl Session {
     /// Waits until the record has everything that the view at the cursor needs.
@@ -13,6 +17,12 @@ impl Session {
         self.recompute.settle();
         // A solver state that was requested meanwhile is shown from here on.
         self.request_recomputation();
+    }
+
+    /// Waits a few milliseconds for what the view at the cursor needs: most steps are recomputed within them, so that a
+    /// window draws one picture and not one before and one after.
+    pub fn settle_shortly(&self) {
+        self.recompute.settle_within(WINDOW_WAITS);
     }
 
     /// Whether steps at the cursor are being recomputed.
@@ -34,33 +44,45 @@ impl Session {
             let (Some(step), Some(history)) = (run.index_at(cursor.stamp_ns), computation.history(number)) else {
                 continue;
             };
-            let request = |step, detail, prefetch| RecomputeRequest {
+            let request = |first: usize, step: usize, detail, prefetch| RecomputeRequest {
                 run: run.id,
                 history: Arc::clone(history),
                 step,
+                count: step + 1 - first,
                 detail,
                 prefetch,
             };
-            if run.has_only_summary(step) {
-                // Playback also needs the next steps; recomputing all of them takes no longer than the last one.
-                let end = step + if cursor.playing { STEPS_AT_ONCE } else { 1 };
-                let last = (step..end).take_while(|step| run.has_only_summary(*step)).last().unwrap_or(step);
-                requests.push(request(last, Detail::Step, false));
+            let missing = |step: &usize| run.has_only_summary(*step);
+            // The steps up to the next snapshot are computed from the same one.
+            let spacing = history.spacing();
+            let last_with = |first: usize| {
+                let others = (first + 1..first + STEPS_AT_ONCE).take_while(|step| !step.is_multiple_of(spacing));
+                others.take_while(missing).last().unwrap_or(first)
+            };
+            let last = if cursor.playing { last_with(step) } else { step };
+            if missing(&step) {
+                requests.push(request(step, last, Detail::Step, false));
             }
             if let Some(shown) = cursor.solver
                 && run.trace.as_ref().is_none_or(|trace| trace.step != step)
             {
-                requests.push(request(step, Detail::SolverStates(shown), false));
+                requests.push(request(step, step, Detail::SolverStates(shown), false));
             }
             let rows = self.factor_rows.filter(|view| view.run == run.id && view.step == step);
             if rows.is_some() && run.factor_rows.as_ref().is_none_or(|rows| rows.step != step) {
-                requests.push(request(step, Detail::FactorRows, false));
+                requests.push(request(step, step, Detail::FactorRows, false));
             }
-            // Users step back: the steps before the cursor are prefetched.
-            let before = (step.saturating_sub(STEPS_AT_ONCE)..step).rev().find(|step| run.has_only_summary(*step));
-            if let Some(before) = before.filter(|_| !cursor.playing) {
-                prefetched.push(request(before, Detail::Step, true));
-            }
+            // Playback goes on, and users step back: the steps that are shown next are prefetched, the nearest first.
+            let next: Vec<usize> = if cursor.playing {
+                (last + 1..last + STEPS_AT_ONCE).filter(missing).collect()
+            } else {
+                (step.saturating_sub(STEPS_AT_ONCE)..step).rev().filter(missing).collect()
+            };
+            let of_one_snapshot = next.chunk_by(|one, other| one / spacing == other / spacing);
+            prefetched.extend(of_one_snapshot.map(|steps| {
+                let (one, other) = (steps[0], steps[steps.len() - 1]);
+                request(one.min(other), one.max(other), Detail::Step, true)
+            }));
         }
         requests.extend(prefetched);
         self.recompute.request(requests);

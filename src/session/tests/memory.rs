@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::estimator::{ColumnGroup, Phase};
-use crate::session::engine::{OwnedStepInput, RunEngine, estimator_config};
-use crate::session::record::RunRecord;
+use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
+use crate::session::record::{RunRecord, StepRecord};
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
 
 /// The step input of a synthetic frame.
@@ -80,4 +80,36 @@ fn a_summary_with_a_linearization_keeps_the_frames_of_its_columns() {
         plain.iter().position(|summary| summary.report.events.iter().any(|event| event.kind.initializes_window()));
     let whole: Vec<usize> = (0..plain.len()).filter(|place| plain[*place].report.window.len() > 1).collect();
     assert_eq!(whole, Vec::from_iter(initialized));
+}
+
+/// A budget for a few snapshots is used up, and every step is recomputed to the same bits from those that are left.
+#[test]
+fn snapshots_fill_their_budget_and_give_back_every_step() {
+    const BUDGET_BYTES: usize = 800_000;
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 5.0, features: 60, ..SyntheticOptions::default() });
+    let config = estimator_config(&flight.given_rig, &"auto".parse().unwrap()).unwrap();
+    let sigma_rad = config.encoder_sigma_rad.unwrap();
+    let mut engine = RunEngine::new(config, None);
+    let history = History::new(BUDGET_BYTES);
+    let mut steps = Vec::new();
+    for (number, frame) in flight.frames.iter().enumerate() {
+        let input = Arc::new(input_of(frame, sigma_rad));
+        history.inputs().push(Arc::clone(&input));
+        history.before_step(number, &engine, &input);
+        steps.push(engine.step(&input));
+        assert!(history.snapshots().bytes <= BUDGET_BYTES || history.snapshots().count == 1);
+    }
+    let used = history.snapshots();
+    assert!(used.count >= 6 && used.bytes > BUDGET_BYTES / 2, "{used:?}");
+    assert!(used.spacing > 5 && used.spacing * used.count < 2 * steps.len(), "{used:?}");
+    let text = |record: &StepRecord| {
+        let mut report = record.report.clone();
+        report.times = Default::default();
+        format!("{report:?} {:?}", record.rank)
+    };
+    for (number, step) in steps.iter().enumerate() {
+        let recomputed = history.recompute(number, 1);
+        assert_eq!(recomputed.iter().map(|(number, _)| *number).collect::<Vec<_>>(), [number]);
+        assert!(text(&recomputed[0].1) == text(step), "step {number}");
+    }
 }
