@@ -36,7 +36,7 @@ pub use plan::{
 };
 pub use playback::{
     Command, Cursor, FrameImage, MoveOutcome, Moved, PlaybackSpeed, SavedBreakpoint, SavedFork, SavedLog, SavedSession,
-    SavedSessionError, Session,
+    SavedSessionError, Session, Wake,
 };
 pub use record::{
     ChainDistance, Comparison, Divergence, ForkOrigin, LostSince, PassProgress, PoseConsistency, PoseError,

@@ -5,6 +5,7 @@ mod leaving;
 #[cfg(test)]
 mod leaving_tests;
 mod playing_log;
+mod repaint;
 mod requests;
 pub mod run_window;
 mod sample;
@@ -22,6 +23,7 @@ mod welcome;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::time::Duration;
 
 use egui::{Ui, ViewportCommand};
 
@@ -29,6 +31,7 @@ use self::kept_window::{KeptWindow, WindowKeeper};
 use self::leaving::{Departure, Leaving, Work};
 use self::playing_log::{Images, go_to_first_frame};
 pub use self::playing_log::{OpenLog, PlayingLog};
+use self::repaint::until_next_step;
 use self::study::ShownStudy;
 pub use self::study::{OpenStudy, StudySource};
 use self::welcome::Welcome;
@@ -42,8 +45,8 @@ use crate::session::{Command, PlaybackSpeed, Recording};
 /// After a longer pause between two frames the cursor does not catch up: the window was hidden or the machine
 /// suspended.
 const MAX_FRAME_TIME_S: f64 = 2.0;
-/// Period in milliseconds at which the window checks for new steps.
-const POLL_PERIOD_MS: u64 = 60;
+/// Period at which the window checks for new steps.
+const POLL_PERIOD: Duration = Duration::from_millis(60);
 /// Period in seconds at which the process's memory is read.
 const MEMORY_PERIOD_S: f64 = 1.0;
 
@@ -74,6 +77,10 @@ pub struct App {
     study: Option<ShownStudy>,
     /// Whether the cursor has been moved to the first frame of the log.
     at_first_frame: bool,
+    /// Whether the session asks for a frame when it has recomputed steps.
+    wakes: bool,
+    /// Clock of the window in its last frame, in seconds, if playback ran then.
+    played_s: Option<f64>,
     opening: Option<Opening>,
     departure: Departure,
     keeper: WindowKeeper,
@@ -114,6 +121,8 @@ impl App {
             open_study: None,
             study: None,
             at_first_frame: false,
+            wakes: false,
+            played_s: None,
             opening: None,
             tour_of: None,
             departure: Departure::default(),
@@ -172,6 +181,7 @@ impl App {
         self.welcome.stop();
         self.log = Some(log);
         self.at_first_frame = false;
+        (self.wakes, self.played_s) = (false, None);
         self.selection = Selection::default();
         self.progress = ProgressMeter::default();
         self.reported_warnings = 0;
@@ -200,7 +210,7 @@ impl App {
         self.update_title(ui);
         self.keep_window(ui);
         if self.opening.is_some() {
-            ui.ctx().request_repaint_after(std::time::Duration::from_millis(POLL_PERIOD_MS));
+            ui.ctx().request_repaint_after(POLL_PERIOD);
         }
     }
 
@@ -250,14 +260,21 @@ impl App {
 
     fn session_ui(&mut self, ui: &mut Ui) {
         let Some(log) = &mut self.log else { return };
+        if !self.wakes {
+            let context = ui.ctx().clone();
+            log.wake_with(Box::new(move || context.request_repaint()));
+            self.wakes = true;
+        }
         // Log time follows the wall clock: slow drawing skips frames, not time.
-        let (elapsed_s, now_s) = ui.input(|input| (f64::from(input.stable_dt), input.time));
+        let (stable_s, now_s) = ui.input(|input| (f64::from(input.stable_dt), input.time));
+        let elapsed_s = self.played_s.map_or(stable_s, |before_s| now_s - before_s);
         if elapsed_s < MAX_FRAME_TIME_S {
             log.advance(elapsed_s);
         } else if log.playback().playing {
             let text = format!("Rendering stalled for {elapsed_s:.1} s; playback resumed");
             self.state.notices.show_message(NoticeLevel::Warning, text);
         }
+        log.settle_shortly();
         for notice in log.take_notices() {
             self.state.notices.show_message(NoticeLevel::Warning, notice);
         }
@@ -285,11 +302,19 @@ impl App {
         for command in commands {
             log.apply(command);
         }
+        let playback = log.playback();
+        self.played_s = playback.playing.then_some(now_s);
         let computing = recording.runs.iter().any(|run| !run.finished && run.error.is_none());
-        if commanded || playback.playing || log.generation() != generation {
+        if commanded {
             ui.ctx().request_repaint();
-        } else if computing || playback.recomputing || playback.running_to_breakpoint {
-            ui.ctx().request_repaint_after(std::time::Duration::from_millis(POLL_PERIOD_MS));
+        } else if playback.playing {
+            // egui subtracts the time that it expects a frame to take.
+            let frame = Duration::from_secs_f32(ui.input(|input| input.predicted_dt.clamp(0.0, 1.0)));
+            let wait = until_next_step(&recording, log.cursor_ns(), playback.speed);
+            ui.ctx().request_repaint_after(wait + frame);
+        } else if computing || playback.recomputing || playback.running_to_breakpoint || log.generation() != generation
+        {
+            ui.ctx().request_repaint_after(POLL_PERIOD);
         }
         self.report_warnings(&recording);
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::gui::{ImageSource, Playback};
-use crate::session::{Command, FrameImage, Recording};
+use crate::session::{Command, FrameImage, Recording, Wake};
 
 /// A log during playback: the interface of a session that the window needs.
 pub trait PlayingLog: Send {
@@ -12,6 +12,8 @@ pub trait PlayingLog: Send {
     fn recording(&self) -> Arc<Recording>;
     /// A counter that grows with every change of the results.
     fn generation(&self) -> u64;
+    /// Sets what asks for a frame when steps at the cursor have been recomputed.
+    fn wake_with(&mut self, wake: Wake);
     /// Position of the cursor, in nanoseconds since the log began.
     fn cursor_ns(&self) -> i64;
     /// The state of playback.
@@ -20,6 +22,8 @@ pub trait PlayingLog: Send {
     fn apply(&mut self, command: Command);
     /// Moves the cursor by `elapsed_s` seconds of the wall clock.
     fn advance(&mut self, elapsed_s: f64);
+    /// Waits a few milliseconds for steps at the cursor that are being recomputed.
+    fn settle_shortly(&mut self);
     /// An image of the log by camera and index in its stream.
     fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage;
     /// Messages about commands that failed, since the last call.

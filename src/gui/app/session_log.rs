@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::flight_log::ImageReader;
 use crate::gui::app::PlayingLog;
 use crate::gui::{ImageSource, Playback};
-use crate::session::{Command, FrameImage, Recording, Session};
+use crate::session::{Command, FrameImage, Recording, Session, Wake};
 
 impl PlayingLog for Session {
     fn recording(&self) -> Arc<Recording> {
@@ -14,6 +14,10 @@ impl PlayingLog for Session {
 
     fn generation(&self) -> u64 {
         Self::generation(self)
+    }
+
+    fn wake_with(&mut self, wake: Wake) {
+        Self::wake_with(self, wake);
     }
 
     fn cursor_ns(&self) -> i64 {
@@ -39,6 +43,10 @@ impl PlayingLog for Session {
 
     fn advance(&mut self, elapsed_s: f64) {
         Self::advance(self, elapsed_s);
+    }
+
+    fn settle_shortly(&mut self) {
+        Self::settle_shortly(self);
     }
 
     fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage {

@@ -13,7 +13,7 @@ use crate::gui::desktop::{Desktop, PanelExport, PathEntry, SampleProgress};
 use crate::gui::samples::{FRAME_PERIOD_NS, sample_images, sample_recording_of};
 use crate::gui::theme::ThemeName;
 use crate::gui::{ImageSource as _, Playback};
-use crate::session::{Command, FrameImage, Recording};
+use crate::session::{Command, FrameImage, Recording, Wake};
 
 /// A log that has been computed already.
 pub(super) struct SampleLog {
@@ -41,6 +41,8 @@ impl PlayingLog for SampleLog {
         1
     }
 
+    fn wake_with(&mut self, _: Wake) {}
+
     fn cursor_ns(&self) -> i64 {
         self.cursor_ns
     }
@@ -66,6 +68,8 @@ impl PlayingLog for SampleLog {
             self.cursor_ns += (elapsed_s * 1e9) as i64;
         }
     }
+
+    fn settle_shortly(&mut self) {}
 
     fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage {
         sample_images().image(camera_key, frame_index)

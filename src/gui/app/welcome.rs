@@ -65,7 +65,7 @@ impl Welcome {
     pub(super) fn ui(&mut self, ui: &mut Ui, theme: &Theme, opening: Option<&Path>) -> Option<Choice> {
         let mut chosen = self.flight.receive().map(|path| chosen_sample(path, self.tour));
         if self.flight.is_running() {
-            ui.ctx().request_repaint_after(std::time::Duration::from_millis(super::POLL_PERIOD_MS));
+            ui.ctx().request_repaint_after(super::POLL_PERIOD);
         }
         ui.with_layout(Layout::top_down(Align::Center), |ui| {
             ui.add_space((0.04 * ui.available_height()).clamp(4.0, 60.0));

@@ -16,3 +16,4 @@ pub use command::{Command, PlaybackSpeed};
 pub use cursor::{Cursor, MoveOutcome, Moved};
 pub use saved::{SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError};
 pub use session::Session;
+pub use shared::Wake;

@@ -7,7 +7,7 @@ use super::background_images::{BackgroundImages, FrameImage};
 use super::command::{Command, PlaybackSpeed};
 use super::cursor::{Cursor, MoveOutcome};
 use super::saved::PendingRestore;
-use super::shared::SharedComputation;
+use super::shared::{SharedComputation, Wake};
 use crate::flight_log::ImageReader;
 use crate::geometry::ns_from_seconds;
 use crate::session::breakpoints::{Breakpoints, Condition};
@@ -90,6 +90,11 @@ impl Session {
     /// A counter that grows with every computed step and every change of the record.
     pub fn generation(&self) -> u64 {
         self.shared.generation()
+    }
+
+    /// Calls `wake` from now on when steps at the cursor have been recomputed, on the thread that computes them.
+    pub fn wake_with(&self, wake: Wake) {
+        self.shared.wake_with(wake);
     }
 
     /// Memory of record and histories in bytes.

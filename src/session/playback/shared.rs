@@ -1,5 +1,6 @@
 //! The computation of a session, shared between the collector thread and its readers.
 
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Receiver;
@@ -11,11 +12,15 @@ use crate::session::engine::{Computation, EngineMessage, RecomputeRequest, Recom
 use crate::session::plan::SessionError;
 use crate::session::record::Recording;
 
-#[derive(Debug)]
 struct State {
     computation: Mutex<Computation>,
     generation: AtomicU64,
+    /// Called when a step at the cursor has been recomputed.
+    wake: Mutex<Option<Wake>>,
 }
+
+/// A function that asks a window for a frame, from any thread.
+pub type Wake = Box<dyn Fn() + Send>;
 
 impl State {
     fn change(&self, change: impl FnOnce(&mut Computation)) {
@@ -25,15 +30,21 @@ impl State {
 }
 
 /// A computation behind a mutex that is locked only for a change or a copy.
-#[derive(Debug)]
 pub(super) struct SharedComputation {
     state: Arc<State>,
     collector: Option<JoinHandle<()>>,
 }
 
+impl fmt::Debug for SharedComputation {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("SharedComputation").field("generation", &self.generation()).finish_non_exhaustive()
+    }
+}
+
 impl SharedComputation {
     pub(super) fn new(computation: Computation) -> Self {
-        let state = State { computation: Mutex::new(computation), generation: AtomicU64::new(1) };
+        let state =
+            State { computation: Mutex::new(computation), generation: AtomicU64::new(1), wake: Mutex::default() };
         Self { state: Arc::new(state), collector: None }
     }
 
@@ -53,7 +64,17 @@ impl SharedComputation {
     /// A function for the recompute thread that stores its results.
     pub(super) fn receiver_of_recomputed(&self) -> impl FnMut(&RecomputeRequest, Recomputed) + Send + 'static {
         let state = Arc::clone(&self.state);
-        move |request, recomputed| state.change(|computation| computation.add_recomputed(request, recomputed))
+        move |request, recomputed| {
+            state.change(|computation| computation.add_recomputed(request, recomputed));
+            if let Some(wake) = state.wake.lock().as_ref().filter(|_| !request.prefetch) {
+                wake();
+            }
+        }
+    }
+
+    /// Sets what is called when a step at the cursor has been recomputed.
+    pub(super) fn wake_with(&self, wake: Wake) {
+        *self.state.wake.lock() = Some(wake);
     }
 
     pub(super) fn recording(&self) -> Arc<Recording> {
