@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::estimator::{ColumnGroup, Phase};
+use crate::estimator::{ColumnGroup, Phase, StageTimes};
 use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
 use crate::session::record::{RunRecord, StepRecord};
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
@@ -104,7 +104,7 @@ fn snapshots_fill_their_budget_and_give_back_every_step() {
     assert!(used.spacing > 5 && used.spacing * used.count < 2 * steps.len(), "{used:?}");
     let text = |record: &StepRecord| {
         let mut report = record.report.clone();
-        report.times = Default::default();
+        report.times = StageTimes::default();
         format!("{report:?} {:?}", record.rank)
     };
     for (number, step) in steps.iter().enumerate() {
