@@ -212,15 +212,15 @@ fn noise_compression_vignetting_and_exposure_drift_change_images() {
     };
     // Without an effect: the images as they are without disturbances.
     let plain = images("exposure-drift=0");
-    let difference = |images: &[crate::sensors::GrayImage]| {
-        let pixels = |images: &[crate::sensors::GrayImage]| -> Vec<f64> {
+    let difference = |images: &[Arc<crate::sensors::GrayImage>]| {
+        let pixels = |images: &[Arc<crate::sensors::GrayImage>]| -> Vec<f64> {
             images.iter().flat_map(|image| image.pixels.iter().map(|pixel| f64::from(*pixel))).collect()
         };
         let (one, other) = (pixels(images), pixels(&plain));
         let squares = one.iter().zip(&other).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
         (squares / one.len() as f64).sqrt()
     };
-    let corner_over_middle = |images: &[crate::sensors::GrayImage]| {
+    let corner_over_middle = |images: &[Arc<crate::sensors::GrayImage>]| {
         let near = |image: &crate::sensors::GrayImage, column: usize, row: usize| -> f64 {
             let rows = (row..row + 8).flat_map(|y| (column..column + 8).map(move |x| y * image.width + x));
             rows.map(|index| f64::from(image.pixels[index])).sum()
@@ -236,7 +236,9 @@ fn noise_compression_vignetting_and_exposure_drift_change_images() {
     assert!((1.0..20.0).contains(&difference(&images("jpeg=10"))));
     assert!((5.0..80.0).contains(&difference(&images("exposure-drift=0.8"))));
     let darker = corner_over_middle(&images("vignetting=0.6")) / corner_over_middle(&plain);
-    assert!((darker - 0.4 / 0.88).abs() < 0.1, "{darker}");
+    // The middle of a patch in the corner is at 0.82 of the squared distance of the corner.
+    let expected = (1.0 - 0.82 * 0.6) / (1.0 - 0.82 * 0.12);
+    assert!((darker - expected).abs() < 0.02, "{darker} instead of {expected}");
     let mut options = small(Experiment::T1);
     options.disturbances.set("jpeg=0").unwrap();
     let refused = simulate(&options, &folder.path().join("refused.mcap"), &mut |_| {});
