@@ -15,7 +15,8 @@ fn run(cache: &Path, arguments: &[&str]) -> Output {
 }
 
 fn entries(cache: &Path) -> Vec<std::path::PathBuf> {
-    let found = fs::read_dir(cache).map(|entries| entries.map(|entry| entry.unwrap().path()).collect::<Vec<_>>());
+    let found = fs::read_dir(cache)
+        .map(|entries| entries.map(|entry| entry.expect("the folder can be read").path()).collect::<Vec<_>>());
     found.unwrap_or_default()
 }
 

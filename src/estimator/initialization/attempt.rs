@@ -105,7 +105,7 @@ fn from_motion(
         .map(|bias| VectorPrior { mean: bias.mean.gyroscope_rad_per_s, sigma: bias.gyroscope_sigma_rad_per_s.max() });
     let known = [at_rest, found].into_iter().flatten().min_by(|one, other| one.sigma.total_cmp(&other.sigma));
     let gyroscope_prior =
-        known.unwrap_or(VectorPrior { mean: Vector3::zeros(), sigma: options.gyroscope_bias_sigma_rad_per_s });
+        known.unwrap_or_else(|| VectorPrior { mean: Vector3::zeros(), sigma: options.gyroscope_bias_sigma_rad_per_s });
     let rotations = guessed_rotations(input.frames, &gyroscope_prior.mean);
     let selected = select_views(input.frames, &rotations, options);
     let count = selected.len() as f64;

@@ -99,12 +99,11 @@ impl Calibration {
             values: of_columns(&self.values),
             first_estimate: self.first_estimate.as_ref().map(of_columns),
             sensors: Arc::clone(&wanted.sensors),
-            given: match wanted.given.earlier() {
-                None => Arc::clone(&self.given),
-                Some(_) => {
-                    let offsets = !self.chain().hides_joint_offsets();
-                    Arc::new(wanted.given.in_parameterization(self.chain().parameterization(), offsets))
-                }
+            given: if wanted.given.earlier().is_some() {
+                let offsets = !self.chain().hides_joint_offsets();
+                Arc::new(wanted.given.in_parameterization(self.chain().parameterization(), offsets))
+            } else {
+                Arc::clone(&self.given)
             },
             ..self.clone()
         }

@@ -52,7 +52,9 @@ impl EarlierPasses<'_> {
             if step.is_multiple_of(STEPS_BETWEEN_READINGS) {
                 found = newer(found, &engine, begin_ns, newest_ns);
                 let progress = PassProgress { number, reached_ns: newest_ns };
-                self.results.send(EngineMessage::Pass { run: self.run, progress }).map_err(|_| PassFailure::Closed)?;
+                self.results
+                    .send(EngineMessage::Pass { run: self.run, progress })
+                    .map_err(|_closed| PassFailure::Closed)?;
             }
         }
         let found = newer(found, &engine, begin_ns, newest_ns).map(Arc::new);
@@ -72,7 +74,7 @@ fn newer(before: Option<EarlierPass>, engine: &RunEngine, begin_ns: Option<i64>,
 
 /// A step whose panic ends the run with a message instead of the program.
 pub(super) fn guarded<T>(stamp_ns: i64, step: impl FnOnce() -> T) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(step)).map_err(|_| {
+    catch_unwind(AssertUnwindSafe(step)).map_err(|_panic| {
         let time_s = seconds_from_ns(stamp_ns);
         format!("internal error in the estimator at {time_s:.3} s; please report it with the log")
     })

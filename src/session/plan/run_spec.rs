@@ -231,8 +231,8 @@ impl FromStr for RunSpec {
                 }
                 "passes" => {
                     run.passes =
-                        value.parse().ok().filter(|passes| RunSpec::PASSES.contains(passes)).ok_or_else(|| {
-                            let (low, high) = (RunSpec::PASSES.start(), RunSpec::PASSES.end());
+                        value.parse().ok().filter(|passes| Self::PASSES.contains(passes)).ok_or_else(|| {
+                            let (low, high) = (Self::PASSES.start(), Self::PASSES.end());
                             bad(format!("passes is '{value}', expected a number from {low} to {high}"))
                         })?;
                 }

@@ -27,7 +27,9 @@ fn recorded_in_passes(flight: &SyntheticFlight, text: &str) -> (RunRecord, Vec<E
     }
     let mut engine = RunEngine::new(config, None);
     let mut run = RunRecord::new(spec, "cam0".to_owned());
-    inputs.iter().for_each(|input| run.push(engine.step(input)));
+    for input in &inputs {
+        run.push(engine.step(input));
+    }
     drop(results);
     (run, progress.into_iter().collect())
 }
@@ -60,7 +62,6 @@ fn a_second_pass_starts_upright_and_follows_the_truth_more_closely() {
     }
     let count = SEEDS.count() as f64;
     let ratio = ((errors[1] - errors[0]) / count).exp();
-    println!("tilt {tilts:?} rad summed, ATE ratio {ratio:.3}, NEES {:.2}", nees / count);
     assert!(tilts[1] < 0.5 * tilts[0], "{tilts:?}");
     assert!(ratio < 0.9, "{ratio}");
     assert!((2.0..10.0).contains(&(nees / count)), "NEES {}", nees / count);
