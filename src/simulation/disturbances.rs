@@ -33,10 +33,10 @@ pub struct Disturbances {
     pub image_noise: Option<f64>,
     /// Quality of the JPEG images, 1 to 100, instead of that of the options.
     pub jpeg_quality: Option<f64>,
-    /// Ratio by which the farthest corner is darker than the middle, instead of [`VIGNETTING`].
+    /// Ratio by which the farthest corner is darker than the middle, instead of 0.12.
     pub vignetting: Option<f64>,
     /// Amplitude of the slow drift of the exposure as a ratio of its mean, as of an automatic exposure, instead of
-    /// [`EXPOSURE_DRIFT`].
+    /// 0.05.
     pub exposure_drift: Option<f64>,
     /// Largest rate that the gyroscope can measure, in rad/s.
     pub gyroscope_range_rad_per_s: Option<f64>,
