@@ -10,6 +10,7 @@ mod error;
 mod estimability;
 mod evaluation;
 mod existing;
+mod file_hash;
 mod flight_noise;
 mod masks;
 mod noise_files;

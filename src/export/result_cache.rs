@@ -4,7 +4,7 @@
 //! files and the options. It holds the files that the command wrote, and is checked by its own SHA-256 when it is read.
 
 use std::fs::{self, File};
-use std::io::{self, Read as _};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -12,10 +12,10 @@ use directories::ProjectDirs;
 use sha2::{Digest as _, Sha256};
 use tempfile::NamedTempFile;
 
+use super::file_hash;
 use crate::flight_log::output;
+use crate::study::hex;
 
-/// Bytes that are hashed at a time.
-const BLOCK_BYTES: usize = 1 << 20;
 /// Most bytes of all entries; those unused for longest go first.
 const MAX_BYTES: u64 = 256 << 20;
 /// Ending of an entry's file.
@@ -78,17 +78,7 @@ impl ResultKeyBuilder {
     /// When it cannot be read.
     pub fn add_file(&mut self, path: &Path) -> io::Result<()> {
         self.inputs.push((path.to_owned(), state_of(path)));
-        let mut file = File::open(path)?;
-        let mut block = vec![0; BLOCK_BYTES];
-        let mut bytes = 0;
-        loop {
-            let count = file.read(&mut block)?;
-            if count == 0 {
-                break;
-            }
-            self.hash.update(&block[..count]);
-            bytes += count as u64;
-        }
+        let bytes = file_hash::add_file(&mut self.hash, path)?;
         // Behind the content, so that the ends of files cannot be mistaken for each other's beginnings.
         self.hash.update(bytes.to_le_bytes());
         Ok(())
@@ -96,8 +86,7 @@ impl ResultKeyBuilder {
 
     /// The name of what depends on all this.
     pub fn finish(self) -> ResultKey {
-        let name: Vec<String> = self.hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-        ResultKey { name: name.concat(), inputs: self.inputs }
+        ResultKey { name: hex(&self.hash.finalize()), inputs: self.inputs }
     }
 }
 

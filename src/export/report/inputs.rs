@@ -1,14 +1,11 @@
-use std::fs::File;
-use std::io::Read as _;
 use std::path::Path;
 
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
 use crate::export::error::ExportError;
-
-/// Bytes that are hashed at a time.
-const BLOCK_BYTES: usize = 1 << 20;
+use crate::export::file_hash;
+use crate::study::hex;
 
 /// A file that went into a report, recognizable again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -28,21 +25,10 @@ impl InputFile {
     /// When it cannot be read.
     pub(super) fn read(path: &Path) -> Result<Self, ExportError> {
         let failed = |source| ExportError::Read { source, path: path.to_owned() };
-        let mut file = File::open(path).map_err(failed)?;
         let mut hash = Sha256::new();
-        let mut block = vec![0; BLOCK_BYTES];
-        let mut bytes = 0;
-        loop {
-            let count = file.read(&mut block).map_err(failed)?;
-            if count == 0 {
-                break;
-            }
-            hash.update(&block[..count]);
-            bytes += count as u64;
-        }
-        let sha256: Vec<String> = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+        let bytes = file_hash::add_file(&mut hash, path).map_err(failed)?;
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { name, bytes, sha256: sha256.concat() })
+        Ok(Self { name, bytes, sha256: hex(&hash.finalize()) })
     }
 }
 

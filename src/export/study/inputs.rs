@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{self, Read as _};
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
@@ -10,14 +10,13 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::error::StudyFileError;
+use crate::export::file_hash;
 use crate::flight_log::{FlightLog, output};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 use crate::session::{TrajectorySource, TrajectorySpec};
 use crate::study::{LOG_PLACE, LogSource, RecordedLog, StudyPlan, StudyTrajectory, hex};
 
-/// Bytes that are hashed at once.
-const BLOCK_BYTES: usize = 1 << 20;
 /// Largest plan that is read.
 const LARGEST_PLAN_BYTES: u64 = 16 << 20;
 
@@ -39,17 +38,9 @@ pub fn read_plan(path: &Path) -> Result<StudyPlan, StudyFileError> {
 
 /// SHA-256 of a file's content.
 pub(super) fn file_sha256(path: &Path) -> Result<String, StudyFileError> {
-    let hash = || -> io::Result<String> {
-        let (mut file, mut hash) = (File::open(path)?, Sha256::new());
-        let mut block = vec![0; BLOCK_BYTES];
-        loop {
-            match file.read(&mut block)? {
-                0 => return Ok(hex(&hash.finalize())),
-                count => hash.update(&block[..count]),
-            }
-        }
-    };
-    hash().map_err(StudyFileError::read(path))
+    let mut hash = Sha256::new();
+    file_hash::add_file(&mut hash, path).map_err(StudyFileError::read(path))?;
+    Ok(hex(&hash.finalize()))
 }
 
 /// Version of the program and SHA-256 of its file, which decide about results.
