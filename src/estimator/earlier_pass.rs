@@ -78,11 +78,11 @@ impl Estimator {
     pub fn findings(&self, duration_s: f64) -> Option<EarlierPass> {
         let PhaseState::Tracking(window) = &self.phase else { return None };
         let covariances = solver::covariances(&self.setup, &window.state)?;
-        let (calibrations, rig) = (&window.state.calibration, self.setup.rig_calibration());
+        let calibrations = &window.state.calibration;
         let cameras = (0..calibrations.cameras()).map(|camera| {
             let columns = calibrations.columns(camera);
             let covariance = covariances.calibration.view_range(columns.clone(), columns).into_owned();
-            calibrations.of(camera).found(&covariance, SIGMA_FACTOR.powi(-2), rig.of(camera))
+            calibrations.of(camera).found(&covariance, SIGMA_FACTOR.powi(-2))
         });
         let mean = window.state.frames.newest().state.navigation.bias;
         let sigma = covariances.newest_bias.diagonal().map(|variance| SIGMA_FACTOR * variance.max(0.0).sqrt());

@@ -59,7 +59,7 @@ impl Setup {
     }
 
     /// Given calibration of the rig.
-    pub(crate) fn rig_calibration(&self) -> Calibrations {
+    fn rig_calibration(&self) -> Calibrations {
         let config = &self.config;
         let given = |camera: usize| {
             let (translation_m, rotation_rad) = config.extrinsics_sigmas(camera);

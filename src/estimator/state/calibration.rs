@@ -142,13 +142,11 @@ impl Calibration {
     }
 
     /// What the next pass over the same measurements starts from: the present values, and of the information behind
-    /// `covariance` the rig's prior whole and this share of the rest; `rig` is the calibration before any pass. `None` where
-    /// the covariance is not positive definite.
-    pub(crate) fn found(&self, covariance: &DMatrix<f64>, share: f64, rig: &Self) -> Option<FoundCamera> {
+    /// `covariance` the rig's prior whole and this share of the rest. `None` where the covariance is not positive definite.
+    pub(crate) fn found(&self, covariance: &DMatrix<f64>, share: f64) -> Option<FoundCamera> {
         let chain = self.chain().dof();
         let carried = if self.free {
-            let offsets = !self.chain().hides_joint_offsets();
-            let rig = rig.given.in_parameterization(self.chain().parameterization(), offsets);
+            let rig = self.given.rig();
             let mut of_rig = rig.square_root_information.tr_mul(&rig.square_root_information);
             of_rig.resize_mut(self.dof(), self.dof(), 0.0);
             for (place, column) in self.sensors.iter().enumerate() {

@@ -128,9 +128,14 @@ impl GivenChain {
         }
     }
 
+    /// The rig's chain in this parameterization.
+    pub(super) fn rig(&self) -> &Self {
+        self.earlier().map_or(self, |earlier| &earlier.rig)
+    }
+
     /// Standard deviations of the chain's columns by the rig.
     pub(super) fn rig_sigmas(&self) -> &DVector<f64> {
-        self.earlier().map_or(&self.prior_sigmas, |earlier| &earlier.rig.prior_sigmas)
+        &self.rig().prior_sigmas
     }
 
     /// Converts a mechanism to the given chain's parameterization.
