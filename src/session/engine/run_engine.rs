@@ -17,6 +17,12 @@ const RIGID_COLUMNS: usize = 6;
 #[derive(Clone, Debug)]
 pub(in crate::session) struct RunEngine {
     estimator: Estimator,
+    settings: EngineSettings,
+}
+
+/// What an engine knows beside its estimator.
+#[derive(Clone, Debug)]
+struct EngineSettings {
     has_joints: bool,
     joints_free: bool,
     /// One report in this many frames keeps its linearization.
@@ -29,22 +35,13 @@ pub(in crate::session) struct RunEngine {
 #[derive(Clone, Debug)]
 pub(super) struct PackedEngine {
     estimator: PackedEstimator,
-    has_joints: bool,
-    joints_free: bool,
-    keep_linearization_every: Option<usize>,
-    altered_measurements: AlteredMeasurements,
+    settings: EngineSettings,
 }
 
 impl PackedEngine {
     /// The engine as it was; `past` are the steps that it was packed with.
     pub(super) fn unpacked(&self, past: &[Arc<OwnedStepInput>]) -> RunEngine {
-        RunEngine {
-            estimator: self.estimator.unpacked(&measurements(past)),
-            has_joints: self.has_joints,
-            joints_free: self.joints_free,
-            keep_linearization_every: self.keep_linearization_every,
-            altered_measurements: self.altered_measurements.clone(),
-        }
+        RunEngine { estimator: self.estimator.unpacked(&measurements(past)), settings: self.settings.clone() }
     }
 
     /// Memory in bytes.
@@ -64,13 +61,13 @@ impl RunEngine {
         let has_joints = !config.chain.links.is_empty();
         let joints_free = has_joints && !config.use_encoder;
         let estimator = Estimator::new(config);
-        Self {
-            estimator,
+        let settings = EngineSettings {
             has_joints,
             joints_free,
             keep_linearization_every,
             altered_measurements: AlteredMeasurements::default(),
-        }
+        };
+        Self { estimator, settings }
     }
 
     /// The estimator, for changes between two steps.
@@ -96,7 +93,7 @@ impl RunEngine {
 
     /// Adds changes of a fork to the measurements.
     pub(super) fn alter(&mut self, changes: AlteredMeasurements) {
-        self.altered_measurements.add(changes);
+        self.settings.altered_measurements.add(changes);
     }
 
     /// Runs one step of the estimator and the observability analysis.
@@ -133,13 +130,7 @@ impl RunEngine {
 
     /// A snapshot; `past` are steps before the next one, the newest last.
     pub(super) fn packed(&self, past: &[Arc<OwnedStepInput>]) -> PackedEngine {
-        PackedEngine {
-            estimator: self.estimator.packed(&measurements(past)),
-            has_joints: self.has_joints,
-            joints_free: self.joints_free,
-            keep_linearization_every: self.keep_linearization_every,
-            altered_measurements: self.altered_measurements.clone(),
-        }
+        PackedEngine { estimator: self.estimator.packed(&measurements(past)), settings: self.settings.clone() }
     }
 
     fn estimate(&mut self, input: &OwnedStepInput) -> StepReport {
@@ -147,15 +138,15 @@ impl RunEngine {
             .tracks
             .iter()
             .enumerate()
-            .map(|(camera, tracks)| match self.altered_measurements.tracks(camera, tracks) {
+            .map(|(camera, tracks)| match self.settings.altered_measurements.tracks(camera, tracks) {
                 Some(altered) => Cow::Owned(altered),
                 None => Cow::Borrowed(&**tracks),
             })
             .collect();
         let rigid: Vec<&TrackedFrame> = altered.iter().skip(1).map(Cow::as_ref).collect();
-        let read = self.has_joints && !self.altered_measurements.encoder_off();
+        let read = self.settings.has_joints && !self.settings.altered_measurements.encoder_off();
         let angles = input.joint_angles.as_ref().filter(|_| read);
-        let noisy = angles.and_then(|angles| self.altered_measurements.joint_angles(angles, input.stamp_ns));
+        let noisy = angles.and_then(|angles| self.settings.altered_measurements.joint_angles(angles, input.stamp_ns));
         self.estimator.step(&StepInput {
             frame_index: input.frame_index,
             stamp_ns: input.stamp_ns,
@@ -179,9 +170,10 @@ impl RunEngine {
         let chain = if chain.dof() + rigid == chain_columns { chain } else { chain.without_joint_offsets() };
         // In a fork without encoders, frames of the window may still have encoder readings that the parent used.
         let unread = || report.window.iter().all(|frame| frame.encoder_angles_rad.is_none());
-        let joints_free = self.joints_free || self.has_joints && self.altered_measurements.encoder_off() && unread();
+        let joints_free = self.settings.joints_free
+            || self.settings.has_joints && self.settings.altered_measurements.encoder_off() && unread();
         let rank = analyse(&linearization, &chain, &angles, joints_free);
-        let kept = self.keep_linearization_every.is_some_and(|every| report.frame_index.is_multiple_of(every));
+        let kept = self.settings.keep_linearization_every.is_some_and(|every| report.frame_index.is_multiple_of(every));
         report.linearization = kept.then_some(linearization);
         rank
     }
