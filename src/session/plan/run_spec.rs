@@ -3,7 +3,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::tuning::EstimatorTuning;
+use super::tuning::{EstimatorTuning, read_count};
 use crate::estimator::SensorColumns;
 use crate::sensors::Rig;
 
@@ -222,20 +222,8 @@ impl FromStr for RunSpec {
                     run.first_estimates =
                         on_or_off(value).map_err(|problem| bad(format!("first-estimates: {problem}")))?;
                 }
-                "window" => {
-                    run.window =
-                        value.parse().ok().filter(|window| WINDOW_RANGE.contains(window)).ok_or_else(|| {
-                            let (low, high) = (WINDOW_RANGE.start(), WINDOW_RANGE.end());
-                            bad(format!("window is '{value}', expected a number from {low} to {high}"))
-                        })?;
-                }
-                "passes" => {
-                    run.passes =
-                        value.parse().ok().filter(|passes| Self::PASSES.contains(passes)).ok_or_else(|| {
-                            let (low, high) = (Self::PASSES.start(), Self::PASSES.end());
-                            bad(format!("passes is '{value}', expected a number from {low} to {high}"))
-                        })?;
-                }
+                "window" => run.window = read_count(key, value, &WINDOW_RANGE).map_err(bad)?,
+                "passes" => run.passes = read_count(key, value, &Self::PASSES).map_err(bad)?,
                 tuned if EstimatorTuning::KEYS.contains(&tuned) => run.tuning.set(tuned, value).map_err(bad)?,
                 "camera" => run.camera_key = Some(value.to_owned()),
                 "name" if folder_name(value) == value && !value.is_empty() => run.label = value.to_owned(),

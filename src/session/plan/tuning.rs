@@ -1,14 +1,16 @@
 //! Options of the estimator that a run specification changes, to study their effect.
 
+use std::ops::RangeInclusive;
+
 use crate::estimator::EstimatorConfig;
 use crate::optimization::RobustLoss;
 
 /// Range of a factor on a standard deviation.
-const FACTORS: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
+const FACTORS: RangeInclusive<f64> = 1e-3..=1e3;
 /// Range of the scale of a robust loss, in standard deviations.
-const LOSS_SCALES: std::ops::RangeInclusive<f64> = 0.05..=100.0;
+const LOSS_SCALES: RangeInclusive<f64> = 0.05..=100.0;
 /// Range of the iterations of a solve.
-const ITERATIONS: std::ops::RangeInclusive<usize> = 1..=100;
+const ITERATIONS: RangeInclusive<usize> = 1..=100;
 
 /// Deviations from the estimator's standard options. Keys of a specification, as of a fork, where both have them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,11 +51,7 @@ impl EstimatorTuning {
             "imu-noise" => self.imu_noise = factor()?,
             "encoder-noise" => self.encoder_noise = factor()?,
             "loss" => self.loss = Some(read_loss(value)?),
-            _ => {
-                let iterations = value.parse().ok().filter(|count| ITERATIONS.contains(count));
-                let expected = || format!("{key} is '{value}', expected a number from 1 to 100");
-                self.iterations = Some(iterations.ok_or_else(expected)?);
-            }
+            _ => self.iterations = Some(read_count(key, value, &ITERATIONS)?),
         }
         Ok(())
     }
@@ -77,6 +75,14 @@ impl EstimatorTuning {
         options.iterations = self.iterations.unwrap_or(options.iterations);
         config.encoder_sigma_rad = config.encoder_sigma_rad.map(|sigma_rad| sigma_rad * self.encoder_noise);
     }
+}
+
+/// Reads the value of a key as a number within a range; the error says what was expected.
+pub(super) fn read_count(key: &str, value: &str, range: &RangeInclusive<usize>) -> Result<usize, String> {
+    value.parse().ok().filter(|count| range.contains(count)).ok_or_else(|| {
+        let (low, high) = (range.start(), range.end());
+        format!("{key} is '{value}', expected a number from {low} to {high}")
+    })
 }
 
 fn read_loss(value: &str) -> Result<RobustLoss, String> {
