@@ -36,7 +36,8 @@ pub struct EstimatorOptions {
     pub track_continuation: TrackContinuation,
     /// Largest number of iterations of a solve.
     pub iterations: usize,
-    /// Converged when a step lowers the cost by less than this fraction.
+    /// Converged when a step lowers the cost by less than this fraction and moves calibration and newest joint angles by less
+    /// than a hundredth of a standard deviation.
     pub relative_cost_tolerance: f64,
     /// Smallest number of observations of a feature in the solve.
     pub min_observations: usize,
@@ -98,7 +99,7 @@ impl Default for EstimatorOptions {
             landmark_model: LandmarkModel::BearingAndInverseDistance,
             track_continuation: TrackContinuation::UseOnce,
             iterations: 6,
-            relative_cost_tolerance: 1e-3,
+            relative_cost_tolerance: 1e-2,
             min_observations: 3,
             min_triangulation_angle_rad: 0.01,
             distance_range_m: (0.1, 300.0),

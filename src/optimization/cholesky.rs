@@ -131,6 +131,14 @@ impl Cholesky {
         inverse.tr_mul(&inverse)
     }
 
+    /// Length of a step of the last `count` unknowns in standard deviations, the others marginalized: `‖L₂₂ᵀ x₂‖` with `x`
+    /// as in the matrix.
+    pub(crate) fn trailing_length(&self, count: usize, step: &DVector<f64>) -> f64 {
+        let first = self.count() - count;
+        let last: Vec<f64> = self.order[first..].iter().map(|index| step[*index]).collect();
+        (0..count).map(|place| dot(self.column(first + place), &last[place..]).powi(2)).sum::<f64>().sqrt()
+    }
+
     /// Covariance of the last `count` unknowns: `(L₂₂ L₂₂ᵀ)⁻¹`, the others marginalized.
     pub(crate) fn trailing_covariance(&self, count: usize) -> DMatrix<f64> {
         self.covariance_of(self.order[self.count() - count..].iter().copied())

@@ -14,6 +14,12 @@ pub(crate) trait DampedProblem {
     /// Linearizes at an estimate; the equations are reused for every damping.
     fn linearize(&self, estimate: &Self::Estimate) -> Self::Equations;
 
+    /// Whether the last step is short enough to be the last one: the cost hardly tells of unknowns that the measurements
+    /// determine weakly.
+    fn is_settled(&self) -> bool {
+        true
+    }
+
     /// The estimate after the step damped by `λ`, `None` when the damped equations are singular.
     fn step(&mut self, estimate: &Self::Estimate, equations: &Self::Equations, damping: f64) -> Option<Self::Estimate>;
 }
@@ -23,7 +29,8 @@ pub(crate) trait DampedProblem {
 pub(crate) struct DampedOptions {
     /// Largest number of tried steps, accepted or not.
     pub(crate) iterations: usize,
-    /// Converged when a step lowers the cost by no more than this ratio of it.
+    /// Converged when a step lowers the cost by no more than this ratio of it and the problem
+    /// [is settled](DampedProblem::is_settled).
     pub(crate) relative_cost_tolerance: f64,
     /// λ of the first step.
     pub(crate) first_damping: f64,
@@ -43,7 +50,7 @@ const ROUNDING: f64 = 1e-9;
 /// Reason for which the solver stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum StopReason {
-    /// The last step lowered the cost by less than the tolerance.
+    /// The last step lowered the cost by less than the tolerance, and the problem is settled.
     Converged,
     /// The last step changed the cost by no more than rounding.
     Rounding,
@@ -94,7 +101,8 @@ pub(crate) fn minimize<P: DampedProblem>(
             if accepted {
                 (solution.estimate, cost, linearized) = (candidate, cost_after, None);
                 damping = (damping * SHRINKAGE).max(options.min_damping);
-                if cost_before - cost_after <= options.relative_cost_tolerance * cost_before {
+                let gain = cost_before - cost_after;
+                if gain <= options.relative_cost_tolerance * cost_before && problem.is_settled() {
                     solution.stop = StopReason::Converged;
                     break;
                 }

@@ -3,7 +3,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3, Vector6};
 use super::damped::{DampedOptions, DampedProblem, StopReason, minimize};
 use super::reprojection::{self, Projection, TangentPlane};
 use super::{
-    BlockTerm, CameraPose, DensePoseEquations, Landmark, LandmarkRows, LossSum, RelativePose, Reprojection,
+    BlockTerm, CameraPose, Cholesky, DensePoseEquations, Landmark, LandmarkRows, LossSum, RelativePose, Reprojection,
     ReprojectionEquations, RobustLoss,
 };
 use crate::camera::{self, CameraModel, Distortion};
@@ -177,7 +177,13 @@ fn elimination_by_qr_equals_the_schur_complement() {
 }
 
 /// Rosenbrock's valley, `r = [1 − x, 10 (y − x²)]`.
-struct Valley;
+#[derive(Default)]
+struct Valley {
+    /// Length of the last step.
+    moved: f64,
+    /// Longest step that may be the last one.
+    longest_last: Option<f64>,
+}
 
 impl DampedProblem for Valley {
     type Estimate = Vector2<f64>;
@@ -195,8 +201,34 @@ impl DampedProblem for Valley {
 
     fn step(&mut self, at: &Vector2<f64>, (hessian, gradient): &Self::Equations, damping: f64) -> Option<Vector2<f64>> {
         let damped = hessian + Matrix2::from_diagonal(&(hessian.diagonal() * damping));
-        Some(at - damped.cholesky()?.solve(gradient))
+        let step = damped.cholesky()?.solve(gradient);
+        self.moved = step.norm();
+        Some(at - step)
     }
+
+    fn is_settled(&self) -> bool {
+        self.longest_last.is_none_or(|longest| self.moved <= longest)
+    }
+}
+
+#[test]
+fn the_damped_solver_goes_on_until_the_problem_is_settled() {
+    let options = DampedOptions {
+        iterations: 100,
+        relative_cost_tolerance: 0.9,
+        first_damping: 1e-3,
+        min_damping: 1e-9,
+        max_damping: 1e8,
+        growth: 10.0,
+    };
+    let start = Vector2::new(-1.2, 1.0);
+    let by_cost = minimize(&mut Valley::default(), start, &options);
+    let settled = minimize(&mut Valley { longest_last: Some(1e-6), ..Valley::default() }, start, &options);
+    assert_eq!((by_cost.stop, settled.stop), (StopReason::Converged, StopReason::Converged));
+    assert!(settled.tried > by_cost.tried, "{} and {} steps", settled.tried, by_cost.tried);
+    let target = Vector2::new(1.0, 1.0);
+    assert!((by_cost.estimate - target).norm() > 0.1, "{by_cost:?}");
+    assert!((settled.estimate - target).norm() < 1e-6, "{settled:?}");
 }
 
 #[test]
@@ -210,7 +242,7 @@ fn the_damped_solver_descends_and_reports_why_it_stopped() {
         growth: 10.0,
     };
     let start = Vector2::new(-1.2, 1.0);
-    let solution = minimize(&mut Valley, start, &options);
+    let solution = minimize(&mut Valley::default(), start, &options);
     assert!((solution.estimate - Vector2::new(1.0, 1.0)).norm() < 1e-6, "{solution:?}");
     assert!(matches!(solution.stop, StopReason::Converged | StopReason::Rounding), "{:?}", solution.stop);
     assert!(solution.iterations.iter().any(|iteration| !iteration.accepted));
@@ -220,8 +252,24 @@ fn the_damped_solver_descends_and_reports_why_it_stopped() {
         assert_eq!(after.cost_before, kept);
         assert_eq!(before.accepted, after.damping < before.damping || after.damping == options.min_damping);
     }
-    let stopped = minimize(&mut Valley, start, &DampedOptions { iterations: 2, ..options });
+    let stopped = minimize(&mut Valley::default(), start, &DampedOptions { iterations: 2, ..options });
     assert_eq!((stopped.stop, stopped.tried), (StopReason::IterationLimit, 2));
     let limit = DampedOptions { max_damping: 1e-2, growth: 100.0, ..options };
-    assert_eq!(minimize(&mut Valley, Vector2::new(-1.2, 1.4), &limit).stop, StopReason::DampingLimit);
+    assert_eq!(minimize(&mut Valley::default(), Vector2::new(-1.2, 1.4), &limit).stop, StopReason::DampingLimit);
+}
+
+#[test]
+fn the_length_of_a_step_is_in_marginal_standard_deviations() {
+    let jacobian = DMatrix::from_fn(9, 5, |row, column| ((3 * row + 5 * column) % 7) as f64 - 2.5 + 0.1 * row as f64);
+    let hessian = jacobian.tr_mul(&jacobian);
+    let step = DVector::from_vec(vec![0.3, -0.2, 0.5, 0.1, -0.4]);
+    let order = vec![4, 1, 0, 3, 2];
+    let factor = Cholesky::ordered(&hessian, order.clone(), |diagonal| diagonal).unwrap();
+    for count in [1, 2, 5] {
+        let last = DVector::from_iterator(count, order[5 - count..].iter().map(|index| step[*index]));
+        let covariance = factor.trailing_covariance(count);
+        let expected = last.dot(&(covariance.try_inverse().unwrap() * &last)).sqrt();
+        let length = factor.trailing_length(count, &step);
+        assert!((length - expected).abs() < 1e-9 * expected, "{count} unknowns: {length}, {expected}");
+    }
 }

@@ -14,7 +14,8 @@ use crate::optimization::damped::{DampedOptions, DampedProblem, Iteration, minim
 pub(crate) struct SolverLimits {
     /// Largest number of tried steps, accepted or not.
     pub(crate) iterations: usize,
-    /// Converged when a step lowers the cost by less than this fraction.
+    /// Converged when a step lowers the cost by less than this fraction and moves what aims the camera by less than
+    /// [`SETTLED_SIGMAS`].
     pub(crate) relative_cost_tolerance: f64,
 }
 
@@ -42,6 +43,9 @@ impl Solution {
 
 /// Added to the diagonal so that unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
+/// A step is short when calibration and newest joint angles move by less than this many standard deviations (root mean
+/// square over the columns): the marginalization keeps what is left of an unfinished solve.
+const SETTLED_SIGMAS: f64 = 0.01;
 /// Length of a velocity, before the biases in its block.
 const VELOCITY: usize = 3;
 
@@ -49,7 +53,7 @@ const VELOCITY: usize = 3;
 pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits) -> Solution {
     let first = problem.layout.calibration().start;
     let fixed = start.calibration.frozen_columns().into_iter().map(|column| first + column).collect();
-    let mut window = DampedWindow { problem, fixed, step_norms: Vec::new(), solved: None };
+    let mut window = DampedWindow { problem, fixed, step_norms: Vec::new(), solved: None, moved_sigmas: 0.0 };
     let start = window.evaluated(start);
     let costs_before = start.costs;
     let options = DampedOptions {
@@ -85,6 +89,8 @@ struct DampedWindow<'a> {
     fixed: Vec<usize>,
     /// Norm of each solved step.
     step_norms: Vec<f64>,
+    /// Root mean square step of calibration and newest joint angles in the last solved step, in standard deviations.
+    moved_sigmas: f64,
     solved: Option<SolvedStep>,
 }
 
@@ -121,6 +127,13 @@ impl DampedWindow<'_> {
         covariance
     }
 
+    /// Root mean square of a step of the calibration and of the newest frame's joints, in standard deviations.
+    fn moved_sigmas(&self, factor: &Cholesky, step: &DVector<f64>) -> f64 {
+        // The joints of the newest frame and the calibration are eliminated last.
+        let count = self.problem.layout.joint_block() + self.problem.layout.calibration;
+        factor.trailing_length(count, step) / (count.max(1) as f64).sqrt()
+    }
+
     fn factor(&self, hessian: &DMatrix<f64>, damping: f64) -> Option<Cholesky> {
         let raised = |diagonal: f64| diagonal + (damping * diagonal + FLOOR);
         Cholesky::ordered(hessian, self.problem.layout.elimination_order(), raised)
@@ -146,6 +159,10 @@ impl DampedProblem for DampedWindow<'_> {
         self.problem.linearize(&evaluated.estimate)
     }
 
+    fn is_settled(&self) -> bool {
+        self.moved_sigmas <= SETTLED_SIGMAS
+    }
+
     fn step(&mut self, evaluated: &Evaluated, equations: &NormalEquations, damping: f64) -> Option<Evaluated> {
         let layout = &self.problem.layout;
         let reduced = equations.eliminate(damping);
@@ -155,6 +172,7 @@ impl DampedProblem for DampedWindow<'_> {
         let step = -factor.solve(&gradient);
         let landmarks = equations.landmark_steps(layout, &reduced, &step);
         self.step_norms.push(step.norm());
+        self.moved_sigmas = self.moved_sigmas(&factor, &step);
         self.solved = Some(SolvedStep { hessian, factor });
         Some(self.evaluated(self.problem.stepped(&evaluated.estimate, &step, &landmarks)))
     }
