@@ -21,16 +21,19 @@ const UNIT: f32 = 1.0 / (32.0 * 32.0 * (BLOCK * BLOCK) as f32);
 const RESPONSES: usize = TILE + 2;
 const GRADIENTS: usize = RESPONSES + 2 * BLOCK_RADIUS;
 const PIXELS: usize = GRADIENTS + 2;
+/// Columns in a vector register.
+const REGISTER: usize = 8;
 /// Columns rounded up to whole vector registers; the surplus ones are computed and not used.
-const RESPONSE_LANES: usize = 36;
-const GRADIENT_LANES: usize = 40;
+const RESPONSE_LANES: usize = 40;
+const GRADIENT_LANES: usize = 48;
 const PIXEL_LANES: usize = GRADIENT_LANES + 2;
 
 /// The smaller eigenvalues of a tile and one pixel around it, and their local maxima.
 #[derive(Clone, Debug)]
 pub(super) struct Responses {
     values: Box<[[f32; RESPONSE_LANES]; RESPONSES]>,
-    is_peak: Box<[[bool; TILE]; TILE]>,
+    /// The maxima, row by row.
+    peaks: Vec<Peak>,
 }
 
 /// A pixel whose response is larger than those around it.
@@ -43,7 +46,7 @@ pub(super) struct Peak {
 
 impl Default for Responses {
     fn default() -> Self {
-        Self { values: Box::new([[0.0; RESPONSE_LANES]; RESPONSES]), is_peak: Box::new([[false; TILE]; TILE]) }
+        Self { values: Box::new([[0.0; RESPONSE_LANES]; RESPONSES]), peaks: Vec::new() }
     }
 }
 
@@ -56,10 +59,7 @@ impl Responses {
 
     /// The peaks among the tile's first columns and rows, row by row.
     pub(super) fn peaks(&self, width: usize, height: usize) -> impl Iterator<Item = Peak> {
-        self.is_peak[..height].iter().enumerate().flat_map(move |(y, row)| {
-            let columns = row[..width].iter().enumerate().filter(|(_, is_peak)| **is_peak);
-            columns.map(move |(x, _)| Peak { pixel: [x, y], response: self.values[y + 1][x + 1] })
-        })
+        self.peaks.iter().copied().filter(move |peak| peak.pixel[0] < width && peak.pixel[1] < height)
     }
 
     /// From a peak's pixel to the top of the parabolas through it and its neighbours, in pixels.
@@ -89,21 +89,36 @@ impl NullaryFnOnce for Computation<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { image, first, min_response, responses: Responses { values, is_peak } } = self;
+        let Self { image, first, min_response, responses: Responses { values, peaks } } = self;
         let mut pixels = [[0.0; PIXEL_LANES]; PIXELS];
         cut_out(image, first, &mut pixels, f32::from);
         smaller_eigenvalues(&pixels, values);
+        peaks.clear();
+        let mut highest = [0.0_f32; TILE];
         for y in 0..TILE {
             let (above, row, below) = (&values[y], &values[y + 1], &values[y + 2]);
             for x in 0..TILE {
                 let here = row[x + 1];
                 // Of equal neighbours the first one counts.
-                let before = (here > above[x]) & (here > above[x + 1]) & (here > above[x + 2]) & (here > row[x]);
-                let after = (here >= row[x + 2]) & (here >= below[x]) & (here >= below[x + 1]) & (here >= below[x + 2]);
-                is_peak[y][x] = (here >= min_response) & before & after;
+                let before = larger(larger(above[x], above[x + 1]), larger(above[x + 2], row[x]));
+                let after = larger(larger(below[x], below[x + 1]), larger(below[x + 2], row[x + 2]));
+                highest[x] = if (here > before) & (here >= after) { here } else { f32::NEG_INFINITY };
+            }
+            for (part, responses) in highest.as_chunks::<REGISTER>().0.iter().enumerate() {
+                if responses.iter().copied().fold(f32::NEG_INFINITY, larger) < min_response {
+                    continue;
+                }
+                let found = responses.iter().enumerate().filter(|(_, response)| **response >= min_response);
+                peaks.extend(found.map(|(x, response)| Peak { pixel: [part * REGISTER + x, y], response: *response }));
             }
         }
     }
+}
+
+/// The larger value, as a vector unit compares them.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 #[inline(always)]
