@@ -31,7 +31,7 @@ fn fitted(seed: u64, factor: f64, seconds: f64) -> FlightNoise {
 #[test]
 fn densities_of_a_flight_are_found_from_wrong_ones() {
     let factor = 3.0;
-    let noise = fitted(2, factor, 10.0);
+    let noise = fitted(2, factor, 14.0);
     let [gyroscope, accelerometer, ..] = &noise.densities;
     assert!(noise.converged, "{noise:?}");
     assert!((noise.pixel_sigma_px / 0.25 - 1.0).abs() < 0.1, "{noise:?}");
