@@ -5,7 +5,8 @@
 use nalgebra::{Matrix6, Vector6};
 use pulp::{Arch, NullaryFnOnce};
 
-use super::reference::{CENTRE, LANES, REGISTER, Rows, SIDE, WINDOW};
+use super::lucas_kanade::REGISTER;
+use super::reference::{CENTRE, LANES, Rows, SIDE, WINDOW};
 
 /// Minimum variance of a window, in squared grey levels.
 const MIN_VARIANCE: f32 = 4.0;

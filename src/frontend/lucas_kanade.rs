@@ -16,7 +16,7 @@ const WINDOW: usize = 21;
 /// Its columns rounded up to whole vector registers; the surplus ones weigh nothing.
 const LANES: usize = 24;
 /// Columns in a vector register.
-const REGISTER: usize = 8;
+pub(super) const REGISTER: usize = 8;
 /// From the first column or row of the window to its centre.
 const CENTRE: f32 = (WINDOW / 2) as f32;
 /// Elements from one row to the next, of the weights and of the region of the second image: with one stride for both, a sum
@@ -102,6 +102,12 @@ impl Buffers {
             search: [[0; STRIDE]; SEARCH_HEIGHT],
         })
     }
+}
+
+/// The larger value, as a vector unit compares them.
+#[inline(always)]
+pub(super) fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// A symmetric 2 × 2 matrix `[xx, xy, yy]` has this smaller eigenvalue.
@@ -279,8 +285,7 @@ fn free_of_brightness(
             products[0][c] += along_x[c] * along_x[c];
             products[1][c] += along_x[c] * along_y[c];
             products[2][c] += along_y[c] * along_y[c];
-            let larger = if along_x[c].abs() > along_y[c].abs() { along_x[c].abs() } else { along_y[c].abs() };
-            largest[c] = if larger > largest[c] { larger } else { largest[c] };
+            largest[c] = larger(larger(along_x[c].abs(), along_y[c].abs()), largest[c]);
         }
         gradient[row] = [along_x, along_y];
     }

@@ -21,8 +21,6 @@ pub(super) const CENTRE: usize = WINDOW / 2;
 pub(super) const SIDE: usize = WINDOW + 2;
 /// Columns rounded up to whole vector registers; the surplus ones weigh nothing.
 pub(super) const LANES: usize = 24;
-/// Columns in a vector register.
-pub(super) const REGISTER: usize = 8;
 
 /// Options of the refinement against reference patches.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,7 +6,7 @@
 use nalgebra::Vector2;
 use pulp::{Arch, NullaryFnOnce};
 
-use super::lucas_kanade::smaller_eigenvalue;
+use super::lucas_kanade::{REGISTER, larger, smaller_eigenvalue};
 use super::pyramid::cut_out;
 use crate::sensors::GrayImage;
 
@@ -21,8 +21,6 @@ const UNIT: f32 = 1.0 / (32.0 * 32.0 * (BLOCK * BLOCK) as f32);
 const RESPONSES: usize = TILE + 2;
 const GRADIENTS: usize = RESPONSES + 2 * BLOCK_RADIUS;
 const PIXELS: usize = GRADIENTS + 2;
-/// Columns in a vector register.
-const REGISTER: usize = 8;
 /// Columns rounded up to whole vector registers; the surplus ones are computed and not used.
 const RESPONSE_LANES: usize = 40;
 const GRADIENT_LANES: usize = 48;
@@ -113,12 +111,6 @@ impl NullaryFnOnce for Computation<'_> {
             }
         }
     }
-}
-
-/// The larger value, as a vector unit compares them.
-#[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 #[inline(always)]

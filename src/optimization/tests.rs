@@ -211,17 +211,24 @@ impl DampedProblem for Valley {
     }
 }
 
+const VALLEY_OPTIONS: DampedOptions = DampedOptions {
+    iterations: 100,
+    relative_cost_tolerance: 1e-12,
+    first_damping: 1e-3,
+    min_damping: 1e-9,
+    max_damping: 1e8,
+    growth: 10.0,
+};
+
+/// A usual start in the valley, far from its minimum at `(1, 1)`.
+fn valley_start() -> Vector2<f64> {
+    Vector2::new(-1.2, 1.0)
+}
+
 #[test]
 fn the_damped_solver_goes_on_until_the_problem_is_settled() {
-    let options = DampedOptions {
-        iterations: 100,
-        relative_cost_tolerance: 0.9,
-        first_damping: 1e-3,
-        min_damping: 1e-9,
-        max_damping: 1e8,
-        growth: 10.0,
-    };
-    let start = Vector2::new(-1.2, 1.0);
+    let options = DampedOptions { relative_cost_tolerance: 0.9, ..VALLEY_OPTIONS };
+    let start = valley_start();
     let by_cost = minimize(&mut Valley::default(), start, &options);
     let settled = minimize(&mut Valley { longest_last: Some(1e-6), ..Valley::default() }, start, &options);
     assert_eq!((by_cost.stop, settled.stop), (StopReason::Converged, StopReason::Converged));
@@ -233,15 +240,7 @@ fn the_damped_solver_goes_on_until_the_problem_is_settled() {
 
 #[test]
 fn the_damped_solver_descends_and_reports_why_it_stopped() {
-    let options = DampedOptions {
-        iterations: 100,
-        relative_cost_tolerance: 1e-12,
-        first_damping: 1e-3,
-        min_damping: 1e-9,
-        max_damping: 1e8,
-        growth: 10.0,
-    };
-    let start = Vector2::new(-1.2, 1.0);
+    let (options, start) = (VALLEY_OPTIONS, valley_start());
     let solution = minimize(&mut Valley::default(), start, &options);
     assert!((solution.estimate - Vector2::new(1.0, 1.0)).norm() < 1e-6, "{solution:?}");
     assert!(matches!(solution.stop, StopReason::Converged | StopReason::Rounding), "{:?}", solution.stop);
