@@ -6,7 +6,7 @@ use nalgebra::{Matrix6, Vector6};
 use pulp::{Arch, NullaryFnOnce};
 
 use super::lucas_kanade::REGISTER;
-use super::reference::{CENTRE, LANES, Rows, SIDE, WINDOW};
+use super::reference::{CENTRE, LANES, MARGIN, Rows, SIDE, WINDOW};
 
 /// Minimum variance of a window, in squared grey levels.
 const MIN_VARIANCE: f32 = 4.0;
@@ -35,19 +35,20 @@ pub(super) struct Appearance {
 }
 
 impl Appearance {
-    /// From a window with one more pixel on every side, row by row; `None` when it has no texture.
+    /// From a window with [`MARGIN`] more pixels on every side, row by row; `None` when it has no texture.
     pub(super) fn new(pixels: &[[f32; SIDE]; SIDE]) -> Option<Self> {
         Arch::new().dispatch(Preparation { pixels })
     }
 
     #[inline(always)]
     fn prepare(pixels: &[[f32; SIDE]; SIDE]) -> Option<Self> {
-        let mut grey = [[0.0_f32; LANES + 2]; SIDE];
+        let mut grey = [[0.0_f32; LANES + 2 * MARGIN]; SIDE];
         for (row, source) in grey.iter_mut().zip(pixels) {
             row[..SIDE].copy_from_slice(source);
         }
         let area = (WINDOW * WINDOW) as f32;
-        let level = grey[1..=WINDOW].iter().flat_map(|row| &row[1..=WINDOW]).sum::<f32>() / area;
+        let within = MARGIN..MARGIN + WINDOW;
+        let level = grey[within.clone()].iter().flat_map(|row| &row[within.clone()]).sum::<f32>() / area;
         let mut mask = [0.0_f32; LANES];
         mask[..WINDOW].fill(1.0);
         let across: [f32; LANES] = std::array::from_fn(|c| c as f32 - CENTRE as f32);
@@ -57,15 +58,13 @@ impl Appearance {
         let mut squares = [0.0_f32; LANES];
         let mut sums = [[[0.0_f32; LANES]; 2]; 6];
         for row in 0..WINDOW {
-            let (above, here, below) = (&grey[row], &grey[row + 1], &grey[row + 2]);
+            let [above_two, above, here, below, below_two] = [0, 1, 2, 3, 4].map(|k: usize| &grey[row + k]);
             let down = row as f32 - CENTRE as f32;
             for c in 0..LANES {
-                // Scharr's derivative.
-                let x = 3.0 * (above[c + 2] - above[c] + below[c + 2] - below[c]) + 10.0 * (here[c + 2] - here[c]);
-                let y =
-                    3.0 * (below[c] - above[c] + below[c + 2] - above[c + 2]) + 10.0 * (below[c + 1] - above[c + 1]);
-                let (x, y) = (x * mask[c] * (1.0 / 32.0), y * mask[c] * (1.0 / 32.0));
-                let grey = (here[c + 1] - level) * mask[c];
+                let place = c + MARGIN;
+                let x = slope([here[place - 2], here[place - 1], here[place + 1], here[place + 2]]) * mask[c];
+                let y = slope([above_two[place], above[place], below[place], below_two[place]]) * mask[c];
+                let grey = (here[place] - level) * mask[c];
                 value[row][c] = grey;
                 along_x[row][c] = x;
                 along_y[row][c] = y;
@@ -203,6 +202,14 @@ struct Moments {
     common: f32,
     /// Of their products with the gradient and its first moments.
     slopes: [f32; 6],
+}
+
+/// Central difference of the fourth order, from the values two and one before and one and two after.
+///
+/// It follows the slope of fine texture; with a smoother one, as Scharr's, Gauss–Newton steps are 1.4 times too long.
+#[inline(always)]
+fn slope([two_before, before, after, two_after]: [f32; 4]) -> f32 {
+    (2.0 / 3.0) * (after - before) - (1.0 / 12.0) * (two_after - two_before)
 }
 
 #[inline(always)]

@@ -17,8 +17,10 @@ use crate::sensors::GrayImage;
 /// Side of the window in pixels.
 pub(super) const WINDOW: usize = 21;
 pub(super) const CENTRE: usize = WINDOW / 2;
-/// Side of the window with the pixels around it that its gradient needs.
-pub(super) const SIDE: usize = WINDOW + 2;
+/// Pixels around the window that its gradient needs.
+pub(super) const MARGIN: usize = 2;
+/// Side of the window with these.
+pub(super) const SIDE: usize = WINDOW + 2 * MARGIN;
 /// Columns rounded up to whole vector registers; the surplus ones weigh nothing.
 pub(super) const LANES: usize = 24;
 
@@ -69,7 +71,8 @@ impl ReferencePatch {
     /// The window about a feature, `None` when part of it is outside the image or it has no texture.
     pub(super) fn cut(image: &GrayImage, uv_px: &Vector2<f64>) -> Option<Self> {
         let middle = uv_px.map(f64::round);
-        let reach = (SIDE / 2) as f64;
+        // Beyond this the gradient at the window's edge takes mirrored pixels.
+        let reach = (CENTRE + 1) as f64;
         let (right, bottom) = (image.width as f64 - 1.0 - reach, image.height as f64 - 1.0 - reach);
         let inside = middle.x >= reach && middle.y >= reach && middle.x <= right && middle.y <= bottom;
         if !inside {

@@ -70,3 +70,31 @@ fn window_comparison_ignores_brightness_and_detects_shifts() {
     }
     assert!(Appearance::new(&[[80.0; SIDE]; SIDE]).is_none(), "no texture");
 }
+
+/// Waves of 4 to 5 px, `shift` pixels further left and up.
+fn fine_texture(shift: Vector2<f64>) -> GrayImage {
+    const SIZE: usize = 64;
+    let waves = [(1.3, 0.2), (-0.4, 1.2), (0.9, 0.9), (1.0, -1.0)];
+    let grey = |index: usize| {
+        let at = Vector2::new((index % SIZE) as f64, (index / SIZE) as f64) + shift;
+        let sum: f64 = waves.iter().map(|(along, down)| (along * at.x + down * at.y).sin()).sum();
+        (128.0 + 30.0 * sum).round() as u8
+    };
+    GrayImage { width: SIZE, height: SIZE, pixels: (0..SIZE * SIZE).map(grey).collect() }
+}
+
+#[test]
+fn a_step_on_fine_texture_is_as_long_as_the_shift() {
+    let mut pixels = [[0.0; SIDE]; SIDE];
+    cut_out(&fine_texture(Vector2::zeros()), [32 - SIDE as i32 / 2; 2], &mut pixels, f32::from);
+    let appearance = Appearance::new(&pixels).unwrap();
+    for shift in [(0.3, 0.0), (0.0, -0.3), (0.25, 0.25), (-0.45, 0.1)].map(|(x, y)| Vector2::new(x, y)) {
+        let mut window = read(&fine_texture(shift), &Matrix2::identity(), &Vector2::new(32.0, 32.0)).unwrap();
+        for value in window.iter_mut().flat_map(|line| &mut line[..WINDOW]) {
+            *value -= appearance.level();
+        }
+        let (_, step) = appearance.compare(&window).unwrap();
+        let ratio = step.fixed_rows::<2>(0).dot(&shift) / shift.norm_squared();
+        assert!((ratio - 1.0).abs() < 0.15, "{ratio} of {shift}");
+    }
+}

@@ -9,9 +9,9 @@ use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions};
 use crate::geometry::median;
 use crate::sensors::GrayImage;
 
-/// Whole-pixel and fractional places well inside the image.
-fn places() -> Vec<Vector2<f64>> {
-    let lattice = (40..200).step_by(23).flat_map(|y| (40..280).step_by(23).map(move |x| (x, y)));
+/// Fractional places well inside the image, so many pixels from one to the next.
+fn places(spacing: usize) -> Vec<Vector2<f64>> {
+    let lattice = (40..200).step_by(spacing).flat_map(|y| (40..280).step_by(spacing).map(move |x| (x, y)));
     lattice.map(|(x, y)| Vector2::new(f64::from(x) + 0.37, f64::from(y) - 0.21)).collect()
 }
 
@@ -23,7 +23,7 @@ fn find(reference: &mut ReferencePatch, image: &GrayImage, rough_px: &Vector2<f6
 fn find_all(scene: &Scene, to: usize) -> (Vec<f64>, usize) {
     let texture = texture();
     let (first, later) = (scene.render(&texture, 4), scene.render(&texture, to));
-    let observed: Vec<_> = places().into_iter().filter(|uv| scene.sees(&scene.flow(4, to, uv))).collect();
+    let observed: Vec<_> = places(11).into_iter().filter(|uv| scene.sees(&scene.flow(4, to, uv))).collect();
     let mut errors = Vec::new();
     for uv in &observed {
         let ground_truth = scene.flow(4, to, uv);
@@ -37,11 +37,11 @@ fn find_all(scene: &Scene, to: usize) -> (Vec<f64>, usize) {
 
 #[test]
 fn a_reference_is_matched_rotated_and_scaled() {
-    for (to, motion_scale, flicker) in [(5, 0.3, 0.0), (7, 0.8, 0.0), (7, 0.8, 0.3)] {
+    for (to, motion_scale, flicker, limit_px) in [(5, 0.3, 0.0, 0.06), (7, 0.8, 0.0, 0.06), (7, 0.8, 0.3, 0.07)] {
         let (errors, count) = find_all(&Scene { flicker, ..scene(motion_scale) }, to);
-        assert!(count > 50 && errors.len() * 20 >= count * 19, "{} of {count} in image {to}", errors.len());
+        assert!(count > 200 && errors.len() * 20 >= count * 19, "{} of {count} in image {to}", errors.len());
         let median_px = median(errors).unwrap();
-        assert!(median_px < 0.06, "median error {median_px} px in image {to}");
+        assert!(median_px < limit_px, "median error {median_px} px in image {to}");
     }
 }
 
@@ -52,7 +52,7 @@ fn a_changed_window_does_not_match() {
     let image = scene.render(&texture, 4);
     let mut upside_down = image.clone();
     upside_down.pixels.reverse();
-    for uv in places() {
+    for uv in places(23) {
         let mut reference = ReferencePatch::cut(&image, &uv).unwrap();
         let before = reference.clone();
         for other in [&blank(&scene), &upside_down] {
