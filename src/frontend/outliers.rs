@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::prediction::PredictedRotation;
-use crate::geometry::{so3, tangent_basis};
+use crate::geometry::{median, so3, tangent_basis};
 
 /// Options of outlier rejection.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -153,12 +153,9 @@ const ROTATION_ITERATIONS: usize = 12;
 /// Weights fall with the fourth power of the residual over a scale, which shrinks with the residuals' median to `floor`.
 pub fn fit_rotation(pairs: &[BearingPair], start: &UnitQuaternion<f64>, floor: f64) -> UnitQuaternion<f64> {
     let mut rotation = *start;
-    let mut lengths: Vec<f64> = Vec::with_capacity(pairs.len());
     for _ in 0..ROTATION_ITERATIONS {
-        lengths.clear();
-        lengths.extend(pairs.iter().map(|pair| (pair.now - rotation * pair.previous).norm()));
-        lengths.sort_by(f64::total_cmp);
-        let Some(median) = lengths.get(lengths.len() / 2) else { return rotation };
+        let lengths = pairs.iter().map(|pair| (pair.now - rotation * pair.previous).norm());
+        let Some(median) = median(lengths) else { return rotation };
         let scale = (2.0 * median).max(floor);
         let previous_from_now = rotation.inverse();
         let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
@@ -185,6 +182,8 @@ const STAGES: [f64; 3] = [6.0, 2.0, 1.0];
 /// Steps of the refinement after each stage.
 const REFINEMENTS: usize = 6;
 
+/// With a smaller ratio of outliers the search ends with the first start: a motion that leaves so few is not a local minimum.
+const FEW_OUTLIERS_RATIO: f64 = 0.1;
 /// With a larger ratio of outliers motions with a free rotation are tried.
 const MAX_OUTLIER_RATIO: f64 = 0.3;
 /// Number of random samples of five tracks, and Gauss–Newton steps for each.
@@ -232,13 +231,15 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The best hypothesis from either start, `None` without parallax.
+    /// The best hypothesis from either start, or from the first one that leaves few outliers; `None` without parallax.
     fn run(
         &mut self,
         predicted: &UnitQuaternion<f64>,
         fitted: &UnitQuaternion<f64>,
         threshold: f64,
     ) -> Option<Hypothesis> {
+        let pairs = self.pairs.len() as f64;
+        let outlier_ratio = |best: &Hypothesis| best.cost / pairs;
         let mut best: Option<Hypothesis> = None;
         for rotation in [predicted, fitted] {
             let found = self.descend(rotation, threshold);
@@ -247,8 +248,10 @@ impl Search<'_> {
             {
                 best = Some(found);
             }
+            if best.as_ref().is_some_and(|best| outlier_ratio(best) < FEW_OUTLIERS_RATIO) {
+                break;
+            }
         }
-        let outlier_ratio = |best: &Hypothesis| best.cost / self.pairs.len() as f64;
         if best.as_ref().is_none_or(|best| outlier_ratio(best) > MAX_OUTLIER_RATIO)
             && let Some(found) = self.draw_with_rotation(fitted, threshold)
             && best.is_none_or(|best| found.cost < best.cost)
