@@ -1,6 +1,6 @@
 //! Windows read from an image and compared.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Vector2, Vector6};
 
 use super::{scene, texture};
 use crate::frontend::appearance::Appearance;
@@ -12,6 +12,27 @@ use crate::sensors::GrayImage;
 fn read(image: &GrayImage, warp: &Matrix2<f64>, middle: &Vector2<f64>) -> Option<Rows> {
     let mut window = [[0.0; LANES]; WINDOW];
     Patch::new().read(image, warp, middle, 0.0, &mut window).then_some(window)
+}
+
+/// The window about a whole pixel, prepared for comparison; `None` without texture.
+fn appearance_at(image: &GrayImage, [x, y]: [i32; 2]) -> Option<Appearance> {
+    let mut pixels = [[0.0; SIDE]; SIDE];
+    cut_out(image, [x - SIDE as i32 / 2, y - SIDE as i32 / 2], &mut pixels, f32::from);
+    Appearance::new(&pixels)
+}
+
+/// Correlation and step of the window about `middle` with grey levels times `gain` plus `offset`.
+fn compare(
+    appearance: &Appearance,
+    image: &GrayImage,
+    middle: &Vector2<f64>,
+    [gain, offset]: [f32; 2],
+) -> (f64, Vector6<f64>) {
+    let mut window = read(image, &Matrix2::identity(), middle).unwrap();
+    for value in window.iter_mut().flat_map(|line| &mut line[..WINDOW]) {
+        *value = gain * *value + offset - appearance.level();
+    }
+    appearance.compare(&window).unwrap()
 }
 
 #[test]
@@ -50,21 +71,12 @@ fn a_window_beyond_the_image_or_too_large_is_none() {
 fn window_comparison_ignores_brightness_and_detects_shifts() {
     let image = scene(0.3).render(&texture(), 4);
     let middle = Vector2::new(150.0, 120.0);
-    let mut pixels = [[0.0; SIDE]; SIDE];
-    cut_out(&image, [150 - SIDE as i32 / 2, 120 - SIDE as i32 / 2], &mut pixels, f32::from);
-    let appearance = Appearance::new(&pixels).unwrap();
-    let compare = |gain: f32, offset: f32, shift: Vector2<f64>| {
-        let mut window = read(&image, &Matrix2::identity(), &(middle + shift)).unwrap();
-        for value in window.iter_mut().flat_map(|line| &mut line[..WINDOW]) {
-            *value = gain * *value + offset - appearance.level();
-        }
-        appearance.compare(&window).unwrap()
-    };
-    for (gain, offset) in [(1.0, 0.0), (0.6, 70.0), (1.4, -30.0)] {
-        let (correlation, step) = compare(gain, offset, Vector2::zeros());
+    let appearance = appearance_at(&image, [150, 120]).unwrap();
+    for brightness in [[1.0, 0.0], [0.6, 70.0], [1.4, -30.0]] {
+        let (correlation, step) = compare(&appearance, &image, &middle, brightness);
         assert!((correlation - 1.0).abs() < 1e-4 && step.norm() < 1e-3, "{correlation} {step}");
         let shift = Vector2::new(0.25, -0.125);
-        let (correlation, step) = compare(gain, offset, shift);
+        let (correlation, step) = compare(&appearance, &image, &(middle + shift), brightness);
         let error = (step.fixed_rows::<2>(0) - shift).norm();
         assert!(correlation > 0.8 && error < 0.1, "{correlation} {step}");
     }
@@ -85,15 +97,9 @@ fn fine_texture(shift: Vector2<f64>) -> GrayImage {
 
 #[test]
 fn a_step_on_fine_texture_is_as_long_as_the_shift() {
-    let mut pixels = [[0.0; SIDE]; SIDE];
-    cut_out(&fine_texture(Vector2::zeros()), [32 - SIDE as i32 / 2; 2], &mut pixels, f32::from);
-    let appearance = Appearance::new(&pixels).unwrap();
+    let appearance = appearance_at(&fine_texture(Vector2::zeros()), [32, 32]).unwrap();
     for shift in [(0.3, 0.0), (0.0, -0.3), (0.25, 0.25), (-0.45, 0.1)].map(|(x, y)| Vector2::new(x, y)) {
-        let mut window = read(&fine_texture(shift), &Matrix2::identity(), &Vector2::new(32.0, 32.0)).unwrap();
-        for value in window.iter_mut().flat_map(|line| &mut line[..WINDOW]) {
-            *value -= appearance.level();
-        }
-        let (_, step) = appearance.compare(&window).unwrap();
+        let (_, step) = compare(&appearance, &fine_texture(shift), &Vector2::new(32.0, 32.0), [1.0, 0.0]);
         let ratio = step.fixed_rows::<2>(0).dot(&shift) / shift.norm_squared();
         assert!((ratio - 1.0).abs() < 0.15, "{ratio} of {shift}");
     }
