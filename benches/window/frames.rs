@@ -82,9 +82,11 @@ impl Player {
         frame
     }
 
+    /// Paints a picture and takes what changed, which the window hands to the graphics adapter.
     fn paint(&mut self, frame: &Frame) {
         let background = Theme::of(OPTIONS.theme).background;
-        drop(self.painter.paint(&frame.primitives, OPTIONS.size_px, OPTIONS.pixels_per_point, background));
+        self.painter.update(&frame.chunks, OPTIONS.size_px, OPTIONS.pixels_per_point, background);
+        self.painter.changes().for_each(drop);
     }
 
     /// One picture.

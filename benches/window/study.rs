@@ -38,7 +38,7 @@ pub(crate) fn measure(runs: usize) -> Result<Table> {
             let frame = layout.take(|| headless.frame(events, |ui| study_ui(ui, state, &theme)));
             painter.set_textures(&frame.textures);
             painter.free_textures(&frame.textures);
-            drop(painter.paint(&frame.primitives, OPTIONS.size_px, OPTIONS.pixels_per_point, theme.background));
+            drop(painter.paint(&frame.chunks, OPTIONS.size_px, OPTIONS.pixels_per_point, theme.background));
         });
     };
     let cells = |times: &[Times; 2]| times.iter().map(|times| times.cells().join(" / ")).collect::<Vec<_>>();

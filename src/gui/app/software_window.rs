@@ -6,6 +6,7 @@
 use egui::epaint::{ClippedShape, ImageDelta, Mesh};
 use egui::{Color32, Context, FullOutput, Plugin, Pos2, Rect, Shape, TextureId, TextureOptions, pos2};
 
+use crate::gui::rendering::chunks::Tessellation;
 use crate::gui::rendering::painter::Painter;
 
 /// The texture with the content of the window; egui counts its own textures up from 0.
@@ -14,6 +15,7 @@ const WINDOW_TEXTURE: TextureId = TextureId::Managed(u64::MAX);
 /// Replaces the meshes of a frame by one texture.
 #[derive(Default)]
 pub(super) struct SoftwareWindow {
+    tessellation: Tessellation,
     painter: Painter,
     /// Size of the texture on the adapter.
     shown_px: [u32; 2],
@@ -29,9 +31,9 @@ impl Plugin for SoftwareWindow {
         let size = ctx.viewport_rect().max.to_vec2();
         let size_px = [size.x, size.y].map(|side| (side * scale).round().max(0.0) as u32);
         let shapes = std::mem::take(&mut output.shapes);
-        let primitives = ctx.tessellate(shapes, scale);
+        let chunks = self.tessellation.chunks(ctx, shapes, scale);
         self.painter.set_textures(&output.textures_delta);
-        self.painter.update(&primitives, size_px, scale, Color32::BLACK);
+        self.painter.update(&chunks, size_px, scale, Color32::BLACK);
         self.painter.free_textures(&output.textures_delta);
         output.textures_delta.clear();
         if size_px.contains(&0) {
@@ -81,7 +83,7 @@ mod tests {
             assert!(seen == expected, "at {scale}");
 
             let mut again = window.frame(Vec::new(), panel);
-            assert_eq!(again.primitives.len(), 1, "one rectangle is left to the adapter");
+            assert_eq!(again.chunks.len(), 1, "one rectangle is left to the adapter");
             assert!(again.textures.is_empty(), "what did not change is not handed over again");
             again.textures.clear();
 

@@ -1,10 +1,12 @@
 //! Runs egui without a window and paints the result, on the CPU or with [`Offscreen`](super::offscreen).
 
 use std::convert::Infallible;
+use std::sync::Arc;
 
-use egui::{ClippedPrimitive, Color32, FullOutput, RawInput, Rect, TexturesDelta, Ui, Vec2, ViewportId, ViewportInfo};
+use egui::{Color32, FullOutput, RawInput, Rect, TexturesDelta, Ui, Vec2, ViewportId, ViewportInfo};
 use image::RgbaImage;
 
+use super::chunks::{Chunk, Tessellation};
 use super::painter::Painter;
 use super::svg::{self, Textures};
 use crate::gui::theme::{Theme, ThemeName};
@@ -28,7 +30,7 @@ pub struct HeadlessOptions {
 /// The output of egui for one frame.
 pub struct Frame {
     /// Meshes, in points.
-    pub primitives: Vec<egui::ClippedPrimitive>,
+    pub chunks: Vec<Arc<Chunk>>,
     /// New, changed and freed textures.
     pub textures: TexturesDelta,
 }
@@ -44,10 +46,10 @@ pub trait FramePainter {
     /// Drops the textures that a frame frees; called for every frame after it is painted.
     fn free_textures(&mut self, delta: &TexturesDelta);
 
-    /// Paints primitives, whose positions are in points, over an opaque background.
+    /// Paints chunks, whose positions are in points, over an opaque background.
     fn paint(
         &mut self,
-        primitives: &[ClippedPrimitive],
+        chunks: &[Arc<Chunk>],
         size_px: [u32; 2],
         pixels_per_point: f32,
         background: Color32,
@@ -67,12 +69,12 @@ impl FramePainter for Painter {
 
     fn paint(
         &mut self,
-        primitives: &[ClippedPrimitive],
+        chunks: &[Arc<Chunk>],
         size_px: [u32; 2],
         pixels_per_point: f32,
         background: Color32,
     ) -> Result<RgbaImage, Infallible> {
-        Ok(Self::paint(self, primitives, size_px, pixels_per_point, background))
+        Ok(Self::paint(self, chunks, size_px, pixels_per_point, background))
     }
 }
 
@@ -80,6 +82,7 @@ impl FramePainter for Painter {
 pub struct Headless {
     context: egui::Context,
     options: HeadlessOptions,
+    tessellation: Tessellation,
     /// Time between frames and elapsed time in seconds.
     frame_time_s: f64,
     time_s: f64,
@@ -90,7 +93,7 @@ impl Headless {
     pub fn new(options: HeadlessOptions) -> Self {
         let context = egui::Context::default();
         Theme::of(options.theme).apply(&context);
-        Self { context, options, frame_time_s: FRAME_TIME_S, time_s: 0.0 }
+        Self { context, options, tessellation: Tessellation::default(), frame_time_s: FRAME_TIME_S, time_s: 0.0 }
     }
 
     /// The context, for setup before the first frame.
@@ -106,8 +109,8 @@ impl Headless {
     /// Runs one frame with input events.
     pub fn frame(&mut self, events: Vec<egui::Event>, ui: impl FnMut(&mut Ui)) -> Frame {
         let output = self.run(events, ui);
-        let primitives = self.context.tessellate(output.shapes, output.pixels_per_point);
-        Frame { primitives, textures: output.textures_delta }
+        let chunks = self.tessellation.chunks(&self.context, output.shapes, output.pixels_per_point);
+        Frame { chunks, textures: output.textures_delta }
     }
 
     fn run(&mut self, events: Vec<egui::Event>, ui: impl FnMut(&mut Ui)) -> FullOutput {
@@ -159,7 +162,7 @@ impl Headless {
         let mut frame = self.frame(Vec::new(), &mut ui);
         painter.set_textures(&frame.textures);
         let background = Theme::of(self.options.theme).background;
-        let image = painter.paint(&frame.primitives, self.options.size_px, self.options.pixels_per_point, background);
+        let image = painter.paint(&frame.chunks, self.options.size_px, self.options.pixels_per_point, background);
         painter.free_textures(&frame.textures);
         frame.textures.clear();
         image

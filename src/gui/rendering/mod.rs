@@ -1,7 +1,9 @@
 //! Painting of egui's frames without a window into pixels or SVG: on the CPU with the same bytes on every machine, or
 //! on a graphics adapter.
 
+pub mod chunks;
 pub mod headless;
+mod mixing;
 pub mod offscreen;
 pub mod painter;
 mod svg;

@@ -3,6 +3,7 @@
 //!
 //! The bytes of such a screenshot depend on the driver; those of the CPU painter do not.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use eframe::egui_wgpu::{self, RendererOptions, ScreenDescriptor};
@@ -10,6 +11,7 @@ use egui::{ClippedPrimitive, Color32, TextureId, TexturesDelta, Ui};
 use image::RgbaImage;
 use thiserror::Error;
 
+use super::chunks::Chunk;
 use super::headless::{FramePainter, Headless, HeadlessOptions};
 use crate::gui::scene::SceneBackend;
 
@@ -176,15 +178,17 @@ impl FramePainter for Offscreen {
 
     fn paint(
         &mut self,
-        primitives: &[ClippedPrimitive],
+        chunks: &[Arc<Chunk>],
         size_px: [u32; 2],
         pixels_per_point: f32,
         background: Color32,
     ) -> Result<RgbaImage, OffscreenError> {
+        let primitives: Vec<ClippedPrimitive> =
+            chunks.iter().flat_map(|chunk| chunk.primitives.iter().cloned()).collect();
         let screen = ScreenDescriptor { size_in_pixels: size_px, pixels_per_point };
         let label = Some("screenshot");
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
-        let before = self.renderer.update_buffers(&self.device, &self.queue, &mut encoder, primitives, &screen);
+        let before = self.renderer.update_buffers(&self.device, &self.queue, &mut encoder, &primitives, &screen);
         let texture = self.device.create_texture(&wgpu::TextureDescriptor {
             label,
             size: wgpu::Extent3d { width: size_px[0], height: size_px[1], depth_or_array_layers: 1 },
@@ -211,7 +215,7 @@ impl FramePainter for Offscreen {
                 })],
                 ..wgpu::RenderPassDescriptor::default()
             });
-            self.renderer.render(&mut pass.forget_lifetime(), primitives, &screen);
+            self.renderer.render(&mut pass.forget_lifetime(), &primitives, &screen);
         }
         self.read_back(encoder, before, &texture)
     }

@@ -1,43 +1,50 @@
 //! The image in tiles that are painted again only when their content changes.
 
+use std::sync::Arc;
+
 use egui::{Color32, ColorImage};
 use image::RgbaImage;
 use rayon::prelude::*;
 
 use super::blend;
-use super::raster::{PreparedMesh, Target, mixed};
+use super::prepared::PreparedChunk;
+use super::raster::Target;
+use super::texture::TextureStore;
 use super::triangle::Clip;
 
 /// Size of a tile in pixels: small enough that a moving cursor changes few tiles, and that a tile fits the cache.
 pub(super) const TILE_PX: [usize; 2] = [64, 32];
 
-/// Indices of a mesh and of a triangle in it.
-#[derive(Clone, Copy)]
-struct Piece {
-    mesh: u32,
-    triangle: u32,
+/// Number of tiles in a row of an image of this width.
+pub(super) fn tiles_in_row(width_px: usize) -> usize {
+    width_px.div_ceil(TILE_PX[0])
 }
 
 /// A tile of the image.
 #[derive(Default)]
 struct Tile {
-    /// Triangles that may touch it, in the order of painting.
-    pieces: Vec<Piece>,
-    /// Hash of its content, `None` before it is painted.
-    mark: Option<u64>,
+    /// Chunks that may touch it, in the order of painting: number of the chunk and of its share.
+    shares: Vec<[u32; 2]>,
+    /// Hashes of the shares of the last image, `None` before the first one.
+    hashes: Option<Vec<u64>>,
     /// Pixels by row, each row as wide as the tile.
     pixels: Vec<u32>,
+    /// The pixels below the first share that changed in the last update. What moves, as a cursor over plots, is mostly the
+    /// same share again, and all that lies below it needs not be painted again.
+    below: Vec<u32>,
+    /// Number of shares in `below`.
+    below_count: usize,
     /// Whether it was painted in the last update.
     changed: bool,
 }
 
 /// A rectangle of the image in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::gui) struct PixelRect {
+pub struct PixelRect {
     /// Column and row of its upper left pixel.
-    pub(in crate::gui) at: [usize; 2],
+    pub at: [usize; 2],
     /// Width and height.
-    pub(in crate::gui) size: [usize; 2],
+    pub size: [usize; 2],
 }
 
 /// The last image.
@@ -51,7 +58,7 @@ pub(super) struct Canvas {
 impl Canvas {
     /// Number of tiles in a row.
     fn columns(&self) -> usize {
-        self.size_px[0].div_ceil(TILE_PX[0])
+        tiles_in_row(self.size_px[0])
     }
 
     fn clip_of(&self, number: usize) -> Clip {
@@ -66,35 +73,28 @@ impl Canvas {
     }
 
     /// Updates the image; the result is the same as painting all of it again.
-    pub(super) fn update(&mut self, meshes: &[PreparedMesh<'_>], size_px: [usize; 2], ground: u32) {
+    pub(super) fn update(
+        &mut self,
+        chunks: &[Arc<PreparedChunk>],
+        textures: &TextureStore,
+        size_px: [usize; 2],
+        ground: u32,
+    ) {
         if (self.size_px, self.ground) != (size_px, ground) {
             *self = Self { size_px, ground, tiles: Vec::new() };
-            let count = if size_px[0] > 0 { self.columns() * size_px[1].div_ceil(TILE_PX[1]) } else { 0 };
+            let count = if size_px[0] > 0 { tiles_in_row(size_px[0]) * size_px[1].div_ceil(TILE_PX[1]) } else { 0 };
             self.tiles.resize_with(count, Tile::default);
         }
-        self.sort_in(meshes);
-        let clips: Vec<Clip> = (0..self.tiles.len()).map(|number| self.clip_of(number)).collect();
-        self.tiles.par_iter_mut().zip(clips).for_each(|(tile, clip)| tile.update(meshes, clip, ground));
-    }
-
-    /// Assigns each triangle to the tiles that it may touch.
-    fn sort_in(&mut self, meshes: &[PreparedMesh<'_>]) {
-        let columns = self.columns();
         for tile in &mut self.tiles {
-            tile.pieces.clear();
+            tile.shares.clear();
         }
-        let tile_of = |pixel: i32, axis: usize| pixel as usize / TILE_PX[axis];
-        for (mesh, prepared) in meshes.iter().enumerate() {
-            for triangle in 0..prepared.triangles() {
-                let Some(reach) = prepared.reach(triangle) else { continue };
-                let piece = Piece { mesh: mesh as u32, triangle: triangle as u32 };
-                for row in tile_of(reach.top, 1)..=tile_of(reach.bottom - 1, 1) {
-                    for column in tile_of(reach.left, 0)..=tile_of(reach.right - 1, 0) {
-                        self.tiles[row * columns + column].pieces.push(piece);
-                    }
-                }
+        for (number, chunk) in chunks.iter().enumerate() {
+            for (place, share) in chunk.shares().iter().enumerate() {
+                self.tiles[share.tile as usize].shares.push([number as u32, place as u32]);
             }
         }
+        let clips: Vec<Clip> = (0..self.tiles.len()).map(|number| self.clip_of(number)).collect();
+        self.tiles.par_iter_mut().zip(clips).for_each(|(tile, clip)| tile.update(chunks, textures, clip, ground));
     }
 
     /// The rectangles that the last update painted; adjacent ones are merged.
@@ -160,19 +160,35 @@ impl Canvas {
 }
 
 impl Tile {
-    fn update(&mut self, meshes: &[PreparedMesh<'_>], clip: Clip, ground: u32) {
-        let each = self.pieces.iter().map(|piece| meshes[piece.mesh as usize].mark(piece.triangle as usize));
-        let mark = each.fold(self.pieces.len() as u64, mixed);
-        self.changed = self.mark != Some(mark);
+    fn update(&mut self, chunks: &[Arc<PreparedChunk>], textures: &TextureStore, clip: Clip, ground: u32) {
+        let share = |[chunk, share]: &[u32; 2]| (&chunks[*chunk as usize], *share as usize);
+        let hash = |at: &[u32; 2]| {
+            let (chunk, share) = share(at);
+            chunk.shares()[share].hash
+        };
+        self.changed =
+            self.hashes.as_ref().is_none_or(|hashes| !hashes.iter().copied().eq(self.shares.iter().map(hash)));
         if !self.changed {
             return;
         }
-        self.mark = Some(mark);
-        self.pixels.clear();
-        self.pixels.resize((clip.right - clip.left) as usize * (clip.bottom - clip.top) as usize, ground);
-        let mut target = Target { pixels: &mut self.pixels, clip };
-        for Piece { mesh, triangle } in &self.pieces {
-            meshes[*mesh as usize].paint(*triangle as usize, &mut target);
+        let hashes: Vec<u64> = self.shares.iter().map(hash).collect();
+        let old = self.hashes.take().unwrap_or_default();
+        let same = old.iter().zip(&hashes).take_while(|(old, new)| old == new).count();
+        if self.below_count == 0 || self.below_count > same {
+            self.below_count = 0;
+            self.below.clear();
+            self.below.resize((clip.right - clip.left) as usize * (clip.bottom - clip.top) as usize, ground);
         }
+        let paint = |shares: &[[u32; 2]], pixels: &mut [u32]| {
+            let mut target = Target { pixels, clip };
+            for (chunk, share) in shares.iter().map(share) {
+                chunk.paint(share, textures, &mut target);
+            }
+        };
+        paint(&self.shares[self.below_count..same], &mut self.below);
+        self.below_count = same;
+        self.pixels.clone_from(&self.below);
+        paint(&self.shares[same..], &mut self.pixels);
+        self.hashes = Some(hashes);
     }
 }

@@ -8,26 +8,36 @@
 
 pub(in crate::gui) mod blend;
 mod canvas;
+mod prepared;
 mod raster;
 #[cfg(test)]
 mod tests;
 mod texture;
 pub(in crate::gui) mod triangle;
 
-use egui::epaint::{ClippedPrimitive, Primitive};
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use egui::{Color32, ColorImage, TexturesDelta};
 use image::RgbaImage;
 use rayon::prelude::*;
 
-use self::canvas::{Canvas, PixelRect};
-use self::raster::PreparedMesh;
+use self::canvas::Canvas;
+pub use self::canvas::PixelRect;
+use self::prepared::PreparedChunk;
 use self::texture::TextureStore;
+use super::chunks::Chunk;
 
-/// Paints egui's meshes. It keeps their textures and the last image, of which only changed tiles are painted again.
+/// Paints egui's meshes. It keeps their textures, the chunks of the last image, and the last image, of which only changed
+/// tiles are painted again.
 #[derive(Default)]
 pub struct Painter {
     textures: TextureStore,
     canvas: Canvas,
+    /// Size and scale for which the chunks are prepared.
+    format: ([u32; 2], f32),
+    /// The chunks of the last image by address, which they keep.
+    prepared: HashMap<usize, Arc<PreparedChunk>>,
 }
 
 impl Painter {
@@ -47,41 +57,38 @@ impl Painter {
         self.textures.free(delta);
     }
 
-    /// Paints primitives, whose positions are in points, over an opaque background.
+    /// Paints chunks, whose positions are in points, over an opaque background.
     ///
     /// Primitives with an unknown texture are skipped, as are triangles with positions that are not finite. Tiles that
     /// did not change since the last image are not painted again.
     pub fn paint(
         &mut self,
-        primitives: &[ClippedPrimitive],
+        chunks: &[Arc<Chunk>],
         size_px: [u32; 2],
         pixels_per_point: f32,
         background: Color32,
     ) -> RgbaImage {
-        self.update(primitives, size_px, pixels_per_point, background);
+        self.update(chunks, size_px, pixels_per_point, background);
         self.canvas.image()
     }
 
     /// Paints as [`Painter::paint`] does without copying the image.
-    pub fn update(
-        &mut self,
-        primitives: &[ClippedPrimitive],
-        size_px: [u32; 2],
-        pixels_per_point: f32,
-        background: Color32,
-    ) {
-        let ground = Color32::from_rgb(background.r(), background.g(), background.b());
-        let meshes: Vec<PreparedMesh<'_>> = primitives
+    pub fn update(&mut self, chunks: &[Arc<Chunk>], size_px: [u32; 2], pixels_per_point: f32, background: Color32) {
+        if self.format != (size_px, pixels_per_point) {
+            self.format = (size_px, pixels_per_point);
+            self.prepared.clear();
+        }
+        let prepared: Vec<Arc<PreparedChunk>> = chunks
             .par_iter()
-            .filter_map(|clipped| match &clipped.primitive {
-                Primitive::Mesh(mesh) => {
-                    let texture = self.textures.get(mesh.texture_id)?;
-                    PreparedMesh::new(mesh, texture, clipped.clip_rect, pixels_per_point, size_px)
-                }
-                Primitive::Callback(_) => None,
+            .map(|chunk| match self.prepared.get(&address(chunk)) {
+                Some(prepared) if prepared.is_current(&self.textures) => Arc::clone(prepared),
+                _ => Arc::new(PreparedChunk::new(chunk, &self.textures, size_px, pixels_per_point)),
             })
             .collect();
-        self.canvas.update(&meshes, size_px.map(|side| side as usize), blend::pack(ground.to_array()));
+        self.prepared = chunks.iter().map(address).zip(prepared.iter().map(Arc::clone)).collect();
+        let ground = Color32::from_rgb(background.r(), background.g(), background.b());
+        let size_px = size_px.map(|side| side as usize);
+        self.canvas.update(&prepared, &self.textures, size_px, blend::pack(ground.to_array()));
     }
 
     /// The last image as colours.
@@ -90,7 +97,12 @@ impl Painter {
     }
 
     /// The rectangles of the image that changed in the last update, as colours.
-    pub(in crate::gui) fn changes(&self) -> impl Iterator<Item = (PixelRect, ColorImage)> {
+    pub fn changes(&self) -> impl Iterator<Item = (PixelRect, ColorImage)> {
         self.canvas.changed().into_iter().map(|rect| (rect, self.canvas.part(rect)))
     }
+}
+
+/// The address of a chunk, which no other one has while it is kept.
+fn address(chunk: &Arc<Chunk>) -> usize {
+    Arc::as_ptr(chunk).addr()
 }

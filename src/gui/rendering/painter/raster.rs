@@ -3,6 +3,8 @@
 use egui::Rect;
 use egui::epaint::{Mesh, Vertex};
 
+use crate::gui::rendering::mixing::mixed;
+
 use super::blend;
 use super::texture::{TEXEL_BITS, TexelKind, Texture, weight};
 use super::triangle::{Clip, Gradient, Place, SUBPIXELS, first_centre, pack_fixed, spans, to_texels};
@@ -31,43 +33,51 @@ impl Target<'_> {
     }
 }
 
-/// A mesh with its vertices snapped to subpixels.
-pub(super) struct PreparedMesh<'a> {
-    mesh: &'a Mesh,
-    texture: &'a Texture,
+/// The vertices of a mesh in subpixels.
+pub(super) struct Snapped {
+    /// The clip rectangle inside the image.
     clip: Clip,
     /// Position of each vertex, `None` if it is not finite.
     points: Vec<Option<[i32; 2]>>,
-    /// Hash of each vertex: position, texture position and colour.
-    marks: Vec<u64>,
 }
 
-impl<'a> PreparedMesh<'a> {
-    /// `None` if the mesh is outside the image or has no triangle.
-    pub(super) fn new(
-        mesh: &'a Mesh,
-        texture: &'a Texture,
-        clip_rect: Rect,
-        pixels_per_point: f32,
-        size_px: [u32; 2],
-    ) -> Option<Self> {
+impl Snapped {
+    /// `None` if the clip rectangle is outside the image.
+    pub(super) fn new(mesh: &Mesh, clip_rect: Rect, pixels_per_point: f32, size_px: [u32; 2]) -> Option<Self> {
         let clip = Clip::new(clip_rect, pixels_per_point, size_px);
-        if clip.left >= clip.right || clip.top >= clip.bottom || texture.is_empty() {
+        if clip.left >= clip.right || clip.top >= clip.bottom {
             return None;
         }
         let snap = |coordinate: f32| {
-            let subpixels = (coordinate * pixels_per_point * SUBPIXELS as f32).round();
-            subpixels.clamp(-MAX_COORDINATE, MAX_COORDINATE) as i32
+            let subpixels = coordinate * pixels_per_point * SUBPIXELS as f32;
+            rounded(subpixels.clamp(-MAX_COORDINATE, MAX_COORDINATE))
         };
-        let points: Vec<Option<[i32; 2]>> = mesh
+        let points = mesh
             .vertices
             .iter()
             .map(|vertex| vertex.pos.is_finite().then(|| [snap(vertex.pos.x), snap(vertex.pos.y)]))
             .collect();
-        let marks = mesh.vertices.iter().zip(&points).map(|(vertex, point)| mark_of(vertex, *point)).collect();
-        Some(Self { mesh, texture, clip, points, marks })
+        Some(Self { clip, points })
     }
+}
 
+/// A number rounded to the nearest integer, halves away from zero.
+#[inline]
+fn rounded(number: f32) -> i32 {
+    // The sum is exact where the half decides.
+    let number = f64::from(number);
+    (number + 0.5_f64.copysign(number)) as i32
+}
+
+/// A mesh with its texture.
+#[derive(Clone, Copy)]
+pub(super) struct PreparedMesh<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) texture: &'a Texture,
+    pub(super) snapped: &'a Snapped,
+}
+
+impl PreparedMesh<'_> {
     /// Number of triangles.
     pub(super) fn triangles(&self) -> usize {
         self.mesh.indices.len() / 3
@@ -82,17 +92,17 @@ impl<'a> PreparedMesh<'a> {
     /// Positions of the corners of a triangle, `None` if one is not finite.
     #[inline]
     fn points(&self, triangle: usize) -> Option<[[i32; 2]; 3]> {
-        let [a, b, c] = self.corners(triangle).map(|corner| self.points.get(corner).copied().flatten());
+        let [a, b, c] = self.corners(triangle).map(|corner| self.snapped.points.get(corner).copied().flatten());
         Some([a?, b?, c?])
     }
 
     /// Pixels that a triangle may touch, `None` if it is outside the clip rectangle.
-    pub(super) fn reach(&self, triangle: usize) -> Option<Clip> {
+    fn reach(&self, triangle: usize) -> Option<Clip> {
         let points = self.points(triangle)?;
         let [across, down] = [0, 1].map(|axis| points.map(|point| point[axis]));
         let first = |values: [i32; 3]| first_centre(values[0].min(values[1]).min(values[2]));
         let end = |values: [i32; 3]| first_centre(values[0].max(values[1]).max(values[2]));
-        let clip = &self.clip;
+        let clip = &self.snapped.clip;
         let reach = Clip {
             left: first(across).max(clip.left),
             top: first(down).max(clip.top),
@@ -104,27 +114,37 @@ impl<'a> PreparedMesh<'a> {
         (reach.left < reach.right && reach.top < reach.bottom && is_inked()).then_some(reach)
     }
 
-    /// Hash of a triangle: triangles with the same hash have the same pixels.
-    pub(super) fn mark(&self, triangle: usize) -> u64 {
-        let corners = self.corners(triangle);
-        let [a, b, c] = corners.map(|corner| self.marks[corner]);
-        let Clip { left, top, right, bottom } = self.clip;
+    /// Hash of each vertex: position, texture position and colour.
+    fn vertex_hashes(&self) -> Vec<u64> {
+        self.mesh.vertices.iter().zip(&self.snapped.points).map(|(vertex, point)| hash_of(vertex, *point)).collect()
+    }
+
+    /// Calls `emit(triangle, reach, hash)` for each triangle inside the clip rectangle: the pixels that it may touch and a
+    /// hash; triangles with the same hash have the same pixels.
+    pub(super) fn for_each_visible(&self, mut emit: impl FnMut(usize, Clip, u64)) {
+        let vertices = self.vertex_hashes();
+        let Clip { left, top, right, bottom } = self.snapped.clip;
         let pair = |a: i32, b: i32| (a as u64) << 32 | u64::from(b as u32);
         let clip = mixed(pair(left, top), pair(right, bottom));
-        let uvs = corners.map(|corner| self.mesh.vertices[corner].uv);
-        let texels = if uvs[0] == uvs[1] && uvs[1] == uvs[2] {
-            u64::from(self.texel_at(uvs[0]))
-        } else {
-            // Bit above every texel value, which has 32 bits.
-            self.texture.version(uvs.map(|uv| uv.y)) | 1 << 63
-        };
-        mixed(mixed(mixed(a, b), c), mixed(clip, texels))
+        for triangle in 0..self.triangles() {
+            let Some(reach) = self.reach(triangle) else { continue };
+            let corners = self.corners(triangle);
+            let [a, b, c] = corners.map(|corner| vertices[corner]);
+            let uvs = corners.map(|corner| self.mesh.vertices[corner].uv);
+            let texels = if uvs[0] == uvs[1] && uvs[1] == uvs[2] {
+                u64::from(self.texel_at(uvs[0]))
+            } else {
+                // Bit above every texel value, which has 32 bits.
+                self.texture.version(uvs.map(|uv| uv.y)) | 1 << 63
+            };
+            emit(triangle, reach, mixed(mixed(mixed(a, b), c), mixed(clip, texels)));
+        }
     }
 
     /// Paints the pixels of a triangle inside a rectangle.
     pub(super) fn paint(&self, triangle: usize, target: &mut Target<'_>) {
-        let rows = &target.clip;
-        let clip = Clip { top: self.clip.top.max(rows.top), bottom: self.clip.bottom.min(rows.bottom), ..self.clip };
+        let (rows, clip) = (&target.clip, self.snapped.clip);
+        let clip = Clip { top: clip.top.max(rows.top), bottom: clip.bottom.min(rows.bottom), ..clip };
         let Some(points) = self.points(triangle) else { return };
         let vertices = self.corners(triangle).map(|corner| &self.mesh.vertices[corner]);
         self.paint_triangle(points, vertices, clip, target);
@@ -276,15 +296,8 @@ fn fill(pixels: &mut [u32], color: u32) {
     }
 }
 
-/// Mixes two numbers into a hash (mixing step of wyhash).
-#[inline]
-pub(super) fn mixed(a: u64, b: u64) -> u64 {
-    let product = u128::from(a ^ 0xa076_1d64_78bd_642f) * u128::from(b ^ 0xe703_7ed1_a0b4_28db);
-    product as u64 ^ (product >> 64) as u64
-}
-
 /// Hash of a vertex.
-fn mark_of(vertex: &Vertex, point: Option<[i32; 2]>) -> u64 {
+fn hash_of(vertex: &Vertex, point: Option<[i32; 2]>) -> u64 {
     let [x, y] = point.unwrap_or([i32::MIN; 2]);
     let pair = |a: u32, b: u32| u64::from(a) << 32 | u64::from(b);
     let place = mixed(pair(x as u32, y as u32), pair(vertex.uv.x.to_bits(), vertex.uv.y.to_bits()));

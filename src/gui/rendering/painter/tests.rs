@@ -1,9 +1,12 @@
+use std::sync::Arc;
+
 use egui::epaint::textures::TextureOptions;
 use egui::epaint::{ClippedPrimitive, ImageDelta, Mesh, Primitive, Tessellator, Vertex};
 use egui::{Color32, ColorImage, Pos2, Rect, Shape, Stroke, TextureId, TexturesDelta, pos2, vec2};
 use image::{Rgba, RgbaImage};
 
 use super::Painter;
+use crate::gui::rendering::chunks::Chunk;
 
 const GROUND: Color32 = Color32::from_rgb(20, 30, 40);
 
@@ -25,8 +28,12 @@ fn everything() -> Rect {
     Rect::from_min_max(pos2(-1e4, -1e4), pos2(1e4, 1e4))
 }
 
+fn chunk(mesh: Mesh, clip_rect: Rect) -> Arc<Chunk> {
+    Arc::new(Chunk::new(vec![ClippedPrimitive { clip_rect, primitive: Primitive::Mesh(mesh) }]))
+}
+
 fn paint_mesh(painter: &mut Painter, mesh: Mesh, clip_rect: Rect, size_px: [u32; 2], scale: f32) -> RgbaImage {
-    painter.paint(&[ClippedPrimitive { clip_rect, primitive: Primitive::Mesh(mesh) }], size_px, scale, GROUND)
+    painter.paint(&[chunk(mesh, clip_rect)], size_px, scale, GROUND)
 }
 
 fn paint_shape(shape: impl Into<Shape>, size_px: [u32; 2]) -> RgbaImage {
@@ -274,23 +281,41 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
     assert_eq!(alone, many);
 }
 
-/// Shapes, a glyph-like texture and a gradient, displaced by `moved`.
-fn moving_primitives(moved: f32) -> Vec<ClippedPrimitive> {
+/// The part of the image in which the test of updates paints.
+fn middle() -> Rect {
+    Rect::from_min_max(pos2(5.0, 5.0), pos2(235.0, 170.0))
+}
+
+fn tessellated(shapes: impl IntoIterator<Item = Shape>) -> Arc<Chunk> {
     let mut mesh = Mesh::default();
     let mut tessellator = Tessellator::new(1.0, Default::default(), [2, 2], Vec::new());
-    let stroke = Stroke::new(1.5, Color32::from_rgba_unmultiplied(250, 120, 30, 180));
-    tessellator.tessellate_shape(Shape::circle_filled(pos2(150.0, 90.0), 70.0, Color32::DARK_GREEN), &mut mesh);
-    for line in 0..30 {
-        let from = pos2(7.0 * line as f32, 3.0);
-        tessellator.tessellate_shape(Shape::line_segment([from, from + vec2(90.0, 140.0)], stroke), &mut mesh);
+    for shape in shapes {
+        tessellator.tessellate_shape(shape, &mut mesh);
     }
-    let cursor = [pos2(40.0 + moved, 0.0), pos2(40.0 + moved, 180.0)];
-    tessellator.tessellate_shape(Shape::line_segment(cursor, Stroke::new(1.0, Color32::WHITE)), &mut mesh);
+    chunk(mesh, middle())
+}
+
+/// A disc and lines of one colour.
+fn lines(color: Color32) -> Arc<Chunk> {
+    let disc = Shape::circle_filled(pos2(150.0, 90.0), 70.0, Color32::DARK_GREEN);
+    let lines = (0..30).map(|line| {
+        let from = pos2(7.0 * line as f32, 3.0);
+        Shape::line_segment([from, from + vec2(90.0, 140.0)], Stroke::new(1.5, color))
+    });
+    tessellated(std::iter::once(disc).chain(lines))
+}
+
+/// A line over the whole height.
+fn cursor(x: f32) -> Arc<Chunk> {
+    tessellated([Shape::line_segment([pos2(x, 0.0), pos2(x, 180.0)], Stroke::new(1.0, Color32::WHITE))])
+}
+
+/// A rectangle with the image, tinted.
+fn textured() -> Arc<Chunk> {
     let mut image = Mesh::with_texture(TextureId::Managed(1));
     let uv = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
     image.add_rect_with_uv(Rect::from_min_size(pos2(60.0, 20.0), vec2(170.0, 130.0)), uv, Color32::from_gray(200));
-    let clip_rect = Rect::from_min_max(pos2(5.0, 5.0), pos2(235.0, 170.0));
-    [mesh, image].map(|mesh| ClippedPrimitive { clip_rect, primitive: Primitive::Mesh(mesh) }).to_vec()
+    chunk(image, middle())
 }
 
 #[test]
@@ -298,13 +323,21 @@ fn an_updated_image_equals_one_painted_again() {
     const SIZE: [u32; 2] = [241, 187];
     let texels = |shade: u8| ColorImage::new([3, 40], vec![Color32::from_rgb(shade, 90, 10); 120]);
     let mut kept = painter_with(Some((texels(30), TextureOptions::LINEAR)));
-    kept.update(&moving_primitives(0.0), SIZE, 1.0, GROUND);
+    // Most chunks are the same from image to image. Every image has another cursor, some have lines of another colour
+    // below it, and twice the texture changes.
+    let [orange, blue] = [[250, 120, 30], [20, 60, 250]]
+        .map(|[red, green, blue]| lines(Color32::from_rgba_unmultiplied(red, green, blue, 180)));
+    let image = textured();
+    let chunks = |moved: u8| {
+        let lines = if moved % 7 == 3 { &blue } else { &orange };
+        [Arc::clone(lines), Arc::clone(&image), cursor(40.0 + f32::from(moved) * 3.7)]
+    };
+    kept.update(&chunks(0), SIZE, 1.0, GROUND);
     assert_eq!(kept.changes().count(), 6, "at first every row of tiles is new");
-    kept.update(&moving_primitives(0.0), SIZE, 1.0, GROUND);
+    kept.update(&chunks(0), SIZE, 1.0, GROUND);
     assert_eq!(kept.changes().count(), 0, "nothing changed");
-    let mut shown = kept.paint(&moving_primitives(0.0), SIZE, 1.0, GROUND);
+    let mut shown = kept.paint(&chunks(0), SIZE, 1.0, GROUND);
     for moved in 0_u8..40 {
-        let primitives = moving_primitives(f32::from(moved) * 3.7);
         let mut delta = TexturesDelta::default();
         if moved == 20 {
             delta.push(
@@ -315,7 +348,7 @@ fn an_updated_image_equals_one_painted_again() {
             delta.push(TextureId::Managed(1), ImageDelta::full(texels(moved), TextureOptions::NEAREST));
         }
         kept.set_textures(&delta);
-        let image = kept.paint(&primitives, SIZE, 1.0, GROUND);
+        let image = kept.paint(&chunks(moved), SIZE, 1.0, GROUND);
         let mut fresh = painter_with(Some((texels(30), TextureOptions::LINEAR)));
         if moved >= 20 {
             let patch = ColorImage::filled([3, 1], Color32::WHITE);
@@ -326,7 +359,7 @@ fn an_updated_image_equals_one_painted_again() {
         }
         fresh.set_textures(&delta);
         delta.clear();
-        assert!(image == fresh.paint(&primitives, SIZE, 1.0, GROUND), "image {moved}");
+        assert!(image == fresh.paint(&chunks(moved), SIZE, 1.0, GROUND), "image {moved}");
         // The reported rectangles are all that differs.
         for (rect, part) in kept.changes() {
             for (index, color) in part.pixels.iter().enumerate() {

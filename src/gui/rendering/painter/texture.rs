@@ -104,6 +104,7 @@ pub(super) struct Texture {
     pub(super) kind: TexelKind,
     options: TextureOptions,
     texels: Vec<u32>,
+    newest: u64,
     /// Version of the last change of each block of [`BLOCK_ROWS`] rows.
     versions: Vec<u64>,
 }
@@ -112,7 +113,15 @@ impl Texture {
     fn new(size: [usize; 2], pixels: &[Color32], options: TextureOptions, version: u64) -> Self {
         let texels = pixels.iter().map(|color| blend::pack(color.to_array())).collect();
         let versions = vec![version; size[1].div_ceil(BLOCK_ROWS)];
-        Self { width: size[0], height: size[1], kind: TexelKind::of(pixels), options, texels, versions }
+        Self {
+            width: size[0],
+            height: size[1],
+            kind: TexelKind::of(pixels),
+            options,
+            texels,
+            newest: version,
+            versions,
+        }
     }
 
     /// Records a change of rows, and of the texture options.
@@ -124,6 +133,7 @@ impl Texture {
             0..all
         };
         self.options = options;
+        self.newest = version;
         self.versions[blocks].fill(version);
     }
 
@@ -141,6 +151,16 @@ impl Texture {
             0..all
         };
         self.versions.get(blocks).unwrap_or(&self.versions).iter().copied().max().unwrap_or(0)
+    }
+
+    /// Version of the last change.
+    pub(super) fn newest(&self) -> u64 {
+        self.newest
+    }
+
+    /// What the rows of these texture coordinates, and the corner texel, look like; it differs after every change of them.
+    pub(super) fn state(&self, vs: [f32; 2]) -> (u64, u32) {
+        (self.version([vs[0], vs[1], vs[1]]), self.corner())
     }
 
     /// The corner texel, which egui uses for untextured meshes.
