@@ -173,7 +173,9 @@ impl ShapeHasher {
             Shape::Noop => {}
             Shape::Vec(shapes) => {
                 self.word(shapes.len() as u64);
-                shapes.iter().for_each(|shape| self.shape(shape));
+                for shape in shapes {
+                    self.shape(shape);
+                }
             }
             Shape::Circle(CircleShape { center, radius, fill, stroke }) => {
                 self.numbers([center.x, center.y, *radius]);
