@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
-use dcvins::export::{self, ReportOptions, write_known_report, write_report};
+use dcvins::export::{self, ReportFigure, ReportOptions, write_known_report, write_report};
 use dcvins::log_check::{self, CheckReport};
 use dcvins::session::{Computation, SessionPlan, image_rotations};
 
@@ -66,16 +66,20 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
         return Ok(Outcome::Success);
     }
     let plan = SessionPlan { interrupted: interrupt.flag(), ..plan.clone() };
-    let (computation, checked) = computed_and_checked(&plan);
-    let mut computation = computation?;
-    if interrupt.is_set() && computation.recording().runs.iter().all(|run| run.steps.is_empty()) {
+    let stopped_early = |computation: &Computation| {
+        interrupt.is_set() && computation.recording().runs.iter().all(|run| run.steps.is_empty())
+    };
+    let (computed, checked) = beside_check(&plan, || {
+        let mut computation = compute(&plan, None)?;
+        let figures =
+            if stopped_early(&computation) { Vec::new() } else { figures_of(arguments, &plan, &mut computation)? };
+        Ok((computation, figures))
+    });
+    let (mut computation, figures) = computed?;
+    if stopped_early(&computation) {
         notify("dcvins: interrupted before the first step; nothing is written");
         return Ok(Outcome::Interrupted);
     }
-    #[cfg(feature = "gui")]
-    let figures = report_figures::draw(arguments, &plan, &mut computation)?;
-    #[cfg(not(feature = "gui"))]
-    let figures = Vec::new();
     // The verdict needs the complete last steps.
     computation.fill_in(computation.recording().last_stamp_ns());
     let options = ReportOptions {
@@ -135,17 +139,34 @@ fn own_command_line() -> String {
     command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
 }
 
-/// Runs the estimators and, at the same time, checks the log and its rig.
-fn computed_and_checked(plan: &SessionPlan) -> (Result<Computation>, CheckReport) {
+/// Does the work and, at the same time, checks the log and its rig.
+fn beside_check<T>(plan: &SessionPlan, work: impl FnOnce() -> Result<T>) -> (Result<T>, CheckReport) {
     std::thread::scope(|scope| {
         let checking = scope.spawn(|| {
             let rotations = image_rotations(&plan.log, &plan.rig);
             log_check::check(&plan.log, Ok(&plan.rig), &rotations)
         });
-        let computation = compute(plan, None);
+        let done = work();
         let _progress = Progress::spinner("checking the log");
-        (computation, checking.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+        (done, checking.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     })
+}
+
+/// The figures of the page.
+#[cfg(feature = "gui")]
+fn figures_of(
+    arguments: &ReportArguments,
+    plan: &SessionPlan,
+    computation: &mut Computation,
+) -> Result<Vec<ReportFigure>> {
+    report_figures::draw(arguments, plan, computation)
+}
+
+/// Without the window no figures can be drawn.
+#[cfg(not(feature = "gui"))]
+#[expect(clippy::unnecessary_wraps, reason = "with the window it can fail")]
+fn figures_of(_: &ReportArguments, _: &SessionPlan, _: &mut Computation) -> Result<Vec<ReportFigure>> {
+    Ok(Vec::new())
 }
 
 /// The command line in a form that can be typed again, with the program's name without its folder.

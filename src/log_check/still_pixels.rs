@@ -55,26 +55,34 @@ impl GradientSums {
         }
         self.images += 1;
         let small = self.averaged(image);
+        let width = self.width;
         for row in 1..self.height.saturating_sub(1) {
-            for column in 1..self.width.saturating_sub(1) {
-                let at = row * self.width + column;
-                let along = 0.5 * (small[at + 1] - small[at - 1]);
-                let down = 0.5 * (small[at + self.width] - small[at - self.width]);
-                let sum = &mut self.sums[at];
-                *sum = [sum[0] + along, sum[1] + down, sum[2] + along.hypot(down)];
+            let line = |row: usize| &small[row * width..(row + 1) * width];
+            let (above, here, below) = (line(row - 1), line(row), line(row + 1));
+            let sums = &mut self.sums[row * width..(row + 1) * width];
+            for column in 1..width.saturating_sub(1) {
+                let along = 0.5 * (here[column + 1] - here[column - 1]);
+                let down = 0.5 * (below[column] - above[column]);
+                let sum = &mut sums[column];
+                *sum = [sum[0] + along, sum[1] + down, sum[2] + length(along, down)];
             }
         }
     }
 
     fn averaged(&self, image: &GrayImage) -> Vec<f32> {
         let scale = self.scale;
-        let pixel = |index: usize| {
-            let (left, top) = (scale * (index % self.width), scale * (index / self.width));
-            let row = |row: usize| &image.pixels[row * image.width + left..][..scale];
-            let sum: u32 = (top..top + scale).flat_map(row).map(|pixel| u32::from(*pixel)).sum();
-            sum as f32 / (scale * scale) as f32
-        };
-        (0..self.width * self.height).map(pixel).collect()
+        let mut averaged = Vec::with_capacity(self.width * self.height);
+        let mut sums = vec![0_u32; self.width];
+        for rows in image.pixels.chunks_exact((scale * image.width).max(1)) {
+            sums.fill(0);
+            for row in rows.chunks_exact(image.width) {
+                for (sum, pixels) in sums.iter_mut().zip(row.chunks_exact(scale)) {
+                    *sum += pixels.iter().map(|pixel| u32::from(*pixel)).sum::<u32>();
+                }
+            }
+            averaged.extend(sums.iter().map(|sum| *sum as f32 / (scale * scale) as f32));
+        }
+        averaged
     }
 
     fn blocks(&self) -> [usize; 2] {
@@ -89,7 +97,7 @@ impl GradientSums {
             let row = |row: usize| &self.sums[row * self.width + left..][..BLOCK];
             let (mut summed, mut norms) = (0.0_f32, 0.0_f32);
             for [along, down, norm] in (top..top + BLOCK).flat_map(row) {
-                summed += along.hypot(*down);
+                summed += length(*along, *down);
                 norms += norm;
             }
             let textured = norms > MIN_GRADIENT * (self.images * BLOCK * BLOCK) as f32;
@@ -123,6 +131,15 @@ impl GradientSums {
         let masked = (top..top + side).flat_map(|row| (left..left + side).map(move |column| (column, row)));
         2 * masked.filter(|(column, row)| mask.is_masked(*column, *row)).count() > side * side
     }
+}
+
+/// Length of a gradient.
+#[expect(
+    clippy::imprecise_flops,
+    reason = "gradients of grey values neither overflow nor vanish, and `hypot` takes long"
+)]
+fn length(along: f32, down: f32) -> f32 {
+    (along * along + down * down).sqrt()
 }
 
 /// Keeps the still blocks that have neighbours enough.

@@ -17,6 +17,7 @@ mod spline;
 pub use self::rates::AngularRates;
 
 use nalgebra::{UnitQuaternion, Vector3};
+use rayon::prelude::*;
 
 use self::pair_motion::PairMotion;
 use super::outliers::BearingPair;
@@ -315,14 +316,13 @@ impl<'a> Search<'a> {
     /// Fits the motion of every pair at a readout; returns their cost.
     fn fit(&mut self, readout_s: f64) -> f64 {
         let mut pairs = std::mem::take(&mut self.pairs);
-        let mut cost = 0.0;
-        for pair in &mut pairs {
+        pairs.par_iter_mut().for_each(|pair| {
             let carried = self.carried(pair.images, readout_s);
             pair.motion = pair.motion.fitted(&carried, self.sigma_rad);
-            cost += if pair.counts { pair.motion.cost } else { 0.0 };
-        }
+        });
         self.pairs = pairs;
-        cost
+        // Added up in their order, so that the cost does not depend on the number of threads.
+        self.counting().map(|pair| pair.motion.cost).sum()
     }
 
     /// The readout of least cost among those of a grid over the whole range.
