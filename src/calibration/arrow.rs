@@ -16,6 +16,8 @@ use rayon::prelude::*;
 
 /// Block size of the band's factorization, in rows and columns.
 const BLOCK: usize = 64;
+/// Entries that one thread fills with zeros at a time.
+const FILLED: usize = 1 << 17;
 /// Rows of the border that are solved for at once.
 const FORWARD_ROWS: usize = 3;
 
@@ -41,10 +43,15 @@ pub(super) struct Band {
 }
 
 impl Band {
-    fn zeros(len: usize, half_width: usize) -> Self {
+    /// Of hundreds of megabytes for a long flight: to fill memory that is there with zeros is faster than to get new one.
+    fn zeros(len: usize, half_width: usize, memory: Vec<f64>) -> Self {
         let reach = half_width.min(len.saturating_sub(1)).div_ceil(BLOCK);
         let blocks = len.div_ceil(BLOCK);
-        Self { len, reach, entries: vec![0.0; blocks * BLOCK * (reach + 1) * BLOCK] }
+        let mut entries = memory;
+        entries.truncate(blocks * BLOCK * (reach + 1) * BLOCK);
+        entries.par_chunks_mut(FILLED).for_each(|part| part.fill(0.0));
+        entries.resize(blocks * BLOCK * (reach + 1) * BLOCK, 0.0);
+        Self { len, reach, entries }
     }
 
     /// Number of stored entries per row.
@@ -227,10 +234,11 @@ fn factored_block(rows: &mut [f64], width: usize) -> Option<Llt<f64>> {
 }
 
 impl ArrowMatrix {
-    /// Returns a zero matrix for `len` unknowns in the band and `borders` in the border.
-    pub(super) fn zeros(len: usize, half_width: usize, borders: usize) -> Self {
+    /// Returns a zero matrix for `len` unknowns in the band and `borders` in the border, in the memory of an earlier one
+    /// ([`ArrowFactor::into_memory`]).
+    pub(super) fn zeros(len: usize, half_width: usize, borders: usize, memory: Vec<f64>) -> Self {
         Self {
-            band: Band::zeros(len, half_width),
+            band: Band::zeros(len, half_width, memory),
             border: vec![vec![0.0; len]; borders],
             corner: DMatrix::zeros(borders, borders),
         }
@@ -300,6 +308,11 @@ pub(super) struct ArrowFactor {
 }
 
 impl ArrowFactor {
+    /// The memory of the band, for the next matrix.
+    pub(super) fn into_memory(self) -> Vec<f64> {
+        self.band.entries
+    }
+
     /// Information matrix of the border's unknowns with the band eliminated (borders × borders).
     pub(super) fn border_information(&self) -> &DMatrix<f64> {
         &self.corner

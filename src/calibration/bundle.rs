@@ -237,15 +237,17 @@ impl Bundle<'_> {
         self.tracks.iter().map(span).max().unwrap_or(0).max(1)
     }
 
-    /// Returns the reduced normal equations and their right side `−gradient`, split into band and border.
+    /// Returns the reduced normal equations and their right side `−gradient`, split into band and border; `memory` is that
+    /// of the equations before.
     pub(super) fn assemble(
         &self,
         equations: &BundleEquations,
         reduced: &ReducedVisualEquations,
+        memory: Vec<f64>,
     ) -> (ArrowMatrix, Vec<f64>, DVector<f64>) {
         let columns = &self.columns;
         let mut matrix =
-            ArrowMatrix::zeros(columns.band(), (self.reach() + 1) * columns.block() - 1, columns.borders());
+            ArrowMatrix::zeros(columns.band(), (self.reach() + 1) * columns.block() - 1, columns.borders(), memory);
         let mut band = vec![0.0; columns.band()];
         let mut border = -&equations.border_gradient;
         *matrix.corner_mut() += &equations.border_hessian;

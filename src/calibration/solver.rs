@@ -31,31 +31,37 @@ pub(super) fn adjust(bundle: &Bundle<'_>, start: Estimate, options: &Calibration
         max_damping: 1e8,
         growth: 30.0,
     };
-    let solution = minimize(&mut DampedBundle(bundle), start, &options);
+    let solution = minimize(&mut DampedBundle { bundle, memory: Vec::new() }, start, &options);
     (!solution.iterations.is_empty()).then_some(Adjusted { estimate: solution.estimate, iterations: solution.tried })
 }
 
 /// The bundle as a problem of the damped solver.
-struct DampedBundle<'a>(&'a Bundle<'a>);
+struct DampedBundle<'a> {
+    bundle: &'a Bundle<'a>,
+    /// Of the equations of the last step.
+    memory: Vec<f64>,
+}
 
 impl DampedProblem for DampedBundle<'_> {
     type Estimate = Estimate;
     type Equations = BundleEquations;
 
     fn cost(&self, estimate: &Estimate) -> f64 {
-        self.0.cost(estimate)
+        self.bundle.cost(estimate)
     }
 
     fn linearize(&self, estimate: &Estimate) -> BundleEquations {
-        self.0.linearize(estimate)
+        self.bundle.linearize(estimate)
     }
 
     fn step(&mut self, estimate: &Estimate, equations: &BundleEquations, damping: f64) -> Option<Estimate> {
-        let bundle = self.0;
+        let bundle = self.bundle;
         let reduced = equations.visual().eliminate_by_parts(damping);
-        let (mut matrix, band, border) = bundle.assemble(equations, &reduced);
+        let (mut matrix, band, border) = bundle.assemble(equations, &reduced, std::mem::take(&mut self.memory));
         matrix.damp(damping, FLOOR);
-        let (band, border) = matrix.factor()?.solve(&band, &border)?;
+        let factor = matrix.factor()?;
+        let (band, border) = factor.solve(&band, &border)?;
+        self.memory = factor.into_memory();
         let view_steps = bundle.view_steps(equations, &band, &border);
         let landmarks = equations.visual().substitute(&reduced, |view| view_steps[&view]);
         Some(estimate.moved(&bundle.columns, &band, &border, &landmarks))
@@ -74,7 +80,7 @@ pub(super) struct Covariances {
 pub(super) fn covariances(bundle: &Bundle<'_>, estimate: &Estimate, of_poses: bool) -> Option<Covariances> {
     let equations = bundle.linearize(estimate);
     let reduced = equations.visual().eliminate_by_parts(0.0);
-    let (mut matrix, _, _) = bundle.assemble(&equations, &reduced);
+    let (mut matrix, _, _) = bundle.assemble(&equations, &reduced, Vec::new());
     matrix.damp(0.0, FLOOR);
     let factor = matrix.factor()?;
     let border = factor.border_information().clone().cholesky()?.inverse();

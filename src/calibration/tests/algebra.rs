@@ -20,7 +20,7 @@ fn example(len: usize, half_width: usize, borders: usize) -> (DMatrix<f64>, Arro
             }
         }
     }
-    let mut arrow = ArrowMatrix::zeros(len, half_width, borders);
+    let mut arrow = ArrowMatrix::zeros(len, half_width, borders, vec![1.5; 1000]);
     for row in 0..len {
         for column in row.saturating_sub(half_width)..(row + half_width + 1).min(len) {
             arrow.add(row, column, dense[(row, column)]);
@@ -70,7 +70,7 @@ fn the_bordered_band_solver_equals_dense_algebra() {
 
 #[test]
 fn a_matrix_that_is_not_positive_definite_is_refused() {
-    let mut arrow = ArrowMatrix::zeros(3, 1, 0);
+    let mut arrow = ArrowMatrix::zeros(3, 1, 0, Vec::new());
     arrow.add(0, 0, 1.0);
     arrow.add(1, 1, -1.0);
     arrow.add(2, 2, 1.0);

@@ -148,7 +148,7 @@ fn the_gradient_of_the_whole_bundle_is_that_of_its_cost() {
     let equations = bundle.linearize(&example.estimate);
     // Landmarks that are held by such a damping do not move: what is left is the plain gradient.
     let reduced = equations.visual().eliminate(1e18);
-    let (_, band, border) = bundle.assemble(&equations, &reduced);
+    let (_, band, border) = bundle.assemble(&equations, &reduced, Vec::new());
     let landmarks = vec![Vector3::zeros(); example.estimate.landmarks.len()];
     let slope = |column: usize| {
         let cost = |step: f64| {
