@@ -6,51 +6,60 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Factor of the standard deviation.
 const SIGMAS: f64 = 3.0;
-/// Largest number of cross-sections.
-const MAX_RINGS: usize = 120;
+/// Largest number of cross-sections of a path without interruption.
+const MAX_RINGS: f64 = 180.0;
 /// Points of a cross-section.
 const RING_POINTS: usize = 20;
-/// Shortest distance of two cross-sections in metres.
+/// Shortest distance of two cross-sections in metres; longer ones are a power of two of it.
 const MIN_SPACING_M: f64 = 0.02;
 /// Lines along the trajectory.
 const SIDES: usize = 4;
 
 /// Cross-sections at equal distances along the path, perpendicular to it, and lines along it on four sides.
 ///
-/// A cross-section is the ellipse of 3σ of the position across the path. Places that are not finite interrupt the tube.
-pub(super) fn outline(places: impl Iterator<Item = (Vector3<f64>, Matrix3<f64>)>) -> Vec<Vec<Vector3<f64>>> {
-    let places: Vec<_> = places.collect();
-    let known = |(place, covariance): &(Vector3<f64>, Matrix3<f64>)| {
-        place.iter().chain(covariance.iter()).all(|number| number.is_finite())
-    };
+/// `place` and `covariance` return the position in metres and its covariance in m² of a step; steps without a place
+/// interrupt the tube. A cross-section is the ellipse of 3σ of the position across the path. The distance of two
+/// cross-sections doubles as the path gets longer: in between they stay where they are.
+pub(super) fn outline(
+    steps: usize,
+    place: impl Fn(usize) -> Option<Vector3<f64>>,
+    covariance: impl Fn(usize) -> Matrix3<f64>,
+) -> Vec<Vec<Vector3<f64>>> {
+    let places: Vec<Option<Vector3<f64>>> = (0..steps).map(place).collect();
+    let way = |pair: &[Option<Vector3<f64>>]| Some((pair[1]? - pair[0]?).norm());
+    let length_m: f64 = places.windows(2).filter_map(way).sum();
+    let mut spacing_m = MIN_SPACING_M;
+    while spacing_m * MAX_RINGS < length_m {
+        spacing_m *= 2.0;
+    }
     let mut lines = Vec::new();
-    let length_m: f64 =
-        places.windows(2).filter(|pair| pair.iter().all(known)).map(|pair| (pair[1].0 - pair[0].0).norm()).sum();
-    let spacing_m = (length_m / MAX_RINGS as f64).max(MIN_SPACING_M);
-    for part in places.split(|place| !known(place)) {
-        let rings = rings(part, spacing_m);
+    let mut rings: Vec<Vec<Vector3<f64>>> = Vec::new();
+    let mut finish = |rings: &mut Vec<Vec<Vector3<f64>>>| {
         for side in 0..SIDES {
             lines.push(rings.iter().map(|ring| ring[side * RING_POINTS / SIDES]).collect());
         }
-        lines.extend(rings);
-    }
-    lines.retain(|line| line.len() > 1);
-    lines
-}
-
-/// The cross-sections of an uninterrupted part of a path, each closed.
-fn rings(part: &[(Vector3<f64>, Matrix3<f64>)], spacing_m: f64) -> Vec<Vec<Vector3<f64>>> {
-    let mut rings = Vec::new();
-    let Some(&(mut last, _)) = part.first() else { return rings };
-    for (place, covariance) in part {
-        let way = place - last;
+        lines.append(rings);
+    };
+    let mut last = None;
+    for (step, place) in places.into_iter().enumerate() {
+        let (Some(place), Some(before)) = (place, last) else {
+            finish(&mut rings);
+            last = place;
+            continue;
+        };
+        let way: Vector3<f64> = place - before;
         if way.norm() < spacing_m {
             continue;
         }
-        last = *place;
-        rings.push(ring(place, covariance, &way.normalize()));
+        last = Some(place);
+        let covariance = covariance(step);
+        if covariance.iter().all(|number| number.is_finite()) {
+            rings.push(ring(&place, &covariance, &way.normalize()));
+        }
     }
-    rings
+    finish(&mut rings);
+    lines.retain(|line| line.len() > 1);
+    lines
 }
 
 /// The ellipse of 3σ across a direction, from the right-hand side on.
@@ -80,10 +89,8 @@ mod tests {
     #[test]
     fn cross_sections_are_ellipses_of_three_sigma_and_gaps_interrupt_them() {
         let covariance = Matrix3::new(0.04, 0.0, 0.0, 0.0, 0.01, 0.004, 0.0, 0.004, 0.04);
-        let at = |step: usize| (Vector3::new(0.5 * step as f64, 0.0, 0.0), covariance);
-        let mut places: Vec<_> = (0..40).map(at).collect();
-        places[20].1[(0, 0)] = f64::NAN;
-        let lines = outline(places.into_iter());
+        let place = |step: usize| (step != 20).then(|| Vector3::new(0.5 * step as f64, 0.0, 0.0));
+        let lines = outline(40, place, |_| covariance);
         let rings: Vec<_> = lines.iter().filter(|line| (line[0] - line[line.len() - 1]).norm() < 1e-12).collect();
         // The first place of each of the two parts has no direction.
         assert_eq!((rings.len(), lines.len() - rings.len()), (37, 2 * SIDES));
@@ -100,9 +107,21 @@ mod tests {
 
     #[test]
     fn a_vertical_path_and_one_place_are_no_failure() {
-        let places = (0..4).map(|step| (Vector3::new(0.0, 0.0, f64::from(step)), Matrix3::identity()));
-        assert!(outline(places).iter().flatten().all(|point| point.iter().all(|x| x.is_finite())));
-        assert!(outline(std::iter::repeat_n((Vector3::zeros(), Matrix3::identity()), 9)).is_empty());
-        assert!(outline(std::iter::empty()).is_empty());
+        let lines = outline(4, |step| Some(Vector3::new(0.0, 0.0, step as f64)), |_| Matrix3::identity());
+        assert!(lines.iter().flatten().all(|point| point.iter().all(|x| x.is_finite())));
+        assert!(outline(9, |_| Some(Vector3::zeros()), |_| Matrix3::identity()).is_empty());
+        assert!(outline(0, |_| None, |_| Matrix3::identity()).is_empty());
+    }
+
+    #[test]
+    fn cross_sections_stay_in_place_until_their_distance_doubles() {
+        let places_of = |steps: usize| -> Vec<f64> {
+            let place = |step: usize| Some(Vector3::new(0.011 * step as f64, 0.0, 0.0));
+            outline(steps, place, |_| Matrix3::identity()).iter().skip(SIDES).map(|ring| ring[0].x).collect()
+        };
+        let (before, longer, doubled) = (places_of(300), places_of(327), places_of(400));
+        assert_eq!((before.len(), longer.len(), doubled.len()), (149, 163, 99));
+        assert!(longer.starts_with(&before));
+        assert!(longer.iter().skip(1).step_by(2).zip(&doubled).all(|(place, kept)| place == kept));
     }
 }

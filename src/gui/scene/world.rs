@@ -132,19 +132,21 @@ impl<'a> RunView<'a> {
         broken_line(self.shown, |step| self.place(GROUND_TRUTH, step))
     }
 
-    /// Aligned positions with their covariances in m², of the estimated frames.
-    pub(super) fn uncertain_places(&self) -> impl Iterator<Item = (Vector3<f64>, Matrix3<f64>)> {
+    /// The tube of three standard deviations around the estimated positions.
+    fn tube_m(&self) -> Vec<Vec<Vector3<f64>>> {
         let rotation = self.aligned.rotation.to_rotation_matrix();
-        let stamps = &self.places.stamps_ns[..self.shown];
-        (0..stamps.len()).map(move |step| {
+        let covariance_m2 = |step: usize| {
             let mut covariance = Matrix3::zeros();
             for (column, (row, other)) in UPPER.into_iter().enumerate() {
                 let value = self.places.columns[COVARIANCE + column][step];
                 (covariance[(row, other)], covariance[(other, row)]) = (value, value);
             }
-            let turned = rotation.matrix() * covariance * rotation.matrix().transpose();
-            (self.aligned.transform(&self.place(ESTIMATE, step)), turned)
-        })
+            rotation.matrix() * covariance * rotation.matrix().transpose()
+        };
+        let is_known =
+            |step: usize| [ESTIMATE, COVARIANCE].iter().all(|column| self.places.columns[*column][step].is_finite());
+        let place = |step: usize| is_known(step).then(|| self.aligned.transform(&self.place(ESTIMATE, step)));
+        tube::outline(self.shown, place, covariance_m2)
     }
 
     fn place(&self, column: usize, step: usize) -> Vector3<f64> {
@@ -329,7 +331,7 @@ impl<'a> WorldBuilder<'a> {
             }
         }
         if self.options.tube {
-            for line in tube::outline(view.uncertain_places()) {
+            for line in view.tube_m() {
                 self.scene.line(line, faint, 1.0, &[]);
             }
         }
