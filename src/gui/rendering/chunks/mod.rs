@@ -73,16 +73,17 @@ impl Tessellation {
         let mut run = Vec::new();
         let mut hasher = ShapeHasher::default();
         let mut shapes = shapes.into_iter().peekable();
+        let mut next_is_alone = shapes.peek().is_some_and(is_alone);
         while let Some(shape) = shapes.next() {
-            let points = hasher.add(&shape);
+            let this_is_alone = std::mem::replace(&mut next_is_alone, shapes.peek().is_some_and(is_alone));
+            hasher.add(&shape);
             let clip_rect = shape.clip_rect;
             run.push(shape);
-            let ends = points > MANY_POINTS
+            let ends = this_is_alone
+                || next_is_alone
                 || run.len() >= MOST_SHAPES
                 || hasher.last() & ENDING_BITS == 0
-                || shapes
-                    .peek()
-                    .is_none_or(|next| next.clip_rect != clip_rect || shape_hash::points_of(&next.shape) > MANY_POINTS);
+                || shapes.peek().is_none_or(|next| next.clip_rect != clip_rect);
             if !ends {
                 continue;
             }
@@ -104,4 +105,9 @@ impl Tessellation {
         self.chunks = kept;
         chunks
     }
+}
+
+/// Whether a shape is a chunk of its own.
+fn is_alone(shape: &ClippedShape) -> bool {
+    shape_hash::points_of(&shape.shape) > MANY_POINTS
 }

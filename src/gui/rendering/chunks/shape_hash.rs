@@ -49,8 +49,8 @@ pub(super) struct ShapeHasher {
 }
 
 impl ShapeHasher {
-    /// Adds a shape and returns the number of its points.
-    pub(super) fn add(&mut self, clipped: &ClippedShape) -> usize {
+    /// Adds a shape.
+    pub(super) fn add(&mut self, clipped: &ClippedShape) {
         let ClippedShape { clip_rect, shape, transform_after_tessellation } = clipped;
         self.last = 0;
         self.rect(*clip_rect);
@@ -58,7 +58,6 @@ impl ShapeHasher {
         self.numbers([scaling, translation.x, translation.y]);
         self.shape(shape);
         self.all = mixed(self.all, self.last);
-        points_of(shape)
     }
 
     /// Hash of the last shape.
@@ -80,13 +79,9 @@ impl ShapeHasher {
         self.last = mixed(self.last, word);
     }
 
-    fn pair(&mut self, first: f32, second: f32) {
-        self.word(joined(first, second));
-    }
-
     fn numbers<const N: usize>(&mut self, numbers: [f32; N]) {
         for pair in numbers.chunks(2) {
-            self.pair(pair[0], pair.get(1).copied().unwrap_or(0.0));
+            self.word(joined(pair[0], pair.get(1).copied().unwrap_or(0.0)));
         }
     }
 
