@@ -9,6 +9,7 @@ use pulp::{Arch, NullaryFnOnce};
 
 use super::products::sums_of_products;
 use super::pyramid::{Pyramid, cut_out};
+use crate::geometry::planar_length;
 use crate::sensors::GrayImage;
 
 /// Side of the tracked square in pixels, on every level.
@@ -113,14 +114,7 @@ pub(super) fn larger(a: f32, b: f32) -> f32 {
 /// A symmetric 2 × 2 matrix `[xx, xy, yy]` has this smaller eigenvalue.
 #[inline(always)]
 pub(super) fn smaller_eigenvalue([xx, xy, yy]: [f32; 3]) -> f32 {
-    0.5 * (xx + yy) - length([0.5 * (xx - yy), xy])
-}
-
-/// Length of a vector.
-#[expect(clippy::imprecise_flops, reason = "`hypot` is a call into the C library, this a vector instruction")]
-#[inline(always)]
-fn length([x, y]: [f32; 2]) -> f32 {
-    (x * x + y * y).sqrt()
+    0.5 * (xx + yy) - planar_length([0.5 * (xx - yy), xy])
 }
 
 /// Weights of the four pixels around a point at `t` after the second one, by Keys' cubic convolution.
@@ -400,7 +394,7 @@ fn settle<const N: usize>(
         let [along, down] = fraction.map(|t| (kernel.0(t), kernel.1(t)));
         let (value, slope) = balance(sums, along, down);
         let [x, y] = step_to_balance(value, slope, hessian);
-        let length = length([x, y]);
+        let length = planar_length([x, y]);
         let shrink = if length > LONGEST_STEP_PX { LONGEST_STEP_PX / length } else { 1.0 };
         fraction = [fraction[0] + shrink * x, fraction[1] + shrink * y];
         if length < epsilon {
@@ -559,7 +553,7 @@ pub(super) fn arrive(
     let found = buffers.track_on_image(previous, now, from, near, options)?;
     if let Some(limit_px) = options.forward_backward_px {
         let back = buffers.track_on_image(now, previous, found, from, options)?;
-        if length([back[0] - from[0], back[1] - from[1]]) > limit_px as f32 {
+        if planar_length([back[0] - from[0], back[1] - from[1]]) > limit_px as f32 {
             return None;
         }
     }

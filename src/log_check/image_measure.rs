@@ -35,7 +35,7 @@ pub(super) fn measure(image: &GrayImage) -> ImageMeasure {
             let value = here[column];
             let along = i32::from(here[column + 1]) - i32::from(here[column - 1]);
             let across = i32::from(below[column]) - i32::from(above[column]);
-            // Of two pixels' distance half is the slope.
+            // The neighbours are two pixels apart.
             let slope = 0.5 * f64::from(along * along + across * across).sqrt();
             slopes[(slope as usize).min(255)] += 1;
             count += 1;

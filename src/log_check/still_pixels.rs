@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 use super::survey::Survey;
 use super::{Area, Findings, ImageRotation, ProposedMask, Severity};
+use crate::geometry::planar_length;
 use crate::sensors::{GrayImage, ImageMask, Rig};
 
 /// Images are averaged down to at most this width.
@@ -64,7 +65,7 @@ impl GradientSums {
                 let along = 0.5 * (here[column + 1] - here[column - 1]);
                 let down = 0.5 * (below[column] - above[column]);
                 let sum = &mut sums[column];
-                *sum = [sum[0] + along, sum[1] + down, sum[2] + length(along, down)];
+                *sum = [sum[0] + along, sum[1] + down, sum[2] + planar_length([along, down])];
             }
         }
     }
@@ -97,7 +98,7 @@ impl GradientSums {
             let row = |row: usize| &self.sums[row * self.width + left..][..BLOCK];
             let (mut summed, mut norms) = (0.0_f32, 0.0_f32);
             for [along, down, norm] in (top..top + BLOCK).flat_map(row) {
-                summed += length(*along, *down);
+                summed += planar_length([*along, *down]);
                 norms += norm;
             }
             let textured = norms > MIN_GRADIENT * (self.images * BLOCK * BLOCK) as f32;
@@ -131,15 +132,6 @@ impl GradientSums {
         let masked = (top..top + side).flat_map(|row| (left..left + side).map(move |column| (column, row)));
         2 * masked.filter(|(column, row)| mask.is_masked(*column, *row)).count() > side * side
     }
-}
-
-/// Length of a gradient.
-#[expect(
-    clippy::imprecise_flops,
-    reason = "gradients of grey values neither overflow nor vanish, and `hypot` takes long"
-)]
-fn length(along: f32, down: f32) -> f32 {
-    (along * along + down * down).sqrt()
 }
 
 /// Keeps the still blocks that have neighbours enough.
