@@ -46,11 +46,11 @@ impl Band {
     /// Of hundreds of megabytes for a long flight: to fill memory that is there with zeros is faster than to get new one.
     fn zeros(len: usize, half_width: usize, memory: Vec<f64>) -> Self {
         let reach = half_width.min(len.saturating_sub(1)).div_ceil(BLOCK);
-        let blocks = len.div_ceil(BLOCK);
+        let size = len.div_ceil(BLOCK) * BLOCK * (reach + 1) * BLOCK;
         let mut entries = memory;
-        entries.truncate(blocks * BLOCK * (reach + 1) * BLOCK);
+        entries.truncate(size);
         entries.par_chunks_mut(FILLED).for_each(|part| part.fill(0.0));
-        entries.resize(blocks * BLOCK * (reach + 1) * BLOCK, 0.0);
+        entries.resize(size, 0.0);
         Self { len, reach, entries }
     }
 

@@ -66,20 +66,18 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
         return Ok(Outcome::Success);
     }
     let plan = SessionPlan { interrupted: interrupt.flag(), ..plan.clone() };
-    let stopped_early = |computation: &Computation| {
-        interrupt.is_set() && computation.recording().runs.iter().all(|run| run.steps.is_empty())
-    };
     let (computed, checked) = beside_check(&plan, || {
         let mut computation = compute(&plan, None)?;
-        let figures =
-            if stopped_early(&computation) { Vec::new() } else { figures_of(arguments, &plan, &mut computation)? };
-        Ok((computation, figures))
+        if interrupt.is_set() && computation.recording().runs.iter().all(|run| run.steps.is_empty()) {
+            return Ok(None);
+        }
+        let figures = figures_of(arguments, &plan, &mut computation)?;
+        Ok(Some((computation, figures)))
     });
-    let (mut computation, figures) = computed?;
-    if stopped_early(&computation) {
+    let Some((mut computation, figures)) = computed? else {
         notify("dcvins: interrupted before the first step; nothing is written");
         return Ok(Outcome::Interrupted);
-    }
+    };
     // The verdict needs the complete last steps.
     computation.fill_in(computation.recording().last_stamp_ns());
     let options = ReportOptions {

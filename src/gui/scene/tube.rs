@@ -25,41 +25,45 @@ pub(super) fn outline(
     place: impl Fn(usize) -> Option<Vector3<f64>>,
     covariance: impl Fn(usize) -> Matrix3<f64>,
 ) -> Vec<Vec<Vector3<f64>>> {
-    let places: Vec<Option<Vector3<f64>>> = (0..steps).map(place).collect();
-    let way = |pair: &[Option<Vector3<f64>>]| Some((pair[1]? - pair[0]?).norm());
+    let places: Vec<Option<(usize, Vector3<f64>)>> = (0..steps).map(|step| Some((step, place(step)?))).collect();
+    let way = |pair: &[Option<(usize, Vector3<f64>)>]| Some((pair[1]?.1 - pair[0]?.1).norm());
     let length_m: f64 = places.windows(2).filter_map(way).sum();
     let mut spacing_m = MIN_SPACING_M;
     while spacing_m * MAX_RINGS < length_m {
         spacing_m *= 2.0;
     }
     let mut lines = Vec::new();
-    let mut rings: Vec<Vec<Vector3<f64>>> = Vec::new();
-    let mut finish = |rings: &mut Vec<Vec<Vector3<f64>>>| {
+    for part in places.split(Option::is_none) {
+        let rings = rings(part.iter().flatten(), spacing_m, &covariance);
         for side in 0..SIDES {
             lines.push(rings.iter().map(|ring| ring[side * RING_POINTS / SIDES]).collect());
         }
-        lines.append(rings);
-    };
-    let mut last = None;
-    for (step, place) in places.into_iter().enumerate() {
-        let (Some(place), Some(before)) = (place, last) else {
-            finish(&mut rings);
-            last = place;
-            continue;
-        };
-        let way: Vector3<f64> = place - before;
+        lines.extend(rings);
+    }
+    lines.retain(|line| line.len() > 1);
+    lines
+}
+
+/// The cross-sections of an uninterrupted part of a path, each closed.
+fn rings<'a>(
+    mut part: impl Iterator<Item = &'a (usize, Vector3<f64>)>,
+    spacing_m: f64,
+    covariance: impl Fn(usize) -> Matrix3<f64>,
+) -> Vec<Vec<Vector3<f64>>> {
+    let mut rings = Vec::new();
+    let Some(&(_, mut last)) = part.next() else { return rings };
+    for (step, place) in part {
+        let way = place - last;
         if way.norm() < spacing_m {
             continue;
         }
-        last = Some(place);
-        let covariance = covariance(step);
+        last = *place;
+        let covariance = covariance(*step);
         if covariance.iter().all(|number| number.is_finite()) {
-            rings.push(ring(&place, &covariance, &way.normalize()));
+            rings.push(ring(place, &covariance, &way.normalize()));
         }
     }
-    finish(&mut rings);
-    lines.retain(|line| line.len() > 1);
-    lines
+    rings
 }
 
 /// The ellipse of 3σ across a direction, from the right-hand side on.
