@@ -23,7 +23,8 @@ pub enum TrackContinuation {
 pub struct EstimatorOptions {
     /// Number of keyframes in the window beside the newest frame.
     pub window: usize,
-    /// Size of the first window before marginalization starts, as a multiple of `window`.
+    /// Size of the first window before marginalization starts, as a multiple of `window`; twice that where a rotation of the
+    /// chain is given with a standard deviation of more than 0.03 rad.
     pub first_window_factor: usize,
     /// Standard deviation of a well tracked pixel, per coordinate. Most tracks are better, some have errors of a
     /// pixel; `loss` limits their weight.

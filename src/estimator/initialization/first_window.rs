@@ -18,6 +18,7 @@ use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::step_input::StepInput;
 use crate::estimator::window::features::{self, FeatureMap};
 use crate::estimator::window::frames::{Frame, Frames};
+use crate::estimator::window::make_room;
 use crate::estimator::window::sliding_window::SlidingWindow;
 use crate::estimator::window::window_state::WindowState;
 use crate::frontend::TrackedFeature;
@@ -49,7 +50,7 @@ impl<'a> FirstWindow<'a> {
         let leading = calibration.leading();
         let joints = calibration.of(MAIN).joint_count();
         let world = world_from_solution(solution, resume_at);
-        let room = options.window * options.first_window_factor;
+        let room = make_room::first_room(&calibration, options);
         let views = &solution.frames[solution.frames.len().saturating_sub(room + 1)..];
         let errors = calibration.imu_errors().copied();
         let empty = || Preintegration::with_intrinsics(setup.imu_noise, solution.bias, errors);

@@ -405,6 +405,12 @@ impl Calibration {
         jacobian
     }
 
+    /// Standard deviation of the rotations of the given chain, in radians; 0 where the chain is not calibrated or an earlier
+    /// pass has found it.
+    pub(crate) fn given_rotation_sigma_rad(&self) -> f64 {
+        if self.free { self.given.rotation_sigma_rad() } else { 0.0 }
+    }
+
     /// Standard deviation of each column by the rig, before any measurement.
     pub(crate) fn prior_sigmas(&self) -> impl Iterator<Item = f64> + '_ {
         let sensors = self.sensors.iter().map(|column| column.sigma);

@@ -133,6 +133,14 @@ impl GivenChain {
         self.earlier().map_or(self, |earlier| &earlier.rig)
     }
 
+    /// Standard deviation of the rotations that the rig gives, in radians; 0 where an earlier pass has found the chain.
+    pub(super) fn rotation_sigma_rad(&self) -> f64 {
+        match &self.uncertainty {
+            Uncertainty::Rig(sigmas) => sigmas.rotation_rad,
+            Uncertainty::Earlier(_) => 0.0,
+        }
+    }
+
     /// Standard deviations of the chain's columns by the rig.
     pub(super) fn rig_sigmas(&self) -> &DVector<f64> {
         &self.rig().prior_sigmas

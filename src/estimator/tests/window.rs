@@ -6,6 +6,7 @@ use super::fixture;
 use super::fixture::TestWindow;
 use crate::estimator::options::EstimatorOptions;
 use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::window::make_room;
 use crate::estimator::window::marginalization;
 use crate::estimator::window::problem::Estimate;
 use crate::estimator::window::rows::stack;
@@ -269,4 +270,47 @@ fn solving_converges_to_the_ground_truth_from_disturbed_values() {
         assert!(solution.costs_after.visual < 1.5 * expected, "{name}: {:?} of {expected}", solution.costs_after);
         assert!(solution.costs_after.total() < 0.01 * solution.costs_before.total(), "{name}");
     }
+}
+
+/// Damping is no information: neither that of a first step nor that of a step that was rejected at last.
+#[test]
+fn the_covariance_of_a_solve_is_without_damping() {
+    let mut rejected = 0;
+    for (name, mut estimator) in windows() {
+        for (scale, iterations) in [(0.0, 1), (4.0, 1), (8.0, 2), (16.0, 3), (32.0, 4)] {
+            fixture::disturb(&mut estimator, scale);
+            let expected = solver::covariances(&estimator.setup, &estimator.window);
+            let solution = estimator.window.solve(&estimator.setup, iterations).solution;
+            let Some(last) = solution.iterations.last() else { continue };
+            rejected += usize::from(!last.accepted);
+            // A step is linearized at the estimate before it, which a rejected one leaves as it is.
+            let expected = match last.accepted {
+                true if scale > 0.0 => continue,
+                true => expected,
+                false => solver::covariances(&estimator.setup, &estimator.window),
+            };
+            let Some(expected) = expected else { continue };
+            let difference = (&solution.calibration_covariance - &expected.calibration).amax();
+            assert!(
+                difference < 1e-3 * expected.calibration.amax(),
+                "{name}, disturbed {scale} times: {difference} of {}",
+                expected.calibration.amax()
+            );
+        }
+    }
+    assert!(rejected > 5, "{rejected} solves end with a rejected step");
+}
+
+#[test]
+fn an_inaccurate_chain_gets_a_larger_first_window() {
+    let room = |test: &TestWindow| make_room::first_room(&test.window.calibration, &test.setup.config.options);
+    let gimbal = |rotation_sigma_rad: f64, calibrate: bool| {
+        fixture::changed_window(true, quadratic(), |config| {
+            (config.chain_prior, config.calibrate) = (Some((0.005, rotation_sigma_rad)), calibrate);
+        })
+    };
+    let usual = room(&gimbal(0.0087, true));
+    assert_eq!(room(&gimbal(0.1, true)), 2 * usual);
+    assert_eq!(room(&gimbal(0.1, false)), usual, "a fixed chain does not move");
+    assert_eq!(room(&fixture::cluster_window(quadratic(), false)), usual, "a rigid camera leads");
 }

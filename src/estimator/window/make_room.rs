@@ -6,11 +6,26 @@ use super::marginalization;
 use super::window_state::WindowState;
 use crate::estimator::options::{EstimatorOptions, TrackContinuation};
 use crate::estimator::setup::Setup;
+use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::{Event, EventKind};
 use crate::optimization::LandmarkModel;
 
 /// A window above its size shrinks by one frame per keyframe.
 const MAX_MARGINALIZED_AT_ONCE: usize = 2;
+
+/// A rotation of the chain that is given with a larger standard deviation is inaccurate, in radians: derivatives at the given
+/// chain are wrong by as many parts of one.
+const INACCURATE_ROTATION_RAD: f64 = 0.03;
+/// Factor on the size of the first window with an inaccurate chain.
+const INACCURATE_CHAIN_FACTOR: usize = 2;
+
+/// Number of frames in the first window, before marginalization. It is larger than the later ones: marginalization fixes
+/// linearization points, and the chain of the leading camera must be close to its true values before.
+pub(crate) fn first_room(calibration: &Calibrations, options: &EstimatorOptions) -> usize {
+    let given_sigma_rad = calibration.of(calibration.leading()).given_rotation_sigma_rad();
+    let inaccurate = given_sigma_rad > INACCURATE_ROTATION_RAD;
+    options.window * options.first_window_factor * if inaccurate { INACCURATE_CHAIN_FACTOR } else { 1 }
+}
 
 impl WindowState {
     /// Removes a frame for the next image: the second-newest one if it is no keyframe, else the oldest one of a
@@ -35,10 +50,9 @@ impl WindowState {
         }
     }
 
-    /// Number of frames that may remain. The first window is larger: marginalization fixes linearization points,
-    /// and the chain must be close to its true values before.
-    pub(crate) fn room(&self, options: &EstimatorOptions) -> usize {
-        if self.prior.is_none() { options.window * options.first_window_factor } else { options.window }
+    /// Number of frames that may remain.
+    fn room(&self, options: &EstimatorOptions) -> usize {
+        if self.prior.is_none() { first_room(&self.calibration, options) } else { options.window }
     }
 
     /// Drops the frame at a slot before the newest one; its encoder readings and IMU samples go to the next frame.

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix6};
 use super::problem::{Costs, Estimate, NormalEquations, Problem};
 use super::window_state::WindowState;
 use crate::estimator::IterationReport;
+use crate::estimator::factors::visual::ReducedVisualEquations;
 use crate::estimator::setup::Setup;
 use crate::optimization::Cholesky;
 use crate::optimization::damped::{DampedOptions, DampedProblem, Iteration, minimize};
@@ -26,7 +27,8 @@ pub(crate) struct Solution {
     pub(crate) costs_before: Costs,
     pub(crate) costs_after: Costs,
     pub(crate) iterations: Vec<IterationReport>,
-    /// Posterior covariance of the calibration at the last linearization; empty without calibration.
+    /// Posterior covariance of the calibration at the last linearization; empty without calibration and where the information
+    /// is not positive definite.
     pub(crate) calibration_covariance: DMatrix<f64>,
     /// Posterior covariance of the newest pose at the last linearization, rotation first; `None` where the information is not
     /// positive definite.
@@ -43,6 +45,12 @@ impl Solution {
 
 /// Added to the diagonal so that unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
+/// Marquardt's λ of a solve until a step raises the cost: no more than rounding requires.
+///
+/// It multiplies the information that an unknown has while all others are fixed. A rotation of the chain is then known to
+/// 1e-5 rad by the features of a window, but to 1e-2 rad where joint angles and the other rotations are unknown too: λ = 1e-6
+/// would halve its steps.
+const DAMPING: f64 = 1e-9;
 /// A step is short when calibration and newest joint angles move by less than this many standard deviations (root mean
 /// square over the columns): the marginalization keeps what is left of an unfinished solve.
 const SETTLED_SIGMAS: f64 = 0.01;
@@ -53,14 +61,14 @@ const VELOCITY: usize = 3;
 pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits) -> Solution {
     let first = problem.layout.calibration().start;
     let fixed = start.calibration.frozen_columns().into_iter().map(|column| first + column).collect();
-    let mut window = DampedWindow { problem, fixed, step_norms: Vec::new(), solved: None, moved_sigmas: 0.0 };
+    let mut window = DampedWindow { problem, fixed, step_norms: Vec::new(), moved_sigmas: 0.0, information: None };
     let start = window.evaluated(start);
     let costs_before = start.costs;
     let options = DampedOptions {
         iterations: limits.iterations,
         relative_cost_tolerance: limits.relative_cost_tolerance,
-        first_damping: 1e-6,
-        min_damping: 1e-9,
+        first_damping: DAMPING,
+        min_damping: DAMPING,
         max_damping: 1e8,
         growth: 100.0,
     };
@@ -72,10 +80,12 @@ pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits
         step_norm: *step_norm,
         accepted: tried.accepted,
     };
+    let posterior = window.posterior();
+    let posterior = posterior.as_ref();
     Solution {
         iterations: solution.iterations.iter().zip(&window.step_norms).map(report).collect(),
-        newest_pose_covariance: window.newest_pose_covariance(),
-        calibration_covariance: window.calibration_covariance(),
+        newest_pose_covariance: posterior.and_then(|factor| window.newest_pose_covariance(factor)),
+        calibration_covariance: posterior.map_or_else(Default::default, |factor| window.calibration_covariance(factor)),
         costs_before,
         costs_after: solution.estimate.costs,
         estimate: solution.estimate.estimate,
@@ -91,15 +101,8 @@ struct DampedWindow<'a> {
     step_norms: Vec<f64>,
     /// Root mean square step of calibration and newest joint angles in the last solved step, in standard deviations.
     moved_sigmas: f64,
-    solved: Option<SolvedStep>,
-}
-
-/// Equations of the last solved step, landmarks marginalized.
-struct SolvedStep {
-    /// Information without damping.
-    hessian: DMatrix<f64>,
-    /// Factor of the damped information.
-    factor: Cholesky,
+    /// Information at the last linearization, landmarks marginalized, without damping.
+    information: Option<DMatrix<f64>>,
 }
 
 /// An estimate and its costs.
@@ -113,18 +116,29 @@ impl DampedWindow<'_> {
         Evaluated { costs: self.problem.costs(&estimate), estimate }
     }
 
-    /// Posterior covariance of the calibration at the last solved step, other unknowns marginalized; zero for fixed
-    /// parameters, empty without a solved step.
-    fn calibration_covariance(&self) -> DMatrix<f64> {
+    /// Factor of the information at the last linearization: damping would act as information about position, yaw and what
+    /// else the window hardly determines. `None` without a solved step and where the information is not positive definite.
+    fn posterior(&self) -> Option<Cholesky> {
+        self.factor(self.information.as_ref()?, 0.0)
+    }
+
+    /// Posterior covariance of the calibration, other unknowns marginalized; zero for fixed parameters.
+    fn calibration_covariance(&self, posterior: &Cholesky) -> DMatrix<f64> {
         let layout = &self.problem.layout;
-        let Some(solved) = &self.solved else { return DMatrix::zeros(0, 0) };
-        let mut covariance = solved.factor.trailing_covariance(layout.calibration);
+        let mut covariance = posterior.trailing_covariance(layout.calibration);
         for column in &self.fixed {
             let column = column - layout.calibration().start;
             covariance.row_mut(column).fill(0.0);
             covariance.column_mut(column).fill(0.0);
         }
         covariance
+    }
+
+    /// Posterior covariance of the newest pose, other unknowns marginalized; `None` where it is not finite.
+    fn newest_pose_covariance(&self, posterior: &Cholesky) -> Option<Matrix6<f64>> {
+        let newest = self.problem.layout.pose(self.problem.layout.frames.checked_sub(1)?);
+        let covariance = posterior.covariance_of(newest);
+        covariance.iter().all(|entry| entry.is_finite()).then(|| Matrix6::from_column_slice(covariance.as_slice()))
     }
 
     /// Root mean square of a step of the calibration and of the newest frame's joints, in standard deviations.
@@ -134,16 +148,20 @@ impl DampedWindow<'_> {
         factor.trailing_length(count, step) / (count.max(1) as f64).sqrt()
     }
 
+    /// Normal equations without landmarks; fixed parameters do not move.
+    fn reduced(
+        &self,
+        equations: &NormalEquations,
+        eliminated: &[ReducedVisualEquations],
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let (mut hessian, mut gradient) = equations.reduced(&self.problem.layout, eliminated);
+        fix(&self.fixed, &mut hessian, &mut gradient);
+        (hessian, gradient)
+    }
+
     fn factor(&self, hessian: &DMatrix<f64>, damping: f64) -> Option<Cholesky> {
         let raised = |diagonal: f64| diagonal + (damping * diagonal + FLOOR);
         Cholesky::ordered(hessian, self.problem.layout.elimination_order(), raised)
-    }
-
-    /// Posterior covariance of the newest pose without damping, which would act as information about position and yaw.
-    fn newest_pose_covariance(&self) -> Option<Matrix6<f64>> {
-        let newest = self.problem.layout.pose(self.problem.layout.frames.checked_sub(1)?);
-        let covariance = self.factor(&self.solved.as_ref()?.hessian, 0.0)?.covariance_of(newest);
-        covariance.iter().all(|entry| entry.is_finite()).then(|| Matrix6::from_column_slice(covariance.as_slice()))
     }
 }
 
@@ -166,14 +184,15 @@ impl DampedProblem for DampedWindow<'_> {
     fn step(&mut self, evaluated: &Evaluated, equations: &NormalEquations, damping: f64) -> Option<Evaluated> {
         let layout = &self.problem.layout;
         let reduced = equations.eliminate(damping);
-        let (mut hessian, mut gradient) = equations.reduced(layout, &reduced);
-        fix(&self.fixed, &mut hessian, &mut gradient);
+        let (hessian, gradient) = self.reduced(equations, &reduced);
         let factor = self.factor(&hessian, damping)?;
         let step = -factor.solve(&gradient);
         let landmarks = equations.landmark_steps(layout, &reduced, &step);
         self.step_norms.push(step.norm());
         self.moved_sigmas = self.moved_sigmas(&factor, &step);
-        self.solved = Some(SolvedStep { hessian, factor });
+        // With more damping, landmarks keep too much of the information.
+        self.information =
+            Some(if damping > DAMPING { self.reduced(equations, &equations.eliminate(0.0)).0 } else { hessian });
         Some(self.evaluated(self.problem.stepped(&evaluated.estimate, &step, &landmarks)))
     }
 }
