@@ -23,9 +23,10 @@ pub enum TrackContinuation {
 pub struct EstimatorOptions {
     /// Number of keyframes in the window beside the newest frame.
     pub window: usize,
-    /// Size of the first window before marginalization starts, as a multiple of `window`; twice that where a rotation of the
-    /// chain is given with a standard deviation of more than 0.03 rad.
+    /// Size of the first window before marginalization starts, as a multiple of `window`.
     pub first_window_factor: usize,
+    /// The same where rotations of the chain are given with a standard deviation of more than 0.03 rad.
+    pub inaccurate_first_window_factor: usize,
     /// Standard deviation of a well tracked pixel, per coordinate. Most tracks are better, some have errors of a
     /// pixel; `loss` limits their weight.
     pub pixel_sigma_px: f64,
@@ -95,6 +96,7 @@ impl Default for EstimatorOptions {
         Self {
             window: 10,
             first_window_factor: 2,
+            inaccurate_first_window_factor: 4,
             pixel_sigma_px: 0.25,
             loss: RobustLoss::Cauchy(1.0),
             landmark_model: LandmarkModel::BearingAndInverseDistance,

@@ -299,7 +299,12 @@ fn the_window_converges_from_poor_initial_values() {
             .collect()
     };
     let standard = EstimatorOptions::default();
-    let held = EstimatorOptions { first_estimate_reach_rad: f64::INFINITY, first_window_factor: 1, ..standard };
+    let held = EstimatorOptions {
+        first_estimate_reach_rad: f64::INFINITY,
+        first_window_factor: 1,
+        inaccurate_first_window_factor: 1,
+        ..standard
+    };
     let (ours, theirs) = (errors_m(standard), errors_m(held));
     let product = |errors: &[f64]| errors.iter().product::<f64>();
     // The cubic root of the product is the mean ratio of the three.

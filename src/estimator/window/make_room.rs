@@ -16,15 +16,13 @@ const MAX_MARGINALIZED_AT_ONCE: usize = 2;
 /// A rotation of the chain that is given with a larger standard deviation is inaccurate, in radians: derivatives at the given
 /// chain are wrong by as many parts of one.
 const INACCURATE_ROTATION_RAD: f64 = 0.03;
-/// Factor on the size of the first window with an inaccurate chain.
-const INACCURATE_CHAIN_FACTOR: usize = 2;
 
 /// Number of frames in the first window, before marginalization. It is larger than the later ones: marginalization fixes
 /// linearization points, and the chain of the leading camera must be close to its true values before.
 pub(crate) fn first_room(calibration: &Calibrations, options: &EstimatorOptions) -> usize {
     let given_sigma_rad = calibration.of(calibration.leading()).given_rotation_sigma_rad();
     let inaccurate = given_sigma_rad > INACCURATE_ROTATION_RAD;
-    options.window * options.first_window_factor * if inaccurate { INACCURATE_CHAIN_FACTOR } else { 1 }
+    options.window * if inaccurate { options.inaccurate_first_window_factor } else { options.first_window_factor }
 }
 
 impl WindowState {
