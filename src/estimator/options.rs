@@ -24,9 +24,9 @@ pub struct EstimatorOptions {
     /// Number of keyframes in the window beside the newest frame.
     pub window: usize,
     /// Size of the first window before marginalization starts, as a multiple of `window`.
-    pub first_window_factor: usize,
+    pub first_window_factor: u16,
     /// The same where rotations of the chain are given with a standard deviation of more than 0.03 rad.
-    pub inaccurate_first_window_factor: usize,
+    pub inaccurate_first_window_factor: u16,
     /// Standard deviation of a well tracked pixel, per coordinate. Most tracks are better, some have errors of a
     /// pixel; `loss` limits their weight.
     pub pixel_sigma_px: f64,

@@ -22,7 +22,8 @@ const INACCURATE_ROTATION_RAD: f64 = 0.03;
 pub(crate) fn first_room(calibration: &Calibrations, options: &EstimatorOptions) -> usize {
     let given_sigma_rad = calibration.of(calibration.leading()).given_rotation_sigma_rad();
     let inaccurate = given_sigma_rad > INACCURATE_ROTATION_RAD;
-    options.window * if inaccurate { options.inaccurate_first_window_factor } else { options.first_window_factor }
+    let factor = if inaccurate { options.inaccurate_first_window_factor } else { options.first_window_factor };
+    options.window * usize::from(factor)
 }
 
 impl WindowState {
