@@ -1,5 +1,7 @@
 //! Levenberg–Marquardt on the window with landmarks eliminated.
 
+use std::rc::Rc;
+
 use nalgebra::{DMatrix, DVector, Matrix6};
 
 use super::problem::{Costs, Estimate, NormalEquations, Problem};
@@ -7,6 +9,7 @@ use super::window_state::WindowState;
 use crate::estimator::IterationReport;
 use crate::estimator::factors::visual::ReducedVisualEquations;
 use crate::estimator::setup::Setup;
+use crate::estimator::state::layout::Layout;
 use crate::optimization::Cholesky;
 use crate::optimization::damped::{DampedOptions, DampedProblem, Iteration, minimize};
 
@@ -61,7 +64,7 @@ const VELOCITY: usize = 3;
 pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits) -> Solution {
     let first = problem.layout.calibration().start;
     let fixed = start.calibration.frozen_columns().into_iter().map(|column| first + column).collect();
-    let mut window = DampedWindow { problem, fixed, step_norms: Vec::new(), moved_sigmas: 0.0, information: None };
+    let mut window = DampedWindow { problem, fixed, step_norms: Vec::new(), moved_sigmas: 0.0, last: None };
     let start = window.evaluated(start);
     let costs_before = start.costs;
     let options = DampedOptions {
@@ -101,7 +104,14 @@ struct DampedWindow<'a> {
     step_norms: Vec<f64>,
     /// Root mean square step of calibration and newest joint angles in the last solved step, in standard deviations.
     moved_sigmas: f64,
-    /// Information at the last linearization, landmarks marginalized, without damping.
+    /// The last linearization for which a step was solved.
+    last: Option<Linearization>,
+}
+
+/// The window linearized at an estimate.
+struct Linearization {
+    equations: Rc<NormalEquations>,
+    /// Information with the landmarks marginalized, where it was computed without damping.
     information: Option<DMatrix<f64>>,
 }
 
@@ -119,7 +129,13 @@ impl DampedWindow<'_> {
     /// Factor of the information at the last linearization: damping would act as information about position, yaw and what
     /// else the window hardly determines. `None` without a solved step and where the information is not positive definite.
     fn posterior(&self) -> Option<Cholesky> {
-        self.factor(self.information.as_ref()?, 0.0)
+        let layout = &self.problem.layout;
+        let Linearization { equations, information } = self.last.as_ref()?;
+        if let Some(information) = information {
+            return factor(layout, information, 0.0);
+        }
+        let (information, _) = self.reduced(equations, &equations.eliminate(0.0));
+        factor(layout, &information, 0.0)
     }
 
     /// Posterior covariance of the calibration, other unknowns marginalized; zero for fixed parameters.
@@ -158,41 +174,41 @@ impl DampedWindow<'_> {
         fix(&self.fixed, &mut hessian, &mut gradient);
         (hessian, gradient)
     }
+}
 
-    fn factor(&self, hessian: &DMatrix<f64>, damping: f64) -> Option<Cholesky> {
-        let raised = |diagonal: f64| diagonal + (damping * diagonal + FLOOR);
-        Cholesky::ordered(hessian, self.problem.layout.elimination_order(), raised)
-    }
+/// Factors normal equations without landmarks, with λ = `damping`; `None` where they are not positive definite.
+fn factor(layout: &Layout, hessian: &DMatrix<f64>, damping: f64) -> Option<Cholesky> {
+    Cholesky::ordered(hessian, layout.elimination_order(), |diagonal| diagonal + (damping * diagonal + FLOOR))
 }
 
 impl DampedProblem for DampedWindow<'_> {
     type Estimate = Evaluated;
-    type Equations = NormalEquations;
+    type Equations = Rc<NormalEquations>;
 
     fn cost(&self, evaluated: &Evaluated) -> f64 {
         evaluated.costs.total()
     }
 
-    fn linearize(&self, evaluated: &Evaluated) -> NormalEquations {
-        self.problem.linearize(&evaluated.estimate)
+    fn linearize(&self, evaluated: &Evaluated) -> Rc<NormalEquations> {
+        Rc::new(self.problem.linearize(&evaluated.estimate))
     }
 
     fn is_settled(&self) -> bool {
         self.moved_sigmas <= SETTLED_SIGMAS
     }
 
-    fn step(&mut self, evaluated: &Evaluated, equations: &NormalEquations, damping: f64) -> Option<Evaluated> {
+    fn step(&mut self, evaluated: &Evaluated, equations: &Rc<NormalEquations>, damping: f64) -> Option<Evaluated> {
         let layout = &self.problem.layout;
         let reduced = equations.eliminate(damping);
         let (hessian, gradient) = self.reduced(equations, &reduced);
-        let factor = self.factor(&hessian, damping)?;
+        let factor = factor(layout, &hessian, damping)?;
         let step = -factor.solve(&gradient);
         let landmarks = equations.landmark_steps(layout, &reduced, &step);
         self.step_norms.push(step.norm());
         self.moved_sigmas = self.moved_sigmas(&factor, &step);
         // With more damping, landmarks keep too much of the information.
-        self.information =
-            Some(if damping > DAMPING { self.reduced(equations, &equations.eliminate(0.0)).0 } else { hessian });
+        let information = (damping <= DAMPING).then_some(hessian);
+        self.last = Some(Linearization { equations: Rc::clone(equations), information });
         Some(self.evaluated(self.problem.stepped(&evaluated.estimate, &step, &landmarks)))
     }
 }
@@ -213,8 +229,8 @@ pub(crate) fn covariances(setup: &Setup, window: &WindowState) -> Option<WindowC
     let estimate = window.estimate(active.iter().map(|active| active.landmarks.clone()).collect());
     let equations = problem.linearize(&estimate);
     let layout = &problem.layout;
-    let (hessian, _) = equations.reduced(layout, &equations.eliminate(0.0));
-    let factor = Cholesky::ordered(&hessian, layout.elimination_order(), |diagonal| diagonal + FLOOR)?;
+    let (information, _) = equations.reduced(layout, &equations.eliminate(0.0));
+    let factor = factor(layout, &information, 0.0)?;
     let newest = layout.velocity_bias(layout.frames.checked_sub(1)?);
     let newest_bias = factor.covariance_of(newest.start + VELOCITY..newest.end);
     let calibration = factor.trailing_covariance(layout.calibration);
