@@ -85,7 +85,7 @@ impl Subject {
             Self::Panel(PanelName::Convergence) => [1200, 480],
             Self::Panel(PanelName::Rank) => [480, 860],
             Self::Panel(PanelName::Jacobian) => [900, 560],
-            Self::Panel(PanelName::Image) => [560, 470],
+            Self::Panel(PanelName::Image) => [500, 420],
             Self::Panel(PanelName::Residuals) => [560, 480],
             Self::Panel(PanelName::Inspector) => [440, 480],
             Self::Panel(PanelName::Laboratory) => [1100, 760],

@@ -31,6 +31,9 @@ const GYROSCOPE_BIAS_SIGMA_RAD_PER_S: f64 = 0.02;
 /// Standard deviation of the orientation of a rigid camera's extrinsics, in radians (0.6°).
 const RIGID_EXTRINSICS_SIGMA_RAD: f64 = 0.01;
 
+/// Features of a camera on a gimbal, a fifth more than of a rigid camera: they also determine its joint angles.
+const FEATURES_ON_GIMBAL: usize = 180;
+
 /// Time after a stamp over which the motion of the vehicle is kept for the rows of a rolling shutter: shutters read an image
 /// in at most 40 ms, and a time offset may be added. A run or a fork may estimate the readout on any log.
 const LONGEST_READOUT_S: f64 = 0.06;
@@ -52,7 +55,7 @@ impl CameraTracker {
         let mask = camera.mask.as_ref().map(|mask| mask.image.clone());
         Ok(Self {
             stream,
-            front_end: FrontEnd::new(camera.model.clone(), FrontEndOptions::default()).with_mask(mask),
+            front_end: FrontEnd::new(camera.model.clone(), front_end_options(&camera.mount)).with_mask(mask),
             chain: rig.chain_of_camera(camera_key).unwrap_or_default(),
             noise: prediction_noise(rig, &camera.mount),
             readout_s: camera.readout_s,
@@ -121,6 +124,15 @@ impl CameraTracker {
             None => None,
         }
     }
+}
+
+/// Options of the front end of a camera. All runs on a camera share its tracks, so that they depend on the camera alone.
+fn front_end_options(mount: &CameraMount) -> FrontEndOptions {
+    let mut options = FrontEndOptions::default();
+    if *mount == CameraMount::Gimbal {
+        options.corners.max_features = FEATURES_ON_GIMBAL;
+    }
+    options
 }
 
 /// Standard deviations of the inputs of the predicted camera rotation, from the rig.
