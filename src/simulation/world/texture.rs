@@ -12,8 +12,8 @@ pub(crate) struct Texture {
 struct Level {
     width: usize,
     height: usize,
-    /// Texels of this level per texel of the finest one, per axis.
-    scale: [f32; 2],
+    /// Texels of this level per texel of the finest one, along a side.
+    scale: f32,
     /// Rows of one texel more than the width, and one row more than the height: what follows when the texture repeats,
     /// the border again when it does not.
     texels: Vec<u8>,
@@ -56,7 +56,7 @@ impl Texture {
     /// From the finest level, rows top to bottom.
     pub(crate) fn new(width: usize, height: usize, texels: &[u8], wrap: bool, texels_per_m: f32) -> Self {
         debug_assert!(!wrap || (width.is_power_of_two() && height.is_power_of_two()));
-        let mut levels = vec![Level::new([width, height], [1.0; 2], texels, wrap)];
+        let mut levels = vec![Level::new([width, height], 1.0, texels, wrap)];
         while let Some(finer) = levels.last()
             && (finer.width > 1 || finer.height > 1)
         {
@@ -138,8 +138,8 @@ impl Texture {
     fn along(&self, level: &Level, centre: [f32; 2], side: [f32; 2], count: usize) -> f32 {
         let fraction = SHARES[count];
         let first = 0.5 * fraction - 0.5;
-        let start = |axis: usize| ((centre[axis] + side[axis] * first) * level.scale[axis] - 0.5) * FRACTION;
-        let step = |axis: usize| (side[axis] * fraction * level.scale[axis] * FRACTION) as i32;
+        let start = |axis: usize| ((centre[axis] + side[axis] * first) * level.scale - 0.5) * FRACTION;
+        let step = |axis: usize| (side[axis] * fraction * level.scale * FRACTION) as i32;
         let (mut u, mut v) = (start(0) as i32, start(1) as i32);
         let (step_u, step_v) = (step(0), step(1));
         let mut sum = 0_u32;
@@ -154,7 +154,7 @@ impl Texture {
 
 impl Level {
     /// From rows of texels.
-    fn new([width, height]: [usize; 2], scale: [f32; 2], texels: &[u8], wrap: bool) -> Self {
+    fn new([width, height]: [usize; 2], scale: f32, texels: &[u8], wrap: bool) -> Self {
         let after = |size: usize| if wrap { 0 } else { size - 1 };
         let mut padded = Vec::with_capacity((width + 1) * (height + 1));
         for row in (0..height).chain([after(height)]) {
@@ -195,7 +195,7 @@ impl Level {
                 texels.push(((at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1) + 2) / 4) as u8);
             }
         }
-        Self::new([width, height], self.scale.map(|scale| 0.5 * scale), &texels, wrap)
+        Self::new([width, height], 0.5 * self.scale, &texels, wrap)
     }
 }
 
