@@ -111,7 +111,7 @@ struct DampedWindow<'a> {
 /// The window linearized at an estimate.
 struct Linearization {
     equations: Rc<NormalEquations>,
-    /// Information with the landmarks marginalized, where it was computed without damping.
+    /// Information with the landmarks marginalized, where the last step was damped by [`DAMPING`] alone.
     information: Option<DMatrix<f64>>,
 }
 
