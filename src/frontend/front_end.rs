@@ -7,7 +7,7 @@ use super::lucas_kanade::{self, LucasKanadeOptions};
 use super::outliers::{self, BearingPair, Motion, OutlierOptions};
 use super::prediction::{PredictedRotation, RowRotations};
 use super::pyramid::Pyramid;
-use super::reference::{ReferenceMatch, ReferenceOptions, ReferencePatch, ReferenceSearch};
+use super::reference::{ReferenceOptions, ReferencePatch, ReferenceSearch};
 use super::tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::camera::CameraModel;
 use crate::geometry::median;
@@ -20,7 +20,7 @@ pub struct FrontEndOptions {
     pub corners: CornerOptions,
     /// Tracking from image to image.
     pub lucas_kanade: LucasKanadeOptions,
-    /// Refinement against the first observation.
+    /// Refinement against reference patches.
     pub reference: ReferenceOptions,
     /// Rejection of features that do not move with the scene.
     pub outliers: OutlierOptions,
@@ -60,7 +60,7 @@ struct Track {
     age: u32,
     uv_px: Vector2<f64>,
     bearing: Vector3<f64>,
-    /// Its first observation, `None` when it was too near to the border or had no texture.
+    /// Its window, `None` when it was too near to the border or had no texture.
     reference: Option<ReferencePatch>,
 }
 
@@ -189,7 +189,7 @@ impl FrontEnd {
             age: feature.age,
             uv_px: feature.uv_px,
             bearing: feature.bearing,
-            reference: reference.or_else(|| ReferencePatch::cut(image, &feature.uv_px)),
+            reference: reference.or_else(|| ReferencePatch::cut(image, &feature.uv_px, &Vector2::zeros())),
         }));
         std::mem::swap(&mut self.previous, &mut self.now);
         Ok(TrackedFrame { stamp_ns, features, statistics })
@@ -244,17 +244,16 @@ impl FrontEnd {
         let options = &self.options.lucas_kanade;
         let Buffers { motion, search } = buffers;
         let near_px = lucas_kanade::approach(&self.previous, &self.now, &track.uv_px, guess_px, options, motion)?;
-        let mut reference = track.reference.clone();
-        let matched = match &mut reference {
-            Some(reference) => reference.find(self.now.levels().first()?, &near_px, &self.options.reference, search),
-            None => ReferenceMatch::OutOfView,
+        let (previous, now) = (self.previous.levels().first()?, self.now.levels().first()?);
+        let renewed = || ReferencePatch::cut(previous, &track.uv_px, &(near_px - track.uv_px));
+        let mut matched = |mut reference: ReferencePatch| {
+            let uv_px = reference.find(now, &near_px, &self.options.reference, search)?;
+            Some((uv_px, Some(reference)))
         };
-        let uv_px = match matched {
-            ReferenceMatch::Found(uv_px) => uv_px,
-            ReferenceMatch::Changed | ReferenceMatch::OutOfView => {
-                reference = reference.filter(|_| matched == ReferenceMatch::OutOfView);
-                lucas_kanade::arrive(&self.previous, &self.now, &track.uv_px, &near_px, options, motion)?
-            }
+        let known = track.reference.clone().and_then(&mut matched);
+        let (uv_px, reference) = match known.or_else(|| renewed().and_then(matched)) {
+            Some(found) => found,
+            None => (lucas_kanade::arrive(&self.previous, &self.now, &track.uv_px, &near_px, options, motion)?, None),
         };
         if self.mask.as_ref().is_some_and(|mask| mask.covers(&uv_px)) {
             return None;

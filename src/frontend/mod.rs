@@ -4,7 +4,7 @@
 //! the same tracks.
 //!
 //! [`FrontEnd`] processes images in order. It predicts features by a [`PredictedRotation`] or, when that is inconsistent with
-//! the images, by aligning coarse images, tracks them by [`lucas_kanade`], refines them against their first observation
+//! the images, by aligning coarse images, tracks them by [`lucas_kanade`], refines them against reference patches
 //! ([`ReferenceOptions`]), rejects those that do not move with the scene ([`outliers`]), and adds new [`corners`].
 
 mod appearance;

@@ -3,7 +3,8 @@
 //! Tracking from image to image accumulates the errors of all steps. The tracked position is therefore refined against the
 //! reference patch under an affine warp with a gain and an offset (Shi and Tomasi, "Good features to track"; inverse
 //! compositional as in Baker and Matthews).
-//! When the patch does not match any more, the feature is tracked from image to image and gets a new reference.
+//! When the patch does not match any more, or leaves the image, the feature gets a new reference from the previous image: one
+//! match adds much less error than a step from image to image by a translation alone.
 
 use std::sync::Arc;
 
@@ -21,6 +22,11 @@ pub(super) const CENTRE: usize = WINDOW / 2;
 pub(super) const MARGIN: usize = 2;
 /// Side of the window with these.
 pub(super) const SIDE: usize = WINDOW + 2 * MARGIN;
+/// From the image's first column or row to the middle of the first window inside, in pixels: further out, the gradient at the
+/// window's edge takes mirrored pixels.
+const NEAR_BORDER: f64 = (CENTRE + 1) as f64;
+/// From the middle of the last window inside to the image's last column or row, in pixels: resampling reads two more there.
+const FAR_BORDER: f64 = (CENTRE + 3) as f64;
 /// Columns rounded up to whole vector registers; the surplus ones weigh nothing.
 pub(super) const LANES: usize = 24;
 
@@ -43,7 +49,11 @@ impl Default for ReferenceOptions {
     }
 }
 
-/// Window of a feature at its first observation.
+/// Pixels by which the window of a feature near the border is moved further inside than it must be, so that it serves for more
+/// than one image.
+const RESERVE_PX: f64 = 3.0;
+
+/// Window of a feature, at its first observation or a later one.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ReferencePatch {
     appearance: Arc<Appearance>,
@@ -53,29 +63,26 @@ pub(super) struct ReferencePatch {
     warp: Matrix2<f64>,
 }
 
-/// Result of matching a reference.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum ReferenceMatch {
-    /// Position of the feature, in pixels.
-    Found(Vector2<f64>),
-    /// The image does not match the reference.
-    Changed,
-    /// Part of the window is outside the image.
-    OutOfView,
-}
-
 /// Grey levels of a window, row by row.
 pub(super) type Rows = [[f32; LANES]; WINDOW];
 
 impl ReferencePatch {
-    /// The window about a feature, `None` when part of it is outside the image or it has no texture.
-    pub(super) fn cut(image: &GrayImage, uv_px: &Vector2<f64>) -> Option<Self> {
-        let middle = uv_px.map(f64::round);
-        // Beyond this the gradient at the window's edge takes mirrored pixels.
-        let reach = (CENTRE + 1) as f64;
-        let (right, bottom) = (image.width as f64 - 1.0 - reach, image.height as f64 - 1.0 - reach);
-        let inside = middle.x >= reach && middle.y >= reach && middle.x <= right && middle.y <= bottom;
-        if !inside {
+    /// The window about a feature that moves by about `motion_px` to the image in which it is matched.
+    ///
+    /// Near the border the feature is not in the window's middle: the window is moved to where it is inside both images. `None`
+    /// when the feature is then outside of it, or the window has no texture.
+    pub(super) fn cut(image: &GrayImage, uv_px: &Vector2<f64>, motion_px: &Vector2<f64>) -> Option<Self> {
+        let mut middle = uv_px.map(f64::round);
+        for (axis, count) in [image.width, image.height].into_iter().enumerate() {
+            let first = NEAR_BORDER + RESERVE_PX - motion_px[axis].min(0.0);
+            let last = count as f64 - 1.0 - FAR_BORDER - RESERVE_PX - motion_px[axis].max(0.0);
+            if first > last {
+                return None;
+            }
+            middle[axis] = middle[axis].max(first.ceil()).min(last.floor());
+        }
+        let within = (uv_px - middle).iter().all(|offset| offset.abs() <= CENTRE as f64);
+        if !within {
             return None;
         }
         let first = [middle.x as i32 - (SIDE / 2) as i32, middle.y as i32 - (SIDE / 2) as i32];
@@ -85,26 +92,26 @@ impl ReferencePatch {
         Some(Self { appearance: Arc::new(appearance), offset_px: uv_px - middle, warp: Matrix2::identity() })
     }
 
-    /// Matches the reference around a tracked position; a match keeps the warp for the next image.
+    /// Matches the reference around a tracked position and returns that of the feature, in pixels; `None` where the image does
+    /// not match, or part of the window is outside of it. A match keeps the warp for the next image.
     pub(super) fn find(
         &mut self,
         image: &GrayImage,
         rough_px: &Vector2<f64>,
         options: &ReferenceOptions,
         finder: &mut ReferenceSearch,
-    ) -> ReferenceMatch {
+    ) -> Option<Vector2<f64>> {
         let appearance = &*self.appearance;
         let mut warp = self.warp;
         let mut middle = rough_px - warp * self.offset_px;
         finder.patch.clear();
         for _ in 0..options.max_steps {
             if !finder.patch.read(image, &warp, &middle, appearance.level(), &mut finder.window) {
-                return ReferenceMatch::OutOfView;
+                return None;
             }
-            let Some((correlation, step)) = appearance.compare(&finder.window) else { return ReferenceMatch::Changed };
+            let (correlation, step) = appearance.compare(&finder.window)?;
             let growth = Matrix2::new(1.0 + step[2], step[3], step[4], 1.0 + step[5]);
-            let Some(back) = growth.try_inverse() else { return ReferenceMatch::Changed };
-            warp *= back;
+            warp *= growth.try_inverse()?;
             let shift = warp * Vector2::new(step[0], step[1]);
             middle -= shift;
             let area = warp.determinant();
@@ -113,17 +120,17 @@ impl ReferencePatch {
                 && area < options.max_area_change
                 && area > 1.0 / options.max_area_change;
             if !plausible {
-                return ReferenceMatch::Changed;
+                return None;
             }
             if shift.norm() < SHORT_STEP_PX {
                 if correlation < options.min_correlation {
-                    return ReferenceMatch::Changed;
+                    return None;
                 }
                 self.warp = warp;
-                return ReferenceMatch::Found(place);
+                return Some(place);
             }
         }
-        ReferenceMatch::Changed
+        None
     }
 }
 
