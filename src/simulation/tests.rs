@@ -2,3 +2,4 @@ mod flight;
 mod images;
 mod logs;
 mod synthetic;
+mod tracking;

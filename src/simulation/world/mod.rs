@@ -10,6 +10,8 @@ mod surface;
 mod texture;
 mod town;
 
+#[cfg(test)]
+pub(crate) use mesh::Face;
 pub(crate) use mesh::{Affine, Bounds, World};
 pub(crate) use texture::Footprints;
 

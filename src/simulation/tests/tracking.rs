@@ -1,0 +1,147 @@
+//! Tracks of the front end on simulated images against the surfaces that the images show.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+use super::super::equipment::{Equipment, Lens};
+use super::super::experiment::Experiment;
+use super::super::random::RandomStream;
+use super::super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
+use super::super::scenario::{Scenario, ScenarioOptions, stream};
+use super::super::world::{self, World};
+use super::flight::experiment_trajectory;
+use crate::camera::CameraModel;
+use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions};
+use crate::geometry::{RigidTransform, median};
+
+const IMAGES: usize = 120;
+const PERIOD_S: f64 = 0.05;
+
+/// The plane that a feature lies on, seen from the camera that observed it first.
+struct Surface {
+    uv_px: Vector2<f64>,
+    world_from_camera: RigidTransform,
+    normal: Vector3<f64>,
+    distance: f64,
+}
+
+impl Surface {
+    /// `None` where the window about the feature shows more than one plane.
+    fn new(
+        world: &World,
+        model: &CameraModel,
+        depths_m: &[f64],
+        world_from_camera: RigidTransform,
+        uv_px: Vector2<f64>,
+    ) -> Option<Self> {
+        let [width, height] = model.resolution_px;
+        let point = |offset: [f64; 2]| {
+            let pixel = (uv_px + Vector2::from(offset)).map(f64::round);
+            let bounds = Vector2::new(width as f64, height as f64);
+            let pixel = pixel.zip_map(&bounds, |at, count| at.clamp(0.0, count - 1.0));
+            let ray = model.unproject(&pixel)?;
+            let depth_m = depths_m[pixel.y as usize * width + pixel.x as usize];
+            let point = world_from_camera.transform(&(ray / ray.z * depth_m));
+            point.iter().all(|x| x.is_finite()).then_some(point)
+        };
+        let middle = point([0.0, 0.0])?;
+        let range_m = (middle - world_from_camera.translation_m).norm();
+        let grid = [-10.0, -5.0, 0.0, 5.0, 10.0];
+        let window: Option<Vec<_>> = grid.iter().flat_map(|y| grid.map(|x| point([x, *y]))).collect();
+        let window = window?;
+        let shows = |face: &&world::Face| {
+            let on = |point: &Vector3<f64>| (face.normal.dot(point) - face.distance).abs() < 1e-3 * range_m;
+            face.normal.dot(&world_from_camera.translation_m) > face.distance && window.iter().all(on)
+        };
+        let face = world.faces.iter().find(shows)?;
+        Some(Self { uv_px, world_from_camera, normal: face.normal, distance: face.distance })
+    }
+
+    /// Where a pixel of the first image lies in the image of another pose.
+    fn seen_from(&self, model: &CameraModel, pose: &RigidTransform, uv_px: &Vector2<f64>) -> Option<Vector2<f64>> {
+        let centre_m = self.world_from_camera.translation_m;
+        let ray = self.world_from_camera.rotation * model.unproject(uv_px)?;
+        let along_m = (self.distance - self.normal.dot(&centre_m)) / self.normal.dot(&ray);
+        model.project(&pose.inverse().transform(&(centre_m + ray * along_m)))
+    }
+
+    /// Factor by which areas about the feature have grown since the first image.
+    fn growth(&self, model: &CameraModel, pose: &RigidTransform) -> Option<f64> {
+        let side = |axis: Vector2<f64>| {
+            let from = self.seen_from(model, pose, &(self.uv_px - axis))?;
+            Some(self.seen_from(model, pose, &(self.uv_px + axis))? - from)
+        };
+        Some(Matrix2::from_columns(&[side(Vector2::new(0.5, 0.0))?, side(Vector2::new(0.0, 0.5))?]).determinant())
+    }
+}
+
+#[test]
+fn tracks_follow_the_surfaces() {
+    let experiment = Experiment::T1;
+    let equipment = Equipment {
+        gimbal_camera: false,
+        static_camera: true,
+        lens: Lens::Pinhole,
+        resolution_px: [640, 480],
+        camera_rate_hz: 1.0 / PERIOD_S,
+        camera_time_offset_s: 0.0,
+        readout_s: 0.0,
+        encoder_sigma_rad: None,
+    };
+    let options = ScenarioOptions {
+        name: "test",
+        seed: 1,
+        equipment,
+        start_error: experiment.start_error(),
+        imu_noise_scale: 1.0,
+    };
+    let look = experiment.look_around(&mut RandomStream::new(1, stream::LOOK));
+    let scenario = Scenario::new(experiment_trajectory(experiment, 1, 10.0), &look, &options);
+    let world = world::build(experiment.environment(), 1);
+    let camera = &scenario.true_rig.cameras[0];
+    let (model, view, renderer) = (&camera.model, View::new(&camera.model), Renderer::new(&world));
+    let sensor = Sensor::new(&view, SensorOptions { noise: 2.0, exposure_drift: 0.05, vignetting: 0.12 }, 7);
+
+    let mut front_end = FrontEnd::new(model.clone(), FrontEndOptions::default());
+    let mut surfaces: BTreeMap<FeatureId, Surface> = BTreeMap::new();
+    let (mut all, mut grown, mut at_border) = (Vec::new(), Vec::new(), Vec::new());
+    let mut workspace = Workspace::default();
+    for image in 0..IMAGES {
+        let time_s = 2.0 + image as f64 * PERIOD_S;
+        let pose = scenario.world_from_camera(camera, time_s);
+        let mut grey = vec![0.0; view.pixels()];
+        renderer.render(&view, 0..480, &pose, 1.0, &mut workspace, &mut grey);
+        let depths_m = workspace.depths_m(&view, &world, &pose);
+        let frame = front_end.process(&sensor.expose(&grey, image, time_s), image as i64, None).unwrap();
+        for feature in &frame.features {
+            if feature.age == 0 {
+                let surface = Surface::new(&world, model, &depths_m, pose, feature.uv_px);
+                surfaces.extend(surface.map(|surface| (feature.id, surface)));
+                continue;
+            }
+            let Some(surface) = surfaces.get(&feature.id) else { continue };
+            let Some(seen) = surface.seen_from(model, &pose, &surface.uv_px) else { continue };
+            let error_px = (feature.uv_px - seen).norm();
+            all.push(error_px);
+            // Past a factor of two the reference is a new one.
+            if surface.growth(model, &pose).is_some_and(|growth| growth > 2.2 && growth < 4.0) {
+                grown.push(error_px);
+            }
+            if !model.contains(&feature.uv_px, 12.0) {
+                at_border.push(error_px);
+            }
+        }
+    }
+    for (name, errors_px, least, limit_px) in [
+        ("all", all, 3000, 0.06),
+        ("grown to twice the area", grown, 150, 0.25),
+        ("near the border", at_border, 100, 0.17),
+    ] {
+        let count = errors_px.len();
+        let median_px = median(errors_px).unwrap();
+        println!("{name}: {median_px:.4} px, {count} observations");
+        assert!(count > least, "{name}: {count} observations");
+        assert!(median_px < limit_px, "{name}: {median_px} px");
+    }
+}
