@@ -1,4 +1,4 @@
-//! The reference patch of a feature: its window at the first observation, matched in later images.
+//! The reference patch of a feature: its window in one image, matched in later ones.
 //!
 //! Tracking from image to image accumulates the errors of all steps. The tracked position is therefore refined against the
 //! reference patch under an affine warp with a gain and an offset (Shi and Tomasi, "Good features to track"; inverse
