@@ -1,5 +1,7 @@
 //! Tracks of the front end on simulated images against the surfaces that the images show.
 
+#![expect(clippy::print_stdout, reason = "docs/accuracy.md states the errors that are printed with --nocapture")]
+
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix2, Vector2, Vector3};
