@@ -12,7 +12,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::appearance::Appearance;
 use super::pyramid::cut_out;
-use super::resample::Patch;
+use super::resample::{BORDER, Patch};
 use crate::sensors::GrayImage;
 
 /// Side of the window in pixels.
@@ -22,11 +22,10 @@ pub(super) const CENTRE: usize = WINDOW / 2;
 pub(super) const MARGIN: usize = 2;
 /// Side of the window with these.
 pub(super) const SIDE: usize = WINDOW + 2 * MARGIN;
-/// From the image's first column or row to the middle of the first window inside, in pixels: further out, the gradient at the
-/// window's edge takes mirrored pixels.
-const NEAR_BORDER: f64 = (CENTRE + 1) as f64;
-/// From the middle of the last window inside to the image's last column or row, in pixels: resampling reads two more there.
-const FAR_BORDER: f64 = (CENTRE + 3) as f64;
+/// From the image's first column or row to the middle of the first window that can be resampled, in pixels.
+const NEAR_BORDER: f64 = (CENTRE + BORDER[0]) as f64;
+/// From the middle of the last window that can be resampled to the image's last column or row, in pixels.
+const FAR_BORDER: f64 = (CENTRE + BORDER[1]) as f64;
 /// Columns rounded up to whole vector registers; the surplus ones weigh nothing.
 pub(super) const LANES: usize = 24;
 

@@ -14,6 +14,10 @@ const HEIGHT: usize = 64;
 /// Additional pixels on every side, so that a window can move.
 const MARGIN: usize = 2;
 
+/// Pixels that a resampled window keeps from the image's first column and row, and from one past its last ones: the four pixels
+/// about a point reach from one before it to two after it, and it may be rounded up.
+pub(super) const BORDER: [usize; 2] = [1, 3];
+
 /// Steps of a pixel between which the weights are the same.
 const FRACTIONS: usize = 128;
 
@@ -78,9 +82,11 @@ impl Patch {
             (warp[(1, 0)].abs() + warp[(1, 1)].abs()) * reach,
         );
         let (low, high) = (middle - extent, middle + extent);
-        // The four pixels about a point reach from one before it to two after it, and it may be rounded up.
-        let inside =
-            low.x >= 1.0 && low.y >= 1.0 && high.x < image.width as f64 - 3.0 && high.y < image.height as f64 - 3.0;
+        let [first, past] = BORDER.map(|border| border as f64);
+        let inside = low.x >= first
+            && low.y >= first
+            && high.x < image.width as f64 - past
+            && high.y < image.height as f64 - past;
         if !inside {
             return false;
         }

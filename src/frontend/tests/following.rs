@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 
 use super::homography::Scene;
-use super::{blank, scene, texture};
+use super::{blank, rim, scene, texture};
 use crate::frontend::Pyramid;
 use crate::frontend::lucas_kanade::{LucasKanadeOptions, track};
 use crate::geometry::median;
@@ -67,12 +67,7 @@ fn points_at_the_border_are_tracked() {
     let scene = scene(0.3);
     let texture = texture();
     let (previous, now) = (pyramid(&scene.render(&texture, 4)), pyramid(&scene.render(&texture, 5)));
-    let (right, bottom) = ((scene.width - 1) as f64, (scene.height - 1) as f64);
-    let rim = (0..40).flat_map(|k| {
-        let (x, y) = (right * f64::from(k) / 39.0, bottom * f64::from(k) / 39.0);
-        [Vector2::new(x, 2.0), Vector2::new(x, bottom - 2.0), Vector2::new(2.0, y), Vector2::new(right - 2.0, y)]
-    });
-    let rim: Vec<_> = rim.filter(|uv| scene.sees(&scene.flow(4, 5, uv))).collect();
+    let rim: Vec<_> = rim(&scene, 2.0).filter(|uv| scene.sees(&scene.flow(4, 5, uv))).collect();
     let options = LucasKanadeOptions::default();
     let errors: Vec<f64> = rim
         .iter()

@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 
 use super::homography::Scene;
-use super::{blank, camera_of, scene, texture};
+use super::{blank, camera_of, rim, scene, texture};
 use crate::frontend::reference::{ReferenceOptions, ReferencePatch, ReferenceSearch};
 use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions};
 use crate::geometry::median;
@@ -72,13 +72,8 @@ fn a_changed_window_does_not_match() {
 fn near_the_border_a_window_is_moved_inside() {
     let (scene, texture) = (scene(0.3), texture());
     let (first, later) = (scene.render(&texture, 4), scene.render(&texture, 5));
-    let (right, bottom) = ((scene.width - 1) as f64, (scene.height - 1) as f64);
-    let rim = (4..36).flat_map(|k| {
-        let (x, y) = (right * f64::from(k) / 39.0, bottom * f64::from(k) / 39.0);
-        [Vector2::new(x, 6.3), Vector2::new(x, bottom - 6.3), Vector2::new(6.3, y), Vector2::new(right - 6.3, y)]
-    });
     let mut errors = Vec::new();
-    for uv in rim {
+    for uv in rim(&scene, 6.3) {
         let flow = scene.flow(4, 5, &uv) - uv;
         let Some(mut reference) = ReferencePatch::cut(&first, &uv, &flow) else { continue };
         if let Some(found) = find(&mut reference, &later, &(uv + flow + Vector2::new(0.4, -0.3))) {

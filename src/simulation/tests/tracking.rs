@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
+use super::super::disturbances::{EXPOSURE_DRIFT, VIGNETTING};
 use super::super::equipment::{Equipment, Lens};
 use super::super::experiment::Experiment;
 use super::super::random::RandomStream;
@@ -52,11 +53,10 @@ impl Surface {
         let grid = [-10.0, -5.0, 0.0, 5.0, 10.0];
         let window: Option<Vec<_>> = grid.iter().flat_map(|y| grid.map(|x| point([x, *y]))).collect();
         let window = window?;
-        let shows = |face: &&world::Face| {
+        let face = world.faces.iter().find(|face| {
             let on = |point: &Vector3<f64>| (face.normal.dot(point) - face.distance).abs() < 1e-3 * range_m;
             face.normal.dot(&world_from_camera.translation_m) > face.distance && window.iter().all(on)
-        };
-        let face = world.faces.iter().find(shows)?;
+        })?;
         Some(Self { uv_px, world_from_camera, normal: face.normal, distance: face.distance })
     }
 
@@ -103,7 +103,8 @@ fn tracks_follow_the_surfaces() {
     let world = world::build(experiment.environment(), 1);
     let camera = &scenario.true_rig.cameras[0];
     let (model, view, renderer) = (&camera.model, View::new(&camera.model), Renderer::new(&world));
-    let sensor = Sensor::new(&view, SensorOptions { noise: 2.0, exposure_drift: 0.05, vignetting: 0.12 }, 7);
+    let sensor =
+        Sensor::new(&view, SensorOptions { noise: 2.0, exposure_drift: EXPOSURE_DRIFT, vignetting: VIGNETTING }, 7);
 
     let mut front_end = FrontEnd::new(model.clone(), FrontEndOptions::default());
     let mut surfaces: BTreeMap<FeatureId, Surface> = BTreeMap::new();

@@ -10,8 +10,6 @@ mod surface;
 mod texture;
 mod town;
 
-#[cfg(test)]
-pub(crate) use mesh::Face;
 pub(crate) use mesh::{Affine, Bounds, World};
 pub(crate) use texture::Footprints;
 
