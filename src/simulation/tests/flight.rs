@@ -17,6 +17,24 @@ pub(super) fn experiment_trajectory(experiment: Experiment, seed: u64, duration_
     Trajectory::new(flight.as_ref(), &mut random, &VehicleLimits::default(), duration_s, GRAVITY_M_PER_S2)
 }
 
+/// An experiment with a static camera, and with the camera on its gimbal where asked for.
+pub(super) fn experiment_scenario(experiment: Experiment, seed: u64, duration_s: f64, gimbal_camera: bool) -> Scenario {
+    let look = experiment.look_around(&mut RandomStream::new(seed, stream::LOOK));
+    let equipment = Equipment {
+        gimbal_camera,
+        static_camera: true,
+        lens: Lens::Pinhole,
+        resolution_px: [640, 480],
+        camera_rate_hz: 20.0,
+        camera_time_offset_s: 0.0,
+        readout_s: 0.0,
+        encoder_sigma_rad: gimbal_camera.then_some(0.01),
+    };
+    let options =
+        ScenarioOptions { name: "test", seed, equipment, start_error: experiment.start_error(), imu_noise_scale: 1.0 };
+    Scenario::new(experiment_trajectory(experiment, seed, duration_s), &look, &options)
+}
+
 #[test]
 fn hover_fixed_joint_and_fixed_camera_intervals_start_and_end_as_given() {
     let mut trajectory = experiment_trajectory(Experiment::T1, 3, 40.0);
@@ -127,25 +145,7 @@ fn noise_free_imu_samples_integrate_to_the_trajectory() {
 #[test]
 fn the_gimbal_keeps_its_limits_and_stabilizes_the_image() {
     for experiment in [Experiment::T1, Experiment::T4] {
-        let look = experiment.look_around(&mut RandomStream::new(8, stream::LOOK));
-        let equipment = Equipment {
-            gimbal_camera: true,
-            static_camera: true,
-            lens: Lens::Pinhole,
-            resolution_px: [640, 480],
-            camera_rate_hz: 20.0,
-            camera_time_offset_s: 0.0,
-            readout_s: 0.0,
-            encoder_sigma_rad: Some(0.01),
-        };
-        let options = ScenarioOptions {
-            name: "test",
-            seed: 8,
-            equipment,
-            start_error: experiment.start_error(),
-            imu_noise_scale: 1.0,
-        };
-        let scenario = Scenario::new(experiment_trajectory(experiment, 8, 40.0), &look, &options);
+        let scenario = experiment_scenario(experiment, 8, 40.0, true);
         let rig = &scenario.true_rig;
         let limits: Vec<_> = rig.gimbal.as_ref().unwrap().joints.iter().map(|joint| joint.limits_rad).collect();
         let mut swing = [0.0_f64; 2];

@@ -7,13 +7,10 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::super::disturbances::{EXPOSURE_DRIFT, VIGNETTING};
-use super::super::equipment::{Equipment, Lens};
 use super::super::experiment::Experiment;
-use super::super::random::RandomStream;
 use super::super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
-use super::super::scenario::{Scenario, ScenarioOptions, stream};
 use super::super::world::{self, World};
-use super::flight::experiment_trajectory;
+use super::flight::experiment_scenario;
 use crate::camera::CameraModel;
 use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions};
 use crate::geometry::{RigidTransform, median};
@@ -81,25 +78,7 @@ impl Surface {
 #[test]
 fn tracks_follow_the_surfaces() {
     let experiment = Experiment::T1;
-    let equipment = Equipment {
-        gimbal_camera: false,
-        static_camera: true,
-        lens: Lens::Pinhole,
-        resolution_px: [640, 480],
-        camera_rate_hz: 1.0 / PERIOD_S,
-        camera_time_offset_s: 0.0,
-        readout_s: 0.0,
-        encoder_sigma_rad: None,
-    };
-    let options = ScenarioOptions {
-        name: "test",
-        seed: 1,
-        equipment,
-        start_error: experiment.start_error(),
-        imu_noise_scale: 1.0,
-    };
-    let look = experiment.look_around(&mut RandomStream::new(1, stream::LOOK));
-    let scenario = Scenario::new(experiment_trajectory(experiment, 1, 10.0), &look, &options);
+    let scenario = experiment_scenario(experiment, 1, 10.0, false);
     let world = world::build(experiment.environment(), 1);
     let camera = &scenario.true_rig.cameras[0];
     let (model, view, renderer) = (&camera.model, View::new(&camera.model), Renderer::new(&world));
@@ -114,7 +93,7 @@ fn tracks_follow_the_surfaces() {
         let time_s = 2.0 + image as f64 * PERIOD_S;
         let pose = scenario.world_from_camera(camera, time_s);
         let mut grey = vec![0.0; view.pixels()];
-        renderer.render(&view, 0..480, &pose, 1.0, &mut workspace, &mut grey);
+        renderer.render(&view, 0..model.resolution_px[1], &pose, 1.0, &mut workspace, &mut grey);
         let depths_m = workspace.depths_m(&view, &world, &pose);
         let frame = front_end.process(&sensor.expose(&grey, image, time_s), image as i64, None).unwrap();
         for feature in &frame.features {
