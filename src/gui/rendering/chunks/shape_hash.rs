@@ -41,7 +41,7 @@ fn joined(first: f32, second: f32) -> u64 {
 pub(super) struct ShapeHasher {
     /// Hash of the shapes so far.
     all: u64,
-    /// Hash of the last shape.
+    /// Hash of the last shape without the addresses of its texts, which differ from process to process.
     last: u64,
     /// Whether a shape contains code, which cannot be compared.
     has_code: bool,
@@ -60,7 +60,7 @@ impl ShapeHasher {
         self.all = mixed(self.all, self.last);
     }
 
-    /// Hash of the last shape.
+    /// Hash of the last shape, the same in every process: texts count by their places and colors only.
     pub(super) fn last(&self) -> u64 {
         self.last
     }
@@ -242,7 +242,7 @@ impl ShapeHasher {
     fn text(&mut self, shape: &TextShape) {
         let TextShape { pos, galley, underline, fallback_color, override_text_color, opacity_factor, angle } = shape;
         self.numbers([pos.x, pos.y]);
-        self.word(Arc::as_ptr(galley).addr() as u64);
+        self.all = mixed(self.all, Arc::as_ptr(galley).addr() as u64);
         self.texts.push(Arc::clone(galley));
         self.stroke(*underline);
         self.color(*fallback_color);

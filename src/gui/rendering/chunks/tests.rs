@@ -11,13 +11,13 @@ use super::{Chunk, Tessellation};
 
 /// A window with texts, lines and a path of a thousand points; `cursor` moves a line that is painted last but one.
 fn output(context: &Context, cursor: f32, words: &[&str]) -> FullOutput {
-    let screen_rect = Some(Rect::from_min_max(Pos2::ZERO, pos2(400.0, 500.0)));
+    let screen_rect = Some(Rect::from_min_max(Pos2::ZERO, pos2(400.0, 1500.0)));
     context.run_ui(RawInput { screen_rect, ..RawInput::default() }, |ui| {
         for word in words {
             ui.label(*word);
         }
         ui.group(|ui| {
-            for number in 0..40 {
+            for number in 0..80 {
                 ui.label(format!("value {number}"));
             }
         });
@@ -25,7 +25,7 @@ fn output(context: &Context, cursor: f32, words: &[&str]) -> FullOutput {
         let stroke = Stroke::new(1.0, Color32::RED);
         let wave = (0..1000).map(|index| pos2(0.4 * index as f32, 300.0 + (0.1 * index as f32).sin())).collect();
         painter.add(Shape::line(wave, stroke));
-        painter.line_segment([pos2(cursor, 0.0), pos2(cursor, 500.0)], stroke);
+        painter.line_segment([pos2(cursor, 0.0), pos2(cursor, 1500.0)], stroke);
         painter.circle_filled(pos2(20.0, 30.0), 5.0, Color32::BLUE);
     })
 }
@@ -90,6 +90,21 @@ fn another_scale_tessellates_everything_anew() {
     context.set_pixels_per_point(2.0);
     let coarse = tessellation.chunks(&context, output.shapes, 2.0);
     assert_eq!(new_ones(&fine, &coarse), coarse.len());
+}
+
+#[test]
+fn chunks_end_at_the_same_shapes_in_every_context() {
+    // Every context lays its texts out anew, at other addresses.
+    let contexts: Vec<_> = (0..20).map(|_| Context::default()).collect();
+    let sizes = contexts.iter().map(|context| {
+        let mut output = output(context, 10.0, &[]);
+        output.textures_delta.clear();
+        let chunks = Tessellation::default().chunks(context, output.shapes, 1.0);
+        chunks.iter().map(|chunk| triangles(chunk.primitives.iter()).len()).collect::<Vec<_>>()
+    });
+    let sizes: Vec<_> = sizes.collect();
+    assert!(sizes.iter().all(|other| *other == sizes[0]), "triangles per chunk: {sizes:?}");
+    assert!(sizes[0].len() > 5, "triangles per chunk: {:?}", sizes[0]);
 }
 
 /// The hash of a shape, `None` if it cannot be compared.
