@@ -37,9 +37,13 @@ impl RobustLoss {
     /// `ρ` of an observation's residual with standard deviation `sigma`; a point that its camera cannot observe (`None`)
     /// costs as much as a residual of 100 standard deviations.
     pub(crate) fn cost_of(self, residual: Option<Vector2<f64>>, sigma: f64) -> f64 {
-        let squared = residual.map_or(UNSEEN_SQUARED, |residual| residual.norm_squared() / (sigma * sigma));
-        self.cost_and_weight(squared).0
+        self.cost_and_weight(whitened_squared(residual, sigma)).0
     }
+}
+
+/// Squared whitened norm of a residual with standard deviation `sigma`, of one that cannot be observed if `None`.
+fn whitened_squared(residual: Option<Vector2<f64>>, sigma: f64) -> f64 {
+    residual.map_or(UNSEEN_SQUARED, |residual| residual.norm_squared() / (sigma * sigma))
 }
 
 /// Sum of [`RobustLoss::cost_of`] over residuals with one standard deviation.
@@ -69,8 +73,7 @@ impl LossSum {
             self.sum += self.loss.cost_of(residual, self.sigma);
             return;
         };
-        let squared = residual.map_or(UNSEEN_SQUARED, |residual| residual.norm_squared() / (self.sigma * self.sigma));
-        self.product *= 1.0 + squared / (scale * scale);
+        self.product *= 1.0 + whitened_squared(residual, self.sigma) / (scale * scale);
         if self.product > MAX_PRODUCT {
             *self = Self { sum: self.get(), product: 1.0, ..*self };
         }
