@@ -53,14 +53,15 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
     }
     let calibration = &summary.calibration;
     if let (Some(first), Some(last)) = (&calibration.chain_error_initial, &calibration.chain_error) {
+        let in_sigmas = calibration
+            .parameter_error_sigma()
+            .map_or_else(String::new, |ratio| format!("; errors of the parameters {ratio:.1} σ RMS"));
         lines.push(format!(
-            "  chain error  {:.1} mm, {:.2}° (rig) → {:.1} ± {:.1} mm, {:.2} ± {:.2}° (final, {})\n",
+            "  chain error  {:.1} mm, {:.2}° (rig) → {:.1} mm, {:.2}° (final, {}{in_sigmas})\n",
             first.translation_mean_m * 1e3,
             first.rotation_mean_rad.to_degrees(),
             last.translation_mean_m * 1e3,
-            last.translation_std_m * 1e3,
             last.rotation_mean_rad.to_degrees(),
-            last.rotation_std_rad.to_degrees(),
             calibration.parameterization
         ));
     }

@@ -392,7 +392,10 @@ impl fmt::Display for CalibrationReport {
         matrix(f, "T_cam_imu of the static camera", &self.static_t_cam_imu)?;
         matrix(f, "T_imu_cam of the gimbal camera, all joints at zero", &self.gimbal_t_imu_cam_at_zero)?;
         if let Some(ground_truth) = &self.ground_truth {
-            writeln!(f, "\nExtrinsics errors against the ground truth")?;
+            writeln!(
+                f,
+                "\nExtrinsics errors against the ground truth, mean ± standard deviation over the joint angles of the log"
+            )?;
             for (name, distance) in [
                 ("static camera, rig", &ground_truth.static_initial),
                 ("static camera, camera-IMU", &ground_truth.static_camera_imu),

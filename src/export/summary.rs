@@ -130,6 +130,18 @@ pub struct CalibrationSummary {
     pub chain_error_initial: Option<ChainError>,
 }
 
+impl CalibrationSummary {
+    /// Root mean square of error over σ of the parameters that have both; `None` without any.
+    pub fn parameter_error_sigma(&self) -> Option<f64> {
+        let ratios = self.parameters.iter().filter_map(|parameter| {
+            let sigma = parameter.sigma.filter(|sigma| *sigma > 0.0)?;
+            Some((parameter.error? / sigma).powi(2))
+        });
+        let squares: Vec<f64> = ratios.collect();
+        (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+    }
+}
+
 /// Rank deficit by cause.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct DeficitSummary {
@@ -430,16 +442,6 @@ pub(super) fn difference(dimension: Dimension, value: f64, reference: f64) -> f6
         Dimension::Angle => principal_angle(value - reference),
         _ => value - reference,
     }
-}
-
-/// Root mean square of error over σ of the parameters that have both; `None` without any.
-pub(super) fn difference_sigmas(parameters: &[ParameterSummary]) -> Option<f64> {
-    let ratios = parameters.iter().filter_map(|parameter| {
-        let sigma = parameter.sigma.filter(|sigma| *sigma > 0.0)?;
-        Some((parameter.error? / sigma).powi(2))
-    });
-    let squares: Vec<f64> = ratios.collect();
-    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }
 
 fn chain_error(run: &RunRecord, chain: &ClassicalChain, ground_truth: &ClassicalChain) -> Option<ChainError> {

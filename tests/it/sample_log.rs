@@ -49,10 +49,10 @@ fn three_runs_leave_the_same_bytes_twice_and_stay_near_the_truth() {
         let specs = ["--run", "auto", "--run", "classical", "--run", "static", "--run", off];
         let mut arguments = vec!["run", text_of(&log), "--out", text_of(&out), "--no-timing"];
         arguments.extend(specs);
-        succeed(&arguments, threads);
-        out
+        let printed = succeed(&arguments, threads);
+        (out, printed)
     };
-    let (first, second) = (run("first", "2"), run("second", "1"));
+    let ((first, printed), (second, _)) = (run("first", "2"), run("second", "1"));
     for label in ["auto", "classical", "static"] {
         for file in FILES {
             let bytes = fs::read(first.join(label).join(file)).unwrap();
@@ -63,6 +63,8 @@ fn three_runs_leave_the_same_bytes_twice_and_stay_near_the_truth() {
         let summary: Value = serde_json::from_str(&text).unwrap();
         let percent = summary["accuracy"]["ate_percent_of_length"].as_f64().unwrap();
         assert!(percent < 1.0, "{label}: ATE {percent} % of the length");
+        let of_chain = chain_error(&summary["calibration"]);
+        assert!(printed.contains(&of_chain), "'{of_chain}' in {printed}");
         let columns = summary["rank"]["columns"].as_u64().unwrap();
         let structural = summary["rank"]["rank_structural"].as_u64().unwrap();
         let expected = match label {
@@ -87,6 +89,23 @@ fn three_runs_leave_the_same_bytes_twice_and_stay_near_the_truth() {
     let known = summary["rank"]["known"].as_array().expect("the known losses are a list");
     let claimed = known.iter().filter(|loss| loss["largest_false_gain"].as_f64() > Some(0.1)).count();
     assert!(known.len() == 6 && claimed >= 2, "{known:?}");
+}
+
+/// The end of the printed line about the chain, from the values of the summary.
+fn chain_error(calibration: &Value) -> String {
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let error = &calibration["chain_error"];
+    let (translation_m, rotation_rad) = (number(&error["translation_mean_m"]), number(&error["rotation_mean_rad"]));
+    let parameters = calibration["parameters"].as_array().expect("the parameters are a list");
+    let squares =
+        parameters.iter().map(|parameter| (number(&parameter["error"]) / number(&parameter["sigma"])).powi(2));
+    let sigmas = (squares.sum::<f64>() / parameters.len() as f64).sqrt();
+    let parameterization = calibration["parameterization"].as_str().expect("a text");
+    format!(
+        "→ {:.1} mm, {:.2}° (final, {parameterization}; errors of the parameters {sigmas:.1} σ RMS)",
+        1e3 * translation_m,
+        rotation_rad.to_degrees()
+    )
 }
 
 /// What the form of the chain is known to lose is what every step measured, and nothing else is lost to the form.

@@ -3,7 +3,7 @@
 use super::folder::StudyTables;
 use crate::estimator::{EventKind, FailureCause};
 use crate::export::calibration_report::CalibrationReport;
-use crate::export::summary::{Accuracy, RunSummary, TrajectorySummary, difference_sigmas};
+use crate::export::summary::{Accuracy, RunSummary, TrajectorySummary};
 use crate::geometry::{median, seconds_from_ns, so3};
 use crate::session::{Recording, RunRecord, TrajectoryLane};
 use crate::study::{Cell, JobLog, StudyJob, TableError, relative_error_columns};
@@ -313,7 +313,7 @@ fn calibration(summary: &RunSummary) -> Cells {
     let mut cells: Cells = vec![
         ("final_parameterization", calibration.parameterization.as_str().into()),
         ("columns", calibration.columns.into()),
-        ("parameter_error_sigma", difference_sigmas(&calibration.parameters).into()),
+        ("parameter_error_sigma", calibration.parameter_error_sigma().into()),
     ];
     if let Some(error) = &calibration.chain_error_initial {
         cells.push(("chain_error_initial_m", error.translation_mean_m.into()));
