@@ -4,15 +4,16 @@ use egui::epaint::{
     BandPoint, BandShape, Brush, CircleShape, ClippedPrimitive, ClippedShape, ColorMode, CubicBezierShape,
     EllipseShape, Mesh, PathShape, PathStroke, Primitive, QuadraticBezierShape, RectShape, TextShape,
 };
-use egui::{Color32, Context, FontId, FullOutput, Pos2, RawInput, Rect, Shape, Stroke, StrokeKind, TextureId, pos2};
+use egui::{Color32, Context, FontId, Pos2, RawInput, Rect, Shape, Stroke, StrokeKind, TextureId, pos2};
 
 use super::shape_hash::ShapeHasher;
 use super::{Chunk, Tessellation};
 
-/// A window with texts, lines and a path of a thousand points; `cursor` moves a line that is painted last but one.
-fn output(context: &Context, cursor: f32, words: &[&str]) -> FullOutput {
+/// The shapes of a window with texts, lines and a path of a thousand points; `cursor` moves a line that is painted last
+/// but one.
+fn shapes(context: &Context, cursor: f32, words: &[&str]) -> Vec<ClippedShape> {
     let screen_rect = Some(Rect::from_min_max(Pos2::ZERO, pos2(400.0, 1500.0)));
-    context.run_ui(RawInput { screen_rect, ..RawInput::default() }, |ui| {
+    let mut output = context.run_ui(RawInput { screen_rect, ..RawInput::default() }, |ui| {
         for word in words {
             ui.label(*word);
         }
@@ -27,7 +28,9 @@ fn output(context: &Context, cursor: f32, words: &[&str]) -> FullOutput {
         painter.add(Shape::line(wave, stroke));
         painter.line_segment([pos2(cursor, 0.0), pos2(cursor, 1500.0)], stroke);
         painter.circle_filled(pos2(20.0, 30.0), 5.0, Color32::BLUE);
-    })
+    });
+    output.textures_delta.clear();
+    output.shapes
 }
 
 /// All triangles in the order of painting: clip rectangle, texture and corners.
@@ -52,10 +55,9 @@ fn chunks_paint_what_the_context_would_and_only_changed_ones_are_new() {
     let context = Context::default();
     let mut tessellation = Tessellation::default();
     let mut frame = |cursor: f32, words: &[&str]| {
-        let mut output = output(&context, cursor, words);
-        output.textures_delta.clear();
-        let chunks = tessellation.chunks(&context, output.shapes.clone(), 1.0);
-        let whole = context.tessellate(output.shapes, 1.0);
+        let shapes = shapes(&context, cursor, words);
+        let chunks = tessellation.chunks(&context, shapes.clone(), 1.0);
+        let whole = context.tessellate(shapes, 1.0);
         let parts = chunks.iter().flat_map(|chunk| &chunk.primitives);
         assert!(triangles(parts) == triangles(whole.iter()), "cursor at {cursor}");
         chunks
@@ -84,11 +86,10 @@ fn chunks_paint_what_the_context_would_and_only_changed_ones_are_new() {
 fn another_scale_tessellates_everything_anew() {
     let context = Context::default();
     let mut tessellation = Tessellation::default();
-    let mut output = output(&context, 10.0, &[]);
-    output.textures_delta.clear();
-    let fine = tessellation.chunks(&context, output.shapes.clone(), 1.0);
+    let shapes = shapes(&context, 10.0, &[]);
+    let fine = tessellation.chunks(&context, shapes.clone(), 1.0);
     context.set_pixels_per_point(2.0);
-    let coarse = tessellation.chunks(&context, output.shapes, 2.0);
+    let coarse = tessellation.chunks(&context, shapes, 2.0);
     assert_eq!(new_ones(&fine, &coarse), coarse.len());
 }
 
@@ -97,9 +98,7 @@ fn chunks_end_at_the_same_shapes_in_every_context() {
     // Every context lays its texts out anew, at other addresses.
     let contexts: Vec<_> = (0..20).map(|_| Context::default()).collect();
     let sizes = contexts.iter().map(|context| {
-        let mut output = output(context, 10.0, &[]);
-        output.textures_delta.clear();
-        let chunks = Tessellation::default().chunks(context, output.shapes, 1.0);
+        let chunks = Tessellation::default().chunks(context, shapes(context, 10.0, &[]), 1.0);
         chunks.iter().map(|chunk| triangles(chunk.primitives.iter()).len()).collect::<Vec<_>>()
     });
     let sizes: Vec<_> = sizes.collect();
@@ -130,8 +129,8 @@ fn every_field_of_a_shape_counts() {
         angle: 0.0,
     };
     let context = Context::default();
-    let mut output = output(&context, 0.0, &[]);
-    output.textures_delta.clear();
+    // Fonts are there after a first frame.
+    shapes(&context, 0.0, &[]);
     let galley =
         |text: &str| context.fonts_mut(|fonts| fonts.layout_no_wrap(text.to_owned(), FontId::default(), Color32::RED));
     let text = || TextShape::new(a, galley("one"), Color32::RED);
