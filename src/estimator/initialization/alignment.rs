@@ -10,59 +10,57 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vect
 use crate::estimator::{ImuBias, Preintegration};
 use crate::geometry::{RigidTransform, median, so3};
 
-/// Noise of a visual rotation between two views, added to that of the extrinsics.
+/// Standard deviation of a visual rotation between two views; added to the noise of the extrinsics.
 const VISUAL_ROTATION_SIGMA_RAD: f64 = 0.002;
 /// Typical distance of landmarks before the scale is known.
 const FIRST_DISTANCE_M: f64 = 8.0;
-/// Error of a gyroscope rotation over a window, which rotates gravity into a false acceleration.
+/// Error of a gyroscope rotation over the window; it turns gravity into a spurious acceleration.
 const TILT_SIGMA_RAD: f64 = 0.003;
-/// Iterations of the linear system; from the second on the rotation of the extrinsics is estimated, too.
+/// Iterations of the linear system; the second and later ones also estimate the rotation of the extrinsics.
 const ROUNDS: usize = 5;
 
-/// A Gaussian prior on a vector, the same for each axis.
+/// Gaussian prior on a vector with equal standard deviation on each axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VectorPrior {
-    /// Expected value.
     pub mean: Vector3<f64>,
     /// Standard deviation of each component.
     pub sigma: f64,
 }
 
-/// Input of the alignment.
 pub(super) struct AlignmentInput<'a> {
     /// `first_camera_from_camera`, up to scale, one per view.
     pub(super) cameras: &'a [RigidTransform],
     /// Extrinsics from calibration and encoders, one per view.
     pub(super) imu_from_camera: &'a [RigidTransform],
-    /// Motion from each view to the next, one fewer than views.
+    /// Motion from each view to the next; one fewer than views.
     pub(super) increments: &'a [Preintegration],
     /// Median distance of the landmarks, in the cameras' unit of length.
     pub(super) median_distance: f64,
     pub(super) bearing_sigma_rad: f64,
     pub(super) gravity_m_per_s2: f64,
-    /// Rotation error of the extrinsics that all views share.
+    /// Rotation error of the extrinsics common to all views.
     pub(super) extrinsics_rotation_sigma_rad: f64,
-    /// Independent rotation error of the extrinsics in each view.
+    /// Rotation error of the extrinsics, independent in each view.
     pub(super) extrinsics_rotation_noise_rad: f64,
     pub(super) gyroscope_bias: VectorPrior,
     pub(super) accelerometer_bias: VectorPrior,
 }
 
-/// A first metric solution, in the IMU frame of the first view.
+/// First metric solution, in the IMU frame of the first view.
 #[derive(Clone, Debug)]
 pub(super) struct Alignment {
     /// Metres per unit of the cameras' translations.
     pub(super) scale: f64,
-    /// Gravity (pointing down) with its exact magnitude.
+    /// Gravity (pointing down) with exact magnitude, in m/s².
     pub(super) gravity: Vector3<f64>,
     /// `start_from_imu` per view.
     pub(super) poses: Vec<RigidTransform>,
-    /// Velocity per view.
+    /// Velocity per view, in m/s.
     pub(super) velocities: Vec<Vector3<f64>>,
     /// Extrinsics per view, with the rotation from the images.
     pub(super) imu_from_camera: Vec<RigidTransform>,
     pub(super) bias: ImuBias,
-    /// Weighted squared residuals of the linear system.
+    /// Weighted sum of squared residuals of the linear system.
     cost: f64,
 }
 
@@ -73,8 +71,8 @@ pub(super) struct RotationAlignment {
     pub(super) gyroscope_bias: Vector3<f64>,
 }
 
-/// Returns `start_from_imu` of every view for a gyroscope bias, with its derivative (right perturbation, 3 × 3)
-/// with respect to the bias.
+/// Returns `start_from_imu` of every view for a gyroscope bias, and its derivative with respect to the bias
+/// (right perturbation, 3 × 3).
 fn gyroscope_rotations(increments: &[Preintegration], bias: &Vector3<f64>) -> Vec<(UnitQuaternion<f64>, Matrix3<f64>)> {
     let mut rotations = vec![(UnitQuaternion::identity(), Matrix3::zeros())];
     let (mut rotation, mut by_bias) = (UnitQuaternion::identity(), Matrix3::zeros());
@@ -89,7 +87,7 @@ fn gyroscope_rotations(increments: &[Preintegration], bias: &Vector3<f64>) -> Ve
     rotations
 }
 
-/// Estimates the rotation of the extrinsics at the first view and the gyroscope's bias together, robustly.
+/// Estimates the rotation of the extrinsics at the first view together with the gyroscope bias, robustly.
 ///
 /// Each view gives `imu_from_first_camera = start_from_imu · imu_from_camera · camera_from_first_camera`.
 pub(super) fn align_rotations(input: &AlignmentInput<'_>) -> Option<RotationAlignment> {
@@ -110,7 +108,7 @@ pub(super) fn align_rotations(input: &AlignmentInput<'_>) -> Option<RotationAlig
         {
             let predicted = start_from_imu * given.rotation * camera.rotation.inverse();
             let error = so3::log(&(extrinsics.inverse() * predicted));
-            // A right perturbation of `start_from_imu` passes through the rest of the product.
+            // Moves the right perturbation of `start_from_imu` to the right end of the product.
             let onward = (given.rotation * camera.rotation.inverse()).inverse().to_rotation_matrix().into_inner();
             let by_bias = onward * by_bias;
             let ratio = error.norm() / sigma;
@@ -141,14 +139,14 @@ const BIAS: usize = 4;
 const GRAVITY: usize = 7;
 const VELOCITY: usize = 10;
 
-/// With a larger uncertainty of the extrinsics' rotation, the alignment starts from several rotations.
+/// Above this uncertainty of the extrinsics' rotation, the alignment starts from several rotations.
 const AMPLE_EXTRINSICS_SIGMA_RAD: f64 = 0.6;
 
-/// Solves for scale, gravity with exact magnitude, velocities, accelerometer bias and the remaining rotation of
+/// Solves for scale, gravity of exact magnitude, velocities, accelerometer bias and the remaining rotation of
 /// the extrinsics.
 ///
-/// Without encoders the camera may point anywhere: then the 24 rotations of a cube are tried as well, one of
-/// which is within 63° of any rotation, and the smallest cost wins.
+/// Without encoders the rotation of the camera is unknown: then the 24 rotations of a cube are tried as well, one of
+/// which is within 63° of any rotation, and the solution of smallest cost is kept.
 pub(super) fn align(input: &AlignmentInput<'_>, rotation: &RotationAlignment) -> Option<Alignment> {
     let mut best = align_from(input, rotation, rotation.imu_from_first_camera);
     if input.extrinsics_rotation_sigma_rad > AMPLE_EXTRINSICS_SIGMA_RAD {
@@ -200,7 +198,7 @@ fn align_from(
         let rotation_step = solution.fixed_rows::<3>(EXTRINSICS).into_owned();
         extrinsics = UnitQuaternion::new_normalize((so3::exp(&rotation_step) * extrinsics).into_inner());
         rotation_change += rotation_step;
-        // A negative scale would mirror the scene; continue from a small positive one.
+        // A negative scale would mirror the scene: continue from a small positive one.
         scale = Some(solution[SCALE].max(1e-6));
         last = Some((solution, cost));
     }
@@ -227,7 +225,7 @@ fn align_from(
     Some(Alignment { scale, gravity, poses, velocities, imu_from_camera: camera_extrinsics, bias, cost })
 }
 
-/// Weighted normal equations `N x = b` of all intervals and priors, and the sum of the weighted squared right sides.
+/// Weighted normal equations `N x = b` of all intervals and priors, and the weighted sum of the squared right sides.
 fn linear_system(
     input: &AlignmentInput<'_>,
     rotations: &[UnitQuaternion<f64>],

@@ -19,11 +19,11 @@ use super::{
 use crate::estimator::{ImuBias, Preintegration};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 
-/// Largest number of iterations of the refinement before and after outlier landmarks are dropped.
+/// Iteration limits of the refinement: before outlier landmarks are dropped, and after.
 const REFINEMENT_ROUNDS: [usize; 2] = [10, 25];
-/// A landmark with an observation beyond this many standard deviations is dropped in between.
+/// A landmark with an observation beyond this many standard deviations is dropped between the two refinements.
 const OUTLIER_SIGMAS: f64 = 4.0;
-/// Change of the gyroscope's bias at which intervals are reintegrated.
+/// Change of the gyroscope bias that triggers a new integration of the intervals.
 const REINTEGRATE_RAD_PER_S: f64 = 0.003;
 
 /// Tries to initialize from the given frames.
@@ -43,7 +43,8 @@ pub fn try_initialize(input: &InitializationInput<'_>, options: &InitializationO
     }
 }
 
-/// Gravity along the mean specific force; only the accelerometer bias along it is observable.
+/// Solution of a stationary vehicle: gravity along the mean specific force, accelerometer bias only along it (the
+/// observable part).
 fn from_stationary(
     input: &InitializationInput<'_>,
     stationary: &StationaryEstimate,
@@ -153,7 +154,7 @@ fn from_motion(
     Some(problem.solution(&refined, parallax_rad))
 }
 
-/// Standard deviation of the mean specific force between neighbouring views, in a frame that does not rotate.
+/// Standard deviation of the mean specific force between neighbouring views, in m/s², in a frame that does not rotate.
 fn excitation(frames: &[InitializationFrame<'_>], selected: &[usize], camera_rotations: &[UnitQuaternion<f64>]) -> f64 {
     let forces: Vec<Vector3<f64>> = selected
         .windows(2)
@@ -226,19 +227,20 @@ fn structure_of(
     }
 }
 
-/// Bound that the mean of this many squared normal numbers exceeds once in a thousand times (the quantile of χ²
-/// over its degrees of freedom, by the cube root of Wilson and Hilferty).
+/// Bound that the mean square of `count` standard normal variables exceeds with probability 0.001 (quantile of χ² over
+/// its
+/// degrees of freedom, by the Wilson–Hilferty cube root).
 fn upper_mean_square(count: usize) -> f64 {
     const NORMAL_QUANTILE: f64 = 3.09;
     let ratio = 2.0 / (9.0 * count.max(1) as f64);
     (1.0 - ratio + NORMAL_QUANTILE * ratio.sqrt()).powi(3)
 }
 
-/// Reconstructed views with the data for the metric part.
+/// Reconstructed views with the data of the metric part.
 struct Problem<'a> {
     input: &'a InitializationInput<'a>,
     options: &'a InitializationOptions,
-    /// Numbers of the frames behind the views.
+    /// Frame indices of the views.
     kept: &'a [usize],
     structure: &'a Structure,
     gyroscope_prior: VectorPrior,
@@ -249,7 +251,7 @@ impl Problem<'_> {
         self.kept.iter().map(|&index| self.input.frames[index].imu_from_camera).collect()
     }
 
-    /// Motion between neighbouring views, integrated around a bias.
+    /// Preintegrated motion between neighbouring views, linearized at `bias`.
     fn increments(&self, bias: ImuBias) -> Vec<Preintegration> {
         self.kept
             .windows(2)
@@ -373,7 +375,7 @@ impl Problem<'_> {
         checklist.all_passed().then_some(refined)
     }
 
-    /// Rotates the refined state such that gravity is vertical.
+    /// The refined state, rotated such that gravity is vertical.
     fn solution(&self, refined: &Refined, parallax_rad: f64) -> InitializationSolution {
         let state = &refined.state;
         let given = self.extrinsics();

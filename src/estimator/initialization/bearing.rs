@@ -1,22 +1,23 @@
-//! Geometry of unit bearings: tangent planes, rotation between two sets, triangulation, pose from known points.
+//! Geometry of unit bearings: rotation between two sets, triangulation, pose from known points.
 
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::geometry::{RigidTransform, median, so3, tangent_basis};
 
-/// What a rotation alone leaves between two sets of bearings.
+/// Rotation between two sets of bearings, with the remaining parallax.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotationFit {
-    /// `camera_j_from_camera_i`.
     pub rotation: UnitQuaternion<f64>,
-    /// Median angle that remains, in radians: the rotation-compensated parallax.
+    /// Median remaining angle in radians: the rotation-compensated parallax.
     pub median_parallax_rad: f64,
 }
 
-/// The rotation that best lays the first bearings of the pairs on the second ones, robustly, from a first guess.
+/// Rotation `camera_j_from_camera_i` that best maps the first bearings of the pairs onto the second ones, by robust
+/// least
+/// squares from an initial value.
 ///
-/// Parallax of near points pulls a least-squares fit, so angles beyond the median count less (reweighted in rounds).
-/// Returns `None` with fewer than three pairs.
+/// Parallax of near points biases a plain least-squares fit, so angles beyond the median get less weight (iteratively
+/// reweighted). Returns `None` with fewer than three pairs.
 pub fn fit_rotation(
     pairs: &[(Vector3<f64>, Vector3<f64>)],
     camera_j_from_camera_i: &UnitQuaternion<f64>,
@@ -34,7 +35,7 @@ pub fn fit_rotation(
             let measured_in_i = camera_i_from_camera_j * bearing_j;
             let error = measured_in_i.cross(bearing_i);
             let weight = 1.0 / (1.0 + (error.norm() / scale).powi(2));
-            // A step φ moves `bearing_i` by φ × bearing_i; its component along the bearing has no effect.
+            // A step φ moves `bearing_i` by φ × bearing_i; the component of φ along the bearing has no effect.
             normal += (Matrix3::identity() - bearing_i * bearing_i.transpose()) * weight;
             rhs += bearing_i.cross(&measured_in_i) * weight;
         }
@@ -49,33 +50,33 @@ pub fn fit_rotation(
 
 /// Median angle between `rotation · first` and `second`, in radians.
 fn median_angle(pairs: &[(Vector3<f64>, Vector3<f64>)], rotation: &UnitQuaternion<f64>) -> f64 {
-    // The length of the chord grows with the angle and is faster to compute.
+    // The chord is monotonic in the angle and faster to compute.
     let rotation_matrix = rotation.to_rotation_matrix();
     let chord = |(first, second): &(Vector3<f64>, Vector3<f64>)| (rotation_matrix * first - second).norm_squared();
     let squared = median(pairs.iter().map(chord)).unwrap_or(0.0);
     2.0 * (0.5 * squared.sqrt()).min(1.0).asin()
 }
 
-/// Angle between two unit vectors in radians, exact for small angles too.
+/// Angle between two unit vectors in radians, accurate for small angles too.
 pub fn angle_between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     a.cross(b).norm().atan2(a.dot(b))
 }
 
-/// A point found from several bearings.
+/// Point triangulated from several bearings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangulatedPoint {
-    /// Where, in the frame that the camera poses are given in.
+    /// Position in the frame of the camera poses.
     pub position: Vector3<f64>,
-    /// Largest angle between two of its rays, in radians.
+    /// Largest angle between two rays, in radians.
     pub parallax_rad: f64,
-    /// Whether it lies before every camera that saw it.
+    /// True if the point lies in front of every observing camera.
     pub in_front: bool,
     /// Largest angle between a measured bearing and the direction to the point, in radians.
     pub worst_angle_rad: f64,
 }
 
-/// The point nearest to the rays of several cameras `(world_from_camera, bearing)`, in the least-squares sense with each
-/// ray weighted by the inverse square of its length; `None` when the rays are parallel or fewer than two.
+/// Least-squares intersection of the rays `(world_from_camera, bearing)`, each weighted by the inverse square of its
+/// length; `None` when the rays are parallel or fewer than two.
 pub fn triangulate(rays: &[(RigidTransform, Vector3<f64>)]) -> Option<TriangulatedPoint> {
     const ROUNDS: usize = 3;
     if rays.len() < 2 {
@@ -113,20 +114,20 @@ pub fn triangulate(rays: &[(RigidTransform, Vector3<f64>)]) -> Option<Triangulat
     Some(TriangulatedPoint { position, parallax_rad, in_front, worst_angle_rad })
 }
 
-/// A camera pose found from known points.
+/// Camera pose estimated from known points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPose {
-    /// The pose.
     pub world_from_camera: RigidTransform,
-    /// Whether each point fits, in the order given.
+    /// One flag per point, in the order given.
     pub inliers: Vec<bool>,
-    /// Root mean square angle of those that fit, in radians.
+    /// Root mean square angle of the inliers, in radians.
     pub rms_rad: f64,
 }
 
-/// Refines a camera pose on known points `(point_in_world, bearing)` with a robust loss that tightens from round to round.
+/// Refines a camera pose on known points `(point_in_world, bearing)` with a robust loss of decreasing scale.
 ///
-/// `bearing_sigma_rad` is the noise of a bearing; a point fits when its angle stays under `inlier_sigmas` of them.
+/// `bearing_sigma_rad` is the noise of a bearing; a point is an inlier when its angle is below `inlier_sigmas` times
+/// that.
 /// Returns `None` with fewer than four points or when the equations are singular.
 pub fn refine_camera_pose(
     points: &[(Vector3<f64>, Vector3<f64>)],
@@ -174,8 +175,8 @@ pub fn refine_camera_pose(
     Some(CameraPose { world_from_camera: pose, inliers, rms_rad: (sum / count.max(1) as f64).sqrt() })
 }
 
-/// Angle error of a known point in the bearing's tangent plane and its derivative by the camera pose `[φ; δt]`,
-/// `None` when the point lies behind.
+/// Angle error of a known point in the bearing's tangent plane (2 × 1) and its derivative by the camera pose `[φ; δt]`
+/// (2 × 6); `None` when the point lies behind the camera.
 fn pose_residual(
     world_from_camera: &RigidTransform,
     point: &Vector3<f64>,

@@ -1,19 +1,17 @@
-//! The checklist of an attempt: each test with its value and threshold.
+//! Checklist of an initialization attempt: each check with its value and threshold.
 
 /// One check with its measured value and threshold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaitReason {
-    /// Short constant name of the check.
+    /// Short constant name.
     pub test: &'static str,
-    /// Reason for waiting (or result, when passed), in one sentence with units.
+    /// Reason for waiting (or result, when passed), with units.
     pub message: String,
-    /// The measured value.
     pub value: f64,
-    /// The threshold that it was compared with.
+    /// Threshold for `value`.
     pub threshold: f64,
 }
 
-/// Checks so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Checklist {
     pub(super) failed: Vec<WaitReason>,
@@ -26,13 +24,13 @@ pub(super) enum Shown {
     Plain(&'static str),
     /// Radians, shown as degrees.
     Degrees,
-    /// A ratio, displayed in percent.
+    /// A ratio, shown in percent.
     Percent,
 }
 
 impl Shown {
     fn text(self, value: f64) -> String {
-        // An empty sum is -0.
+        // An empty sum is −0.
         let value = value + 0.0;
         match self {
             Self::Plain(unit) if value.fract() == 0.0 => format!("{value:.0}{unit}"),
@@ -89,7 +87,7 @@ impl Checklist {
         passed
     }
 
-    /// Whether nothing has failed so far.
+    /// True if no check has failed.
     pub(super) fn all_passed(&self) -> bool {
         self.failed.is_empty()
     }

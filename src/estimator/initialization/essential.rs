@@ -1,4 +1,5 @@
-//! Essential matrices of five bearing pairs (Nistér, "An efficient solution to the five-point relative pose problem").
+//! Essential matrices from five bearing pairs (Nistér, "An efficient solution to the five-point relative pose
+//! problem").
 //!
 //! Bearings are unit vectors in their cameras; `bearing_jᵀ · E · bearing_i = 0` with `E = [t]^·R` for
 //! `camera_j_from_camera_i = (R, t)`.
@@ -11,7 +12,8 @@ use super::polynomial::real_roots;
 const MONOMIALS_2: [[u8; 3]; 10] =
     [[2, 0, 0], [1, 1, 0], [1, 0, 1], [1, 0, 0], [0, 2, 0], [0, 1, 1], [0, 1, 0], [0, 0, 2], [0, 0, 1], [0, 0, 0]];
 
-/// Exponents of the twenty monomials up to degree three, in the order that lets the last ten hold all powers of z.
+/// Exponents of the twenty monomials up to degree three; the last ten are the blocks of x, y and 1 with falling powers
+/// of z.
 const MONOMIALS_3: [[u8; 3]; 20] = [
     [3, 0, 0],
     [0, 3, 0],
@@ -38,7 +40,7 @@ const MONOMIALS_3: [[u8; 3]; 20] = [
 /// Exponents of the linear monomials x, y, z, 1.
 const MONOMIALS_1: [[u8; 3]; 4] = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]];
 
-/// Where the product of two monomials stands in a list.
+/// Index of each product `left[a]·right[b]` in `products`.
 const fn product_table<const A: usize, const B: usize, const N: usize>(
     left: &[[u8; 3]; A],
     right: &[[u8; 3]; B],
@@ -89,7 +91,7 @@ fn add_product_2_1(sum: &mut Cubic, a: &Quadratic, b: &Linear, factor: f64) {
     }
 }
 
-/// Up to ten essential matrices that fit five pairs `(bearing_i, bearing_j)`, unit Frobenius norm.
+/// Up to ten essential matrices that satisfy five pairs `(bearing_i, bearing_j)`, each of unit Frobenius norm.
 pub(super) fn five_point(pairs: &[(Vector3<f64>, Vector3<f64>); 5]) -> Vec<Matrix3<f64>> {
     let mut constraints = SMatrix::<f64, 9, 5>::zeros();
     for (column, (bearing_i, bearing_j)) in pairs.iter().enumerate() {
@@ -102,8 +104,9 @@ pub(super) fn five_point(pairs: &[(Vector3<f64>, Vector3<f64>); 5]) -> Vec<Matri
     let Some(basis) = complement(&constraints) else { return Vec::new() };
     let Some(rows) = eliminate(polynomial_constraints(&basis)) else { return Vec::new() };
 
-    // Rows 4 to 9 lead with x²z, x², y²z, y², xyz, xy: subtracting z times the second of each pair from the first
-    // leaves three equations that are linear in x and y with coefficients that are polynomials in z.
+    // Rows 4 to 9 have the leading terms x²z, x², y²z, y², xyz, xy: subtracting z times the second of each pair from
+    // the first
+    // leaves three equations linear in x and y, whose coefficients are polynomials in z.
     let mut equations = [[[0.0_f64; 5]; 3]; 3];
     for (equation, (upper, lower)) in equations.iter_mut().zip([(4, 5), (6, 7), (8, 9)]) {
         for (block, start, length) in [(0, 10, 3), (1, 13, 3), (2, 16, 4)] {
@@ -138,7 +141,7 @@ pub(super) fn five_point(pairs: &[(Vector3<f64>, Vector3<f64>); 5]) -> Vec<Matri
     solutions
 }
 
-/// An orthonormal basis of the space orthogonal to five columns, `None` when they are (nearly) dependent.
+/// Orthonormal basis of the complement of five columns, `None` when they are (nearly) dependent.
 fn complement(columns: &SMatrix<f64, 9, 5>) -> Option<SMatrix<f64, 9, 4>> {
     let mut reduced = *columns;
     let mut reflectors = [SVector::<f64, 9>::zeros(); 5];
@@ -234,7 +237,7 @@ fn eliminate(mut rows: SMatrix<f64, 10, 20>) -> Option<SMatrix<f64, 10, 20>> {
     Some(rows)
 }
 
-/// The determinant of a 3 × 3 matrix of polynomials in z (degrees 3, 3, 4 by column), eleven coefficients.
+/// Determinant of a 3 × 3 matrix of polynomials in z (degrees 3, 3, 4 by column): eleven coefficients.
 fn determinant_polynomial(m: &[[[f64; 5]; 3]; 3]) -> [f64; 11] {
     let mut determinant = [0.0; 11];
     for (a, b, c) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
@@ -256,11 +259,11 @@ fn determinant_polynomial(m: &[[[f64; 5]; 3]; 3]) -> [f64; 11] {
     determinant
 }
 
-/// The four relative poses `(R, t)` with unit `t` that an essential matrix allows.
+/// The four relative poses `(R, t)`, with unit `t`, of an essential matrix.
 pub(super) fn decompose(essential: &Matrix3<f64>) -> Option<[(UnitQuaternion<f64>, Vector3<f64>); 4]> {
     let svd = essential.try_svd(true, true, f64::EPSILON, 200)?;
     let (mut u, mut v_t) = (svd.u?, svd.v_t?);
-    // nalgebra does not promise an order: bring the smallest singular value last.
+    // nalgebra does not guarantee an order: move the smallest singular value to the last place.
     let smallest = (0..3).min_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]))?;
     u.swap_columns(smallest, 2);
     v_t.swap_rows(smallest, 2);

@@ -1,4 +1,4 @@
-//! Fits joint angles and chain to the camera rotations of a solution.
+//! Fit of joint angles and chain parameters to the camera rotations of a solution.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,8 +11,9 @@ use crate::geometry::{RigidTransform, so3};
 const EXTRINSICS_SIGMA_RAD: f64 = 0.01;
 const ROUNDS: usize = 10;
 
-/// Fits chain parameters and joint angles to the rotations `imu_from_camera` of the frames, by Gauss–Newton, with the encoder
-/// angles and the rig's prior on the chain as priors. Nothing changes when the equations are singular or there are no joints.
+/// Fits chain parameters and joint angles to the rotations `imu_from_camera` of the frames by Gauss–Newton, with the
+/// encoder angles and the rig's chain prior as priors. Changes nothing when the equations are singular or there are no
+/// joints.
 pub(super) fn fit_extrinsics(calibration: &mut Calibration, frames: &mut Frames, imu_from_camera: &[RigidTransform]) {
     let joints = calibration.joint_count();
     if joints == 0 || imu_from_camera.len() != frames.len() {

@@ -24,20 +24,21 @@ use crate::estimator::window::window_state::WindowState;
 use crate::frontend::TrackedFeature;
 use crate::geometry::{RigidTransform, so3};
 
-/// Largest number of iterations per solve of the first window: the first from inaccurate values, later ones
-/// after outlier rejection.
+/// Iteration limits of the solves of the first window: the first starts from inaccurate values, the others follow an
+/// outlier rejection.
 const FIRST_SOLVES: [usize; 3] = [15, 10, 5];
 
-/// A window made from a solution, before its first solve.
+/// Window created from a solution, before its first solve.
 pub(super) struct FirstWindow<'a> {
     solution: &'a InitializationSolution,
     window: SlidingWindow,
-    /// By frame of the window and camera, the features of its image.
+    /// Features by frame and camera.
     observed: Vec<Vec<Vec<TrackedFeature>>>,
 }
 
 impl<'a> FirstWindow<'a> {
-    /// The window of the newest views of a solution, with the features of the leading camera; `None` when none of them is
+    /// Window of the newest views of a solution, with the features of the leading camera; `None` when none of these
+    /// views is
     /// among the waiting frames.
     pub(super) fn new(
         setup: &Setup,
@@ -119,7 +120,7 @@ impl<'a> FirstWindow<'a> {
         Some(Self { solution, window: SlidingWindow::new(state), observed })
     }
 
-    /// Solves the window with outlier rejection between solves; returns it with its report.
+    /// Solves the window with outlier rejection between the solves; returns it with its report.
     pub(super) fn solve(
         mut self,
         setup: &Setup,
@@ -160,8 +161,9 @@ impl<'a> FirstWindow<'a> {
         (self.window, report)
     }
 
-    /// Adds the features of the further cameras and returns whether there are any. Their given extrinsics may have
-    /// large errors, so that they are excluded from the first solve.
+    /// Adds the features of the other cameras; returns true if there are any. Their given extrinsics may have large
+    /// errors, so
+    /// they are excluded from the first solve.
     fn add_other_cameras(&mut self) -> bool {
         let window = &mut self.window.state;
         let leading = window.calibration.leading();
@@ -174,7 +176,7 @@ impl<'a> FirstWindow<'a> {
     }
 }
 
-/// Pose of the solution's world: at the origin, or with position and yaw of the window before a failure.
+/// Pose of the solution's world frame: identity, or position and yaw of the window before a failure.
 fn world_from_solution(solution: &InitializationSolution, resume_at: Option<&RigidTransform>) -> RigidTransform {
     let (Some(resume), Some(first)) = (resume_at, solution.frames.first()) else {
         return RigidTransform::identity();

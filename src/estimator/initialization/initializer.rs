@@ -1,4 +1,4 @@
-//! Initialization phase: frames are kept until an attempt has a solution, from which the first window is created.
+//! Initialization phase: keeps frames until an attempt has a solution, then creates the first window from it.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -20,13 +20,13 @@ use crate::frontend::FeatureId;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{ChainPrior, ImuSample};
 
-/// Longest gap in the IMU samples over which frames on both sides may be used together.
+/// Longest gap between IMU samples within the kept frames; a longer one drops the frames before it.
 const LONGEST_GAP_S: f64 = 0.1;
 
 /// Keeps the frames of the last seconds and tries to initialize from them.
 #[derive(Clone, Debug)]
 pub(crate) struct Initializer {
-    /// Given calibration; parameters may be fixed or set in between.
+    /// Given calibration; a user may fix or set parameters before the window exists.
     pub(crate) calibration: Calibrations,
     /// Last pose before the failure, at which a restarted window starts.
     resume_at: Option<RigidTransform>,
@@ -35,17 +35,16 @@ pub(crate) struct Initializer {
     stationary: Option<StationaryEstimate>,
 }
 
-/// Result of one image without a window.
+/// Result of a step without a window.
 #[derive(Debug)]
 pub(crate) enum InitializationStep {
     /// The initialization waits; the report has the reasons.
     Waiting(StepReport),
-    /// The window with its report, solved.
+    /// The solved window with its report.
     Initialized(Box<SlidingWindow>, StepReport),
 }
 
 impl Initializer {
-    /// An initializer without frames.
     pub(crate) fn new(calibration: Calibrations, resume_at: Option<RigidTransform>) -> Self {
         Self { calibration, resume_at, waiting: VecDeque::new(), stationary: None }
     }
@@ -88,13 +87,12 @@ impl Initializer {
         step
     }
 
-    /// Creates the window of a solution and consumes the frames.
+    /// Creates the window of a solution; consumes the waiting frames.
     fn first_window<'a>(&mut self, setup: &Setup, solution: &'a InitializationSolution) -> Option<FirstWindow<'a>> {
         let waiting = std::mem::take(&mut self.waiting);
         FirstWindow::new(setup, solution, waiting, self.calibration.clone(), self.resume_at.as_ref())
     }
 
-    /// Drops features of a camera.
     pub(crate) fn drop_features(&mut self, camera: usize, dropped: &impl Fn(FeatureId) -> bool) {
         for frame in &mut self.waiting {
             if let Some(features) = frame.features.get_mut(camera) {
@@ -103,7 +101,6 @@ impl Initializer {
         }
     }
 
-    /// Bytes on the heap.
     pub(crate) fn heap_bytes(&self) -> usize {
         self.waiting.iter().map(WaitingFrame::bytes).sum()
     }
@@ -117,7 +114,7 @@ impl Initializer {
         self.calibration.of(MAIN).joint_count()
     }
 
-    /// Keeps the frame of this image; drops frames that are too old or before a gap.
+    /// Keeps the frame of this image; drops frames that are too old or lie before a gap.
     fn keep(&mut self, setup: &Setup, input: &StepInput<'_>, events: &mut Vec<Event>) {
         let encoder = setup.encoder_reading(input, self.joints());
         let joints_rad = initial_joints_rad(encoder.as_ref(), self.joints());
@@ -146,7 +143,7 @@ impl Initializer {
         }
     }
 
-    /// The largest standard deviation of the encoder angles of the kept frames, `None` when one has none.
+    /// Largest standard deviation of the encoder angles of the kept frames, `None` when a frame has no encoder reading.
     fn largest_encoder_sigma_rad(&self) -> Option<f64> {
         self.waiting.iter().try_fold(0.0, |largest: f64, frame| {
             frame.encoder.as_ref().map(|encoder| encoder.sigmas_rad.iter().copied().fold(largest, f64::max))
@@ -175,7 +172,7 @@ impl Initializer {
         if joints == 0 {
             return base.for_rigid_camera(rotation_rad, translation_m);
         }
-        // The rig's bounds are those of uniform errors.
+        // The rig's bounds are those of uniform errors (σ·√3).
         let bounds = ChainPrior {
             translation_bound_m: translation_m * 3.0_f64.sqrt(),
             rotation_bound_rad: rotation_rad * 3.0_f64.sqrt(),
@@ -185,7 +182,7 @@ impl Initializer {
 
     fn attempt(&self, setup: &Setup, options: &InitializationOptions) -> InitializationOutcome {
         let leading = self.calibration.leading();
-        // With several cameras the leading one may lack an image; its motion is added to the next frame.
+        // With several cameras the leading one may lack an image; its IMU samples are added to the next frame.
         let has_image = |frame: &WaitingFrame| frame.features.len() == 1 || !frame.features[leading].is_empty();
         if !self.waiting.back().is_some_and(has_image) {
             return InitializationOutcome::Waiting { reasons: Vec::new(), passed: Vec::new(), stationary: None };
@@ -230,7 +227,7 @@ fn waiting_for(reason: WaitReason) -> Event {
     Event::decided(EventKind::InitializationWaits, reason.message, reason.value, reason.threshold)
 }
 
-/// The longest time without an IMU sample between the last image and this one.
+/// Longest time without an IMU sample between the previous image and this one.
 fn longest_gap_s(input: &StepInput<'_>, last_stamp_ns: i64) -> f64 {
     let stamps = std::iter::once(last_stamp_ns)
         .chain(input.imu.iter().map(|sample| sample.stamp_ns).filter(|stamp| *stamp > last_stamp_ns))

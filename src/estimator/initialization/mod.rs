@@ -1,22 +1,29 @@
-//! Initialization: from a short stretch of tracked features and IMU samples to poses, velocities, gravity, biases and
-//! landmarks in metres.
+//! Initialization: poses, velocities, gravity, biases and landmarks in metres from a few seconds of tracked features
+//! and
+//! IMU samples.
 //!
-//! [`try_initialize`] is a pure function of its input; call it at frames while waiting, with the frames of the last
-//! [`InitializationOptions::longest_window_s`] seconds. It returns a solution, or the reasons for waiting.
+//! [`try_initialize`] is a pure function of its input. It is called at each frame until it succeeds, with the frames of
+//! the
+//! last [`InitializationOptions::longest_window_s`] seconds, and returns a solution or the reasons for waiting.
 //!
 //! Steps, in the order of the reported checks:
 //!
-//! 1. *Stationary vehicle.* IMU samples of little variance and a constant image give gyroscope bias and gravity direction.
-//!    An accelerometer's turn-on bias of 0.5 m/s² tilts that direction by 3°, and only motion separates the two.
-//!    By default the estimate is kept ([`StationaryEstimate`]) and the initialization waits for motion; with
-//!    [`StationaryPolicy::InitializeAtOnce`] it initializes right away, with velocity zero and no landmarks: the estimator
-//!    then has to find depths itself once there is parallax, and must give the accelerometer's bias its full prior.
-//! 2. *Selection.* A dozen views, spaced by parallax and time, so that a hover before the motion is represented by few of
-//!    them: these few bind tilt and accelerometer bias together, which makes the scale of the motion after it reliable.
-//! 3. *Structure.* Camera poses from the images alone. Encoders may have errors of many degrees and only give initial values.
+//! 1. *Stationary vehicle.* IMU samples of little variance and a constant image give gyroscope bias and gravity
+//! direction.
+//!    An accelerometer turn-on bias of 0.5 m/s² tilts that direction by 3°, and only motion separates the two.
+//!    By default the estimate is kept ([`StationaryEstimate`]) and the initialization waits for motion. With
+//!    [`StationaryPolicy::InitializeAtOnce`] it initializes immediately, with velocity zero and no landmarks: the
+//! estimator
+//!    then has to find depths once there is parallax, and must give the accelerometer bias its full prior.
+//! 2. *Selection.* A dozen views, spaced by parallax and time, so that a hover before the motion is represented by few
+//! of
+//!    them: these few constrain tilt and accelerometer bias jointly, which makes the scale of the later motion
+//! reliable.
+//! 3. *Structure.* Camera poses from the images alone. Encoders may have errors of many degrees and only give initial
+//! values.
 //! 4. *Alignment.* Rotation of the extrinsics and gyroscope bias from rotations; scale, gravity of exact magnitude,
 //!    velocities and accelerometer bias from a linear system.
-//! 5. *Refinement.* All of it together with the IMU covariances, the calibration's error included as unknowns with priors.
+//! 5. *Refinement.* All of these together with the IMU covariances; calibration errors are unknowns with priors.
 //! 6. *Acceptance.* Residuals, and the standard deviations of scale, velocity and gravity from the refined problem.
 //!    Constant velocity, hover and pure rotation fail here: their standard deviation of the scale is large.
 //!
@@ -58,14 +65,13 @@ use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::RigidTransform;
 use crate::sensors::{ImuNoise, ImuSample};
 
-/// One frame that the initialization may use.
 #[derive(Clone, Copy, Debug)]
 pub struct InitializationFrame<'a> {
-    /// Number of the image in its camera's stream.
+    /// Index of the image in its camera's stream.
     pub frame_index: usize,
-    /// Header stamp of the image since the log began.
+    /// Header stamp of the image since the start of the log.
     pub stamp_ns: i64,
-    /// Its features, ordered by id; bearings are unit vectors in the camera.
+    /// Features ordered by id; bearings are unit vectors in the camera.
     pub features: &'a [TrackedFeature],
     /// Extrinsics from calibration and encoders.
     pub imu_from_camera: RigidTransform,
@@ -73,33 +79,28 @@ pub struct InitializationFrame<'a> {
     pub imu: &'a [ImuSample],
 }
 
-/// Input of an attempt.
 #[derive(Clone, Debug)]
 pub struct InitializationInput<'a> {
     /// Frames in time order, without gaps in the IMU samples between them.
     pub frames: &'a [InitializationFrame<'a>],
     /// Magnitude of gravity in m/s².
     pub gravity_m_per_s2: f64,
-    /// Noise of the IMU.
     pub imu_noise: ImuNoise,
-    /// Last estimate of a stationary vehicle, if there was one ([`InitializationOutcome::Waiting`] has it).
+    /// Last estimate of a stationary vehicle (from [`InitializationOutcome::Waiting`]), `None` if there was none.
     pub stationary: Option<StationaryEstimate>,
-    /// Biases that an earlier pass over the log has found.
+    /// Biases estimated by an earlier pass over the log.
     pub bias: Option<BiasPrior>,
 }
 
-/// Result of an attempt.
 #[derive(Clone, Debug, PartialEq)]
 pub enum InitializationOutcome {
-    /// There is a solution.
     Initialized(Box<InitializationSolution>),
-    /// The initialization waits.
     Waiting {
-        /// Failed checks, in order; checks after the first failing group were not made.
+        /// Failed checks, in order; checks after the first failing group were not run.
         reasons: Vec<WaitReason>,
         /// Passed checks with their values.
         passed: Vec<WaitReason>,
-        /// Estimate of a stationary vehicle, to be passed to later attempts.
+        /// Estimate of a stationary vehicle, for later attempts.
         stationary: Option<StationaryEstimate>,
     },
 }
@@ -107,31 +108,28 @@ pub enum InitializationOutcome {
 /// Origin of the initial state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InitializationOrigin {
-    /// From motion: scale and all states are estimated.
+    /// Motion: scale and all states are estimated.
     FromMotion,
-    /// From a stationary vehicle: no landmark has a depth.
+    /// Stationary vehicle: no landmark has a depth.
     FromStationary,
 }
 
-/// State of one view of the solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InitializedFrame {
-    /// Number of the image in its camera's stream.
+    /// Index of the image in its camera's stream.
     pub frame_index: usize,
-    /// Stamp of the image since the log started.
+    /// Header stamp of the image since the start of the log.
     pub stamp_ns: i64,
-    /// Pose.
     pub world_from_imu: RigidTransform,
     /// Velocity in the world.
     pub velocity_m_per_s: Vector3<f64>,
-    /// Refined extrinsics: with poor encoders their rotation is much more accurate than the given one.
+    /// Refined extrinsics; with poor encoders their rotation is much more accurate than the given one.
     pub imu_from_camera: RigidTransform,
 }
 
-/// A feature with a depth.
+/// Feature with a depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InitializedLandmark {
-    /// Identity of the feature.
     pub id: FeatureId,
     /// `frame_index` of the first observing view.
     pub anchor_frame_index: usize,
@@ -139,7 +137,7 @@ pub struct InitializedLandmark {
     pub position_m: Vector3<f64>,
     /// Inverse depth along the anchor's optical axis, in 1/m.
     pub inverse_depth_per_m: f64,
-    /// Number of observing views of the solution.
+    /// Number of views of the solution that observe it.
     pub views: usize,
 }
 
@@ -152,33 +150,30 @@ pub struct InitializationDiagnostics {
     pub velocity_sigma_m_per_s: f64,
     /// Standard deviation of gravity's direction.
     pub gravity_sigma_rad: f64,
-    /// Standard deviation of the gyroscope's bias (worst axis).
+    /// Standard deviation of the gyroscope bias (worst axis).
     pub gyroscope_bias_sigma_rad_per_s: f64,
-    /// Standard deviation of the accelerometer's bias (worst axis).
+    /// Standard deviation of the accelerometer bias (worst axis).
     pub accelerometer_bias_sigma_m_per_s2: f64,
-    /// Root mean square angle error of a bearing's coordinate.
+    /// Root mean square angle error of a bearing, per coordinate.
     pub reprojection_rms_rad: f64,
-    /// Mean square of the whitened IMU residuals (1 when the noise is as stated, less with few intervals).
+    /// Mean square of the whitened IMU residuals (1 when the noise densities are correct, less with few intervals).
     pub imu_mean_square: f64,
     /// Largest rotation-compensated parallax between two views.
     pub parallax_rad: f64,
-    /// Rounds of the refinement.
+    /// Iterations of the refinement.
     pub refinement_rounds: usize,
 }
 
-/// A solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InitializationSolution {
-    /// From motion or from a stationary vehicle.
     pub origin: InitializationOrigin,
-    /// The views, in time order; a subset of the frames given, the newest among them.
+    /// Views in time order: a subset of the given frames that includes the newest.
     pub frames: Vec<InitializedFrame>,
-    /// Biases over the window.
+    /// Biases, constant over the window.
     pub bias: ImuBias,
     /// Landmarks by ascending id; empty for a stationary vehicle.
     pub landmarks: Vec<InitializedLandmark>,
-    /// Accuracy of the solution.
     pub diagnostics: InitializationDiagnostics,
-    /// The tests that it passed.
+    /// Passed checks with their values.
     pub passed: Vec<WaitReason>,
 }

@@ -1,17 +1,16 @@
 use crate::sensors::ChainPrior;
 
-/// Treatment of a stationary vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StationaryPolicy {
-    /// Keep its estimate and wait for motion: the most accurate.
+    /// Keep its estimate and wait for motion (most accurate).
     WaitForMotion,
     /// Initialize at once, with zero velocity and without depths.
     InitializeAtOnce,
 }
 
-/// Independent rotation error of the extrinsics in each frame without an encoder.
+/// Independent rotation error of the extrinsics in each frame, without an encoder.
 const BLIND_EXTRINSICS_NOISE_RAD: f64 = 0.5;
-/// Common rotation error of the extrinsics without an encoder.
+/// Common rotation error of the extrinsics, without an encoder.
 const BLIND_EXTRINSICS_SIGMA_RAD: f64 = 1.0;
 
 /// Options of [`super::try_initialize`].
@@ -19,9 +18,9 @@ const BLIND_EXTRINSICS_SIGMA_RAD: f64 = 1.0;
 pub struct InitializationOptions {
     /// Standard deviation of a bearing: pixel noise over focal length.
     pub bearing_sigma_rad: f64,
-    /// Rotation error of the extrinsics that all frames share (calibration).
+    /// Rotation error of the extrinsics common to all frames (calibration).
     pub extrinsics_rotation_sigma_rad: f64,
-    /// Independent rotation error of the extrinsics in each frame (encoder noise; zero for a rigid camera).
+    /// Rotation error of the extrinsics, independent in each frame (encoder noise; zero for a rigid camera).
     pub extrinsics_rotation_noise_rad: f64,
     /// Translation error of the extrinsics.
     pub extrinsics_translation_sigma_m: f64,
@@ -29,16 +28,13 @@ pub struct InitializationOptions {
     pub gyroscope_bias_sigma_rad_per_s: f64,
     /// Turn-on bias of the accelerometer, standard deviation per axis.
     pub accelerometer_bias_sigma_m_per_s2: f64,
-    /// Treatment of a stationary vehicle.
     pub stationary_policy: StationaryPolicy,
 
-    /// Frames older than this against the newest are not used.
+    /// Largest age of a frame relative to the newest.
     pub longest_window_s: f64,
-    /// The views must span at least this.
+    /// Smallest time span of the views.
     pub shortest_window_s: f64,
-    /// Largest number of views.
     pub max_views: usize,
-    /// Smallest number of views.
     pub min_views: usize,
     /// Smallest time between views.
     pub min_spacing_s: f64,
@@ -47,13 +43,14 @@ pub struct InitializationOptions {
     /// Rotation-compensated parallax that selects the next view.
     pub spacing_parallax_rad: f64,
 
-    /// Common features that neighbouring views and the base of the reconstruction need.
+    /// Smallest number of common features of neighbouring views and of the reconstruction's initial pair.
     pub min_common_features: usize,
-    /// Rotation-compensated parallax that the base of the reconstruction needs.
+    /// Smallest rotation-compensated parallax of the reconstruction's initial pair.
     pub min_parallax_rad: f64,
-    /// Standard deviation of the acceleration between views, gravity included, below which the scale is unobservable.
+    /// Smallest standard deviation of the acceleration between views, gravity included; the scale is unobservable
+    /// below.
     pub min_excitation_m_per_s2: f64,
-    /// Smallest ratio of features consistent with a pose.
+    /// Smallest ratio of inliers to features for a pose.
     pub min_inlier_ratio: f64,
     /// Smallest number of landmarks with a depth.
     pub min_landmarks: usize,
@@ -61,13 +58,13 @@ pub struct InitializationOptions {
     pub max_landmarks: usize,
     /// Largest root mean square reprojection error, in standard deviations of a bearing.
     pub max_reprojection_sigmas: f64,
-    /// Tolerated factor on the rig's IMU noise before its residuals reject a solution.
+    /// Factor on the rig's IMU noise that the residuals may reach before a solution is rejected.
     pub imu_noise_factor: f64,
     /// Largest relative standard deviation of the scale.
     pub max_scale_sigma: f64,
     /// Largest standard deviation of the newest velocity.
     pub max_velocity_sigma_m_per_s: f64,
-    /// Largest standard deviation of gravity's direction.
+    /// Largest standard deviation of the direction of gravity.
     pub max_gravity_sigma_rad: f64,
 }
 
@@ -103,14 +100,15 @@ impl Default for InitializationOptions {
     }
 }
 
-/// Parallax, in standard deviations of a bearing, that two views need to triangulate: a landmark that is seen under so wide
-/// an angle has a depth to about a fifth (the noise of two bearings over it), and hundreds of them make a base.
+/// Parallax that two views need to triangulate, in standard deviations of a bearing. It gives the depth of a landmark
+/// to
+/// about a fifth (noise of two bearings over the parallax); hundreds of such landmarks suffice for an initial pair.
 const PARALLAX_SIGMAS: f64 = 7.0;
 
 impl InitializationOptions {
-    /// Sets the options that depend on the camera: the noise of a bearing, and parallaxes relative to it.
+    /// Sets the options that depend on the camera: noise of a bearing, and parallaxes relative to it.
     ///
-    /// Times do not depend on the frame rate: they depend on the motion of the vehicle.
+    /// Times depend on the motion of the vehicle, not on the frame rate.
     #[must_use]
     pub fn for_camera(mut self, focal_length_px: f64, pixel_sigma_px: f64) -> Self {
         self.bearing_sigma_rad = pixel_sigma_px / focal_length_px;
@@ -119,18 +117,20 @@ impl InitializationOptions {
         self
     }
 
-    /// Sets the errors of the extrinsics for a gimbal with `joints` joints: bounds of the chain's uniform errors,
-    /// and the noise of an encoder reading (`None` without encoders: the rotation is then hardly known).
+    /// Sets the errors of the extrinsics for a gimbal with `joints` joints from the bounds of the chain's uniform
+    /// errors
+    /// and the noise of an encoder reading (`None` without encoders: the rotation is then almost unknown).
     #[must_use]
     pub fn for_gimbal(self, prior: &ChainPrior, joints: usize, encoder_sigma_rad: Option<f64>) -> Self {
-        // A uniform error of bound b has standard deviation b/√3; errors of base, links and end add up along the chain.
+        // A uniform error of bound b has standard deviation b/√3; errors of base, links and end accumulate along the
+        // chain.
         let parts = (joints + 2) as f64;
         let rotation = prior.rotation_bound_rad / 3.0_f64.sqrt();
         let translation = prior.translation_bound_m / 3.0_f64.sqrt();
         self.for_gimbal_with(rotation * parts.sqrt(), translation * parts.sqrt(), encoder_sigma_rad)
     }
 
-    /// Sets the errors of the extrinsics for a gimbal whose chain has these standard deviations altogether.
+    /// Sets the errors of the extrinsics for a gimbal from the total standard deviations of its chain.
     #[must_use]
     pub(super) fn for_gimbal_with(
         mut self,
@@ -138,7 +138,7 @@ impl InitializationOptions {
         translation_sigma_m: f64,
         encoder_sigma_rad: Option<f64>,
     ) -> Self {
-        // A part of the common error rotates with the joints and so differs from frame to frame.
+        // Part of the common error rotates with the joints and so differs between frames.
         let wandering = 0.5 * rotation_sigma_rad;
         self.extrinsics_rotation_sigma_rad = rotation_sigma_rad.max(1e-3);
         self.extrinsics_translation_sigma_m = translation_sigma_m.max(1e-3);

@@ -1,17 +1,19 @@
-//! Real roots of a polynomial in one unknown, without complex arithmetic.
+//! Real roots of a univariate polynomial, without complex arithmetic.
 
-/// Bisection and Newton steps per bracket; a bracket halves at least every second step, so this ends at rounding level.
+/// Bisection and Newton steps per bracket; a bracket is halved at least every second step, so this reaches rounding
+/// level.
 const STEPS_PER_BRACKET: usize = 120;
 
-/// The value of `Σ coefficients[i]·xⁱ`.
+/// `Σ coefficients[i]·xⁱ`.
 pub(super) fn evaluate(coefficients: &[f64], x: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
 }
 
-/// Real roots of `Σ coefficients[i]·xⁱ`, in rising order; a root that only touches zero counts when rounding lets it.
+/// Real roots of `Σ coefficients[i]·xⁱ` in ascending order; a root without a sign change is found only if rounding
+/// permits.
 ///
-/// Between two neighbouring stationary points the polynomial is monotonic, so each sign change there holds one root;
-/// the stationary points are the roots of the derivative, found in the same way.
+/// The polynomial is monotonic between two neighbouring stationary points, so each sign change there brackets one root.
+/// The stationary points are the roots of the derivative, found in the same way.
 pub(super) fn real_roots(coefficients: &[f64]) -> Vec<f64> {
     let largest = coefficients.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
     if !largest.is_finite() || largest == 0.0 {
@@ -38,10 +40,10 @@ pub(super) fn real_roots(coefficients: &[f64]) -> Vec<f64> {
     stationary
 }
 
-/// Roots of a polynomial whose stationary points are known, one search per monotonic piece.
+/// Roots of a polynomial with known stationary points, one search per monotonic piece.
 fn roots_between(polynomial: &[f64], stationary: &[f64]) -> Vec<f64> {
     let Some((&leading, lower)) = polynomial.split_last() else { return Vec::new() };
-    // Cauchy's bound holds all real roots.
+    // Cauchy's bound contains all real roots.
     let bound = 1.0 + lower.iter().fold(0.0_f64, |most, c| most.max((c / leading).abs()));
     if !bound.is_finite() {
         return Vec::new();
@@ -65,7 +67,7 @@ fn roots_between(polynomial: &[f64], stationary: &[f64]) -> Vec<f64> {
     roots
 }
 
-/// The root in a bracket with a sign change, by Newton steps that fall back to halving.
+/// Root in a bracket with a sign change, by Newton steps with bisection as fallback.
 fn root_in_bracket(polynomial: &[f64], mut left: f64, mut right: f64, rising: bool) -> f64 {
     let mut x = 0.5 * (left + right);
     for _ in 0..STEPS_PER_BRACKET {

@@ -1,4 +1,4 @@
-//! Camera poses from images alone, for callers with their own alignment.
+//! Camera poses from images alone, for callers that do the alignment themselves.
 
 use nalgebra::UnitQuaternion;
 
@@ -7,32 +7,31 @@ use super::structure::{StructureLimits, collect_tracks, rank_pairs, reconstruct}
 use crate::frontend::TrackedFeature;
 use crate::geometry::RigidTransform;
 
-/// Prior knowledge of the cameras.
+/// Initial values and options of a reconstruction.
 #[derive(Clone, Copy, Debug)]
 pub struct ReconstructionGuess<'a> {
     /// Orientation of every view in any common frame.
     pub rotations: &'a [UnitQuaternion<f64>],
-    /// Standard deviation of the rotations between views, in radians.
+    /// Standard deviation of the relative rotations, in radians.
     pub sigma_rad: f64,
     /// Seed of the random samples.
     pub seed: u64,
 }
 
-/// Poses of views up to scale, in the frame of the first one that was placed.
+/// Poses of views up to scale, in the frame of the first placed view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reconstruction {
     /// Indices of the placed views, ascending.
     pub views: Vec<usize>,
     /// `first_camera_from_camera`, one per placed view.
     pub poses: Vec<RigidTransform>,
-    /// Root mean square angle error of a bearing's coordinate, in radians.
+    /// Root mean square angle error of a bearing, per coordinate, in radians.
     pub rms_rad: f64,
 }
 
-/// Reconstructs views of one camera from their features (step 3 of this module's list), `None` when too few of them or of
-/// their landmarks could be placed, or when they show too little parallax.
+/// Reconstructs views of one camera from their features (step 3 in the module's list) within the limits of `options`.
 ///
-/// The limits are those of `options`.
+/// Returns `None` when too few views or landmarks could be placed, or when the parallax is too small.
 pub fn reconstruct_views(
     views: &[&[TrackedFeature]],
     guess: &ReconstructionGuess<'_>,

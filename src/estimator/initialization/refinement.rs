@@ -1,9 +1,11 @@
-//! Joint adjustment of images and IMU samples: poses, velocities, biases, gravity, extrinsics.
+//! Joint least-squares refinement of images and IMU samples: poses, velocities, biases, gravity, extrinsics.
 //!
-//! The IMU frame of the first view is the frame of reference, so there is no gauge freedom left; gravity is a direction in
-//! it with known magnitude.
-//! The extrinsics are the given ones with an error that all views share (a rotation on the IMU's side and a translation)
-//! and, on a gimbal, an independent rotation per view: `R = common·given·view`. Every rotation is perturbed on the right.
+//! The IMU frame of the first view is the frame of reference, so there is no gauge freedom; gravity is a direction in
+//! it
+//! with known magnitude.
+//! The extrinsics are the given ones with an error common to all views (a rotation on the IMU's side and a translation)
+//! and, on a gimbal, an independent rotation per view: `R = common·given·view`. Every rotation is perturbed on the
+//! right.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 
@@ -20,7 +22,7 @@ const MIN_SIGMA: f64 = 1e-5;
 type Matrix9 = SMatrix<f64, 9, 9>;
 type Vector9 = SVector<f64, 9>;
 
-/// Constant input of the adjustment.
+/// Constant input of the refinement.
 pub(super) struct RefinementInput<'a> {
     /// Extrinsics from calibration and encoders, one per view.
     pub(super) imu_from_camera: &'a [RigidTransform],
@@ -34,12 +36,12 @@ pub(super) struct RefinementInput<'a> {
     pub(super) accelerometer_bias: VectorPrior,
 }
 
-/// Unknowns of the adjustment, in the IMU frame of the first view.
+/// Unknowns of the refinement, in the IMU frame of the first view.
 #[derive(Clone, Debug)]
 pub(super) struct RefinedState {
     pub(super) poses: Vec<RigidTransform>,
     pub(super) velocities: Vec<Vector3<f64>>,
-    /// Gravity, pointing down.
+    /// Gravity, pointing down, in m/s².
     pub(super) gravity: Vector3<f64>,
     pub(super) bias: ImuBias,
     pub(super) landmarks: Vec<TrackedLandmark>,
@@ -51,7 +53,7 @@ pub(super) struct RefinedState {
 /// Standard deviations from the inverse of the last normal matrix.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct RefinementSigmas {
-    /// Relative standard deviation of the longest distance from the first view: of the metric scale.
+    /// Relative standard deviation of the longest distance from the first view, which is that of the metric scale.
     pub(super) scale: f64,
     pub(super) velocity_m_per_s: f64,
     pub(super) gravity_rad: f64,
@@ -59,7 +61,6 @@ pub(super) struct RefinementSigmas {
     pub(super) accelerometer_bias_m_per_s2: f64,
 }
 
-/// Column layout.
 pub(super) struct Layout {
     views: usize,
     per_view_rotations: bool,
@@ -77,17 +78,17 @@ impl Layout {
         if self.per_view_rotations { 12 } else { 9 }
     }
 
-    /// Velocity of a view (3).
+    /// First of the 3 velocity columns of a view.
     fn velocity(&self, view: usize) -> usize {
         Self::GLOBALS + view * self.per_view()
     }
 
-    /// Pose of a view (6); the first view's columns are fixed.
+    /// First of the 6 pose columns of a view; those of the first view are fixed.
     pub(super) fn pose(&self, view: usize) -> usize {
         self.velocity(view) + 3
     }
 
-    /// Independent rotation of a view's extrinsics (3), if estimated.
+    /// First of the 3 columns of a view's independent extrinsics rotation, `None` if it is not estimated.
     fn view_rotation(&self, view: usize) -> Option<usize> {
         self.per_view_rotations.then(|| self.velocity(view) + 9)
     }
@@ -98,9 +99,9 @@ impl Layout {
 }
 
 impl RefinedState {
-    /// Starts from an alignment; `landmarks` are in the cameras' unit of length and are scaled here.
+    /// Initial state from an alignment; scales `landmarks`, given in the cameras' unit of length, to metres.
     pub(super) fn new(input: &RefinementInput<'_>, alignment: &Alignment, landmarks: &[TrackedLandmark]) -> Self {
-        // The alignment's change of the extrinsics is split: the mean rotation on the IMU's side, the rest per view.
+        // Splits the alignment's change of the extrinsics: the mean rotation on the IMU's side, the rest per view.
         let changes: Vec<UnitQuaternion<f64>> = alignment
             .imu_from_camera
             .iter()
@@ -135,7 +136,7 @@ impl RefinedState {
         }
     }
 
-    /// Adjusted extrinsics per view.
+    /// Refined extrinsics per view.
     pub(super) fn imu_from_camera(&self, given: &[RigidTransform]) -> Vec<RigidTransform> {
         given
             .iter()
@@ -214,15 +215,14 @@ pub(super) struct RefinementEquations {
     gradient: DVector<f64>,
 }
 
-/// The adjustment's problem: fixed data, whitening matrices and column layout.
+/// The refinement as a least-squares problem: constant data, whitening matrices and column layout.
 pub(super) struct Refinement<'a> {
     input: &'a RefinementInput<'a>,
-    /// `Wᵀ W = covariance⁻¹` of each interval's `[φ, p, v]`.
+    /// `W` (9 × 9) of each interval's `[φ, p, v]` with `Wᵀ W = covariance⁻¹`.
     whitening: Vec<Matrix9>,
     pub(super) layout: Layout,
 }
 
-/// Result of an adjustment.
 #[derive(Clone, Debug)]
 pub(super) struct Refined {
     pub(super) state: RefinedState,
@@ -230,7 +230,7 @@ pub(super) struct Refined {
     pub(super) imu_mean_square: f64,
     pub(super) sigmas: Option<RefinementSigmas>,
     pub(super) rounds: usize,
-    /// The last round changed next to nothing.
+    /// True if the solver stopped before its iteration limit.
     pub(super) converged: bool,
 }
 
@@ -242,7 +242,7 @@ impl<'a> Refinement<'a> {
             .iter()
             .map(|increment| {
                 let mut covariance: Matrix9 = increment.covariance().fixed_view::<9, 9>(0, 0).into_owned();
-                // Sampling and discretization: keeps short intervals from outweighing all else.
+                // Slightly larger diagonal, so that the covariance of a short interval stays positive definite.
                 for index in 0..9 {
                     covariance[(index, index)] *= 1.0 + 1e-9;
                 }
@@ -257,7 +257,6 @@ impl<'a> Refinement<'a> {
         Some(Self { input, whitening, layout })
     }
 
-    /// Adjusts with at most `rounds` iterations.
     pub(super) fn run(&self, start: RefinedState, rounds: usize) -> Refined {
         let options = DampedOptions {
             iterations: rounds,
@@ -279,12 +278,11 @@ impl<'a> Refinement<'a> {
         }
     }
 
-    /// Standard deviations at a state.
     pub(super) fn sigmas(&self, state: &RefinedState) -> Option<RefinementSigmas> {
         let (normal, _, _) = self.reduced(state, &self.linearized(state), 0.0);
         let factor = normal.cholesky()?;
         let layout = &self.layout;
-        // Columns of the covariance for a handful of quantities only.
+        // Covariances of a few quantities only.
         let columns = layout.columns();
         let variance = |direction: &DVector<f64>| direction.dot(&factor.solve(direction)).max(0.0);
         let block = |start: usize, length: usize| {
@@ -344,7 +342,6 @@ impl<'a> Refinement<'a> {
         cost
     }
 
-    /// Linearizes all factors.
     pub(super) fn linearized(&self, state: &RefinedState) -> RefinementEquations {
         let columns = self.layout.columns();
         let cameras = state.cameras(self.input.imu_from_camera);
@@ -361,7 +358,7 @@ impl<'a> Refinement<'a> {
         equations
     }
 
-    /// Normal matrix and gradient with landmarks eliminated, and the data for the landmarks' steps.
+    /// Normal matrix and gradient after elimination of the landmarks, and the data of the landmarks' steps.
     pub(super) fn reduced(
         &self,
         state: &RefinedState,
@@ -371,7 +368,7 @@ impl<'a> Refinement<'a> {
         let (mut normal, mut gradient) = (equations.normal.clone(), equations.gradient.clone());
         let visual = equations.visual.eliminate(damping);
         self.add_visual(state, &visual.poses, &mut normal, &mut gradient);
-        // The first view is the frame of reference.
+        // The first view is the frame of reference: its pose is fixed.
         let fixed = self.layout.pose(0);
         for column in fixed..fixed + 6 {
             normal.row_mut(column).fill(0.0);
@@ -382,7 +379,7 @@ impl<'a> Refinement<'a> {
         (normal, gradient, visual)
     }
 
-    /// Derivative of a camera pose with respect to its columns: pairs of a column and a 6 × 3 block.
+    /// Derivative of a camera pose by the columns it depends on: pairs of a first column and a 6 × 3 block.
     fn camera_blocks(&self, state: &RefinedState, view: usize) -> Vec<(usize, SMatrix<f64, 6, 3>)> {
         let pose = &state.poses[view];
         let given = &self.input.imu_from_camera[view];
@@ -438,7 +435,7 @@ impl<'a> Refinement<'a> {
         }
     }
 
-    /// Steps `[φ; δt]` of the camera poses for a step of the state.
+    /// Steps `[φ; δt]` of the camera poses that correspond to a step of the state.
     fn camera_steps(&self, state: &RefinedState, step: &DVector<f64>) -> Vec<Vector6<f64>> {
         (0..self.layout.views)
             .map(|view| {
@@ -547,7 +544,7 @@ impl<'a> Refinement<'a> {
     }
 }
 
-/// Derivative of an IMU residual with respect to the two gravity columns (9 × 2), not whitened.
+/// Derivative of an IMU residual by the two gravity columns (9 × 2), not whitened.
 fn gravity_columns(state: &RefinedState, back: &Matrix3<f64>, t: f64) -> SMatrix<f64, 9, 2> {
     let rotated_basis = back * state.gravity_basis();
     let mut block = SMatrix::<f64, 9, 2>::zeros();

@@ -1,4 +1,4 @@
-//! The pose between two views from bearing pairs: five-point hypotheses, a rotation prior, robust refinement.
+//! Relative pose of two views from bearing pairs: five-point hypotheses, rotation prior, robust refinement.
 
 use nalgebra::{Matrix3, Matrix5, UnitQuaternion, Vector3, Vector5};
 
@@ -9,50 +9,48 @@ use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
 
 /// Largest number of five-point samples drawn.
 const MAX_SAMPLES: usize = 160;
-/// Chance that one of the samples was free of outliers before the search ends early.
+/// Probability that a sample was free of outliers at which the search ends.
 const CONFIDENCE: f64 = 0.999;
-/// A pair fits when its epipolar angle stays under this many standard deviations.
+/// A pair is an inlier below this many standard deviations of the epipolar angle.
 const INLIER_SIGMAS: f64 = 3.0;
 
-/// Samples drawn beyond those, for the second solution of a plane.
+/// Further samples, for the second solution of a plane.
 const EXTRA_SAMPLES: usize = 12;
 /// Hypotheses kept while sampling.
 const KEPT: usize = 5;
-/// Two hypotheses closer than both of these are one.
+/// Two hypotheses within this rotation and [`SAME_HEADING_RAD`] are equal.
 const SAME_ROTATION_RAD: f64 = 0.02;
 /// See [`SAME_ROTATION_RAD`].
 const SAME_HEADING_RAD: f64 = 0.2;
-/// A pose whose cost (χ²) lies within this much per pair of the best one is returned as well.
+/// A pose is also returned when its cost (χ²) exceeds the best one by less than this per pair.
 const AMBIGUOUS_RATIO: f64 = 0.3;
 
 /// Unit bearings of one point in camera i and camera j.
 type BearingPair = (Vector3<f64>, Vector3<f64>);
 
-/// Prior on a rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotationPrior {
-    /// The expected rotation.
     pub rotation: UnitQuaternion<f64>,
-    /// Its standard deviation about each axis.
+    /// Standard deviation about each axis.
     pub sigma_rad: f64,
 }
 
-/// A relative pose up to scale.
+/// Relative pose up to scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RelativePose {
-    /// Maps points of camera i into camera j; the translation has unit length.
+    /// Transform of points from camera i to camera j; the translation has unit length.
     pub camera_j_from_camera_i: RigidTransform,
     /// Indices of the inliers in front of both cameras.
     pub inliers: Vec<usize>,
-    /// Root mean square epipolar angle of those, in radians.
+    /// Root mean square epipolar angle of the inliers, in radians.
     pub rms_rad: f64,
 }
 
-/// Finds the relative poses of two cameras that explain the pairs `(bearing_i, bearing_j)`, the best one first.
+/// Estimates the relative poses of two cameras from pairs `(bearing_i, bearing_j)`, best first.
 ///
-/// There is more than one when the points (nearly) lie in a plane: both then fit, and only a third view or a good prior on
-/// the rotation tells them apart; without any, give a `sigma_rad` of π.
-/// The samples are drawn from a generator that `seed` starts, so equal input gives equal bits.
+/// Points (nearly) in a plane have two solutions; only a third view or a good prior on the rotation distinguishes them.
+/// Without a prior, give a `sigma_rad` of π.
+/// Samples are drawn from a generator seeded with `seed`: equal input gives equal bits.
 pub fn relative_poses(
     pairs: &[(Vector3<f64>, Vector3<f64>)],
     prior: &RotationPrior,
@@ -93,7 +91,7 @@ pub fn relative_poses(
     candidates.finish()
 }
 
-/// The best few hypotheses that differ from each other, least cost first.
+/// The best few distinct hypotheses, smallest cost first.
 struct Candidates<'a> {
     pairs: &'a [BearingPair],
     prior: &'a RotationPrior,
@@ -102,12 +100,12 @@ struct Candidates<'a> {
 }
 
 impl Candidates<'_> {
-    /// Largest cost of a useful hypothesis.
+    /// Cost that a new hypothesis must undercut.
     fn worst_kept(&self) -> f64 {
         if self.found.len() < KEPT { f64::INFINITY } else { self.found.last().map_or(f64::INFINITY, |(cost, _)| *cost) }
     }
 
-    /// Cost with points behind a camera counted as outliers and the prior added.
+    /// Sum of squared whitened epipolar angles and prior; points behind a camera count as outliers.
     fn cost(&self, pose: &RigidTransform) -> f64 {
         let limit = INLIER_SIGMAS * INLIER_SIGMAS;
         let essential = essential_of(pose);
@@ -137,7 +135,7 @@ impl Candidates<'_> {
         self.found.truncate(KEPT);
     }
 
-    /// Refines the kept hypotheses; drops equal ones and those clearly worse than the best.
+    /// Refines the kept hypotheses; drops duplicates and those clearly worse than the best.
     fn finish(self) -> Vec<RelativePose> {
         let mut refined = Candidates { found: Vec::new(), ..self };
         for (_, pose) in &self.found {
@@ -176,14 +174,14 @@ fn epipolar_cost(pairs: &[BearingPair], essential: &Matrix3<f64>, sigma_rad: f64
     pairs.iter().map(|pair| (epipolar_angle(essential, pair) / sigma_rad).powi(2).min(limit)).sum()
 }
 
-/// Whether the pair's point is in front of both cameras; too little parallax counts as yes.
+/// True if the point lies in front of both cameras or its parallax is too small to decide.
 fn lies_in_front(
     camera_j_from_camera_i: &RigidTransform,
     (bearing_i, bearing_j): &BearingPair,
     sigma_rad: f64,
 ) -> bool {
     let rotated = camera_j_from_camera_i.rotation * bearing_i;
-    // distance_j · bearing_j = distance_i · rotated + t; cross with each ray to solve for the other distance.
+    // distance_j · bearing_j = distance_i · rotated + t; the cross product with each ray gives the other distance.
     let normal = rotated.cross(bearing_j);
     if normal.norm() < 2.0 * sigma_rad {
         return true;
@@ -202,8 +200,8 @@ fn inliers(pairs: &[BearingPair], pose: &RigidTransform, sigma_rad: f64) -> Vec<
     (0..pairs.len()).filter(|&index| fits(&pairs[index])).collect()
 }
 
-/// Best direction of translation for a known rotation (eigenvector of the smallest eigenvalue of the epipolar
-/// normals).
+/// Direction of translation for a known rotation: eigenvector of the smallest eigenvalue of Σ n nᵀ over the epipolar
+/// normals n.
 fn translation_for_rotation(pairs: &[BearingPair], rotation: &UnitQuaternion<f64>) -> Option<Vector3<f64>> {
     let mut moment = Matrix3::zeros();
     for (bearing_i, bearing_j) in pairs {
@@ -215,7 +213,7 @@ fn translation_for_rotation(pairs: &[BearingPair], rotation: &UnitQuaternion<f64
     Some(eigen.eigenvectors.column(least).into_owned())
 }
 
-/// Robust least squares on the epipolar angles over rotation (3) and direction of translation (2).
+/// Robust least squares of the epipolar angles over rotation (3) and direction of translation (2).
 fn refine(pairs: &[BearingPair], start: &RigidTransform, sigma_rad: f64) -> RigidTransform {
     let options = DampedOptions {
         iterations: 12,
@@ -228,7 +226,7 @@ fn refine(pairs: &[BearingPair], start: &RigidTransform, sigma_rad: f64) -> Rigi
     minimize(&mut EpipolarFit { pairs, sigma_rad }, *start, &options).estimate
 }
 
-/// The epipolar angles of all pairs.
+/// Least-squares problem over the epipolar angles of all pairs.
 struct EpipolarFit<'a> {
     pairs: &'a [BearingPair],
     sigma_rad: f64,
@@ -236,7 +234,7 @@ struct EpipolarFit<'a> {
 
 impl DampedProblem for EpipolarFit<'_> {
     type Estimate = RigidTransform;
-    /// Normal matrix and gradient by `[φ; two on the tangent plane of the translation]`.
+    /// Normal matrix and gradient by `[φ; 2 in the tangent plane of the translation]`.
     type Equations = (Matrix5<f64>, Vector5<f64>);
 
     fn cost(&self, pose: &RigidTransform) -> f64 {
@@ -282,14 +280,14 @@ impl DampedProblem for EpipolarFit<'_> {
     }
 }
 
-/// Geman–McClure cost of the epipolar angles, scale two standard deviations.
+/// Geman–McClure cost of the epipolar angles; the scale is two standard deviations.
 fn robust_cost(pairs: &[BearingPair], pose: &RigidTransform, sigma_rad: f64) -> f64 {
     let essential = essential_of(pose);
     let square = |pair| (epipolar_angle(&essential, pair) / (2.0 * sigma_rad)).powi(2);
     pairs.iter().map(|pair| square(pair) / (1.0 + square(pair))).sum()
 }
 
-/// Five different numbers below `count` (which must be at least five).
+/// Five different indices below `count` (which must be at least five).
 fn five_of(random: &mut SplitMix64, count: usize) -> [usize; 5] {
     let mut chosen = [usize::MAX; 5];
     let mut filled = 0;

@@ -8,7 +8,7 @@ use crate::frontend::TrackedFeature;
 use crate::geometry::{seconds_from_ns, so3};
 use crate::sensors::ImuSample;
 
-/// Rotation of the camera of every frame, `first_imu_from_camera`, by gyroscope (bias-corrected) and extrinsics.
+/// `first_imu_from_camera` rotation of every frame, from the bias-corrected gyroscope and the extrinsics.
 pub(super) fn guessed_rotations(
     frames: &[InitializationFrame<'_>],
     gyroscope_bias: &Vector3<f64>,
@@ -39,9 +39,10 @@ fn gyroscope_rotation(samples: &[ImuSample], bias: &Vector3<f64>) -> UnitQuatern
 
 /// Indices of the selected frames, ascending; the newest one is always selected.
 ///
-/// Going back in time, a frame is selected when it has enough parallax or time difference to the last selected
-/// one; where the common features run out before, the frame before is selected. The views start where even
-/// neighbouring frames have too few common features.
+/// Going back in time, a frame is selected when its parallax or time difference to the last selected one is large
+/// enough,
+/// or when the next older frame has too few features in common with the last selected one.
+/// The views start where even neighbouring frames have too few common features.
 pub(super) fn select_views(
     frames: &[InitializationFrame<'_>],
     rotations: &[UnitQuaternion<f64>],
@@ -52,7 +53,7 @@ pub(super) fn select_views(
     let mut selected = vec![newest];
     let mut last = newest;
     let mut candidate = newest;
-    // The farthest frame so far with enough common features with the last selected one.
+    // Oldest frame so far with enough features in common with the last selected one.
     let mut linked = None;
     while candidate > 0 && selected.len() < options.max_views {
         candidate -= 1;
@@ -84,7 +85,7 @@ pub(super) fn select_views(
     selected
 }
 
-/// Bearings of the common features of two frames; both are ordered by id.
+/// Bearings of the common features of two frames, both ordered by id.
 pub(super) fn shared_bearings(
     first: &[TrackedFeature],
     second: &[TrackedFeature],

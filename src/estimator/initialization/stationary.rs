@@ -1,4 +1,4 @@
-//! Detection of a stationary vehicle before the window runs: IMU samples of little variance and a constant image.
+//! Detection of a stationary vehicle before the window exists: IMU samples of little variance and a constant image.
 
 use nalgebra::Vector3;
 
@@ -16,23 +16,23 @@ const BLOCK_NS: i64 = 100_000_000;
 const MAX_GYROSCOPE_STD_RAD_PER_S: f64 = 0.002;
 /// Largest standard deviation of the averaged specific force (worst axis), beyond the sensor noise.
 const MAX_ACCELEROMETER_STD_M_PER_S2: f64 = 0.03;
-/// Slow rotation that is not separable from a bias within a second.
+/// Largest slow rotation that cannot be separated from a bias within a second; floor of the bias' σ.
 const HIDDEN_ANGULAR_RATE_RAD_PER_S: f64 = 0.001;
 /// Largest mean angular velocity: above the usual turn-on bias, below a rotation.
 const MAX_ANGULAR_RATE_RAD_PER_S: f64 = 0.15;
-/// Largest rotation-compensated parallax over the stretch.
+/// Largest rotation-compensated parallax over the stationary phase.
 const MAX_PARALLAX_RAD: f64 = 0.004;
 
 /// Measurements of a stationary vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StationaryEstimate {
-    /// Stamp of the newest frame that belongs to it.
+    /// Stamp of the newest frame of the stationary phase.
     pub stamp_ns: i64,
-    /// Mean angular velocity: the gyroscope's bias.
+    /// Gyroscope bias: the mean angular velocity.
     pub gyroscope_bias_rad_per_s: Vector3<f64>,
-    /// Standard deviation of that (worst axis).
+    /// Standard deviation of the gyroscope bias (worst axis).
     pub gyroscope_bias_sigma_rad_per_s: f64,
-    /// Mean specific force: upwards, with the accelerometer's bias on top.
+    /// Mean specific force: upwards, plus accelerometer bias.
     pub specific_force_m_per_s2: Vector3<f64>,
 }
 
@@ -96,7 +96,7 @@ fn block_means(samples: &[&ImuSample]) -> Vec<(Vector3<f64>, Vector3<f64>)> {
         .collect()
 }
 
-/// Mean and the largest standard deviation of the components.
+/// Mean, and largest standard deviation of the components.
 fn mean_and_std(values: impl Iterator<Item = Vector3<f64>> + Clone) -> (Vector3<f64>, f64) {
     let count = values.clone().count().max(1) as f64;
     let mean = values.clone().sum::<Vector3<f64>>() / count;

@@ -1,8 +1,9 @@
-//! Camera poses and landmarks from the images alone, up to scale: two views first, the others one by one, then
-//! all together.
+//! Camera poses and landmarks from the images alone, up to scale: an initial pair, then the other views one by one,
+//! then
+//! a joint adjustment.
 //!
-//! The cameras are free: a gimbal may rotate them. Gyroscope and encoders only give initial rotations, and
-//! resolve the ambiguity of a plane.
+//! Each view has an independent pose, because a gimbal may rotate the camera. Gyroscope and encoders only give initial
+//! rotations and resolve the ambiguity of a plane.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -20,21 +21,21 @@ use crate::optimization::{DensePoseEquations, ReprojectionEquations};
 
 /// Smallest parallax of a landmark with a depth.
 const MIN_PARALLAX_RAD: f64 = 0.006;
-/// Number of pairs for the parallax of two views.
+/// Largest number of bearing pairs used for the parallax of two views.
 const PARALLAX_PAIRS: usize = 60;
-/// Parallax beyond this makes a pair of views no better.
+/// Parallax above which the score of a pair of views no longer grows.
 const AMPLE_PARALLAX_RAD: f64 = 0.14;
-/// Common features beyond this make a pair of views no better.
+/// Number of common features above which the score of a pair of views no longer grows.
 const AMPLE_PAIRS: f64 = 60.0;
-/// Number of tried pairs of views.
+/// Number of initial pairs to try.
 const PAIRS_TRIED: usize = 3;
 /// A landmark with an observation beyond this many standard deviations is dropped.
 const OUTLIER_SIGMAS: f64 = 4.0;
 
-/// All observations of one feature as `(view, bearing)`, views rising.
+/// Observations of each feature as `(view, bearing)`, by ascending view.
 pub(super) type Tracks = BTreeMap<FeatureId, Vec<(usize, Vector3<f64>)>>;
 
-/// Collects the observations of all features that at least two of the views hold.
+/// Collects the observations of all features that at least two views observe.
 pub(super) fn collect_tracks(views: &[&[TrackedFeature]]) -> Tracks {
     let mut tracks = Tracks::new();
     for (view, features) in views.iter().enumerate() {
@@ -52,9 +53,8 @@ pub(super) fn collect_tracks(views: &[&[TrackedFeature]]) -> Tracks {
     tracks
 }
 
-/// Keeps at most `most` tracks: each pair of neighbouring views in turn selects the longest common track that
-/// is not selected yet, so that every pair keeps its proportion. The front end has spread features over the
-/// image.
+/// Keeps at most `most` tracks. Each pair of neighbouring views in turn selects its longest common track that is not
+/// selected yet, so that every pair keeps its proportion. The front end has already spread the features over the image.
 pub(super) fn thin_out(tracks: &mut Tracks, views: usize, most: usize) {
     if tracks.len() <= most {
         return;
@@ -93,14 +93,12 @@ pub(super) fn common_bearings(tracks: &Tracks, view_i: usize, view_j: usize) -> 
         .collect()
 }
 
-/// A pair of views.
 #[derive(Clone, Debug)]
 pub(super) struct ViewPair {
     pub(super) view_i: usize,
     pub(super) view_j: usize,
-    /// Common features.
     pub(super) common: usize,
-    /// `camera_j_from_camera_i` and the parallax it leaves.
+    /// Rotation `camera_j_from_camera_i` and remaining parallax.
     pub(super) fit: RotationFit,
 }
 
@@ -110,7 +108,7 @@ impl ViewPair {
     }
 }
 
-/// Every pair of views with at least `min_common` features in common, best base for a reconstruction first.
+/// Pairs of views with at least `min_common` common features, best initial pair first.
 pub(super) fn rank_pairs(
     tracks: &Tracks,
     guessed_rotations: &[UnitQuaternion<f64>],
@@ -123,7 +121,7 @@ pub(super) fn rank_pairs(
             if bearings.len() < min_common {
                 continue;
             }
-            // Every n-th one: ids follow the grid in which features were found, so this stays spread.
+            // Every n-th pair: ids follow the detection grid, so the sample stays spread over the image.
             let stride = bearings.len().div_ceil(PARALLAX_PAIRS);
             let sample: Vec<_> = bearings.iter().step_by(stride).copied().collect();
             let guess = guessed_rotations[view_j].inverse() * guessed_rotations[view_i];
@@ -136,7 +134,7 @@ pub(super) fn rank_pairs(
     pairs
 }
 
-/// Why there is no reconstruction.
+/// Reason for the failure of a reconstruction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum StructureFailure {
     /// No pair of views has a relative pose with enough inliers.
@@ -145,27 +143,21 @@ pub(super) enum StructureFailure {
         inlier_ratio: f64,
     },
     /// Too few landmarks remained.
-    FewLandmarks {
-        /// Landmarks with a depth.
-        landmarks: usize,
-    },
+    FewLandmarks { landmarks: usize },
     /// Too few views were placed.
-    FewViews {
-        /// Placed views.
-        views: usize,
-    },
+    FewViews { views: usize },
 }
 
-/// A reconstruction in the frame of its first view, the unit of length arbitrary.
+/// Reconstruction in the frame of its first view, in an arbitrary unit of length.
 #[derive(Clone, Debug)]
 pub(super) struct Structure {
-    /// Which of the given views were placed, rising; all other fields count these only.
+    /// Indices of the placed views, ascending; all other fields refer to these only.
     pub(super) views: Vec<usize>,
     /// `first_camera_from_camera`, one per placed view.
     pub(super) poses: Vec<RigidTransform>,
-    /// Landmarks; anchors and observations are numbers of placed views.
+    /// Landmarks; `anchor` and `view` are indices into `views`.
     pub(super) landmarks: Vec<TrackedLandmark>,
-    /// Root mean square angle error per coordinate, in radians.
+    /// Root mean square angle error of a bearing, per coordinate, in radians.
     pub(super) rms_rad: f64,
 }
 
@@ -180,7 +172,7 @@ impl Structure {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StructureLimits {
     pub(super) bearing_sigma_rad: f64,
-    /// Standard deviation of the guessed relative rotations.
+    /// Standard deviation of the initial relative rotations.
     pub(super) rotation_sigma_rad: f64,
     pub(super) min_landmarks: usize,
     pub(super) min_views: usize,
@@ -188,7 +180,7 @@ pub(super) struct StructureLimits {
     pub(super) seed: u64,
 }
 
-/// Reconstructs the views, trying the best few pairs as a base.
+/// Reconstructs the views from the best initial pair that succeeds.
 pub(super) fn reconstruct(
     tracks: &Tracks,
     pairs: &[ViewPair],
@@ -220,7 +212,7 @@ fn reconstruct_from(
     let mut best: Result<Structure, StructureFailure> = Err(StructureFailure::NoRelativePose { inlier_ratio });
     for base in bases.iter().filter(|base| ratio_of_inliers(base) >= limits.min_inlier_ratio) {
         let grown = grow(tracks, pair, base, guessed_rotations, limits);
-        // Of two solutions of a plane the wrong one places fewer views or landmarks.
+        // The wrong solution of a plane places fewer views or landmarks, or fits worse.
         let merit = |structure: &Structure| {
             structure.observations() as f64 * (1.0 - structure.rms_rad / limits.bearing_sigma_rad / 3.0)
         };
@@ -233,7 +225,7 @@ fn reconstruct_from(
     best
 }
 
-/// Places all other views on the points of the first two, then adjusts everything.
+/// Places all other views on the points of the initial pair, then adjusts everything.
 fn grow(
     tracks: &Tracks,
     pair: &ViewPair,
@@ -264,7 +256,7 @@ fn grow(
     Ok(structure)
 }
 
-/// The other views: those between the pair from both ends inwards, then those outside, nearest first.
+/// Order of the other views: those inside the pair from both ends inwards, then those outside, nearest first.
 fn by_distance(pair: &ViewPair, count: usize) -> Vec<usize> {
     let distance = |view: usize| view.abs_diff(pair.view_i).min(view.abs_diff(pair.view_j));
     let outside = |view: usize| view < pair.view_i || view > pair.view_j;
@@ -282,8 +274,8 @@ struct GrowingMap<'a> {
 }
 
 impl GrowingMap<'_> {
-    /// Triangulates every feature of a view again from all views placed so far; the others stay as they are, as
-    /// their views are the same.
+    /// Retriangulates every feature of a view from all views placed so far; the other features have the same views as
+    /// before.
     fn triangulate_seen_in(&mut self, view: usize) {
         for (id, observations) in self.tracks {
             if observations.binary_search_by_key(&view, |(view, _)| *view).is_err() {
@@ -300,7 +292,7 @@ impl GrowingMap<'_> {
         }
     }
 
-    /// Places one more view on the points, starting from its nearest placed neighbour.
+    /// Places one more view on the points, with its nearest placed neighbour as initial value.
     fn place(&mut self, view: usize, guessed_rotations: &[UnitQuaternion<f64>], limits: &StructureLimits) {
         let known: Vec<(Vector3<f64>, Vector3<f64>)> = self
             .points
@@ -327,7 +319,7 @@ impl GrowingMap<'_> {
         }
     }
 
-    /// Renumbers the placed views, with the first of them as the reference frame.
+    /// Renumbers the placed views; the first of them becomes the reference frame.
     fn finish(self) -> Structure {
         let views: Vec<usize> = (0..self.poses.len()).filter(|&view| self.poses[view].is_some()).collect();
         let placed: Vec<RigidTransform> = self.poses.iter().filter_map(|pose| *pose).collect();
@@ -348,7 +340,7 @@ impl GrowingMap<'_> {
     }
 }
 
-/// Adjusts all poses and depths together, twice, with bad landmarks dropped in between.
+/// Adjusts all poses and depths twice; drops outlier landmarks in between.
 fn adjust(mut structure: Structure, sigma_rad: f64) -> Structure {
     for _ in 0..2 {
         structure = bundle_adjust(structure, sigma_rad);
@@ -375,7 +367,7 @@ fn bundle_adjust(structure: Structure, sigma_rad: f64) -> Structure {
     minimize(&mut FreeViews { sigma_rad }, structure, &options).estimate
 }
 
-/// All poses but the first, and all landmarks.
+/// Least-squares problem over all poses but the first, and all landmarks.
 struct FreeViews {
     sigma_rad: f64,
 }

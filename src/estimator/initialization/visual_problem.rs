@@ -1,4 +1,4 @@
-//! Reprojection of anchored features in a handful of views: cost and normal equations over the camera poses.
+//! Reprojection of anchored features in a few views: cost and normal equations over the camera poses.
 //!
 //! The residual is the angle error in the tangent plane of each measured bearing, divided by its standard deviation.
 //! The anchor's bearing is a measurement like the others: treating it as exact would make views with many anchors, and
@@ -15,52 +15,48 @@ use crate::optimization::{
 
 /// Robust loss of all observations.
 const LOSS: RobustLoss = RobustLoss::Huber(1.5);
-/// What a point behind a camera counts for, in standard deviations.
+/// Residual of a point behind a camera, in standard deviations.
 const BEHIND_SIGMAS: f64 = 100.0;
 
-/// One observation of a feature.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BearingObservation {
-    /// Number of the view.
     pub(super) view: usize,
-    /// About the measured bearing there.
+    /// Tangent plane of the measured bearing.
     plane: TangentPlane,
 }
 
 impl BearingObservation {
-    /// From the measured unit bearing.
     pub(super) fn new(view: usize, bearing: Vector3<f64>) -> Self {
         Self { view, plane: TangentPlane::new(bearing) }
     }
 }
 
-/// A landmark with its observations.
 #[derive(Clone, Debug)]
 pub(super) struct TrackedLandmark {
     pub(super) id: FeatureId,
     /// First view that observes it.
     pub(super) anchor: usize,
-    /// In the anchor's frame; the inverse distance is in 1/baseline before the scale is known.
+    /// Landmark in the anchor's frame; the inverse distance is in 1/baseline before the scale is known.
     pub(super) landmark: Landmark,
-    /// All observations, the anchor's first.
+    /// Observations; the anchor's comes first.
     pub(super) observations: Vec<BearingObservation>,
 }
 
 impl TrackedLandmark {
-    /// A landmark along the bearing of its first observation.
+    /// Landmark along the bearing of its first observation; `None` without observations.
     pub(super) fn new(id: FeatureId, inverse_distance: f64, observations: Vec<BearingObservation>) -> Option<Self> {
         let first = observations.first()?;
         let landmark = Landmark { bearing: first.plane.bearing, inverse_distance };
         Some(Self { id, anchor: first.view, landmark, observations })
     }
 
-    /// Its position in the world, `None` when it is infinitely far.
+    /// Position in the world, `None` when it is infinitely far.
     pub(super) fn position(&self, world_from_camera: &[RigidTransform]) -> Option<Vector3<f64>> {
         let pose = world_from_camera.get(self.anchor)?;
         (!self.landmark.is_infinitely_far()).then(|| pose.transform(&self.landmark.point_in_anchor()))
     }
 
-    /// Residual of one observation in radians, `None` when the landmark lies behind that camera.
+    /// Residual of one observation in radians (2 × 1), `None` when the landmark lies behind that camera.
     fn residual_rad(&self, poses: &RelativePoses, observation: &BearingObservation) -> Option<Vector2<f64>> {
         let relative = poses.get(self.anchor, observation.view);
         reprojection::residual(&observation.plane, relative, &self.landmark, &Vector2::zeros())
@@ -75,7 +71,7 @@ impl TrackedLandmark {
         reprojection::linearize(&observation.plane, relative, relative, &self.landmark, &Vector2::zeros())
     }
 
-    /// Whether it has a finite distance and no observation is off by more than `limit` standard deviations.
+    /// True if the distance is finite and every residual is below `limit` standard deviations.
     pub(super) fn fits(&self, poses: &RelativePoses, sigma_rad: f64, limit: f64) -> bool {
         let ratio = |observation| self.residual_rad(poses, observation).map_or(BEHIND_SIGMAS, |r| r.norm() / sigma_rad);
         !self.landmark.is_infinitely_far() && self.observations.iter().all(|observation| ratio(observation) < limit)
@@ -100,7 +96,7 @@ pub(super) fn visual_cost(landmarks: &[TrackedLandmark], world_from_camera: &[Ri
     cost
 }
 
-/// Mean square whitened residual per coordinate over all observations.
+/// Mean square of the whitened residuals of all observations, per coordinate.
 pub(super) fn mean_square(landmarks: &[TrackedLandmark], world_from_camera: &[RigidTransform], sigma_rad: f64) -> f64 {
     let poses = between(world_from_camera);
     let (mut sum, mut count) = (0.0, 0_usize);
@@ -115,7 +111,7 @@ pub(super) fn mean_square(landmarks: &[TrackedLandmark], world_from_camera: &[Ri
     sum / count.max(1) as f64
 }
 
-/// The normal equations of all observations over the camera poses (6 per view, `[φ; δt]`) and the landmarks.
+/// Normal equations of all observations over the camera poses (6 per view, `[φ; δt]`) and the landmarks.
 pub(super) fn visual_equations(
     landmarks: &[TrackedLandmark],
     world_from_camera: &[RigidTransform],
@@ -133,7 +129,7 @@ pub(super) fn visual_equations(
     equations
 }
 
-/// The landmarks moved by their steps.
+/// Landmarks updated by their steps.
 pub(super) fn moved(landmarks: &[TrackedLandmark], steps: &[Vector3<f64>]) -> Vec<TrackedLandmark> {
     let plus = |(tracked, step): (&TrackedLandmark, &Vector3<f64>)| TrackedLandmark {
         landmark: tracked.landmark.plus(step),

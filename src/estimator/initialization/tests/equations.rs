@@ -1,4 +1,4 @@
-//! The gradients of the adjustments against central differences.
+//! Gradients of the refinements against central differences.
 
 use nalgebra::{DVector, Vector3};
 
@@ -70,7 +70,7 @@ fn gradient_of_the_refinement_meets_central_differences() {
             per_view_rotations: (0..VIEWS).map(|_| random_rotation(&mut random)).collect(),
         };
         let refinement = Refinement::new(&input).unwrap();
-        // An endless damping of the depths leaves the plain gradient at fixed depths.
+        // A damping of 1e15 on the depths leaves the plain gradient at fixed depths.
         let (normal, gradient, _) = refinement.reduced(&state, &refinement.linearized(&state), 1e15);
         assert!((&normal - normal.transpose()).amax() < 1e-9 * normal.amax());
         let fixed_columns = refinement.layout.pose(0);
@@ -86,7 +86,7 @@ fn gradient_of_the_refinement_meets_central_differences() {
             };
             let numeric = (cost(1.0) - cost(-1.0)) / (2.0 * h);
             let analytic = 2.0 * gradient[column];
-            // The scale of what is summed up, for the rounding of the differences.
+            // Magnitude of the summed terms, for the rounding of the differences.
             let scale = normal[(column, column)].sqrt() + 1e-6 * cost(0.0);
             assert!(
                 (numeric - analytic).abs() < 1e-5 * numeric.abs().max(1.0) + 1e-3 * scale,

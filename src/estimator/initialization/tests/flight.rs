@@ -11,7 +11,6 @@ pub(super) const FOCAL_PX: f64 = 352.0;
 const FRAME_NS: i64 = 50_000_000;
 const SAMPLE_NS: i64 = 5_000_000;
 
-/// Uniform and normal numbers.
 pub(super) struct Random(SplitMix64);
 
 impl Random {
@@ -37,7 +36,6 @@ impl Random {
     }
 }
 
-/// Motion of the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Motion {
     /// Near-hover, then aggressive motion.
@@ -56,11 +54,11 @@ pub(super) enum Motion {
 pub(super) struct FlightOptions {
     pub(super) seed: u64,
     pub(super) motion: Motion,
-    /// When the motion begins.
+    /// Start time of the motion.
     pub(super) hover_s: f64,
     pub(super) duration_s: f64,
     pub(super) gimbal: bool,
-    /// Without encoders the given joint angles are zero.
+    /// True if encoders report the joint angles; they are zero otherwise.
     pub(super) encoders: bool,
     pub(super) encoder_sigma_rad: f64,
     pub(super) chain_rotation_bound_rad: f64,
@@ -123,7 +121,6 @@ pub(super) struct Flight {
     pub(super) accelerometer_bias: Vector3<f64>,
 }
 
-/// The analytic motion.
 struct Path {
     motion: Motion,
     hover_s: f64,
@@ -153,7 +150,7 @@ impl Path {
         }
     }
 
-    /// 0 before the motion, 1 a second and a half later, smooth to the third derivative.
+    /// 0 before the motion, 1 after 1.5 s of it; smooth to the third derivative.
     fn envelope(&self, t: f64) -> f64 {
         let x = ((t - self.hover_s) / 1.5).clamp(0.0, 1.0);
         x.powi(4) * (35.0 - 84.0 * x + 70.0 * x * x - 20.0 * x.powi(3))
@@ -183,7 +180,7 @@ impl Path {
         position
     }
 
-    /// Derivatives by differences of fourth order: exact to about 1e-7 here.
+    /// Fourth-order differences: exact to about 1e-7 here.
     fn velocity(&self, t: f64) -> Vector3<f64> {
         let h = 1e-3;
         let p = |k: f64| self.position(t + k * h);
@@ -196,7 +193,7 @@ impl Path {
         (-p(-2.0) - p(2.0) + (p(1.0) + p(-1.0)) * 16.0 - p(0.0) * 30.0) / (12.0 * h * h)
     }
 
-    /// A multirotor tilts its thrust into the acceleration.
+    /// Attitude of a multirotor: thrust along the acceleration minus gravity.
     fn rotation(&self, t: f64) -> UnitQuaternion<f64> {
         let envelope = self.envelope(t);
         let yaw = match self.motion {
@@ -271,24 +268,22 @@ fn joint_angles(options: &FlightOptions, path: &Path, t: f64) -> Vector3<f64> {
     if !options.gimbal {
         return Vector3::new(0.1, 0.0, 0.15);
     }
-    // Roll follows the body against its tilt, yaw and pitch look around.
+    // Roll counteracts the body's tilt; yaw and pitch scan.
     let up = path.rotation(t).inverse() * Vector3::z();
     let roll = up.y.atan2(up.z).clamp(-0.43, 0.43);
     Vector3::new(0.5 * (0.9 * t + 0.4).sin(), roll, 0.2 + 0.25 * (1.1 * t).sin())
 }
 
-/// A tracked feature.
 #[derive(Clone, Copy)]
 struct LiveTrack {
     id: FeatureId,
     landmark: usize,
-    /// Of an outlier, in pixels per frame.
+    /// Drift of an outlier, in pixels per frame.
     drift_px: Vector2<f64>,
     offset_px: Vector2<f64>,
     age: u32,
 }
 
-/// Features tracked from frame to frame.
 struct Tracker {
     landmarks: Vec<Vector3<f64>>,
     live: Vec<LiveTrack>,

@@ -1,4 +1,4 @@
-//! Whole attempts on synthetic flights.
+//! Complete attempts on synthetic flights.
 
 use nalgebra::Vector3;
 
@@ -50,7 +50,7 @@ fn attempt(
     )
 }
 
-/// Attempts at every frame; returns the solution, or the last reasons.
+/// Attempts at every frame; returns the solution, or the last reasons for waiting.
 fn run(flight: &Flight, options: &InitializationOptions) -> Result<(usize, InitializationSolution), Vec<WaitReason>> {
     let mut stationary = None;
     let mut last = Vec::new();
@@ -256,7 +256,7 @@ fn a_stationary_estimate_is_kept_or_used_at_once() {
     };
     assert_eq!(solution.origin, InitializationOrigin::FromStationary);
     let errors = errors(&flight, 0.0, newest, &solution);
-    // The accelerometer's bias tilts the world by up to asin(0.5·√2/9.81) = 4.1°.
+    // The accelerometer bias tilts the world by up to asin(0.5·√2/9.81) = 4.1°.
     assert!(errors.gravity_deg < 4.2 && errors.velocity_m_per_s < 1e-9, "{errors:?}");
     assert!(errors.gyroscope_rad_per_s < 1e-3);
     let ground_truth = flight.frames[newest].true_world_from_imu.rotation.inverse() * Vector3::z();

@@ -1,4 +1,4 @@
-//! Geometry of bearings and the small solvers.
+//! Tests of bearing geometry and the small solvers.
 
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
@@ -14,7 +14,7 @@ fn random_pose(random: &mut Random) -> RigidTransform {
     RigidTransform::new(so3::exp(&random.vector(0.6)), random.vector(1.0))
 }
 
-/// Points before both cameras with their bearings, noise in radians.
+/// Bearing pairs of points in front of both cameras, with noise in radians.
 fn pairs_of(
     pose: &RigidTransform,
     count: usize,
@@ -48,7 +48,7 @@ fn roots_are_those_the_polynomial_was_built_from() {
         }
         coefficients = next;
     }
-    // Times x² + 1, which has no real root.
+    // Multiplied by x² + 1, which has no real root.
     let mut product = vec![0.0; coefficients.len() + 2];
     for (power, c) in coefficients.iter().enumerate() {
         product[power] += c;
@@ -117,7 +117,7 @@ fn relative_pose_survives_noise_outliers_and_planes() {
             let rotation_error = (found.camera_j_from_camera_i.rotation.inverse() * pose.rotation).angle();
             (rotation_error, angle_between(&found.camera_j_from_camera_i.translation_m, &pose.translation_m))
         };
-        // A plane has two solutions: one of those found must be the true one.
+        // A plane has two solutions: one of the poses must be the true one.
         let best = found.iter().map(error).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
         let worst = &mut worst[usize::from(planar)];
         *worst = (worst.0.max(best.0), worst.1.max(best.1));

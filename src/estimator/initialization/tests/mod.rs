@@ -1,4 +1,4 @@
-//! Tests of the initialization: geometry, equations, and whole attempts on synthetic flights with ground truth.
+//! Tests of the initialization: geometry, equations, and complete attempts on synthetic flights with ground truth.
 
 #![expect(clippy::print_stdout, reason = "figures of many seeds are worth reading with --nocapture")]
 
