@@ -1,11 +1,14 @@
 //! The estimator: initializing or tracking, and the step from one image to the next.
 
 use super::config::EstimatorConfig;
-use super::initialization::initializer::{InitializationStep, Initializer};
 use super::report::{Phase, StepReport};
-use super::setup::Setup;
+use super::start::initializer::{InitializationStep, Initializer};
 use super::state::calibrations::{Calibrations, MAIN};
+use super::state::earlier_pass::BiasPrior;
+use super::state::earlier_pass::EarlierPass;
 use super::step_input::StepInput;
+use super::window::covariances;
+use super::window::setup::Setup;
 use super::window::sliding_window::{SlidingWindow, WindowFailure};
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
@@ -130,5 +133,41 @@ impl Estimator {
                 report
             }
         }
+    }
+}
+
+/// Factor on the standard deviations of a pass that are the prior of the next.
+///
+/// Each pass uses the measurements again. With a factor k the information of the last pass is that of the measurements
+/// times 1 + 1/k² + 1/k⁴ + …: with 2 at most 4/3, so that its standard deviations are too small by at most 13 %.
+const SIGMA_FACTOR: f64 = 2.0;
+
+impl Estimator {
+    /// What this estimator has found, as the prior of another pass over the measurements: the calibration with its
+    /// covariance, and the biases at the start of the log, `duration_s` before the newest image. Standard deviations are
+    /// doubled. `None` before the first window, and where the information is not positive definite.
+    ///
+    /// The intrinsics of the IMU are not among it: they start again at the rig's prior.
+    pub fn findings(&self, duration_s: f64) -> Option<EarlierPass> {
+        let PhaseState::Tracking(window) = &self.phase else { return None };
+        let covariances = covariances::covariances(&self.setup, &window.state)?;
+        let calibrations = &window.state.calibration;
+        let cameras = (0..calibrations.cameras()).map(|camera| {
+            let columns = calibrations.columns(camera);
+            let covariance = covariances.calibration.view_range(columns.clone(), columns).into_owned();
+            calibrations.of(camera).found(&covariance, SIGMA_FACTOR.powi(-2))
+        });
+        let mean = window.state.frames.newest().state.navigation.bias;
+        let sigma = covariances.newest_bias.diagonal().map(|variance| SIGMA_FACTOR * variance.max(0.0).sqrt());
+        let bias = BiasPrior {
+            mean,
+            gyroscope_sigma_rad_per_s: sigma.fixed_rows::<3>(0).into_owned(),
+            accelerometer_sigma_m_per_s2: sigma.fixed_rows::<3>(3).into_owned(),
+        };
+        let noise = &self.setup.imu_noise;
+        Some(EarlierPass {
+            cameras: cameras.collect::<Option<_>>()?,
+            bias: bias.after(duration_s, noise.gyroscope_random_walk, noise.accelerometer_random_walk),
+        })
     }
 }

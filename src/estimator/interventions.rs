@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use thiserror::Error;
 
 use super::estimator::{Estimator, PhaseState};
-use crate::estimator::state::calibrations::MAIN;
+use super::state::calibrations::MAIN;
 use crate::frontend::FeatureId;
 use crate::gimbal::{ParameterId, Parameterization};
 

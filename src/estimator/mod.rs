@@ -3,17 +3,16 @@
 //! It processes a [`StepInput`] per image and returns a [`StepReport`].
 
 mod config;
-mod earlier_pass;
 #[expect(clippy::module_inception, reason = "the type that the folder is about")]
 mod estimator;
+mod explain;
 mod factors;
-mod hypothetical;
 pub mod initialization;
 mod interventions;
-mod options;
 mod packed;
+mod problem;
 mod report;
-mod setup;
+mod start;
 mod state;
 mod step_input;
 #[cfg(test)]
@@ -21,22 +20,28 @@ mod tests;
 mod window;
 
 pub use config::{
-    CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidCamera, imu_columns, imu_intrinsics, rigid_columns,
+    CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, EstimatorOptions, RigidCamera, TrackContinuation,
+    imu_columns, imu_intrinsics, rigid_columns,
 };
-pub use earlier_pass::{BiasPrior, EarlierPass};
 pub use estimator::Estimator;
-pub use factors::{imu_factor, preintegration};
-pub use hypothetical::{HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge};
+pub use explain::{FeatureRows, StepJacobian};
+pub use factors::{FactorKind, imu as imu_factor};
 pub use interventions::{InterventionError, SensorColumns};
-pub use options::{EstimatorOptions, TrackContinuation};
-pub use packed::{PackedEstimator, StepMeasurements};
-pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
-pub use report::{
-    CalibrationEstimate, ColumnBlock, ColumnGroup, ColumnId, Event, EventKind, FactorKind, FactorRows, FailureCause,
-    FeatureCounts, FeatureReport, FeatureRows, FrameId, FrameStateReport, InformationGain, IterationReport,
-    JacobianFactor, JacobianRow, JacobianSource, LandmarkReport, Linearization, Motion, ObservationReport,
-    Observations, Phase, PoseCovariance, ReportBytes, ResidualSummary, StageTimes, StepJacobian, StepReport,
-    allocated_bytes,
+pub use packed::PackedEstimator;
+pub use problem::hypothetical::{
+    HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge,
 };
-pub use setup::gravity_in_world;
-pub use step_input::StepInput;
+pub use problem::information_gain::{InformationGain, Motion};
+pub use problem::linearization::Linearization;
+pub use problem::solver::IterationReport;
+pub use report::{
+    CalibrationEstimate, Event, EventKind, FactorRows, FailureCause, FeatureCounts, FeatureReport, FrameStateReport,
+    JacobianFactor, JacobianRow, JacobianSource, LandmarkReport, ObservationReport, Observations, Phase,
+    PoseCovariance, ReportBytes, ResidualSummary, StageTimes, StepReport,
+};
+pub use state::allocation::allocated_bytes;
+pub use state::columns::{ColumnBlock, ColumnGroup, ColumnId, FrameId};
+pub use state::earlier_pass::{BiasPrior, EarlierPass};
+pub use state::preintegration::{self, ImuBias, MotionIncrement, NavigationState, Preintegration};
+pub use step_input::{StepInput, StepMeasurements};
+pub use window::setup::gravity_in_world;

@@ -1,22 +1,11 @@
 //! A snapshot of the estimator in a third of its memory: what its numbers are made from instead of the numbers.
 
 use super::estimator::{Estimator, PhaseState};
-use super::initialization::initializer::Initializer;
-use super::setup::Setup;
-use super::window::packed_window::PackedWindow;
-use crate::frontend::TrackedFeature;
+use super::start::initializer::Initializer;
+use super::step_input::StepMeasurements;
+use super::window::packed::PackedWindow;
+use super::window::setup::Setup;
 use crate::geometry::RigidTransform;
-use crate::sensors::ImuSample;
-
-/// The measurements of one step, from which a packed estimator takes those of its window again.
-pub trait StepMeasurements {
-    /// Stamp of the image, as in [`StepInput`](super::StepInput).
-    fn stamp_ns(&self) -> i64;
-    /// The IMU samples, as in [`StepInput`](super::StepInput).
-    fn imu(&self) -> &[ImuSample];
-    /// Features of a camera by its number, the main camera first, ordered by id.
-    fn features(&self, camera: usize) -> &[TrackedFeature];
-}
 
 /// An estimator without what can be computed again to the same bits: integrated IMU intervals, products of the prior.
 /// Measurements are places in the inputs of the steps before.

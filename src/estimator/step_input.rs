@@ -44,3 +44,13 @@ impl StepInput<'_> {
         })
     }
 }
+
+/// The measurements of one step, from which a packed estimator takes those of its window again.
+pub trait StepMeasurements {
+    /// Stamp of the image, as in [`StepInput`](crate::estimator::StepInput).
+    fn stamp_ns(&self) -> i64;
+    /// The IMU samples, as in [`StepInput`](crate::estimator::StepInput).
+    fn imu(&self) -> &[ImuSample];
+    /// Features of a camera by its number, the main camera first, ordered by id.
+    fn features(&self, camera: usize) -> &[TrackedFeature];
+}

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::prior::{Prior, PriorColumn};
+use super::marginal_prior::{Prior, PriorColumn};
 
 /// A [`Prior`] of which only the entries of the Jacobian down to the last one of each column are kept: it is nearly
 /// triangular.

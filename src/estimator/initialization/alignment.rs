@@ -7,7 +7,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
-use crate::estimator::{ImuBias, Preintegration};
+use crate::estimator::state::navigation::ImuBias;
+use crate::estimator::state::preintegration::Preintegration;
 use crate::geometry::{RigidTransform, median, so3};
 
 /// Standard deviation of a visual rotation between two views; added to the noise of the extrinsics.

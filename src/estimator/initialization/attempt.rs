@@ -16,7 +16,8 @@ use super::{
     InitializationOutcome, InitializationSolution, InitializedFrame, InitializedLandmark, StationaryEstimate,
     StationaryPolicy, stationary,
 };
-use crate::estimator::{ImuBias, Preintegration};
+use crate::estimator::state::navigation::ImuBias;
+use crate::estimator::state::preintegration::Preintegration;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 
 /// Iteration limits of the refinement: before outlier landmarks are dropped, and after.
@@ -177,7 +178,7 @@ fn excitation(frames: &[InitializationFrame<'_>], selected: &[usize], camera_rot
 }
 
 fn structure_of(
-    tracks: &super::structure::Tracks,
+    tracks: &crate::estimator::initialization::structure::Tracks,
     pairs: &[ViewPair],
     guesses: &[UnitQuaternion<f64>],
     input: &InitializationInput<'_>,

@@ -121,7 +121,9 @@ pub(super) fn five_point(pairs: &[(Vector3<f64>, Vector3<f64>); 5]) -> Vec<Matri
     let determinant = determinant_polynomial(&equations);
     let mut solutions = Vec::new();
     for z in real_roots(&determinant) {
-        let at: Matrix3<f64> = Matrix3::from_fn(|row, col| super::polynomial::evaluate(&equations[row][col], z));
+        let at: Matrix3<f64> = Matrix3::from_fn(|row, col| {
+            crate::estimator::initialization::polynomial::evaluate(&equations[row][col], z)
+        });
         let rows: [Vector3<f64>; 3] = [0, 1, 2].map(|row| at.row(row).transpose());
         let candidates = [rows[0].cross(&rows[1]), rows[0].cross(&rows[2]), rows[1].cross(&rows[2])];
         let Some(null) = candidates.iter().max_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared())) else {

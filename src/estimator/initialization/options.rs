@@ -13,7 +13,7 @@ const BLIND_EXTRINSICS_NOISE_RAD: f64 = 0.5;
 /// Common rotation error of the extrinsics, without an encoder.
 const BLIND_EXTRINSICS_SIGMA_RAD: f64 = 1.0;
 
-/// Options of [`super::try_initialize`].
+/// Options of [`crate::estimator::initialization::try_initialize`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct InitializationOptions {
     /// Standard deviation of a bearing: pixel noise over focal length.
@@ -132,7 +132,7 @@ impl InitializationOptions {
 
     /// Sets the errors of the extrinsics for a gimbal from the total standard deviations of its chain.
     #[must_use]
-    pub(super) fn for_gimbal_with(
+    pub(crate) fn for_gimbal_with(
         mut self,
         rotation_sigma_rad: f64,
         translation_sigma_m: f64,

@@ -11,7 +11,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, SMatrix, SVector, UnitQuate
 
 use super::alignment::{Alignment, VectorPrior};
 use super::visual_problem::{TrackedLandmark, moved, visual_cost, visual_equations};
-use crate::estimator::{ImuBias, Preintegration};
+use crate::estimator::state::navigation::ImuBias;
+use crate::estimator::state::preintegration::Preintegration;
 use crate::geometry::{RigidTransform, so3, tangent_basis};
 use crate::optimization::damped::{DampedOptions, DampedProblem, StopReason, minimize};
 use crate::optimization::{DensePoseEquations, ReducedEquations, ReprojectionEquations};

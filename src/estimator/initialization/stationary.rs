@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::bearing::fit_rotation;
 use super::checks::{Checklist, Shown};
+use super::input::{InitializationFrame, InitializationInput, StationaryEstimate};
 use super::selection::shared_bearings;
-use super::{InitializationFrame, InitializationInput};
 use crate::sensors::ImuSample;
 
 /// Required duration of the stationary phase.
@@ -22,19 +22,6 @@ const HIDDEN_ANGULAR_RATE_RAD_PER_S: f64 = 0.001;
 const MAX_ANGULAR_RATE_RAD_PER_S: f64 = 0.15;
 /// Largest rotation-compensated parallax over the stationary phase.
 const MAX_PARALLAX_RAD: f64 = 0.004;
-
-/// Measurements of a stationary vehicle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StationaryEstimate {
-    /// Stamp of the newest frame of the stationary phase.
-    pub stamp_ns: i64,
-    /// Gyroscope bias: the mean angular velocity.
-    pub gyroscope_bias_rad_per_s: Vector3<f64>,
-    /// Standard deviation of the gyroscope bias (worst axis).
-    pub gyroscope_bias_sigma_rad_per_s: f64,
-    /// Mean specific force: upwards, plus accelerometer bias.
-    pub specific_force_m_per_s2: Vector3<f64>,
-}
 
 /// Checks the last [`QUIET_S`] seconds; the results go to `checklist`.
 pub(super) fn detect(input: &InitializationInput<'_>, checklist: &mut Checklist) -> Option<StationaryEstimate> {

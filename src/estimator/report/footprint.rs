@@ -1,9 +1,9 @@
 //! Memory of a report.
 
-use super::allocation::allocated_bytes;
-use super::information_gain::InformationGain;
-use super::jacobian_source::JacobianSource;
-use super::step::{CalibrationEstimate, FrameStateReport, StepReport};
+use super::step::FrameStateReport;
+use super::{CalibrationEstimate, JacobianSource, StepReport};
+use crate::estimator::problem::information_gain::InformationGain;
+use crate::estimator::state::allocation::allocated_bytes;
 
 /// Bytes of a report by part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

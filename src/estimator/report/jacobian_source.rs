@@ -4,10 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Quaternion, UnitQuaternion, Vector3};
 
+use crate::estimator::factors::FactorKind;
+use crate::estimator::state::allocation::allocated_bytes;
 use crate::estimator::state::calibrations::Calibrations;
+use crate::estimator::state::columns::FrameId;
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::layout::POSE;
-use crate::estimator::{FactorKind, FrameId, ImuBias, NavigationState, allocated_bytes};
+use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, ParameterId};
 use crate::optimization::{LandmarkModel, RobustLoss};

@@ -4,7 +4,22 @@ use std::fmt;
 
 use nalgebra::Vector2;
 
-use crate::estimator::ObservationReport;
+/// An observation of a feature by a frame of the window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObservationReport {
+    /// Number of the observing image in its stream.
+    pub frame_index: usize,
+    /// Measured pixel.
+    pub measured_px: Vector2<f64>,
+    /// Predicted minus measured before the solve, in pixels.
+    pub residual_before_px: Option<Vector2<f64>>,
+    /// Predicted minus measured after the solve, in pixels.
+    pub residual_after_px: Option<Vector2<f64>>,
+    /// Squared whitened residual after the solve.
+    pub chi2: f64,
+    /// Robust weight, 0 to 1.
+    pub robust_weight: f64,
+}
 
 /// The observations of one feature in the window, the anchor's first.
 ///

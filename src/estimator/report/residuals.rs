@@ -1,57 +1,6 @@
 //! Residuals by kind of factor, and the iterations of the solver that lowered them.
 
-/// A kind of factor of the window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum FactorKind {
-    /// Reprojections of features.
-    Visual,
-    /// Preintegrated IMU samples between two frames.
-    Imu,
-    /// Encoder readings of the joint angles.
-    Encoder,
-    /// The rig's prior on the calibration.
-    CalibrationPrior,
-    /// The marginalization prior, or the prior at the start.
-    MarginalizationPrior,
-    /// Zero-velocity update of a stationary vehicle.
-    ZeroVelocity,
-}
-
-impl FactorKind {
-    /// All of them.
-    pub const ALL: [Self; 6] = [
-        Self::Visual,
-        Self::Imu,
-        Self::Encoder,
-        Self::CalibrationPrior,
-        Self::MarginalizationPrior,
-        Self::ZeroVelocity,
-    ];
-
-    /// Name for people.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Visual => "visual",
-            Self::Imu => "IMU",
-            Self::Encoder => "encoder",
-            Self::CalibrationPrior => "calibration prior",
-            Self::MarginalizationPrior => "marginalization prior",
-            Self::ZeroVelocity => "zero velocity",
-        }
-    }
-
-    /// Name in tables and conditions, without spaces.
-    pub const fn key(self) -> &'static str {
-        match self {
-            Self::Imu => "imu",
-            Self::CalibrationPrior => "calibration_prior",
-            Self::MarginalizationPrior => "marginalization_prior",
-            Self::ZeroVelocity => "standstill",
-            _ => self.name(),
-        }
-    }
-}
-
+use crate::estimator::factors::FactorKind;
 /// Sum of squared whitened residuals of one kind of factor, and how many there are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResidualSummary {
@@ -70,19 +19,4 @@ impl ResidualSummary {
     pub fn mean_square(&self) -> Option<f64> {
         (self.count > 0).then(|| self.chi2_after / self.count as f64)
     }
-}
-
-/// One iteration of the solver.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct IterationReport {
-    /// Cost before the step.
-    pub cost_before: f64,
-    /// Cost after it.
-    pub cost_after: f64,
-    /// Damping or trust radius in use.
-    pub damping: f64,
-    /// Norm of the step.
-    pub step_norm: f64,
-    /// Whether the step was accepted.
-    pub accepted: bool,
 }

@@ -2,13 +2,12 @@
 
 use nalgebra::Vector3;
 
-use super::events::Event;
-use super::features::{FeatureCounts, FeatureReport, LandmarkReport};
-use super::information_gain::InformationGain;
-use super::jacobian_source::{FactorRows, JacobianSource};
-use super::linearization::Linearization;
+use super::features::{FeatureCounts, LandmarkReport};
 use super::pose_covariance::PoseCovariance;
-use super::residuals::{IterationReport, ResidualSummary};
+use super::{Event, FactorRows, FeatureReport, JacobianSource, ResidualSummary};
+use crate::estimator::problem::information_gain::InformationGain;
+use crate::estimator::problem::linearization::Linearization;
+use crate::estimator::problem::solver::IterationReport;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization, Singularity};
 

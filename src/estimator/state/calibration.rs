@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::earlier_pass::FoundCamera;
 use super::given_chain::{EarlierPrior, GivenChain, GivenSigmas};
 use super::sensor_columns::SensorColumn;
 use crate::camera::CameraModel;
-use crate::estimator::earlier_pass::FoundCamera;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{
     Chain, ChainLinearization, ClassicalChain, ParameterId, ParameterPart, Parameterization, Quantity, transport,

@@ -5,9 +5,9 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::calibration::Calibration;
+use super::earlier_pass::FoundCamera;
 use super::imu_calibration::ImuCalibration;
 use super::imu_errors::{self, ImuErrors};
-use crate::estimator::earlier_pass::FoundCamera;
 use crate::gimbal::{ParameterId, Parameterization};
 
 /// Index of the main camera, which may have joints. Its image is shown, its calibration has the first columns.

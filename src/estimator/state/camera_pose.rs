@@ -6,8 +6,8 @@ use std::ops::Range;
 use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6x3, Matrix6xX, Vector3};
 
 use super::calibration::Calibration;
+use super::frame_state::FrameState;
 use super::layout::{Layout, POSE, ROW_MOTION};
-use crate::estimator::state::frame_state::FrameState;
 use crate::geometry::so3;
 use crate::gimbal::{Chain, ChainLinearization};
 use crate::optimization::CameraPose;

@@ -7,9 +7,9 @@ use nalgebra::{Matrix2x6, Vector2, Vector3};
 
 use super::calibration::Calibration;
 use super::camera_pose::{self, CameraSensor, ROLLING_ROWS};
+use super::frame_state::FrameState;
+use super::track::TrackObservation;
 use crate::camera::CameraModel;
-use crate::estimator::factors::visual::TrackObservation;
-use crate::estimator::state::frame_state::FrameState;
 use crate::optimization::{CameraPose, PoseBlocksOf, RelativePose, RelativePoses};
 
 /// Blocks per frame of a rolling shutter.

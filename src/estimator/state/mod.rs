@@ -2,10 +2,14 @@
 //!
 //! Values, steps and first estimates; no measurements and no solver.
 
+pub(crate) mod allocation;
 pub(crate) mod calibration;
 pub(crate) mod calibrations;
 pub(crate) mod camera_pose;
 pub(crate) mod camera_view;
+pub(crate) mod columns;
+pub(crate) mod earlier_pass;
+pub(crate) mod estimate;
 pub(crate) mod frame_state;
 pub(crate) mod given_chain;
 pub(crate) mod imu_calibration;
@@ -13,4 +17,6 @@ pub(crate) mod imu_errors;
 pub(crate) mod layout;
 pub(crate) mod motion_profile;
 pub(crate) mod navigation;
+pub mod preintegration;
 pub(crate) mod sensor_columns;
+pub(crate) mod track;

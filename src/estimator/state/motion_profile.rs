@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::navigation::ImuBias;
-use crate::estimator::factors::preintegration::Preintegration;
+use super::preintegration::Preintegration;
 use crate::geometry::{seconds_from_ns, so3};
 use crate::sensors::{ImuNoise, ImuSample};
 

@@ -2,7 +2,8 @@
 
 use super::fixture;
 use super::flight::{run_flight, trajectory_error_m};
-use crate::estimator::{EstimatorConfig, EstimatorOptions, StepReport};
+use crate::estimator::config::{EstimatorConfig, EstimatorOptions};
+use crate::estimator::report::StepReport;
 use crate::geometry::Dimension;
 use crate::gimbal::{ParameterId, Parameterization, Quantity};
 use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};

@@ -2,7 +2,9 @@
 
 use super::fixture;
 use super::flight::{chain_error, run_flight, trajectory_error_m};
-use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, Phase, StepReport};
+use crate::estimator::config::{EstimatorConfig, EstimatorOptions};
+use crate::estimator::report::StepReport;
+use crate::estimator::{Estimator, Phase};
 use crate::frontend::TrackedFrame;
 use crate::geometry::so3;
 use crate::gimbal::Parameterization;
@@ -114,7 +116,7 @@ fn both_calibrations_have_named_columns() {
     let linearization = last.linearization.as_ref().unwrap();
     assert_eq!(linearization.calibration_column_norms.len(), 24);
     let cameras = [&estimator.config().camera, &estimator.config().rigid_cameras[0].model];
-    super::jacobian::check(last, &cameras);
+    crate::estimator::tests::jacobian::check(last, &cameras);
     let columns: Vec<_> = linearization.columns[..24].iter().filter_map(|column| column.id.parameter()).collect();
     assert_eq!(columns, calibration.parameters);
 

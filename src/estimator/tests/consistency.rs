@@ -1,8 +1,10 @@
 //! Start and end of the warnings about inconsistent residuals.
 
 use super::fixture;
+use crate::estimator::config::{EstimatorConfig, EstimatorOptions};
+use crate::estimator::factors::FactorKind;
+use crate::estimator::report::ResidualSummary;
 use crate::estimator::window::consistency::ConsistencyMonitor;
-use crate::estimator::{EstimatorConfig, EstimatorOptions, FactorKind, ResidualSummary};
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 

@@ -3,22 +3,23 @@
 use nalgebra::{DVector, Vector3};
 
 use super::Noise;
+use crate::estimator::config::{CameraSensorPrior, EstimatorConfig, EstimatorOptions, RigidCamera};
 use crate::estimator::estimator::PhaseState;
-use crate::estimator::factors::preintegration::Preintegration;
-use crate::estimator::factors::prior::StartPrior;
-use crate::estimator::setup::Setup;
+use crate::estimator::factors::start_prior::StartPrior;
+use crate::estimator::problem::frame::{Frame, layout};
+use crate::estimator::problem::problem::Problem;
+use crate::estimator::report::StepReport;
 use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
+use crate::estimator::state::preintegration::Preintegration;
 use crate::estimator::window::active_tracks::ActiveTracks;
 use crate::estimator::window::features::{self, FeatureMap};
-use crate::estimator::window::frames::{Frame, Frames, layout};
-use crate::estimator::window::problem::{Estimate, Problem};
+use crate::estimator::window::frames::Frames;
+use crate::estimator::window::setup::Setup;
 use crate::estimator::window::window_state::WindowState;
-use crate::estimator::{
-    CameraSensorPrior, DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, StepInput,
-    StepReport,
-};
+use crate::estimator::{DEFAULT_CHAIN_PRIOR, Estimator, StepInput};
 use crate::frontend::TrackedFrame;
 use crate::geometry::Dimension;
 use crate::gimbal::{Chain, ParameterId, Parameterization};

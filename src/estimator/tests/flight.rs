@@ -3,7 +3,9 @@
 use nalgebra::Vector3;
 
 use super::fixture;
-use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepReport};
+use crate::estimator::config::{EstimatorConfig, EstimatorOptions};
+use crate::estimator::report::{EventKind, StepReport};
+use crate::estimator::{Estimator, Phase};
 use crate::geometry::so3;
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};

@@ -3,10 +3,12 @@
 use super::fixture;
 use super::flight::run_flight;
 use crate::camera::CameraModel;
-use crate::estimator::{
-    ColumnBlock, ColumnGroup, ColumnId, EstimatorOptions, FactorKind, FactorRows, FrameId, JacobianFactor,
-    Linearization, StepJacobian, StepReport,
-};
+use crate::estimator::StepJacobian;
+use crate::estimator::config::EstimatorOptions;
+use crate::estimator::factors::FactorKind;
+use crate::estimator::problem::linearization::Linearization;
+use crate::estimator::report::{FactorRows, JacobianFactor, StepReport};
+use crate::estimator::state::columns::{ColumnBlock, ColumnGroup, ColumnId, FrameId};
 use crate::geometry::Dimension;
 use crate::gimbal::{ParameterGroup, Parameterization};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};

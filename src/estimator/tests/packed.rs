@@ -1,7 +1,9 @@
 //! Packed estimators.
 
 use super::fixture;
-use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, Phase, StepMeasurements};
+use crate::estimator::config::{EstimatorConfig, EstimatorOptions};
+use crate::estimator::step_input::StepMeasurements;
+use crate::estimator::{Estimator, Phase};
 use crate::frontend::TrackedFeature;
 use crate::gimbal::Parameterization;
 use crate::sensors::ImuSample;

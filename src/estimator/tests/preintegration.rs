@@ -1,8 +1,8 @@
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 
-use crate::estimator::factors::imu_factor;
-use crate::estimator::factors::preintegration::Preintegration;
+use crate::estimator::factors::imu;
 use crate::estimator::state::navigation::{ImuBias, Matrix15, NavigationState, Vector15};
+use crate::estimator::state::preintegration::Preintegration;
 use crate::geometry::{RigidTransform, ns_from_seconds, so3};
 use crate::sensors::{ImuNoise, ImuSample};
 
@@ -125,7 +125,7 @@ fn bias_jacobian_meets_central_differences() {
 /// Increments with sampled white noise and random walks scatter according to the covariance.
 #[test]
 fn covariance_is_that_of_drawn_noise() {
-    let mut random = super::Noise::new(7);
+    let mut random = crate::estimator::tests::Noise::new(7);
     let clean = samples(0.3, 200.0);
     let nominal = Preintegration::from_samples(NOISE, bias(), &clean);
     let h: f64 = 0.005;

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use super::fixture;
 use super::flight::{chain_error, run_flight_by_rows, trajectory_error_m};
-use crate::estimator::{EstimatorConfig, EstimatorOptions, StepReport};
+use crate::estimator::config::{EstimatorConfig, EstimatorOptions};
+use crate::estimator::report::StepReport;
 use crate::gimbal::{ParameterId, ParameterNames, Parameterization};
 use crate::simulation::{IntrinsicsError, SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
 

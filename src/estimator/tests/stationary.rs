@@ -6,7 +6,9 @@ use nalgebra::Vector3;
 
 use super::flight::{run_flight, trajectory_error_m};
 use super::{Noise, fixture};
-use crate::estimator::{EstimatorOptions, EventKind, Phase, StepReport};
+use crate::estimator::Phase;
+use crate::estimator::config::EstimatorOptions;
+use crate::estimator::report::{EventKind, StepReport};
 use crate::frontend::{FeatureId, TrackedFeature, TrackedFrame};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::Parameterization;

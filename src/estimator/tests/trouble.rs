@@ -4,9 +4,11 @@ use nalgebra::DMatrix;
 
 use super::fixture::{self, TestWindow};
 use super::flight::{chain_error, run_flight, step, trajectory_error_m};
+use crate::estimator::config::{EstimatorConfig, EstimatorOptions};
 use crate::estimator::estimator::PhaseState;
+use crate::estimator::report::{EventKind, StepReport};
 use crate::estimator::state::calibrations::MAIN;
-use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepReport};
+use crate::estimator::{Estimator, Phase};
 use crate::frontend::FeatureId;
 use crate::gimbal::{Parameterization, transport_covariance};
 use crate::optimization::Cholesky;

@@ -4,13 +4,13 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::fixture;
 use super::fixture::TestWindow;
-use crate::estimator::options::EstimatorOptions;
+use crate::estimator::config::EstimatorOptions;
+use crate::estimator::problem::marginalization;
+use crate::estimator::problem::rows::stack;
+use crate::estimator::problem::solver::{self, SolverLimits};
 use crate::estimator::state::calibrations::MAIN;
-use crate::estimator::window::make_room;
-use crate::estimator::window::marginalization;
-use crate::estimator::window::problem::Estimate;
-use crate::estimator::window::rows::stack;
-use crate::estimator::window::solver::{self, SolverLimits};
+use crate::estimator::state::estimate::Estimate;
+use crate::estimator::window::drop_or_marginalize_frame;
 use crate::gimbal::Parameterization;
 use crate::optimization::RobustLoss;
 use crate::optimization::{Cholesky, dense};
@@ -303,7 +303,8 @@ fn the_covariance_of_a_solve_is_without_damping() {
 
 #[test]
 fn an_inaccurate_chain_gets_a_larger_first_window() {
-    let room = |test: &TestWindow| make_room::first_room(&test.window.calibration, &test.setup.config.options);
+    let room =
+        |test: &TestWindow| drop_or_marginalize_frame::first_room(&test.window.calibration, &test.setup.config.options);
     let gimbal = |rotation_sigma_rad: f64, calibrate: bool| {
         fixture::changed_window(true, quadratic(), |config| {
             (config.chain_prior, config.calibrate) = (Some((0.005, rotation_sigma_rad)), calibrate);

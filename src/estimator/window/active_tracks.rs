@@ -1,7 +1,7 @@
 //! Features of a solve.
 
 use super::features::{FeatureMap, Observation};
-use crate::estimator::factors::visual::{Track, TrackObservation};
+use crate::estimator::state::track::{Track, TrackObservation};
 use crate::frontend::FeatureId;
 use crate::optimization::Landmark;
 

@@ -1,7 +1,7 @@
 //! The static calibration in the report: parameters, values and standard deviations of its columns.
 
+use super::setup::Setup;
 use crate::estimator::report::CalibrationEstimate;
-use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 
 /// Returns the static calibration with the standard deviations of its columns, NaN without a solve.

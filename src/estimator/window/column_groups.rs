@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
+use super::setup::Setup;
 use super::window_state::WindowState;
-use crate::estimator::setup::Setup;
+use crate::estimator::problem::frame;
 use crate::estimator::state::frame_state::{FrameState, Rates};
-use crate::estimator::window::frames;
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::ParameterId;
 use crate::optimization::Cholesky;
@@ -45,7 +45,7 @@ impl WindowState {
     /// frames and prior follow.
     pub(crate) fn add_columns(&mut self, setup: &Setup) {
         let before = self.calibration.parameters();
-        let old = frames::layout(&self.frames, self.calibration.dof());
+        let old = frame::layout(&self.frames, self.calibration.dof());
         self.calibration = self.calibration.with_columns_of(&setup.given_calibration());
         let profiles: Vec<Vec<ImuSample>> = (0..self.frames.len()).map(|slot| self.samples_after(slot)).collect();
         for (frame, after) in self.frames.iter_mut().zip(&profiles) {
@@ -63,7 +63,7 @@ impl WindowState {
             changed(&mut frame.state);
             frame.first_estimate.iter_mut().for_each(changed);
         }
-        let new = frames::layout(&self.frames, self.calibration.dof());
+        let new = frame::layout(&self.frames, self.calibration.dof());
         let after = self.calibration.parameters();
         let places: Vec<usize> =
             before.iter().filter_map(|known| after.iter().position(|parameter| parameter == known)).collect();

@@ -5,7 +5,9 @@
 //! then stay too large.
 
 use super::column_groups::SuspectedParameter;
-use crate::estimator::{EstimatorConfig, FactorKind, ResidualSummary};
+use crate::estimator::config::EstimatorConfig;
+use crate::estimator::factors::FactorKind;
+use crate::estimator::report::ResidualSummary;
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::Quantity;
 

@@ -1,11 +1,11 @@
 //! Failure criteria of the window.
 
 use super::features::FeatureMap;
-use super::frames::Frame;
 use super::window_state::WindowState;
-use crate::estimator::options::EstimatorOptions;
+use crate::estimator::config::EstimatorOptions;
+use crate::estimator::problem::frame::Frame;
+use crate::estimator::report::{Event, EventKind, FailureCause};
 use crate::estimator::state::navigation::NavigationState;
-use crate::estimator::{Event, EventKind, FailureCause};
 use crate::geometry::seconds_from_ns;
 
 /// Monitors the number of observed landmarks.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use crate::estimator::options::EstimatorOptions;
+use crate::estimator::config::EstimatorOptions;
 use crate::estimator::state::camera_view::CameraView;
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::optimization::LandmarkModel;

@@ -2,49 +2,13 @@
 
 use std::ops::{Deref, DerefMut};
 
-use crate::estimator::factors::preintegration::Preintegration;
-use crate::estimator::factors::zero_velocity::Stationary;
-use crate::estimator::options::EstimatorOptions;
-use crate::estimator::state::frame_state::FrameState;
+use crate::estimator::config::EstimatorOptions;
+use crate::estimator::problem::frame::Frame;
 use crate::estimator::state::imu_errors::ImuErrors;
-use crate::estimator::state::layout::Layout;
-use crate::estimator::state::navigation::Matrix15;
-use crate::sensors::JointAngles;
 
 /// Change of a scale error, a misalignment or the rotation in radians at which an interval is reintegrated: second-order
 /// effects are then a millionth.
 const REINTEGRATION_INTRINSICS_CHANGE: f64 = 1e-3;
-
-/// One frame of the window.
-#[derive(Clone, Debug)]
-pub(crate) struct Frame {
-    /// Number of the image in its camera's stream.
-    pub(crate) index: usize,
-    /// Stamp of the image since the log started.
-    pub(crate) stamp_ns: i64,
-    /// Current estimate.
-    pub(crate) state: FrameState,
-    /// Linearization point of the marginalization prior, for frames in the prior.
-    pub(crate) first_estimate: Option<FrameState>,
-    /// Encoder angles at the stamp.
-    pub(crate) encoder: Option<JointAngles>,
-    /// Present while the vehicle is stationary.
-    pub(crate) stationary: Option<Stationary>,
-    /// Whether it is a keyframe.
-    pub(crate) keyframe: bool,
-    /// IMU samples since the previous frame of the window.
-    pub(crate) motion: Preintegration,
-    /// Square-root information of `motion` (15 × 15), `None` when it is empty.
-    pub(crate) motion_information: Option<Matrix15>,
-}
-
-impl Frame {
-    /// Returns the state for derivatives: the first estimate while `current` is within `reach_rad` of it in
-    /// attitude and joint angles, else `current`.
-    pub(crate) fn linearization_point<'a>(&'a self, current: &'a FrameState, reach_rad: f64) -> &'a FrameState {
-        self.first_estimate.as_ref().filter(|first| current.rotation_from_rad(first) <= reach_rad).unwrap_or(current)
-    }
-}
 
 /// Frames of the window, oldest first; never empty.
 #[derive(Clone, Debug)]
@@ -130,17 +94,5 @@ impl Deref for Frames {
 impl DerefMut for Frames {
     fn deref_mut(&mut self) -> &mut [Frame] {
         &mut self.0
-    }
-}
-
-/// Column layout of a window with these frames.
-pub(crate) fn layout(frames: &[Frame], calibration: usize) -> Layout {
-    let first = frames.first().map(|frame| &frame.state);
-    Layout {
-        frames: frames.len(),
-        joints: first.map_or(0, |state| state.joints_rad.len()),
-        joint_motion: first.map_or(0, |state| state.joint_motion.len()),
-        moving_rows: first.is_some_and(FrameState::has_moving_rows),
-        calibration,
     }
 }

@@ -2,18 +2,16 @@
 
 use nalgebra::DMatrix;
 
+use super::setup::Setup;
+use super::solve::SolvedWindow;
 use super::window_state::WindowState;
-use crate::estimator::report::columns::scales_of;
-use crate::estimator::report::jacobian_source::{
-    ClockColumns, ExactSource, FactorRows, JacobianSource, PackedKind, PackedRow,
-};
-use crate::estimator::report::linearization::{column_blocks, column_order};
-use crate::estimator::setup::Setup;
+use crate::estimator::problem::linearization::{column_blocks, column_order};
+use crate::estimator::problem::rows::stack_columns;
+use crate::estimator::report::jacobian_source::{ClockColumns, ExactSource, PackedKind, PackedRow};
+use crate::estimator::report::{FactorRows, JacobianSource};
 use crate::estimator::state::calibrations::Calibrations;
+use crate::estimator::state::columns::{ColumnBlock, FrameId, scales_of};
 use crate::estimator::state::frame_state::FrameState;
-use crate::estimator::window::rows::stack_columns;
-use crate::estimator::window::solve::SolvedWindow;
-use crate::estimator::{ColumnBlock, FrameId};
 
 impl WindowState {
     /// Returns the source of the Jacobian at the final estimate, and the rows without a feature if they are

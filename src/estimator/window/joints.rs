@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::setup::Setup;
 use super::window_state::WindowState;
-use crate::estimator::setup::Setup;
+use crate::estimator::factors::joint_motion::UNKNOWN_JOINT_SIGMA_RAD;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::estimator::state::camera_view::CameraView;
@@ -11,38 +12,11 @@ use crate::geometry::wrap_angle;
 use crate::optimization::{RelativePose, reprojection};
 use crate::sensors::JointAngles;
 
-/// Standard deviation of a joint's rotation since the previous frame, without an encoder.
-pub(crate) const UNKNOWN_JOINT_SIGMA_RAD: f64 = 1.0;
 /// Smallest number of landmarks that constrain the joint angles of a frame.
 const MIN_LANDMARKS: usize = 15;
 /// The visual standard deviation of a joint angle must be smaller than the encoder's by this factor before
 /// readings are propagated with it: the visual rotation between the frames is then independent of the encoder.
 const SHARPER: f64 = 3.0;
-
-/// Standard deviation of a joint rate without a measurement, in rad/s: motors of gimbals rotate at up to 200°/s.
-const UNKNOWN_RATE_RAD_PER_S: f64 = 2.0;
-/// Standard deviation of a joint acceleration without a measurement, in rad/s²: a stabilized joint compensates the
-/// vehicle, which reaches 20 rad/s² when it is agile.
-const UNKNOWN_ACCELERATION_RAD_PER_S2: f64 = 10.0;
-/// Smallest standard deviations of rate and acceleration, in rad/s and rad/s²: over the 0.1 s of the readings a joint does
-/// not follow a parabola any better.
-const MIN_MOTION_SIGMAS: [f64; 2] = [0.02, 2.0];
-
-/// Value and standard deviation of a joint rate or joint acceleration: what the encoders measure, or zero. `place` counts
-/// the rates of all joints, then their accelerations.
-pub(crate) fn measured_joint_motion(encoder: Option<&JointAngles>, place: usize, joints: usize) -> (f64, f64) {
-    let (joint, derivative) = (place % joints.max(1), place / joints.max(1));
-    let unknown = [UNKNOWN_RATE_RAD_PER_S, UNKNOWN_ACCELERATION_RAD_PER_S2][derivative.min(1)];
-    let measured = encoder.and_then(|encoder| {
-        let fit = encoder.motion_fits.get(joint)?;
-        let (value, sigma) = match derivative {
-            0 => (*encoder.rates_rad_per_s.get(joint)?, fit.rate_sigma_rad_per_s),
-            _ => (fit.acceleration_rad_per_s2, fit.acceleration_sigma_rad_per_s2),
-        };
-        (value.is_finite() && sigma.is_finite()).then(|| (value, sigma.hypot(MIN_MOTION_SIGMAS[derivative.min(1)])))
-    });
-    measured.filter(|(_, sigma)| *sigma < unknown).unwrap_or((0.0, unknown))
-}
 
 impl WindowState {
     /// Fits the newest frame's joint angles to the observations of triangulated landmarks with a fixed pose: an

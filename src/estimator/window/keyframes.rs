@@ -1,10 +1,10 @@
 //! Selection of keyframes.
 
 use super::features;
+use super::setup::Setup;
 use super::window_state::WindowState;
-use crate::estimator::setup::Setup;
+use crate::estimator::report::{Event, EventKind};
 use crate::estimator::state::calibrations::MAIN;
-use crate::estimator::{Event, EventKind};
 use crate::geometry::seconds_from_ns;
 
 /// A stationary vehicle gets a keyframe this often, so that IMU intervals stay short enough to be integrated again.

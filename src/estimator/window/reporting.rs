@@ -2,15 +2,17 @@
 
 use nalgebra::Vector2;
 
-use super::problem::Costs;
+use super::setup::Setup;
 use super::solve::{SolvedWindow, TrackResiduals};
 use super::window_state::WindowState;
-use crate::estimator::factors::prior::{Prior, StartPrior};
+use crate::estimator::factors::FactorKind;
+use crate::estimator::factors::marginal_prior::Prior;
+use crate::estimator::factors::start_prior::StartPrior;
+use crate::estimator::problem::problem::Costs;
 use crate::estimator::report::{
-    CalibrationEstimate, FactorKind, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport,
-    Phase, PoseCovariance, ResidualSummary, StageTimes, StepReport,
+    CalibrationEstimate, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport, Phase,
+    PoseCovariance, ResidualSummary, StageTimes, StepReport,
 };
-use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::step_input::StepInput;
 use crate::geometry::median;

@@ -3,13 +3,18 @@
 use nalgebra::Vector2;
 
 use super::active_tracks::ActiveTracks;
-use super::problem::{CameraFactors, Estimate, Problem};
-use super::solver::{self, Solution, SolverLimits};
+use super::setup::Setup;
 use super::window_state::WindowState;
-use crate::estimator::factors::visual::{self, TrackObservation};
-use crate::estimator::options::EstimatorOptions;
-use crate::estimator::setup::Setup;
-use crate::estimator::{Event, EventKind};
+use crate::estimator::config::EstimatorOptions;
+use crate::estimator::factors::reprojection;
+use crate::estimator::problem::information_gain::InformationGain;
+use crate::estimator::problem::linearization::Linearization;
+use crate::estimator::problem::problem::{CameraFactors, Problem};
+use crate::estimator::problem::solver::{self, Solution, SolverLimits};
+use crate::estimator::report::{Event, EventKind};
+use crate::estimator::state::columns::FrameId;
+use crate::estimator::state::estimate::Estimate;
+use crate::estimator::state::track::TrackObservation;
 
 /// Reprojection residuals in pixels, by track and observation; `None` behind the camera.
 pub(crate) type TrackResiduals = Vec<Vec<Option<Vector2<f64>>>>;
@@ -69,6 +74,27 @@ impl WindowState {
         SolvedWindow { cameras, solution, checks }
     }
 
+    /// Returns the linearization at the final estimate (rows of the measurements and of the priors) and the
+    /// information gain of the newest image.
+    pub(crate) fn linearization(
+        &self,
+        setup: &Setup,
+        solved: &SolvedWindow,
+    ) -> (Linearization, Option<InformationGain>) {
+        let problem = self.problem(setup, &solved.cameras);
+        let frames: Vec<FrameId> = self.frames.iter().map(|frame| FrameId(frame.index)).collect();
+        let parameters = self.calibration.parameters();
+        let estimate = &solved.solution.estimate;
+        // An image that does not become a keyframe is dropped: it adds no information.
+        if !self.frames.newest().keyframe {
+            let linearization = problem.linearization(estimate, &parameters, &frames, None);
+            return (linearization, problem.no_information_gain(estimate));
+        }
+        let mut cameras = Vec::new();
+        let linearization = problem.linearization(estimate, &parameters, &frames, Some(&mut cameras));
+        (linearization, problem.information_gain(estimate, &cameras))
+    }
+
     /// Drops rejected features; a track that continues is a new feature from its next observation on.
     pub(crate) fn drop_rejected(&mut self, solved: &SolvedWindow, options: &EstimatorOptions, events: &mut Vec<Event>) {
         let (mut count, mut all) = (0, 0);
@@ -105,7 +131,7 @@ fn track_residuals(problem: &Problem<'_>, estimate: &Estimate) -> Vec<TrackResid
             .map(|(track, landmark)| {
                 let anchor = view.relative_to(&track.observations[0]);
                 let residual = |observation: &TrackObservation| {
-                    visual::observation_residual_px(&view, &anchor, landmark, observation)
+                    reprojection::observation_residual_px(&view, &anchor, landmark, observation)
                 };
                 track.observations.iter().map(residual).collect()
             })

@@ -2,13 +2,16 @@
 
 use super::active_tracks::ActiveTracks;
 use super::features::{self, FeatureMap};
-use super::frames::{self, Frames};
-use super::problem::{CameraFactors, Estimate, Problem};
-use crate::estimator::factors::prior::{Prior, StartPrior};
-use crate::estimator::factors::visual::VisualModel;
-use crate::estimator::setup::Setup;
+use super::frames::Frames;
+use super::setup::Setup;
+use crate::estimator::factors::marginal_prior::Prior;
+use crate::estimator::factors::reprojection::VisualModel;
+use crate::estimator::factors::start_prior::StartPrior;
+use crate::estimator::problem::frame;
+use crate::estimator::problem::problem::{CameraFactors, Problem};
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::camera_view::CameraView;
+use crate::estimator::state::estimate::Estimate;
 use crate::gimbal::Parameterization;
 use crate::optimization::Landmark;
 
@@ -36,7 +39,7 @@ impl WindowState {
     /// at the end.
     pub(crate) fn problem<'a>(&'a self, setup: &'a Setup, active: &'a [ActiveTracks]) -> Problem<'a> {
         let options = &setup.config.options;
-        let layout = frames::layout(&self.frames, self.calibration.dof());
+        let layout = frame::layout(&self.frames, self.calibration.dof());
         let start = layout.calibration().start;
         let factors = |camera: usize| {
             let columns = self.calibration.columns(camera);
@@ -86,7 +89,7 @@ impl WindowState {
 
     /// Switches the chain's parameterization: the calibration stays the same, and the prior's columns are transported.
     pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) {
-        let layout = frames::layout(&self.frames, self.calibration.dof());
+        let layout = frame::layout(&self.frames, self.calibration.dof());
         let before = self.calibration.first_estimate_offset();
         let old_from_new = self.calibration.switch_parameterization(parameterization);
         if let Some(prior) = &mut self.prior {

@@ -1,0 +1,10 @@
+//! Configuration of an estimator: sensors, given calibration and options.
+
+mod estimator_config;
+mod options;
+
+pub(crate) use estimator_config::rigid_chain;
+pub use estimator_config::{
+    CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidCamera, imu_columns, imu_intrinsics, rigid_columns,
+};
+pub use options::{EstimatorOptions, TrackContinuation};

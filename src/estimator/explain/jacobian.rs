@@ -1,0 +1,318 @@
+//! The full Jacobian of a step by blocks: rows by factor, columns by unknowns.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, Vector3};
+
+use crate::camera::CameraModel;
+use crate::estimator::factors::reprojection::{Anchor, VisualModel, whitened};
+use crate::estimator::problem::linearization::column_blocks;
+use crate::estimator::report::{FeatureReport, JacobianFactor, JacobianRow, JacobianSource, StepReport};
+use crate::estimator::state::camera_pose::{self, CameraMaps, CameraSensor};
+use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS};
+use crate::estimator::state::columns::{ColumnBlock, ColumnId, FrameId, scales_of};
+use crate::estimator::state::frame_state::FrameState;
+use crate::estimator::state::layout::{Layout, POSE, VELOCITY_BIAS};
+use crate::estimator::state::track::TrackObservation;
+use crate::frontend::FeatureId;
+use crate::gimbal::ParameterId;
+use crate::optimization::{BlockTerm, CameraPose, Landmark};
+
+/// The Jacobian of a step by blocks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepJacobian {
+    /// Calibration, joint angles, poses, velocities and biases; last the inverse depths as one block: each feature
+    /// has its own column, which no other row touches.
+    pub columns: Vec<ColumnBlock>,
+    /// The features in the report's order, then the rest.
+    pub rows: Vec<JacobianRow>,
+}
+
+/// Rows of one feature in some columns, two per observation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FeatureRows {
+    /// Number of the observing frame of each observation.
+    pub frames: Vec<FrameId>,
+    /// Whitened rows in the columns of the step, the feature's inverse depth last: residuals over their standard
+    /// deviations with robust weights, per radian, metre and 1/m.
+    pub rows: DMatrix<f64>,
+}
+
+impl StepReport {
+    /// Returns the blocks of the Jacobian, `None` without a stored source; `cameras` are the main one and the
+    /// further rigid ones.
+    pub fn jacobian(&self, cameras: &[&CameraModel]) -> Option<StepJacobian> {
+        let writer = Writer::new(self, cameras)?;
+        let mut rows = Vec::with_capacity(self.features.len());
+        for (index, feature) in self.features.iter().enumerate() {
+            let Some(written) = writer.feature(index, feature) else { continue };
+            rows.push(writer.row_of(feature, &written));
+        }
+        rows.extend(writer.other_rows());
+        Some(StepJacobian { columns: writer.columns, rows })
+    }
+
+    /// Returns the rows of one feature; `cameras` as for [`Self::jacobian`].
+    pub fn feature_rows(&self, cameras: &[&CameraModel], id: FeatureId) -> Option<FeatureRows> {
+        let writer = Writer::new(self, cameras)?;
+        let index = self.features.iter().position(|feature| feature.id == id)?;
+        writer.feature(index, &self.features[index])
+    }
+}
+
+/// One camera at the states of the window.
+struct WindowCamera<'a> {
+    model: VisualModel<'a>,
+    current: CameraView<'a>,
+    linearized: CameraView<'a>,
+    maps: CameraMaps,
+    /// First column of the camera's calibration, and their number.
+    start: usize,
+    columns: usize,
+}
+
+struct Writer<'a> {
+    report: &'a StepReport,
+    source: &'a JacobianSource,
+    layout: Layout,
+    columns: Vec<ColumnBlock>,
+    states: Vec<FrameState>,
+    cameras: Vec<WindowCamera<'a>>,
+    /// Landmarks in the world.
+    places_m: BTreeMap<FeatureId, Vector3<f64>>,
+}
+
+impl<'a> Writer<'a> {
+    fn new(report: &'a StepReport, cameras: &[&'a CameraModel]) -> Option<Self> {
+        let source = report.jacobian_source.as_ref()?;
+        let frames = report.window.len();
+        let joints = report.window.first().map_or(0, |frame| frame.joint_angles_rad.len());
+        let states = source.frames(joints);
+        if !source.describes(&report.calibration.parameters)
+            || states.len() != frames
+            || cameras.len() < source.chains.len()
+        {
+            return None;
+        }
+        let first = states.first();
+        let layout = Layout {
+            frames,
+            joints,
+            joint_motion: first.map_or(0, |state| state.joint_motion.len()),
+            moving_rows: first.is_some_and(FrameState::has_moving_rows),
+            calibration: if source.calibrated { report.calibration.parameters.len() } else { 0 },
+        };
+        let numbers: Vec<FrameId> = report.window.iter().map(|frame| FrameId(frame.frame_index)).collect();
+        let mut columns = column_blocks(&layout, &report.calibration.parameters, &numbers);
+        let start = columns.last().map_or(0, |last| last.start + last.len);
+        columns.push(ColumnBlock { id: ColumnId::InverseDepth, start, len: 1 });
+        let mut start = 0;
+        let cameras = source
+            .chains
+            .iter()
+            .zip(cameras)
+            .enumerate()
+            .map(|(camera, (_, model))| {
+                let camera = window_camera(report, source, &states, camera, model, start);
+                start += camera.columns;
+                camera
+            })
+            .collect();
+        let places_m = report.landmarks.iter().map(|landmark| (landmark.id, landmark.position_m)).collect();
+        Some(Self { report, source, layout, columns, states, cameras, places_m })
+    }
+
+    /// Rows of a feature; `None` when its camera is unknown.
+    fn feature(&self, index: usize, feature: &FeatureReport) -> Option<FeatureRows> {
+        let camera = self.cameras.get(feature.id.camera())?;
+        let slot_of = |number: usize| self.report.window.iter().position(|frame| frame.frame_index == number);
+        let anchor = slot_of(feature.anchor_frame_index)?;
+        let width = self.columns.last().map_or(0, |last| last.start + last.len);
+        let mut rows = DMatrix::zeros(2 * feature.observations.len(), width);
+        let mut frames = Vec::new();
+        let anchored = feature.observations.iter().find(|seen| seen.frame_index == feature.anchor_frame_index)?;
+        let anchored = TrackObservation { slot: anchor, uv_px: anchored.measured_px };
+        let landmark = self.landmark(index, feature, &camera.current.pose(anchor, &anchored.uv_px))?;
+        let anchor = Anchor::new(&camera.current, &camera.linearized, &anchored);
+        for seen in feature.observations.iter() {
+            let Some(slot) = slot_of(seen.frame_index) else { continue };
+            let observation = TrackObservation { slot, uv_px: seen.measured_px };
+            // Stored residuals are rounded: the robust weight of the step is used instead of a recomputed one.
+            let weight = seen.residual_after_px.map(|_| seen.robust_weight);
+            let mut target = rows.rows_mut(2 * frames.len(), 2);
+            let written = match camera.current.blocks_per_frame() {
+                1 => self.write::<1>(&mut target, camera, &anchor, &landmark, &observation, weight),
+                _ => self.write::<ROLLING_BLOCKS>(&mut target, camera, &anchor, &landmark, &observation, weight),
+            };
+            if written.is_some() {
+                frames.push(FrameId(seen.frame_index));
+            }
+        }
+        let height = 2 * frames.len();
+        Some(FeatureRows { frames, rows: rows.resize_vertically(height, 0.0) })
+    }
+
+    /// Landmark of a feature in its anchor's camera: from its position in the world, for a rejected one as stored.
+    fn landmark(&self, index: usize, feature: &FeatureReport, anchor: &CameraPose) -> Option<Landmark> {
+        let rejected = self.source.rejected.iter().find(|(place, _)| *place as usize == index);
+        if let Some((_, bearing)) = rejected {
+            let bearing = Vector3::from(*bearing).cast::<f64>().normalize();
+            return Some(Landmark { bearing, inverse_distance: feature.inverse_depth_per_m * bearing.z });
+        }
+        let position_m = self.places_m.get(&feature.id)?;
+        let point = anchor.rotation.tr_mul(&(position_m - anchor.position_m));
+        Some(Landmark { bearing: point.normalize(), inverse_distance: point.norm().recip() })
+    }
+
+    /// Rows of factors without a feature.
+    fn other_rows(&self) -> Vec<JacobianRow> {
+        let numbers: Vec<FrameId> = self.report.window.iter().map(|frame| FrameId(frame.frame_index)).collect();
+        let mut rows: Vec<JacobianRow> = self.source.rows(&numbers).collect();
+        let is_imu = |row: &JacobianRow| matches!(row.factor, JacobianFactor::Imu { .. });
+        let place = rows.iter().position(|row| !is_imu(row)).unwrap_or(rows.len());
+        // Readings of a frame touch its joint angles only, each with its inverse standard deviation.
+        let encoders = self.report.window.iter().enumerate().filter_map(|(slot, frame)| {
+            let sigmas = frame.encoder_sigmas_rad.as_ref().filter(|sigmas| !sigmas.is_empty())?;
+            let id = ColumnId::Joints(numbers[slot]);
+            let column = self.columns.iter().position(|block| block.id == id)?;
+            let scale = id.scale(0);
+            let sigmas = || sigmas.iter().take(self.layout.joints).enumerate();
+            let squared: f64 = sigmas().map(|(_, sigma)| (scale / sigma).powi(2)).sum();
+            let factor = JacobianFactor::Encoder(numbers[slot]);
+            let mut norms = vec![(column as u16, squared.sqrt() as f32)];
+            if let Some((clock, block)) = self.encoder_clock() {
+                let scale = block.id.scale(0);
+                let rate = |joint: usize| self.states[slot].joint_rate_rad_per_s(joint);
+                let squared: f64 = sigmas().map(|(joint, sigma)| (scale * rate(joint) / sigma).powi(2)).sum();
+                if squared > 0.0 {
+                    norms.insert(0, (clock as u16, squared.sqrt() as f32));
+                }
+            }
+            Some(JacobianRow { factor, height: sigmas().count(), norms })
+        });
+        let encoders: Vec<JacobianRow> = encoders.collect();
+        rows.splice(place..place, encoders);
+        rows
+    }
+
+    /// Number and block of the column of the encoders' time offset, if estimated.
+    fn encoder_clock(&self) -> Option<(usize, &ColumnBlock)> {
+        let id = ColumnId::Calibration(ParameterId::ENCODER_TIMESHIFT);
+        self.columns.iter().enumerate().find(|(_, block)| block.id == id)
+    }
+
+    /// Writes the rows of an observation by a camera with `N` blocks per frame; `None` where it has none.
+    fn write<const N: usize>(
+        &self,
+        rows: &mut nalgebra::DMatrixViewMut<'_, f64>,
+        camera: &WindowCamera<'_>,
+        anchor: &Anchor<'_>,
+        landmark: &Landmark,
+        observation: &TrackObservation,
+        weight: Option<f64>,
+    ) -> Option<()> {
+        let term: BlockTerm<usize, N> = whitened(&camera.model, anchor, landmark, observation, weight)?;
+        rows.column_mut(rows.ncols() - 1).copy_from(&term.by_landmark.column(2));
+        let layout = &self.layout;
+        let (joints, count) = (layout.calibration, layout.joint_block());
+        let poses = joints + count * layout.frames;
+        let velocities = poses + POSE * layout.frames;
+        for (block, by_block) in term.blocks() {
+            let mut by_calibration = rows.columns_mut(camera.start, camera.columns);
+            by_calibration += by_block * &camera.maps.calibration[*block];
+            let of_frame = camera.maps.columns(layout, *block);
+            if of_frame.is_empty() {
+                continue;
+            }
+            let slot = of_frame.start / layout.frame_len();
+            let by_frame = by_block * &camera.maps.own[*block];
+            let mut add = |place: usize, from: usize, count: usize| {
+                let mut target = rows.columns_mut(place, count);
+                target += by_frame.columns(from, count);
+            };
+            add(poses + POSE * slot, 0, POSE);
+            add(joints + count * slot, POSE, count);
+            add(velocities + VELOCITY_BIAS * slot, POSE + count, of_frame.len() - POSE - count);
+        }
+        Some(())
+    }
+
+    fn row_of(&self, feature: &FeatureReport, written: &FeatureRows) -> JacobianRow {
+        let mut scales = scales_of(&self.columns);
+        if let Some(last) = scales.last_mut() {
+            // A tenth of the inverse distance.
+            *last = ColumnId::InverseDepth.scale(0) * feature.inverse_depth_per_m.abs();
+        }
+        let mut norms = Vec::new();
+        for (number, block) in self.columns.iter().enumerate() {
+            let range = block.start..block.start + block.len;
+            let squared: f64 = range.map(|column| (written.rows.column(column) * scales[column]).norm_squared()).sum();
+            if squared > 0.0 {
+                norms.push((number as u16, squared.sqrt() as f32));
+            }
+        }
+        JacobianRow { factor: JacobianFactor::Feature(feature.id), height: written.rows.nrows(), norms }
+    }
+}
+
+fn window_camera<'a>(
+    report: &'a StepReport,
+    source: &'a JacobianSource,
+    states: &[FrameState],
+    camera: usize,
+    model: &'a CameraModel,
+    start: usize,
+) -> WindowCamera<'a> {
+    let (sigma_px, loss, landmark_model) = (source.pixel_sigma_px, source.loss, source.landmark_model);
+    let visual = VisualModel { camera: model, sigma_px, loss, landmark_model };
+    if let Some(exact) = &source.exact {
+        let (current, linearized) = (exact.current.1.of(camera), exact.linearized.1.of(camera));
+        return WindowCamera {
+            model: visual,
+            current: CameraView::new(&exact.current.0, current, model),
+            linearized: CameraView::new(&exact.linearized.0, linearized, model),
+            maps: CameraMaps::new(&exact.linearized.0, linearized),
+            start,
+            columns: linearized.dof(),
+        };
+    }
+    let chain = &source.chains[camera];
+    let clocks = source.clocks.get(camera).copied().unwrap_or_default();
+    let [then_s, now_s] = clocks.shifts_s;
+    let sensor = CameraSensor {
+        chain: Cow::Borrowed(chain),
+        columns: if source.calibrated { chain.dof() + clocks.count } else { 0 },
+        shift_s: then_s,
+        shift_column: (source.calibrated && clocks.count > 0).then(|| chain.dof()),
+        rolling: false,
+        readout_s: 0.0,
+        readout_column: None,
+        intrinsics: 0..0,
+    };
+    let columns = sensor.columns;
+    let maps = CameraMaps::of_sensor(states, &sensor);
+    let linearized = CameraView::of_sensor(Cow::Owned(states.to_vec()), sensor, Cow::Borrowed(model), false);
+    let rigid = camera.checked_sub(1).and_then(|rigid| report.calibration.rigid_cameras.get(rigid));
+    let now = report.window.iter().zip(states).map(|(frame, state)| {
+        let mut state = state.clone();
+        state.navigation.world_from_imu = frame.world_from_imu;
+        state.navigation.velocity_m_per_s = frame.velocity_m_per_s;
+        state.joints_rad.clone_from(&frame.joint_angles_rad);
+        let seen = camera_pose::when_seen(&state, now_s);
+        let imu_from_observer = match rigid {
+            Some((_, extrinsics)) => *extrinsics,
+            // Without a time offset the camera pose is that of the report.
+            None if now_s == 0.0 => frame.imu_from_camera,
+            None => {
+                // Motion of the joints during the time offset; at the first estimate it is nearly the same.
+                let moved =
+                    chain.imu_from_camera(&state.joints_rad).inverse() * chain.imu_from_camera(&seen.joints_rad);
+                frame.imu_from_camera * moved
+            }
+        };
+        CameraPose::from(seen.navigation.world_from_imu * imu_from_observer)
+    });
+    let current = CameraView::of_poses(now.collect(), model);
+    WindowCamera { model: visual, current, linearized, maps, start, columns }
+}

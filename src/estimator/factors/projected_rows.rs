@@ -1,0 +1,127 @@
+//! Reprojection factors as rows over the blocks of a camera (its poses, and its intrinsics) with every landmark projected out orthogonally: without
+//! normal equations, unobservable directions stay exactly unobservable.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::reprojection::{Anchor, VisualModel, whitened};
+use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS};
+use crate::estimator::state::track::Track;
+use crate::geometry::triangular_factor::{PORTION, TriangularFactor};
+use crate::optimization::{Landmark, LandmarkRows, PoseBlocks};
+
+/// Columns of a block of the camera: a pose, or its intrinsics.
+const BLOCK: usize = 6;
+
+/// The whitened rows of some tracks.
+#[derive(Clone, Debug)]
+pub(crate) struct ProjectedRows {
+    /// `[blocks of the camera, 6 each | residual]`, compressed to as many rows as columns at most; rows begin with the newest frame that
+    /// they depend on, so that they are triangular from the newest frame back.
+    pub(crate) rows: DMatrix<f64>,
+    /// Rows of the newest frame's observations, conditioned on the landmarks' posterior from all other
+    /// observations, in the same columns. They are included in `rows`.
+    pub(crate) newest_rows: DMatrix<f64>,
+    /// `JᵀJ` of the blocks before the landmarks were projected out.
+    blocks: PoseBlocks,
+}
+
+impl ProjectedRows {
+    /// Linearizes at `current`, with the derivatives by poses taken at `linearized`.
+    pub(crate) fn new(
+        model: &VisualModel<'_>,
+        current: &CameraView<'_>,
+        linearized: &CameraView<'_>,
+        tracks: &[Track],
+        landmarks: &[Landmark],
+        apart: NewestRows,
+    ) -> Self {
+        match current.blocks_per_frame() {
+            1 => Self::by_blocks::<1>(model, current, linearized, tracks, landmarks, apart),
+            _ => Self::by_blocks::<ROLLING_BLOCKS>(model, current, linearized, tracks, landmarks, apart),
+        }
+    }
+
+    /// [`Self::new`] for a camera with `N` blocks per frame.
+    fn by_blocks<const N: usize>(
+        model: &VisualModel<'_>,
+        current: &CameraView<'_>,
+        linearized: &CameraView<'_>,
+        tracks: &[Track],
+        landmarks: &[Landmark],
+        apart: NewestRows,
+    ) -> Self {
+        let frames = current.frames();
+        let newest = frames.saturating_sub(1);
+        let mut blocks = PoseBlocks::new(current.blocks());
+        let columns = BLOCK * current.blocks() + 1;
+        // The newest frame comes first in the triangular factor: rows begin with the newest frame that they depend on, and
+        // those of older observations are short. The intrinsics come after all frames.
+        let place = |block: usize| {
+            let (slot, row) = (block / N, block % N);
+            BLOCK * if slot < frames { N * (newest - slot) + row } else { block }
+        };
+        let mut groups = vec![Vec::new(); frames];
+        let mut newest_rows = Vec::new();
+        let mut local = LandmarkRows::default();
+        for (track, landmark) in tracks.iter().zip(landmarks) {
+            let Some(first) = track.observations.first() else { continue };
+            let anchor = Anchor::new(current, linearized, first);
+            let observers = N * (track.observations.len() - 1);
+            local.begin(CameraView::blocks_of::<N>(first.slot), current.intrinsics_block(), observers);
+            for observation in &track.observations {
+                let Some(term) = whitened::<N>(model, &anchor, landmark, observation, None) else { continue };
+                blocks.add(&term);
+                local.push(&term);
+            }
+            local.eliminate();
+            let seen_last = first.slot != newest && local.last_observer().map(|block| block / N) == Some(newest);
+            if apart == NewestRows::Apart
+                && seen_last
+                && let Some((added, of_added)) = local.added().next_back()
+            {
+                local.append_to(&mut newest_rows, columns, added, of_added, |block| BLOCK * block);
+            }
+            for (added, of_added) in local.added() {
+                let slots = of_added.iter().map(|block| block / N).filter(|slot| *slot < frames);
+                let begin = newest - slots.max().unwrap_or(first.slot);
+                let skipped = BLOCK * N * begin;
+                local.append_to(&mut groups[begin], columns - skipped, added, of_added, |block| place(block) - skipped);
+            }
+        }
+        let mut factor = TriangularFactor::new(columns);
+        for (begin, rows) in groups.iter().enumerate() {
+            let skipped = BLOCK * N * begin;
+            let width = columns - skipped;
+            for portion in rows.chunks(PORTION * width) {
+                factor.merge(skipped, portion.len() / width, |column, entries| {
+                    for (entry, row) in entries.iter_mut().zip(portion.chunks_exact(width)) {
+                        *entry = row[column - skipped];
+                    }
+                });
+            }
+        }
+        // Without a row of the residual alone, which no unknown can change.
+        let by_place = factor.leading_rows(columns - 1);
+        let mut rows = DMatrix::zeros(by_place.nrows(), columns);
+        for block in 0..current.blocks() {
+            rows.fixed_columns_mut::<BLOCK>(BLOCK * block).copy_from(&by_place.fixed_columns::<BLOCK>(place(block)));
+        }
+        rows.set_column(columns - 1, &by_place.column(columns - 1));
+        let newest_rows = DMatrix::from_row_slice(newest_rows.len() / columns, columns, &newest_rows);
+        Self { rows, newest_rows, blocks }
+    }
+
+    /// Squared norms of the columns that change the blocks by `columns` (6 × n each), before the projection.
+    pub(crate) fn squared_column_norms(&self, columns: &[DMatrix<f64>]) -> DVector<f64> {
+        self.blocks.squared_norms(columns)
+    }
+}
+
+/// Treatment of the newest frame's rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NewestRows {
+    /// Not requested.
+    Among,
+    /// Stored separately as well.
+    Apart,
+}

@@ -1,0 +1,173 @@
+//! The reprojection factors of one camera in a window: cost and normal equations over its poses.
+
+use nalgebra::Vector2;
+
+use crate::camera::CameraModel;
+use crate::estimator::config::EstimatorOptions;
+use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS, RelativeTo};
+use crate::estimator::state::track::Track;
+use crate::estimator::state::track::TrackObservation;
+use crate::optimization::{
+    BlockTerm, DensePoseEquations, Landmark, LandmarkModel, LossSum, ReducedEquations, ReprojectionEquations,
+    RobustLoss, reprojection,
+};
+
+/// Camera model of the rig, pixel noise and robust loss.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct VisualModel<'a> {
+    /// The model of the rig; a [`CameraView`] has the one with estimated intrinsics.
+    pub(crate) camera: &'a CameraModel,
+    pub(crate) sigma_px: f64,
+    pub(crate) loss: RobustLoss,
+    pub(crate) landmark_model: LandmarkModel,
+}
+
+impl<'a> VisualModel<'a> {
+    pub(crate) fn new(camera: &'a CameraModel, options: &EstimatorOptions) -> Self {
+        Self { camera, sigma_px: options.pixel_sigma_px, loss: options.loss, landmark_model: options.landmark_model }
+    }
+
+    /// Whether the anchor's own observation has a residual.
+    fn measures_in_anchor(&self) -> bool {
+        self.landmark_model == LandmarkModel::BearingAndInverseDistance
+    }
+}
+
+/// Reprojection residual of one observation in pixels (2 × 1), `None` when the landmark does not project into
+/// the camera.
+pub(crate) fn observation_residual_px(
+    view: &CameraView<'_>,
+    anchor: &RelativeTo<'_>,
+    landmark: &Landmark,
+    observation: &TrackObservation,
+) -> Option<Vector2<f64>> {
+    reprojection::residual(view.model(), &anchor.get(observation), landmark, &observation.uv_px)
+}
+
+/// Robust cost (half the sum of losses) of all reprojection factors.
+pub(crate) fn cost(model: &VisualModel<'_>, view: &CameraView<'_>, tracks: &[Track], landmarks: &[Landmark]) -> f64 {
+    let mut total = LossSum::new(model.loss, model.sigma_px);
+    for (track, landmark) in tracks.iter().zip(landmarks) {
+        let Some(first) = track.observations.first() else { continue };
+        let anchor = view.relative_to(first);
+        for observation in &track.observations {
+            if observation.slot == first.slot && !model.measures_in_anchor() {
+                continue;
+            }
+            let residual = observation_residual_px(view, &anchor, landmark, observation);
+            total.add(residual);
+        }
+    }
+    0.5 * total.get()
+}
+
+/// Normal equations of the reprojection factors of one camera over the blocks of its [`CameraView`].
+pub(crate) type VisualEquations = ReprojectionEquations<DensePoseEquations>;
+
+/// [`VisualEquations`] with the landmarks eliminated.
+pub(crate) type ReducedVisualEquations = ReducedEquations<DensePoseEquations>;
+
+/// Linearizes all observations at `current`, with the derivatives by poses taken at `linearized`.
+pub(crate) fn equations(
+    model: &VisualModel<'_>,
+    current: &CameraView<'_>,
+    linearized: &CameraView<'_>,
+    tracks: &[Track],
+    landmarks: &[Landmark],
+) -> VisualEquations {
+    match current.blocks_per_frame() {
+        1 => equations_by_blocks::<1>(model, current, linearized, tracks, landmarks),
+        _ => equations_by_blocks::<ROLLING_BLOCKS>(model, current, linearized, tracks, landmarks),
+    }
+}
+
+/// [`equations`] of a camera with `N` blocks per frame.
+fn equations_by_blocks<const N: usize>(
+    model: &VisualModel<'_>,
+    current: &CameraView<'_>,
+    linearized: &CameraView<'_>,
+    tracks: &[Track],
+    landmarks: &[Landmark],
+) -> VisualEquations {
+    let mut equations = ReprojectionEquations::new(DensePoseEquations::new(current.blocks()), tracks.len());
+    for (track, landmark) in tracks.iter().zip(landmarks) {
+        // Observations come in the order of the slots and the anchor is the first of them.
+        let anchor = track.observations.first().map(|first| Anchor::new(current, linearized, first));
+        let blocks = anchor.as_ref().map(|anchor| CameraView::blocks_of::<N>(anchor.observation.slot));
+        let terms = track
+            .observations
+            .iter()
+            .filter_map(|observation| whitened(model, anchor.as_ref()?, landmark, observation, None));
+        let observations = track.observations.len() * current.blocks_per_frame();
+        equations.add_landmark_by_blocks(blocks, current.intrinsics_block(), observations, terms);
+    }
+    equations
+}
+
+/// The anchor of a track at the current estimate and at the linearization point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Anchor<'a> {
+    current: &'a CameraView<'a>,
+    linearized: &'a CameraView<'a>,
+    observation: &'a TrackObservation,
+    to_current: RelativeTo<'a>,
+    to_linearized: RelativeTo<'a>,
+}
+
+impl<'a> Anchor<'a> {
+    pub(crate) fn new(
+        current: &'a CameraView<'a>,
+        linearized: &'a CameraView<'a>,
+        observation: &'a TrackObservation,
+    ) -> Self {
+        let (to_current, to_linearized) = (current.relative_to(observation), linearized.relative_to(observation));
+        Self { current, linearized, observation, to_current, to_linearized }
+    }
+}
+
+/// Linearizes one observation by the `N` blocks of the camera per frame, divided by sigma and multiplied by the root of its robust
+/// weight: that of its residual, unless given.
+#[inline]
+pub(crate) fn whitened<const N: usize>(
+    model: &VisualModel<'_>,
+    anchor: &Anchor<'_>,
+    landmark: &Landmark,
+    observation: &TrackObservation,
+    known_weight: Option<f64>,
+) -> Option<BlockTerm<usize, N>> {
+    let camera = anchor.current.model();
+    let in_anchor = observation.slot == anchor.observation.slot;
+    let relative = anchor.to_current.get(observation);
+    let (linearized, pose) = anchor.to_linearized.with_pose(observation);
+    let term = if in_anchor {
+        if !model.measures_in_anchor() {
+            return None;
+        }
+        reprojection::linearize_in_anchor(camera, landmark, &observation.uv_px)?
+    } else {
+        reprojection::linearize(camera, &relative, &linearized, landmark, &observation.uv_px)?
+    };
+    let weight = known_weight.unwrap_or_else(|| term.robust_weight(model.sigma_px, model.loss));
+    let mut term = term.weighted(model.sigma_px, weight);
+    if !model.measures_in_anchor() {
+        term.by_landmark.fixed_view_mut::<2, 2>(0, 0).fill(0.0);
+    }
+    let shared = match anchor.current.intrinsics_block() {
+        None => None,
+        Some(block) => {
+            let direction = if in_anchor { landmark.bearing } else { relative.direction(landmark) };
+            let (_, _, by_intrinsics) = camera.project_with_intrinsics_jacobian(&direction)?;
+            Some((block, by_intrinsics * (weight.sqrt() / model.sigma_px)))
+        }
+    };
+    let view = anchor.linearized;
+    let (anchor, observer) = if in_anchor {
+        (None, None)
+    } else {
+        (
+            Some(view.by_blocks(anchor.observation, &anchor.to_linearized.pose, &term.by_anchor)),
+            Some(view.by_blocks(observation, &pose, &term.by_observer)),
+        )
+    };
+    Some(BlockTerm { residual: term.residual, by_landmark: term.by_landmark, anchor, observer, shared })
+}

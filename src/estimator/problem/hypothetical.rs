@@ -1,0 +1,242 @@
+//! Hypothetical windows: states and landmarks with exact measurements, linearized by the estimator's own
+//! factors, to predict the information of a motion.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, Vector3};
+
+use super::frame::{Frame, layout};
+use super::linearization::Linearization;
+use super::problem::{CameraFactors, Problem};
+use crate::camera::CameraModel;
+use crate::estimator::factors::reprojection::VisualModel;
+use crate::estimator::state::calibration::Calibration;
+use crate::estimator::state::calibrations::Calibrations;
+use crate::estimator::state::camera_pose;
+use crate::estimator::state::columns::{ColumnBlock, ColumnGroup, FrameId};
+use crate::estimator::state::estimate::Estimate;
+use crate::estimator::state::frame_state::{FrameState, Rates};
+use crate::estimator::state::given_chain::GivenSigmas;
+use crate::estimator::state::navigation::NavigationState;
+use crate::estimator::state::preintegration::Preintegration;
+use crate::estimator::state::track::{Track, TrackObservation};
+use crate::geometry::ns_from_seconds;
+use crate::gimbal::{ClassicalChain, Parameterization};
+use crate::optimization::{Landmark, LandmarkModel, RelativePose, RobustLoss};
+use crate::sensors::{ImuNoise, ImuSample, JointAngles, JointMotionFit};
+
+/// Knowledge of the poses in a hypothetical window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PoseKnowledge {
+    /// Poses are known.
+    Known,
+    /// IMU measurements, with known or unknown biases.
+    Imu {
+        /// Noise densities of the IMU.
+        noise: ImuNoise,
+        /// Whether the biases are known.
+        biases_known: bool,
+    },
+}
+
+/// Knowledge of the joint angles in a hypothetical window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JointKnowledge {
+    /// Joint angles are known.
+    Known,
+    /// One reading per frame and joint with white noise of this standard deviation, in radians.
+    Encoder(f64),
+    /// Joint angles are unknown.
+    Unknown,
+}
+
+/// One frame of a hypothetical window.
+#[derive(Clone, Debug)]
+pub struct HypotheticalFrame {
+    /// Time of the frame, in seconds.
+    pub time_s: f64,
+    /// Pose, velocity and biases.
+    pub navigation: NavigationState,
+    /// Joint angles without the static offsets.
+    pub joints_rad: Vec<f64>,
+    /// IMU samples since the previous frame, both ends included; unused with known poses.
+    pub imu: Vec<ImuSample>,
+}
+
+/// A landmark of a hypothetical window and the frames that observe it.
+#[derive(Clone, Debug)]
+pub struct HypotheticalLandmark {
+    /// Slot of the frame in which it is anchored.
+    pub anchor: usize,
+    /// Direction in the anchor's camera, of any length.
+    pub bearing: Vector3<f64>,
+    /// Inverse distance from the anchor's camera, in 1/m.
+    pub inverse_distance_per_m: f64,
+    /// Slots of the other observing frames.
+    pub observers: Vec<usize>,
+}
+
+/// A window of hypothetical states with exact measurements.
+#[derive(Clone, Debug)]
+pub struct HypotheticalWindow {
+    /// Model of the camera.
+    pub camera: CameraModel,
+    /// Frames, oldest first.
+    pub frames: Vec<HypotheticalFrame>,
+    /// Landmarks with their observing frames.
+    pub landmarks: Vec<HypotheticalLandmark>,
+    /// Knowledge of the poses.
+    pub poses: PoseKnowledge,
+    /// Knowledge of the joint angles.
+    pub joints: JointKnowledge,
+    /// Standard deviation of a pixel.
+    pub pixel_sigma_px: f64,
+    /// Parameterization of the landmarks.
+    pub landmark_model: LandmarkModel,
+    /// Gravity in the world, in m/s².
+    pub gravity_in_world: Vector3<f64>,
+    /// Prior standard deviations of the chain's parameters, in metres and radians.
+    pub chain_prior: (f64, f64),
+}
+
+impl HypotheticalWindow {
+    /// Linearizes the window with the chain in one parameterization, with or without its joint offsets as columns.
+    ///
+    /// Known quantities have no columns. The rows of the priors are those of the rig's prior alone.
+    pub fn linearize(
+        &self,
+        chain: &ClassicalChain,
+        parameterization: Parameterization,
+        joint_offsets: bool,
+    ) -> Linearization {
+        let (translation_m, rotation_rad) = self.chain_prior;
+        let sigmas = GivenSigmas { translation_m, rotation_rad };
+        let calibration = Calibration::new(chain, parameterization, sigmas, true, joint_offsets);
+        let frames: Vec<Frame> = self.frames.iter().enumerate().map(|(slot, it)| self.frame(slot, it)).collect();
+        let states: Vec<FrameState> = frames.iter().map(|frame| frame.state.clone()).collect();
+        let (tracks, landmarks) = self.tracks(&states, &calibration);
+        let layout = layout(&frames, calibration.dof());
+        let visual = VisualModel {
+            camera: &self.camera,
+            sigma_px: self.pixel_sigma_px,
+            loss: RobustLoss::None,
+            landmark_model: self.landmark_model,
+        };
+        let problem = Problem {
+            layout,
+            cameras: vec![CameraFactors { visual, tracks: &tracks, columns: layout.calibration() }],
+            gravity_in_world: self.gravity_in_world,
+            frames: &frames,
+            prior: None,
+            start: None,
+            first_estimate_reach_rad: 0.0,
+            calibration_first_estimates: false,
+        };
+        let numbers: Vec<FrameId> = (0..frames.len()).map(FrameId).collect();
+        let parameters = calibration.parameters();
+        let calibration = Calibrations::new(calibration, []);
+        let estimate = Estimate { frames: states, calibration, landmarks: vec![landmarks] };
+        let whole = problem.linearization(&estimate, &parameters, &numbers, None);
+        keeping(&whole, |group| match (group, &self.poses, &self.joints) {
+            (ColumnGroup::Joints, _, JointKnowledge::Known)
+            | (ColumnGroup::Pose | ColumnGroup::VelocityBias, PoseKnowledge::Known, _) => 0,
+            // The biases come after the velocity.
+            (ColumnGroup::VelocityBias, PoseKnowledge::Imu { biases_known: true, .. }, _) => 3,
+            _ => usize::MAX,
+        })
+    }
+
+    fn frame(&self, slot: usize, hypothetical: &HypotheticalFrame) -> Frame {
+        let navigation = hypothetical.navigation;
+        let motion = match &self.poses {
+            PoseKnowledge::Imu { noise, .. } if slot > 0 => {
+                Preintegration::from_samples(*noise, navigation.bias, &hypothetical.imu)
+            }
+            PoseKnowledge::Imu { noise, .. } => Preintegration::new(*noise, navigation.bias),
+            PoseKnowledge::Known => Preintegration::new(NO_NOISE, navigation.bias),
+        };
+        let encoder = match self.joints {
+            JointKnowledge::Encoder(sigma_rad) => Some(JointAngles {
+                angles_rad: hypothetical.joints_rad.clone(),
+                sigmas_rad: vec![sigma_rad; hypothetical.joints_rad.len()],
+                lasting_sigmas_rad: vec![0.0; hypothetical.joints_rad.len()],
+                rates_rad_per_s: vec![0.0; hypothetical.joints_rad.len()],
+                motion_fits: vec![JointMotionFit::UNKNOWN; hypothetical.joints_rad.len()],
+            }),
+            JointKnowledge::Known | JointKnowledge::Unknown => None,
+        };
+        Frame {
+            index: slot,
+            stamp_ns: ns_from_seconds(hypothetical.time_s),
+            state: FrameState {
+                navigation,
+                joints_rad: hypothetical.joints_rad.clone(),
+                joint_motion: Vec::new(),
+                rates: Arc::new(Rates::default()),
+            },
+            first_estimate: None,
+            encoder,
+            stationary: None,
+            keyframe: true,
+            motion_information: motion.square_root_information(),
+            motion,
+        }
+    }
+
+    /// Landmarks with exact pixels; where they do not project they are not observed.
+    fn tracks(&self, states: &[FrameState], calibration: &Calibration) -> (Vec<Track>, Vec<Landmark>) {
+        let cameras: Vec<_> = states.iter().map(|state| camera_pose::at(state, calibration)).collect();
+        let mut tracks = Vec::with_capacity(self.landmarks.len());
+        let mut landmarks = Vec::with_capacity(self.landmarks.len());
+        for hypothetical in &self.landmarks {
+            let landmark = Landmark {
+                bearing: hypothetical.bearing.normalize(),
+                inverse_distance: hypothetical.inverse_distance_per_m,
+            };
+            let anchor = hypothetical.anchor;
+            let Some(uv_px) = self.camera.project(&landmark.bearing) else { continue };
+            let mut observations = vec![TrackObservation { slot: anchor, uv_px }];
+            for slot in hypothetical.observers.iter().copied().filter(|slot| *slot != anchor) {
+                let relative = RelativePose::new(&cameras[anchor], &cameras[slot]);
+                let seen = self.camera.project(&relative.direction(&landmark));
+                observations.extend(seen.map(|uv_px| TrackObservation { slot, uv_px }));
+            }
+            if observations.len() > 1 {
+                tracks.push(Track { observations });
+                landmarks.push(landmark);
+            }
+        }
+        (tracks, landmarks)
+    }
+}
+
+/// Noise of intervals without measurements.
+const NO_NOISE: ImuNoise = ImuNoise {
+    accelerometer_noise_density: 0.0,
+    accelerometer_random_walk: 0.0,
+    gyroscope_noise_density: 0.0,
+    gyroscope_random_walk: 0.0,
+};
+
+/// Linearization with the first columns of each block only, as many as `count` returns for its group.
+fn keeping(whole: &Linearization, count: impl Fn(ColumnGroup) -> usize) -> Linearization {
+    let mut kept = Vec::new();
+    let mut columns = Vec::new();
+    for block in &whole.columns {
+        let len = block.len.min(count(block.id.group()));
+        if len > 0 {
+            columns.push(ColumnBlock { start: kept.len(), len, ..*block });
+            kept.extend(block.start..block.start + len);
+        }
+    }
+    let select = |matrix: &DMatrix<f64>| matrix.select_columns(&kept);
+    Linearization {
+        columns,
+        fixed_parameters: whole.fixed_parameters.clone(),
+        jacobian: select(&whole.jacobian),
+        prior_jacobian: select(&whole.prior_jacobian),
+        rig_prior_rows: whole.rig_prior_rows,
+        calibration_column_norms: whole.calibration_column_norms.clone(),
+        chain: whole.chain.clone(),
+    }
+}

@@ -1,0 +1,137 @@
+//! Linearization of a solved window, for observability analysis and display.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::information_gain::CameraInformation;
+use super::problem::Problem;
+use super::rows::stack_columns;
+use crate::estimator::factors::projected_rows::NewestRows;
+use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::state::camera_pose::CameraMaps;
+use crate::estimator::state::columns::ColumnBlock;
+use crate::estimator::state::columns::ColumnId;
+use crate::estimator::state::columns::FrameId;
+use crate::estimator::state::estimate::Estimate;
+use crate::estimator::state::layout::Layout;
+use crate::estimator::state::layout::POSE;
+use crate::estimator::state::layout::VELOCITY_BIAS;
+use crate::gimbal::{Chain, ParameterId};
+
+/// The whitened linearization of the step at its final estimate, without the priors on the calibration.
+///
+/// The inverse depths are already projected out by orthogonal projection (each feature's own rows rotated and its first
+/// row dropped), so that the rows stay whitened residuals and no normal equations were formed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Linearization {
+    /// Column blocks in order: calibration, joints, poses, velocities and biases.
+    pub columns: Vec<ColumnBlock>,
+    /// Calibration parameters that are fixed at their values: they are known, and have no columns.
+    pub fixed_parameters: Vec<ParameterId>,
+    /// Jacobian of the measurements, rows whitened.
+    pub jacobian: DMatrix<f64>,
+    /// Jacobian of the priors (rig prior on the calibration, marginalization prior), same columns, whitened.
+    pub prior_jacobian: DMatrix<f64>,
+    /// How many rows of these, the first ones, are the rig's prior.
+    pub rig_prior_rows: usize,
+    /// Norm of each calibration column before the depths were projected out, for the reference of the rank rule.
+    pub calibration_column_norms: DVector<f64>,
+    /// Chain at which the calibration columns were evaluated (with first estimates not the present one).
+    pub chain: Chain,
+}
+
+/// What the columns of a linearization stand for.
+pub(crate) fn column_blocks(layout: &Layout, parameters: &[ParameterId], frames: &[FrameId]) -> Vec<ColumnBlock> {
+    let mut blocks = Vec::new();
+    let mut start = 0;
+    let mut push = |id: ColumnId, len: usize| {
+        if len > 0 {
+            blocks.push(ColumnBlock { id, start, len });
+            start += len;
+        }
+    };
+    if layout.calibration > 0 {
+        for parameter in parameters {
+            push(ColumnId::Calibration(*parameter), 1);
+        }
+    }
+    for frame in frames {
+        push(ColumnId::Joints(*frame), layout.joint_block());
+    }
+    for frame in frames {
+        push(ColumnId::Pose(*frame), POSE);
+    }
+    for frame in frames {
+        push(ColumnId::VelocityBias(*frame), VELOCITY_BIAS);
+    }
+    blocks
+}
+
+/// Columns of the layout in the order of the report: calibration, joints, poses, velocities and biases.
+pub(crate) fn column_order(layout: &Layout) -> Vec<usize> {
+    let mut order: Vec<usize> = layout.calibration().collect();
+    order.extend((0..layout.frames).flat_map(|slot| layout.joints(slot).start..layout.joint_motion(slot).end));
+    order.extend((0..layout.frames).flat_map(|slot| layout.pose(slot)));
+    order.extend((0..layout.frames).flat_map(|slot| layout.velocity_bias(slot)));
+    order
+}
+
+impl Problem<'_> {
+    /// Linearizes the whole window at an estimate; `parameters` are those of the calibration columns, free or
+    /// fixed. The information of each camera's observations is appended to `seen`, if requested.
+    pub(crate) fn linearization(
+        &self,
+        estimate: &Estimate,
+        parameters: &[ParameterId],
+        numbers: &[FrameId],
+        mut seen: Option<&mut Vec<CameraInformation>>,
+    ) -> Linearization {
+        let layout = self.layout;
+        let frames = self.linearization_frames(estimate);
+        let calibration = self.linearization_calibration(&estimate.calibration);
+        let mut measured = Vec::new();
+        let mut norms = Vec::new();
+        for camera in 0..self.cameras.len() {
+            let maps = CameraMaps::new(&frames, calibration.of(camera));
+            let linearized = self.view(camera, &frames, &calibration);
+            let apart = if seen.is_some() { NewestRows::Apart } else { NewestRows::Among };
+            let projected = self.projected_rows(camera, estimate, &linearized, apart);
+            measured.push(self.carried_rows(camera, &projected, &maps));
+            let squared = projected.squared_column_norms(&maps.calibration);
+            norms.extend(squared.iter().map(|squared| squared.max(0.0).sqrt()));
+            if let Some(seen) = &mut seen {
+                seen.push(CameraInformation::new(&projected, maps));
+            }
+        }
+        let imu: Vec<DMatrix<f64>> = (1..layout.frames).map(|slot| self.imu_rows_at(slot, estimate, &frames)).collect();
+        norms.extend(
+            self.imu_columns(&estimate.calibration)
+                .map(|column| imu.iter().map(|rows| rows.column(column).norm_squared()).sum::<f64>().sqrt()),
+        );
+        measured.extend(imu);
+        measured.extend((0..layout.frames).map(|slot| self.encoder_rows(slot, estimate)));
+        let stationary: Vec<_> = self.zero_velocity_terms(&estimate.frames).collect();
+        measured.push(self.zero_velocity_rows(&stationary));
+        let priors = [self.calibration_prior_rows(estimate), self.prior_rows(estimate)];
+        let frozen = estimate.calibration.frozen_columns();
+        let is_fixed = |column: usize| frozen.contains(&column);
+        let first = layout.calibration().start;
+        let order: Vec<usize> =
+            column_order(&layout).into_iter().filter(|column| *column < first || !is_fixed(column - first)).collect();
+        let of = |fixed_parameters: bool| {
+            let parameters =
+                parameters.iter().enumerate().filter(move |(column, _)| is_fixed(*column) == fixed_parameters);
+            parameters.map(|(_, parameter)| *parameter).collect::<Vec<_>>()
+        };
+        let free = |column: &usize| !is_fixed(*column);
+        let norms: Vec<f64> = (0..norms.len()).filter(free).map(|column| norms[column]).collect();
+        Linearization {
+            columns: column_blocks(&layout, &of(false), numbers),
+            fixed_parameters: of(true),
+            jacobian: stack_columns(&measured, order.iter().copied()),
+            prior_jacobian: stack_columns(&priors, order.iter().copied()),
+            rig_prior_rows: priors[0].nrows(),
+            calibration_column_norms: DVector::from_vec(norms),
+            chain: calibration.of(MAIN).chain().clone(),
+        }
+    }
+}

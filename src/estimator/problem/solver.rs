@@ -1,0 +1,235 @@
+//! Levenberg–Marquardt on the window with landmarks eliminated.
+
+use std::rc::Rc;
+
+use nalgebra::{DMatrix, DVector, Matrix6};
+
+use super::problem::{Costs, NormalEquations, Problem};
+use crate::estimator::factors::reprojection::ReducedVisualEquations;
+use crate::estimator::state::estimate::Estimate;
+use crate::estimator::state::layout::Layout;
+use crate::optimization::Cholesky;
+use crate::optimization::damped::{DampedOptions, DampedProblem, Iteration, minimize};
+
+/// One iteration of the solver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IterationReport {
+    /// Cost before the step.
+    pub cost_before: f64,
+    /// Cost after it.
+    pub cost_after: f64,
+    /// Damping or trust radius in use.
+    pub damping: f64,
+    /// Norm of the step.
+    pub step_norm: f64,
+    /// Whether the step was accepted.
+    pub accepted: bool,
+}
+
+/// Limits of a solve.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SolverLimits {
+    /// Largest number of tried steps, accepted or not.
+    pub(crate) iterations: usize,
+    /// Converged when a step lowers the cost by less than this fraction and moves what aims the camera by less than
+    /// [`SETTLED_SIGMAS`].
+    pub(crate) relative_cost_tolerance: f64,
+}
+
+/// Result of a solve.
+#[derive(Clone, Debug)]
+pub(crate) struct Solution {
+    pub(crate) estimate: Estimate,
+    pub(crate) costs_before: Costs,
+    pub(crate) costs_after: Costs,
+    pub(crate) iterations: Vec<IterationReport>,
+    /// Posterior covariance of the calibration at the last linearization; empty without calibration and where the information
+    /// is not positive definite.
+    pub(crate) calibration_covariance: DMatrix<f64>,
+    /// Posterior covariance of the newest pose at the last linearization, rotation first; `None` where the information is not
+    /// positive definite.
+    pub(crate) newest_pose_covariance: Option<Matrix6<f64>>,
+}
+
+impl Solution {
+    /// Posterior standard deviations of the calibration's columns, empty without calibration.
+    pub(crate) fn calibration_sigmas(&self) -> Vec<f64> {
+        let variances = self.calibration_covariance.diagonal();
+        variances.iter().map(|variance| variance.max(0.0).sqrt()).collect()
+    }
+}
+
+/// Added to the diagonal so that unknowns without a factor do not move.
+const FLOOR: f64 = 1e-6;
+/// Marquardt's λ of a solve until a step raises the cost: no more than rounding requires.
+///
+/// It multiplies the information that an unknown has while all others are fixed. A rotation of the chain is then known to
+/// 1e-5 rad by the features of a window, but to 1e-2 rad where joint angles and the other rotations are unknown too: λ = 1e-6
+/// would halve its steps.
+const DAMPING: f64 = 1e-9;
+/// A step is short when calibration and newest joint angles move by less than this many standard deviations (root mean
+/// square over the columns): the marginalization keeps what is left of an unfinished solve.
+const SETTLED_SIGMAS: f64 = 0.01;
+
+/// Minimizes the cost from `start`.
+pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits) -> Solution {
+    let first = problem.layout.calibration().start;
+    let fixed = start.calibration.frozen_columns().into_iter().map(|column| first + column).collect();
+    let mut window = DampedWindow { problem, fixed, step_norms: Vec::new(), moved_sigmas: 0.0, last: None };
+    let start = window.evaluated(start);
+    let costs_before = start.costs;
+    let options = DampedOptions {
+        iterations: limits.iterations,
+        relative_cost_tolerance: limits.relative_cost_tolerance,
+        first_damping: DAMPING,
+        min_damping: DAMPING,
+        max_damping: 1e8,
+        growth: 100.0,
+    };
+    let solution = minimize(&mut window, start, &options);
+    let report = |(tried, step_norm): (&Iteration, &f64)| IterationReport {
+        cost_before: tried.cost_before,
+        cost_after: tried.cost_after,
+        damping: tried.damping,
+        step_norm: *step_norm,
+        accepted: tried.accepted,
+    };
+    let posterior = window.posterior();
+    let posterior = posterior.as_ref();
+    Solution {
+        iterations: solution.iterations.iter().zip(&window.step_norms).map(report).collect(),
+        newest_pose_covariance: posterior.and_then(|factor| window.newest_pose_covariance(factor)),
+        calibration_covariance: posterior.map_or_else(Default::default, |factor| window.calibration_covariance(factor)),
+        costs_before,
+        costs_after: solution.estimate.costs,
+        estimate: solution.estimate.estimate,
+    }
+}
+
+/// The window's problem for the damped solver.
+struct DampedWindow<'a> {
+    problem: &'a Problem<'a>,
+    /// Columns of fixed parameters.
+    fixed: Vec<usize>,
+    /// Norm of each solved step.
+    step_norms: Vec<f64>,
+    /// Root mean square step of calibration and newest joint angles in the last solved step, in standard deviations.
+    moved_sigmas: f64,
+    /// The last linearization for which a step was solved.
+    last: Option<Linearization>,
+}
+
+/// The window linearized at an estimate.
+struct Linearization {
+    equations: Rc<NormalEquations>,
+    /// Information with the landmarks marginalized, where the last step was damped by [`DAMPING`] alone.
+    information: Option<DMatrix<f64>>,
+}
+
+/// An estimate and its costs.
+struct Evaluated {
+    estimate: Estimate,
+    costs: Costs,
+}
+
+impl DampedWindow<'_> {
+    fn evaluated(&self, estimate: Estimate) -> Evaluated {
+        Evaluated { costs: self.problem.costs(&estimate), estimate }
+    }
+
+    /// Factor of the information at the last linearization: damping would act as information about position, yaw and what
+    /// else the window hardly determines. `None` without a solved step and where the information is not positive definite.
+    fn posterior(&self) -> Option<Cholesky> {
+        let layout = &self.problem.layout;
+        let Linearization { equations, information } = self.last.as_ref()?;
+        if let Some(information) = information {
+            return factor(layout, information, 0.0);
+        }
+        let (information, _) = self.reduced(equations, &equations.eliminate(0.0));
+        factor(layout, &information, 0.0)
+    }
+
+    /// Posterior covariance of the calibration, other unknowns marginalized; zero for fixed parameters.
+    fn calibration_covariance(&self, posterior: &Cholesky) -> DMatrix<f64> {
+        let layout = &self.problem.layout;
+        let mut covariance = posterior.trailing_covariance(layout.calibration);
+        for column in &self.fixed {
+            let column = column - layout.calibration().start;
+            covariance.row_mut(column).fill(0.0);
+            covariance.column_mut(column).fill(0.0);
+        }
+        covariance
+    }
+
+    /// Posterior covariance of the newest pose, other unknowns marginalized; `None` where it is not finite.
+    fn newest_pose_covariance(&self, posterior: &Cholesky) -> Option<Matrix6<f64>> {
+        let newest = self.problem.layout.pose(self.problem.layout.frames.checked_sub(1)?);
+        let covariance = posterior.covariance_of(newest);
+        covariance.iter().all(|entry| entry.is_finite()).then(|| Matrix6::from_column_slice(covariance.as_slice()))
+    }
+
+    /// Root mean square of a step of the calibration and of the newest frame's joints, in standard deviations.
+    fn moved_sigmas(&self, factor: &Cholesky, step: &DVector<f64>) -> f64 {
+        // The joints of the newest frame and the calibration are eliminated last.
+        let count = self.problem.layout.joint_block() + self.problem.layout.calibration;
+        factor.trailing_length(count, step) / (count.max(1) as f64).sqrt()
+    }
+
+    /// Normal equations without landmarks; fixed parameters do not move.
+    fn reduced(
+        &self,
+        equations: &NormalEquations,
+        eliminated: &[ReducedVisualEquations],
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let (mut hessian, mut gradient) = equations.reduced(&self.problem.layout, eliminated);
+        fix(&self.fixed, &mut hessian, &mut gradient);
+        (hessian, gradient)
+    }
+}
+
+/// Factors normal equations without landmarks, with λ = `damping`; `None` where they are not positive definite.
+pub(crate) fn factor(layout: &Layout, hessian: &DMatrix<f64>, damping: f64) -> Option<Cholesky> {
+    Cholesky::ordered(hessian, layout.elimination_order(), |diagonal| diagonal + (damping * diagonal + FLOOR))
+}
+
+impl DampedProblem for DampedWindow<'_> {
+    type Estimate = Evaluated;
+    type Equations = Rc<NormalEquations>;
+
+    fn cost(&self, evaluated: &Evaluated) -> f64 {
+        evaluated.costs.total()
+    }
+
+    fn linearize(&self, evaluated: &Evaluated) -> Rc<NormalEquations> {
+        Rc::new(self.problem.linearize(&evaluated.estimate))
+    }
+
+    fn is_settled(&self) -> bool {
+        self.moved_sigmas <= SETTLED_SIGMAS
+    }
+
+    fn step(&mut self, evaluated: &Evaluated, equations: &Rc<NormalEquations>, damping: f64) -> Option<Evaluated> {
+        let layout = &self.problem.layout;
+        let reduced = equations.eliminate(damping);
+        let (hessian, gradient) = self.reduced(equations, &reduced);
+        let factor = factor(layout, &hessian, damping)?;
+        let step = -factor.solve(&gradient);
+        let landmarks = equations.landmark_steps(layout, &reduced, &step);
+        self.step_norms.push(step.norm());
+        self.moved_sigmas = self.moved_sigmas(&factor, &step);
+        // With more damping, landmarks keep too much of the information.
+        let information = (damping <= DAMPING).then_some(hessian);
+        self.last = Some(Linearization { equations: Rc::clone(equations), information });
+        Some(self.evaluated(self.problem.stepped(&evaluated.estimate, &step, &landmarks)))
+    }
+}
+
+/// Removes unknowns from the normal equations: their steps become zero.
+fn fix(fixed: &[usize], hessian: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
+    for column in fixed {
+        hessian.row_mut(*column).fill(0.0);
+        hessian.column_mut(*column).fill(0.0);
+        hessian[(*column, *column)] = 1.0;
+        gradient[*column] = 0.0;
+    }
+}

@@ -1,0 +1,192 @@
+//! The first window: created from a solution of the initialization and solved several times with outlier rejection.
+
+use std::collections::VecDeque;
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::extrinsics_fit::fit_extrinsics;
+use super::waiting_frame::WaitingFrame;
+use crate::estimator::factors::start_prior::StartPrior;
+use crate::estimator::initialization::{InitializationOrigin, InitializationSolution};
+use crate::estimator::problem::frame::Frame;
+use crate::estimator::report::{Event, EventKind, StepReport};
+use crate::estimator::state::calibrations::{Calibrations, MAIN};
+use crate::estimator::state::earlier_pass::BiasPrior;
+use crate::estimator::state::frame_state::{FrameState, Rates};
+use crate::estimator::state::navigation::{ImuBias, NavigationState};
+use crate::estimator::state::preintegration::Preintegration;
+use crate::estimator::step_input::StepInput;
+use crate::estimator::window::drop_or_marginalize_frame;
+use crate::estimator::window::features::{self, FeatureMap};
+use crate::estimator::window::frames::Frames;
+use crate::estimator::window::setup::Setup;
+use crate::estimator::window::sliding_window::SlidingWindow;
+use crate::estimator::window::window_state::WindowState;
+use crate::frontend::TrackedFeature;
+use crate::geometry::{RigidTransform, so3};
+
+/// Iteration limits of the solves of the first window: the first starts from inaccurate values, the others follow an
+/// outlier rejection.
+const FIRST_SOLVES: [usize; 3] = [15, 10, 5];
+
+/// Window created from a solution, before its first solve.
+pub(super) struct FirstWindow<'a> {
+    solution: &'a InitializationSolution,
+    window: SlidingWindow,
+    /// Features by frame and camera.
+    observed: Vec<Vec<Vec<TrackedFeature>>>,
+}
+
+impl<'a> FirstWindow<'a> {
+    /// Window of the newest views of a solution, with the features of the leading camera; `None` when none of these
+    /// views is
+    /// among the waiting frames.
+    pub(super) fn new(
+        setup: &Setup,
+        solution: &'a InitializationSolution,
+        waiting: VecDeque<WaitingFrame>,
+        mut calibration: Calibrations,
+        resume_at: Option<&RigidTransform>,
+    ) -> Option<Self> {
+        let options = &setup.config.options;
+        let leading = calibration.leading();
+        let joints = calibration.of(MAIN).joint_count();
+        let world = world_from_solution(solution, resume_at);
+        let room = drop_or_marginalize_frame::first_room(&calibration, options);
+        let views = &solution.frames[solution.frames.len().saturating_sub(room + 1)..];
+        let errors = calibration.imu_errors().copied();
+        let empty = || Preintegration::with_intrinsics(setup.imu_noise, solution.bias, errors);
+        let mut imu = empty();
+        let mut extrinsics = Vec::new();
+        let mut observed = Vec::new();
+        let mut features = vec![FeatureMap::new(); calibration.cameras()];
+        let mut frames: Option<Frames> = None;
+        for waiting in waiting {
+            imu.extend(&waiting.imu);
+            let Some(view) = views.iter().find(|view| view.frame_index == waiting.index) else { continue };
+            let since_last = std::mem::replace(&mut imu, empty());
+            let motion = if frames.is_some() { since_last } else { empty() };
+            let navigation = NavigationState {
+                world_from_imu: world * view.world_from_imu,
+                velocity_m_per_s: world.rotation * view.velocity_m_per_s,
+                bias: solution.bias,
+            };
+            let joints_rad = waiting.initial_joints_rad(joints);
+            let joint_motion = setup.initial_joint_motion(waiting.encoder.as_ref(), joints_rad.len());
+            let profile = setup.motion_profile(&waiting.imu, &waiting.imu_after, solution.bias);
+            let frame = Frame {
+                index: waiting.index,
+                stamp_ns: waiting.stamp_ns,
+                state: FrameState {
+                    navigation,
+                    joints_rad,
+                    joint_motion,
+                    rates: Rates::at(&waiting.imu, waiting.encoder.as_ref(), profile),
+                },
+                first_estimate: None,
+                encoder: waiting.encoder,
+                stationary: None,
+                keyframe: true,
+                motion_information: motion.square_root_information(),
+                motion,
+            };
+            match &mut frames {
+                None => frames = Some(Frames::new(frame)),
+                Some(frames) => frames.push(frame),
+            }
+            extrinsics.push(view.imu_from_camera);
+            features::observe(&mut features[leading], extrinsics.len() - 1, &waiting.features[leading]);
+            observed.push(waiting.features);
+        }
+        let mut frames = frames?;
+        frames.newest_mut().keyframe = false;
+        if leading == MAIN {
+            fit_extrinsics(calibration.of_mut(MAIN), &mut frames, &extrinsics);
+        }
+        let bias = setup.found_bias().unwrap_or_else(|| BiasPrior {
+            mean: ImuBias {
+                gyroscope_rad_per_s: solution.bias.gyroscope_rad_per_s,
+                accelerometer_m_per_s2: Vector3::zeros(),
+            },
+            gyroscope_sigma_rad_per_s: Vector3::repeat(options.gyroscope_bias_sigma),
+            accelerometer_sigma_m_per_s2: Vector3::repeat(options.accelerometer_bias_sigma),
+        });
+        let start = StartPrior {
+            reference: frames.oldest().state.clone(),
+            bias: bias.mean,
+            accelerometer_bias_sigma: bias.accelerometer_sigma_m_per_s2,
+            gyroscope_bias_sigma: bias.gyroscope_sigma_rad_per_s,
+        };
+        let state = WindowState { frames, features, calibration, prior: None, start: Some(start) };
+        Some(Self { solution, window: SlidingWindow::new(state), observed })
+    }
+
+    /// Solves the window with outlier rejection between the solves; returns it with its report.
+    pub(super) fn solve(
+        mut self,
+        setup: &Setup,
+        input: &StepInput<'_>,
+        max_scale_sigma: f64,
+        events: &mut Vec<Event>,
+    ) -> (SlidingWindow, StepReport) {
+        let options = &setup.config.options;
+        let mut solved = self.window.state.solve(setup, FIRST_SOLVES[0]);
+        if self.add_other_cameras() {
+            self.window.state.drop_rejected(&solved, options, events);
+            solved = self.window.state.solve(setup, FIRST_SOLVES[0]);
+        }
+        for iterations in &FIRST_SOLVES[1..] {
+            self.window.state.drop_rejected(&solved, options, events);
+            solved = self.window.state.solve(setup, *iterations);
+        }
+        let window = &mut self.window.state;
+        if let Some(start) = &mut window.start {
+            start.reference = window.frames.oldest().state.clone();
+        }
+        let (kind, how) = match self.solution.origin {
+            InitializationOrigin::FromMotion => (EventKind::InitializedFromMotion, "motion"),
+            InitializationOrigin::FromStationary => (EventKind::InitializedFromStationary, "a stationary vehicle"),
+        };
+        let scale_sigma = self.solution.diagnostics.scale_sigma;
+        let message = format!(
+            "initialized from {how}: {} frames, {} landmarks, σ(scale) {:.1} %",
+            self.solution.frames.len(),
+            self.solution.landmarks.len(),
+            100.0 * scale_sigma
+        );
+        events.push(Event::decided(kind, message, scale_sigma, max_scale_sigma));
+        events.push(window.choose_keyframe(setup));
+        let report = self.window.report(setup, input, &mut solved);
+        self.window.state.drop_rejected(&solved, options, events);
+        self.window.state.make_room(setup, events);
+        (self.window, report)
+    }
+
+    /// Adds the features of the other cameras; returns true if there are any. Their given extrinsics may have large
+    /// errors, so
+    /// they are excluded from the first solve.
+    fn add_other_cameras(&mut self) -> bool {
+        let window = &mut self.window.state;
+        let leading = window.calibration.leading();
+        for (slot, by_camera) in self.observed.iter().enumerate() {
+            for (camera, features) in by_camera.iter().enumerate().filter(|(camera, _)| *camera != leading) {
+                features::observe(&mut window.features[camera], slot, features);
+            }
+        }
+        window.calibration.cameras() > 1
+    }
+}
+
+/// Pose of the solution's world frame: identity, or position and yaw of the window before a failure.
+fn world_from_solution(solution: &InitializationSolution, resume_at: Option<&RigidTransform>) -> RigidTransform {
+    let (Some(resume), Some(first)) = (resume_at, solution.frames.first()) else {
+        return RigidTransform::identity();
+    };
+    let yaw = |rotation: &UnitQuaternion<f64>| {
+        let forward = rotation * Vector3::x();
+        forward.y.atan2(forward.x)
+    };
+    let yaw_change = yaw(&resume.rotation) - yaw(&first.world_from_imu.rotation);
+    let rotation = so3::exp(&Vector3::new(0.0, 0.0, yaw_change));
+    RigidTransform::new(rotation, resume.translation_m - rotation * first.world_from_imu.translation_m)
+}

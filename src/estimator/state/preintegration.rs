@@ -1,0 +1,434 @@
+//! Preintegration of the IMU samples between two frames (Forster et al., TRO 2017) with covariance and bias
+//! Jacobians.
+//!
+//! Angular velocity and specific force are linear between samples: rotations by the second Magnus term,
+//! velocity and position by Simpson's rule over each sample interval.
+//! Error vectors are ordered `[φ, p, v, b_g, b_a]` (15), with the perturbation rule of [`crate::geometry`].
+
+use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+
+use super::imu_errors::{self, ImuErrors};
+
+pub use crate::estimator::state::navigation::{ImuBias, Matrix15, NavigationState, Vector15};
+use crate::geometry::{RigidTransform, seconds_from_ns, so3};
+use crate::sensors::{ImuNoise, ImuSample};
+
+/// Derivative of `[φ, p, v]` with respect to `[b_g, b_a]` (9 × 6).
+pub type BiasJacobian = SMatrix<f64, 9, 6>;
+
+/// Derivative of `[φ, p, v]` with respect to the IMU intrinsics (9 × 15), in the order of [`ImuErrors`].
+pub(crate) type IntrinsicsJacobian = SMatrix<f64, 9, 15>;
+
+/// Intrinsics of an interval's integration, and what a change of them changes.
+#[derive(Clone, Debug)]
+struct IntegratedIntrinsics {
+    errors: ImuErrors,
+    jacobian: IntrinsicsJacobian,
+}
+
+/// Motion of the IMU over an interval in its frame at the start, without gravity and initial velocity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionIncrement {
+    /// `imu_i_from_imu_j`.
+    pub rotation: UnitQuaternion<f64>,
+    /// `R_iᵀ (p_j − p_i − v_i T − g T²/2)` in metres.
+    pub position_m: Vector3<f64>,
+    /// `R_iᵀ (v_j − v_i − g T)` in m/s.
+    pub velocity_m_per_s: Vector3<f64>,
+}
+
+/// Saturation: an axis that repeats the same value this often, at least [`MIN_SATURATED_RAD_PER_S`] or
+/// [`MIN_SATURATED_M_PER_S2`] large, is at the end of its range. Noise never repeats a value of full
+/// resolution.
+const SATURATED_REPEATS: u8 = 3;
+
+/// Smaller angular rates are in every sensor's range.
+const MIN_SATURATED_RAD_PER_S: f64 = 0.5;
+
+/// Gravity is in every sensor's range.
+const MIN_SATURATED_M_PER_S2: f64 = 12.0;
+
+/// Noise density of a saturated axis relative to its value, in √s: the true value exceeds it by about half
+/// (standard deviation) for about a tenth of a second.
+const SATURATED_DENSITY: f64 = 0.16;
+
+/// Number of repetitions of each axis' value.
+#[derive(Clone, Copy, Debug, Default)]
+struct Repeats {
+    gyroscope: [u8; 3],
+    accelerometer: [u8; 3],
+}
+
+impl Repeats {
+    fn count(&mut self, from: &ImuSample, to: &ImuSample) {
+        let follow = |counts: &mut [u8; 3], before: &Vector3<f64>, now: &Vector3<f64>| {
+            for axis in 0..3 {
+                counts[axis] = if before[axis] == now[axis] { counts[axis].saturating_add(1) } else { 0 };
+            }
+        };
+        follow(&mut self.gyroscope, &from.angular_velocity_rad_per_s, &to.angular_velocity_rad_per_s);
+        follow(&mut self.accelerometer, &from.specific_force_m_per_s2, &to.specific_force_m_per_s2);
+    }
+
+    /// Squared noise densities of the axes, those of saturated ones raised.
+    fn densities(counts: &[u8; 3], shown: &Vector3<f64>, least: f64, density: f64) -> (Vector3<f64>, bool) {
+        let mut saturated = false;
+        let squares = Vector3::from_fn(|axis, _| {
+            let at_end = counts[axis] + 1 >= SATURATED_REPEATS && shown[axis].abs() >= least;
+            saturated |= at_end;
+            let density = if at_end { SATURATED_DENSITY * shown[axis].abs() } else { density };
+            density * density
+        });
+        (squares, saturated)
+    }
+}
+
+/// Preintegrated IMU samples of an interval.
+#[derive(Clone, Debug)]
+pub struct Preintegration {
+    noise: ImuNoise,
+    samples: Vec<ImuSample>,
+    bias: ImuBias,
+    duration_s: f64,
+    increment: MotionIncrement,
+    bias_jacobian: BiasJacobian,
+    /// `None` where the samples are taken as they are.
+    intrinsics: Option<Box<IntegratedIntrinsics>>,
+    covariance: Matrix15,
+    repeats: Repeats,
+    saturated: usize,
+}
+
+impl Preintegration {
+    /// Returns an empty interval that is integrated with `bias`.
+    pub fn new(noise: ImuNoise, bias: ImuBias) -> Self {
+        Self {
+            noise,
+            samples: Vec::new(),
+            bias,
+            duration_s: 0.0,
+            increment: MotionIncrement {
+                rotation: UnitQuaternion::identity(),
+                position_m: Vector3::zeros(),
+                velocity_m_per_s: Vector3::zeros(),
+            },
+            bias_jacobian: BiasJacobian::zeros(),
+            intrinsics: None,
+            covariance: Matrix15::zeros(),
+            repeats: Repeats::default(),
+            saturated: 0,
+        }
+    }
+
+    /// [`Self::new`] with samples that are corrected by intrinsics, if there are any.
+    pub(crate) fn with_intrinsics(noise: ImuNoise, bias: ImuBias, errors: Option<ImuErrors>) -> Self {
+        let intrinsics =
+            errors.map(|errors| Box::new(IntegratedIntrinsics { errors, jacobian: IntrinsicsJacobian::zeros() }));
+        Self { intrinsics, ..Self::new(noise, bias) }
+    }
+
+    /// Integrates the samples of one interval, both ends included.
+    pub fn from_samples(noise: ImuNoise, bias: ImuBias, samples: &[ImuSample]) -> Self {
+        let mut preintegration = Self::new(noise, bias);
+        preintegration.extend(samples);
+        preintegration
+    }
+
+    /// Appends the samples of the following interval; samples that are not later than the last one or not finite
+    /// are skipped.
+    pub fn extend(&mut self, samples: &[ImuSample]) {
+        for sample in samples {
+            if !Self::takes(self.samples.last(), sample) {
+                continue;
+            }
+            if let Some(last) = self.samples.last().copied() {
+                self.propagate(&last, sample);
+            }
+            self.samples.push(*sample);
+        }
+    }
+
+    /// Whether a sample is integrated after the last one: it is later and finite.
+    pub(crate) fn takes(last: Option<&ImuSample>, sample: &ImuSample) -> bool {
+        let finite = sample.angular_velocity_rad_per_s.iter().all(|x| x.is_finite())
+            && sample.specific_force_m_per_s2.iter().all(|x| x.is_finite());
+        finite && last.is_none_or(|last| sample.stamp_ns > last.stamp_ns)
+    }
+
+    /// Reintegrates the samples with another bias.
+    pub fn reintegrate(&mut self, bias: ImuBias) {
+        let errors = self.intrinsics.as_ref().map(|intrinsics| intrinsics.errors);
+        self.reintegrate_with(bias, errors);
+    }
+
+    /// Reintegrates the samples with another bias and other intrinsics.
+    pub(crate) fn reintegrate_with(&mut self, bias: ImuBias, errors: Option<ImuErrors>) {
+        let samples = std::mem::take(&mut self.samples);
+        *self = Self::with_intrinsics(self.noise, bias, errors);
+        self.extend(&samples);
+    }
+
+    /// The samples.
+    pub fn samples(&self) -> &[ImuSample] {
+        &self.samples
+    }
+
+    /// Noise of the integration.
+    pub(crate) fn noise(&self) -> &ImuNoise {
+        &self.noise
+    }
+
+    /// Intrinsics of the integration.
+    pub(crate) fn intrinsics(&self) -> Option<&ImuErrors> {
+        self.intrinsics.as_ref().map(|intrinsics| &intrinsics.errors)
+    }
+
+    /// Bias of the integration.
+    pub fn bias(&self) -> &ImuBias {
+        &self.bias
+    }
+
+    /// Duration of the interval in seconds.
+    pub fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    /// Number of samples with a saturated axis.
+    pub fn saturated_samples(&self) -> usize {
+        self.saturated
+    }
+
+    /// Motion at the bias of the integration.
+    pub fn increment(&self) -> &MotionIncrement {
+        &self.increment
+    }
+
+    /// Derivative of the increment's `[φ, p, v]` with respect to `[b_g, b_a]` (9 × 6).
+    pub fn bias_jacobian(&self) -> &BiasJacobian {
+        &self.bias_jacobian
+    }
+
+    /// Covariance of `[φ, p, v, b_g, b_a]` over the interval; the bias blocks are their random walk.
+    pub fn covariance(&self) -> &Matrix15 {
+        &self.covariance
+    }
+
+    /// Derivative of the increment's `[φ, p, v]` with respect to the intrinsics (9 × 15), zero without any.
+    pub(crate) fn intrinsics_jacobian(&self) -> IntrinsicsJacobian {
+        self.intrinsics.as_ref().map_or_else(IntrinsicsJacobian::zeros, |intrinsics| intrinsics.jacobian)
+    }
+
+    /// Change of the intrinsics from those of the integration; `None` without any in the integration or now.
+    pub(crate) fn intrinsics_change(&self, errors: Option<&ImuErrors>) -> Option<ImuErrors> {
+        Some(errors? - self.intrinsics.as_ref()?.errors)
+    }
+
+    /// Motion at another bias, to first order in the change.
+    pub fn corrected(&self, bias: &ImuBias) -> MotionIncrement {
+        self.shifted(&self.shift(bias, None))
+    }
+
+    /// Change of `[φ, p, v]` (9 × 1) by a change of bias and intrinsics, to first order.
+    pub(crate) fn shift(&self, bias: &ImuBias, errors: Option<&ImuErrors>) -> SVector<f64, 9> {
+        let shift: SVector<f64, 9> = self.bias_jacobian * self.bias_change(bias);
+        match self.intrinsics_change(errors) {
+            Some(change) => shift + self.intrinsics_jacobian() * change,
+            None => shift,
+        }
+    }
+
+    /// The increment with a change of `[φ, p, v]`.
+    pub(crate) fn shifted(&self, shift: &SVector<f64, 9>) -> MotionIncrement {
+        MotionIncrement {
+            rotation: self.increment.rotation * so3::exp(&shift.fixed_rows::<3>(0).into_owned()),
+            position_m: self.increment.position_m + shift.fixed_rows::<3>(3),
+            velocity_m_per_s: self.increment.velocity_m_per_s + shift.fixed_rows::<3>(6),
+        }
+    }
+
+    /// Change `[b_g, b_a]` of `bias` from the bias of the integration (6 × 1).
+    pub fn bias_change(&self, bias: &ImuBias) -> SVector<f64, 6> {
+        let mut change = SVector::<f64, 6>::zeros();
+        change.fixed_rows_mut::<3>(0).copy_from(&(bias.gyroscope_rad_per_s - self.bias.gyroscope_rad_per_s));
+        change.fixed_rows_mut::<3>(3).copy_from(&(bias.accelerometer_m_per_s2 - self.bias.accelerometer_m_per_s2));
+        change
+    }
+
+    /// Predicts the state at the end of the interval from the one at its start.
+    pub fn predict(&self, start: &NavigationState, gravity_in_world: &Vector3<f64>) -> NavigationState {
+        let motion = self.corrected(&start.bias);
+        let t = self.duration_s;
+        let rotation = start.world_from_imu.rotation;
+        NavigationState {
+            world_from_imu: RigidTransform::new(
+                UnitQuaternion::new_normalize((rotation * motion.rotation).into_inner()),
+                start.world_from_imu.translation_m
+                    + start.velocity_m_per_s * t
+                    + gravity_in_world * (0.5 * t * t)
+                    + rotation * motion.position_m,
+            ),
+            velocity_m_per_s: start.velocity_m_per_s + gravity_in_world * t + rotation * motion.velocity_m_per_s,
+            bias: start.bias,
+        }
+    }
+
+    /// The upper triangular `W` with `Wᵀ W = covariance⁻¹`, `None` for an empty interval.
+    pub fn square_root_information(&self) -> Option<Matrix15> {
+        let lower = self.covariance.cholesky()?.unpack();
+        let inverse = lower.solve_lower_triangular(&Matrix15::identity())?;
+        inverse.iter().all(|x| x.is_finite()).then_some(inverse)
+    }
+
+    fn propagate(&mut self, from: &ImuSample, to: &ImuSample) {
+        let h = seconds_from_ns(to.stamp_ns - from.stamp_ns);
+        self.repeats.count(from, to);
+        let (gyroscope_noise, gyroscope_saturated) = Repeats::densities(
+            &self.repeats.gyroscope,
+            &to.angular_velocity_rad_per_s,
+            MIN_SATURATED_RAD_PER_S,
+            self.noise.gyroscope_noise_density,
+        );
+        let (force_noise, force_saturated) = Repeats::densities(
+            &self.repeats.accelerometer,
+            &to.specific_force_m_per_s2,
+            MIN_SATURATED_M_PER_S2,
+            self.noise.accelerometer_noise_density,
+        );
+        self.saturated += usize::from(gyroscope_saturated || force_saturated);
+        let corrected = self
+            .intrinsics
+            .as_ref()
+            .map(|it| (imu_errors::corrected(&it.errors, from), imu_errors::corrected(&it.errors, to)));
+        let (from_corrected, to_corrected) = corrected.as_ref().map_or((from, to), |(from, to)| (from, to));
+        let w0 = from_corrected.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
+        let w1 = to_corrected.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
+        let a0 = from_corrected.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
+        let a1 = to_corrected.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
+        let a_half = (a0 + a1) * 0.5;
+
+        // Rotations over the first half and over the whole, second Magnus term included.
+        let w_half = (w0 + w1) * 0.5;
+        let phi_half = (w0 + w_half) * (0.25 * h) + w0.cross(&w_half) * (h * h / 48.0);
+        let phi = w_half * h + w0.cross(&w1) * (h * h / 12.0);
+        let half_rotation = so3::exp(&phi_half);
+        let step_rotation = so3::exp(&phi);
+
+        // Simpson's rule, in the frame at `from`.
+        let force_half = half_rotation * a_half;
+        let force_end = step_rotation * a1;
+        let dv = (a0 + force_half * 4.0 + force_end) * (h / 6.0);
+        let dp = (a0 + force_half * 2.0) * (h * h / 6.0);
+
+        let r = self.increment.rotation.to_rotation_matrix().into_inner();
+        let e_half: Matrix3<f64> = half_rotation.to_rotation_matrix().into_inner();
+        let e: Matrix3<f64> = step_rotation.to_rotation_matrix().into_inner();
+        // Derivatives of the step with respect to a constant change of angular velocity and specific force.
+        let phi_by_w = so3::right_jacobian(&phi) * (Matrix3::identity() * h - so3::hat(&(w1 - w0)) * (h * h / 12.0));
+        let phi_half_by_w = so3::right_jacobian(&phi_half)
+            * (Matrix3::identity() * (0.5 * h) - so3::hat(&(w_half - w0)) * (h * h / 48.0));
+        let half_by_w = -(e_half * so3::hat(&a_half) * phi_half_by_w);
+        let end_by_angular_rate = -(e * so3::hat(&a1) * phi_by_w);
+        let dv_by_w = r * (half_by_w * 4.0 + end_by_angular_rate) * (h / 6.0);
+        let dp_by_w = r * half_by_w * (h * h / 3.0);
+        let dv_by_a = r * (Matrix3::identity() + e_half * 4.0 + e) * (h / 6.0);
+        let dp_by_a = r * (Matrix3::identity() + e_half * 2.0) * (h * h / 6.0);
+        let step_rotation_transpose = e.transpose();
+        let dv_by_phi = -(r * so3::hat(&dv));
+        let dp_by_phi = -(r * so3::hat(&dp));
+
+        self.propagate_bias_jacobian(
+            h,
+            &step_rotation_transpose,
+            [&dp_by_phi, &dv_by_phi],
+            [&phi_by_w, &dp_by_w, &dv_by_w],
+            [&dp_by_a, &dv_by_a],
+        );
+
+        if let Some(intrinsics) = &mut self.intrinsics {
+            // Both ends change by nearly the same: their mean counts for the whole interval.
+            let [first, second] = [from, to].map(|sample| imu_errors::derivatives(&intrinsics.errors, sample));
+            let (rates, forces) = ((first.0 + second.0) * 0.5, (first.1 + second.1) * 0.5);
+            let j = &mut intrinsics.jacobian;
+            let phi: SMatrix<f64, 3, 15> = j.fixed_rows::<3>(0).into_owned();
+            let velocity: SMatrix<f64, 3, 15> = j.fixed_rows::<3>(6).into_owned();
+            let mut position = j.fixed_rows_mut::<3>(3);
+            position += velocity * h + dp_by_phi * phi + dp_by_w * rates + dp_by_a * forces;
+            let mut velocity = j.fixed_rows_mut::<3>(6);
+            velocity += dv_by_phi * phi + dv_by_w * rates + dv_by_a * forces;
+            j.fixed_rows_mut::<3>(0).copy_from(&(step_rotation_transpose * phi + phi_by_w * rates));
+        }
+
+        let mut transition = Matrix15::identity();
+        transition.fixed_view_mut::<3, 3>(0, 0).copy_from(&step_rotation_transpose);
+        transition.fixed_view_mut::<3, 3>(0, 9).copy_from(&-phi_by_w);
+        transition.fixed_view_mut::<3, 3>(3, 0).copy_from(&dp_by_phi);
+        transition.fixed_view_mut::<3, 3>(3, 6).copy_from(&(Matrix3::identity() * h));
+        transition.fixed_view_mut::<3, 3>(3, 9).copy_from(&-dp_by_w);
+        transition.fixed_view_mut::<3, 3>(3, 12).copy_from(&-dp_by_a);
+        transition.fixed_view_mut::<3, 3>(6, 0).copy_from(&dv_by_phi);
+        transition.fixed_view_mut::<3, 3>(6, 9).copy_from(&-dv_by_w);
+        transition.fixed_view_mut::<3, 3>(6, 12).copy_from(&-dv_by_a);
+        self.covariance = transition * self.covariance * transition.transpose();
+        self.add_noise(
+            h,
+            [&phi_by_w, &dp_by_w, &dv_by_w],
+            &gyroscope_noise,
+            &(r * Matrix3::from_diagonal(&force_noise) * r.transpose()),
+        );
+
+        self.increment.position_m += self.increment.velocity_m_per_s * h + r * dp;
+        self.increment.velocity_m_per_s += r * dv;
+        self.increment.rotation = UnitQuaternion::new_normalize((self.increment.rotation * step_rotation).into_inner());
+        self.duration_s += h;
+    }
+
+    fn propagate_bias_jacobian(
+        &mut self,
+        h: f64,
+        step_rotation_transpose: &Matrix3<f64>,
+        [dp_by_phi, dv_by_phi]: [&Matrix3<f64>; 2],
+        [phi_by_w, dp_by_w, dv_by_w]: [&Matrix3<f64>; 3],
+        [dp_by_a, dv_by_a]: [&Matrix3<f64>; 2],
+    ) {
+        let j = &mut self.bias_jacobian;
+        let phi_by_bg: Matrix3<f64> = j.fixed_view::<3, 3>(0, 0).into_owned();
+        let v_by_bg: Matrix3<f64> = j.fixed_view::<3, 3>(6, 0).into_owned();
+        let v_by_ba: Matrix3<f64> = j.fixed_view::<3, 3>(6, 3).into_owned();
+        let mut p_by_bg = j.fixed_view_mut::<3, 3>(3, 0);
+        p_by_bg += v_by_bg * h + dp_by_phi * phi_by_bg - dp_by_w;
+        let mut p_by_ba = j.fixed_view_mut::<3, 3>(3, 3);
+        p_by_ba += v_by_ba * h - dp_by_a;
+        let mut v_by_bg = j.fixed_view_mut::<3, 3>(6, 0);
+        v_by_bg += dv_by_phi * phi_by_bg - dv_by_w;
+        let mut v_by_ba = j.fixed_view_mut::<3, 3>(6, 3);
+        v_by_ba -= dv_by_a;
+        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&(step_rotation_transpose * phi_by_bg - phi_by_w));
+    }
+
+    /// White noise and random walk of one sample interval (15 × 15), from the squared continuous densities: of the
+    /// angular velocity by axis, of the specific force as a matrix in the frame at the interval's start.
+    fn add_noise(
+        &mut self,
+        h: f64,
+        [phi_by_w, dp_by_w, dv_by_w]: [&Matrix3<f64>; 3],
+        gyroscope_noise: &Vector3<f64>,
+        force_noise: &Matrix3<f64>,
+    ) {
+        let square = |density: f64| density * density;
+        let mut by_angular_rate = SMatrix::<f64, 9, 3>::zeros();
+        by_angular_rate.fixed_view_mut::<3, 3>(0, 0).copy_from(phi_by_w);
+        by_angular_rate.fixed_view_mut::<3, 3>(3, 0).copy_from(dp_by_w);
+        by_angular_rate.fixed_view_mut::<3, 3>(6, 0).copy_from(dv_by_w);
+        let mut motion = self.covariance.fixed_view_mut::<9, 9>(0, 0);
+        motion += by_angular_rate * Matrix3::from_diagonal(gyroscope_noise) * by_angular_rate.transpose() / h;
+        // White specific force over the interval correlates velocity and position.
+        for (row, column, factor) in [(3, 3, h * h * h / 3.0), (3, 6, h * h / 2.0), (6, 3, h * h / 2.0), (6, 6, h)] {
+            let mut block = self.covariance.fixed_view_mut::<3, 3>(row, column);
+            block += force_noise * factor;
+        }
+        for axis in 0..3 {
+            self.covariance[(9 + axis, 9 + axis)] += square(self.noise.gyroscope_random_walk) * h;
+            self.covariance[(12 + axis, 12 + axis)] += square(self.noise.accelerometer_random_walk) * h;
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Removal of frames from the window.
+
+use super::active_tracks::ActiveTracks;
+use super::features::{self, FeatureMap};
+use super::setup::Setup;
+use super::window_state::WindowState;
+use crate::estimator::config::{EstimatorOptions, TrackContinuation};
+use crate::estimator::problem::marginalization;
+use crate::estimator::report::{Event, EventKind};
+use crate::estimator::state::calibrations::Calibrations;
+use crate::optimization::LandmarkModel;
+
+/// A window above its size shrinks by one frame per keyframe.
+const MAX_MARGINALIZED_AT_ONCE: usize = 2;
+
+/// A rotation of the chain that is given with a larger standard deviation is inaccurate, in radians: derivatives at the given
+/// chain are wrong by as many parts of one.
+const INACCURATE_ROTATION_RAD: f64 = 0.03;
+
+/// Number of frames in the first window, before marginalization. It is larger than the later ones: marginalization fixes
+/// linearization points, and the chain of the leading camera must be close to its true values before.
+pub(crate) fn first_room(calibration: &Calibrations, options: &EstimatorOptions) -> usize {
+    let given_sigma_rad = calibration.of(calibration.leading()).given_rotation_sigma_rad();
+    let inaccurate = given_sigma_rad > INACCURATE_ROTATION_RAD;
+    let factor = if inaccurate { options.inaccurate_first_window_factor } else { options.first_window_factor };
+    options.window * usize::from(factor)
+}
+
+impl WindowState {
+    /// Removes a frame for the next image: the second-newest one if it is no keyframe, else the oldest one of a
+    /// full window by marginalization.
+    pub(crate) fn make_room(&mut self, setup: &Setup, events: &mut Vec<Event>) {
+        let newest = self.frames.newest_slot();
+        if newest >= 2 && !self.frames[newest - 1].keyframe {
+            let message = format!("frame {} dropped: no keyframe", self.frames[newest - 1].index);
+            events.push(Event::new(EventKind::SecondNewestDropped, message));
+            self.drop_frame(setup, newest - 1);
+            return;
+        }
+        for _ in 0..MAX_MARGINALIZED_AT_ONCE {
+            let room = self.room(&setup.config.options);
+            if self.frames.len() <= room {
+                break;
+            }
+            let message = format!("frame {} marginalized: the window is full", self.frames.oldest().index);
+            let count = self.frames.len() as f64;
+            events.push(Event::decided(EventKind::OldestMarginalized, message, count, room as f64));
+            self.marginalize_oldest(setup);
+        }
+    }
+
+    /// Number of frames that may remain.
+    fn room(&self, options: &EstimatorOptions) -> usize {
+        if self.prior.is_none() { first_room(&self.calibration, options) } else { options.window }
+    }
+
+    /// Drops the frame at a slot before the newest one; its encoder readings and IMU samples go to the next frame.
+    fn drop_frame(&mut self, setup: &Setup, gone: usize) {
+        if self.prior.as_ref().is_none_or(|prior| !prior.holds_frame(gone)) {
+            self.carry_encoder(setup, gone, gone + 1);
+        }
+        let estimate = self.estimate(vec![Vec::new(); self.features.len()]);
+        self.prior = marginalization::dropped(&self.problem(setup, &[]), &estimate, gone);
+        self.drop_observations(setup, gone);
+        self.frames.drop_before_newest(gone);
+        self.renumber_prior(gone);
+    }
+
+    fn marginalize_oldest(&mut self, setup: &Setup) {
+        let newest = self.frames.newest_slot();
+        let continuation = setup.config.options.track_continuation;
+        let removed: Vec<ActiveTracks> = self
+            .active_tracks()
+            .into_iter()
+            .map(|active| {
+                active.filtered(|track| {
+                    let continues = track.observations.last().is_some_and(|last| last.slot == newest);
+                    let anchored = track.observations.first().is_some_and(|first| first.slot == 0);
+                    anchored && !(continues && continuation == TrackContinuation::DropAnchor)
+                })
+            })
+            .collect();
+        let estimate = self.estimate(removed.iter().map(|active| active.landmarks.clone()).collect());
+        let prior = marginalization::oldest(&self.problem(setup, &removed), &estimate);
+
+        for (features, active) in self.features.iter_mut().zip(&removed) {
+            for (id, track) in active.ids.iter().zip(&active.tracks) {
+                let ended = track.observations.last().is_none_or(|last| last.slot != newest);
+                if ended || continuation == TrackContinuation::UseOnce {
+                    features.remove(id);
+                }
+            }
+        }
+        self.prior = prior;
+        self.start = None;
+        self.drop_observations(setup, 0);
+        if setup.config.options.landmark_model == LandmarkModel::InverseDistance {
+            self.face_measured_bearings();
+        }
+        self.frames.remove_oldest();
+        self.renumber_prior(0);
+    }
+
+    /// Removes the observations of a frame from all features.
+    fn drop_observations(&mut self, setup: &Setup, gone: usize) {
+        for camera in 0..self.features.len() {
+            let mut features = std::mem::take(&mut self.features[camera]);
+            features::drop_frame(&mut features, gone, &self.view(setup, camera));
+            self.features[camera] = features;
+        }
+    }
+
+    /// Moves landmarks with a new anchor to the bearing that the anchor measured.
+    fn face_measured_bearings(&mut self) {
+        for feature in self.features.iter_mut().flat_map(FeatureMap::values_mut) {
+            if let (Some(first), Some(landmark)) = (feature.observations.first(), feature.landmark.as_mut()) {
+                landmark.bearing = first.bearing;
+            }
+        }
+    }
+
+    /// Renumbers the slots of the prior after the removal of a frame; frames outside of the prior lose their first
+    /// estimate.
+    fn renumber_prior(&mut self, gone: usize) {
+        if let Some(prior) = &mut self.prior {
+            prior.renumber(gone);
+            marginalization::keep_first_estimates(prior, &mut self.frames);
+        } else {
+            self.frames.iter_mut().for_each(|frame| frame.first_estimate = None);
+        }
+        let prior = self.prior.as_ref();
+        self.calibration.keep_first_estimates(|columns| prior.is_some_and(|prior| prior.holds_calibration(columns)));
+    }
+}

@@ -1,0 +1,143 @@
+//! Constant input of every step: the configuration and derived values.
+
+use nalgebra::Vector3;
+
+use crate::estimator::config::{EstimatorConfig, rigid_chain};
+use crate::estimator::factors::joint_motion::measured_joint_motion;
+use crate::estimator::state::calibration::Calibration;
+use crate::estimator::state::calibrations::{Calibrations, MAIN};
+use crate::estimator::state::earlier_pass::BiasPrior;
+use crate::estimator::state::given_chain::GivenSigmas;
+use crate::estimator::state::imu_calibration::ImuCalibration;
+use crate::estimator::state::motion_profile::MotionProfile;
+use crate::estimator::state::navigation::ImuBias;
+use crate::estimator::state::sensor_columns::SensorColumn;
+use crate::estimator::step_input::StepInput;
+use crate::gimbal::Parameterization;
+use crate::sensors::{ImuNoise, ImuSample, JointAngles};
+
+/// Gravity in the world frame, whose z axis points up: `(0, 0, −g)` in m/s².
+pub fn gravity_in_world(gravity_m_per_s2: f64) -> Vector3<f64> {
+    Vector3::new(0.0, 0.0, -gravity_m_per_s2)
+}
+
+/// The configuration and derived values.
+#[derive(Clone, Debug)]
+pub(crate) struct Setup {
+    pub(crate) config: EstimatorConfig,
+    /// The rig's noise densities times [`crate::estimator::EstimatorOptions::imu_noise_factor`].
+    pub(crate) imu_noise: ImuNoise,
+    /// In the world frame, in m/s².
+    pub(crate) gravity_in_world: Vector3<f64>,
+}
+
+impl Setup {
+    pub(crate) fn new(config: EstimatorConfig) -> Self {
+        let mut imu_noise = config.imu_noise;
+        scale_noise(&mut imu_noise, config.options.imu_noise_factor);
+        Self { imu_noise, gravity_in_world: gravity_in_world(config.gravity_m_per_s2), config }
+    }
+
+    /// Scales the noise densities of all following IMU intervals.
+    pub(crate) fn scale_imu_noise(&mut self, factor: f64) {
+        scale_noise(&mut self.imu_noise, factor);
+        scale_noise(&mut self.config.imu_noise, factor);
+    }
+
+    /// Milliseconds of the clock of the stage times.
+    pub(crate) fn clock_ms(&self) -> f64 {
+        (self.config.clock_ms)()
+    }
+
+    /// Calibration at which the estimator starts: that of an earlier pass, or else of the rig.
+    pub(crate) fn given_calibration(&self) -> Calibrations {
+        let rig = self.rig_calibration();
+        match &self.config.earlier_pass {
+            Some(earlier) => rig.with_found(&earlier.cameras),
+            None => rig,
+        }
+    }
+
+    /// Given calibration of the rig.
+    fn rig_calibration(&self) -> Calibrations {
+        let config = &self.config;
+        let given = |camera: usize| {
+            let (translation_m, rotation_rad) = config.extrinsics_sigmas(camera);
+            GivenSigmas { translation_m, rotation_rad }
+        };
+        let encoders = config.encoder_in_use().is_some();
+        let main = Calibration::new(&config.chain, config.parameterization, given(MAIN), config.calibrate, encoders);
+        let has_readings = main.joint_count() > 0 && encoders;
+        let main = self.with_sensors(main, MAIN, config.timeshift_s, has_readings);
+        let rigid = config.rigid_cameras.iter().enumerate().map(|(index, camera)| {
+            let mount = rigid_chain(&camera.imu_from_camera);
+            let rigid = Calibration::new(&mount, Parameterization::Minimal, given(index + 1), config.calibrate, false);
+            self.with_sensors(rigid, index + 1, camera.timeshift_s, false)
+        });
+        let estimated = config.calibrate && config.estimate_imu_intrinsics;
+        Calibrations::new(main, rigid).with_imu(estimated.then(|| ImuCalibration::new(config.imu_intrinsics)))
+    }
+
+    /// Prior of the biases that an earlier pass has found.
+    pub(crate) fn found_bias(&self) -> Option<BiasPrior> {
+        self.config.earlier_pass.as_ref().map(|earlier| earlier.bias)
+    }
+
+    /// Adds the estimated clocks, shutter and intrinsics of a camera.
+    fn with_sensors(&self, calibration: Calibration, camera: usize, timeshift_s: f64, encoders: bool) -> Calibration {
+        let config = &self.config;
+        let sensor = config.sensor(camera);
+        let mut columns = Vec::new();
+        if config.estimate_timeshift {
+            columns.push(SensorColumn::camera_clock(timeshift_s));
+            columns.extend(encoders.then_some(SensorColumn::ENCODER_CLOCK));
+        }
+        if config.estimate_readout {
+            columns.push(SensorColumn::readout(sensor.readout_s, sensor.readout_sigma_s));
+        }
+        if config.estimate_intrinsics {
+            columns.extend(SensorColumn::intrinsics(config.model(camera), sensor.intrinsics_sigma));
+        }
+        calibration.with_sensors(columns).with_given_readout(sensor.readout_s)
+    }
+
+    /// Whether some camera has a rolling shutter: camera poses then depend on the motion after the stamp.
+    pub(crate) fn has_moving_rows(&self) -> bool {
+        let config = &self.config;
+        let given = |camera: usize| config.sensor(camera).readout_s != 0.0;
+        (config.estimate_readout && config.calibrate) || (0..=config.rigid_cameras.len()).any(given)
+    }
+
+    /// Motion of the vehicle after a stamp, where camera poses depend on it: from the samples up to the stamp and those
+    /// from it on.
+    pub(crate) fn motion_profile(
+        &self,
+        before: &[ImuSample],
+        after: &[ImuSample],
+        bias: ImuBias,
+    ) -> Option<MotionProfile> {
+        let samples = if after.is_empty() { &before[before.len().saturating_sub(1)..] } else { after };
+        let profile = || MotionProfile::new(samples, bias, self.gravity_in_world);
+        self.has_moving_rows()
+            .then(|| profile().unwrap_or_else(|| MotionProfile::stationary(bias, self.gravity_in_world)))
+    }
+
+    /// Joint rates and joint accelerations at which the solver starts, where camera poses depend on them.
+    pub(crate) fn initial_joint_motion(&self, encoder: Option<&JointAngles>, joints: usize) -> Vec<f64> {
+        let count = if self.has_moving_rows() { 2 * joints } else { 0 };
+        (0..count).map(|place| measured_joint_motion(encoder, place, joints).0).collect()
+    }
+
+    /// Encoder angles of the joints, `None` where they are unused or unusable.
+    pub(crate) fn encoder_reading(&self, input: &StepInput<'_>, joints: usize) -> Option<JointAngles> {
+        self.config.encoder_in_use()?;
+        input.encoder_angles(joints).cloned()
+    }
+}
+
+fn scale_noise(noise: &mut ImuNoise, factor: f64) {
+    noise.accelerometer_noise_density *= factor;
+    noise.accelerometer_random_walk *= factor;
+    noise.gyroscope_noise_density *= factor;
+    noise.gyroscope_random_walk *= factor;
+}
