@@ -5,16 +5,16 @@ use nalgebra::{Vector2, Vector3};
 use super::observations::Observations;
 use crate::frontend::FeatureId;
 
-/// An observation of a feature by a frame of the window.
+/// Observation of a feature in a frame of the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObservationReport {
-    /// Number of the observing image in its stream.
+    /// Index of the observing image in its stream.
     pub frame_index: usize,
     /// Measured pixel.
     pub measured_px: Vector2<f64>,
-    /// Predicted minus measured before the solve, in pixels.
+    /// Predicted minus measured before the solve, in pixels; `None` when the prediction fails.
     pub residual_before_px: Option<Vector2<f64>>,
-    /// Predicted minus measured after the solve, in pixels.
+    /// Predicted minus measured after the solve, in pixels; `None` when the prediction fails.
     pub residual_after_px: Option<Vector2<f64>>,
     /// Squared whitened residual after the solve.
     pub chi2: f64,
@@ -22,25 +22,23 @@ pub struct ObservationReport {
     pub robust_weight: f64,
 }
 
-/// A feature of the solve.
+/// Feature used in the solve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureReport {
-    /// Identity; [`FeatureId::camera`] is the number of its camera.
+    /// [`FeatureId::camera`] is the index of its camera.
     pub id: FeatureId,
-    /// Anchor frame.
     pub anchor_frame_index: usize,
     /// Inverse depth along the anchor's optical axis, in 1/m.
     pub inverse_depth_per_m: f64,
-    /// All its observations in the window, the anchor's first.
+    /// Observations in the window; the anchor's comes first.
     pub observations: Observations,
-    /// Rejected as an outlier after this solve.
+    /// True if rejected as an outlier after this solve.
     pub rejected: bool,
 }
 
-/// Numbers of features in the solve, also of steps without stored features.
+/// Feature counts; also kept for steps whose features are not stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FeatureCounts {
-    /// Features in the solve.
     pub solved: usize,
     /// Features rejected as outliers after the solve.
     pub rejected: usize,
@@ -49,7 +47,6 @@ pub struct FeatureCounts {
 }
 
 impl FeatureCounts {
-    /// Counts the features of a report.
     pub fn of(features: &[FeatureReport]) -> Self {
         Self {
             solved: features.len(),
@@ -58,16 +55,14 @@ impl FeatureCounts {
         }
     }
 
-    /// Features that were not rejected.
     pub fn inliers(&self) -> usize {
         self.solved - self.rejected
     }
 }
 
-/// A feature as a point of the world, for drawing.
+/// Position of a feature, for the 3D view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LandmarkReport {
-    /// Identity of the feature.
     pub id: FeatureId,
     /// Position in the world, in metres.
     pub position_m: Vector3<f64>,

@@ -1,4 +1,4 @@
-//! The observations of a feature in a report, packed: of a recording they are by far the largest part.
+//! Packed observations of a feature in a report: they are by far the largest part of a recording.
 
 use std::fmt;
 
@@ -6,15 +6,15 @@ use nalgebra::Vector2;
 
 use crate::estimator::ObservationReport;
 
-/// The observations of one feature in the window, the anchor's first.
+/// Observations of one feature in the window; the anchor's comes first.
 ///
-/// They are kept in single precision, which resolves a ten-thousandth of a pixel at the far edge of an image.
+/// Stored in single precision, which resolves a ten-thousandth of a pixel at the far edge of an image.
 #[derive(Clone, Default, PartialEq, Eq)]
 pub struct Observations {
     packed: Box<[PackedObservation]>,
 }
 
-/// 36 bytes in place of 88; numbers by their bits, so that what is missing equals itself.
+/// 36 bytes instead of 88; numbers are stored as bits, so that a missing value equals itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct PackedObservation {
     frame_index: u32,
@@ -25,26 +25,23 @@ struct PackedObservation {
     robust_weight: u32,
 }
 
-/// A residual that is missing: a NaN that no computation makes.
+/// Missing residual: a NaN that no computation produces.
 const MISSING: [u32; 2] = [0x7fc0_dead; 2];
 
 impl Observations {
-    /// Number of observations.
     pub fn len(&self) -> usize {
         self.packed.len()
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.packed.is_empty()
     }
 
-    /// All of them, unpacked.
+    /// Unpacked observations.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = ObservationReport> + '_ {
         self.packed.iter().map(PackedObservation::unpacked)
     }
 
-    /// Bytes on the heap.
     pub(crate) fn heap_bytes(&self) -> usize {
         size_of_val(&*self.packed)
     }

@@ -1,6 +1,5 @@
-//! Residuals by kind of factor, and the iterations of the solver that lowered them.
+//! Residuals by kind of factor, and the solver iterations.
 
-/// A kind of factor of the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FactorKind {
     /// Reprojections of features.
@@ -9,16 +8,15 @@ pub enum FactorKind {
     Imu,
     /// Encoder readings of the joint angles.
     Encoder,
-    /// The rig's prior on the calibration.
+    /// Rig's prior on the calibration.
     CalibrationPrior,
-    /// The marginalization prior, or the prior at the start.
+    /// Marginalization prior, or the prior at the start.
     MarginalizationPrior,
     /// Zero-velocity update of a stationary vehicle.
     ZeroVelocity,
 }
 
 impl FactorKind {
-    /// All of them.
     pub const ALL: [Self; 6] = [
         Self::Visual,
         Self::Imu,
@@ -28,7 +26,7 @@ impl FactorKind {
         Self::ZeroVelocity,
     ];
 
-    /// Name for people.
+    /// Label for display.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Visual => "visual",
@@ -40,7 +38,7 @@ impl FactorKind {
         }
     }
 
-    /// Name in tables and conditions, without spaces.
+    /// Key in tables and conditions, without spaces.
     pub const fn key(self) -> &'static str {
         match self {
             Self::Imu => "imu",
@@ -52,10 +50,9 @@ impl FactorKind {
     }
 }
 
-/// Sum of squared whitened residuals of one kind of factor, and how many there are.
+/// Sum of squared whitened residuals of one kind of factor, and their number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResidualSummary {
-    /// Kind of factor.
     pub factor: FactorKind,
     /// Number of scalar residuals.
     pub count: usize,
@@ -77,12 +74,10 @@ impl ResidualSummary {
 pub struct IterationReport {
     /// Cost before the step.
     pub cost_before: f64,
-    /// Cost after it.
     pub cost_after: f64,
-    /// Damping or trust radius in use.
+    /// Levenberg–Marquardt damping.
     pub damping: f64,
-    /// Norm of the step.
     pub step_norm: f64,
-    /// Whether the step was accepted.
+    /// True if the step was accepted.
     pub accepted: bool,
 }
