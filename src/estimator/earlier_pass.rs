@@ -82,7 +82,7 @@ impl Estimator {
         let cameras = (0..calibrations.cameras()).map(|camera| {
             let columns = calibrations.columns(camera);
             let covariance = covariances.calibration.view_range(columns.clone(), columns).into_owned();
-            calibrations.of(camera).found(&covariance, SIGMA_FACTOR.powi(-2))
+            calibrations.of(camera).next_pass_prior(&covariance, SIGMA_FACTOR.powi(-2))
         });
         let mean = window.state.frames.newest().state.navigation.bias;
         let sigma = covariances.newest_bias.diagonal().map(|variance| SIGMA_FACTOR * variance.max(0.0).sqrt());
