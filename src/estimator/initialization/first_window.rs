@@ -16,9 +16,9 @@ use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::step_input::StepInput;
+use crate::estimator::window::drop_or_marginalize_frame;
 use crate::estimator::window::features::{self, FeatureMap};
 use crate::estimator::window::frames::{Frame, Frames};
-use crate::estimator::window::make_room;
 use crate::estimator::window::sliding_window::SlidingWindow;
 use crate::estimator::window::window_state::WindowState;
 use crate::frontend::TrackedFeature;
@@ -51,8 +51,8 @@ impl<'a> FirstWindow<'a> {
         let leading = calibration.leading();
         let joints = calibration.of(MAIN).joint_count();
         let world = world_from_solution(solution, resume_at);
-        let room = make_room::first_room(&calibration, options);
-        let views = &solution.frames[solution.frames.len().saturating_sub(room + 1)..];
+        let frame_limit = drop_or_marginalize_frame::first_window_frames(&calibration, options);
+        let views = &solution.frames[solution.frames.len().saturating_sub(frame_limit + 1)..];
         let errors = calibration.imu_errors().copied();
         let empty = || Preintegration::with_intrinsics(setup.imu_noise, solution.bias, errors);
         let mut imu = empty();
@@ -157,7 +157,7 @@ impl<'a> FirstWindow<'a> {
         events.push(window.choose_keyframe(setup));
         let report = self.window.report(setup, input, &mut solved);
         self.window.state.drop_rejected(&solved, options, events);
-        self.window.state.make_room(setup, events);
+        self.window.state.drop_or_marginalize_frame(setup, events);
         (self.window, report)
     }
 

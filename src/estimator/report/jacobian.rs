@@ -301,7 +301,7 @@ fn window_camera<'a>(
         state.navigation.world_from_imu = frame.world_from_imu;
         state.navigation.velocity_m_per_s = frame.velocity_m_per_s;
         state.joints_rad.clone_from(&frame.joint_angles_rad);
-        let seen = camera_pose::when_seen(&state, now_s);
+        let seen = camera_pose::state_at_exposure(&state, now_s);
         let imu_from_observer = match rigid {
             Some((_, extrinsics)) => *extrinsics,
             // Without a time offset the reported camera pose applies.

@@ -85,13 +85,13 @@ pub(crate) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
 
 /// `world_from_camera` at a state and the exposure of a row: 0 for the first row, 1 for the end of the last one.
 pub(crate) fn at_row(state: &FrameState, sensor: &CameraSensor<'_>, row: f64) -> CameraPose {
-    let state = &*when_seen(state, sensor.row_time_s(row));
+    let state = &*state_at_exposure(state, sensor.row_time_s(row));
     let pose = state.navigation.world_from_imu * sensor.chain.imu_from_camera(sensor.own(&state.joints_rad));
     CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
 }
 
 /// State at the exposure, extrapolated by `shift_s` from the stamp.
-pub(crate) fn when_seen(state: &FrameState, shift_s: f64) -> Cow<'_, FrameState> {
+pub(crate) fn state_at_exposure(state: &FrameState, shift_s: f64) -> Cow<'_, FrameState> {
     if shift_s == 0.0 { Cow::Borrowed(state) } else { Cow::Owned(state.later(shift_s)) }
 }
 
@@ -225,7 +225,7 @@ fn add_transposed_product(
 /// Derivatives of the camera pose at a row with respect to the unknowns of its frame and to the calibration.
 fn block_map(stamped: &FrameState, sensor: &CameraSensor<'_>, row: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let time_s = sensor.row_time_s(row);
-    let state = &*when_seen(stamped, time_s);
+    let state = &*state_at_exposure(stamped, time_s);
     let chain = sensor.linearize(&state.joints_rad);
     let world_from_imu = state.navigation.world_from_imu.rotation_matrix();
     let (mut own, mut by_calibration) = camera_map(&world_from_imu, state.joints_rad.len(), &chain);

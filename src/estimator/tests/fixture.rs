@@ -225,7 +225,7 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
 pub(super) fn marginalize_once(test: &mut TestWindow) {
     test.setup.config.options.window = test.window.frames.len() - 1;
     test.setup.config.options.first_window_factor = 1;
-    test.window.make_room(&test.setup, &mut Vec::new());
+    test.window.drop_or_marginalize_frame(&test.setup, &mut Vec::new());
     assert!(test.window.prior.is_some());
 }
 

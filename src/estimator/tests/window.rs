@@ -6,7 +6,7 @@ use super::fixture;
 use super::fixture::TestWindow;
 use crate::estimator::options::EstimatorOptions;
 use crate::estimator::state::calibrations::MAIN;
-use crate::estimator::window::make_room;
+use crate::estimator::window::drop_or_marginalize_frame;
 use crate::estimator::window::marginalization;
 use crate::estimator::window::problem::Estimate;
 use crate::estimator::window::rows::stack;
@@ -214,7 +214,7 @@ fn a_prior_contains_only_estimated_columns() {
             fixture::disturb(&mut estimator, 0.2);
             estimator.setup.config.options.window = left - 1;
             estimator.setup.config.options.first_window_factor = 1;
-            estimator.window.make_room(&estimator.setup, &mut Vec::new());
+            estimator.window.drop_or_marginalize_frame(&estimator.setup, &mut Vec::new());
             let problem = estimator.problem(&[]);
             let estimate = estimator.estimate(&[]);
             let total = problem.layout.total();
@@ -303,14 +303,16 @@ fn the_covariance_of_a_solve_is_without_damping() {
 
 #[test]
 fn an_inaccurate_chain_gets_a_larger_first_window() {
-    let room = |test: &TestWindow| make_room::first_room(&test.window.calibration, &test.setup.config.options);
+    let frame_limit = |test: &TestWindow| {
+        drop_or_marginalize_frame::first_window_frames(&test.window.calibration, &test.setup.config.options)
+    };
     let gimbal = |rotation_sigma_rad: f64, calibrate: bool| {
         fixture::changed_window(true, quadratic(), |config| {
             (config.chain_prior, config.calibrate) = (Some((0.005, rotation_sigma_rad)), calibrate);
         })
     };
-    let usual = room(&gimbal(0.0087, true));
-    assert_eq!(room(&gimbal(0.1, true)), 2 * usual);
-    assert_eq!(room(&gimbal(0.1, false)), usual, "a fixed chain does not move");
-    assert_eq!(room(&fixture::cluster_window(quadratic(), false)), usual, "a rigid camera leads");
+    let usual = frame_limit(&gimbal(0.0087, true));
+    assert_eq!(frame_limit(&gimbal(0.1, true)), 2 * usual);
+    assert_eq!(frame_limit(&gimbal(0.1, false)), usual, "a fixed chain does not move");
+    assert_eq!(frame_limit(&fixture::cluster_window(quadratic(), false)), usual, "a rigid camera leads");
 }

@@ -43,7 +43,7 @@ pub(crate) fn motion_parts(
     // The states at the exposures of the blocks.
     let frames: Vec<Cow<'_, FrameState>> = stamped
         .iter()
-        .flat_map(|state| rows.iter().map(|row| camera_pose::when_seen(state, sensor.row_time_s(*row))))
+        .flat_map(|state| rows.iter().map(|row| camera_pose::state_at_exposure(state, sensor.row_time_s(*row))))
         .collect();
     let Some(newest) = frames.last() else { return parts };
     let there = twists(calibration, &newest.joints_rad);

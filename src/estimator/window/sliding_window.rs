@@ -85,7 +85,7 @@ impl SlidingWindow {
         let warnings = self.monitors.consistency.observe(report.stamp_ns, &report.residuals, &setup.config, scores);
         self.state.drop_rejected(&solved, options, &mut events);
         events.extend(self.switch_near_singularity(setup));
-        self.state.make_room(setup, &mut events);
+        self.state.drop_or_marginalize_frame(setup, &mut events);
         report.times.optimize_ms = optimized_ms - begin_ms;
         report.times.marginalize_ms = setup.clock_ms() - marginalizing_ms;
         report.events.extend(events);

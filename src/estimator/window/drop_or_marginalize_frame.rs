@@ -19,7 +19,7 @@ const INACCURATE_ROTATION_RAD: f64 = 0.03;
 
 /// Number of frames in the first window, before marginalization. It is larger than the later ones: marginalization fixes
 /// linearization points, and the chain of the leading camera must be close to its true values before.
-pub(crate) fn first_room(calibration: &Calibrations, options: &EstimatorOptions) -> usize {
+pub(crate) fn first_window_frames(calibration: &Calibrations, options: &EstimatorOptions) -> usize {
     let given_sigma_rad = calibration.of(calibration.leading()).given_rotation_sigma_rad();
     let inaccurate = given_sigma_rad > INACCURATE_ROTATION_RAD;
     let factor = if inaccurate { options.inaccurate_first_window_factor } else { options.first_window_factor };
@@ -29,7 +29,7 @@ pub(crate) fn first_room(calibration: &Calibrations, options: &EstimatorOptions)
 impl WindowState {
     /// Removes a frame for the next image: the second-newest one if it is no keyframe, else the oldest one of a
     /// full window by marginalization.
-    pub(crate) fn make_room(&mut self, setup: &Setup, events: &mut Vec<Event>) {
+    pub(crate) fn drop_or_marginalize_frame(&mut self, setup: &Setup, events: &mut Vec<Event>) {
         let newest = self.frames.newest_slot();
         if newest >= 2 && !self.frames[newest - 1].keyframe {
             let message = format!("frame {} dropped: no keyframe", self.frames[newest - 1].index);
@@ -38,20 +38,20 @@ impl WindowState {
             return;
         }
         for _ in 0..MAX_MARGINALIZED_AT_ONCE {
-            let room = self.room(&setup.config.options);
-            if self.frames.len() <= room {
+            let frame_limit = self.frame_limit(&setup.config.options);
+            if self.frames.len() <= frame_limit {
                 break;
             }
             let message = format!("frame {} marginalized: the window is full", self.frames.oldest().index);
             let count = self.frames.len() as f64;
-            events.push(Event::decided(EventKind::OldestMarginalized, message, count, room as f64));
+            events.push(Event::decided(EventKind::OldestMarginalized, message, count, frame_limit as f64));
             self.marginalize_oldest(setup);
         }
     }
 
     /// Number of frames that may remain.
-    fn room(&self, options: &EstimatorOptions) -> usize {
-        if self.prior.is_none() { first_room(&self.calibration, options) } else { options.window }
+    fn frame_limit(&self, options: &EstimatorOptions) -> usize {
+        if self.prior.is_none() { first_window_frames(&self.calibration, options) } else { options.window }
     }
 
     /// Drops the frame at a slot before the newest one; its encoder readings and IMU samples go to the next frame.
