@@ -1,4 +1,4 @@
-//! Passes over the same measurements: what one finds of calibration and biases is the prior of the next.
+//! Repeated passes over the same measurements: calibration and biases of one pass are the prior of the next.
 
 use nalgebra::{DMatrix, Vector3};
 
@@ -7,16 +7,16 @@ use super::preintegration::ImuBias;
 use super::window::solver;
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization};
 
-/// Factor on the standard deviations of a pass that are the prior of the next.
+/// Factor on the standard deviations of a pass when they become the prior of the next.
 ///
 /// Each pass uses the measurements again. With a factor k the information of the last pass is that of the measurements
-/// times 1 + 1/k² + 1/k⁴ + …: with 2 at most 4/3, so that its standard deviations are too small by at most 13 %.
+/// times 1 + 1/k² + 1/k⁴ + …: at most 4/3 for k = 2, so its standard deviations are too small by at most 13 %.
 const SIGMA_FACTOR: f64 = 2.0;
 
-/// What a pass over the measurements has found, as the prior of the next pass over them.
+/// Result of a pass over the measurements, as prior of the next pass.
 #[derive(Clone, Debug)]
 pub struct EarlierPass {
-    /// By camera, the main one first.
+    /// Cameras, main camera first.
     pub(super) cameras: Vec<FoundCamera>,
     /// Biases of the IMU at the start of the log.
     pub(super) bias: BiasPrior,
@@ -27,25 +27,24 @@ pub struct EarlierPass {
 pub(crate) struct FoundCamera {
     pub(crate) chain: ClassicalChain,
     pub(crate) parameterization: Parameterization,
-    /// Prior covariance of all its columns.
+    /// Prior covariance of all columns.
     pub(crate) covariance: DMatrix<f64>,
-    /// Clocks, shutter and intrinsics relative to the rig's values.
+    /// Estimated time offsets, shutter and intrinsics, relative to the rig's values.
     pub(crate) sensors: Vec<(ParameterId, f64)>,
 }
 
-/// Prior of the biases of an IMU at a time of the log.
+/// Prior of the IMU biases at one time of the log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BiasPrior {
-    /// Expected biases.
     pub mean: ImuBias,
-    /// Standard deviation of the gyroscope's bias by axis, in rad/s.
+    /// Standard deviation of the gyroscope bias by axis, in rad/s.
     pub gyroscope_sigma_rad_per_s: Vector3<f64>,
-    /// Standard deviation of the accelerometer's bias by axis, in m/s².
+    /// Standard deviation of the accelerometer bias by axis, in m/s².
     pub accelerometer_sigma_m_per_s2: Vector3<f64>,
 }
 
 impl BiasPrior {
-    /// The same biases after (or before) a time in which they walk at random, with noise densities in rad/s²/√Hz and
+    /// Prior after (or before) a duration of random walk, with noise densities in rad/s²/√Hz and
     /// m/s³/√Hz.
     fn after(self, duration_s: f64, gyroscope_random_walk: f64, accelerometer_random_walk: f64) -> Self {
         let walk = duration_s.abs().sqrt();
@@ -60,7 +59,7 @@ impl BiasPrior {
 }
 
 impl EarlierPass {
-    /// Takes the biases that were found at another time of the same pass, where these are less certain.
+    /// Takes the bias prior of `other`, from another time of the same pass, if its accelerometer bias is more certain.
     #[must_use]
     pub fn with_best_bias(self, other: &Self) -> Self {
         let uncertainty = |bias: &BiasPrior| bias.accelerometer_sigma_m_per_s2.norm();
@@ -70,11 +69,12 @@ impl EarlierPass {
 }
 
 impl Estimator {
-    /// What this estimator has found, as the prior of another pass over the measurements: the calibration with its
-    /// covariance, and the biases at the start of the log, `duration_s` before the newest image. Standard deviations are
-    /// doubled. `None` before the first window, and where the information is not positive definite.
+    /// Prior of another pass over the measurements from the current estimate: calibration with its covariance, and
+    /// biases at
+    /// the start of the log, `duration_s` before the newest image. Standard deviations are doubled.
+    /// `None` before the first window, and if the information is not positive definite.
     ///
-    /// The intrinsics of the IMU are not among it: they start again at the rig's prior.
+    /// The intrinsics of the IMU are not included: they restart at the rig's prior.
     pub fn findings(&self, duration_s: f64) -> Option<EarlierPass> {
         let PhaseState::Tracking(window) = &self.phase else { return None };
         let covariances = solver::covariances(&self.setup, &window.state)?;

@@ -1,4 +1,4 @@
-//! The estimator: initializing or tracking, and the step from one image to the next.
+//! Estimator: initialization or tracking, and the step from one image to the next.
 
 use super::config::EstimatorConfig;
 use super::initialization::initializer::{InitializationStep, Initializer};
@@ -10,44 +10,38 @@ use super::window::sliding_window::{SlidingWindow, WindowFailure};
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
 
-/// A sliding-window visual-inertial estimator for a camera on a gimbal or a rigid camera, and for further rigid
-/// cameras.
+/// Sliding-window visual-inertial estimator for a camera on a gimbal or a rigid camera, and further rigid cameras.
 ///
-/// It is a plain value: a clone is a snapshot, and the same steps from it give the same bits. [`Estimator::packed`] makes
-/// a smaller one.
+/// It is a plain value: a clone is a snapshot, and equal steps from it give equal bits. [`Estimator::packed`] makes
+/// a smaller snapshot.
 #[derive(Clone, Debug)]
 pub struct Estimator {
     pub(super) setup: Setup,
     pub(super) phase: PhaseState,
-    /// Number of failures of the window.
     pub(super) restarts: usize,
-    /// Last pose before the last failure.
+    /// Last pose before the last failure, `None` if there was none.
     pub(super) resume_at: Option<RigidTransform>,
 }
 
 /// Data of each [`Phase`].
 #[derive(Clone, Debug)]
 pub(super) enum PhaseState {
-    /// No window yet.
     Initializing(Initializer),
-    /// A running window.
     Tracking(Box<SlidingWindow>),
 }
 
 impl Estimator {
-    /// Returns an estimator without images.
     pub fn new(config: EstimatorConfig) -> Self {
         let setup = Setup::new(config);
         let phase = PhaseState::Initializing(Initializer::new(setup.given_calibration(), None));
         Self { setup, phase, restarts: 0, resume_at: None }
     }
 
-    /// Configuration with the changes since its creation.
+    /// Configuration, with all changes since the estimator's creation.
     pub fn config(&self) -> &EstimatorConfig {
         &self.setup.config
     }
 
-    /// Whether it is initializing or tracking.
     pub fn phase(&self) -> Phase {
         match self.phase {
             PhaseState::Initializing(_) => Phase::Initializing,
@@ -66,13 +60,14 @@ impl Estimator {
         self.setup.config.options.keep_factor_rows = true;
     }
 
-    /// Limits the solver's iterations from the next image on; with fewer than a step took, that step stops in
-    /// between.
+    /// Limits the solver's iterations from the next image on. If the limit is smaller than the iterations of a step,
+    /// that step
+    /// stops early.
     pub fn set_iterations(&mut self, iterations: usize) {
         self.setup.config.options.iterations = iterations;
     }
 
-    /// Estimated chain in the classical form.
+    /// Estimated chain in the classical parameterization.
     pub fn classical_chain(&self) -> ClassicalChain {
         self.calibration().of(MAIN).chain().to_classical()
     }
@@ -121,7 +116,7 @@ impl Estimator {
         self.after(step)
     }
 
-    /// Replaces the initializer by its window.
+    /// Replaces the initializer by the window once it exists.
     fn after(&mut self, step: InitializationStep) -> StepReport {
         match step {
             InitializationStep::Waiting(report) => report,

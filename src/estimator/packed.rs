@@ -1,4 +1,4 @@
-//! A snapshot of the estimator in a third of its memory: what its numbers are made from instead of the numbers.
+//! Snapshot of the estimator in a third of its memory: stores inputs instead of recomputable numbers.
 
 use super::estimator::{Estimator, PhaseState};
 use super::initialization::initializer::Initializer;
@@ -8,18 +8,18 @@ use crate::frontend::TrackedFeature;
 use crate::geometry::RigidTransform;
 use crate::sensors::ImuSample;
 
-/// The measurements of one step, from which a packed estimator takes those of its window again.
+/// Measurements of one step, from which a packed estimator restores those of its window.
 pub trait StepMeasurements {
     /// Stamp of the image, as in [`StepInput`](super::StepInput).
     fn stamp_ns(&self) -> i64;
-    /// The IMU samples, as in [`StepInput`](super::StepInput).
+    /// IMU samples, as in [`StepInput`](super::StepInput).
     fn imu(&self) -> &[ImuSample];
-    /// Features of a camera by its number, the main camera first, ordered by id.
+    /// Features of a camera, ordered by id; index 0 is the main camera.
     fn features(&self, camera: usize) -> &[TrackedFeature];
 }
 
-/// An estimator without what can be computed again to the same bits: integrated IMU intervals, products of the prior.
-/// Measurements are places in the inputs of the steps before.
+/// Estimator without data that can be recomputed to the same bits: integrated IMU intervals, products of the prior.
+/// Measurements are stored as references to the inputs of earlier steps.
 #[derive(Clone, Debug)]
 pub struct PackedEstimator {
     setup: Setup,
@@ -35,7 +35,7 @@ enum PackedPhase {
 }
 
 impl Estimator {
-    /// Packs the estimator. `past` are steps before the next one, the newest last; measurements that are not among them
+    /// Packs the estimator. `past` has the inputs of earlier steps, newest last; measurements that are not among them
     /// are copied.
     pub fn packed(&self, past: &[&dyn StepMeasurements]) -> PackedEstimator {
         let phase = match &self.phase {
@@ -47,7 +47,7 @@ impl Estimator {
 }
 
 impl PackedEstimator {
-    /// The estimator as it was; `past` are the steps that it was packed with.
+    /// Restores the estimator; `past` must be the steps with which it was packed.
     pub fn unpacked(&self, past: &[&dyn StepMeasurements]) -> Estimator {
         let phase = match &self.phase {
             PackedPhase::Initializing(initializer) => PhaseState::Initializing(initializer.clone()),
@@ -56,7 +56,7 @@ impl PackedEstimator {
         Estimator { setup: self.setup.clone(), phase, restarts: self.restarts, resume_at: self.resume_at }
     }
 
-    /// Memory in bytes; data that all snapshots share counts with its inline size.
+    /// Memory use in bytes; data shared by all snapshots counts only with its inline size.
     pub fn bytes(&self) -> usize {
         size_of::<Self>()
             + match &self.phase {
