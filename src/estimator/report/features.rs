@@ -12,9 +12,9 @@ pub struct ObservationReport {
     pub frame_index: usize,
     /// Measured pixel.
     pub measured_px: Vector2<f64>,
-    /// Predicted minus measured before the solve, in pixels; `None` when the prediction fails.
+    /// Predicted minus measured before the solve, in pixels; `None` behind the camera.
     pub residual_before_px: Option<Vector2<f64>>,
-    /// Predicted minus measured after the solve, in pixels; `None` when the prediction fails.
+    /// Predicted minus measured after the solve, in pixels; `None` behind the camera.
     pub residual_after_px: Option<Vector2<f64>>,
     /// Squared whitened residual after the solve.
     pub chi2: f64,

@@ -10,15 +10,16 @@ use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::{Event, EventKind};
 use crate::optimization::LandmarkModel;
 
-/// A window above its size shrinks by one frame per keyframe.
+/// Limit of marginalized frames per image: a window above its size shrinks by one frame per keyframe.
 const MAX_MARGINALIZED_AT_ONCE: usize = 2;
 
-/// A rotation of the chain that is given with a larger standard deviation is inaccurate, in radians: derivatives at the given
-/// chain are wrong by as many parts of one.
+/// Standard deviation of the given chain rotations above which they are inaccurate, in radians: derivatives at the
+/// given
+/// chain have a relative error of the same size.
 const INACCURATE_ROTATION_RAD: f64 = 0.03;
 
-/// Number of frames in the first window, before marginalization. It is larger than the later ones: marginalization fixes
-/// linearization points, and the chain of the leading camera must be close to its true values before.
+/// Number of frames in the first window, before marginalization. It is larger than later windows: marginalization fixes
+/// linearization points, so the chain of the leading camera must be close to its true values first.
 pub(crate) fn first_window_frames(calibration: &Calibrations, options: &EstimatorOptions) -> usize {
     let given_sigma_rad = calibration.of(calibration.leading()).given_rotation_sigma_rad();
     let inaccurate = given_sigma_rad > INACCURATE_ROTATION_RAD;
@@ -27,8 +28,9 @@ pub(crate) fn first_window_frames(calibration: &Calibrations, options: &Estimato
 }
 
 impl WindowState {
-    /// Removes a frame for the next image: the second-newest one if it is no keyframe, else the oldest one of a
-    /// full window by marginalization.
+    /// Removes a frame after the step: drops the second-newest one if it is no keyframe, else marginalizes the oldest
+    /// ones of
+    /// a full window.
     pub(crate) fn drop_or_marginalize_frame(&mut self, setup: &Setup, events: &mut Vec<Event>) {
         let newest = self.frames.newest_slot();
         if newest >= 2 && !self.frames[newest - 1].keyframe {
@@ -49,12 +51,13 @@ impl WindowState {
         }
     }
 
-    /// Number of frames that may remain.
+    /// Number of frames above which the window is full.
     fn frame_limit(&self, options: &EstimatorOptions) -> usize {
         if self.prior.is_none() { first_window_frames(&self.calibration, options) } else { options.window }
     }
 
-    /// Drops the frame at a slot before the newest one; its encoder readings and IMU samples go to the next frame.
+    /// Drops the frame at slot `gone`, before the newest one; its encoder readings and IMU samples go to the next
+    /// frame.
     fn drop_frame(&mut self, setup: &Setup, gone: usize) {
         if self.prior.as_ref().is_none_or(|prior| !prior.holds_frame(gone)) {
             self.carry_encoder(setup, gone, gone + 1);
@@ -110,7 +113,7 @@ impl WindowState {
         }
     }
 
-    /// Moves landmarks with a new anchor to the bearing that the anchor measured.
+    /// Sets the bearing of each landmark to the one measured in its anchor.
     fn face_measured_bearings(&mut self) {
         for feature in self.features.iter_mut().flat_map(FeatureMap::values_mut) {
             if let (Some(first), Some(landmark)) = (feature.observations.first(), feature.landmark.as_mut()) {
@@ -119,8 +122,8 @@ impl WindowState {
         }
     }
 
-    /// Renumbers the slots of the prior after the removal of a frame; frames outside of the prior lose their first
-    /// estimate.
+    /// Renumbers the slots of the prior after the removal of a frame; removes the first estimates of frames outside the
+    /// prior.
     fn renumber_prior(&mut self, gone: usize) {
         if let Some(prior) = &mut self.prior {
             prior.renumber(gone);

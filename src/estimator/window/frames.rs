@@ -1,4 +1,4 @@
-//! The frames of the window.
+//! Frames of the window.
 
 use std::ops::{Deref, DerefMut};
 
@@ -11,35 +11,31 @@ use crate::estimator::state::layout::Layout;
 use crate::estimator::state::navigation::Matrix15;
 use crate::sensors::JointAngles;
 
-/// Change of a scale error, a misalignment or the rotation in radians at which an interval is reintegrated: second-order
-/// effects are then a millionth.
+/// Change of a scale error, a misalignment or the rotation in radians above which an interval is integrated again:
+/// second-order effects are then one millionth.
 const REINTEGRATION_INTRINSICS_CHANGE: f64 = 1e-3;
 
-/// One frame of the window.
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {
-    /// Number of the image in its camera's stream.
     pub(crate) index: usize,
-    /// Stamp of the image since the log started.
+    /// Header stamp of the image since the start of the log.
     pub(crate) stamp_ns: i64,
-    /// Current estimate.
     pub(crate) state: FrameState,
-    /// Linearization point of the marginalization prior, for frames in the prior.
+    /// Linearization point in the marginalization prior, `None` for frames outside the prior.
     pub(crate) first_estimate: Option<FrameState>,
-    /// Encoder angles at the stamp.
+    /// Encoder angles at the stamp, `None` without usable readings.
     pub(crate) encoder: Option<JointAngles>,
-    /// Present while the vehicle is stationary.
+    /// Zero-velocity update, `None` unless the vehicle is stationary.
     pub(crate) stationary: Option<Stationary>,
-    /// Whether it is a keyframe.
     pub(crate) keyframe: bool,
-    /// IMU samples since the previous frame of the window.
+    /// Preintegrated IMU samples since the previous frame of the window.
     pub(crate) motion: Preintegration,
     /// Square-root information of `motion` (15 × 15), `None` when it is empty.
     pub(crate) motion_information: Option<Matrix15>,
 }
 
 impl Frame {
-    /// Returns the state for derivatives: the first estimate while `current` is within `reach_rad` of it in
+    /// State at which derivatives are evaluated: the first estimate while `current` is within `reach_rad` of it in
     /// attitude and joint angles, else `current`.
     pub(crate) fn linearization_point<'a>(&'a self, current: &'a FrameState, reach_rad: f64) -> &'a FrameState {
         self.first_estimate.as_ref().filter(|first| current.rotation_from_rad(first) <= reach_rad).unwrap_or(current)
@@ -51,12 +47,11 @@ impl Frame {
 pub(crate) struct Frames(Vec<Frame>);
 
 impl Frames {
-    /// A window of one frame.
+    /// Window of one frame.
     pub(crate) fn new(first: Frame) -> Self {
         Self(vec![first])
     }
 
-    /// Adds the newest frame.
     pub(crate) fn push(&mut self, newest: Frame) {
         self.0.push(newest);
     }
@@ -86,7 +81,7 @@ impl Frames {
         }
     }
 
-    /// Removes the frame at a slot before the newest one and adds its IMU samples to the next frame.
+    /// Removes the frame at a slot before the newest one; its IMU samples are prepended to those of the next frame.
     pub(crate) fn drop_before_newest(&mut self, slot: usize) {
         if slot >= self.newest_slot() {
             return;
@@ -98,9 +93,8 @@ impl Frames {
         next.motion = motion;
     }
 
-    /// Reintegrates intervals whose intrinsics have changed by more than [`REINTEGRATION_INTRINSICS_CHANGE`] or whose bias
-    /// has changed by more than [`EstimatorOptions::reintegration_change`] since
-    /// their integration.
+    /// Integrates intervals again if, since their integration, the IMU intrinsics changed by more than
+    /// [`REINTEGRATION_INTRINSICS_CHANGE`] or the bias by more than [`EstimatorOptions::reintegration_change`].
     pub(crate) fn reintegrate(&mut self, options: &EstimatorOptions, intrinsics: Option<&ImuErrors>) {
         let limit = options.reintegration_change;
         for slot in 1..self.0.len() {

@@ -6,7 +6,7 @@
 //! Up to a rigid motion of the scene, the calibration columns of the observations are zero without motion in
 //! the window. With motion they are a sum over motions ([`super::motion_parts`]), and so is `G`: each motion
 //! contributes the symmetric `½(JmᵀU·UᵀJc + JcᵀU·UᵀJm)`, which is also its Shapley value. The remainder comes
-//! with the marginalization prior: from images that have left the window.
+//! from the marginalization prior, that is, from images that have left the window.
 
 use nalgebra::DMatrix;
 
@@ -20,10 +20,10 @@ use crate::estimator::window::problem::{Estimate, Problem};
 use crate::geometry::seconds_from_ns;
 use crate::optimization::Cholesky;
 
-/// Added to the diagonals, as in the solver: unknowns without a factor do not move.
+/// Addition to the diagonals, as in the solver, so that unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
 
-/// Gains below this fraction of the variance are rounding errors.
+/// Relative decrease of the variance below which a gain is a rounding error.
 const ROUNDING: f64 = 1e-10;
 
 /// Information of one camera's observations at the final estimate, with and without the newest image.
@@ -53,12 +53,12 @@ struct Answer {
     /// Covariance of the free calibration.
     covariance: DMatrix<f64>,
     /// Derivative of the states and the calibration (columns of the layout) with respect to the free calibration
-    /// columns: least squares of the other unknowns.
+    /// columns: least-squares response of the other unknowns.
     response: DMatrix<f64>,
 }
 
 impl Answer {
-    /// Of the calibration, the columns `free` are unknown.
+    /// `free` are the calibration columns that are not fixed.
     fn new(hessian: &DMatrix<f64>, layout: &Layout, free: &[usize]) -> Option<Self> {
         let mut order = layout.elimination_order();
         order.truncate(layout.calibration().start);
@@ -73,8 +73,9 @@ impl Answer {
 }
 
 impl Problem<'_> {
-    /// Returns the information gain of the newest image; `None` without free calibration columns, with a single
-    /// frame, or when a matrix is not positive definite.
+    /// Information gain of the newest image; `None` without free calibration columns, with a single frame, or when a
+    /// matrix is
+    /// not positive definite.
     pub(crate) fn information_gain(
         &self,
         estimate: &Estimate,
@@ -114,7 +115,7 @@ impl Problem<'_> {
         Some(InformationGain::new(interval_s, layout.joints, bits, by_motion))
     }
 
-    /// Returns a zero gain, for an image that is dropped; `None` as in [`Self::information_gain`].
+    /// Zero gain, for an image that is dropped; `None` without free calibration columns or with a single frame.
     pub(crate) fn no_information_gain(&self, estimate: &Estimate) -> Option<InformationGain> {
         let (interval_s, free) = self.newest_interval(estimate)?;
         let joints = self.layout.joints;
@@ -122,7 +123,7 @@ impl Problem<'_> {
     }
 
     /// Time since the previous image in seconds, and the free columns of the calibration; `None` without free
-    /// columns.
+    /// columns or with a single frame.
     fn newest_interval(&self, estimate: &Estimate) -> Option<(f64, Vec<usize>)> {
         let newest = self.layout.frames.checked_sub(1).filter(|newest| *newest > 0)?;
         let interval_s = seconds_from_ns(self.frames[newest].stamp_ns - self.frames[newest - 1].stamp_ns);
@@ -144,7 +145,7 @@ impl Problem<'_> {
         let layout = self.layout;
         let calibration = self.linearization_calibration(&estimate.calibration);
         let mut motion_terms = DMatrix::zeros(6 + layout.joints, free.len());
-        // Effect of each motion for all parameters that change with one of them.
+        // Effect of each motion on all parameters, for a change of one of them.
         let (with_p, without_p) = (&with.response * &with.covariance, &without.response * &with.covariance);
         for (camera, information) in cameras.iter().enumerate() {
             let maps = &information.maps;
@@ -164,7 +165,7 @@ impl Problem<'_> {
         motion_terms
     }
 
-    /// Adds the contribution of moving joints' readings to the encoders' time offset.
+    /// Adds the contribution that readings of moving joints make to the encoders' time offset.
     fn encoder_clock_parts(
         &self,
         estimate: &Estimate,
@@ -188,7 +189,7 @@ impl Problem<'_> {
     }
 }
 
-/// Derivative of the camera's blocks (6 rows each) with respect to the unknowns.
+/// Changes of the camera's blocks (6 rows each) for changes of the unknowns.
 fn camera_moves(
     layout: Layout,
     maps: &CameraMaps,

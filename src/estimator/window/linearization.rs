@@ -1,4 +1,4 @@
-//! Linearization of a solved window, for observability analysis and display.
+//! Linearization of a solved window, for the observability analysis and display.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,7 +16,7 @@ use crate::estimator::{FrameId, InformationGain, Linearization};
 use crate::gimbal::ParameterId;
 
 impl WindowState {
-    /// Returns the linearization at the final estimate (rows of the measurements and of the priors) and the
+    /// Linearization at the final estimate (rows of the measurements and of the priors), and the
     /// information gain of the newest image.
     pub(crate) fn linearization(
         &self,
@@ -39,7 +39,7 @@ impl WindowState {
 }
 
 impl Problem<'_> {
-    /// Linearizes the whole window at an estimate; `parameters` are those of the calibration columns, free or
+    /// Linearizes the complete window at an estimate; `parameters` are those of the calibration columns, free or
     /// fixed. The information of each camera's observations is appended to `seen`, if requested.
     pub(crate) fn linearization(
         &self,
