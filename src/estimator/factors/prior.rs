@@ -1,4 +1,4 @@
-//! The marginalization prior, in square-root form around fixed linearization points.
+//! Marginalization prior in square-root form around fixed linearization points.
 
 use std::ops::Range;
 
@@ -9,22 +9,17 @@ use crate::estimator::state::layout::{Layout, POSE};
 use crate::estimator::state::navigation::ImuBias;
 use crate::optimization::dense;
 
-/// Unknown of a column of the prior.
+/// Unknown that a column of the prior belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum PriorColumn {
-    /// Entry `offset` of the frame at `slot`, in the order of [`Layout`].
-    Frame {
-        /// Slot of the frame.
-        slot: usize,
-        /// Offset within its block.
-        offset: usize,
-    },
-    /// A calibration parameter.
+    /// Entry `offset` of the block of the frame at `slot`, in the order of [`Layout`].
+    Frame { slot: usize, offset: usize },
+    /// Index of a calibration column.
     Calibration(usize),
 }
 
 impl PriorColumn {
-    /// Index of the column in the layout of the window.
+    /// Column in the layout of the window.
     pub(crate) fn index(self, layout: &Layout) -> usize {
         match self {
             Self::Frame { slot, offset } => layout.frame(slot).start + offset,
@@ -46,14 +41,15 @@ pub(crate) struct Prior {
     columns: Vec<PriorColumn>,
     jacobian: DMatrix<f64>,
     residual: DVector<f64>,
-    /// `JᵀJ` and `Jᵀr`, constant over all iterations.
+    /// `JᵀJ`, constant over all iterations, as is `gradient = Jᵀr`.
     hessian: DMatrix<f64>,
     gradient: DVector<f64>,
 }
 
 impl Prior {
-    /// From whitened rows `[columns of the layout | residual]` whose residuals are taken at `x₀`, after the columns of the
-    /// frame at `gone` have been eliminated; `None` when nothing remains.
+    /// Prior from whitened rows `[columns of the layout | residual]` with residuals at `x₀`, after elimination of the
+    /// columns of
+    /// the frame at `gone`; `None` when nothing remains.
     pub(crate) fn eliminating(rows: &DMatrix<f64>, layout: &Layout, gone: usize) -> Option<Self> {
         let total = layout.total();
         let removed = layout.frame(gone);
@@ -64,7 +60,7 @@ impl Prior {
             return None;
         }
         let ordered: Vec<usize> = eliminated.iter().chain(&kept).copied().chain([total]).collect();
-        // A residual that no unknown can change is dropped: its cost would accumulate over a flight until no step
+        // Drops residuals that no unknown can change: their cost would accumulate over a flight until no step
         // seemed to lower the cost.
         let echelon = dense::echelon(&rows.select_columns(&ordered), eliminated.len());
         let (first, height) = (echelon.leading_rank, echelon.rows.nrows() - echelon.leading_rank);
@@ -83,7 +79,7 @@ impl Prior {
         Self { columns, jacobian, residual, hessian, gradient }
     }
 
-    /// Renumbers the slots after the frame at `gone` has left; the prior must not contain that frame.
+    /// Renumbers the slots after removal of the frame at `gone`, which the prior must not contain.
     pub(crate) fn renumber(&mut self, gone: usize) {
         for column in &mut self.columns {
             if let PriorColumn::Frame { slot, .. } = column {
@@ -95,8 +91,8 @@ impl Prior {
         }
     }
 
-    /// Renumbers the columns for a layout with more columns: of joint motion within each frame, and of the calibration,
-    /// where `places` has the new place of each old column.
+    /// Renumbers the columns for a layout with more columns: joint motion within each frame, and calibration,
+    /// where `places` has the new index of each old column.
     pub(crate) fn move_columns(&mut self, old: &Layout, new: &Layout, places: &[usize]) {
         let added = new.joint_motion - old.joint_motion;
         let before_motion = POSE + old.joints;
@@ -109,14 +105,14 @@ impl Prior {
         }
     }
 
-    /// Whether the prior has columns of the frame at `slot`.
+    /// True if the prior has columns of the frame at `slot`.
     pub(crate) fn holds_frame(&self, slot: usize) -> bool {
         self.columns
             .iter()
             .any(|column| matches!(column, PriorColumn::Frame { slot: contained, .. } if *contained == slot))
     }
 
-    /// Whether the prior has columns of some of these parameters.
+    /// True if the prior has columns of some of these calibration parameters.
     pub(crate) fn holds_calibration(&self, parameters: &Range<usize>) -> bool {
         let contained = |column: &PriorColumn| matches!(column, PriorColumn::Calibration(contained) if parameters.contains(contained));
         self.columns.iter().any(contained)
@@ -127,22 +123,21 @@ impl Prior {
         self.residual.len()
     }
 
-    /// The unknowns of the columns.
     pub(super) fn columns(&self) -> &[PriorColumn] {
         &self.columns
     }
 
-    /// `J`.
+    /// Jacobian `J`.
     pub(super) fn jacobian(&self) -> &DMatrix<f64> {
         &self.jacobian
     }
 
-    /// `r`, the residual at `x₀`.
+    /// Residual `r` at `x₀`.
     pub(super) fn offset(&self) -> &DVector<f64> {
         &self.residual
     }
 
-    /// The residuals at an estimate; `first_estimate_offset` is `x ⊟ x₀` in the window's layout.
+    /// Residual at an estimate; `first_estimate_offset` is `x ⊟ x₀` in the window's layout.
     pub(crate) fn residual(&self, layout: &Layout, first_estimate_offset: &DVector<f64>) -> DVector<f64> {
         &self.residual + &self.jacobian * self.gather(layout, first_estimate_offset)
     }
@@ -179,8 +174,8 @@ impl Prior {
     /// Transforms the calibration columns to another parameterization: `old = by_new · new` to first order.
     ///
     /// `first_estimate_offsets` are the offsets of the calibration from its first estimate in the old and in the
-    /// new parameterization. Where they differ beyond first order, the residual compensates the difference, so that
-    /// cost and gradient are unchanged at the present estimate.
+    /// new parameterization. If they differ beyond first order, the residual compensates the difference, so that
+    /// cost and gradient are unchanged at the current estimate.
     pub(crate) fn transport_calibration(
         &mut self,
         old_from_new: &DMatrix<f64>,
@@ -219,24 +214,25 @@ impl Prior {
 pub(crate) struct StartPrior {
     /// State at which the prior was set.
     pub(crate) reference: FrameState,
-    /// Most likely biases.
+    /// Mean of the biases.
     pub(crate) bias: ImuBias,
-    /// Standard deviation of the accelerometer's bias by axis, in m/s².
+    /// Standard deviation of the accelerometer bias by axis, in m/s².
     pub(crate) accelerometer_bias_sigma: Vector3<f64>,
-    /// Standard deviation of the gyroscope's bias by axis, in rad/s.
+    /// Standard deviation of the gyroscope bias by axis, in rad/s.
     pub(crate) gyroscope_bias_sigma: Vector3<f64>,
 }
 
-/// Standard deviation of the first position, in metres: it only fixes the origin.
+/// Standard deviation of the first position, in metres: only fixes the origin.
 const ORIGIN_SIGMA_M: f64 = 1e-3;
-/// Standard deviation of the first yaw, in radians: it only fixes the direction of the axes.
+/// Standard deviation of the first yaw, in radians: only fixes the direction of the axes.
 const YAW_SIGMA_RAD: f64 = 1e-4;
 
 impl StartPrior {
     /// Number of scalar residuals.
     pub(crate) const LEN: usize = 10;
 
-    /// Whitened rows on the first frame's block `[pose | joints | velocity and biases]` and their residuals.
+    /// Whitened rows on the first frame's block `[pose | joints | velocity and biases]` (10 × columns) and their
+    /// residuals.
     pub(crate) fn rows(&self, state: &FrameState) -> (DMatrix<f64>, DVector<f64>) {
         let joints = state.joint_block();
         let mut jacobian = DMatrix::zeros(Self::LEN, 15 + joints);

@@ -1,4 +1,4 @@
-//! The reprojection factors of one camera in a window: cost and normal equations over its poses.
+//! Reprojection factors of one camera in a window: cost and normal equations over its poses.
 
 use nalgebra::Vector2;
 
@@ -10,26 +10,23 @@ use crate::optimization::{
     RobustLoss, reprojection,
 };
 
-/// An observation of a feature: slot of the frame and pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TrackObservation {
-    /// Slot of the frame in the window.
     pub(crate) slot: usize,
-    /// Measured pixel.
     pub(crate) uv_px: Vector2<f64>,
 }
 
-/// Observations of one feature in the solve, the anchor's first.
+/// Observations of one feature in the solve.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Track {
-    /// In the order of the slots.
+    /// By ascending slot; the anchor's comes first.
     pub(crate) observations: Vec<TrackObservation>,
 }
 
 /// Camera model of the rig, pixel noise and robust loss.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct VisualModel<'a> {
-    /// The model of the rig; a [`CameraView`] has the one with estimated intrinsics.
+    /// Rig's model; a [`CameraView`] has the model with estimated intrinsics.
     pub(crate) camera: &'a CameraModel,
     pub(crate) sigma_px: f64,
     pub(crate) loss: RobustLoss,
@@ -41,7 +38,7 @@ impl<'a> VisualModel<'a> {
         Self { camera, sigma_px: options.pixel_sigma_px, loss: options.loss, landmark_model: options.landmark_model }
     }
 
-    /// Whether the anchor's own observation has a residual.
+    /// True if the anchor's own observation has a residual.
     fn measures_in_anchor(&self) -> bool {
         self.landmark_model == LandmarkModel::BearingAndInverseDistance
     }
@@ -81,7 +78,7 @@ pub(crate) type VisualEquations = ReprojectionEquations<DensePoseEquations>;
 /// [`VisualEquations`] with the landmarks eliminated.
 pub(crate) type ReducedVisualEquations = ReducedEquations<DensePoseEquations>;
 
-/// Linearizes all observations at `current`, with the derivatives by poses taken at `linearized`.
+/// Linearizes all observations at `current`, with derivatives by the poses at `linearized`.
 pub(crate) fn equations(
     model: &VisualModel<'_>,
     current: &CameraView<'_>,
@@ -105,7 +102,7 @@ fn equations_by_blocks<const N: usize>(
 ) -> VisualEquations {
     let mut equations = ReprojectionEquations::new(DensePoseEquations::new(current.blocks()), tracks.len());
     for (track, landmark) in tracks.iter().zip(landmarks) {
-        // Observations come in the order of the slots and the anchor is the first of them.
+        // Observations are in ascending order of the slots; the first one is the anchor's.
         let anchor = track.observations.first().map(|first| Anchor::new(current, linearized, first));
         let blocks = anchor.as_ref().map(|anchor| CameraView::blocks_of::<N>(anchor.observation.slot));
         let terms = track
@@ -118,7 +115,7 @@ fn equations_by_blocks<const N: usize>(
     equations
 }
 
-/// The anchor of a track at the current estimate and at the linearization point.
+/// Anchor of a track at the current estimate and at the linearization point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Anchor<'a> {
     current: &'a CameraView<'a>,
@@ -139,8 +136,8 @@ impl<'a> Anchor<'a> {
     }
 }
 
-/// Linearizes one observation by the `N` blocks of the camera per frame, divided by sigma and multiplied by the root of its robust
-/// weight: that of its residual, unless given.
+/// Linearizes one observation by the `N` blocks per frame, divided by sigma and multiplied by the root of its robust
+/// weight: `known_weight`, or else that of the residual.
 #[inline]
 pub(crate) fn whitened<const N: usize>(
     model: &VisualModel<'_>,
