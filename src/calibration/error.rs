@@ -30,9 +30,7 @@ pub enum CalibrationError {
          ({reason}): record a longer flight with both cameras over textured ground"
     )]
     TooFewMeasurements {
-        /// Number of measured pairs.
         found: usize,
-        /// Required number of pairs.
         needed: usize,
         /// Start of the interval with a trajectory.
         from_s: f64,

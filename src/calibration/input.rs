@@ -28,7 +28,6 @@ pub struct TrackedView {
 pub struct StaticCamera {
     pub key: String,
     pub model: CameraModel,
-    /// Given extrinsics.
     pub imu_from_camera: RigidTransform,
     /// Error bounds of the extrinsics.
     pub prior: ChainPrior,
@@ -54,7 +53,6 @@ pub struct GimbalCamera {
 pub struct CalibrationInput {
     /// Camera fixed to the vehicle.
     pub static_camera: StaticCamera,
-    /// Camera on the gimbal.
     pub gimbal_camera: GimbalCamera,
     pub imu_noise: ImuNoise,
     /// Magnitude of gravity in m/s².

@@ -12,11 +12,8 @@ pub struct CalibratedParameter {
     pub parameter: ParameterId,
     /// Value in the given rig.
     pub initial: f64,
-    /// Calibrated value.
     pub value: f64,
-    /// Posterior standard deviation.
     pub sigma: f64,
-    /// Prior standard deviation.
     pub prior_sigma: f64,
 }
 
@@ -59,7 +56,6 @@ pub struct PoseLoopReport {
     /// errors of
     /// the poses of one reconstruction.
     pub sigmas: Vec<f64>,
-    /// Number of solver iterations.
     pub iterations: usize,
 }
 
@@ -83,7 +79,6 @@ pub struct CalibrationOutcome {
     pub static_camera_imu: ExtrinsicsReport,
     /// Reprojection residuals of the stage with only static camera and IMU.
     pub static_pixels: PixelReport,
-    /// Pose loops.
     pub pose_loop: PoseLoopReport,
     /// Extrinsics of the static camera after the bundle of both cameras.
     pub extrinsics: ExtrinsicsReport,
@@ -106,7 +101,6 @@ pub struct CalibrationOutcome {
     pub rank: Option<RankReport>,
     /// Estimated joint angles of all measurements, in radians.
     pub visited_rad: Vec<Vec<f64>>,
-    /// Adjusted trajectory.
     pub trajectory: Vec<BatchPose>,
     /// Problems that did not stop the calibration.
     pub warnings: Vec<String>,

@@ -30,7 +30,6 @@ const FRAME: usize = 7;
 /// Median length of a three-dimensional normal error, in standard deviations of a coordinate.
 const MEDIAN_LENGTH: f64 = 1.538_172_254_455_05;
 
-/// Pair of camera poses.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PosePair {
     /// Pose of the vehicle at the gimbal camera's image, from the static camera's trajectory.

@@ -25,7 +25,6 @@ const MEDIAN_LENGTH: f64 = 1.177_410_022_515_474_7;
 /// Common input of the rounds of one stage.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stage<'a> {
-    /// Name in messages.
     pub(super) name: &'static str,
     pub(super) cameras: [&'a CameraModel; 2],
     pub(super) gravity_in_world: Vector3<f64>,

@@ -15,7 +15,6 @@ const MOTION: usize = 9;
 /// Number of columns of a navigation state.
 const NAVIGATION: usize = 15;
 
-/// Camera of a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Camera {
     /// Fixed to the vehicle.

@@ -7,7 +7,6 @@ pub struct Statistics {
     pub median: f64,
     /// Standard deviation about the mean.
     pub std: f64,
-    /// Root mean square.
     pub rms: f64,
 }
 

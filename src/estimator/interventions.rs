@@ -24,9 +24,7 @@ pub enum SensorColumns {
     Timeshift,
     /// Readout times of rolling shutters.
     Readout,
-    /// Intrinsics of the cameras.
     Intrinsics,
-    /// Intrinsics of the IMU.
     ImuIntrinsics,
 }
 

@@ -31,7 +31,6 @@ pub struct EstimatorOptions {
     pub pixel_sigma_px: f64,
     /// Robust loss of the visual residuals.
     pub loss: RobustLoss,
-    /// Parameterization of the landmarks.
     pub landmark_model: LandmarkModel,
     /// Treatment of tracks whose anchor leaves the window.
     pub track_continuation: TrackContinuation,

@@ -81,7 +81,6 @@ impl NoiseDensity {
 /// Sums over the residuals of one density.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Sums {
-    /// Squared whitened residuals.
     pub(super) chi2: f64,
     /// Degrees of freedom of the residuals.
     pub(super) freedom: f64,
@@ -89,7 +88,6 @@ pub(super) struct Sums {
     pub(super) information: f64,
 }
 
-/// Sums over a run.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Innovations {
     /// Sums in the order of [`NoiseDensity::ALL`].
@@ -98,7 +96,6 @@ pub(super) struct Innovations {
     pub(super) visual: (f64, f64),
     /// First and last stamp of the intervals.
     pub(super) span_ns: Option<(i64, i64)>,
-    /// Number of intervals.
     pub(super) intervals: usize,
     pub(super) length_ns: i64,
     seen: BTreeSet<FrameId>,

@@ -21,7 +21,6 @@ use crate::geometry::seconds_from_ns;
 use crate::optimization::RobustLoss;
 use crate::sensors::ImuNoise;
 
-/// Largest number of runs.
 const MAX_RUNS: usize = 12;
 /// First run in which random walks are fitted too.
 const FIRST_WALK_RUN: usize = 4;
@@ -86,10 +85,7 @@ pub enum ImuNoiseError {
     #[error(
         "the estimator has {intervals} intervals between keyframes with images on both sides, {FEWEST_INTERVALS} are needed"
     )]
-    TooShort {
-        /// Number of intervals.
-        intervals: usize,
-    },
+    TooShort { intervals: usize },
     #[error("interrupted")]
     Interrupted,
 }

@@ -36,7 +36,6 @@ pub struct InitializationOptions {
     pub shortest_window_s: f64,
     pub max_views: usize,
     pub min_views: usize,
-    /// Smallest time between views.
     pub min_spacing_s: f64,
     /// Largest time between views without motion.
     pub max_spacing_s: f64,
@@ -54,7 +53,6 @@ pub struct InitializationOptions {
     pub min_inlier_ratio: f64,
     /// Smallest number of landmarks with a depth.
     pub min_landmarks: usize,
-    /// Largest number of features.
     pub max_landmarks: usize,
     /// Largest root mean square reprojection error, in standard deviations of a bearing.
     pub max_reprojection_sigmas: f64,

@@ -142,10 +142,13 @@ pub(super) enum StructureFailure {
         /// Largest ratio of inliers to common features.
         inlier_ratio: f64,
     },
-    /// Too few landmarks remained.
-    FewLandmarks { landmarks: usize },
+    FewLandmarks {
+        landmarks: usize,
+    },
     /// Too few views were placed.
-    FewViews { views: usize },
+    FewViews {
+        views: usize,
+    },
 }
 
 /// Reconstruction in the frame of its first view, in an arbitrary unit of length.
@@ -168,7 +171,6 @@ impl Structure {
     }
 }
 
-/// Limits of the reconstruction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StructureLimits {
     pub(super) bearing_sigma_rad: f64,

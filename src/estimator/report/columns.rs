@@ -15,7 +15,6 @@ impl fmt::Display for FrameId {
     }
 }
 
-/// Block of unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ColumnId {
     /// A parameter of the static calibration, one column.

@@ -20,7 +20,6 @@ pub enum EventKind {
     SecondNewestDropped,
     /// Features were rejected as outliers after the solve.
     OutliersRejected,
-    /// The vehicle is stationary.
     Stationary,
     /// The estimator failed and restarts.
     Failure,
@@ -63,7 +62,6 @@ pub enum FailureCause {
     AccelerometerBias,
     /// Gyroscope bias out of bounds.
     GyroscopeBias,
-    /// Velocity out of bounds.
     Velocity,
     /// Correction of the newest position by the solve too large.
     Correction,

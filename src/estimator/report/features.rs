@@ -10,7 +10,6 @@ use crate::frontend::FeatureId;
 pub struct ObservationReport {
     /// Index of the observing image in its stream.
     pub frame_index: usize,
-    /// Measured pixel.
     pub measured_px: Vector2<f64>,
     /// Predicted minus measured before the solve, in pixels; `None` behind the camera.
     pub residual_before_px: Option<Vector2<f64>>,

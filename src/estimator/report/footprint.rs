@@ -12,7 +12,6 @@ pub struct ReportBytes {
     pub calibration: usize,
     /// Features without their observations.
     pub features: usize,
-    /// Observations of the features.
     pub observations: usize,
     /// Landmark positions.
     pub landmarks: usize,

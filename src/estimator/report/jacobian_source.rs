@@ -119,10 +119,12 @@ pub enum JacobianFactor {
     /// Reprojections of a feature, two rows per observation.
     Feature(crate::frontend::FeatureId),
     /// Preintegrated IMU samples between two frames.
-    Imu { from: FrameId, to: FrameId },
+    Imu {
+        from: FrameId,
+        to: FrameId,
+    },
     /// Encoder readings of a frame.
     Encoder(FrameId),
-    /// Zero-velocity updates.
     ZeroVelocity,
     /// Rig's prior on the calibration.
     CalibrationPrior,
@@ -147,7 +149,6 @@ impl JacobianFactor {
 #[derive(Clone, Debug, PartialEq)]
 pub struct JacobianRow {
     pub factor: JacobianFactor,
-    /// Number of rows.
     pub height: usize,
     /// Index of a column block and Frobenius norm of its rows, in standard deviations of the residuals per scale of the
     /// column (see [`crate::estimator::ColumnId::scale`]); zero blocks are left out.
@@ -225,5 +226,5 @@ impl JacobianSource {
     }
 }
 
-/// Values of a pose in [`JacobianSource::frames`]: quaternion and position.
+/// Number of values of a pose in `JacobianSource::frames`: quaternion and position.
 const POSE_NUMBERS: usize = 7;

@@ -54,11 +54,8 @@ impl FactorKind {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResidualSummary {
     pub factor: FactorKind,
-    /// Number of scalar residuals.
     pub count: usize,
-    /// χ² before the solve.
     pub chi2_before: f64,
-    /// χ² after the solve.
     pub chi2_after: f64,
 }
 
@@ -72,7 +69,6 @@ impl ResidualSummary {
 /// One iteration of the solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IterationReport {
-    /// Cost before the step.
     pub cost_before: f64,
     pub cost_after: f64,
     /// Levenberg–Marquardt damping.

@@ -84,11 +84,9 @@ pub struct StageTimes {
     pub optimize_ms: f64,
     /// Linearization of the window at its final estimate, for the observability analysis.
     pub linearize_ms: f64,
-    /// Construction of the report.
     pub report_ms: f64,
     /// Outlier rejection, switch of the parameterization, marginalization.
     pub marginalize_ms: f64,
-    /// Observability analysis.
     pub observability_ms: f64,
     pub step_ms: f64,
 }

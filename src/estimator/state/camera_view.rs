@@ -32,7 +32,7 @@ pub(crate) struct CameraView<'a> {
 #[derive(Clone, Debug)]
 enum Poses<'a> {
     Global {
-        /// By slot.
+        /// Poses by slot.
         poses: Vec<CameraPose>,
         /// Computed at first use: most callers need only the poses.
         relative: OnceCell<RelativePoses>,

@@ -61,7 +61,6 @@ impl EarlierPrior {
 }
 
 impl GivenChain {
-    /// Chain of a rig.
     pub(super) fn new(
         classical: &ClassicalChain,
         parameterization: Parameterization,

@@ -42,7 +42,6 @@ pub(crate) fn of_intrinsics(intrinsics: &ImuIntrinsics) -> ImuErrors {
     ImuErrors::from_iterator(parts.iter().flat_map(Vector3::iter).copied())
 }
 
-/// Corrected sample.
 pub(crate) fn corrected(errors: &ImuErrors, sample: &ImuSample) -> ImuSample {
     intrinsics(errors).correct(sample)
 }

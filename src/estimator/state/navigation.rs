@@ -15,9 +15,7 @@ pub type Vector15 = SVector<f64, 15>;
 /// Biases of the IMU: measured minus true.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuBias {
-    /// Gyroscope bias, in rad/s.
     pub gyroscope_rad_per_s: Vector3<f64>,
-    /// Accelerometer bias, in m/s².
     pub accelerometer_m_per_s2: Vector3<f64>,
 }
 

@@ -25,7 +25,6 @@ use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::Rig;
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
-/// Window and its setup.
 pub(super) struct TestWindow {
     pub(super) setup: Setup,
     pub(super) window: WindowState,

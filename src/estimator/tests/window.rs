@@ -131,7 +131,6 @@ fn marginalizing_the_oldest_agrees_with_the_full_batch() {
         let problem = estimator.problem(&active);
         let layout = problem.layout;
         let estimate = estimator.estimate(&active);
-        // Full batch.
         let equations = problem.linearize(&estimate);
         let (hessian, gradient) = equations.reduced(&layout, &equations.eliminate(0.0));
         let batch = Cholesky::new(&hessian).unwrap().solve(&-gradient);

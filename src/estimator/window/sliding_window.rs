@@ -40,7 +40,6 @@ pub(crate) struct Monitors {
     landmarks: LandmarkWatch,
 }
 
-/// Failure of the window.
 #[derive(Debug)]
 pub(crate) struct WindowFailure {
     /// Events of the step; the failure is the last one.

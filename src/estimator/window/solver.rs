@@ -100,7 +100,6 @@ pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits
 
 struct DampedWindow<'a> {
     problem: &'a Problem<'a>,
-    /// Columns of fixed parameters.
     fixed: Vec<usize>,
     step_norms: Vec<f64>,
     /// Root mean square step of calibration and newest joint angles in the last solved step, in standard deviations.
