@@ -1,5 +1,5 @@
-//! Symmetric positive definite systems with a band and a border: states in time order, then the unknowns that
-//! all states share.
+//! Symmetric positive definite systems with a band and a border: states in time order, then the unknowns common
+//! to all states.
 
 #![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
 
@@ -16,9 +16,9 @@ use rayon::prelude::*;
 
 /// Block size of the band's factorization, in rows and columns.
 const BLOCK: usize = 64;
-/// Entries that one thread fills with zeros at a time.
+/// Number of entries that one thread zeroes at a time.
 const FILLED: usize = 1 << 17;
-/// Rows of the border that are solved for at once.
+/// Number of border rows solved together.
 const FORWARD_ROWS: usize = 3;
 
 /// Lower triangle of `[band Cᵀ; C corner]`.
@@ -33,17 +33,18 @@ pub(super) struct ArrowMatrix {
 /// Lower triangle of a band, row by row.
 ///
 /// The stored rows of a block of [`BLOCK`] start at the same column, so that blocks are matrices. Entries left
-/// of the first column or behind the last row are zero.
+/// of the first column or after the last row are zero.
 #[derive(Clone, Debug)]
 pub(super) struct Band {
     len: usize,
-    /// Blocks left of the diagonal that are stored.
+    /// Number of stored blocks left of the diagonal.
     reach: usize,
     entries: Vec<f64>,
 }
 
 impl Band {
-    /// Of hundreds of megabytes for a long flight: to fill memory that is there with zeros is faster than to get new one.
+    /// `memory` is reused between iterations: hundreds of megabytes on a long flight; zeroing is faster than
+    /// allocating.
     fn zeros(len: usize, half_width: usize, memory: Vec<f64>) -> Self {
         let reach = half_width.min(len.saturating_sub(1)).div_ceil(BLOCK);
         let size = len.div_ceil(BLOCK) * BLOCK * (reach + 1) * BLOCK;
@@ -59,7 +60,7 @@ impl Band {
         (self.reach + 1) * BLOCK
     }
 
-    /// Returns the stored columns of a row up to its diagonal, and their indices in the storage.
+    /// Stored columns of a row before its diagonal, and their indices in the storage.
     fn stored(&self, row: usize) -> (Range<usize>, Range<usize>) {
         let first = (row / BLOCK * BLOCK).saturating_sub(self.reach * BLOCK);
         (first..row, self.index(row, first)..self.index(row, row))
@@ -79,7 +80,7 @@ impl Band {
         }
     }
 
-    /// Columns of a row up to its diagonal.
+    /// Entries of a row in `columns`, at most up to its diagonal.
     pub(super) fn row_mut(&mut self, row: usize, columns: Range<usize>) -> &mut [f64] {
         debug_assert!(columns.start >= self.stored(row).0.start && columns.end <= row + 1, "within the band");
         let first = self.index(row, columns.start);
@@ -91,9 +92,9 @@ impl Band {
         &mut self.entries[index]
     }
 
-    /// Factors in place by Cholesky; `false` when the matrix is not positive definite.
+    /// Cholesky factorization in place; `false` when the matrix is not positive definite.
     ///
-    /// Right-looking by blocks: each finished block column is subtracted from the blocks that it reaches. Sums have
+    /// Right-looking by blocks: each finished block column is subtracted from the blocks within its reach. Sums have
     /// a fixed order for any number of threads.
     fn factor(&mut self) -> bool {
         let (width, reach) = (self.width(), self.reach);
@@ -130,9 +131,9 @@ impl Band {
 
     /// Replaces the factor `L` by the entries of `(L Lᵀ)⁻¹` within the band, both triangles of its diagonal blocks.
     ///
-    /// An entry of the inverse depends on those of the columns behind it within the band alone (Erisman and Tinney, *On
-    /// Computing Certain Elements of the Inverse of a Sparse Matrix*, CACM 1975), here by blocks from the last column on. Sums
-    /// have a fixed order for any number of threads.
+    /// An entry of the inverse depends only on those of later columns within the band (Erisman and Tinney, *On
+    /// Computing Certain Elements of the Inverse of a Sparse Matrix*, CACM 1975), here by blocks from the last column
+    /// back. Sums have a fixed order for any number of threads.
     fn invert(&mut self) {
         let (width, reach) = (self.width(), self.reach);
         let mut rows: Vec<&mut [f64]> = self.entries.chunks_exact_mut(BLOCK * width).collect();
@@ -179,7 +180,7 @@ impl Band {
         }
     }
 
-    /// Computes `L⁻¹ x` in place for each of some vectors: what is read of the factor serves all of them.
+    /// Computes `L⁻¹ x` in place for several vectors, with a single pass over the factor.
     fn forward(&self, vectors: &mut [Vec<f64>]) {
         Arch::new().dispatch(Forward { band: self, vectors });
     }
@@ -220,7 +221,7 @@ impl NullaryFnOnce for Forward<'_> {
     }
 }
 
-/// A block of the stored columns of a block of rows.
+/// Block at index `place` of the stored columns of a block of rows.
 fn block_of(rows: &[f64], width: usize, place: usize) -> MatRef<'_, f64> {
     MatRef::from_row_major_slice(rows, BLOCK, width).subcols(place * BLOCK, BLOCK)
 }
@@ -234,7 +235,7 @@ fn factored_block(rows: &mut [f64], width: usize) -> Option<Llt<f64>> {
 }
 
 impl ArrowMatrix {
-    /// Returns a zero matrix for `len` unknowns in the band and `borders` in the border, in the memory of an earlier one
+    /// Zero matrix for `len` unknowns in the band and `borders` in the border; reuses the memory of an earlier one
     /// ([`ArrowFactor::into_memory`]).
     pub(super) fn zeros(len: usize, half_width: usize, borders: usize, memory: Vec<f64>) -> Self {
         Self {
@@ -254,7 +255,7 @@ impl ArrowMatrix {
         self.border[border][column] += value;
     }
 
-    /// Band, rows of the border, and the block of the border, to be added to at the same time.
+    /// Band, rows of the border, and block of the border, for parallel additions.
     pub(super) fn parts_mut(&mut self) -> (&mut Band, &mut [Vec<f64>], &mut DMatrix<f64>) {
         (&mut self.band, &mut self.border, &mut self.corner)
     }
@@ -275,7 +276,7 @@ impl ArrowMatrix {
         }
     }
 
-    /// The Cholesky factor, `None` when the matrix is not positive definite.
+    /// Cholesky factor, `None` when the matrix is not positive definite.
     pub(super) fn factor(self) -> Option<ArrowFactor> {
         let Self { mut band, mut border, mut corner } = self;
         if !band.factor() {
@@ -308,21 +309,21 @@ pub(super) struct ArrowFactor {
 }
 
 impl ArrowFactor {
-    /// The memory of the band, for the next matrix.
+    /// Memory of the band, for the next matrix.
     pub(super) fn into_memory(self) -> Vec<f64> {
         self.band.entries
     }
 
-    /// Information matrix of the border's unknowns with the band eliminated (borders × borders).
+    /// Information matrix of the border's unknowns (borders × borders), the band eliminated.
     pub(super) fn border_information(&self) -> &DMatrix<f64> {
         &self.corner
     }
 
-    /// Covariances of ranges of consecutive unknowns of the band within its width, all others eliminated; `None` when the
-    /// border's Schur complement is not positive definite.
+    /// Covariances of ranges of consecutive band unknowns within the band's width, all others marginalized; `None` when
+    /// the border's Schur complement is not positive definite.
     pub(super) fn covariances(self, ranges: &[Range<usize>]) -> Option<Vec<DMatrix<f64>>> {
         let Self { mut band, mut border, corner } = self;
-        // From `L⁻¹Cᵀ` to `A⁻¹Cᵀ`, with which the uncertainty of the border adds to that of the band.
+        // From `L⁻¹Cᵀ` to `A⁻¹Cᵀ`, which adds the uncertainty of the border to that of the band.
         border.par_iter_mut().for_each(|row| band.backward(row));
         band.invert();
         let shared = if corner.is_empty() { corner } else { corner.cholesky()?.inverse() };

@@ -1,4 +1,4 @@
-//! The trajectory that the bundle adjustment of the whole flight finds.
+//! Trajectory from the bundle adjustment of the whole flight.
 
 use nalgebra::Vector3;
 
@@ -7,22 +7,21 @@ use crate::estimator::{NavigationState, PoseCovariance};
 use crate::geometry::RigidTransform;
 use crate::sensors::ImuNoise;
 
-/// Time between poses in nanoseconds: interpolated between them, a vehicle at 10 m/s² is 0.13 mm off at most.
+/// Time between poses in nanoseconds: interpolation between them has an error of at most 0.13 mm at 10 m/s².
 const STEP_NS: i64 = 10_000_000;
 
-/// A pose of the trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatchPose {
-    /// Stamp in nanoseconds since the log began.
+    /// Time in nanoseconds since the start of the log.
     pub stamp_ns: i64,
     /// Pose of the IMU. Position and yaw of the first one are those of the sliding-window estimator.
     pub world_from_imu: RigidTransform,
-    /// Covariance relative to position and yaw of the first pose, of adjusted poses where it was asked for
-    /// ([`CalibrationOptions::pose_covariances`](super::CalibrationOptions::pose_covariances)).
+    /// Covariance relative to position and yaw of the first pose; `None` for poses that are not adjusted, or if not
+    /// requested ([`CalibrationOptions::pose_covariances`](super::CalibrationOptions::pose_covariances)).
     pub covariance: Option<PoseCovariance>,
 }
 
-/// The adjusted states with their covariances, and between them poses by the IMU samples since the last one.
+/// Adjusted states with their covariances, and between them poses predicted by the IMU samples since the last one.
 pub(super) fn batch_trajectory(
     imu: &ImuBuffer,
     noise: ImuNoise,

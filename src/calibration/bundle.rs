@@ -15,19 +15,17 @@ use crate::estimator::{NavigationState, imu_factor};
 use crate::geometry::{RigidTransform, so3, wrap_angle};
 use crate::optimization::CameraPose;
 
-/// Standard deviation of the first position, which only fixes the gauge, in metres.
+/// Standard deviation of the first position in metres; only fixes the gauge.
 const GAUGE_SIGMA_M: f64 = 1e-3;
-/// Standard deviation of the first heading, which only fixes the gauge, in radians.
+/// Standard deviation of the first heading in radians; only fixes the gauge.
 const GAUGE_SIGMA_RAD: f64 = 1e-4;
 
-/// Priors of the bundle.
 #[derive(Clone, Debug)]
 pub(super) struct Priors {
-    /// The gimbal's chain.
     pub(super) chain: ChainTerm,
     /// Given `imu_from_camera` of the static camera.
     pub(super) extrinsics: RigidTransform,
-    /// Its standard deviations per axis, in metres and radians.
+    /// Standard deviations of the extrinsics per axis, in metres and radians.
     pub(super) extrinsics_sigmas: (f64, f64),
     pub(super) time_shift_sigma_s: f64,
     /// Standard deviations of the first biases about zero, in rad/s and m/s².
@@ -36,7 +34,6 @@ pub(super) struct Priors {
     pub(super) first: NavigationState,
 }
 
-/// A bundle adjustment problem.
 #[derive(Clone, Debug)]
 pub(super) struct Bundle<'a> {
     pub(super) columns: Columns,
@@ -52,17 +49,17 @@ struct EncoderEquation {
     /// Column of the joint angle in the band.
     column: usize,
     information: f64,
-    /// `q − reading`, in radians; the reading is shifted by the gimbal camera's time offset.
+    /// `q − reading` in radians; the reading is corrected by the gimbal camera's time offset.
     residual: f64,
     /// Rate of change of the reading, in rad/s.
     rate: f64,
 }
 
-/// Normal equations without the visual factors' blocks of the view poses.
+/// Normal equations; those of the visual factors are kept over the view poses.
 pub(super) struct BundleEquations {
     visual: VisualEquations,
     maps: BTreeMap<ViewId, ViewMap>,
-    /// IMU rows of two neighbouring frame sets: first column, whitened Jacobian, residual.
+    /// IMU rows of each pair of neighbouring frame sets: first column, whitened Jacobian, residual.
     imu: Vec<(usize, DMatrix<f64>, Vector15)>,
     encoders: Vec<EncoderEquation>,
     /// Jacobian and residual of the priors on the first frame set.
@@ -90,7 +87,7 @@ impl Bundle<'_> {
         self.views().into_iter().map(pose).collect()
     }
 
-    /// Twice the cost: the sum of the robust squared whitened residuals.
+    /// Twice the cost: sum of the robust squared whitened residuals.
     pub(super) fn cost(&self, estimate: &Estimate) -> f64 {
         let mut cost = self.pixels.cost(&self.poses(estimate), self.tracks, &estimate.landmarks);
         for frame_set in 1..self.frame_sets.len() {
@@ -111,7 +108,7 @@ impl Bundle<'_> {
         Some(information * imu_factor::residual(motion, from, to, &self.gravity_in_world))
     }
 
-    /// Returns `((frame_set, joint), 1/σ², q − reading)` of every encoder reading, shifted by the gimbal camera's
+    /// `((frame_set, joint), 1/σ², q − reading)` of every encoder reading, corrected by the gimbal camera's
     /// time offset.
     fn encoder_terms<'s>(&'s self, estimate: &'s Estimate) -> impl Iterator<Item = ((usize, usize), f64, f64)> + 's {
         let shift_s = estimate.shifts_s[1];
@@ -137,7 +134,7 @@ impl Bundle<'_> {
         let mut rows = DMatrix::zeros(10, 15);
         let mut residual = DVector::zeros(10);
         let rotation_error = so3::log(&(first.world_from_imu.rotation.inverse() * state.world_from_imu.rotation));
-        // The vertical in the IMU axes of the first frame set.
+        // Vertical in the IMU frame of the first frame set.
         let vertical: Vector3<f64> = first.world_from_imu.rotation.inverse() * Vector3::z();
         let heading = vertical.transpose() * so3::right_jacobian_inverse(&rotation_error);
         rows.fixed_view_mut::<1, 3>(0, 0).copy_from(&(heading / GAUGE_SIGMA_RAD));
@@ -186,7 +183,6 @@ impl Bundle<'_> {
         rows.tr_mul(&rows)
     }
 
-    /// Linearizes all factors.
     pub(super) fn linearize(&self, estimate: &Estimate) -> BundleEquations {
         let poses = self.poses(estimate);
         let map =
@@ -223,7 +219,7 @@ impl Bundle<'_> {
         equations
     }
 
-    /// Column of a navigation state's entry in the band.
+    /// Column in the band of an entry of a navigation state.
     fn navigation_column(&self, frame_set: usize, entry: usize) -> usize {
         frame_set * self.columns.block() + self.columns.navigation(entry)
     }
@@ -237,8 +233,8 @@ impl Bundle<'_> {
         self.tracks.iter().map(span).max().unwrap_or(0).max(1)
     }
 
-    /// Returns the reduced normal equations and their right side `−gradient`, split into band and border; `memory` is that
-    /// of the equations before.
+    /// Reduced normal equations and their right side `−gradient`, split into band and border; reuses the `memory` of
+    /// the previous equations.
     pub(super) fn assemble(
         &self,
         equations: &BundleEquations,
@@ -299,7 +295,7 @@ impl Bundle<'_> {
         (matrix, band, border)
     }
 
-    /// Returns the steps `[φ; δt]` of the view poses for a step of the unknowns.
+    /// Steps `[φ; δt]` of the view poses for a step of the unknowns.
     pub(super) fn view_steps(
         &self,
         equations: &BundleEquations,

@@ -1,4 +1,4 @@
-//! The calibration, stage by stage.
+//! Stages of the calibration.
 
 use std::ops::ControlFlow;
 
@@ -33,21 +33,20 @@ fn singular(stage: &'static str) -> CalibrationError {
     CalibrationError::Singular { stage }
 }
 
-/// Progress of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CalibrationProgress {
-    /// Name of the present stage.
+    /// Name of the current stage.
     pub stage: &'static str,
     /// Completed fraction of the whole calibration, 0 to 1.
     pub fraction: f64,
 }
 
-/// Calibrates static camera and gimbal from a flight: static camera and IMU, then pose loops, then a bundle of
-/// both cameras.
+/// Calibrates static camera and gimbal from a flight: static camera and IMU, then pose loops, then a bundle adjustment
+/// of both cameras.
 ///
 /// # Errors
 ///
-/// When the flight does not constrain the calibration: no trajectory, no moving joint, too few pairs of camera poses. When
+/// If the flight does not constrain the calibration: no trajectory, no moving joint, too few pairs of camera poses. If
 /// `on_progress` breaks, [`CalibrationError::Interrupted`].
 pub fn calibrate(
     input: &CalibrationInput,
@@ -61,7 +60,7 @@ pub fn calibrate(
     calibrate_along(input, trajectory, options, on_progress)
 }
 
-/// [`calibrate`] with the trajectory over all images of the static camera estimated before.
+/// [`calibrate`] with a given trajectory over all images of the static camera.
 ///
 /// # Errors
 ///
@@ -177,7 +176,7 @@ pub fn calibrate_along(
     })
 }
 
-/// Reports progress; an error where that breaks.
+/// Reports progress; an error if `on_progress` breaks.
 fn report(
     on_progress: &mut dyn FnMut(CalibrationProgress) -> ControlFlow<()>,
     stage: &'static str,
@@ -193,7 +192,7 @@ fn stretch(frame_sets: &[FrameSet]) -> (i64, i64) {
     (frame_sets.first().map_or(0, |first| first.stamp_ns), frame_sets.last().map_or(0, |last| last.stamp_ns))
 }
 
-/// Refuses flights without a joint that moves: the spread of its readings must exceed their noise and the limit.
+/// Rejects flights without a moving joint: the variance of its readings must exceed their noise and the limit.
 fn check_joint_motion(
     input: &CalibrationInput,
     options: &CalibrationOptions,
@@ -205,7 +204,7 @@ fn check_joint_motion(
         frame_sets.iter().filter_map(|frame_set| Some(&frame_set.gimbal.as_ref()?.encoder.angles_rad)).collect();
     let count = readings.len().max(1) as f64;
     let noise = segments::encoder_sigma_rad(frame_sets).powi(2);
-    // Relative standard deviation of the estimated variance of the readings.
+    // Three standard deviations of the estimated variance of the readings.
     let doubt = 3.0 * noise * (2.0 / count).sqrt();
     let mut moving = false;
     let mut spreads = Vec::new();
@@ -349,7 +348,7 @@ fn rank(result: &StageResult, visited_rad: &[Vec<f64>]) -> Option<RankReport> {
     let count = chain.dof();
     let place = (Columns::CHAIN, Columns::CHAIN);
     let block = |matrix: &DMatrix<f64>| matrix.view(place, (count, count)).into_owned();
-    // Beside the chain the border has extrinsics and time offsets: the marginal information of the chain is the
+    // Besides the chain, the border has extrinsics and time offsets: the marginal information of the chain is the
     // inverse of its covariance.
     let with_priors = block(&result.covariance).cholesky()?.inverse();
     let priors = block(&result.prior_information);

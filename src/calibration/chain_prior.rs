@@ -1,4 +1,4 @@
-//! The rig's prior on the chain as a least-squares term in the minimal parameterization.
+//! Rig's prior on the chain as a least-squares term in the minimal parameterization.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,7 +8,7 @@ use crate::sensors::ChainPrior;
 /// Variance added to every column, so that the covariance stays regular when the prior fixes a column.
 const MIN_VARIANCE: f64 = 1e-12;
 
-/// The given chain in its best minimal parameterization, with its prior.
+/// Given chain in its best minimal parameterization, with its prior.
 #[derive(Clone, Debug)]
 pub(super) struct ChainTerm {
     pub(super) given: Chain,
@@ -35,7 +35,7 @@ impl ChainTerm {
         Self { given, prior_sigmas, square_root_information }
     }
 
-    /// Whitened difference `W·(chain ⊟ given)` (dof).
+    /// Whitened difference `W·(chain ⊟ given)` (dof × 1).
     pub(super) fn residual(&self, chain: &Chain) -> DVector<f64> {
         &self.square_root_information * chain.minus(&self.given)
     }

@@ -1,12 +1,11 @@
 use thiserror::Error;
 
-/// Why a calibration failed.
+/// Reason for the failure of a calibration.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum CalibrationError {
     /// The estimator of the static camera did not initialize.
     #[error("the static camera '{camera}' has no trajectory: {reason}; details: 'dcvins check'")]
     NoTrajectory {
-        /// Key of the camera.
         camera: String,
         /// Last reason for which the initialization waited.
         reason: String,
@@ -14,14 +13,13 @@ pub enum CalibrationError {
     /// No joint moves: the joint axes are unobservable.
     #[error(
         "no joint of the gimbal moves by more than {limit_deg:.1}° between {from_s:.1} and {to_s:.1} s ({spreads}): \
-         record a flight in which the gimbal looks around"
+         record a flight in which the gimbal joints move"
     )]
     NoJointMotion {
         /// Smallest standard deviation of the angle of a moving joint.
         limit_deg: f64,
         /// Start of the examined interval.
         from_s: f64,
-        /// End of the examined interval.
         to_s: f64,
         /// Measured standard deviations, joint by joint.
         spreads: String,
@@ -32,27 +30,19 @@ pub enum CalibrationError {
          ({reason}): record a longer flight with both cameras over textured ground"
     )]
     TooFewMeasurements {
-        /// Number of measured pairs.
         found: usize,
-        /// Required number of pairs.
         needed: usize,
         /// Start of the interval with a trajectory.
         from_s: f64,
         /// End of the interval with a trajectory.
         to_s: f64,
-        /// Why other pairs were not measured.
+        /// Numbers of frame sets and missing pairs, by cause.
         reason: String,
     },
-    /// A least-squares problem that has no solution.
+    /// Singular equations of a least-squares problem.
     #[error("the {stage} did not converge: its equations are singular; possible reasons: 'dcvins check'")]
-    Singular {
-        /// Name of the stage.
-        stage: &'static str,
-    },
+    Singular { stage: &'static str },
     /// The caller ended the calibration.
     #[error("interrupted, stage '{stage}': nothing is written")]
-    Interrupted {
-        /// Name of the stage.
-        stage: &'static str,
-    },
+    Interrupted { stage: &'static str },
 }

@@ -1,4 +1,4 @@
-//! Synchronized frame sets, whose states are estimated: an image of the static camera and the next image of the
+//! Synchronized frame sets with estimated states: an image of the static camera and the next image of the
 //! gimbal camera.
 
 use nalgebra::Vector3;
@@ -10,44 +10,44 @@ use crate::estimator::{ImuBias, NavigationState, Preintegration};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
 use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 
-/// Largest delay of the gimbal camera's image after the static camera's image of the same frame set.
+/// Largest delay of the gimbal camera's image relative to the static camera's image of the same frame set.
 const MAX_IMAGE_DELAY_NS: i64 = 60_000_000;
 
 /// Image of the gimbal camera in a frame set.
 #[derive(Clone, Debug)]
 pub(super) struct GimbalView {
-    /// Index among the camera's views.
+    /// Index among the gimbal camera's views.
     pub(super) view: usize,
-    /// Preintegrated motion from the frame set's stamp to this image, so short that it counts as exact.
+    /// Preintegrated motion from the frame set's stamp to this image; so short that it is treated as exact.
     pub(super) image_delay: Preintegration,
     /// Angular velocity measured at the image's stamp, in rad/s.
     pub(super) gyroscope_rad_per_s: Vector3<f64>,
     /// Encoder readings at the image's stamp.
     pub(super) encoder: JointAngles,
-    /// Rates of change of the readings, from those before and after, in rad/s.
+    /// Rates of change of the readings in rad/s, from the previous and the next image; zero without these.
     pub(super) reading_rate_rad_per_s: Vec<f64>,
 }
 
-/// An image of the static camera, with the gimbal camera's image that follows it.
+/// Image of the static camera with the gimbal camera's image that follows it.
 #[derive(Clone, Debug)]
 pub(super) struct FrameSet {
-    /// Stamp of the static camera's image since the log started.
+    /// Stamp of the static camera's image since the start of the log.
     pub(super) stamp_ns: i64,
     /// Index of the static camera's image among its views.
     pub(super) static_view: usize,
     /// Angular velocity measured at the stamp, in rad/s.
     pub(super) gyroscope_rad_per_s: Vector3<f64>,
-    /// Bias for intervals of milliseconds: the delay of the gimbal camera's image and the time offsets.
+    /// Bias for intervals of milliseconds: delay of the gimbal camera's image and time offsets.
     pub(super) bias: ImuBias,
-    /// Preintegrated IMU samples since the previous frame set, and their square-root information (15 × 15); `None`
+    /// Preintegrated IMU samples since the previous frame set with their square-root information (15 × 15); `None`
     /// for the first.
     pub(super) motion: Option<(Preintegration, Matrix15)>,
-    /// Image of the gimbal camera, if there is one close enough.
+    /// Image of the gimbal camera, `None` if there is none close enough with encoder readings.
     pub(super) gimbal: Option<GimbalView>,
 }
 
 impl FrameSet {
-    /// Reintegrates the IMU samples with the bias at the start of their interval.
+    /// Integrates the IMU samples again with the bias at the start of their interval.
     pub(super) fn reintegrate(&mut self, before: Option<&ImuBias>, here: &ImuBias) {
         if let (Some((motion, information)), Some(bias)) = (&mut self.motion, before) {
             motion.reintegrate(*bias);
@@ -62,7 +62,7 @@ impl FrameSet {
     }
 }
 
-/// All IMU samples in time order.
+/// IMU samples in time order.
 pub(super) struct ImuBuffer {
     samples: Vec<ImuSample>,
 }
@@ -81,7 +81,7 @@ impl ImuBuffer {
         Self { samples }
     }
 
-    /// Sample at a time, interpolated linearly; beyond the ends the nearest sample.
+    /// Sample at a time, by linear interpolation; beyond the ends the nearest sample.
     pub(super) fn at(&self, stamp_ns: i64) -> Option<ImuSample> {
         let after = self.samples.partition_point(|sample| sample.stamp_ns < stamp_ns);
         let Some(next) = self.samples.get(after) else { return self.samples.last().copied() };
@@ -115,7 +115,7 @@ impl ImuBuffer {
     }
 }
 
-/// Returns the frame sets of the longest interval in which the static camera has states, with those states.
+/// Frame sets of the longest interval in which the static camera has states, with these states.
 pub(super) fn frame_sets(
     input: &CalibrationInput,
     options: &CalibrationOptions,
@@ -127,7 +127,7 @@ pub(super) fn frame_sets(
     let mut chosen: Vec<(usize, NavigationState)> = Vec::new();
     for index in longest_stretch(states) {
         let Some(state) = &states[index] else { continue };
-        // Half an image period early is nearer than half a period late.
+        // Half an image period of tolerance selects the image nearest to the spacing.
         let due = chosen.last().is_none_or(|(last, _)| {
             let period_ns = static_views[index].stamp_ns - static_views[index - 1].stamp_ns;
             static_views[index].stamp_ns - static_views[*last].stamp_ns >= spacing_ns - period_ns / 2
@@ -157,7 +157,8 @@ pub(super) fn frame_sets(
     (frame_sets, chosen.into_iter().map(|(_, state)| state).collect())
 }
 
-/// First image of the gimbal camera at or after a stamp, when its delay is small and it has encoder readings.
+/// First image of the gimbal camera at or after a stamp, `None` if its delay is too large or it has no encoder
+/// readings.
 fn gimbal_view(input: &CalibrationInput, tape: &ImuBuffer, stamp_ns: i64, bias: &ImuBias) -> Option<GimbalView> {
     let views = &input.gimbal_camera.views;
     let index = views.partition_point(|view| view.stamp_ns < stamp_ns);

@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::optimization::{CameraPose, Landmark};
 
-/// A landmark with a fixed anchor in the world: the position of the view that observed it first.
+/// Landmark with a fixed anchor in the world: the position of the view that observed it first.
 ///
-/// The anchor does not move with that view, so that an observation depends on one camera pose only.
+/// The anchor does not move with that view, so an observation depends on one camera pose only.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AnchoredLandmark {
     /// `world_from_anchor`: fixed position, axes of the world.
@@ -15,20 +15,20 @@ pub(super) struct AnchoredLandmark {
 }
 
 impl AnchoredLandmark {
-    /// Returns the landmark of a point in the world for an anchor; `None` when the two coincide.
+    /// Landmark at a point in the world for an anchor; `None` when the two coincide.
     pub(super) fn from_point(anchor_m: Vector3<f64>, point_m: &Vector3<f64>) -> Option<Self> {
         let anchor = CameraPose { rotation: Matrix3::identity(), position_m: anchor_m };
         Some(Self { anchor, landmark: Landmark::from_point(&(point_m - anchor_m))? })
     }
 
-    /// Returns `x ⊞ δ` of the landmark; the anchor stays.
+    /// `x ⊞ δ` of the landmark; the anchor stays fixed.
     pub(super) fn plus(&self, delta: &Vector3<f64>) -> Self {
         Self { anchor: self.anchor, landmark: self.landmark.plus(delta) }
     }
 }
 
 /// Triangulates a landmark from rays `(view, unit bearing in its camera)`: least squares of the distances
-/// across the rays, weighted by distance. `None` when the rays open less than `min_angle_rad` or the point lies
+/// perpendicular to the rays, weighted by distance. `None` when the parallax is below `min_angle_rad` or the point lies
 /// behind a camera.
 pub(super) fn triangulate(rays: &[(CameraPose, Vector3<f64>)], min_angle_rad: f64) -> Option<AnchoredLandmark> {
     let (first, first_bearing) = rays.first()?;

@@ -1,16 +1,16 @@
-//! The offline calibration that the paper compares against (§5.2), from a flight log alone.
+//! Offline calibration as baseline of the paper's comparison (§5.2), from a flight log alone.
 //!
 //! The paper uses a calibration target and a prebuilt map; this calibration uses the flight itself:
 //!
 //! 1. *Camera–IMU.* The sliding-window estimator processes the static camera. A bundle adjustment over the
 //!    whole flight then refines trajectory, extrinsics and time offset from all tracks and the IMU samples.
 //! 2. *Pose loops.* The gimbal camera's poses are reconstructed from its own images, segment by segment, and
-//!    paired with the static camera's: static pose and chain must give the gimbal camera's pose. Unknown are the
+//!    paired with the static camera's: static pose and chain must give the gimbal camera's pose. The unknowns are the
 //!    chain with the rig's prior, every joint angle with its encoder reading, and the frame of each segment.
 //! 3. *Pixels.* One bundle adjustment of both cameras: all observations, IMU samples, encoder readings and
-//!    priors, all unknowns at once.
+//!    priors, all unknowns jointly.
 //!
-//! The chain has its best minimal parameterization, in which every column is observable under sufficient excitation.
+//! The chain uses its best minimal parameterization, in which every column is observable under sufficient excitation.
 
 mod arrow;
 mod batch;

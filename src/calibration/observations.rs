@@ -1,4 +1,4 @@
-//! Converts the front ends' tracks to those of the bundle.
+//! Conversion of the front end's tracks to those of the bundle.
 
 use std::collections::BTreeMap;
 
@@ -24,8 +24,8 @@ pub(super) fn tracked<'a>(
     }
 }
 
-/// Collects the tracks of one camera over the frame sets that `wanted` accepts, cut to the largest length of
-/// the options; the parts of one track share no observation.
+/// Tracks of one camera over the frame sets that satisfy `wanted`, cut to the largest length of
+/// the options; the parts of one track have no common observation.
 pub(super) fn collect(
     input: &CalibrationInput,
     options: &CalibrationOptions,
@@ -57,7 +57,7 @@ pub(super) fn collect(
     finished
 }
 
-/// Triangulates the tracks with the present poses; tracks without a landmark are omitted.
+/// Triangulates the tracks with the current poses; omits tracks without a landmark.
 pub(super) fn triangulated(
     tracks: Vec<Track>,
     poses: &BTreeMap<ViewId, CameraPose>,
@@ -78,7 +78,7 @@ pub(super) fn triangulated(
 }
 
 /// Drops observations with residuals beyond `limit` standard deviations, and landmarks with too few
-/// observations left.
+/// remaining observations.
 pub(super) fn without_outliers(
     tracks: Vec<Track>,
     landmarks: &[AnchoredLandmark],

@@ -1,4 +1,3 @@
-/// Options of the calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CalibrationOptions {
     /// Time between frame sets, in seconds.
@@ -11,11 +10,11 @@ pub struct CalibrationOptions {
     pub min_parallax_rad: f64,
     /// Largest number of iterations of one adjustment.
     pub iterations: usize,
-    /// An adjustment has converged when a step lowers its cost by less than this fraction.
+    /// Convergence threshold: a step lowers the cost by less than this fraction.
     pub relative_cost_tolerance: f64,
-    /// Number of bundle adjustments; outliers are dropped between them.
+    /// Number of bundle adjustments, with outlier rejection between them.
     pub rounds: usize,
-    /// Observations with residuals beyond this many standard deviations are dropped.
+    /// Standard deviations beyond which an observation is dropped.
     pub outlier_sigmas: f64,
     /// Largest number of views in one reconstruction of the gimbal camera's poses.
     pub segment_views: usize,
@@ -23,7 +22,7 @@ pub struct CalibrationOptions {
     pub min_measurements: usize,
     /// Smallest standard deviation of the angle of a moving joint, in radians.
     pub min_joint_motion_rad: f64,
-    /// Whether to compute the covariance of every pose of the trajectory.
+    /// Compute the covariance of every pose of the trajectory.
     pub pose_covariances: bool,
     /// Prior standard deviation of a camera's time offset, in seconds.
     pub time_shift_sigma_s: f64,

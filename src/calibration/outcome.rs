@@ -6,35 +6,30 @@ use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization};
 use crate::observability::RankReport;
 
-/// Value of one calibrated parameter, in radians, metres or seconds.
+/// Value of a calibrated parameter, in radians, metres or seconds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibratedParameter {
-    /// Identity of the parameter.
     pub parameter: ParameterId,
     /// Value in the given rig.
     pub initial: f64,
-    /// Calibrated value.
     pub value: f64,
-    /// Posterior standard deviation.
     pub sigma: f64,
-    /// Prior standard deviation.
     pub prior_sigma: f64,
 }
 
 /// Reprojection residuals of one camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PixelReport {
-    /// Key of the camera.
     pub camera: String,
     /// Number of landmarks with an observation by this camera.
     pub landmarks: usize,
     /// Lengths of the residuals in pixels.
     pub residuals_px: Statistics,
-    /// Standard deviation of a pixel coordinate, estimated from the median residual.
+    /// Standard deviation of a pixel coordinate, from the median residual.
     pub sigma_px: f64,
 }
 
-/// Residuals of the IMU samples after the adjustment.
+/// IMU residuals after the adjustment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImuResidualReport {
     /// Mean angular velocity between frame sets minus the gyroscope's, in rad/s.
@@ -43,7 +38,7 @@ pub struct ImuResidualReport {
     pub accelerometer_m_per_s2: Statistics,
 }
 
-/// Chain calibrated by the pose loops alone.
+/// Chain calibrated by the pose loops only.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseLoopReport {
     /// Number of reconstructions of the gimbal camera.
@@ -54,23 +49,19 @@ pub struct PoseLoopReport {
     pub fitting: usize,
     /// Lengths of the position gaps of the loops, in metres.
     pub gaps_m: Statistics,
-    /// Standard deviation of a measured position per coordinate, estimated from the median gap, in metres.
+    /// Standard deviation of a measured position per coordinate in metres, from the median gap.
     pub position_sigma_m: f64,
-    /// Calibrated chain.
     pub chain: ClassicalChain,
-    /// Standard deviations of the chain's parameters for independent errors of the measured poses; common errors of
-    /// the poses of one reconstruction are not included.
+    /// Standard deviations of the chain's parameters for independent errors of the measured poses; excludes common
+    /// errors of the poses of one reconstruction.
     pub sigmas: Vec<f64>,
-    /// Number of solver iterations.
     pub iterations: usize,
 }
 
 /// Extrinsics of the static camera after a stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExtrinsicsReport {
-    /// Extrinsics in the given rig.
     pub initial: RigidTransform,
-    /// Calibrated extrinsics.
     pub imu_from_camera: RigidTransform,
     /// Standard deviations of `[φ; t]`, in radians and metres.
     pub sigmas: [f64; 6],
@@ -78,18 +69,15 @@ pub struct ExtrinsicsReport {
     pub time_shift_s: (f64, f64),
 }
 
-/// The result of an offline calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationOutcome {
-    /// Start and end of the used interval since the log started.
+    /// Start and end of the used interval in nanoseconds since the start of the log.
     pub stretch_ns: (i64, i64),
-    /// Number of frame sets.
     pub frame_sets: usize,
-    /// Extrinsics after the stage with static camera and IMU alone.
+    /// Extrinsics after the stage with only static camera and IMU.
     pub static_camera_imu: ExtrinsicsReport,
-    /// Reprojection residuals of that stage.
+    /// Reprojection residuals of the stage with only static camera and IMU.
     pub static_pixels: PixelReport,
-    /// Result of the pose loops.
     pub pose_loop: PoseLoopReport,
     /// Extrinsics of the static camera after the bundle of both cameras.
     pub extrinsics: ExtrinsicsReport,
@@ -99,27 +87,25 @@ pub struct CalibrationOutcome {
     pub chain: ClassicalChain,
     /// Chain in the given rig.
     pub given_chain: ClassicalChain,
-    /// The parameterization of the estimated chain.
+    /// Parameterization of the estimated chain.
     pub parameterization: Parameterization,
     /// Parameters of the chain, in the order of its columns.
     pub parameters: Vec<CalibratedParameter>,
     /// Reprojection residuals of the bundle, static camera first.
     pub pixels: [PixelReport; 2],
-    /// Solver iterations of the static camera alone and of both cameras.
+    /// Solver iterations of the static camera alone, then of both cameras.
     pub iterations: [usize; 2],
-    /// Residuals of the IMU samples.
     pub imu: ImuResidualReport,
-    /// Observability of the chain over the whole flight.
+    /// Observability of the chain over the whole flight, `None` if it cannot be computed.
     pub rank: Option<RankReport>,
     /// Estimated joint angles of all measurements, in radians.
     pub visited_rad: Vec<Vec<f64>>,
-    /// The adjusted trajectory.
     pub trajectory: Vec<BatchPose>,
     /// Problems that did not stop the calibration.
     pub warnings: Vec<String>,
 }
 
-/// Distance of a chain from a reference over joint angles: translation in metres, rotation in radians.
+/// Distance between a chain and a reference, over joint angles: translation in metres, rotation in radians.
 ///
 /// `None` without joint angles.
 pub fn chain_distance(

@@ -1,7 +1,8 @@
-//! Information that two views share, carried from their poses to the unknowns: most of the time of an assembly goes here.
+//! Conversion of the information between two views from their poses to the unknowns; an assembly spends most of its
+//! time here.
 //!
-//! Every entry is the sum that matrix products of the whole Jacobians would give, without their columns of zeros; entries
-//! are added in the order of the pairs for any number of threads.
+//! Every entry is the sum that matrix products of the complete Jacobians would give, without their zero columns.
+//! Entries are added in the order of the pairs for any number of threads.
 
 #![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
 
@@ -23,7 +24,7 @@ pub(super) struct ViewRows<'a> {
     start: usize,
 }
 
-/// Six rows of the columns that are not zero, row by row.
+/// Six rows of the nonzero columns, row by row.
 #[derive(Clone, Debug)]
 struct Rows {
     columns: Range<usize>,
@@ -39,14 +40,14 @@ pub(super) struct ViewPair<'a> {
 }
 
 impl<'a> ViewRows<'a> {
-    /// Of a view whose frame set begins at a column of the band.
+    /// `start` is the column of the band at which the view's frame set starts.
     pub(super) fn new(map: &'a ViewMap, start: usize) -> Self {
         Self { map, own: Rows::shown(&map.own), shared: Rows::shown(&map.shared), start }
     }
 }
 
 impl Rows {
-    /// Some columns of a matrix of six rows.
+    /// Columns of a matrix with six rows.
     fn of<S: RawStorage<f64, R, Dyn>, R: Dim>(matrix: &Matrix<f64, R, Dyn, S>, columns: Range<usize>) -> Self {
         let mut entries = Vec::with_capacity(6 * columns.len());
         for row in 0..6 {
@@ -55,7 +56,7 @@ impl Rows {
         Self { columns, entries }
     }
 
-    /// From the first to the last column that is not zero.
+    /// Columns from the first to the last nonzero one.
     fn shown(matrix: &DMatrix<f64>) -> Self {
         let shows = |column: &usize| matrix.column(*column).iter().any(|entry| *entry != 0.0);
         let first = (0..matrix.ncols()).find(shows).unwrap_or(0);
@@ -63,7 +64,7 @@ impl Rows {
         Self::of(matrix, first..end)
     }
 
-    /// Adds the products of a column of six with the first columns of these to as many entries.
+    /// Adds the products of a 6-vector with the first columns to as many entries of `target`.
     #[inline(always)]
     fn add_products(&self, column: &[f64; 6], target: &mut [f64]) {
         let len = self.columns.len();
@@ -76,7 +77,7 @@ impl Rows {
     }
 }
 
-/// Column of a matrix of six rows.
+/// Column of a matrix with six rows.
 #[inline(always)]
 fn column_of<S: RawStorage<f64, R, Dyn>, R: Dim>(matrix: &Matrix<f64, R, Dyn, S>, column: usize) -> [f64; 6] {
     std::array::from_fn(|row| matrix[(row, column)])
@@ -85,7 +86,7 @@ fn column_of<S: RawStorage<f64, R, Dyn>, R: Dim>(matrix: &Matrix<f64, R, Dyn, S>
 /// Adds all pairs to the matrix of the unknowns.
 pub(super) fn add_pairs(matrix: &mut ArrowMatrix, pairs: &[ViewPair<'_>]) {
     let (band, border, corner) = matrix.parts_mut();
-    // Both take about as long.
+    // Both tasks take about as long.
     rayon::join(
         || Arch::new().dispatch(BandAndCorner { pairs, band, corner }),
         || Arch::new().dispatch(Border { pairs, border }),
@@ -110,7 +111,7 @@ impl NullaryFnOnce for BandAndCorner<'_> {
             let right = *block * &second.map.own;
             let same = std::ptr::eq(*first, *second);
             if !same && first.start == second.start {
-                // Both cameras of one frame set: the lower triangle has both orders of the pair.
+                // Both cameras of one frame set: the lower triangle contains both orders of the pair.
                 let own = first.map.own.tr_mul(&right);
                 for a in 0..own.nrows() {
                     for b in 0..own.ncols() {
@@ -122,7 +123,7 @@ impl NullaryFnOnce for BandAndCorner<'_> {
                 for column in second.own.columns.clone() {
                     let row = second.start + column;
                     let start = first.start + first.own.columns.start;
-                    // Rows of the later frame set; within one view the lower triangle.
+                    // Rows of the later frame set; the lower triangle within one view.
                     let end = (start + first.own.columns.len()).min(row + 1);
                     if start < end {
                         first.own.add_products(&column_of(&right, column), band.row_mut(row, start..end));

@@ -1,7 +1,7 @@
-//! The pose loops: the static camera's pose followed by the chain must give the gimbal camera's measured pose.
+//! Pose loops: the static camera's pose followed by the chain must give the gimbal camera's measured pose.
 //!
 //! The measured poses of a segment have an unknown position, rotation and scale with respect to the map,
-//! estimated along with the joint angles of every view. All unknowns of one segment are eliminated onto the
+//! estimated together with the joint angles of every view. All unknowns of one segment are eliminated onto the
 //! chain.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6xX, UnitQuaternion, Vector3, Vector6};
@@ -14,30 +14,28 @@ use crate::optimization::RobustLoss;
 use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
 use crate::sensors::JointAngles;
 
-/// Standard deviation of the rotations of a measured pose, in radians: a pixel over the root of the features.
+/// Standard deviation of the rotation of a measured pose, in radians: a pixel over the root of the number of features.
 const ROTATION_SIGMA_RAD: f64 = 1e-3;
-/// Noise of the first adjustment, when chain and readings have large errors.
+/// Noise of the first adjustment, in which chain and readings have large errors.
 const INITIAL_NOISE: LoopNoise = LoopNoise { rotation_rad: 0.02, position_m: 0.05, loss: RobustLoss::None };
 /// Smallest standard deviation of a measured position, in metres.
 const MIN_POSITION_SIGMA_M: f64 = 2e-3;
-/// Residual at which a pair has half its weight, in standard deviations.
+/// Residual at which a pair has half weight, in standard deviations.
 const CAUCHY_SIGMAS: f64 = 3.0;
 /// Number of estimations of the position noise.
 const ROUNDS: usize = 4;
 const ITERATIONS: usize = 25;
-/// Columns of a segment's frame: rotation, translation, logarithm of the scale.
+/// Number of columns of a segment's frame: rotation, translation, logarithm of the scale.
 const FRAME: usize = 7;
 /// Median length of a three-dimensional normal error, in standard deviations of a coordinate.
 const MEDIAN_LENGTH: f64 = 1.538_172_254_455_05;
 
-/// One pair of camera poses.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PosePair {
-    /// Pose of the vehicle at the gimbal camera's image by the static camera's trajectory.
+    /// Pose of the vehicle at the gimbal camera's image, from the static camera's trajectory.
     pub(super) world_from_imu: RigidTransform,
-    /// `segment_from_camera` as measured.
+    /// Measured `segment_from_camera`.
     pub(super) segment_from_camera: RigidTransform,
-    /// Encoder readings at the view.
     pub(super) encoder: JointAngles,
 }
 
@@ -48,7 +46,6 @@ impl PosePair {
     }
 }
 
-/// The pairs of one segment.
 pub(super) type PairedSegment = Vec<PosePair>;
 
 /// Pairs the measured poses with the trajectory.
@@ -70,7 +67,7 @@ pub(super) fn paired(
         .collect()
 }
 
-/// Pose and scale of a segment on the map.
+/// Pose and scale of a segment in the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SegmentFrame {
     pub(super) world_from_segment: RigidTransform,
@@ -93,7 +90,6 @@ impl SegmentFrame {
     }
 }
 
-/// Result of the pose loops.
 #[derive(Clone, Debug)]
 pub(super) struct PoseLoopSolution {
     pub(super) chain: Chain,
@@ -112,14 +108,13 @@ pub(super) struct PoseLoopSolution {
 /// Noise and robust loss of the loops.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LoopNoise {
-    /// Standard deviation of a rotation's coordinate.
+    /// Standard deviation of a rotation per coordinate.
     pub(super) rotation_rad: f64,
-    /// Standard deviation of a position's coordinate.
+    /// Standard deviation of a position per coordinate.
     pub(super) position_m: f64,
     pub(super) loss: RobustLoss,
 }
 
-/// The pose loops of a flight.
 pub(super) struct PoseLoops<'a> {
     pub(super) segments: &'a [PairedSegment],
     pub(super) prior: &'a ChainTerm,
@@ -205,7 +200,7 @@ impl PoseLoops<'_> {
         })
     }
 
-    /// Factor by which the segments' own frames reduce position residuals below the position errors.
+    /// Ratio of position errors to position residuals, which the estimated frames of the segments reduce.
     fn lost_freedom(&self) -> f64 {
         let coordinates = 3.0 * self.each_pair().count() as f64;
         let free = coordinates - (FRAME * self.segments.len()) as f64;
@@ -299,7 +294,7 @@ impl PoseLoops<'_> {
         (solution.estimate, solution.tried)
     }
 
-    /// Covariance of the chain's columns at a state (dof × dof), all other unknowns eliminated; `None` when the
+    /// Covariance of the chain's columns at a state (dof × dof), all other unknowns marginalized; `None` when the
     /// equations are singular.
     fn covariance(&self, state: &LoopState, noise: &LoopNoise) -> Option<DMatrix<f64>> {
         let mut equations = self.linearize(state, noise);
@@ -316,7 +311,7 @@ impl PoseLoops<'_> {
         LoopEquations { hessian, gradient, segments }
     }
 
-    /// Normal equations of one segment; blocks of the chain alone are added to `hessian` and `gradient`.
+    /// Normal equations of one segment; blocks of the chain only are added to `hessian` and `gradient`.
     fn segment_equations(
         &self,
         state: &LoopState,
@@ -361,8 +356,8 @@ impl PoseLoops<'_> {
 }
 
 impl LoopEquations {
-    /// Eliminates every segment onto the chain, diagonals of the segments raised by the factor `1 + damping`, and returns
-    /// their damped factors; `None` when one is singular.
+    /// Eliminates every segment onto the chain, after multiplication of the segments' diagonals by `1 + damping`, and
+    /// returns their damped factors; `None` when one is singular.
     fn eliminate(&mut self, damping: f64) -> Option<Vec<SegmentFactor>> {
         let mut factors = Vec::with_capacity(self.segments.len());
         for segment in &self.segments {
@@ -446,7 +441,7 @@ fn first_frame(pairs: &[PosePair], chain: &Chain) -> SegmentFrame {
         square_m += (pose.translation_m - middle_m).norm_squared();
     }
     let square = square.max(1e-12);
-    // A large rotation error may even change the sign; the ratio of the extents is then the better initial value.
+    // A large rotation error may even change the sign; then the ratio of the extents is the better initial value.
     let metres_per_unit =
         if along > 0.3 * (square * square_m).sqrt() { along / square } else { (square_m / square).sqrt() };
     let metres_per_unit = metres_per_unit.max(1e-6);

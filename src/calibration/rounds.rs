@@ -22,34 +22,32 @@ const HUBER_SIGMAS: f64 = 1.5;
 /// Median length of a two-dimensional normal error, in standard deviations of a coordinate.
 const MEDIAN_LENGTH: f64 = 1.177_410_022_515_474_7;
 
-/// Input that the rounds of one stage share.
+/// Common input of the rounds of one stage.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stage<'a> {
-    /// Name in messages.
     pub(super) name: &'static str,
     pub(super) cameras: [&'a CameraModel; 2],
     pub(super) gravity_in_world: Vector3<f64>,
     pub(super) priors: &'a Priors,
     pub(super) options: &'a CalibrationOptions,
-    /// Whether to compute the covariances of the poses.
+    /// Compute the covariances of the poses.
     pub(super) pose_covariances: bool,
 }
 
-/// Result of a stage.
 #[derive(Clone, Debug)]
 pub(super) struct StageResult {
     pub(super) estimate: Estimate,
     pub(super) tracks: Vec<Track>,
-    /// Standard deviation of a pixel coordinate of each camera, estimated from the residuals.
+    /// Standard deviation of a pixel coordinate by camera, estimated from the residuals.
     pub(super) sigma_px: [f64; 2],
     pub(super) iterations: usize,
     /// Covariance of the border's unknowns (borders × borders).
     pub(super) covariance: DMatrix<f64>,
-    /// Covariance of the pose of each frame set; empty where the stage does not compute them.
+    /// Covariance of the pose of each frame set; empty if the stage does not compute them.
     pub(super) pose_covariances: Vec<PoseCovariance>,
     /// Information matrix of the priors on the border (borders × borders).
     pub(super) prior_information: DMatrix<f64>,
-    /// Lengths of the reprojection residuals of each camera, in pixels.
+    /// Lengths of the reprojection residuals by camera, in pixels.
     pub(super) residuals_px: [Vec<f64>; 2],
 }
 
@@ -86,7 +84,7 @@ impl Stage<'_> {
         }
     }
 
-    /// Adjusts all unknowns to all tracks in rounds; an error of `on_round`, called before each round, ends them.
+    /// Adjusts all unknowns to all tracks in rounds; an error of `on_round`, called before each round, stops it.
     pub(super) fn run(
         &self,
         frame_sets: &mut [FrameSet],
@@ -106,7 +104,7 @@ impl Stage<'_> {
             Self::reintegrate(frame_sets, &estimate);
             let poses = self.bundle(frame_sets, columns, all_tracks, sigma_px).poses(&estimate);
             let (tracks, landmarks) = observations::triangulated(all_tracks.to_vec(), &poses, self.options);
-            // The first poses are inaccurate: observations that are outliers now may be inliers later.
+            // The first poses are inaccurate: outliers now may be inliers later.
             let limit = if round == 0 { 30.0 / INITIAL_SIGMA_PX } else { self.options.outlier_sigmas };
             let pixels = self.pixels(sigma_px);
             let (tracks, landmarks) =

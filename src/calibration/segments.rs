@@ -1,4 +1,4 @@
-//! Measured poses of the gimbal camera: short reconstructions from its images alone, each with its own frame
+//! Measured poses of the gimbal camera: short reconstructions from its images alone, each with a separate frame
 //! and unit of length.
 
 use nalgebra::UnitQuaternion;
@@ -13,28 +13,27 @@ use crate::estimator::initialization::{InitializationOptions, ReconstructionGues
 use crate::frontend::TrackedFeature;
 use crate::geometry::RigidTransform;
 
-/// A segment ends where neighbouring views have fewer common features.
+/// Number of common features of neighbouring views below which a segment ends.
 const MIN_COMMON: usize = 25;
-/// Smallest number of views of a segment; its frame and unit alone take seven unknowns.
+/// Smallest number of views of a segment; its frame and unit alone have seven unknowns.
 const MIN_VIEWS: usize = 6;
 
-/// One reconstruction.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Segment {
-    /// Frame sets of its views, ascending.
+    /// Frame sets of the views, ascending.
     pub(super) frame_sets: Vec<usize>,
-    /// `segment_from_camera` of each, translations in the segment's unit.
+    /// `segment_from_camera` of each view, translations in the segment's unit.
     pub(super) poses: Vec<RigidTransform>,
 }
 
-/// Numbers of gimbal camera views by their use.
+/// Number of gimbal camera views by use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct SegmentCounts {
     /// Frame sets with an image of the gimbal camera and encoder readings.
     pub(super) offered: usize,
-    /// Of these, in runs too short to reconstruct.
+    /// Offered views in runs too short to reconstruct.
     pub(super) broken: usize,
-    /// Of these, in failed reconstructions, mostly for lack of parallax.
+    /// Offered views in failed reconstructions, mostly for lack of parallax.
     pub(super) unsolved: usize,
 }
 
@@ -123,7 +122,7 @@ fn stretches(
     long
 }
 
-/// Number of common features of two images; both lists are ordered by id.
+/// Number of common features of two images, both ordered by id.
 fn common(first: &[TrackedFeature], second: &[TrackedFeature]) -> usize {
     let mut rest = second.iter().peekable();
     first

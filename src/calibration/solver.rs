@@ -1,4 +1,4 @@
-//! Levenberg–Marquardt on the bundle.
+//! Levenberg–Marquardt solver of the bundle.
 
 use std::ops::Range;
 
@@ -10,10 +10,9 @@ use super::state::{Columns, Estimate};
 use crate::estimator::PoseCovariance;
 use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
 
-/// Added to the diagonal so that unknowns without a factor do not move.
+/// Addition to the diagonal, so that unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
 
-/// Result of an adjustment.
 #[derive(Clone, Debug)]
 pub(super) struct Adjusted {
     pub(super) estimate: Estimate,
@@ -38,7 +37,7 @@ pub(super) fn adjust(bundle: &Bundle<'_>, start: Estimate, options: &Calibration
 /// The bundle as a problem of the damped solver.
 struct DampedBundle<'a> {
     bundle: &'a Bundle<'a>,
-    /// Of the equations of the last step.
+    /// Memory of the previous equations.
     memory: Vec<f64>,
 }
 
@@ -68,15 +67,15 @@ impl DampedProblem for DampedBundle<'_> {
     }
 }
 
-/// Covariances at an estimate, all other unknowns eliminated.
+/// Covariances at an estimate, all other unknowns marginalized.
 pub(super) struct Covariances {
-    /// Of the border's unknowns (borders × borders).
+    /// Covariance of the border's unknowns (borders × borders).
     pub(super) border: DMatrix<f64>,
-    /// Of the pose of each frame set; empty where they were not asked for.
+    /// Covariance of the pose of each frame set; empty if not requested.
     pub(super) poses: Vec<PoseCovariance>,
 }
 
-/// The covariances of the border and, where asked for, of the poses.
+/// Covariances of the border and, if `of_poses`, of the poses; `None` when the equations are singular.
 pub(super) fn covariances(bundle: &Bundle<'_>, estimate: &Estimate, of_poses: bool) -> Option<Covariances> {
     let equations = bundle.linearize(estimate);
     let reduced = equations.visual().eliminate_by_parts(0.0);

@@ -10,17 +10,16 @@ use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::Chain;
 use crate::optimization::CameraPose;
 
-/// Number of columns of pose and velocity, which come first in a frame set's block.
+/// Number of columns of pose and velocity, the first in a frame set's block.
 const MOTION: usize = 9;
 /// Number of columns of a navigation state.
 const NAVIGATION: usize = 15;
 
-/// Camera of a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Camera {
-    /// The one fixed to the vehicle.
+    /// Fixed to the vehicle.
     Static,
-    /// The one on the gimbal.
+    /// On the gimbal.
     Gimbal,
 }
 
@@ -48,7 +47,6 @@ impl From<ViewId> for usize {
     }
 }
 
-/// Values of all unknowns.
 #[derive(Clone, Debug)]
 pub(super) struct Estimate {
     /// States by frame set.
@@ -59,14 +57,13 @@ pub(super) struct Estimate {
     pub(super) extrinsics: RigidTransform,
     /// Corrections of the rig's time offsets of static and gimbal camera, `t_imu = t_cam + shift`, in seconds.
     pub(super) shifts_s: [f64; 2],
-    /// The gimbal's chain.
     pub(super) chain: Chain,
     /// Landmarks in the order of the tracks.
     pub(super) landmarks: Vec<AnchoredLandmark>,
 }
 
-/// Column layout: a block per frame set, `[φ p v | joints | b_g b_a]`, and the border that all frame sets
-/// share, `[extrinsics 6 | static shift | chain | gimbal shift]`.
+/// Column layout: one block per frame set, `[φ p v | joints | b_g b_a]`, and the border common to all frame sets,
+/// `[extrinsics 6 | static shift | chain | gimbal shift]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Columns {
     pub(super) frame_sets: usize,
@@ -75,7 +72,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Number of columns of a pose, which come first in a frame set's block.
+    /// Number of columns of a pose, the first in a frame set's block.
     pub(super) const POSE: usize = 6;
     pub(super) const EXTRINSICS: usize = 0;
     pub(super) const STATIC_SHIFT: usize = 6;
@@ -97,12 +94,12 @@ impl Columns {
         self.frame_sets * self.block()
     }
 
-    /// Number of columns that move a view directly: pose, velocity and joints of its frame set.
+    /// Number of columns that affect a view directly: pose, velocity and joints of its frame set.
     pub(super) fn own(&self) -> usize {
         MOTION + self.joints
     }
 
-    /// Column of a navigation state's entry within the block.
+    /// Column within the block of an entry of a navigation state.
     pub(super) fn navigation(&self, entry: usize) -> usize {
         if entry < MOTION { entry } else { entry + self.joints }
     }
@@ -114,7 +111,7 @@ impl Columns {
 }
 
 impl Estimate {
-    /// Returns the estimate after a step of band, border and landmarks.
+    /// Estimate after a step of band, border and landmarks.
     pub(super) fn moved(
         &self,
         columns: &Columns,
@@ -140,7 +137,7 @@ impl Estimate {
         moved
     }
 
-    /// State of the vehicle at a view and its angular velocity there; the rotation over the time shift is not
+    /// State of the vehicle at a view and its angular velocity there; the rotation over the time offset is not
     /// applied.
     fn vehicle_at(
         &self,
@@ -158,7 +155,7 @@ impl Estimate {
         }
     }
 
-    /// Returns `world_from_imu` at a view.
+    /// `world_from_imu` at a view.
     pub(super) fn world_from_imu(
         &self,
         view: ViewId,
@@ -180,12 +177,12 @@ impl Estimate {
         }
     }
 
-    /// Returns `world_from_camera` of a view.
+    /// `world_from_camera` of a view.
     pub(super) fn view(&self, view: ViewId, frame_sets: &[FrameSet], gravity: &Vector3<f64>) -> CameraPose {
         (self.world_from_imu(view, frame_sets, gravity) * self.imu_from_camera(view)).into()
     }
 
-    /// Returns the Jacobian of a view's pose with respect to the unknowns.
+    /// Jacobian of a view's pose with respect to the unknowns.
     pub(super) fn view_map(
         &self,
         view: ViewId,
@@ -202,7 +199,7 @@ impl Estimate {
         let image_delay = frame_sets[frame_set].gimbal.as_ref().filter(|_| gimbal).map(|gimbal| &gimbal.image_delay);
         let world_from_imu: Matrix3<f64> =
             (state.world_from_imu.rotation * so3::exp(&(rate * shift_s))).to_rotation_matrix().into_inner();
-        // From the IMU axes of the frame set to the camera axes.
+        // From the IMU frame of the frame set to the camera frame.
         let imu_from_node = world_from_imu.tr_mul(&node);
         let (lag_s, carried) = image_delay.map_or_else(
             || (0.0, Vector3::zeros()),
@@ -245,8 +242,8 @@ impl Estimate {
 /// Jacobian of `[φ; δt]` of one view's `world_from_camera` with respect to the unknowns.
 #[derive(Clone, Debug)]
 pub(super) struct ViewMap {
-    /// With respect to pose, velocity and joints of its frame set (6 × own).
+    /// Derivative by pose, velocity and joints of the view's frame set (6 × own).
     pub(super) own: DMatrix<f64>,
-    /// With respect to the border (6 × borders).
+    /// Derivative by the border (6 × borders).
     pub(super) shared: DMatrix<f64>,
 }

@@ -1,22 +1,17 @@
 use crate::geometry::median;
 
-/// Statistics of a series of lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistics {
-    /// How many.
     pub count: usize,
-    /// Mean.
     pub mean: f64,
-    /// Median.
     pub median: f64,
     /// Standard deviation about the mean.
     pub std: f64,
-    /// Root of the mean square.
     pub rms: f64,
 }
 
 impl Statistics {
-    /// Of the values, `None` of none.
+    /// Statistics of the values, `None` without values.
     pub fn of(values: &[f64]) -> Option<Self> {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;

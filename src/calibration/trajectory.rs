@@ -6,19 +6,18 @@ use super::CalibrationError;
 use super::input::{StaticCamera, TrackedView};
 use crate::estimator::{Estimator, EstimatorConfig, EventKind, ImuBias, NavigationState, StepInput};
 
-/// The estimation of the initial trajectory, image by image as they are tracked.
+/// Estimation of the initial trajectory, image by image as they are tracked.
 pub struct InitialTrajectory {
     estimator: Estimator,
-    /// Place of an image among all, by the number of its frame.
+    /// Index of an image in `states`, by its frame index.
     places: BTreeMap<usize, usize>,
     states: Vec<Option<NavigationState>>,
     restarts: usize,
-    /// Why there is no state yet.
+    /// Last reason for waiting, reported if there is no state.
     waits: String,
 }
 
 impl InitialTrajectory {
-    /// Before the first image.
     pub fn new(config: EstimatorConfig) -> Self {
         Self {
             estimator: Estimator::new(config),
@@ -63,7 +62,7 @@ impl InitialTrajectory {
         }
     }
 
-    /// The last estimated state of every image, `None` where the estimator was not running. A restart leaves a gap of one
+    /// Last estimated state of every image, `None` where the estimator was not tracking. A restart leaves a gap of one
     /// image between the intervals.
     pub(super) fn states(self, camera_key: &str) -> Result<Vec<Option<NavigationState>>, CalibrationError> {
         if self.states.iter().all(Option::is_none) {
@@ -73,8 +72,7 @@ impl InitialTrajectory {
     }
 }
 
-/// The trajectory over all images of the static camera. An error of `on_image`, called before each image, ends the
-/// estimation.
+/// Trajectory over all images of the static camera. An error of `on_image`, called before each image, stops it.
 pub(super) fn estimate_trajectory(
     camera: &StaticCamera,
     config: &EstimatorConfig,

@@ -12,7 +12,7 @@ use crate::optimization::{
     CameraPose, ReducedEquations, RelativePose, ReprojectionEquations, RobustLoss, SparsePoseEquations, reprojection,
 };
 
-/// An observation of a landmark in one view.
+/// Observation of a landmark in one view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Observation {
     pub(super) view: ViewId,
@@ -21,7 +21,7 @@ pub(super) struct Observation {
     pub(super) bearing: Vector3<f64>,
 }
 
-/// All observations of one landmark, views ascending.
+/// Observations of one landmark, by ascending view.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Track {
     pub(super) observations: Vec<Observation>,
@@ -31,7 +31,7 @@ pub(super) struct Track {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelModel<'a> {
     pub(super) cameras: [&'a CameraModel; 2],
-    /// Standard deviation of a pixel coordinate of each camera.
+    /// Standard deviation of a pixel coordinate by camera.
     pub(super) sigma_px: [f64; 2],
     pub(super) loss: RobustLoss,
 }
@@ -53,7 +53,7 @@ impl PixelModel<'_> {
         reprojection::residual(camera, &relative, &anchored.landmark, &observation.uv_px)
     }
 
-    /// Sum of the robust squared residuals of all observations, twice the cost.
+    /// Sum of the robust squared residuals of all observations (twice the cost).
     pub(super) fn cost(
         &self,
         poses: &BTreeMap<ViewId, CameraPose>,
@@ -67,7 +67,7 @@ impl PixelModel<'_> {
             };
             track.observations.iter().map(cost).collect::<Vec<f64>>()
         });
-        // Summed in the order of the observations, for any number of threads.
+        // Summed in the order of the observations for any number of threads.
         costs.collect::<Vec<_>>().iter().flatten().fold(0.0, |sum, cost| sum + cost)
     }
 }
@@ -78,7 +78,6 @@ pub(super) type VisualEquations = ReprojectionEquations<SparsePoseEquations<View
 /// [`VisualEquations`] with the landmarks eliminated.
 pub(super) type ReducedVisualEquations = ReducedEquations<SparsePoseEquations<ViewId>>;
 
-/// Linearizes all observations.
 pub(super) fn equations(
     model: &PixelModel<'_>,
     poses: &BTreeMap<ViewId, CameraPose>,

@@ -1,4 +1,4 @@
-//! The estimator: initializing or tracking, and the step from one image to the next.
+//! Estimator: initialization or tracking, and the step from one image to the next.
 
 use super::config::EstimatorConfig;
 use super::report::{Phase, StepReport};
@@ -13,44 +13,38 @@ use super::window::sliding_window::{SlidingWindow, WindowFailure};
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
 
-/// A sliding-window visual-inertial estimator for a camera on a gimbal or a rigid camera, and for further rigid
-/// cameras.
+/// Sliding-window visual-inertial estimator for a camera on a gimbal or a rigid camera, and further rigid cameras.
 ///
-/// It is a plain value: a clone is a snapshot, and the same steps from it give the same bits. [`Estimator::packed`] makes
-/// a smaller one.
+/// It is a plain value: a clone is a snapshot, and equal steps from it give equal bits. [`Estimator::packed`] makes
+/// a smaller snapshot.
 #[derive(Clone, Debug)]
 pub struct Estimator {
     pub(super) setup: Setup,
     pub(super) phase: PhaseState,
-    /// Number of failures of the window.
     pub(super) restarts: usize,
-    /// Last pose before the last failure.
+    /// Last pose before the last failure, `None` if there was none.
     pub(super) resume_at: Option<RigidTransform>,
 }
 
 /// Data of each [`Phase`].
 #[derive(Clone, Debug)]
 pub(super) enum PhaseState {
-    /// No window yet.
     Initializing(Initializer),
-    /// A running window.
     Tracking(Box<SlidingWindow>),
 }
 
 impl Estimator {
-    /// Returns an estimator without images.
     pub fn new(config: EstimatorConfig) -> Self {
         let setup = Setup::new(config);
         let phase = PhaseState::Initializing(Initializer::new(setup.given_calibration(), None));
         Self { setup, phase, restarts: 0, resume_at: None }
     }
 
-    /// Configuration with the changes since its creation.
+    /// Configuration, with all changes since the estimator's creation.
     pub fn config(&self) -> &EstimatorConfig {
         &self.setup.config
     }
 
-    /// Whether it is initializing or tracking.
     pub fn phase(&self) -> Phase {
         match self.phase {
             PhaseState::Initializing(_) => Phase::Initializing,
@@ -69,13 +63,13 @@ impl Estimator {
         self.setup.config.options.keep_factor_rows = true;
     }
 
-    /// Limits the solver's iterations from the next image on; with fewer than a step took, that step stops in
-    /// between.
+    /// Limits the solver's iterations from the next image on. If the limit is smaller than the iterations of a step,
+    /// that step stops early.
     pub fn set_iterations(&mut self, iterations: usize) {
         self.setup.config.options.iterations = iterations;
     }
 
-    /// Estimated chain in the classical form.
+    /// Estimated chain in the classical parameterization.
     pub fn classical_chain(&self) -> ClassicalChain {
         self.calibration().of(MAIN).chain().to_classical()
     }
@@ -124,7 +118,7 @@ impl Estimator {
         self.after(step)
     }
 
-    /// Replaces the initializer by its window.
+    /// Replaces the initializer by the window once it exists.
     fn after(&mut self, step: InitializationStep) -> StepReport {
         match step {
             InitializationStep::Waiting(report) => report,
@@ -136,18 +130,18 @@ impl Estimator {
     }
 }
 
-/// Factor on the standard deviations of a pass that are the prior of the next.
+/// Factor on the standard deviations of a pass when they become the prior of the next.
 ///
 /// Each pass uses the measurements again. With a factor k the information of the last pass is that of the measurements
-/// times 1 + 1/k² + 1/k⁴ + …: with 2 at most 4/3, so that its standard deviations are too small by at most 13 %.
+/// times 1 + 1/k² + 1/k⁴ + …: at most 4/3 for k = 2, so its standard deviations are too small by at most 13 %.
 const SIGMA_FACTOR: f64 = 2.0;
 
 impl Estimator {
-    /// What this estimator has found, as the prior of another pass over the measurements: the calibration with its
-    /// covariance, and the biases at the start of the log, `duration_s` before the newest image. Standard deviations are
-    /// doubled. `None` before the first window, and where the information is not positive definite.
+    /// Prior of another pass over the measurements from the current estimate: calibration with its covariance, and
+    /// biases at the start of the log, `duration_s` before the newest image. Standard deviations are doubled. `None`
+    /// before the first window, and if the information is not positive definite.
     ///
-    /// The intrinsics of the IMU are not among it: they start again at the rig's prior.
+    /// The intrinsics of the IMU are not included: they restart at the rig's prior.
     pub fn findings(&self, duration_s: f64) -> Option<EarlierPass> {
         let PhaseState::Tracking(window) = &self.phase else { return None };
         let covariances = covariances::covariances(&self.setup, &window.state)?;
@@ -155,7 +149,7 @@ impl Estimator {
         let cameras = (0..calibrations.cameras()).map(|camera| {
             let columns = calibrations.columns(camera);
             let covariance = covariances.calibration.view_range(columns.clone(), columns).into_owned();
-            calibrations.of(camera).found(&covariance, SIGMA_FACTOR.powi(-2))
+            calibrations.of(camera).next_pass_prior(&covariance, SIGMA_FACTOR.powi(-2))
         });
         let mean = window.state.frames.newest().state.navigation.bias;
         let sigma = covariances.newest_bias.diagonal().map(|variance| SIGMA_FACTOR * variance.max(0.0).sqrt());

@@ -8,10 +8,9 @@ use super::state::calibrations::MAIN;
 use crate::frontend::FeatureId;
 use crate::gimbal::{ParameterId, Parameterization};
 
-/// Why a change is refused.
+/// Reason to refuse a change.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum InterventionError {
-    /// No such parameter.
     #[error("there is no parameter {0:?} in this parameterization")]
     UnknownParameter(ParameterId),
     /// The calibration is not estimated.
@@ -19,24 +18,20 @@ pub enum InterventionError {
     FixedCalibration,
 }
 
-/// Calibration columns beside the chain that are switched on together.
+/// Calibration columns in addition to the chain that are enabled together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SensorColumns {
-    /// Time offsets of cameras and encoders.
     Timeshift,
     /// Readout times of rolling shutters.
     Readout,
-    /// Intrinsics of the cameras.
     Intrinsics,
-    /// Intrinsics of the IMU.
     ImuIntrinsics,
 }
 
 impl SensorColumns {
-    /// All of them.
     pub const ALL: [Self; 4] = [Self::Timeshift, Self::Readout, Self::Intrinsics, Self::ImuIntrinsics];
 
-    /// Key of a run's specification.
+    /// Key in the specification of a run.
     pub const fn key(self) -> &'static str {
         match self {
             Self::Timeshift => "timeshift",
@@ -48,7 +43,7 @@ impl SensorColumns {
 }
 
 impl Estimator {
-    /// Switches the parameterization of the chain: the calibration stays, and so does its prior, as far as the new
+    /// Switches the parameterization of the chain. The calibration stays; its prior stays as far as the new
     /// columns can represent it.
     pub fn use_parameterization(&mut self, parameterization: Parameterization, auto_parameterize: bool) {
         self.setup.config.auto_parameterize = auto_parameterize;
@@ -66,13 +61,13 @@ impl Estimator {
         }
     }
 
-    /// The parameters of the calibration, estimated or not, in the order of their columns.
+    /// Parameters of the calibration, estimated or not, in column order.
     pub fn parameters(&self) -> Vec<ParameterId> {
         self.calibration().parameters()
     }
 
-    /// Estimates further sensor parameters from the next solve on, starting at the values of the rig; the frames of the window
-    /// and the marginalization prior stay.
+    /// Estimates further sensor parameters from the next solve on, starting at the rig's values; the frames of the
+    /// window and the marginalization prior stay.
     pub fn estimate_sensors(&mut self, columns: SensorColumns) -> Result<(), InterventionError> {
         let config = &mut self.setup.config;
         if !config.calibrate {
@@ -93,14 +88,14 @@ impl Estimator {
         Ok(())
     }
 
-    /// Fixes a parameter at its present value from the next solve on.
+    /// Fixes a parameter at its current value from the next solve on.
     pub fn freeze(&mut self, parameter: ParameterId) -> Result<(), InterventionError> {
         let column = self.free_column(parameter)?;
         self.calibration_mut().freeze(column);
         Ok(())
     }
 
-    /// Sets a parameter to another value; window and priors stay and pull it back.
+    /// Sets a parameter to another value. Window and priors stay and pull it back.
     pub fn set_value(&mut self, parameter: ParameterId, value: f64) -> Result<(), InterventionError> {
         let column = self.free_column(parameter)?;
         let calibration = self.calibration_mut();
@@ -120,7 +115,7 @@ impl Estimator {
         self.setup.config.options.pixel_sigma_px *= factor;
     }
 
-    /// Drops features of a camera; their information in the marginalization prior stays.
+    /// Drops features of a camera; their information stays in the marginalization prior.
     pub fn drop_features(&mut self, camera: usize, dropped: impl Fn(FeatureId) -> bool) {
         match &mut self.phase {
             PhaseState::Initializing(initializer) => initializer.drop_features(camera, &dropped),

@@ -1,4 +1,4 @@
-//! A snapshot of the estimator in a third of its memory: what its numbers are made from instead of the numbers.
+//! Snapshot of the estimator in a third of its memory: stores inputs instead of recomputable numbers.
 
 use super::estimator::{Estimator, PhaseState};
 use super::start::initializer::Initializer;
@@ -7,8 +7,8 @@ use super::window::packed::PackedWindow;
 use super::window::setup::Setup;
 use crate::geometry::RigidTransform;
 
-/// An estimator without what can be computed again to the same bits: integrated IMU intervals, products of the prior.
-/// Measurements are places in the inputs of the steps before.
+/// Estimator without data that can be recomputed to the same bits: integrated IMU intervals, products of the prior.
+/// Measurements are stored as references to the inputs of earlier steps.
 #[derive(Clone, Debug)]
 pub struct PackedEstimator {
     setup: Setup,
@@ -24,7 +24,7 @@ enum PackedPhase {
 }
 
 impl Estimator {
-    /// Packs the estimator. `past` are steps before the next one, the newest last; measurements that are not among them
+    /// Packs the estimator. `past` has the inputs of earlier steps, newest last; measurements that are not among them
     /// are copied.
     pub fn packed(&self, past: &[&dyn StepMeasurements]) -> PackedEstimator {
         let phase = match &self.phase {
@@ -36,7 +36,7 @@ impl Estimator {
 }
 
 impl PackedEstimator {
-    /// The estimator as it was; `past` are the steps that it was packed with.
+    /// Restores the estimator; `past` must be the steps with which it was packed.
     pub fn unpacked(&self, past: &[&dyn StepMeasurements]) -> Estimator {
         let phase = match &self.phase {
             PackedPhase::Initializing(initializer) => PhaseState::Initializing(initializer.clone()),
@@ -45,7 +45,7 @@ impl PackedEstimator {
         Estimator { setup: self.setup.clone(), phase, restarts: self.restarts, resume_at: self.resume_at }
     }
 
-    /// Memory in bytes; data that all snapshots share counts with its inline size.
+    /// Memory use in bytes; data shared by all snapshots counts only with its inline size.
     pub fn bytes(&self) -> usize {
         size_of::<Self>()
             + match &self.phase {

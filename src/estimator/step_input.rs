@@ -1,31 +1,29 @@
-//! Input of one step.
-
 use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::sensors::{ImuSample, JointAngles};
 
-/// Measurements of one image for the estimator.
+/// Measurements of one image as input of the estimator.
 #[derive(Clone, Debug)]
 pub struct StepInput<'a> {
-    /// Number of the image in its camera's stream.
+    /// Index of the image in its camera's stream.
     pub frame_index: usize,
-    /// Header stamp of the image since the log began.
+    /// Header stamp of the image since the start of the log.
     pub stamp_ns: i64,
     /// IMU samples from the previous image's stamp to this one's, both ends included and interpolated.
     pub imu: &'a [ImuSample],
-    /// IMU samples from the stamp on, the first one at the stamp, for the rows of a rolling shutter that are exposed after
-    /// it; empty where no run needs them.
+    /// IMU samples after the stamp (the first one at the stamp) while the rows of a rolling shutter are exposed; empty
+    /// if no run needs them.
     pub imu_after: &'a [ImuSample],
     /// Encoder angles at the stamp with their standard deviations, `None` without encoders.
     pub joint_angles: Option<&'a JointAngles>,
-    /// Tracked features; none where the main camera has no image in this frame set.
+    /// Tracked features of the main camera; empty if it has no image in this frame set.
     pub tracks: &'a TrackedFrame,
     /// Tracked features of [`crate::estimator::EstimatorConfig::rigid_cameras`] in the same frame set, in their
-    /// order; none where an image is missing.
+    /// order; empty where an image is missing.
     pub rigid_tracks: &'a [&'a TrackedFrame],
 }
 
 impl StepInput<'_> {
-    /// Features of a camera by its number, the main camera first.
+    /// Features of a camera; index 0 is the main camera.
     pub(crate) fn features(&self, camera: usize) -> &[TrackedFeature] {
         match camera.checked_sub(1) {
             None => &self.tracks.features,
@@ -33,7 +31,7 @@ impl StepInput<'_> {
         }
     }
 
-    /// Encoder angles of the joints, `None` where one is missing, not finite or without a standard deviation.
+    /// Encoder angles of the joints, `None` if one is missing, not finite or without a standard deviation.
     pub(crate) fn encoder_angles(&self, joints: usize) -> Option<&JointAngles> {
         self.joint_angles.filter(|angles| {
             angles.angles_rad.len() == joints
@@ -45,12 +43,12 @@ impl StepInput<'_> {
     }
 }
 
-/// The measurements of one step, from which a packed estimator takes those of its window again.
+/// Measurements of one step, from which a packed estimator restores those of its window.
 pub trait StepMeasurements {
     /// Stamp of the image, as in [`StepInput`](crate::estimator::StepInput).
     fn stamp_ns(&self) -> i64;
     /// The IMU samples, as in [`StepInput`](crate::estimator::StepInput).
     fn imu(&self) -> &[ImuSample];
-    /// Features of a camera by its number, the main camera first, ordered by id.
+    /// Features of a camera, ordered by id; index 0 is the main camera.
     fn features(&self, camera: usize) -> &[TrackedFeature];
 }

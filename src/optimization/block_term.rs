@@ -1,4 +1,5 @@
-//! Derivatives of one observation by blocks of six unknowns: camera poses, and what all observations of a camera share.
+//! Derivatives of one observation by blocks of six unknowns: camera poses, and a block shared by all observations of a
+//! camera.
 
 use nalgebra::{Matrix2x3, Matrix2x6, Vector2};
 
@@ -6,19 +7,19 @@ use super::Reprojection;
 
 /// Residual of one observation with its derivatives by the landmark and by blocks of six unknowns named by `K`.
 ///
-/// `N` blocks per camera pose: a global shutter has one; a rolling shutter has three, the poses of the first, the middle
-/// and the last row. The intrinsics of a camera are one more block, which all its observations share.
+/// `N` blocks per camera pose: a global shutter has one; a rolling shutter has three, the poses of the first, the
+/// middle and the last row. The intrinsics of a camera are another block, shared by all its observations.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlockTerm<K, const N: usize> {
-    /// Predicted minus measured (2), whitened.
+    /// Predicted minus measured (2 × 1), whitened.
     pub(crate) residual: Vector2<f64>,
-    /// By [`super::Landmark::plus`].
+    /// Derivative by the landmark's step in [`super::Landmark::plus`].
     pub(crate) by_landmark: Matrix2x3<f64>,
-    /// By the blocks of the anchor's camera pose; none in the anchor's own observation.
+    /// Derivatives by the blocks of the anchor's camera pose; `None` in the anchor's own observation.
     pub(crate) anchor: Option<PoseBlocksOf<K, N>>,
-    /// By the blocks of the observing camera pose; none in the anchor's own observation.
+    /// Derivatives by the blocks of the observing camera pose; `None` in the anchor's own observation.
     pub(crate) observer: Option<PoseBlocksOf<K, N>>,
-    /// By the block that all observations share.
+    /// Derivative by the block shared by all observations, `None` without one.
     pub(crate) shared: Option<(K, Matrix2x6<f64>)>,
 }
 
@@ -26,7 +27,7 @@ pub(crate) struct BlockTerm<K, const N: usize> {
 pub(crate) type PoseBlocksOf<K, const N: usize> = [(K, Matrix2x6<f64>); N];
 
 impl<K: Copy + PartialEq> BlockTerm<K, 1> {
-    /// A term with one block per camera pose; the anchor's own observation (`anchor` equals `pose`) has none.
+    /// Term with one block per camera pose; the anchor's own observation (`anchor` equals `pose`) has none.
     pub(crate) fn of_poses(anchor: Option<K>, pose: K, term: &Reprojection) -> Self {
         let apart = anchor != Some(pose);
         Self {
@@ -40,7 +41,7 @@ impl<K: Copy + PartialEq> BlockTerm<K, 1> {
 }
 
 impl<K, const N: usize> BlockTerm<K, N> {
-    /// All blocks with their derivatives.
+    /// Blocks with their derivatives.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = &(K, Matrix2x6<f64>)> + Clone {
         self.anchor.iter().flatten().chain(&self.shared).chain(self.observer.iter().flatten())
     }

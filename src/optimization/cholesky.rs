@@ -1,32 +1,32 @@
-//! Cholesky factorization of a symmetric matrix that leaves out zeros.
+//! Cholesky factorization of a symmetric matrix that skips zeros.
 
 #![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
 
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
 
-/// Columns that are eliminated together: those of the velocity and the biases of a frame.
+/// Number of columns eliminated together: velocity and biases of a frame.
 const PANEL: usize = 9;
 
-/// A lower Cholesky factor `L` of a matrix whose unknowns are eliminated in a given order.
+/// Lower Cholesky factor `L` of a matrix whose unknowns are eliminated in a given order.
 ///
-/// Rows that are zero in all columns of a panel are left out of its elimination: an order that begins with unknowns that
-/// are coupled with few others is cheaper.
+/// Rows that are zero in all columns of a panel are skipped in its elimination: an order that starts with unknowns
+/// coupled with few others is cheaper.
 #[derive(Clone, Debug)]
 pub(crate) struct Cholesky {
-    /// Index in the matrix of each unknown.
+    /// Index in the matrix of each unknown, in the order of elimination.
     order: Vec<usize>,
     /// Column-major, n × n.
     lower: Vec<f64>,
 }
 
 impl Cholesky {
-    /// Factors a symmetric matrix of which the lower triangle is read; `None` when it is not positive definite.
+    /// Factors a symmetric matrix from its lower triangle; `None` when it is not positive definite.
     pub(crate) fn new(matrix: &DMatrix<f64>) -> Option<Self> {
         Self::ordered(matrix, (0..matrix.nrows()).collect(), |diagonal| diagonal)
     }
 
-    /// [`Self::new`] of the unknowns in `order` alone, eliminated in that order, with another diagonal.
+    /// [`Self::new`] for the unknowns in `order` only, eliminated in that order; `diagonal` maps the diagonal entries.
     pub(crate) fn ordered(matrix: &DMatrix<f64>, order: Vec<usize>, diagonal: impl Fn(f64) -> f64) -> Option<Self> {
         let count = order.len();
         let mut places = vec![None; matrix.nrows()];
@@ -59,7 +59,7 @@ impl Cholesky {
         self.order.len()
     }
 
-    /// A column of `L` from the diagonal on.
+    /// Column of `L` from the diagonal on.
     fn column(&self, column: usize) -> &[f64] {
         &self.lower[column * self.count() + column..(column + 1) * self.count()]
     }
@@ -76,7 +76,7 @@ impl Cholesky {
         ordered
     }
 
-    /// Solves `L₂₂ y = b` of the unknowns from `first` on in the order of elimination, in place.
+    /// Solves `L₂₂ y = b` in place for the unknowns from `first` on in the order of elimination.
     fn solve_lower(&self, first: usize, right: &mut [f64]) {
         for column in 0..right.len() {
             let (pivot, below) = self.column(first + column).split_first().expect("a column has its diagonal");
@@ -90,7 +90,7 @@ impl Cholesky {
         }
     }
 
-    /// Solves `L₁₁ᵀ x = b` of the first `count` unknowns in the order of elimination, in place.
+    /// Solves `L₁₁ᵀ x = b` in place for the first `count` unknowns in the order of elimination.
     fn solve_upper(&self, count: usize, right: &mut [f64]) {
         for column in (0..count).rev() {
             let (pivot, below) = self.column(column).split_first().expect("a column has its diagonal");
@@ -99,8 +99,8 @@ impl Cholesky {
         }
     }
 
-    /// Response of the other unknowns to the last `count` ones, `−A₁₁⁻¹ A₁₂`: rows as in the matrix, of which those of the
-    /// last ones and of the unknowns that are not in the order are zero.
+    /// Response of the other unknowns to the last `count` ones, `−A₁₁⁻¹ A₁₂`. Rows are those of the matrix; they are
+    /// zero for the last unknowns and for unknowns that are not in the order.
     pub(crate) fn leading_response(&self, count: usize, rows: usize) -> DMatrix<f64> {
         let first = self.count() - count;
         let mut response = DMatrix::zeros(rows, count);
@@ -117,11 +117,11 @@ impl Cholesky {
         response
     }
 
-    /// Covariance of some unknowns: their block of `(L Lᵀ)⁻¹`, the others marginalized.
+    /// Covariance of some unknowns, the others marginalized: their block of `(L Lᵀ)⁻¹`.
     pub(crate) fn covariance_of(&self, unknowns: impl Iterator<Item = usize>) -> DMatrix<f64> {
         let place = |unknown: usize| self.order.iter().position(|index| *index == unknown);
         let places: Vec<usize> = unknowns.filter_map(place).collect();
-        // L is zero above the diagonal, so that the solution begins at the first of these unknowns.
+        // L is zero above the diagonal, so the solution starts at the first of these unknowns.
         let first = places.iter().min().copied().unwrap_or(0);
         let mut inverse = DMatrix::zeros(self.count() - first, places.len());
         for (mut column, place) in inverse.column_iter_mut().zip(&places) {
@@ -131,21 +131,21 @@ impl Cholesky {
         inverse.tr_mul(&inverse)
     }
 
-    /// Length of a step of the last `count` unknowns in standard deviations, the others marginalized: `‖L₂₂ᵀ x₂‖` with `x`
-    /// as in the matrix.
+    /// Length of a step of the last `count` unknowns in standard deviations, the others marginalized: `‖L₂₂ᵀ x₂‖`.
+    /// `step` is ordered as in the matrix.
     pub(crate) fn trailing_length(&self, count: usize, step: &DVector<f64>) -> f64 {
         let first = self.count() - count;
         let last: Vec<f64> = self.order[first..].iter().map(|index| step[*index]).collect();
         (0..count).map(|place| dot(self.column(first + place), &last[place..]).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Covariance of the last `count` unknowns: `(L₂₂ L₂₂ᵀ)⁻¹`, the others marginalized.
+    /// Covariance of the last `count` unknowns, the others marginalized: `(L₂₂ L₂₂ᵀ)⁻¹`.
     pub(crate) fn trailing_covariance(&self, count: usize) -> DMatrix<f64> {
         self.covariance_of(self.order[self.count() - count..].iter().copied())
     }
 }
 
-/// Product of two vectors, the longer one cut off.
+/// Scalar product over the length of the shorter vector.
 fn dot(left: &[f64], right: &[f64]) -> f64 {
     const SUMS: usize = 8;
     let count = left.len().min(right.len());
@@ -162,7 +162,7 @@ fn dot(left: &[f64], right: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
-/// The factorization in place, compiled for every width of vector registers; `false` when a pivot is not positive.
+/// In-place factorization, compiled for every width of vector registers; `false` when a pivot is not positive.
 struct Factorization<'a> {
     lower: &'a mut [f64],
     count: usize,
@@ -175,9 +175,9 @@ impl WithSimd for Factorization<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> bool {
         let Self { lower, count } = self;
         let mut panel = Vec::new();
-        // Sums of the absolute entries of each row in the panel.
+        // Sum of the absolute entries of each row in the panel.
         let mut sizes = Vec::new();
-        // Consecutive rows with entries in the panel: the first one, and the one behind the last one.
+        // Runs of consecutive rows with entries in the panel: first row and end row (exclusive).
         let mut runs: Vec<(usize, usize)> = Vec::new();
         let mut begin = 0;
         while begin < count {
@@ -227,7 +227,7 @@ impl WithSimd for Factorization<'_> {
                     place += target.len();
                 }
             }
-            // The rows behind the panel, minus its products.
+            // Subtract the products of the panel from the rows after it.
             let mut place = width;
             for (index, (first, end)) in runs.iter().enumerate() {
                 for column in (begin + width).max(*first)..*end {
@@ -252,13 +252,13 @@ impl WithSimd for Factorization<'_> {
     }
 }
 
-/// Factors the columns of a panel, of which the first rows are those of the diagonal.
+/// Factors the columns of a panel; its first rows are those of the diagonal.
 #[inline(always)]
 fn factor_panel(panel: &mut [f64], height: usize, width: usize) -> bool {
     for column in 0..width {
         let (own, later) = panel[column * height..].split_at_mut(height);
         let pivot = own[column];
-        // A pivot that is not a number is not positive either.
+        // A NaN pivot is rejected too.
         if !(pivot > 0.0 && pivot.is_finite()) {
             return false;
         }
@@ -279,7 +279,7 @@ fn factor_panel(panel: &mut [f64], height: usize, width: usize) -> bool {
     true
 }
 
-/// Takes the products of a panel's rows from `source` on with the factors off some rows of a column.
+/// Subtracts the products of a panel's rows from `source` on with the factors from the rows `target` of a column.
 #[inline(always)]
 fn subtract<S: Simd>(simd: S, target: &mut [f64], panel: &[f64], height: usize, source: usize, factors: &[f64; PANEL]) {
     let count = target.len();
@@ -292,7 +292,7 @@ fn subtract<S: Simd>(simd: S, target: &mut [f64], panel: &[f64], height: usize, 
         weights[k] = simd.splat_f64s(-factors[k]);
     }
     for (place, vector) in vectors.iter_mut().enumerate() {
-        // Two sums: each product waits for the one before it in the same sum.
+        // Two independent sums, because each multiply-add depends on the previous one of the same sum.
         let mut sum = *vector;
         let mut other = simd.splat_f64s(0.0);
         for k in 0..PANEL / 2 {

@@ -1,26 +1,24 @@
-//! Levenberg–Marquardt with Marquardt's scaling: `(H + λ diag H) δ = −g`, `λ` lowered after a step that lowers the cost and
-//! raised after one that does not.
+//! Levenberg–Marquardt with Marquardt's scaling: `(H + λ diag H) δ = −g`. `λ` decreases after a step that lowers the
+//! cost and increases after one that does not.
 
-/// A least-squares problem whose normal equations can be damped.
+/// Least-squares problem whose normal equations can be damped.
 pub(crate) trait DampedProblem {
-    /// Values of all unknowns.
     type Estimate;
-    /// The problem linearized at an estimate.
+    /// Normal equations at an estimate.
     type Equations;
 
-    /// The cost, in any unit.
     fn cost(&self, estimate: &Self::Estimate) -> f64;
 
-    /// Linearizes at an estimate; the equations are reused for every damping.
+    /// Linearizes at an estimate; the equations are reused for all dampings.
     fn linearize(&self, estimate: &Self::Estimate) -> Self::Equations;
 
-    /// Whether the last step is short enough to be the last one: the cost hardly tells of unknowns that the measurements
-    /// determine weakly.
+    /// True if the last step is short enough for the solver to stop: the cost is insensitive to weakly determined
+    /// unknowns.
     fn is_settled(&self) -> bool {
         true
     }
 
-    /// The estimate after the step damped by `λ`, `None` when the damped equations are singular.
+    /// Estimate after the step damped by `λ`, `None` when the damped equations are singular.
     fn step(&mut self, estimate: &Self::Estimate, equations: &Self::Equations, damping: f64) -> Option<Self::Estimate>;
 }
 
@@ -29,38 +27,36 @@ pub(crate) trait DampedProblem {
 pub(crate) struct DampedOptions {
     /// Largest number of tried steps, accepted or not.
     pub(crate) iterations: usize,
-    /// Converged when a step lowers the cost by no more than this ratio of it and the problem
+    /// Convergence threshold: a step lowers the cost by no more than this fraction and the problem
     /// [is settled](DampedProblem::is_settled).
     pub(crate) relative_cost_tolerance: f64,
     /// λ of the first step.
     pub(crate) first_damping: f64,
-    /// Smallest λ.
     pub(crate) min_damping: f64,
     /// λ at which the solver stops.
     pub(crate) max_damping: f64,
-    /// λ grows by this factor after a rejected step and when the equations are singular.
+    /// Factor on λ after a rejected step or singular equations.
     pub(crate) growth: f64,
 }
 
-/// λ shrinks by this factor after an accepted step.
+/// Factor on λ after an accepted step.
 const SHRINKAGE: f64 = 0.1;
-/// A step that raises the cost by no more than this ratio of it was rejected because of rounding alone.
+/// Relative increase of the cost up to which a step is rejected because of rounding only.
 const ROUNDING: f64 = 1e-9;
 
-/// Reason for which the solver stopped.
+/// Reason why the solver stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum StopReason {
     /// The last step lowered the cost by less than the tolerance, and the problem is settled.
     Converged,
-    /// The last step changed the cost by no more than rounding.
+    /// The last step changed the cost only by rounding.
     Rounding,
-    /// No step lowers the cost, however damped.
+    /// No step lowers the cost, even with the largest damping.
     DampingLimit,
-    /// All iterations were used.
+    /// The iterations are used up.
     IterationLimit,
 }
 
-/// One step tried.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Iteration {
     pub(crate) cost_before: f64,
@@ -69,13 +65,12 @@ pub(crate) struct Iteration {
     pub(crate) accepted: bool,
 }
 
-/// Last estimate.
 #[derive(Clone, Debug)]
 pub(crate) struct DampedSolution<E> {
     pub(crate) estimate: E,
-    /// Steps whose equations were solved, in order.
+    /// Steps with solvable equations, in order.
     pub(crate) iterations: Vec<Iteration>,
-    /// Steps tried, those with singular equations included.
+    /// Number of tried steps, including those with singular equations.
     pub(crate) tried: usize,
     pub(crate) stop: StopReason,
 }

@@ -1,5 +1,5 @@
 //! Elimination of a landmark by QR: the rows of its observations are projected orthogonally onto the complement of the
-//! landmark's columns, no normal equations are formed, so that what is exactly unobservable stays exactly so.
+//! landmark's columns. No normal equations are formed, so exactly unobservable directions stay exactly unobservable.
 
 #![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
 
@@ -10,48 +10,48 @@ use pulp::{Arch, NullaryFnOnce};
 
 use super::BlockTerm;
 
-/// Columns of a landmark.
+/// Number of columns of a landmark.
 const LANDMARK: usize = 3;
-/// Columns before those of the blocks: the landmark's and the residual.
+/// Number of columns before the blocks: landmark and residual.
 const LEADING: usize = LANDMARK + 1;
-/// Columns of a block.
+/// Number of columns of a block.
 const BLOCK: usize = 6;
-/// Rows of an observation.
+/// Number of rows of an observation.
 const OBSERVATION: usize = 2;
-/// A column of the landmark depends on those before it when no more than this fraction of it is independent.
+/// A column of the landmark depends on the previous ones when no more than this fraction of it is independent.
 const DEPENDENT: f64 = 1e-12;
 
-/// The whitened rows of one landmark's observations, `[landmark 3 | residual 1 | anchor | shared | observers]`, six columns
-/// a block: of the blocks only those that its observations depend on.
+/// Whitened rows of one landmark's observations, `[landmark 3 | residual 1 | anchor | shared | observers]`, six columns
+/// per block, with only those blocks on which its observations depend.
 ///
-/// The landmark is eliminated from one observation after the other: the rows that an observation adds depend on the blocks
-/// of the observations up to this one only, and are conditioned on the landmark's posterior from those before.
+/// The landmark is eliminated observation by observation: the rows that an observation adds depend only on the blocks
+/// of the observations up to this one, and are conditioned on the landmark's posterior from the previous ones.
 #[derive(Debug, Default)]
 pub(crate) struct LandmarkRows {
     /// Row-major.
     entries: Vec<f64>,
     width: usize,
-    /// The blocks of columns: the anchor's, the shared one, then those of the observers.
+    /// Blocks of columns: anchor, shared block, observers.
     blocks: Vec<usize>,
-    /// Number of blocks before those of the observers.
+    /// Number of blocks before the observers'.
     common: usize,
-    /// By observation, in order.
+    /// Added rows by observation, in order.
     added: Vec<AddedRows>,
     products: Vec<f64>,
 }
 
-/// The rows that an observation adds.
+/// Rows that an observation adds.
 #[derive(Clone, Debug)]
 struct AddedRows {
-    /// After the elimination; the landmark still fills the rows behind those of the last observation.
+    /// Row range; after the elimination, the rows of the landmark follow those of the last observation.
     rows: Range<usize>,
-    /// How many of the blocks they depend on.
+    /// Number of leading blocks on which the rows depend.
     blocks: usize,
 }
 
 impl LandmarkRows {
-    /// A landmark without rows yet, with the blocks of its anchor, the block that all observations share, and room for so
-    /// many blocks of observers.
+    /// Starts a landmark without rows: blocks of its anchor, the block shared by all observations, and space for
+    /// `observers` blocks.
     pub(crate) fn begin(&mut self, anchor: impl IntoIterator<Item = usize>, shared: Option<usize>, observers: usize) {
         self.blocks.clear();
         self.blocks.extend(anchor);
@@ -62,7 +62,6 @@ impl LandmarkRows {
         self.width = LEADING + BLOCK * (self.common + observers);
     }
 
-    /// Adds the two rows of an observation.
     pub(crate) fn push<const N: usize>(&mut self, term: &BlockTerm<usize, N>) {
         let observers = self.blocks.len();
         self.blocks.extend(term.observer.iter().flatten().map(|(block, _)| *block));
@@ -93,23 +92,22 @@ impl LandmarkRows {
         self.added.push(AddedRows { rows: height - OBSERVATION..height, blocks: self.blocks.len() });
     }
 
-    /// The last block of the newest observation, `None` before any but the anchor's.
+    /// Last block of the newest observation, `None` if only the anchor has been added.
     pub(crate) fn last_observer(&self) -> Option<usize> {
         self.blocks[self.common..].last().copied()
     }
 
-    /// Eliminates the landmark from all rows.
     pub(crate) fn eliminate(&mut self) {
         Arch::new().dispatch(Elimination(self));
     }
 
-    /// The rows of each observation without the landmark, with the blocks that they depend on; after the elimination.
+    /// Rows of each observation after the elimination, with the blocks on which they depend.
     pub(crate) fn added(&self) -> impl DoubleEndedIterator<Item = (Range<usize>, &[usize])> {
         self.added.iter().map(|added| (added.rows.clone(), &self.blocks[..added.blocks]))
     }
 
-    /// Appends some rows, row-major, as `[blocks, 6 columns each | residual]` of `width` columns; `place` is the first column
-    /// of a block.
+    /// Appends the rows of `range`, row-major, as `[blocks, 6 columns each | residual]` of `width` columns; `place`
+    /// returns the first column of a block.
     pub(crate) fn append_to(
         &self,
         rows: &mut Vec<f64>,
@@ -131,13 +129,13 @@ impl LandmarkRows {
     }
 }
 
-/// The elimination of a landmark, compiled for every width of vector registers.
+/// Elimination of a landmark, compiled for every width of vector registers.
 struct Elimination<'a>(&'a mut LandmarkRows);
 
 impl NullaryFnOnce for Elimination<'_> {
     type Output = ();
 
-    /// Householder reflections of the rows that the landmark fills so far and of those of the next observation.
+    /// Applies Householder reflections to the landmark's rows so far together with those of the next observation.
     #[inline(always)]
     fn call(self) {
         let LandmarkRows { entries, width, added, products, .. } = self.0;
@@ -166,14 +164,14 @@ impl NullaryFnOnce for Elimination<'_> {
                     break;
                 }
             }
-            // The rows of the landmark go right before those of the next observation.
+            // Move the landmark's rows directly before those of the next observation.
             part.rotate_left(filled * width);
             *rows = begin..rows.end - filled;
         }
     }
 }
 
-/// Reflects some rows so that a column becomes zero below the first one; `norm` is that of the column.
+/// Reflects rows so that a column becomes zero below the first one; `norm` is the norm of the column.
 #[inline(always)]
 fn reflect(rows: &mut [f64], width: usize, columns: usize, column: usize, norm: f64, products: &mut Vec<f64>) {
     // I − v·vᵀ / (norm·|v₀|)

@@ -1,10 +1,10 @@
-//! What every least-squares problem here shares: landmark and reprojection residual with their Jacobians, robust loss,
+//! Shared parts of all least-squares problems: landmark and reprojection residual with their Jacobians, robust loss,
 //! elimination of landmarks, damped solver.
 //!
-//! Residuals are predicted minus measured; poses are perturbed by the rule of [`crate::geometry`]. A problem keeps its own
-//! unknowns and its own assembly: it linearizes observations by camera poses here (`reprojection`), eliminates the
-//! landmarks by QR (`LandmarkRows`) or by the Schur complement (`ReprojectionEquations`), carries the result on to its
-//! unknowns, and hands itself to `damped::minimize`.
+//! Residuals are predicted minus measured; poses are perturbed by the rule of [`crate::geometry`]. A problem has
+//! separate unknowns and assembly: it linearizes observations by camera poses here (`reprojection`), eliminates the
+//! landmarks by QR (`LandmarkRows`) or by the Schur complement (`ReprojectionEquations`), converts the result to its
+//! unknowns, and is solved by `damped::minimize`.
 
 mod block_term;
 mod cholesky;

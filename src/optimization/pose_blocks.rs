@@ -2,7 +2,7 @@ use nalgebra::{DMatrix, DVector, Matrix6};
 
 use super::BlockTerm;
 
-/// A symmetric matrix over camera poses, its upper 6 × 6 blocks stored row by row: `(0,0) (0,1) … (1,1) …`.
+/// Symmetric matrix over camera poses; its upper 6 × 6 blocks are stored row by row: `(0,0) (0,1) … (1,1) …`.
 #[derive(Clone, Debug)]
 pub(crate) struct PoseBlocks {
     frames: usize,
@@ -10,7 +10,6 @@ pub(crate) struct PoseBlocks {
 }
 
 impl PoseBlocks {
-    /// Zeros.
     pub(crate) fn new(frames: usize) -> Self {
         Self { frames, blocks: vec![Matrix6::zeros(); frames * (frames + 1) / 2] }
     }
@@ -20,17 +19,17 @@ impl PoseBlocks {
         row * (2 * self.frames + 1 - row) / 2 + column - row
     }
 
-    /// The block of two camera poses, `row ≤ column`.
+    /// Block of two camera poses, `row ≤ column`.
     pub(crate) fn block(&self, row: usize, column: usize) -> &Matrix6<f64> {
         &self.blocks[self.index(row, column)]
     }
 
-    /// The block of two camera poses in either order.
+    /// Block of two camera poses in either order.
     pub(crate) fn symmetric_block(&self, row: usize, column: usize) -> Matrix6<f64> {
         if row <= column { *self.block(row, column) } else { self.block(column, row).transpose() }
     }
 
-    /// [`Self::block`] to be changed.
+    /// Mutable [`Self::block`].
     pub(crate) fn block_mut(&mut self, row: usize, column: usize) -> &mut Matrix6<f64> {
         let index = self.index(row, column);
         &mut self.blocks[index]
@@ -51,7 +50,7 @@ impl PoseBlocks {
         }
     }
 
-    /// The diagonal of `CᵀAC` for the columns `C` that move the camera poses, one 6 × n matrix a pose.
+    /// Diagonal of `CᵀAC` for columns `C` that move the camera poses, a 6 × n matrix per pose.
     pub(crate) fn squared_norms(&self, columns: &[DMatrix<f64>]) -> DVector<f64> {
         let count = columns.first().map_or(0, DMatrix::ncols);
         let mut norms = DVector::zeros(count);

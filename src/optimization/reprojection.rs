@@ -1,4 +1,4 @@
-//! The reprojection residual of one observation (Eqs. 9–10) with its Jacobians.
+//! Reprojection residual of one observation (Eqs. 9–10) with its Jacobians.
 //!
 //! With the landmark's bearing `b` and inverse distance `ρ` in the anchor camera `a`, observed by camera `o`:
 //!
@@ -13,7 +13,7 @@
 //!
 //! `Π = ∂π/∂d` (2 × 3), poses are perturbed by the rule of [`crate::geometry`], the landmark by [`Landmark::plus`].
 //! Extrinsics, joint angles and time offsets change a residual only through the poses of the two cameras, parameters of
-//! the camera model only through `π`: [`linearize`] is the one place where a new sensor model adds its derivative.
+//! the camera model only through `π`: [`linearize`] is the only place where a new sensor model adds its derivative.
 
 use nalgebra::{ArrayStorage, Matrix2, Matrix2x3, Matrix2x6, Matrix3, Vector2, Vector3};
 
@@ -21,12 +21,11 @@ use super::{Landmark, RobustLoss};
 use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, tangent_basis};
 
-/// Pose of a camera in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CameraPose {
     /// `world_from_camera`.
     pub(crate) rotation: Matrix3<f64>,
-    /// Its centre in the world, in metres.
+    /// Centre of the camera in the world, in metres.
     pub(crate) position_m: Vector3<f64>,
 }
 
@@ -41,9 +40,9 @@ impl From<RigidTransform> for CameraPose {
 pub(crate) struct RelativePose {
     /// Rotation from the anchor camera to the observing one.
     pub(crate) rotation: Matrix3<f64>,
-    /// The anchor's centre in the observing camera, in metres.
+    /// Centre of the anchor in the observing camera, in metres.
     pub(crate) translation_m: Vector3<f64>,
-    /// Rotation from the world to the observing camera, which the derivatives by positions need.
+    /// Rotation from the world to the observing camera, for the derivatives by positions.
     pub(crate) observer_from_world: Matrix3<f64>,
 }
 
@@ -57,7 +56,7 @@ impl RelativePose {
         }
     }
 
-    /// The landmark in the observing camera, up to the positive factor `inverse_distance`.
+    /// Direction of the landmark in the observing camera, up to the positive factor `inverse_distance`.
     pub(crate) fn direction(&self, landmark: &Landmark) -> Vector3<f64> {
         self.rotation * landmark.bearing + self.translation_m * landmark.inverse_distance
     }
@@ -84,16 +83,16 @@ impl RelativePoses {
     }
 }
 
-/// `π`: what an observation of a direction in the camera would measure.
+/// Projection `π` of a direction in the camera to a measurement.
 pub(crate) trait Projection {
-    /// The prediction, `None` when the camera cannot observe that direction.
+    /// Predicted measurement, `None` when the camera cannot observe the direction.
     fn project(&self, direction: &Vector3<f64>) -> Option<Vector2<f64>>;
 
-    /// The prediction and its derivative by the direction (2 × 3).
+    /// Predicted measurement and its derivative by the direction (2 × 3).
     fn project_with_jacobian(&self, direction: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)>;
 }
 
-/// Pixels.
+/// Projection to pixels.
 impl Projection for CameraModel {
     fn project(&self, direction: &Vector3<f64>) -> Option<Vector2<f64>> {
         self.project(direction)
@@ -104,7 +103,7 @@ impl Projection for CameraModel {
     }
 }
 
-/// Angles in radians about a measured bearing, on the plane tangent to the unit sphere there; the bearing itself is zero.
+/// Projection to angles in radians in the plane tangent to the unit sphere at a measured bearing, which is the origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TangentPlane {
     /// Unit direction in the camera.
@@ -117,7 +116,7 @@ impl TangentPlane {
         Self { bearing, basis: tangent_basis(&bearing).transpose() }
     }
 
-    /// The unit vector along a direction that points to the bearing's side, and its length.
+    /// Unit vector and length of a direction, `None` unless it points to the bearing's side.
     fn ahead(&self, direction: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
         let length = direction.norm();
         (direction.dot(&self.bearing) > 1e-3 * length).then(|| (direction / length, length))
@@ -142,22 +141,21 @@ impl Projection for TangentPlane {
 pub(crate) struct Reprojection {
     /// Predicted minus measured.
     pub(crate) residual: Vector2<f64>,
-    /// By `[φ; δt]` of the anchor's camera pose; zero when the anchor observes itself.
+    /// Derivative by `[φ; δt]` of the anchor's camera pose; zero in the anchor's own observation.
     pub(crate) by_anchor: Matrix2x6<f64>,
-    /// By `[φ; δt]` of the observing camera's pose.
+    /// Derivative by `[φ; δt]` of the observing camera's pose.
     pub(crate) by_observer: Matrix2x6<f64>,
-    /// By [`Landmark::plus`].
+    /// Derivative by the landmark's step in [`Landmark::plus`].
     pub(crate) by_landmark: Matrix2x3<f64>,
 }
 
 impl Reprojection {
-    /// Divided by the standard deviation and multiplied by the root of the robust weight, so that `rᵀr` and `Jᵀr` are those
-    /// of the reweighted problem.
+    /// Division by the standard deviation and multiplication by the root of the robust weight, so that `rᵀr` and `Jᵀr`
+    /// are those of the reweighted problem.
     pub(crate) fn whitened(&self, sigma: f64, loss: RobustLoss) -> Self {
         self.weighted(sigma, self.robust_weight(sigma, loss))
     }
 
-    /// Robust weight of the residual.
     pub(crate) fn robust_weight(&self, sigma: f64, loss: RobustLoss) -> f64 {
         let squared = self.residual.norm_squared() / (sigma * sigma);
         loss.cost_and_weight(squared).1
@@ -176,7 +174,7 @@ impl Reprojection {
     }
 }
 
-/// The residual alone (2), `None` when the camera cannot observe the landmark.
+/// Residual without derivatives (2 × 1), `None` when the camera cannot observe the landmark.
 pub(crate) fn residual(
     projection: &impl Projection,
     relative: &RelativePose,
@@ -187,10 +185,10 @@ pub(crate) fn residual(
     Some(predicted - measured)
 }
 
-/// The residual with its Jacobians.
+/// Residual with its Jacobians, `None` when the camera cannot observe the landmark.
 ///
-/// `relative` holds the current poses; `linearized` the ones at which the derivatives by the poses are taken (first
-/// estimates): the derivative of the projection and the landmark stay at the current estimate, as in Basalt.
+/// `relative` has the current pose; derivatives by the poses are evaluated at `linearized` (first estimates), while the
+/// derivative of the projection and the landmark stay at the current estimate, as in Basalt.
 #[inline]
 pub(crate) fn linearize(
     projection: &impl Projection,
@@ -227,14 +225,14 @@ fn times_hat(rows: &Matrix2x3<f64>, v: &Vector3<f64>) -> Matrix2x3<f64> {
     ]))
 }
 
-/// The columns of one matrix before those of another (2 × 6).
+/// The columns of `left`, then those of `right` (2 × 6).
 #[inline]
 fn beside(left: &Matrix2x3<f64>, right: &Matrix2x3<f64>) -> Matrix2x6<f64> {
     let ([a, b, c], [d, e, f]) = (left.data.0, right.data.0);
     Matrix2x6::from_array_storage(ArrayStorage([a, b, c, d, e, f]))
 }
 
-/// The anchor's own observation of its landmark: only the bearing changes it.
+/// Residual of the anchor's own observation of its landmark, which depends only on the bearing.
 pub(crate) fn linearize_in_anchor(
     projection: &impl Projection,
     landmark: &Landmark,

@@ -1,6 +1,6 @@
 use nalgebra::Vector2;
 
-/// Squared whitened residual of an observation whose landmark its camera cannot observe.
+/// Squared whitened residual of an observation whose landmark the camera cannot observe.
 const UNSEEN_SQUARED: f64 = 1e4;
 
 /// Robust loss ρ on the squared whitened norm `s = ‖r‖²/σ²` of a residual; a problem minimizes `½ Σ ρ(s)`.
@@ -34,40 +34,39 @@ impl RobustLoss {
         }
     }
 
-    /// `ρ` of an observation's residual with standard deviation `sigma`; a point that its camera cannot observe (`None`)
+    /// `ρ` of an observation's residual with standard deviation `sigma`; a point that the camera cannot observe
+    /// (`None`)
     /// costs as much as a residual of 100 standard deviations.
     pub(crate) fn cost_of(self, residual: Option<Vector2<f64>>, sigma: f64) -> f64 {
         self.cost_and_weight(whitened_squared(residual, sigma)).0
     }
 }
 
-/// Squared whitened norm of a residual with standard deviation `sigma`, of one that cannot be observed if `None`.
+/// Squared whitened norm of a residual with standard deviation `sigma`; `None` is a point that cannot be observed.
 fn whitened_squared(residual: Option<Vector2<f64>>, sigma: f64) -> f64 {
     residual.map_or(UNSEEN_SQUARED, |residual| residual.norm_squared() / (sigma * sigma))
 }
 
-/// Sum of [`RobustLoss::cost_of`] over residuals with one standard deviation.
+/// Sum of [`RobustLoss::cost_of`] over residuals with equal standard deviation.
 ///
-/// The logarithms of Cauchy's loss are taken of products, of many residuals at once.
+/// The logarithms of Cauchy's loss are taken of products over many residuals.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LossSum {
     loss: RobustLoss,
     sigma: f64,
     sum: f64,
-    /// Product of `1 + s/c²`, whose logarithm is not in the sum yet.
+    /// Product of the factors `1 + s/c²` whose logarithm is not in the sum yet.
     product: f64,
 }
 
-/// A larger product goes into the sum.
+/// Size above which the logarithm of the product is added to the sum.
 const MAX_PRODUCT: f64 = 1e150;
 
 impl LossSum {
-    /// The sum over no residuals.
     pub(crate) fn new(loss: RobustLoss, sigma: f64) -> Self {
         Self { loss, sigma, sum: 0.0, product: 1.0 }
     }
 
-    /// Adds a residual.
     pub(crate) fn add(&mut self, residual: Option<Vector2<f64>>) {
         let RobustLoss::Cauchy(scale) = self.loss else {
             self.sum += self.loss.cost_of(residual, self.sigma);
@@ -79,7 +78,6 @@ impl LossSum {
         }
     }
 
-    /// The sum.
     pub(crate) fn get(&self) -> f64 {
         let of_product = match self.loss {
             RobustLoss::Cauchy(scale) => scale * scale * self.product.ln(),

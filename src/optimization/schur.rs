@@ -1,15 +1,15 @@
-//! Normal equations of reprojection residuals, the landmarks eliminated by their Schur complement.
+//! Normal equations of reprojection residuals, with elimination of the landmarks by their Schur complement.
 //!
-//! Six columns per camera pose hold whatever a camera observes, however many joints and parameters move it: the landmarks
-//! are eliminated there, and only the result is carried on to the states. A rolling shutter has three poses per image
-//! ([`BlockTerm`]), and the intrinsics of the camera are one more block of six.
+//! The equations have six columns per camera pose, independent of the number of joints and parameters that move it: the
+//! landmarks are eliminated there, and only the result is converted to the states. A rolling shutter has three poses
+//! per image ([`BlockTerm`]), and the intrinsics of the camera are another block of six.
 //!
 //! ```text
 //! [ H_pp  H_pl ] [ δp ]     [ g_p ]        (H_pp − H_pl H_ll⁻¹ H_lp) δp = −(g_p − H_pl H_ll⁻¹ g_l)
 //! [ H_lp  H_ll ] [ δl ] = − [ g_l ]   ⇒    δl = −H_ll⁻¹ (g_l + H_lp δp)
 //! ```
 //!
-//! `H_ll` is block-diagonal, 3 × 3 a landmark.
+//! `H_ll` is block-diagonal, 3 × 3 per landmark.
 
 #![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
 
@@ -23,29 +23,28 @@ use pulp::{Arch, NullaryFnOnce};
 pub(crate) use self::sparse::SparsePoseEquations;
 use super::{BlockTerm, PoseBlocks, Reprojection};
 
-/// Hessian and gradient over camera poses; of the Hessian the blocks `(row, column)` with `row ≤ column`.
+/// Hessian and gradient over camera poses; only the blocks `(row, column)` with `row ≤ column` of the Hessian.
 pub(crate) trait PoseEquations: Clone {
-    /// Names a camera pose.
+    /// Identifier of a camera pose.
     type Pose: Copy + PartialEq;
 
-    /// A block of the Hessian, `row ≤ column`.
+    /// Block of the Hessian, `row ≤ column`.
     fn hessian_mut(&mut self, row: Self::Pose, column: Self::Pose) -> &mut Matrix6<f64>;
 
-    /// The gradient by one pose.
+    /// Gradient by one pose.
     fn gradient_mut(&mut self, pose: Self::Pose) -> &mut Vector6<f64>;
 }
 
-/// Equations that couple (nearly) every pair of poses, as in a window; poses are numbered.
+/// Equations that couple (nearly) every pair of poses, as in a window; poses are numbered from 0.
 #[derive(Clone, Debug)]
 pub(crate) struct DensePoseEquations {
     /// Upper blocks of the Hessian.
     pub(crate) hessian: PoseBlocks,
-    /// By pose.
+    /// Gradient by pose.
     pub(crate) gradient: Vec<Vector6<f64>>,
 }
 
 impl DensePoseEquations {
-    /// Zeros.
     pub(crate) fn new(poses: usize) -> Self {
         Self { hessian: PoseBlocks::new(poses), gradient: vec![Vector6::zeros(); poses] }
     }
@@ -63,28 +62,28 @@ impl PoseEquations for DensePoseEquations {
     }
 }
 
-/// One landmark's part of the normal equations.
+/// Contribution of one landmark to the normal equations.
 #[derive(Clone, Debug)]
 struct LandmarkBlock {
     hessian: Matrix3<f64>,
     gradient: Vector3<f64>,
-    /// Its blocks of `H_pl` among those of all landmarks.
+    /// Range of its blocks of `H_pl` in the list of all landmarks.
     couplings: Range<usize>,
 }
 
-/// A block of `H_pl`.
+/// Block of `H_pl`.
 type Coupling<K> = (K, Matrix6x3<f64>);
 
-/// Normal equations of whitened reprojection residuals: camera poses on one side, landmarks on the other.
+/// Normal equations of whitened reprojection residuals over camera poses and landmarks.
 #[derive(Clone, Debug)]
 pub(crate) struct ReprojectionEquations<P: PoseEquations> {
     poses: P,
     landmarks: Vec<LandmarkBlock>,
-    /// Landmark by landmark, the poses of each rising.
+    /// Blocks of `H_pl`, landmark by landmark, by ascending pose.
     couplings: Vec<Coupling<P::Pose>>,
 }
 
-/// The equations of the camera poses after the landmarks were eliminated.
+/// Equations of the camera poses after elimination of the landmarks.
 #[derive(Clone, Debug)]
 pub(crate) struct ReducedEquations<P> {
     /// Reduced Hessian and gradient.
@@ -94,15 +93,14 @@ pub(crate) struct ReducedEquations<P> {
 }
 
 impl<P: PoseEquations> ReprojectionEquations<P> {
-    /// Equations without a residual, over these poses.
+    /// Equations over these poses, without residuals.
     pub(crate) fn new(poses: P, landmarks: usize) -> Self {
         Self { poses, landmarks: Vec::with_capacity(landmarks), couplings: Vec::new() }
     }
 
-    /// Adds one landmark by the whitened terms of its observations, poses rising.
+    /// Adds one landmark by the whitened terms of its observations, by ascending pose.
     ///
-    /// The anchor, where the landmark has one among the poses, comes before all others; its own term moves the landmark
-    /// only.
+    /// The anchor, if it is among the poses, comes first; its own term constrains only the landmark.
     pub(crate) fn add_landmark(
         &mut self,
         anchor: Option<P::Pose>,
@@ -113,8 +111,8 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         self.add_landmark_by_blocks(anchor.map(|anchor| [anchor]), None, observations, terms);
     }
 
-    /// [`Self::add_landmark`] by terms that may have several blocks: those of the anchor rise and come before those of the
-    /// observers, which rise as well; the shared one comes after all.
+    /// [`Self::add_landmark`] for terms with several blocks: the anchor's in ascending order, then the observers' in
+    /// ascending order, then the shared one.
     pub(crate) fn add_landmark_by_blocks<const N: usize>(
         &mut self,
         anchor: Option<[P::Pose; N]>,
@@ -127,7 +125,7 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
             LandmarkBlock { hessian: Matrix3::zeros(), gradient: Vector3::zeros(), couplings: first..first };
         self.couplings.reserve(N + observations + 1);
         self.couplings.extend(anchor.iter().flatten().map(|pose| (*pose, Matrix6x3::zeros())));
-        // The anchor's blocks and the shared one have a part of nearly every term: summed here first.
+        // Nearly every term contributes to the anchor's blocks and the shared one: these are summed here first.
         let mut of_anchor = [CommonBlock::<N>::ZERO; N];
         let mut of_shared = CommonBlock::<N>::ZERO;
         for term in terms {
@@ -181,7 +179,7 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         self.landmarks.push(block);
     }
 
-    /// Eliminates the landmarks, the diagonals of their blocks raised by the factor `1 + damping`.
+    /// Eliminates the landmarks, after multiplication of the diagonals of their blocks by `1 + damping`.
     pub(crate) fn eliminate(&self, damping: f64) -> ReducedEquations<P> {
         let mut reduced =
             ReducedEquations { poses: self.poses.clone(), inverses: Vec::with_capacity(self.landmarks.len()) };
@@ -201,7 +199,7 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
         reduced
     }
 
-    /// Steps of the landmarks that belong to steps `[φ; δt]` of the camera poses.
+    /// Steps of the landmarks for steps `[φ; δt]` of the camera poses.
     pub(crate) fn substitute(
         &self,
         reduced: &ReducedEquations<P>,
@@ -221,14 +219,15 @@ impl<P: PoseEquations> ReprojectionEquations<P> {
     }
 }
 
-/// What the elimination of a landmark takes off the equations of the poses, compiled for every width of vector registers.
+/// Subtraction of one landmark's contribution from the equations of the poses, compiled for every width of vector
+/// registers.
 struct Elimination<'a, P: PoseEquations> {
     poses: &'a mut P,
     gradient: &'a Vector3<f64>,
     couplings: &'a [Coupling<P::Pose>],
     /// Inverse of the landmark's block.
     inverse: &'a Matrix3<f64>,
-    /// Couplings times that inverse.
+    /// Couplings times `inverse`.
     weighted: &'a mut Vec<Matrix6x3<f64>>,
 }
 
@@ -249,7 +248,7 @@ impl<P: PoseEquations> NullaryFnOnce for Elimination<'_, P> {
     }
 }
 
-/// Sums over the terms of a landmark for a block that most of them have: one of its anchor's, or the shared one.
+/// Sums over the terms of a landmark for a block that most of them have: one of the anchor's, or the shared one.
 #[derive(Clone, Copy)]
 struct CommonBlock<const N: usize> {
     gradient: Vector6<f64>,
@@ -274,7 +273,7 @@ impl<const N: usize> CommonBlock<N> {
     }
 }
 
-/// Adds `leftᵀ · right` to `block`, without a matrix in between.
+/// Adds `leftᵀ · right` to `block`, without a temporary matrix.
 fn add_product(block: &mut Matrix6<f64>, left: &Matrix2x6<f64>, right: &Matrix2x6<f64>) {
     for (target, [x, y]) in block.data.0.iter_mut().zip(&right.data.0) {
         for (entry, [a, b]) in target.iter_mut().zip(&left.data.0) {
@@ -283,7 +282,7 @@ fn add_product(block: &mut Matrix6<f64>, left: &Matrix2x6<f64>, right: &Matrix2x
     }
 }
 
-/// A coupling times the inverse of its landmark's block.
+/// Coupling times the inverse of its landmark's block.
 #[inline(always)]
 fn times_inverse(coupling: &Matrix6x3<f64>, inverse: &Matrix3<f64>) -> Matrix6x3<f64> {
     let [a, b, c] = &coupling.data.0;
@@ -297,7 +296,7 @@ fn times_inverse(coupling: &Matrix6x3<f64>, inverse: &Matrix3<f64>) -> Matrix6x3
     Matrix6x3::from_array_storage(ArrayStorage(product))
 }
 
-/// Takes `left · rightᵀ` off `block`, without a matrix in between: most of an elimination's time goes here.
+/// Subtracts `left · rightᵀ` from `block` without a temporary matrix; an elimination spends most of its time here.
 #[inline(always)]
 fn subtract_product(block: &mut Matrix6<f64>, left: &Matrix6x3<f64>, right: &Matrix6x3<f64>) {
     let [a, b, c] = &left.data.0;
@@ -309,7 +308,7 @@ fn subtract_product(block: &mut Matrix6<f64>, left: &Matrix6x3<f64>, right: &Mat
     }
 }
 
-/// The inverse of a landmark's block with its diagonal raised; directions without information get no step.
+/// Inverse of a landmark's damped block; directions without information get no step.
 fn damped_inverse(hessian: &Matrix3<f64>, damping: f64) -> Matrix3<f64> {
     let mut damped = *hessian;
     let floor = 1e-9 * hessian.trace().max(1e-6);

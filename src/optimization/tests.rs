@@ -41,7 +41,8 @@ fn cameras() -> Vec<CameraModel> {
     .collect()
 }
 
-/// Every column of the Jacobians against central differences; `tolerance` is absolute, in the unit of the projection.
+/// Compares every column of the Jacobians with central differences; `tolerance` is absolute, in the unit of the
+/// projection.
 fn check_jacobians(random: &mut SplitMix64, projection: &impl Projection, measured: &Vector2<f64>, tolerance: f64) {
     const STEP: f64 = 1e-6;
     let (anchor, observer) = (pose(random), pose(random));
@@ -181,7 +182,7 @@ fn elimination_by_qr_equals_the_schur_complement() {
 struct Valley {
     /// Length of the last step.
     moved: f64,
-    /// Longest step that may be the last one.
+    /// Largest length of a step at which the solver may stop.
     longest_last: Option<f64>,
 }
 
@@ -220,7 +221,7 @@ const VALLEY_OPTIONS: DampedOptions = DampedOptions {
     growth: 10.0,
 };
 
-/// A usual start in the valley, far from its minimum at `(1, 1)`.
+/// Usual start in the valley, far from its minimum at `(1, 1)`.
 fn valley_start() -> Vector2<f64> {
     Vector2::new(-1.2, 1.0)
 }

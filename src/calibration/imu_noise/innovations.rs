@@ -1,12 +1,13 @@
 //! Residuals of IMU factors with their degrees of freedom.
 //!
-//! Residuals after the fit are smaller than their noise, because the states follow the samples. With whitened rows `J` of the
-//! factors, posterior covariance `P` of the window (all factors and priors) and true noise densities, their covariance is
-//! `R = I − J P Jᵀ`; the degrees of freedom of some rows are the trace of their block (the redundancy numbers of Förstner and
-//! Baarda). Prediction errors of the newest frame instead would also hold the error of its images.
+//! Residuals after the fit are smaller than their noise, because the states fit the samples. With whitened rows `J` of
+//! the factors, posterior covariance `P` of the window (all factors and priors) and true noise densities, their
+//! covariance is `R = I − J P Jᵀ`. The degrees of freedom of some rows are the trace of their block (the redundancy
+//! numbers of Förstner and Baarda). Prediction errors of the newest frame would also contain the error of its images.
 //!
-//! The square root of the information is lower triangular in the order rotation, position, velocity, biases: the first three
-//! rows are the gyroscope's noise alone, the next six the accelerometer's given those, and the last six the random walks.
+//! The square root of the information is lower triangular in the order rotation, position, velocity, biases: the first
+//! three rows depend on the gyroscope's noise only, the next six on the accelerometer's given the former, and the last
+//! six on the random walks.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -16,28 +17,27 @@ use nalgebra::DMatrix;
 use crate::estimator::{FactorRows, FrameId, JacobianFactor, StepReport};
 use crate::optimization::Cholesky;
 
-/// Rows of an IMU factor.
+/// Number of rows of an IMU factor.
 const ROWS: usize = 15;
-/// Added to the diagonal of the information, as in the solver: unknowns without a factor do not move.
+/// Addition to the diagonal of the information, as in the solver, so that unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
-/// Frames at either end of a window that are less well known.
+/// Number of frames at either end of a window that are excluded because they are less certain.
 const EDGE_FRAMES: usize = 3;
 
-/// A noise density of a rig.
+/// Noise density of a rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoiseDensity {
     /// White noise of the gyroscope.
     Gyroscope,
     /// White noise of the accelerometer.
     Accelerometer,
-    /// Random walk of the gyroscope's bias.
+    /// Random walk of the gyroscope bias.
     GyroscopeWalk,
-    /// Random walk of the accelerometer's bias.
+    /// Random walk of the accelerometer bias.
     AccelerometerWalk,
 }
 
 impl NoiseDensity {
-    /// All four.
     pub const ALL: [Self; 4] = [Self::Gyroscope, Self::Accelerometer, Self::GyroscopeWalk, Self::AccelerometerWalk];
 
     /// Key in the rig's `imu0`.
@@ -50,7 +50,6 @@ impl NoiseDensity {
         }
     }
 
-    /// Its unit.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Gyroscope => "rad/s/√Hz",
@@ -77,31 +76,28 @@ impl NoiseDensity {
 /// Sums over the residuals of one density.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Sums {
-    /// Squared whitened residuals.
     pub(super) chi2: f64,
-    /// Their degrees of freedom.
+    /// Degrees of freedom of the residuals.
     pub(super) freedom: f64,
-    /// `tr(R R)` over its rows: twice the Fisher information of the logarithm of the variance.
+    /// `tr(R R)` over the rows: twice the Fisher information of the logarithm of the variance.
     pub(super) information: f64,
 }
 
-/// What was summed up over a run.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Innovations {
-    /// In the order of [`NoiseDensity::ALL`].
+    /// Sums in the order of [`NoiseDensity::ALL`].
     pub(super) sums: [Sums; 4],
     /// Weighted squared residuals of the observations, and their degrees of freedom.
     pub(super) visual: (f64, f64),
     /// First and last stamp of the intervals.
     pub(super) span_ns: Option<(i64, i64)>,
-    /// Number and length of the intervals.
     pub(super) intervals: usize,
     pub(super) length_ns: i64,
     seen: BTreeSet<FrameId>,
 }
 
 impl Innovations {
-    /// Takes the intervals of the step's window that have images on both sides; each interval counts once.
+    /// Adds the intervals of the step's window that have images on both sides; each interval counts once.
     pub(super) fn take(&mut self, report: &StepReport) -> Option<()> {
         let window = &report.window;
         let inner = EDGE_FRAMES..window.len().saturating_sub(EDGE_FRAMES);
@@ -142,7 +138,7 @@ impl Innovations {
 
     fn take_interval(&mut self, cholesky: &Cholesky, columns: usize, factors: &[&FactorRows], number: FrameId) {
         let Some(own) = factors.iter().position(|rows| ends_at(rows, number)) else { return };
-        // Columns of fixed parameters come first and are no columns of the linearization.
+        // Columns of fixed parameters come first and are missing in the linearization.
         let jacobian = |rows: &FactorRows| rows.rows.columns(rows.rows.ncols() - 1 - columns, columns).into_owned();
         let of_interval = jacobian(factors[own]);
         let mut gains = DMatrix::zeros(columns, ROWS);
@@ -153,7 +149,7 @@ impl Innovations {
         for (density, sums) in NoiseDensity::ALL.into_iter().zip(&mut self.sums) {
             let rows = density.rows();
             for (index, other) in factors.iter().enumerate() {
-                // Blocks of R between its rows of this interval and of all intervals.
+                // Block of R between the density's rows of this interval and those of `other`.
                 let mut block = -(jacobian(other).rows_range(rows.clone()) * gains.columns_range(rows.clone()));
                 if index == own {
                     block += DMatrix::identity(rows.len(), rows.len());
@@ -167,8 +163,8 @@ impl Innovations {
         self.intervals += 1;
     }
 
-    /// Observations of the window: each landmark takes three of their degrees of freedom, the states take what their rows
-    /// with the landmarks projected out contribute.
+    /// Adds the observations of the window. Each landmark reduces their degrees of freedom by three, the states by the
+    /// leverage of their rows after elimination of the landmarks.
     fn take_observations(&mut self, report: &StepReport, cholesky: &Cholesky, rows: &DMatrix<f64>) {
         let leverage: f64 = rows
             .row_iter()

@@ -1,9 +1,9 @@
-//! Noise densities of an IMU fitted to a flight.
+//! Fit of the noise densities of an IMU to a flight.
 //!
-//! The estimator runs over the tracked images; the densities of gyroscope and accelerometer are scaled until the squared
-//! residuals of their factors (NIS) equal their degrees of freedom ([`innovations`]), by Fisher scoring on the logarithm of
-//! each variance: `Δ ln σ² = (χ² − dof) / tr(R R)`. This is the estimation of variance components by restricted maximum
-//! likelihood (Förstner 1979; Koch 1986), and `tr(R R)/2` the information of `ln σ²`.
+//! The estimator runs over the tracked images; the densities of gyroscope and accelerometer are scaled until the
+//! squared residuals of their factors (NIS) equal their degrees of freedom ([`innovations`]), by Fisher scoring on the
+//! logarithm of each variance: `Δ ln σ² = (χ² − dof) / tr(R R)`. This is the estimation of variance components by
+//! restricted maximum likelihood (Förstner 1979; Koch 1986), and `tr(R R)/2` the information of `ln σ²`.
 
 mod innovations;
 #[cfg(test)]
@@ -19,86 +19,80 @@ use crate::geometry::seconds_from_ns;
 use crate::optimization::RobustLoss;
 use crate::sensors::ImuNoise;
 
-/// Largest number of runs.
 const MAX_RUNS: usize = 12;
-/// From this run on random walks are fitted, too.
+/// First run in which random walks are fitted too.
 const FIRST_WALK_RUN: usize = 4;
-/// The densities are found when none changes by more than this part of its standard deviation.
+/// Convergence threshold: change of each density relative to its standard deviation.
 const CONVERGED_SIGMAS: f64 = 0.2;
-/// The same for the noise of the observations, as a ratio.
+/// Convergence threshold: relative change of the noise of the observations.
 const PIXEL_CONVERGED: f64 = 0.02;
 /// Largest change of the logarithm of a variance in one run.
 const LARGEST_STEP: f64 = 2.8;
-/// A density is fitted while its standard deviation is below this part of it.
+/// Relative standard deviation below which a density is fitted.
 const LARGEST_RELATIVE_SIGMA: f64 = 0.5;
-/// Standard deviations of χ² that contradict a density.
+/// Deviation of χ² above which a density is inconsistent, in standard deviations.
 const CONTRADICTION_SIGMAS: f64 = 3.0;
-/// Loss of the observations: quadratic for noise, so that their information is that of their noise, which is fitted, too.
+/// Loss of the observations: quadratic for noise, so that their information is that of their noise, which is fitted
+/// too.
 const LOSS: RobustLoss = RobustLoss::Huber(3.0);
-/// One step in this many is looked at; an interval stays in the window for longer.
+/// Interval of the steps whose residuals are used; an IMU interval stays in the window for longer.
 const STRIDE: usize = 3;
-/// Fewer intervals say nothing.
+/// Smallest number of intervals for a fit.
 const FEWEST_INTERVALS: usize = 20;
 
-/// A density before and after the fit.
+/// Noise density before and after the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FittedDensity {
-    /// Which one.
     pub density: NoiseDensity,
-    /// The given value.
     pub given: f64,
-    /// The value with which the residuals agree with their degrees of freedom; the given one where the flight does not show
+    /// Value at which the residuals agree with their degrees of freedom; the given one if the flight does not constrain
     /// it.
     pub found: f64,
-    /// Standard deviation of it; `None` where the flight does not show it.
+    /// Standard deviation of `found`; `None` if the flight does not constrain it.
     pub sigma: Option<f64>,
     /// Squared whitened residuals per degree of freedom with the given density.
     pub nis_before: f64,
-    /// The same with the density found.
+    /// Squared whitened residuals per degree of freedom with the fitted density.
     pub nis_after: f64,
     /// Degrees of freedom of the residuals after the fit.
     pub degrees_of_freedom: f64,
 }
 
-/// The result of [`fit_imu_noise`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlightNoise {
-    /// In the order of [`NoiseDensity::ALL`].
+    /// Densities in the order of [`NoiseDensity::ALL`].
     pub densities: [FittedDensity; 4],
-    /// Start and end of the intervals that were used, in nanoseconds since the log began.
+    /// Start and end of the used intervals, in nanoseconds since the start of the log.
     pub span_ns: (i64, i64),
     /// Number of intervals between two keyframes.
     pub intervals: usize,
-    /// Their mean length.
+    /// Mean length of the intervals.
     pub mean_interval_s: f64,
-    /// Standard deviation of an observation that the residuals agree with, in pixels.
+    /// Standard deviation of an observation with which the residuals agree, in pixels.
     pub pixel_sigma_px: f64,
-    /// Runs of the estimator.
+    /// Number of runs of the estimator.
     pub runs: usize,
-    /// Whether the last change was smaller than a fifth of each standard deviation.
+    /// True if the last change was smaller than a fifth of each standard deviation.
     pub converged: bool,
 }
 
-/// Why no densities were found.
+/// Reason for the failure of a fit.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ImuNoiseError {
-    /// The estimator never has enough frames with IMU samples between them.
+    /// Too few intervals between keyframes with images on both sides.
     #[error(
         "the estimator has {intervals} intervals between keyframes with images on both sides, {FEWEST_INTERVALS} are needed"
     )]
-    TooShort {
-        /// How many there are.
-        intervals: usize,
-    },
-    /// The caller broke.
+    TooShort { intervals: usize },
     #[error("interrupted")]
     Interrupted,
 }
 
-/// Fits the densities to a flight. `config` has the given ones; `on_progress` is called with a fraction from 0 to 1.
+/// Fits the noise densities to a flight, starting from those of `config`; calls `on_progress` with a fraction from 0 to
+/// 1.
 ///
 /// # Errors
-/// When the flight is too short, or `on_progress` breaks.
+/// If the flight is too short, or if `on_progress` breaks.
 pub fn fit_imu_noise(
     config: &EstimatorConfig,
     views: &[TrackedView],
@@ -125,7 +119,7 @@ pub fn fit_imu_noise(
         config.options.pixel_sigma_px *= pixel_ratio;
         converged = (pixel_ratio - 1.0).abs() < PIXEL_CONVERGED && run >= FIRST_WALK_RUN;
         for (density, sums) in NoiseDensity::ALL.into_iter().zip(&found.sums) {
-            // White noise that is far too small would be taken for a random walk.
+            // White noise that is far too small would be fitted as a random walk.
             let waits = density.is_random_walk() && run < FIRST_WALK_RUN;
             if waits || !is_shown(sums) && (density.is_random_walk() || !is_wrong(sums)) {
                 continue;
@@ -166,12 +160,13 @@ fn variance_sigma(sums: &Sums) -> f64 {
     (2.0 / sums.information.max(1e-9)).sqrt()
 }
 
-/// Whether a flight shows a density to better than half its value.
+/// True if the flight constrains a density to better than half its value.
 fn is_shown(sums: &Sums) -> bool {
     0.5 * variance_sigma(sums) < LARGEST_RELATIVE_SIGMA
 }
 
-/// Whether the residuals contradict a density although the flight hardly shows it, as when it is much too small.
+/// True if the residuals are inconsistent with a density that the flight hardly constrains, for instance a much too
+/// small one.
 fn is_wrong(sums: &Sums) -> bool {
     (sums.chi2 - sums.freedom).abs() > CONTRADICTION_SIGMAS * (2.0 * sums.information).sqrt()
 }
@@ -185,7 +180,6 @@ fn value(noise: &mut ImuNoise, density: NoiseDensity) -> &mut f64 {
     }
 }
 
-/// One run with these densities.
 fn measure(
     config: &EstimatorConfig,
     imu_noise: ImuNoise,

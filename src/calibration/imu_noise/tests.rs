@@ -1,4 +1,4 @@
-//! Densities of synthetic flights, found again from wrong ones.
+//! Fits of synthetic flights with wrong initial densities.
 
 use std::ops::ControlFlow;
 
@@ -8,7 +8,7 @@ use crate::estimator::EstimatorConfig;
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
-/// Standard deviation of encoder readings, which a rigid camera does not have.
+/// Standard deviation of encoder readings; unused for a rigid camera.
 const NO_ENCODERS: f64 = 1.0;
 
 /// Fits a flight of `seconds` whose true densities are those of the rig times `factor`.
@@ -39,8 +39,8 @@ fn densities_of_a_flight_are_found_from_wrong_ones() {
         let (sigma, truth) = (density.sigma.unwrap(), density.given * factor);
         assert!((density.found - truth).abs() < 3.0 * sigma && sigma < 0.6 * truth, "{density:?}, true {truth:.2e}");
     }
-    // The residuals have some 250 degrees of freedom of the gyroscope and a dozen of the accelerometer, whose density is
-    // left where its NIS agrees with 1: two standard deviations.
+    // The residuals have about 250 degrees of freedom of the gyroscope and a dozen of the accelerometer, whose density
+    // is kept if its NIS agrees with 1 within two standard deviations.
     assert!((gyroscope.nis_after - 1.0).abs() < 0.1, "{gyroscope:?}");
     let agrees = 2.0 * (2.0 / accelerometer.degrees_of_freedom).sqrt();
     assert!((accelerometer.nis_after - 1.0).abs() < agrees.min(0.8), "{accelerometer:?}");

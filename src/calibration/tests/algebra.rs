@@ -1,11 +1,11 @@
-//! The bordered band against dense algebra.
+//! Band with border against dense algebra.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::calibration::arrow::ArrowMatrix;
 use crate::geometry::SplitMix64;
 
-/// A positive definite arrow of this shape, dense and stored.
+/// Positive definite arrow matrix of this shape, dense and stored.
 fn example(len: usize, half_width: usize, borders: usize) -> (DMatrix<f64>, ArrowMatrix) {
     let total = len + borders;
     let mut numbers = SplitMix64::new(12345);
@@ -61,7 +61,7 @@ fn check(len: usize, half_width: usize, borders: usize) {
 #[test]
 fn the_bordered_band_solver_equals_dense_algebra() {
     let small = [(1, 0, 0), (5, 4, 0), (40, 7, 3), (33, 16, 1), (20, 100, 4)];
-    // Of several blocks, whole ones and not.
+    // Several blocks, complete and incomplete.
     let large = [(130, 0, 1), (128, 64, 2), (200, 70, 3), (321, 130, 2), (150, 149, 1)];
     for (len, half_width, borders) in small.into_iter().chain(large) {
         check(len, half_width, borders);

@@ -16,7 +16,7 @@ use crate::simulation::{SyntheticMotion, SyntheticOptions};
 
 const STEP: f64 = 1e-6;
 
-/// A short flight whose gimbal images are 50 ms after the static ones, at an estimate away from the ground truth.
+/// Short flight whose gimbal images are 50 ms after the static ones, at an estimate away from the ground truth.
 struct Example {
     flight: Flight,
     frame_sets: Vec<FrameSet>,
@@ -130,7 +130,7 @@ fn view_jacobians_meet_central_differences() {
                 border[k] = step;
                 border
             };
-            // The rotation over the time shift is of first order in the shift.
+            // The rotation over the time offset is accurate to first order in the offset.
             assert!(
                 (slope(&still_band, &border) - map.shared.column(k)).amax()
                     < 2e-2 * map.shared.column(k).amax().max(1e-4),
@@ -146,7 +146,7 @@ fn the_gradient_of_the_whole_bundle_is_that_of_its_cost() {
     let bundle = bundle(&example);
     let columns = &example.columns;
     let equations = bundle.linearize(&example.estimate);
-    // Landmarks that are held by such a damping do not move: what is left is the plain gradient.
+    // A damping of 1e18 fixes the landmarks, so that the plain gradient remains.
     let reduced = equations.visual().eliminate(1e18);
     let (_, band, border) = bundle.assemble(&equations, &reduced, Vec::new());
     let landmarks = vec![Vector3::zeros(); example.estimate.landmarks.len()];
@@ -160,7 +160,7 @@ fn the_gradient_of_the_whole_bundle_is_that_of_its_cost() {
             }
             bundle.cost(&example.estimate.moved(columns, &band, &border, &landmarks))
         };
-        // The bundle's cost is twice the one whose gradient is taken.
+        // The bundle's cost is twice the one with this gradient.
         -(cost(1e-5) - cost(-1e-5)) / (4.0 * 1e-5)
     };
     for column in 0..columns.band() + columns.borders() {

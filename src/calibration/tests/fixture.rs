@@ -9,7 +9,7 @@ use crate::gimbal::{ClassicalChain, Parameterization};
 use crate::sensors::{CameraMount, ChainPrior, Rig};
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
-/// A flight with both cameras and its ground truth.
+/// Flight with both cameras and its ground truth.
 pub(super) struct Flight {
     pub(super) input: CalibrationInput,
     pub(super) true_extrinsics: RigidTransform,
@@ -37,7 +37,7 @@ pub(super) fn mount(rig: &Rig) -> RigidTransform {
     }
 }
 
-/// Tracked images of a flight; without encoders the standard deviation of their readings is not used.
+/// Tracked images of a flight; `encoder_sigma_rad` is unused without encoders.
 pub(in crate::calibration) fn views(flight: &SyntheticFlight, encoder_sigma_rad: f64) -> Vec<TrackedView> {
     flight
         .frames
@@ -52,7 +52,7 @@ pub(in crate::calibration) fn views(flight: &SyntheticFlight, encoder_sigma_rad:
         .collect()
 }
 
-/// The same flight with either camera: one seed gives one trajectory and one series of IMU samples.
+/// The same flight with either camera: equal seeds give equal trajectories and IMU samples.
 pub(super) fn flight(options: &SyntheticOptions) -> Flight {
     let gimbal = synthetic_tracks(&SyntheticOptions { mount: SyntheticMount::Gimbal, ..options.clone() });
     let rigid = synthetic_tracks(&SyntheticOptions { mount: SyntheticMount::Static, ..options.clone() });

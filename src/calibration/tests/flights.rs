@@ -1,4 +1,4 @@
-//! Whole synthetic flights against their ground truth.
+//! Complete synthetic flights against their ground truth.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -70,7 +70,7 @@ fn a_wrong_chain_is_found_within_its_sigmas() {
         let sigmas: Vec<f64> = outcome.parameters.iter().map(|parameter| parameter.sigma).collect();
         of_pixels += normalized_square(&outcome.chain, &sigmas, &flight.true_chain, form) / 3.0;
     }
-    // The parameters of one flight are correlated: they count as a third as many numbers.
+    // The parameters of one flight are correlated: they count as a third of their number.
     let tolerance = 4.0 * (2.0_f64 / (3.0 * 18.0 / 3.0)).sqrt();
     assert!((of_pixels - 1.0).abs() < tolerance, "pixels: mean square of error over sigma {of_pixels}");
 }
@@ -119,8 +119,8 @@ fn a_calibration_ends_at_the_stage_in_which_it_is_interrupted() {
     assert_eq!(stage_at(images), CalibrationError::Interrupted { stage: "calibrating the static camera" });
 }
 
-/// The trajectory of the bundle against the true one: errors agree with the covariances, and the poses between the adjusted
-/// ones are as good.
+/// The errors of the bundle's trajectory agree with its covariances, and the poses between the adjusted ones are as
+/// accurate.
 #[test]
 fn the_batch_trajectory_is_within_its_sigmas() {
     let mut nees = Vec::new();

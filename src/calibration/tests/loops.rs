@@ -1,4 +1,4 @@
-//! Pose loops with known answers.
+//! Pose loops with known solutions.
 
 use nalgebra::{DVector, UnitQuaternion, Vector3, Vector6};
 
@@ -23,7 +23,7 @@ impl Random {
         Vector3::from_fn(|_, _| self.next()) * scale
     }
 
-    /// About normal, of this standard deviation.
+    /// Approximately normal with this standard deviation.
     fn normal(&mut self, sigma: f64) -> f64 {
         (0..12).map(|_| 0.5 * self.next()).sum::<f64>() * sigma
     }
@@ -36,7 +36,7 @@ struct Example {
     visited: Vec<Vec<f64>>,
 }
 
-/// Poses measured up to `noise` of rotation and position, the given chain wrong by up to 10° and 3 cm.
+/// Poses measured with errors `noise` of rotation and position; the given chain has errors of up to 10° and 3 cm.
 fn example(seed: u64, encoder_sigma_rad: f64, noise: (f64, f64), still: bool) -> Example {
     let flight =
         synthetic_tracks(&SyntheticOptions { seed, duration_s: 0.2, features: 1, ..SyntheticOptions::default() });
@@ -178,13 +178,13 @@ fn noisy_encoders_leave_the_chain_within_its_sigmas() {
         square += (error.transpose() * information * &error)[0];
         count += error.len() as f64;
     }
-    // Mean of a χ² over its degrees of freedom: within four standard deviations of one.
+    // Mean of χ² over its degrees of freedom: within four standard deviations of one.
     let ratio: f64 = square / count;
     assert!((ratio - 1.0).abs() < 4.0 * (2.0 / count).sqrt(), "normalized square of the error {ratio}");
 }
 
 /// Stationary joints determine one rigid transform only: the parameters keep their prior uncertainty, the
-/// transform is found.
+/// transform is estimated.
 #[test]
 fn stationary_joints_leave_unobservable_directions_at_the_prior() {
     let moving = example(5, 0.01, (0.0, 0.0), false);

@@ -10,85 +10,79 @@ use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, ClassicalChain, ParameterId, Parameterization};
 use crate::sensors::{CameraMount, CameraRig, ImuIntrinsics, ImuNoise, IntrinsicsSigma, Rig, UnknownCamera};
 
-/// Configuration of an estimator: sensors, given calibration, options.
 #[derive(Clone, Debug)]
 pub struct EstimatorConfig {
-    /// Model of the main camera.
     pub camera: CameraModel,
-    /// Noise of the IMU.
     pub imu_noise: ImuNoise,
-    /// Magnitude of gravity in m/s².
     pub gravity_m_per_s2: f64,
-    /// Given chain of the main camera; without links a rigid camera.
+    /// Given chain of the main camera; without links for a rigid camera.
     pub chain: ClassicalChain,
     /// Parameterization in which the chain is estimated.
     pub parameterization: Parameterization,
-    /// Whether the minimal parameterization may switch to another one near a singularity.
+    /// True if the minimal parameterization may switch to another one near a singularity.
     pub auto_parameterize: bool,
     /// Standard deviation of an encoder reading, `None` without encoders.
     pub encoder_sigma_rad: Option<f64>,
-    /// Whether encoder readings are used.
+    /// Use encoder readings.
     pub use_encoder: bool,
-    /// Whether the static calibration is estimated; joint angles always are.
+    /// Estimate the static calibration; joint angles are always estimated.
     pub calibrate: bool,
     /// Standard deviations of the given chain's parameters, in metres and radians; `None` for
     /// [`DEFAULT_CHAIN_PRIOR`].
     pub chain_prior: Option<(f64, f64)>,
-    /// Whether the time offsets of cameras and encoders to the IMU are estimated, which requires `calibrate`.
+    /// Estimate the time offsets of cameras and encoders relative to the IMU; requires `calibrate`.
     pub estimate_timeshift: bool,
-    /// Whether the readout times of the cameras' rolling shutters are estimated, which requires `calibrate`.
+    /// Estimate the readout times of the cameras' rolling shutters; requires `calibrate`.
     pub estimate_readout: bool,
-    /// Whether the intrinsics of the cameras are estimated, which requires `calibrate`.
+    /// Estimate the intrinsics of the cameras; requires `calibrate`.
     pub estimate_intrinsics: bool,
-    /// Whether the intrinsics of the IMU are estimated, which requires `calibrate`.
+    /// Estimate the intrinsics of the IMU; requires `calibrate`.
     pub estimate_imu_intrinsics: bool,
-    /// Intrinsics of the IMU in the rig; samples are already corrected by them.
+    /// Rig's intrinsics of the IMU; samples are already corrected by them.
     pub imu_intrinsics: ImuIntrinsics,
-    /// Shutter of the main camera, and how well its intrinsics are known.
+    /// Shutter of the main camera, and the uncertainty of its intrinsics.
     pub sensor: CameraSensorPrior,
     /// Given time offset of the main camera, in seconds (`t_imu = t_cam + shift`); stamps already include it.
     pub timeshift_s: f64,
-    /// Rigid cameras beside the main one.
+    /// Rigid cameras in addition to the main one.
     pub rigid_cameras: Vec<RigidCamera>,
-    /// What an earlier pass over the same measurements found: start and prior of the calibration in place of the given
-    /// chains' above, and prior of the biases.
+    /// Result of an earlier pass over the same measurements: initial values and prior of the calibration, which replace
+    /// the given chains, and prior of the biases.
     pub earlier_pass: Option<Arc<EarlierPass>>,
-    /// Options of the estimator.
     pub options: EstimatorOptions,
-    /// Monotonic clock in milliseconds, for the stage times of the reports.
+    /// Monotonic clock in milliseconds, for the stage times in the reports.
     pub clock_ms: fn() -> f64,
 }
 
-/// A rigid camera beside the main one.
+/// Rigid camera in addition to the main one.
 #[derive(Clone, Debug)]
 pub struct RigidCamera {
-    /// Name in parameters: its key in the rig, `cam1`.
+    /// Key of the camera in the rig, used in parameter names: `cam1`.
     pub key: String,
-    /// Projection model with intrinsics.
     pub model: CameraModel,
     /// Given `imu_from_camera`.
     pub imu_from_camera: RigidTransform,
-    /// Standard deviations of its parameters, in metres and radians.
+    /// Prior standard deviations of the extrinsics, in metres and radians.
     pub prior: (f64, f64),
     /// Given time offset, in seconds.
     pub timeshift_s: f64,
-    /// Shutter, and how well the intrinsics are known.
+    /// Shutter, and the uncertainty of the intrinsics.
     pub sensor: CameraSensorPrior,
 }
 
-/// Shutter of a camera, and how well shutter and intrinsics are known.
+/// Shutter of a camera, with the uncertainty of shutter and intrinsics.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CameraSensorPrior {
-    /// Time from the exposure of the first row to that of the last one, in seconds; zero for a global shutter.
+    /// Time from the exposure of the first row to the end of the last one, in seconds; zero for a global shutter.
     pub readout_s: f64,
-    /// Its standard deviation, `None` when the rig does not state it.
+    /// Standard deviation of the readout time, `None` if the rig does not state it.
     pub readout_sigma_s: Option<f64>,
-    /// Standard deviations of the intrinsics, `None` when the rig does not state them.
+    /// Standard deviations of the intrinsics, `None` if the rig does not state them.
     pub intrinsics_sigma: Option<IntrinsicsSigma>,
 }
 
 impl CameraSensorPrior {
-    /// Shutter and intrinsics of a camera as the rig has them.
+    /// Shutter and uncertainties of a camera of a rig.
     pub fn of_rig(camera: &CameraRig) -> Self {
         Self {
             readout_s: camera.readout_s,
@@ -98,7 +92,7 @@ impl CameraSensorPrior {
     }
 }
 
-/// Parameters and values of the six columns of a rigid camera by its number: rotation vector and translation of
+/// Parameters and values of the six extrinsics columns of rigid camera `camera`: rotation vector and translation of
 /// `imu_from_camera`.
 pub fn rigid_columns(camera: u8, imu_from_camera: &RigidTransform) -> Vec<(ParameterId, f64)> {
     let chain = Chain::from_classical(&rigid_chain(imu_from_camera), Parameterization::Minimal);
@@ -106,12 +100,12 @@ pub fn rigid_columns(camera: u8, imu_from_camera: &RigidTransform) -> Vec<(Param
     parameters.zip(chain.values().iter().copied()).collect()
 }
 
-/// Parameters and values of the 15 columns of the intrinsics of an IMU, those of the gyroscope first.
+/// Parameters and values of the 15 columns of IMU intrinsics, gyroscope first.
 pub fn imu_columns(intrinsics: &ImuIntrinsics) -> Vec<(ParameterId, f64)> {
     imu_errors::parameters().into_iter().zip(imu_errors::of_intrinsics(intrinsics).iter().copied()).collect()
 }
 
-/// The intrinsics of an IMU with these values of [`imu_columns`]; a column that is not among them is zero.
+/// IMU intrinsics from values of [`imu_columns`]; missing columns are zero.
 pub fn imu_intrinsics(columns: &[(ParameterId, f64)]) -> ImuIntrinsics {
     let value_of = |parameter| columns.iter().find(|(known, _)| *known == parameter).map_or(0.0, |(_, value)| *value);
     let values = ImuErrors::from_iterator(imu_errors::parameters().into_iter().map(value_of));
@@ -123,7 +117,7 @@ pub(crate) fn rigid_chain(imu_from_camera: &RigidTransform) -> ClassicalChain {
     ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() }
 }
 
-/// Default standard deviations of a calibration without stated quality: 5 mm and 0.5°.
+/// Default standard deviations of a calibration of unstated accuracy: 5 mm and 0.5°.
 pub const DEFAULT_CHAIN_PRIOR: (f64, f64) = (0.005, 0.0087);
 
 impl RigidCamera {
@@ -142,16 +136,16 @@ impl RigidCamera {
 }
 
 impl EstimatorConfig {
-    /// Configuration for one camera of a rig (`cam0`) alone: encoders are used if the rig has them, the calibration
+    /// Configuration for a single camera of a rig (`cam0`): encoders are used if the rig has them, the calibration
     /// is estimated from the rig's prior, time offsets are fixed; default options, no clock for stage times.
     ///
     /// # Errors
     ///
-    /// When the rig has no camera with this key.
+    /// If the rig has no camera with this key.
     pub fn for_camera(rig: &Rig, camera_key: &str, parameterization: Parameterization) -> Result<Self, UnknownCamera> {
         let camera = rig.camera(camera_key)?;
         let gimbal = rig.gimbal.as_ref().filter(|_| camera.mount == CameraMount::Gimbal);
-        // Without a topic there are no readings, whatever their noise.
+        // Without a topic there are no readings, even if their noise is given.
         let encoder_sigma_rad = gimbal.filter(|gimbal| gimbal.topic.is_some()).and_then(|it| it.encoder_sigma_rad);
         Ok(Self {
             camera: camera.model.clone(),

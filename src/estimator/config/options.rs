@@ -8,8 +8,8 @@ use crate::optimization::{LandmarkModel, RobustLoss};
 /// Treatment of a tracked feature whose anchor leaves the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrackContinuation {
-    /// Its observations go into the marginalization prior and stay in the window, as in VINS-Fusion: they count
-    /// twice, which makes the window too confident and requires a larger pixel sigma.
+    /// Observations enter the marginalization prior and stay in the window, as in VINS-Fusion: they count
+    /// twice, which makes the window overconfident and requires a larger pixel sigma.
     Reuse,
     /// Every observation is used once, as in Basalt: those in the prior leave the window, and the feature restarts
     /// with the next images.
@@ -18,28 +18,26 @@ pub enum TrackContinuation {
     DropAnchor,
 }
 
-/// Options of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatorOptions {
-    /// Number of keyframes in the window beside the newest frame.
+    /// Number of keyframes in the window, not counting the newest frame.
     pub window: usize,
     /// Size of the first window before marginalization starts, as a multiple of `window`.
     pub first_window_factor: u16,
-    /// The same where rotations of the chain are given with a standard deviation of more than 0.03 rad.
+    /// First window factor if rotations of the chain are given with a standard deviation above 0.03 rad.
     pub inaccurate_first_window_factor: u16,
-    /// Standard deviation of a well tracked pixel, per coordinate. Most tracks are better, some have errors of a
-    /// pixel; `loss` limits their weight.
+    /// Standard deviation of a well tracked pixel, per coordinate. Most tracks are better; some have errors of a
+    /// pixel, whose weight `loss` limits.
     pub pixel_sigma_px: f64,
     /// Robust loss of the visual residuals.
     pub loss: RobustLoss,
-    /// Parameterization of the landmarks.
     pub landmark_model: LandmarkModel,
     /// Treatment of tracks whose anchor leaves the window.
     pub track_continuation: TrackContinuation,
     /// Largest number of iterations of a solve.
     pub iterations: usize,
-    /// Converged when a step lowers the cost by less than this fraction and moves calibration and newest joint angles by less
-    /// than a hundredth of a standard deviation.
+    /// Convergence threshold: a step lowers the cost by less than this fraction and changes calibration and newest
+    /// joint angles by less than a hundredth of a standard deviation.
     pub relative_cost_tolerance: f64,
     /// Smallest number of observations of a feature in the solve.
     pub min_observations: usize,
@@ -47,43 +45,43 @@ pub struct EstimatorOptions {
     pub min_triangulation_angle_rad: f64,
     /// Smallest and largest distance of a triangulated feature, in metres.
     pub distance_range_m: (f64, f64),
-    /// Rotation-compensated mean parallax against the last keyframe that makes a keyframe, in radians.
+    /// Rotation-compensated mean parallax to the last keyframe above which a frame becomes a keyframe, in radians.
     pub keyframe_parallax_rad: f64,
-    /// Fewer features in common with the last keyframe than this make a keyframe.
+    /// Number of features in common with the last keyframe below which a frame becomes a keyframe.
     pub keyframe_min_tracked: usize,
-    /// A larger ratio of new features since the last keyframe makes a keyframe.
+    /// Ratio of new features since the last keyframe above which a frame becomes a keyframe.
     pub keyframe_new_ratio: f64,
-    /// Features whose mean reprojection error exceeds this are rejected, in pixels.
+    /// Mean reprojection error above which a feature is rejected, in pixels.
     pub outlier_px: f64,
-    /// Jacobians of states in the prior are evaluated at its linearization point while attitude and joint angles are within
-    /// this distance of it, in radians; 0 evaluates all at the present estimate.
+    /// Distance in attitude and joint angles from the linearization point, in radians, within which Jacobians of states
+    /// in the prior are evaluated there; beyond it, or with 0, they are evaluated at the current estimate.
     ///
-    /// First-estimate Jacobians prevent spurious information along unobservable directions. With inaccurate first estimates,
-    /// as after a start with a chain error of degrees, they bias the solution: an error of a hundredth of a radian changes a
-    /// derivative by a percent.
+    /// First-estimate Jacobians prevent spurious information along unobservable directions. With inaccurate first
+    /// estimates, as after a start with a chain error of degrees, they bias the solution: an error of a hundredth of a
+    /// radian changes a derivative by one percent.
     pub first_estimate_reach_rad: f64,
-    /// Jacobians of the static calibration are always evaluated at the linearization point of the prior.
+    /// Evaluate Jacobians of the static calibration always at the linearization point of the prior.
     pub calibration_first_estimates: bool,
-    /// Initial standard deviation of the accelerometer's bias, in m/s².
+    /// Initial standard deviation of the accelerometer bias, in m/s².
     pub accelerometer_bias_sigma: f64,
-    /// Initial standard deviation of the gyroscope's bias, in rad/s.
+    /// Initial standard deviation of the gyroscope bias, in rad/s.
     pub gyroscope_bias_sigma: f64,
     /// Factor on the rig's IMU noise densities.
     pub imu_noise_factor: f64,
-    /// Change of the biases at which an interval is reintegrated.
+    /// Change of the biases above which an interval is integrated again.
     pub reintegration_change: ImuBias,
-    /// Failure: norm of the accelerometer's bias, in m/s².
+    /// Failure above this norm of the accelerometer bias, in m/s².
     pub max_accelerometer_bias: f64,
-    /// Failure: norm of the gyroscope's bias, in rad/s.
+    /// Failure above this norm of the gyroscope bias, in rad/s.
     pub max_gyroscope_bias: f64,
-    /// Failure: norm of the velocity, in m/s.
+    /// Failure above this norm of the velocity, in m/s.
     pub max_velocity_m_per_s: f64,
-    /// Failure: correction of the newest position against its prediction, in metres.
+    /// Failure above this correction of the newest position relative to its prediction, in metres.
     pub max_position_correction_m: f64,
-    /// Failure: fewer than `min_landmarks` observed landmarks for this time, in seconds. Until then IMU-only
+    /// Failure after this time with fewer than `min_landmarks` observed landmarks, in seconds. Until then IMU-only
     /// propagation continues the window, which is better than a restart.
     pub max_blind_s: f64,
-    /// Fewer observed landmarks than this count as none.
+    /// Number of observed landmarks below which the window counts as without visual measurements.
     pub min_landmarks: usize,
     /// Whether to fill [`crate::estimator::StepReport::linearization`].
     pub keep_linearization: bool,

@@ -1,4 +1,4 @@
-//! The full Jacobian of a step by blocks: rows by factor, columns by unknowns.
+//! Jacobian of a step in blocks: rows by factor, columns by unknowns.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -19,29 +19,28 @@ use crate::frontend::FeatureId;
 use crate::gimbal::ParameterId;
 use crate::optimization::{BlockTerm, CameraPose, Landmark};
 
-/// The Jacobian of a step by blocks.
+/// Jacobian of a step in blocks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepJacobian {
-    /// Calibration, joint angles, poses, velocities and biases; last the inverse depths as one block: each feature
-    /// has its own column, which no other row touches.
+    /// Calibration, joint angles, poses, velocities and biases, then the inverse depths as one block: each feature
+    /// has a separate column, which no other feature's rows use.
     pub columns: Vec<ColumnBlock>,
-    /// The features in the report's order, then the rest.
+    /// Features in the report's order, then the other factors.
     pub rows: Vec<JacobianRow>,
 }
 
-/// Rows of one feature in some columns, two per observation.
+/// Rows of one feature, two per observation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureRows {
-    /// Number of the observing frame of each observation.
+    /// Observing frame of each observation.
     pub frames: Vec<FrameId>,
-    /// Whitened rows in the columns of the step, the feature's inverse depth last: residuals over their standard
+    /// Whitened rows by the columns of the step, the feature's inverse depth last: residuals over their standard
     /// deviations with robust weights, per radian, metre and 1/m.
     pub rows: DMatrix<f64>,
 }
 
 impl StepReport {
-    /// Returns the blocks of the Jacobian, `None` without a stored source; `cameras` are the main one and the
-    /// further rigid ones.
+    /// Blocks of the Jacobian, `None` without a stored source; `cameras` are the main camera, then the rigid ones.
     pub fn jacobian(&self, cameras: &[&CameraModel]) -> Option<StepJacobian> {
         let writer = Writer::new(self, cameras)?;
         let mut rows = Vec::with_capacity(self.features.len());
@@ -53,7 +52,7 @@ impl StepReport {
         Some(StepJacobian { columns: writer.columns, rows })
     }
 
-    /// Returns the rows of one feature; `cameras` as for [`Self::jacobian`].
+    /// Rows of one feature; `cameras` as for [`Self::jacobian`].
     pub fn feature_rows(&self, cameras: &[&CameraModel], id: FeatureId) -> Option<FeatureRows> {
         let writer = Writer::new(self, cameras)?;
         let index = self.features.iter().position(|feature| feature.id == id)?;
@@ -61,13 +60,13 @@ impl StepReport {
     }
 }
 
-/// One camera at the states of the window.
+/// Camera with its poses at the states of the window.
 struct WindowCamera<'a> {
     model: VisualModel<'a>,
     current: CameraView<'a>,
     linearized: CameraView<'a>,
     maps: CameraMaps,
-    /// First column of the camera's calibration, and their number.
+    /// First column and number of columns of the camera's calibration.
     start: usize,
     columns: usize,
 }
@@ -79,7 +78,7 @@ struct Writer<'a> {
     columns: Vec<ColumnBlock>,
     states: Vec<FrameState>,
     cameras: Vec<WindowCamera<'a>>,
-    /// Landmarks in the world.
+    /// Landmark positions in the world, in metres.
     places_m: BTreeMap<FeatureId, Vector3<f64>>,
 }
 
@@ -123,7 +122,7 @@ impl<'a> Writer<'a> {
         Some(Self { report, source, layout, columns, states, cameras, places_m })
     }
 
-    /// Rows of a feature; `None` when its camera is unknown.
+    /// Rows of a feature; `None` when its camera or an anchor observation is missing.
     fn feature(&self, index: usize, feature: &FeatureReport) -> Option<FeatureRows> {
         let camera = self.cameras.get(feature.id.camera())?;
         let slot_of = |number: usize| self.report.window.iter().position(|frame| frame.frame_index == number);
@@ -138,7 +137,7 @@ impl<'a> Writer<'a> {
         for seen in feature.observations.iter() {
             let Some(slot) = slot_of(seen.frame_index) else { continue };
             let observation = TrackObservation { slot, uv_px: seen.measured_px };
-            // Stored residuals are rounded: the robust weight of the step is used instead of a recomputed one.
+            // Stored residuals are rounded: take the robust weight of the step instead of recomputing it.
             let weight = seen.residual_after_px.map(|_| seen.robust_weight);
             let mut target = rows.rows_mut(2 * frames.len(), 2);
             let written = match camera.current.blocks_per_frame() {
@@ -153,7 +152,8 @@ impl<'a> Writer<'a> {
         Some(FeatureRows { frames, rows: rows.resize_vertically(height, 0.0) })
     }
 
-    /// Landmark of a feature in its anchor's camera: from its position in the world, for a rejected one as stored.
+    /// Landmark of a feature in its anchor's camera: from its position in the world, or from the stored bearing if
+    /// rejected.
     fn landmark(&self, index: usize, feature: &FeatureReport, anchor: &CameraPose) -> Option<Landmark> {
         let rejected = self.source.rejected.iter().find(|(place, _)| *place as usize == index);
         if let Some((_, bearing)) = rejected {
@@ -171,7 +171,8 @@ impl<'a> Writer<'a> {
         let mut rows: Vec<JacobianRow> = self.source.rows(&numbers).collect();
         let is_imu = |row: &JacobianRow| matches!(row.factor, JacobianFactor::Imu { .. });
         let place = rows.iter().position(|row| !is_imu(row)).unwrap_or(rows.len());
-        // Readings of a frame touch its joint angles only, each with its inverse standard deviation.
+        // Readings depend on the joint angles of their frame and on the time offset, each with its inverse standard
+        // deviation.
         let encoders = self.report.window.iter().enumerate().filter_map(|(slot, frame)| {
             let sigmas = frame.encoder_sigmas_rad.as_ref().filter(|sigmas| !sigmas.is_empty())?;
             let id = ColumnId::Joints(numbers[slot]);
@@ -196,13 +197,13 @@ impl<'a> Writer<'a> {
         rows
     }
 
-    /// Number and block of the column of the encoders' time offset, if estimated.
+    /// Index and block of the encoder time offset's column, `None` if it is not estimated.
     fn encoder_clock(&self) -> Option<(usize, &ColumnBlock)> {
         let id = ColumnId::Calibration(ParameterId::ENCODER_TIMESHIFT);
         self.columns.iter().enumerate().find(|(_, block)| block.id == id)
     }
 
-    /// Writes the rows of an observation by a camera with `N` blocks per frame; `None` where it has none.
+    /// Writes the rows of an observation by a camera with `N` blocks per frame; `None` if the observation has no rows.
     fn write<const N: usize>(
         &self,
         rows: &mut nalgebra::DMatrixViewMut<'_, f64>,
@@ -241,7 +242,7 @@ impl<'a> Writer<'a> {
     fn row_of(&self, feature: &FeatureReport, written: &FeatureRows) -> JacobianRow {
         let mut scales = scales_of(&self.columns);
         if let Some(last) = scales.last_mut() {
-            // A tenth of the inverse distance.
+            // The scale of an inverse depth is relative: a tenth of its value.
             *last = ColumnId::InverseDepth.scale(0) * feature.inverse_depth_per_m.abs();
         }
         let mut norms = Vec::new();
@@ -299,13 +300,13 @@ fn window_camera<'a>(
         state.navigation.world_from_imu = frame.world_from_imu;
         state.navigation.velocity_m_per_s = frame.velocity_m_per_s;
         state.joints_rad.clone_from(&frame.joint_angles_rad);
-        let seen = camera_pose::when_seen(&state, now_s);
+        let seen = camera_pose::state_at_exposure(&state, now_s);
         let imu_from_observer = match rigid {
             Some((_, extrinsics)) => *extrinsics,
-            // Without a time offset the camera pose is that of the report.
+            // Without a time offset the reported camera pose applies.
             None if now_s == 0.0 => frame.imu_from_camera,
             None => {
-                // Motion of the joints during the time offset; at the first estimate it is nearly the same.
+                // Motion of the joints during the time offset, with the chain of the first estimate: nearly the same.
                 let moved =
                     chain.imu_from_camera(&state.joints_rad).inverse() * chain.imu_from_camera(&seen.joints_rad);
                 frame.imu_from_camera * moved

@@ -1,4 +1,4 @@
-//! The IMU residual between two frames and its Jacobians.
+//! IMU residual between two frames and its Jacobians.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -7,7 +7,7 @@ use crate::estimator::state::navigation::{Matrix15, NavigationState, Vector15};
 use crate::estimator::state::preintegration::Preintegration;
 use crate::geometry::so3;
 
-/// Residual `[φ, p, v, b_g, b_a]` (15 × 1) of two states against the samples between them (IMU term of Eq. 8),
+/// Residual `[φ, p, v, b_g, b_a]` (15 × 1) of two states given the IMU samples between them (IMU term of Eq. 8),
 /// not whitened.
 pub fn residual(
     preintegration: &Preintegration,
@@ -18,7 +18,7 @@ pub fn residual(
     residual_with(preintegration, from, to, gravity_in_world, None)
 }
 
-/// [`residual`] with intrinsics of the IMU.
+/// [`residual`] with intrinsics of the IMU, `None` if they are not estimated.
 pub(crate) fn residual_with(
     preintegration: &Preintegration,
     from: &NavigationState,
@@ -56,7 +56,7 @@ pub fn jacobians(
     (by_from, by_to)
 }
 
-/// [`jacobians`] with intrinsics of the IMU; the third matrix is by these (15 × 15, zero without any).
+/// [`jacobians`] with intrinsics of the IMU; the third matrix is the derivative by these (15 × 15, zero without any).
 pub(crate) fn jacobians_with(
     preintegration: &Preintegration,
     from: &NavigationState,
@@ -81,7 +81,7 @@ pub(crate) fn jacobians_with(
     let gain = to.velocity_m_per_s - from.velocity_m_per_s - gravity_in_world * t;
     let identity = Matrix3::<f64>::identity();
 
-    // The bias correction rotates by Exp(J δb): its derivative passes through the rotation error.
+    // The bias correction rotates by Exp(J δb): its derivative is transformed by the rotation error.
     let correction = total_shift.fixed_rows::<3>(0).into_owned();
     let error_back: Matrix3<f64> = so3::exp(&-rotation_error).to_rotation_matrix().into_inner();
     let phi_by_correction = -(error_inverse * error_back * so3::right_jacobian(&correction));

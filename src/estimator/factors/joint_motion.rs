@@ -2,18 +2,18 @@
 
 use crate::sensors::JointAngles;
 
-/// Standard deviation of a joint's rotation since the previous frame, without an encoder.
+/// Standard deviation of the change of a joint angle since the previous frame, without an encoder.
 pub(crate) const UNKNOWN_JOINT_SIGMA_RAD: f64 = 1.0;
 /// Standard deviation of a joint rate without a measurement, in rad/s: motors of gimbals rotate at up to 200°/s.
 const UNKNOWN_RATE_RAD_PER_S: f64 = 2.0;
 /// Standard deviation of a joint acceleration without a measurement, in rad/s²: a stabilized joint compensates the
-/// vehicle, which reaches 20 rad/s² when it is agile.
+/// vehicle, which reaches 20 rad/s² in agile flight.
 const UNKNOWN_ACCELERATION_RAD_PER_S2: f64 = 10.0;
-/// Smallest standard deviations of rate and acceleration, in rad/s and rad/s²: over the 0.1 s of the readings a joint does
-/// not follow a parabola any better.
+/// Smallest standard deviations of rate and acceleration, in rad/s and rad/s²: over the 0.1 s of the readings, joints
+/// deviate from a parabola by this much.
 const MIN_MOTION_SIGMAS: [f64; 2] = [0.02, 2.0];
 
-/// Value and standard deviation of a joint rate or joint acceleration: what the encoders measure, or zero. `place` counts
+/// Value and standard deviation of a joint rate or joint acceleration, from the encoders or else zero. `place` indexes
 /// the rates of all joints, then their accelerations.
 pub(crate) fn measured_joint_motion(encoder: Option<&JointAngles>, place: usize, joints: usize) -> (f64, f64) {
     let (joint, derivative) = (place % joints.max(1), place / joints.max(1));

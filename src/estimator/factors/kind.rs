@@ -1,6 +1,5 @@
 //! Kinds of factors.
 
-/// A kind of factor of the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FactorKind {
     /// Reprojections of features.
@@ -9,16 +8,15 @@ pub enum FactorKind {
     Imu,
     /// Encoder readings of the joint angles.
     Encoder,
-    /// The rig's prior on the calibration.
+    /// Rig's prior on the calibration.
     CalibrationPrior,
-    /// The marginalization prior, or the prior at the start.
+    /// Marginalization prior, or the prior at the start.
     MarginalizationPrior,
     /// Zero-velocity update of a stationary vehicle.
     ZeroVelocity,
 }
 
 impl FactorKind {
-    /// All of them.
     pub const ALL: [Self; 6] = [
         Self::Visual,
         Self::Imu,
@@ -28,7 +26,7 @@ impl FactorKind {
         Self::ZeroVelocity,
     ];
 
-    /// Name for people.
+    /// Label for display.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Visual => "visual",
@@ -40,7 +38,7 @@ impl FactorKind {
         }
     }
 
-    /// Name in tables and conditions, without spaces.
+    /// Key in tables and conditions, without spaces.
     pub const fn key(self) -> &'static str {
         match self {
             Self::Imu => "imu",

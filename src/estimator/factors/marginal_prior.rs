@@ -1,4 +1,4 @@
-//! The marginalization prior, in square-root form around fixed linearization points.
+//! Marginalization prior in square-root form around fixed linearization points.
 
 use std::ops::Range;
 
@@ -7,22 +7,17 @@ use nalgebra::{DMatrix, DVector};
 use crate::estimator::state::layout::{Layout, POSE};
 use crate::optimization::dense;
 
-/// Unknown of a column of the prior.
+/// Unknown that a column of the prior belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum PriorColumn {
-    /// Entry `offset` of the frame at `slot`, in the order of [`Layout`].
-    Frame {
-        /// Slot of the frame.
-        slot: usize,
-        /// Offset within its block.
-        offset: usize,
-    },
-    /// A calibration parameter.
+    /// Entry `offset` of the block of the frame at `slot`, in the order of [`Layout`].
+    Frame { slot: usize, offset: usize },
+    /// Index of a calibration column.
     Calibration(usize),
 }
 
 impl PriorColumn {
-    /// Index of the column in the layout of the window.
+    /// Column in the layout of the window.
     pub(crate) fn index(self, layout: &Layout) -> usize {
         match self {
             Self::Frame { slot, offset } => layout.frame(slot).start + offset,
@@ -44,14 +39,14 @@ pub(crate) struct Prior {
     columns: Vec<PriorColumn>,
     jacobian: DMatrix<f64>,
     residual: DVector<f64>,
-    /// `JᵀJ` and `Jᵀr`, constant over all iterations.
+    /// `JᵀJ`, constant over all iterations, as is `gradient = Jᵀr`.
     hessian: DMatrix<f64>,
     gradient: DVector<f64>,
 }
 
 impl Prior {
-    /// From whitened rows `[columns of the layout | residual]` whose residuals are taken at `x₀`, after the columns of the
-    /// frame at `gone` have been eliminated; `None` when nothing remains.
+    /// Prior from whitened rows `[columns of the layout | residual]` with residuals at `x₀`, after elimination of the
+    /// columns of the frame at `gone`; `None` when nothing remains.
     pub(crate) fn eliminating(rows: &DMatrix<f64>, layout: &Layout, gone: usize) -> Option<Self> {
         let total = layout.total();
         let removed = layout.frame(gone);
@@ -62,7 +57,7 @@ impl Prior {
             return None;
         }
         let ordered: Vec<usize> = eliminated.iter().chain(&kept).copied().chain([total]).collect();
-        // A residual that no unknown can change is dropped: its cost would accumulate over a flight until no step
+        // Drops residuals that no unknown can change: their cost would accumulate over a flight until no step
         // seemed to lower the cost.
         let echelon = dense::echelon(&rows.select_columns(&ordered), eliminated.len());
         let (first, height) = (echelon.leading_rank, echelon.rows.nrows() - echelon.leading_rank);
@@ -81,7 +76,7 @@ impl Prior {
         Self { columns, jacobian, residual, hessian, gradient }
     }
 
-    /// Renumbers the slots after the frame at `gone` has left; the prior must not contain that frame.
+    /// Renumbers the slots after removal of the frame at `gone`, which the prior must not contain.
     pub(crate) fn renumber(&mut self, gone: usize) {
         for column in &mut self.columns {
             if let PriorColumn::Frame { slot, .. } = column {
@@ -93,8 +88,8 @@ impl Prior {
         }
     }
 
-    /// Renumbers the columns for a layout with more columns: of joint motion within each frame, and of the calibration,
-    /// where `places` has the new place of each old column.
+    /// Renumbers the columns for a layout with more columns: joint motion within each frame, and calibration,
+    /// where `places` has the new index of each old column.
     pub(crate) fn move_columns(&mut self, old: &Layout, new: &Layout, places: &[usize]) {
         let added = new.joint_motion - old.joint_motion;
         let before_motion = POSE + old.joints;
@@ -107,14 +102,14 @@ impl Prior {
         }
     }
 
-    /// Whether the prior has columns of the frame at `slot`.
+    /// True if the prior has columns of the frame at `slot`.
     pub(crate) fn holds_frame(&self, slot: usize) -> bool {
         self.columns
             .iter()
             .any(|column| matches!(column, PriorColumn::Frame { slot: contained, .. } if *contained == slot))
     }
 
-    /// Whether the prior has columns of some of these parameters.
+    /// True if the prior has columns of some of these calibration parameters.
     pub(crate) fn holds_calibration(&self, parameters: &Range<usize>) -> bool {
         let contained = |column: &PriorColumn| matches!(column, PriorColumn::Calibration(contained) if parameters.contains(contained));
         self.columns.iter().any(contained)
@@ -140,7 +135,7 @@ impl Prior {
         &self.residual
     }
 
-    /// The residuals at an estimate; `first_estimate_offset` is `x ⊟ x₀` in the window's layout.
+    /// Residual at an estimate; `first_estimate_offset` is `x ⊟ x₀` in the window's layout.
     pub(crate) fn residual(&self, layout: &Layout, first_estimate_offset: &DVector<f64>) -> DVector<f64> {
         &self.residual + &self.jacobian * self.gather(layout, first_estimate_offset)
     }
@@ -177,8 +172,8 @@ impl Prior {
     /// Transforms the calibration columns to another parameterization: `old = by_new · new` to first order.
     ///
     /// `first_estimate_offsets` are the offsets of the calibration from its first estimate in the old and in the
-    /// new parameterization. Where they differ beyond first order, the residual compensates the difference, so that
-    /// cost and gradient are unchanged at the present estimate.
+    /// new parameterization. If they differ beyond first order, the residual compensates the difference, so that
+    /// cost and gradient are unchanged at the current estimate.
     pub(crate) fn transport_calibration(
         &mut self,
         old_from_new: &DMatrix<f64>,

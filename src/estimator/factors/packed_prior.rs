@@ -1,15 +1,15 @@
-//! The marginalization prior without its products and zeros.
+//! Marginalization prior without its products and zeros.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::marginal_prior::{Prior, PriorColumn};
 
-/// A [`Prior`] of which only the entries of the Jacobian down to the last one of each column are kept: it is nearly
-/// triangular.
+/// [`Prior`] that stores of each column of the Jacobian only the entries down to the last nonzero one: the Jacobian is
+/// nearly triangular.
 #[derive(Clone, Debug)]
 pub(crate) struct PackedPrior {
     columns: Vec<PriorColumn>,
-    /// Number of kept entries of each column.
+    /// Number of stored entries of each column.
     heights: Vec<u16>,
     entries: Vec<f64>,
     residual: DVector<f64>,
@@ -39,7 +39,6 @@ impl PackedPrior {
         Prior::new(self.columns.clone(), jacobian, self.residual.clone())
     }
 
-    /// Bytes on the heap.
     pub(crate) fn heap_bytes(&self) -> usize {
         self.columns.capacity() * size_of::<PriorColumn>()
             + self.heights.capacity() * size_of::<u16>()

@@ -1,5 +1,5 @@
-//! Reprojection factors as rows over the blocks of a camera (its poses, and its intrinsics) with every landmark projected out orthogonally: without
-//! normal equations, unobservable directions stay exactly unobservable.
+//! Reprojection factors as rows over the blocks of a camera (its poses and intrinsics), with every landmark eliminated
+//! by orthogonal projection: without normal equations, unobservable directions stay exactly unobservable.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,21 +12,22 @@ use crate::optimization::{Landmark, LandmarkRows, PoseBlocks};
 /// Columns of a block of the camera: a pose, or its intrinsics.
 const BLOCK: usize = 6;
 
-/// The whitened rows of some tracks.
+/// Whitened rows of some tracks.
 #[derive(Clone, Debug)]
 pub(crate) struct ProjectedRows {
-    /// `[blocks of the camera, 6 each | residual]`, compressed to as many rows as columns at most; rows begin with the newest frame that
-    /// they depend on, so that they are triangular from the newest frame back.
+    /// `[blocks of the camera, 6 columns each | residual]`, compressed to at most as many rows as columns. The first
+    /// nonzero entries of a row belong to the newest frame it depends on, so the rows are triangular from the newest
+    /// frame back.
     pub(crate) rows: DMatrix<f64>,
     /// Rows of the newest frame's observations, conditioned on the landmarks' posterior from all other
-    /// observations, in the same columns. They are included in `rows`.
+    /// observations, in the same columns; also included in `rows`.
     pub(crate) newest_rows: DMatrix<f64>,
-    /// `JᵀJ` of the blocks before the landmarks were projected out.
+    /// `JᵀJ` of the blocks before elimination of the landmarks.
     blocks: PoseBlocks,
 }
 
 impl ProjectedRows {
-    /// Linearizes at `current`, with the derivatives by poses taken at `linearized`.
+    /// Linearizes at `current`, with derivatives by the poses at `linearized`.
     pub(crate) fn new(
         model: &VisualModel<'_>,
         current: &CameraView<'_>,
@@ -54,8 +55,8 @@ impl ProjectedRows {
         let newest = frames.saturating_sub(1);
         let mut blocks = PoseBlocks::new(current.blocks());
         let columns = BLOCK * current.blocks() + 1;
-        // The newest frame comes first in the triangular factor: rows begin with the newest frame that they depend on, and
-        // those of older observations are short. The intrinsics come after all frames.
+        // The newest frame comes first in the triangular factor: the first nonzero entries of a row belong to the
+        // newest frame it depends on, and rows of older observations are short. The intrinsics come after all frames.
         let place = |block: usize| {
             let (slot, row) = (block / N, block % N);
             BLOCK * if slot < frames { N * (newest - slot) + row } else { block }
@@ -100,7 +101,7 @@ impl ProjectedRows {
                 });
             }
         }
-        // Without a row of the residual alone, which no unknown can change.
+        // Omits the last row, which has the residual only and which no unknown can change.
         let by_place = factor.leading_rows(columns - 1);
         let mut rows = DMatrix::zeros(by_place.nrows(), columns);
         for block in 0..current.blocks() {
@@ -111,7 +112,7 @@ impl ProjectedRows {
         Self { rows, newest_rows, blocks }
     }
 
-    /// Squared norms of the columns that change the blocks by `columns` (6 × n each), before the projection.
+    /// Squared norms of columns that change the blocks by `columns` (6 × n each), before the elimination.
     pub(crate) fn squared_column_norms(&self, columns: &[DMatrix<f64>]) -> DVector<f64> {
         self.blocks.squared_norms(columns)
     }
@@ -120,8 +121,8 @@ impl ProjectedRows {
 /// Treatment of the newest frame's rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NewestRows {
-    /// Not requested.
+    /// Only included in [`ProjectedRows::rows`].
     Among,
-    /// Stored separately as well.
+    /// Also stored separately.
     Apart,
 }

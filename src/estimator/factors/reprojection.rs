@@ -1,4 +1,4 @@
-//! The reprojection factors of one camera in a window: cost and normal equations over its poses.
+//! Reprojection factors of one camera in a window: cost and normal equations over its poses.
 
 use nalgebra::Vector2;
 
@@ -15,7 +15,7 @@ use crate::optimization::{
 /// Camera model of the rig, pixel noise and robust loss.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct VisualModel<'a> {
-    /// The model of the rig; a [`CameraView`] has the one with estimated intrinsics.
+    /// Rig's model; a [`CameraView`] has the model with estimated intrinsics.
     pub(crate) camera: &'a CameraModel,
     pub(crate) sigma_px: f64,
     pub(crate) loss: RobustLoss,
@@ -27,7 +27,7 @@ impl<'a> VisualModel<'a> {
         Self { camera, sigma_px: options.pixel_sigma_px, loss: options.loss, landmark_model: options.landmark_model }
     }
 
-    /// Whether the anchor's own observation has a residual.
+    /// True if the anchor's own observation has a residual.
     fn measures_in_anchor(&self) -> bool {
         self.landmark_model == LandmarkModel::BearingAndInverseDistance
     }
@@ -67,7 +67,7 @@ pub(crate) type VisualEquations = ReprojectionEquations<DensePoseEquations>;
 /// [`VisualEquations`] with the landmarks eliminated.
 pub(crate) type ReducedVisualEquations = ReducedEquations<DensePoseEquations>;
 
-/// Linearizes all observations at `current`, with the derivatives by poses taken at `linearized`.
+/// Linearizes all observations at `current`, with derivatives by the poses at `linearized`.
 pub(crate) fn equations(
     model: &VisualModel<'_>,
     current: &CameraView<'_>,
@@ -91,7 +91,7 @@ fn equations_by_blocks<const N: usize>(
 ) -> VisualEquations {
     let mut equations = ReprojectionEquations::new(DensePoseEquations::new(current.blocks()), tracks.len());
     for (track, landmark) in tracks.iter().zip(landmarks) {
-        // Observations come in the order of the slots and the anchor is the first of them.
+        // Observations are in ascending order of the slots; the first one is the anchor's.
         let anchor = track.observations.first().map(|first| Anchor::new(current, linearized, first));
         let blocks = anchor.as_ref().map(|anchor| CameraView::blocks_of::<N>(anchor.observation.slot));
         let terms = track
@@ -104,7 +104,7 @@ fn equations_by_blocks<const N: usize>(
     equations
 }
 
-/// The anchor of a track at the current estimate and at the linearization point.
+/// Anchor of a track at the current estimate and at the linearization point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Anchor<'a> {
     current: &'a CameraView<'a>,
@@ -125,8 +125,8 @@ impl<'a> Anchor<'a> {
     }
 }
 
-/// Linearizes one observation by the `N` blocks of the camera per frame, divided by sigma and multiplied by the root of its robust
-/// weight: that of its residual, unless given.
+/// Linearizes one observation by the `N` blocks per frame, divided by sigma and multiplied by the root of its robust
+/// weight: `known_weight`, or else that of the residual.
 #[inline]
 pub(crate) fn whitened<const N: usize>(
     model: &VisualModel<'_>,

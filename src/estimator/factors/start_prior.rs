@@ -11,24 +11,25 @@ use crate::estimator::state::navigation::ImuBias;
 pub(crate) struct StartPrior {
     /// State at which the prior was set.
     pub(crate) reference: FrameState,
-    /// Most likely biases.
+    /// Mean of the biases.
     pub(crate) bias: ImuBias,
-    /// Standard deviation of the accelerometer's bias by axis, in m/s².
+    /// Standard deviation of the accelerometer bias by axis, in m/s².
     pub(crate) accelerometer_bias_sigma: Vector3<f64>,
-    /// Standard deviation of the gyroscope's bias by axis, in rad/s.
+    /// Standard deviation of the gyroscope bias by axis, in rad/s.
     pub(crate) gyroscope_bias_sigma: Vector3<f64>,
 }
 
-/// Standard deviation of the first position, in metres: it only fixes the origin.
+/// Standard deviation of the first position, in metres: only fixes the origin.
 const ORIGIN_SIGMA_M: f64 = 1e-3;
-/// Standard deviation of the first yaw, in radians: it only fixes the direction of the axes.
+/// Standard deviation of the first yaw, in radians: only fixes the direction of the axes.
 const YAW_SIGMA_RAD: f64 = 1e-4;
 
 impl StartPrior {
     /// Number of scalar residuals.
     pub(crate) const LEN: usize = 10;
 
-    /// Whitened rows on the first frame's block `[pose | joints | velocity and biases]` and their residuals.
+    /// Whitened rows on the first frame's block `[pose | joints | velocity and biases]` (10 × columns) and their
+    /// residuals.
     pub(crate) fn rows(&self, state: &FrameState) -> (DMatrix<f64>, DVector<f64>) {
         let joints = state.joint_block();
         let mut jacobian = DMatrix::zeros(Self::LEN, 15 + joints);

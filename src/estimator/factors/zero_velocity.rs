@@ -1,4 +1,4 @@
-//! The zero-velocity update (ZUPT) of a stationary vehicle.
+//! Zero-velocity update (ZUPT) of a stationary vehicle.
 //!
 //! It is soft: position equal to that of the previous frame and zero velocity, up to the motion that the images
 //! cannot resolve at the distance of the scene.
@@ -6,10 +6,10 @@
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::Layout;
 
-/// A frame at which the vehicle is stationary.
+/// Zero-velocity update of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stationary {
-    /// Since when the vehicle has not moved.
+    /// Start of the stationary phase.
     pub(crate) since_ns: i64,
     /// Standard deviation of the position relative to the previous frame, per axis: the resolution of the images.
     pub(crate) position_sigma_m: f64,
@@ -21,13 +21,12 @@ pub(crate) struct Stationary {
 /// previous frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ZeroVelocityTerm {
-    /// Column with derivative `slope`.
+    /// Column whose derivative is `slope`.
     pub(crate) column: usize,
-    /// Column with derivative `-slope`.
+    /// Column whose derivative is `-slope`, `None` without one.
     pub(crate) against: Option<usize>,
     /// Residual over its standard deviation.
     pub(crate) residual: f64,
-    /// One over the standard deviation.
     pub(crate) slope: f64,
 }
 
@@ -45,7 +44,7 @@ impl Stationary {
         })
     }
 
-    /// `(p_j − p_i) / σ_p` of the frame `j` at `slot` against the one before it, world frame, one term per axis.
+    /// `(p_j − p_i) / σ_p` of the frame `j` at `slot` and the previous frame `i`, world frame, one term per axis.
     pub(crate) fn position_terms(&self, layout: Layout, slot: usize, states: &[FrameState]) -> [ZeroVelocityTerm; 3] {
         let slope = 1.0 / self.position_sigma_m;
         let position = |slot: usize| states[slot].navigation.world_from_imu.translation_m;

@@ -229,8 +229,7 @@ fn structure_of(
 }
 
 /// Bound that the mean square of `count` standard normal variables exceeds with probability 0.001 (quantile of χ² over
-/// its
-/// degrees of freedom, by the Wilson–Hilferty cube root).
+/// its degrees of freedom, by the Wilson–Hilferty cube root).
 fn upper_mean_square(count: usize) -> f64 {
     const NORMAL_QUANTILE: f64 = 3.09;
     let ratio = 2.0 / (9.0 * count.max(1) as f64);

@@ -13,8 +13,7 @@ pub struct RotationFit {
 }
 
 /// Rotation `camera_j_from_camera_i` that best maps the first bearings of the pairs onto the second ones, by robust
-/// least
-/// squares from an initial value.
+/// least squares from an initial value.
 ///
 /// Parallax of near points biases a plain least-squares fit, so angles beyond the median get less weight (iteratively
 /// reweighted). Returns `None` with fewer than three pairs.

@@ -105,8 +105,7 @@ pub(super) fn five_point(pairs: &[(Vector3<f64>, Vector3<f64>); 5]) -> Vec<Matri
     let Some(rows) = eliminate(polynomial_constraints(&basis)) else { return Vec::new() };
 
     // Rows 4 to 9 have the leading terms x²z, x², y²z, y², xyz, xy: subtracting z times the second of each pair from
-    // the first
-    // leaves three equations linear in x and y, whose coefficients are polynomials in z.
+    // the first leaves three equations linear in x and y, whose coefficients are polynomials in z.
     let mut equations = [[[0.0_f64; 5]; 3]; 3];
     for (equation, (upper, lower)) in equations.iter_mut().zip([(4, 5), (6, 7), (8, 9)]) {
         for (block, start, length) in [(0, 10, 3), (1, 13, 3), (2, 16, 4)] {

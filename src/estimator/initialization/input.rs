@@ -25,7 +25,6 @@ pub struct InitializationFrame<'a> {
 pub struct InitializationInput<'a> {
     /// Frames in time order, without gaps in the IMU samples between them.
     pub frames: &'a [InitializationFrame<'a>],
-    /// Magnitude of gravity in m/s².
     pub gravity_m_per_s2: f64,
     pub imu_noise: ImuNoise,
     /// Last estimate of a stationary vehicle (from [`InitializationOutcome::Waiting`]), `None` if there was none.

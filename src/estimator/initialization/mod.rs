@@ -1,26 +1,21 @@
 //! Initialization: poses, velocities, gravity, biases and landmarks in metres from a few seconds of tracked features
-//! and
-//! IMU samples.
+//! and IMU samples.
 //!
 //! [`try_initialize`] is a pure function of its input. It is called at each frame until it succeeds, with the frames of
-//! the
-//! last [`InitializationOptions::longest_window_s`] seconds, and returns a solution or the reasons for waiting.
+//! the last [`InitializationOptions::longest_window_s`] seconds, and returns a solution or the reasons for waiting.
 //!
 //! Steps, in the order of the reported checks:
 //!
 //! 1. *Stationary vehicle.* IMU samples of little variance and a constant image give gyroscope bias and gravity
-//! direction.
-//!    An accelerometer turn-on bias of 0.5 m/s² tilts that direction by 3°, and only motion separates the two.
-//!    By default the estimate is kept ([`StationaryEstimate`]) and the initialization waits for motion. With
+//!    direction. An accelerometer turn-on bias of 0.5 m/s² tilts that direction by 3°, and only motion separates the
+//!    two. By default the estimate is kept ([`StationaryEstimate`]) and the initialization waits for motion. With
 //!    [`StationaryPolicy::InitializeAtOnce`] it initializes immediately, with velocity zero and no landmarks: the
-//! estimator
-//!    then has to find depths once there is parallax, and must give the accelerometer bias its full prior.
+//!    estimator then has to find depths once there is parallax, and must give the accelerometer bias its full prior.
 //! 2. *Selection.* A dozen views, spaced by parallax and time, so that a hover before the motion is represented by few
-//! of
-//!    them: these few constrain tilt and accelerometer bias jointly, which makes the scale of the later motion
-//! reliable.
+//!    of them: these few constrain tilt and accelerometer bias jointly, which makes the scale of the later motion
+//!    reliable.
 //! 3. *Structure.* Camera poses from the images alone. Encoders may have errors of many degrees and only give initial
-//! values.
+//!    values.
 //! 4. *Alignment.* Rotation of the extrinsics and gyroscope bias from rotations; scale, gravity of exact magnitude,
 //!    velocities and accelerometer bias from a linear system.
 //! 5. *Refinement.* All of these together with the IMU covariances; calibration errors are unknowns with priors.

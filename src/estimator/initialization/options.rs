@@ -36,7 +36,6 @@ pub struct InitializationOptions {
     pub shortest_window_s: f64,
     pub max_views: usize,
     pub min_views: usize,
-    /// Smallest time between views.
     pub min_spacing_s: f64,
     /// Largest time between views without motion.
     pub max_spacing_s: f64,
@@ -54,7 +53,6 @@ pub struct InitializationOptions {
     pub min_inlier_ratio: f64,
     /// Smallest number of landmarks with a depth.
     pub min_landmarks: usize,
-    /// Largest number of features.
     pub max_landmarks: usize,
     /// Largest root mean square reprojection error, in standard deviations of a bearing.
     pub max_reprojection_sigmas: f64,
@@ -101,8 +99,7 @@ impl Default for InitializationOptions {
 }
 
 /// Parallax that two views need to triangulate, in standard deviations of a bearing. It gives the depth of a landmark
-/// to
-/// about a fifth (noise of two bearings over the parallax); hundreds of such landmarks suffice for an initial pair.
+/// to about a fifth (noise of two bearings over the parallax); hundreds of such landmarks suffice for an initial pair.
 const PARALLAX_SIGMAS: f64 = 7.0;
 
 impl InitializationOptions {
@@ -118,8 +115,7 @@ impl InitializationOptions {
     }
 
     /// Sets the errors of the extrinsics for a gimbal with `joints` joints from the bounds of the chain's uniform
-    /// errors
-    /// and the noise of an encoder reading (`None` without encoders: the rotation is then almost unknown).
+    /// errors and the noise of an encoder reading (`None` without encoders: the rotation is then almost unknown).
     #[must_use]
     pub fn for_gimbal(self, prior: &ChainPrior, joints: usize, encoder_sigma_rad: Option<f64>) -> Self {
         // A uniform error of bound b has standard deviation b/√3; errors of base, links and end accumulate along the

@@ -1,11 +1,9 @@
 //! Joint least-squares refinement of images and IMU samples: poses, velocities, biases, gravity, extrinsics.
 //!
 //! The IMU frame of the first view is the frame of reference, so there is no gauge freedom; gravity is a direction in
-//! it
-//! with known magnitude.
-//! The extrinsics are the given ones with an error common to all views (a rotation on the IMU's side and a translation)
-//! and, on a gimbal, an independent rotation per view: `R = common·given·view`. Every rotation is perturbed on the
-//! right.
+//! it with known magnitude. The extrinsics are the given ones with an error common to all views (a rotation on the
+//! IMU's side and a translation) and, on a gimbal, an independent rotation per view: `R = common·given·view`. Every
+//! rotation is perturbed on the right.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 

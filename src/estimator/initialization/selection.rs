@@ -40,9 +40,8 @@ fn gyroscope_rotation(samples: &[ImuSample], bias: &Vector3<f64>) -> UnitQuatern
 /// Indices of the selected frames, ascending; the newest one is always selected.
 ///
 /// Going back in time, a frame is selected when its parallax or time difference to the last selected one is large
-/// enough,
-/// or when the next older frame has too few features in common with the last selected one.
-/// The views start where even neighbouring frames have too few common features.
+/// enough, or when the next older frame has too few features in common with the last selected one. The views start
+/// where even neighbouring frames have too few common features.
 pub(super) fn select_views(
     frames: &[InitializationFrame<'_>],
     rotations: &[UnitQuaternion<f64>],

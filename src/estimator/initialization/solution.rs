@@ -57,7 +57,6 @@ pub struct InitializedLandmark {
     pub views: usize,
 }
 
-/// Accuracy of the solution.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InitializationDiagnostics {
     /// Relative standard deviation of the metric scale.

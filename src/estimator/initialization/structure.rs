@@ -1,6 +1,5 @@
 //! Camera poses and landmarks from the images alone, up to scale: an initial pair, then the other views one by one,
-//! then
-//! a joint adjustment.
+//! then a joint adjustment.
 //!
 //! Each view has an independent pose, because a gimbal may rotate the camera. Gyroscope and encoders only give initial
 //! rotations and resolve the ambiguity of a plane.
@@ -142,10 +141,13 @@ pub(super) enum StructureFailure {
         /// Largest ratio of inliers to common features.
         inlier_ratio: f64,
     },
-    /// Too few landmarks remained.
-    FewLandmarks { landmarks: usize },
+    FewLandmarks {
+        landmarks: usize,
+    },
     /// Too few views were placed.
-    FewViews { views: usize },
+    FewViews {
+        views: usize,
+    },
 }
 
 /// Reconstruction in the frame of its first view, in an arbitrary unit of length.
@@ -168,7 +170,6 @@ impl Structure {
     }
 }
 
-/// Limits of the reconstruction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StructureLimits {
     pub(super) bearing_sigma_rad: f64,

@@ -7,31 +7,27 @@ use crate::estimator::state::navigation::Matrix15;
 use crate::estimator::state::preintegration::Preintegration;
 use crate::sensors::JointAngles;
 
-/// One frame of the window.
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {
-    /// Number of the image in its camera's stream.
     pub(crate) index: usize,
-    /// Stamp of the image since the log started.
+    /// Header stamp of the image since the start of the log.
     pub(crate) stamp_ns: i64,
-    /// Current estimate.
     pub(crate) state: FrameState,
-    /// Linearization point of the marginalization prior, for frames in the prior.
+    /// Linearization point in the marginalization prior, `None` for frames outside the prior.
     pub(crate) first_estimate: Option<FrameState>,
-    /// Encoder angles at the stamp.
+    /// Encoder angles at the stamp, `None` without usable readings.
     pub(crate) encoder: Option<JointAngles>,
-    /// Present while the vehicle is stationary.
+    /// Zero-velocity update, `None` unless the vehicle is stationary.
     pub(crate) stationary: Option<Stationary>,
-    /// Whether it is a keyframe.
     pub(crate) keyframe: bool,
-    /// IMU samples since the previous frame of the window.
+    /// Preintegrated IMU samples since the previous frame of the window.
     pub(crate) motion: Preintegration,
     /// Square-root information of `motion` (15 × 15), `None` when it is empty.
     pub(crate) motion_information: Option<Matrix15>,
 }
 
 impl Frame {
-    /// Returns the state for derivatives: the first estimate while `current` is within `reach_rad` of it in
+    /// State at which derivatives are evaluated: the first estimate while `current` is within `reach_rad` of it in
     /// attitude and joint angles, else `current`.
     pub(crate) fn linearization_point<'a>(&'a self, current: &'a FrameState, reach_rad: f64) -> &'a FrameState {
         self.first_estimate.as_ref().filter(|first| current.rotation_from_rad(first) <= reach_rad).unwrap_or(current)

@@ -1,4 +1,4 @@
-//! Hypothetical windows: states and landmarks with exact measurements, linearized by the estimator's own
+//! Hypothetical windows: states and landmarks with exact measurements, linearized by the estimator's
 //! factors, to predict the information of a motion.
 
 use std::sync::Arc;
@@ -25,37 +25,33 @@ use crate::gimbal::{ClassicalChain, Parameterization};
 use crate::optimization::{Landmark, LandmarkModel, RelativePose, RobustLoss};
 use crate::sensors::{ImuNoise, ImuSample, JointAngles, JointMotionFit};
 
-/// Knowledge of the poses in a hypothetical window.
+/// Information on the poses in a hypothetical window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PoseKnowledge {
-    /// Poses are known.
+    /// Known poses, without columns.
     Known,
     /// IMU measurements, with known or unknown biases.
     Imu {
-        /// Noise densities of the IMU.
         noise: ImuNoise,
-        /// Whether the biases are known.
+        /// True if the biases are known and have no columns.
         biases_known: bool,
     },
 }
 
-/// Knowledge of the joint angles in a hypothetical window.
+/// Information on the joint angles in a hypothetical window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointKnowledge {
-    /// Joint angles are known.
+    /// Known joint angles, without columns.
     Known,
     /// One reading per frame and joint with white noise of this standard deviation, in radians.
     Encoder(f64),
-    /// Joint angles are unknown.
+    /// Unknown joint angles, without readings.
     Unknown,
 }
 
-/// One frame of a hypothetical window.
 #[derive(Clone, Debug)]
 pub struct HypotheticalFrame {
-    /// Time of the frame, in seconds.
     pub time_s: f64,
-    /// Pose, velocity and biases.
     pub navigation: NavigationState,
     /// Joint angles without the static offsets.
     pub joints_rad: Vec<f64>,
@@ -63,12 +59,12 @@ pub struct HypotheticalFrame {
     pub imu: Vec<ImuSample>,
 }
 
-/// A landmark of a hypothetical window and the frames that observe it.
+/// Landmark of a hypothetical window with the observing frames.
 #[derive(Clone, Debug)]
 pub struct HypotheticalLandmark {
-    /// Slot of the frame in which it is anchored.
+    /// Slot of the anchor frame.
     pub anchor: usize,
-    /// Direction in the anchor's camera, of any length.
+    /// Direction in the anchor's camera; need not be normalized.
     pub bearing: Vector3<f64>,
     /// Inverse distance from the anchor's camera, in 1/m.
     pub inverse_distance_per_m: f64,
@@ -76,22 +72,17 @@ pub struct HypotheticalLandmark {
     pub observers: Vec<usize>,
 }
 
-/// A window of hypothetical states with exact measurements.
+/// Window of hypothetical states with exact measurements.
 #[derive(Clone, Debug)]
 pub struct HypotheticalWindow {
-    /// Model of the camera.
     pub camera: CameraModel,
     /// Frames, oldest first.
     pub frames: Vec<HypotheticalFrame>,
-    /// Landmarks with their observing frames.
     pub landmarks: Vec<HypotheticalLandmark>,
-    /// Knowledge of the poses.
     pub poses: PoseKnowledge,
-    /// Knowledge of the joint angles.
     pub joints: JointKnowledge,
     /// Standard deviation of a pixel.
     pub pixel_sigma_px: f64,
-    /// Parameterization of the landmarks.
     pub landmark_model: LandmarkModel,
     /// Gravity in the world, in m/s².
     pub gravity_in_world: Vector3<f64>,
@@ -100,9 +91,9 @@ pub struct HypotheticalWindow {
 }
 
 impl HypotheticalWindow {
-    /// Linearizes the window with the chain in one parameterization, with or without its joint offsets as columns.
+    /// Linearizes the window with the chain in a parameterization; `joint_offsets` adds the joint offsets as columns.
     ///
-    /// Known quantities have no columns. The rows of the priors are those of the rig's prior alone.
+    /// Known quantities have no columns. The prior rows are those of the rig's prior only.
     pub fn linearize(
         &self,
         chain: &ClassicalChain,
@@ -140,7 +131,7 @@ impl HypotheticalWindow {
         keeping(&whole, |group| match (group, &self.poses, &self.joints) {
             (ColumnGroup::Joints, _, JointKnowledge::Known)
             | (ColumnGroup::Pose | ColumnGroup::VelocityBias, PoseKnowledge::Known, _) => 0,
-            // The biases come after the velocity.
+            // Keeps the velocity; the biases follow it in the block.
             (ColumnGroup::VelocityBias, PoseKnowledge::Imu { biases_known: true, .. }, _) => 3,
             _ => usize::MAX,
         })
@@ -183,7 +174,7 @@ impl HypotheticalWindow {
         }
     }
 
-    /// Landmarks with exact pixels; where they do not project they are not observed.
+    /// Landmarks with exact pixels; a frame into which a landmark does not project has no observation.
     fn tracks(&self, states: &[FrameState], calibration: &Calibration) -> (Vec<Track>, Vec<Landmark>) {
         let cameras: Vec<_> = states.iter().map(|state| camera_pose::at(state, calibration)).collect();
         let mut tracks = Vec::with_capacity(self.landmarks.len());
@@ -210,7 +201,7 @@ impl HypotheticalWindow {
     }
 }
 
-/// Noise of intervals without measurements.
+/// Noise of intervals without IMU measurements.
 const NO_NOISE: ImuNoise = ImuNoise {
     accelerometer_noise_density: 0.0,
     accelerometer_random_walk: 0.0,
@@ -218,7 +209,7 @@ const NO_NOISE: ImuNoise = ImuNoise {
     gyroscope_random_walk: 0.0,
 };
 
-/// Linearization with the first columns of each block only, as many as `count` returns for its group.
+/// Linearization reduced to the first columns of each block, as many as `count` returns for its group.
 fn keeping(whole: &Linearization, count: impl Fn(ColumnGroup) -> usize) -> Linearization {
     let mut kept = Vec::new();
     let mut columns = Vec::new();

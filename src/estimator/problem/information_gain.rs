@@ -6,7 +6,7 @@
 //! Up to a rigid motion of the scene, the calibration columns of the observations are zero without motion in
 //! the window. With motion they are a sum over motions ([`crate::estimator::problem::motion_parts`]), and so is `G`: each motion
 //! contributes the symmetric `½(JmᵀU·UᵀJc + JcᵀU·UᵀJm)`, which is also its Shapley value. The remainder comes
-//! with the marginalization prior: from images that have left the window.
+//! from the marginalization prior, that is, from images that have left the window.
 
 use nalgebra::DMatrix;
 
@@ -21,24 +21,24 @@ use crate::estimator::state::layout::Layout;
 use crate::geometry::seconds_from_ns;
 use crate::optimization::Cholesky;
 
-/// A motion: of the body along or about an axis of the IMU, or of a joint.
+/// Motion of the IMU along or about one of its axes, or of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Motion {
-    /// A translation along an axis of the IMU, 0 to 2.
+    /// Translation along an axis of the IMU, 0 to 2.
     Translation(usize),
-    /// A rotation about an axis of the IMU, 0 to 2.
+    /// Rotation about an axis of the IMU, 0 to 2.
     Rotation(usize),
-    /// A joint, from 0.
+    /// Joint index.
     Joint(usize),
 }
 
 impl Motion {
-    /// All motions of a body with this number of joints, in table order.
+    /// Motions of a vehicle with this number of joints, in table order.
     pub fn all(joints: usize) -> impl Iterator<Item = Self> {
         (0..3).map(Self::Translation).chain((0..3).map(Self::Rotation)).chain((0..joints).map(Self::Joint))
     }
 
-    /// Name of the motion in tables and files; joints by their names, if known.
+    /// Name in tables and files; joints by their names, if given.
     pub fn name(self, joint_names: &[String]) -> String {
         let axis = |axis: usize, names: [&str; 3]| names.get(axis).copied().unwrap_or("?").to_owned();
         match self {
@@ -48,65 +48,62 @@ impl Motion {
         }
     }
 
-    /// Label of the motion on the screen: `trans x`, `rot z`; joints as in [`Self::name`].
+    /// Label in the window: `trans x`, `rot z`; joints as in [`Self::name`].
     pub fn label(self, joint_names: &[String]) -> String {
         self.name(joint_names).replace("move ", "trans ").replace("turn ", "rot ")
     }
 }
 
-/// Information gain of the newest image about each parameter, and its attribution to the motions of the window.
+/// Information gain of the newest image about each free calibration parameter, attributed to the motions of the window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InformationGain {
     /// Time since the previous image, in seconds.
     pub interval_s: f64,
-    /// Number of joints.
     pub joints: usize,
     /// Gain per free calibration column: `log₂` of the ratio of the standard deviations without and with the image.
     bits: Box<[f32]>,
-    /// Contribution of each motion per column, in the order of [`Motion::all`].
+    /// Contribution of each motion in bits, column by column, in the order of [`Motion::all`].
     by_motion: Box<[f32]>,
 }
 
 impl InformationGain {
-    /// From the gain per free calibration column and the contribution of each motion, in the order of
-    /// [`Motion::all`].
+    /// `bits` has the gain per free calibration column, `by_motion` the contribution of each motion, column by column
+    /// in the order of [`Motion::all`].
     pub(crate) fn new(interval_s: f64, joints: usize, bits: Vec<f32>, by_motion: Vec<f32>) -> Self {
         Self { interval_s, joints, bits: bits.into(), by_motion: by_motion.into() }
     }
 
-    /// Number of columns.
     pub fn columns(&self) -> usize {
         self.bits.len()
     }
 
-    /// Gain about a parameter in bits per second: one bit halves the standard deviation.
+    /// Gain about a parameter in bits per second; one bit halves the standard deviation.
     pub fn bits_per_s(&self, column: usize) -> f64 {
         f64::from(self.bits[column]) / self.interval_s
     }
 
-    /// Contribution of each motion to [`Self::bits_per_s`]. A negative one reduces the contributions of others, as
-    /// the joints of a stabilized gimbal do.
+    /// Contribution of each motion to [`Self::bits_per_s`]. A negative value reduces the contribution of other motions,
+    /// as the joints of a stabilized gimbal do.
     pub fn by_motion_per_s(&self, column: usize) -> impl Iterator<Item = f64> + '_ {
         let motions = 6 + self.joints;
         let parts = self.by_motion.get(motions * column..motions * (column + 1)).unwrap_or_default();
         parts.iter().map(|part| f64::from(*part) / self.interval_s)
     }
 
-    /// Remaining contribution: from confirming images that have left the window.
+    /// Remainder of [`Self::bits_per_s`]: the newest image confirms information of images that have left the window.
     pub fn earlier_per_s(&self, column: usize) -> f64 {
         self.bits_per_s(column) - self.by_motion_per_s(column).sum::<f64>()
     }
 
-    /// Bytes on the heap.
     pub(crate) fn heap_bytes(&self) -> usize {
         allocated_bytes(size_of_val(&*self.bits)) + allocated_bytes(size_of_val(&*self.by_motion))
     }
 }
 
-/// Added to the diagonals, as in the solver: unknowns without a factor do not move.
+/// Addition to the diagonals, as in the solver, so that unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
 
-/// Gains below this fraction of the variance are rounding errors.
+/// Relative decrease of the variance below which a gain is a rounding error.
 const ROUNDING: f64 = 1e-10;
 
 /// Information of one camera's observations at the final estimate, with and without the newest image.
@@ -136,12 +133,12 @@ struct Answer {
     /// Covariance of the free calibration.
     covariance: DMatrix<f64>,
     /// Derivative of the states and the calibration (columns of the layout) with respect to the free calibration
-    /// columns: least squares of the other unknowns.
+    /// columns: least-squares response of the other unknowns.
     response: DMatrix<f64>,
 }
 
 impl Answer {
-    /// Of the calibration, the columns `free` are unknown.
+    /// `free` are the calibration columns that are not fixed.
     fn new(hessian: &DMatrix<f64>, layout: &Layout, free: &[usize]) -> Option<Self> {
         let mut order = layout.elimination_order();
         order.truncate(layout.calibration().start);
@@ -156,8 +153,8 @@ impl Answer {
 }
 
 impl Problem<'_> {
-    /// Returns the information gain of the newest image; `None` without free calibration columns, with a single
-    /// frame, or when a matrix is not positive definite.
+    /// Information gain of the newest image; `None` without free calibration columns, with a single frame, or when a
+    /// matrix is not positive definite.
     pub(crate) fn information_gain(
         &self,
         estimate: &Estimate,
@@ -197,7 +194,7 @@ impl Problem<'_> {
         Some(InformationGain::new(interval_s, layout.joints, bits, by_motion))
     }
 
-    /// Returns a zero gain, for an image that is dropped; `None` as in [`Self::information_gain`].
+    /// Zero gain, for an image that is dropped; `None` without free calibration columns or with a single frame.
     pub(crate) fn no_information_gain(&self, estimate: &Estimate) -> Option<InformationGain> {
         let (interval_s, free) = self.newest_interval(estimate)?;
         let joints = self.layout.joints;
@@ -205,7 +202,7 @@ impl Problem<'_> {
     }
 
     /// Time since the previous image in seconds, and the free columns of the calibration; `None` without free
-    /// columns.
+    /// columns or with a single frame.
     fn newest_interval(&self, estimate: &Estimate) -> Option<(f64, Vec<usize>)> {
         let newest = self.layout.frames.checked_sub(1).filter(|newest| *newest > 0)?;
         let interval_s = seconds_from_ns(self.frames[newest].stamp_ns - self.frames[newest - 1].stamp_ns);
@@ -227,7 +224,7 @@ impl Problem<'_> {
         let layout = self.layout;
         let calibration = self.linearization_calibration(&estimate.calibration);
         let mut motion_terms = DMatrix::zeros(6 + layout.joints, free.len());
-        // Effect of each motion for all parameters that change with one of them.
+        // Effect of each motion on all parameters, for a change of one of them.
         let (with_p, without_p) = (&with.response * &with.covariance, &without.response * &with.covariance);
         for (camera, information) in cameras.iter().enumerate() {
             let maps = &information.maps;
@@ -247,7 +244,7 @@ impl Problem<'_> {
         motion_terms
     }
 
-    /// Adds the contribution of moving joints' readings to the encoders' time offset.
+    /// Adds the contribution that readings of moving joints make to the encoders' time offset.
     fn encoder_clock_parts(
         &self,
         estimate: &Estimate,
@@ -271,7 +268,7 @@ impl Problem<'_> {
     }
 }
 
-/// Derivative of the camera's blocks (6 rows each) with respect to the unknowns.
+/// Changes of the camera's blocks (6 rows each) for changes of the unknowns.
 fn camera_moves(
     layout: Layout,
     maps: &CameraMaps,

@@ -1,4 +1,4 @@
-//! Linearization of a solved window, for observability analysis and display.
+//! Linearization of a solved window, for the observability analysis and display.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -17,29 +17,30 @@ use crate::estimator::state::layout::POSE;
 use crate::estimator::state::layout::VELOCITY_BIAS;
 use crate::gimbal::{Chain, ParameterId};
 
-/// The whitened linearization of the step at its final estimate, without the priors on the calibration.
+/// Whitened linearization of the step at its final estimate, without the priors on the calibration.
 ///
-/// The inverse depths are already projected out by orthogonal projection (each feature's own rows rotated and its first
-/// row dropped), so that the rows stay whitened residuals and no normal equations were formed.
+/// The inverse depths are already eliminated by orthogonal projection (each feature's rows are rotated and their first
+/// row is dropped), so that the rows stay whitened residuals and no normal equations are formed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Linearization {
     /// Column blocks in order: calibration, joints, poses, velocities and biases.
     pub columns: Vec<ColumnBlock>,
-    /// Calibration parameters that are fixed at their values: they are known, and have no columns.
+    /// Calibration parameters fixed at their values; they have no columns.
     pub fixed_parameters: Vec<ParameterId>,
     /// Jacobian of the measurements, rows whitened.
     pub jacobian: DMatrix<f64>,
     /// Jacobian of the priors (rig prior on the calibration, marginalization prior), same columns, whitened.
     pub prior_jacobian: DMatrix<f64>,
-    /// How many rows of these, the first ones, are the rig's prior.
+    /// Number of leading rows of `prior_jacobian` that belong to the rig's prior.
     pub rig_prior_rows: usize,
-    /// Norm of each calibration column before the depths were projected out, for the reference of the rank rule.
+    /// Norm of each calibration column before elimination of the depths, as reference of the rank rule.
     pub calibration_column_norms: DVector<f64>,
-    /// Chain at which the calibration columns were evaluated (with first estimates not the present one).
+    /// Chain at which the calibration columns were evaluated (the first estimate, not the current one, where there is
+    /// one).
     pub chain: Chain,
 }
 
-/// What the columns of a linearization stand for.
+/// Column blocks of a linearization, in the order of the report.
 pub(crate) fn column_blocks(layout: &Layout, parameters: &[ParameterId], frames: &[FrameId]) -> Vec<ColumnBlock> {
     let mut blocks = Vec::new();
     let mut start = 0;
@@ -76,7 +77,7 @@ pub(crate) fn column_order(layout: &Layout) -> Vec<usize> {
 }
 
 impl Problem<'_> {
-    /// Linearizes the whole window at an estimate; `parameters` are those of the calibration columns, free or
+    /// Linearizes the complete window at an estimate; `parameters` are those of the calibration columns, free or
     /// fixed. The information of each camera's observations is appended to `seen`, if requested.
     pub(crate) fn linearization(
         &self,

@@ -1,4 +1,4 @@
-//! Marginalization: the information of a removed frame becomes the prior of the others.
+//! Marginalization: the information of a removed frame becomes the prior of the other frames.
 
 use nalgebra::DMatrix;
 
@@ -8,10 +8,10 @@ use super::rows::stack;
 use crate::estimator::factors::marginal_prior::Prior;
 use crate::estimator::state::estimate::Estimate;
 
-/// Returns the prior after marginalization of the oldest frame and of the features of the problem's tracks (all
-/// that it observes and that leave with it).
+/// Prior after marginalization of the oldest frame and of the landmarks of the problem's tracks (those that
+/// leave the window with it).
 ///
-/// Its residuals refer to the first estimates: frames of the old prior keep theirs, others take the present estimate.
+/// Its residuals refer to the first estimates: frames of the old prior keep theirs, others use the current estimate.
 pub(crate) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior> {
     let mut parts = vec![problem.prior_rows(estimate), problem.encoder_rows(0, estimate)];
     parts.extend(problem.velocity_terms(0, &estimate.frames[0]).map(|terms| problem.zero_velocity_rows(&terms)));
@@ -23,8 +23,8 @@ pub(crate) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior
     eliminated(problem, estimate, &parts, 0)
 }
 
-/// Returns the prior without the frame at `slot`, whose encoder readings it takes, while the observations are
-/// dropped and the IMU samples go to the next frame; `None` without a prior.
+/// Prior without the frame at `slot`, including its encoder readings; its visual observations are
+/// discarded and its IMU samples go to the next frame. `None` without a prior.
 pub(crate) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -> Option<Prior> {
     let prior = problem.prior?;
     if !prior.holds_frame(slot) {
@@ -34,7 +34,7 @@ pub(crate) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -
     eliminated(problem, estimate, &[carried, problem.encoder_rows(slot, estimate)], slot)
 }
 
-/// Converts rows with residuals at the present estimate to a prior at the first estimates.
+/// Converts rows with residuals at the current estimate to a prior at the first estimates.
 fn eliminated(problem: &Problem<'_>, estimate: &Estimate, parts: &[DMatrix<f64>], slot: usize) -> Option<Prior> {
     let total = problem.layout.total();
     let mut rows = stack(parts, total + 1);
@@ -44,7 +44,7 @@ fn eliminated(problem: &Problem<'_>, estimate: &Estimate, parts: &[DMatrix<f64>]
     Prior::eliminating(&rows, &problem.layout, slot)
 }
 
-/// Frames of a new prior keep their present state as their first estimate.
+/// Sets missing first estimates of frames in the prior to the current state; removes those of frames outside.
 pub(crate) fn keep_first_estimates(prior: &Prior, frames: &mut [Frame]) {
     for (slot, frame) in frames.iter_mut().enumerate() {
         if prior.holds_frame(slot) {

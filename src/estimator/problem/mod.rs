@@ -7,7 +7,7 @@ pub(crate) mod hypothetical;
 pub(crate) mod information_gain;
 pub(crate) mod linearization;
 pub(crate) mod marginalization;
-mod motion_parts;
+pub(crate) mod motion_parts;
 #[expect(clippy::module_inception, reason = "the type that the folder is about")]
 pub(crate) mod problem;
 pub(crate) mod rows;

@@ -1,11 +1,11 @@
 //! Relative motion of the camera poses due to a calibration parameter, split by the motions in the window.
 //!
 //! Let `D(q)` be the derivative of the extrinsics at joint angles `q` with respect to the parameters, as a
-//! twist in the IMU frame, and `M` the motion of the body from a frame to the newest one. Up to a rigid motion
+//! twist in the IMU frame, and `M` the motion of the IMU from a frame to the newest one. Up to a rigid motion
 //! of the scene with the newest camera, the camera of the frame moves by `D(q) − Ad(M)·D(q')`, where `q'` are
 //! the newest joint angles. Without motion this is zero.
-//! The difference is a sum. `I − Ad(M)` splits by the axes of the body's rotation vector and translation,
-//! exactly, because `exp([w]) − I = [w]·Jl(w)`; `D(q) − D(q')` telescopes over the joints, as the mean of both
+//! The difference is a sum. `I − Ad(M)` splits exactly by the axes of the rotation vector and the translation of `M`,
+//! because `exp([w]) − I = [w]·Jl(w)`; `D(q) − D(q')` telescopes over the joints, as the mean of both
 //! orders.
 
 use std::borrow::Cow;
@@ -25,11 +25,11 @@ struct Twists {
     shift: Matrix3xX<f64>,
 }
 
-/// Returns, for each motion (translations along and rotations about the IMU's axes, then the joints), its
+/// For each motion (translations along and rotations about the IMU's axes, then the joints), its
 /// contribution to the derivative of the camera's blocks with respect to the calibration (6·blocks × columns).
 ///
 /// The sum over motions is that derivative up to a rigid motion of all poses. Intrinsics change the images without any
-/// motion: nothing of them is attributed.
+/// motion and are not attributed.
 pub(crate) fn motion_parts(
     stamped: &[FrameState],
     calibration: &Calibration,
@@ -40,10 +40,10 @@ pub(crate) fn motion_parts(
     let mut parts = vec![DMatrix::zeros(6 * maps.blocks(), columns); 6 + joints];
     let sensor = calibration.sensor_model();
     let rows = sensor.block_rows();
-    // The states at the exposures of the blocks.
+    // States at the exposures of the blocks.
     let frames: Vec<Cow<'_, FrameState>> = stamped
         .iter()
-        .flat_map(|state| rows.iter().map(|row| camera_pose::when_seen(state, sensor.row_time_s(*row))))
+        .flat_map(|state| rows.iter().map(|row| camera_pose::state_at_exposure(state, sensor.row_time_s(*row))))
         .collect();
     let Some(newest) = frames.last() else { return parts };
     let there = twists(calibration, &newest.joints_rad);
@@ -68,7 +68,7 @@ pub(crate) fn motion_parts(
     parts
 }
 
-/// Twists of the extrinsics with respect to the parameters; zero for time offsets.
+/// Twists of the extrinsics with respect to the parameters; zero for columns after the chain's.
 fn twists(calibration: &Calibration, joints_rad: &[f64]) -> Twists {
     let linearization = calibration.linearize(joints_rad);
     let extrinsics = linearization.imu_from_camera;
@@ -81,7 +81,7 @@ fn twists(calibration: &Calibration, joints_rad: &[f64]) -> Twists {
 /// `(I − Ad(M))·D` by the axes of the translation and of the rotation.
 fn body_parts(to_newest: &RigidTransform, there: &Twists, put: &mut impl FnMut(usize, &Twists)) {
     let angle = so3::log(&to_newest.rotation);
-    // The left Jacobian is the right one of the negative angle.
+    // The left Jacobian is the right Jacobian of the negative angle.
     let mean = so3::right_jacobian(&-angle);
     let rotation = to_newest.rotation_matrix();
     for axis in 0..3 {
@@ -93,7 +93,7 @@ fn body_parts(to_newest: &RigidTransform, there: &Twists, put: &mut impl FnMut(u
     }
 }
 
-/// `D(q) − D(q')` joint by joint, as the mean of both orders.
+/// `D(q) − D(q')` joint by joint, as mean of both orders.
 fn joint_parts(calibration: &Calibration, from_rad: &[f64], to_rad: &[f64], put: &mut impl FnMut(usize, &Twists)) {
     let joints = calibration.joint_count().min(to_rad.len());
     if from_rad[..joints] == to_rad[..joints] {
@@ -115,7 +115,8 @@ fn joint_parts(calibration: &Calibration, from_rad: &[f64], to_rad: &[f64], put:
     }
 }
 
-/// Contributions to a time offset or readout time: it moves the camera of a row by its velocity times the row's factor.
+/// Contributions to a time offset or readout time, which moves the camera of a row by its velocity times the row's
+/// factor.
 fn clock_parts(
     frames: &[Cow<'_, FrameState>],
     maps: &CameraMaps,

@@ -22,10 +22,9 @@ use crate::estimator::state::track::Track;
 use crate::geometry::wrap_angle;
 use crate::optimization::Landmark;
 
-/// Columns of a frame's state in an IMU factor, `[φ, p, v, b_g, b_a]`.
+/// Number of columns of a frame's state in an IMU factor, `[φ, p, v, b_g, b_a]`.
 const STATE: usize = POSE + VELOCITY_BIAS;
 
-/// Visual factors of one camera.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraFactors<'a> {
     pub(crate) visual: VisualModel<'a>,
@@ -34,11 +33,10 @@ pub(crate) struct CameraFactors<'a> {
     pub(crate) columns: Range<usize>,
 }
 
-/// All factors of the window.
 #[derive(Clone, Debug)]
 pub(crate) struct Problem<'a> {
     pub(crate) layout: Layout,
-    /// Cameras observe no common features, so that each has its own visual system.
+    /// Cameras have no common features, so each has a separate visual system.
     pub(crate) cameras: Vec<CameraFactors<'a>>,
     pub(crate) gravity_in_world: Vector3<f64>,
     pub(crate) frames: &'a [Frame],
@@ -60,7 +58,7 @@ pub(crate) struct Costs {
 }
 
 impl Costs {
-    /// Objective of the solver.
+    /// Objective of the solver: half the sum.
     pub(crate) fn total(&self) -> f64 {
         0.5 * (self.visual + self.imu + self.encoder + self.zero_velocity + self.calibration + self.prior)
     }
@@ -69,13 +67,13 @@ impl Costs {
 /// Whitened IMU factor between two frames.
 #[derive(Clone, Debug)]
 pub(crate) struct ImuBlocks {
-    /// With respect to the earlier frame (15 × 15).
+    /// Derivative by the state of the earlier frame (15 × 15).
     pub(crate) by_from: Matrix15,
-    /// With respect to the later frame (15 × 15).
+    /// Derivative by the state of the later frame (15 × 15).
     pub(crate) by_to: Matrix15,
-    /// With respect to the IMU's intrinsics (15 × 15), where they are estimated.
+    /// Derivative by the IMU's intrinsics (15 × 15), `None` if they are not estimated.
     pub(crate) by_intrinsics: Option<Matrix15>,
-    /// 15 × 1.
+    /// Whitened residual `[φ, p, v, b_g, b_a]` (15 × 1).
     pub(crate) residual: Vector15,
 }
 
@@ -87,11 +85,11 @@ struct CameraEquations {
     columns: Range<usize>,
 }
 
-/// The problem linearized at an estimate.
+/// Normal equations at an estimate, landmarks not yet eliminated.
 #[derive(Clone, Debug)]
 pub(crate) struct NormalEquations {
     cameras: Vec<CameraEquations>,
-    /// All other factors (lower triangle).
+    /// Normal matrix of all other factors (lower triangle).
     hessian: DMatrix<f64>,
     gradient: DVector<f64>,
 }
@@ -106,7 +104,7 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// A camera over frames and calibrations.
+    /// Camera at the given frames and calibrations.
     pub(crate) fn view<'v>(
         &'v self,
         camera: usize,
@@ -116,7 +114,7 @@ impl Problem<'_> {
         CameraView::new(frames, calibrations.of(camera), self.cameras[camera].visual.camera)
     }
 
-    /// The cost by kind of factor.
+    /// Costs by kind of factor.
     pub(crate) fn costs(&self, estimate: &Estimate) -> Costs {
         let mut costs = Costs::default();
         for (camera, (factors, landmarks)) in self.cameras.iter().zip(&estimate.landmarks).enumerate() {
@@ -146,7 +144,7 @@ impl Problem<'_> {
         costs
     }
 
-    /// Returns `x ⊟ x₀` of all unknowns with a first estimate, zero for the others (columns of the layout).
+    /// `x ⊟ x₀` of all unknowns with a first estimate, zero for the others (columns of the layout).
     pub(crate) fn first_estimate_offset(&self, estimate: &Estimate) -> DVector<f64> {
         let mut first_estimate_offset = DVector::zeros(self.layout.total());
         for (slot, (frame, current)) in self.frames.iter().zip(&estimate.frames).enumerate() {
@@ -174,8 +172,7 @@ impl Problem<'_> {
         Some(information * residual)
     }
 
-    /// Returns joint, whitened residual and its derivative with respect to the angle, for each encoder reading of a
-    /// frame.
+    /// Joint, whitened residual and its derivative by the joint angle, for each encoder reading of a frame.
     pub(crate) fn encoder_residuals<'s>(
         &'s self,
         slot: usize,
@@ -191,8 +188,8 @@ impl Problem<'_> {
         })
     }
 
-    /// Returns place, whitened residual and its derivative, for each joint rate and joint acceleration of a frame: against
-    /// what the encoders measure, or against zero with the motion of a gimbal as standard deviation.
+    /// Place, whitened residual and its derivative, for each joint rate and joint acceleration of a frame. The
+    /// reference is the encoder's measurement, or zero with the typical motion of a gimbal as standard deviation.
     pub(crate) fn joint_motion_residuals<'s>(
         &'s self,
         slot: usize,
@@ -206,8 +203,8 @@ impl Problem<'_> {
         })
     }
 
-    /// Column of the encoders' time offset, if it is estimated; its derivative is that of the angle times the
-    /// joint's rate.
+    /// Column of the encoders' time offset, `None` if it is not estimated. A reading's derivative by it is that by the
+    /// angle times the joint rate.
     pub(crate) fn encoder_clock_column(&self, estimate: &Estimate) -> Option<usize> {
         let calibration = &estimate.calibration;
         let column = calibration.of(MAIN).encoder_shift_column()?;
@@ -234,12 +231,12 @@ impl Problem<'_> {
         })
     }
 
-    /// Zero velocity at `slot`, if the vehicle is stationary there.
+    /// Zero-velocity terms at `slot`, `None` unless the vehicle is stationary there.
     pub(crate) fn velocity_terms(&self, slot: usize, state: &FrameState) -> Option<[ZeroVelocityTerm; 3]> {
         Some(self.frames[slot].stationary.as_ref()?.velocity_terms(self.layout, slot, state))
     }
 
-    /// Zero translation since the previous frame, if the vehicle has been stationary since then.
+    /// Zero-translation terms since the previous frame, `None` unless the vehicle has been stationary since then.
     pub(crate) fn position_terms(&self, slot: usize, states: &[FrameState]) -> Option<[ZeroVelocityTerm; 3]> {
         let before = slot.checked_sub(1)?;
         let stationary = self.frames[slot].stationary.filter(|it| self.frames[before].stamp_ns >= it.since_ns)?;
@@ -251,7 +248,6 @@ impl Problem<'_> {
         if self.calibration_first_estimates { current.at_first_estimate() } else { current.clone() }
     }
 
-    /// Linearizes all factors.
     pub(crate) fn linearize(&self, estimate: &Estimate) -> NormalEquations {
         let frames = self.linearization_frames(estimate);
         let calibration = self.linearization_calibration(&estimate.calibration);
@@ -274,8 +270,8 @@ impl Problem<'_> {
         NormalEquations { cameras, hessian, gradient }
     }
 
-    /// Normal equations of all factors but the visual ones: of measurements up to the frame before `slots`, and of
-    /// priors; derivatives with respect to the frames are evaluated at `linearized`.
+    /// Normal equations (lower triangle) of all factors but the visual ones: measurements of the frames before `slots`,
+    /// and priors. Derivatives by the frames are evaluated at `linearized`.
     pub(crate) fn other_equations(
         &self,
         estimate: &Estimate,
@@ -343,7 +339,7 @@ impl Problem<'_> {
         (hessian, gradient)
     }
 
-    /// Whitened Jacobians and residual of the IMU factor that ends at `slot`.
+    /// Whitened Jacobians and residual of the IMU factor that ends at `slot`; `None` without IMU samples.
     pub(crate) fn imu_blocks(&self, slot: usize, estimate: &Estimate, linearized: &[FrameState]) -> Option<ImuBlocks> {
         let information = self.frames[slot].motion_information.as_ref()?;
         let residual = self.imu_residual(slot, &estimate.frames, &estimate.calibration)?;
@@ -362,7 +358,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Columns of the IMU's intrinsics in the layout, empty where they are not estimated.
+    /// Columns of the IMU's intrinsics in the layout; empty if they are not estimated.
     pub(crate) fn imu_columns(&self, calibration: &Calibrations) -> Range<usize> {
         let (start, columns) = (self.layout.calibration().start, calibration.imu_columns());
         start + columns.start..start + columns.end
@@ -376,7 +372,7 @@ impl Problem<'_> {
         hessian: &mut DMatrix<f64>,
         gradient: &mut DVector<f64>,
     ) {
-        // One row of all columns after the other, so that the sums run along the columns.
+        // Transposed Jacobians, so that the sums run along contiguous memory.
         let mut rows = SMatrix::<f64, { 2 * STATE }, STATE>::zeros();
         rows.fixed_rows_mut::<STATE>(0).copy_from(&by_from.transpose());
         rows.fixed_rows_mut::<STATE>(STATE).copy_from(&by_to.transpose());
@@ -419,7 +415,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Returns the estimate after a step.
+    /// Estimate after a step.
     pub(crate) fn stepped(
         &self,
         estimate: &Estimate,
@@ -498,7 +494,7 @@ impl CameraEquations {
         }
     }
 
-    /// Steps of the camera's blocks, for a step of the unknowns.
+    /// Steps of the camera's blocks for a step of the unknowns.
     fn block_steps(&self, layout: &Layout, step: &DVector<f64>) -> Vec<Vector6<f64>> {
         (0..self.maps.blocks())
             .map(|block| {
@@ -510,7 +506,7 @@ impl CameraEquations {
     }
 }
 
-/// `left · right`, where most entries of the right matrix are zero.
+/// `left · right` for a mostly zero right matrix.
 fn sparse_product(left: &Matrix15, right: &Matrix15) -> Matrix15 {
     let mut product = Matrix15::zeros();
     for (target, factors) in product.data.0.iter_mut().zip(&right.data.0) {

@@ -12,7 +12,7 @@ use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{POSE, VELOCITY_BIAS};
 
 impl Problem<'_> {
-    /// Reprojection factors with landmarks projected out; at most `6·frames` rows per camera.
+    /// Rows of the reprojection factors after elimination of the landmarks; at most `6·frames` rows per camera.
     pub(crate) fn visual_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
         let frames = self.linearization_frames(estimate);
         let calibration = self.linearization_calibration(&estimate.calibration);
@@ -28,7 +28,7 @@ impl Problem<'_> {
         stack(&rows, self.layout.total() + 1)
     }
 
-    /// Reprojection factors of one camera with respect to its blocks; derivatives at `linearized`.
+    /// Rows of the reprojection factors of one camera by its blocks, landmarks eliminated; derivatives at `linearized`.
     pub(crate) fn projected_rows(
         &self,
         camera: usize,
@@ -42,7 +42,7 @@ impl Problem<'_> {
         ProjectedRows::new(&factors.visual, &current, linearized, factors.tracks, landmarks, apart)
     }
 
-    /// Converts rows with respect to the blocks of a camera to rows with respect to the unknowns.
+    /// Converts rows by the blocks of a camera to rows by the unknowns.
     pub(crate) fn carried_rows(&self, camera: usize, projected: &ProjectedRows, maps: &CameraMaps) -> DMatrix<f64> {
         let by_camera = &projected.rows;
         let total = self.layout.total();
@@ -58,7 +58,7 @@ impl Problem<'_> {
         rows
     }
 
-    /// Rows of the IMU factor that ends at `slot`, 15 or none.
+    /// Rows of the IMU factor that ends at `slot`: 15 rows, or none without IMU samples.
     pub(crate) fn imu_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
         self.imu_rows_at(slot, estimate, &self.linearization_frames(estimate))
     }
@@ -82,7 +82,7 @@ impl Problem<'_> {
         rows
     }
 
-    /// One row per encoder reading of a frame, and one per joint rate and acceleration where these are unknowns.
+    /// One row per encoder reading of a frame, and one per joint rate and joint acceleration if these are unknowns.
     pub(crate) fn encoder_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
         let readings: Vec<_> = self.encoder_residuals(slot, estimate).collect();
         let clock = self.encoder_clock_column(estimate);
@@ -116,7 +116,7 @@ impl Problem<'_> {
         rows
     }
 
-    /// Rows of the marginalization prior and of the prior on the first frame.
+    /// Rows of the marginalization prior and of the start prior on the first frame.
     pub(crate) fn prior_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
         let total = self.layout.total();
         let window_prior = self.prior.map_or_else(

@@ -1,4 +1,4 @@
-//! Levenberg–Marquardt on the window with landmarks eliminated.
+//! Levenberg–Marquardt solver of the window, landmarks eliminated.
 
 use std::rc::Rc;
 
@@ -14,61 +14,56 @@ use crate::optimization::damped::{DampedOptions, DampedProblem, Iteration, minim
 /// One iteration of the solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IterationReport {
-    /// Cost before the step.
     pub cost_before: f64,
-    /// Cost after it.
     pub cost_after: f64,
-    /// Damping or trust radius in use.
+    /// Levenberg–Marquardt damping.
     pub damping: f64,
-    /// Norm of the step.
     pub step_norm: f64,
-    /// Whether the step was accepted.
+    /// True if the step was accepted.
     pub accepted: bool,
 }
 
-/// Limits of a solve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SolverLimits {
     /// Largest number of tried steps, accepted or not.
     pub(crate) iterations: usize,
-    /// Converged when a step lowers the cost by less than this fraction and moves what aims the camera by less than
-    /// [`SETTLED_SIGMAS`].
+    /// Convergence threshold: a step lowers the cost by less than this fraction and moves calibration and newest joint
+    /// angles by less than [`SETTLED_SIGMAS`].
     pub(crate) relative_cost_tolerance: f64,
 }
 
-/// Result of a solve.
 #[derive(Clone, Debug)]
 pub(crate) struct Solution {
     pub(crate) estimate: Estimate,
     pub(crate) costs_before: Costs,
     pub(crate) costs_after: Costs,
     pub(crate) iterations: Vec<IterationReport>,
-    /// Posterior covariance of the calibration at the last linearization; empty without calibration and where the information
-    /// is not positive definite.
+    /// Posterior covariance of the calibration at the last linearization; empty without calibration or if the
+    /// information is not positive definite.
     pub(crate) calibration_covariance: DMatrix<f64>,
-    /// Posterior covariance of the newest pose at the last linearization, rotation first; `None` where the information is not
-    /// positive definite.
+    /// Posterior covariance of the newest pose at the last linearization, rotation first; `None` if the information is
+    /// not positive definite.
     pub(crate) newest_pose_covariance: Option<Matrix6<f64>>,
 }
 
 impl Solution {
-    /// Posterior standard deviations of the calibration's columns, empty without calibration.
+    /// Posterior standard deviations of the calibration's columns; empty without calibration.
     pub(crate) fn calibration_sigmas(&self) -> Vec<f64> {
         let variances = self.calibration_covariance.diagonal();
         variances.iter().map(|variance| variance.max(0.0).sqrt()).collect()
     }
 }
 
-/// Added to the diagonal so that unknowns without a factor do not move.
+/// Addition to the diagonal, so that unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
 /// Marquardt's λ of a solve until a step raises the cost: no more than rounding requires.
 ///
-/// It multiplies the information that an unknown has while all others are fixed. A rotation of the chain is then known to
-/// 1e-5 rad by the features of a window, but to 1e-2 rad where joint angles and the other rotations are unknown too: λ = 1e-6
-/// would halve its steps.
+/// It multiplies the information about an unknown while all others are fixed. The features of a window determine a
+/// rotation of the chain to 1e-5 rad in that case, but only to 1e-2 rad if joint angles and the other rotations are
+/// unknown too: λ = 1e-6 would halve its steps.
 const DAMPING: f64 = 1e-9;
-/// A step is short when calibration and newest joint angles move by less than this many standard deviations (root mean
-/// square over the columns): the marginalization keeps what is left of an unfinished solve.
+/// Step of calibration and newest joint angles below which the solver may stop, in standard deviations (root mean
+/// square over the columns): marginalization keeps the remaining error of an unfinished solve.
 const SETTLED_SIGMAS: f64 = 0.01;
 
 /// Minimizes the cost from `start`.
@@ -106,27 +101,23 @@ pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits
     }
 }
 
-/// The window's problem for the damped solver.
 struct DampedWindow<'a> {
     problem: &'a Problem<'a>,
-    /// Columns of fixed parameters.
     fixed: Vec<usize>,
-    /// Norm of each solved step.
     step_norms: Vec<f64>,
     /// Root mean square step of calibration and newest joint angles in the last solved step, in standard deviations.
     moved_sigmas: f64,
-    /// The last linearization for which a step was solved.
+    /// Last linearization for which a step was solved.
     last: Option<Linearization>,
 }
 
-/// The window linearized at an estimate.
+/// Window linearized at an estimate.
 struct Linearization {
     equations: Rc<NormalEquations>,
-    /// Information with the landmarks marginalized, where the last step was damped by [`DAMPING`] alone.
+    /// Information after marginalization of the landmarks; `None` unless the last step was damped by [`DAMPING`] only.
     information: Option<DMatrix<f64>>,
 }
 
-/// An estimate and its costs.
 struct Evaluated {
     estimate: Estimate,
     costs: Costs,
@@ -137,8 +128,9 @@ impl DampedWindow<'_> {
         Evaluated { costs: self.problem.costs(&estimate), estimate }
     }
 
-    /// Factor of the information at the last linearization: damping would act as information about position, yaw and what
-    /// else the window hardly determines. `None` without a solved step and where the information is not positive definite.
+    /// Factorization of the undamped information at the last linearization: damping would act as information about
+    /// position, yaw and other weakly observable unknowns. `None` without a solved step or if the information is not
+    /// positive definite.
     fn posterior(&self) -> Option<Cholesky> {
         let layout = &self.problem.layout;
         let Linearization { equations, information } = self.last.as_ref()?;
@@ -161,21 +153,21 @@ impl DampedWindow<'_> {
         covariance
     }
 
-    /// Posterior covariance of the newest pose, other unknowns marginalized; `None` where it is not finite.
+    /// Posterior covariance of the newest pose, other unknowns marginalized; `None` if it is not finite.
     fn newest_pose_covariance(&self, posterior: &Cholesky) -> Option<Matrix6<f64>> {
         let newest = self.problem.layout.pose(self.problem.layout.frames.checked_sub(1)?);
         let covariance = posterior.covariance_of(newest);
         covariance.iter().all(|entry| entry.is_finite()).then(|| Matrix6::from_column_slice(covariance.as_slice()))
     }
 
-    /// Root mean square of a step of the calibration and of the newest frame's joints, in standard deviations.
+    /// Root mean square step of the calibration and of the newest frame's joints, in standard deviations.
     fn moved_sigmas(&self, factor: &Cholesky, step: &DVector<f64>) -> f64 {
         // The joints of the newest frame and the calibration are eliminated last.
         let count = self.problem.layout.joint_block() + self.problem.layout.calibration;
         factor.trailing_length(count, step) / (count.max(1) as f64).sqrt()
     }
 
-    /// Normal equations without landmarks; fixed parameters do not move.
+    /// Normal equations after elimination of the landmarks; fixed parameters do not move.
     fn reduced(
         &self,
         equations: &NormalEquations,
@@ -217,14 +209,14 @@ impl DampedProblem for DampedWindow<'_> {
         let landmarks = equations.landmark_steps(layout, &reduced, &step);
         self.step_norms.push(step.norm());
         self.moved_sigmas = self.moved_sigmas(&factor, &step);
-        // With more damping, landmarks keep too much of the information.
+        // With more damping, the eliminated landmarks withhold too much information.
         let information = (damping <= DAMPING).then_some(hessian);
         self.last = Some(Linearization { equations: Rc::clone(equations), information });
         Some(self.evaluated(self.problem.stepped(&evaluated.estimate, &step, &landmarks)))
     }
 }
 
-/// Removes unknowns from the normal equations: their steps become zero.
+/// Removes unknowns from the normal equations, so that their steps are zero.
 fn fix(fixed: &[usize], hessian: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
     for column in fixed {
         hessian.row_mut(*column).fill(0.0);

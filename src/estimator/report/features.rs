@@ -5,25 +5,23 @@ use nalgebra::Vector3;
 use super::observations::Observations;
 use crate::frontend::FeatureId;
 
-/// A feature of the solve.
+/// Feature used in the solve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureReport {
-    /// Identity; [`FeatureId::camera`] is the number of its camera.
+    /// [`FeatureId::camera`] is the index of its camera.
     pub id: FeatureId,
-    /// Anchor frame.
     pub anchor_frame_index: usize,
     /// Inverse depth along the anchor's optical axis, in 1/m.
     pub inverse_depth_per_m: f64,
-    /// All its observations in the window, the anchor's first.
+    /// Observations in the window; the anchor's comes first.
     pub observations: Observations,
-    /// Rejected as an outlier after this solve.
+    /// True if rejected as an outlier after this solve.
     pub rejected: bool,
 }
 
-/// Numbers of features in the solve, also of steps without stored features.
+/// Feature counts; also kept for steps whose features are not stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FeatureCounts {
-    /// Features in the solve.
     pub solved: usize,
     /// Features rejected as outliers after the solve.
     pub rejected: usize,
@@ -32,7 +30,6 @@ pub struct FeatureCounts {
 }
 
 impl FeatureCounts {
-    /// Counts the features of a report.
     pub fn of(features: &[FeatureReport]) -> Self {
         Self {
             solved: features.len(),
@@ -41,16 +38,14 @@ impl FeatureCounts {
         }
     }
 
-    /// Features that were not rejected.
     pub fn inliers(&self) -> usize {
         self.solved - self.rejected
     }
 }
 
-/// A feature as a point of the world, for drawing.
+/// Position of a feature, for the 3D view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LandmarkReport {
-    /// Identity of the feature.
     pub id: FeatureId,
     /// Position in the world, in metres.
     pub position_m: Vector3<f64>,

@@ -1,33 +1,28 @@
-//! Memory of a report.
+//! Memory use of a report.
 
 use super::step::FrameStateReport;
 use super::{CalibrationEstimate, JacobianSource, StepReport};
 use crate::estimator::problem::information_gain::InformationGain;
 use crate::estimator::state::allocation::allocated_bytes;
 
-/// Bytes of a report by part.
+/// Memory use of a report, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReportBytes {
-    /// The frames of the window.
     pub window: usize,
-    /// The calibration.
     pub calibration: usize,
     /// Features without their observations.
     pub features: usize,
-    /// Observations of the features.
     pub observations: usize,
-    /// Points of the map.
+    /// Landmark positions.
     pub landmarks: usize,
-    /// The linearization, where it was kept.
+    /// Linearization, if stored.
     pub linearization: usize,
-    /// Source of the Jacobian.
     pub jacobian: usize,
-    /// The report itself, events, residuals, iterations and warnings.
+    /// Report struct, events, residuals, iterations and warnings.
     pub other: usize,
 }
 
 impl ReportBytes {
-    /// Sum of all fields.
     pub fn total(&self) -> usize {
         self.window
             + self.calibration
@@ -49,7 +44,7 @@ fn of_text(text: &String) -> usize {
 }
 
 impl StepReport {
-    /// Memory of the report in bytes.
+    /// Memory use of the report.
     pub fn bytes(&self) -> ReportBytes {
         let messages = self.events.iter().map(|event| of_text(&event.message)).sum::<usize>()
             + self.warnings.iter().map(of_text).sum::<usize>();

@@ -1,4 +1,4 @@
-//! Stored data of a report from which any block of the step's Jacobian can be reproduced.
+//! Stored data from which any block of the step's Jacobian can be reproduced.
 
 use std::sync::Arc;
 
@@ -17,28 +17,28 @@ use crate::optimization::{LandmarkModel, RobustLoss};
 
 /// Linearization points of the step's Jacobian, and blocks that cannot be reproduced from the report.
 ///
-/// The rows of features are the largest part: they follow from the rest of the report, these states and the bearings.
+/// The rows of features, the largest part, follow from the rest of the report, these states and the bearings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JacobianSource {
     /// Linearization points by slot (first estimates): `world_from_imu` as quaternion x, y, z, w and position, then
-    /// the joint angles; in single precision, much finer than the display.
+    /// the joint angles. Single precision, much finer than the display.
     pub(crate) frames: Box<[f32]>,
     /// Linearization points of the chains, by camera.
     pub(crate) chains: Box<[Chain]>,
-    /// Estimated time offsets by camera; empty without any.
+    /// Estimated time offsets by camera; empty if none is estimated.
     pub(crate) clocks: Box<[ClockColumns]>,
-    /// By slot, with estimated time offsets: rates of the body's rotation and position, then of the joints.
+    /// By slot, if time offsets are estimated: angular rate and velocity of the IMU, then joint rates.
     pub(crate) rates: Box<[f32]>,
-    /// States and calibrations where rows of the images have poses of their own or intrinsics of a camera or of the IMU are
-    /// estimated, which the fields above do not describe.
+    /// States and calibrations, stored when rows of an image have separate poses or when intrinsics of a camera or of
+    /// the IMU are estimated; the fields above do not cover these cases.
     pub(crate) exact: Option<Box<ExactSource>>,
-    /// Whether the calibration has columns.
+    /// True if the calibration has columns.
     pub(crate) calibrated: bool,
-    /// Indices of the rejected features in the report, which have no landmark there, and their unit bearings in
-    /// their anchors' cameras.
+    /// Rejected features, which have no landmark in the report: their index there, and their unit bearing in
+    /// the anchor's camera.
     pub(crate) rejected: Box<[(u32, [f32; 3])]>,
     pub(crate) rows: Box<[PackedRow]>,
-    /// Norms of all packed rows: indices of column blocks, and the norms there.
+    /// Column-block indices of the norms of all packed rows, parallel to `norms`.
     pub(crate) columns: Box<[u16]>,
     pub(crate) norms: Box<[f32]>,
     pub(crate) pixel_sigma_px: f64,
@@ -63,27 +63,26 @@ impl ExactSource {
     }
 }
 
-/// Time offsets that are estimated with a camera.
+/// Time offsets estimated with a camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ClockColumns {
-    /// Number of time offsets: the camera's, then the encoders'.
+    /// Number of time offsets: camera first, then encoders.
     pub(crate) count: usize,
-    /// Camera time offset at the linearization point, and as estimated, relative to the rig.
+    /// Camera time offset relative to the rig, at the linearization point and as estimated.
     pub(crate) shifts_s: [f64; 2],
 }
 
-/// Rows of neither features nor encoders.
+/// Rows of a factor other than features and encoders.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PackedRow {
     pub(crate) kind: PackedKind,
     pub(crate) height: u16,
-    /// Number of its norms.
     pub(crate) count: u16,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum PackedKind {
-    /// The IMU samples that end at this slot.
+    /// Preintegrated IMU samples that end at this slot.
     Imu(u8),
     ZeroVelocity,
     CalibrationPrior,
@@ -91,7 +90,7 @@ pub(crate) enum PackedKind {
 }
 
 impl PackedKind {
-    /// Factor of the rows, with these frame numbers.
+    /// Factor of the rows; `numbers` are the frames by slot.
     pub(crate) fn factor(self, numbers: &[FrameId]) -> Option<JacobianFactor> {
         Some(match self {
             Self::Imu(slot) => {
@@ -109,37 +108,32 @@ impl PackedKind {
 /// Rows of a factor without a feature.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FactorRows {
-    /// Factor of the rows.
     pub factor: JacobianFactor,
-    /// By the columns of the step (calibration, joints, poses, velocities and biases), whitened; the residual last, at
-    /// the final estimate.
+    /// Whitened rows by the columns of the step (calibration, joints, poses, velocities and biases); the last column is
+    /// the residual at the final estimate.
     pub rows: DMatrix<f64>,
 }
 
-/// Where residuals come from.
+/// Factor that residuals belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum JacobianFactor {
-    /// The reprojections of a feature, two rows per observation.
+    /// Reprojections of a feature, two rows per observation.
     Feature(crate::frontend::FeatureId),
-    /// The IMU samples between two frames, by the frames' numbers.
+    /// Preintegrated IMU samples between two frames.
     Imu {
-        /// The earlier one.
         from: FrameId,
-        /// The later one.
         to: FrameId,
     },
-    /// The encoder readings of a frame.
+    /// Encoder readings of a frame.
     Encoder(FrameId),
-    /// Zero-velocity updates.
     ZeroVelocity,
-    /// The rig's prior on the calibration.
+    /// Rig's prior on the calibration.
     CalibrationPrior,
-    /// The marginalization prior, and what was known at the start.
+    /// Marginalization prior, or the prior at the start.
     MarginalizationPrior,
 }
 
 impl JacobianFactor {
-    /// Its kind.
     pub const fn kind(self) -> FactorKind {
         match self {
             Self::Feature(_) => FactorKind::Visual,
@@ -152,20 +146,17 @@ impl JacobianFactor {
     }
 }
 
-/// Rows of the Jacobian that belong together.
+/// Rows of the Jacobian that belong to one factor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JacobianRow {
-    /// Where they come from.
     pub factor: JacobianFactor,
-    /// How many they are.
     pub height: usize,
-    /// Number of a block of columns and the Frobenius norm of the rows there, in standard deviations of the residuals by
-    /// the column's scale (see [`crate::estimator::ColumnId::scale`]); blocks that are zero are left out.
+    /// Index of a column block and Frobenius norm of its rows, in standard deviations of the residuals per scale of the
+    /// column (see [`crate::estimator::ColumnId::scale`]); zero blocks are left out.
     pub norms: Vec<(u16, f32)>,
 }
 
 impl JacobianSource {
-    /// Bytes on the heap.
     pub(crate) fn heap_bytes(&self) -> usize {
         allocated_bytes(size_of_val(&*self.frames))
             + allocated_bytes(size_of_val(&*self.chains))
@@ -179,7 +170,7 @@ impl JacobianSource {
             + self.exact.as_ref().map_or(0, |exact| allocated_bytes(exact.bytes()))
     }
 
-    /// Whether these are the parameters of its calibration columns.
+    /// True if `parameters` are those of the calibration columns.
     pub(crate) fn describes(&self, parameters: &[ParameterId]) -> bool {
         if let Some(exact) = &self.exact {
             return exact.linearized.1.parameters() == parameters;
@@ -188,8 +179,8 @@ impl JacobianSource {
         self.chains.iter().map(Chain::dof).sum::<usize>() + clocks == parameters.len()
     }
 
-    /// States by slot, for frames with this number of joints; velocities and rates only with estimated time
-    /// offsets, bias-corrected.
+    /// States by slot for this number of joints; bias-corrected velocities and rates only if time offsets are
+    /// estimated.
     pub(crate) fn frames(&self, joints: usize) -> Vec<FrameState> {
         if let Some(exact) = &self.exact {
             return exact.linearized.0.clone();
@@ -223,7 +214,7 @@ impl JacobianSource {
         self.frames.chunks_exact(POSE_NUMBERS + joints).map(unpacked).collect()
     }
 
-    /// The packed rows, for frames of these numbers.
+    /// Packed rows; `numbers` are the frames by slot.
     pub(crate) fn rows<'a>(&'a self, numbers: &'a [FrameId]) -> impl Iterator<Item = JacobianRow> + 'a {
         let mut begin = 0;
         self.rows.iter().filter_map(move |row| {
@@ -236,5 +227,5 @@ impl JacobianSource {
     }
 }
 
-/// Numbers of a pose among those of a frame.
+/// Number of values of a pose in `JacobianSource::frames`: quaternion and position.
 const POSE_NUMBERS: usize = 7;

@@ -1,6 +1,6 @@
 //! Immutable reports of the steps: plain values with public fields, by subject.
 //!
-//! A report has all data for panels, tables and the observability analysis; the window creates it.
+//! A report holds all data for panels, tables and the observability analysis; the window creates it.
 
 mod events;
 mod features;

@@ -1,19 +1,18 @@
-//! The observations of a feature in a report, packed: of a recording they are by far the largest part.
+//! Packed observations of a feature in a report: they are by far the largest part of a recording.
 
 use std::fmt;
 
 use nalgebra::Vector2;
 
-/// An observation of a feature by a frame of the window.
+/// Observation of a feature in a frame of the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObservationReport {
-    /// Number of the observing image in its stream.
+    /// Index of the observing image in its stream.
     pub frame_index: usize,
-    /// Measured pixel.
     pub measured_px: Vector2<f64>,
-    /// Predicted minus measured before the solve, in pixels.
+    /// Predicted minus measured before the solve, in pixels; `None` behind the camera.
     pub residual_before_px: Option<Vector2<f64>>,
-    /// Predicted minus measured after the solve, in pixels.
+    /// Predicted minus measured after the solve, in pixels; `None` behind the camera.
     pub residual_after_px: Option<Vector2<f64>>,
     /// Squared whitened residual after the solve.
     pub chi2: f64,
@@ -21,15 +20,15 @@ pub struct ObservationReport {
     pub robust_weight: f64,
 }
 
-/// The observations of one feature in the window, the anchor's first.
+/// Observations of one feature in the window; the anchor's comes first.
 ///
-/// They are kept in single precision, which resolves a ten-thousandth of a pixel at the far edge of an image.
+/// Stored in single precision, which resolves a ten-thousandth of a pixel at the far edge of an image.
 #[derive(Clone, Default, PartialEq, Eq)]
 pub struct Observations {
     packed: Box<[PackedObservation]>,
 }
 
-/// 36 bytes in place of 88; numbers by their bits, so that what is missing equals itself.
+/// 36 bytes instead of 88; numbers are stored as bits, so that a missing value equals itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct PackedObservation {
     frame_index: u32,
@@ -40,26 +39,23 @@ struct PackedObservation {
     robust_weight: u32,
 }
 
-/// A residual that is missing: a NaN that no computation makes.
+/// Missing residual: a NaN that no computation produces.
 const MISSING: [u32; 2] = [0x7fc0_dead; 2];
 
 impl Observations {
-    /// Number of observations.
     pub fn len(&self) -> usize {
         self.packed.len()
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.packed.is_empty()
     }
 
-    /// All of them, unpacked.
+    /// Unpacked observations.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = ObservationReport> + '_ {
         self.packed.iter().map(PackedObservation::unpacked)
     }
 
-    /// Bytes on the heap.
     pub(crate) fn heap_bytes(&self) -> usize {
         size_of_val(&*self.packed)
     }

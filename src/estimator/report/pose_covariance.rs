@@ -1,42 +1,40 @@
-//! Covariance of an estimated pose.
-
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector6};
 
-/// Covariance of a pose `world_from_imu`.
+/// Covariance (6 × 6) of a pose `world_from_imu`.
 ///
-/// The origin of the world and the direction of its axes are those of the first frame after the initialization, where the
-/// variances of position and yaw are nearly zero; they grow from then on. Calibration, velocities, biases, joint angles and
-/// landmarks are marginalized.
+/// The origin of the world and the direction of its axes are those of the first frame after the initialization, where
+/// the variances of position and yaw are nearly zero; they grow from there. Calibration, velocities, biases, joint
+/// angles and landmarks are marginalized.
 ///
 /// Rows and columns: rotation vector in the IMU frame (`R exp(δφ)`, rad), then position in the world (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseCovariance(pub Matrix6<f64>);
 
 impl PoseCovariance {
-    /// Root of the summed variances of the three coordinates of the position, in metres.
+    /// Root of the sum of the variances of the three position coordinates, in metres.
     pub fn position_sigma_m(&self) -> f64 {
         self.position_m2().trace().sqrt()
     }
 
-    /// Root of the summed variances of the three components of the rotation, in radians.
+    /// Root of the sum of the variances of the three rotation components, in radians.
     pub fn attitude_sigma_rad(&self) -> f64 {
         self.0.fixed_view::<3, 3>(0, 0).trace().sqrt()
     }
 
-    /// Root of the summed variances of the rotations about the two horizontal axes of the world, in radians, of a pose with
-    /// this rotation `world_from_imu`.
+    /// Root of the sum of the variances of the rotations about the two horizontal axes of the world, in radians;
+    /// `world_from_imu` is the rotation of the pose.
     pub fn tilt_sigma_rad(&self, world_from_imu: &UnitQuaternion<f64>) -> f64 {
         let in_world = self.in_world(world_from_imu);
         (in_world[(3, 3)] + in_world[(4, 4)]).sqrt()
     }
 
-    /// Covariance of the position in the world, in m².
+    /// Covariance of the position in the world (3 × 3), in m².
     pub fn position_m2(&self) -> Matrix3<f64> {
         self.0.fixed_view::<3, 3>(3, 3).into_owned()
     }
 
-    /// The covariance with the position first and rotations about the axes of the world, as ROS messages have it, of a pose
-    /// with this rotation `world_from_imu`.
+    /// Covariance (6 × 6) as in ROS messages: position first, rotations about the axes of the world; `world_from_imu`
+    /// is the rotation of the pose.
     pub fn in_world(&self, world_from_imu: &UnitQuaternion<f64>) -> Matrix6<f64> {
         let rotation = world_from_imu.to_rotation_matrix();
         let mut change = Matrix6::zeros();
@@ -46,13 +44,14 @@ impl PoseCovariance {
         0.5 * (turned + turned.transpose())
     }
 
-    /// Normalized error squared (NEES) of an error of the same rows; 6 on average for a consistent estimator. `None` for a
-    /// matrix that is not positive definite.
+    /// Normalized estimation error squared (NEES) of an error with the same rows; 6 on average for a consistent
+    /// estimator.
+    /// `None` when the covariance is not positive definite.
     pub fn nees(&self, error: &Vector6<f64>) -> Option<f64> {
         Some(error.dot(&self.0.cholesky()?.solve(error)))
     }
 
-    /// The same of the rotation alone, 3 on average.
+    /// NEES of the rotation alone, 3 on average.
     pub fn rotation_nees(&self, error: &Vector6<f64>) -> Option<f64> {
         let error = error.fixed_rows::<3>(0).into_owned();
         Some(error.dot(&self.0.fixed_view::<3, 3>(0, 0).into_owned().cholesky()?.solve(&error)))
@@ -69,7 +68,7 @@ mod tests {
 
     #[test]
     fn axes_of_the_world_and_of_the_imu_are_told_apart() {
-        // Rotations about the x axis of the IMU are uncertain; a yaw of 90° makes that the y axis of the world.
+        // Rotations about the x axis of the IMU are uncertain; after a yaw of 90° that is the y axis of the world.
         let covariance = PoseCovariance(Matrix6::from_diagonal(&Vector6::new(0.04, 1e-4, 1e-4, 1.0, 4.0, 4.0)));
         let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2);
         let found = covariance.in_world(&yaw);

@@ -1,16 +1,12 @@
-//! Residuals by kind of factor, and the iterations of the solver that lowered them.
+//! Residuals by kind of factor, and the solver iterations.
 
 use crate::estimator::factors::FactorKind;
-/// Sum of squared whitened residuals of one kind of factor, and how many there are.
+/// Sum of squared whitened residuals of one kind of factor, and their number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResidualSummary {
-    /// Kind of factor.
     pub factor: FactorKind,
-    /// Number of scalar residuals.
     pub count: usize,
-    /// χ² before the solve.
     pub chi2_before: f64,
-    /// χ² after the solve.
     pub chi2_after: f64,
 }
 

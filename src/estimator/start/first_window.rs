@@ -39,8 +39,7 @@ pub(super) struct FirstWindow<'a> {
 
 impl<'a> FirstWindow<'a> {
     /// Window of the newest views of a solution, with the features of the leading camera; `None` when none of these
-    /// views is
-    /// among the waiting frames.
+    /// views is among the waiting frames.
     pub(super) fn new(
         setup: &Setup,
         solution: &'a InitializationSolution,
@@ -52,8 +51,8 @@ impl<'a> FirstWindow<'a> {
         let leading = calibration.leading();
         let joints = calibration.of(MAIN).joint_count();
         let world = world_from_solution(solution, resume_at);
-        let room = drop_or_marginalize_frame::first_room(&calibration, options);
-        let views = &solution.frames[solution.frames.len().saturating_sub(room + 1)..];
+        let most_frames = drop_or_marginalize_frame::first_window_frames(&calibration, options);
+        let views = &solution.frames[solution.frames.len().saturating_sub(most_frames + 1)..];
         let errors = calibration.imu_errors().copied();
         let empty = || Preintegration::with_intrinsics(setup.imu_noise, solution.bias, errors);
         let mut imu = empty();
@@ -158,13 +157,12 @@ impl<'a> FirstWindow<'a> {
         events.push(window.choose_keyframe(setup));
         let report = self.window.report(setup, input, &mut solved);
         self.window.state.drop_rejected(&solved, options, events);
-        self.window.state.make_room(setup, events);
+        self.window.state.drop_or_marginalize_frame(setup, events);
         (self.window, report)
     }
 
     /// Adds the features of the other cameras; returns true if there are any. Their given extrinsics may have large
-    /// errors, so
-    /// they are excluded from the first solve.
+    /// errors, so they are excluded from the first solve.
     fn add_other_cameras(&mut self) -> bool {
         let window = &mut self.window.state;
         let leading = window.calibration.leading();

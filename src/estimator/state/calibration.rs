@@ -1,4 +1,4 @@
-//! The estimated static calibration of a camera: its chain, clocks, shutter and intrinsics with their priors, and the
+//! Estimated static calibration of a camera: chain, time offsets, shutter and intrinsics with their priors, and the
 //! linearization point of the marginalization prior.
 
 use std::borrow::Cow;
@@ -16,11 +16,10 @@ use crate::gimbal::{
     Chain, ChainLinearization, ClassicalChain, ParameterId, ParameterPart, Parameterization, Quantity, transport,
 };
 
-/// Estimated values.
 #[derive(Clone, Debug, PartialEq)]
 struct Values {
     chain: Chain,
-    /// Estimated values of the sensor columns relative to the rig's.
+    /// Estimated values of the sensor columns, relative to the rig's.
     sensors: DVector<f64>,
 }
 
@@ -43,7 +42,7 @@ impl Values {
     }
 }
 
-/// A chain with the clocks, the shutter and the intrinsics of its camera, free or fixed.
+/// Chain with the time offsets, shutter and intrinsics of its camera, free or fixed.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Calibration {
     values: Values,
@@ -54,12 +53,12 @@ pub(crate) struct Calibration {
     given_readout_s: f64,
     first_estimate: Option<Values>,
     free: bool,
-    /// Parameters fixed at their values; the parameterization may change.
+    /// Parameters fixed at their values; the parameterization may still change.
     frozen: Vec<ParameterId>,
 }
 
 impl Calibration {
-    /// The given chain in a parameterization; without encoders its joint offsets are fixed.
+    /// Given chain in a parameterization; `joint_offsets` is false without encoders, which fixes the joint offsets.
     pub(crate) fn new(
         classical: &ClassicalChain,
         parameterization: Parameterization,
@@ -80,14 +79,14 @@ impl Calibration {
         }
     }
 
-    /// Adds columns of clocks, shutter and intrinsics; a fixed calibration has none.
+    /// Adds columns for time offsets, shutter and intrinsics, unless the calibration is fixed.
     pub(crate) fn with_sensors(self, columns: Vec<SensorColumn>) -> Self {
         let columns = if self.free { columns } else { Vec::new() };
         let sensors = DVector::zeros(columns.len());
         Self { values: Values { sensors, ..self.values }, sensors: columns.into(), ..self }
     }
 
-    /// This calibration with the columns of another one, which has all of its own; new ones start at the rig's values.
+    /// This calibration with the columns of `wanted`, which contain its own; new columns start at the rig's values.
     pub(crate) fn with_columns_of(&self, wanted: &Self) -> Self {
         let of_columns = |values: &Values| {
             let value =
@@ -109,7 +108,7 @@ impl Calibration {
         }
     }
 
-    /// This calibration at the values of an earlier pass, with their covariance as its prior.
+    /// This calibration at the values of an earlier pass, with that pass' covariance as its prior.
     pub(crate) fn with_found(self, found: &FoundCamera) -> Self {
         if !self.free {
             return self;
@@ -117,7 +116,7 @@ impl Calibration {
         let offsets = !self.chain().hides_joint_offsets();
         let chain = GivenChain::form(&found.chain, found.parameterization, offsets);
         let rig = Arc::new(self.given.in_parameterization(found.parameterization, offsets));
-        // Columns that the earlier pass did not have keep the rig's prior.
+        // Columns that the earlier pass did not estimate keep the rig's prior.
         let columns = chain.dof();
         let place_of = |column: &SensorColumn| {
             let place = found.sensors.iter().position(|(parameter, _)| *parameter == column.parameter);
@@ -141,9 +140,10 @@ impl Calibration {
         }
     }
 
-    /// What the next pass over the same measurements starts from: the present values, and of the information behind
-    /// `covariance` the rig's prior whole and this share of the rest. `None` where the covariance is not positive definite.
-    pub(crate) fn found(&self, covariance: &DMatrix<f64>, share: f64) -> Option<FoundCamera> {
+    /// Prior of the next pass over the same measurements. Mean: current estimate. Information:
+    /// `Λ_rig + weight·(covariance⁻¹ − Λ_rig)`.
+    /// `None` when the covariance is not positive definite.
+    pub(crate) fn next_pass_prior(&self, covariance: &DMatrix<f64>, weight: f64) -> Option<FoundCamera> {
         let chain = self.chain().dof();
         let carried = if self.free {
             let rig = self.given.rig();
@@ -152,7 +152,7 @@ impl Calibration {
             for (place, column) in self.sensors.iter().enumerate() {
                 of_rig[(chain + place, chain + place)] = column.sigma.powi(-2);
             }
-            let information = covariance.clone().cholesky()?.inverse() * share + of_rig * (1.0 - share);
+            let information = covariance.clone().cholesky()?.inverse() * weight + of_rig * (1.0 - weight);
             information.cholesky()?.inverse()
         } else {
             DMatrix::zeros(0, 0)
@@ -166,8 +166,9 @@ impl Calibration {
         })
     }
 
-    /// Standard deviations of `imu_from_camera` at these joint angles by the prior of an earlier pass, the worst axes: of the
-    /// translation in metres and of the rotation in radians. `None` where the prior is the rig's.
+    /// Standard deviations of `imu_from_camera` at these joint angles under the prior of an earlier pass, worst axis
+    /// each:
+    /// translation in metres, rotation in radians. `None` with the rig's prior.
     pub(crate) fn found_extrinsics_sigmas(&self, joints_rad: &[f64]) -> Option<(f64, f64)> {
         let earlier = self.given.earlier()?;
         let by_parameters = self.chain().linearize(self.own(joints_rad)).by_parameters;
@@ -186,17 +187,17 @@ impl Calibration {
         &self.values.chain
     }
 
-    /// Place of a parameter among the columns after the chain's.
+    /// Index of a parameter among the columns after the chain's, `None` without a column.
     fn sensor(&self, parameter: ParameterId) -> Option<usize> {
         self.sensors.iter().position(|column| column.parameter == parameter)
     }
 
-    /// Column of a parameter after the chain's.
+    /// Column of a parameter after the chain's, `None` without one.
     fn sensor_column(&self, parameter: ParameterId) -> Option<usize> {
         self.sensor(parameter).map(|place| self.chain().dof() + place)
     }
 
-    /// Estimated value of a parameter relative to the rig's, zero without a column.
+    /// Estimated value of a parameter relative to the rig's; zero without a column.
     fn sensor_value(&self, parameter: ParameterId) -> f64 {
         self.sensor(parameter).map_or(0.0, |place| self.values.sensors[place])
     }
@@ -206,7 +207,6 @@ impl Calibration {
         self.sensor_value(ParameterId::timeshift(0))
     }
 
-    /// Column of the camera's time offset.
     pub(crate) fn camera_shift_column(&self) -> Option<usize> {
         self.sensor_column(ParameterId::timeshift(0))
     }
@@ -216,7 +216,6 @@ impl Calibration {
         self.sensor_value(ParameterId::ENCODER_TIMESHIFT)
     }
 
-    /// Column of the encoders' time offset.
     pub(crate) fn encoder_shift_column(&self) -> Option<usize> {
         self.sensor_column(ParameterId::ENCODER_TIMESHIFT)
     }
@@ -226,17 +225,17 @@ impl Calibration {
         self.given_readout_s + self.sensor_value(ParameterId::readout(0))
     }
 
-    /// Column of the readout time.
     pub(crate) fn readout_column(&self) -> Option<usize> {
         self.sensor_column(ParameterId::readout(0))
     }
 
-    /// Whether the rows of an image are exposed at different times: by the rig, or because the readout is estimated.
+    /// True if the rows of an image are exposed at different times: by the rig, or because the readout time is
+    /// estimated.
     pub(crate) fn has_rolling_shutter(&self) -> bool {
         self.given_readout_s != 0.0 || self.readout_column().is_some()
     }
 
-    /// Columns of the camera's intrinsics, in the order of [`Quantity::INTRINSICS`]; empty without.
+    /// Columns of the camera's intrinsics, in the order of [`Quantity::INTRINSICS`]; empty if they are fixed.
     pub(crate) fn intrinsics_columns(&self) -> Range<usize> {
         let is_intrinsic = |column: &&SensorColumn| {
             column.parameter.part == ParameterPart::Camera(0)
@@ -247,7 +246,7 @@ impl Calibration {
         start..start + self.sensors.iter().filter(is_intrinsic).count()
     }
 
-    /// The camera model with the estimated intrinsics.
+    /// Camera model with the estimated intrinsics.
     pub(crate) fn camera_model<'m>(&self, given: &'m CameraModel) -> Cow<'m, CameraModel> {
         let columns = self.intrinsics_columns();
         if columns.is_empty() {
@@ -258,11 +257,11 @@ impl Calibration {
         for (value, change) in intrinsics.iter_mut().zip(self.values.sensors.rows(first, columns.len()).iter()) {
             *value += change;
         }
-        // Only a step of the solver far out of range is no camera any more; its cost is that of the given one.
+        // Invalid intrinsics occur only when a solver step goes far out of range; the given model then yields the cost.
         given.with_intrinsics(intrinsics).map_or(Cow::Borrowed(given), Cow::Owned)
     }
 
-    /// The parameters of all columns, free or not, as those of the main camera.
+    /// Parameters of all columns, free or not, named as those of the main camera.
     pub(crate) fn parameters(&self) -> Vec<ParameterId> {
         let mut parameters = self.chain().parameters();
         parameters.extend(self.sensors.iter().map(|column| column.parameter));
@@ -276,7 +275,7 @@ impl Calibration {
         self.chain().values().iter().copied().chain(sensors).collect()
     }
 
-    /// Fixes a parameter at its present value.
+    /// Fixes a parameter at its current value.
     pub(crate) fn freeze(&mut self, column: usize) {
         let parameter = self.parameters()[column];
         if !self.frozen.contains(&parameter) {
@@ -289,7 +288,7 @@ impl Calibration {
         self.frozen.clone_from(&other.frozen);
     }
 
-    /// Free columns that are fixed at their values.
+    /// Columns of a free calibration that are fixed at their values.
     pub(crate) fn frozen_columns(&self) -> Vec<usize> {
         if self.frozen.is_empty() || !self.free {
             return Vec::new();
@@ -298,7 +297,6 @@ impl Calibration {
         parameters.filter(|(_, parameter)| self.frozen.contains(parameter)).map(|(column, _)| column).collect()
     }
 
-    /// Number of free columns.
     pub(crate) fn dof(&self) -> usize {
         if self.free { self.values.dof() } else { 0 }
     }
@@ -307,7 +305,7 @@ impl Calibration {
         self.chain().joint_count()
     }
 
-    /// Returns `imu_from_camera` at a frame's joint angles; a rigid camera ignores them.
+    /// `imu_from_camera` at a frame's joint angles, which a rigid camera ignores.
     pub(crate) fn imu_from_camera(&self, joints_rad: &[f64]) -> RigidTransform {
         self.chain().imu_from_camera(self.own(joints_rad))
     }
@@ -316,7 +314,7 @@ impl Calibration {
         &joints_rad[..self.joint_count().min(joints_rad.len())]
     }
 
-    /// Returns `imu_from_camera` with its derivatives with respect to the free columns and the joint angles; those
+    /// `imu_from_camera` with its derivatives with respect to the free columns and the joint angles; those
     /// of the columns after the chain's are zero.
     pub(crate) fn linearize(&self, joints_rad: &[f64]) -> ChainLinearization {
         let mut linearization = self.chain().linearize(self.own(joints_rad));
@@ -326,7 +324,7 @@ impl Calibration {
         linearization
     }
 
-    /// Applies a step of the solver, counted from the first estimate where there is one.
+    /// Applies a step of the solver; with a first estimate, the step is added in its tangent space.
     pub(crate) fn stepped(&self, delta: &[f64]) -> Self {
         if !self.free {
             return self.clone();
@@ -338,19 +336,19 @@ impl Calibration {
         Self { values, ..self.clone() }
     }
 
-    /// Returns `x ⊟ x₀` (free columns), `None` without a first estimate.
+    /// `x ⊟ x₀` (free columns) from the first estimate `x₀`, `None` without one.
     pub(crate) fn first_estimate_offset(&self) -> Option<DVector<f64>> {
         self.first_estimate.as_ref().map(|first| self.values.minus(first))
     }
 
-    /// Returns the calibration at the first estimate, or the present one without it.
+    /// This calibration at the first estimate, or at the current one without it.
     pub(crate) fn at_first_estimate(&self) -> Self {
         let values = self.first_estimate.as_ref().unwrap_or(&self.values).clone();
         Self { values, ..self.clone() }
     }
 
-    /// Keeps the first estimate, or takes the present one, while the prior has calibration columns; drops it
-    /// otherwise.
+    /// Keeps the first estimate, or sets it to the current values, while the prior has calibration columns; otherwise
+    /// removes it.
     pub(crate) fn keep_first_estimate(&mut self, in_prior: bool) {
         self.first_estimate = match self.first_estimate.take() {
             Some(first) if in_prior => Some(first),
@@ -359,7 +357,7 @@ impl Calibration {
         };
     }
 
-    /// Whitened prior residual: difference from the rig's values; one row per column.
+    /// Whitened prior residual, one row per column: difference from the rig's values or from those of an earlier pass.
     pub(crate) fn prior_residual(&self) -> DVector<f64> {
         if let Some(earlier) = self.given.earlier() {
             let expected = Values { chain: self.given.chain.clone(), sensors: earlier.expected.clone() };
@@ -372,8 +370,8 @@ impl Calibration {
 
     /// Derivative of the prior residual with respect to a step (columns × columns).
     ///
-    /// For rotation blocks the logarithm of the difference rotates with the difference itself, and a step counts
-    /// from the first estimate; the inner blocks of `poe` count as flat.
+    /// For rotation blocks it includes the right Jacobians of the logarithm of the difference and of the step from the
+    /// first estimate; the inner blocks of `poe` are treated as vector spaces.
     pub(crate) fn prior_jacobian(&self) -> DMatrix<f64> {
         let (all, chain) = (self.values.dof(), self.chain().dof());
         let mut jacobian = self.given.square_root_information.clone().resize(all, all, 0.0);
@@ -405,25 +403,25 @@ impl Calibration {
         jacobian
     }
 
-    /// Standard deviation of the rotations of the given chain, in radians; 0 where the chain is not calibrated or an earlier
-    /// pass has found it.
+    /// Standard deviation of the rotations of the given chain, in radians; 0 if the chain is not calibrated or comes
+    /// from an earlier pass.
     pub(crate) fn given_rotation_sigma_rad(&self) -> f64 {
         if self.free { self.given.rotation_sigma_rad() } else { 0.0 }
     }
 
-    /// Standard deviation of each column by the rig, before any measurement.
+    /// Standard deviation of each column under the rig's prior.
     pub(crate) fn prior_sigmas(&self) -> impl Iterator<Item = f64> + '_ {
         let sensors = self.sensors.iter().map(|column| column.sigma);
         self.given.rig_sigmas().iter().copied().chain(sensors)
     }
 
-    /// Sets the ground truth in a test.
+    /// Sets the chain to the ground truth.
     #[cfg(test)]
     pub(crate) fn set_chain(&mut self, chain: Chain) {
         self.values.chain = chain;
     }
 
-    /// Switches to another parameterization; returns the derivative of the old columns with respect to the new ones
+    /// Switches to another parameterization. Returns the derivative of the old columns with respect to the new ones
     /// at the first estimate.
     pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
         let offsets = !self.chain().hides_joint_offsets();

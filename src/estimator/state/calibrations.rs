@@ -1,4 +1,4 @@
-//! Static calibrations of all cameras and of the IMU with adjacent free columns.
+//! Static calibrations of all cameras and of the IMU, with adjacent free columns.
 
 use std::ops::Range;
 
@@ -10,10 +10,10 @@ use super::imu_calibration::ImuCalibration;
 use super::imu_errors::{self, ImuErrors};
 use crate::gimbal::{ParameterId, Parameterization};
 
-/// Index of the main camera, which may have joints. Its image is shown, its calibration has the first columns.
+/// Index of the main camera, which may have joints. The window shows its image; its calibration has the first columns.
 pub(crate) const MAIN: usize = 0;
 
-/// The calibrations by camera, the main camera's first, then that of the IMU where it is estimated.
+/// Calibrations by camera, main camera first, then the IMU if its intrinsics are estimated.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Calibrations {
     cameras: Vec<Calibration>,
@@ -21,23 +21,21 @@ pub(crate) struct Calibrations {
 }
 
 impl Calibrations {
-    /// Collects the main camera's calibration and those of the further rigid cameras.
     pub(crate) fn new(main: Calibration, rigid: impl IntoIterator<Item = Calibration>) -> Self {
         Self { cameras: std::iter::once(main).chain(rigid).collect(), imu: None }
     }
 
-    /// Adds the intrinsics of the IMU.
     pub(crate) fn with_imu(self, imu: Option<ImuCalibration>) -> Self {
         Self { imu: imu.map(Box::new), ..self }
     }
 
-    /// These calibrations at the values of an earlier pass, by camera.
+    /// These calibrations at the values of an earlier pass; `found` is by camera.
     pub(crate) fn with_found(self, found: &[FoundCamera]) -> Self {
         let cameras = self.cameras.into_iter().zip(found).map(|(camera, found)| camera.with_found(found));
         Self { cameras: cameras.collect(), ..self }
     }
 
-    /// These calibrations with all columns that others have.
+    /// These calibrations with all columns of `wanted`.
     pub(crate) fn with_columns_of(&self, wanted: &Self) -> Self {
         let cameras = self.cameras.iter().zip(&wanted.cameras);
         Self {
@@ -46,23 +44,23 @@ impl Calibrations {
         }
     }
 
-    /// Intrinsics of the IMU, `None` where they are not estimated.
+    /// Intrinsics of the IMU, `None` if they are not estimated.
     pub(crate) fn imu(&self) -> Option<&ImuCalibration> {
         self.imu.as_deref()
     }
 
-    /// Correction of the IMU's samples beyond that of the rig, `None` where it is not estimated.
+    /// Correction of the IMU samples relative to the rig's, `None` if it is not estimated.
     pub(crate) fn imu_errors(&self) -> Option<&ImuErrors> {
         self.imu().map(ImuCalibration::errors)
     }
 
-    /// Range of the IMU's columns, empty where its intrinsics are not estimated.
+    /// Range of the IMU's columns; empty if its intrinsics are not estimated.
     pub(crate) fn imu_columns(&self) -> Range<usize> {
         let start = self.cameras.iter().map(Calibration::dof).sum();
         start..start + self.imu.as_ref().map_or(0, |_| ImuCalibration::DOF)
     }
 
-    /// Fixes a parameter at its present value.
+    /// Fixes a parameter at its current value.
     pub(crate) fn freeze(&mut self, column: usize) {
         let imu = self.imu_columns();
         if let Some(calibration) = self.imu.as_mut().filter(|_| imu.contains(&column)) {
@@ -75,7 +73,6 @@ impl Calibrations {
         }
     }
 
-    /// Number of cameras.
     pub(crate) fn cameras(&self) -> usize {
         self.cameras.len()
     }
@@ -88,13 +85,13 @@ impl Calibrations {
         &mut self.cameras[camera]
     }
 
-    /// Camera with which the window starts: a rigid one if there is one, since its extrinsics are most accurate.
+    /// Camera that starts the window: a rigid one if there is one, since its extrinsics are most accurate.
     pub(crate) fn leading(&self) -> usize {
         self.cameras.iter().position(|calibration| calibration.joint_count() == 0).unwrap_or(MAIN)
     }
 
-    /// Parameters of all columns, free or not: the main camera's chain and time offsets, then those of the rigid
-    /// cameras.
+    /// Parameters of all columns, free or not: chain and sensor columns of the main camera, then the rigid
+    /// cameras, then the IMU.
     pub(crate) fn parameters(&self) -> Vec<ParameterId> {
         let of = |(camera, one): (usize, &Calibration)| {
             one.parameters().into_iter().map(move |parameter| parameter.of_camera(camera as u8))
@@ -115,7 +112,6 @@ impl Calibrations {
         self.cameras.iter().flat_map(Calibration::prior_sigmas).chain(imu).collect()
     }
 
-    /// Number of free columns.
     pub(crate) fn dof(&self) -> usize {
         self.imu_columns().end
     }
@@ -137,7 +133,7 @@ impl Calibrations {
         (0..self.cameras()).flat_map(of_camera).chain(of_imu).collect()
     }
 
-    /// Fixes the same parameters as others.
+    /// Fixes the same parameters as `others`.
     pub(crate) fn freeze_as(&mut self, others: &Self) {
         for (one, other) in self.cameras.iter_mut().zip(&others.cameras) {
             one.freeze_as(other);
@@ -147,7 +143,7 @@ impl Calibrations {
         }
     }
 
-    /// Applies a step of the solver, counted from the first estimates where there are any.
+    /// Applies a step of the solver; with first estimates, the step is added in their tangent spaces.
     pub(crate) fn stepped(&self, delta: &[f64]) -> Self {
         let cameras = self.cameras.iter().enumerate();
         Self {
@@ -156,7 +152,7 @@ impl Calibrations {
         }
     }
 
-    /// Returns `x ⊟ x₀` (free columns), zero for a camera without a first estimate; `None` when no camera has one.
+    /// `x ⊟ x₀` (free columns), zero for a camera without a first estimate; `None` when no camera has one.
     pub(crate) fn first_estimate_offset(&self) -> Option<DVector<f64>> {
         let offsets: Vec<_> = self.cameras.iter().map(Calibration::first_estimate_offset).collect();
         let imu = self.imu().and_then(ImuCalibration::first_estimate_offset);
@@ -176,7 +172,7 @@ impl Calibrations {
         Some(first_estimate_offset)
     }
 
-    /// Returns the calibrations at their first estimates, or the present ones.
+    /// These calibrations at their first estimates, or at the current ones without them.
     pub(crate) fn at_first_estimate(&self) -> Self {
         Self {
             cameras: self.cameras.iter().map(Calibration::at_first_estimate).collect(),
@@ -184,8 +180,8 @@ impl Calibrations {
         }
     }
 
-    /// Cameras with columns in the marginalization prior keep their first estimate, or take the present one; the
-    /// others have none.
+    /// Keeps the first estimates of calibrations with columns in the marginalization prior, or sets them to the current
+    /// values; removes those of the others.
     pub(crate) fn keep_first_estimates(&mut self, prior_holds: impl Fn(&Range<usize>) -> bool) {
         for camera in 0..self.cameras() {
             let columns = self.columns(camera);
@@ -197,7 +193,7 @@ impl Calibrations {
         }
     }
 
-    /// Whitened prior residuals of all cameras.
+    /// Whitened prior residuals of all calibrations.
     pub(crate) fn prior_residual(&self) -> DVector<f64> {
         let offsets: Vec<DVector<f64>> = self.free().map(|(_, one)| one.prior_residual()).collect();
         let imu: Vec<ImuErrors> = self.imu().into_iter().map(ImuCalibration::prior_residual).collect();
@@ -222,7 +218,7 @@ impl Calibrations {
         self.cameras.iter().enumerate().filter(|(_, one)| one.dof() > 0)
     }
 
-    /// Switches the main camera's chain to another parameterization; returns the derivative of the old columns with
+    /// Switches the main camera's chain to another parameterization. Returns the derivative of the old columns with
     /// respect to the new ones at the first estimate.
     pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
         let old_from_new = self.cameras[MAIN].switch_parameterization(parameterization);

@@ -12,31 +12,31 @@ use crate::geometry::so3;
 use crate::gimbal::{Chain, ChainLinearization};
 use crate::optimization::CameraPose;
 
-/// Rows of a rolling shutter whose poses have a block of unknowns: the first, the middle and the last one.
+/// Rows of a rolling shutter with a separate block of derivatives: first, middle and last, as fractions of the image.
 pub(crate) const ROLLING_ROWS: [f64; 3] = [0.0, 0.5, 1.0];
 
-/// Extrinsics, clock and shutter of a camera.
+/// Extrinsics, time offset and shutter of a camera.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraSensor<'a> {
     pub(crate) chain: Cow<'a, Chain>,
-    /// Number of calibration columns, those of clock, shutter and intrinsics after the chain; zero when fixed.
+    /// Number of calibration columns, those of time offset, shutter and intrinsics after the chain; zero when fixed.
     pub(crate) columns: usize,
     /// Time offset in seconds: exposure time of the first row minus stamp.
     pub(crate) shift_s: f64,
-    /// Column of the time offset.
+    /// Column of the time offset, `None` if it is fixed.
     pub(crate) shift_column: Option<usize>,
-    /// Whether the rows are exposed at different times.
+    /// True if the rows are exposed at different times.
     pub(crate) rolling: bool,
-    /// Time from the exposure of the first row to that of the last one, in seconds.
+    /// Time from the exposure of the first row to the end of the last one, in seconds.
     pub(crate) readout_s: f64,
-    /// Column of the readout time.
+    /// Column of the readout time, `None` if it is fixed.
     pub(crate) readout_column: Option<usize>,
-    /// Columns of the intrinsics.
+    /// Columns of the intrinsics; empty if they are fixed.
     pub(crate) intrinsics: Range<usize>,
 }
 
 impl CameraSensor<'_> {
-    /// A rigid camera ignores the joints.
+    /// The first joint angles, as many as the chain has joints; none for a rigid camera.
     fn own<'j>(&self, joints_rad: &'j [f64]) -> &'j [f64] {
         &joints_rad[..self.chain.joint_count().min(joints_rad.len())]
     }
@@ -54,14 +54,14 @@ impl CameraSensor<'_> {
         if self.rolling { self.shift_s + row * self.readout_s } else { self.shift_s }
     }
 
-    /// Rows whose poses have a block of unknowns.
+    /// Rows with a separate block of derivatives.
     pub(crate) fn block_rows(&self) -> &'static [f64] {
         if self.rolling { &ROLLING_ROWS } else { &[0.0] }
     }
 }
 
 impl Calibration {
-    /// Extrinsics, clock and shutter of the camera.
+    /// Extrinsics, time offset and shutter of the camera.
     pub(crate) fn sensor_model(&self) -> CameraSensor<'_> {
         let free = self.dof() > 0;
         CameraSensor {
@@ -77,26 +77,26 @@ impl Calibration {
     }
 }
 
-/// Returns `world_from_camera` at a state and the camera's time offset: the IMU pose and the extrinsics at the state's
-/// joint angles, for the first row.
+/// `world_from_camera` at a state and the camera's time offset, for the first row: IMU pose and extrinsics at the
+/// extrapolated joint angles.
 pub(crate) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
     at_row(state, &calibration.sensor_model(), 0.0)
 }
 
-/// Returns `world_from_camera` at a state and the exposure of a row, from 0 for the first one to 1 for the last one.
+/// `world_from_camera` at a state and the exposure of a row: 0 for the first row, 1 for the end of the last one.
 pub(crate) fn at_row(state: &FrameState, sensor: &CameraSensor<'_>, row: f64) -> CameraPose {
-    let state = &*when_seen(state, sensor.row_time_s(row));
+    let state = &*state_at_exposure(state, sensor.row_time_s(row));
     let pose = state.navigation.world_from_imu * sensor.chain.imu_from_camera(sensor.own(&state.joints_rad));
     CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
 }
 
-/// State at the exposure, `shift_s` after the stamp.
-pub(crate) fn when_seen(state: &FrameState, shift_s: f64) -> Cow<'_, FrameState> {
+/// State at the exposure, extrapolated by `shift_s` from the stamp.
+pub(crate) fn state_at_exposure(state: &FrameState, shift_s: f64) -> Cow<'_, FrameState> {
     if shift_s == 0.0 { Cow::Borrowed(state) } else { Cow::Owned(state.later(shift_s)) }
 }
 
-/// Derivatives of the blocks of a camera with respect to the unknowns: `[φ; δt]` of `world_from_camera` by frame (with a
-/// rolling shutter of the first, the middle and the last row), then the intrinsics where they are estimated.
+/// Derivatives of the blocks of a camera with respect to the unknowns: `[φ; δt]` of `world_from_camera` by frame (with
+/// a rolling shutter, of the first, the middle and the last row), then the intrinsics if they are estimated.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraMaps {
     /// 6 × columns of [`Layout::camera`], with respect to the unknowns of the block's frame; 6 × 0 for the intrinsics.
@@ -115,8 +115,8 @@ impl CameraMaps {
 
     /// [`Self::new`] for a given sensor.
     ///
-    /// At constant rates the derivative of a time offset with respect to velocity and gyroscope bias is neglected: a bias
-    /// change over a centisecond has no effect. Along a measured motion it is not.
+    /// With constant rates, the derivatives of the shifted pose by velocity and gyroscope bias are neglected: a bias
+    /// change has no effect over a centisecond. Along a measured motion they are included.
     pub(crate) fn of_sensor(frames: &[FrameState], sensor: &CameraSensor<'_>) -> Self {
         let rows = sensor.block_rows();
         let mut maps =
@@ -141,7 +141,8 @@ impl CameraMaps {
 
     /// Adds the information of the blocks to that of the unknowns (lower triangle).
     ///
-    /// `calibration` are the columns of the camera's calibration; `information` returns the 6 × 6 block of a row and a column.
+    /// `calibration` is the column range of the camera's calibration; `information` returns the 6 × 6 block at a row
+    /// and a column.
     pub(crate) fn add_information(
         &self,
         layout: &Layout,
@@ -160,8 +161,8 @@ impl CameraMaps {
                 if column > row {
                     continue;
                 }
-                // Lower triangle: the frame of `row` below the frame of `column`. Two blocks of one frame make a block on the
-                // diagonal, with its transpose.
+                // Lower triangle: the frame of `row` is not before the frame of `column`. Two blocks of one frame
+                // contribute to the block on the diagonal, with their transpose.
                 let of_column = self.columns(layout, column);
                 by_own.clear();
                 by_own.resize(6 * of_column.len(), 0.0);
@@ -178,12 +179,11 @@ impl CameraMaps {
         }
     }
 
-    /// Number of blocks.
     pub(crate) fn blocks(&self) -> usize {
         self.own.len()
     }
 
-    /// Columns of the layout that move a block beside the calibration; none for the intrinsics.
+    /// Columns of the frame of a block (calibration excluded); empty for the intrinsics.
     pub(crate) fn columns(&self, layout: &Layout, block: usize) -> Range<usize> {
         let slot = block / self.blocks_per_frame;
         if slot < self.frames { layout.camera(slot) } else { 0..0 }
@@ -221,7 +221,7 @@ fn add_transposed_product(
 /// Derivatives of the camera pose at a row with respect to the unknowns of its frame and to the calibration.
 fn block_map(stamped: &FrameState, sensor: &CameraSensor<'_>, row: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let time_s = sensor.row_time_s(row);
-    let state = &*when_seen(stamped, time_s);
+    let state = &*state_at_exposure(stamped, time_s);
     let chain = sensor.linearize(&state.joints_rad);
     let world_from_imu = state.navigation.world_from_imu.rotation_matrix();
     let (mut own, mut by_calibration) = camera_map(&world_from_imu, state.joints_rad.len(), &chain);
@@ -231,7 +231,7 @@ fn block_map(stamped: &FrameState, sensor: &CameraSensor<'_>, row: f64) -> (DMat
         }
     }
     if time_s != 0.0 {
-        // The unknown attitude is the one at the stamp.
+        // The unknown is the attitude at the stamp.
         let at_stamp = stamped.navigation.world_from_imu.rotation_matrix();
         let by_attitude: Matrix6x3<f64> = own.fixed_view::<6, 3>(0, 0) * world_from_imu.tr_mul(&at_stamp);
         if stamped.has_moving_rows() {
@@ -246,8 +246,9 @@ fn block_map(stamped: &FrameState, sensor: &CameraSensor<'_>, row: f64) -> (DMat
     (own, by_calibration)
 }
 
-/// Extends the derivatives by pose and joints at a time after the stamp to those by the state at the stamp:
-/// `[φ, p, joints, joint rates and accelerations, v, b_g]`; `by_rotation` are those by the attitude at the stamp through the attitude alone.
+/// Converts derivatives by pose and joints at `time_s` after the stamp to derivatives by the state at the stamp
+/// (6 × columns): `[φ, p, joints, joint rates and accelerations, v, b_g]`.
+/// `by_rotation` has the derivatives by the attitude at the stamp at fixed position.
 fn moving_map(stamped: &FrameState, own: &DMatrix<f64>, by_rotation: &Matrix6x3<f64>, time_s: f64) -> DMatrix<f64> {
     let (joints, motion) = (stamped.joints_rad.len(), stamped.joint_motion.len());
     let mut map = DMatrix::zeros(6, POSE + joints + motion + ROW_MOTION);
@@ -257,7 +258,7 @@ fn moving_map(stamped: &FrameState, own: &DMatrix<f64>, by_rotation: &Matrix6x3<
     let at_stamp = stamped.navigation.world_from_imu.rotation_matrix();
     let by_attitude = by_rotation - by_position * at_stamp * so3::hat(&moved);
     map.fixed_columns_mut::<3>(0).copy_from(&by_attitude);
-    // Rates, then accelerations.
+    // Joint rates, then joint accelerations.
     for (part, factor) in [time_s, 0.5 * time_s * time_s].into_iter().enumerate().take(motion / joints.max(1)) {
         let by_part = own.columns(POSE, joints) * factor;
         map.columns_mut(POSE + joints * (1 + part), joints).copy_from(&by_part);
@@ -269,7 +270,7 @@ fn moving_map(stamped: &FrameState, own: &DMatrix<f64>, by_rotation: &Matrix6x3<
 }
 
 /// Derivatives of the camera pose with respect to pose and joints of its frame (6 × (6 + N)) and to its
-/// calibration (6 × columns), at this rotation of the vehicle.
+/// calibration (6 × columns), at this attitude of the IMU.
 pub(crate) fn camera_map(
     world_from_imu: &Matrix3<f64>,
     joints: usize,
@@ -287,7 +288,7 @@ pub(crate) fn camera_map(
         carried.fixed_rows_mut::<3>(3).copy_from(&shift);
         carried
     };
-    // A rigid camera ignores the joints.
+    // The columns of a rigid camera stay zero.
     own.columns_mut(POSE, chain.by_joints.ncols()).copy_from(&carried(&chain.by_joints));
     (own, carried(&chain.by_parameters))
 }

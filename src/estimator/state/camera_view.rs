@@ -1,4 +1,4 @@
-//! A camera in a window at one estimate: its model, and its pose at each observation.
+//! A camera of the window at one estimate: its model, and its pose at each observation.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
@@ -15,11 +15,11 @@ use crate::optimization::{CameraPose, PoseBlocksOf, RelativePose, RelativePoses}
 /// Blocks per frame of a rolling shutter.
 pub(crate) const ROLLING_BLOCKS: usize = ROLLING_ROWS.len();
 
-/// A camera with its intrinsics and poses at an estimate.
+/// Camera with its intrinsics and poses at an estimate.
 ///
-/// Derivatives are by blocks of six: one per frame with a global shutter, the pose `[φ; δt]` of `world_from_camera`; three
-/// per frame with a rolling shutter, the poses of the first, the middle and the last row; and after all frames the intrinsics, where
-/// they are estimated. [`camera_pose::CameraMaps`] has the same blocks.
+/// Derivatives are in blocks of six. A global shutter has one block per frame, the pose `[φ; δt]` of
+/// `world_from_camera`; a rolling shutter has three, the poses of the first, the middle and the last row. The
+/// intrinsics, if estimated, follow after all frames. [`camera_pose::CameraMaps`] has the same blocks.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraView<'a> {
     model: Cow<'a, CameraModel>,
@@ -31,21 +31,21 @@ pub(crate) struct CameraView<'a> {
 #[derive(Clone, Debug)]
 enum Poses<'a> {
     Global {
-        /// By slot.
+        /// Poses by slot.
         poses: Vec<CameraPose>,
-        /// Made at first use: most callers need poses alone.
+        /// Computed at first use: most callers need only the poses.
         relative: OnceCell<RelativePoses>,
     },
     Rolling {
         frames: Cow<'a, [FrameState]>,
         sensor: Box<CameraSensor<'a>>,
-        /// Of the first, the middle and the last row, by slot.
+        /// Poses of the first, the middle and the last row, by slot.
         rows: Vec<[CameraPose; 3]>,
     },
 }
 
 impl<'a> CameraView<'a> {
-    /// The camera of a calibration over the frames of a window; `given` is the model of the rig.
+    /// Camera of a calibration over the frames of a window; `given` is the rig's model.
     pub(crate) fn new(frames: &'a [FrameState], calibration: &'a Calibration, given: &'a CameraModel) -> Self {
         let has_intrinsics = !calibration.intrinsics_columns().is_empty();
         Self::of_sensor(
@@ -56,7 +56,7 @@ impl<'a> CameraView<'a> {
         )
     }
 
-    /// [`Self::new`] with states of its own.
+    /// [`Self::new`] with owned states.
     pub(crate) fn of_states(frames: Vec<FrameState>, calibration: &'a Calibration, given: &'a CameraModel) -> Self {
         let has_intrinsics = !calibration.intrinsics_columns().is_empty();
         Self::of_sensor(Cow::Owned(frames), calibration.sensor_model(), calibration.camera_model(given), has_intrinsics)
@@ -80,7 +80,7 @@ impl<'a> CameraView<'a> {
         Self { model, has_intrinsics, frames: count, poses }
     }
 
-    /// A camera at given poses by slot, with a global shutter.
+    /// Camera with a global shutter at given poses by slot.
     pub(crate) fn of_poses(poses: Vec<CameraPose>, model: &'a CameraModel) -> Self {
         let frames = poses.len();
         Self {
@@ -91,7 +91,7 @@ impl<'a> CameraView<'a> {
         }
     }
 
-    /// The camera model with the estimated intrinsics.
+    /// Camera model with the estimated intrinsics.
     pub(crate) fn model(&self) -> &CameraModel {
         &self.model
     }
@@ -101,12 +101,11 @@ impl<'a> CameraView<'a> {
         if self.has_intrinsics { self.model.unproject(uv_px).unwrap_or(*nominal) } else { *nominal }
     }
 
-    /// Whether all observations of a frame have its one pose and the bearings of the rig's model.
+    /// True if all observations of a frame have the same pose and the bearings of the rig's model.
     pub(crate) fn has_nominal_bearings(&self) -> bool {
         !self.has_intrinsics && matches!(self.poses, Poses::Global { .. })
     }
 
-    /// Number of blocks of a frame.
     pub(crate) fn blocks_per_frame(&self) -> usize {
         match self.poses {
             Poses::Global { .. } => 1,
@@ -114,17 +113,15 @@ impl<'a> CameraView<'a> {
         }
     }
 
-    /// Number of all blocks.
     pub(crate) fn blocks(&self) -> usize {
         self.frames * self.blocks_per_frame() + usize::from(self.has_intrinsics)
     }
 
-    /// Number of frames.
     pub(crate) fn frames(&self) -> usize {
         self.frames
     }
 
-    /// Block of the intrinsics, `None` where they are fixed.
+    /// Block of the intrinsics, `None` if they are fixed.
     pub(crate) fn intrinsics_block(&self) -> Option<usize> {
         self.has_intrinsics.then(|| self.frames * self.blocks_per_frame())
     }
@@ -134,7 +131,7 @@ impl<'a> CameraView<'a> {
         std::array::from_fn(|row| N * slot + row)
     }
 
-    /// Pose at the row of a pixel.
+    /// `world_from_camera` at the row of a pixel.
     pub(crate) fn pose(&self, slot: usize, uv_px: &Vector2<f64>) -> CameraPose {
         match &self.poses {
             Poses::Global { poses, .. } => poses[slot],
@@ -144,7 +141,7 @@ impl<'a> CameraView<'a> {
         }
     }
 
-    /// Pose at the first row, by slot.
+    /// `world_from_camera` at the first row.
     pub(crate) fn first_row(&self, slot: usize) -> CameraPose {
         match &self.poses {
             Poses::Global { poses, .. } => poses[slot],
@@ -152,21 +149,23 @@ impl<'a> CameraView<'a> {
         }
     }
 
-    /// Relative poses of other observations to an anchor's.
+    /// Relative poses of other observations with respect to the anchor's.
     pub(crate) fn relative_to(&self, anchor: &TrackObservation) -> RelativeTo<'_> {
         RelativeTo { view: self, slot: anchor.slot, pose: self.pose(anchor.slot, &anchor.uv_px) }
     }
 
-    /// Place of a pixel's row between the first one (0) and the end of the last one (1).
+    /// Row of a pixel as a fraction of the image: 0 for the first row, 1 for the end of the last one.
     pub(crate) fn row_fraction(&self, uv_px: &Vector2<f64>) -> f64 {
         uv_px.y / self.model.resolution_px[1] as f64
     }
 
-    /// Derivatives by the blocks of a frame from those by the pose at an observation's row (2 × 6), which is `pose`.
+    /// Converts derivatives by `pose`, the pose at an observation's row (2 × 6), to derivatives by the blocks of its
+    /// frame.
     ///
-    /// Between the first, the middle and the last row, a change of the pose is interpolated by a parabola, rotations in world
-    /// axes; `N` is [`Self::blocks_per_frame`]. It is exact for changes of pose, velocity, readout, joint rates and joint accelerations but for the rotation of
-    /// their axes during the readout, which it follows to second order.
+    /// A change of the pose is interpolated between the first, the middle and the last row by a parabola, rotations in
+    /// world axes; `N` is [`Self::blocks_per_frame`]. The interpolation is exact for changes of pose, velocity, readout
+    /// time, joint rates and joint accelerations, except that the rotation of their axes during the readout is of
+    /// second order.
     pub(crate) fn by_blocks<const N: usize>(
         &self,
         observation: &TrackObservation,
@@ -190,12 +189,12 @@ impl<'a> CameraView<'a> {
     }
 }
 
-/// An anchor's observation to which others are related.
+/// Observation in the anchor, with the view that relates other observations to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RelativeTo<'a> {
     view: &'a CameraView<'a>,
     slot: usize,
-    /// At the row of the anchor's observation.
+    /// Pose at the row of the anchor's observation.
     pub(crate) pose: CameraPose,
 }
 
@@ -205,7 +204,7 @@ impl<'a> RelativeTo<'a> {
         self.with_pose(observation).0
     }
 
-    /// [`Self::get`] with the pose at the row of the observation.
+    /// [`Self::get`], and the pose at the row of the observation.
     pub(crate) fn with_pose(&self, observation: &TrackObservation) -> (Cow<'a, RelativePose>, Cow<'a, CameraPose>) {
         match &self.view.poses {
             Poses::Global { poses, relative } => {

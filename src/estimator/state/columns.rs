@@ -1,11 +1,11 @@
-//! Columns of a Jacobian.
+//! Columns of a Jacobian, in blocks of unknowns.
 
 use std::fmt;
 
 use crate::geometry::Dimension;
 use crate::gimbal::ParameterId;
 
-/// Number of an image in its camera's stream.
+/// Index of an image in its camera's stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FrameId(pub usize);
 
@@ -15,12 +15,11 @@ impl fmt::Display for FrameId {
     }
 }
 
-/// A block of unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ColumnId {
     /// A parameter of the static calibration, one column.
     Calibration(ParameterId),
-    /// Joint angles of a frame; with a rolling shutter then joint rates and joint accelerations.
+    /// Joint angles of a frame; with a rolling shutter also joint rates and joint accelerations, in this order.
     Joints(FrameId),
     /// Pose of a frame, rotation before translation, six columns.
     Pose(FrameId),
@@ -33,20 +32,14 @@ pub enum ColumnId {
 /// Kind of a block of columns, independent of frame and parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ColumnGroup {
-    /// Static calibration.
     Calibration,
-    /// Joint angles.
     Joints,
-    /// Poses.
     Pose,
-    /// Velocities and biases.
     VelocityBias,
-    /// Inverse depths.
     InverseDepth,
 }
 
 impl ColumnId {
-    /// Kind of the block.
     pub const fn group(self) -> ColumnGroup {
         match self {
             Self::Calibration(_) => ColumnGroup::Calibration,
@@ -57,7 +50,7 @@ impl ColumnId {
         }
     }
 
-    /// Its calibration parameter, if it is one.
+    /// Calibration parameter of a [`ColumnId::Calibration`], `None` for other blocks.
     pub const fn parameter(self) -> Option<ParameterId> {
         match self {
             Self::Calibration(parameter) => Some(parameter),
@@ -65,7 +58,7 @@ impl ColumnId {
         }
     }
 
-    /// Its frame, if it is a block of one.
+    /// Frame of the block, `None` for calibration and inverse depth.
     pub const fn frame(self) -> Option<FrameId> {
         match self {
             Self::Joints(frame) | Self::Pose(frame) | Self::VelocityBias(frame) => Some(frame),
@@ -73,8 +66,8 @@ impl ColumnId {
         }
     }
 
-    /// Unit of the column `place` within the block, so that columns are comparable: [`Dimension::scale`] for
-    /// angles, lengths, time offsets and the ratio of the inverse depth, 0.1 m/s, 1 °/s and 0.1 m/s².
+    /// Typical size of column `place` of the block, which makes columns comparable: [`Dimension::scale`] for
+    /// angles, lengths, time offsets and the relative inverse depth, 0.1 m/s, 1 °/s and 0.1 m/s².
     pub const fn scale(self, place: usize) -> f64 {
         const VELOCITY_M_PER_S: f64 = 0.1;
         const GYROSCOPE_BIAS_RAD_PER_S: f64 = std::f64::consts::PI / 180.0;
@@ -94,15 +87,12 @@ impl ColumnId {
 /// Consecutive columns of one block of unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ColumnBlock {
-    /// Unknowns of the block.
     pub id: ColumnId,
-    /// First column.
     pub start: usize,
-    /// Number of columns.
     pub len: usize,
 }
 
-/// Units of all columns of some blocks.
+/// [`ColumnId::scale`] of all columns of the blocks.
 pub(crate) fn scales_of(columns: &[ColumnBlock]) -> Vec<f64> {
     columns.iter().flat_map(|block| (0..block.len).map(move |place| block.id.scale(place))).collect()
 }

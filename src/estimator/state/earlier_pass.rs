@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Vector3};
 use super::navigation::ImuBias;
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization};
 
-/// What a pass over the measurements has found, as the prior of the next pass over them.
+/// Result of a pass over the measurements, as prior of the next pass.
 #[derive(Clone, Debug)]
 pub struct EarlierPass {
     /// By camera, the main one first.
@@ -19,20 +19,19 @@ pub struct EarlierPass {
 pub(crate) struct FoundCamera {
     pub(crate) chain: ClassicalChain,
     pub(crate) parameterization: Parameterization,
-    /// Prior covariance of all its columns.
+    /// Prior covariance of all columns.
     pub(crate) covariance: DMatrix<f64>,
-    /// Clocks, shutter and intrinsics relative to the rig's values.
+    /// Estimated time offsets, shutter and intrinsics, relative to the rig's values.
     pub(crate) sensors: Vec<(ParameterId, f64)>,
 }
 
-/// Prior of the biases of an IMU at a time of the log.
+/// Prior of the IMU biases at one time of the log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BiasPrior {
-    /// Expected biases.
     pub mean: ImuBias,
-    /// Standard deviation of the gyroscope's bias by axis, in rad/s.
+    /// Standard deviation of the gyroscope bias by axis, in rad/s.
     pub gyroscope_sigma_rad_per_s: Vector3<f64>,
-    /// Standard deviation of the accelerometer's bias by axis, in m/s².
+    /// Standard deviation of the accelerometer bias by axis, in m/s².
     pub accelerometer_sigma_m_per_s2: Vector3<f64>,
 }
 
@@ -52,7 +51,7 @@ impl BiasPrior {
 }
 
 impl EarlierPass {
-    /// Takes the biases that were found at another time of the same pass, where these are less certain.
+    /// Takes the bias prior of `other`, from another time of the same pass, if its accelerometer bias is more certain.
     #[must_use]
     pub fn with_best_bias(self, other: &Self) -> Self {
         let uncertainty = |bias: &BiasPrior| bias.accelerometer_sigma_m_per_s2.norm();

@@ -11,14 +11,13 @@ use super::navigation::{NavigationState, Vector15};
 use crate::geometry::{so3, wrap_angle};
 use crate::sensors::{ImuSample, JointAngles};
 
-/// The unknowns of one frame (Eq. 7).
+/// Unknowns of one frame (Eq. 7).
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FrameState {
-    /// Pose, velocity, biases.
     pub(crate) navigation: NavigationState,
     /// Joint angles without the static offsets, in radians.
     pub(crate) joints_rad: Vec<f64>,
-    /// Joint rates in rad/s, then joint accelerations in rad/s², where rows of the image depend on them; empty otherwise.
+    /// Joint rates in rad/s, then joint accelerations in rad/s²; empty unless rows of the image depend on them.
     pub(crate) joint_motion: Vec<f64>,
     /// Measured rates of attitude and joints.
     pub(crate) rates: Arc<Rates>,
@@ -27,16 +26,16 @@ pub(crate) struct FrameState {
 /// Measured rates at a frame's stamp, for the time offset of a camera.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Rates {
-    /// Angular velocity of the gyroscope, in rad/s.
+    /// Angular velocity measured by the gyroscope, bias included, in rad/s.
     pub(crate) gyroscope_rad_per_s: Vector3<f64>,
-    /// Joint rates of the encoders, in rad/s; empty without readings.
+    /// Joint rates measured by the encoders, in rad/s; empty without readings.
     pub(crate) joints_rad_per_s: Vec<f64>,
-    /// Motion of the vehicle after the stamp, where rows of the image depend on it.
+    /// Motion of the vehicle after the stamp, `None` unless rows of the image depend on it.
     pub(crate) profile: Option<MotionProfile>,
 }
 
 impl Rates {
-    /// Rates at the last of these samples, whose stamp is the frame's.
+    /// Rates at the last of `imu`, whose stamp is that of the frame.
     pub(crate) fn at(imu: &[ImuSample], encoder: Option<&JointAngles>, profile: Option<MotionProfile>) -> Arc<Self> {
         let gyroscope_rad_per_s = imu.last().map_or_else(Vector3::zeros, |sample| sample.angular_velocity_rad_per_s);
         let finite = gyroscope_rad_per_s.iter().all(|rate| rate.is_finite());
@@ -48,7 +47,7 @@ impl Rates {
         })
     }
 
-    /// Bytes with the heap.
+    /// Memory use in bytes, heap included.
     pub(crate) fn bytes(&self) -> usize {
         allocated_bytes(size_of::<Self>())
             + allocated_bytes(self.joints_rad_per_s.capacity() * size_of::<f64>())
@@ -62,7 +61,7 @@ impl Rates {
 }
 
 impl FrameState {
-    /// Extrapolates the state over a time: along the measured motion where there is one, else at constant rates.
+    /// Extrapolates the state by a time: along the measured motion if there is one, else at constant rates.
     pub(crate) fn later(&self, seconds: f64) -> Self {
         let mut later = self.clone();
         let pose = &mut later.navigation.world_from_imu;
@@ -86,13 +85,14 @@ impl FrameState {
         later
     }
 
-    /// Measured motion of the vehicle over a time since the stamp, and gravity; `None` where it is not recorded.
+    /// Measured motion of the vehicle over a time since the stamp, and gravity in the world; `None` if it is not
+    /// recorded.
     pub(crate) fn row_motion(&self, seconds: f64) -> Option<(RowMotion, Vector3<f64>)> {
         let profile = self.rates.profile.as_ref()?;
         Some((profile.at(seconds, &self.navigation.bias.gyroscope_rad_per_s), profile.gravity_in_world))
     }
 
-    /// Whether camera poses at other times than the stamp are derived by all unknowns on which they depend.
+    /// True if camera poses at other times than the stamp have derivatives by all unknowns on which they depend.
     pub(crate) fn has_moving_rows(&self) -> bool {
         self.rates.profile.is_some()
     }
@@ -103,13 +103,12 @@ impl FrameState {
         estimated.unwrap_or_else(|| self.rates.joint_rad_per_s(joint))
     }
 
-    /// Estimated acceleration of one joint, in rad/s².
     fn joint_acceleration_rad_per_s2(&self, joint: usize) -> Option<f64> {
         self.joint_motion.get(self.joints_rad.len() + joint).copied()
     }
 
-    /// Time derivative of pose and joints at a time since the stamp: `[angular velocity; velocity; joint rates]` of
-    /// [`Self::later`].
+    /// Time derivative of pose and joints of [`Self::later`] at a time since the stamp:
+    /// `[angular velocity; velocity; joint rates]`.
     pub(crate) fn motion_at(&self, seconds: f64) -> DVector<f64> {
         let joints = (0..self.joints_rad.len()).map(|joint| {
             let acceleration = self.joint_acceleration_rad_per_s2(joint).unwrap_or(0.0);
@@ -128,12 +127,12 @@ impl FrameState {
         DVector::from_vec(all)
     }
 
-    /// [`Self::motion_at`] the stamp.
+    /// [`Self::motion_at`] zero.
     pub(crate) fn motion(&self) -> DVector<f64> {
         self.motion_at(0.0)
     }
 
-    /// Bytes on the heap without the rates, which the states of a frame share.
+    /// Bytes on the heap, without the rates, which the states of a frame share.
     pub(crate) fn heap_bytes(&self) -> usize {
         let of_vec = |numbers: &Vec<f64>| allocated_bytes(numbers.capacity() * size_of::<f64>());
         of_vec(&self.joints_rad) + of_vec(&self.joint_motion)
@@ -188,8 +187,8 @@ impl FrameState {
         joints.map(|(angle, start)| wrap_angle(angle - start).abs()).fold(vehicle, f64::max)
     }
 
-    /// Applies a step of the solver: frames in the prior count their step from its linearization point, so that the
-    /// prior stays exactly linear.
+    /// Applies a step of the solver. A frame in the prior adds the step in the tangent space of its linearization
+    /// point, so that the prior stays exactly linear.
     pub(crate) fn stepped(&self, first_estimate: Option<&Self>, delta: &[f64]) -> Self {
         let Some(first) = first_estimate else { return self.plus(delta) };
         let mut sum = self.minus(first);

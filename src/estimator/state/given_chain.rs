@@ -1,4 +1,4 @@
-//! The chain that an estimator starts from, with its prior: of the rig, or of an earlier pass over the same measurements.
+//! Initial chain of an estimator with its prior: of the rig, or of an earlier pass over the same measurements.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::gimbal::{Chain, ClassicalChain, NearestForm, Parameterization, transport, transport_covariance};
 
-/// Prior standard deviations of the given chain, for every parameter of its classical form.
+/// Prior standard deviations of the given chain, for all parameters of its classical parameterization.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GivenSigmas {
     pub(crate) translation_m: f64,
@@ -19,34 +19,33 @@ pub(super) struct GivenChain {
     classical: ClassicalChain,
     pub(super) chain: Chain,
     uncertainty: Uncertainty,
-    /// Standard deviations of the rows of `square_root_information`.
+    /// Prior standard deviations of the columns of `square_root_information`.
     prior_sigmas: DVector<f64>,
-    /// `W` with `WᵀW` the inverse of the prior covariance: of the chain's columns, after an earlier pass of all columns.
+    /// `W` with `WᵀW` the inverse of the prior covariance: of the chain's columns, or of all columns after an earlier
+    /// pass.
     pub(super) square_root_information: DMatrix<f64>,
 }
 
-/// How well the given chain is known.
+/// Source of the prior on the given chain.
 #[derive(Clone, Debug, PartialEq)]
 enum Uncertainty {
-    /// As the rig says.
     Rig(GivenSigmas),
-    /// As an earlier pass has found.
     Earlier(EarlierPrior),
 }
 
-/// What an earlier pass has found.
+/// Prior from an earlier pass.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct EarlierPrior {
     /// Covariance of all columns.
     pub(super) covariance: DMatrix<f64>,
     /// Values of the columns after the chain's, relative to the rig's.
     pub(super) expected: DVector<f64>,
-    /// The rig's chain and prior.
+    /// Chain and prior of the rig.
     pub(super) rig: Arc<GivenChain>,
 }
 
 impl EarlierPrior {
-    /// The same for another form `to` of the chain `from`.
+    /// This prior after conversion of the chain `from` to `to`, another parameterization of it.
     fn transported(&self, from: &Chain, to: &Chain, rig: GivenChain) -> Self {
         let (old, new, sensors) = (from.dof(), to.dof(), self.expected.len());
         let part = |start: (usize, usize), size: (usize, usize)| self.covariance.view(start, size).into_owned();
@@ -62,7 +61,6 @@ impl EarlierPrior {
 }
 
 impl GivenChain {
-    /// The chain of a rig.
     pub(super) fn new(
         classical: &ClassicalChain,
         parameterization: Parameterization,
@@ -74,7 +72,7 @@ impl GivenChain {
         Self::with_covariance(classical, chain, Uncertainty::Rig(sigmas), covariance)
     }
 
-    /// The chain of an earlier pass.
+    /// Chain of an earlier pass.
     pub(super) fn of_earlier_pass(classical: &ClassicalChain, chain: Chain, earlier: EarlierPrior) -> Self {
         let covariance = earlier.covariance.clone();
         Self::with_covariance(classical, chain, Uncertainty::Earlier(earlier), covariance)
@@ -87,7 +85,7 @@ impl GivenChain {
         covariance: DMatrix<f64>,
     ) -> Self {
         let prior_sigmas = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
-        // A column that the prior fixes would make the covariance singular.
+        // Regularizes columns that the prior fixes, which would make the covariance singular.
         let floor = 1e-12;
         let mut regular = covariance;
         for k in 0..regular.nrows() {
@@ -101,13 +99,13 @@ impl GivenChain {
         Self { classical: classical.clone(), chain, uncertainty, prior_sigmas, square_root_information }
     }
 
-    /// A chain in a parameterization; without encoders its joint offsets are fixed.
+    /// Chain in a parameterization; `joint_offsets` is false without encoders, which fixes the joint offsets.
     pub(super) fn form(classical: &ClassicalChain, parameterization: Parameterization, joint_offsets: bool) -> Chain {
         let whole = Chain::from_classical(classical, parameterization);
         if joint_offsets { whole } else { whole.without_joint_offsets() }
     }
 
-    /// The same chain and what is known of it in another parameterization.
+    /// The same chain and prior in another parameterization.
     pub(super) fn in_parameterization(&self, parameterization: Parameterization, joint_offsets: bool) -> Self {
         match &self.uncertainty {
             Uncertainty::Rig(sigmas) => Self::new(&self.classical, parameterization, *sigmas, joint_offsets),
@@ -120,7 +118,7 @@ impl GivenChain {
         }
     }
 
-    /// What an earlier pass has found, `None` where the chain is the rig's.
+    /// Prior from an earlier pass, `None` if the chain is the rig's.
     pub(super) fn earlier(&self) -> Option<&EarlierPrior> {
         match &self.uncertainty {
             Uncertainty::Rig(_) => None,
@@ -128,12 +126,12 @@ impl GivenChain {
         }
     }
 
-    /// The rig's chain in this parameterization.
+    /// The rig's chain in the current parameterization.
     pub(super) fn rig(&self) -> &Self {
         self.earlier().map_or(self, |earlier| &earlier.rig)
     }
 
-    /// Standard deviation of the rotations that the rig gives, in radians; 0 where an earlier pass has found the chain.
+    /// Standard deviation of the rig's rotations in radians; 0 if the chain comes from an earlier pass.
     pub(super) fn rotation_sigma_rad(&self) -> f64 {
         match &self.uncertainty {
             Uncertainty::Rig(sigmas) => sigmas.rotation_rad,
@@ -141,15 +139,16 @@ impl GivenChain {
         }
     }
 
-    /// Standard deviations of the chain's columns by the rig.
+    /// Standard deviations of the chain's columns under the rig's prior.
     pub(super) fn rig_sigmas(&self) -> &DVector<f64> {
         &self.rig().prior_sigmas
     }
 
     /// Converts a mechanism to the given chain's parameterization.
     ///
-    /// The classical form has many values for the same mechanism. The values nearest to the given ones are used, in
-    /// units of their standard deviations: at any others the rig's prior would pull.
+    /// The classical parameterization has many values for the same mechanism. The result is the one nearest to the
+    /// given values, in units of their standard deviations: for any other the residual of the rig's prior would be
+    /// larger.
     pub(super) fn form_of(&self, mechanism: &Chain) -> Chain {
         let sigmas = self.prior_sigmas.rows(0, self.chain.dof()).into_owned();
         NearestForm::new(self.chain.clone(), &sigmas).of(mechanism)

@@ -1,16 +1,16 @@
-//! The estimated intrinsics of the IMU with their prior.
+//! Estimated intrinsics of the IMU with their prior.
 
 use super::imu_errors::{self, IMU_ERRORS, ImuErrors};
 use crate::gimbal::ParameterId;
 use crate::sensors::ImuIntrinsics;
 
-/// Prior standard deviation of scale errors and misalignments, without units: consumer IMUs are within 1 to 3 %, their axes
-/// within a degree.
+/// Prior standard deviation of scale errors and misalignments, dimensionless: consumer IMUs are within 1 to 3 %, their
+/// axes within a degree.
 const SCALE_SIGMA: f64 = 0.01;
 /// Prior standard deviation of each component of the rotation between gyroscope and accelerometer, in radians.
 const ROTATION_SIGMA_RAD: f64 = 0.01;
 
-/// Intrinsics of the IMU, relative to those of the rig that the samples are already corrected by.
+/// Intrinsics of the IMU, relative to those of the rig, by which the samples are already corrected.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ImuCalibration {
     given: ImuIntrinsics,
@@ -21,20 +21,18 @@ pub(crate) struct ImuCalibration {
 }
 
 impl ImuCalibration {
-    /// The intrinsics of a rig.
     pub(crate) fn new(given: ImuIntrinsics) -> Self {
         Self { given, values: ImuErrors::zeros(), first_estimate: None, frozen: Vec::new() }
     }
 
-    /// Number of columns.
     pub(crate) const DOF: usize = IMU_ERRORS;
 
-    /// Correction of the samples, beyond that of the rig.
+    /// Correction of the samples relative to the rig's.
     pub(crate) fn errors(&self) -> &ImuErrors {
         &self.values
     }
 
-    /// Values of the whole correction, that of the rig included.
+    /// Values of the total correction, that of the rig included.
     pub(crate) fn values(&self) -> ImuErrors {
         imu_errors::of_intrinsics(&imu_errors::intrinsics(&self.values).after(&self.given))
     }
@@ -46,7 +44,7 @@ impl ImuCalibration {
         sigmas
     }
 
-    /// Fixes a parameter at its present value.
+    /// Fixes a parameter at its current value.
     pub(crate) fn freeze(&mut self, column: usize) {
         let parameter = imu_errors::parameters()[column];
         if !self.frozen.contains(&parameter) {
@@ -65,22 +63,23 @@ impl ImuCalibration {
         parameters.filter(|(_, parameter)| self.frozen.contains(parameter)).map(|(column, _)| column).collect()
     }
 
-    /// Applies a step of the solver. The values are a vector space: counted from the first estimate, it is the same step.
+    /// Applies a step of the solver. The values are a vector space, so a first estimate does not change the step.
     pub(crate) fn stepped(&self, delta: &[f64]) -> Self {
         Self { values: self.values + ImuErrors::from_column_slice(delta), ..self.clone() }
     }
 
-    /// Returns `x − x₀`, `None` without a first estimate.
+    /// `x − x₀` (15 × 1) from the first estimate `x₀`, `None` without one.
     pub(crate) fn first_estimate_offset(&self) -> Option<ImuErrors> {
         self.first_estimate.map(|first| self.values - first)
     }
 
-    /// Returns the calibration at the first estimate, or the present one without it.
+    /// This calibration at the first estimate, or at the current one without it.
     pub(crate) fn at_first_estimate(&self) -> Self {
         Self { values: self.first_estimate.unwrap_or(self.values), ..self.clone() }
     }
 
-    /// Keeps the first estimate, or takes the present one, while the prior has its columns; drops it otherwise.
+    /// Keeps the first estimate, or sets it to the current values, while the prior has the IMU's columns; otherwise
+    /// removes it.
     pub(crate) fn keep_first_estimate(&mut self, in_prior: bool) {
         self.first_estimate = in_prior.then(|| self.first_estimate.unwrap_or(self.values));
     }

@@ -6,14 +6,12 @@ use crate::geometry::so3;
 use crate::gimbal::{ParameterId, ParameterPart, Quantity};
 use crate::sensors::{ImuIntrinsics, ImuIntrinsicsParameters, ImuSample, ScaleMisalignment};
 
-/// Number of the parameters.
 pub(crate) const IMU_ERRORS: usize = 15;
 
-/// Parameters of the correction of samples: of the gyroscope scale (3), misalignment (3) and rotation vector (3), of the
+/// Parameters of the correction of samples (15 × 1): gyroscope scale (3), misalignment (3) and rotation vector (3),
 /// accelerometer scale (3) and misalignment (3), as in [`ImuIntrinsicsParameters`].
 pub(crate) type ImuErrors = SVector<f64, IMU_ERRORS>;
 
-/// The parameters in the order of [`ImuErrors`].
 pub(crate) fn parameters() -> Vec<ParameterId> {
     let of = |part: ParameterPart| move |quantity: Quantity| ParameterId { part, quantity };
     let gyroscope = Quantity::SCALE_MISALIGNMENT.into_iter().chain([Quantity::Rx, Quantity::Ry, Quantity::Rz]);
@@ -21,7 +19,7 @@ pub(crate) fn parameters() -> Vec<ParameterId> {
     gyroscope.chain(Quantity::SCALE_MISALIGNMENT.map(of(ParameterPart::Accelerometer))).collect()
 }
 
-/// The correction with these parameters.
+/// Correction with these parameters.
 pub(crate) fn intrinsics(errors: &ImuErrors) -> ImuIntrinsics {
     let three = |first: usize| errors.fixed_rows::<3>(first).into_owned();
     ImuIntrinsics::from_parameters(&ImuIntrinsicsParameters {
@@ -31,7 +29,7 @@ pub(crate) fn intrinsics(errors: &ImuErrors) -> ImuIntrinsics {
     })
 }
 
-/// The parameters of a correction.
+/// Parameters of a correction.
 pub(crate) fn of_intrinsics(intrinsics: &ImuIntrinsics) -> ImuErrors {
     let parameters = intrinsics.parameters();
     let parts = [
@@ -44,7 +42,6 @@ pub(crate) fn of_intrinsics(intrinsics: &ImuIntrinsics) -> ImuErrors {
     ImuErrors::from_iterator(parts.iter().flat_map(Vector3::iter).copied())
 }
 
-/// A corrected sample.
 pub(crate) fn corrected(errors: &ImuErrors, sample: &ImuSample) -> ImuSample {
     intrinsics(errors).correct(sample)
 }

@@ -2,24 +2,23 @@
 
 use std::ops::Range;
 
-/// Length of a pose's block, `[φ, p]`.
+/// Length of a pose block, `[φ, p]`.
 pub(crate) const POSE: usize = 6;
 /// Length of a velocity-bias block, `[v, b_g, b_a]`.
 pub(crate) const VELOCITY_BIAS: usize = 9;
-/// Length of `[v, b_g]`, the part of the velocity-bias block on which the pose at another time than the stamp depends.
+/// Length of `[v, b_g]`, the part of the velocity-bias block that affects the pose at times other than the stamp.
 pub(crate) const ROW_MOTION: usize = 6;
 
 /// Columns of the window: frame by frame `[pose 6 | joint angles N | joint motion | velocity and biases 9]`, then the static
 /// calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Layout {
-    /// Number of frames.
     pub(crate) frames: usize,
-    /// Number of joints.
     pub(crate) joints: usize,
-    /// Number of joint rates and joint accelerations, which rows of a rolling shutter depend on: 2 N, or zero.
+    /// Number of joint rates and joint accelerations, on which rows of a rolling shutter depend: 2 N, or zero.
     pub(crate) joint_motion: usize,
-    /// Whether camera poses are taken at other times than the stamp, so that they depend on velocity and gyroscope bias.
+    /// True if camera poses are evaluated at other times than the stamp, so that they depend on velocity and gyroscope
+    /// bias.
     pub(crate) moving_rows: bool,
     /// Number of free calibration parameters.
     pub(crate) calibration: usize,
@@ -34,12 +33,11 @@ impl Layout {
         slot * self.frame_len()..(slot + 1) * self.frame_len()
     }
 
-    /// Number of joint angles, rates and accelerations.
     pub(crate) fn joint_block(&self) -> usize {
         self.joints + self.joint_motion
     }
 
-    /// Pose and joints, which move the camera; with moving rows also velocity and gyroscope bias.
+    /// Columns of pose and joints, on which the camera pose depends; with moving rows also velocity and gyroscope bias.
     pub(crate) fn camera(&self, slot: usize) -> Range<usize> {
         let start = slot * self.frame_len();
         let rows = if self.moving_rows { ROW_MOTION } else { 0 };
@@ -71,8 +69,8 @@ impl Layout {
         start..start + self.calibration
     }
 
-    /// All columns in an order that suits an elimination: velocities and biases from the newest frame back, which are
-    /// coupled with their neighbours only, then poses and joints, then the calibration.
+    /// Elimination order of the columns: velocities and biases from the newest frame back, which are
+    /// coupled only with their neighbours, then poses and joints, then the calibration.
     pub(crate) fn elimination_order(&self) -> Vec<usize> {
         let velocities = (0..self.frames).rev().flat_map(|slot| self.velocity_bias(slot));
         let poses = (0..self.frames).flat_map(|slot| self.pose(slot).start..self.joint_motion(slot).end);

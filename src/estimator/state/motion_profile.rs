@@ -1,4 +1,4 @@
-//! Motion of the vehicle in the time after a stamp, during which the rows of a rolling shutter are exposed.
+//! Motion of the vehicle after a stamp, while the rows of a rolling shutter are exposed.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -7,7 +7,7 @@ use super::preintegration::Preintegration;
 use crate::geometry::{seconds_from_ns, so3};
 use crate::sensors::{ImuNoise, ImuSample};
 
-/// The motion over the rows of an image is taken as it was measured.
+/// Zero noise: the measured motion over the rows of an image is treated as exact.
 const NO_NOISE: ImuNoise = ImuNoise {
     accelerometer_noise_density: 0.0,
     accelerometer_random_walk: 0.0,
@@ -15,17 +15,17 @@ const NO_NOISE: ImuNoise = ImuNoise {
     gyroscope_random_walk: 0.0,
 };
 
-/// Motion of the IMU from a stamp on, integrated from its samples without gravity and initial velocity.
+/// Motion of the IMU after a stamp, integrated from its samples without gravity and initial velocity.
 ///
-/// It does not depend on the state at the stamp: it is what the samples say about the rows of the image, to which the
-/// state adds pose, velocity and gyroscope bias.
+/// It depends only on the samples, not on the state at the stamp, which adds pose, velocity and gyroscope bias.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MotionProfile {
-    /// Biases of the integration.
+    /// Biases used in the integration.
     pub(crate) bias: ImuBias,
-    /// In the world, in m/s².
+    /// Gravity in the world, in m/s².
     pub(crate) gravity_in_world: Vector3<f64>,
-    /// At the stamp and at the times of the samples after it, rising; the first one is at zero, without motion.
+    /// Motion at the stamp and at the samples after it, in ascending order; the first knot is at time zero, without
+    /// motion.
     pub(crate) knots: Vec<ProfileKnot>,
 }
 
@@ -38,11 +38,11 @@ pub(crate) struct ProfileKnot {
     pub(crate) rotation: UnitQuaternion<f64>,
     /// Integral of the specific force in the IMU frame at the stamp, in m/s.
     pub(crate) velocity_m_per_s: Vector3<f64>,
-    /// Integral of that, in metres.
+    /// Integral of `velocity_m_per_s`, in metres.
     pub(crate) position_m: Vector3<f64>,
-    /// Angular velocity measured there, in rad/s.
+    /// Measured angular velocity at that time, bias included, in rad/s.
     pub(crate) rate_rad_per_s: Vector3<f64>,
-    /// Specific force without bias there, in the IMU frame at that time, in m/s².
+    /// Specific force at that time without bias, in the IMU frame at that time, in m/s².
     pub(crate) force_m_per_s2: Vector3<f64>,
 }
 
@@ -55,13 +55,13 @@ pub(crate) struct RowMotion {
     pub(crate) velocity_m_per_s: Vector3<f64>,
     /// As in [`ProfileKnot::position_m`].
     pub(crate) position_m: Vector3<f64>,
-    /// Angular velocity without bias there, in rad/s.
+    /// Angular velocity at that time without bias, in rad/s.
     pub(crate) rate_rad_per_s: Vector3<f64>,
 }
 
 impl MotionProfile {
-    /// Integrates samples from a stamp on, the first of them at the stamp; samples that are not later than the one before
-    /// or not finite are skipped. `None` without a sample at the stamp.
+    /// Integrates samples from the stamp on, the first of them at the stamp; skips samples that are not finite or not
+    /// later than the previous one. `None` without a sample at the stamp.
     pub(crate) fn new(samples: &[ImuSample], bias: ImuBias, gravity_in_world: Vector3<f64>) -> Option<Self> {
         let first = samples.first()?;
         let mut motion = Preintegration::new(NO_NOISE, bias);
@@ -85,7 +85,7 @@ impl MotionProfile {
         (!knots.is_empty()).then_some(Self { bias, gravity_in_world, knots })
     }
 
-    /// Without samples: a stationary vehicle.
+    /// Profile of a stationary vehicle, without samples.
     pub(crate) fn stationary(bias: ImuBias, gravity_in_world: Vector3<f64>) -> Self {
         let knot = ProfileKnot {
             time_s: 0.0,
@@ -98,11 +98,11 @@ impl MotionProfile {
         Self { bias, gravity_in_world, knots: vec![knot] }
     }
 
-    /// Motion over `time_s` from the stamp on, at a gyroscope bias; outside of the samples at the rate and the
-    /// specific force of the nearest one.
+    /// Motion over `time_s` from the stamp, at a gyroscope bias.
     ///
-    /// Between samples the rotation is interpolated at a constant rate, the position with constant specific force. A
-    /// change of the gyroscope bias counts to first order.
+    /// Between samples the rotation is interpolated at a constant rate, the position with constant specific force;
+    /// outside the samples, rate and specific force of the nearest one apply. A change of the gyroscope bias corrects
+    /// the rotation to first order; velocity and position neglect it.
     pub(crate) fn at(&self, time_s: f64, gyroscope_bias_rad_per_s: &Vector3<f64>) -> RowMotion {
         let next = self.knots.iter().position(|knot| knot.time_s > time_s).unwrap_or(self.knots.len());
         let before = self.knots[next.saturating_sub(1)];
@@ -128,7 +128,6 @@ impl MotionProfile {
         }
     }
 
-    /// Bytes on the heap.
     pub(crate) fn heap_bytes(&self) -> usize {
         self.knots.capacity() * size_of::<ProfileKnot>()
     }

@@ -1,4 +1,4 @@
-//! Pose, velocity and IMU biases of a frame with their perturbation.
+//! Pose, velocity and IMU biases of a frame, with their perturbation.
 //!
 //! Error vectors are ordered `[φ, p, v, b_g, b_a]` (15), with the perturbation rule of [`crate::geometry`].
 
@@ -6,18 +6,16 @@ use nalgebra::{SMatrix, SVector, Vector3};
 
 use crate::geometry::RigidTransform;
 
-/// 15 × 15, ordered `[φ, p, v, b_g, b_a]`.
+/// Matrix ordered `[φ, p, v, b_g, b_a]`.
 pub type Matrix15 = SMatrix<f64, 15, 15>;
 
-/// 15, ordered `[φ, p, v, b_g, b_a]`.
+/// Vector ordered `[φ, p, v, b_g, b_a]`.
 pub type Vector15 = SVector<f64, 15>;
 
 /// Biases of the IMU: measured minus true.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuBias {
-    /// Of the gyroscope, in rad/s.
     pub gyroscope_rad_per_s: Vector3<f64>,
-    /// Of the accelerometer, in m/s².
     pub accelerometer_m_per_s2: Vector3<f64>,
 }
 
@@ -28,7 +26,6 @@ pub struct NavigationState {
     pub world_from_imu: RigidTransform,
     /// Velocity in the world, in m/s.
     pub velocity_m_per_s: Vector3<f64>,
-    /// Biases.
     pub bias: ImuBias,
 }
 

@@ -1,8 +1,8 @@
 //! Preintegration of the IMU samples between two frames (Forster et al., TRO 2017) with covariance and bias
 //! Jacobians.
 //!
-//! Angular velocity and specific force are linear between samples: rotations by the second Magnus term,
-//! velocity and position by Simpson's rule over each sample interval.
+//! Angular velocity and specific force are linear between samples: rotations use the second Magnus term,
+//! velocity and position Simpson's rule over each sample interval.
 //! Error vectors are ordered `[φ, p, v, b_g, b_a]` (15), with the perturbation rule of [`crate::geometry`].
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
@@ -19,14 +19,14 @@ pub type BiasJacobian = SMatrix<f64, 9, 6>;
 /// Derivative of `[φ, p, v]` with respect to the IMU intrinsics (9 × 15), in the order of [`ImuErrors`].
 pub(crate) type IntrinsicsJacobian = SMatrix<f64, 9, 15>;
 
-/// Intrinsics of an interval's integration, and what a change of them changes.
+/// Intrinsics used in the integration, and the derivative of the increment by them.
 #[derive(Clone, Debug)]
 struct IntegratedIntrinsics {
     errors: ImuErrors,
     jacobian: IntrinsicsJacobian,
 }
 
-/// Motion of the IMU over an interval in its frame at the start, without gravity and initial velocity.
+/// Motion of the IMU over an interval from `i` to `j`, in its frame at the start, without gravity and initial velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionIncrement {
     /// `imu_i_from_imu_j`.
@@ -37,22 +37,22 @@ pub struct MotionIncrement {
     pub velocity_m_per_s: Vector3<f64>,
 }
 
-/// Saturation: an axis that repeats the same value this often, at least [`MIN_SATURATED_RAD_PER_S`] or
-/// [`MIN_SATURATED_M_PER_S2`] large, is at the end of its range. Noise never repeats a value of full
+/// Number of equal consecutive values of an axis that indicates saturation, if the value is at least
+/// [`MIN_SATURATED_RAD_PER_S`] or [`MIN_SATURATED_M_PER_S2`]. Noise never repeats a value of full
 /// resolution.
 const SATURATED_REPEATS: u8 = 3;
 
-/// Smaller angular rates are in every sensor's range.
+/// Smallest angular rate of a saturated axis: every sensor's range includes smaller ones.
 const MIN_SATURATED_RAD_PER_S: f64 = 0.5;
 
-/// Gravity is in every sensor's range.
+/// Smallest specific force of a saturated axis: every sensor's range includes gravity.
 const MIN_SATURATED_M_PER_S2: f64 = 12.0;
 
-/// Noise density of a saturated axis relative to its value, in √s: the true value exceeds it by about half
+/// Noise density of a saturated axis relative to its value, in √s: the true value exceeds it by about half its size
 /// (standard deviation) for about a tenth of a second.
 const SATURATED_DENSITY: f64 = 0.16;
 
-/// Number of repetitions of each axis' value.
+/// Number of repetitions of the value of each axis.
 #[derive(Clone, Copy, Debug, Default)]
 struct Repeats {
     gyroscope: [u8; 3],
@@ -70,7 +70,7 @@ impl Repeats {
         follow(&mut self.accelerometer, &from.specific_force_m_per_s2, &to.specific_force_m_per_s2);
     }
 
-    /// Squared noise densities of the axes, those of saturated ones raised.
+    /// Squared noise densities of the axes, larger for saturated ones; true if any axis is saturated.
     fn densities(counts: &[u8; 3], shown: &Vector3<f64>, least: f64, density: f64) -> (Vector3<f64>, bool) {
         let mut saturated = false;
         let squares = Vector3::from_fn(|axis, _| {
@@ -92,7 +92,7 @@ pub struct Preintegration {
     duration_s: f64,
     increment: MotionIncrement,
     bias_jacobian: BiasJacobian,
-    /// `None` where the samples are taken as they are.
+    /// `None` if the samples are not corrected.
     intrinsics: Option<Box<IntegratedIntrinsics>>,
     covariance: Matrix15,
     repeats: Repeats,
@@ -100,7 +100,7 @@ pub struct Preintegration {
 }
 
 impl Preintegration {
-    /// Returns an empty interval that is integrated with `bias`.
+    /// Empty interval, to be integrated with `bias`.
     pub fn new(noise: ImuNoise, bias: ImuBias) -> Self {
         Self {
             noise,
@@ -120,7 +120,7 @@ impl Preintegration {
         }
     }
 
-    /// [`Self::new`] with samples that are corrected by intrinsics, if there are any.
+    /// [`Self::new`] with samples corrected by intrinsics, if there are any.
     pub(crate) fn with_intrinsics(noise: ImuNoise, bias: ImuBias, errors: Option<ImuErrors>) -> Self {
         let intrinsics =
             errors.map(|errors| Box::new(IntegratedIntrinsics { errors, jacobian: IntrinsicsJacobian::zeros() }));
@@ -134,8 +134,7 @@ impl Preintegration {
         preintegration
     }
 
-    /// Appends the samples of the following interval; samples that are not later than the last one or not finite
-    /// are skipped.
+    /// Appends the samples of the following interval; skips samples that are not finite or not later than the last one.
     pub fn extend(&mut self, samples: &[ImuSample]) {
         for sample in samples {
             if !Self::takes(self.samples.last(), sample) {
@@ -148,42 +147,41 @@ impl Preintegration {
         }
     }
 
-    /// Whether a sample is integrated after the last one: it is later and finite.
+    /// True if a sample is integrated after the last one: it is finite and later.
     pub(crate) fn takes(last: Option<&ImuSample>, sample: &ImuSample) -> bool {
         let finite = sample.angular_velocity_rad_per_s.iter().all(|x| x.is_finite())
             && sample.specific_force_m_per_s2.iter().all(|x| x.is_finite());
         finite && last.is_none_or(|last| sample.stamp_ns > last.stamp_ns)
     }
 
-    /// Reintegrates the samples with another bias.
+    /// Integrates the samples again with another bias.
     pub fn reintegrate(&mut self, bias: ImuBias) {
         let errors = self.intrinsics.as_ref().map(|intrinsics| intrinsics.errors);
         self.reintegrate_with(bias, errors);
     }
 
-    /// Reintegrates the samples with another bias and other intrinsics.
+    /// Integrates the samples again with another bias and other intrinsics.
     pub(crate) fn reintegrate_with(&mut self, bias: ImuBias, errors: Option<ImuErrors>) {
         let samples = std::mem::take(&mut self.samples);
         *self = Self::with_intrinsics(self.noise, bias, errors);
         self.extend(&samples);
     }
 
-    /// The samples.
     pub fn samples(&self) -> &[ImuSample] {
         &self.samples
     }
 
-    /// Noise of the integration.
+    /// Noise densities used in the integration.
     pub(crate) fn noise(&self) -> &ImuNoise {
         &self.noise
     }
 
-    /// Intrinsics of the integration.
+    /// Intrinsics used in the integration, `None` if the samples are not corrected.
     pub(crate) fn intrinsics(&self) -> Option<&ImuErrors> {
         self.intrinsics.as_ref().map(|intrinsics| &intrinsics.errors)
     }
 
-    /// Bias of the integration.
+    /// Bias used in the integration.
     pub fn bias(&self) -> &ImuBias {
         &self.bias
     }
@@ -208,7 +206,7 @@ impl Preintegration {
         &self.bias_jacobian
     }
 
-    /// Covariance of `[φ, p, v, b_g, b_a]` over the interval; the bias blocks are their random walk.
+    /// Covariance of `[φ, p, v, b_g, b_a]` over the interval (15 × 15); the bias blocks are their random walk.
     pub fn covariance(&self) -> &Matrix15 {
         &self.covariance
     }
@@ -218,7 +216,7 @@ impl Preintegration {
         self.intrinsics.as_ref().map_or_else(IntrinsicsJacobian::zeros, |intrinsics| intrinsics.jacobian)
     }
 
-    /// Change of the intrinsics from those of the integration; `None` without any in the integration or now.
+    /// Change of the intrinsics since the integration; `None` if either the integration or `errors` has none.
     pub(crate) fn intrinsics_change(&self, errors: Option<&ImuErrors>) -> Option<ImuErrors> {
         Some(errors? - self.intrinsics.as_ref()?.errors)
     }
@@ -228,7 +226,7 @@ impl Preintegration {
         self.shifted(&self.shift(bias, None))
     }
 
-    /// Change of `[φ, p, v]` (9 × 1) by a change of bias and intrinsics, to first order.
+    /// Change of `[φ, p, v]` (9 × 1) due to a change of bias and intrinsics, to first order.
     pub(crate) fn shift(&self, bias: &ImuBias, errors: Option<&ImuErrors>) -> SVector<f64, 9> {
         let shift: SVector<f64, 9> = self.bias_jacobian * self.bias_change(bias);
         match self.intrinsics_change(errors) {
@@ -237,7 +235,7 @@ impl Preintegration {
         }
     }
 
-    /// The increment with a change of `[φ, p, v]`.
+    /// Increment changed by `[φ, p, v]`.
     pub(crate) fn shifted(&self, shift: &SVector<f64, 9>) -> MotionIncrement {
         MotionIncrement {
             rotation: self.increment.rotation * so3::exp(&shift.fixed_rows::<3>(0).into_owned()),
@@ -246,7 +244,7 @@ impl Preintegration {
         }
     }
 
-    /// Change `[b_g, b_a]` of `bias` from the bias of the integration (6 × 1).
+    /// Difference `[b_g, b_a]` of `bias` from the bias of the integration (6 × 1).
     pub fn bias_change(&self, bias: &ImuBias) -> SVector<f64, 6> {
         let mut change = SVector::<f64, 6>::zeros();
         change.fixed_rows_mut::<3>(0).copy_from(&(bias.gyroscope_rad_per_s - self.bias.gyroscope_rad_per_s));
@@ -272,7 +270,7 @@ impl Preintegration {
         }
     }
 
-    /// The upper triangular `W` with `Wᵀ W = covariance⁻¹`, `None` for an empty interval.
+    /// Lower triangular `W` (15 × 15) with `Wᵀ W = covariance⁻¹`, `None` for an empty interval.
     pub fn square_root_information(&self) -> Option<Matrix15> {
         let lower = self.covariance.cholesky()?.unpack();
         let inverse = lower.solve_lower_triangular(&Matrix15::identity())?;
@@ -306,7 +304,7 @@ impl Preintegration {
         let a1 = to_corrected.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
         let a_half = (a0 + a1) * 0.5;
 
-        // Rotations over the first half and over the whole, second Magnus term included.
+        // Rotations over the first half and the whole interval, with the second Magnus term.
         let w_half = (w0 + w1) * 0.5;
         let phi_half = (w0 + w_half) * (0.25 * h) + w0.cross(&w_half) * (h * h / 48.0);
         let phi = w_half * h + w0.cross(&w1) * (h * h / 12.0);
@@ -345,7 +343,7 @@ impl Preintegration {
         );
 
         if let Some(intrinsics) = &mut self.intrinsics {
-            // Both ends change by nearly the same: their mean counts for the whole interval.
+            // The intrinsics change both ends by nearly the same: use the mean over the whole interval.
             let [first, second] = [from, to].map(|sample| imu_errors::derivatives(&intrinsics.errors, sample));
             let (rates, forces) = ((first.0 + second.0) * 0.5, (first.1 + second.1) * 0.5);
             let j = &mut intrinsics.jacobian;
@@ -405,7 +403,7 @@ impl Preintegration {
         j.fixed_view_mut::<3, 3>(0, 0).copy_from(&(step_rotation_transpose * phi_by_bg - phi_by_w));
     }
 
-    /// White noise and random walk of one sample interval (15 × 15), from the squared continuous densities: of the
+    /// Adds white noise and random walk of one sample interval (15 × 15), from the squared continuous densities: of the
     /// angular velocity by axis, of the specific force as a matrix in the frame at the interval's start.
     fn add_noise(
         &mut self,
@@ -421,7 +419,7 @@ impl Preintegration {
         by_angular_rate.fixed_view_mut::<3, 3>(6, 0).copy_from(dv_by_w);
         let mut motion = self.covariance.fixed_view_mut::<9, 9>(0, 0);
         motion += by_angular_rate * Matrix3::from_diagonal(gyroscope_noise) * by_angular_rate.transpose() / h;
-        // White specific force over the interval correlates velocity and position.
+        // White noise of the specific force correlates velocity and position over the interval.
         for (row, column, factor) in [(3, 3, h * h * h / 3.0), (3, 6, h * h / 2.0), (6, 3, h * h / 2.0), (6, 6, h)] {
             let mut block = self.covariance.fixed_view_mut::<3, 3>(row, column);
             block += force_noise * factor;

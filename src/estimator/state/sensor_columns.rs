@@ -1,14 +1,14 @@
-//! Calibration columns beside the chain: clocks, shutter and intrinsics of a camera.
+//! Calibration columns in addition to the chain: time offsets, shutter and intrinsics of a camera.
 
 use crate::camera::CameraModel;
 use crate::gimbal::{ParameterId, ParameterPart, Quantity};
 use crate::sensors::IntrinsicsSigma;
 
-/// A scalar parameter that is estimated relative to the rig's value.
+/// Scalar parameter, estimated relative to the rig's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SensorColumn {
     pub(crate) parameter: ParameterId,
-    /// Value of the rig, in the unit of the parameter's dimension.
+    /// Rig's value, in the unit of the parameter's dimension.
     pub(crate) given: f64,
     /// Prior standard deviation, in the same unit.
     pub(crate) sigma: f64,
@@ -17,27 +17,26 @@ pub(crate) struct SensorColumn {
 /// Prior standard deviation of a time offset relative to the rig, in seconds: transport and exposure delay an
 /// image by a frame period at most.
 const CLOCK_SIGMA_S: f64 = 0.02;
-/// Prior standard deviation of a readout time without one in the rig, in seconds: shutters read an image in 5 to 35 ms.
+/// Prior standard deviation of a readout time for which the rig has none, in seconds: shutters read an image in 5 to 35
+/// ms.
 const READOUT_SIGMA_S: f64 = 0.02;
-/// Prior of intrinsics without one in the rig: those of a calibration with a target, used at another focus.
+/// Prior of intrinsics for which the rig has none: those of a target calibration, used at another focus.
 const INTRINSICS_SIGMA: IntrinsicsSigma = IntrinsicsSigma { focal_ratio: 0.02, centre_px: 10.0, distortion: 0.03 };
 
 impl SensorColumn {
-    /// Time offset of the camera.
     pub(crate) fn camera_clock(given_timeshift_s: f64) -> Self {
         Self { parameter: ParameterId::timeshift(0), given: given_timeshift_s, sigma: CLOCK_SIGMA_S }
     }
 
-    /// Time offset of the joint encoders.
     pub(crate) const ENCODER_CLOCK: Self =
         Self { parameter: ParameterId::ENCODER_TIMESHIFT, given: 0.0, sigma: CLOCK_SIGMA_S };
 
-    /// Readout time of the camera.
     pub(crate) fn readout(given_s: f64, sigma_s: Option<f64>) -> Self {
         Self { parameter: ParameterId::readout(0), given: given_s, sigma: sigma_s.unwrap_or(READOUT_SIGMA_S) }
     }
 
-    /// Intrinsics of a camera: focal lengths, principal point, and the first coefficients of a lens that has some.
+    /// Intrinsics of a camera: focal lengths, principal point, and the first distortion coefficients if the lens model
+    /// has any.
     pub(crate) fn intrinsics(model: &CameraModel, sigma: Option<IntrinsicsSigma>) -> Vec<Self> {
         let sigma = sigma.unwrap_or(INTRINSICS_SIGMA);
         let column = |(place, quantity): (usize, Quantity)| {

@@ -2,18 +2,15 @@
 
 use nalgebra::Vector2;
 
-/// An observation of a feature: slot of the frame and pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TrackObservation {
-    /// Slot of the frame in the window.
     pub(crate) slot: usize,
-    /// Measured pixel.
     pub(crate) uv_px: Vector2<f64>,
 }
 
-/// Observations of one feature in the solve, the anchor's first.
+/// Observations of one feature in the solve.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Track {
-    /// In the order of the slots.
+    /// By ascending slot; the anchor's comes first.
     pub(crate) observations: Vec<TrackObservation>,
 }

@@ -1,4 +1,4 @@
-//! Cameras and encoders whose clocks are off.
+//! Time offsets of cameras and encoders.
 
 use super::fixture;
 use super::flight::{run_flight, trajectory_error_m};
@@ -18,7 +18,7 @@ fn flight(mount: SyntheticMount, seed: u64, clock_offsets_s: [f64; 2]) -> Synthe
     })
 }
 
-/// Error in metres, and the last report.
+/// Position error in metres, and the last report.
 fn run_flight_at(flight: &SyntheticFlight, estimate_timeshift: bool) -> (f64, StepReport) {
     let options = EstimatorOptions::default();
     let config = EstimatorConfig {

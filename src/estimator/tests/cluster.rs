@@ -12,15 +12,15 @@ use crate::gimbal::tests::parameter;
 use crate::sensors::ChainPrior;
 use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
-/// One flight seen by both cameras.
+/// The same flight with a gimballed and a rigid camera.
 struct BothFlights {
     gimbal: SyntheticFlight,
     rigid: SyntheticFlight,
 }
 
 impl BothFlights {
-    /// The given chain has errors of up to 10° and 3 cm in every parameter, the rigid extrinsics those of a good
-    /// calibration.
+    /// Flights with errors of the given chain of up to 10° and 3 cm in every parameter; the rigid extrinsics have the
+    /// errors of a good calibration.
     fn new(seed: u64, duration_s: f64) -> Self {
         let options = |mount| SyntheticOptions {
             mount,
@@ -45,7 +45,7 @@ impl BothFlights {
         }
     }
 
-    /// One step; a camera whose image is missing has seen nothing.
+    /// Runs one step; a camera whose flag is false has no features.
     fn step(&self, estimator: &mut Estimator, index: usize, [gimbal, rigid]: [bool; 2]) -> StepReport {
         let nothing = TrackedFrame::default();
         let [frame, beside] = [&self.gimbal, &self.rigid].map(|flight| &flight.frames[index]);
@@ -129,7 +129,7 @@ fn both_calibrations_have_named_columns() {
     let given = estimator.config().rigid_cameras[0].imu_from_camera;
     assert!(angle(mount) < 0.3 * angle(&given), "{} of {} rad", angle(mount), angle(&given));
 
-    // Features are distinguished.
+    // Feature ids distinguish the cameras.
     let of = |camera: usize| last.features.iter().filter(|feature| feature.id.camera() == camera).count();
     assert!(of(0) > 30 && of(1) > 30, "{} and {}", of(0), of(1));
     assert!(last.landmarks.iter().any(|landmark| landmark.id.camera() == 1));
@@ -139,7 +139,7 @@ fn both_calibrations_have_named_columns() {
 fn a_missing_image_leaves_the_other_cameras_observations() {
     let flights = BothFlights::new(6, 12.0);
     let seen = |index: usize| match index {
-        // One by one at the start, then a second without each camera.
+        // Missing images of one camera at a time at the start, then a second without each camera.
         0..60 => [!index.is_multiple_of(3), !index.is_multiple_of(4)],
         120..140 => [false, true],
         160..180 => [true, false],

@@ -17,7 +17,7 @@ fn config() -> EstimatorConfig {
     fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default())
 }
 
-/// Steps, at 20 Hz, that give a warning; all of them give the same one.
+/// Indices of the steps, at 20 Hz, that give a warning; asserts that all give the same one.
 fn reported(mean_squares: impl IntoIterator<Item = f64>) -> Vec<usize> {
     let config = config();
     let mut watch = ConsistencyMonitor::default();
@@ -49,7 +49,7 @@ fn inconsistent_residuals_warn_after_four_seconds_until_they_end() {
     let steps = reported((0..400).map(|step| if step < 200 { 3.0 } else { 0.9 }));
     assert_eq!(steps.first(), Some(&80));
     assert_eq!(steps.len(), steps.last().unwrap() - 79, "without a pause");
-    // The mean falls from 3 towards 0.9 with a time constant of four seconds: below 0.8 of 1.6 after some 135 steps.
+    // The mean falls from 3 towards 0.9 with a time constant of four seconds: below 0.8 of 1.6 after about 135 steps.
     assert!((330..340).contains(steps.last().unwrap()), "{:?}", steps.last());
 }
 

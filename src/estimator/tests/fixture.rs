@@ -1,4 +1,4 @@
-//! Windows and estimators made from synthetic flights.
+//! Windows and estimators from synthetic flights.
 
 use nalgebra::{DVector, Vector3};
 
@@ -26,14 +26,13 @@ use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::Rig;
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
-/// A window, and the setup that it reads.
 pub(super) struct TestWindow {
     pub(super) setup: Setup,
     pub(super) window: WindowState,
 }
 
 impl TestWindow {
-    /// The window of a tracking estimator.
+    /// Window of a tracking estimator.
     pub(super) fn of(estimator: &Estimator) -> Self {
         let PhaseState::Tracking(window) = &estimator.phase else { panic!("the estimator has no window") };
         Self { setup: estimator.setup.clone(), window: window.state.clone() }
@@ -54,13 +53,13 @@ impl TestWindow {
         self.window.problem(&self.setup, active)
     }
 
-    /// The present estimate, with the landmarks of these tracks.
+    /// Current estimate, with the landmarks of these tracks.
     pub(super) fn estimate(&self, active: &[ActiveTracks]) -> Estimate {
         self.window.estimate(active.iter().map(|active| active.landmarks.clone()).collect())
     }
 }
 
-/// An estimator for a rig's `cam0`.
+/// Configuration for a rig's `cam0`.
 pub(super) fn config(rig: &Rig, parameterization: Parameterization, options: EstimatorOptions) -> EstimatorConfig {
     let gimbal_prior = rig.gimbal.as_ref().map(|gimbal| gimbal.prior.sigmas());
     EstimatorConfig {
@@ -70,7 +69,7 @@ pub(super) fn config(rig: &Rig, parameterization: Parameterization, options: Est
     }
 }
 
-/// The camera of a rigid flight, as one that is watched beside another.
+/// Camera of a rigid flight, as `cam1`.
 pub(super) fn rigid_camera(flight: &SyntheticFlight) -> RigidCamera {
     RigidCamera {
         timeshift_s: 0.0,
@@ -82,7 +81,7 @@ pub(super) fn rigid_camera(flight: &SyntheticFlight) -> RigidCamera {
     }
 }
 
-/// One step on a synthetic frame, with what its cameras have tracked.
+/// Runs one step on a synthetic frame with the given tracks.
 pub(super) fn step(
     estimator: &mut Estimator,
     frame: &SyntheticFrame,
@@ -121,12 +120,12 @@ fn flight(gimbal: bool) -> SyntheticFlight {
     })
 }
 
-/// A window of six frames at the ground truth (landmarks from the noisy tracks), with the given chain.
+/// Window of six frames at the ground truth (landmarks from the noisy tracks), with the given chain.
 pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: EstimatorOptions) -> TestWindow {
     window_of(&flight(gimbal), None, config(&flight(gimbal).given_rig, parameterization, options))
 }
 
-/// The same with a rigid camera beside the gimballed one, and with the offsets of all clocks.
+/// [`window`] of a gimballed and a rigid camera, with all time offsets if `estimate_timeshift`.
 pub(super) fn cluster_window(options: EstimatorOptions, estimate_timeshift: bool) -> TestWindow {
     let (main, rigid) = (flight(true), flight(false));
     assert_eq!(main.frames[7].imu, rigid.frames[7].imu, "one flight");
@@ -138,7 +137,7 @@ pub(super) fn cluster_window(options: EstimatorOptions, estimate_timeshift: bool
     window_of(&main, Some(&rigid), config)
 }
 
-/// A window of a gimballed or a rigid camera with another configuration.
+/// Window of a gimballed or a rigid camera with a changed configuration.
 pub(super) fn changed_window(
     gimbal: bool,
     options: EstimatorOptions,
@@ -222,15 +221,16 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
     TestWindow { setup, window }
 }
 
-/// Marginalizes the oldest frame, so that there is a prior and there are first estimates.
+/// Marginalizes the oldest frame, which creates a prior and first estimates.
 pub(super) fn marginalize_once(test: &mut TestWindow) {
     test.setup.config.options.window = test.window.frames.len() - 1;
     test.setup.config.options.first_window_factor = 1;
-    test.window.make_room(&test.setup, &mut Vec::new());
+    test.window.drop_or_marginalize_frame(&test.setup, &mut Vec::new());
     assert!(test.window.prior.is_some());
 }
 
-/// Moves every unknown but the clocks at random; `scale` 1 is 2 cm and 1° of pose, 0.1 m/s, 2 mm and 0.2° of calibration.
+/// Disturbs all unknowns but time offsets and intrinsics; `scale` 1 is 2 cm and 1° of pose, 0.1 m/s, 2 mm and 0.2° of
+/// calibration.
 pub(super) fn disturb(test: &mut TestWindow, scale: f64) {
     let mut random = Noise::new(11);
     let layout = layout(&test.window.frames, test.window.calibration.dof());
@@ -250,7 +250,7 @@ pub(super) fn disturb(test: &mut TestWindow, scale: f64) {
         delta[column] = match parameter.dimension() {
             Dimension::Angle => 0.0035 * random.normal(),
             Dimension::Length => 0.002 * random.normal(),
-            // Derivatives by velocity and bias, which an offset of the clocks multiplies, are left out.
+            // Derivatives by velocity and bias, which a time offset multiplies, are neglected.
             Dimension::Time | Dimension::Pixel | Dimension::Ratio => 0.0,
         };
     }

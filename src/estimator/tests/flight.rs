@@ -1,4 +1,4 @@
-//! Whole synthetic flights: accuracy, calibration, replay, trouble.
+//! Complete synthetic flights: accuracy, calibration, replay, faults.
 
 use nalgebra::Vector3;
 
@@ -10,7 +10,7 @@ use crate::geometry::so3;
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
-/// An estimated and a true position.
+/// Estimated and true position.
 type Pair = (Vector3<f64>, Vector3<f64>);
 
 fn options(mount: SyntheticMount) -> SyntheticOptions {
@@ -47,8 +47,8 @@ pub(super) fn run_flight_by_rows(frames: &[SyntheticFrame], config: EstimatorCon
     (estimator, reports)
 }
 
-/// Root mean square position error after alignment of yaw and position with the ground truth, and the length of
-/// the trajectory.
+/// Root mean square position error after alignment of yaw and position with the ground truth, and length of
+/// the trajectory, in metres.
 pub(super) fn trajectory_error_m(frames: &[SyntheticFrame], reports: &[StepReport]) -> (f64, f64) {
     let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = reports
         .iter()
@@ -157,7 +157,7 @@ fn measurement_faults_are_reported_and_survived() {
     for frame in &flight.frames {
         let mut frame = frame.clone();
         match frame.index {
-            // A sample that is no number, and an image from the past.
+            // A sample with NaN, and an image from the past.
             100 => frame.imu[3].specific_force_m_per_s2 = Vector3::repeat(f64::NAN),
             105 => frame.stamp_ns -= 400_000_000,
             // Half a second without images, then one and a half without IMU samples.

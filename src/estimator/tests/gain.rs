@@ -69,7 +69,7 @@ fn the_terms_of_the_motions_sum_to_the_calibration_jacobian() {
     }
 }
 
-/// Bits by column, from explicit inverses of two windows, of which one has nothing of the newest image.
+/// Bits by column, from explicit inverses for two windows, one of them without any information of the newest image.
 fn bits_by_definition(problem: &Problem<'_>, estimate: &Estimate, active: &[ActiveTracks]) -> Vec<f64> {
     let parameters = estimate.calibration.parameters();
     let numbers: Vec<FrameId> = (0..problem.layout.frames).map(FrameId).collect();
@@ -157,8 +157,8 @@ fn information_gain_is_attributed_to_the_moving_joint() {
         });
         let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
         let mut estimator = Estimator::new(config);
-        // All information of the last second by motion: by then no frame of the window is from before the exercise.
-        // Hovering makes no keyframes, so the images are asked one by one.
+        // Total information of the last second by motion: by then no frame of the window is from before the exercise.
+        // Hover yields no keyframes, so the gain is evaluated for each image.
         let mut sums = [0.0; 9];
         for frame in &flight.frames {
             step(&mut estimator, frame);

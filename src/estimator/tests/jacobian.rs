@@ -1,4 +1,4 @@
-//! The Jacobian that is written out from a report, against the linearization of the step.
+//! Jacobian reproduced from a report, against the linearization of the step.
 
 use super::fixture;
 use super::flight::run_flight;
@@ -35,7 +35,7 @@ pub(super) fn check(report: &StepReport, cameras: &[&CameraModel]) -> StepJacobi
         let written = squared[column].sqrt();
         assert!((written - norm).abs() <= 1e-4 * norm + 1e-6, "column {column}: {written} for {norm}");
     }
-    // Velocities and biases are in IMU factors and zero-velocity updates only.
+    // Only IMU factors and zero-velocity updates depend on velocities and biases.
     for (number, block) in
         jacobian.columns.iter().enumerate().filter(|(_, block)| block.id.group() == ColumnGroup::VelocityBias)
     {
@@ -54,7 +54,7 @@ pub(super) fn check(report: &StepReport, cameras: &[&CameraModel]) -> StepJacobi
     jacobian
 }
 
-/// Holds the rows of the other factors against the norms of their blocks and the χ² of their kind.
+/// Compares the rows of the other factors with the norms of their blocks and the χ² of their kind.
 fn check_factor_rows(report: &StepReport, jacobian: &StepJacobian) {
     let all = report.factor_rows.as_ref().expect("they were asked for");
     for FactorRows { factor, rows } in all {
@@ -119,7 +119,7 @@ fn blocks_are_those_of_the_linearization() {
         assert_eq!(of(|factor| matches!(factor, JacobianFactor::Encoder(_))), frames);
         assert_eq!(of(|factor| *factor == JacobianFactor::CalibrationPrior), usize::from(calibrate));
         assert_eq!(of(|factor| *factor == JacobianFactor::MarginalizationPrior), 1);
-        // A feature touches nothing but the calibration, the frames that see it, and its depth.
+        // Rows of a feature depend only on the calibration, the observing frames, and the feature's depth.
         for (row, feature) in jacobian.rows.iter().zip(&report.features) {
             assert_eq!(row.factor, JacobianFactor::Feature(feature.id));
             let sees = |frame: FrameId| feature.observations.iter().any(|seen| seen.frame_index == frame.0);
@@ -134,7 +134,7 @@ fn blocks_are_those_of_the_linearization() {
                 assert!(touched, "{block:?}");
             }
         }
-        // Without the right cameras or the source there is none.
+        // `None` without the right cameras or without the source.
         assert_eq!(report.jacobian(&[]), None);
         assert_eq!(reports[0].jacobian(&[&camera]), None);
         assert_eq!(report.feature_rows(&[&camera], crate::frontend::FeatureId(u64::MAX)), None);

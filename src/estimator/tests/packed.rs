@@ -23,8 +23,8 @@ impl StepMeasurements for SyntheticFrame {
     }
 }
 
-/// Packs and unpacks the estimator before each step, with so many steps before it as its past, and returns the largest
-/// packed window in bytes.
+/// Packs and unpacks the estimator before each step, with the `past` steps before it, and returns the size of the
+/// largest packed window in bytes.
 fn check(
     flight: &SyntheticFlight,
     config: &EstimatorConfig,
@@ -38,7 +38,7 @@ fn check(
             flight.frames[number.saturating_sub(past)..number].iter().map(|frame| frame as _).collect();
         let packed = estimator.packed(&steps);
         let unpacked = packed.unpacked(&steps);
-        // Every number is written in full.
+        // Debug output has all digits.
         assert_eq!(format!("{unpacked:?}"), format!("{estimator:?}"), "step {number}");
         if estimator.phase() == Phase::Tracking {
             largest = largest.max(packed.bytes());
@@ -67,7 +67,7 @@ fn measurements_that_the_past_does_not_have_are_copied() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 5.0, features: 40, ..SyntheticOptions::default() });
     let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
     let whole = check(&flight, &config, 256, &|_| {});
-    // A short past, and measurements that were changed before the estimator saw them.
+    // A short past, and measurements that were changed before the step.
     let short = check(&flight, &config, 5, &|_| {});
     let altered = check(&flight, &config, 256, &|frame| {
         for feature in &mut frame.tracks.features {

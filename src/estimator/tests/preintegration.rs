@@ -20,7 +20,7 @@ fn bias() -> ImuBias {
     }
 }
 
-/// A lively motion of a multirotor: true angular velocity and specific force at `t_s`.
+/// Strong motion of a multirotor: true angular velocity and specific force at `t_s`.
 fn motion(t_s: f64) -> (Vector3<f64>, Vector3<f64>) {
     let w = Vector3::new(1.5 * (3.0 * t_s).sin(), 1.2 * (2.0 * t_s + 0.4).cos(), 0.8 * (1.3 * t_s).sin());
     let a = Vector3::new(2.0 * (2.5 * t_s).cos(), 1.5 * (3.1 * t_s).sin(), 9.81 + 2.0 * (1.7 * t_s).cos());
@@ -41,7 +41,7 @@ fn samples(duration_s: f64, rate_hz: f64) -> Vec<ImuSample> {
         .collect()
 }
 
-/// The same motion by a plain Euler integration a thousand times finer.
+/// The same motion by Euler integration with a thousand times smaller steps.
 fn fine_increment(duration_s: f64) -> (UnitQuaternion<f64>, Vector3<f64>, Vector3<f64>) {
     let steps = (duration_s * 400_000.0).round() as usize;
     let h = duration_s / steps as f64;
@@ -122,7 +122,7 @@ fn bias_jacobian_meets_central_differences() {
     }
 }
 
-/// Increments with sampled white noise and random walks scatter according to the covariance.
+/// Increments with sampled white noise and random walks scatter as their covariance predicts.
 #[test]
 fn covariance_is_that_of_drawn_noise() {
     let mut random = crate::estimator::tests::Noise::new(7);
@@ -156,7 +156,7 @@ fn covariance_is_that_of_drawn_noise() {
         let ratio = scatter[(k, k)] / nominal.covariance()[(k, k)];
         assert!((0.88..1.12).contains(&ratio), "variance {k}: drawn over predicted {ratio}");
     }
-    // Samples show the walk with the sign opposite to the bias error of the transition, hence the minus.
+    // In samples the walk has the opposite sign of the bias error in the transition.
     for (row, column) in [(6, 12), (3, 6), (7, 13), (0, 9)] {
         let scale = (nominal.covariance()[(row, row)] * nominal.covariance()[(column, column)]).sqrt();
         let sign = if column >= 9 { -1.0 } else { 1.0 };
@@ -186,7 +186,7 @@ fn prediction_leaves_no_residual() {
     let preintegration = Preintegration::from_samples(NOISE, bias(), &samples(0.3, 200.0));
     let (from, _) = states();
     let to = preintegration.predict(&from, &gravity);
-    assert!(imu_factor::residual(&preintegration, &from, &to, &gravity).amax() < 1e-13);
+    assert!(imu::residual(&preintegration, &from, &to, &gravity).amax() < 1e-13);
 }
 
 #[test]
@@ -194,13 +194,12 @@ fn factor_jacobians_meet_central_differences() {
     let gravity = Vector3::new(0.0, 0.0, -9.81);
     let preintegration = Preintegration::from_samples(NOISE, bias(), &samples(0.3, 200.0));
     let (from, to) = states();
-    let (by_from, by_to) = imu_factor::jacobians(&preintegration, &from, &to, &gravity);
+    let (by_from, by_to) = imu::jacobians(&preintegration, &from, &to, &gravity);
     let step = 1e-6;
     for column in 0..15 {
         let mut delta = Vector15::zeros();
         delta[column] = step;
-        let at =
-            |from: &NavigationState, to: &NavigationState| imu_factor::residual(&preintegration, from, to, &gravity);
+        let at = |from: &NavigationState, to: &NavigationState| imu::residual(&preintegration, from, to, &gravity);
         let numeric_from = (at(&from.plus(&delta), &to) - at(&from.plus(&-delta), &to)) / (2.0 * step);
         let numeric_to = (at(&from, &to.plus(&delta)) - at(&from, &to.plus(&-delta))) / (2.0 * step);
         assert!((by_from.column(column) - numeric_from).amax() < 1e-7, "from, column {column}");

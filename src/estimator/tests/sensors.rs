@@ -21,7 +21,7 @@ fn run(flight: &SyntheticFlight, change: impl Fn(&mut EstimatorConfig)) -> (f64,
     (error_m, chain_m, reports.pop().expect("a flight has frames"))
 }
 
-/// Position error in metres and all different warnings of a run with the given rig as it is.
+/// Position error in metres and the distinct warnings of a run that does not estimate the errors of the given rig.
 fn ignored(flight: &SyntheticFlight) -> (f64, BTreeSet<String>) {
     let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
     let (_, reports) = run_flight_by_rows(&flight.frames, config);

@@ -1,4 +1,4 @@
-//! Standing still: before the first motion, and in the middle of a flight.
+//! Stationary vehicle: before the first motion, and in the middle of a flight.
 
 use std::collections::BTreeMap;
 
@@ -32,7 +32,7 @@ fn options(mount: SyntheticMount, motion: SyntheticMotion) -> SyntheticOptions {
     }
 }
 
-/// A flight that starts stationary, reversed in time: it lands where it took off, stays there, and takes off again.
+/// Flight that starts stationary, reversed in time: it lands at its take-off point, stays there, and takes off again.
 struct Landing<'a> {
     flight: &'a SyntheticFlight,
     frames: Vec<SyntheticFrame>,
@@ -53,7 +53,7 @@ impl<'a> Landing<'a> {
         self.frames.last().map_or(3_000_000, |last| last.stamp_ns + FRAME_NS)
     }
 
-    /// The flight reversed in time: the specific force stays, velocities and angular rates change their sign,
+    /// Appends the flight reversed in time: the specific force stays, velocities and angular rates change their sign,
     /// biases do not.
     fn land(mut self) -> Self {
         let stationary_features: Vec<FeatureId> =
@@ -71,7 +71,7 @@ impl<'a> Landing<'a> {
                 });
                 backwards.collect()
             });
-            // A track before the stationary phase is not the one after it.
+            // A track from before the stationary phase has another id than one after it.
             let features = frame.tracks.features.iter().map(|feature| {
                 let id = if stationary_features.contains(&feature.id) {
                     feature.id
@@ -87,7 +87,7 @@ impl<'a> Landing<'a> {
         self
     }
 
-    /// Adds a stationary phase; returns the new ids of its features. `creep_m` is the translation along x over time,
+    /// Appends a stationary phase; returns the new ids of its features. `creep_m` is the translation along x over time,
     /// `ending` the ratio of tracks that end in every image and restart.
     fn stay(mut self, seconds: f64, ending: f64, creep_m: fn(f64) -> f64) -> (Self, BTreeMap<FeatureId, FeatureId>) {
         let first = &self.flight.frames[0];
@@ -147,7 +147,7 @@ impl<'a> Landing<'a> {
         (self, ids)
     }
 
-    /// Takes off again, as the flight does by itself.
+    /// Appends the take-off, which is the original flight.
     fn take_off(mut self, ids: &BTreeMap<FeatureId, FeatureId>) -> Vec<SyntheticFrame> {
         for frame in &self.flight.frames[1..] {
             let stamp_ns = self.next_stamp_ns();
@@ -181,14 +181,14 @@ fn reports_stationary(report: &StepReport) -> bool {
 fn a_landed_vehicle_does_not_drift_and_takes_off_again() {
     for mount in [SyntheticMount::Gimbal, SyntheticMount::Static] {
         let flight = synthetic_tracks(&options(mount, SyntheticMotion::StationaryThenAggressive));
-        // One track in fifty ends in every image: hardly one lives through ten seconds.
+        // One track in fifty ends in every image: hardly any survives ten seconds.
         let (landing, ids) = Landing::new(&flight).land().stay(12.0, 0.02, |_| 0.0);
         let frames = landing.take_off(&ids);
         let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
         let (estimator, reports) = run_flight(&frames, config);
         assert_eq!(estimator.restarts, 0, "{mount:?}");
         let landed = flight.frames.len();
-        // Two seconds of rest are needed to notice it: one of quiet samples, and the landing itself is one.
+        // Detection takes about two seconds: one of quiet samples, and the landing itself.
         let stationary_reports = &reports[landed + 20..landed + 235];
         let reported = stationary_reports.iter().filter(|report| reports_stationary(report)).count();
         assert!(reported > 200, "{mount:?}: reported stationary {reported} times of {}", stationary_reports.len());
@@ -210,7 +210,7 @@ fn a_landed_vehicle_does_not_drift_and_takes_off_again() {
     }
 }
 
-/// A smooth centimetre per second: the IMU samples do not show it, the image does.
+/// A constant 1 cm/s: invisible in the IMU samples, visible in the image.
 #[test]
 fn a_slowly_moving_vehicle_gets_no_zero_velocity_update() {
     let creep = |after_s: f64| 0.01 * (after_s * after_s / (after_s.max(0.0) + 2.0));

@@ -37,7 +37,7 @@ fn kinds(reports: &[StepReport]) -> Vec<EventKind> {
     reports.iter().flat_map(|report| report.events.iter().map(|event| event.kind)).collect()
 }
 
-/// Frames with new feature ids, as after an image that no track survives.
+/// Gives a frame new feature ids, as after an image that no track survives.
 fn renamed(frame: &mut SyntheticFrame) {
     for feature in &mut frame.tracks.features {
         feature.id = FeatureId(feature.id.0 + 1_000_000);
@@ -56,7 +56,7 @@ fn without_encoders_the_trajectory_is_tracked_and_the_calibration_stays_uncertai
         let (error, length) = trajectory_error_m(&flight.frames, &reports);
         assert!(error < 0.01 * length, "seed {seed}: {error} m over {length} m");
         let last = &reports.last().unwrap().calibration;
-        // 18 columns without the three offsets, which free joint angles would take up.
+        // 18 columns minus three offsets, which free joint angles absorb.
         assert_eq!(last.parameters.len(), 15);
         let learnt: Vec<f64> =
             last.sigmas.iter().zip(&last.prior_sigmas).map(|(after, before)| after / before).collect();
@@ -71,7 +71,7 @@ fn without_encoders_the_trajectory_is_tracked_and_the_calibration_stays_uncertai
     }
 }
 
-/// Joint angles that come late or pause are no reason to fail.
+/// Late or interrupted joint angles are no failure.
 #[test]
 fn late_and_interrupted_encoder_readings_are_handled() {
     let flight = synthetic_tracks(&options(SyntheticMount::Gimbal, 5));
@@ -115,7 +115,7 @@ fn three_seconds_without_images_are_bridged() {
     }
 }
 
-/// Frames of a flight with a period without features, and new features after it.
+/// Frames of a flight with a period without features and new features after it.
 fn blinded(flight: &SyntheticFlight, blind: std::ops::Range<usize>) -> Vec<SyntheticFrame> {
     let mut frames = flight.frames.clone();
     for frame in &mut frames {
@@ -161,12 +161,12 @@ fn a_long_visual_outage_leads_to_a_successful_restart() {
     assert_eq!(estimator.restarts, 1);
     let again = failed + reports[failed..].iter().position(|report| report.phase == Phase::Tracking).unwrap();
     assert!(again < 370, "tracking again at {again}");
-    // Each part by itself is as good as ever.
+    // Each part alone is as accurate as a normal flight.
     for range in [0..failed, again..frames.len()] {
         let (error, length) = trajectory_error_m(&frames[range.clone()], &reports[range]);
         assert!(error < 0.006 * length, "{error} m over {length} m");
     }
-    // The second part begins near where the first one ended.
+    // The second part starts near the end of the first one.
     let place = |index: usize| reports[index].newest().unwrap().world_from_imu.translation_m;
     assert!((place(again) - place(failed - 1)).norm() < 25.0);
 }
@@ -198,7 +198,7 @@ fn a_saturated_imu_does_not_corrupt_the_window() {
     }
 }
 
-/// Covariance of the calibration at the present estimate, all else marginalized.
+/// Covariance of the calibration at the current estimate, everything else marginalized.
 fn calibration_covariance(estimator: &Estimator) -> DMatrix<f64> {
     let window = TestWindow::of(estimator);
     let active = window.active_tracks();
@@ -209,13 +209,13 @@ fn calibration_covariance(estimator: &Estimator) -> DMatrix<f64> {
     Cholesky::new(&hessian).unwrap().trailing_covariance(problem.layout.calibration)
 }
 
-/// As near a singularity: the configured parameterization stays what it is.
+/// Switches as near a singularity: the configured parameterization stays.
 fn switch(estimator: &mut Estimator, parameterization: Parameterization) {
     let PhaseState::Tracking(window) = &mut estimator.phase else { panic!("the estimator has no window") };
     window.state.switch_parameterization(parameterization);
 }
 
-/// The same flight with and without a switch of parameterization: the posterior is transformed, not only the values.
+/// Compares a flight with and without a switch of parameterization: the posterior is transformed, not only the values.
 #[test]
 fn a_switch_of_parameterization_keeps_the_window_estimate() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 9.0, ..options(SyntheticMount::Gimbal, 5) });
@@ -262,7 +262,7 @@ fn a_parameterization_near_its_singularity_is_switched_once() {
     for frame in &flight.frames {
         if frame.index == 130 {
             assert_eq!(estimator.phase(), Phase::Tracking);
-            // As if the mechanism had come near: the swapped end block is singular on this gimbal.
+            // Imitates a mechanism near the singularity: the swapped end block is singular on this gimbal.
             switch(&mut estimator, Parameterization::MinimalSwapped);
         }
         let report = step(&mut estimator, frame);
@@ -277,7 +277,7 @@ fn a_parameterization_near_its_singularity_is_switched_once() {
     assert_eq!(estimator.restarts, 0);
 }
 
-/// A flight with the paper's T4 conditions: chain off by up to 3 cm and 10°, encoders by 7°.
+/// Flight with the paper's T4 conditions: chain errors of up to 3 cm and 10°, encoder noise of 7°.
 fn far_off(seed: u64, duration_s: f64) -> SyntheticFlight {
     synthetic_tracks(&SyntheticOptions {
         start_error: Experiment::T4.start_error(),
@@ -287,7 +287,7 @@ fn far_off(seed: u64, duration_s: f64) -> SyntheticFlight {
     })
 }
 
-/// After a start with a poor chain, derivatives at poor first estimates and an early prior would hold the flight back.
+/// With a poor initial chain, derivatives at poor first estimates and an early prior would prevent convergence.
 #[test]
 fn the_window_converges_from_poor_initial_values() {
     let errors_m = |options: EstimatorOptions| -> Vec<f64> {
@@ -309,6 +309,6 @@ fn the_window_converges_from_poor_initial_values() {
     };
     let (ours, theirs) = (errors_m(standard), errors_m(held));
     let product = |errors: &[f64]| errors.iter().product::<f64>();
-    // The cubic root of the product is the mean ratio of the three.
+    // The cube root of the product is the geometric mean of the three ratios.
     assert!((product(&ours) / product(&theirs)).cbrt() < 0.75, "{ours:?} against {theirs:?}");
 }

@@ -1,4 +1,4 @@
-//! The window's problem: Jacobians, elimination, marginalization, solving.
+//! Least-squares problem of the window: Jacobians, elimination, marginalization, solve.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -10,6 +10,7 @@ use crate::estimator::problem::rows::stack;
 use crate::estimator::problem::solver::{self, SolverLimits};
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::estimate::Estimate;
+use crate::estimator::window::covariances;
 use crate::estimator::window::drop_or_marginalize_frame;
 use crate::gimbal::Parameterization;
 use crate::optimization::RobustLoss;
@@ -19,8 +20,8 @@ fn quadratic() -> EstimatorOptions {
     EstimatorOptions { loss: RobustLoss::None, ..EstimatorOptions::default() }
 }
 
-/// A gimbal's window in each form, a rigid camera's, one of both cameras, also with the offsets of their clocks, and windows
-/// with a rolling shutter of 20 ms and with intrinsics.
+/// Windows of a gimbal in each parameterization, a rigid camera, both cameras with and without time offsets, a
+/// rolling shutter of 20 ms, and intrinsics.
 fn windows() -> Vec<(&'static str, TestWindow)> {
     let gimbal = |parameterization| fixture::window(parameterization, true, quadratic());
     vec![
@@ -53,7 +54,7 @@ fn windows() -> Vec<(&'static str, TestWindow)> {
 #[test]
 fn the_gradient_of_every_factor_meets_central_differences() {
     for (name, mut estimator) in windows() {
-        // Steps count from the first estimates, so that derivatives are plain ones only there.
+        // Steps are taken from the first estimates: derivatives equal finite differences only there.
         fixture::disturb(&mut estimator, 0.2);
         fixture::marginalize_once(&mut estimator);
         let active = estimator.active_tracks();
@@ -61,7 +62,7 @@ fn the_gradient_of_every_factor_meets_central_differences() {
         assert!(problem.prior.is_some(), "{name}: a prior takes part");
         let estimate = estimator.estimate(&active);
         let equations = problem.linearize(&estimate);
-        // Damped without end, the landmarks stay where they are.
+        // A damping of 1e14 leaves the landmarks unchanged.
         let carried = equations.eliminate(1e14);
         let (_, gradient) = equations.reduced(&problem.layout, &carried);
         let still: Vec<Vec<Vector3<f64>>> =
@@ -73,7 +74,8 @@ fn the_gradient_of_every_factor_meets_central_differences() {
             let up = problem.costs(&problem.stepped(&estimate, &delta, &still)).total();
             let down = problem.costs(&problem.stepped(&estimate, &-delta, &still)).total();
             let numeric = (up - down) / (2.0 * step);
-            // Rows of poe's prior are taken as flat; between rows of a rolling shutter a change of the pose is interpolated.
+            // The prior of poe treats rotations as a vector space; between rows of a rolling shutter a change of the
+            // pose is interpolated.
             let tolerance = match name {
                 "poe" => 2e-2,
                 name if name.ends_with("rolling") => 2e-3,
@@ -121,7 +123,7 @@ fn projecting_landmarks_out_equals_their_schur_complement() {
     }
 }
 
-/// The step of the others is the same whether the oldest frame is solved with them or was marginalized before.
+/// The step of the other unknowns is equal whether the oldest frame is in the batch or marginalized before.
 #[test]
 fn marginalizing_the_oldest_agrees_with_the_full_batch() {
     for (name, estimator) in windows() {
@@ -129,12 +131,11 @@ fn marginalizing_the_oldest_agrees_with_the_full_batch() {
         let problem = estimator.problem(&active);
         let layout = problem.layout;
         let estimate = estimator.estimate(&active);
-        // Everything in one batch.
         let equations = problem.linearize(&estimate);
         let (hessian, gradient) = equations.reduced(&layout, &equations.eliminate(0.0));
         let batch = Cholesky::new(&hessian).unwrap().solve(&-gradient);
 
-        // The oldest frame and all tracks first, the rest of the factors on what they leave.
+        // The oldest frame and all tracks marginalized first, then the other factors with the resulting prior.
         let mut prior = marginalization::oldest(&problem, &estimate).unwrap();
         let mut rest = vec![problem.calibration_prior_rows(&estimate)];
         rest.extend((2..layout.frames).map(|slot| problem.imu_rows(slot, &estimate)));
@@ -150,7 +151,7 @@ fn marginalizing_the_oldest_agrees_with_the_full_batch() {
         let solution =
             upper.view((0, 0), (count, count)).solve_upper_triangular(&-upper.view((0, count), (count, 1))).unwrap();
         let difference = solution.column(0) - batch.rows(layout.frame(1).start, count);
-        // Joint accelerations are in units in which they are a thousand times less accurate than the angles.
+        // In their units, joint accelerations are a thousand times less accurate than the angles.
         let tolerance = if layout.joint_motion > 0 { 1e-3 } else { 1e-5 };
         assert!(difference.amax() < tolerance * batch.amax(), "{name}: {}", difference.amax());
     }
@@ -187,8 +188,8 @@ fn dropping_a_frame_from_the_prior_keeps_the_information_on_the_others() {
     assert!(difference < 1e-7, "{difference}");
 }
 
-/// A dependent column is in the span of the earlier ones: rows below belong to other columns, none to the
-/// residual alone.
+/// A dependent column is in the span of the earlier ones: the rows below belong to other columns, and no row has the
+/// residual only.
 #[test]
 fn an_echelon_gives_dependent_columns_no_row() {
     // Columns 1 and 3 are combinations of those before them; the residual has a part outside all of them.
@@ -206,7 +207,7 @@ fn an_echelon_gives_dependent_columns_no_row() {
     assert_eq!(echelon.rows.view((1, 0), (2, 2)).amax(), 0.0);
 }
 
-/// A residual that no step can change would count in every cost from then on, and pile up over a flight.
+/// A residual that no step can change would add to every later cost and accumulate over a flight.
 #[test]
 fn a_prior_contains_only_estimated_columns() {
     for (name, mut estimator) in windows() {
@@ -214,13 +215,13 @@ fn a_prior_contains_only_estimated_columns() {
             fixture::disturb(&mut estimator, 0.2);
             estimator.setup.config.options.window = left - 1;
             estimator.setup.config.options.first_window_factor = 1;
-            estimator.window.make_room(&estimator.setup, &mut Vec::new());
+            estimator.window.drop_or_marginalize_frame(&estimator.setup, &mut Vec::new());
             let problem = estimator.problem(&[]);
             let estimate = estimator.estimate(&[]);
             let total = problem.layout.total();
             let rows = problem.prior.unwrap().rows(&problem.layout, &problem.first_estimate_offset(&estimate));
             let residual = rows.column(total).into_owned();
-            // Columns of one length, since units differ.
+            // Normalized columns, since units differ.
             let mut jacobian = rows.columns(0, total).into_owned();
             for mut column in jacobian.column_iter_mut() {
                 column /= column.norm().max(f64::MIN_POSITIVE);
@@ -233,7 +234,7 @@ fn a_prior_contains_only_estimated_columns() {
     }
 }
 
-/// No measurement changes along the six redundant directions of the classical chain.
+/// Measurements do not change along the six redundant directions of the classical chain.
 #[test]
 fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
     let mut estimator = fixture::window(Parameterization::Classical, true, quadratic());
@@ -265,29 +266,29 @@ fn solving_converges_to_the_ground_truth_from_disturbed_values() {
         let solution = solver::solve(&problem, estimator.estimate(&active), limits);
         let tracks = active.iter().flat_map(|active| &active.tracks);
         let residuals = 2 * tracks.map(|track| track.observations.len()).sum::<usize>();
-        // The tracks are off by 0.3 px (standard deviation).
+        // The pixel noise of the tracks is 0.3 px (standard deviation).
         let expected = residuals as f64 * (0.3 / estimator.setup.config.options.pixel_sigma_px).powi(2);
         assert!(solution.costs_after.visual < 1.5 * expected, "{name}: {:?} of {expected}", solution.costs_after);
         assert!(solution.costs_after.total() < 0.01 * solution.costs_before.total(), "{name}");
     }
 }
 
-/// Damping is no information: neither that of a first step nor that of a step that was rejected at last.
+/// The covariance excludes the damping, both of a first step and of a final rejected step.
 #[test]
 fn the_covariance_of_a_solve_is_without_damping() {
     let mut rejected = 0;
     for (name, mut estimator) in windows() {
         for (scale, iterations) in [(0.0, 1), (4.0, 1), (8.0, 2), (16.0, 3), (32.0, 4)] {
             fixture::disturb(&mut estimator, scale);
-            let expected = solver::covariances(&estimator.setup, &estimator.window);
+            let expected = covariances::covariances(&estimator.setup, &estimator.window);
             let solution = estimator.window.solve(&estimator.setup, iterations).solution;
             let Some(last) = solution.iterations.last() else { continue };
             rejected += usize::from(!last.accepted);
-            // A step is linearized at the estimate before it, which a rejected one leaves as it is.
+            // Equations are linearized at the estimate before the step; a rejected step keeps that estimate.
             let expected = match last.accepted {
                 true if scale > 0.0 => continue,
                 true => expected,
-                false => solver::covariances(&estimator.setup, &estimator.window),
+                false => covariances::covariances(&estimator.setup, &estimator.window),
             };
             let Some(expected) = expected else { continue };
             let difference = (&solution.calibration_covariance - &expected.calibration).amax();
@@ -303,15 +304,16 @@ fn the_covariance_of_a_solve_is_without_damping() {
 
 #[test]
 fn an_inaccurate_chain_gets_a_larger_first_window() {
-    let room =
-        |test: &TestWindow| drop_or_marginalize_frame::first_room(&test.window.calibration, &test.setup.config.options);
+    let frame_limit = |test: &TestWindow| {
+        drop_or_marginalize_frame::first_window_frames(&test.window.calibration, &test.setup.config.options)
+    };
     let gimbal = |rotation_sigma_rad: f64, calibrate: bool| {
         fixture::changed_window(true, quadratic(), |config| {
             (config.chain_prior, config.calibrate) = (Some((0.005, rotation_sigma_rad)), calibrate);
         })
     };
-    let usual = room(&gimbal(0.0087, true));
-    assert_eq!(room(&gimbal(0.1, true)), 2 * usual);
-    assert_eq!(room(&gimbal(0.1, false)), usual, "a fixed chain does not move");
-    assert_eq!(room(&fixture::cluster_window(quadratic(), false)), usual, "a rigid camera leads");
+    let usual = frame_limit(&gimbal(0.0087, true));
+    assert_eq!(frame_limit(&gimbal(0.1, true)), 2 * usual);
+    assert_eq!(frame_limit(&gimbal(0.1, false)), usual, "a fixed chain does not move");
+    assert_eq!(frame_limit(&fixture::cluster_window(quadratic(), false)), usual, "a rigid camera leads");
 }

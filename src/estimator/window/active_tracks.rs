@@ -1,11 +1,11 @@
-//! Features of a solve.
+//! Features that take part in a solve.
 
 use super::features::{FeatureMap, Observation};
 use crate::estimator::state::track::{Track, TrackObservation};
 use crate::frontend::FeatureId;
 use crate::optimization::Landmark;
 
-/// Features of one camera in a solve, ordered by id.
+/// Features of one camera that take part in a solve, ordered by id.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ActiveTracks {
     pub(crate) ids: Vec<FeatureId>,
@@ -31,7 +31,7 @@ impl ActiveTracks {
         active
     }
 
-    /// Keeps the features whose tracks `wanted` accepts.
+    /// Keeps the features whose tracks satisfy `wanted`.
     pub(crate) fn filtered(self, wanted: impl Fn(&Track) -> bool) -> Self {
         let mut kept = Self::default();
         for ((id, track), landmark) in self.ids.into_iter().zip(self.tracks).zip(self.landmarks) {

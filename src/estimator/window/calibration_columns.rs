@@ -1,10 +1,10 @@
-//! The static calibration in the report: parameters, values and standard deviations of its columns.
+//! Static calibration in the report: parameters, values and standard deviations of its columns.
 
 use super::setup::Setup;
 use crate::estimator::report::CalibrationEstimate;
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 
-/// Returns the static calibration with the standard deviations of its columns, NaN without a solve.
+/// Static calibration with the standard deviations of its columns: NaN before a solve, zero if it is fixed.
 pub(crate) fn calibration_estimate(setup: &Setup, calibration: &Calibrations, sigmas: &[f64]) -> CalibrationEstimate {
     let cameras = || (0..calibration.cameras()).map(|camera| calibration.of(camera));
     let parameters = calibration.parameters();

@@ -1,4 +1,4 @@
-//! Calibration columns that a running window gains, and which of them would explain its residuals.
+//! Calibration columns added to a running window, and scores of those that would explain its residuals.
 
 use std::sync::Arc;
 
@@ -13,26 +13,27 @@ use crate::gimbal::ParameterId;
 use crate::optimization::Cholesky;
 use crate::sensors::ImuSample;
 
-/// Length of the motion after a stamp that frames of the window take from the samples before the next frame, in seconds.
+/// Duration of the motion after a stamp that frames of the window take from the IMU samples before the next frame, in
+/// seconds.
 const MOTION_AFTER_S: f64 = 0.06;
 
-/// A fixed parameter, and what it would be if it were estimated: to first order, from one window or from several.
+/// Fixed parameter with its estimate to first order if it were free, from one window or several.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SuspectedParameter {
     pub(crate) parameter: ParameterId,
-    /// Change from the value of the rig.
+    /// Change from the rig's value.
     pub(crate) change: f64,
-    /// Inverse of its variance.
+    /// Inverse variance of `change`.
     pub(crate) information: f64,
 }
 
 impl SuspectedParameter {
-    /// By how much χ² would fall.
+    /// Decrease of χ² if the parameter were free.
     pub(crate) fn chi2(&self) -> f64 {
         self.change * self.change * self.information
     }
 
-    /// Adds what another window says about the same parameter.
+    /// Combines the estimate with that of another window for the same parameter.
     pub(crate) fn add(&mut self, other: &Self) {
         let information = self.information + other.information;
         self.change = (self.change * self.information + other.change * other.information) / information;
@@ -41,8 +42,8 @@ impl SuspectedParameter {
 }
 
 impl WindowState {
-    /// Adds the calibration columns that the setup estimates and the window does not have yet, at the values of the rig;
-    /// frames and prior follow.
+    /// Adds the calibration columns that the setup estimates and the window does not have yet, at the rig's values;
+    /// extends frames and prior accordingly.
     pub(crate) fn add_columns(&mut self, setup: &Setup) {
         let before = self.calibration.parameters();
         let old = frame::layout(&self.frames, self.calibration.dof());
@@ -72,7 +73,7 @@ impl WindowState {
         }
     }
 
-    /// IMU samples from the stamp of a frame on, the first one at it, as far as the next frame has them.
+    /// IMU samples from the stamp of a frame on (the first one at the stamp), as far as the next frame has them.
     fn samples_after(&self, slot: usize) -> Vec<ImuSample> {
         let Some(next) = self.frames.get(slot + 1) else { return Vec::new() };
         let stamp_ns = next.motion.samples().first().map_or(0, |first| first.stamp_ns);
@@ -80,8 +81,8 @@ impl WindowState {
         next.motion.samples().iter().take_while(near).copied().collect()
     }
 
-    /// How much each clock, each shutter and each parameter of the cameras' intrinsics that is not estimated would lower χ² of the
-    /// window, each one tried alone with all that is estimated; none with a fixed calibration.
+    /// Scores of the time offsets, readout times and camera intrinsics that are not estimated: the decrease of the
+    /// window's χ² when each is freed alone in addition to the estimated unknowns. Empty with a fixed calibration.
     pub(crate) fn sensor_scores(&self, setup: &Setup) -> Vec<SuspectedParameter> {
         if !setup.config.calibrate {
             return Vec::new();
@@ -119,5 +120,5 @@ impl WindowState {
     }
 }
 
-/// Added to the diagonal, as in the solver: unknowns without a factor do not move.
+/// Addition to the diagonal, as in the solver, so that unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;

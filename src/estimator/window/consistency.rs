@@ -11,27 +11,28 @@ use crate::estimator::report::ResidualSummary;
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::Quantity;
 
-/// Averaging time of the squared residuals, in nanoseconds. No warning is given earlier: single images, stops and shocks
-/// are no inconsistency, and the values of the first window are inaccurate by nature.
+/// Averaging time of the squared residuals, in nanoseconds. No warning is given earlier: single images, stops and
+/// shocks are no inconsistency, and the values of the first window are always inaccurate.
 const AVERAGED_NS: i64 = 4_000_000_000;
-/// Interval of the windows that are asked for parameters of sensors while a mean exceeds its limit.
+/// Interval between windows that are scored for sensor parameters while a mean exceeds its limit.
 const SAMPLED_NS: i64 = 250_000_000;
-/// Smallest change of χ² that makes a sensor's parameter the cause of an inconsistency: five of its standard deviations.
+/// Smallest change of χ² at which a sensor parameter is named as cause of an inconsistency: five standard deviations.
 const SIGNIFICANT_CHI2: f64 = 25.0;
 /// Hysteresis: a warning ends when the mean falls to this fraction of its limit.
 const RELEASE: f64 = 0.8;
 
-/// A kind of factor whose residuals are monitored.
+/// Kind of factor whose residuals are monitored.
 struct MonitoredFactor {
     factor: FactorKind,
-    /// Largest mean of its squared whitened residuals (χ²/dof) without a warning.
+    /// Limit of the mean squared whitened residual (χ²/dof) above which a warning is given.
     limit: f64,
-    /// Start of the warning.
+    /// First words of the warning.
     inconsistency: &'static str,
 }
 
-/// Consistent encoder readings have χ²/dof 1. Most rows of the prior are fitted, so that its χ²/dof is 0.1 to 0.45 (simulated
-/// and real logs) with a correct model; a camera time offset of 10 ms raises it to 2, an encoder time offset of 20 ms to 1.2.
+/// Consistent encoder readings have χ²/dof 1. Most rows of the prior are fitted, so its χ²/dof is 0.1 to 0.45
+/// (simulated and real logs) with a correct model; a camera time offset of 10 ms raises it to 2, an encoder time offset
+/// of 20 ms to 1.2.
 const MONITORED: [MonitoredFactor; 2] = [
     MonitoredFactor {
         factor: FactorKind::Encoder,
@@ -45,14 +46,14 @@ const MONITORED: [MonitoredFactor; 2] = [
     },
 ];
 
-/// The running means, one for each of [`MONITORED`].
+/// Running means of [`MONITORED`].
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ConsistencyMonitor {
     last_ns: Option<i64>,
     means: [Mean; MONITORED.len()],
-    /// Parameters of sensors that are not estimated, over the windows since a mean exceeds its limit.
+    /// Scores of sensor parameters that are not estimated, combined over the windows since a mean exceeded its limit.
     suspected: Vec<SuspectedParameter>,
-    /// Stamp of the last of these windows.
+    /// Stamp of the last scored window.
     sampled_ns: Option<i64>,
 }
 
@@ -61,14 +62,14 @@ struct Mean {
     value: f64,
     /// Time averaged so far, up to [`AVERAGED_NS`].
     over_ns: i64,
-    /// Value that started the present warning. The warning keeps it, so that one inconsistency is one message.
+    /// Value at the start of the current warning. The warning repeats it, so that one inconsistency is one message.
     reported: Option<f64>,
-    /// What the warning suggests, as long as it lasts.
+    /// Suggested cause, constant during a warning.
     cause: Option<String>,
 }
 
 impl Mean {
-    /// Adds a value that holds for an interval.
+    /// Adds a value that is valid for an interval.
     fn take(&mut self, value: f64, interval_ns: i64) {
         self.over_ns = (self.over_ns + interval_ns).min(AVERAGED_NS.max(interval_ns));
         self.value += (value - self.value) * interval_ns as f64 / self.over_ns as f64;
@@ -76,13 +77,13 @@ impl Mean {
 }
 
 impl ConsistencyMonitor {
-    /// Whether a mean exceeds its limit.
+    /// True if a mean exceeds its limit.
     fn is_suspicious(&self) -> bool {
         MONITORED.iter().zip(&self.means).any(|(monitored, mean)| mean.value > monitored.limit)
     }
 
-    /// Adds the residuals of a solved window and returns the warnings that hold in this step; `scores` is what the
-    /// window says about clocks, shutters and intrinsics that are not estimated.
+    /// Adds the residuals of a solved window and returns the warnings of this step; `scores` returns the window's
+    /// scores of time offsets, readout times and intrinsics that are not estimated.
     pub(crate) fn observe(
         &mut self,
         stamp_ns: i64,
@@ -122,8 +123,8 @@ impl ConsistencyMonitor {
     }
 }
 
-/// The cause of an inconsistency: a rolling shutter or wrong intrinsics where they explain the windows better than any clock,
-/// else what may be wrong in general.
+/// Cause of an inconsistency: a rolling shutter or wrong intrinsics if they explain the windows better than any time
+/// offset, else the usual causes.
 fn cause(suspected: &[SuspectedParameter], config: &EstimatorConfig) -> String {
     let strongest = suspected.iter().max_by(|one, other| one.chi2().total_cmp(&other.chi2()));
     let Some(found) = strongest.filter(|it| it.chi2() > SIGNIFICANT_CHI2) else { return usual_causes(config) };
@@ -133,7 +134,7 @@ fn cause(suspected: &[SuspectedParameter], config: &EstimatorConfig) -> String {
         Quantity::Readout => {
             return format!(
                 "rolling shutter of {camera} not modelled (a readout explains the residuals better than a time offset does): \
-                 try readout=on, or set the readout in the rig, which check measures"
+                 try readout=on, or set the readout in the rig (dcvins check measures it)"
             );
         }
         Quantity::Fx | Quantity::Fy => "focal length",
@@ -147,7 +148,7 @@ fn cause(suspected: &[SuspectedParameter], config: &EstimatorConfig) -> String {
     )
 }
 
-/// What may be wrong where no single parameter explains an inconsistency, and the options that may remove it.
+/// Possible causes if no single parameter explains an inconsistency, and the options that may remove it.
 fn usual_causes(config: &EstimatorConfig) -> String {
     let options = [("calibrate=on", config.calibrate), ("timeshift=on", config.estimate_timeshift)];
     let tries: Vec<&str> = options.into_iter().filter(|(_, on)| !on).map(|(option, _)| option).collect();
@@ -155,7 +156,7 @@ fn usual_causes(config: &EstimatorConfig) -> String {
     format!("check time offsets, calibration, noise densities{tries}")
 }
 
-/// The warning with the mean that started it (χ²/dof), its limit, and the cause.
+/// Warning with the mean that started it (χ²/dof), its limit, and the cause.
 fn warning_text(monitored: &MonitoredFactor, value: f64, cause: &str) -> String {
     format!(
         "{} (χ²/dof {value:.2} > {:.2} over {:.0} s): {cause}",

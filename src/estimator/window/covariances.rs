@@ -6,19 +6,20 @@ use super::setup::Setup;
 use super::window_state::WindowState;
 use crate::estimator::problem::solver::factor;
 
-/// Length of a velocity, before the biases in its block.
+/// Length of the velocity in a velocity-bias block.
 const VELOCITY: usize = 3;
 
-/// Posterior covariances of a window at its present estimate, all other unknowns marginalized.
+/// Posterior covariances of a window at its current estimate, all other unknowns marginalized.
 #[derive(Clone, Debug)]
 pub(crate) struct WindowCovariances {
-    /// Of the calibration's columns.
+    /// Covariance of the calibration's columns.
     pub(crate) calibration: DMatrix<f64>,
-    /// Of the newest frame's biases, gyroscope first.
+    /// Covariance of the newest frame's biases, gyroscope first.
     pub(crate) newest_bias: Matrix6<f64>,
 }
 
-/// Linearizes a window at its present estimate; `None` where the information is not positive definite.
+/// Posterior covariances from a linearization at the current estimate; `None` if the information is not positive
+/// definite.
 pub(crate) fn covariances(setup: &Setup, window: &WindowState) -> Option<WindowCovariances> {
     let active = window.active_tracks();
     let problem = window.problem(setup, &active);

@@ -10,16 +10,16 @@ use crate::estimator::report::{Event, EventKind};
 use crate::estimator::state::calibrations::Calibrations;
 use crate::optimization::LandmarkModel;
 
-/// A window above its size shrinks by one frame per keyframe.
+/// Limit of marginalized frames per image: a window above its size shrinks by one frame per keyframe.
 const MAX_MARGINALIZED_AT_ONCE: usize = 2;
 
-/// A rotation of the chain that is given with a larger standard deviation is inaccurate, in radians: derivatives at the given
-/// chain are wrong by as many parts of one.
+/// Standard deviation of the given chain rotations above which they are inaccurate, in radians: derivatives at the
+/// given chain have a relative error of the same size.
 const INACCURATE_ROTATION_RAD: f64 = 0.03;
 
-/// Number of frames in the first window, before marginalization. It is larger than the later ones: marginalization fixes
-/// linearization points, and the chain of the leading camera must be close to its true values before.
-pub(crate) fn first_room(calibration: &Calibrations, options: &EstimatorOptions) -> usize {
+/// Number of frames in the first window, before marginalization. It is larger than later windows: marginalization fixes
+/// linearization points, so the chain of the leading camera must be close to its true values first.
+pub(crate) fn first_window_frames(calibration: &Calibrations, options: &EstimatorOptions) -> usize {
     let given_sigma_rad = calibration.of(calibration.leading()).given_rotation_sigma_rad();
     let inaccurate = given_sigma_rad > INACCURATE_ROTATION_RAD;
     let factor = if inaccurate { options.inaccurate_first_window_factor } else { options.first_window_factor };
@@ -27,9 +27,9 @@ pub(crate) fn first_room(calibration: &Calibrations, options: &EstimatorOptions)
 }
 
 impl WindowState {
-    /// Removes a frame for the next image: the second-newest one if it is no keyframe, else the oldest one of a
-    /// full window by marginalization.
-    pub(crate) fn make_room(&mut self, setup: &Setup, events: &mut Vec<Event>) {
+    /// Removes a frame after the step: drops the second-newest one if it is no keyframe, else marginalizes the oldest
+    /// ones of a full window.
+    pub(crate) fn drop_or_marginalize_frame(&mut self, setup: &Setup, events: &mut Vec<Event>) {
         let newest = self.frames.newest_slot();
         if newest >= 2 && !self.frames[newest - 1].keyframe {
             let message = format!("frame {} dropped: no keyframe", self.frames[newest - 1].index);
@@ -38,23 +38,24 @@ impl WindowState {
             return;
         }
         for _ in 0..MAX_MARGINALIZED_AT_ONCE {
-            let room = self.room(&setup.config.options);
-            if self.frames.len() <= room {
+            let frame_limit = self.frame_limit(&setup.config.options);
+            if self.frames.len() <= frame_limit {
                 break;
             }
             let message = format!("frame {} marginalized: the window is full", self.frames.oldest().index);
             let count = self.frames.len() as f64;
-            events.push(Event::decided(EventKind::OldestMarginalized, message, count, room as f64));
+            events.push(Event::decided(EventKind::OldestMarginalized, message, count, frame_limit as f64));
             self.marginalize_oldest(setup);
         }
     }
 
-    /// Number of frames that may remain.
-    fn room(&self, options: &EstimatorOptions) -> usize {
-        if self.prior.is_none() { first_room(&self.calibration, options) } else { options.window }
+    /// Number of frames above which the window is full.
+    fn frame_limit(&self, options: &EstimatorOptions) -> usize {
+        if self.prior.is_none() { first_window_frames(&self.calibration, options) } else { options.window }
     }
 
-    /// Drops the frame at a slot before the newest one; its encoder readings and IMU samples go to the next frame.
+    /// Drops the frame at slot `gone`, before the newest one; its encoder readings and IMU samples go to the next
+    /// frame.
     fn drop_frame(&mut self, setup: &Setup, gone: usize) {
         if self.prior.as_ref().is_none_or(|prior| !prior.holds_frame(gone)) {
             self.carry_encoder(setup, gone, gone + 1);
@@ -110,7 +111,7 @@ impl WindowState {
         }
     }
 
-    /// Moves landmarks with a new anchor to the bearing that the anchor measured.
+    /// Sets the bearing of each landmark to the one measured in its anchor.
     fn face_measured_bearings(&mut self) {
         for feature in self.features.iter_mut().flat_map(FeatureMap::values_mut) {
             if let (Some(first), Some(landmark)) = (feature.observations.first(), feature.landmark.as_mut()) {
@@ -119,8 +120,8 @@ impl WindowState {
         }
     }
 
-    /// Renumbers the slots of the prior after the removal of a frame; frames outside of the prior lose their first
-    /// estimate.
+    /// Renumbers the slots of the prior after the removal of a frame; removes the first estimates of frames outside the
+    /// prior.
     fn renumber_prior(&mut self, gone: usize) {
         if let Some(prior) = &mut self.prior {
             prior.renumber(gone);

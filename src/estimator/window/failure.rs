@@ -8,10 +8,9 @@ use crate::estimator::report::{Event, EventKind, FailureCause};
 use crate::estimator::state::navigation::NavigationState;
 use crate::geometry::seconds_from_ns;
 
-/// Monitors the number of observed landmarks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LandmarkWatch {
-    /// Stamp of the first image with too few landmarks.
+    /// Stamp of the first image with too few landmarks, `None` while there are enough.
     blind_since_ns: Option<i64>,
 }
 
@@ -48,7 +47,7 @@ impl LandmarkWatch {
     }
 }
 
-/// Returns the failure of the window, if there is one; `predicted` is the state of the newest frame before the solve.
+/// Failure of the window, `None` without one; `predicted` is the state of the newest frame before the solve.
 pub(crate) fn failure(
     newest: &Frame,
     predicted: &NavigationState,
@@ -93,7 +92,7 @@ pub(crate) fn failure(
     Some(Event::failure(cause, format!("{reason}: {value:.3} (limit {limit:.3})"), value, limit))
 }
 
-/// Returns an event for saturated IMU samples in the newest interval.
+/// Event for saturated IMU samples in the newest interval, `None` without any.
 pub(crate) fn saturation(newest: &Frame) -> Option<Event> {
     let (saturated, count) = (newest.motion.saturated_samples(), newest.motion.samples().len());
     (saturated > 0).then(|| {

@@ -10,23 +10,19 @@ use crate::frontend::{FeatureId, TrackedFeature};
 use crate::optimization::LandmarkModel;
 use crate::optimization::{CameraPose, Landmark};
 
-/// An observation of a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Observation {
-    /// Slot of the frame.
     pub(crate) slot: usize,
-    /// Measured pixel.
     pub(crate) uv_px: Vector2<f64>,
     /// Measured unit bearing in the camera.
     pub(crate) bearing: Vector3<f64>,
 }
 
-/// A feature with its observations in the window.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Feature {
-    /// By slot, ascending; the first one is the anchor's.
+    /// By ascending slot; the first observation is the anchor's.
     pub(crate) observations: Vec<Observation>,
-    /// Landmark in the anchor's camera, once triangulated.
+    /// Landmark in the anchor's camera, `None` until triangulated.
     pub(crate) landmark: Option<Landmark>,
 }
 
@@ -36,10 +32,9 @@ impl Feature {
     }
 }
 
-/// All features by their identity.
 pub(crate) type FeatureMap = BTreeMap<FeatureId, Feature>;
 
-/// Adds the observations of a camera at a frame.
+/// Adds the features observed in a frame to those of the camera; skips non-finite ones.
 pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFeature]) {
     for tracked in seen {
         let finite = tracked.bearing.iter().chain(tracked.uv_px.iter()).all(|x| x.is_finite());
@@ -51,7 +46,7 @@ pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFea
     }
 }
 
-/// Removes a frame: its observations are dropped, later slots move up, and landmarks that it anchors move to
+/// Removes a frame: drops its observations, renumbers later slots, and moves landmarks anchored in it to
 /// the next observing frame. `view` has the poses before the removal.
 pub(crate) fn drop_frame(features: &mut FeatureMap, gone: usize, view: &CameraView<'_>) {
     for feature in features.values_mut() {
@@ -72,7 +67,7 @@ pub(crate) fn drop_frame(features: &mut FeatureMap, gone: usize, view: &CameraVi
     features.retain(|_, feature| !feature.observations.is_empty());
 }
 
-/// Transforms a landmark to another camera; `None` when it lies in that camera's centre.
+/// Transforms a landmark to another camera; `None` when it lies in the centre of that camera.
 fn moved(landmark: &Landmark, from: &CameraPose, to: &CameraPose) -> Option<Landmark> {
     let direction_in_world =
         from.rotation * landmark.bearing + (from.position_m - to.position_m) * landmark.inverse_distance;
@@ -83,7 +78,7 @@ fn moved(landmark: &Landmark, from: &CameraPose, to: &CameraPose) -> Option<Land
     })
 }
 
-/// Triangulates a feature from all its observations: least squares of the distances across the bearings,
+/// Triangulates a feature from all its observations: least squares of the distances perpendicular to the bearings,
 /// weighted by depth in a second iteration. `None` when the parallax is too small, or the point is out of range
 /// or behind a camera.
 pub(crate) fn triangulate(feature: &Feature, view: &CameraView<'_>, options: &EstimatorOptions) -> Option<Landmark> {

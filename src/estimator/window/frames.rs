@@ -1,4 +1,4 @@
-//! The frames of the window.
+//! Frames of the window.
 
 use std::ops::{Deref, DerefMut};
 
@@ -6,8 +6,8 @@ use crate::estimator::config::EstimatorOptions;
 use crate::estimator::problem::frame::Frame;
 use crate::estimator::state::imu_errors::ImuErrors;
 
-/// Change of a scale error, a misalignment or the rotation in radians at which an interval is reintegrated: second-order
-/// effects are then a millionth.
+/// Change of a scale error, a misalignment or the rotation in radians above which an interval is integrated again:
+/// second-order effects are then one millionth.
 const REINTEGRATION_INTRINSICS_CHANGE: f64 = 1e-3;
 
 /// Frames of the window, oldest first; never empty.
@@ -15,12 +15,11 @@ const REINTEGRATION_INTRINSICS_CHANGE: f64 = 1e-3;
 pub(crate) struct Frames(Vec<Frame>);
 
 impl Frames {
-    /// A window of one frame.
+    /// Window of one frame.
     pub(crate) fn new(first: Frame) -> Self {
         Self(vec![first])
     }
 
-    /// Adds the newest frame.
     pub(crate) fn push(&mut self, newest: Frame) {
         self.0.push(newest);
     }
@@ -50,7 +49,7 @@ impl Frames {
         }
     }
 
-    /// Removes the frame at a slot before the newest one and adds its IMU samples to the next frame.
+    /// Removes the frame at a slot before the newest one; its IMU samples are prepended to those of the next frame.
     pub(crate) fn drop_before_newest(&mut self, slot: usize) {
         if slot >= self.newest_slot() {
             return;
@@ -62,9 +61,8 @@ impl Frames {
         next.motion = motion;
     }
 
-    /// Reintegrates intervals whose intrinsics have changed by more than [`REINTEGRATION_INTRINSICS_CHANGE`] or whose bias
-    /// has changed by more than [`EstimatorOptions::reintegration_change`] since
-    /// their integration.
+    /// Integrates intervals again if, since their integration, the IMU intrinsics changed by more than
+    /// [`REINTEGRATION_INTRINSICS_CHANGE`] or the bias by more than [`EstimatorOptions::reintegration_change`].
     pub(crate) fn reintegrate(&mut self, options: &EstimatorOptions, intrinsics: Option<&ImuErrors>) {
         let limit = options.reintegration_change;
         for slot in 1..self.0.len() {

@@ -14,7 +14,7 @@ use crate::estimator::state::columns::{ColumnBlock, FrameId, scales_of};
 use crate::estimator::state::frame_state::FrameState;
 
 impl WindowState {
-    /// Returns the source of the Jacobian at the final estimate, and the rows without a feature if they are
+    /// Source of the Jacobian at the final estimate, and the rows without a feature if they are
     /// requested.
     pub(crate) fn jacobian_source(&self, setup: &Setup, solved: &SolvedWindow) -> (JacobianSource, Vec<FactorRows>) {
         let problem = self.problem(setup, &solved.cameras);
@@ -99,7 +99,7 @@ impl WindowState {
     }
 }
 
-/// Norms of the nonzero blocks of some rows.
+/// Indices and norms of the nonzero column blocks of some rows.
 fn norms_of(jacobian: &DMatrix<f64>, columns: &[ColumnBlock], scales: &[f64]) -> Vec<(u16, f32)> {
     let mut norms: Vec<(u16, f32)> = Vec::new();
     for (number, block) in columns.iter().enumerate() {

@@ -14,12 +14,12 @@ use crate::sensors::JointAngles;
 
 /// Smallest number of landmarks that constrain the joint angles of a frame.
 const MIN_LANDMARKS: usize = 15;
-/// The visual standard deviation of a joint angle must be smaller than the encoder's by this factor before
+/// Factor by which the visual standard deviation of a joint angle must be smaller than the encoder's before
 /// readings are propagated with it: the visual rotation between the frames is then independent of the encoder.
 const SHARPER: f64 = 3.0;
 
 impl WindowState {
-    /// Fits the newest frame's joint angles to the observations of triangulated landmarks with a fixed pose: an
+    /// Fits the newest frame's joint angles to the observations of triangulated landmarks at a fixed pose: an
     /// encoder may have an error of many degrees, and without encoders there is no other initial value.
     pub(crate) fn align_newest_joints(&mut self, setup: &Setup) {
         let joints = self.calibration.of(MAIN).joint_count();
@@ -52,7 +52,7 @@ impl WindowState {
         }
     }
 
-    /// Normal equations of a frame's joint angles from landmarks with anchors in other frames, all other unknowns
+    /// Normal equations of a frame's joint angles from landmarks anchored in other frames, all other unknowns
     /// fixed, and the number of these landmarks.
     fn joints_by_landmarks(
         &self,
@@ -104,7 +104,7 @@ impl WindowState {
         (count >= MIN_LANDMARKS).then(|| inverse.diagonal())
     }
 
-    /// Combines the encoder readings of a frame that is removed with those of the next frame, propagated by the
+    /// Combines the encoder readings of a removed frame with those of the next frame, propagated by the
     /// visually measured rotation of the joints between the frames.
     ///
     /// Only independent errors are averaged; the variance of the visual rotation is added.
@@ -127,7 +127,7 @@ impl WindowState {
             }
             let removed_variance = removed_variance + between;
             let removed_weight = own_variance / (own_variance + removed_variance);
-            // A reading that is late by the clocks' offset is late at either frame's rate.
+            // The time offset shifts a reading by the joint rate of its frame.
             let faster =
                 self.frames[to].state.joint_rate_rad_per_s(joint) - self.frames[from].state.joint_rate_rad_per_s(joint);
             let rotation_rad = rotation_rad + faster * self.calibration.of(MAIN).encoder_shift_s();
@@ -142,7 +142,7 @@ impl WindowState {
     }
 }
 
-/// Variances of an encoder angle: the independent one, and the one that neighbouring frames share.
+/// Variances of an encoder angle: the independent part, and the part common to neighbouring frames.
 fn variances(encoder: &JointAngles, joint: usize) -> (f64, f64) {
     let bias_variance = encoder.lasting_sigmas_rad[joint].powi(2);
     ((encoder.sigmas_rad[joint].powi(2) - bias_variance).max(0.0), bias_variance)

@@ -7,10 +7,10 @@ use crate::estimator::report::{Event, EventKind};
 use crate::estimator::state::calibrations::MAIN;
 use crate::geometry::seconds_from_ns;
 
-/// A stationary vehicle gets a keyframe this often, so that IMU intervals stay short enough to be integrated again.
+/// Interval of keyframes while stationary, so that IMU intervals stay short enough to be integrated again.
 const STATIONARY_KEYFRAME_NS: i64 = 5_000_000_000;
 
-/// Whether the newest frame becomes a keyframe, with the deciding value.
+/// Keyframe decision on the newest frame, with the deciding value.
 struct Decision {
     keyframe: bool,
     event: Event,
@@ -23,7 +23,6 @@ impl Decision {
 }
 
 impl WindowState {
-    /// Decides whether the newest frame becomes a keyframe.
     pub(crate) fn choose_keyframe(&mut self, setup: &Setup) -> Event {
         let decision = self.keyframe_decision(setup);
         self.frames.newest_mut().keyframe = decision.keyframe;
@@ -45,7 +44,7 @@ impl WindowState {
             let message = "stationary: keyframes by elapsed time only, s";
             return Decision::new(age_ns >= STATIONARY_KEYFRAME_NS, message, age_s, limit_s);
         }
-        // Any camera can request a keyframe; a camera without an image takes no part.
+        // Any camera can request a keyframe; cameras without an image are ignored.
         let observed = |camera: usize| {
             let features = self.features[camera].values();
             (camera, features.filter(|feature| feature.observation(newest).is_some()).count())
@@ -62,8 +61,8 @@ impl WindowState {
         decisions.swap_remove(first)
     }
 
-    /// Whether one camera requests a keyframe, by what it has in common with the last one; `observed` features are in its
-    /// newest image.
+    /// Keyframe decision of one camera from its features in common with the last keyframe; `observed` is the number of
+    /// features in its newest image.
     fn keyframe_by_image(&self, setup: &Setup, camera: usize, last: usize, observed: usize) -> Decision {
         let options = &setup.config.options;
         let newest = self.frames.newest_slot();

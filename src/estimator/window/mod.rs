@@ -1,7 +1,7 @@
 //! The sliding window: frames, features and the policy of what enters and leaves.
 //!
-//! [`SlidingWindow::step`](sliding_window::SlidingWindow::step) takes an image and returns a report or a
-//! failure; a window is never without a frame.
+//! [`SlidingWindow::step`](sliding_window::SlidingWindow::step) processes an image and returns a report or a
+//! failure; a window always has at least one frame.
 
 pub(crate) mod active_tracks;
 pub(crate) mod calibration_columns;

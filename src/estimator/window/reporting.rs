@@ -1,4 +1,4 @@
-//! Report of a step, from the window.
+//! Report of a step from the window.
 
 use nalgebra::Vector2;
 
@@ -17,7 +17,7 @@ use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::step_input::StepInput;
 use crate::geometry::median;
 
-/// Returns a report with the calibration only.
+/// Report with the calibration only.
 pub(crate) fn empty_report(
     setup: &Setup,
     input: &StepInput<'_>,
@@ -54,7 +54,6 @@ pub(crate) fn empty_report(
 }
 
 impl WindowState {
-    /// Returns the report of a solved window.
     pub(crate) fn report(
         &self,
         setup: &Setup,
@@ -91,7 +90,6 @@ impl WindowState {
         report
     }
 
-    /// The frames of the window.
     pub(crate) fn window_report(&self) -> Vec<FrameStateReport> {
         self.frames
             .iter()
@@ -169,7 +167,6 @@ impl WindowState {
                 }
             }));
         }
-        // Reports are stored: release unused capacity.
         landmarks.shrink_to_fit();
         landmarks
     }
@@ -205,7 +202,7 @@ impl WindowState {
     }
 }
 
-/// Standard deviation of a pixel with the same information as these observations on average, robust weights included.
+/// Standard deviation of a pixel with the same average information as the observations, robust weights included.
 fn effective_sigma(sigma_px: f64, features: &[FeatureReport]) -> f64 {
     let weights = || {
         let kept = features.iter().filter(|feature| !feature.rejected);

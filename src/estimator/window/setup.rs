@@ -1,4 +1,4 @@
-//! Constant input of every step: the configuration and derived values.
+//! Constant input of every step: configuration and derived values.
 
 use nalgebra::Vector3;
 
@@ -21,13 +21,12 @@ pub fn gravity_in_world(gravity_m_per_s2: f64) -> Vector3<f64> {
     Vector3::new(0.0, 0.0, -gravity_m_per_s2)
 }
 
-/// The configuration and derived values.
 #[derive(Clone, Debug)]
 pub(crate) struct Setup {
     pub(crate) config: EstimatorConfig,
     /// The rig's noise densities times [`crate::estimator::EstimatorOptions::imu_noise_factor`].
     pub(crate) imu_noise: ImuNoise,
-    /// In the world frame, in m/s².
+    /// Gravity in the world frame, in m/s².
     pub(crate) gravity_in_world: Vector3<f64>,
 }
 
@@ -44,12 +43,12 @@ impl Setup {
         scale_noise(&mut self.config.imu_noise, factor);
     }
 
-    /// Milliseconds of the clock of the stage times.
+    /// Time of the stage-time clock in milliseconds.
     pub(crate) fn clock_ms(&self) -> f64 {
         (self.config.clock_ms)()
     }
 
-    /// Calibration at which the estimator starts: that of an earlier pass, or else of the rig.
+    /// Initial calibration: that of an earlier pass, else that of the rig.
     pub(crate) fn given_calibration(&self) -> Calibrations {
         let rig = self.rig_calibration();
         match &self.config.earlier_pass {
@@ -58,7 +57,6 @@ impl Setup {
         }
     }
 
-    /// Given calibration of the rig.
     fn rig_calibration(&self) -> Calibrations {
         let config = &self.config;
         let given = |camera: usize| {
@@ -78,12 +76,12 @@ impl Setup {
         Calibrations::new(main, rigid).with_imu(estimated.then(|| ImuCalibration::new(config.imu_intrinsics)))
     }
 
-    /// Prior of the biases that an earlier pass has found.
+    /// Prior of the biases from an earlier pass.
     pub(crate) fn found_bias(&self) -> Option<BiasPrior> {
         self.config.earlier_pass.as_ref().map(|earlier| earlier.bias)
     }
 
-    /// Adds the estimated clocks, shutter and intrinsics of a camera.
+    /// Adds the columns of estimated time offsets, shutter and intrinsics of a camera.
     fn with_sensors(&self, calibration: Calibration, camera: usize, timeshift_s: f64, encoders: bool) -> Calibration {
         let config = &self.config;
         let sensor = config.sensor(camera);
@@ -101,15 +99,15 @@ impl Setup {
         calibration.with_sensors(columns).with_given_readout(sensor.readout_s)
     }
 
-    /// Whether some camera has a rolling shutter: camera poses then depend on the motion after the stamp.
+    /// True if some camera has a rolling shutter, so that camera poses depend on the motion after the stamp.
     pub(crate) fn has_moving_rows(&self) -> bool {
         let config = &self.config;
         let given = |camera: usize| config.sensor(camera).readout_s != 0.0;
         (config.estimate_readout && config.calibrate) || (0..=config.rigid_cameras.len()).any(given)
     }
 
-    /// Motion of the vehicle after a stamp, where camera poses depend on it: from the samples up to the stamp and those
-    /// from it on.
+    /// Motion of the vehicle after a stamp, from the samples before and after it; `None` if camera poses do not depend
+    /// on it.
     pub(crate) fn motion_profile(
         &self,
         before: &[ImuSample],
@@ -122,13 +120,13 @@ impl Setup {
             .then(|| profile().unwrap_or_else(|| MotionProfile::stationary(bias, self.gravity_in_world)))
     }
 
-    /// Joint rates and joint accelerations at which the solver starts, where camera poses depend on them.
+    /// Initial joint rates and joint accelerations of the solver; empty if camera poses do not depend on them.
     pub(crate) fn initial_joint_motion(&self, encoder: Option<&JointAngles>, joints: usize) -> Vec<f64> {
         let count = if self.has_moving_rows() { 2 * joints } else { 0 };
         (0..count).map(|place| measured_joint_motion(encoder, place, joints).0).collect()
     }
 
-    /// Encoder angles of the joints, `None` where they are unused or unusable.
+    /// Encoder angles of the joints, `None` if they are unused or unusable.
     pub(crate) fn encoder_reading(&self, input: &StepInput<'_>, joints: usize) -> Option<JointAngles> {
         self.config.encoder_in_use()?;
         input.encoder_angles(joints).cloned()

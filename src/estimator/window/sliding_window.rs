@@ -1,4 +1,4 @@
-//! The running window. A step predicts, solves, rejects outliers, selects keyframes and removes a frame.
+//! Running window. A step predicts, solves, rejects outliers, selects keyframes and removes a frame.
 
 use super::calibration_columns::calibration_estimate;
 use super::consistency::ConsistencyMonitor;
@@ -21,17 +21,16 @@ use crate::gimbal::SWITCH_MARGIN;
 
 /// Assumed distance of a scene without triangulated landmarks.
 const UNKNOWN_DISTANCE_M: f64 = 10.0;
-/// Upper bound of the distance of a scene.
+/// Upper bound of the assumed distance of a scene.
 const FARTHEST_USUAL_M: f64 = 100.0;
 
-/// A running window with its monitors.
 #[derive(Clone, Debug)]
 pub(crate) struct SlidingWindow {
     pub(crate) state: WindowState,
     pub(super) monitors: Monitors,
 }
 
-/// What a window remembers beside its problem.
+/// State kept between steps outside the least-squares problem: detectors, running means, last standard deviations.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Monitors {
     /// Posterior standard deviations of the calibration's columns after the last solve.
@@ -41,17 +40,16 @@ pub(crate) struct Monitors {
     landmarks: LandmarkWatch,
 }
 
-/// The window has failed.
 #[derive(Debug)]
 pub(crate) struct WindowFailure {
-    /// Events of the step, the failure last.
+    /// Events of the step; the failure is the last one.
     pub(crate) events: Vec<Event>,
-    /// Last pose before the failure, `None` when none is finite.
+    /// Last pose before the failure, `None` if no pose is finite.
     pub(crate) last_pose: Option<RigidTransform>,
 }
 
 impl SlidingWindow {
-    /// A window that starts from these frames.
+    /// Window that starts from the given state.
     pub(crate) fn new(state: WindowState) -> Self {
         Self { state, monitors: Monitors::default() }
     }
@@ -85,7 +83,7 @@ impl SlidingWindow {
         let warnings = self.monitors.consistency.observe(report.stamp_ns, &report.residuals, &setup.config, scores);
         self.state.drop_rejected(&solved, options, &mut events);
         events.extend(self.switch_near_singularity(setup));
-        self.state.make_room(setup, &mut events);
+        self.state.drop_or_marginalize_frame(setup, &mut events);
         report.times.optimize_ms = optimized_ms - begin_ms;
         report.times.marginalize_ms = setup.clock_ms() - marginalizing_ms;
         report.events.extend(events);
@@ -93,7 +91,6 @@ impl SlidingWindow {
         Ok(report)
     }
 
-    /// The report of a solved window.
     pub(crate) fn report(&mut self, setup: &Setup, input: &StepInput<'_>, solved: &mut SolvedWindow) -> StepReport {
         self.monitors.calibration_sigmas = solved.solution.calibration_sigmas();
         let calibration = calibration_estimate(setup, &self.state.calibration, &self.monitors.calibration_sigmas);
@@ -121,7 +118,7 @@ impl SlidingWindow {
         WindowFailure { events, last_pose: self.state.frames.iter().rev().find(is_good).map(pose) }
     }
 
-    /// Adds the frame of `input` with a predicted state; a failure when IMU samples are missing.
+    /// Adds the frame of `input` with a predicted state; fails when IMU samples are missing.
     fn push_frame(&mut self, setup: &Setup, input: &StepInput<'_>) -> Result<(), Event> {
         let window = &mut self.state;
         let last = window.frames.newest();
@@ -165,7 +162,7 @@ impl SlidingWindow {
         Ok(())
     }
 
-    /// Detects whether the vehicle is stationary at the newest frame.
+    /// Detects a stationary vehicle at the newest frame.
     fn detect_stationary(&mut self, setup: &Setup, input: &StepInput<'_>) -> Option<Event> {
         let newest = self.state.frames.newest();
         let navigation = newest.state.navigation;
@@ -199,7 +196,6 @@ impl SlidingWindow {
 }
 
 impl Monitors {
-    /// Bytes on the heap.
     pub(super) fn heap_bytes(&self) -> usize {
         allocated_bytes(self.calibration_sigmas.capacity() * size_of::<f64>()) + self.stationary.heap_bytes()
     }

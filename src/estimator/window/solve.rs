@@ -25,11 +25,9 @@ pub(crate) struct SolvedWindow {
     /// Tracks by camera, with the landmarks before the solve.
     pub(crate) cameras: Vec<ActiveTracks>,
     pub(crate) solution: Solution,
-    /// Residuals and outliers by camera.
     pub(crate) checks: Vec<TrackChecks>,
 }
 
-/// Residuals and outliers of one camera's tracks.
 #[derive(Clone, Debug)]
 pub(crate) struct TrackChecks {
     pub(crate) residuals_before: TrackResiduals,
@@ -74,7 +72,7 @@ impl WindowState {
         SolvedWindow { cameras, solution, checks }
     }
 
-    /// Returns the linearization at the final estimate (rows of the measurements and of the priors) and the
+    /// Linearization at the final estimate (rows of the measurements and of the priors), and the
     /// information gain of the newest image.
     pub(crate) fn linearization(
         &self,
@@ -95,7 +93,7 @@ impl WindowState {
         (linearization, problem.information_gain(estimate, &cameras))
     }
 
-    /// Drops rejected features; a track that continues is a new feature from its next observation on.
+    /// Drops rejected features; a continuing track becomes a new feature at its next observation.
     pub(crate) fn drop_rejected(&mut self, solved: &SolvedWindow, options: &EstimatorOptions, events: &mut Vec<Event>) {
         let (mut count, mut all) = (0, 0);
         for (features, (active, checks)) in self.features.iter_mut().zip(solved.cameras.iter().zip(&solved.checks)) {

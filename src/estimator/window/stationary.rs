@@ -18,7 +18,7 @@ use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::ImuNoise;
 
-/// Both criteria must hold for this time.
+/// Time for which both criteria must hold.
 const QUIET_NS: i64 = 1_000_000_000;
 
 /// Largest standard deviation of the angular velocity (worst axis, averaged between images), beyond the sensor noise.
@@ -61,14 +61,14 @@ struct Reference {
 /// Detects a stationary vehicle, image by image.
 #[derive(Clone, Debug)]
 pub(crate) struct StationaryDetector {
-    /// Intervals of the last second and a little more.
+    /// Intervals of slightly more than the last second.
     intervals: VecDeque<Interval>,
     reference: Option<Reference>,
     /// Stamp since which the image has been constant.
     unmoved_since_ns: i64,
-    /// Start of the stationary phase, once detected.
+    /// Start of the stationary phase, `None` until detected.
     stationary_since_ns: Option<i64>,
-    /// Required time of a constant image. An image that moves while the IMU samples are quiet means slow motion:
+    /// Required time of a constant image. An image that moves while the IMU samples are quiet indicates slow motion:
     /// the image must then be constant for twice the time of that motion.
     required_ns: i64,
 }
@@ -85,21 +85,21 @@ impl Default for StationaryDetector {
     }
 }
 
-/// A new image with the previous estimate of the window.
+/// New image with the window's previous estimate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Observed<'a> {
-    /// The features of the leading camera.
+    /// Features of the leading camera.
     pub(crate) features: &'a [TrackedFeature],
     pub(crate) noise: &'a ImuNoise,
     pub(crate) bias: &'a ImuBias,
     pub(crate) velocity_norm_m_per_s: f64,
     pub(crate) imu_from_camera: UnitQuaternion<f64>,
-    /// Median distance of the scene, in metres.
+    /// Median distance of the landmarks, in metres.
     pub(crate) distance_m: f64,
 }
 
 impl StationaryDetector {
-    /// Processes an image; returns a zero-velocity update and an event when the vehicle is stationary.
+    /// Processes an image; returns a zero-velocity update and an event if the vehicle is stationary.
     pub(crate) fn observe(&mut self, input: &StepInput<'_>, image: &Observed<'_>) -> Option<(Stationary, Event)> {
         self.take_interval(input);
         let before_ns = self.unmoved_since_ns;
@@ -142,7 +142,6 @@ impl StationaryDetector {
         Some((Stationary { since_ns, position_sigma_m, velocity_sigma_m_per_s }, event))
     }
 
-    /// Bytes on the heap.
     pub(super) fn heap_bytes(&self) -> usize {
         let bearings = self.reference.as_ref().map_or(0, |reference| reference.bearings.capacity());
         self.intervals.capacity() * size_of::<Interval>() + bearings * size_of::<(FeatureId, Vector3<f64>)>()
@@ -176,7 +175,7 @@ impl StationaryDetector {
         }
     }
 
-    /// Rotation-compensated parallax against the reference image; an image with too much parallax becomes the
+    /// Rotation-compensated parallax to the reference image, in radians; an image with too much parallax becomes the
     /// reference.
     fn compare_image(&mut self, stamp_ns: i64, image: &Observed<'_>) -> Option<f64> {
         let (features, imu_from_camera) = (image.features, image.imu_from_camera);
@@ -192,12 +191,12 @@ impl StationaryDetector {
             if pairs.len() < MIN_COMMON {
                 return None;
             }
-            // The gyroscope checks the vehicle's own rotation: a stationary vehicle has none.
+            // The rotation is not checked here: the gyroscope shows that the vehicle does not rotate.
             let guess = imu_from_camera.inverse() * reference.imu_from_camera;
             Some(fit_rotation(&pairs, &guess)?.median_parallax_rad)
         });
         let moved = parallax_rad.is_none_or(|parallax_rad| parallax_rad > MAX_PARALLAX_RAD);
-        // Tracks end in a constant image, too: the newest image with enough common features becomes the reference.
+        // Tracks also end in a constant image: the newest image with enough features then becomes the reference.
         let fading = self.reference.is_some() && parallax_rad.is_none() && self.stationary_since_ns.is_some();
         if moved {
             let bearings = features.iter().map(|feature| (feature.id, feature.bearing)).collect();
@@ -209,7 +208,7 @@ impl StationaryDetector {
         if fading && features.len() >= MIN_COMMON { Some(MAX_PARALLAX_RAD) } else { parallax_rad }
     }
 
-    /// Standard deviations of the last second's samples, `None` without a full second.
+    /// Standard deviations of the samples of the last second, `None` without a full second.
     fn spread(&self, stamp_ns: i64, image: &Observed<'_>) -> Option<Spread> {
         let first = self.intervals.front()?;
         let begin_ns = first.end_ns - (first.duration_s * 1e9) as i64;
@@ -232,7 +231,7 @@ impl StationaryDetector {
     }
 }
 
-/// Spread of the IMU samples with its limits.
+/// Standard deviations of the IMU samples with their limits.
 #[derive(Clone, Copy, Debug)]
 struct Spread {
     angular_rate: f64,
@@ -250,7 +249,7 @@ impl Spread {
     }
 }
 
-/// Mean, and largest standard deviation over the components.
+/// Mean, and largest standard deviation of the components.
 fn mean_and_spread(values: impl Iterator<Item = Vector3<f64>> + Clone) -> (Vector3<f64>, f64) {
     let count = values.clone().count().max(1) as f64;
     let mean = values.clone().sum::<Vector3<f64>>() / count;

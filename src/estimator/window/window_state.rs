@@ -1,4 +1,4 @@
-//! Everything that the least-squares problem of the window is made from.
+//! State from which the least-squares problem of the window is built.
 
 use super::active_tracks::ActiveTracks;
 use super::features::{self, FeatureMap};
@@ -19,24 +19,24 @@ use crate::optimization::Landmark;
 #[derive(Clone, Debug)]
 pub(crate) struct WindowState {
     pub(crate) frames: Frames,
-    /// Features by camera: none is observed by two of them.
+    /// Features by camera; cameras have no common features.
     pub(crate) features: Vec<FeatureMap>,
     pub(crate) calibration: Calibrations,
-    /// What marginalized frames leave behind.
+    /// Marginalization prior, `None` before the first marginalization.
     pub(crate) prior: Option<Prior>,
-    /// The prior on the first frame, until that is marginalized.
+    /// Prior on the first frame, until that frame is marginalized.
     pub(crate) start: Option<StartPrior>,
 }
 
 impl WindowState {
-    /// A camera at the present estimate.
+    /// Camera at the current estimate.
     pub(crate) fn view<'v>(&'v self, setup: &'v Setup, camera: usize) -> CameraView<'v> {
         let states = self.frames.iter().map(|frame| frame.state.clone()).collect();
         CameraView::of_states(states, self.calibration.of(camera), setup.config.model(camera))
     }
 
-    /// The least-squares problem of the window as it is, with the tracks of each camera; cameras without any may be left out
-    /// at the end.
+    /// Least-squares problem of the window with the tracks of each camera; trailing cameras without tracks may be
+    /// omitted.
     pub(crate) fn problem<'a>(&'a self, setup: &'a Setup, active: &'a [ActiveTracks]) -> Problem<'a> {
         let options = &setup.config.options;
         let layout = frame::layout(&self.frames, self.calibration.dof());
@@ -61,12 +61,12 @@ impl WindowState {
         }
     }
 
-    /// The features that take part in the solve, by camera.
+    /// Features that take part in the solve, by camera.
     pub(crate) fn active_tracks(&self) -> Vec<ActiveTracks> {
         self.features.iter().map(ActiveTracks::new).collect()
     }
 
-    /// The present values of the unknowns, with landmarks by camera in the order of its tracks.
+    /// Current values of the unknowns, with landmarks by camera in the order of the camera's tracks.
     pub(crate) fn estimate(&self, landmarks: Vec<Vec<Landmark>>) -> Estimate {
         Estimate {
             frames: self.frames.iter().map(|frame| frame.state.clone()).collect(),
@@ -75,7 +75,7 @@ impl WindowState {
         }
     }
 
-    /// Triangulates features whose rays open far enough.
+    /// Triangulates features with enough parallax.
     pub(crate) fn triangulate_new(&mut self, setup: &Setup) {
         for camera in 0..self.features.len() {
             let mut features = std::mem::take(&mut self.features[camera]);
@@ -87,7 +87,7 @@ impl WindowState {
         }
     }
 
-    /// Switches the chain's parameterization: the calibration stays the same, and the prior's columns are transported.
+    /// Switches the parameterization of the chain: the calibration stays, and the prior's columns are converted.
     pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) {
         let layout = frame::layout(&self.frames, self.calibration.dof());
         let before = self.calibration.first_estimate_offset();

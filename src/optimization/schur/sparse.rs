@@ -1,4 +1,4 @@
-//! Equations of many poses of which each is coupled with few others, as over a whole flight.
+//! Equations of many poses, each coupled with few others, as over a whole flight.
 
 use nalgebra::{Matrix3, Matrix6, Vector6};
 use pulp::{Arch, NullaryFnOnce};
@@ -6,29 +6,29 @@ use rayon::prelude::*;
 
 use super::{PoseEquations, ReducedEquations, ReprojectionEquations, damped_inverse, subtract_product, times_inverse};
 
-/// Parts of the poses into which landmarks are eliminated at the same time: some more than processors, because parts take
+/// Number of parts of the poses that are processed in parallel; more than processors, because the parts take
 /// different times.
 const PARTS: usize = 16;
 
-/// Hessian and gradient over poses whose names count up from 0.
+/// Hessian and gradient over poses numbered from 0.
 #[derive(Clone, Debug)]
 pub(crate) struct SparsePoseEquations<K> {
-    /// By pose; `None` where there is no observation.
+    /// Rows by pose; `None` for a pose without observations.
     rows: Vec<Option<PoseRow<K>>>,
 }
 
-/// What belongs to one pose.
+/// Row of one pose.
 #[derive(Clone, Debug)]
 struct PoseRow<K> {
     gradient: Vector6<f64>,
-    /// Blocks of the Hessian with this pose and those behind it, by how far they are behind it; `None` where they are zero.
+    /// Blocks of the Hessian of this pose and later ones, by distance from this pose; `None` for zero blocks.
     blocks: Vec<Option<(K, Matrix6<f64>)>>,
 }
 
 impl<K> PoseRow<K> {
     const ZERO: Self = Self { gradient: Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), blocks: Vec::new() };
 
-    /// The block with a pose so far behind this one.
+    /// Block with the pose at a distance of `behind` from this one.
     fn block_mut(&mut self, behind: usize, column: K) -> &mut Matrix6<f64> {
         if self.blocks.len() <= behind {
             self.blocks.resize_with(behind + 1, || None);
@@ -38,7 +38,6 @@ impl<K> PoseRow<K> {
 }
 
 impl<K: Copy + Into<usize>> SparsePoseEquations<K> {
-    /// Zeros.
     pub(crate) fn new() -> Self {
         Self { rows: Vec::new() }
     }
@@ -51,12 +50,12 @@ impl<K: Copy + Into<usize>> SparsePoseEquations<K> {
         self.rows[place].get_or_insert(PoseRow::ZERO)
     }
 
-    /// The gradient by each pose with an observation, poses rising.
+    /// Gradient of each pose with an observation, by ascending pose.
     pub(crate) fn gradients(&self) -> impl Iterator<Item = (K, &Vector6<f64>)> {
         self.rows.iter().flatten().filter_map(|row| Some((row.blocks.first()?.as_ref()?.0, &row.gradient)))
     }
 
-    /// The upper blocks of the Hessian that are not zero, rows rising, then columns.
+    /// Nonzero upper blocks of the Hessian, by ascending row, then column.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = (K, K, &Matrix6<f64>)> {
         self.rows.iter().flatten().flat_map(|row| {
             let first = row.blocks.first().and_then(|block| Some(block.as_ref()?.0));
@@ -78,9 +77,9 @@ impl<K: Copy + PartialEq + Into<usize>> PoseEquations for SparsePoseEquations<K>
 }
 
 impl<K: Copy + PartialEq + Into<usize> + Send + Sync> ReprojectionEquations<SparsePoseEquations<K>> {
-    /// [`Self::eliminate`] by all threads.
+    /// [`Self::eliminate`] in parallel.
     ///
-    /// Each part of the poses takes the landmarks in their order: the sums are the same for any number of threads.
+    /// Each part of the poses processes the landmarks in their order: the sums are the same for any number of threads.
     pub(crate) fn eliminate_by_parts(&self, damping: f64) -> ReducedEquations<SparsePoseEquations<K>> {
         let inverses: Vec<Matrix3<f64>> =
             self.landmarks.par_iter().map(|block| damped_inverse(&block.hessian, damping)).collect();
@@ -97,7 +96,7 @@ impl<K: Copy + PartialEq + Into<usize> + Send + Sync> ReprojectionEquations<Spar
         let len = poses.rows.len().div_ceil(PARTS).max(1);
         poses.rows.par_chunks_mut(len).zip(reaches.par_chunks(len)).enumerate().for_each(|(part, (rows, reaches))| {
             for (row, reach) in rows.iter_mut().zip(reaches) {
-                // At once instead of block by block.
+                // Reserves once instead of block by block.
                 let blocks = &mut row.get_or_insert(PoseRow::ZERO).blocks;
                 blocks.reserve_exact((reach + 1).saturating_sub(blocks.len()));
             }
@@ -107,12 +106,13 @@ impl<K: Copy + PartialEq + Into<usize> + Send + Sync> ReprojectionEquations<Spar
     }
 }
 
-/// What the elimination of all landmarks takes off the rows of some poses, compiled for every width of vector registers.
+/// Subtraction of all landmarks' contributions from the rows of some poses, compiled for every width of vector
+/// registers.
 struct PartOfElimination<'a, K: Copy + PartialEq + Into<usize>> {
     equations: &'a ReprojectionEquations<SparsePoseEquations<K>>,
     inverses: &'a [Matrix3<f64>],
     rows: &'a mut [Option<PoseRow<K>>],
-    /// The pose of the first row.
+    /// Pose of the first row.
     first: usize,
 }
 
@@ -146,7 +146,7 @@ mod tests {
     use crate::geometry::SplitMix64;
     use crate::optimization::Reprojection;
 
-    /// Landmarks that every third pose of a stretch observes.
+    /// Landmarks, each observed by every third pose of a range of 20.
     fn example(poses: usize) -> ReprojectionEquations<SparsePoseEquations<usize>> {
         let mut numbers = SplitMix64::new(7);
         let mut equations = ReprojectionEquations::new(SparsePoseEquations::new(), 4 * poses);

@@ -40,11 +40,9 @@ impl Random {
 pub(super) enum Motion {
     /// Near-hover, then aggressive motion.
     Flight,
-    /// Near-hover only.
     Hover,
     /// On the ground.
     Stationary,
-    /// Rotation in place.
     RotationOnly,
     /// A straight line at constant velocity, without rotation.
     ConstantVelocity,
@@ -108,7 +106,6 @@ pub(super) struct Frame {
     pub(super) stamp_ns: i64,
     pub(super) features: Vec<TrackedFeature>,
     pub(super) imu: Vec<ImuSample>,
-    /// Given extrinsics.
     pub(super) imu_from_camera: RigidTransform,
     pub(super) true_world_from_imu: RigidTransform,
     pub(super) true_velocity: Vector3<f64>,

@@ -2,13 +2,12 @@
 
 use nalgebra::Vector3;
 
-use super::flight::{FOCAL_PX, Flight, FlightOptions, GRAVITY, noise, simulate_flight};
+use super::flight::{FOCAL_PX, Flight, FlightOptions, GRAVITY, Motion, noise, simulate_flight};
 use crate::estimator::initialization::bearing::angle_between;
 use crate::estimator::initialization::{
     InitializationFrame, InitializationInput, InitializationOptions, InitializationOrigin, InitializationOutcome,
     InitializationSolution, StationaryEstimate, StationaryPolicy, WaitReason, try_initialize,
 };
-use crate::estimator::problem::information_gain::Motion;
 use crate::sensors::ChainPrior;
 
 fn options_for(flight: &FlightOptions) -> InitializationOptions {

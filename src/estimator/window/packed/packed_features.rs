@@ -1,17 +1,16 @@
-//! Features of the window whose observations are places in the inputs of the steps before.
+//! Features of the window whose observations are references to the inputs of earlier steps.
 
 use crate::estimator::step_input::StepMeasurements;
 use crate::estimator::window::features::{Feature, FeatureMap, Observation};
 use crate::frontend::FeatureId;
 use crate::optimization::Landmark;
 
-/// The features of one camera.
 #[derive(Clone, Debug)]
 pub(crate) struct PackedFeatures {
     features: Vec<PackedFeature>,
-    /// Twice the slot of each observation, plus one where it is copied.
+    /// Twice the slot of each observation, plus one if it is copied.
     observations: Vec<u16>,
-    /// The copied observations: those that the step of their frame does not have.
+    /// Copied observations: those missing in the step of their frame.
     own: Vec<Observation>,
 }
 
@@ -19,7 +18,6 @@ pub(crate) struct PackedFeatures {
 struct PackedFeature {
     id: FeatureId,
     landmark: Option<Landmark>,
-    /// Number of its observations.
     count: u32,
 }
 
@@ -65,7 +63,7 @@ impl PackedFeatures {
     }
 }
 
-/// What the step of the frame at `slot` has of a feature.
+/// Observation of a feature in the step of the frame at `slot`, `None` without one.
 fn observation_of(
     steps: &[Option<&dyn StepMeasurements>],
     slot: usize,

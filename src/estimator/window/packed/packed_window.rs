@@ -1,4 +1,4 @@
-//! The running window without what can be computed again.
+//! Running window without recomputable data.
 
 use super::packed_features::PackedFeatures;
 use crate::estimator::factors::packed_prior::PackedPrior;
@@ -16,7 +16,7 @@ use crate::estimator::window::sliding_window::{Monitors, SlidingWindow};
 use crate::estimator::window::window_state::WindowState;
 use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 
-/// A [`SlidingWindow`] whose measurements are places in the inputs of the steps before.
+/// [`SlidingWindow`] whose measurements are references to the inputs of earlier steps.
 #[derive(Clone, Debug)]
 pub(crate) struct PackedWindow {
     frames: Vec<PackedFrame>,
@@ -27,12 +27,12 @@ pub(crate) struct PackedWindow {
     monitors: Monitors,
 }
 
-/// A [`Frame`] without its integrated motion.
+/// [`Frame`] without its integrated motion.
 #[derive(Clone, Debug)]
 struct PackedFrame {
     index: usize,
     stamp_ns: i64,
-    /// Place of its step in the past.
+    /// Index of its step in `past`, `None` if it is not there.
     step: Option<usize>,
     state: FrameState,
     first_estimate: Option<FrameState>,
@@ -40,11 +40,11 @@ struct PackedFrame {
     stationary: Option<Stationary>,
     keyframe: bool,
     motion: PackedMotion,
-    /// Whether the motion has an information.
+    /// True if `motion_information` is present.
     informed: bool,
 }
 
-/// What a [`Preintegration`] is integrated from.
+/// Input of a [`Preintegration`].
 #[derive(Clone, Debug)]
 struct PackedMotion {
     noise: ImuNoise,
@@ -55,9 +55,9 @@ struct PackedMotion {
 
 #[derive(Clone, Debug)]
 enum PackedSamples {
-    /// Those of consecutive steps of the past: the first one and the one behind the last.
+    /// Samples of consecutive steps in `past`: first index and end index (exclusive).
     OfSteps(usize, usize),
-    /// A copy.
+    /// Copied samples.
     Own(Vec<ImuSample>),
 }
 
@@ -97,7 +97,6 @@ impl PackedWindow {
         }
     }
 
-    /// Bytes on the heap.
     pub(crate) fn heap_bytes(&self) -> usize {
         self.frames.iter().map(PackedFrame::bytes).sum::<usize>()
             + self.features.iter().map(PackedFeatures::bytes).sum::<usize>()
@@ -106,7 +105,7 @@ impl PackedWindow {
     }
 }
 
-/// The step of each frame, `None` where it is not in the past.
+/// Step of each frame, `None` if it is not in the past.
 fn steps_of<'a>(frames: &[PackedFrame], past: &[&'a dyn StepMeasurements]) -> Vec<Option<&'a dyn StepMeasurements>> {
     frames.iter().map(|frame| past.get(frame.step?).copied()).collect()
 }
@@ -182,7 +181,7 @@ impl PackedMotion {
     }
 }
 
-/// The steps whose samples, one after the other, are integrated as exactly these; `None` where there are none.
+/// Range of consecutive steps whose samples, concatenated, integrate exactly as `samples`; `None` if there is none.
 fn steps_with(samples: &[ImuSample], past: &[&dyn StepMeasurements]) -> Option<(usize, usize)> {
     let (first, last) = (samples.first()?, samples.last()?);
     let begins = |step: &&dyn StepMeasurements| step.imu().first().is_some_and(|it| it.stamp_ns == first.stamp_ns);
