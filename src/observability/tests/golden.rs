@@ -33,7 +33,7 @@ fn window(golden: &Value) -> Window {
     }
 }
 
-/// The projector onto the structural null space, from the directions that the report names.
+/// Projector onto the structural null space, from the directions of the report.
 fn null_projector(report: &RankReport) -> DMatrix<f64> {
     let columns = report.parameters.len();
     let null: Vec<_> = report.directions.iter().filter(|direction| direction.structural).collect();
