@@ -59,12 +59,10 @@ impl fmt::Display for Table {
     }
 }
 
-/// Bytes in MiB.
 pub(crate) fn mib(bytes: usize) -> String {
     format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
 }
 
-/// Bytes in KiB.
 pub(crate) fn kib(bytes: usize) -> String {
     format!("{:.1} KiB", bytes as f64 / 1024.0)
 }

@@ -47,7 +47,6 @@ pub(super) struct VibrationLine {
 /// Spectrum of one sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Spectrum {
-    /// Samples per second.
     pub(super) rate_hz: f64,
     /// Noise density per axis, in the unit of the samples per √Hz.
     pub(super) density: f64,

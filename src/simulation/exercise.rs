@@ -13,7 +13,6 @@ pub enum VehicleSwing {
     Forward,
     /// Left and right.
     Sideways,
-    /// Up and down.
     UpDown,
     /// Quickly left and right, so that it rolls.
     Roll,

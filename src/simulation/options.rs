@@ -86,7 +86,6 @@ pub struct SimulationSummary {
     pub rig: PathBuf,
     /// True rig with further ground truth.
     pub ground_truth: PathBuf,
-    /// Length in seconds.
     pub duration_s: f64,
     pub path_length_m: f64,
     /// Number of images of all cameras.

@@ -9,7 +9,6 @@ const DEGREE: usize = 5;
 /// standstill.
 #[derive(Clone, Debug)]
 pub(crate) struct Spline<const D: usize> {
-    /// Time between knots.
     pub(crate) knot_s: f64,
     pub(crate) points: Vec<SVector<f64, D>>,
 }

@@ -105,7 +105,6 @@ pub struct SensorNoise {
     pub sensor: &'static str,
     /// Unit of the samples.
     pub unit: &'static str,
-    /// Samples per second.
     pub rate_hz: f64,
     /// Time covered by the used samples, in seconds.
     pub covered_s: f64,

@@ -172,7 +172,6 @@ impl std::str::FromStr for LaboratoryMotion {
     }
 }
 
-/// A sine wave.
 #[derive(Clone, Copy, Debug)]
 struct Sine {
     size: f64,

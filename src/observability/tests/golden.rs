@@ -94,8 +94,8 @@ fn golden_windows() {
                 );
             }
             assert!(matrix(&Value::Null).is_empty());
-            // Closed forms and measurement agree: the six of the classical form, and offsets absorbed by free joint
-            // angles.
+            // Closed forms and measurement agree: the six directions of the classical parameterization, and offsets
+            // absorbed by free joint angles.
             let six = if parameterization == Parameterization::Classical { 6 } else { 0 };
             let absorbed =
                 report.parameters.iter().filter(|parameter| joints_free && parameter.is_joint_offset()).count();

@@ -249,7 +249,7 @@ fn movies_with_telemetry_are_converted() {
             }
         }
         assert_eq!(topic(&report, "SHUT").left, 36);
-        // The rig of the log contains both sensors and asks for the rest.
+        // The rig of the log contains both sensors and lists assumed values.
         let written = rig_of(&report);
         assert_eq!(written.imu.topic, "/camera/imu/gyroscope");
         assert_eq!(written.imu.accelerometer_topic.as_deref(), Some("/camera/imu/accelerometer"));

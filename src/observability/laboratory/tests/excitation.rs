@@ -153,7 +153,7 @@ fn advice_is_repeatable_and_rendered_as_text() {
     assert!(hover.remaining > 0.999, "{advice}");
     assert!(!advice.candidates[0].words.contains("hover"), "{advice}");
     assert!(advice.candidates[0].remaining < 0.9, "{advice}");
-    // Redundant directions cannot be excited: the classical form gets suggestions for the other directions.
+    // Redundant directions cannot be excited: for the classical parameterization the other directions get suggestions.
     let classical = LaboratoryForm::whole(Parameterization::Classical);
     let situation = Situation::of_experiment(&setup, classical, LABORATORY_IMU).unwrap();
     let advice = advise(&situation).unwrap();
