@@ -1,8 +1,8 @@
-//! The estimator's stages on one full window of a synthetic flight with a gimbal: 150 features, eleven frames, a step that
-//! marginalizes the oldest frame.
+//! Stages of the estimator on one full window of a synthetic flight with a gimbal: 150 features, eleven frames, a step
+//! that marginalizes the oldest frame.
 //!
-//! `cargo bench --bench estimator` times the solve, the linearization, the report, the marginalization, the rank analysis
-//! and the whole step; each sample starts from the same snapshot.
+//! `cargo bench --bench estimator` measures the time of the solve, the linearization, the report, the marginalization,
+//! the rank analysis and the whole step; each sample starts from the same snapshot.
 
 #![expect(clippy::disallowed_methods, reason = "a bench measures time")]
 
@@ -18,7 +18,7 @@ use dcvins::gimbal::{Chain, Parameterization};
 use dcvins::observability::analyse;
 use dcvins::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
 
-/// The window is full long before this frame.
+/// The window is full well before this frame.
 const FIRST_FRAME: usize = 160;
 
 fn clock_ms() -> f64 {
@@ -26,7 +26,7 @@ fn clock_ms() -> f64 {
     BEGIN.elapsed().as_secs_f64() * 1e3
 }
 
-/// A snapshot before a step, and the frame of that step.
+/// Snapshot before a step, and the frame of that step.
 struct Recorded {
     estimator: Estimator,
     frame: SyntheticFrame,
@@ -34,7 +34,7 @@ struct Recorded {
 }
 
 impl Recorded {
-    /// The first step behind [`FIRST_FRAME`] that marginalizes the oldest frame.
+    /// First step after [`FIRST_FRAME`] that marginalizes the oldest frame.
     fn new() -> Self {
         let flight = synthetic_tracks(&SyntheticOptions::default());
         let encoder_sigma_rad = encoder_sigma_rad(&flight);
@@ -50,7 +50,7 @@ impl Recorded {
         panic!("a flight of {} s marginalizes a frame", SyntheticOptions::default().duration_s);
     }
 
-    /// The step once more.
+    /// Repeats the step.
     fn step(&self) -> StepReport {
         step(&mut self.estimator.clone(), &self.frame, self.encoder_sigma_rad)
     }

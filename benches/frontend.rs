@@ -1,10 +1,10 @@
-//! The front end on images whose true motion is known: time per image, tracked points, errors.
+//! Front end on images with known motion: time per image, tracked points, errors.
 //!
-//! `cargo bench --bench frontend` prints the table of the motion tracker from one image to the next, and of the whole front
-//! end over all images: how far features have drifted from their first observation, by age, with and without refinement
+//! `cargo bench --bench frontend` prints the table of the motion tracker from one image to the next, and of the whole
+//! front end over all images: the drift of features from their first observation, by age, with and without refinement
 //! against it.
 //! With `-- --export DIR` the frames (PGM) and the points with their true motion (CSV) are written there, to run other
-//! trackers on the same; `-- --flicker RATIO` sets the change of brightness from image to image.
+//! trackers on the same data; `-- --flicker RATIO` sets the change of brightness from image to image.
 
 #![expect(clippy::print_stdout, clippy::disallowed_methods, reason = "a bench measures time and prints it")]
 
@@ -49,7 +49,7 @@ struct Sequence {
     name: &'static str,
     scene: Scene,
     frames: Vec<GrayImage>,
-    /// For every pair the points in its first image.
+    /// Points in the first image of every pair.
     points: Vec<Vec<Vector2<f64>>>,
 }
 
@@ -134,7 +134,7 @@ fn bench_tracker(sequence: &Sequence, label: &str, options: &LucasKanadeOptions)
     );
 }
 
-/// Youngest ages of the groups that drift is shown for, in images.
+/// Smallest age of each group of the drift table, in images.
 const AGES: [usize; 5] = [1, 2, 5, 9, 17];
 
 fn bench_front_end(sequence: &Sequence, label: &str, options: &FrontEndOptions) {
@@ -190,7 +190,7 @@ fn main() {
         let forward = LucasKanadeOptions { forward_backward_px: None, ..Default::default() };
         bench_tracker(sequence, "forward", &forward);
         bench_tracker(sequence, "forward and backward", &LucasKanadeOptions::default());
-        // No window correlates better than perfectly.
+        // No window exceeds a correlation of 1: this disables the refinement.
         let without = ReferenceOptions { min_correlation: 2.0, ..Default::default() };
         bench_front_end(sequence, "without reference", &FrontEndOptions { reference: without, ..Default::default() });
         bench_front_end(sequence, "with reference", &FrontEndOptions::default());

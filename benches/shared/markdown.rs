@@ -1,5 +1,3 @@
-//! Tables as Markdown.
-
 use std::fmt;
 
 /// Writes a table's title, header and rows.

@@ -1,4 +1,4 @@
-//! What several benches need.
+//! Common code of several benchmarks.
 
 pub(crate) mod markdown;
 pub(crate) mod process;

@@ -6,14 +6,14 @@ use dcvins::session::Stopwatch;
 
 use crate::shared::markdown::write_table;
 
-/// Milliseconds of many goes at the same thing.
+/// Durations of repeated measurements, in milliseconds.
 #[derive(Default)]
 pub(crate) struct Times {
     ms: Vec<f64>,
 }
 
 impl Times {
-    /// Measures one go.
+    /// Measures one call.
     pub(crate) fn take<T>(&mut self, work: impl FnOnce() -> T) -> T {
         let watch = Stopwatch::start();
         let result = work();
@@ -21,7 +21,7 @@ impl Times {
         result
     }
 
-    /// Adds what a stopwatch shows.
+    /// Adds the time of a stopwatch.
     pub(crate) fn add(&mut self, watch: &Stopwatch) {
         self.ms.push(watch.elapsed_ms());
     }
@@ -59,12 +59,10 @@ impl fmt::Display for Table {
     }
 }
 
-/// Bytes in MiB.
 pub(crate) fn mib(bytes: usize) -> String {
     format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
 }
 
-/// Bytes in KiB.
 pub(crate) fn kib(bytes: usize) -> String {
     format!("{:.1} KiB", bytes as f64 / 1024.0)
 }

@@ -1,4 +1,4 @@
-//! Pictures of the window over a recording.
+//! Frames of the window over a recording.
 
 use std::sync::Arc;
 
@@ -17,17 +17,17 @@ use super::shared::process::cpu_s;
 
 const OPTIONS: HeadlessOptions =
     HeadlessOptions { size_px: [1920, 1080], pixels_per_point: 1.0, theme: ThemeName::Dark };
-/// Pictures of each preset while the cursor runs.
+/// Number of frames of each preset with a moving cursor.
 const PLAYED: usize = 60;
-/// Pictures of each preset with the cursor at rest.
+/// Number of frames of each preset with a stationary cursor.
 const PAUSED: usize = 30;
-/// Pictures that are drawn first, until everything has found its place.
+/// Number of initial frames until the layout is stable.
 const SETTLING: usize = 4;
 
-/// Seconds from picture to picture: one for each image of the camera.
+/// Seconds between two frames: one frame per camera image.
 const FRAME_TIME_S: f64 = 0.05;
 
-/// A window without a screen, which leaves advice to a thread as the real one does.
+/// Window without a screen; suggested excitation is computed on a thread, as in the real window.
 pub(crate) struct Player {
     images: ImageReader,
     headless: Headless,
@@ -51,12 +51,12 @@ impl Player {
         }
     }
 
-    /// The first image of a camera.
+    /// First image of a camera.
     pub(crate) fn first_image(&self, camera_key: &str) -> Option<Arc<GrayImage>> {
         self.images.image(camera_key, 0).ok()
     }
 
-    /// Lays out a picture and hands its textures to the painter.
+    /// Lays out a frame and passes its textures to the painter.
     fn lay_out(&mut self, recording: &Recording, cursor_ns: i64) -> Frame {
         let Self { images, headless, state, selection, .. } = self;
         let (theme, playback) = (Theme::of(OPTIONS.theme), Playback::default());
@@ -82,20 +82,20 @@ impl Player {
         frame
     }
 
-    /// Paints a picture and takes what changed, which the window hands to the graphics adapter.
+    /// Paints a frame and takes the changes that the window passes to the graphics adapter.
     fn paint(&mut self, frame: &Frame) {
         let background = Theme::of(OPTIONS.theme).background;
         self.painter.update(&frame.chunks, OPTIONS.size_px, OPTIONS.pixels_per_point, background);
         self.painter.changes().for_each(drop);
     }
 
-    /// One picture.
+    /// Draws one frame.
     pub(crate) fn picture(&mut self, recording: &Recording, cursor_ns: i64) {
         let frame = self.lay_out(recording, cursor_ns);
         self.paint(&frame);
     }
 
-    /// One picture, with the time of its parts.
+    /// Draws one frame and measures the time of its parts.
     fn measured(&mut self, recording: &Recording, cursor_ns: i64, times: &mut [Times; 3]) {
         let [layout, paint, whole] = times;
         whole.take(|| {
@@ -105,11 +105,11 @@ impl Player {
     }
 }
 
-/// Every preset, with the cursor running through the last part of the recording, and at rest at its end.
+/// Measures every preset, with the cursor moving through the last part of the recording, and stationary at its end.
 pub(crate) fn measure(recording: &Recording, player: &mut Player) -> Table {
     let mut table = Table::new(
-        "A picture of the window at 1920×1080, drawn on the CPU: ms at the median / 95 % / largest",
-        &["preset", "cursor", "laying out", "painting", "together", "processor time, mean"],
+        "A frame of the window at 1920×1080, drawn on the CPU: ms, median / 95 % / largest",
+        &["preset", "cursor", "layout", "painting", "total", "mean CPU time"],
     );
     let steps = recording.runs.first().map_or(&[][..], |run| &run.steps);
     let stamps_ns: Vec<i64> = steps.iter().map(|step| step.report.stamp_ns).collect();
@@ -121,8 +121,8 @@ pub(crate) fn measure(recording: &Recording, player: &mut Player) -> Table {
             player.picture(recording, first_ns);
         }
         let resting = vec![*played.last().unwrap_or(&first_ns); PAUSED];
-        for (what, cursors_ns) in [("runs", played), ("rests", &resting[..])] {
-            // The first picture at another place belongs to the running cursor.
+        for (what, cursors_ns) in [("moving", played), ("stationary", &resting[..])] {
+            // The first frame after a seek is not measured with the stationary cursor.
             player.picture(recording, cursors_ns[0]);
             let mut times = [Times::default(), Times::default(), Times::default()];
             let before_s = cpu_s();

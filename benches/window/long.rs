@@ -1,4 +1,4 @@
-//! A long recording from a short one.
+//! Long recording made from a short one.
 
 use std::sync::Arc;
 
@@ -9,9 +9,9 @@ use dcvins::session::{Computation, Recording, RunRecord, StepRecord};
 use super::Table;
 use super::figures::{kib, mib};
 
-/// The recording with its steps repeated, one copy after the other, until every run has so many.
+/// Recording with its steps repeated, one copy after the other, until every run has `frames` steps.
 ///
-/// No step is a summary: it is what a recording of all steps takes.
+/// No step is a summary: the recording has the size of one with all steps.
 pub(crate) fn lengthened(computation: &Computation, frames: usize) -> Recording {
     let mut recording = Recording::clone(computation.recording());
     let period_ns = recording.duration_ns;
@@ -42,12 +42,12 @@ fn lengthened_run(computation: &Computation, number: usize, period_ns: i64, fram
     long
 }
 
-/// What it takes.
+/// Memory of the recording.
 pub(crate) fn memory(recording: &Recording) -> Table {
-    let mut table = Table::new("Memory of the long recording, every step whole", &["what", "figure"]);
+    let mut table = Table::new("Memory of the long recording, every step in full", &["quantity", "value"]);
     table.row("recording, without snapshots", [mib(recording.memory_bytes())]);
     let process = Machine::new().resident_bytes();
-    table.row("whole process", [process.map_or_else(|| "not known".to_owned(), |bytes| mib(bytes as usize))]);
+    table.row("whole process", [process.map_or_else(|| "unknown".to_owned(), |bytes| mib(bytes as usize))]);
     for run in &recording.runs {
         let steps = run.steps.len().max(1);
         let figure =

@@ -1,14 +1,14 @@
-//! What a window costs on a log: opening it, what is remembered of it, going back in it, and every picture of it.
+//! Costs of the window on a log: opening it, memory of the recording, seeking backwards, and every frame.
 //!
 //! `cargo bench --bench window` plays the sample log with two runs at 1920×1080. Another log and other runs:
-//! `cargo bench --bench window -- flight.mcap --run auto --run classical`, and `--budget-mib N` for the memory that the
-//! recording may take. Pictures are drawn by the program itself, as they are without a graphics adapter.
+//! `cargo bench --bench window -- flight.mcap --run auto --run classical`, and `--budget-mib N` for the memory limit of
+//! the recording. Frames are drawn by the CPU painter, as without a graphics adapter.
 //!
-//! `--frames 12000` measures a long flight by a short log. What a recording may remember is as much less as the log is
-//! shorter, so that the same share of steps is kept in outline and snapshots lie as far apart. For the pictures the steps
-//! are repeated until there are so many, each a copy of its own with later stamps.
+//! `--frames 12000` simulates a long flight with a short log. The memory limit of the recording is reduced by the same
+//! factor, so that the ratio of summaries and the distance of snapshots are those of the long flight. For the frames
+//! the steps are repeated until there are enough, each as a copy with later stamps.
 //!
-//! `--study 10000` measures the view of a made-up study of so many runs instead.
+//! `--study 10000` measures the view of a simulated study with this number of runs instead.
 
 mod figures;
 mod frames;
@@ -33,14 +33,13 @@ use dcvins::session::{RunSpec, Session, SessionPlan, SessionRequest};
 use figures::Table;
 use frames::Player;
 
-/// What is measured.
 struct Arguments {
     log: PathBuf,
     runs: Vec<RunSpec>,
     budget_mib: Option<usize>,
-    /// Frames of the long flight that is measured.
+    /// Frames of the simulated long flight.
     frames: Option<usize>,
-    /// Runs of the study that is measured instead.
+    /// Number of runs of the study that is measured instead.
     study: Option<usize>,
 }
 
@@ -55,7 +54,7 @@ impl Arguments {
         while let Some(word) = words.next() {
             let mut value = |what: &str| words.next().with_context(|| format!("{word} needs {what}"));
             match word.as_str() {
-                // Cargo says so to every bench.
+                // Cargo passes it to every benchmark.
                 "--bench" => {}
                 "--run" => runs.push(value("the name of a run")?.parse()?),
                 "--budget-mib" => budget_mib = Some(value("a number of MiB")?.parse()?),
@@ -64,7 +63,7 @@ impl Arguments {
                 path if !path.starts_with('-') && log.is_none() => log = Some(PathBuf::from(path)),
                 other => {
                     bail!(
-                        "'{other}' is not understood: expected LOG.mcap, --run SPEC, --budget-mib N, --frames N or --study N"
+                        "unknown argument '{other}': expected LOG.mcap, --run SPEC, --budget-mib N, --frames N or --study N"
                     )
                 }
             }

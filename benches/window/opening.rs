@@ -1,4 +1,4 @@
-//! From the file to the first picture.
+//! Time from the file to the first frame.
 
 use std::fs;
 use std::thread::sleep;
@@ -11,7 +11,7 @@ use super::figures::mib;
 use super::frames::Player;
 use super::{Arguments, Table};
 
-/// Opens the log, its first image, and the window with its first step.
+/// Measures the opening of the log, its first image, and the window with its first step.
 pub(crate) fn measure(arguments: &Arguments) -> Result<Table> {
     let size = fs::metadata(&arguments.log).with_context(|| format!("cannot open {}", arguments.log.display()))?.len();
     let watch = Stopwatch::start();
@@ -30,6 +30,6 @@ pub(crate) fn measure(arguments: &Arguments) -> Result<Table> {
     let mut table = Table::new(format!("Opening a log of {}", mib(size as usize)), &["from the command to", "ms"]);
     table.row("the opened log", [opened]);
     table.row("its first image", [image]);
-    table.row("the first picture of the window with a step in it", [ms()]);
+    table.row("the first frame of the window with a step", [ms()]);
     Ok(table)
 }

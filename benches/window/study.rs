@@ -1,4 +1,4 @@
-//! What the view of a large study costs: opening it, and every picture of it.
+//! Costs of the view of a large study: opening it, and every frame.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ const OPTIONS: HeadlessOptions =
     HeadlessOptions { size_px: [1920, 1080], pixels_per_point: 1.0, theme: ThemeName::Dark };
 const PICTURES: usize = 40;
 
-/// A study of at least `runs` made-up runs.
+/// Measures a simulated study with at least `runs` runs.
 pub(crate) fn measure(runs: usize) -> Result<Table> {
     let theme = Theme::of(OPTIONS.theme);
     let [sample, _] = study_sample::tables(study_sample::SEEDS);
@@ -27,8 +27,8 @@ pub(crate) fn measure(runs: usize) -> Result<Table> {
     let count = results.rows();
     let study = Arc::new(Study { name: "sample".to_owned(), runs: results, parameters });
     let mut table = Table::new(
-        format!("The view of a study of {count} runs at 1920×1080, on the CPU: ms at the median / 95 % / largest"),
-        &["", "laying out", "with painting"],
+        format!("The view of a study of {count} runs at 1920×1080, on the CPU: ms, median / 95 % / largest"),
+        &["", "layout", "with painting"],
     );
     let mut state = StudyState::new(Arc::clone(&study), &StudyOptions::default()).map_err(|error| anyhow!(error))?;
     let mut headless = Headless::new(OPTIONS);
@@ -45,13 +45,13 @@ pub(crate) fn measure(runs: usize) -> Result<Table> {
 
     let mut times = <[Times; 2]>::default();
     measure(&mut state, Vec::new(), &mut times);
-    table.row("first picture", cells(&times));
+    table.row("first frame", cells(&times));
     measure(&mut state, Vec::new(), &mut <[Times; 2]>::default());
     let mut times = <[Times; 2]>::default();
     for _ in 0..PICTURES {
         measure(&mut state, Vec::new(), &mut times);
     }
-    table.row("at rest", cells(&times));
+    table.row("stationary", cells(&times));
     let mut times = <[Times; 2]>::default();
     for number in 0..PICTURES {
         let pointer = Event::PointerMoved(pos2(140.0 + 8.0 * number as f32, 150.0));

@@ -1,4 +1,4 @@
-//! What is remembered of a log, and what it takes to go back in it.
+//! Memory of the recording of a log, and the time to seek backwards in it.
 
 use dcvins::export::Machine;
 use dcvins::geometry::SplitMix64;
@@ -9,22 +9,22 @@ use super::Table;
 use super::figures::{Times, kib, mib};
 use super::frames::Player;
 
-/// Steps back from each place.
+/// Steps back from each position.
 const STEPS_BACK: usize = 200;
-/// Jumps to any frame.
+/// Number of seeks to any frame.
 const JUMPS: usize = 100;
-/// Steps of a run that are recomputed from the snapshot before them.
+/// Number of steps of a run that are recomputed from the snapshot before them.
 const RECOMPUTED: usize = 100;
 
-/// What the recording holds.
+/// Memory of the recording.
 pub(crate) fn memory(session: &Session) -> Table {
     let computation = session.computation();
     let recording = computation.recording();
     let budget = mib(recording.memory_budget_bytes);
-    let mut table = Table::new(format!("Memory, of {budget} that a recording may take"), &["what", "figure"]);
+    let mut table = Table::new(format!("Memory, limit of the recording {budget}"), &["quantity", "value"]);
     table.row("recording", [mib(recording.memory_bytes())]);
     let process = Machine::new().resident_bytes();
-    table.row("whole process", [process.map_or_else(|| "not known".to_owned(), |bytes| mib(bytes as usize))]);
+    table.row("whole process", [process.map_or_else(|| "unknown".to_owned(), |bytes| mib(bytes as usize))]);
     for (number, run) in recording.runs.iter().enumerate() {
         let label = &run.spec.label;
         let steps = run.steps.len().max(1);
@@ -35,7 +35,7 @@ pub(crate) fn memory(session: &Session) -> Table {
         let of_summaries: Vec<usize> =
             run.steps.iter().filter(|step| step.summary_only).map(|step| step.own_bytes()).collect();
         let mean = |bytes: &[usize]| kib(bytes.iter().sum::<usize>() / bytes.len().max(1));
-        table.row(format!("{label}: a whole step, a summary"), [format!("{}, {}", mean(&whole), mean(&of_summaries))]);
+        table.row(format!("{label}: a full step, a summary"), [format!("{}, {}", mean(&whole), mean(&of_summaries))]);
         table.row(format!("{label}: tracks of a step"), [kib(run.memory.tracks / steps)]);
         if let Some(snapshots) = computation.snapshots(number) {
             let each = kib(snapshots.bytes / snapshots.count.max(1));
@@ -46,11 +46,11 @@ pub(crate) fn memory(session: &Session) -> Table {
     table
 }
 
-/// Steps back and jumps, each until everything of the step is there, and until the window shows it.
+/// Measures steps back and seeks, each until all data of the step are available, and until the window shows them.
 pub(crate) fn measure(session: &mut Session, player: &mut Player) -> Table {
     let mut table = Table::new(
-        "Going back, in ms: until the whole step is there, until the window shows it",
-        &["what", "step p50", "p95", "largest", "picture p50", "p95", "largest"],
+        "Seeking backwards, in ms: until the step is complete, until the window shows it",
+        &["action", "step p50", "p95", "largest", "frame p50", "p95", "largest"],
     );
     let recording = session.recording();
     let Some(run) = recording.runs.first() else { return table };
@@ -67,9 +67,11 @@ pub(crate) fn measure(session: &mut Session, player: &mut Player) -> Table {
         times[1].add(&watch);
     };
     let cells = |times: &[Times; 2]| times.iter().flat_map(Times::cells).collect::<Vec<_>>();
-    for (name, place) in [("a frame back, from the end", stamps_ns.len() - 1), ("from the middle", stamps_ns.len() / 2)]
-    {
-        // How long it takes to get there is not asked here, and panels read a long recording once.
+    for (name, place) in [
+        ("one frame back, from the end", stamps_ns.len() - 1),
+        ("one frame back, from the middle", stamps_ns.len() / 2),
+    ] {
+        // The time of the first seek is not measured, and panels read a long recording once.
         go(&mut <[Times; 2]>::default(), Command::Seek { stamp_ns: stamps_ns[place] });
         let mut times = <[Times; 2]>::default();
         for _ in 0..STEPS_BACK.min(place) {
@@ -83,13 +85,13 @@ pub(crate) fn measure(session: &mut Session, player: &mut Player) -> Table {
     for _ in 0..JUMPS {
         go(&mut times, Command::Seek { stamp_ns: stamps_ns[any()] });
     }
-    table.row("a jump to any frame", cells(&times));
+    table.row("a seek to any frame", cells(&times));
     let computation = session.computation();
     let mut times = Times::default();
     for _ in 0..RECOMPUTED {
         let step = any();
         times.take(|| computation.recompute(0, step, 1));
     }
-    table.row("a recomputed step, whatever is kept of it", times.cells());
+    table.row("a recomputed step", times.cells());
     table
 }

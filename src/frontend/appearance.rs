@@ -1,6 +1,6 @@
-//! A feature's window, prepared for comparison with other windows.
+//! Window around a feature, prepared for comparison with other windows.
 
-#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+#![expect(clippy::inline_always, reason = "code not inlined is not compiled for the registers of its caller")]
 
 use nalgebra::{Matrix6, Vector6};
 use pulp::{Arch, NullaryFnOnce};
@@ -11,22 +11,19 @@ use super::reference::{CENTRE, LANES, MARGIN, Rows, SIDE, WINDOW};
 /// Minimum variance of a window, in squared grey levels.
 const MIN_VARIANCE: f32 = 4.0;
 
-/// A window with its gradient and the normal matrix of the comparison.
+/// Window with its gradient and the normal matrix of the comparison.
 ///
-/// Surplus columns are zero.
+/// Padding columns are zero.
 #[derive(Debug, PartialEq)]
 pub(super) struct Appearance {
-    /// Mean grey level.
     level: f32,
-    /// Grey levels less their mean.
+    /// Grey levels minus their mean.
     value: Rows,
-    /// Gradient along a row.
     along_x: Rows,
-    /// Gradient along a column.
     along_y: Rows,
     /// Means of the gradient and of its first moments `[gx, gy, gx·x, gx·y, gy·x, gy·y]`.
     means: [f32; 6],
-    /// Their regressions on the grey levels.
+    /// Regressions of these six on the grey levels.
     regressions: [f32; 6],
     /// Inverse of the normal matrix (6 × 6) of these six, gain and offset eliminated.
     inverse: Matrix6<f64>,
@@ -35,7 +32,7 @@ pub(super) struct Appearance {
 }
 
 impl Appearance {
-    /// From a window with [`MARGIN`] more pixels on every side, row by row; `None` when it has no texture.
+    /// Prepares a window with [`MARGIN`] more pixels on every side, row by row; `None` without texture.
     pub(super) fn new(pixels: &[[f32; SIDE]; SIDE]) -> Option<Self> {
         Arch::new().dispatch(Preparation { pixels })
     }
@@ -102,14 +99,14 @@ impl Appearance {
         Some(Self { level, value, along_x, along_y, means, regressions, inverse, square })
     }
 
-    /// The grey level to subtract from a window before the comparison.
+    /// Grey level to subtract from a window before the comparison.
     pub(super) fn level(&self) -> f32 {
         self.level
     }
 
-    /// Normalized correlation of a window, less [`Self::level`] and with surplus columns of zero, with this one, and the
-    /// Gauss–Newton step of this one towards it (6 × 1): `[dx, dy]` in pixels, then the derivatives of dx and of dy by x
-    /// and y; `None` without positive correlation.
+    /// Normalized correlation of `window` with this one, and the Gauss–Newton step of this one towards it (6 × 1):
+    /// `[dx, dy]` in pixels, then the derivatives of dx and of dy by x and y. `window` has [`Self::level`] subtracted
+    /// and padding columns of zero. `None` without positive correlation.
     pub(super) fn compare(&self, window: &Rows) -> Option<(f64, Vector6<f64>)> {
         let moments = Arch::new().dispatch(Comparison { appearance: self, window });
         let area = (WINDOW * WINDOW) as f32;
@@ -141,7 +138,7 @@ impl NullaryFnOnce for Preparation<'_> {
     }
 }
 
-/// The sums that comparing a window needs, compiled for every width of vector registers.
+/// Sums for the comparison with a window, compiled for every width of vector registers.
 struct Comparison<'a> {
     appearance: &'a Appearance,
     window: &'a Rows,
@@ -194,19 +191,20 @@ impl NullaryFnOnce for Comparison<'_> {
 
 /// Sums over a window.
 struct Moments {
-    /// Of its grey levels.
+    /// Of the grey levels.
     sum: f32,
-    /// Of their squares.
+    /// Of the squared grey levels.
     square: f32,
-    /// Of their products with those of the appearance.
+    /// Of the products with the grey levels of the appearance.
     common: f32,
-    /// Of their products with the gradient and its first moments.
+    /// Of the products with the gradient and its first moments.
     slopes: [f32; 6],
 }
 
-/// Central difference of the fourth order, from the values two and one before and one and two after.
+/// Central difference of fourth order, from the values two and one before and one and two after.
 ///
-/// It follows the slope of fine texture; with a smoother one, as Scharr's, Gauss–Newton steps are 1.4 times too long.
+/// It is accurate for fine texture; with a smoother difference, such as Scharr's, Gauss–Newton steps are 1.4 times too
+/// long.
 #[inline(always)]
 fn slope([two_before, before, after, two_after]: [f32; 4]) -> f32 {
     (2.0 / 3.0) * (after - before) - (1.0 / 12.0) * (two_after - two_before)

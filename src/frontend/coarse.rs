@@ -20,35 +20,33 @@ pub(super) const EXTRA_LEVELS: usize = 1;
 const ACCURATE_SIGMA_PX: f64 = 6.0;
 /// Maximum number of samples on a level; more do not improve the result.
 const MAX_SAMPLES: usize = 1200;
-/// Number of independent grey-level measurements that all samples count as: neighbouring samples are correlated, and near
-/// objects move differently.
+/// Number of independent grey-level measurements assumed for all samples together: neighbouring samples are correlated,
+/// and near objects move differently.
 const INDEPENDENT_SAMPLES: f64 = 100.0;
 /// Scale of the robust loss: this ratio of the image's contrast (its standard deviation), at least this many grey levels.
 const SCALE_RATIO: f64 = 0.5;
 const MIN_SCALE: f64 = 4.0;
 /// Minimum contrast of an image, in grey levels.
 const MIN_CONTRAST: f64 = 2.0;
-/// Cost of a sample outside of the other image; a matching one has cost 0, an outlier nearly 1.
+/// Cost of a sample outside the other image; an exact match costs 0, an outlier nearly 1.
 const OUTSIDE_COST: f64 = 0.5;
-/// A prediction is rejected when the cost under it is higher than under no rotation by this.
+/// A prediction is rejected if its cost exceeds that of no rotation by this.
 const WORSE_BY: f64 = 0.02;
 /// Gauss–Newton steps on each level, coarsest first.
 const STEPS: [usize; 2] = [10, 5];
-/// A step shorter than this ends the search, in pixels of the level.
+/// Length of a step that ends the search, in pixels of the level.
 const SHORT_STEP_PX: f64 = 0.03;
 
-/// One pixel of a level.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     x: usize,
     y: usize,
     /// Unit direction in the camera frame.
     bearing: Vector3<f64>,
-    /// Derivative of its position by a rotation of its bearing (2 × 3), in pixels of the level per radian.
+    /// Derivative of the pixel by a rotation of the bearing (2 × 3), in pixels of the level per radian.
     by_rotation: Matrix2x3<f64>,
 }
 
-/// The samples of one level.
 #[derive(Clone, Debug)]
 struct SampledLevel {
     level: usize,
@@ -63,7 +61,7 @@ pub(super) struct CoarseAligner {
     levels: Vec<SampledLevel>,
 }
 
-/// A rotation with gain and offset of the brightness, and the cost.
+/// Rotation with gain and offset of the brightness, and the cost.
 #[derive(Clone, Copy)]
 struct Fit {
     /// `camera_now_from_camera_previous`.
@@ -78,8 +76,8 @@ impl CoarseAligner {
         Self { camera, levels: Vec::new() }
     }
 
-    /// The rotation `camera_now_from_camera_previous` to predict features with: the prediction where it is accurate, else the
-    /// one measured on the images; `None` without either.
+    /// Rotation `camera_now_from_camera_previous` with which features are predicted: the prediction if it is accurate,
+    /// otherwise the rotation measured on the images; `None` without either.
     pub(super) fn search_rotation(
         &mut self,
         previous: &Pyramid,
@@ -163,7 +161,7 @@ struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    /// `None` when an image has too little contrast.
+    /// Returns `None` if an image has too little contrast.
     fn new(
         camera: &'a CameraModel,
         sampled: &'a SampledLevel,

@@ -14,7 +14,7 @@ pub struct CornerOptions {
     pub min_distance_px: f64,
     /// Minimum distance from the image border, in pixels.
     pub border_px: usize,
-    /// Smaller eigenvalue of the mean structure tensor below which there is no corner, in (grey levels/px)².
+    /// Smallest accepted smaller eigenvalue of the mean structure tensor, in (grey levels/px)².
     pub min_eigenvalue: f64,
 }
 
@@ -34,7 +34,7 @@ struct Candidate {
     response: f32,
 }
 
-/// A square of the image that is searched separately, smaller at the image border.
+/// Square of the image that is searched separately, smaller at the image border.
 #[derive(Clone, Copy, Debug)]
 struct Tile {
     left: usize,
@@ -43,7 +43,7 @@ struct Tile {
     height: usize,
 }
 
-/// Detects corners; its buffers are reused from image to image.
+/// Corner detector; its buffers are reused from image to image.
 #[derive(Clone, Debug, Default)]
 pub struct CornerDetector {
     candidates: Vec<Candidate>,
@@ -57,10 +57,12 @@ pub struct CornerDetector {
 }
 
 impl CornerDetector {
-    /// Adds to `found` corners of `image` until there are `max_features` with the `existing` ones (all in pixels).
+    /// Adds corners of `image` to `found` until there are `max_features` together with the `existing` ones (all in
+    /// pixels).
     ///
-    /// None lies in a pixel that is masked. The image is divided into about as many cells as there may be features. First every cell that has no feature gets
-    /// its best corner, however weak beside those of other cells, then every cell that has one gets a second, and so on.
+    /// Masked pixels contain no corners. The image is divided into about `max_features` cells. First every cell without
+    /// a feature gets its best corner, even if it is weaker than corners of other cells, then every cell with one
+    /// feature gets a second, and so on.
     pub fn detect(
         &mut self,
         image: &GrayImage,
@@ -89,7 +91,7 @@ impl CornerDetector {
         let mut crowd = std::mem::take(&mut self.crowd);
         let mut round = 0;
         while count < options.max_features {
-            // The first round fills empty cells, so it needs the corners of no others; most often it is the only one.
+            // The first round fills empty cells and needs no corners of other cells; usually it is the only round.
             self.collect(image, options, mask, |tile| round > 0 || cells.about(tile).any(|cell| crowd[cell] == 0));
             if self.candidates.is_empty() && self.tiles.is_empty() {
                 break;
@@ -114,7 +116,7 @@ impl CornerDetector {
         self.crowd = crowd;
     }
 
-    /// Collects the best corners of tiles that are `wanted`, not searched yet and not covered by features.
+    /// Collects the best corners of the `wanted` tiles that are neither searched yet nor covered by features.
     fn collect(
         &mut self,
         image: &GrayImage,
@@ -160,7 +162,7 @@ impl CornerDetector {
         }
     }
 
-    /// Whether a coarse test finds no position in a tile far enough from the features.
+    /// True if a coarse test finds no position in a tile that is far enough from the features.
     fn is_covered(&self, tile: &Tile) -> bool {
         const LOOK: usize = 4;
         (0..=LOOK).all(|j| {
@@ -174,13 +176,12 @@ impl CornerDetector {
 }
 
 impl Candidate {
-    /// Its pixel, row first, the order among equal responses.
+    /// Pixel, row first: order of candidates with equal responses.
     fn place(&self) -> (usize, usize) {
         (self.uv_px.y.round() as usize, self.uv_px.x.round() as usize)
     }
 }
 
-/// All tiles of an image, row by row.
 fn tiles_of(image: &GrayImage, border_px: usize) -> impl Iterator<Item = Tile> {
     let (right, bottom) = (image.width.saturating_sub(border_px), image.height.saturating_sub(border_px));
     (border_px..bottom).step_by(TILE).flat_map(move |top| {
@@ -193,7 +194,7 @@ fn tiles_of(image: &GrayImage, border_px: usize) -> impl Iterator<Item = Tile> {
     })
 }
 
-/// The division of an image into about as many cells as features are wanted.
+/// Division of an image into about `count` cells.
 #[derive(Clone, Copy)]
 struct Cells {
     side_px: f64,
@@ -214,9 +215,9 @@ impl Cells {
         row * self.columns + column
     }
 
-    /// The cells that may contain a corner of a tile.
+    /// Cells that may contain a corner of a tile.
     fn about(&self, tile: &Tile) -> impl Iterator<Item = usize> {
-        // A corner may be half a pixel beside its pixel.
+        // A corner may be half a pixel away from its pixel.
         let range = |first: usize, length: usize, count: usize| {
             let at = |pixel: usize| ((pixel as f64 / self.side_px) as usize).min(count - 1);
             at(first.saturating_sub(1))..at(first + length) + 1
@@ -245,7 +246,7 @@ impl PointGrid {
         self.squares.resize(self.columns * rows, Vec::new());
     }
 
-    /// Column and row of a point's square; there is one more all around, so that every square has its eight neighbours.
+    /// Column and row of a point's square; a border of one square gives every square eight neighbours.
     fn square(&self, uv_px: &Vector2<f64>) -> (usize, usize) {
         let last_row = self.squares.len() / self.columns - 2;
         let column = (uv_px.x / self.distance_px) as usize + 1;
@@ -258,7 +259,7 @@ impl PointGrid {
         self.squares[row * self.columns + column].push(uv_px);
     }
 
-    /// Whether no point is nearer than the minimum distance.
+    /// True if no point is nearer than the minimum distance.
     pub(super) fn is_free(&self, uv_px: &Vector2<f64>) -> bool {
         let (column, row) = self.square(uv_px);
         (row - 1..=row + 1).all(|row| {

@@ -13,7 +13,6 @@ use crate::camera::CameraModel;
 use crate::geometry::median;
 use crate::sensors::{GrayImage, ImageMask};
 
-/// Options of a front end, by stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrontEndOptions {
     /// Detection of new features.
@@ -26,29 +25,29 @@ pub struct FrontEndOptions {
     pub outliers: OutlierOptions,
 }
 
-/// Why an image was refused.
+/// Reason that an image was rejected.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum FrontEndError {
-    /// It does not have the camera's size.
+    /// The image does not have the size of the camera model.
     #[error("the image is {width}×{height}, but the camera model is for {expected_width}×{expected_height}")]
     ImageSize {
-        /// Columns it has.
+        /// Columns of the image.
         width: usize,
-        /// Rows it has.
+        /// Rows of the image.
         height: usize,
         /// Columns of the camera model.
         expected_width: usize,
         /// Rows of the camera model.
         expected_height: usize,
     },
-    /// The number of its pixels does not match its size.
+    /// The number of pixels does not match the image size.
     #[error("the image of {width}×{height} has {pixels} pixels")]
     PixelCount {
-        /// Columns it should have.
+        /// Columns of the image.
         width: usize,
-        /// Rows it should have.
+        /// Rows of the image.
         height: usize,
-        /// Pixels it has.
+        /// Number of pixels.
         pixels: usize,
     },
 }
@@ -60,7 +59,7 @@ struct Track {
     age: u32,
     uv_px: Vector2<f64>,
     bearing: Vector3<f64>,
-    /// Its window, `None` when it was too near to the border or had no texture.
+    /// Window of the feature; `None` if it was too near to the border or had no texture.
     reference: Option<ReferencePatch>,
 }
 
@@ -78,7 +77,6 @@ struct Step {
     reference: Option<ReferencePatch>,
 }
 
-/// Buffers of tracking.
 struct Buffers {
     motion: Box<lucas_kanade::Buffers>,
     search: ReferenceSearch,
@@ -86,7 +84,7 @@ struct Buffers {
 
 /// Tracks features through the images of one camera.
 ///
-/// It takes images in order of time and keeps the last one; a clone continues exactly as the original.
+/// Images are passed in order of time. The front end keeps the last one; a clone continues exactly like the original.
 #[derive(Clone, Debug)]
 pub struct FrontEnd {
     camera: CameraModel,
@@ -102,17 +100,16 @@ pub struct FrontEnd {
     found: Vec<Vector2<f64>>,
 }
 
-/// Two predictions of a feature's position are both tried when they differ by more than this, in pixels.
+/// Two predicted positions of a feature are both tried if they differ by more than this, in pixels.
 const DIFFERENT_GUESS_PX: f64 = 2.0;
-/// Steps towards the row in which a direction is seen; each leaves less than a tenth of the error.
+/// Iterations for the row in which a direction is observed; each leaves less than a tenth of the error.
 const ROW_STEPS: usize = 3;
 /// Minimum number of tracks from which the motion of lost ones is predicted.
 const MIN_TRACKS_FOR_GUESS: usize = 8;
-/// Ratio of the minimum distance below which the younger of two features is dropped.
+/// Ratio of the minimum distance below which the younger of two features is removed.
 const CROWDED_RATIO: f64 = 0.5;
 
 impl FrontEnd {
-    /// A front end for one camera, before its first image.
     pub fn new(camera: CameraModel, options: FrontEndOptions) -> Self {
         Self {
             coarse: CoarseAligner::new(camera.clone()),
@@ -129,14 +126,13 @@ impl FrontEnd {
         }
     }
 
-    /// Leaves out what a mask of the camera's size covers: no feature is detected there, and none is followed there.
+    /// Excludes the masked pixels: features are neither detected nor tracked there. The mask has the camera's size.
     #[must_use]
     pub fn with_mask(mut self, mask: Option<ImageMask>) -> Self {
         self.mask = mask;
         self
     }
 
-    /// The camera model of its images.
     pub fn camera(&self) -> &CameraModel {
         &self.camera
     }
@@ -144,10 +140,11 @@ impl FrontEnd {
     /// Processes the next image and returns its features.
     ///
     /// `predicted` is the rotation since the last processed image, as from
-    /// [`predict_camera_rotation`](super::predict_camera_rotation); it may be wrong, and is `None` without a prediction.
+    /// [`predict_camera_rotation`](super::predict_camera_rotation); it may be wrong, and is `None` without a
+    /// prediction.
     ///
     /// # Errors
-    /// When the image does not have the camera's size; the front end is then unchanged.
+    /// If the image does not have the camera's size; the front end is then unchanged.
     pub fn process(
         &mut self,
         image: &GrayImage,
@@ -207,7 +204,7 @@ impl FrontEnd {
         Ok(())
     }
 
-    /// Tracks every feature from its predicted position, then the lost ones from the motion of those found.
+    /// Tracks every feature from its predicted position, then the lost ones from the motion of the tracked ones.
     fn follow(&self, expected: Option<&UnitQuaternion<f64>>, rows: Option<&RowRotations>) -> Vec<Step> {
         let guesses: Vec<Vector2<f64>> = self
             .tracks
@@ -223,7 +220,7 @@ impl FrontEnd {
             let start = expected.copied().unwrap_or_else(UnitQuaternion::identity);
             let floor = self.options.outliers.threshold_px / self.camera.focal_length_px();
             let observed = (found.len() >= MIN_TRACKS_FOR_GUESS).then(|| outliers::fit_rotation(&found, &start, floor));
-            // When most are lost, the prediction may be wrong altogether.
+            // If most features are lost, the prediction may be wrong.
             let start_over = 2 * lost > results.len();
             for ((track, guess), result) in self.tracks.iter().zip(&guesses).zip(&mut results) {
                 let others = [
@@ -270,7 +267,7 @@ impl FrontEnd {
         })
     }
 
-    /// Pixel of a feature under a rotation of the camera alone; its previous pixel when that is out of view.
+    /// Pixel of a feature under a pure camera rotation; its previous pixel if the rotated one is out of view.
     fn rotated(&self, track: &Track, rotation: &UnitQuaternion<f64>, rows: Option<&RowRotations>) -> Vector2<f64> {
         let rotated_px = match rows {
             None => self.camera.project(&(rotation * track.bearing)),
@@ -287,7 +284,7 @@ impl FrontEnd {
         uv_px.y / self.camera.resolution_px[1] as f64
     }
 
-    /// Pixel of a direction in the camera at the middle row, in the row in which it is seen.
+    /// Pixel of `middle`, a direction in the camera at the middle row, in the row in which it is observed.
     fn at_its_row(&self, middle: &Vector3<f64>, over_readout_rad: &Vector3<f64>) -> Option<Vector2<f64>> {
         let mut uv_px = self.camera.project(middle)?;
         for _ in 0..ROW_STEPS {
@@ -297,7 +294,7 @@ impl FrontEnd {
         Some(uv_px)
     }
 
-    /// The bearings of a feature in both images, in the cameras at the middle rows where the shutter rolls.
+    /// Bearings of a feature in both images; for a rolling shutter, in the cameras at the middle rows.
     fn pair_of(&self, step: &Step, rows: Option<&RowRotations>) -> BearingPair {
         let Some(rows) = rows else { return BearingPair { previous: step.previous_bearing, now: step.bearing } };
         BearingPair {
@@ -326,7 +323,7 @@ impl FrontEnd {
         (kept.collect(), motion)
     }
 
-    /// Keeps the longest track of features that are too near to each other.
+    /// Keeps the longest of tracks that are too near to each other.
     fn thin_out(&mut self, mut steps: Vec<Step>) -> Vec<Step> {
         let [width, height] = self.camera.resolution_px;
         self.crowd.reset(width, height, CROWDED_RATIO * self.options.corners.min_distance_px);

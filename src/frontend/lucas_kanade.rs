@@ -1,6 +1,6 @@
 //! Tracking of points from one image to the next: pyramidal Lucas–Kanade.
 
-#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+#![expect(clippy::inline_always, reason = "code not inlined is not compiled for the registers of its caller")]
 
 use std::ops::Range;
 
@@ -14,18 +14,18 @@ use crate::sensors::GrayImage;
 
 /// Side of the tracked square in pixels, on every level.
 const WINDOW: usize = 21;
-/// Its columns rounded up to whole vector registers; the surplus ones weigh nothing.
+/// Columns of the window, padded to whole vector registers; the padding has zero weight.
 const LANES: usize = 24;
 /// Columns in a vector register.
 pub(super) const REGISTER: usize = 8;
-/// From the first column or row of the window to its centre.
+/// Distance of the centre from the first column or row of the window.
 const CENTRE: f32 = (WINDOW / 2) as f32;
 /// Elements from one row to the next, of the weights and of the region of the second image: with one stride for both, a sum
 /// over the window is a single loop.
 pub(super) const STRIDE: usize = 32;
 /// Rows of the region of the second image, so that the window can move within it.
 const SEARCH_HEIGHT: usize = 34;
-/// Largest first column and row of a window of which also the neighbours one and two further fit in.
+/// Largest first column and row of a window for which the neighbouring windows at one and two pixels also fit.
 const LAST_COLUMN: i32 = (STRIDE - WINDOW - 2) as i32;
 const LAST_ROW: i32 = (SEARCH_HEIGHT - WINDOW - 3) as i32;
 /// Largest weight; times 128 grey levels times the window's area it still fits into an `i32`.
@@ -65,13 +65,13 @@ impl Default for LucasKanadeOptions {
     }
 }
 
-/// The gradient of the window in the first image, with gain and offset of the brightness eliminated.
+/// Gradient of the window in the first image, with gain and offset of the brightness eliminated.
 ///
 /// With `T` the window of the first image, `g` its gradient and `J` the second image, the shift `d` satisfies
-/// `Σ g'·J(x + d) = 0`, where `g'` is `g` less its projection on `1` and `T`.
-/// That is the least-squares solution for `d`, a gain and an offset at once, the latter two eliminated, and `Σ g'·T = 0`.
-/// As `J(x + d)` is interpolated, the sum is a polynomial in the fraction of `d` whose coefficients are sums
-/// over whole pixels: iterations within one pixel cost nothing, and the sums are exact in integers.
+/// `Σ g'·J(x + d) = 0`, where `g'` is `g` minus its projection on `1` and `T`.
+/// That is the least-squares solution for `d` with gain and offset eliminated, and `Σ g'·T = 0`.
+/// As `J(x + d)` is interpolated, the sum is a polynomial in the fraction of `d` whose coefficients are sums over whole
+/// pixels: iterations within one pixel cost nothing, and the sums are exact in integers.
 #[derive(Clone, Debug)]
 struct Template {
     x: Weights,
@@ -86,9 +86,9 @@ pub(super) struct Buffers {
     template: Template,
     /// Pixels of the first image that the patch is interpolated from.
     pixels: [[f32; PATCH_WIDTH + 4]; PATCH_HEIGHT + 3],
-    /// The first image about the window.
+    /// The first image around the window.
     patch: Patch,
-    /// Its gradient; surplus columns and rows are zero.
+    /// Gradient of the window; padding columns and rows are zero.
     gradient: Gradient,
     search: Search,
 }
@@ -105,13 +105,13 @@ impl Buffers {
     }
 }
 
-/// The larger value, as a vector unit compares them.
+/// The larger value, by the comparison of vector units.
 #[inline(always)]
 pub(super) fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// A symmetric 2 × 2 matrix `[xx, xy, yy]` has this smaller eigenvalue.
+/// Smaller eigenvalue of the symmetric 2 × 2 matrix `[xx, xy, yy]`.
 #[inline(always)]
 pub(super) fn smaller_eigenvalue([xx, xy, yy]: [f32; 3]) -> f32 {
     0.5 * (xx + yy) - planar_length([0.5 * (xx - yy), xy])
@@ -154,8 +154,8 @@ const PATCH_HEIGHT: usize = WINDOW + 2;
 type Patch = [[f32; PATCH_WIDTH]; PATCH_HEIGHT];
 
 impl Buffers {
-    /// Computes the template of the window of `image` around `at`, without the pixels outside it or outside when moved to
-    /// `guess`. Returns whether enough of it remains to be tracked.
+    /// Computes the template of the window of `image` around `at`, without the pixels that are outside the image or
+    /// outside when moved to `guess`. Returns true if enough of the window remains for tracking.
     fn fill(&mut self, image: &GrayImage, at: [f32; 2], guess: [f32; 2], options: &LucasKanadeOptions) -> bool {
         Arch::new().dispatch(Filling { buffers: self, image, at, guess, options })
     }
@@ -217,7 +217,7 @@ impl NullaryFnOnce for Filling<'_> {
 /// `[gx, gy]` of a window, row by row.
 type Gradient = [[[f32; LANES]; 2]; WINDOW];
 
-/// Writes the gradient of some rows of a window, times `mask` along each, into `gradient`; the others are zero.
+/// Writes the gradient of `rows` of a window, times `mask` along each row, into `gradient`; all other entries are zero.
 ///
 /// Returns the sums over the window of `T, T², gx, gy, gx·T, gy·T`.
 #[inline(always)]
@@ -298,20 +298,20 @@ impl Template {
     }
 }
 
-/// The nearest integer of a value far below 2²²: adding 1.5·2²³ leaves it in the low bits, where vector units reach it
+/// Nearest integer of a value far below 2²²: adding 1.5·2²³ leaves it in the low bits, where vector units read it
 /// faster than through a checked conversion.
 #[inline(always)]
 fn rounded(value: f32) -> i16 {
     (value + 12_582_912.0).to_bits() as i16
 }
 
-/// The largest integer not above `value`, which must fit into an `i32`.
+/// Largest integer not above `value`, which must fit into an `i32`.
 fn floor(value: f32) -> i32 {
     let towards_zero = value as i32;
     towards_zero - i32::from(towards_zero as f32 > value)
 }
 
-/// The pixels around `at` by cubic convolution, one more on every side than the window; `pixels` is a buffer.
+/// Pixels around `at` by cubic convolution, one more on every side than the window; `pixels` is a buffer.
 #[inline(always)]
 fn interpolate(
     image: &GrayImage,
@@ -344,7 +344,7 @@ fn interpolate(
     }
 }
 
-/// The value of `Σ g'·J(x + d)` and its derivative by `d`, from its coefficients and the weights of the fraction of `d`.
+/// Value of `Σ g'·J(x + d)` and its derivative by `d`, from its coefficients and the weights of the fraction of `d`.
 fn balance<const N: usize>(
     sums: &[[[f32; 2]; N]; N],
     along: ([f32; N], [f32; N]),
@@ -363,7 +363,7 @@ fn balance<const N: usize>(
     (value, slope)
 }
 
-/// The step towards `value` = 0: Newton's, or the Gauss–Newton one where the two matrices differ too much.
+/// Step towards `value` = 0: Newton's, or the Gauss–Newton step if the two matrices differ too much.
 fn step_to_balance(value: [f32; 2], slope: [[f32; 2]; 2], [xx, xy, yy]: [f32; 3]) -> [f32; 2] {
     let determinant = xx * yy - xy * xy;
     let newton = slope[0][0] * slope[1][1] - slope[0][1] * slope[1][0];
@@ -372,17 +372,18 @@ fn step_to_balance(value: [f32; 2], slope: [[f32; 2]; 2], [xx, xy, yy]: [f32; 3]
     [-(d * value[0] - b * value[1]) / determinant, -(a * value[1] - c * value[0]) / determinant]
 }
 
-/// Largest distance of a fraction outside its pixel before the sums are recomputed; avoids oscillation at a pixel border.
+/// Largest distance of a fraction outside its pixel before the sums are recomputed; prevents oscillation at a pixel
+/// border.
 const OVERHANG_PX: f32 = 0.02;
 /// Maximum iterations within one pixel.
 const MAX_ITERATIONS: usize = 8;
 /// Longest single step, in pixels of the level.
 const LONGEST_STEP_PX: f32 = 6.0;
 
-/// The weights of `N` pixels at a fraction, and their derivatives by it.
+/// Weights of `N` pixels at a fraction, and their derivatives by the fraction.
 type Taps<const N: usize> = (fn(f32) -> [f32; N], fn(f32) -> [f32; N]);
 
-/// Iterates within one pixel; returns the fraction of `d` and whether the last step was shorter than `epsilon`.
+/// Iterates within one pixel; returns the fraction of `d`, and true if the last step was shorter than `epsilon`.
 fn settle<const N: usize>(
     sums: &[[[f32; 2]; N]; N],
     kernel: Taps<N>,
@@ -410,9 +411,9 @@ fn settle<const N: usize>(
 /// Interpolation of the second image.
 #[derive(Clone, Copy, PartialEq)]
 enum Kernel {
-    /// Linear, two pixels.
+    /// Two pixels.
     Linear,
-    /// Cubic, four pixels, for the last stage.
+    /// Four pixels, for the last stage.
     Cubic,
 }
 
@@ -432,12 +433,12 @@ impl NullaryFnOnce for Cutting<'_> {
     }
 }
 
-/// Whether a position is finite and small enough for integer pixels.
+/// True if a position is finite and small enough for integer pixels.
 fn is_sane(at: [f32; 2]) -> bool {
     at.iter().all(|t| t.abs() < 1e5)
 }
 
-/// Iterates `at` until `Σ g'·J` vanishes for the window of `image` around it; `None` when it does not converge.
+/// Iterates `at` until `Σ g'·J` vanishes for the window of `image` around it; `None` without convergence.
 fn seek(
     template: &Template,
     search: &mut Search,
@@ -446,7 +447,7 @@ fn seek(
     kernel: Kernel,
     options: &LucasKanadeOptions,
 ) -> Option<[f32; 2]> {
-    // The first pixel of the region.
+    // First pixel of the region.
     let mut origin: Option<[i32; 2]> = None;
     let epsilon = options.epsilon_px as f32;
     for _ in 0..options.max_moves {
@@ -493,7 +494,7 @@ fn seek(
 /// Tracks one point from one image to the next by pyramidal Lucas–Kanade with compensation of gain and offset.
 ///
 /// `from_px` is its position in `previous`, `guess_px` the initial one in `now`; both in pixels of the image.
-/// Returns its position in pixels, or `None` when it left the image, has no texture, or fails the forward–backward check
+/// Returns its position in pixels, or `None` if it left the image, has no texture, or fails the forward–backward check
 /// ([`LucasKanadeOptions::forward_backward_px`]).
 pub fn track(
     previous: &Pyramid,
@@ -507,10 +508,10 @@ pub fn track(
     arrive(previous, now, from_px, &near_px, options, &mut buffers)
 }
 
-/// The first stage of [`track`]: on the half-size levels, to about half a pixel.
+/// First stage of [`track`]: on the half-size levels, to about half a pixel.
 ///
 /// The window of a level is centred at the nearest whole pixel, which is assumed to move like the point.
-/// A level without texture passes the guess on; `None` only for positions that are not finite or too large.
+/// A level without texture keeps the guess; `None` only for positions that are not finite or too large.
 pub(super) fn approach(
     previous: &Pyramid,
     now: &Pyramid,
@@ -538,7 +539,7 @@ pub(super) fn approach(
     Some(Vector2::new(f64::from(guess[0]), f64::from(guess[1])))
 }
 
-/// The second stage of [`track`]: on the images themselves, and back again.
+/// Second stage of [`track`]: on the full-size images, forwards and backwards.
 pub(super) fn arrive(
     previous: &Pyramid,
     now: &Pyramid,
@@ -571,7 +572,7 @@ impl Buffers {
         seek(&self.template, &mut self.search, image, at, kernel, options)
     }
 
-    /// The last stage of [`track`], on the image itself.
+    /// Last stage of [`track`], on the full-size image.
     fn track_on_image(
         &mut self,
         previous: &GrayImage,

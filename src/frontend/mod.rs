@@ -1,10 +1,10 @@
-//! Image in, feature tracks out.
+//! Front end: images in, feature tracks out.
 //!
-//! The front end depends on the camera and a predicted rotation only, not on the estimator: all runs of a comparison use
-//! the same tracks.
+//! The front end depends on the camera and a predicted rotation only, not on the estimator: all runs of a comparison
+//! use the same tracks.
 //!
-//! [`FrontEnd`] processes images in order. It predicts features by a [`PredictedRotation`] or, when that is inconsistent with
-//! the images, by aligning coarse images, tracks them by [`lucas_kanade`], refines them against reference patches
+//! [`FrontEnd`] processes images in order. It predicts features by a [`PredictedRotation`] or, if that is inconsistent
+//! with the images, by aligning coarse images, tracks them by [`lucas_kanade`], refines them against reference patches
 //! ([`ReferenceOptions`]), rejects those that do not move with the scene ([`outliers`]), and adds new [`corners`].
 
 mod appearance;

@@ -8,16 +8,15 @@ use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 use super::prediction::PredictedRotation;
 use crate::geometry::{median, so3, tangent_basis};
 
-/// Options of outlier rejection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutlierOptions {
     /// Largest distance of an inlier from its epipolar line, in pixels at the image centre.
     pub threshold_px: f64,
-    /// Number of random pairs of features that propose a direction of translation, per stage and start.
+    /// Number of random pairs of features from which directions of translation are hypothesized, per stage and start.
     pub hypotheses: usize,
-    /// With fewer tracks none is rejected.
+    /// With fewer tracks no track is rejected.
     pub min_tracks: usize,
-    /// With a smaller ratio of inliers the model is invalid and none is rejected.
+    /// With a smaller ratio of inliers the model is invalid and no track is rejected.
     pub min_inlier_ratio: f64,
     /// Standard deviation of an inlier's track, in pixels; weights a predicted rotation against the tracks.
     pub track_sigma_px: f64,
@@ -43,9 +42,10 @@ impl Default for OutlierOptions {
 pub struct Motion {
     /// Rotation `camera_now_from_camera_previous`.
     pub rotation: UnitQuaternion<f64>,
-    /// Unit direction of the translation of points from the previous camera frame to this one, where there is parallax.
+    /// Unit direction of the translation of points from the previous camera frame to the current one; `None` without
+    /// parallax.
     pub direction: Option<Vector3<f64>>,
-    /// Whether each track is an inlier.
+    /// True for each inlier track.
     pub is_inlier: Vec<bool>,
 }
 
@@ -58,7 +58,7 @@ pub struct BearingPair {
     pub now: Vector3<f64>,
 }
 
-/// A rotation with a direction of translation, and their cost.
+/// Rotation and direction of translation with their cost.
 #[derive(Clone, Copy)]
 pub(super) struct Hypothesis {
     pub(super) rotation: UnitQuaternion<f64>,
@@ -127,13 +127,15 @@ fn choose_model(
 
 /// Distance of a pair from the epipolar geometry as an angle, to first order (Sampson's), in radians.
 ///
-/// A point in front of both cameras moves towards `direction`; for one that moves the other way the distance is its motion.
+/// A point in front of both cameras moves towards `direction`; for a point that moves the other way the distance is the
+/// length of its motion.
 pub(super) fn epipolar_distance(pair: &BearingPair, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>) -> f64 {
     let rotated = BearingPair { previous: rotation * pair.previous, now: pair.now };
     epipolar_distances(&rotated, direction)[0]
 }
 
-/// [`epipolar_distance`] of a pair whose previous bearing is rotated already, for a direction and its opposite, in radians.
+/// [`epipolar_distance`] of a pair whose previous bearing is already rotated, for a direction and its opposite, in
+/// radians.
 fn epipolar_distances(pair: &BearingPair, direction: &Vector3<f64>) -> [f64; 2] {
     let rotated = pair.previous;
     let normal = direction.cross(&rotated);
@@ -150,7 +152,8 @@ const ROTATION_ITERATIONS: usize = 12;
 
 /// Robust fit of a rotation to pairs, from an initial one that may have a large error.
 ///
-/// Weights fall with the fourth power of the residual over a scale, which shrinks with the residuals' median to `floor`.
+/// Weights decrease with the fourth power of residual over scale; the scale decreases with the median of the residuals,
+/// down to `floor`.
 pub fn fit_rotation(pairs: &[BearingPair], start: &UnitQuaternion<f64>, floor: f64) -> UnitQuaternion<f64> {
     let mut rotation = *start;
     for _ in 0..ROTATION_ITERATIONS {
@@ -182,9 +185,10 @@ const STAGES: [f64; 3] = [6.0, 2.0, 1.0];
 /// Steps of the refinement after each stage.
 const REFINEMENTS: usize = 6;
 
-/// With a smaller ratio of outliers the search ends with the first start: a motion that leaves so few is not a local minimum.
+/// With a smaller ratio of outliers the search ends with the first start: a motion with so few outliers is not a local
+/// minimum.
 const FEW_OUTLIERS_RATIO: f64 = 0.1;
-/// With a larger ratio of outliers motions with a free rotation are tried.
+/// With a larger ratio of outliers motions with a free rotation are also tried.
 const MAX_OUTLIER_RATIO: f64 = 0.3;
 /// Number of random samples of five tracks, and Gauss–Newton steps for each.
 const FULL_HYPOTHESES: usize = 60;
@@ -207,10 +211,10 @@ impl Prior {
         }
     }
 
-    /// Information (3 × 3) relative to squared track residuals over `scale`, and the error `Log(rotation·predictedᵀ)` of a
-    /// rotation in the current camera frame (3 × 1), in radians.
+    /// Information (3 × 3) relative to squared track residuals over `scale`, and the error `Log(rotation·predictedᵀ)`
+    /// of a rotation in the current camera frame (3 × 1), in radians.
     ///
-    /// Where the scale is larger than the noise of the tracks, the prior is weakened alike.
+    /// If the scale exceeds the noise of the tracks, the prior is weakened by the same factor.
     fn at(&self, rotation: &UnitQuaternion<f64>, scale: f64) -> (Matrix3<f64>, Vector3<f64>) {
         let rotation_vector = so3::log(&(rotation * self.rotation.inverse()));
         (self.information * (self.track_sigma_rad / scale).powi(2), rotation_vector)
@@ -220,18 +224,18 @@ impl Prior {
 /// Pairs that are summed between two comparisons of a cost with its limit.
 const PAIRS_BETWEEN_CHECKS: usize = 16;
 
-/// The search for a rotation and a direction of translation.
+/// Search for a rotation and a direction of translation.
 struct Search<'a> {
     pairs: &'a [BearingPair],
     prior: Prior,
     options: &'a OutlierOptions,
     dice: Dice,
-    /// The pairs with the previous bearing rotated by the current rotation.
+    /// Pairs with the previous bearing rotated by the current rotation.
     rotated: Vec<BearingPair>,
 }
 
 impl Search<'_> {
-    /// The best hypothesis from either start, or from the first one that leaves few outliers; `None` without parallax.
+    /// Best hypothesis from either start, or from the first one with few outliers; `None` without parallax.
     fn run(
         &mut self,
         predicted: &UnitQuaternion<f64>,
@@ -261,7 +265,7 @@ impl Search<'_> {
         best
     }
 
-    /// The best of many motions through five random tracks each, when no start converged.
+    /// Best of many motions through five random tracks each; used if no start converged.
     fn draw_with_rotation(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<Hypothesis> {
         let mut best: Option<Hypothesis> = None;
         for _ in 0..FULL_HYPOTHESES {
@@ -270,7 +274,7 @@ impl Search<'_> {
             let Some(direction) = normals[0].cross(&normals[1]).try_normalize(1e-14) else { continue };
             let mut trial = Hypothesis { rotation: *rotation, direction, cost: f64::INFINITY };
             for _ in 0..MINIMAL_ITERATIONS {
-                // Little damping and a scale at which all five have full weight.
+                // Little damping, and a scale at which all five tracks have full weight.
                 let barely = Matrix3::identity() * 1e-9;
                 let Some(step) = step_towards(&sample, &trial, 1.0, &barely, &Vector3::zeros()) else { break };
                 (trial.rotation, trial.direction) = step;
@@ -286,7 +290,7 @@ impl Search<'_> {
         best.map(|best| self.settle(best, threshold))
     }
 
-    /// The best of a few Gauss–Newton steps.
+    /// Best iterate of a few Gauss–Newton steps.
     fn settle(&self, start: Hypothesis, scale: f64) -> Hypothesis {
         let (mut best, mut at) = (start, start);
         for _ in 0..REFINEMENTS {
@@ -299,7 +303,7 @@ impl Search<'_> {
         best
     }
 
-    /// Proposes directions and refines the best one, at decreasing scales.
+    /// Hypothesizes directions and refines the best one, at decreasing scales.
     fn descend(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<Hypothesis> {
         let mut best = Hypothesis { rotation: *rotation, direction: Vector3::zeros(), cost: f64::INFINITY };
         for stage in STAGES {
@@ -317,7 +321,7 @@ impl Search<'_> {
         best.cost.is_finite().then_some(best)
     }
 
-    /// The best direction among those of random pairs of tracks, with a fixed rotation; `None` when no cost is below `below`.
+    /// Best direction among those of random pairs of tracks, with a fixed rotation; `None` if no cost is below `below`.
     fn draw(&mut self, rotation: &UnitQuaternion<f64>, scale: f64, mut below: f64) -> Option<Hypothesis> {
         self.rotated.clear();
         self.rotated
@@ -341,10 +345,10 @@ impl Search<'_> {
         best
     }
 
-    /// Costs of a direction and of the opposite one with the rotated pairs: the sum of squared distances, each over `scale`
-    /// and no larger than one, plus the cost of the prior, `pull`.
+    /// Costs of a direction and of the opposite one with the rotated pairs: the sum of squared distances, each over
+    /// `scale` and no larger than one, plus `pull`, the cost of the prior.
     ///
-    /// Sums only until both costs reach `limit`; costs below it are complete.
+    /// The sum ends early when both costs reach `limit`; costs below it are complete.
     fn costs(&self, direction: &Vector3<f64>, scale: f64, pull: f64, limit: f64) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for pairs in self.rotated.chunks(PAIRS_BETWEEN_CHECKS) {
@@ -363,7 +367,7 @@ impl Search<'_> {
 
     /// Sum of squared distances over `scale`, each truncated at one, plus the cost of the prior.
     ///
-    /// Sums only until the cost reaches `limit`; a cost below it is complete.
+    /// The sum ends early when the cost reaches `limit`; a cost below it is complete.
     fn cost(&self, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>, scale: f64, limit: f64) -> f64 {
         let pull = self.prior_cost(rotation, scale);
         let mut sum = 0.0;
@@ -385,8 +389,8 @@ impl Search<'_> {
         rotation_vector.dot(&(information * rotation_vector))
     }
 
-    /// One Gauss–Newton step on rotation and direction, with weights that reject outliers; its cost as [`Self::cost`] with this
-    /// limit.
+    /// One Gauss–Newton step on rotation and direction, with weights that reject outliers; its cost is that of
+    /// [`Self::cost`] with this limit.
     fn refine(&self, at: &Hypothesis, scale: f64, limit: f64) -> Option<Hypothesis> {
         let (information, rotation_error) = self.prior.at(&at.rotation, scale);
         let (rotation, direction) = step_towards(self.pairs, at, scale, &information, &rotation_error)?;
@@ -437,7 +441,7 @@ pub(super) fn step_towards(
     let mut top = right.fixed_rows_mut::<3>(0);
     top -= previous_from_now * (prior * rotation_error);
     for k in 0..5 {
-        // Without parallax the direction is unobservable, and without a prior the rotation about a single track.
+        // Without parallax the direction is unobservable; without a prior, so is the rotation about a single track.
         normal[(k, k)] += MIN_INFORMATION;
     }
     let step = normal.cholesky()?.solve(&right);
@@ -447,7 +451,7 @@ pub(super) fn step_towards(
     Some((rotation, direction))
 }
 
-/// A small random number generator (xorshift64*), the same everywhere.
+/// Small random number generator (xorshift64*), equal on all platforms.
 struct Dice(u64);
 
 impl Dice {

@@ -7,22 +7,22 @@ use crate::sensors::ImuSample;
 /// Predicted rotation of a camera between two images, with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PredictedRotation {
-    /// `camera_now_from_camera_previous`, between the middle rows where the camera has a rolling shutter.
+    /// `camera_now_from_camera_previous`; for a rolling shutter, between the middle rows.
     pub rotation: UnitQuaternion<f64>,
-    /// How the camera rotates while it reads each of the images, `None` for a global shutter.
+    /// Rotation of the camera during the readout of both images; `None` for a global shutter.
     pub rows: Option<RowRotations>,
-    /// Covariance (3 × 3, rad²) of its error `δ` in the current camera frame, true rotation = `Exp(δ)·rotation`.
+    /// Covariance (3 × 3, rad²) of the error `δ` in the current camera frame, true rotation = `Exp(δ)·rotation`.
     pub covariance_rad2: Matrix3<f64>,
 }
 
 impl PredictedRotation {
-    /// A prediction with the same standard deviation about every axis.
+    /// Prediction with the same standard deviation about every axis.
     pub fn isotropic(rotation: UnitQuaternion<f64>, sigma_rad: f64) -> Self {
         Self { rotation, rows: None, covariance_rad2: Matrix3::identity() * sigma_rad.powi(2) }
     }
 
-    /// The same prediction, made for the first rows, for the middle rows of a camera with this readout that rotates at these
-    /// rates (rad/s, camera frame) during the previous image and this one.
+    /// Converts a prediction between the first rows to one between the middle rows of a camera with this readout; the
+    /// rates (rad/s, camera frame) are those during the previous and the current image.
     #[must_use]
     pub fn with_readout(self, readout_s: f64, rates_rad_per_s: [Vector3<f64>; 2]) -> Self {
         if readout_s == 0.0 {
@@ -45,29 +45,29 @@ impl PredictedRotation {
     }
 }
 
-/// How a camera with a rolling shutter rotates while it reads two images: rotation vectors over the whole readout, in the
-/// camera frame.
+/// Rotation vectors of a rolling-shutter camera over the readout of two images, in the camera frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RowRotations {
     /// During the previous image.
     pub previous_rad: Vector3<f64>,
-    /// During the current one.
+    /// During the current image.
     pub now_rad: Vector3<f64>,
 }
 
 impl RowRotations {
-    /// A direction in the camera at a row of an image (as a ratio of its height), in the camera at the middle row.
+    /// Transforms a direction from the camera at a row (as a ratio of the image height) to the camera at the middle
+    /// row.
     pub(super) fn to_middle(over_readout_rad: &Vector3<f64>, row: f64, bearing: &Vector3<f64>) -> Vector3<f64> {
         so3::exp(&(over_readout_rad * (row - 0.5))) * bearing
     }
 
-    /// A direction in the camera at the middle row, in the camera at a row.
+    /// Transforms a direction from the camera at the middle row to the camera at a row.
     pub(super) fn from_middle(over_readout_rad: &Vector3<f64>, row: f64, bearing: &Vector3<f64>) -> Vector3<f64> {
         so3::exp(&(over_readout_rad * (0.5 - row))) * bearing
     }
 }
 
-/// Lower bound of a prediction's standard deviation, a tenth of a pixel or less.
+/// Lower bound of a prediction's standard deviation: a tenth of a pixel or less.
 const MIN_SIGMA_RAD: f64 = 2e-4;
 
 /// Standard deviations, per axis, of the inputs of a predicted rotation.
@@ -84,11 +84,11 @@ pub struct PredictionNoise {
 /// Orientations of base, joints, end effector and camera relative to the IMU at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainOrientation {
-    /// `imu_from_frame` of the base, of the frame after each joint, and last of the camera: N + 2 of them.
+    /// `imu_from_frame` of the base, of the frame after each joint, and of the camera: N + 2 rotations.
     imu_from_frame: Vec<UnitQuaternion<f64>>,
     /// Standard deviations of the joint angles, in radians.
     joint_sigmas_rad: Vec<f64>,
-    /// Angular rates of the joints in rad/s; those that are not known are missing.
+    /// Angular rates of the joints in rad/s; empty if unknown.
     joint_rates_rad_per_s: Vec<f64>,
 }
 
@@ -96,7 +96,7 @@ impl ChainOrientation {
     /// Orientations of a chain at joint angles with their standard deviations; a chain without links is a rigid camera.
     ///
     /// # Panics
-    /// When the number of angles or of standard deviations is not the number of joints.
+    /// If the number of angles or of standard deviations differs from the number of joints.
     pub fn new(chain: &ClassicalChain, joint_angles_rad: &[f64], joint_sigmas_rad: &[f64]) -> Self {
         assert_eq!(joint_sigmas_rad.len(), chain.joint_count(), "one standard deviation per joint");
         let frames = chain.frames_in_imu(joint_angles_rad);
@@ -107,25 +107,25 @@ impl ChainOrientation {
         }
     }
 
-    /// The same orientations of joints that move at these rates.
+    /// Adds the angular rates of the joints.
     #[must_use]
     pub fn with_joint_rates(self, joint_rates_rad_per_s: &[f64]) -> Self {
         Self { joint_rates_rad_per_s: joint_rates_rad_per_s.to_vec(), ..self }
     }
 
-    /// Angular velocity of the camera in its own frame, in rad/s, when the IMU has this one.
+    /// Angular velocity of the camera in its own frame, in rad/s, for this angular velocity of the IMU.
     fn camera_rate(&self, imu_rad_per_s: &Vector3<f64>) -> Vector3<f64> {
         let joints = self.imu_from_frame.iter().zip(&self.joint_rates_rad_per_s);
         let of_joints: Vector3<f64> = joints.map(|(frame, rate)| frame * (Vector3::z() * *rate)).sum();
         self.imu_from_camera().inverse() * (imu_rad_per_s + of_joints)
     }
 
-    /// Orientation `imu_from_camera`.
     fn imu_from_camera(&self) -> UnitQuaternion<f64> {
         self.imu_from_frame.last().copied().unwrap_or_else(UnitQuaternion::identity)
     }
 
-    /// Rotation vector of the camera by an error of one standard deviation in each joint, in the camera frame, in radians.
+    /// Rotation vector of the camera due to an error of one standard deviation in each joint, in the camera frame, in
+    /// radians.
     fn joint_errors_in_camera(&self) -> impl Iterator<Item = Vector3<f64>> {
         let camera_from_imu = self.imu_from_camera().inverse();
         // Each joint rotates about the z axis of the frame before it.
@@ -134,15 +134,16 @@ impl ChainOrientation {
     }
 }
 
-/// Predicts the rotation of a camera between two images, from the gyroscope and the orientation on the IMU at both images.
+/// Predicts the rotation of a camera between two images, from the gyroscope and the orientation on the IMU at both
+/// images.
 ///
-/// `imu` goes from the previous image's stamp to this one's (see `SensorFrame::imu` of the flight log); the
+/// `imu` goes from the previous image's stamp to the current one's (see `SensorFrame::imu` of the flight log); the
 /// angular velocity is interpolated linearly.
-/// `gyroscope_bias_rad_per_s` is subtracted; zero when it is unknown.
-/// The covariance consists of gyroscope bias and noise, joint angles at both images, and the error of the chain, of which
-/// only the change between the images counts: `Rᵀ_now·(G·F_previous − F_now)` for a frame `F` of the chain and the
-/// rotation `G` of the IMU.
-/// Returns `None` with fewer than two samples, when stamps do not increase, or when a value is not finite.
+/// `gyroscope_bias_rad_per_s` is subtracted; zero if unknown.
+/// The covariance consists of gyroscope bias and noise, joint angles at both images, and the error of the chain, of
+/// which only the change between the images counts: `Rᵀ_now·(G·F_previous − F_now)` for a frame `F` of the chain and
+/// the rotation `G` of the IMU.
+/// Returns `None` with fewer than two samples, if stamps do not increase, or if a value is not finite.
 pub fn predict_camera_rotation(
     imu: &[ImuSample],
     gyroscope_bias_rad_per_s: &Vector3<f64>,
@@ -187,10 +188,10 @@ pub fn predict_camera_rotation(
     finite.then_some(PredictedRotation { rotation, rows: None, covariance_rad2 })
 }
 
-/// Angular velocities of the camera in its own frame (rad/s) while it reads the previous image and this one, for
-/// [`PredictedRotation::with_readout`]: the mean of the gyroscope over `readout_s` after the previous stamp and before this one
-/// (the rows of this image come after the samples), with the rates of the joints; arguments as in
-/// [`predict_camera_rotation`].
+/// Angular velocities of the camera in its own frame (rad/s) during the readout of the previous and the current image,
+/// for [`PredictedRotation::with_readout`]: the mean of the gyroscope over `readout_s` after the previous stamp and
+/// before the current one (the rows of the current image come after the samples), with the rates of the joints.
+/// Arguments as in [`predict_camera_rotation`].
 pub fn camera_rates(
     imu: &[ImuSample],
     gyroscope_bias_rad_per_s: &Vector3<f64>,

@@ -1,15 +1,15 @@
-//! Sums of products over a window, for its place and the neighbouring ones to the right, below and both at once.
+//! Sums of products over a window at its position and at the neighbours to the right, below and diagonally.
 
 use super::lucas_kanade::{STRIDE, Weights};
 
-/// The pixels from the first one of a window to the last one of its neighbours.
+/// Pixels from the first one of a window to the last one of its neighbours.
 pub(super) type Pixels = [i16; STRIDE * WINDOW_ROWS + STRIDE + 1];
 const WINDOW_ROWS: usize = size_of::<Weights>() / size_of::<i16>() / STRIDE;
 
-/// From the first pixel of the window to those of the four places.
+/// Offsets of the first pixels of the four positions from the first pixel of the window.
 const OFFSETS: [usize; 4] = [0, 1, STRIDE, STRIDE + 1];
 
-/// Adds up the products of both weights with the pixels at each of the four places: `[[x, y]; 4]`, row by row.
+/// Sums of the products of both weights with the pixels at each of the four positions: `[[x, y]; 4]`, row by row.
 pub(super) fn sums_of_products(weights: [&Weights; 2], pixels: &Pixels) -> [[i32; 2]; 4] {
     #[cfg(target_arch = "x86_64")]
     if let Some(simd) = pulp::x86::V3::try_new() {
@@ -18,7 +18,7 @@ pub(super) fn sums_of_products(weights: [&Weights; 2], pixels: &Pixels) -> [[i32
     OFFSETS.map(|offset| weights.map(|weights| dot(weights, &pixels[offset..])))
 }
 
-/// A sum of products.
+/// Sum of products.
 ///
 /// A separate function over eight partial sums, which the compiler vectorizes.
 #[inline(never)]
@@ -32,8 +32,8 @@ pub(super) fn dot(weights: &Weights, pixels: &[i16]) -> i32 {
     sums.iter().sum()
 }
 
-/// [`sums_of_products`] with AVX2, which multiplies 16 pairs and adds up neighbours in one instruction; compilers do not find
-/// it by themselves in registers of this width.
+/// [`sums_of_products`] with AVX2, which multiplies 16 pairs and adds up neighbours in one instruction; compilers do
+/// not generate it for registers of this width.
 #[cfg(target_arch = "x86_64")]
 struct PairedProducts<'a> {
     simd: pulp::x86::V3,

@@ -1,11 +1,11 @@
-#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+#![expect(clippy::inline_always, reason = "code not inlined is not compiled for the registers of its caller")]
 
 use crate::sensors::GrayImage;
 
-/// Mirrored pixels that the smoothing needs on either side.
+/// Mirrored pixels that the smoothing needs on each side.
 const FILTER_RADIUS: usize = 2;
 
-/// An image and its half-size levels, each smoothed by the binomial filter `1 4 6 4 1` before every second pixel is kept.
+/// Image and its half-size levels, each smoothed by the binomial filter `1 4 6 4 1` before every second pixel is kept.
 ///
 /// Pixel `(x, y)` of level `l` is pixel `(2ˡ·x, 2ˡ·y)` of the image.
 /// Beyond its borders an image is mirrored about the outermost pixels (reflect-101), both in the smoothing and in the
@@ -14,7 +14,7 @@ const FILTER_RADIUS: usize = 2;
 #[derive(Clone, Debug, Default)]
 pub struct Pyramid {
     levels: Vec<GrayImage>,
-    /// One row of column sums with mirrored pixels on either side.
+    /// One row of column sums with mirrored pixels on each side.
     column_sums: Vec<u16>,
 }
 
@@ -22,7 +22,7 @@ impl Pyramid {
     /// Minimum side of a level, in pixels; smaller ones cannot be tracked.
     pub const SMALLEST_LEVEL_PX: usize = 16;
 
-    /// Builds up to `levels` levels of an image, the image itself first; fewer when it is too small for all.
+    /// Builds up to `levels` levels of an image, the image itself first; fewer if it is too small for all.
     pub fn build(&mut self, image: &GrayImage, levels: usize) {
         let (mut width, mut height) = (image.width, image.height);
         let mut count = 0;
@@ -50,7 +50,7 @@ impl Pyramid {
     }
 }
 
-/// Index of the pixel at `index` of a line of `count` pixels that is mirrored about its ends.
+/// Index of the pixel at `index` of a line of `count` pixels, mirrored about its ends.
 pub(super) fn mirrored(index: i32, count: usize) -> usize {
     let last = count as i32 - 1;
     let from_the_left = index.abs();
@@ -58,7 +58,7 @@ pub(super) fn mirrored(index: i32, count: usize) -> usize {
     from_the_right.clamp(0, last) as usize
 }
 
-/// Copies the pixels from `first` (column, row) on, which may be outside the image.
+/// Copies the pixels starting at `first` (column, row), which may be outside the image.
 #[inline(always)]
 pub(super) fn cut_out<T, const WIDTH: usize>(
     image: &GrayImage,
@@ -97,7 +97,7 @@ pub(super) fn cut_out<T, const WIDTH: usize>(
 /// Smooths `source` and keeps every second pixel of every second row.
 fn halve(source: &GrayImage, target: &mut GrayImage, column_sums: &mut Vec<u16>) {
     let width = source.width;
-    // One pixel more on the right, so that an odd width still gives whole pairs.
+    // One more pixel on the right, so that an odd width also forms whole pairs.
     column_sums.resize(width + 2 * FILTER_RADIUS + 1, 0);
     let row = |y: i32| &source.pixels[mirrored(y, source.height) * width..][..width];
     for (target_y, target_row) in target.pixels.chunks_exact_mut(target.width).enumerate() {
@@ -115,7 +115,7 @@ fn halve(source: &GrayImage, target: &mut GrayImage, column_sums: &mut Vec<u16>)
         let (pairs, _) = column_sums.as_chunks::<2>();
         for (pixel, taps) in target_row.iter_mut().zip(pairs.windows(3)) {
             let [[far_left, left], [middle, right], [far_right, _]] = *taps else { continue };
-            // At most 16 · 16 · 255 + 128, which fits into a u16.
+            // At most 16 · 16 · 255 + 128: fits into a u16.
             *pixel = ((far_left + far_right + 4 * (left + right) + 6 * middle + 128) >> 8) as u8;
         }
     }

@@ -1,9 +1,9 @@
-//! The reference patch of a feature: its window in one image, matched in later ones.
+//! Reference patch of a feature: its window in one image, matched in later ones.
 //!
-//! Tracking from image to image accumulates the errors of all steps. The tracked position is therefore refined against the
-//! reference patch under an affine warp with a gain and an offset (Shi and Tomasi, "Good features to track"; inverse
-//! compositional as in Baker and Matthews).
-//! When the patch does not match any more, or leaves the image, the feature gets a new reference from the previous image: one
+//! Tracking from image to image accumulates the errors of all steps. The tracked position is therefore refined against
+//! the reference patch under an affine warp with a gain and an offset (Shi and Tomasi, "Good features to track";
+//! inverse compositional as in Baker and Matthews).
+//! If the patch no longer matches, or leaves the image, the feature gets a new reference from the previous image: one
 //! match adds much less error than a step from image to image by a translation alone.
 
 use std::sync::Arc;
@@ -18,15 +18,15 @@ use crate::sensors::GrayImage;
 /// Side of the window in pixels.
 pub(super) const WINDOW: usize = 21;
 pub(super) const CENTRE: usize = WINDOW / 2;
-/// Pixels around the window that its gradient needs.
+/// Pixels around the window for its gradient.
 pub(super) const MARGIN: usize = 2;
-/// Side of the window with these.
+/// Side of the window with this margin.
 pub(super) const SIDE: usize = WINDOW + 2 * MARGIN;
-/// From the image's first column or row to the middle of the first window that can be resampled, in pixels.
+/// Distance from the image's first column or row to the centre of the first window that can be resampled, in pixels.
 const NEAR_BORDER: f64 = (CENTRE + BORDER[0]) as f64;
-/// From the middle of the last window that can be resampled to the image's last column or row, in pixels.
+/// Distance from the centre of the last window that can be resampled to the image's last column or row, in pixels.
 const FAR_BORDER: f64 = (CENTRE + BORDER[1]) as f64;
-/// Columns rounded up to whole vector registers; the surplus ones weigh nothing.
+/// Columns of the window, padded to whole vector registers; the padding has zero weight.
 pub(super) const LANES: usize = 24;
 
 /// Options of the refinement against reference patches.
@@ -36,7 +36,6 @@ pub struct ReferenceOptions {
     pub min_correlation: f64,
     /// Largest distance from the tracked position, in pixels.
     pub max_correction_px: f64,
-    /// Maximum number of steps.
     pub max_steps: usize,
     /// Largest change of the window's area, as a factor; beyond, the reference is replaced.
     pub max_area_change: f64,
@@ -48,17 +47,17 @@ impl Default for ReferenceOptions {
     }
 }
 
-/// Pixels by which the window of a feature near the border is moved further inside than it must be, so that it serves for more
-/// than one image.
+/// Additional distance by which the window of a feature near the border is moved inwards, in pixels, so that it can be
+/// used for more than one image.
 const RESERVE_PX: f64 = 3.0;
 
 /// Window of a feature, at its first observation or a later one.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ReferencePatch {
     appearance: Arc<Appearance>,
-    /// From the window's centre, a whole pixel, to the feature.
+    /// Offset of the feature from the window's centre, a whole pixel.
     offset_px: Vector2<f64>,
-    /// Maps offsets in the reference to offsets in the newest image.
+    /// Map from offsets in the reference to offsets in the newest image.
     warp: Matrix2<f64>,
 }
 
@@ -66,10 +65,10 @@ pub(super) struct ReferencePatch {
 pub(super) type Rows = [[f32; LANES]; WINDOW];
 
 impl ReferencePatch {
-    /// The window about a feature that moves by about `motion_px` to the image in which it is matched.
+    /// Window around a feature that moves by about `motion_px` to the image in which it is matched.
     ///
-    /// Near the border the feature is not in the window's middle: the window is moved to where it is inside both images. `None`
-    /// when the feature is then outside of it, or the window has no texture.
+    /// Near the border the feature is not in the centre: the window is moved until it is inside both images. `None` if
+    /// the feature is then outside the window, or the window has no texture.
     pub(super) fn cut(image: &GrayImage, uv_px: &Vector2<f64>, motion_px: &Vector2<f64>) -> Option<Self> {
         let mut middle = uv_px.map(f64::round);
         for (axis, count) in [image.width, image.height].into_iter().enumerate() {
@@ -91,8 +90,8 @@ impl ReferencePatch {
         Some(Self { appearance: Arc::new(appearance), offset_px: uv_px - middle, warp: Matrix2::identity() })
     }
 
-    /// Matches the reference around a tracked position and returns that of the feature, in pixels; `None` where the image does
-    /// not match, or part of the window is outside of it. A match keeps the warp for the next image.
+    /// Matches the reference around a tracked position and returns the position of the feature in pixels; `None` if the
+    /// image does not match, or part of the window is outside it. A match keeps the warp for the next image.
     pub(super) fn find(
         &mut self,
         image: &GrayImage,
@@ -137,7 +136,7 @@ impl ReferencePatch {
 #[derive(Clone, Debug)]
 pub(super) struct ReferenceSearch {
     patch: Patch,
-    /// Surplus columns are zero.
+    /// Padding columns are zero.
     window: Rows,
 }
 
@@ -147,6 +146,6 @@ impl ReferenceSearch {
     }
 }
 
-/// A step shorter than this ends the refinement, in pixels. The next ones would be a fraction of it, below the error of
-/// a match, which is 0.04 px in the median.
+/// Length of a step that ends the refinement, in pixels. Further steps would be shorter than the error of a match,
+/// which is 0.04 px in the median.
 const SHORT_STEP_PX: f64 = 0.03;

@@ -1,6 +1,6 @@
 //! Resampling of an image at the pixels of an affinely warped window.
 
-#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+#![expect(clippy::inline_always, reason = "code not inlined is not compiled for the registers of its caller")]
 
 use nalgebra::{Matrix2, Vector2};
 use pulp::{Arch, NullaryFnOnce};
@@ -8,20 +8,20 @@ use pulp::{Arch, NullaryFnOnce};
 use super::reference::{CENTRE, LANES, Rows, WINDOW};
 use crate::sensors::GrayImage;
 
-/// Elements from one row of a patch to the next, and its rows: enough for a window of twice the area at any rotation.
+/// Row stride of a patch, and its number of rows: enough for a window of twice the area at any rotation.
 const STRIDE: usize = 64;
 const HEIGHT: usize = 64;
 /// Additional pixels on every side, so that a window can move.
 const MARGIN: usize = 2;
 
-/// Pixels that a resampled window keeps from the image's first column and row, and from one past its last ones: the four pixels
-/// about a point reach from one before it to two after it, and it may be rounded up.
+/// Smallest distance of the pixels of a resampled window from the image's first column and row, and from one past its
+/// last ones: interpolation uses one pixel before a point to two after it, and the point may be rounded up.
 pub(super) const BORDER: [usize; 2] = [1, 3];
 
-/// Steps of a pixel between which the weights are the same.
+/// Number of steps per pixel for which the weights are tabulated.
 const FRACTIONS: usize = 128;
 
-/// Weights of the four pixels about a point, by Keys' cubic convolution, at fractions of a pixel.
+/// Weights of the four pixels around a point, by Keys' cubic convolution, at fractions of a pixel.
 static CUBIC: [[f32; 4]; FRACTIONS] = cubic_table();
 
 const fn cubic_table() -> [[f32; 4]; FRACTIONS] {
@@ -40,14 +40,14 @@ const fn cubic_table() -> [[f32; 4]; FRACTIONS] {
     table
 }
 
-/// A region of an image in floating point, from which windows are resampled.
+/// Region of an image in floating point, from which windows are resampled.
 #[derive(Clone, Debug)]
 pub(super) struct Patch {
     /// Row by row, padded after the last one, so that the four rows around any pixel exist.
     pixels: Box<[f32; STRIDE * HEIGHT + SURPLUS]>,
-    /// Column and row of its first pixel in the image.
+    /// Column and row of the first pixel in the image.
     first: [usize; 2],
-    /// Its columns and rows.
+    /// Numbers of columns and rows.
     size: [usize; 2],
 }
 
@@ -59,15 +59,14 @@ impl Patch {
         Self { pixels: Box::new([0.0; STRIDE * HEIGHT + SURPLUS]), first: [0; 2], size: [0; 2] }
     }
 
-    /// Discards the image.
     pub(super) fn clear(&mut self) {
         self.size = [0; 2];
     }
 
-    /// Reads the image at `middle + warp·step` for every step of the window, less `level`.
+    /// Reads the image at `middle + warp·step` for every step of the window, minus `level`.
     ///
-    /// Returns whether all of that is inside the image and fits into a patch.
-    /// `image` is the same until the patch is [cleared](Self::clear).
+    /// Returns true if all these positions are inside the image and fit into a patch.
+    /// `image` must be the same until the patch is [cleared](Self::clear).
     pub(super) fn read(
         &mut self,
         image: &GrayImage,
@@ -102,7 +101,7 @@ impl Patch {
         (0..2).all(|k| needed[k][0] >= self.first[k] && needed[k][1] < self.first[k] + self.size[k])
     }
 
-    /// Copies the needed region with the margin; returns whether it fits.
+    /// Copies the needed region with the margin; returns true if it fits.
     fn cut_out(&mut self, image: &GrayImage, needed: [[usize; 2]; 2]) -> bool {
         let counts = [image.width, image.height];
         for k in 0..2 {
@@ -124,7 +123,7 @@ impl Patch {
         let unit = FRACTIONS as f64;
         let corner = Vector2::new(self.first[0] as f64, self.first[1] as f64);
         let step = [warp[(0, 0)], warp[(1, 0)]].map(|step| (step * unit) as f32);
-        // Written anew for each row.
+        // Overwritten for each row.
         let mut places = [[0; LANES]; 3];
         let mut products = [[0.0_f32; 4]; LANES];
         for (row, line) in window.iter_mut().enumerate() {
@@ -138,7 +137,7 @@ impl Patch {
                 places[2][c] = y % FRACTIONS as u32;
             }
             for (c, products) in products[..WINDOW].iter_mut().enumerate() {
-                // One row and one column before the pixel; the remainder tells the compiler that it lies within.
+                // One row and one column before the pixel; the remainder removes the bounds check.
                 let first = (places[0][c] as usize).wrapping_sub(STRIDE + 1) % (STRIDE * HEIGHT);
                 let (along, down) = (&CUBIC[places[1][c] as usize], &CUBIC[places[2][c] as usize]);
                 let taps = &self.pixels[first..first + SURPLUS];
@@ -179,8 +178,8 @@ impl NullaryFnOnce for Cutting<'_> {
     }
 }
 
-/// The nearest integer of a value from 0 to 2²²: adding 1.5·2²³ leaves it in the low bits, where vector units reach it faster
-/// than through a checked conversion.
+/// Nearest integer of a value from 0 to 2²²: adding 1.5·2²³ leaves it in the low bits, where vector units read it
+/// faster than through a checked conversion.
 fn rounded(value: f32) -> u32 {
     (value + 12_582_912.0).to_bits() & 0x003f_ffff
 }

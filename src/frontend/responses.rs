@@ -1,6 +1,6 @@
-//! Corner response of the pixels of a tile: the smaller eigenvalue of the mean structure tensor around each.
+//! Corner response of the pixels of a tile: the smaller eigenvalue of the mean structure tensor around each pixel.
 
-#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+#![expect(clippy::inline_always, reason = "code not inlined is not compiled for the registers of its caller")]
 #![expect(clippy::needless_bitwise_bool, reason = "without branches, many pixels are compared at once")]
 
 use nalgebra::Vector2;
@@ -12,29 +12,29 @@ use crate::sensors::GrayImage;
 
 /// Side of a tile, in pixels.
 pub(super) const TILE: usize = 32;
-/// The structure tensor is the mean over a square that reaches this far about a pixel.
+/// Radius of the square over which the structure tensor is averaged.
 const BLOCK_RADIUS: usize = 2;
 const BLOCK: usize = 2 * BLOCK_RADIUS + 1;
-/// Scharr's weights add up to 32, and the mean is over the block.
+/// Scale of the tensor: Scharr's weights add up to 32, and the mean is over the block.
 const UNIT: f32 = 1.0 / (32.0 * 32.0 * (BLOCK * BLOCK) as f32);
-/// Eigenvalues are needed one pixel beyond the tile, to decide whether a pixel at its border is a maximum.
+/// Side of the region with eigenvalues: one pixel beyond the tile decides if a pixel at its border is a maximum.
 const RESPONSES: usize = TILE + 2;
 const GRADIENTS: usize = RESPONSES + 2 * BLOCK_RADIUS;
 const PIXELS: usize = GRADIENTS + 2;
-/// Columns rounded up to whole vector registers; the surplus ones are computed and not used.
+/// Columns padded to whole vector registers; the padding is computed and not used.
 const RESPONSE_LANES: usize = 40;
 const GRADIENT_LANES: usize = 48;
 const PIXEL_LANES: usize = GRADIENT_LANES + 2;
 
-/// The smaller eigenvalues of a tile and one pixel around it, and their local maxima.
+/// Smaller eigenvalues of a tile and of one pixel around it, and their local maxima.
 #[derive(Clone, Debug)]
 pub(super) struct Responses {
     values: Box<[[f32; RESPONSE_LANES]; RESPONSES]>,
-    /// The maxima, row by row.
+    /// Maxima, row by row.
     peaks: Vec<Peak>,
 }
 
-/// A pixel whose response is larger than those around it.
+/// Pixel with a larger response than its neighbours.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Peak {
     /// Column and row in the tile.
@@ -49,18 +49,18 @@ impl Default for Responses {
 }
 
 impl Responses {
-    /// Computes the tile of `image` at `first` (column, row); responses below `min_response` are no peaks.
+    /// Computes the tile of `image` at `first` (column, row); responses below `min_response` are not peaks.
     pub(super) fn compute(&mut self, image: &GrayImage, first: [usize; 2], min_response: f32) {
         let first = first.map(|t| t as i32 - (BLOCK_RADIUS + 2) as i32);
         Arch::new().dispatch(Computation { image, first, min_response, responses: self });
     }
 
-    /// The peaks among the tile's first columns and rows, row by row.
+    /// Peaks among the first `width` columns and `height` rows of the tile, row by row.
     pub(super) fn peaks(&self, width: usize, height: usize) -> impl Iterator<Item = Peak> {
         self.peaks.iter().copied().filter(move |peak| peak.pixel[0] < width && peak.pixel[1] < height)
     }
 
-    /// From a peak's pixel to the top of the parabolas through it and its neighbours, in pixels.
+    /// Offset from a peak's pixel to the maximum of the parabolas through it and its neighbours, in pixels.
     pub(super) fn peak_shift(&self, peak: &Peak) -> Vector2<f64> {
         let [x, y] = peak.pixel.map(|t| t + 1);
         let top = |before: f32, here: f32, after: f32| {
@@ -73,7 +73,7 @@ impl Responses {
     }
 }
 
-/// Filling [`Responses`], compiled for every width of vector registers.
+/// Computation of [`Responses`], compiled for every width of vector registers.
 struct Computation<'a> {
     image: &'a GrayImage,
     /// Column and row of the first pixel whose gradient is needed, less one.
@@ -97,7 +97,7 @@ impl NullaryFnOnce for Computation<'_> {
             let (above, row, below) = (&values[y], &values[y + 1], &values[y + 2]);
             for x in 0..TILE {
                 let here = row[x + 1];
-                // Of equal neighbours the first one counts.
+                // Of equal neighbours the first one is the maximum.
                 let before = larger(larger(above[x], above[x + 1]), larger(above[x + 2], row[x]));
                 let after = larger(larger(below[x], below[x + 1]), larger(below[x + 2], row[x + 2]));
                 highest[x] = if (here > before) & (here >= after) { here } else { f32::NEG_INFINITY };

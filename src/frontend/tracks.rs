@@ -4,11 +4,11 @@ use nalgebra::{Vector2, Vector3};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FeatureId(pub u64);
 
-/// Distance of the ids of two cameras, more than the features of one.
+/// Offset between the ids of two cameras, larger than the number of features of one.
 const IDS_PER_CAMERA: u64 = 1_000_000_000;
 
 impl FeatureId {
-    /// The id made unique among cameras: `id + 10⁹·camera`.
+    /// Id that is unique among cameras: `id + 10⁹·camera`.
     pub fn of_camera(self, camera: usize) -> Self {
         Self(self.0 + camera as u64 * IDS_PER_CAMERA)
     }
@@ -19,10 +19,9 @@ impl FeatureId {
     }
 }
 
-/// One feature in one image.
+/// Observation of one feature in one image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackedFeature {
-    /// Its identity.
     pub id: FeatureId,
     /// Number of consecutive images before this one with an observation; 0 for a new feature.
     pub age: u32,
@@ -34,16 +33,14 @@ pub struct TrackedFeature {
     pub bearing: Vector3<f64>,
 }
 
-/// Counts and motion of one image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrontEndStatistics {
     /// Features tracked from the previous image and kept.
     pub tracked: usize,
-    /// New features.
     pub detected: usize,
-    /// Lost by the Lucas–Kanade tracker or its forward–backward check.
+    /// Number lost by the Lucas–Kanade tracker or its forward–backward check.
     pub lost: usize,
-    /// Rejected as geometric outliers.
+    /// Number rejected as geometric outliers.
     pub rejected: usize,
     /// Mean parallax of the tracked features to the previous image, camera rotation removed, in pixels.
     pub mean_parallax_px: f64,
@@ -56,8 +53,7 @@ pub struct FrontEndStatistics {
 pub struct TrackedFrame {
     /// Header stamp of the image since the log began.
     pub stamp_ns: i64,
-    /// The features, ordered by id.
+    /// Ordered by id.
     pub features: Vec<TrackedFeature>,
-    /// Counts and motion.
     pub statistics: FrontEndStatistics,
 }

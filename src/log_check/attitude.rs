@@ -1,4 +1,4 @@
-//! The gimbal's attitude over a whole log, for a rig that names one in place of joint angles.
+//! Gimbal attitudes of a whole log, for a rig that names an attitude in place of joint angles.
 
 use nalgebra::UnitQuaternion;
 
@@ -16,39 +16,38 @@ use crate::flight_log::{FlightLog, LogError};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::{AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig};
 
-/// Attitudes further apart are not interpolated.
+/// Attitudes farther apart are not interpolated.
 const MAX_GAP_NS: i64 = 300_000_000;
 
-/// The gimbal's attitude and the vehicle's, as they are recorded.
+/// Attitudes of gimbal and vehicle as recorded.
 #[derive(Debug)]
 pub(super) struct AttitudeSurvey {
     topic: String,
     clock: StampClock,
-    /// Of transforms.
+    /// For a gimbal attitude in transforms, otherwise `None`.
     merge: Option<(TransformPath, TransformMerge)>,
-    /// Readings of the transforms of a path, in the order of log times.
+    /// Rotations of the moving transforms of the path, in the order of log times.
     moved: Vec<(usize, i64, UnitQuaternion<f64>)>,
     vehicle_topic: Option<(String, MessageKind, StampClock)>,
-    /// In the order of their stamps, which are those of the messages.
+    /// Ordered by stamp; the stamps are those of the messages.
     pub(super) values: Vec<(i64, AttitudeValue)>,
-    /// `earth_from_vehicle` as recorded, in the order of the stamps.
+    /// `earth_from_vehicle` as recorded, ordered by stamp.
     pub(super) vehicle: Vec<(i64, UnitQuaternion<f64>)>,
-    /// Warnings about clocks.
     pub(super) warnings: Vec<String>,
 }
 
-/// The joint angles of one attitude.
+/// Joint angles of one attitude.
 #[derive(Clone, Debug)]
 pub(super) struct SolvedAttitude {
     pub(super) reading: JointReading,
-    /// The rotation that the joints cannot make, in radians.
+    /// Rotation that the joints cannot reach, in radians.
     pub(super) unreachable_rad: f64,
-    /// Whether the orientation alone determines the joint angles.
+    /// True if the orientation alone determines the joint angles.
     pub(super) decided: bool,
 }
 
 impl AttitudeSurvey {
-    /// What has to be known before the log is read; `None` for a rig with joint angles.
+    /// Finds the topics and clocks of the attitudes; `None` for a rig with joint angles.
     pub(super) fn new(log: &FlightLog, gimbal: &GimbalRig) -> Result<Option<Self>, LogError> {
         let (Some(source), Some(topic)) = (&gimbal.attitude, &gimbal.topic) else { return Ok(None) };
         let info = log.require_topic(topic_field(gimbal), topic, gimbal_kinds(gimbal))?;
@@ -61,7 +60,7 @@ impl AttitudeSurvey {
             }
             _ => None,
         };
-        // Also for an attitude relative to the body: other frames are tried, too.
+        // Also for an attitude relative to the body: other frames are tried as well.
         let any_frame = AttitudeSource { frame: AttitudeFrame::Earth, ..source.clone() };
         let read_vehicle = if source.frame == AttitudeFrame::Body { &any_frame } else { source };
         let vehicle = match vehicle_topic(log, read_vehicle).or_else(|error| match source.frame {
@@ -87,14 +86,15 @@ impl AttitudeSurvey {
         }))
     }
 
-    /// Whether a topic's log times count for its stamps.
+    /// True if the stamps of a topic are taken from log times.
     pub(super) fn counts_log_times(&self, topic: &str) -> bool {
         let of_vehicle = self.vehicle_topic.as_ref().filter(|(vehicle, ..)| vehicle == topic).map(|(.., clock)| *clock);
         let clock = if topic == self.topic { Some(self.clock) } else { of_vehicle };
         matches!(clock, Some(StampClock::LogTimes { .. }))
     }
 
-    /// Takes a message of any topic; `stamp_ns` and the stamps within it count since the log's start. Returns what is wrong with it.
+    /// Reads a message of any topic; `stamp_ns` and the stamps within it are relative to the log's start. Returns the
+    /// problem of an invalid message.
     pub(super) fn take(
         &mut self,
         topic: &str,
@@ -103,7 +103,7 @@ impl AttitudeSurvey {
         epoch_ns: i64,
         data: &[u8],
     ) -> Result<(), String> {
-        const NO_ATTITUDE: &str = "the attitude is not finite, a zero quaternion, or said to be unknown";
+        const NO_ATTITUDE: &str = "the attitude is not finite, a zero quaternion, or marked as unknown";
         if topic == self.topic {
             if let Some((path, _)) = &self.merge {
                 for entry in messages::read_transforms(data).map_err(|error| error.to_string())? {
@@ -123,7 +123,7 @@ impl AttitudeSurvey {
         Ok(())
     }
 
-    /// Orders what was read.
+    /// Merges transforms, and sorts all readings by stamp.
     pub(super) fn finish(&mut self) {
         if let Some((_, merge)) = &mut self.merge {
             self.moved.sort_by_key(|(_, stamp_ns, _)| *stamp_ns);
@@ -144,24 +144,24 @@ impl AttitudeSurvey {
         self.vehicle.dedup_by_key(|(stamp_ns, _)| *stamp_ns);
     }
 
-    /// The vehicle's attitude in FLU and ENU at a stamp.
+    /// Attitude of the vehicle in FLU and ENU at a stamp.
     fn enu_from_flu(&self, source: &AttitudeSource, stamp_ns: i64) -> Option<UnitQuaternion<f64>> {
         let (_, kind, _) = self.vehicle_topic.as_ref()?;
         let rotation = rotation_at(&self.vehicle, stamp_ns, MAX_VEHICLE_GAP_NS)?;
         Some(source.enu_from_flu(&rotation, *kind == MessageKind::Px4VehicleAttitude))
     }
 
-    /// Whether the vehicle's attitude is known.
+    /// True if there are attitudes of the vehicle.
     pub(super) fn has_vehicle(&self) -> bool {
         !self.vehicle.is_empty()
     }
 
-    /// Topic of the gimbal's attitude.
     pub(super) fn topic(&self) -> &str {
         &self.topic
     }
 
-    /// The orientation `imu_from_camera` at a time by a source, which may differ from the rig's, between the recorded ones.
+    /// Orientation `imu_from_camera` at a time, interpolated between the recorded ones; `source` may differ from the
+    /// rig's.
     pub(super) fn orientation_at(
         &self,
         source: &AttitudeSource,
@@ -180,7 +180,7 @@ impl AttitudeSurvey {
         source.imu_from_camera(&value, self.enu_from_flu(source, stamp_ns).as_ref())
     }
 
-    /// Orientations `imu_from_camera` by a source, which may differ from the rig's, with stamps shifted by `timeshift_ns`.
+    /// Orientations `imu_from_camera` with stamps shifted by `timeshift_ns`; `source` may differ from the rig's.
     pub(super) fn orientations(&self, source: &AttitudeSource, timeshift_ns: i64) -> Vec<(i64, UnitQuaternion<f64>)> {
         let orientation = |(at, value): &(i64, AttitudeValue)| {
             let stamp_ns = at.saturating_add(timeshift_ns);
@@ -190,7 +190,7 @@ impl AttitudeSurvey {
         self.values.iter().filter_map(orientation).collect()
     }
 
-    /// The joint angles of all attitudes by the rig.
+    /// Joint angles of all attitudes by the rig.
     pub(super) fn solve(&self, gimbal: &GimbalRig) -> Vec<SolvedAttitude> {
         let Some(source) = &gimbal.attitude else { return Vec::new() };
         let Some(inverse) = gimbal.inverse_chain() else { return Vec::new() };
@@ -210,11 +210,10 @@ impl AttitudeSurvey {
     }
 }
 
-/// Rotations that the joints cannot make are tolerated up to this size: the chain may be wrong by degrees before it is
-/// calibrated.
+/// Tolerated rotation that the joints cannot reach: before calibration the chain may have an error of degrees.
 const UNREACHABLE_RAD: f64 = 0.035;
 
-/// Whether the attitude could be read, whether the joints can make it, and whether it determines their angles.
+/// Checks that the attitude is readable, that the joints can reach it, and that it determines their angles.
 pub(super) fn check_attitude(survey: &Survey, findings: &mut Findings) {
     if let Some(problem) = &survey.attitude_problem {
         let title = "the gimbal's attitude cannot be read";
@@ -229,7 +228,8 @@ pub(super) fn check_attitude(survey: &Survey, findings: &mut Findings) {
     let all = attitude.values.len();
     let solved = &survey.solved;
     if solved.len() < all {
-        let evidence = format!("{} of {all} attitudes have no attitude of the vehicle near them", all - solved.len());
+        let evidence =
+            format!("{} of {all} attitudes are too far in time from an attitude of the vehicle", all - solved.len());
         let remedy = format!(
             "record the vehicle's attitude at 10 Hz or more; gaps above {:.1} s are not interpolated",
             seconds_from_ns(MAX_VEHICLE_GAP_NS)
@@ -251,18 +251,19 @@ pub(super) fn check_attitude(survey: &Survey, findings: &mut Findings) {
     let beyond = unreachable.iter().filter(|angle| **angle > UNREACHABLE_RAD).count();
     if beyond * 100 > solved.len() {
         let severity = if beyond * 2 > solved.len() { Severity::Error } else { Severity::Warning };
-        let title = "the joints cannot make the recorded attitude";
+        let title = "the joints cannot reach the recorded attitude";
         let remedy = "check frame, axes, order and unit of gimbal.source, then links and limits";
         findings.add(severity, Area::Encoders, title, evidence, remedy);
     } else {
-        findings.good(Area::Encoders, "the joints can make the recorded attitude", evidence);
+        findings.good(Area::Encoders, "the joints can reach the recorded attitude", evidence);
     }
     let undecided = solved.iter().filter(|solved| !solved.decided).count();
     if undecided * 2 > solved.len() {
         let title = "the limits of the joints admit two solutions";
         let evidence =
             format!("for {undecided} of {} attitudes; the one nearest to the previous is taken", solved.len());
-        let remedy = "narrow the limits of gimbal.links to the mechanism's: a jump into the log then need not read it from its start";
+        let remedy =
+            "narrow the limits of gimbal.links to the mechanism's: a seek then need not read the log from its start";
         findings.add(Severity::Note, Area::Encoders, title, evidence, remedy);
     }
 }

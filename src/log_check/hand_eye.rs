@@ -1,5 +1,5 @@
-//! Cameras against the gyroscope: rotations measured from the images alone, compared with those that gyroscope, encoders
-//! and rig predict. A constant rotation between them is an error of the extrinsics, a delay a time offset.
+//! Cameras against the gyroscope: rotations measured from the images alone, compared with those that gyroscope,
+//! encoders and rig predict. A constant rotation between them is an error of the extrinsics, a delay is a time offset.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
@@ -16,21 +16,21 @@ use crate::sensors::{CameraMount, CameraRig, Rig};
 const MIN_ROTATIONS: usize = 20;
 /// Minimum median rotation between two images.
 const MIN_ROTATION_RAD: f64 = 0.003;
-/// Largest time offset that is searched, either sign.
+/// Largest magnitude of a time offset in the search.
 const MAX_OFFSET_S: f64 = 0.15;
-/// Step of that search.
+/// Step of that search, in seconds.
 const OFFSET_STEP_S: f64 = 0.005;
-/// Time offset that is reported: a twelfth of the image interval at 20 Hz; rolling shutter and exposure shift stamps by
-/// less.
+/// Smallest reported time offset: a twelfth of the image interval at 20 Hz; rolling shutter and exposure shift stamps
+/// by less.
 const OFFSET_TOLERANCE_S: f64 = 0.004;
 /// Minimum relative decrease of the squared misfit by a time offset.
 const MIN_GAIN: f64 = 0.2;
-/// Error of a camera's orientation that is tolerated.
+/// Tolerated error of a camera's orientation.
 const ROTATION_TOLERANCE_RAD: f64 = 0.07;
-/// A larger error is a wrong matrix and not an inaccuracy.
+/// A larger error means a wrong matrix, not an inaccurate one.
 const WRONG_ROTATION_RAD: f64 = 0.35;
-/// Largest ratio of misfit to rotation at which the prediction is usable; noisy encoders under a stabilized camera exceed
-/// it.
+/// Largest ratio of misfit to rotation with which the prediction is usable; noisy encoders of a stabilized camera
+/// exceed it.
 const MAX_NOISE_RATIO: f64 = 0.5;
 /// Smallest ratio of the second singular value to the first; below it all rotations are about one axis, and the rotation
 /// about that axis is unobservable.
@@ -74,7 +74,7 @@ pub(super) fn check_against_gyroscope(
 }
 
 impl HandEye<'_> {
-    /// Predicted and measured rotation vectors, for a chain and an additional time offset.
+    /// Predicted and measured rotation vectors for a chain and an additional time offset.
     fn pairs(&self, chain: &ClassicalChain, offset_s: f64) -> Vec<Pair> {
         let shift = ns_from_seconds(self.camera.timeshift_cam_imu_s + offset_s);
         let imu_from_camera = |stamp_ns: i64| {
@@ -91,8 +91,8 @@ impl HandEye<'_> {
         self.rotations.iter().filter_map(pair).collect()
     }
 
-    /// The time offset in seconds, `t_imu = t_cam + offset` beyond the rig's, that minimizes the misfit under any constant
-    /// rotation; 0 when it is too small or unobservable.
+    /// Time offset in seconds, `t_imu = t_cam + offset` beyond the rig's, that minimizes the misfit under any constant
+    /// rotation; 0 if it is too small or unobservable.
     fn check_time_offset(&self, chain: &ClassicalChain, rotation_rad: f64, findings: &mut Findings) -> f64 {
         let key = &self.camera.key;
         let cost = |offset_s: f64| {
@@ -174,7 +174,7 @@ impl HandEye<'_> {
         }
     }
 
-    /// The transform of the rig whose inverse predicts the rotations much better, up to an error within tolerance, with the
+    /// Transform of the rig whose inverse predicts the rotations much better, up to an error within tolerance, with the
     /// misfit in radians.
     fn inverted(&self, chain: &ClassicalChain, offset_s: f64, given_rad: f64) -> Option<(String, f64)> {
         let key = &self.camera.key;
@@ -200,8 +200,8 @@ impl HandEye<'_> {
     }
 }
 
-/// Rotation of the IMU between two times by its gyroscope, bias removed: `second_from_first`, which rotates vectors from
-/// the first IMU frame to the second.
+/// Rotation of the IMU between two times by its gyroscope, bias removed: `second_from_first`, which rotates vectors
+/// from the first IMU frame to the second.
 pub(super) fn imu_rotation(imu_facts: &ImuFacts, from_ns: i64, to_ns: i64) -> Option<UnitQuaternion<f64>> {
     let samples = &imu_facts.samples;
     let (first, last) = (samples.first()?.stamp_ns, samples.last()?.stamp_ns);
@@ -222,8 +222,8 @@ pub(super) fn imu_rotation(imu_facts: &ImuFacts, from_ns: i64, to_ns: i64) -> Op
     Some(first_from_now.inverse())
 }
 
-/// The rotation that minimizes `Σ |measured − R·predicted|²` (Wahba's problem, by SVD), with the ratio of the second
-/// singular value to the first, which is near zero when all rotations are about one axis.
+/// Rotation that minimizes `Σ |measured − R·predicted|²` (Wahba's problem, by SVD), with the ratio of the second
+/// singular value to the first, which is near zero if all rotations are about one axis.
 pub(super) fn best_rotation(pairs: &[Pair]) -> Option<(UnitQuaternion<f64>, f64)> {
     let sum: Matrix3<f64> = pairs.iter().map(|(predicted, measured)| measured * predicted.transpose()).sum();
     let svd = sum.svd(true, true);

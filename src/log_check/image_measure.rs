@@ -9,12 +9,11 @@ const BRIGHT: u8 = 250;
 /// Pixels at most this bright count as underexposed.
 const DARK: u8 = 5;
 
-/// Brightness, texture and sharpness of one image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ImageMeasure {
     pub(super) resolution_px: [usize; 2],
     pub(super) mean_grey: f64,
-    /// Ratio of black pixels, and of white pixels.
+    /// Ratios of black and of white pixels.
     pub(super) dark: f64,
     pub(super) bright: f64,
     /// Ratio of pixels with texture.

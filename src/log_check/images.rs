@@ -6,12 +6,12 @@ use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
-/// An image is blurred when the ratio of its edge gradient to the median is below this.
+/// An image is blurred if the ratio of its edge gradient to the median is below this.
 const BLURRED: f64 = 0.5;
 /// Ratio of pixels with texture below which an image gives few features.
 const MIN_TEXTURE: f64 = 0.01;
 
-/// Size, blur, exposure and texture of each camera's images, and their motion by rotation.
+/// Checks size, blur, exposure and texture of each camera's images, and their motion by rotation.
 pub(super) fn check_images(survey: &Survey, rig: &Rig, imu_facts: &ImuFacts, findings: &mut Findings) {
     for camera in &rig.cameras {
         let Some(images) = survey.images.get(&camera.key).filter(|images| !images.is_empty()) else { continue };
@@ -125,7 +125,7 @@ fn check_texture(camera: &CameraRig, images: &[SampledImage], findings: &mut Fin
     }
 }
 
-/// Image motion between images by the vehicle's rotation alone, in pixels; a gimbal compensates it.
+/// Checks the image motion between images due to the vehicle's rotation alone, in pixels; a gimbal compensates it.
 fn check_motion(camera: &CameraRig, imu_facts: &ImuFacts, findings: &mut Findings) {
     if camera.mount == CameraMount::Gimbal || camera.rate_hz <= 0.0 || imu_facts.samples.is_empty() {
         return;

@@ -8,19 +8,19 @@ use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{ImuSample, Rig};
 
-/// A norm of the specific force below this is that of messages that leave it unset.
+/// Norm of the specific force below which it counts as unset in the message.
 const NO_FORCE_M_PER_S2: f64 = 0.01;
-/// Length of the windows that are classified as stationary or not.
+/// Length of the windows that are classified as stationary or moving.
 pub(super) const WINDOW_NS: i64 = 500_000_000;
-/// Half width of the Hann window by which motion is told from vibration and white noise: what is slower than 4 Hz remains.
+/// Half width of the Hann window that separates motion from vibration and white noise: frequencies below 4 Hz remain.
 pub(super) const SMOOTHING_NS: i64 = 125_000_000;
 /// Step of the smoothed signal.
 const SMOOTHED_STEP_NS: i64 = 31_250_000;
-/// Stationary: the standard deviation of the smoothed angular rate, white noise removed, is below this.
+/// Upper bound for a stationary window: standard deviation of the smoothed angular rate, white noise removed.
 const STATIONARY_RATE_RAD_PER_S: f64 = 0.012;
-/// Stationary: the standard deviation of the smoothed specific force, white noise removed, is below this.
+/// Upper bound for a stationary window: standard deviation of the smoothed specific force, white noise removed.
 const STATIONARY_FORCE_M_PER_S2: f64 = 0.06;
-/// Stationary: the mean angular rate, bias included, is below this.
+/// Upper bound for a stationary window: mean angular rate, bias included.
 const STATIONARY_MEAN_RAD_PER_S: f64 = 0.08;
 /// Half a second of IMU samples.
 #[derive(Clone, Copy, Debug)]
@@ -32,19 +32,19 @@ pub(super) struct Window {
     mean_force: Vector3<f64>,
 }
 
-/// IMU samples and what they measure of the motion, for later checks.
+/// IMU samples and quantities derived from them, for later checks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ImuFacts {
-    /// Finite samples in the order of their stamps.
+    /// Finite samples, ordered by stamp.
     pub(super) samples: Vec<ImuSample>,
-    /// Mean angular rate while stationary, in the IMU frame; `None` when the vehicle never was.
+    /// Mean angular rate while stationary, in the IMU frame; `None` if the vehicle is never stationary.
     pub(super) gyroscope_bias_rad_per_s: Option<Vector3<f64>>,
-    /// Time and mean specific force (IMU frame, m/s²) of a stationary window; without one, the middle of the log and the
-    /// mean over all of it. Its direction is up.
+    /// Time and mean specific force (IMU frame, m/s²) of a stationary window; without one, the middle and the mean of
+    /// the log. The vector points up.
     pub(super) up: Option<(i64, Vector3<f64>)>,
 }
 
-/// Units, gravity, biases, noise and saturation of the IMU, and stationary periods.
+/// Checks units, gravity, biases, noise and saturation of the IMU, and finds stationary periods.
 pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) -> ImuFacts {
     let finite = |sample: &&ImuSample| {
         let numbers = sample.angular_velocity_rad_per_s.iter().chain(&sample.specific_force_m_per_s2);
@@ -65,7 +65,7 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
     }
     let rates: Vec<Stamped> =
         samples.iter().map(|sample| (sample.stamp_ns, sample.angular_velocity_rad_per_s)).collect();
-    // Specific forces are those of an accelerometer of its own when there is one: interpolation removes noise.
+    // Specific forces are those of a separate accelerometer topic, if there is one: interpolation removes noise.
     let forces: Vec<Stamped> = if survey.accelerometer.is_empty() {
         samples.iter().map(|sample| (sample.stamp_ns, sample.specific_force_m_per_s2)).collect()
     } else {
@@ -88,10 +88,10 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
     ImuFacts { samples, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up) }
 }
 
-/// A stamp with a vector in the IMU frame.
+/// Stamp and vector in the IMU frame.
 pub(super) type Stamped = (i64, Vector3<f64>);
 
-/// The windows of a log from its angular rates and specific forces, both in the order of their stamps.
+/// Windows of a log from its angular rates and specific forces, both ordered by stamp.
 fn windows_of(rates: &[Stamped], forces: &[Stamped], spectra: &[Option<Spectrum>; 2]) -> Vec<Window> {
     let mut windows = Vec::new();
     let white = |sensor: usize| spectra[sensor].as_ref().map_or(0.0, |spectrum| smoothed_white(spectrum.density));
@@ -135,7 +135,7 @@ pub(super) fn vectors_within(samples: &[Stamped], range: (i64, i64)) -> Vec<Vect
     within(samples, range).iter().map(|(_, vector)| *vector).collect()
 }
 
-/// Norm of the standard deviation of the smoothed signal within a range of time, infinite where there are no samples.
+/// Norm of the standard deviation of the smoothed signal within a range of time; infinite without samples.
 pub(super) fn smoothed_deviation(samples: &[Stamped], (start_ns, end_ns): (i64, i64)) -> f64 {
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return f64::INFINITY };
     let mut smoothed = Vec::new();
@@ -175,7 +175,7 @@ fn check_gravity(
         );
     }
     let (measured, when) = if stationary.is_empty() {
-        // Where start and end velocity are equal, the mean specific force is gravity, measured in a tilting frame.
+        // If start and end velocity are equal, the mean specific force is gravity, measured in a tilting frame.
         let norms: Vec<f64> = samples.iter().map(|sample| sample.specific_force_m_per_s2.norm()).collect();
         (median(&norms), "median over the flight")
     } else {
@@ -241,7 +241,7 @@ fn check_gyroscope_bias(stationary: &[Window], findings: &mut Findings) -> Optio
     Some(bias)
 }
 
-/// Saturation (many samples at exactly the largest value) and samples that repeat.
+/// Checks saturation (many samples at exactly the largest value) and repeated samples.
 fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
     let components = |gyroscope: bool, axis: usize| {
         samples.iter().map(move |sample| {
@@ -285,7 +285,7 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
     }
 }
 
-/// Periods in which the vehicle is stationary or hovers, where motion neither initializes nor calibrates anything.
+/// Finds periods in which the vehicle is stationary or hovers: such motion neither initializes nor calibrates.
 fn check_stationary(windows: &[Window], findings: &mut Findings) {
     let total_s: f64 = windows.iter().map(|window| seconds_from_ns(window.end_ns - window.start_ns)).sum();
     let mut periods: Vec<(i64, i64)> = Vec::new();

@@ -1,18 +1,19 @@
-//! White noise against the rig's densities, and vibration.
+//! White noise compared with the rig's densities, and vibration.
 
 use super::spectrum::Spectrum;
 use super::{Area, Findings, Severity};
 use crate::sensors::Rig;
 
-/// Measured noise above this many times the rig's is reported.
+/// Ratio of measured noise to the rig's from which it is reported.
 const NOISE_TOO_SMALL: f64 = 3.0;
-/// Measured noise this many times below the rig's is reported.
+/// Ratio of the rig's noise to the measured one from which it is reported.
 const NOISE_TOO_LARGE: f64 = 30.0;
 
-/// Vibration is reported from this many times the white noise of a sample on.
+/// Ratio of vibration to the white noise of a sample from which it is reported.
 const VIBRATION_RATIO: f64 = 3.0;
 
-/// White noise against the rig's densities, and vibration; the spectra are those of gyroscope and accelerometer.
+/// Compares white noise with the rig's densities, and reports vibration; the spectra are those of gyroscope and
+/// accelerometer.
 pub(super) fn check_noise(spectra: &[Option<Spectrum>; 2], rig: Option<&Rig>, findings: &mut Findings) {
     let noise = rig.map(|rig| &rig.imu.noise);
     let sensors = [
@@ -28,7 +29,7 @@ pub(super) fn check_noise(spectra: &[Option<Spectrum>; 2], rig: Option<&Rig>, fi
     }
 }
 
-/// Frequencies and amplitudes of a vibration that exceeds the white noise.
+/// Reports frequencies and amplitudes of a vibration that exceeds the white noise.
 fn report_vibration(name: &str, spectrum: &Spectrum, unit: &str, findings: &mut Findings) {
     let white_rms = spectrum.density * (3.0 * spectrum.rate_hz).sqrt();
     if spectrum.lines.is_empty() || spectrum.vibration_rms < VIBRATION_RATIO * white_rms {
@@ -40,7 +41,7 @@ fn report_vibration(name: &str, spectrum: &Spectrum, unit: &str, findings: &mut 
     };
     let lines: Vec<String> = spectrum.lines.iter().map(line).collect();
     let evidence =
-        format!("{:.3} {unit} RMS beside white noise of {white_rms:.3}: {}", spectrum.vibration_rms, lines.join(", "));
+        format!("{:.3} {unit} RMS, white noise {white_rms:.3}: {}", spectrum.vibration_rms, lines.join(", "));
     let remedy = "isolate the IMU from the rotors; the noise densities need not cover a vibration, which averages out \
                   between two images unless it is clipped or aliased to a low frequency";
     findings.add(Severity::Note, Area::Imu, format!("vibration on the {name}"), evidence, remedy);
@@ -55,7 +56,7 @@ fn compare_density(name: &str, spectrum: &Spectrum, given: f64, unit: &str, find
     // A density confused with the noise of one sample differs by √rate.
     let discrete = |ratio: f64| (ratio.ln() - 0.5 * rate_hz.ln()).abs() < 0.3;
     let field = format!("imu0.{name}_noise_density");
-    // A density may have been raised to cover vibration.
+    // A density may include vibration on purpose.
     let excess = given / spectrum.density_with_vibration();
     if ratio > NOISE_TOO_SMALL {
         let hint = if discrete(ratio) { " (it appears to have been divided by √rate twice)" } else { "" };

@@ -1,14 +1,15 @@
-//! Topics of the IMU's message type that hold orientations only: filters of autopilots and drivers publish them.
+//! Topics of the IMU's message type that contain orientations only, as published by filters of autopilots and drivers.
 
 use super::{Area, Findings, Severity};
 use crate::flight_log::messages::{self, MessageKind};
 use crate::flight_log::{FlightLog, LogError};
 use crate::sensors::Rig;
 
-/// Messages of a topic that are read to find one with a measurement.
+/// Number of messages of a topic that are searched for a measurement.
 const MESSAGES: usize = 200;
 
-/// Names the topics without angular velocities and specific forces; the estimator integrates both and reads no orientation.
+/// Reports the topics without angular velocities and specific forces; the estimator integrates both and uses no
+/// orientation.
 pub(super) fn check_orientation_topics(log: &FlightLog, rig: Result<&Rig, &LogError>, findings: &mut Findings) {
     let topics = log.topics_of(&[MessageKind::Imu]);
     let (without, with): (Vec<&String>, Vec<&String>) = topics.iter().partition(|topic| !measures(log, topic));
@@ -30,19 +31,19 @@ pub(super) fn check_orientation_topics(log: &FlightLog, rig: Result<&Rig, &LogEr
     }
 }
 
-/// Whether one of the first messages has an angular velocity or a specific force.
+/// True if one of the first messages has an angular velocity or a specific force.
 fn measures(log: &FlightLog, topic: &str) -> bool {
     let mut read = 0;
     let found = log.find_message(topic, |data| {
         read += 1;
         let sample = messages::read_imu(data).ok();
-        // A message that cannot be read is reported elsewhere and decides nothing here.
+        // Unreadable messages are reported by another check and are ignored here.
         let measured = sample.is_none_or(|sample| {
             let values = sample.angular_velocity_rad_per_s.iter().chain(&sample.specific_force_m_per_s2);
             values.copied().any(|value| value != 0.0)
         });
         (measured || read >= MESSAGES).then_some(measured)
     });
-    // A topic without messages lacks nothing.
+    // A topic without messages is not reported.
     found.unwrap_or(read == 0)
 }

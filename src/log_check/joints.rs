@@ -5,12 +5,12 @@ use super::{Area, Findings, Severity};
 use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::sensors::{GimbalRig, Joint, Rig};
 
-/// With a smaller range of motion over the log the parameters of a joint are unobservable.
+/// Range of motion over the log below which the parameters of a joint are unobservable.
 const MIN_RANGE_RAD: f64 = 0.05;
 /// A reading this close to a limit counts as at the limit.
 const AT_LIMIT_RAD: f64 = 0.01;
 
-/// Names, range, limits and noise of the encoders.
+/// Checks names, range, limits and noise of the encoders.
 pub(super) fn check_joints(survey: &Survey, rig: &Rig, findings: &mut Findings) {
     let Some(gimbal) = &rig.gimbal else { return };
     if gimbal.topic.is_none() || gimbal.encoder_sigma_rad.is_none() {
@@ -36,7 +36,8 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
     let readings = || survey.joints.iter().filter_map(|message| Some((message.stamp_ns, message.angles_rad[number]?)));
     let missing = survey.joints.len() - readings().count();
     let all = survey.joints.len();
-    // A message that names another joint may come from that joint's driver; one that names none of the rig's joints is an error.
+    // A message that names another joint may come from that joint's driver; a message that names no joint of the rig is
+    // an error.
     let silent = survey.joints.iter().filter(|message| message.angles_rad.iter().all(Option::is_none)).count();
     if missing == all || silent > 0 {
         let evidence = format!("missing in {missing} of {all} messages, which name {}", survey.joint_names.join(", "));
@@ -44,7 +45,7 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
         let remedy = format!("set the messages' name in gimbal.links[{number}].joint");
         findings.add(severity, Area::Encoders, format!("joint '{name}' is not in the messages"), evidence, remedy);
     } else if missing > 0 {
-        let title = format!("'{name}' has messages of its own");
+        let title = format!("'{name}' has separate messages");
         let evidence = format!("it is in {} of {all} messages; the joints are merged by name", all - missing);
         findings.add(Severity::Note, Area::Encoders, title, evidence, "");
     }

@@ -1,5 +1,5 @@
-//! Checks of a log and its rig that need no estimator: topics, timing, IMU, encoders, images, intrinsics and extrinsics,
-//! each finding with its evidence and its remedy.
+//! Checks of a log and its rig that need no estimator: topics, timing, IMU, encoders, images, intrinsics and
+//! extrinsics, each finding with its evidence and remedy.
 
 mod attitude;
 mod clock_alignment;
@@ -48,9 +48,7 @@ use crate::sensors::{ImageMask, Rig};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// Checked without a problem.
     Good,
-    /// For information.
     Note,
     /// Degrades results or delays initialization.
     Warning,
@@ -81,37 +79,31 @@ pub enum Area {
     Extrinsics,
 }
 
-/// One result of the check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// Its severity.
     pub severity: Severity,
-    /// The checked subject.
     pub area: Area,
-    /// The finding in one sentence.
+    /// In one sentence.
     pub title: String,
-    /// The measured values, with units.
+    /// Measured values with units.
     pub evidence: String,
-    /// What to do; empty when nothing needs to be done.
+    /// Instruction; empty if nothing needs to be done.
     pub remedy: String,
 }
 
-/// One topic of the log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TopicReport {
-    /// Topic name.
     pub topic: String,
     /// Message type, such as `sensor_msgs/msg/Imu`.
     pub schema: String,
-    /// Its use: `imu0`, `cam0`, `gimbal`, `ground truth`, `not in the rig`, or `ignored`.
+    /// `imu0`, `cam0`, `gimbal`, `ground truth`, `not in the rig`, or `ignored`.
     pub role: String,
-    /// Number of messages.
     pub count: u64,
     /// Mean rate over its log times, in Hz.
     pub rate_hz: f64,
     /// First header stamp since the log began, in seconds; log time for an ignored topic.
     pub first_s: f64,
-    /// Last header stamp, likewise.
+    /// Last header stamp, as for `first_s`.
     pub last_s: f64,
     /// Median of log time minus header stamp in seconds, `None` for an ignored topic.
     pub latency_s: Option<f64>,
@@ -120,7 +112,6 @@ pub struct TopicReport {
 /// Rotation between two images of one camera, measured from the images alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageRotation {
-    /// Key of the camera.
     pub camera_key: String,
     /// Header stamp of the first image since the log began.
     pub from_ns: i64,
@@ -128,36 +119,34 @@ pub struct ImageRotation {
     pub to_ns: i64,
     /// Rotates vectors from the camera frame of the first image to that of the second.
     pub second_from_first: UnitQuaternion<f64>,
-    /// The features of both images, for the readout; may be empty.
+    /// Features of both images, for the readout; may be empty.
     pub tracks: Vec<RowTrack>,
 }
 
 /// Result of [`check`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CheckReport {
-    /// Path of the log.
     pub log: String,
     /// Name of the rig, `None` without a readable one.
     pub rig: Option<String>,
     /// Absolute header stamp of the log's start, in nanoseconds.
     pub epoch_ns: i64,
-    /// Length of the log.
+    /// Length of the log, in seconds.
     pub duration_s: f64,
-    /// All topics in the order of their names.
+    /// All topics, ordered by name.
     pub topics: Vec<TopicReport>,
     /// Most severe first, then by area.
     pub findings: Vec<Finding>,
-    /// Masks for cameras that see the vehicle.
+    /// Masks for cameras with the vehicle in view.
     #[serde(skip)]
     pub proposed_masks: Vec<ProposedMask>,
 }
 
-/// A mask for what never moves in the images of a camera.
+/// Mask of the static pixels in the images of a camera.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProposedMask {
-    /// Key of the camera.
     pub camera_key: String,
-    /// The mask, that of the rig not included.
+    /// The proposed pixels, without those of the rig's mask.
     pub mask: ImageMask,
 }
 
@@ -192,7 +181,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         pictures::check_pictures(log, &survey, rig, &mut findings);
         images::check_images(&survey, rig, &imu_facts, &mut findings);
         if let Some(fitted) = source_fit::check_source(&survey, rig, &imu_facts, image_rotations, &mut findings) {
-            // The cameras are checked with the attitude as it should be read.
+            // The cameras are checked with the corrected attitude.
             survey.use_source(rig, fitted.source, fitted.timeshift_s);
         }
         rotation::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);
@@ -212,7 +201,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
 }
 
 impl CheckReport {
-    /// The worst severity among the findings.
+    /// Highest severity of the findings.
     pub fn worst(&self) -> Severity {
         self.findings.iter().map(|finding| finding.severity).max().unwrap_or(Severity::Good)
     }
@@ -242,7 +231,7 @@ impl Findings {
     }
 }
 
-/// Damage to the file, unreadable messages, and topics of other types.
+/// Reports damage to the file, unreadable messages, and topics of other types.
 fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
     for (kind, warning) in log.warnings_by_kind() {
         let (area, title, remedy) = match kind {
@@ -280,7 +269,7 @@ fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
 
 const POSES: [MessageKind; 3] = [MessageKind::Odometry, MessageKind::PoseStamped, MessageKind::TransformStamped];
 
-/// Whether the log has the topics that the rig names.
+/// Checks that the log has the topics that the rig names.
 fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     let mut named = 0;
     let mut require = |field: String, topic: &str, kinds: &[MessageKind], severity| {
@@ -347,7 +336,7 @@ fn role_of(topic: &str, kind: Option<MessageKind>, rig: Option<&Rig>) -> String 
 fn topic_reports(log: &FlightLog, survey: &Survey, rig: Option<&Rig>) -> Vec<TopicReport> {
     let report = |info: &TopicInfo| {
         let times = survey.topics.get(&info.topic).filter(|topic| !topic.times.is_empty());
-        // Stamps that were never set say nothing about time.
+        // Stamps that were never set contain no time.
         let times = times.filter(|topic| !topic.has_one_stamp());
         let stamps = times.map(|topic| topic.stamp_range());
         let (first_ns, last_ns) = stamps.unwrap_or((info.first_ns, info.last_ns));

@@ -1,4 +1,4 @@
-//! Pictures of videos that cannot be decoded.
+//! Images of videos that cannot be decoded.
 
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
@@ -7,12 +7,12 @@ use crate::flight_log::video::{MissingPictures, missing_pictures};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 
-/// Messages of a video that are decoded; at 30 Hz those of about a minute.
+/// Number of messages of a video that are decoded: about a minute at 30 Hz.
 const DECODED: usize = 2000;
-/// Stretches that are listed.
+/// Maximum number of listed intervals.
 const LISTED: usize = 3;
 
-/// Decodes the videos of a rig's cameras and names the stretches that a run has to leave out.
+/// Decodes the videos of a rig's cameras and reports the intervals that a run has to skip.
 pub(super) fn check_pictures(log: &FlightLog, survey: &Survey, rig: &Rig, findings: &mut Findings) {
     for camera in &rig.cameras {
         let Some(info) = log.topic(&camera.topic) else { continue };
@@ -21,11 +21,7 @@ pub(super) fn check_pictures(log: &FlightLog, survey: &Survey, rig: &Rig, findin
         let of = if read < info.count as usize { format!("the first {read}") } else { read.to_string() };
         let count: usize = missing.iter().map(|stretch| stretch.count).sum();
         if count == 0 {
-            findings.good(
-                Area::Images,
-                format!("the video of {} can be decoded", camera.key),
-                format!("{of} pictures"),
-            );
+            findings.good(Area::Images, format!("the video of {} can be decoded", camera.key), format!("{of} images"));
             continue;
         }
         let times = survey.topics.get(&camera.topic).map_or(&[][..], |topic| topic.times.as_slice());
@@ -36,12 +32,11 @@ pub(super) fn check_pictures(log: &FlightLog, survey: &Survey, rig: &Rig, findin
         };
         let mut stretches: Vec<String> = missing.iter().take(LISTED).map(listed).collect();
         if missing.len() > LISTED {
-            stretches.push(format!("{} more stretches", missing.len() - LISTED));
+            stretches.push(format!("{} more intervals", missing.len() - LISTED));
         }
-        let title = format!("pictures of {} cannot be decoded", camera.key);
-        let evidence = format!("{count} of {of} pictures: {}", stretches.join("; "));
-        let remedy =
-            "a run leaves them out, up to the next keyframe: record without losses, or with keyframes more often";
+        let title = format!("images of {} cannot be decoded", camera.key);
+        let evidence = format!("{count} of {of} images: {}", stretches.join("; "));
+        let remedy = "a run skips them up to the next keyframe: record without losses, or with more frequent keyframes";
         findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
     }
 }

@@ -1,4 +1,4 @@
-//! Rolling shutters: the readout of each camera, measured from how the image motion varies over the rows.
+//! Rolling shutters: the readout of each camera, measured from the variation of the image motion over the rows.
 
 use super::imu_facts::ImuFacts;
 use super::{Area, Findings, ImageRotation, Severity};
@@ -8,15 +8,14 @@ use crate::frontend::readout::{
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig};
 
-/// A readout is reported when it differs from the rig's by more standard deviations than this.
+/// A readout is reported if it differs from the rig's by more standard deviations than this.
 const SIGNIFICANT_SIGMAS: f64 = 5.0;
-/// And by more than this: rows are then less than a millisecond from where the rig says.
+/// It must also differ by more than this; below, rows are exposed within a millisecond of the rig's time.
 const TOLERANCE_S: f64 = 0.002;
-/// With a larger standard deviation nothing is known about a shutter.
+/// With a larger standard deviation the readout counts as unobservable.
 const USEFUL_SIGMA_S: f64 = 0.003;
 
-/// Checks a camera's readout by the features of consecutive images; returns the readout by which its rotations are to be
-/// understood.
+/// Checks a camera's readout by the features of consecutive images; returns the readout to be used for its rotations.
 pub(super) fn check_readout(
     camera: &CameraRig,
     imu_facts: &ImuFacts,
@@ -66,9 +65,9 @@ pub(super) fn check_readout(
     camera.readout_s
 }
 
-const ROTATE: &str = "rotate faster, to and fro about all axes";
+const ROTATE: &str = "rotate faster, back and forth about all axes";
 
-/// The features of a camera's consecutive images, by the clock of the IMU as far as the rig has it.
+/// Features of a camera's consecutive images, with the rig's time offset applied.
 fn image_pairs(camera: &CameraRig, rotations: &[ImageRotation]) -> Vec<ImagePair> {
     let of_camera = rotations.iter().filter(|rotation| rotation.camera_key == camera.key);
     of_camera
@@ -81,8 +80,8 @@ fn image_pairs(camera: &CameraRig, rotations: &[ImageRotation]) -> Vec<ImagePair
         .collect()
 }
 
-/// A camera's rotations between the first rows of its images, which is what their stamps say; those of images whose features
-/// are too few are left out.
+/// A camera's rotations between the first rows of its images, to which their stamps refer; images with too few features
+/// are omitted.
 pub(super) fn between_first_rows(
     camera: &CameraRig,
     rotations: &[ImageRotation],

@@ -16,7 +16,6 @@ impl Severity {
 }
 
 impl Area {
-    /// Name in reports.
     pub fn label(self) -> &'static str {
         match self {
             Self::Log => "log",
@@ -31,7 +30,7 @@ impl Area {
     }
 }
 
-/// The report as text: topics as a table, then the findings, worst first.
+/// Text report: a table of topics, then the findings, most severe first.
 impl Display for CheckReport {
     fn fmt(&self, out: &mut Formatter<'_>) -> Result {
         let rig = self.rig.as_deref().map_or_else(|| "no rig".to_owned(), |name| format!("rig {name}"));
@@ -77,10 +76,10 @@ impl Display for CheckReport {
     }
 }
 
-/// Characters of a topic or a type in the table; longer ones are cut.
+/// Characters of a topic or a type in the table; longer ones are truncated.
 const WIDEST_NAME: usize = 60;
 
-/// Columns as wide as their widest cell, numbers to the right.
+/// Writes columns as wide as their widest cell, numbers aligned to the right.
 fn write_table<const N: usize>(out: &mut Formatter<'_>, rows: &[[String; N]]) -> Result {
     const FIRST_NUMBER: usize = 3;
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);

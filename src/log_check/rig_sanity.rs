@@ -5,13 +5,14 @@ use crate::camera::{CameraModel, Projection};
 use crate::flight_log::FlightLog;
 use crate::sensors::{AssumedField, CameraRig, ChainPrior, GimbalRig, Rig};
 
-/// A camera further from the IMU than this is unusual on a drone.
+/// A camera farther from the IMU than this is unusual on a drone.
 const MAX_LEVER_M: f64 = 1.0;
-/// Difference of a pixel by the log's `CameraInfo` from the rig's that is reported, as a ratio of the focal length.
+/// Smallest reported difference between a pixel by the log's `CameraInfo` and by the rig, as a ratio of the focal
+/// length.
 const INTRINSICS_TOLERANCE: f64 = 0.02;
 
 impl CheckReport {
-    /// Adds a note about keys in the file of the rig that other programs write and this one does not use.
+    /// Adds a note about keys in the rig's file that are written by other programs and not used here.
     pub fn add_unused_rig_keys(&mut self, keys: &[String]) {
         if keys.is_empty() {
             return;
@@ -28,7 +29,7 @@ impl CheckReport {
     }
 }
 
-/// Plausibility of the rig's intrinsics, time offsets and chain.
+/// Checks the plausibility of the rig's intrinsics, time offsets and chain.
 pub(super) fn check_rig(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     for camera in &rig.cameras {
         check_lens(camera, findings);
@@ -46,7 +47,7 @@ pub(super) fn check_rig(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     check_assumed(rig, findings);
 }
 
-/// One finding for each field that nobody has measured yet, with how to measure it.
+/// Adds one finding for each assumed field, with instructions for measuring it.
 fn check_assumed(rig: &Rig, findings: &mut Findings) {
     for AssumedField { field, reason } in &rig.assumed {
         let (area, how) = how_to_measure(field);
@@ -55,7 +56,7 @@ fn check_assumed(rig: &Rig, findings: &mut Findings) {
     }
 }
 
-/// Subject of a field of the rig, and how to get its value.
+/// Subject of a field of the rig, and instructions for measuring its value.
 fn how_to_measure(field: &str) -> (Area, &'static str) {
     let (part, name) = field.split_once('.').unwrap_or((field, ""));
     match (part, name) {
@@ -63,7 +64,7 @@ fn how_to_measure(field: &str) -> (Area, &'static str) {
             (Area::Log, "name the topic of the log")
         }
         ("imu0", _) => {
-            (Area::Imu, "record the IMU lying still for some minutes, or take twice the value that check measures")
+            (Area::Imu, "record the stationary IMU for some minutes, or take twice the value that check measures")
         }
         ("gravity", _) => (Area::Imu, "set gravity for the place of the flight"),
         ("gimbal", "source") => {
@@ -76,7 +77,7 @@ fn how_to_measure(field: &str) -> (Area, &'static str) {
              ruler, and refine with dcvins calibrate or a run",
         ),
         ("gimbal", _) => (Area::Extrinsics, "measure it with a ruler, and refine with dcvins calibrate or a run"),
-        ("ground_truth", _) => (Area::Log, "confirm that the topic is measured from outside and is the IMU's pose"),
+        ("ground_truth", _) => (Area::Log, "confirm that the topic is an external measurement of the IMU's pose"),
         (_, "rostopic") => (Area::Log, "name the topic of the log"),
         (_, "timeshift_cam_imu") => (Area::Time, "take the time offset that check measures, or run with timeshift=on"),
         (_, "T_cam_imu") => (Area::Extrinsics, "calibrate camera and IMU, as with Kalibr"),
@@ -128,8 +129,8 @@ fn check_lens(camera: &CameraRig, findings: &mut Findings) {
     }
 }
 
-/// Horizontal field of view in degrees: angle between the bearings of the middle pixels at the left and right border,
-/// `None` when the model cannot unproject these or a pixel near a corner.
+/// Horizontal field of view in degrees: angle between the bearings of the middle pixels at the left and right border;
+/// `None` if the model cannot unproject these or a pixel near a corner.
 fn field_of_view_deg(model: &CameraModel) -> Option<f64> {
     let [width, height] = model.resolution_px.map(|side| side as f64);
     let direction = |u: f64, v: f64| model.unproject(&Vector2::new(u, v));
@@ -167,8 +168,8 @@ fn check_camera_info(log: &FlightLog, camera: &CameraRig, findings: &mut Finding
     }
 }
 
-/// The largest distance between the pixels of one direction through two cameras, in pixels, and the pixel of the first one.
-/// Directions are those of a grid over the first camera's image; one that the second camera does not see does not count.
+/// Largest distance between the pixels of one direction in two cameras, in pixels, and the pixel in the first one.
+/// Directions are those of a grid over the first camera's image that are visible in both.
 fn largest_pixel_difference(camera: &CameraModel, other: &CameraModel) -> (f64, Vector2<f64>) {
     const CELLS: u32 = 8;
     let [width, height] = camera.resolution_px.map(|side| side as f64 - 1.0);
@@ -182,7 +183,7 @@ fn largest_pixel_difference(camera: &CameraModel, other: &CameraModel) -> (f64, 
 }
 
 fn check_chain(gimbal: &GimbalRig, findings: &mut Findings) {
-    // The camera's position over joint angles within the limits.
+    // Position of the camera over joint angles within the limits.
     let middle: Vec<f64> = gimbal.joints.iter().map(|joint| 0.5 * (joint.limits_rad.0 + joint.limits_rad.1)).collect();
     let mut farthest = 0.0_f64;
     for (number, joint) in gimbal.joints.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Extrinsics of the cameras against gravity and the gyroscope, and the plausibility of their values.
+//! Extrinsics of the cameras compared with gravity and the gyroscope, and the plausibility of their values.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -9,7 +9,6 @@ use super::{Area, Findings, ImageRotation, Severity, hand_eye};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
-/// Checks every camera's orientation.
 pub(super) fn check_rotations(
     survey: &Survey,
     rig: &Rig,
@@ -32,11 +31,11 @@ fn imu_from_camera(survey: &Survey, rig: &Rig, camera: &CameraRig, stamp_ns: i64
     Some(chain.imu_from_camera(&angles_rad))
 }
 
-/// Roll about the optical axis and elevation of that axis against gravity, in whole degrees; both are zero for an upright
-/// camera with a horizontal axis.
+/// Roll about the optical axis, and elevation of that axis relative to gravity, in whole degrees; both are zero for an
+/// upright camera with a horizontal axis.
 fn attitude_deg(camera_from_imu: &UnitQuaternion<f64>, up_in_imu: &Vector3<f64>) -> (f64, f64) {
     let up = camera_from_imu * up_in_imu;
-    // Adding zero turns −0 into 0.
+    // Adding zero converts −0 to 0.
     let degrees = |angle_rad: f64| angle_rad.to_degrees().round() + 0.0;
     (degrees(up.x.atan2(-up.y)), degrees(up.z.clamp(-1.0, 1.0).asin()))
 }

@@ -1,43 +1,42 @@
-//! White noise and vibration of an IMU, told apart in its spectrum.
+//! White noise and vibration of an IMU, separated in its spectrum.
 //!
 //! White noise is the floor between the lines of a vibration: of the powers in all cells of a time–frequency plane, the
-//! lowest tenth belongs to cells without motion and without a line, also where rotors and their harmonics cover half of
-//! the plane. Powers of white noise in one cell are distributed exponentially, which gives the density from a quantile.
+//! lowest tenth belongs to cells without motion and without a line, even if rotors and their harmonics cover half of
+//! the plane. Powers of white noise in one cell have an exponential distribution, which gives the density from a
+//! quantile.
 
 use nalgebra::{Complex, Vector3};
 
 use super::statistics::percentile;
 use crate::geometry::seconds_from_ns;
 
-/// Length of a segment, rounded to a power of two of samples: rotors change their speed over longer ones.
+/// Length of a segment in seconds, rounded to a power of two of samples: rotors change their speed over longer ones.
 const SEGMENT_S: f64 = 0.64;
-/// Fewest samples of a segment.
 const MIN_SEGMENT: usize = 32;
-/// Most segments that are looked at, evenly over the log.
+/// Maximum number of segments, distributed evenly over the log.
 const MAX_SEGMENTS: usize = 600;
-/// Vehicles and hands move below this frequency.
+/// Upper frequency of the motion of vehicles and hands.
 const MOTION_HZ: f64 = 10.0;
-/// The same for slow sensors, as a ratio of their rate.
+/// Upper frequency of motion for slow sensors, as a ratio of their rate.
 const MOTION_RATE_RATIO: f64 = 0.1;
-/// Upper end of the band of the floor as a ratio of the rate: filters in sensors attenuate what lies above.
+/// Upper end of the band of the floor as a ratio of the rate: sensor filters attenuate higher frequencies.
 const FLOOR_RATE_RATIO: f64 = 0.3;
-/// The quantile of the powers that determines the floor.
+/// Quantile of the powers that determines the floor.
 const FLOOR_QUANTILE: f64 = 0.1;
-/// Vibration begins at this many times the frequencies of motion.
+/// Lowest frequency of vibration, as a ratio of the upper frequency of motion.
 const VIBRATION_MOTION_RATIO: f64 = 1.5;
-/// A line stands out of the floor by this ratio of powers.
+/// Minimum ratio of the power of a line to the floor.
 const LINE_RATIO: f64 = 20.0;
-/// A line reaches down to this ratio of its highest power.
+/// Ratio of the highest power of a line at which the line ends.
 const LINE_EDGE: f64 = 0.05;
-/// Weaker lines than this ratio of the strongest one are not named.
+/// Lines weaker than this ratio of the strongest one are not reported.
 const LINE_RMS_RATIO: f64 = 0.2;
-/// Most lines that are named.
+/// Maximum number of reported lines.
 const MAX_LINES: usize = 3;
 
-/// One line of a vibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct VibrationLine {
-    /// Mean frequency in the samples; a vibration faster than half the rate appears at another one.
+    /// Mean frequency in the samples; a vibration above half the sample rate is aliased to another one.
     pub(super) frequency_hz: f64,
     /// Lowest and highest frequency.
     pub(super) range_hz: (f64, f64),
@@ -48,20 +47,19 @@ pub(super) struct VibrationLine {
 /// Spectrum of one sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Spectrum {
-    /// Samples per second.
     pub(super) rate_hz: f64,
     /// Noise density per axis, in the unit of the samples per √Hz.
     pub(super) density: f64,
-    /// Frequencies from which it was taken.
+    /// Frequencies from which the density was determined.
     pub(super) band_hz: (f64, f64),
-    /// Root mean square of all that is faster than motion and is no white noise, in the unit of the samples.
+    /// Root mean square of the signal above the frequencies of motion, white noise removed, in the unit of the samples.
     pub(super) vibration_rms: f64,
-    /// Its lines, the strongest first.
+    /// Lines of the vibration, the strongest first.
     pub(super) lines: Vec<VibrationLine>,
 }
 
 impl Spectrum {
-    /// Of samples in the order of their stamps; `None` for too few.
+    /// Spectrum of samples that are ordered by stamp; `None` with too few samples.
     pub(super) fn of(samples: &[(i64, Vector3<f64>)]) -> Option<Self> {
         let (first, last) = (samples.first()?.0, samples.last()?.0);
         let rate_hz = (samples.len() - 1) as f64 / seconds_from_ns(last - first).max(1e-9);
@@ -94,7 +92,7 @@ impl Spectrum {
         })
     }
 
-    /// The density of white noise that varies the samples as much as noise and vibration together.
+    /// Density of white noise with the same variance as noise and vibration together.
     pub(super) fn density_with_vibration(&self) -> f64 {
         (self.density.powi(2) + self.vibration_rms.powi(2) / (3.0 * self.rate_hz)).sqrt()
     }
@@ -110,7 +108,7 @@ fn segment_powers(samples: &[(i64, Vector3<f64>)], length: usize, rate_hz: f64) 
     for begin in (0..=room).step_by(stride) {
         let segment = &samples[begin..begin + length];
         let span_s = seconds_from_ns(segment[length - 1].0 - segment[0].0);
-        // A gap would be a step of the signal.
+        // Skipped: a gap would be a step of the signal.
         if (span_s * rate_hz / (length - 1) as f64 - 1.0).abs() > 0.2 {
             continue;
         }
@@ -129,13 +127,13 @@ fn segment_powers(samples: &[(i64, Vector3<f64>)], length: usize, rate_hz: f64) 
     powers
 }
 
-/// The window of Blackman and Harris, of four terms (sidelobes at −92 dB), at a place from 0 to 1.
+/// Window of Blackman and Harris with four terms (sidelobes at −92 dB), at a position from 0 to 1.
 fn blackman_harris(place: f64) -> f64 {
     let angle = std::f64::consts::TAU * place;
     0.358_75 - 0.488_29 * angle.cos() + 0.141_28 * (2.0 * angle).cos() - 0.011_68 * (3.0 * angle).cos()
 }
 
-/// The values without their mean and their linear trend.
+/// Values minus their mean and linear trend.
 fn without_trend(values: &[f64]) -> Vec<f64> {
     let middle = 0.5 * (values.len() as f64 - 1.0);
     let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -145,7 +143,7 @@ fn without_trend(values: &[f64]) -> Vec<f64> {
     centred().map(|(at, value)| value - slope * at).collect()
 }
 
-/// The discrete Fourier transform in place, by Cooley and Tukey; the length is a power of two.
+/// Discrete Fourier transform in place, by Cooley and Tukey; the length is a power of two.
 fn transform(signal: &mut [Complex<f64>]) {
     let count = signal.len();
     let bits = count.trailing_zeros();
@@ -172,12 +170,12 @@ fn transform(signal: &mut [Complex<f64>]) {
     }
 }
 
-/// The strongest lines from an index on: their highest power stands out of the floor, and they do not belong to the slower
+/// Strongest lines from index `start` on: their highest power exceeds the floor, and they do not belong to slower
 /// motion.
 fn lines(mean: &[f64], start: usize, floor: f64, step_hz: f64) -> Vec<VibrationLine> {
     let mut rest = mean.to_vec();
     let mut found: Vec<VibrationLine> = Vec::new();
-    // Every round removes a line or motion that reaches up.
+    // Each iteration removes a line, or motion that extends into the band.
     while found.len() < MAX_LINES {
         let highest = (start..rest.len()).max_by(|a, b| rest[*a].total_cmp(&rest[*b]));
         let Some(peak) = highest.filter(|peak| rest[*peak] > LINE_RATIO * floor) else { break };
@@ -216,7 +214,7 @@ mod tests {
         (0..count).map(|index| (index * 5_000_000, value(index as f64 / RATE_HZ, &mut random))).collect()
     }
 
-    /// White noise of a density of 0.01 per √Hz.
+    /// White noise with a density of 0.01 per √Hz.
     fn white(random: &mut SplitMix64) -> Vector3<f64> {
         let normal = |random: &mut SplitMix64| (0..12).map(|_| random.next_unit()).sum::<f64>() - 6.0;
         Vector3::from_fn(|_, _| 0.01 * RATE_HZ.sqrt() * normal(random))

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::geometry;
 
-/// Quantile at `fraction` (0 to 1) of the values, the nearest one; 0 for none.
+/// Quantile at `fraction` (0 to 1) of the values, nearest rank; 0 without values.
 pub(super) fn percentile(values: &[f64], fraction: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -12,12 +12,12 @@ pub(super) fn percentile(values: &[f64], fraction: f64) -> f64 {
     sorted.get((fraction * last as f64).round() as usize).copied().unwrap_or(0.0)
 }
 
-/// The median; 0 for none.
+/// Median; 0 without values.
 pub(super) fn median(values: &[f64]) -> f64 {
     geometry::median(values.iter().copied()).unwrap_or(0.0)
 }
 
-/// Mean of vectors; zero for none.
+/// Mean of vectors; zero without vectors.
 pub(super) fn mean(vectors: &[Vector3<f64>]) -> Vector3<f64> {
     let sum: Vector3<f64> = vectors.iter().sum();
     if vectors.is_empty() { sum } else { sum / vectors.len() as f64 }

@@ -1,6 +1,7 @@
-//! Parts of a camera's images that never move although the camera does: the vehicle in view.
+//! Static regions of the images of a moving camera: the vehicle in view.
 //!
-//! The gradient of a pixel that shows the vehicle keeps its direction in all images; that of the scene points anywhere.
+//! The gradient of a pixel that shows the vehicle keeps its direction in all images; gradients of the scene have any
+//! direction.
 
 use std::collections::BTreeMap;
 
@@ -9,24 +10,24 @@ use super::{Area, Findings, ImageRotation, ProposedMask, Severity};
 use crate::geometry::planar_length;
 use crate::sensors::{GrayImage, ImageMask, Rig};
 
-/// Images are averaged down to at most this width.
+/// Images are averaged down to this width or less.
 const LARGEST_WIDTH: usize = 640;
-/// Side of the blocks that are judged, in pixels of the averaged images.
+/// Side of the classified blocks, in pixels of the averaged images.
 const BLOCK: usize = 8;
 /// Mean gradient of a block with texture, in grey levels per pixel; compression and noise stay below.
 const MIN_GRADIENT: f32 = 2.0;
-/// Ratio of the norm of the summed gradients to the sum of their norms above which a block is still. Scenes that move have
-/// about the inverse square root of the number of images.
+/// Ratio of the norm of the summed gradients to the sum of their norms above which a block is static. Moving scenes
+/// have about the inverse square root of the number of images.
 const STILL_COHERENCE: f32 = 0.6;
-/// Fewest neighbouring blocks of a part.
+/// Minimum number of neighbouring blocks of a region.
 const MIN_BLOCKS: usize = 3;
-/// Fewest images that are compared.
+/// Minimum number of images that are compared.
 const MIN_IMAGES: usize = 20;
-/// The camera must have rotated by this much in all measured pairs of images together, in degrees.
+/// Minimum rotation of the camera, summed over all measured pairs of images, in degrees.
 const MIN_ROTATION_DEG: f64 = 45.0;
-/// With more of the textured blocks still, the camera has seen one and the same scene.
+/// If more of the textured blocks are static, all images show the same scene.
 const MAX_STILL_RATIO: f64 = 0.5;
-/// A mask over more of the image than this is likely inverted.
+/// A mask of more of the image than this is probably inverted.
 const MAX_MASKED_RATIO: f64 = 0.6;
 
 /// Sums of the gradients of all sampled images of a camera.
@@ -35,7 +36,7 @@ pub(super) struct GradientSums {
     size_px: [usize; 2],
     width: usize,
     height: usize,
-    /// Number of pixels along each side that are averaged.
+    /// Side of the square of pixels that is averaged.
     scale: usize,
     images: usize,
     /// Sum of the gradients along columns and rows, and of their norms.
@@ -43,7 +44,7 @@ pub(super) struct GradientSums {
 }
 
 impl GradientSums {
-    /// Adds an image; one of another size than the first is left out.
+    /// Adds an image; an image whose size differs from the first one is ignored.
     pub(super) fn add(&mut self, image: &GrayImage) {
         if self.images == 0 {
             self.size_px = [image.width, image.height];
@@ -90,7 +91,7 @@ impl GradientSums {
         [self.width / BLOCK, self.height / BLOCK]
     }
 
-    /// Whether each block is still, row by row; `None` for one without texture.
+    /// True for each static block, row by row; `None` for a block without texture.
     fn judge(&self) -> Vec<Option<bool>> {
         let [columns, rows] = self.blocks();
         let block = |index: usize| {
@@ -107,7 +108,7 @@ impl GradientSums {
         (0..columns * rows).map(block).collect()
     }
 
-    /// The pixels of some blocks and of those around them.
+    /// Mask of the pixels of some blocks and of the blocks around them.
     fn mask(&self, blocks: &[bool]) -> ImageMask {
         let [columns, rows] = self.blocks();
         let near = |column: usize, row: usize| {
@@ -117,14 +118,14 @@ impl GradientSums {
         let [width, height] = self.size_px;
         let side = BLOCK * self.scale;
         let pixel = |index: usize| {
-            // What is left beside the last block belongs to it.
+            // Pixels beyond the last block belong to it.
             let (column, row) = ((index % width / side).min(columns - 1), (index / width / side).min(rows - 1));
             if near(column, row) { u8::MAX } else { 0 }
         };
         ImageMask::from_image(&GrayImage { width, height, pixels: (0..width * height).map(pixel).collect() })
     }
 
-    /// Whether a mask covers most of a block.
+    /// True if a mask covers most of a block.
     fn is_covered(&self, mask: &ImageMask, block: usize) -> bool {
         let side = BLOCK * self.scale;
         let [columns, _] = self.blocks();
@@ -134,7 +135,7 @@ impl GradientSums {
     }
 }
 
-/// Keeps the still blocks that have neighbours enough.
+/// Keeps the static blocks with enough neighbours.
 fn connected(still: &[bool], columns: usize) -> Vec<bool> {
     let mut kept = vec![false; still.len()];
     let mut visited = vec![false; still.len()];
@@ -167,7 +168,7 @@ fn connected(still: &[bool], columns: usize) -> Vec<bool> {
     kept
 }
 
-/// Proposes a mask for each camera that sees the vehicle, and checks the masks of the rig.
+/// Proposes a mask for each camera with the vehicle in view, and checks the masks of the rig.
 pub(super) fn check_still_pixels(
     survey: &Survey,
     rig: &Rig,
@@ -185,7 +186,7 @@ pub(super) fn check_still_pixels(
         if let Some(mask) = given.filter(|mask| mask.ratio() > MAX_MASKED_RATIO) {
             let title = format!("most of the images of {} is masked", camera.key);
             let evidence = format!("{:.0} % of the pixels", 100.0 * mask.ratio());
-            let remedy = "white pixels are masked: invert the mask when it marks what is to be used";
+            let remedy = "white pixels are masked: invert the mask if it marks the pixels to use";
             findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
         }
         let (rotation_deg, pairs) = rotated_deg.get(camera.key.as_str()).copied().unwrap_or_default();
@@ -208,13 +209,13 @@ pub(super) fn check_still_pixels(
             format!("in {} images, while the camera rotated by {rotation_deg:.0}° over {pairs} pairs", sums.images);
         if !parts.contains(&true) {
             if given.is_some() {
-                let title = format!("the mask of {} covers what never moves", camera.key);
+                let title = format!("the mask of {} covers all static regions", camera.key);
                 findings.good(Area::Images, title, motion);
             }
             continue;
         }
         let mask = sums.mask(&parts);
-        let title = format!("a part of the images of {} never moves", camera.key);
+        let title = format!("a region of the images of {} is static", camera.key);
         let evidence = format!("{:.1} % of the pixels {motion}: {}", 100.0 * mask.ratio(), extent(&mask));
         let remedy = format!(
             "it is likely the vehicle: write the proposed mask with dcvins check --write-masks FOLDER, correct it, and name it in {}.mask",

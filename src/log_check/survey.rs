@@ -16,33 +16,34 @@ use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
 use crate::sensors::{AttitudeSource, GimbalRig, ImuSample, JointSample, Rig};
 
-/// Joint names that are listed; messages may name more.
+/// Maximum number of listed joint names; messages may name more.
 const JOINT_NAMES: usize = 64;
 
-/// Number of images of each camera that are decoded, evenly over the log.
+/// Number of decoded images per camera, distributed evenly over the log.
 const IMAGES_PER_CAMERA: u64 = 60;
 
-/// Half length of the encoder readings that a parabola is fitted to; over longer spans a stabilized joint is none.
+/// Half length of the interval of encoder readings to which a parabola is fitted; over longer intervals a stabilized
+/// joint does not follow one.
 const HALF_BATCH_NS: i64 = 25_000_000;
-/// Joint readings further apart than this are not interpolated.
+/// Joint readings farther apart are not interpolated.
 const MAX_GAP_NS: i64 = 200_000_000;
 
 /// Lower bound of an encoder's standard deviation.
 const MIN_SIGMA_RAD: f64 = 1e-5;
 
-/// Log time and header stamp of a message since the log began.
+/// Log time and header stamp of a message, relative to the log's start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Times {
     pub(super) log_time_ns: i64,
     pub(super) stamp_ns: i64,
 }
 
-/// The times of one topic in the order of log times.
+/// Times of one topic, ordered by log time.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TopicSurvey {
     pub(super) topic: String,
     pub(super) times: Vec<Times>,
-    /// Messages that cannot be decoded, and why the first one could not.
+    /// Number of messages that cannot be decoded.
     pub(super) unreadable: usize,
     pub(super) first_problem: String,
 }
@@ -53,7 +54,7 @@ impl TopicSurvey {
         (stamps().min().unwrap_or(0), stamps().max().unwrap_or(0))
     }
 
-    /// Whether all of several messages have the same stamp, as when it was never set.
+    /// True if there are several messages and all have the same stamp, as if it was never set.
     pub(super) fn has_one_stamp(&self) -> bool {
         let (first, last) = self.stamp_range();
         self.times.len() > 2 && first == last
@@ -73,44 +74,43 @@ impl TopicSurvey {
     }
 }
 
-/// Measures of one decoded image.
 #[derive(Clone, Debug)]
 pub(super) struct SampledImage {
     pub(super) stamp_ns: i64,
     pub(super) measure: ImageMeasure,
 }
 
-/// Data of one pass through the log.
+/// Data from one pass through the log.
 #[derive(Debug, Default)]
 pub(super) struct Survey {
     /// Topics that are read, by name.
     pub(super) topics: BTreeMap<String, TopicSurvey>,
-    /// Topic of the IMU: the rig's, or the only one.
+    /// Topic of the IMU: the rig's, or the first one.
     pub(super) imu_topic: Option<String>,
     /// All topics of the IMU's type.
     pub(super) imu_topics: Vec<String>,
-    /// Samples of the IMU in the order of log times, not-finite ones included. With an accelerometer of its own they are merged, in the
-    /// order of their stamps and without those that are not finite.
+    /// Samples of the IMU in the order of log times, not-finite ones included. With a separate accelerometer topic they
+    /// are merged, ordered by stamp and without those that are not finite.
     pub(super) imu: Vec<ImuSample>,
-    /// Stamps and specific forces of an accelerometer on a topic of its own, in the order of log times.
+    /// Stamps and specific forces of a separate accelerometer topic, in the order of log times.
     pub(super) accelerometer: Vec<(i64, Vector3<f64>)>,
-    /// The encoders' messages in the order of log times.
+    /// Messages of the encoders in the order of log times.
     pub(super) joints: Vec<JointReading>,
-    /// Angles of all joints at common stamps, in the order of the stamps, from the finite readings.
+    /// Angles of all joints at common stamps, ordered by stamp, from the finite readings.
     pub(super) joint_samples: Vec<JointSample>,
-    /// The attitudes that the joint angles come from, where the rig names them.
+    /// Attitudes from which the joint angles are computed; `None` unless the rig names them.
     pub(super) attitude: Option<AttitudeSurvey>,
-    /// Why there is none although the rig names one.
+    /// Reason that `attitude` is `None` although the rig names one.
     pub(super) attitude_problem: Option<String>,
-    /// The joint angles of `attitude`.
+    /// Joint angles of `attitude`.
     pub(super) solved: Vec<SolvedAttitude>,
-    /// Variance of a reading from the rig.
+    /// Variance of an encoder reading by the rig.
     encoder_variance_rad2: f64,
-    /// Names that the joint messages use.
+    /// Names in the joint messages.
     pub(super) joint_names: Vec<String>,
     /// Images by camera key.
     pub(super) images: BTreeMap<String, Vec<SampledImage>>,
-    /// Bits of a grey value by camera key.
+    /// Bits per grey value by camera key.
     pub(super) depths: BTreeMap<String, BitDepth>,
     /// Sums of the gradients of those images by camera key.
     pub(super) gradients: BTreeMap<String, GradientSums>,
@@ -138,7 +138,7 @@ impl Survey {
         let mut keyframes_due: BTreeMap<String, u64> = BTreeMap::new();
         for block in &log.index().blocks {
             let decoded = DecodedBlock::decode(log.file(), block);
-            // A scanned log has reported its damage when it was opened.
+            // The damage of a scanned log was reported when it was opened.
             let reported = !log.index().from_summary || block.bytes.end > log.file().len();
             if let Some(damage) = decoded.damage.as_ref().filter(|_| !reported) {
                 let (first, last) = block.log_time_ns;
@@ -156,7 +156,7 @@ impl Survey {
                 let number = counts.entry(info.topic.clone()).or_default();
                 let stride = info.count.div_ceil(IMAGES_PER_CAMERA).max(1);
                 let data = decoded.bytes(&message.data);
-                // Of a video, keyframes are sampled: the others depend on those before.
+                // Of a video, only keyframes are sampled: other frames depend on previous ones.
                 let sampled = if kind.is_video() {
                     let due = keyframes_due.entry(info.topic.clone()).or_default();
                     let sampled = *number >= *due
@@ -184,7 +184,8 @@ impl Survey {
         survey
     }
 
-    /// All joint angles in radians at a time, by a fit to the readings around it; `None` without readings on both sides.
+    /// All joint angles in radians at a time, by a fit to the readings around it; `None` without readings on both
+    /// sides.
     pub(super) fn joint_angles_at(&self, stamp_ns: i64) -> Option<Vec<f64>> {
         let before = |time_ns: i64| self.joint_samples.partition_point(|sample| sample.stamp_ns < time_ns);
         let after = before(stamp_ns);
@@ -206,7 +207,7 @@ impl Survey {
         (0..around.len()).map(angle).collect()
     }
 
-    /// Joint angles of all joints from encoders or attitudes, on the IMU's clock.
+    /// Sets the joint angles of all joints from encoders or attitudes, in IMU time.
     fn set_joints(&mut self, gimbal: &GimbalRig) {
         if let Some(attitude) = &mut self.attitude {
             attitude.finish();
@@ -221,7 +222,7 @@ impl Survey {
         self.joint_samples = merged(&self.joints);
     }
 
-    /// Takes the joint angles of another meaning of the gimbal's attitude than the rig's.
+    /// Recomputes the joint angles with another interpretation of the gimbal's attitude than the rig's.
     pub(super) fn use_source(&mut self, rig: &Rig, source: AttitudeSource, timeshift_s: f64) {
         if let (Some(attitude), Some(gimbal)) = (&self.attitude, &rig.gimbal) {
             let gimbal = GimbalRig { attitude: Some(source), timeshift_gimbal_imu_s: timeshift_s, ..gimbal.clone() };
@@ -319,7 +320,7 @@ impl Survey {
     }
 }
 
-/// The samples of the gyroscope with the specific forces of an accelerometer of its own, both in any order.
+/// Samples of the gyroscope with the specific forces of a separate accelerometer, both in any order.
 fn merged_imu(gyroscope: &[ImuSample], accelerometer: &[(i64, Vector3<f64>)]) -> Vec<ImuSample> {
     let mut ordered: Vec<&ImuSample> = gyroscope.iter().collect();
     ordered.retain(|sample| sample.angular_velocity_rad_per_s.iter().all(|value| value.is_finite()));
@@ -334,7 +335,7 @@ fn merged_imu(gyroscope: &[ImuSample], accelerometer: &[(i64, Vector3<f64>)]) ->
     std::iter::from_fn(|| merge.pop()).collect()
 }
 
-/// The readings of all messages as samples of all joints; those that are not finite are left out.
+/// Readings of all messages as samples of all joints; those that are not finite are omitted.
 fn merged(readings: &[JointReading]) -> Vec<JointSample> {
     let Some(joints) = readings.first().map(|reading| reading.angles_rad.len()) else { return Vec::new() };
     let mut ordered: Vec<&JointReading> = readings.iter().collect();

@@ -17,7 +17,7 @@ const RATE_HZ: f64 = 200.0;
 const GYRO_DENSITY: f64 = 3.4e-4;
 const ACCEL_DENSITY: f64 = 0.004;
 
-/// Normal random numbers, always the same ones.
+/// Normal random numbers from a seed.
 pub(super) struct Noise(pub(super) u64);
 
 impl Noise {
@@ -42,16 +42,16 @@ fn rate_at(time_s: f64) -> Vector3<f64> {
     Vector3::new((1.1 * t).sin(), 0.8 * (1.7 * t).sin(), 0.9 * (0.7 * t).sin()) * (0.5 * grow)
 }
 
-/// Changes to a faultless flight; every field may be replaced.
+/// Changes to a faultless flight.
 struct Flight {
     imu: fn(i64, &mut MessageTimes, &mut Vector3<f64>, &mut Vector3<f64>) -> bool,
     image: fn(i64, &mut MessageTimes, &mut GrayImage) -> bool,
     joint: fn(i64, &mut f64),
     rig: String,
     camera_info: [f64; 4],
-    /// Whether the accelerometer has a topic of its own, with 62.5 Hz.
+    /// True if the accelerometer has a separate topic, at 62.5 Hz.
     accelerometer_apart: bool,
-    /// A topic of orientations only.
+    /// Topic with orientations only.
     orientations: Option<&'static str>,
 }
 
@@ -167,7 +167,7 @@ impl Flight {
     }
 }
 
-/// Exactly one finding of this severity contains all these words.
+/// Checks that exactly one finding of this severity contains all these words.
 fn expect(flight: &Flight, severity: Severity, words: &[&str]) {
     let report = flight.check(&[]);
     let found: Vec<_> = report
@@ -306,7 +306,7 @@ fn vibration_is_neither_noise_nor_motion() {
     assert!(report.worst() == Note, "{report}");
 }
 
-/// An image whose scene moves, behind a frame of the vehicle in its lower left corner.
+/// Image of a moving scene, with a frame of the vehicle in its lower left corner.
 fn behind_a_frame(_: i64, times: &mut MessageTimes, image: &mut GrayImage) -> bool {
     let at = (times.stamp_ns - EPOCH_NS) / (50 * MS);
     for (index, pixel) in image.pixels.iter_mut().enumerate() {
@@ -315,7 +315,7 @@ fn behind_a_frame(_: i64, times: &mut MessageTimes, image: &mut GrayImage) -> bo
             // Struts of the vehicle.
             *pixel = if (column / 6 + row / 9) % 2 == 0 { 30 } else { 90 };
         } else {
-            // A scene that is another one in every image.
+            // A different scene in every image.
             let random = SplitMix64::new(((column / 5 * 1000 + row / 5) * 1000 + at) as u64).next_u64();
             *pixel = 60 + u8::try_from(random % 120).unwrap();
         }
@@ -346,7 +346,7 @@ fn a_mask_is_proposed_for_what_never_moves() {
         beyond += usize::from(!near && proposed.mask.is_masked(column, row));
     }
     assert_eq!((missed, beyond), (0, 0));
-    // Without rotation, or with everything still, there is nothing to compare.
+    // Without rotation, or with everything static, there is nothing to compare.
     assert!(flight.check(&turns[..10]).proposed_masks.is_empty());
     let still = |_: i64, _: &mut MessageTimes, image: &mut GrayImage| {
         *image = texture(0);
@@ -503,7 +503,7 @@ fn faults_of_the_gimbal_and_the_extrinsics_are_found() {
     );
     expect(&rig("translation_bound: 0.003", "translation_bound: 0.0"), Note, &["the prior of the chain is zero"]);
     expect(&rig("d: 0.046", "d: 46.0"), Warning, &["the gimbal chain is unusually long"]);
-    // The inverse matrix: a camera with its axis along the IMU's x becomes one along −y, its image up.
+    // Inverse matrix: the optical axis changes from the IMU's x to −y, and the image is upright.
     expect(
         &rig(
             "[[0, -1, 0, 0], [0, 0, -1, 0.05], [1, 0, 0, -0.1], [0, 0, 0, 1]]",
@@ -530,7 +530,7 @@ fn a_log_without_a_rig_is_checked() {
     assert!(report.findings.iter().any(|finding| finding.title == "the accelerometer measures gravity"), "{report}");
 }
 
-/// Image rotations of the true motion, with the images late by `late_s` and the camera rotated by `error`.
+/// Image rotations of the true motion, with the images `late_s` late and the camera rotated by `error`.
 fn rotations(late_s: f64, error: UnitQuaternion<f64>) -> Vec<ImageRotation> {
     let camera_from_imu = {
         let columns = nalgebra::Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);

@@ -4,18 +4,18 @@ use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{AttitudeMessage, GimbalRig, Rig};
 
-/// Relative difference from the rig's rate that is reported.
+/// Smallest reported relative difference from the rig's rate.
 const RATE_TOLERANCE: f64 = 0.05;
-/// Jitter of the stamps that is reported, as a ratio of the period.
+/// Smallest reported jitter of the stamps, as a ratio of the period.
 const JITTER_TOLERANCE: f64 = 0.2;
-/// Topics whose latencies (log time minus header stamp) differ by more are stamped by different clocks.
+/// Difference of the latencies (log time minus header stamp) from which topics count as stamped by different clocks.
 const CLOCK_TOLERANCE_S: f64 = 0.2;
-/// Clock drift over the log that is reported.
+/// Smallest reported clock drift over the log.
 const DRIFT_TOLERANCE_S: f64 = 0.005;
-/// A topic that starts later or ends earlier than the IMU by more is reported.
+/// Smallest reported time by which a topic starts later or ends earlier than the IMU.
 const OVERLAP_TOLERANCE_S: f64 = 1.0;
 
-/// Rates, gaps, order and time bases of every topic that the rig names.
+/// Checks rates, gaps, order and time bases of every topic that the rig names.
 pub(super) fn check_timing(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) {
     let mut used = used_topics(survey, rig);
     used.retain(|(role, topic, ..)| {
@@ -45,7 +45,7 @@ pub(super) fn check_timing(survey: &Survey, rig: Option<&Rig>, findings: &mut Fi
     check_overlap(&used, findings);
 }
 
-/// Role, times, the rig's rate in Hz, and whether one lost message counts as a gap (images).
+/// Role, times, the rig's rate in Hz, and true if one lost message counts as a gap (images).
 type Used<'a> = (String, &'a TopicSurvey, Option<f64>, bool);
 
 fn used_topics<'a>(survey: &'a Survey, rig: Option<&Rig>) -> Vec<Used<'a>> {
@@ -60,7 +60,7 @@ fn used_topics<'a>(survey: &'a Survey, rig: Option<&Rig>) -> Vec<Used<'a>> {
     for camera in &rig.cameras {
         add(camera.key.clone(), Some(&camera.topic), Some(camera.rate_hz), true);
     }
-    // Transforms of other frames come between those of the gimbal.
+    // Transforms of other frames are interleaved with those of the gimbal.
     let of_one_kind = |gimbal: &&GimbalRig| {
         let message = gimbal.attitude.as_ref().map(|source| &source.message);
         !matches!(message, Some(AttitudeMessage::Transforms { .. }))

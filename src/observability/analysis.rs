@@ -50,7 +50,7 @@ pub fn analyse<A: AsRef<[f64]>>(
     analyse_with_scaling(linearization, chain, joint_angles_rad, joints_free, &ScalingRule::Fixed)
 }
 
-/// [`analyse`] with other units of the columns.
+/// [`analyse`] with other column units.
 pub fn analyse_with_scaling<A: AsRef<[f64]>>(
     linearization: &Linearization,
     chain: &Chain,
@@ -117,7 +117,7 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
     })
 }
 
-/// Indices of the chain's columns that are not fixed.
+/// Indices of the chain's columns that are estimated.
 fn kept_columns(chain: &Chain, fixed_parameters: &[ParameterId]) -> Vec<usize> {
     let parameters = chain.parameters().into_iter().enumerate();
     parameters.filter(|(_, parameter)| !fixed_parameters.contains(parameter)).map(|(column, _)| column).collect()
@@ -145,7 +145,7 @@ pub(super) fn measured_block(linearization: &Linearization) -> Option<MeasuredBl
 }
 
 impl MeasuredBlock {
-    /// The same with some of the calibration columns of its linearization, the others being known.
+    /// Block of some of the calibration columns; the others are treated as known.
     pub(super) fn select(&self, linearization: &Linearization, columns: &[usize]) -> Self {
         let scale = ScalingRule::Fixed.scale(&calibration_parameters(linearization));
         let norms = linearization.calibration_column_norms.component_mul(&scale).select_rows(columns);
@@ -156,8 +156,8 @@ impl MeasuredBlock {
     }
 }
 
-/// Frobenius norm of the columns before projection. It replaces the spectral norm, which needs more than the
-/// column norms, and exceeds it at most by the root of the number of columns.
+/// Frobenius norm of the columns before projection. It replaces the spectral norm, which needs more than the column
+/// norms, and exceeds it at most by the square root of the number of columns.
 fn reference(linearization: &Linearization, scale: &DVector<f64>) -> f64 {
     linearization.calibration_column_norms.component_mul(scale).norm()
 }
@@ -204,8 +204,8 @@ impl Projected {
     }
 }
 
-/// Blocks of the other unknowns in an efficient order of elimination, from the newest frame back: velocities and biases,
-/// which couple neighbours only, then depths, then joints and poses, which couple everything.
+/// Blocks of the other unknowns in an efficient order of elimination, from the newest frame back: velocities and
+/// biases, which couple neighbours only, then depths, then joints and poses, which couple all blocks.
 fn nuisance_blocks(linearization: &Linearization) -> Vec<Range<usize>> {
     let of = |groups: &'static [ColumnGroup]| {
         let blocks = linearization.columns.iter().filter(move |block| groups.contains(&block.id.group()));

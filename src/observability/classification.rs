@@ -53,9 +53,9 @@ pub(super) fn classify(
     Deficits { parameterization, joints, absorbed, motion: deficit - parameterization - joints - absorbed }
 }
 
-/// Returns orthonormal directions (dof × k, in units of the two scales) that some motion of joints and vehicle
-/// makes observable: neither redundant in the parameterization nor absorbed by free joint angles. Empty for a
-/// chain that is not finite.
+/// Returns orthonormal directions (dof × k, in units of 10° and 3 cm) that are observable under some motion of joints
+/// and vehicle: neither redundant in the parameterization nor absorbed by free joint angles. Empty for a chain that is
+/// not finite.
 pub(super) fn excitable_directions(chain: &Chain, joints_free: bool) -> DMatrix<f64> {
     let generic = generic_joint_angles(chain.joint_count(), 4 * (chain.joint_count() + 1));
     let mut stack = scaled_stack(chain, &generic);
@@ -68,7 +68,7 @@ pub(super) fn excitable_directions(chain: &Chain, joints_free: bool) -> DMatrix<
     svd.v.columns(0, rank_above(&stack, &values, reference)).into_owned()
 }
 
-/// Stacked Jacobians of the chain, rows and columns in units of the two scales.
+/// Stacked Jacobians of the chain, rows and columns in units of 10° and 3 cm.
 fn scaled_stack(chain: &Chain, joint_angles_rad: &[Vec<f64>]) -> DMatrix<f64> {
     let mut stack = stacked_jacobian(chain, joint_angles_rad);
     for (mut column, parameter) in stack.column_iter_mut().zip(chain.parameters()) {

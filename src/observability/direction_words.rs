@@ -1,4 +1,4 @@
-//! Directions of the calibration in words.
+//! Directions of the calibration as text.
 
 use super::CalibrationDirection;
 use crate::gimbal::{ParameterGroup, ParameterId, ParameterNames, Quantity};
@@ -13,7 +13,7 @@ pub fn parameters_of(
     parameters_of_weights(names, parameters, &direction.weights, max_count)
 }
 
-/// The same for weights without a direction.
+/// [`parameters_of`] for weights that belong to no [`CalibrationDirection`].
 pub fn parameters_of_weights(
     names: &ParameterNames,
     parameters: &[ParameterId],
@@ -25,7 +25,7 @@ pub fn parameters_of_weights(
     entries.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
     entries.retain(|(_, weight)| weight.abs() >= SMALLEST_NAMED);
     let omitted = entries.len().saturating_sub(max_count);
-    // A direction has no sign of its own: the first weight counts as positive.
+    // The sign of a direction is arbitrary: the first weight is shown as positive.
     let flip = entries.first().map_or(1.0, |(_, weight)| weight.signum());
     let mut text = String::new();
     for (place, (column, weight)) in entries.iter().take(max_count).enumerate() {
@@ -43,8 +43,8 @@ pub fn parameters_of_weights(
     text
 }
 
-/// The parameter that a direction exchanges its leading one for, where one of the two belongs to the shutter, the
-/// intrinsics of a camera or those of the IMU: a change of both together changes little in the measurements.
+/// Parameter with the second largest weight in a direction, if it or the leading one belongs to the shutter, the
+/// intrinsics of a camera or those of the IMU: a joint change of both hardly changes the measurements.
 pub(super) fn trades_with(parameters: &[ParameterId], direction: &CalibrationDirection) -> Option<ParameterId> {
     const SMALLEST_RATIO: f64 = 0.3;
     let leading = direction.leading(parameters)?;

@@ -46,7 +46,7 @@ pub(super) fn weak_directions(
     directions
 }
 
-/// A basis of the same space by Gauss–Jordan elimination on the parameters, as unit vectors in the order of their leading
+/// Basis of the same space by Gauss–Jordan elimination on the parameters, as unit vectors in the order of their leading
 /// parameters.
 fn eliminated_basis(mut basis: DMatrix<f64>) -> Vec<DVector<f64>> {
     let (rows, columns) = basis.shape();

@@ -4,14 +4,14 @@ use nalgebra::DMatrix;
 
 use crate::geometry::triangular_factor::{TriangularFactor, skip_dependent_columns};
 
-/// A column of which no more than this fraction is independent of those before it is dependent.
+/// A column is dependent if at most this fraction of it is independent of the columns before it.
 ///
-/// The four unobservable directions of visual-inertial windows leave about 1e-15; weakly observable directions stay above
-/// 1e-9.
+/// The four unobservable directions of visual-inertial windows leave about 1e-15; weakly observable directions stay
+/// above 1e-9.
 const DEPENDENT: f64 = 1e-11;
 
-/// The rows of a triangular factor without its first `nuisance` columns, these being projected out; `norms` are those of
-/// the columns of the rows that it was made of.
+/// Rows of a triangular factor with its first `nuisance` columns projected out; `norms` are the column norms of the
+/// matrix that was factorized.
 pub(super) fn project_out(factor: &TriangularFactor, nuisance: usize, norms: &[f64]) -> DMatrix<f64> {
     let mut upper = factor.to_matrix();
     let rank = skip_dependent_columns(&mut upper, nuisance, norms, DEPENDENT).len();

@@ -1,5 +1,5 @@
-//! Which calibration parameters a flight determines: their posterior against their prior standard deviations, with the
-//! reason where the analysis of the last window or the posterior correlations name one.
+//! Calibration parameters that a flight determines: posterior against prior standard deviations, with the reason where
+//! the analysis of the last window or the posterior correlations name one.
 
 use nalgebra::DMatrix;
 
@@ -12,7 +12,7 @@ const KNOWN_RATIO: f64 = 0.3;
 /// Ratio from which the flight does not determine a parameter: it contributes less than a quarter of the prior's
 /// information.
 const UNKNOWN_RATIO: f64 = 0.9;
-/// A direction explains a parameter that has at least this ratio of its squared unit vector in it.
+/// A direction explains a parameter if it contains at least this fraction of the parameter's squared unit vector.
 const MIN_INVOLVED: f64 = 0.25;
 /// Smallest weight of a named partner, relative to the parameter's own.
 const MIN_PARTNER: f64 = 0.2;
@@ -21,7 +21,7 @@ const MAX_PARTNERS: usize = 3;
 /// Smallest correlation that is named.
 const MIN_CORRELATION: f64 = 0.8;
 
-/// How well a flight determines a parameter.
+/// Quality of a parameter's estimate from a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Estimability {
     /// The posterior σ is less than 0.3 of the prior σ.
@@ -36,10 +36,9 @@ pub enum Estimability {
     Waiting,
 }
 
-/// A calibration parameter with what is known of it.
+/// Estimate of a calibration parameter with its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterEstimability {
-    /// Which.
     pub parameter: ParameterId,
     /// Estimate in the unit of its dimension; angles in (−π, π].
     pub value: f64,
@@ -47,15 +46,13 @@ pub struct ParameterEstimability {
     pub sigma: f64,
     /// Prior standard deviation.
     pub prior_sigma: f64,
-    /// The verdict.
     pub estimability: Estimability,
-    /// Why it is not known: the null or weak direction of the last window or the correlation that it belongs to, and for a sensor
-    /// the motion that determines it; empty without any.
+    /// Reason that the parameter is not known: the null or weak direction of the last window or the correlation that it
+    /// belongs to, and for a sensor the motion that determines it; empty without a reason.
     pub reason: String,
 }
 
 impl Estimability {
-    /// The verdict in words.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Known => "known",
@@ -84,8 +81,8 @@ impl ParameterEstimability {
     }
 }
 
-/// The verdict on every parameter of an estimate, in groups and else in the order of the columns; `rank` belongs to the same
-/// step or to the last one before it.
+/// Estimability of every parameter of an estimate, grouped, otherwise in column order; `rank` belongs to the same step
+/// or to the last one before it.
 pub fn estimability(
     estimate: &CalibrationEstimate,
     rank: Option<&RankReport>,
@@ -109,7 +106,7 @@ pub fn estimability(
             let reason = reason(rank, correlations.as_ref(), *parameter, names);
             let parts: Vec<String> = reason
                 .into_iter()
-                .chain(exciting_motion(*parameter).map(|motion| format!("to know it, {motion}")))
+                .chain(exciting_motion(*parameter).map(|motion| format!("suggested excitation: {motion}")))
                 .collect();
             row.reason = parts.join("; ");
         }
@@ -119,12 +116,12 @@ pub fn estimability(
     rows
 }
 
-/// Number of parameters with a verdict.
+/// Number of parameters with this estimability.
 pub fn count_of(rows: &[ParameterEstimability], estimability: Estimability) -> usize {
     rows.iter().filter(|row| row.estimability == estimability).count()
 }
 
-/// The null direction of a parameter, else its weak direction, else its largest correlation.
+/// Null direction of a parameter, else its weak direction, else its largest correlation.
 fn reason(
     rank: &RankReport,
     correlations: Option<&DMatrix<f64>>,
@@ -148,10 +145,10 @@ fn reason(
     Some(format!("correlation {correlation:+.2} with {}", names.name(*named)))
 }
 
-/// The columns that trade against a column in the span of some directions, largest weight first; `None` when the column
+/// Columns that trade off against a column in the span of some directions, largest weight first; `None` if the column
 /// is hardly in the span.
 ///
-/// The weights are those of the column's unit vector projected on the span, which do not depend on the choice of its basis.
+/// The weights are those of the column's unit vector projected on the span, which do not depend on the choice of basis.
 fn partners<'a>(directions: impl Iterator<Item = &'a CalibrationDirection>, column: usize) -> Option<Vec<usize>> {
     let mut projected: Vec<f64> = Vec::new();
     for direction in directions {
@@ -211,7 +208,7 @@ mod tests {
     fn every_parameter_has_a_verdict_and_unknown_ones_a_reason() {
         let parameters = Chain::from_classical(&ClassicalChain::default(), Parameterization::Minimal).parameters();
         let [rx, ry, rz, tx, ty, tz] = parameters[..] else { panic!("{parameters:?}") };
-        // Of the six, tx is not observable, rz weak with ty, and ry and tz are known together only.
+        // Of the six, tx is unobservable, rz weak with ty, and ry and tz are known only in combination.
         let mut information = DMatrix::identity(6, 6);
         information[(1, 5)] = 0.95;
         information[(5, 1)] = 0.95;

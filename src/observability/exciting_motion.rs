@@ -4,22 +4,22 @@ use super::RankReport;
 use crate::gimbal::{ParameterId, ParameterPart, Quantity};
 
 impl RankReport {
-    /// The least observable parameter with the motion that determines it, where it belongs to a sensor.
+    /// Least observable parameter with the motion that determines it; `None` if it does not belong to a sensor.
     pub fn sensor_excitation(&self) -> Option<(ParameterId, &'static str)> {
         let parameter = self.least_observable()?;
         Some((parameter, exciting_motion(parameter)?))
     }
 }
 
-/// The motion that determines a parameter of a sensor, in words; `None` for the chain, whose excitation depends on its state
+/// Motion that determines a sensor parameter, as text; `None` for the chain, whose excitation depends on its state
 /// ([`super::laboratory::advise`]).
 ///
-/// Axes of the image and of the IMU are named instead of those of the vehicle, so that it holds for every mount. The test of the
-/// laboratory's table of motions holds the words against predicted standard deviations.
+/// The text names axes of the image and of the IMU, not of the vehicle, so that it is valid for any extrinsics. The
+/// test of the laboratory's table of motions checks it against predicted standard deviations.
 pub fn exciting_motion(parameter: ParameterId) -> Option<&'static str> {
     let words = match (parameter.part, parameter.quantity) {
-        (ParameterPart::Encoder, Quantity::Timeshift) => "move the joints to and fro",
-        (_, Quantity::Timeshift | Quantity::Readout) => "rotate the camera to and fro",
+        (ParameterPart::Encoder, Quantity::Timeshift) => "move the joints back and forth",
+        (_, Quantity::Timeshift | Quantity::Readout) => "rotate the camera back and forth",
         (_, Quantity::Fx) => "rotate the camera about its vertical image axis",
         (_, Quantity::Fy) => "rotate the camera about its horizontal image axis",
         (_, Quantity::Cx | Quantity::Cy) => "rotate the camera about both image axes",

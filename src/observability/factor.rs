@@ -6,8 +6,8 @@ use crate::estimator::allocated_bytes;
 
 /// Upper triangle `R` in single precision of the information matrix `RᵀR`.
 ///
-/// The range of a factor is the square root of that of the information, so that single precision represents
-/// weakly beside strongly observable directions. A step's factor takes 1.2 kB at most.
+/// The dynamic range of a factor is the square root of that of the information, so that single precision represents
+/// weakly and strongly observable directions together. A step's factor takes 1.2 kB at most.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PackedFactor {
     columns: usize,
@@ -24,7 +24,6 @@ impl PackedFactor {
         Self { columns, entries }
     }
 
-    /// Number of columns.
     pub fn columns(&self) -> usize {
         self.columns
     }
@@ -41,7 +40,6 @@ impl PackedFactor {
         triangle.tr_mul(&triangle)
     }
 
-    /// Bytes on the heap.
     pub(super) fn heap_bytes(&self) -> usize {
         allocated_bytes(size_of_val(&*self.entries))
     }

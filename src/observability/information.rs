@@ -11,20 +11,19 @@ pub struct InformationRate {
     pub duration_s: f64,
     /// Motions in the order of the entries of [`ParameterRate::by_motion`].
     pub motions: Vec<Motion>,
-    /// Each parameter, in the order of the columns.
+    /// In column order.
     pub parameters: Vec<ParameterRate>,
 }
 
 /// Information gain of one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterRate {
-    /// Which.
     pub parameter: ParameterId,
     /// Gain in bits per second: one bit halves the standard deviation.
     pub bits_per_s: f64,
     /// Contribution of each motion; a negative one reduces the contributions of others.
     pub by_motion: Vec<f64>,
-    /// Remaining contribution: images that confirm earlier images outside of the window.
+    /// Remaining contribution: images that confirm earlier images outside the window.
     pub earlier: f64,
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::RankReport;
 use crate::gimbal::ParameterId;
 
-/// A parameter counts as lost when at least this ratio of its squared unit vector lies in the span of the directions.
+/// A parameter counts as lost if at least this ratio of its squared unit vector lies in the span of the directions.
 const MIN_LOST_RATIO: f64 = 0.25;
 
 /// Observability of a parameter in a step.

@@ -5,12 +5,13 @@ use nalgebra::{DMatrix, DVector};
 use super::RankReport;
 use crate::gimbal::ParameterId;
 
-/// A direction is unobservable in another step when this fraction of it lies in that step's null and weak directions.
+/// A direction is also unobservable in another step if this fraction of it lies in that step's null and weak
+/// directions.
 const SAME_RATIO: f64 = 0.9;
 
 /// Counts the earlier steps, latest first, in which a direction was null or weak without interruption.
 ///
-/// The iteration ends at the first step that observes the direction or has other columns.
+/// The count ends at the first step that observes the direction or has other columns.
 pub fn steps_lost<'a>(
     parameters: &[ParameterId],
     direction: &[f64],
@@ -22,7 +23,7 @@ pub fn steps_lost<'a>(
 }
 
 impl RankReport {
-    /// Whether a unit direction lies in the span of the null and weak directions.
+    /// True if a unit direction lies in the span of the null and weak directions.
     fn loses(&self, direction: &DVector<f64>) -> bool {
         if self.directions.is_empty() {
             return false;
@@ -84,7 +85,7 @@ mod tests {
         let count =
             |direction: &[f64], earlier: &[Option<&RankReport>]| steps_lost(&names, direction, earlier.iter().copied());
         assert_eq!(count(&first, &[Some(&lost), Some(&lost), Some(&seen), Some(&lost)]), 2);
-        // A combination of unobservable directions is unobservable as well, whatever basis each step has.
+        // A combination of unobservable directions is also unobservable, in any basis of the step.
         assert_eq!(count(&mixed, &[Some(&lost), Some(&report(&[mixed])), Some(&report(&[first]))]), 2);
         assert_eq!(count(&first, &[None, Some(&lost)]), 0);
         assert_eq!(steps_lost(&names[..2], &first, [Some(&lost)]), 0);

@@ -47,9 +47,8 @@ pub struct RankReport {
 /// A right singular direction of the calibration block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationDirection {
-    /// Its singular value.
     pub singular_value: f64,
-    /// Whether it is a structural zero, not only uninformed.
+    /// True for a structural zero; false if only uninformed.
     pub structural: bool,
     /// Signed weight of each parameter in the scaled unit direction.
     pub weights: Vec<f64>,
@@ -76,7 +75,6 @@ impl RankReport {
         parts.join("; ")
     }
 
-    /// Bytes that it takes on the heap.
     pub fn heap_bytes(&self) -> usize {
         let weights = self.directions.iter().map(|direction| of_vec(&direction.weights)).sum::<usize>();
         weights
@@ -105,7 +103,7 @@ impl RankReport {
         self.known.iter().map(|known| known.spurious_gain).fold(0.0, f64::max)
     }
 
-    /// The least observable direction that is not a structural zero, else the first null direction.
+    /// Least observable direction that is not a structural zero, else the first null direction.
     pub fn least_observable_direction(&self) -> Option<&CalibrationDirection> {
         let weak = self.directions.iter().find(|direction| !direction.structural);
         weak.or_else(|| self.directions.first())

@@ -9,14 +9,13 @@ use crate::frontend::FeatureId;
 use crate::geometry::{Dimension, RigidTransform, so3};
 use crate::gimbal::{Chain, ClassicalChain};
 
-/// A chain moved along a direction.
+/// Chain moved along a direction, with the predicted effect on camera and images.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainSlide {
     /// Stamp of the step whose chain was moved.
     pub stamp_ns: i64,
-    /// How far, in units of 10° and 3 cm along the unit direction.
+    /// Amount in units of 10° and 3 cm along the unit direction.
     pub amount: f64,
-    /// The moved chain.
     pub chain: ClassicalChain,
     /// Change of `imu_from_camera` at the newest frame, in metres and radians.
     pub camera_moves: (f64, f64),
@@ -24,15 +23,15 @@ pub struct ChainSlide {
     pub changes: Vec<f64>,
     /// Largest change of a reprojection in the window, in pixels.
     pub largest_px: f64,
-    /// The same to first order: the effect of a small change, scaled up.
+    /// The same to first order: effect of a small change, scaled up linearly.
     pub largest_first_order_px: f64,
-    /// Predicted pixels of the newest frame's features with the present and with the moved chain.
+    /// Predicted pixels of the newest frame's features: with the present chain, with the moved chain.
     pub predictions_px: Vec<(FeatureId, [Vector2<f64>; 2])>,
 }
 
 /// A change small enough for first-order effects only.
 const SMALL: f64 = 1e-4;
-/// Steps of the search for a feature's depth.
+/// Iterations of the search for a feature's depth.
 const DEPTH_STEPS: usize = 4;
 /// Iterations of the joint angles where they are unknown.
 const JOINT_STEPS: usize = 4;
@@ -51,14 +50,14 @@ pub fn chain_of_step(report: &StepReport, rank: &RankReport) -> Option<Chain> {
     has(&chain).then_some(chain)
 }
 
-/// Moves the chain of a step along a scaled direction and predicts all features of the window with fixed poses.
-/// Each feature takes the depth with the smallest residuals, as in the estimator; joint angles without encoder
-/// readings are adapted.
+/// Moves the chain of a step along a scaled direction and predicts all features of the window with fixed poses. Each
+/// feature takes the depth with the smallest residuals, as in the estimator; joint angles without encoder readings are
+/// adapted.
 ///
 /// `None` when no feature can be predicted.
 ///
-/// Along an unobservable direction the pixels stay, to first order or at any amount, unless the poses must
-/// change with it.
+/// Along an unobservable direction the pixels do not change, to first order or at any amount, unless the direction
+/// includes a change of the poses.
 pub fn slide(
     report: &StepReport,
     camera: &CameraModel,
@@ -130,7 +129,7 @@ fn extrinsics(frame: &FrameStateReport, chain: &Chain, like: Option<&RigidTransf
     chain.imu_from_camera(&angles)
 }
 
-/// Step of the joint angles that brings `imu_from_camera` closest to `like`, 10° weighing as much as 3 cm.
+/// Step of the joint angles that brings `imu_from_camera` closest to `like`; 10° weigh as much as 3 cm.
 fn towards(chain: &Chain, angles_rad: &[f64], like: &RigidTransform) -> Option<DVector<f64>> {
     let linearization = chain.linearize(angles_rad);
     let mut wanted = like.minus(&linearization.imu_from_camera);
@@ -190,7 +189,7 @@ impl Track {
         self.observers.iter().map(|slot| camera.project(&poses[*slot].inverse().transform(&point))).collect()
     }
 
-    /// Predicted pixels with the depth that minimizes the distance to the wanted ones.
+    /// Predicted pixels with the depth that minimizes the distance to `wanted`.
     fn fitted(
         &self,
         poses: &[RigidTransform],

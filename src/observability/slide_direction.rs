@@ -1,4 +1,4 @@
-//! Directions along which a chain can be moved, by name.
+//! Named directions along which a chain can be moved.
 
 use std::str::FromStr;
 
@@ -16,7 +16,6 @@ pub enum SlideDirection {
     Measured(usize),
     /// A null direction in closed form.
     Known(KnownLoss),
-    /// A single parameter.
     Parameter(ParameterId),
 }
 
@@ -38,14 +37,13 @@ pub struct SlideRequest {
     pub amount: f64,
 }
 
-/// A text that is no change.
+/// Text that does not parse as a change.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
     "'{given}' is no direction with a value: expected DIRECTION=VALUE, as in 1=0.5 (the least observable direction by half of 10° \
      and 3 cm), base-d=1 or yaw.alpha=-1"
 )]
 pub struct InvalidSlide {
-    /// The given text.
     pub given: String,
 }
 
@@ -63,7 +61,7 @@ impl FromStr for SlideRequest {
 }
 
 impl SlideRequest {
-    /// Resolves the direction on a rig with these parameter names; `None` when there is no such direction.
+    /// Resolves the direction on a rig with these parameter names; `None` for an unknown direction.
     pub fn position(&self, names: &ParameterNames) -> Option<SlidePosition> {
         let measured = self.direction.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
         let direction = measured
@@ -118,7 +116,7 @@ impl KnownLoss {
         ends.chain(rigid).chain(joints).find(|loss| loss.name() == name)
     }
 
-    /// Its name on the command line: `base-d`, `free-angle-2`.
+    /// Name on the command line: `base-d`, `free-angle-2`.
     pub fn name(self) -> String {
         let axis = |axis: usize| ["x", "y", "z"].get(axis).copied().unwrap_or("?");
         match self {

@@ -1,15 +1,14 @@
-//! Null directions of the chain in closed form: steps of its columns that leave the camera pose unchanged at
-//! all joint angles, each with its reason.
+//! Null directions of the chain in closed form: steps of its columns that leave the camera pose unchanged at all joint
+//! angles, each with its reason.
 //!
-//! The paper claims six degenerate columns of the classical chain (§4.5): `d`, `a`, `α` and `θ` of the last
-//! link and `d` and `θ` of the first one. It proves that of `d` (Eqs. 11–17) and fixes the others by the forms
-//! of Eqs. 19 and 20. Errors of the print do not affect the claim (docs/mathematics.md, section 2): Eq. 12 has
-//! a minus before the lever-arm block where a plus belongs (left convention; the proof uses other columns
-//! only), and Eq. 18 has `−cos β` in the lower right corner of a rotation, while Eq. 19 needs `+cos β`.
-//! Switching the rotations of α and β against the singularity of Eq. 19 works only when `y` is moved together
-//! with β (docs/mathematics.md, section 4): [`crate::gimbal::Parameterization::MinimalSwapped`].
-//! The paper perturbs rotations on the left; the directions here use the right convention, as the rest of the
-//! program.
+//! The paper claims six degenerate columns of the classical chain (§4.5): `d`, `a`, `α` and `θ` of the last link and
+//! `d` and `θ` of the first one. It proves that of `d` (Eqs. 11–17) and fixes the others by the forms of Eqs. 19 and
+//! 20. Errors of the print do not affect the claim (docs/mathematics.md, section 2): Eq. 12 has a minus before the
+//! lever-arm block where a plus belongs (left convention; the proof uses other columns only), and Eq. 18 has `−cos β`
+//! in the lower right corner of a rotation, while Eq. 19 needs `+cos β`. Exchanging the rotations of α and β to avoid
+//! the singularity of Eq. 19 works only when `y` is moved together with β (docs/mathematics.md, section 4):
+//! [`crate::gimbal::Parameterization::MinimalSwapped`]. The paper perturbs rotations on the left; the directions here
+//! use the right convention, as the rest of the program.
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
@@ -47,20 +46,20 @@ pub enum KnownLoss {
 /// A closed-form null direction, compared with a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownDirection {
-    /// The null direction.
     pub loss: KnownLoss,
     /// Scaled response of the window to the direction, relative to the reference of the rank rule: a rounding error
     /// when the measurement agrees.
     pub response: f64,
     /// Fraction of the scaled direction inside the measured null space, 1 when the measurement agrees.
     pub null_space_fraction: f64,
-    /// Whether the measurement agrees.
+    /// True if the measurement confirms the direction.
     pub agrees: bool,
-    /// Information along the direction beyond the rig's prior, 1 as much as that of the scale.
+    /// Square root of the information along the direction beyond the rig's prior, in units of the scale (1: σ = 10° or
+    /// 3 cm).
     ///
     /// The direction is unobservable, so that any value but zero is spurious: marginalization prior and window were
-    /// linearized at different values of the calibration. First-estimate Jacobians keep it at zero. Zero for
-    /// offsets of free joint angles: encoder readings before a fork may constrain them.
+    /// linearized at different values of the calibration. First-estimate Jacobians keep it at zero. Zero for offsets of
+    /// free joint angles: encoder readings before a fork may constrain them.
     pub spurious_gain: f64,
 }
 
@@ -68,7 +67,7 @@ pub struct KnownDirection {
 pub const MIN_SPURIOUS_GAIN: f64 = 0.01;
 
 impl KnownDirection {
-    /// Whether the spurious information is not negligible.
+    /// True if the spurious information exceeds [`MIN_SPURIOUS_GAIN`].
     pub fn is_claimed(&self) -> bool {
         self.spurious_gain > MIN_SPURIOUS_GAIN
     }
@@ -91,7 +90,7 @@ pub fn known_losses(chain: &Chain, joints_free: bool) -> Vec<(KnownLoss, DVector
     losses
 }
 
-/// Adds the six of the classical form.
+/// Adds the six redundant directions of the classical parameterization.
 fn redundant(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<f64>)>) {
     let classical = chain.to_classical();
     let directions = redundant_directions(&classical);
@@ -123,7 +122,7 @@ fn redundant(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVec
     }
 }
 
-/// Adds those of links: joint offsets against free angles, and neighbours on parallel axes.
+/// Adds the directions between links: joint offsets against free angles, and neighbours on parallel axes.
 fn links(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<f64>)>) {
     let parameters = chain.parameters();
     let column = |link: usize, quantity: Quantity| {
@@ -162,14 +161,12 @@ fn links(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<
     }
 }
 
-/// Information about the calibration, columns scaled and all other unknowns projected out.
+/// Information about the calibration; columns scaled, all other unknowns projected out.
 pub(super) struct Measured<'a> {
     pub(super) scale: &'a DVector<f64>,
-    /// Rows of the measurements.
     pub(super) block: &'a DMatrix<f64>,
-    /// Null space of that block.
+    /// Null space of `block`.
     pub(super) null_space: DMatrixView<'a, f64>,
-    /// Rows of measurements and priors.
     pub(super) with_priors: &'a DMatrix<f64>,
     /// Rows of the rig's prior alone.
     pub(super) rig_prior: &'a DMatrix<f64>,
@@ -229,7 +226,7 @@ impl KnownLoss {
         }
     }
 
-    /// Why the direction is unobservable, in one sentence, for a chain with this number of joints.
+    /// Reason that the direction is unobservable, as one sentence; `joints` is the chain's number of joints.
     pub fn reason(self, joints: usize, names: &ParameterNames) -> String {
         let link = |link: usize| names.part(ParameterPart::Link(link as u8));
         let (first, last) = (link(0), link(joints.saturating_sub(1)));

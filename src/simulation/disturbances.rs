@@ -1,78 +1,80 @@
-//! What goes wrong on a flight, on purpose.
+//! Simulated sensor faults and calibration errors.
 
 use super::interval::during;
 use super::options::SimulationError;
 use super::vibration::Vibration;
 
-/// What may go wrong on a flight; by default nothing.
+/// Simulated sensor faults and calibration errors; none by default.
 ///
-/// Times are seconds since the log began.
+/// Times are in seconds since the log's start.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Disturbances {
-    /// Kalibr's `timeshift_cam_imu`, untold to the given rig: `t_imu = t_cam + shift`.
+    /// Kalibr's `timeshift_cam_imu`, `t_imu = t_cam + shift`; applied to the data only, absent from the given rig.
     pub camera_time_offset_s: f64,
-    /// Readout of the cameras, untold to the given rig: row v is exposed `v / height · readout` after the stamp.
+    /// Readout of the cameras: row v is exposed `v / height · readout` after the stamp. Applied to the data only,
+    /// absent from the given rig.
     pub readout_s: f64,
     /// Error of the given rig's focal lengths, as a ratio: 0.01 makes them 1 % too long.
     pub focal_ratio: f64,
-    /// Standard deviations of the errors of the IMU's scales and of its angles in radians (misalignment, rotation of the
-    /// gyroscope), untold to the given rig.
+    /// Standard deviations of the errors of the IMU's scales, and of its angles in radians (misalignment, rotation of
+    /// the gyroscope). Applied to the data only, absent from the given rig.
     pub imu_intrinsics: [f64; 2],
     /// First-order Gauss–Markov error of each axis of the accelerometer: standard deviation in m/s², time constant in
     /// seconds.
     pub accelerometer_drift: Option<[f64; 2]>,
-    /// How much later than measured the joint angles are stamped.
+    /// Delay of the stamps of the joint angles after the measurement.
     pub joint_lag_s: f64,
-    /// Joint angles are recorded from this time on.
+    /// Start of the recording of joint angles.
     pub joint_start_s: f64,
-    /// From when and for how long no image is recorded.
+    /// Start and duration of an interval without images.
     pub image_gap_s: Option<[f64; 2]>,
-    /// Exposure time: images are blurred by the motion during it.
+    /// Exposure time; images are blurred by the motion during it.
     pub exposure_s: f64,
-    /// Standard deviation of the images' noise in grey values, instead of that of the options.
+    /// Standard deviation of the image noise in grey values; replaces that of the options.
     pub image_noise: Option<f64>,
-    /// Quality of the JPEG images, 1 to 100, instead of that of the options.
+    /// Quality of the JPEG images, 1 to 100; replaces that of the options.
     pub jpeg_quality: Option<f64>,
-    /// Ratio by which the farthest corner is darker than the middle, instead of 0.12.
+    /// Ratio by which the farthest corner is darker than the centre; replaces 0.12.
     pub vignetting: Option<f64>,
-    /// Amplitude of the slow drift of the exposure as a ratio of its mean, as of an automatic exposure, instead of
-    /// 0.05.
+    /// Amplitude of the slow drift of the exposure as a ratio of its mean, as with automatic exposure; replaces 0.05.
     pub exposure_drift: Option<f64>,
-    /// Largest rate that the gyroscope can measure, in rad/s.
+    /// Range of the gyroscope, in rad/s.
     pub gyroscope_range_rad_per_s: Option<f64>,
-    /// Largest specific force that the accelerometer can measure, in m/s².
+    /// Range of the accelerometer, in m/s².
     pub accelerometer_range_m_per_s2: Option<f64>,
-    /// When the light changes (a cloud, a shadow's edge) and by which factor; the cameras' automatic exposure makes it
-    /// good with a time constant of 0.4 s.
+    /// Time and factor of a change of the light (a cloud, a shadow's edge); the cameras' automatic exposure compensates
+    /// it with a time constant of 0.4 s.
     pub light_change: Option<[f64; 2]>,
-    /// From when and for how long the cameras see an even grey, as in fog or close before a bare wall; their noise stays.
+    /// Start and duration of an interval in which the images are uniformly grey, as in fog or in front of a bare wall;
+    /// noise is added.
     pub blank_s: Option<[f64; 2]>,
-    /// From when and for how long the operator swings the gimbal's heading to and fro, 60° to each side, as fast as the
-    /// motors follow (200°/s).
+    /// Start and duration of an interval in which the operator swings the gimbal's heading back and forth, 60° to each
+    /// side, at the motors' largest rate (200°/s).
     pub gimbal_slew_s: Option<[f64; 2]>,
-    /// Joint (from 1) that is fixed at its angle, start and duration in seconds.
+    /// Joint (from 1) that is fixed at its angle, start and duration.
     pub fixed_joint: Option<[f64; 3]>,
-    /// Start and duration in seconds of hovering with a sway of a centimetre; the flight goes on after it.
+    /// Start and duration of hovering with a sway of a centimetre; the flight continues afterwards.
     pub hover_s: Option<[f64; 2]>,
-    /// From when and for how long the camera keeps its orientation in the world exactly, as far as the stops let it.
+    /// Start and duration of an interval in which the camera keeps its orientation in the world exactly, within the
+    /// joint limits.
     pub stabilized_s: Option<[f64; 2]>,
-    /// Start, duration and rate (in rad/s) of a rotation of the vehicle about the vertical, beyond the limits of
+    /// Start, duration and rate (in rad/s) of a rotation of the vehicle about the vertical, beyond the limits of the
     /// experiments.
     pub spin: Option<[f64; 3]>,
-    /// Vibration of the airframe in the IMU; images and gimbal are free of it.
+    /// Vibration of the airframe in the IMU; images and gimbal are not affected.
     pub vibration: Option<Vibration>,
 }
 
-/// Ratio by which the farthest corner of an image is darker than the middle, unless a disturbance says otherwise.
+/// Default ratio by which the farthest corner of an image is darker than the centre.
 pub(crate) const VIGNETTING: f64 = 0.12;
-/// Slow drift of the exposure as a ratio of its mean, unless a disturbance says otherwise.
+/// Default slow drift of the exposure as a ratio of its mean.
 pub(crate) const EXPOSURE_DRIFT: f64 = 0.05;
 /// Time constant of the cameras' automatic exposure.
 const AUTO_EXPOSURE_S: f64 = 0.4;
-/// Grey of what the cameras see while there is nothing to see.
+/// Grey value of the images in a blank interval.
 pub(crate) const BLANK_GREY: f32 = 150.0;
 
-/// What [`Disturbances::set`] reads, for messages and help.
+/// Keys and values of [`Disturbances::set`], for messages and help.
 const KEYS: &str = "camera-offset=S, readout=S, focal=RATIO, imu-intrinsics=SCALE,RAD, accelerometer-drift=M/S²,S, \
                     joint-lag=S, joint-start=S, image-gap=START,LENGTH, exposure=S, image-noise=GREY, jpeg=QUALITY, vignetting=RATIO, exposure-drift=RATIO, \
                     gyroscope-range=RAD/S, accelerometer-range=M/S², light=START,FACTOR, blank=START,LENGTH, \
@@ -83,7 +85,7 @@ impl Disturbances {
     /// Adds one disturbance written as `KEY=VALUE[,VALUE…]`, in seconds and SI units, as on the command line.
     ///
     /// # Errors
-    /// When there is no such key, or it wants other values.
+    /// If the key is unknown or its values are invalid.
     pub fn set(&mut self, text: &str) -> Result<(), SimulationError> {
         let bad = |expected: String| SimulationError::BadDisturbance { text: text.to_owned(), expected };
         let unknown = || bad(format!("expected one of {KEYS}"));
@@ -93,7 +95,7 @@ impl Disturbances {
             .map(|value| value.parse::<f64>().ok().filter(|value| value.is_finite()))
             .collect::<Option<_>>()
             .ok_or_else(|| bad(format!("expected numbers after '{key}='")))?;
-        let wants = |count: usize| bad(format!("'{key}' wants {count} numbers between commas, not {}", values.len()));
+        let wants = |count: usize| bad(format!("'{key}' takes {count} comma-separated numbers, not {}", values.len()));
         let one = || <[f64; 1]>::try_from(values.as_slice()).map(|[value]| value).map_err(|_length| wants(1));
         let two = || <[f64; 2]>::try_from(values.as_slice()).map_err(|_length| wants(2));
         let three = || <[f64; 3]>::try_from(values.as_slice()).map_err(|_length| wants(3));
@@ -129,7 +131,6 @@ impl Disturbances {
         Ok(())
     }
 
-    /// Checks the ranges of all values.
     pub(crate) fn check(&self) -> Result<(), SimulationError> {
         let within = |option: &'static str, value: f64, low: f64, high: f64| {
             let inside = value >= low && value <= high;
@@ -162,7 +163,7 @@ impl Disturbances {
         within("rate of the spin in rad/s", self.spin.map_or(0.0, |[_, _, rate]| rate), -6.0, 6.0)
     }
 
-    /// Ratio of the image brightness at a time to that without a change of the light.
+    /// Ratio of the image brightness at a time to the brightness without a change of the light.
     pub(crate) fn light_at(&self, time_s: f64) -> f64 {
         match self.light_change {
             Some([start_s, factor]) if time_s >= start_s => factor.powf((-(time_s - start_s) / AUTO_EXPOSURE_S).exp()),
@@ -170,7 +171,7 @@ impl Disturbances {
         }
     }
 
-    /// Whether there is nothing to see at a time.
+    /// True if the images are blank at a time.
     pub(crate) fn blank_at(&self, time_s: f64) -> bool {
         during(self.blank_s, time_s)
     }

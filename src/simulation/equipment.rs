@@ -1,4 +1,4 @@
-//! The firefly's rig: what is true, and the wrong one that an estimator is given.
+//! Rig of the firefly: the true one, and the given one with errors.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
@@ -17,19 +17,19 @@ use crate::sensors::{
 pub(crate) const GRAVITY_M_PER_S2: f64 = 9.81;
 /// Rate of the IMU and of the encoders.
 pub(crate) const IMU_RATE_HZ: f64 = 200.0;
-/// Size that the intrinsics below belong to.
+/// Image size of the intrinsics below.
 const NOMINAL_SIZE_PX: [usize; 2] = [640, 480];
 
-/// The lens of the simulated cameras.
+/// Lens of the simulated cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lens {
-    /// A perfect pinhole.
+    /// Pinhole without distortion.
     Pinhole,
-    /// A mild barrel distortion, radial–tangential.
+    /// Mild barrel distortion, radial–tangential.
     Radtan,
 }
 
-/// A simulated camera at this image size; `which` is 0 for the gimbal camera, 1 for the static one.
+/// Camera model at this image size; `which` is 0 for the gimbal camera, 1 for the static one.
 pub(crate) fn camera_model(which: usize, lens: Lens, resolution_px: [usize; 2]) -> CameraModel {
     let [fx, fy, cx, cy] = [[361.4, 360.9, 318.6, 241.8], [357.8, 358.3, 322.7, 237.4]][which.min(1)];
     let distortion = match (lens, which) {
@@ -48,7 +48,7 @@ pub(crate) fn camera_model(which: usize, lens: Lens, resolution_px: [usize; 2]) 
     }
 }
 
-/// What a rig is to hold.
+/// Contents of a rig.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Equipment {
     pub(crate) gimbal_camera: bool,
@@ -62,7 +62,7 @@ pub(crate) struct Equipment {
 }
 
 impl Equipment {
-    /// The true rig, its chain's errors of manufacture drawn from a random stream.
+    /// True rig; the manufacturing errors of its chain are drawn from a random stream.
     pub(crate) fn true_rig(&self, name: &str, random: &mut RandomStream) -> Rig {
         let chain = true_chain(random);
         let static_extrinsics = CameraMount::Static { imu_from_camera: static_extrinsics(random) };
@@ -119,7 +119,7 @@ impl Equipment {
     }
 }
 
-/// A static camera under the nose, ahead and 12° down, give or take two degrees.
+/// Extrinsics of a static camera under the nose that looks forward and 12° down, with random errors of two degrees.
 fn static_extrinsics(random: &mut RandomStream) -> RigidTransform {
     let optical = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let optical = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(optical));
@@ -129,9 +129,10 @@ fn static_extrinsics(random: &mut RandomStream) -> RigidTransform {
     RigidTransform::new(down * optical * so3::exp(&tilt), Vector3::new(0.105, 0.003, 0.022) + shift)
 }
 
-/// The rig an estimator is given: each of the chain's `4N + 6` independent parameters (the minimal form's) is wrong by
-/// a uniform error within `bounds`, as the paper starts its experiments; static cameras are wrong within the same
-/// bounds, but by no more than 3 mm and 0.5° per axis, and the cameras' time offset and readout are not in it.
+/// Rig given to an estimator: each of the chain's `4N + 6` independent parameters (those of the minimal
+/// parameterization) has a uniform error within `bounds`, as at the start of the paper's experiments; static cameras
+/// have errors within the same bounds, but of at most 3 mm and 0.5° per axis. The cameras' time offset and readout are
+/// absent.
 pub(crate) fn given_rig(ground_truth: &Rig, bounds: ChainPrior, random: &mut RandomStream) -> Rig {
     let mut given = ground_truth.clone();
     if let Some(gimbal) = &mut given.gimbal {
@@ -152,19 +153,19 @@ pub(crate) fn given_rig(ground_truth: &Rig, bounds: ChainPrior, random: &mut Ran
     given
 }
 
-/// How wrong the intrinsics of a given camera are.
+/// Errors of the intrinsics of a given camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct IntrinsicsError {
-    /// Of both focal lengths, as a ratio: 0.01 makes the given ones 1 % too long.
+    /// Error of both focal lengths, as a ratio: 0.01 makes the given ones 1 % too long.
     pub focal_ratio: f64,
-    /// Of the principal point.
+    /// Error of the principal point.
     pub centre_px: [f64; 2],
-    /// Of the first two coefficients of the lens, where it has any.
+    /// Errors of the first two coefficients of the lens, if it has any.
     pub distortion: [f64; 2],
 }
 
 impl IntrinsicsError {
-    /// The camera with this error.
+    /// Camera model with this error.
     pub(crate) fn applied(&self, model: &CameraModel) -> CameraModel {
         let mut wrong = model.clone();
         let [fx, fy, cx, cy] = &mut wrong.intrinsics_px;
@@ -180,8 +181,8 @@ impl IntrinsicsError {
     }
 }
 
-/// Scale and axes of an IMU as a random stream draws them: normal errors of a scale's and an angle's standard deviation, at
-/// most twice it. The angle (in radians) is that of misalignments and of the rotation between gyroscope and accelerometer.
+/// Random scales and axes of an IMU: normal errors with these standard deviations, limited to twice them. The angle (in
+/// radians) is that of misalignments and of the rotation between gyroscope and accelerometer.
 pub(crate) fn random_imu_intrinsics(scale: f64, angle_rad: f64, random: &mut RandomStream) -> ImuIntrinsics {
     let mut errors = |sigma: f64| Vector3::from_fn(|_, _| sigma * random.normal().clamp(-2.0, 2.0));
     let mut sensor = || ScaleMisalignment { scale: errors(scale), misalignment: errors(angle_rad) };

@@ -1,19 +1,18 @@
-//! Exercises: single swings of the vehicle and of one joint, for flights that are to excite something.
+//! Exercises: swings of the vehicle and of one joint, for flights with a defined excitation.
 
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
-/// How the vehicle swings; a multirotor tilts as its acceleration asks.
+/// Swing of the vehicle; a multirotor tilts to accelerate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum VehicleSwing {
-    /// It hovers.
+    /// No swing.
     Hover,
     /// Forward and back.
     Forward,
     /// Left and right.
     Sideways,
-    /// Up and down.
     UpDown,
     /// Quickly left and right, so that it rolls.
     Roll,
@@ -24,44 +23,40 @@ pub enum VehicleSwing {
 }
 
 impl VehicleSwing {
-    /// All of them.
     pub const ALL: [Self; 7] =
         [Self::Hover, Self::Forward, Self::Sideways, Self::UpDown, Self::Roll, Self::Pitch, Self::Yaw];
 }
 
-/// A swing of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointSwing {
-    /// Which joint, from 0.
+    /// Index of the joint, from 0.
     pub joint: usize,
-    /// How far to either side of where it is.
+    /// Amplitude to each side of the initial angle.
     pub amplitude_rad: f64,
 }
 
 /// Simultaneous swings of the vehicle and of a joint, the other joints fixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exercise {
-    /// The vehicle's.
     pub vehicle: VehicleSwing,
-    /// The joint's.
     pub joint: Option<JointSwing>,
 }
 
-/// Slow swings go this far to either side.
+/// Amplitude of slow swings, to each side.
 pub const SWING_M: f64 = 0.75;
-/// Period of a slow swing.
+/// Period of slow swings.
 const SWING_PERIOD_S: f64 = 4.0;
-/// Quick ones go this far.
+/// Amplitude of quick swings, to each side.
 pub const ROCK_M: f64 = 0.12;
-/// Period of a quick swing: 3 m/s² and 17° of tilt at its turning points.
+/// Period of quick swings: 3 m/s² and 17° of tilt at the turning points.
 pub const ROCK_PERIOD_S: f64 = 1.25;
-/// The vehicle's yaw goes this far.
+/// Amplitude of the vehicle's yaw.
 pub const YAW_SWING_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Period of the vehicle's yaw.
 const YAW_PERIOD_S: f64 = 3.3;
-/// Period of a joint's swing; no simple ratio to the vehicle's, so that the two do not go in step.
+/// Period of a joint's swing; in no simple ratio to the vehicle's periods, so that the two are not correlated.
 pub const JOINT_PERIOD_S: f64 = 2.6;
-/// A swing grows to its size in this time.
+/// Time in which a swing grows to its amplitude.
 const GROWTH_S: f64 = 1.0;
 
 fn swing(time_s: f64, period_s: f64) -> f64 {
@@ -71,7 +66,7 @@ fn swing(time_s: f64, period_s: f64) -> f64 {
 }
 
 impl Exercise {
-    /// Shift of the vehicle from where it began: forward, left, up, in metres.
+    /// Displacement of the vehicle from its start: forward, left, up, in metres.
     pub fn shift_m(&self, time_s: f64) -> Vector3<f64> {
         let slow = SWING_M * swing(time_s, SWING_PERIOD_S);
         let quick = ROCK_M * swing(time_s, ROCK_PERIOD_S);
@@ -90,7 +85,7 @@ impl Exercise {
         if self.vehicle == VehicleSwing::Yaw { YAW_SWING_RAD * swing(time_s, YAW_PERIOD_S) } else { 0.0 }
     }
 
-    /// How far a joint is from where it began, in radians.
+    /// Change of a joint's angle from its start, in radians.
     pub fn joint_rad(&self, joint: usize, time_s: f64) -> f64 {
         let swung = self.joint.filter(|swung| swung.joint == joint);
         swung.map_or(0.0, |swung| swung.amplitude_rad * swing(time_s, JOINT_PERIOD_S))

@@ -1,4 +1,4 @@
-//! The paper's experiments T1–T4 (§5.3) as flights over one of two worlds.
+//! Experiments T1–T4 of the paper (§5.3) as flights through one of two environments.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -7,7 +7,6 @@ use super::random::RandomStream;
 use super::route::{Cruise, Flight, Pace, Path, Shuttle};
 use crate::sensors::ChainPrior;
 
-/// One of the paper's experiments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Experiment {
     /// Random aggressive manoeuvres around a house (environment 1), 461 m.
@@ -16,11 +15,10 @@ pub enum Experiment {
     T2,
     /// Random aggressive manoeuvres between buildings (environment 2), 384 m.
     T3,
-    /// As T3 with a start calibration wrong by 3 cm and 10° and encoders of σ 7°, 456 m: online calibration.
+    /// As T3 with errors of 3 cm and 10° in the initial calibration and encoders of σ 7°, 456 m: online calibration.
     T4,
 }
 
-/// A rendered world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Environment {
     /// Environment 1: a house in its garden.
@@ -29,13 +27,12 @@ pub enum Environment {
     Town,
 }
 
-/// Side of a block of the town with its half of the roads around, in metres.
+/// Side of a block of the town including half of the adjacent roads, in metres.
 pub(crate) const TOWN_PITCH_M: f64 = 30.0;
-/// Roads per direction of the town.
+/// Number of roads per direction of the town.
 pub(crate) const TOWN_ROADS: usize = 4;
 
 impl Experiment {
-    /// All four.
     pub const ALL: [Self; 4] = [Self::T1, Self::T2, Self::T3, Self::T4];
 
     /// Name as in the paper and on the command line.
@@ -48,12 +45,11 @@ impl Experiment {
         }
     }
 
-    /// The experiment of this name, in either case.
+    /// Experiment of this name, ignoring case.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|experiment| experiment.name().eq_ignore_ascii_case(name))
     }
 
-    /// Its environment.
     pub fn environment(self) -> Environment {
         match self {
             Self::T1 | Self::T2 => Environment::House,
@@ -71,7 +67,7 @@ impl Experiment {
         }
     }
 
-    /// Standard deviation of the encoders: 7° in T4 (§5.4), else 0.5°, which the paper leaves open.
+    /// Standard deviation of the encoders: 7° in T4 (§5.4), otherwise 0.5°, which the paper does not specify.
     pub fn encoder_sigma_rad(self) -> f64 {
         match self {
             Self::T4 => 7_f64.to_radians(),
@@ -79,7 +75,7 @@ impl Experiment {
         }
     }
 
-    /// How wrong the calibration is that the estimator starts from: 3 cm and 10° in T4 (§5.4), else 3 mm and 0.5°.
+    /// Error of the initial calibration: 3 cm and 10° in T4 (§5.4), otherwise 3 mm and 0.5°.
     pub fn start_error(self) -> ChainPrior {
         match self {
             Self::T4 => ChainPrior { translation_bound_m: 0.03, rotation_bound_rad: 10_f64.to_radians() },
@@ -87,24 +83,24 @@ impl Experiment {
         }
     }
 
-    /// What the camera on the gimbal looks at.
+    /// Orientation of the gimbal camera.
     pub(crate) fn look_around(self, random: &mut RandomStream) -> LookAround {
         match self {
-            // Towards the house, which lies to the left of the round.
+            // Towards the house, which lies to the left of the path.
             Self::T1 => LookAround::new([25.0, 25.0], [-6.0, 8.0], 0.0, random),
             Self::T2 => LookAround::new([0.0, 25.0], [-4.0, 7.0], 0.0, random),
             Self::T3 => LookAround::new([0.0, 30.0], [-6.0, 8.0], 0.0, random),
-            // Calibrating wants all joints moved.
+            // Calibration requires motion of all joints.
             Self::T4 => LookAround::new([0.0, 50.0], [-12.0, 18.0], 9.0, random),
         }
     }
 
-    /// The flight; a path that is not a round reaches at least `length_m` far.
+    /// Flight of the experiment; a path that is not closed has at least this length.
     pub(crate) fn flight(self, length_m: f64, random: &mut RandomStream) -> Box<dyn Flight> {
         self.flight_at(Pace::aggressive(), length_m, random)
     }
 
-    /// The flight at another pace.
+    /// Flight with another pace.
     pub(crate) fn flight_at(self, pace: Pace, length_m: f64, random: &mut RandomStream) -> Box<dyn Flight> {
         match self {
             Self::T1 => {
@@ -123,7 +119,7 @@ impl Experiment {
                 forward_strokes: 5,
             }),
             Self::T3 | Self::T4 => {
-                // Streets of their own stream: a longer flight starts as a shorter one does.
+                // Streets have a separate stream: a longer flight starts like a shorter one.
                 let mut random_directions = RandomStream::new(random.next_u64(), 0);
                 let path = Path::new(streets(length_m, &mut random_directions), false, 5);
                 Box::new(Cruise::new(pace, path, [2.9, 0.8], 0.7, 0.0, random))
@@ -132,7 +128,7 @@ impl Experiment {
     }
 }
 
-/// A random walk through the streets of the town without reversals.
+/// Random walk through the streets of the town without reversals.
 fn streets(length_m: f64, random: &mut RandomStream) -> Vec<Vector2<f64>> {
     let roads = TOWN_ROADS as i32;
     let position = |node: [i32; 2]| {
@@ -148,7 +144,7 @@ fn streets(length_m: f64, random: &mut RandomStream) -> Vec<Vector2<f64>> {
     for _ in 0..blocks {
         let next = step(node, direction);
         let along = Vector2::new(f64::from(direction[0]), f64::from(direction[1]));
-        // Points near the crossings keep the rounding of corners there.
+        // Points near the crossings limit the rounding of corners to the crossings.
         points.push(position(node) + along * 7.0);
         points.push(position(next) - along * 7.0);
         points.push(position(next));

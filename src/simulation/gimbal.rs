@@ -1,4 +1,4 @@
-//! The gimbal: its chain, a stabilizing controller with lag, and the joint angles that come of it.
+//! Gimbal: its chain, a stabilizing controller with lag, and the resulting joint angles.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
@@ -11,7 +11,7 @@ use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
 use crate::sensors::Joint;
 
-/// The joints of the paper's gimbal (§5.1): yaw ±180°, roll ±25°, pitch −120° to 30°.
+/// Joints of the paper's gimbal (§5.1): yaw ±180°, roll ±25°, pitch −120° to 30°.
 pub(crate) fn joints() -> Vec<Joint> {
     let joint = |name: &str, low_deg: f64, high_deg: f64| Joint {
         name: name.to_owned(),
@@ -20,11 +20,10 @@ pub(crate) fn joints() -> Vec<Joint> {
     vec![joint("yaw", -180.0, 180.0), joint("roll", -25.0, 25.0), joint("pitch", -120.0, 30.0)]
 }
 
-/// A true chain: the nominal yaw–roll–pitch gimbal under the nose with machining and mounting errors drawn from a
-/// random stream.
+/// True chain: the nominal yaw–roll–pitch gimbal under the nose with random machining and mounting errors.
 ///
-/// Nominal: base z down; yaw about it, roll about the forward axis, pitch about the right one; all angles zero looks
-/// ahead with a level optical frame.
+/// Nominal: base z down; yaw about it, roll about the forward axis, pitch about the right one; at angles zero the
+/// optical frame is level and looks forward.
 pub(crate) fn true_chain(random: &mut RandomStream) -> ClassicalChain {
     let mut angle = |nominal_deg: f64| (nominal_deg + 2.2 * random.normal().clamp(-2.0, 2.0)).to_radians();
     let quarter = 90.0;
@@ -49,26 +48,26 @@ pub(crate) fn true_chain(random: &mut RandomStream) -> ClassicalChain {
     }
 }
 
-/// What the camera operator wants: level roll, a pitch and a heading that look around.
+/// Commanded orientation of the camera: level roll, varying pitch and heading.
 #[derive(Clone, Debug)]
 pub(crate) struct LookAround {
-    /// Heading against the vehicle's (smoothed) heading, and how far it swings.
+    /// Heading relative to the vehicle's (smoothed) heading, and its amplitude.
     pub(crate) yaw_rad: [f64; 2],
-    /// Pitch, positive up, and how far it swings.
+    /// Pitch, positive up, and its amplitude.
     pub(crate) pitch_rad: [f64; 2],
-    /// How far the roll swings about level.
+    /// Amplitude of the roll about level.
     pub(crate) roll_rad: f64,
-    /// From when and for how long the heading is swung to and fro as fast as the motors follow.
+    /// Start and duration of back-and-forth swings of the heading at the motors' largest rate.
     pub(crate) slew_s: Option<[f64; 2]>,
     /// Joint that is fixed at its angle, start and duration in seconds.
     pub(crate) fixed_joint: Option<(usize, [f64; 2])>,
-    /// From when and for how long the camera keeps its orientation in the world exactly.
+    /// Start and duration of an interval in which the camera keeps its orientation in the world exactly.
     pub(crate) stabilized_s: Option<[f64; 2]>,
     waves: [Wave; 3],
 }
 
 impl LookAround {
-    /// Waves of about 11, 9 and 7 seconds with random phases.
+    /// Periods of about 11, 9 and 7 seconds with random phases.
     pub(crate) fn new(yaw_deg: [f64; 2], pitch_deg: [f64; 2], roll_deg: f64, random: &mut RandomStream) -> Self {
         Self {
             yaw_rad: yaw_deg.map(f64::to_radians),
@@ -94,7 +93,7 @@ impl LookAround {
         amplitude * if place < 2.0 { place - 1.0 } else { 3.0 - place }
     }
 
-    /// The wanted orientation of the optical frame in the world.
+    /// Commanded orientation `world_from_camera`.
     fn orientation(&self, followed_heading_rad: f64, time_s: f64) -> UnitQuaternion<f64> {
         let wave = self.yaw_rad[1] * self.waves[0].at(time_s);
         let yaw = followed_heading_rad + self.yaw_rad[0] + wave + self.slew_rad(time_s);
@@ -112,11 +111,10 @@ impl LookAround {
 /// Gains and limits of the stabilizing controller.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stabilizer {
-    /// Rate asked for per radian of orientation error, in 1/s: its inverse is the lag.
+    /// Commanded rate per radian of orientation error, in 1/s: its inverse is the lag.
     pub(crate) gain_per_s: f64,
     /// Time constant of the joint motors.
     pub(crate) motor_s: f64,
-    /// Largest joint rate.
     pub(crate) rate_rad_per_s: f64,
     /// Time constant with which the camera's heading follows the vehicle's.
     pub(crate) follow_s: f64,
@@ -131,7 +129,7 @@ impl Default for Stabilizer {
 /// Step of the controller and of the stored motion, in seconds.
 const CONTROL_STEP_S: f64 = 0.001;
 
-/// The true joint angles over a flight.
+/// True joint angles over a flight.
 #[derive(Clone, Debug)]
 pub struct JointMotion {
     /// Angle and rate of each joint per control step.
@@ -139,8 +137,8 @@ pub struct JointMotion {
 }
 
 impl JointMotion {
-    /// Simulates the gimbal: at every step the controller requests joint rates towards the wanted orientation, the
-    /// motors follow with lag, and the limits hold.
+    /// Simulates the gimbal: at every step the controller commands joint rates towards the commanded orientation, and
+    /// the motors follow with lag within the joint limits.
     pub(crate) fn simulate(
         trajectory: &Trajectory,
         chain: &ClassicalChain,
@@ -178,7 +176,7 @@ impl JointMotion {
                 let (low, high) = joints[k].limits_rad;
                 let asked = if fixed.is_some_and(|(joint, _)| joint == k) { 0.0 } else { asked[k] };
                 rates[k] += (asked.clamp(-limit, limit) - rates[k]) * (CONTROL_STEP_S / stabilizer.motor_s);
-                // Braking ahead of a stop keeps the motion smooth up to it.
+                // Braking ahead of a joint limit keeps the motion smooth up to it.
                 let brake_per_s = 20.0;
                 rates[k] = rates[k].clamp((low - angles[k]) * brake_per_s, (high - angles[k]) * brake_per_s);
                 angles[k] = (angles[k] + rates[k] * CONTROL_STEP_S).clamp(low, high);
@@ -187,7 +185,7 @@ impl JointMotion {
         Self { states }
     }
 
-    /// From a time on the joints are fixed, but for an exercise's swing within the stops.
+    /// Fixes the joints from a time on, except for the swing of an exercise within the joint limits.
     pub(crate) fn exercise_from(&mut self, start_s: f64, exercise: &Exercise, joints: &[Joint]) {
         let first = ((start_s / CONTROL_STEP_S).ceil() as usize).min(self.states.len() - 1);
         let fixed = self.states[first].0;
@@ -204,7 +202,7 @@ impl JointMotion {
         }
     }
 
-    /// The true joint angles at a time, by cubic interpolation between control steps.
+    /// True joint angles at a time, by cubic interpolation between control steps.
     pub fn at(&self, time_s: f64) -> [f64; 3] {
         let last = self.states.len() - 1;
         let position = (time_s / CONTROL_STEP_S).clamp(0.0, last as f64);
@@ -221,7 +219,7 @@ impl JointMotion {
     }
 }
 
-/// First-order joint increments, in radians, that rotate the camera to the wanted orientation.
+/// First-order joint increments, in radians, that rotate the camera to the commanded orientation.
 fn joint_rates_towards(
     world_from_imu: &UnitQuaternion<f64>,
     chain: &ClassicalChain,
@@ -236,12 +234,13 @@ fn joint_rates_towards(
     }
     orientation *= chain.effector_from_camera.rotation;
     let error = so3::log(&(wanted * orientation.inverse()));
-    // Damped, so that parallel axes ask for no infinite rate.
+    // Damped, so that parallel axes do not lead to infinite rates.
     let normal = axes.transpose() * axes + Matrix3::identity() * 1e-3;
     normal.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * (axes.transpose() * error))
 }
 
-/// Joint angles, in radians within the stops, for a wanted orientation of the camera in the world.
+/// Iterates the joint angles, in radians within their limits, towards a commanded orientation of the camera in the
+/// world.
 fn keep(
     world_from_imu: &UnitQuaternion<f64>,
     chain: &ClassicalChain,
@@ -259,7 +258,7 @@ fn keep(
     }
 }
 
-/// Joint angles, in radians, that meet the wanted orientation at the start of the log.
+/// Joint angles, in radians, with the commanded orientation at the log's start.
 fn start_angles(trajectory: &Trajectory, chain: &ClassicalChain, look: &LookAround, heading_rad: f64) -> [f64; 3] {
     let rotation = trajectory.at(0.0).world_from_imu.rotation;
     let wanted = look.orientation(heading_rad, 0.0);

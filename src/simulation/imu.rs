@@ -7,7 +7,7 @@ use super::trajectory::Trajectory;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::{ImuIntrinsics, ImuNoise, ImuSample};
 
-/// Noise of the ADIS16448 as `RotorS` gives it, the IMU of the paper.
+/// Noise of the ADIS16448, the IMU of the paper, with the values of `RotorS`.
 pub(crate) const FIREFLY_IMU: ImuNoise = ImuNoise {
     accelerometer_noise_density: 0.004,
     accelerometer_random_walk: 0.006,
@@ -29,7 +29,7 @@ pub struct ImuBias {
     pub gyroscope_rad_per_s: Vector3<f64>,
 }
 
-/// All samples of a flight with the biases that are in them.
+/// All samples of a flight with their biases.
 #[derive(Clone, Debug)]
 pub(crate) struct ImuRecord {
     pub(crate) samples: Vec<ImuSample>,
@@ -37,7 +37,7 @@ pub(crate) struct ImuRecord {
 }
 
 impl ImuRecord {
-    /// Measures a flight from its start to its end; `noise_scale` 0 gives perfect samples without bias.
+    /// Simulates the samples of a flight; `noise_scale` 0 gives ideal samples without bias.
     pub(crate) fn measure(
         trajectory: &Trajectory,
         noise: &ImuNoise,
@@ -72,8 +72,8 @@ impl ImuRecord {
         record
     }
 
-    /// Adds a first-order Gauss–Markov error of this stationary standard deviation (m/s²) and time constant to each axis of the
-    /// accelerometer; it counts as bias.
+    /// Adds a first-order Gauss–Markov error of this stationary standard deviation (m/s²) and time constant to each
+    /// axis of the accelerometer; the error is part of the bias.
     pub(crate) fn drift(&mut self, sigma_m_per_s2: f64, time_constant_s: f64, random: &mut RandomStream) {
         let mut error = random.normal_vector(sigma_m_per_s2);
         let mut before_ns = None;
@@ -87,16 +87,16 @@ impl ImuRecord {
         }
     }
 
-    /// Measures with wrong scales and axes: the samples that `intrinsics` corrects to those so far.
+    /// Applies errors of scales and axes: `intrinsics` corrects the new samples to the previous ones.
     pub(crate) fn miscalibrate(&mut self, intrinsics: &ImuIntrinsics) {
-        // The inverse of a correction near the identity exists.
+        // A correction near the identity is invertible.
         let Some(measured) = ImuIntrinsics::default().left_after(intrinsics) else { return };
         for sample in &mut self.samples {
             *sample = measured.correct(sample);
         }
     }
 
-    /// The sample at a stamp, interpolated linearly; the first or last one outside.
+    /// Sample at a stamp, interpolated linearly; the first or last one outside the record.
     pub(crate) fn interpolated(&self, stamp_ns: i64) -> Option<ImuSample> {
         let after = self.samples.partition_point(|sample| sample.stamp_ns < stamp_ns);
         let last = self.samples.last()?;
@@ -112,7 +112,7 @@ impl ImuRecord {
         })
     }
 
-    /// The samples from one stamp to another, both ends included and interpolated.
+    /// Samples from one stamp to another, both ends included and interpolated.
     pub(crate) fn between(&self, from_ns: i64, to_ns: i64) -> Vec<ImuSample> {
         let first = self.samples.partition_point(|sample| sample.stamp_ns <= from_ns);
         let end = self.samples.partition_point(|sample| sample.stamp_ns < to_ns);
@@ -125,7 +125,6 @@ impl ImuRecord {
         between
     }
 
-    /// The biases at a stamp.
     pub(crate) fn bias_at(&self, stamp_ns: i64) -> ImuBias {
         let after = self.samples.partition_point(|sample| sample.stamp_ns <= stamp_ns);
         self.biases.get(after.saturating_sub(1)).copied().unwrap_or_default()

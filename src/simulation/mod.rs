@@ -2,7 +2,7 @@
 //!
 //! A multirotor follows a smooth aggressive path within its limits, a gimbal under its nose looks around and stabilizes
 //! the image with lag, and sensors measure with noise.
-//! All randomness comes from a seed; the same options give the same bits whatever the thread count.
+//! All randomness comes from a seed; the same options give the same bits for any number of threads.
 
 #![cfg_attr(not(feature = "logs"), expect(dead_code, reason = "recorded flights use more than tracks do"))]
 

@@ -11,37 +11,32 @@ use crate::sensors::ChainPrior;
 /// Flight and sensors of a simulation; [`SimulationOptions::new`] gives an experiment of the paper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulationOptions {
-    /// Which experiment.
     pub experiment: Experiment,
-    /// Everything random follows from this.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Length in seconds; `None` ends where the path has the experiment's length. A shorter flight is the beginning
-    /// of a longer one.
+    /// Length in seconds; with `None` the path has the experiment's length. A shorter flight equals the beginning of a
+    /// longer one.
     pub duration_s: Option<f64>,
     /// Standard deviation of the encoders' white noise; `None` records no joint angles.
     pub encoder_sigma_rad: Option<f64>,
-    /// How wrong the given rig's chain is.
+    /// Errors of the given rig's chain.
     pub start_error: ChainPrior,
-    /// Scales noise, bias random walk and turn-on biases of the IMU; 0 makes it ideal.
+    /// Factor of noise, bias random walk and turn-on biases of the IMU; 0 makes it ideal.
     pub imu_noise_scale: f64,
-    /// The cameras' lenses.
     pub lens: Lens,
-    /// Size of the images.
     pub resolution_px: [usize; 2],
-    /// Rate of the images.
     pub camera_rate_hz: f64,
-    /// Whether the static camera is recorded as well.
+    /// True if the static camera is also recorded.
     pub static_camera: bool,
-    /// Standard deviation of the images' noise, in grey values.
+    /// Standard deviation of the image noise, in grey values.
     pub image_noise: f64,
     /// Quality of the JPEG images, 1 to 100.
     pub jpeg_quality: u8,
-    /// What goes wrong.
     pub disturbances: Disturbances,
 }
 
 impl SimulationOptions {
-    /// An experiment with the paper's conditions; seed 1.
+    /// Experiment under the paper's conditions; seed 1.
     pub fn new(experiment: Experiment) -> Self {
         Self {
             experiment,
@@ -60,7 +55,6 @@ impl SimulationOptions {
         }
     }
 
-    /// Checks the ranges of all options.
     pub(crate) fn check(&self) -> Result<(), SimulationError> {
         let within = |option: &'static str, value: f64, low: f64, high: f64| {
             let inside = value >= low && value <= high;
@@ -84,71 +78,46 @@ impl SimulationOptions {
     }
 }
 
-/// What `simulate` has written.
+/// Result of a simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulationSummary {
-    /// The log.
     pub log: PathBuf,
-    /// The rig given to an estimator.
+    /// Rig given to an estimator.
     pub rig: PathBuf,
-    /// The rig as it is, with what else is known.
+    /// True rig with further ground truth.
     pub ground_truth: PathBuf,
-    /// Length in seconds.
     pub duration_s: f64,
-    /// Length of the path.
     pub path_length_m: f64,
-    /// Number of images, all cameras together.
+    /// Number of images of all cameras.
     pub images: usize,
-    /// Mean extrinsics error of the given chain over the joint angles visited: metres and radians.
+    /// Mean extrinsics error of the given chain over the joint angles of the flight: metres and radians.
     pub given_chain_error: (f64, f64),
 }
 
-/// How far a simulation is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SimulationProgress {
-    /// Images rendered and written.
     pub images_done: usize,
-    /// Images in all.
     pub images_total: usize,
 }
 
-/// Why a simulation ended without its files.
+/// Reason that a simulation ended without its files.
 #[derive(Debug, Error)]
 pub enum SimulationError {
-    /// A disturbance that cannot be read.
+    /// A disturbance that cannot be parsed.
     #[error("disturbance '{text}': {expected}")]
-    BadDisturbance {
-        /// As it was written.
-        text: String,
-        /// What was expected.
-        expected: String,
-    },
+    BadDisturbance { text: String, expected: String },
     /// An option out of its range.
     #[error("{option} is {value}: expected {low} to {high}")]
-    BadOption {
-        /// Which.
-        option: &'static str,
-        /// What it holds.
-        value: f64,
-        /// Least value.
-        low: f64,
-        /// Largest value.
-        high: f64,
-    },
+    BadOption { option: &'static str, value: f64, low: f64, high: f64 },
     /// An image could not be compressed.
     #[error("cannot compress an image as JPEG: {problem}")]
     Image {
-        /// The encoder's answer.
+        /// Message of the encoder.
         problem: String,
     },
-    /// The caller has stopped it.
+    /// Stopped by the caller.
     #[error("interrupted after {images_done} of {images_total} images; nothing is written")]
-    Interrupted {
-        /// Images so far.
-        images_done: usize,
-        /// Images of the whole log.
-        images_total: usize,
-    },
+    Interrupted { images_done: usize, images_total: usize },
     /// A file could not be written.
     #[error(transparent)]
     Log(#[from] LogError),

@@ -1,9 +1,9 @@
 use crate::geometry::SplitMix64;
 
-/// A stream of random numbers that depends on a seed, a stream number and a counter only.
+/// Stream of random numbers that depends on a seed, a stream number and a counter only.
 ///
-/// The generator is PCG-RXS-M-XS 64 (O'Neill 2014) over a 64-bit linear congruential state; streams differ by
-/// their increment, so that a new sensor does not change the noise of the others.
+/// The generator is PCG-RXS-M-XS 64 (O'Neill 2014) over a 64-bit linear congruential state; streams differ by their
+/// increment, so that a new sensor does not change the noise of the others.
 #[derive(Clone, Debug)]
 pub(crate) struct RandomStream {
     state: u64,
@@ -11,19 +11,17 @@ pub(crate) struct RandomStream {
     spare_normal: Option<f64>,
 }
 
-/// One round of `splitmix64`, a good mixer of structured integers.
+/// One round of `splitmix64`, which mixes structured integers.
 pub(crate) fn mix(value: u64) -> u64 {
     SplitMix64::new(value).next_u64()
 }
 
 impl RandomStream {
-    /// The stream `stream` of the seed `seed`.
     pub(crate) fn new(seed: u64, stream: u64) -> Self {
         let key = mix(mix(seed) ^ stream.wrapping_mul(0xD6E8_FEB8_6659_FD93));
         Self { state: mix(key), increment: (mix(key ^ 0x5851_F42D) << 1) | 1, spare_normal: None }
     }
 
-    /// 64 random bits.
     pub(crate) fn next_u64(&mut self) -> u64 {
         self.state = self.state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(self.increment);
         let word = ((self.state >> ((self.state >> 59) + 5)) ^ self.state).wrapping_mul(12_605_985_483_714_917_081);
@@ -40,12 +38,12 @@ impl RandomStream {
         low + (high - low) * self.unit()
     }
 
-    /// An index below `count`, 0 when `count` is 0.
+    /// Index below `count`; 0 if `count` is 0.
     pub(crate) fn index(&mut self, count: usize) -> usize {
         ((self.unit() * count as f64) as usize).min(count.saturating_sub(1))
     }
 
-    /// Whether an event of this probability happens.
+    /// True with this probability.
     pub(crate) fn chance(&mut self, probability: f64) -> bool {
         self.unit() < probability
     }

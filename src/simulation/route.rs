@@ -1,4 +1,4 @@
-//! Routes of the experiments in plan view, with velocity, height, heading and random deviations.
+//! Routes of the experiments in plan view, with velocity, height, heading and random manoeuvres.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -6,7 +6,7 @@ use super::exercise::Exercise;
 use super::random::RandomStream;
 use crate::geometry::wrap_angle;
 
-/// What a flight wants at one time.
+/// Reference position and heading of a flight at one time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FlightPoint {
     /// Position in the world.
@@ -15,33 +15,33 @@ pub(crate) struct FlightPoint {
     pub(crate) position_wander_m: Vector3<f64>,
     /// Heading, continuous over time.
     pub(crate) heading_rad: f64,
-    /// Standard deviation of the heading's.
+    /// Standard deviation of the random manoeuvres in heading.
     pub(crate) heading_wander_rad: f64,
 }
 
-/// A plan that a trajectory follows with its random manoeuvres.
+/// Reference of a trajectory, without its random manoeuvres.
 pub(crate) trait Flight {
-    /// Time between two manoeuvres.
+    /// Time between two manoeuvres, in seconds.
     fn knot_s(&self) -> f64 {
         0.65
     }
 
-    /// What is wanted at a time after the start.
+    /// Reference at a time after the start.
     fn point(&self, time_s: f64) -> FlightPoint;
 }
 
-/// Dynamics of a flight.
+/// Speed and size of the manoeuvres of a flight.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pace {
-    /// Seconds of hover at the start.
+    /// Duration of the hover at the start.
     pub(crate) hover_s: f64,
     /// Sway while hovering (standard deviation).
     pub(crate) sway_m: f64,
-    /// Seconds from hover to full velocity.
+    /// Time from hover to full velocity.
     pub(crate) ramp_s: f64,
     /// Velocity along the route after the ramp.
     pub(crate) speed_m_per_s: f64,
-    /// Horizontal and vertical manoeuvres (standard deviation of the spline's control points).
+    /// Horizontal and vertical manoeuvres (standard deviations of the spline's control points).
     pub(crate) manoeuvre_m: [f64; 2],
     /// Manoeuvres in heading (standard deviation of the spline's control points).
     pub(crate) manoeuvre_heading_rad: f64,
@@ -60,13 +60,13 @@ impl Pace {
         }
     }
 
-    /// Progress of the ramp: 0 while hovering, 1 under way, smooth in between.
+    /// Progress of the ramp: 0 while hovering, 1 at full velocity, smooth in between.
     pub(crate) fn liveliness(&self, time_s: f64) -> f64 {
         let fraction = ((time_s - self.hover_s) / self.ramp_s).clamp(0.0, 1.0);
         fraction * fraction * fraction * (fraction * (fraction * 6.0 - 15.0) + 10.0)
     }
 
-    /// Time in motion, with the ramp counted at its growing speed; its derivative is [`Self::liveliness`].
+    /// Equivalent time at full velocity; its derivative is [`Self::liveliness`].
     pub(crate) fn moving_time_s(&self, time_s: f64) -> f64 {
         let fraction = ((time_s - self.hover_s) / self.ramp_s).clamp(0.0, 1.0);
         let ramp = fraction.powi(4) * (fraction * (fraction - 3.0) + 2.5);
@@ -85,7 +85,7 @@ impl Pace {
     }
 }
 
-/// A slow wave: two sines with random phases, about one in amplitude.
+/// Slow wave: two sines with random phases, with a total amplitude of about one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wave {
     period_s: [f64; 2],
@@ -104,7 +104,7 @@ impl Wave {
     }
 }
 
-/// A polyline on the plan, walked by length; a closed one is walked round and round.
+/// Polyline in plan view, parameterized by length; a closed one is repeated.
 #[derive(Clone, Debug)]
 pub(crate) struct Path {
     points: Vec<Vector2<f64>>,
@@ -114,7 +114,7 @@ pub(crate) struct Path {
 }
 
 impl Path {
-    /// From corners, which are rounded by cutting them `cuts` times.
+    /// Path through points whose corners are rounded by cutting them `cuts` times.
     pub(crate) fn new(mut points: Vec<Vector2<f64>>, closed: bool, cuts: usize) -> Self {
         for _ in 0..cuts {
             points = cut_corners(&points, closed);
@@ -148,7 +148,7 @@ impl Path {
         (from + step * fraction, self.heading_rad[after - 1] + heading_change)
     }
 
-    /// Change of direction in one round of a closed path.
+    /// Change of direction over one round of a closed path.
     fn heading_change_rad(&self) -> f64 {
         let area: f64 = self.points.windows(2).map(|pair| pair[0].x * pair[1].y - pair[1].x * pair[0].y).sum();
         std::f64::consts::TAU.copysign(area)
@@ -177,18 +177,17 @@ fn cut_corners(points: &[Vector2<f64>], closed: bool) -> Vec<Vector2<f64>> {
     cut
 }
 
-/// Along a path with slowly changing velocity, height and distance from it.
+/// Flight along a path with slowly varying velocity, height and lateral distance.
 #[derive(Clone, Debug)]
 pub(crate) struct Cruise {
-    /// How hard.
     pub(crate) pace: Pace,
-    /// Where.
+    /// Ground track.
     pub(crate) path: Path,
-    /// Height over ground and how much it changes.
+    /// Height above ground, and its variation.
     pub(crate) height_m: [f64; 2],
-    /// How far the flight wanders to the sides.
+    /// Amplitude of the lateral distance from the path.
     pub(crate) wander_m: f64,
-    /// Heading against the path's direction, positive to the left.
+    /// Heading relative to the path's direction, positive to the left.
     pub(crate) heading_offset_rad: f64,
     waves: [Wave; 4],
 }
@@ -211,13 +210,13 @@ impl Cruise {
 impl Flight for Cruise {
     fn point(&self, time_s: f64) -> FlightPoint {
         let moving_time_s = self.pace.moving_time_s(time_s);
-        // The wave starts at no displacement, so that hovering really hovers.
+        // The wave starts without displacement, so that the vehicle hovers.
         let since = |wave: &Wave| wave.at(moving_time_s) - wave.at(0.0) * (-moving_time_s / 4.0).exp();
         let speed_swing_m = 1.6 * self.pace.speed_m_per_s * since(&self.waves[0]) * 0.5;
         let along_m =
             self.pace.speed_m_per_s * moving_time_s + speed_swing_m.max(-self.pace.speed_m_per_s * moving_time_s);
         let (on_path, _) = self.path.at(along_m);
-        // The heading is that of a chord ahead: it rotates before the corner.
+        // The heading is that of a chord ahead: it changes before the corner.
         let (_, direction) = self.path.at(along_m);
         let (_, ahead) = self.path.at(along_m + 2.5);
         let side = Vector2::new(-direction.sin(), direction.cos()) * (self.wander_m * since(&self.waves[1]));
@@ -234,17 +233,16 @@ impl Flight for Cruise {
 /// Forward and backward along the heading, then left and right: experiment T2.
 #[derive(Clone, Debug)]
 pub(crate) struct Shuttle {
-    /// How hard.
     pub(crate) pace: Pace,
-    /// Middle of the strokes.
+    /// Centre of the strokes.
     pub(crate) centre_m: Vector3<f64>,
-    /// Heading throughout.
+    /// Constant heading.
     pub(crate) heading_rad: f64,
     /// Length of a stroke from end to end.
     pub(crate) stroke_m: f64,
-    /// Time of a stroke there and back.
+    /// Period of a stroke forward and back.
     pub(crate) period_s: f64,
-    /// How many times forward and back before it goes left and right.
+    /// Number of strokes forward and back before those to the left and right.
     pub(crate) forward_strokes: u32,
 }
 
@@ -252,11 +250,11 @@ impl Flight for Shuttle {
     fn point(&self, time_s: f64) -> FlightPoint {
         let moving_time_s = self.pace.moving_time_s(time_s);
         let strokes = moving_time_s / self.period_s;
-        let forward_share = f64::from(self.forward_strokes);
+        let forward_strokes = f64::from(self.forward_strokes);
         let swing = -(std::f64::consts::TAU * strokes).cos() * 0.5 * self.stroke_m;
-        // Each half starts and ends at the rear end of the forward stroke; the left-right half starts on the right.
+        // Each half starts and ends at the rear end of the forward stroke; the left–right half starts on the right.
         let (ahead_m, left_m) =
-            if strokes < forward_share { (swing, 0.0) } else { (-0.5 * self.stroke_m, swing + 0.5 * self.stroke_m) };
+            if strokes < forward_strokes { (swing, 0.0) } else { (-0.5 * self.stroke_m, swing + 0.5 * self.stroke_m) };
         let (sine, cosine) = self.heading_rad.sin_cos();
         let shift = Vector3::new(cosine * ahead_m - sine * left_m, sine * ahead_m + cosine * left_m, 0.0);
         FlightPoint {
@@ -268,35 +266,29 @@ impl Flight for Shuttle {
     }
 }
 
-/// Staying at one place, with the pace's sway and, once under way, its manoeuvres.
+/// Flight at one position, with the pace's sway and, after the ramp, its manoeuvres.
 #[derive(Clone, Debug)]
 pub(crate) struct Station {
-    /// How hard.
     pub(crate) pace: Pace,
-    /// Where.
     pub(crate) position_m: Vector3<f64>,
-    /// Heading.
     pub(crate) heading_rad: f64,
 }
 
-/// A stay at one place with a lively warm-up, then an exercise from rest.
+/// Flight at one position with a warm-up, then an exercise that starts from hover.
 #[derive(Clone, Debug)]
 pub(crate) struct Drill {
-    /// Where.
     pub(crate) position_m: Vector3<f64>,
     /// Heading while hovering.
     pub(crate) heading_rad: f64,
-    /// Start of the exercise.
     pub(crate) start_s: f64,
-    /// What is exercised.
     pub(crate) exercise: Exercise,
 }
 
 impl Drill {
-    /// Rest before and after the warm-up.
+    /// Duration of the hover before and after the warm-up.
     const REST_S: f64 = 1.0;
 
-    /// Amplitude of the warm-up at a time as a ratio of its full size: 0 while hovering.
+    /// Amplitude of the warm-up at a time as a ratio of its largest value: 0 while hovering.
     fn liveliness(&self, time_s: f64) -> f64 {
         let (begin_s, end_s) = (Self::REST_S, self.start_s - Self::REST_S);
         let fraction = ((time_s - begin_s) / (end_s - begin_s).max(1e-3)).clamp(0.0, 1.0);

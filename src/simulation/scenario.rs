@@ -1,4 +1,4 @@
-//! A flight with its rig and everything that the sensors but the cameras measure.
+//! Flight with its rig and the measurements of all sensors except the cameras.
 
 use super::equipment::{Equipment, GRAVITY_M_PER_S2, IMU_RATE_HZ, IntrinsicsError, given_rig, random_imu_intrinsics};
 use super::gimbal::{JointMotion, LookAround, Stabilizer};
@@ -8,7 +8,7 @@ use super::trajectory::Trajectory;
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, JointSample, Rig};
 
-/// Streams of random numbers, one per purpose, so that they do not disturb each other.
+/// Streams of random numbers, one per purpose, so that they are independent.
 pub(crate) mod stream {
     pub(crate) const ROUTE: u64 = 1;
     pub(crate) const MANOEUVRES: u64 = 2;
@@ -28,7 +28,7 @@ pub(crate) mod stream {
 /// Time from an IMU sample to the encoder reading.
 const ENCODER_PHASE_S: f64 = 0.002;
 
-/// A flight, its rig, and the measurements of its IMU and encoders.
+/// Flight, its rig, and the measurements of its IMU and encoders.
 #[derive(Clone, Debug)]
 pub(crate) struct Scenario {
     pub(crate) trajectory: Trajectory,
@@ -39,7 +39,7 @@ pub(crate) struct Scenario {
     seed: u64,
 }
 
-/// What a scenario is made from besides its trajectory.
+/// Options of a scenario in addition to its trajectory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScenarioOptions<'a> {
     pub(crate) name: &'a str,
@@ -68,21 +68,21 @@ impl Scenario {
         Self { trajectory, joints, imu_record, true_rig, given_rig, seed: options.seed }
     }
 
-    /// Measures with an IMU of random scales and axes, of which the given rig does not know.
+    /// Applies random scales and axes to the IMU samples, which are absent from the given rig.
     pub(crate) fn miscalibrate_imu(&mut self, [scale, angle_rad]: [f64; 2], random: &mut RandomStream) {
         let intrinsics = random_imu_intrinsics(scale, angle_rad, random);
         self.imu_record.miscalibrate(&intrinsics);
         self.true_rig.imu.intrinsics = intrinsics;
     }
 
-    /// Makes the intrinsics of all cameras of the given rig wrong.
+    /// Applies errors to the intrinsics of all cameras of the given rig.
     pub(crate) fn spoil_intrinsics(&mut self, error: &IntrinsicsError) {
         for (given, actual) in self.given_rig.cameras.iter_mut().zip(&self.true_rig.cameras) {
             given.model = error.applied(&actual.model);
         }
     }
 
-    /// Ground truth `world_from_camera` at a time of the IMU's clock.
+    /// Ground truth `world_from_camera` at a time in the IMU's clock.
     pub(crate) fn world_from_camera(&self, camera: &CameraRig, time_s: f64) -> RigidTransform {
         let world_from_imu = self.trajectory.at(time_s).world_from_imu;
         match (&camera.mount, &self.true_rig.gimbal, &self.joints) {
@@ -94,12 +94,12 @@ impl Scenario {
         }
     }
 
-    /// The true joint angles at a time.
+    /// True joint angles at a time.
     pub(crate) fn joint_angles_rad(&self, time_s: f64) -> Option<Vec<f64>> {
         self.joints.as_ref().map(|joints| joints.at(time_s).to_vec())
     }
 
-    /// The true joint angles at the encoders' stamps.
+    /// True joint angles at the encoders' stamps.
     pub(crate) fn true_joint_samples(&self) -> Vec<JointSample> {
         let Some(joints) = &self.joints else { return Vec::new() };
         let duration_s = self.trajectory.duration_s();
@@ -110,7 +110,7 @@ impl Scenario {
             .collect()
     }
 
-    /// What the encoders read, white noise of this standard deviation on every reading.
+    /// Encoder readings with white noise of this standard deviation.
     pub(crate) fn encoder_samples(&self, sigma_rad: f64) -> Vec<JointSample> {
         let mut random = RandomStream::new(self.seed, stream::ENCODERS);
         let mut samples = self.true_joint_samples();
@@ -123,7 +123,6 @@ impl Scenario {
     }
 }
 
-/// Gravity of all simulated worlds.
 pub(crate) fn gravity_m_per_s2() -> f64 {
     GRAVITY_M_PER_S2
 }

@@ -29,25 +29,26 @@ use crate::sensors::{CameraRig, ImuSample, JointSample};
 const EPOCH_NS: i64 = 1_750_000_000_000_000_000;
 /// Stamp of the first image; streams are not aligned on purpose.
 const FIRST_IMAGE_S: f64 = 0.003;
-/// Images that are rendered at once, over all threads.
+/// Number of images that are rendered concurrently.
 const BATCH: usize = 24;
 /// Rendered images that are averaged into one with motion blur.
 const BLUR_STEPS: usize = 7;
-/// Rows of an image that are rendered at the pose of their middle when a camera has a readout. A row is then half a row from
-/// its time: with 30 ms over 480 rows 0.03 ms, in which the image moves by 0.03 px at 2.4 rad/s, the vehicle's limit.
+/// Rows of an image that are rendered at one pose, that of their middle, if a camera has a readout. A row is then at
+/// most half a row from its exposure time: with 30 ms over 480 rows 0.03 ms, in which the image moves by 0.03 px at 2.4
+/// rad/s, the vehicle's limit.
 const SHUTTER_ROWS: usize = 2;
-/// Mean velocity that flights are planned for, a lower bound.
+/// Lower bound of the mean velocity, for planning the length of a flight.
 const PLANNED_M_PER_S: f64 = 2.5;
 /// Delay from measurement to recording: IMU, encoders, first camera, and each further camera.
 const DELAYS_S: [f64; 4] = [0.0004, 0.0007, 0.018, 0.0015];
 
-/// Simulates an experiment and writes `output` (an MCAP log) with `.rig.yaml` and `.truth.yaml` beside it.
+/// Simulates an experiment and writes `output` (an MCAP log) with `.rig.yaml` and `.truth.yaml` in the same folder.
 ///
-/// The same options and file name give the same bytes whatever the thread count. `progress` is called as images are
-/// done.
+/// The same options and file name give the same bytes for any number of threads. `progress` is called after each batch
+/// of images.
 ///
 /// # Errors
-/// When an option is out of its range, or a file cannot be written.
+/// If an option is out of its range, or a file cannot be written.
 pub fn simulate(
     options: &SimulationOptions,
     output: &Path,
@@ -59,7 +60,7 @@ pub fn simulate(
     })
 }
 
-/// [`simulate`] that ends where `progress` breaks.
+/// [`simulate`] that stops if `progress` returns `Break`.
 ///
 /// # Errors
 /// As [`simulate`], and [`SimulationError::Interrupted`], in which case no file is written.
@@ -106,7 +107,7 @@ pub fn simulate_interruptible(
     })
 }
 
-/// The flight with its measurements.
+/// Flight with its measurements.
 fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
     let experiment = options.experiment;
     let variant = 100 * Experiment::ALL.iter().position(|other| *other == experiment).unwrap_or(0) as u64;
@@ -178,7 +179,7 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
     scenario
 }
 
-/// A message on its way into the log, by its number among its kind.
+/// Message of the log by its index among those of its kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Message {
     Truth(usize),
@@ -188,7 +189,6 @@ enum Message {
     Image(usize),
 }
 
-/// An image to be rendered.
 #[derive(Clone, Copy, Debug)]
 struct Shot {
     camera: usize,
@@ -196,7 +196,7 @@ struct Shot {
     stamp_ns: i64,
 }
 
-/// Everything that is recorded, as it was measured.
+/// All recorded measurements in the order of measurement.
 struct Recordings {
     imu: Vec<ImuSample>,
     joints: Vec<JointSample>,
@@ -260,7 +260,7 @@ fn write_messages(
                 let camera = &rig.cameras[shot.camera];
                 let info = camera.topic.replace("image_raw/compressed", "camera_info");
                 let times = times(shot.stamp_ns);
-                // A camera publishes the intrinsics that its calibration has found, right or wrong.
+                // A camera publishes its given intrinsics, including their errors.
                 log.write_camera_info(&info, &camera.frame_id, times, &scenario.given_rig.cameras[shot.camera].model)?;
                 if let Some(jpeg) = ready.pop_front() {
                     log.write_compressed_image(&camera.topic, &camera.frame_id, times, "jpeg", &jpeg)?;
@@ -281,7 +281,7 @@ fn recordings(options: &SimulationOptions, scenario: &Scenario) -> Recordings {
     joints.retain(|sample| sample.stamp_ns >= start_ns);
     let duration_s = scenario.trajectory.duration_s();
     let shift_s = options.disturbances.camera_time_offset_s;
-    // Rows that are exposed first and last.
+    // Earliest and latest exposure of a row, relative to the stamp.
     let rows_s = [options.disturbances.readout_s.min(0.0), options.disturbances.readout_s.max(0.0)];
     let mut shots = Vec::new();
     for (camera, _) in scenario.true_rig.cameras.iter().enumerate() {
@@ -299,12 +299,12 @@ fn recordings(options: &SimulationOptions, scenario: &Scenario) -> Recordings {
             frame_index += 1;
         }
     }
-    // In the order in which they will be written.
+    // In the order of writing.
     shots.sort_by_key(|shot| (shot.stamp_ns, shot.camera));
     Recordings { imu: scenario.imu_record.samples.clone(), joints, true_joints: scenario.true_joint_samples(), shots }
 }
 
-/// All messages in the order of their log times, which come later than the stamps by a delay that jitters.
+/// All messages in the order of their log times, which follow the stamps by a delay with jitter.
 fn schedule(recordings: &Recordings, seed: u64) -> Vec<(i64, Message)> {
     let mut random = RandomStream::new(seed, stream::DELIVERY);
     let mut late = |delay_s: f64| ns_from_seconds(delay_s * (1.0 + 0.06 * random.unit()));
@@ -354,7 +354,7 @@ impl<'a> Studio<'a> {
         Self { options, scenario, renderer: Renderer::new(world), cameras: cameras.collect() }
     }
 
-    /// The images of some shots as JPEG, in their order.
+    /// Renders the images of some shots as JPEG, in their order.
     fn develop(&self, shots: &[Shot]) -> Result<VecDeque<Vec<u8>>, SimulationError> {
         let developed: Result<Vec<_>, _> = shots
             .par_iter()
@@ -412,7 +412,8 @@ impl<'a> Studio<'a> {
     }
 }
 
-/// Extrinsics error of the given chain, averaged over the joint angles visited: translation in metres, rotation in radians.
+/// Extrinsics error of the given chain, averaged over the joint angles of the flight: translation in metres, rotation
+/// in radians.
 fn given_chain_error(scenario: &Scenario) -> (f64, f64) {
     let (Some(given), Some(ground_truth)) = (&scenario.given_rig.gimbal, &scenario.true_rig.gimbal) else {
         return (0.0, 0.0);

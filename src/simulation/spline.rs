@@ -1,20 +1,19 @@
 use nalgebra::SVector;
 
-/// Degree of the splines: five, so that position, velocity, acceleration and jerk are all smooth.
+/// Degree of the splines: position, velocity, acceleration and jerk are smooth.
 const DEGREE: usize = 5;
 
-/// A uniform B-spline of degree five through `D`-dimensional control points.
+/// Uniform B-spline of degree five through `D`-dimensional control points.
 ///
-/// Control point `c` has its greatest weight at the time `(c − 2) · knot_s`; equal control points are an exact rest.
+/// Control point `c` has its largest weight at the time `(c − 2) · knot_s`; equal control points give an exact
+/// standstill.
 #[derive(Clone, Debug)]
 pub(crate) struct Spline<const D: usize> {
-    /// Time between knots.
     pub(crate) knot_s: f64,
-    /// Control points.
     pub(crate) points: Vec<SVector<f64, D>>,
 }
 
-/// Weights of the `degree + 1` control points that act at `u ∈ [0, 1]` of a knot interval.
+/// Weights of the `degree + 1` control points that affect `u ∈ [0, 1]` of a knot interval.
 fn basis(degree: usize, u: f64) -> [f64; DEGREE + 1] {
     let mut weights = [0.0; DEGREE + 1];
     weights[0] = 1.0;
@@ -30,23 +29,23 @@ fn basis(degree: usize, u: f64) -> [f64; DEGREE + 1] {
 }
 
 impl<const D: usize> Spline<D> {
-    /// Index of the control point whose greatest weight lies at `time_s`, as a real number.
+    /// Time in seconds at which a control point has its largest weight.
     pub(crate) fn time_of_point(&self, index: usize) -> f64 {
         (index as f64 - 2.0) * self.knot_s
     }
 
-    /// How many control points reach to `duration_s` and one interval on.
+    /// Number of control points that cover `duration_s` and one more interval.
     pub(crate) fn points_for(duration_s: f64, knot_s: f64) -> usize {
         (duration_s / knot_s).ceil() as usize + DEGREE + 2
     }
 
-    /// The control points that act at a time: the first of six.
+    /// Index of the first of the six control points that affect a time.
     pub(crate) fn first_acting(&self, time_s: f64) -> usize {
         let last = self.points.len().saturating_sub(DEGREE + 1);
         ((time_s / self.knot_s).max(0.0) as usize).min(last)
     }
 
-    /// The derivative of order `order` (0 to 4) at a time; the ends are continued as polynomials.
+    /// Derivative of order `order` (0 to 4) at a time; the ends are extrapolated as polynomials.
     pub(crate) fn derivative(&self, time_s: f64, order: usize) -> SVector<f64, D> {
         let first = self.first_acting(time_s);
         let mut acting = [SVector::<f64, D>::zeros(); DEGREE + 1];

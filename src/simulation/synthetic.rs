@@ -1,4 +1,4 @@
-//! Flights without images: ideal feature tracks with noise, for judging an estimator quickly and against known truth.
+//! Flights without images: ideal feature tracks with noise, for fast tests of an estimator against ground truth.
 
 use std::collections::BTreeMap;
 
@@ -18,16 +18,15 @@ use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFram
 use crate::geometry::{RigidTransform, median, ns_from_seconds};
 use crate::sensors::{ChainPrior, ImuSample, JointAngles, JointMotionFit, Rig};
 
-/// What carries the camera of a synthetic flight.
+/// Carrier of the camera of a synthetic flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SyntheticMount {
     /// The three-joint gimbal, `cam0` with `mount: gimbal`.
     Gimbal,
-    /// The vehicle itself; the rig has no gimbal.
+    /// The vehicle; the rig has no gimbal.
     Static,
 }
 
-/// How a synthetic flight moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SyntheticMotion {
     /// Aggressive from the first frame on.
@@ -40,48 +39,43 @@ pub enum SyntheticMotion {
     Hover,
 }
 
-/// What a synthetic flight is to be like.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SyntheticOptions {
-    /// What carries the camera.
     pub mount: SyntheticMount,
-    /// How it moves.
     pub motion: SyntheticMotion,
-    /// Everything random follows from this.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Length in seconds.
     pub duration_s: f64,
-    /// Rate of the frames.
     pub frame_rate_hz: f64,
     /// Noise of a feature's pixel, per axis.
     pub pixel_sigma_px: f64,
-    /// Ratio of features whose tracks drift off their landmark.
+    /// Ratio of features whose tracks drift away from their landmark.
     pub outlier_ratio: f64,
-    /// Most features in a frame.
+    /// Maximum number of features in a frame.
     pub features: usize,
-    /// Scales noise, bias random walk and turn-on bias of the IMU; 0 makes it ideal.
+    /// Factor of noise, bias random walk and turn-on bias of the IMU; 0 makes it ideal.
     pub imu_noise_scale: f64,
-    /// Noise of the encoders; `None` without encoders.
+    /// Standard deviation of the encoders; `None` without encoders.
     pub encoder_sigma_rad: Option<f64>,
-    /// How long after their stamps the camera took its images and the encoders their readings, in seconds.
+    /// Delays of the camera's exposures and of the encoder readings after their stamps, in seconds.
     pub clock_offsets_s: [f64; 2],
-    /// Readout of the camera, which the given rig does not have: each landmark is observed at the time of its row.
+    /// Readout of the camera: each landmark is observed at the time of its row. Absent from the given rig.
     pub readout_s: f64,
-    /// How wrong the given rig's intrinsics are; bearings are those of the given camera.
+    /// Errors of the given rig's intrinsics; bearings are those of the given camera.
     pub intrinsics_error: IntrinsicsError,
-    /// Standard deviations of the IMU's scales and of its angles in radians (misalignment, rotation between the sensors), of
-    /// which the given rig does not know; zeros for a perfect one.
+    /// Standard deviations of the errors of the IMU's scales, and of its angles in radians (misalignment, rotation
+    /// between the sensors). Absent from the given rig; zeros for an ideal IMU.
     pub imu_intrinsics_error: [f64; 2],
     /// First-order Gauss–Markov error of each axis of the accelerometer: standard deviation in m/s², time constant in
     /// seconds.
     pub accelerometer_drift: Option<[f64; 2]>,
-    /// How wrong the given rig's chain is.
+    /// Errors of the given rig's chain.
     pub start_error: ChainPrior,
-    /// How far the gimbal looks around in yaw, in radians (pitch 0.4 and roll 0.15 of it); 0 stabilizes only.
+    /// Amplitude of the gimbal's yaw, in radians (pitch 0.4 and roll 0.15 of it); with 0 it only stabilizes.
     pub look_around_rad: f64,
-    /// The lens.
     pub lens: Lens,
-    /// In place of the motion: a stay with a warm-up until this second, then the exercise.
+    /// Replaces the motion: one position with a warm-up until this time in seconds, then the exercise.
     pub exercise: Option<(f64, Exercise)>,
 }
 
@@ -111,36 +105,33 @@ impl Default for SyntheticOptions {
     }
 }
 
-/// One frame: the estimator's input and the ground truth.
+/// One frame: input of the estimator and ground truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SyntheticFrame {
-    /// Number of the frame.
     pub index: usize,
-    /// Stamp since the flight began.
+    /// Stamp since the start of the flight.
     pub stamp_ns: i64,
-    /// IMU samples from the previous frame's stamp to this one's, both ends included and interpolated; the first
-    /// frame has those since the flight began.
+    /// IMU samples from the previous frame's stamp to this one's, both ends included and interpolated; those of the
+    /// first frame begin at the start of the flight.
     pub imu: Vec<ImuSample>,
-    /// Encoder angles, `None` without encoders.
+    /// Encoder angles; `None` without encoders.
     pub joint_angles_rad: Option<Vec<f64>>,
-    /// The tracked features.
     pub tracks: TrackedFrame,
     /// True pose of the IMU in the world.
     pub true_world_from_imu: RigidTransform,
     /// True velocity in the world.
     pub true_velocity_m_per_s: Vector3<f64>,
-    /// True biases.
     pub true_bias: ImuBias,
-    /// True joint angles, empty for a rigid camera.
+    /// True joint angles; empty for a rigid camera.
     pub true_joint_angles_rad: Vec<f64>,
-    /// True rates of the joints in rad/s, empty for a rigid camera.
+    /// True rates of the joints in rad/s; empty for a rigid camera.
     pub true_joint_rates_rad_per_s: Vec<f64>,
-    /// True pose of the camera in the world when it took the image (its first row).
+    /// True pose of the camera in the world at the exposure of the first row.
     pub true_world_from_camera: RigidTransform,
 }
 
 impl SyntheticFrame {
-    /// The encoder readings as an estimator takes them, white with a standard deviation of `sigma_rad`; `None` without
+    /// Encoder readings as input of an estimator, white with a standard deviation of `sigma_rad`; `None` without
     /// encoders.
     pub fn encoder_angles(&self, sigma_rad: f64) -> Option<JointAngles> {
         let angles_rad = self.joint_angles_rad.clone()?;
@@ -155,22 +146,20 @@ impl SyntheticFrame {
     }
 }
 
-/// A whole flight.
 #[derive(Clone, Debug)]
 pub struct SyntheticFlight {
     /// Frames in time order.
     pub frames: Vec<SyntheticFrame>,
-    /// The rig that the estimator is given; its only camera is `cam0`.
+    /// Rig given to the estimator; its only camera is `cam0`.
     pub given_rig: Rig,
-    /// The rig as it is.
     pub true_rig: Rig,
-    /// Where the tracked landmarks are.
+    /// True positions of the tracked landmarks.
     pub landmarks: BTreeMap<FeatureId, Vector3<f64>>,
 }
 
 /// Stamp of the first frame.
 const FIRST_FRAME_S: f64 = 0.003;
-/// Half the time over which the rate of a joint is taken.
+/// Half the interval of the central difference that gives the rate of a joint.
 const RATE_STEP_S: f64 = 0.005;
 
 /// Simulates a flight and its feature tracks.
@@ -253,7 +242,7 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
     SyntheticFlight { frames, given_rig: scenario.given_rig, true_rig: scenario.true_rig, landmarks: tracker.landmarks }
 }
 
-/// Makes IMU and given rig as wrong as asked.
+/// Applies the errors of the options to the IMU and the given rig.
 fn spoil(scenario: &mut Scenario, options: &SyntheticOptions) {
     if let Some([sigma_m_per_s2, time_constant_s]) = options.accelerometer_drift {
         let mut random = RandomStream::new(options.seed, stream::ACCELEROMETER_DRIFT);
@@ -268,7 +257,7 @@ fn spoil(scenario: &mut Scenario, options: &SyntheticOptions) {
     }
 }
 
-/// The flight around the house of T1, or a stay at one place.
+/// Flight around the house of T1, or at one position.
 fn trajectory(options: &SyntheticOptions) -> Trajectory {
     let mut route = RandomStream::new(options.seed, stream::ROUTE);
     let pace = match options.motion {
@@ -294,7 +283,7 @@ fn trajectory(options: &SyntheticOptions) -> Trajectory {
     )
 }
 
-/// A feature on its way through the frames.
+/// Feature with its state between frames.
 struct Track {
     id: FeatureId,
     age: u32,
@@ -304,10 +293,10 @@ struct Track {
     remaining: u32,
 }
 
-/// An ideal front end with known correspondences.
+/// Ideal front end with known correspondences.
 struct Tracker {
     model: CameraModel,
-    /// The camera that the estimator is given: bearings are its.
+    /// Camera model given to the estimator, which defines the bearings.
     given: CameraModel,
     random: RandomStream,
     pixel_sigma_px: f64,
@@ -319,17 +308,17 @@ struct Tracker {
     before: Option<RigidTransform>,
 }
 
-/// Features keep this distance when new.
+/// Minimum distance of a new feature from all others.
 const SPACING_PX: f64 = 22.0;
-/// Features end this close to the border.
+/// Distance from the border at which features end.
 const BORDER_PX: f64 = 6.0;
-/// Steps towards the row in which a landmark is seen.
+/// Maximum number of iterations for the row in which a landmark is observed.
 const MOST_ROW_STEPS: usize = 12;
-/// How well that row is known.
+/// Change of the row at which the iterations end.
 const ROW_TOLERANCE_PX: f64 = 1e-9;
-/// Mean life of a track that stays in sight, in frames.
+/// Mean duration of a track that stays in the image, in frames.
 const LIFE_FRAMES: f64 = 60.0;
-/// Nearest and farthest landmark when first seen.
+/// Nearest and farthest landmark at its first observation.
 const DEPTH_M: [f64; 2] = [2.5, 20.0];
 
 impl Tracker {
@@ -348,7 +337,7 @@ impl Tracker {
         }
     }
 
-    /// The frame of a camera whose rows have these poses.
+    /// Tracks a frame of a camera whose rows have these poses.
     fn track(&mut self, stamp_ns: i64, world_from_camera: &dyn Fn(f64) -> RigidTransform) -> TrackedFrame {
         let before = self.tracks.len();
         let mut features = Vec::with_capacity(self.features);
@@ -367,7 +356,7 @@ impl Tracker {
         uv_px + Vector2::new(self.random.normal(), self.random.normal()) * self.pixel_sigma_px
     }
 
-    /// Follows the tracks that stay in sight.
+    /// Continues the tracks that stay in the image.
     fn follow(&mut self, world_from_camera: &dyn Fn(f64) -> RigidTransform, features: &mut Vec<TrackedFeature>) {
         for mut track in std::mem::take(&mut self.tracks) {
             if let Some(slip) = &mut track.slip_px {
@@ -388,7 +377,8 @@ impl Tracker {
         }
     }
 
-    /// Where a landmark is seen, at the pose of the row that it is seen in.
+    /// Pixel of a landmark, at the pose of the row in which it is observed; `None` behind the camera or outside the
+    /// lens.
     fn observe(
         &self,
         world_from_camera: &dyn Fn(f64) -> RigidTransform,
@@ -399,8 +389,8 @@ impl Tracker {
             self.model.project(&point).filter(|_| point.z > 0.3)
         };
         let mut seen_px = at_row(0.5 * self.model.resolution_px[1] as f64)?;
-        // Each step leaves the part of an error that the image moves by during the error's readout: a tenth, or all of it
-        // for a global shutter.
+        // Each iteration reduces the error by the ratio of image motion during the readout to the image height: to a
+        // tenth, or to zero for a global shutter.
         for _ in 0..MOST_ROW_STEPS {
             let before_px = seen_px;
             seen_px = at_row(before_px.y)?;
@@ -411,7 +401,7 @@ impl Tracker {
         Some(seen_px)
     }
 
-    /// Fills free places of the image with new features.
+    /// Adds new features in free regions of the image.
     fn find(&mut self, world_from_camera: &dyn Fn(f64) -> RigidTransform, features: &mut Vec<TrackedFeature>) {
         let [width, height] = self.model.resolution_px.map(|size| size as f64);
         for _ in 0..20 * self.features {
@@ -444,7 +434,7 @@ impl Tracker {
         }
     }
 
-    /// A point on a ray: at a random distance, or on the ground before that.
+    /// Point on a ray: at a random distance, or on the ground if that is nearer.
     fn landmark(&mut self, world_from_camera: &RigidTransform, ray: &Vector3<f64>) -> Option<Vector3<f64>> {
         let [near, far] = DEPTH_M;
         let distance_m = self.random.uniform(near.ln(), far.ln()).exp();
@@ -454,7 +444,7 @@ impl Tracker {
         (distance_m > 0.5).then(|| world_from_camera.translation_m + direction * distance_m)
     }
 
-    /// Median motion in the image and mean parallax with the rotation taken out.
+    /// Sets the median motion in the image and the mean parallax with the rotation removed.
     fn measure_motion(&self, pose: &RigidTransform, features: &[TrackedFeature], statistics: &mut FrontEndStatistics) {
         let Some(before) = &self.before else { return };
         let before_from_now = before.rotation.inverse() * pose.rotation;

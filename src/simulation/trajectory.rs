@@ -1,4 +1,4 @@
-//! The multirotor's flight: a spline for position and one for heading, everything else by differential flatness.
+//! Flight of the multirotor: a spline for position and one for heading, everything else by differential flatness.
 
 use nalgebra::{Matrix3, Rotation3, SVector, UnitQuaternion, Vector1, Vector3};
 
@@ -7,7 +7,7 @@ use super::route::Flight;
 use super::spline::Spline;
 use crate::geometry::RigidTransform;
 
-/// What the multirotor can do, after the `AscTec` Firefly of `RotorS` (1.57 kg, six rotors, about two g of thrust).
+/// Limits of the multirotor, after the `AscTec` Firefly of `RotorS` (1.57 kg, six rotors, about two g of thrust).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VehicleLimits {
     /// Largest angle between thrust and the vertical, in radians.
@@ -52,11 +52,11 @@ pub struct Kinematics {
     pub heading_rad: f64,
 }
 
-/// A smooth flight in closed form: uniform quintic B-splines of position and heading.
+/// Smooth flight in closed form: uniform quintic B-splines of position and heading.
 ///
 /// Attitude, angular velocity and specific force follow from velocity, acceleration, jerk and heading (differential
-/// flatness of a multirotor with linear air drag `c`): the z axis lies along the thrust `a + g + c·v`, the y axis is
-/// square to it and to the heading.
+/// flatness of a multirotor with linear air drag `c`): the z axis is parallel to the thrust `a + g + c·v`, the y axis
+/// is perpendicular to it and to the heading.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     position_m: Spline<3>,
@@ -68,12 +68,11 @@ pub struct Trajectory {
 /// Drag of the air over mass and velocity, in 1/s.
 pub(crate) const AIR_DRAG_PER_S: f64 = 0.15;
 
-/// Step at which limits are checked and lengths are summed, in seconds.
+/// Time step at which limits are checked and lengths are summed, in seconds.
 const CHECK_STEP_S: f64 = 0.02;
 
 impl Trajectory {
-    /// Follows `flight` with the perturbations of a random stream, softened where `limits` would be exceeded, for
-    /// `duration_s` seconds.
+    /// Follows `flight` with random manoeuvres for `duration_s` seconds; manoeuvres that exceed `limits` are reduced.
     pub(crate) fn new(
         flight: &dyn Flight,
         random: &mut RandomStream,
@@ -103,7 +102,7 @@ impl Trajectory {
         trajectory
     }
 
-    /// Shrinks the deviations that act where a limit is exceeded until none is, at most 200 times.
+    /// Reduces the manoeuvres where a limit is exceeded until none is, in at most 200 iterations.
     fn soften(&mut self, base: &[SVector<f64, 3>], position_wander: &mut [SVector<f64, 3>], limits: &VehicleLimits) {
         for _ in 0..200 {
             let mut factor = vec![1.0_f64; base.len()];
@@ -138,9 +137,11 @@ impl Trajectory {
         }
     }
 
-    /// Inserts hovering over an interval of start and length in seconds, swaying by a centimetre; the rest is delayed.
+    /// Inserts hovering over an interval of start and length in seconds, with a sway of a centimetre; the rest is
+    /// delayed.
     ///
-    /// A spline reaches three knots to either side of its points, so the vehicle slows down before and is stationary after.
+    /// A spline extends three knots to each side of its points, so the vehicle decelerates before and is stationary
+    /// after.
     pub(crate) fn hover(&mut self, [start_s, length_s]: [f64; 2]) {
         const SWAY_M: f64 = 0.01;
         const REACH: usize = 6;
@@ -162,12 +163,11 @@ impl Trajectory {
         self.heading_rad.points.truncate(count);
     }
 
-    /// How long the flight is.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
 
-    /// Gravity of its world, in m/s².
+    /// Gravity of the world, in m/s².
     pub(super) fn gravity_m_per_s2(&self) -> f64 {
         self.gravity_m_per_s2
     }
@@ -229,7 +229,7 @@ impl Trajectory {
         f64::from(step) * STEP_S
     }
 
-    /// The same flight, ended earlier.
+    /// Ends the flight earlier.
     pub(crate) fn cut(mut self, duration_s: f64) -> Self {
         self.duration_s = self.duration_s.min(duration_s);
         self
@@ -237,7 +237,7 @@ impl Trajectory {
 }
 
 impl VehicleLimits {
-    /// Whether the vehicle can be in this state.
+    /// True if the state is within the limits.
     pub fn admit(&self, state: &Kinematics) -> bool {
         let thrust = state.specific_force_m_per_s2.z;
         let upright = (state.world_from_imu.rotation * Vector3::z()).z;

@@ -1,4 +1,4 @@
-//! Vibration of the airframe by its rotors, as the IMU samples it.
+//! Vibration of the airframe by its rotors, as sampled by the IMU.
 
 use std::f64::consts::TAU;
 
@@ -10,33 +10,32 @@ use super::route::Wave;
 use super::trajectory::Trajectory;
 use crate::geometry::seconds_from_ns;
 
-/// Rotors, each at a speed of its own.
+/// Number of rotors, each with its own speed.
 const ROTORS: usize = 4;
 /// Multiples of a rotor's frequency (imbalance, blades, their harmonics), with amplitudes relative to the first.
 const HARMONICS: [(f64, f64); 4] = [(1.0, 1.0), (2.0, 0.5), (3.0, 0.25), (4.0, 0.12)];
 /// Speed of idling rotors on the ground, relative to hovering.
 const IDLE_RATIO: f64 = 0.6;
-/// Time constant with which rotors follow the wanted thrust.
+/// Time constant with which rotors follow the commanded thrust.
 const ROTOR_S: f64 = 0.1;
-/// How far a rotor's speed wanders.
+/// Amplitude of random changes of a rotor's speed.
 const WANDER_RATIO: f64 = 0.03;
-/// Longest period of the wandering.
+/// Longest period of these changes.
 const WANDER_S: f64 = 7.1;
-/// The vehicle has left the ground at this speed.
+/// Velocity from which the vehicle counts as airborne.
 const AIRBORNE_M_PER_S: f64 = 0.2;
-/// Corner of the sensor's low-pass filter (second order) as a ratio of the sample rate. What passes beyond half the rate
-/// appears at another frequency.
+/// Corner of the sensor's low-pass filter (second order) as a ratio of the sample rate. Frequencies above half the rate
+/// are aliased.
 const FILTER_RATE_RATIO: f64 = 0.4;
 
-/// A vibration of rotors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vibration {
-    /// Frequency of the rotors while hovering, in Hz. Their thrust follows the flight and grows with the square of the speed;
-    /// until the vehicle first moves they idle at 60 % of it.
+    /// Frequency of the rotors while hovering, in Hz. Their thrust follows the flight and grows with the square of the
+    /// speed; until the vehicle first moves they idle at 60 % of it.
     pub rotor_hz: f64,
     /// Amplitude of the angular rate at that frequency before the sensor's filter, root sum square over the rotors, in rad/s.
     pub rate_rad_per_s: f64,
-    /// The same of the specific force, in m/s².
+    /// Amplitude of the specific force, likewise, in m/s².
     pub force_m_per_s2: f64,
 }
 
@@ -56,11 +55,11 @@ struct Rotor {
 impl Rotor {
     fn new(vibration: &Vibration, random: &mut RandomStream) -> Self {
         // Independent rotors add up as a root sum square.
-        let share = (ROTORS as f64).sqrt().recip();
+        let per_rotor = (ROTORS as f64).sqrt().recip();
         let lines = HARMONICS.into_iter().map(|(multiple, amplitude)| {
             let mut direction = |size: f64| {
                 let vector = random.normal_vector(1.0);
-                (vector * (share * amplitude * size / vector.norm().max(1e-9)), random.uniform(0.0, TAU))
+                (vector * (per_rotor * amplitude * size / vector.norm().max(1e-9)), random.uniform(0.0, TAU))
             };
             Line { multiple, rate: direction(vibration.rate_rad_per_s), force: direction(vibration.force_m_per_s2) }
         });

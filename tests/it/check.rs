@@ -1,4 +1,4 @@
-//! `check` on rendered pictures: what the turns of the cameras tell about clocks and extrinsics.
+//! `check` on rendered images: time offsets and extrinsics measured from the rotations of the cameras.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ impl Measured {
         Self { log, rig, rotations }
     }
 
-    /// What is found when the rig is changed so.
+    /// Checks the log with a changed rig.
     fn check(&self, change: impl Fn(&mut Rig)) -> CheckReport {
         let mut rig = self.rig.clone();
         change(&mut rig);
@@ -44,14 +44,14 @@ fn shifted(rig: &mut Rig, shift_s: f64) {
     }
 }
 
-/// Exactly one finding with these words in its title, of this severity.
+/// Asserts that exactly one finding of this severity has these words in its title, and returns it.
 fn expect<'a>(report: &'a CheckReport, severity: Severity, title: &str) -> &'a Finding {
     let found: Vec<&Finding> = report.findings.iter().filter(|finding| finding.title.contains(title)).collect();
     assert!(found.len() == 1 && found[0].severity == severity, "{severity:?} '{title}' in\n{report}");
     found[0]
 }
 
-/// The milliseconds of a title such as `time offset of cam1 to the gyroscope: +30 ms`.
+/// Milliseconds in a title such as `time offset of cam1 to the gyroscope: +30 ms`.
 fn time_offset_ms(report: &CheckReport, camera: &str) -> i32 {
     let finding = expect(report, Severity::Warning, &format!("time offset of {camera} to the gyroscope"));
     let number = finding.title.split_whitespace().find_map(|word| word.parse().ok());
@@ -105,7 +105,7 @@ fn a_simulated_time_offset_is_found() {
     let camera = late.static_camera();
     let report = late.check(|_| {});
     assert!((time_offset_ms(&report, camera) - 30).abs() <= 2, "{report}");
-    // A rig with 20 of the 30 ms leaves 10.
+    // A rig with 20 of the 30 ms: 10 remain.
     let report = late.check(|rig| shifted(rig, 0.02));
     assert!((time_offset_ms(&report, camera) - 10).abs() <= 2, "{report}");
     let report = late.check(|rig| shifted(rig, 0.03));

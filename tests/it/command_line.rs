@@ -1,4 +1,4 @@
-//! The binary's exit codes and messages: 0 success, 1 the work failed, 2 wrong use; never a panic.
+//! Exit codes and messages of the binary: 0 success, 1 failure, 2 wrong usage; never a panic.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -11,7 +11,7 @@ fn dcvins(arguments: &[&str]) -> Output {
         .expect("the program starts")
 }
 
-/// Runs the program and checks its exit code and that its complaint holds every word.
+/// Runs the program and checks its exit code and that its error message contains every word.
 fn check(arguments: &[&str], code: i32, words: &[&str]) {
     let output = dcvins(arguments);
     let complaint = String::from_utf8_lossy(&output.stderr);

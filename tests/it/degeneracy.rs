@@ -22,7 +22,7 @@ fn json(arguments: &[&str]) -> Value {
     serde_json::from_str(&printed(arguments)).expect("the report is JSON")
 }
 
-/// One experiment with one form: its structural rank, and words that its text must hold.
+/// Runs one experiment with one parameterization and checks its structural rank and the words of its text.
 fn check(arguments: &[&str], rank: u64, words: &[&str]) {
     let mut with_json = arguments.to_vec();
     with_json.push("--json");

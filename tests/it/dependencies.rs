@@ -1,7 +1,6 @@
-//! The crates that the program is built from: their licences, those present in several versions, and those without a
-//! maintainer.
+//! Crates of the build: their licences, crates in several versions, and crates without a maintainer.
 //!
-//! Read from `cargo metadata` without a network, so it needs what the build has downloaded already.
+//! Read from `cargo metadata` without network access; requires that the build has downloaded its dependencies.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
@@ -27,7 +26,7 @@ const LICENCES: [&str; 14] = [
     "bzip2-1.0.6",
 ];
 
-/// Crates in more than one version, with those that need the older ones.
+/// Crates in more than one version, with the crates that need the older ones.
 const SEVERAL_VERSIONS: [(&str, &str); 16] = [
     ("equator", "nano-gemm"),
     ("equator-macro", "equator of nano-gemm"),
@@ -47,7 +46,7 @@ const SEVERAL_VERSIONS: [(&str, &str); 16] = [
     ("thiserror-impl", "thiserror 1"),
 ];
 
-/// Crates without a maintainer, with the crates that bring them; there is no release of those without them.
+/// Crates without a maintainer, with the crates that depend on them; no release of these avoids them.
 const UNMAINTAINED: [(&str, &[&str]); 2] = [
     ("paste", &["gemm", "gemm-c32", "gemm-c64", "gemm-common", "gemm-f16", "gemm-f32", "gemm-f64", "mcap", "pulp"]),
     ("ttf-parser", &["owned_ttf_parser"]),
@@ -58,7 +57,7 @@ struct Package {
     name: String,
     version: String,
     licence: String,
-    /// Names of the crates that it depends on in this build.
+    /// Names of its dependencies in this build.
     dependencies: BTreeSet<String>,
 }
 
@@ -70,7 +69,7 @@ fn array<'a>(value: &'a Value, key: &str) -> &'a [Value] {
     value[key].as_array().map_or(&[], Vec::as_slice)
 }
 
-/// Every crate that is built for this platform, tests and benchmarks included.
+/// Every crate that is built for this platform, including those of tests and benchmarks.
 fn packages() -> Vec<Package> {
     let rustc = Command::new("rustc").arg("-vV").output().expect("rustc runs");
     let version = String::from_utf8(rustc.stdout).expect("its version is text");

@@ -1,6 +1,6 @@
 //! Agreement with evo 1.38.1 on `tests/data/estimate.tum` and `tests/data/reference.tum`.
 //!
-//! The expected numbers were printed by evo's `metrics.APE` and `metrics.RPE` (translation part, rotation angle in
+//! The expected numbers are the output of evo's `metrics.APE` and `metrics.RPE` (translation part, rotation angle in
 //! degrees, consecutive pairs) after `sync.associate_trajectories(reference, estimate, max_diff=0.01)`.
 
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! Damaged logs through the whole program: no panic, bounded memory, and a result from what is whole.
+//! Damaged logs through the whole program: no panic, bounded memory, and a result from the undamaged part.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,12 +6,12 @@ use std::process::{Command, Output};
 
 use dcvins::flight_log::FlightLog;
 
-/// Address space that a run may take; the sample log needs a third of it.
+/// Limit of the address space of a run; the sample log needs a third of it.
 const MEMORY_KIB: u64 = 3_000_000;
-/// Part of the log that is estimated, in the half that stays whole.
+/// Estimated part of the log, in the undamaged half.
 const DURATION_S: &str = "4";
 
-/// A sequence of numbers that looks random (splitmix64), for damage that is the same in every run.
+/// Pseudorandom numbers (splitmix64), for the same damage in every run.
 struct Numbers(u64);
 
 impl Numbers {
@@ -24,12 +24,12 @@ impl Numbers {
     }
 }
 
-/// What happens to the last half of a file.
+/// Damage to the last half of a file.
 #[derive(Clone, Copy, Debug)]
 enum Damage {
-    /// A sector of 512 bytes reads as 0xff, as erased flash memory does.
+    /// A sector of 512 bytes is 0xff, as erased flash memory.
     ErasedSector,
-    /// A page of 4096 bytes reads as 0, as a file does whose end was never written.
+    /// A page of 4096 bytes is 0, as a file whose end was never written.
     ZeroPage,
     /// Fifty bits are flipped.
     Bits,
@@ -37,9 +37,9 @@ enum Damage {
     Truncated,
     /// A piece of 10 kB is missing.
     Hole,
-    /// A piece of 10 kB stands there twice.
+    /// A piece of 10 kB is repeated.
     Repeated,
-    /// Eight bytes, where a length may stand, hold the largest number.
+    /// Eight bytes at the possible place of a length are the largest number.
     LargestLength,
 }
 
@@ -74,7 +74,7 @@ fn damaged(bytes: &[u8], damage: Damage, seed: u64) -> Vec<u8> {
     damaged
 }
 
-/// The program with bounded memory.
+/// Runs the program with bounded memory.
 fn dcvins(arguments: &[&str]) -> Output {
     let limited = format!("ulimit -v {MEMORY_KIB}; exec \"$0\" \"$@\"");
     Command::new("sh")

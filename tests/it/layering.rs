@@ -1,9 +1,10 @@
-//! The one-way order of the folders of `src/`, read from their imports.
+//! One-way order of the folders of `src/`, read from their imports.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Folders from the first to the last; each may use those before it. The table in `src/lib.rs` says what each promises.
+/// Folders from the first to the last; each may use those before it. The table in `src/lib.rs` lists the contract of
+/// each.
 const ORDER: [&str; 18] = [
     "geometry",
     "camera",
@@ -25,7 +26,7 @@ const ORDER: [&str; 18] = [
     "main",
 ];
 
-/// Folders that must not name another one although it comes before them.
+/// Folders that must not import another one although it precedes them.
 const UNKNOWN_TO: [(&str, &[&str]); 5] = [
     ("flight_log", &["optimization"]),
     ("frontend", &["flight_log"]),
@@ -45,7 +46,7 @@ struct Source {
     path: PathBuf,
     folder: String,
     text: String,
-    /// Whether it holds tests only.
+    /// True if it contains tests only.
     test: bool,
 }
 
@@ -82,7 +83,7 @@ fn code_of(text: &str) -> String {
     lines.flat_map(|line| [line, "\n"]).collect()
 }
 
-/// Names that stand directly behind `crate::` or `dcvins::`, groups in braces included.
+/// Names directly after `crate::` or `dcvins::`, groups in braces included.
 fn named_folders(text: &str) -> Vec<String> {
     let mut names = Vec::new();
     for root in ["crate::", "dcvins::"] {
@@ -102,7 +103,7 @@ fn first_name(text: &str) -> String {
     text.chars().take_while(|letter| letter.is_alphanumeric() || *letter == '_').collect()
 }
 
-/// The first names of the entries of a group, whose opening brace has been read.
+/// First names of the entries of a group, whose opening brace has already been read.
 fn first_names_of_group(group: &str) -> Vec<String> {
     let mut names = Vec::new();
     let (mut depth, mut entry) = (0_usize, String::new());

@@ -1,4 +1,4 @@
-//! Integration tests, a module per feature.
+//! Integration tests, one module per feature.
 
 mod check;
 mod command_line;

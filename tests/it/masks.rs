@@ -1,4 +1,4 @@
-//! The mask of a camera: no feature there, and it goes along with the rig of a run.
+//! Mask of a camera: no feature inside it, and it is copied with the rig of a run.
 
 use std::path::Path;
 use std::process::Command;
@@ -38,7 +38,7 @@ fn a_run_with_a_mask_writes_it_beside_its_rig() {
     let mask = written.cameras[0].mask.as_ref().unwrap();
     assert_eq!(mask.file, format!("{key}.mask.png"));
     assert!((mask.image.ratio() - 0.25).abs() < 0.01);
-    // Results of the same log are replaced, the mask with them.
+    // Results of the same log are replaced, including the mask.
     let (code, text) = dcvins(&arguments);
     assert_eq!(code, 0, "{text}");
 }

@@ -1,4 +1,4 @@
-//! `dcvins export` on the sample log: files of every program, the angles that a log measures, refusals.
+//! `dcvins export` on the sample log: files for every program, joint angles from a log, errors.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,7 +10,7 @@ fn sample(name: &str) -> String {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs").join(name).display().to_string()
 }
 
-/// Exit code and what was printed.
+/// Exit code and output.
 fn dcvins(arguments: &[&str]) -> (i32, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_dcvins"))
         .env("DCVINS_CACHE_DIR", "")
@@ -44,7 +44,7 @@ fn every_program_gets_its_files() {
     check("orb-slam3", &["orb_slam3.yaml"]);
 }
 
-/// The extrinsics of cam0 in an exported chain.
+/// Extrinsics of cam0 in an exported chain.
 fn exported(folder: &Path) -> dcvins::geometry::RigidTransform {
     let rig = Rig::from_file(&folder.join("camchain-imucam.yaml")).expect("our reader takes the files of Kalibr");
     match &rig.cameras[0].mount {
@@ -68,7 +68,7 @@ fn the_gimbal_is_fixed_at_the_angles_that_the_log_measures() {
     let chain = Rig::from_file(Path::new(&path)).unwrap().chain_of_camera("cam0").unwrap();
     assert!(exported(folder.path()).minus(&chain.imu_from_camera(&angles_rad)).norm() < 1e-9);
 
-    // The same from the rig with its log; other angles replace the files.
+    // The same from the rig with its log; another time replaces the files.
     let (code, text) = dcvins(&["export", &path, "--log", &log, "--at", "4", "--to", "kalibr", "-o", &out]);
     assert_eq!(code, 0, "{text}");
     assert!(exported(folder.path()).minus(&chain.imu_from_camera(&angles_rad)).norm() < 1e-9);

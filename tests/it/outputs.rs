@@ -1,4 +1,4 @@
-//! Outputs and exit codes: what is overwritten, what is left of earlier runs, what scripts are told.
+//! Outputs and exit codes: overwritten files, remaining files of earlier runs, output for scripts.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ fn dcvins(folder: &Path, arguments: &[&str]) -> Output {
     command.current_dir(folder).args(arguments).output().expect("the program starts")
 }
 
-/// Checks the exit code of a command and that its standard error holds all words.
+/// Checks the exit code of a command and that its standard error contains all words.
 fn check(folder: &Path, arguments: &[&str], code: i32, words: &[&str]) {
     let output = dcvins(folder, arguments);
     let complaint = String::from_utf8_lossy(&output.stderr);

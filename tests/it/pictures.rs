@@ -1,7 +1,7 @@
-//! The pictures of the documents: every panel, every layout, the dialogs and the welcome view, drawn from the sample log
+//! Screenshots of the documents: every panel, every layout, the dialogs and the welcome view, drawn from the sample log
 //! and compared with `docs/images` byte for byte.
 //!
-//! `UPDATE_PICTURES=1 cargo test --release --test it pictures` draws them anew; see `docs/images/README.md`.
+//! `UPDATE_PICTURES=1 cargo test --release --test it pictures` redraws them; see `docs/images/README.md`.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -30,20 +30,20 @@ use rayon::prelude::*;
 
 use crate::study_sample;
 
-/// Cursor of all pictures in seconds: the flight is under way, and directions are still weak.
+/// Cursor of all screenshots in seconds: the vehicle is in flight, and some directions are still weak.
 const AT_S: f64 = 6.0;
-/// The runs of all pictures.
+/// Runs of all screenshots.
 const RUNS: [&str; 2] = ["auto", "classical"];
-/// Conditions in the picture of the breakpoints.
+/// Conditions in the screenshot of the breakpoints.
 const BREAKPOINTS: [&str; 3] = ["rank_informed < 12", "sigma(roll.alpha) < 0.5deg", "event(outliers)"];
-/// Most bytes of all pictures together.
+/// Maximum total size of all screenshots, in bytes.
 const MOST_BYTES: u64 = 3_000_000;
-/// The variable that lets the test replace the pictures.
+/// Environment variable with which the test replaces the screenshots.
 const UPDATE: &str = "UPDATE_PICTURES";
-/// Colour of different pixels.
+/// Colour that marks different pixels.
 const DIFFERENT: Rgba<u8> = Rgba([255, 0, 255, 255]);
 
-/// What a picture shows.
+/// Content of a screenshot.
 #[derive(Clone, Copy, Debug)]
 enum Subject {
     Panel(PanelName),
@@ -51,11 +51,10 @@ enum Subject {
     Dialog(Dialog),
     Shortcuts,
     Welcome,
-    /// A panel of a study, `None` for the whole view.
+    /// Panel of a study; `None` for the whole view.
     Study(Option<StudyPanel>),
 }
 
-/// All pictures.
 fn subjects() -> Vec<Subject> {
     let dialogs = [Dialog::AddRun, Dialog::Fork, Dialog::Palette, Dialog::Settings];
     let panels = PanelName::ALL.into_iter().map(Subject::Panel);
@@ -66,7 +65,7 @@ fn subjects() -> Vec<Subject> {
 }
 
 impl Subject {
-    /// The name of the file.
+    /// File name of the screenshot.
     fn file(self) -> String {
         let name = |kind: &str, name: &str| format!("{kind}-{}.png", name.to_lowercase().replace(' ', "-"));
         match self {
@@ -99,7 +98,6 @@ impl Subject {
         }
     }
 
-    /// Draws the picture.
     fn draw(self, sample: &Sample) -> RgbaImage {
         let Sample { plan, recording, playback } = sample;
         let (cursor_ns, mut images) = (ns_from_seconds(AT_S), ImageReader::new(Arc::clone(&plan.log), &plan.rig));
@@ -159,7 +157,7 @@ impl Subject {
     }
 }
 
-/// The part of a window of one pixel per point that its dialog covers.
+/// Crop of a window (one pixel per point) to its dialog.
 fn cut_to_dialog(window: &RgbaImage, context: &egui::Context) -> RgbaImage {
     let dialogs = context.memory(|memory| {
         let layers = memory.areas().visible_layer_ids();
@@ -172,7 +170,7 @@ fn cut_to_dialog(window: &RgbaImage, context: &egui::Context) -> RgbaImage {
     image::imageops::crop_imm(window, left, top, size[0], size[1]).to_image()
 }
 
-/// The machine of the pictures: the same files on every machine, and nothing is written.
+/// Desktop of the screenshots: the same files on every machine, and nothing is written.
 struct Paper;
 
 impl Desktop for Paper {
@@ -239,7 +237,7 @@ impl Desktop for Paper {
     }
 }
 
-/// What all pictures are drawn from.
+/// Data of all screenshots.
 struct Sample {
     plan: SessionPlan,
     recording: Recording,
@@ -247,7 +245,7 @@ struct Sample {
     playback: Playback,
 }
 
-/// The sample log, computed once up to the cursor of the pictures.
+/// Sample log, computed once up to the cursor of the screenshots.
 fn sample() -> Sample {
     let specs = RUNS.map(|spec| spec.parse().expect("the specifications of tests are valid"));
     let log_path = root().join("sample_logs/garden.mcap");
@@ -268,10 +266,10 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The folder of the pictures, part of the repository.
+/// Folder of the screenshots, part of the repository.
 static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| root().join("docs/images"));
 
-/// The names of the PNG files in the folder of the pictures.
+/// Names of the PNG files in the folder of the screenshots.
 fn committed() -> BTreeSet<String> {
     let entries = fs::read_dir(&*FOLDER).expect("the folder can be listed");
     let paths = entries.map(|entry| entry.expect("the entry can be read").path());
@@ -279,26 +277,26 @@ fn committed() -> BTreeSet<String> {
     pictures.filter_map(|path| path.file_name().map(|name| name.to_string_lossy().into_owned())).collect()
 }
 
-/// The picture as a PNG, encoded for size: screenshots have large areas of one colour, which filters would hide.
+/// Screenshot as a PNG, optimized for size: large areas of one colour compress best without filters.
 fn encoded(picture: &RgbaImage) -> Vec<u8> {
     let mut bytes = Vec::new();
     let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::NoFilter);
-    // They are opaque.
+    // Screenshots are opaque.
     let opaque = DynamicImage::from(picture.clone()).to_rgb8();
     opaque.write_with_encoder(encoder).expect("the picture is encoded");
     bytes
 }
 
-/// Where two pictures of one size differ.
+/// Difference between two images of one size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Difference {
     pixels: usize,
-    /// Left, top, right and bottom of the smallest rectangle around them; the last row and column are part of it.
+    /// Left, top, right and bottom of the smallest rectangle around the different pixels, last row and column included.
     bounds: [u32; 4],
 }
 
 impl Difference {
-    /// `None` for equal pictures.
+    /// `None` for equal images.
     fn between(expected: &RgbaImage, actual: &RgbaImage) -> Option<Self> {
         let mut found: Option<Self> = None;
         for ((x, y, expected), actual) in expected.enumerate_pixels().zip(actual.pixels()) {
@@ -313,7 +311,7 @@ impl Difference {
         found
     }
 
-    /// The expected picture, faded, with the different pixels marked.
+    /// The expected image, faded, with the different pixels marked.
     fn picture(expected: &RgbaImage, actual: &RgbaImage) -> RgbaImage {
         let faded = |channel: u8| 192 + channel / 4;
         RgbaImage::from_fn(expected.width(), expected.height(), |x, y| {
@@ -327,8 +325,8 @@ impl Difference {
     }
 }
 
-/// Compares a picture with the file of its name in `folder`; the answer says in what they differ. Of different ones, the
-/// new picture and the differences are written to `kept`.
+/// Compares an image with the file of its name in `folder`; the error describes the difference. If they differ, the new
+/// image and the differences are written to `kept`.
 fn compare(name: &str, actual: &RgbaImage, [folder, kept]: [&Path; 2]) -> Result<(), String> {
     let bytes = encoded(actual);
     let committed = fs::read(folder.join(name)).unwrap_or_default();

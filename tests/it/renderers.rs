@@ -1,4 +1,4 @@
-//! The same pictures from the CPU painter and from a graphics adapter (a software Vulkan will do), within a tolerance.
+//! Screenshots from the CPU painter and from a graphics adapter (also a software Vulkan), compared within a tolerance.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -13,17 +13,17 @@ use dcvins::gui::theme::ThemeName;
 use dcvins::session::{self, SessionPlan, SessionRequest};
 use image::RgbaImage;
 
-/// A pixel counts as different when a channel is off by more than this, of 255.
+/// A pixel counts as different if a channel differs by more than this, of 255.
 const NOTICEABLE: u8 = 16;
-/// Share of the pixels that may be different: edges of lines, where the two place their samples a little apart.
+/// Maximum ratio of different pixels: edges of lines, where the sample positions of both differ slightly.
 const MOST_DIFFERENT: f64 = 0.005;
 /// Largest mean difference of a channel, of 255.
 const MOST_MEAN: f64 = 0.25;
 
-/// How far two pictures of one size are apart.
+/// Difference between two screenshots of one size.
 #[derive(Clone, Copy, Debug)]
 struct Difference {
-    /// Share of pixels with a channel off by more than [`NOTICEABLE`].
+    /// Ratio of pixels with a channel that differs by more than [`NOTICEABLE`].
     different: f64,
     /// Mean over all pixels and channels, of 255.
     mean: f64,
@@ -47,9 +47,9 @@ impl Difference {
     }
 }
 
-/// Prints a line at once, whether the test passes or not.
+/// Prints a line immediately, whether or not the test passes.
 fn report(text: &str) {
-    // Without standard error there is nowhere to print.
+    // Errors are ignored: without standard error there is no output.
     drop(writeln!(std::io::stderr(), "{text}"));
 }
 
@@ -57,7 +57,7 @@ fn sample_log() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap")
 }
 
-/// Fails without an adapter; `cargo test --release --test it -- --ignored renderers` runs it.
+/// Fails without an adapter; run by `cargo test --release --test it -- --ignored renderers`.
 #[test]
 #[ignore = "needs a Vulkan adapter, for example Mesa's software one (Debian: mesa-vulkan-drivers)"]
 fn cpu_and_graphics_adapter_draw_the_same_panels() {
@@ -96,13 +96,13 @@ fn cpu_and_graphics_adapter_draw_the_same_panels() {
         assert!(difference.is_tolerable(), "{panel} at {size_px:?}: {difference:?}");
         pictures.push(cpu);
     }
-    // The measure tells pictures apart that are not the same: a panel from itself shifted by a pixel, and one empty.
+    // Check of the measure: it distinguishes a panel from itself shifted by a pixel, and from an empty one.
     let scene = &pictures[3];
     let shifted = RgbaImage::from_fn(scene.width(), scene.height(), |x, y| *scene.get_pixel(x.saturating_sub(1), y));
     assert!(!Difference::between(scene, &shifted).is_tolerable());
     let empty = RgbaImage::from_pixel(scene.width(), scene.height(), *scene.get_pixel(450, 350));
     assert!(!Difference::between(scene, &empty).is_tolerable());
-    // Larger than any adapter draws.
+    // Exceeds the limit of all adapters.
     let options = ScreenshotOptions { size_px: [16_384, 64], renderer: Renderer::Wgpu, ..ScreenshotOptions::default() };
     match draw_panel("rank", &recording, cursor_ns, &mut images, &options) {
         Ok(picture) => assert_eq!(picture.dimensions(), (16_384, 64)),

@@ -1,4 +1,4 @@
-//! `report`: one page that holds everything, the same bytes twice.
+//! `report`: one self-contained page, the same bytes twice.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// Makes a report on the begin of the sample log from a folder of its own, so that the command is the same.
+/// Writes a report on the beginning of the sample log in a separate folder, so that the command line is the same.
 fn report(folder: &Path, threads: &str) -> (String, String) {
     fs::create_dir_all(folder).expect("the folder can be made");
     for name in ["garden.mcap", "garden.rig.yaml", "garden.truth.yaml"] {
@@ -24,7 +24,7 @@ fn report(folder: &Path, threads: &str) -> (String, String) {
     (text("report.html"), text("report.json"))
 }
 
-/// The page opens with the verdict of each run, which names every parameter once.
+/// Checks that the page begins with the verdict of each run, which names every parameter once.
 fn check_verdict(page: &str, report: &Value) {
     let figures = page.find("<figure").unwrap_or(page.len());
     for run in report["runs"].as_array().expect("a list") {
@@ -67,7 +67,7 @@ fn check_verdict(page: &str, report: &Value) {
     assert!(page.find(report["log_verdict"]["text"].as_str().expect("a text")).expect("it is in the page") < figures);
 }
 
-/// Every figure has a number, in order, and says at which time it is.
+/// Checks that every figure has a number, in order, and states its time.
 fn check_captions(page: &str, count: usize) {
     let captions: Vec<&str> = page.split("<figcaption>").skip(1).collect();
     assert_eq!(captions.len(), count);
@@ -79,8 +79,8 @@ fn check_captions(page: &str, count: usize) {
     }
 }
 
-/// All letters are those of ordinary text fonts: Latin, Greek, general punctuation, superscripts and subscripts, and
-/// mathematical operators.
+/// Checks that all letters are those of ordinary text fonts: Latin, Greek, general punctuation, superscripts and
+/// subscripts, and mathematical operators.
 fn check_glyphs(page: &str) {
     let ordinary = |letter: char| {
         matches!(letter, '\n' | ' '..='~' | '\u{a0}'..='\u{ff}' | 'Α'..='ω' | '\u{2010}'..='\u{2030}'
@@ -97,7 +97,7 @@ fn a_report_holds_everything_and_has_the_same_bytes_twice() {
     let again = report(&folder.path().join("second"), "1");
     assert!(page == again.0 && json == again.1, "two reports differ");
 
-    // Everything is in the page: no address is asked for.
+    // The page is self-contained: no address is requested.
     for reference in ["http:", "https:", "src=\"/", "<script", "<link"] {
         assert!(!page.contains(reference), "the page holds '{reference}'");
     }
@@ -117,14 +117,14 @@ fn a_report_holds_everything_and_has_the_same_bytes_twice() {
     check_captions(&page, pictures.iter().sum());
     check_glyphs(&page);
     assert_eq!(page.contains("informed rank over time, of 24"), cfg!(feature = "gui"), "plots hold their texts");
-    // What `check` finds about the log stands in it.
+    // Findings of `check` about the log are included.
     let findings = report["check"]["findings"].as_array().unwrap();
     assert!(findings.len() > 5 && page.contains("Log and rig"), "{findings:?}");
     for finding in findings {
         assert!(page.contains(finding["title"].as_str().unwrap()), "{finding}");
     }
 
-    // The numbers are those of the summaries, and the classical form is told to lose six columns.
+    // The numbers are those of the summaries, and the classical parameterization is reported to lose six columns.
     for (run, columns, lost) in [(0, 18, 0), (1, 24, 6)] {
         let run = &report["runs"][run];
         let ate_m = run["summary"]["accuracy"]["ate_rmse_m"].as_f64().unwrap();

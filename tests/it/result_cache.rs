@@ -1,4 +1,4 @@
-//! Pictures and reports that the same command has written before.
+//! Screenshots and reports from the cache of earlier commands.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 const LOG: &str = "sample_logs/garden.mcap";
 
-/// Runs the program with its cache in a folder.
+/// Runs the program with its cache in this folder.
 fn run(cache: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
     let output = command.env("DCVINS_CACHE_DIR", cache).args(arguments).output().expect("the program runs");
@@ -34,7 +34,8 @@ fn a_picture_of_the_same_command_is_the_same_and_another_one_is_not() {
     };
     let first = draw("first.png", &["--at", "0.5"]);
     assert_eq!(entries(&cache).len(), 1);
-    // The second one comes from the entry: with other bytes in it, it is told that the entry is damaged.
+    // The second screenshot comes from the cache entry: with other bytes in the entry, the program reports that it is
+    // damaged.
     assert_eq!(draw("second.png", &["--at", "0.5"]), first);
     let entry = entries(&cache).remove(0);
     let mut bytes = fs::read(&entry).unwrap();

@@ -1,4 +1,4 @@
-//! `run --mcap` and `--euroc`: what viewers and other programs are given.
+//! `run --mcap` and `--euroc`: files for viewers and other programs.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -7,7 +7,8 @@ use std::process::Command;
 
 use mcap::MessageStream;
 
-/// Flies the begin of the sample log and returns its `results.mcap`, its trajectory and its table in EuRoC's form.
+/// Runs on the beginning of the sample log and returns its `results.mcap`, its trajectory and its table in EuRoC
+/// format.
 fn fly(out: &Path, threads: &str) -> (Vec<u8>, String, String) {
     let log = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
@@ -66,7 +67,7 @@ fn results_hold_every_estimated_frame_and_have_the_same_bytes_twice() {
         assert!(frames.windows(name.len()).any(|bytes| bytes == name.as_bytes()), "{name} is no frame of /tf");
     }
 
-    // The last pose stands where CDR puts it: encapsulation 4, stamp 8, two names (each 4 + length + 1, aligned to 4), then
+    // Position of the last pose in CDR: encapsulation 4, stamp 8, two names (each 4 + length + 1, aligned to 4), then
     // doubles aligned to 8 after the encapsulation.
     let last: Vec<f64> = tum.lines().last().unwrap().split(' ').skip(1).map(|word| word.parse().unwrap()).collect();
     let named = |at: usize, name: &str| (at + 4 + name.len() + 1).next_multiple_of(4);

@@ -1,4 +1,4 @@
-//! A rig for a recording without one: written from the log, checked and run.
+//! Rig for a recording without one: written from the log, checked and used in a run.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -31,7 +31,7 @@ fn a_log_without_its_rig_is_run_with_a_new_one() {
     let (code, text) = dcvins(&new);
     assert!(code == 1 && text.contains("--force"), "a rig is not overwritten: {text}");
 
-    // One finding for each field that is only assumed, and none for another.
+    // One finding for each assumed field, and none for other fields.
     let (code, text) = dcvins(&["check", &log, "--rig", &rig, "--json"]);
     assert_eq!(code, 0, "{text}");
     let report: Value = serde_json::from_str(&text).unwrap();

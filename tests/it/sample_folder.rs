@@ -1,9 +1,9 @@
-//! A folder with the sample log and a plan, for tests that run a study.
+//! Folder with the sample log and a plan, for tests that run a study.
 
 use std::fs;
 use std::path::Path;
 
-/// Copies the sample log with its rigs into a folder and writes a plan beside it.
+/// Copies the sample log with its rigs into a folder and writes a plan there.
 pub(crate) fn fill(folder: &Path, plan: &str) {
     let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs");
     for name in ["garden.mcap", "garden.rig.yaml", "garden.truth.yaml"] {

@@ -1,4 +1,4 @@
-//! The main job on the sample log: files, equal bytes, accuracy against the truth, pictures, and damage.
+//! Complete runs on the sample log: files, equal bytes, accuracy against ground truth, screenshots, and damage.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ fn dcvins(arguments: &[&str], threads: &str) -> Output {
     command.output().expect("the program starts")
 }
 
-/// Runs and asserts success; returns what was printed.
+/// Runs the program, asserts success, and returns its output.
 fn succeed(arguments: &[&str], threads: &str) -> String {
     let output = dcvins(arguments, threads);
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -83,7 +83,7 @@ fn three_runs_leave_the_same_bytes_twice_and_stay_near_the_truth() {
         let output = dcvins(&arguments, "2");
         assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
     }
-    // Priors that were linearized at other values of the calibration claim what nobody can measure.
+    // Priors linearized at other values of the calibration contain spurious information.
     let text = fs::read_to_string(first.join("off/summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&text).unwrap();
     let known = summary["rank"]["known"].as_array().expect("the known losses are a list");
@@ -91,7 +91,7 @@ fn three_runs_leave_the_same_bytes_twice_and_stay_near_the_truth() {
     assert!(known.len() == 6 && claimed >= 2, "{known:?}");
 }
 
-/// The end of the printed line about the chain, from the values of the summary.
+/// End of the printed line about the chain, from the values of the summary.
 fn chain_error(calibration: &Value) -> String {
     let number = |value: &Value| value.as_f64().expect("a number");
     let error = &calibration["chain_error"];
@@ -108,7 +108,8 @@ fn chain_error(calibration: &Value) -> String {
     )
 }
 
-/// What the form of the chain is known to lose is what every step measured, and nothing else is lost to the form.
+/// Checks that the closed-form null directions of the parameterization agree with the measurement in every step, and
+/// that no other direction is lost to the parameterization.
 fn check_structure(summary: &Value, rank_csv: &Path, (columns, structural): (u64, u64)) {
     let known = summary["rank"]["known"].as_array().expect("the known losses are a list");
     assert_eq!(known.len() as u64, columns - structural);

@@ -1,4 +1,4 @@
-//! `screenshot` at several instants.
+//! `screenshot` at several times.
 
 use std::fs;
 use std::path::Path;

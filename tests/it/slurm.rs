@@ -1,7 +1,7 @@
-//! `dcvins sweep --slurm` against a real controller and two nodes on this machine.
+//! `dcvins sweep --slurm` with a real controller and two nodes on this machine.
 //!
-//! Needs the packages `slurm-wlm` and `munge` (Debian, Ubuntu) and root; the test of the accounting also needs `slurmdbd`
-//! and `mariadb-server`:
+//! Requires the packages `slurm-wlm` and `munge` (Debian, Ubuntu) and root; the test of the accounting also requires
+//! `slurmdbd` and `mariadb-server`:
 //! `apt-get install slurm-wlm munge slurmdbd mariadb-server && cargo test --release --test it -- --ignored slurm`.
 
 use std::fs;
@@ -36,13 +36,13 @@ cpus_per_task = 2
 
 /// Nodes, each with the processors of one task.
 const NODES: [&str; 2] = ["node1", "node2"];
-/// Offsets of the daemons' ports from a cluster's first one; the nodes come behind them.
+/// Offsets of the daemons' ports from the first port of a cluster; the nodes follow.
 const CONTROLLER: u16 = 0;
 const ACCOUNTING: u16 = 1;
 const DATABASE: u16 = 2;
 const FIRST_NODE: u16 = 3;
 
-/// Controller, nodes, authentication and, if asked for, accounting; they end with the value.
+/// Controller, nodes, authentication and optionally accounting; all stop when the value is dropped.
 struct Cluster {
     daemons: Vec<Child>,
     folder: tempfile::TempDir,
@@ -70,7 +70,7 @@ fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
 }
 
 impl Cluster {
-    /// A cluster for a plan, with ports from this one on.
+    /// Starts a cluster for a plan, with ports from `first_port` on.
     fn start(plan: &str, first_port: u16, accounting: bool) -> Self {
         let folder = tempfile::tempdir().expect("a folder can be made");
         let mut cluster = Self { daemons: Vec::new(), folder, first_port };
@@ -102,7 +102,7 @@ impl Cluster {
         wait_for("munged", || waited.exists());
     }
 
-    /// Starts a database and the daemon of the accounting.
+    /// Starts a database and the accounting daemon.
     fn account(&mut self) {
         let data = format!("--datadir={}", self.text("database"));
         let install =
@@ -169,7 +169,7 @@ impl Cluster {
         String::from_utf8_lossy(&self.output(program, arguments).stdout).into_owned()
     }
 
-    /// The command of a sweep of the plan.
+    /// Command of a sweep of the plan.
     fn sweep(&self, out: &str, more: &[&str]) -> Command {
         let mut command = self.command(env!("CARGO_BIN_EXE_dcvins"));
         command.args(["sweep", "plan.toml", "-o", out]).args(more);
@@ -181,7 +181,7 @@ impl Cluster {
         read_parquet(&self.path(out).join("results.parquet")).expect("the table can be read")
     }
 
-    /// Two nodes on this machine, each with two processors.
+    /// Configuration of two nodes on this machine, each with two processors.
     fn configuration(&self, accounting: bool) -> String {
         let socket = self.text("munge.socket");
         let mut pairs = vec![
@@ -263,7 +263,7 @@ fn an_array_of_slurm_on_two_nodes_gives_the_tables_of_a_local_sweep() {
     }
     let script = fs::read_to_string(cluster.path("array/slurm/batch.sh")).unwrap();
     assert!(script.contains("#SBATCH --partition=debug") && script.contains("--shard \"$SLURM_ARRAY_TASK_ID/4\""));
-    // Each task takes a whole node, so that two of four run at a time, one on each.
+    // Each task uses a whole node: two of the four run concurrently, one on each.
     for name in NODES {
         let log = fs::read_to_string(cluster.path(&format!("slurmd-{name}.log"))).unwrap();
         assert!(log.contains("Launching batch job"), "{name} has run nothing: {log}");

@@ -1,4 +1,4 @@
-//! Commands on a study: pictures, tables and a report, from Parquet and from CSV.
+//! Commands on a study: screenshots, tables and a report, from Parquet and from CSV.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! A small study with made-up results, for the pictures and the commands that show a study.
+//! Small study with simulated results, for the screenshots and the commands on studies.
 
 use dcvins::study::{Cell, ColumnType, StudyColumn, StudyTable};
 
@@ -7,7 +7,7 @@ const RUNS: [&str; 4] = ["auto", "classical", "auto:encoder=off", "static"];
 const PERTURBATIONS: [&str; 2] = ["none", "mount-2deg"];
 /// Error of each specification relative to the first one.
 const FACTORS: [f64; 4] = [1.0, 1.12, 1.6, 7.0];
-/// Name, unit and σ of the parameters; σ of the last one is reported half as large as it is.
+/// Name, unit and σ of the parameters; the reported σ of the last one is half of the true one.
 const PARAMETERS: [(&str, &str, f64); 5] = [
     ("yaw.alpha", "rad", 2e-3),
     ("yaw.a", "m", 1e-3),
@@ -16,7 +16,7 @@ const PARAMETERS: [(&str, &str, f64); 5] = [
     ("pitch.alpha", "rad", 3e-3),
 ];
 
-/// Numbers without a generator's state: fractional parts of multiples of an irrational number, nearly normal in the sum.
+/// Stateless numbers: fractional parts of multiples of an irrational number, whose sum is nearly normal.
 struct Noise(f64);
 
 impl Noise {
@@ -34,10 +34,10 @@ fn table(columns: &[(&str, ColumnType, &str)]) -> StudyTable {
     StudyTable::new(columns.iter().map(column).collect()).expect("the names differ")
 }
 
-/// Seeds of the study of the tests and of the pictures.
+/// Number of seeds of the study in tests and screenshots.
 pub(crate) const SEEDS: i64 = 6;
 
-/// The tables of runs and of parameters.
+/// Tables of runs and of parameters.
 pub(crate) fn tables(seeds: i64) -> [StudyTable; 2] {
     use ColumnType::{Integer, Number, Text};
     let mut runs = table(&[

@@ -1,4 +1,4 @@
-//! `dcvins sweep`: interrupted and resumed, with jobs that fail, are killed and take too long, in shards, against a baseline.
+//! `dcvins sweep`: interrupted and resumed; with jobs that fail, are killed or time out; in shards; against a baseline.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::sample_folder;
 
-/// Five seconds of the sample log with and without errors of the rig, and a file that is no log.
+/// Five seconds of the sample log with and without errors of the rig, and a file that is not a log.
 const PLAN: &str = r#"
 name = "garden"
 seeds = [1, 2]
@@ -88,7 +88,7 @@ fn signal(name: &str, process: u32) {
     sent.expect("kill runs");
 }
 
-/// Processes that a process has started.
+/// Child processes of a process.
 fn children(of: &Child) -> Vec<u32> {
     let id = of.id();
     let text = fs::read_to_string(format!("/proc/{id}/task/{id}/children")).unwrap_or_default();

@@ -1,4 +1,5 @@
-//! Going back in time on the sample log: every recomputed step is the step that was recorded, whatever was kept of it.
+//! Recomputation of earlier steps on the sample log: every recomputed step equals the recorded one, even if only its
+//! summary was kept.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,14 +20,14 @@ fn plan(specs: &[&str], memory_budget_bytes: usize) -> SessionPlan {
     SessionPlan { memory_budget_bytes, ..plan }
 }
 
-/// Everything in a record by its bits (missing numbers are equal), but for the measured times.
+/// A record as its bits (NaNs are equal), without the measured times.
 fn bits(record: &StepRecord) -> String {
     let mut record = record.clone();
     record.report.times = StageTimes::default();
     format!("{record:?}")
 }
 
-/// Runs with memory for everything, computed from start to end.
+/// Runs without a memory limit, computed from start to end.
 fn straight(specs: &[&str]) -> Computation {
     let computation = session::compute(&plan(specs, usize::MAX), None, &mut |_| {}).expect("the runs start");
     assert!(computation.recording().runs.iter().all(|run| run.error.is_none() && run.memory.summaries == 0));
@@ -53,7 +54,7 @@ fn every_recomputed_step_is_the_step_that_was_recorded() {
             }
             end = next;
         }
-        // And in any order.
+        // In any order as well.
         for number in [3, 150, 77, 141, 16] {
             let (last, again) = computation.recompute(index, number, 1).pop().expect("every step can be recomputed");
             assert_eq!(last, number);
@@ -63,7 +64,6 @@ fn every_recomputed_step_is_the_step_that_was_recorded() {
     }
 }
 
-/// Plays to the end of the log.
 fn played(session: &mut Session) {
     while session.recording().runs.iter().any(|run| !run.finished) {
         std::thread::sleep(std::time::Duration::from_millis(20));
@@ -104,7 +104,7 @@ fn summaries_hold_everything_that_is_plotted_over_time() {
     for (whole, kept) in whole.runs[0].steps.iter().zip(&summaries.runs[0].steps) {
         let mut report = whole.report.clone();
         if kept.summary_only {
-            // The first window is kept whole: poses and their covariances are relative to its oldest frame.
+            // The first window is kept in full: poses and their covariances are relative to its oldest frame.
             if !report.events.iter().any(|event| event.kind.initializes_window()) {
                 report.window.drain(..report.window.len().saturating_sub(1));
             }
@@ -134,7 +134,7 @@ fn the_solver_can_be_followed_through_a_step() {
             let of = |it: &dcvins::estimator::ResidualSummary| if after { it.chi2_after } else { it.chi2_before };
             state.report.residuals.iter().map(of).sum()
         };
-        // The cost of the solver is that of the report.
+        // The solver's cost equals that of the report.
         let expected = if count == 0 { chi2(false) } else { 2.0 * iterations[count - 1].cost_after };
         let shown = chi2(true);
         assert!((shown - expected).abs() < 1e-6 * expected || count == 0 && shown == expected, "{shown} {expected}");
@@ -152,7 +152,7 @@ fn the_solver_can_be_followed_through_a_step() {
     }
     let expected: Vec<String> = states.iter().rev().map(bits).collect();
     assert!(shown == expected);
-    // One more went to the frame before; forward again comes back to the first state here.
+    // The last step went to the previous frame; a step forward returns to the first state here.
     session.settle();
     assert_eq!(session.cursor_ns(), run.steps[number - 1].report.stamp_ns);
     session.apply(Command::StepIteration { forward: true });
@@ -162,7 +162,7 @@ fn the_solver_can_be_followed_through_a_step() {
     assert_eq!(bits(state), bits(&states[0]));
 }
 
-/// `screenshot` and `report` draw any instant of a long log, of whose steps only summaries are kept.
+/// `screenshot` and `report` draw any time of a long log whose steps are kept as summaries only.
 #[cfg(feature = "gui")]
 #[test]
 fn pictures_of_any_instant_have_the_same_bytes_with_little_memory() {

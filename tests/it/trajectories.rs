@@ -1,4 +1,4 @@
-//! Trajectories of other programs beside the runs: evaluated like a run, in summary, report and pictures.
+//! Trajectories of other programs in addition to the runs: evaluated like a run, in summary, report and screenshots.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,8 @@ fn dcvins(arguments: &[&str]) -> (i32, String) {
     (output.status.code().unwrap_or(-1), text)
 }
 
-/// The ground truth of the sample log as a EuRoC table, with a height that is wrong by a constant amount up and down.
+/// Writes the ground truth of the sample log as a EuRoC table, with heights that are alternately too large and too
+/// small by a constant error.
 fn write_trajectory(path: &Path, error_m: f64) {
     let log = FlightLog::open(&sample_log()).expect("the sample log");
     let mut text = "#timestamp [ns],p x,p y,p z,q w,q x,q y,q z\n".to_owned();
@@ -66,7 +67,7 @@ fn a_trajectory_is_evaluated_like_a_run() {
     assert!(lanes[0]["accuracy"]["rpe"].as_array().is_some_and(|rpe| !rpe.is_empty()), "{lanes:?}");
     assert_eq!(lanes[1]["source"], "topic:/ground_truth/odometry");
 
-    // The run's own trajectory is evaluated like the run.
+    // The run's trajectory is evaluated like the run.
     let own = format!("{}:own", at("results/auto/trajectory.tum"));
     let again = at("again");
     let (code, text) = dcvins(&["run", &log, "--duration", "6", "--out", &again, "--trajectory", &own]);
@@ -83,7 +84,7 @@ fn a_trajectory_is_evaluated_like_a_run() {
     assert!(page.contains("Trajectories of other programs") && page.contains("Other"), "the page lists it");
 }
 
-/// A sweep has a row for each trajectory, with the errors that the run of the same poses has.
+/// A sweep has a row for each trajectory, with the same errors as the run with the same poses.
 #[test]
 fn a_sweep_evaluates_trajectories_beside_its_runs() {
     let folder = tempfile::tempdir().unwrap();
@@ -109,7 +110,7 @@ fn a_sweep_evaluates_trajectories_beside_its_runs() {
     assert_eq!(table.text(3, "run"), Some("trajectory:Other"));
     assert_eq!((table.text(3, "status"), table.text(3, "parameterization")), (Some("ok"), None));
     assert_eq!(table.text(4, "trajectory_path"), Some("topic:/ground_truth/odometry"));
-    // A row of a trajectory opens the run on the same log, with both trajectories beside it.
+    // The row of a trajectory opens the run on the same log, with both trajectories.
     let study = OpenedStudy::read(&folder.path().join("study")).unwrap();
     let rows = rows_beside(&study.study().runs, 3, 4);
     assert_eq!(rows, [3, 0, 4]);
@@ -117,12 +118,12 @@ fn a_sweep_evaluates_trajectories_beside_its_runs() {
     let recording = opened.recording();
     let lanes: Vec<&str> = recording.trajectories.iter().map(|lane| lane.label.as_str()).collect();
     assert_eq!((recording.runs.len(), lanes), (1, vec!["Other", "Truth"]));
-    // Again: nothing to do, also from another place of the file.
+    // A second time there is nothing to do, also with the file in another folder.
     std::fs::rename(folder.path().join("other"), folder.path().join("moved")).unwrap();
     std::fs::write(at("plan.toml"), plan.replace("other/", "moved/")).unwrap();
     let (code, text) = dcvins(&sweep);
     assert!(code == 0 && text.contains("0 done now, 5 done before"), "{text}");
-    // A file that is not there is named.
+    // The message names a missing file.
     std::fs::remove_dir_all(folder.path().join("moved")).unwrap();
     let (code, text) = dcvins(&sweep);
     assert!(code != 0 && text.contains("moved/garden.csv"), "{code}: {text}");
@@ -150,7 +151,7 @@ fn what_does_not_belong_to_the_log_is_refused() {
     check("", "topic:/imu", "topic '/imu' is of type sensor_msgs/msg/Imu, expected one of nav_msgs/msg/Odometry");
 }
 
-/// Positions of an antenna at 5 Hz from the ground truth of the sample log, as TUM with quaternions of zeros.
+/// Writes positions of an antenna at 5 Hz from the ground truth of the sample log, as TUM with quaternions of zeros.
 fn write_positions(path: &Path, lever_arm_m: [f64; 3]) {
     let log = FlightLog::open(&sample_log()).expect("the sample log");
     let mut text = String::new();

@@ -1,14 +1,15 @@
-//! Readout of a rolling shutter, measured from feature tracks and the angular rate of the camera.
+//! Readout time of a rolling shutter, measured from feature tracks and the angular rate of the camera.
 //!
-//! Between two images the rotation of each row differs: row `s` (as a ratio of the height) sees the rotation from
-//! `t₁ + s₁·ρ` to `t₂ + s₂·ρ` with the readout `ρ`. Bearings are carried to the first row of their image by the rate; at the
-//! true readout all of them then obey one rotation and one direction of translation. Both are free for each pair of images,
-//! so that no error of gyroscope bias, extrinsics, encoders or clocks is taken for a readout: it is measured by how the
-//! motion varies over the rows, where the rate changes between two images or features move vertically.
+//! Between two images the rotation of each row differs: row `s` (as a ratio of the height) rotates from `t₁ + s₁·ρ` to
+//! `t₂ + s₂·ρ` with the readout `ρ`. Bearings are transformed to the first row of their image by the rate; at the true
+//! readout all of them then satisfy one rotation and one direction of translation. Both are free for each pair of
+//! images, so that errors of gyroscope bias, extrinsics, encoders or time offsets do not bias the readout: it is
+//! measured by the variation of the motion over the rows, where the rate changes between two images or features move
+//! vertically.
 //!
 //! The rate comes from a gyroscope, or from the rotations of the images themselves by a cubic spline: for a camera that
-//! rotates smoothly, as on a gimbal, this is better than the sum of a gyroscope and the derivatives of encoder readings, whose
-//! noise would make the readout too small.
+//! rotates smoothly, as on a gimbal, this is better than the sum of a gyroscope and the derivatives of encoder
+//! readings, whose noise would make the readout too small.
 
 mod pair_motion;
 mod rates;
@@ -23,12 +24,12 @@ use self::pair_motion::PairMotion;
 use super::outliers::BearingPair;
 use crate::geometry::{median, so3};
 
-/// One feature in one image.
+/// Observation of one feature in one image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RowObservation {
     /// Direction in the camera frame, unit length.
     pub bearing: Vector3<f64>,
-    /// Row of its pixel as a ratio of the height: 0 in the first row.
+    /// Row of the pixel as a ratio of the height: 0 in the first row.
     pub row: f64,
 }
 
@@ -37,34 +38,35 @@ pub struct RowObservation {
 pub struct RowTrack {
     /// In the previous image.
     pub previous: RowObservation,
-    /// In the current one.
+    /// In the current image.
     pub now: RowObservation,
 }
 
-/// The features that two images share.
+/// Features common to two images.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImagePair {
-    /// Times of the first rows of previous and current image by the camera's clock, in seconds.
+    /// Times of the first rows of the previous and the current image in the camera's clock, in seconds.
     pub stamps_s: [f64; 2],
-    /// Their features; wrong tracks are tolerated.
+    /// Common features; outliers are tolerated.
     pub tracks: Vec<RowTrack>,
 }
 
 /// Options of [`measure_readout`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReadoutOptions {
-    /// Largest and smallest standard deviation of a bearing, in radians; in between it follows from the tracks.
+    /// Largest and smallest standard deviation of a bearing, in radians; the value between them follows from the
+    /// tracks.
     pub bearing_sigmas_rad: [f64; 2],
-    /// Largest readout, either sign.
+    /// Largest magnitude of the readout, in seconds.
     pub largest_s: f64,
-    /// Largest time offset between the clocks of camera and rates, either sign.
+    /// Largest magnitude of the time offset between camera and rates, in seconds.
     pub largest_offset_s: f64,
-    /// Most pairs of images that are used: those in which the rate changes most.
+    /// Maximum number of image pairs; those with the largest change of the rate are used.
     pub most_pairs: usize,
 }
 
 impl ReadoutOptions {
-    /// For a camera of this focal length, with tracks of a twentieth to half a pixel.
+    /// Options for a camera of this focal length, with track errors of a twentieth to half a pixel.
     pub fn for_focal_length(focal_px: f64) -> Self {
         const TRACK_SIGMAS_PX: [f64; 2] = [0.5, 0.05];
         let bearing_sigmas_rad = TRACK_SIGMAS_PX.map(|sigma_px| sigma_px / focal_px);
@@ -72,60 +74,59 @@ impl ReadoutOptions {
     }
 }
 
-/// A measured readout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReadoutMeasurement {
-    /// Time from the exposure of the first row to that of a row behind the last one, negative where rows are read upwards.
+    /// Time from the exposure of the first row to that of a row past the last one; negative if rows are read from the
+    /// bottom up.
     pub readout_s: f64,
-    /// Its standard deviation, from how stretches of a second disagree with each other, and from what they share: the image
-    /// of a feature is distorted by the shutter itself, so that its tracks are off by some percent of the effect.
+    /// Standard deviation from the disagreement of segments of a second, and from their common error: the shutter
+    /// itself distorts the image of a feature, so that its tracks have an error of some percent of the effect.
     pub sigma_s: f64,
-    /// Time to add to the camera's stamps (of first rows) for the clock of the gyroscope: 0 where the rotations do not show it,
-    /// and without a gyroscope.
+    /// Time to add to the camera's stamps (of first rows) to obtain gyroscope time: 0 if the rotations do not constrain
+    /// it, and without a gyroscope.
     pub time_offset_s: f64,
     /// Number of image pairs with enough features and rates.
     pub pairs: usize,
-    /// Distance from the motion of their pair below which nine of ten bearings lie, without a readout and with this one, in
-    /// radians.
+    /// Distance of nine of ten bearings from the motion of their pair (upper bound), without a readout and with this
+    /// one, in radians.
     pub misfits_rad: [f64; 2],
 }
 
-/// Half the time over which the gyroscope's rates are averaged.
+/// Half the time over which the gyroscope's rates are averaged, in seconds.
 const SMOOTHING_S: f64 = 0.01;
-/// A usual readout, and how far a row usually is from the mean row: by these a pair's rows differ.
+/// Typical readout, and typical distance of a row from the mean row; both give the typical difference between the rows
+/// of a pair.
 const USUAL_READOUT_S: f64 = 0.03;
 const USUAL_ROW: f64 = 0.25;
-/// Least such difference, as a ratio of the largest standard deviation of a bearing: errors of the lens model and drifts of
-/// tracks are a twentieth of a pixel.
+/// Smallest such difference, as a ratio of the largest standard deviation of a bearing: errors of the lens model and
+/// drifts of tracks are a twentieth of a pixel.
 const MIN_EFFECT_RATIO: f64 = 0.14;
 /// Quantile of the distances that a measurement reports.
 const MISFIT_QUANTILE: f64 = 0.9;
-/// Step of the search for a readout.
+/// Step of the search for a readout, in seconds.
 const READOUT_STEP_S: f64 = 0.015;
-/// Least number of features that two images share.
+/// Minimum number of common features of two images.
 const MIN_TRACKS: usize = 20;
-/// Least number of pairs.
 const MIN_PAIRS: usize = 12;
-/// Gauss–Newton steps.
 const REFINEMENTS: usize = 3;
-/// Step of central differences.
+/// Step of central differences, in seconds.
 const DIFFERENCE_S: f64 = 2e-4;
-/// Length of the stretches whose disagreement gives the standard deviation.
+/// Length of the segments whose disagreement gives the standard deviation, in seconds.
 const STRETCH_S: f64 = 1.0;
-/// Error that all stretches share, as a ratio of the readout: rendered flights with 30 ms come out 1 to 3 % off.
+/// Error common to all segments, as a ratio of the readout: on rendered flights with 30 ms the error is 1 to 3 %.
 const SYSTEMATIC_RATIO: f64 = 0.02;
-/// Rounds of time offset and readout in turn.
+/// Rounds of alternating estimation of time offset and readout.
 const ROUNDS: usize = 2;
-/// Step of the search for a time offset.
+/// Step of the search for a time offset, in seconds.
 const OFFSET_STEP_S: f64 = 0.002;
-/// A time offset must lessen the squared misfit of the rotations by this ratio.
+/// A time offset must reduce the squared misfit of the rotations by this ratio.
 const MIN_OFFSET_GAIN: f64 = 0.2;
 
-/// Measures a camera's readout from pairs of images, in the order of their times, and the camera's angular rate by a
-/// gyroscope (camera frame, the clock of the gyroscope; bias and errors of the axes do not matter).
+/// Measures a camera's readout from pairs of images in order of time, and the camera's angular rate by a gyroscope
+/// (camera frame, gyroscope time; bias and errors of the axes do not matter).
 ///
-/// Without a gyroscope the rate is that of the images, which then must be consecutive. Returns `None` with too few pairs, or
-/// with so little rotation that the rows hardly differ.
+/// Without a gyroscope the rate is that of the images, which then must be consecutive. Returns `None` with too few
+/// pairs, or with so little rotation that the rows hardly differ.
 pub fn measure_readout(
     images: &[ImagePair],
     gyroscope: Option<&AngularRates>,
@@ -171,8 +172,8 @@ pub struct FirstRowRotation {
 
 /// Rotations between the first rows of consecutive images at a readout, by the rates of the images themselves.
 ///
-/// A rotation of all features as if they were exposed at once is one of the mean of their rows, and where features move over
-/// the rows not even that. Pairs with too few features are left out.
+/// A rotation fitted to all features as if they were exposed at once is that of their mean row only if features do not
+/// move over the rows. Pairs with too few features are omitted.
 pub fn rotations_of_first_rows(
     images: &[ImagePair],
     readout_s: f64,
@@ -193,25 +194,25 @@ pub fn rotations_of_first_rows(
 struct Pair<'a> {
     images: &'a ImagePair,
     motion: PairMotion,
-    /// Whether it counts; the others only give rates.
+    /// True if the pair is used for the readout; the others only provide rates.
     counts: bool,
 }
 
 struct Search<'a> {
-    /// Whether the rates are those of the images.
+    /// True if the rates are those of the images.
     of_images: bool,
     rates: AngularRates,
     options: ReadoutOptions,
-    /// Standard deviation of a bearing.
+    /// Standard deviation of a bearing, in radians.
     sigma_rad: f64,
     pairs: Vec<Pair<'a>>,
-    /// Time to add to the stamps for the clock of the rates.
+    /// Time to add to the stamps to obtain the time of the rates, in seconds.
     offset_s: f64,
 }
 
 impl<'a> Search<'a> {
     fn new(images: &'a [ImagePair], gyroscope: Option<&AngularRates>, options: &ReadoutOptions) -> Self {
-        // An image is read before the next one begins.
+        // An image is read before the next one starts.
         let intervals_s = images.iter().map(|pair| pair.stamps_s[1] - pair.stamps_s[0]);
         let options = ReadoutOptions { largest_s: intervals_s.fold(options.largest_s, f64::min), ..*options };
         let usable = images.iter().filter(|pair| pair.tracks.len() >= MIN_TRACKS);
@@ -240,7 +241,8 @@ impl<'a> Search<'a> {
         search
     }
 
-    /// Lets the pairs count of which all rows have rates under any hypothesis, and of these the ones in which the rate changes most.
+    /// Selects the pairs for which all rows have rates under any hypothesis, and of these the ones with the largest
+    /// change of the rate.
     fn select(&mut self, reach_s: f64) {
         let change = |pair: &Pair<'_>| {
             let [from_s, to_s] = pair.images.stamps_s;
@@ -262,16 +264,16 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Takes the standard deviation of the bearings from their distances to the motions: with one that is too large a small
-    /// parallax counts as noise.
+    /// Sets the standard deviation of the bearings from their distances to the motions: if it is too large, small
+    /// parallax is treated as noise.
     fn take_sigma(&mut self, readout_s: f64) {
-        /// Standard deviation over the median of the absolute value of a normal variable.
+        /// Ratio of the standard deviation and the median absolute value of a normal variable.
         const SIGMA_PER_MEDIAN: f64 = 1.4826;
         let [largest, smallest] = self.options.bearing_sigmas_rad;
         self.sigma_rad = (SIGMA_PER_MEDIAN * self.misfit_rad(readout_s, 0.5)).clamp(smallest, largest);
     }
 
-    /// Takes the rates of the images at a readout, or the offset of their clock to that of the gyroscope.
+    /// Updates the rates of the images at a readout or, with a gyroscope, the time offset.
     fn take_rates(&mut self, readout_s: f64) {
         if !self.of_images {
             return self.find_offset(readout_s);
@@ -279,18 +281,17 @@ impl<'a> Search<'a> {
         let angles =
             self.pairs.iter().map(|pair| (pair.images.stamps_s, -so3::log(&self.of_middle_rows(pair, readout_s))));
         self.rates = spline::rates_of(&angles.collect::<Vec<_>>());
-        // They count from the first rows, and are those of the middle ones.
+        // Their stamps are those of the first rows, but the rates are those of the middle rows.
         self.offset_s = -0.5 * readout_s;
     }
 
-    /// The rotation of a pair between its middle rows.
     fn of_middle_rows(&self, pair: &Pair<'_>, readout_s: f64) -> UnitQuaternion<f64> {
         let [previous, now] =
             pair.images.stamps_s.map(|stamp_s| self.rates.sweep(stamp_s + self.offset_s, readout_s).at(0.5));
         so3::exp(&-now) * pair.motion.rotation * so3::exp(&previous)
     }
 
-    /// The bearings of a pair carried to the first rows.
+    /// Bearings of a pair transformed to the first rows.
     fn carried(&self, images: &ImagePair, readout_s: f64) -> Vec<BearingPair> {
         let [previous, now] = images.stamps_s.map(|stamp_s| self.rates.sweep(stamp_s + self.offset_s, readout_s));
         let carried = |track: &RowTrack| BearingPair {
@@ -300,7 +301,8 @@ impl<'a> Search<'a> {
         images.tracks.iter().map(carried).collect()
     }
 
-    /// How much the bearings of different rows differ in a pair by a usual readout, the median over pairs, in radians.
+    /// Typical difference between the bearings of different rows of a pair at [`USUAL_READOUT_S`], median over pairs,
+    /// in radians.
     fn row_effect_rad(&self) -> f64 {
         let change = |pair: &Pair<'_>| {
             let [from_s, to_s] = pair.images.stamps_s.map(|stamp_s| stamp_s + self.offset_s);
@@ -321,11 +323,11 @@ impl<'a> Search<'a> {
             pair.motion = pair.motion.fitted(&carried, self.sigma_rad);
         });
         self.pairs = pairs;
-        // Added up in their order, so that the cost does not depend on the number of threads.
+        // Summed in a fixed order, so that the cost does not depend on the number of threads.
         self.counting().map(|pair| pair.motion.cost).sum()
     }
 
-    /// The readout of least cost among those of a grid over the whole range.
+    /// Readout of least cost on a grid over the whole range.
     fn coarse(&mut self) -> f64 {
         let steps = (self.options.largest_s / READOUT_STEP_S).round() as i32;
         let mut best = (f64::INFINITY, 0.0);
@@ -339,7 +341,7 @@ impl<'a> Search<'a> {
         best.1
     }
 
-    /// Gauss–Newton from a readout; the readout with its standard deviation.
+    /// Gauss–Newton from an initial readout; returns the readout with its standard deviation.
     fn refine(&mut self, start_s: f64) -> Option<(f64, f64)> {
         let mut readout_s = start_s;
         for _ in 0..REFINEMENTS {
@@ -365,14 +367,15 @@ impl<'a> Search<'a> {
         }
         let count = stretches.len() as f64;
         let spread: f64 = stretches.iter().map(|(_, gradient)| gradient * gradient).sum();
-        // One stretch cannot disagree with itself.
+        // A single segment has no disagreement.
         let of_stretches_s = (spread * count / (count - 1.0).max(0.5)).sqrt() / information;
         let of_noise_s = information.sqrt().recip();
         let random_s = of_stretches_s.max(of_noise_s);
         Some((readout_s, random_s.hypot(SYSTEMATIC_RATIO * readout_s)))
     }
 
-    /// Time, gradient and information of each pair about the readout, its motion eliminated, in units of the bearings' noise.
+    /// Time, gradient and information of each pair for the readout, with its motion marginalized, in units of the
+    /// bearings' noise.
     fn equations(&self, readout_s: f64) -> Vec<(f64, f64, f64)> {
         let of_pair = |pair: &Pair<'_>| {
             let [before, at, after] =
@@ -384,7 +387,7 @@ impl<'a> Search<'a> {
         self.pairs.iter().filter(|pair| pair.counts).filter_map(of_pair).collect()
     }
 
-    /// Finds the time offset at which the rates predict the rotations of the images best, up to a constant rate.
+    /// Finds the time offset at which the rates best predict the rotations of the images, up to a constant rate.
     fn find_offset(&mut self, readout_s: f64) {
         let middle_s = 0.5 * readout_s;
         let of_pair = |pair: &Pair<'_>| {

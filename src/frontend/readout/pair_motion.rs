@@ -9,13 +9,13 @@ pub(super) struct PairMotion {
     /// `camera_now_from_camera_previous`.
     pub(super) rotation: UnitQuaternion<f64>,
     direction: Option<Vector3<f64>>,
-    /// Squared distances over the variance, truncated, plus the price of the unknowns.
+    /// Squared distances over the variance, truncated, plus the penalty of the unknowns.
     pub(super) cost: f64,
 }
 
-/// A track costs at most this, as one of four standard deviations.
+/// Largest cost of a track: that of four standard deviations.
 const LARGEST_COST: f64 = 16.0;
-/// Price of an unknown (Akaike's): a direction of translation costs two, and each track its depth.
+/// Penalty of an unknown (Akaike's): a direction of translation costs two of them, and the depth of each track one.
 const UNKNOWN_COST: f64 = 2.0;
 /// Residual in standard deviations at which the weight of a track is a quarter.
 const WEIGHT_SIGMAS: f64 = 3.0;
@@ -25,12 +25,12 @@ const STEPS: usize = 4;
 const DAMPING: f64 = 1e-9;
 
 impl PairMotion {
-    /// A rotation alone, not yet fitted.
+    /// A rotation without translation, not yet fitted.
     pub(super) fn of_rotation(rotation: UnitQuaternion<f64>) -> Self {
         Self { rotation, direction: None, cost: 0.0 }
     }
 
-    /// The motion of some tracks, starting from this one.
+    /// Motion fitted to some tracks, starting from this one.
     pub(super) fn fitted(&self, pairs: &[BearingPair], sigma_rad: f64) -> Self {
         let rotation = fit_rotation(pairs, &self.rotation, WEIGHT_SIGMAS * sigma_rad);
         let mut best = Self { rotation, direction: None, cost: 0.0 };
@@ -73,8 +73,9 @@ impl PairMotion {
         pairs.iter().map(distance).collect()
     }
 
-    /// Gradient and information of the tracks about a parameter of their bearings, the motion eliminated; `around` are the
-    /// bearings half a `step` of the parameter before and behind. `None` where the tracks do not constrain the motion.
+    /// Gradient (1) and information (1 × 1) of a parameter of the bearings after marginalizing the motion; derivative
+    /// by central differences over `step`, from the bearings `around` at half a `step` before and after. `None` if the
+    /// tracks do not constrain the motion.
     pub(super) fn eliminated(
         &self,
         at: &[BearingPair],
@@ -113,7 +114,7 @@ impl Sums {
         self.parameter_right += by_parameter * residual * weight;
     }
 
-    /// Both components of `now - R·previous`.
+    /// Adds both components of `now - R·previous`.
     fn add_rotation(
         &mut self,
         pair: &BearingPair,
@@ -133,7 +134,7 @@ impl Sums {
         }
     }
 
-    /// Distance from the epipolar line.
+    /// Adds the distance from the epipolar line.
     fn add_epipolar(
         &mut self,
         pair: &BearingPair,
@@ -172,7 +173,7 @@ impl Sums {
     }
 }
 
-/// Weight of a residual over its variance, falling with its fourth power.
+/// Weight of a residual over its variance; decreases with the fourth power.
 fn weight_of(residual_rad: f64, sigma_rad: f64) -> f64 {
     let ratio = (residual_rad / (WEIGHT_SIGMAS * sigma_rad)).powi(2);
     1.0 / (sigma_rad * sigma_rad * (1.0 + ratio) * (1.0 + ratio))

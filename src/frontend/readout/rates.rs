@@ -1,6 +1,6 @@
 use nalgebra::Vector3;
 
-/// The angular rate of a camera over time, in the camera frame; linear between samples.
+/// Angular rate of a camera over time, in the camera frame; linear between samples.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AngularRates {
     times_s: Vec<f64>,
@@ -9,17 +9,17 @@ pub struct AngularRates {
     angles_rad: Vec<Vector3<f64>>,
 }
 
-/// Samples further apart are not interpolated between.
+/// Samples farther apart are not interpolated, in seconds.
 const MAX_GAP_S: f64 = 0.15;
-/// Rows at which a sweep is computed.
+/// Number of rows for which a sweep is computed.
 const NODES: usize = 9;
 
-/// How a camera rotates during the readout of an image: rotation vectors by row, from the first row on.
+/// Rotation of a camera during the readout of an image: rotation vectors by row, relative to the first row.
 pub(super) struct Sweep([Vector3<f64>; NODES]);
 
 impl AngularRates {
-    /// From times in seconds and rates in rad/s in the camera frame; samples whose time does not increase, or that are not
-    /// finite, are left out.
+    /// Rates in rad/s in the camera frame at times in seconds; samples whose time does not increase, or that are not
+    /// finite, are omitted.
     pub fn new(samples: impl IntoIterator<Item = (f64, Vector3<f64>)>) -> Self {
         let mut rates = Self::default();
         for (time_s, rate) in samples {
@@ -38,7 +38,7 @@ impl AngularRates {
         rates
     }
 
-    /// The mean rates over `half_s` to either side of each sample: without vibration, which averages out over the readout.
+    /// Mean rates over `half_s` to each side of each sample, to remove vibration, which averages out over the readout.
     #[must_use]
     pub(super) fn smoothed(&self, half_s: f64) -> Self {
         let mean =
@@ -46,7 +46,7 @@ impl AngularRates {
         Self::new(self.times_s.iter().filter_map(mean))
     }
 
-    /// Index of the sample before a time and the fraction of the way to the next one.
+    /// Index of the sample before a time, and the fraction of the interval to the next one.
     fn place(&self, time_s: f64) -> Option<(usize, f64)> {
         let after = self.times_s.partition_point(|sample_s| *sample_s <= time_s).clamp(1, self.times_s.len().max(1));
         let (from_s, to_s) = (*self.times_s.get(after - 1)?, *self.times_s.get(after)?);
@@ -54,7 +54,7 @@ impl AngularRates {
         ((0.0..=1.0).contains(&fraction) && to_s - from_s <= MAX_GAP_S).then_some((after - 1, fraction))
     }
 
-    /// The rate at a time in rad/s, `None` outside of the samples.
+    /// Rate at a time in rad/s; `None` outside the samples.
     pub fn at(&self, time_s: f64) -> Option<Vector3<f64>> {
         let (index, fraction) = self.place(time_s)?;
         Some(self.rates_rad_per_s[index].lerp(&self.rates_rad_per_s[index + 1], fraction))
@@ -69,15 +69,15 @@ impl AngularRates {
         Some(self.angles_rad[index] + (rate + change * (0.5 * fraction)) * step_s)
     }
 
-    /// Integral of the rate between two times, a rotation vector in radians as far as the axis stays the same; `None` outside
-    /// of the samples, or over a gap in them.
+    /// Integral of the rate between two times: a rotation vector in radians if the axis is constant. `None` outside the
+    /// samples, or over a gap between them.
     pub fn angle_between(&self, from_s: f64, to_s: f64) -> Option<Vector3<f64>> {
         let (from, to) = (self.place(from_s)?, self.place(to_s)?);
         let gap = self.times_s[from.0..=to.0].windows(2).any(|pair| pair[1] - pair[0] > MAX_GAP_S);
         (!gap).then_some(self.angle_at(to_s)? - self.angle_at(from_s)?)
     }
 
-    /// The rotation during the readout of an image whose first row is exposed at a time; none where there are no rates.
+    /// Rotation during the readout of an image whose first row is exposed at a time; zero without rates.
     pub(super) fn sweep(&self, first_row_s: f64, readout_s: f64) -> Sweep {
         let start = self.angle_at(first_row_s);
         Sweep(std::array::from_fn(|node| {
@@ -91,8 +91,8 @@ impl AngularRates {
 }
 
 impl Sweep {
-    /// Rotation vector (rad) from the first row to a row, as a ratio of the height: it maps directions in the camera at that
-    /// row to the camera at the first one.
+    /// Rotation vector (rad) at a row, as a ratio of the height: it maps directions in the camera at that row to the
+    /// camera at the first row.
     pub(super) fn at(&self, row: f64) -> Vector3<f64> {
         let place = (row * (NODES - 1) as f64).clamp(0.0, (NODES - 1) as f64);
         let before = (place as usize).min(NODES - 2);

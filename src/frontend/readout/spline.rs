@@ -2,13 +2,13 @@ use nalgebra::Vector3;
 
 use super::AngularRates;
 
-/// Step of the sampled rates.
+/// Step of the sampled rates, in seconds.
 const STEP_S: f64 = 0.0025;
-/// Fewest consecutive pairs of a spline.
+/// Minimum number of consecutive pairs of a spline.
 const MIN_PAIRS: usize = 4;
 
-/// Angular rates from rotation vectors (rad) between consecutive times: the derivative of a cubic spline through their sums,
-/// for each unbroken series of pairs.
+/// Angular rates from rotation vectors (rad) between consecutive times: the derivative of a cubic spline through their
+/// sums, for each uninterrupted series of pairs.
 pub(super) fn rates_of(pairs: &[([f64; 2], Vector3<f64>)]) -> AngularRates {
     let mut samples = Vec::new();
     let mut first = 0;
@@ -23,7 +23,6 @@ pub(super) fn rates_of(pairs: &[([f64; 2], Vector3<f64>)]) -> AngularRates {
     AngularRates::new(samples)
 }
 
-/// Adds the rates of one series.
 fn sample(pairs: &[([f64; 2], Vector3<f64>)], samples: &mut Vec<(f64, Vector3<f64>)>) {
     let lengths_s: Vec<f64> = pairs.iter().map(|([from_s, to_s], _)| to_s - from_s).collect();
     let rates = knot_rates(pairs, &lengths_s);
@@ -44,7 +43,7 @@ fn sample(pairs: &[([f64; 2], Vector3<f64>)], samples: &mut Vec<(f64, Vector3<f6
     }
 }
 
-/// Rates at the ends of all pairs for which the second derivative is continuous, and zero at both ends.
+/// Rates at the ends of all pairs, such that the second derivative is continuous, and zero at both ends.
 fn knot_rates(pairs: &[([f64; 2], Vector3<f64>)], lengths_s: &[f64]) -> Vec<Vector3<f64>> {
     let count = pairs.len() + 1;
     let mean = |index: usize| pairs[index].1 / lengths_s[index];

@@ -14,14 +14,14 @@ fn read(image: &GrayImage, warp: &Matrix2<f64>, middle: &Vector2<f64>) -> Option
     Patch::new().read(image, warp, middle, 0.0, &mut window).then_some(window)
 }
 
-/// The window about a whole pixel, prepared for comparison; `None` without texture.
+/// Window around a whole pixel, prepared for comparison; `None` without texture.
 fn appearance_at(image: &GrayImage, [x, y]: [i32; 2]) -> Option<Appearance> {
     let mut pixels = [[0.0; SIDE]; SIDE];
     cut_out(image, [x - SIDE as i32 / 2, y - SIDE as i32 / 2], &mut pixels, f32::from);
     Appearance::new(&pixels)
 }
 
-/// Correlation and step of the window about `middle` with grey levels times `gain` plus `offset`.
+/// Correlation and step of the window around `middle` with grey levels times `gain` plus `offset`.
 fn compare(
     appearance: &Appearance,
     image: &GrayImage,
@@ -47,7 +47,7 @@ fn a_window_of_a_plane_is_the_plane() {
             for (column, value) in line[..WINDOW].iter().enumerate() {
                 let step = Vector2::new(column as f64 - CENTRE as f64, row as f64 - CENTRE as f64);
                 let at = middle + warp * step;
-                // The pixels are rounded, the places to the 128th of a pixel.
+                // Pixels are rounded; positions are rounded to a 128th of a pixel.
                 assert!((f64::from(*value) - grey(at.x, at.y)).abs() < 0.7, "{value} at {at}");
             }
             assert!(line[WINDOW..].iter().all(|surplus| *surplus == 0.0));
@@ -83,7 +83,7 @@ fn window_comparison_ignores_brightness_and_detects_shifts() {
     assert!(Appearance::new(&[[80.0; SIDE]; SIDE]).is_none(), "no texture");
 }
 
-/// Waves of 4 to 5 px, `shift` pixels further left and up.
+/// Waves of 4 to 5 px, shifted by `shift` pixels to the left and up.
 fn fine_texture(shift: Vector2<f64>) -> GrayImage {
     const SIZE: usize = 64;
     let waves = [(1.3, 0.2), (-0.4, 1.2), (0.9, 0.9), (1.0, -1.0)];

@@ -1,5 +1,3 @@
-//! The corner detector.
-
 use nalgebra::Vector2;
 
 use super::{blank, scene, texture};
@@ -12,7 +10,7 @@ fn detect(image: &GrayImage, existing: &[Vector2<f64>], options: &CornerOptions)
     found
 }
 
-/// A dark image with bright squares; returns the image and the squares' corners.
+/// Dark image with bright squares, and the squares' corners.
 fn chessboard_of_one(squares: &[(usize, usize, u8)]) -> (GrayImage, Vec<Vector2<f64>>) {
     let (width, height, side) = (200, 160, 24);
     let mut image = GrayImage { width, height, pixels: vec![40; width * height] };

@@ -1,4 +1,4 @@
-//! The motion tracker against known motion.
+//! Motion tracker against known motion.
 
 use nalgebra::Vector2;
 
@@ -15,7 +15,7 @@ fn pyramid(image: &GrayImage) -> Pyramid {
     pyramid
 }
 
-/// A lattice of points of image `from` that image `to` shows too.
+/// Lattice of points of image `from` that are visible in image `to`.
 fn common_points(scene: &Scene, from: usize, to: usize) -> Vec<Vector2<f64>> {
     let lattice = (0..scene.height).step_by(17).flat_map(|y| (0..scene.width).step_by(17).map(move |x| (x, y)));
     lattice
@@ -24,7 +24,7 @@ fn common_points(scene: &Scene, from: usize, to: usize) -> Vec<Vector2<f64>> {
         .collect()
 }
 
-/// Follows the lattice from image 4 to image 5 and demands a ratio of tracked points and a median error.
+/// Tracks the lattice from image 4 to image 5 and checks the ratio of tracked points and the median error.
 fn check(scene: &Scene, min_ratio: f64, largest_median_px: f64) {
     let texture = texture();
     let (previous, now) = (pyramid(&scene.render(&texture, 4)), pyramid(&scene.render(&texture, 5)));

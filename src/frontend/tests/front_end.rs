@@ -1,4 +1,4 @@
-//! The whole front end on rendered sequences.
+//! Complete front end on rendered sequences.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -14,16 +14,16 @@ fn front_end(scene: &Scene) -> FrontEnd {
     FrontEnd::new(camera_of(scene), FrontEndOptions { corners, ..Default::default() })
 }
 
-/// A prediction claims to be this good.
+/// Standard deviation of the predictions.
 const PREDICTION_SIGMA_RAD: f64 = 0.01;
 
-/// The true `camera_now_from_camera_previous` between two images of a scene.
+/// True `camera_now_from_camera_previous` between two images of a scene.
 fn rotation_between(scene: &Scene, previous: usize, now: usize) -> UnitQuaternion<f64> {
     let rotation = scene.camera_from_plane(now) * scene.camera_from_plane(previous).inverse();
     UnitQuaternion::from_rotation_matrix(&rotation)
 }
 
-/// Plays images `indices` of a scene; `prediction` gives the rotation between two of them.
+/// Processes images `indices` of a scene; `prediction` gives the rotation between two of them.
 fn play(
     scene: &Scene,
     texture: &Texture,
@@ -41,7 +41,7 @@ fn play(
     frames
 }
 
-/// Errors of the tracked features' motion between two images in a row.
+/// Errors of the tracked features' motion between two consecutive images.
 fn errors(scene: &Scene, previous: &TrackedFrame, now: &TrackedFrame) -> Vec<f64> {
     let tracked = now.features.iter().filter_map(|feature| Some((feature, feature.previous_uv_px?)));
     let error = tracked.map(|(feature, before)| {
@@ -166,7 +166,7 @@ fn images_of_another_size_are_refused_and_change_nothing() {
 fn nothing_is_tracked_under_a_mask() {
     let (scene, texture) = (scene(0.4), texture());
     let [width, height] = camera_of(&scene).resolution_px;
-    // The right third, and a bar across the middle.
+    // Right third, and a bar across the middle.
     let masked =
         |index: usize| 3 * (index % width) >= 2 * width || (height / 2..height / 2 + 12).contains(&(index / width));
     let pixels = (0..width * height).map(|index| if masked(index) { 255 } else { 0 }).collect();
@@ -183,7 +183,7 @@ fn nothing_is_tracked_under_a_mask() {
     };
     assert!(under(&free) > 100, "{} features lie there without a mask", under(&free));
     assert_eq!(under(&covered), 0);
-    // Elsewhere features are followed as before.
+    // Elsewhere features are tracked as before.
     let tracked: usize = covered[1..].iter().map(|frame| frame.statistics.tracked).sum();
     assert!(tracked > 200, "{tracked} features followed");
     // An empty mask changes nothing.

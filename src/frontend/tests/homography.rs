@@ -1,18 +1,18 @@
-//! A textured plane observed through known homographies, for the tests and the bench: the true motion of every pixel is
-//! known.
+//! Textured plane observed through known homographies, for the tests and the benchmark: the true motion of every pixel
+//! is known.
 
 use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 
 use super::GrayImage;
 
-/// Texture pixels per image pixel, so that sampling between them is exact enough.
+/// Texture pixels per image pixel, so that interpolation is accurate enough.
 const OVERSAMPLING: f64 = 2.0;
 
-/// A small random number generator (xorshift64*), the same everywhere.
+/// Small random number generator (xorshift64*), equal on all platforms.
 pub(crate) struct Dice(pub(crate) u64);
 
 impl Dice {
-    /// Evenly in `0 .. 1`.
+    /// Uniform in `0 .. 1`.
     pub(crate) fn uniform(&mut self) -> f64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
@@ -20,14 +20,14 @@ impl Dice {
         (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Normal with variance one.
+    /// Normal with variance 1.
     pub(crate) fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()
     }
 }
 
-/// A periodic texture with edges, corners and noise of all wavelengths, as grey values about 128.
+/// Periodic texture with edges, corners and noise of all wavelengths, as grey values about 128.
 pub(crate) struct Texture {
     size: usize,
     values: Vec<f32>,
@@ -49,7 +49,7 @@ impl Texture {
         Self { size, values }
     }
 
-    /// The same without any texture.
+    /// Constant grey texture.
     #[expect(clippy::allow_attributes, reason = "the bench does not use it")]
     #[allow(dead_code, reason = "the bench does not use it")]
     pub(crate) fn flattened(mut self) -> Self {
@@ -57,7 +57,7 @@ impl Texture {
         self
     }
 
-    /// The grey value at a point in texture pixels, by cubic convolution.
+    /// Grey value at a point in texture pixels, by cubic convolution.
     fn at(&self, x: f64, y: f64) -> f64 {
         let (column, row) = (x.floor(), y.floor());
         let (weights_x, weights_y) = (cubic_weights((x - column) as f32), cubic_weights((y - row) as f32));
@@ -118,7 +118,7 @@ fn add_rectangle(values: &mut [f32], size: usize, dice: &mut Dice) {
     }
 }
 
-/// The blur of a lens: the binomial filter `1 4 6 4 1` both ways.
+/// Blur of a lens: the binomial filter `1 4 6 4 1` in both directions.
 fn soften(values: &mut [f32], size: usize) {
     let weights = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
     for (stride, line_stride) in [(1, size), (size, 1)] {
@@ -132,13 +132,13 @@ fn soften(values: &mut [f32], size: usize) {
     }
 }
 
-/// How the camera moves before the plane, and how the sensor sees.
+/// Motion of the camera in front of the plane, and errors of the image sensor.
 #[derive(Clone, Copy)]
 pub(crate) struct Scene {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) focal_px: f64,
-    /// Scales the motion per image.
+    /// Factor of the motion per image.
     pub(crate) motion_scale: f64,
     /// Standard deviation of the pixel noise in grey levels.
     pub(crate) noise: f64,
@@ -176,14 +176,14 @@ impl Scene {
         texture_from_plane * image_from_plane.try_inverse().expect("the camera stays before the plane")
     }
 
-    /// Where a pixel of image `from` lies in image `to`.
+    /// Position in image `to` of a pixel of image `from`.
     pub(crate) fn flow(&self, from: usize, to: usize, uv_px: &Vector2<f64>) -> Vector2<f64> {
         let back = self.texture_from_image(to).try_inverse().expect("the camera stays before the plane");
         let moved = back * self.texture_from_image(from) * uv_px.push(1.0);
         moved.xy() / moved.z
     }
 
-    /// What the camera sees at `index`.
+    /// Image of the camera at `index`.
     pub(crate) fn render(&self, texture: &Texture, index: usize) -> GrayImage {
         let texture_from_image = self.texture_from_image(index);
         let mut dice = Dice(0x9e37_79b9_7f4a_7c15 ^ (index as u64 + 1));
@@ -204,7 +204,7 @@ impl Scene {
         GrayImage { width: self.width, height: self.height, pixels }
     }
 
-    /// Whether a pixel lies in the image.
+    /// True if a pixel is inside the image.
     pub(crate) fn sees(&self, uv_px: &Vector2<f64>) -> bool {
         let (right, bottom) = ((self.width - 1) as f64, (self.height - 1) as f64);
         uv_px.x >= 0.0 && uv_px.y >= 0.0 && uv_px.x <= right && uv_px.y <= bottom

@@ -14,7 +14,7 @@ use crate::camera::CameraModel;
 use crate::sensors::GrayImage;
 use homography::{Scene, Texture};
 
-/// A plane of rich texture before a small camera.
+/// Plane with rich texture in front of a small camera.
 fn scene(motion_scale: f64) -> Scene {
     Scene { width: 320, height: 240, focal_px: 200.0, motion_scale, noise: 2.0, flicker: 0.0 }
 }
@@ -29,7 +29,7 @@ fn camera_of(scene: &Scene) -> CameraModel {
     CameraModel::pinhole(intrinsics_px, [scene.width, scene.height]).unwrap()
 }
 
-/// Points along the four borders, at a distance from them.
+/// Points along the four borders, at distance `inset_px` from them.
 fn rim(scene: &Scene, inset_px: f64) -> impl Iterator<Item = Vector2<f64>> {
     let (right, bottom) = ((scene.width - 1) as f64, (scene.height - 1) as f64);
     (0..40).flat_map(move |k| {

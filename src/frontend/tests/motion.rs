@@ -12,15 +12,15 @@ use crate::sensors::ImuSample;
 
 const FOCAL_PX: f64 = 450.0;
 
-/// A made-up pair of images of scattered points.
+/// Simulated pair of images of scattered points.
 struct View {
     rotation: Vector3<f64>,
     translation: Vector3<f64>,
-    /// How wrong the predicted rotation is.
+    /// Error of the predicted rotation, in radians.
     prediction_error: Vector3<f64>,
     predicted: bool,
     outlier_ratio: f64,
-    /// Depths between these, in the unit of the translation.
+    /// Range of the depths, in the unit of the translation.
     depths: (f64, f64),
 }
 
@@ -37,7 +37,7 @@ impl Default for View {
     }
 }
 
-/// Judges 120 tracks and counts how many of the right ones are kept and how many of the wrong ones.
+/// Classifies 120 tracks and checks the kept ratios of inliers and outliers.
 fn check(name: &str, view: &View, min_inliers_kept: f64, max_outliers_kept: f64) {
     for seed in 1..20 {
         let mut dice = Dice(seed * 7919);
@@ -140,7 +140,7 @@ const NOISE: PredictionNoise =
 
 const JOINT_SIGMA_RAD: f64 = 0.03;
 
-/// A gimbal of one joint with everything off the axes.
+/// Gimbal with one joint, all of whose parameters differ from zero.
 fn chain() -> ClassicalChain {
     let pose = |x, y, z| RigidTransform::new(so3::exp(&Vector3::new(x, y, z)), Vector3::new(0.1, 0.0, -0.1));
     ClassicalChain {
@@ -162,7 +162,7 @@ fn the_predicted_rotation_is_that_of_the_chain_of_frames() {
     let previous = UnitQuaternion::from_euler_angles(0.3, -0.2, 1.0);
     let now = UnitQuaternion::from_euler_angles(0.5, 0.1, 1.2);
     let rotation = predict_camera_rotation(&imu, &bias, &rigid(previous), &rigid(now), &NOISE).unwrap().rotation;
-    // A direction fixed in the world: world = IMU at the first instant.
+    // Direction fixed in the world: world = IMU at the first time.
     let world = Vector3::new(0.2, 0.7, -0.4);
     let world_from_imu_now = so3::exp(&(rate * 0.05));
     let in_previous = previous.inverse() * world;
@@ -182,7 +182,7 @@ fn the_covariance_matches_predictions_from_perturbed_input() {
     let mut dice = Dice(11);
     let mut measured = Matrix3::zeros();
     let count = 20_000;
-    // So small that the first order holds.
+    // Small enough for the first order.
     let shrink = 0.1;
     for _ in 0..count {
         let mut vector = |sigma: f64| Vector3::from_fn(|_, _| shrink * sigma * dice.normal());
@@ -196,7 +196,7 @@ fn the_covariance_matches_predictions_from_perturbed_input() {
         let error = so3::log(&(observed.rotation * given.rotation.inverse())) / shrink;
         measured += error * error.transpose() / f64::from(count);
     }
-    // The gyroscope's noise is no part of this, and negligible.
+    // The noise of the gyroscope is not included; it is negligible.
     let difference = (given.covariance_rad2 - measured).norm() / measured.norm();
     assert!(difference < 0.03, "{} instead of {measured}", given.covariance_rad2);
 }

@@ -1,4 +1,4 @@
-//! Sums of products in wide registers and without them.
+//! Sums of products with and without wide registers.
 
 use crate::frontend::products::{Pixels, dot, sums_of_products};
 

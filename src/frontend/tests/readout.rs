@@ -1,4 +1,4 @@
-//! Readout of a rolling shutter from made-up tracks of a moving camera.
+//! Readout of a rolling shutter from simulated tracks of a moving camera.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -10,13 +10,13 @@ const FOCAL_PX: f64 = 360.0;
 const HEIGHT_PX: f64 = 480.0;
 const STEP_S: f64 = 0.005;
 
-/// A camera that rotates and flies for ten seconds.
+/// Camera that rotates and moves for ten seconds.
 struct Flight {
     readout_s: f64,
-    /// Scales the rotation.
+    /// Factor of the rotation.
     rotation: f64,
     speed_m_per_s: f64,
-    /// Added to the camera's stamps for the clock of the rates.
+    /// Time to add to the camera's stamps to obtain the time of the rates, in seconds.
     time_offset_s: f64,
     outlier_ratio: f64,
 }
@@ -98,7 +98,7 @@ impl Flight {
             ImagePair { stamps_s, tracks }
         };
         let images = (0..180).map(pair).collect();
-        // A gyroscope of a clock of its own with bias, noise and axes that are wrong by two degrees.
+        // Gyroscope with a time offset, bias, noise and axes with an error of two degrees.
         let wrong: UnitQuaternion<f64> = so3::exp(&Vector3::new(0.02, -0.03, 0.01));
         let samples = (0..2040).map(|step| {
             let time_s = f64::from(step) * STEP_S;
@@ -114,7 +114,7 @@ fn check(name: &str, flight: &Flight, largest_sigma_s: f64) {
         let (images, rates) = flight.images(seed * 7919);
         let found = measure_readout(&images, Some(&rates), &ReadoutOptions::for_focal_length(FOCAL_PX)).unwrap();
         let error_s = found.readout_s - flight.readout_s;
-        // Beside the random part it contains two percent of the readout.
+        // The sigma contains two percent of the readout in addition to the random part.
         let largest_sigma_s = largest_sigma_s.hypot(0.02 * flight.readout_s);
         assert!(found.sigma_s < largest_sigma_s, "{name}, seed {seed}: {found:?}");
         assert!(error_s.abs() < 4.0 * found.sigma_s, "{name}, seed {seed}: {found:?}, error {error_s}");

@@ -9,7 +9,7 @@ use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions};
 use crate::geometry::median;
 use crate::sensors::GrayImage;
 
-/// Fractional places well inside the image, so many pixels from one to the next.
+/// Fractional positions inside the image, `spacing` pixels apart.
 fn places(spacing: usize) -> Vec<Vector2<f64>> {
     let lattice = (40..200).step_by(spacing).flat_map(|y| (40..280).step_by(spacing).map(move |x| (x, y)));
     lattice.map(|(x, y)| Vector2::new(f64::from(x) + 0.37, f64::from(y) - 0.21)).collect()
@@ -23,7 +23,8 @@ fn find(reference: &mut ReferencePatch, image: &GrayImage, rough_px: &Vector2<f6
     reference.find(image, rough_px, &ReferenceOptions::default(), &mut ReferenceSearch::new())
 }
 
-/// Matches references of image 4 in image `to`, from half a pixel beside; returns errors and the number of references.
+/// Matches references of image 4 in image `to`, starting half a pixel away; returns errors and the number of
+/// references.
 fn find_all(scene: &Scene, to: usize) -> (Vec<f64>, usize) {
     let texture = texture();
     let (first, later) = (scene.render(&texture, 4), scene.render(&texture, to));

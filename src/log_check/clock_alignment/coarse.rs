@@ -3,11 +3,11 @@
 use super::{DISTINCT_S, MIN_ROTATIONS, Measured, OrientationSeries};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 
-/// Step of the search and of the sampled speeds.
+/// Step of the search and of the sampled speeds, in seconds.
 const STEP_S: f64 = 0.01;
-/// Tolerance of the largest speed: a wrong focal length scales the speeds of images.
+/// Ratio by which an image speed may exceed the largest reference speed: a wrong focal length scales the speeds of
+/// images.
 const SPEED_MARGIN: f64 = 1.5;
-/// Number of offsets that are refined.
 const PEAKS: usize = 24;
 
 /// Correlation of the angular speeds at one offset.
@@ -15,18 +15,19 @@ const PEAKS: usize = 24;
 pub(super) struct Correlation {
     pub(super) offset_s: f64,
     pub(super) correlation: f64,
-    /// Number of samples that overlap.
+    /// Number of overlapping samples.
     count: usize,
 }
 
 impl Correlation {
-    /// Fisher's transform in standard deviations of samples without correlation; a short overlap correlates more by chance.
+    /// Fisher's transform in standard deviations of uncorrelated samples; a short overlap has larger correlations by
+    /// chance.
     fn significance(&self) -> f64 {
         self.correlation.min(1.0 - 1e-9).atanh() * (self.count as f64).sqrt()
     }
 }
 
-/// Angular speeds of the images in rad/s, by the places of a grid of [`STEP_S`] where there are some.
+/// Angular speeds of the images in rad/s, by index of a grid of [`STEP_S`]; sparse.
 struct SpeedGrid {
     start_ns: i64,
     speeds: Vec<(usize, f64)>,
@@ -49,8 +50,8 @@ impl SpeedGrid {
     }
 }
 
-/// Correlation coefficient of the angular speeds of images and reference by offset in seconds; offsets at which too little
-/// overlaps are left out.
+/// Correlation coefficient of the angular speeds of images and reference by offset in seconds; offsets with too little
+/// overlap are omitted.
 pub(super) fn correlation(
     measured: &[Measured],
     reference: &OrientationSeries,
@@ -61,7 +62,7 @@ pub(super) fn correlation(
     let step_ns = ns_from_seconds(STEP_S);
     let images = SpeedGrid::of(measured);
     let interval_ns = measured.iter().map(|pair| pair.to_ns - pair.from_ns).min().unwrap_or(step_ns).max(step_ns);
-    // The reference's speed over the interval of the images, so that both are smoothed alike.
+    // Speed of the reference over the interval of the images, so that both have the same smoothing.
     let count = usize::try_from((last_ns - first_ns) / step_ns).unwrap_or(0);
     let speed = |place: usize| {
         let middle_ns = first_ns + place as i64 * step_ns + step_ns / 2;
@@ -69,13 +70,13 @@ pub(super) fn correlation(
         rotation.map_or(f64::NAN, |rotation| rotation.norm() / seconds_from_ns(interval_ns))
     };
     let speeds: Vec<f64> = (0..count).map(speed).collect();
-    // The camera rotates no faster than the reference; beyond it features were matched wrongly.
+    // The camera rotates no faster than the reference; larger speeds are due to wrong matches.
     let fastest = speeds.iter().copied().filter(|speed| speed.is_finite()).fold(0.0, f64::max) * SPEED_MARGIN;
     let steps = (search_s / STEP_S).round() as i64;
     let guess = (guess_s / STEP_S).round() as i64;
     let base = (images.start_ns - first_ns).div_euclid(step_ns);
     let offset_of_base_s = seconds_from_ns(first_ns + base * step_ns - images.start_ns);
-    // Two images apart by an interval share the samples between them.
+    // All grid samples within one image interval have the same speed.
     let needed = MIN_ROTATIONS * usize::try_from(interval_ns / step_ns).unwrap_or(1).max(1) / 2;
     let at = |lag: i64| {
         let pairs = images.speeds.iter().filter_map(|(place, speed)| {
@@ -88,7 +89,7 @@ pub(super) fn correlation(
     (guess - steps..=guess + steps).filter_map(at).collect()
 }
 
-/// Pearson's correlation coefficient and the number of pairs, `None` with fewer pairs than needed or without variation.
+/// Pearson's correlation coefficient and the number of pairs; `None` with fewer pairs than needed or without variation.
 fn coefficient(pairs: impl Iterator<Item = (f64, f64)>, needed: usize) -> Option<(f64, usize)> {
     let (mut count, mut sums) = (0, [0.0; 5]);
     for (a, b) in pairs {
@@ -105,7 +106,7 @@ fn coefficient(pairs: impl Iterator<Item = (f64, f64)>, needed: usize) -> Option
     (variances > 0.0).then(|| ((ab - a * b) / variances.sqrt(), count))
 }
 
-/// The most significant offsets that are distinct, the most significant first.
+/// Most significant distinct offsets, the most significant first.
 pub(super) fn peaks(correlation: &[Correlation]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..correlation.len()).collect();
     order.sort_by(|a, b| correlation[*b].significance().total_cmp(&correlation[*a].significance()));

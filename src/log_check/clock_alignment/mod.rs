@@ -1,9 +1,9 @@
-//! Offset and drift between the clock of a camera and the clock of an IMU or of a gimbal's attitude, from the rotations that
-//! both measure.
+//! Offset and drift between the clock of a camera and the clock of an IMU or of a gimbal's attitude, from the rotations
+//! that both measure.
 //!
-//! The angular speeds, which do not depend on how the camera is mounted, are correlated over all offsets of the search. Each
-//! of the best offsets is then refined by least squares on the rotation vectors: offset, drift, the constant rotation from
-//! the reference to the camera, and a scale, because a wrong focal length scales the rotations that images show.
+//! The angular speeds, which do not depend on the extrinsics, are correlated over all offsets of the search. Each of
+//! the best offsets is then refined by least squares on the rotation vectors: offset, drift, the constant rotation from
+//! the reference to the camera, and a scale, because a wrong focal length scales the rotations measured from images.
 
 mod coarse;
 mod references;
@@ -27,25 +27,26 @@ const MIN_ROTATIONS: usize = 40;
 const MIN_ROTATION_RAD: f64 = 0.001;
 /// Minimum ratio of the squared rotations that the reference explains.
 const MIN_EXPLAINED: f64 = 0.6;
-/// The next offset must leave this many times as much unexplained.
+/// Minimum ratio of the unexplained rotations of the next offset to those of the best one.
 const MIN_DISTINCTION: f64 = 1.5;
-/// Lengths over which rotations of consecutive images are composed, in seconds, for a noisy reference: it needs more than the
-/// rotation of a stabilized camera from one image to the next.
+/// Lengths over which rotations of consecutive images are composed, in seconds, for a noisy reference: from one image
+/// to the next a stabilized camera rotates too little.
 const NOISY_LENGTHS_S: [f64; 2] = [0.3, 0.6];
-/// An image rotation that differs from its neighbours by this many times the median is wrong.
+/// An image rotation is an outlier if it differs from its neighbours by this many times the median.
 const OUTLIER_RATIO: f64 = 8.0;
-/// Offsets closer than this are one.
+/// Offsets closer than this count as one, in seconds.
 const DISTINCT_S: f64 = 0.25;
 
-/// The rotation between two images.
+/// Rotation between two images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Measured {
-    /// Stamps of both images.
+    /// Stamp of the first image.
     from_ns: i64,
     to_ns: i64,
     /// Rotation vector of `second_from_first`, in radians.
     rotation: Vector3<f64>,
-    /// Its derivative when both times are shifted, in rad/s, from the rotations of images around both; zero for single pairs.
+    /// Derivative of the rotation by a shift of both times, in rad/s, from the rotations of images around both; zero
+    /// for single pairs.
     by_shift: Vector3<f64>,
 }
 
@@ -61,16 +62,16 @@ impl Measured {
 
 /// Orientations on one clock, up to a constant rotation on either side: `fixed_from_body` at increasing stamps.
 ///
-/// From a gyroscope they are its integral; from a gimbal its attitudes relative to the earth.
+/// From a gyroscope they are its integral; from a gimbal, its attitudes relative to the earth.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OrientationSeries {
     samples: Vec<(i64, UnitQuaternion<f64>)>,
-    /// Whether its noise from sample to sample exceeds that of the images, as that of measured joint angles does.
+    /// True if the noise between samples exceeds that of the images, as for measured joint angles.
     is_noisy: bool,
 }
 
 impl OrientationSeries {
-    /// From orientations with stamps in nanoseconds; a sample whose stamp does not increase is left out.
+    /// Series of orientations with stamps in nanoseconds; samples whose stamp does not increase are omitted.
     pub fn from_orientations(orientations: impl IntoIterator<Item = (i64, UnitQuaternion<f64>)>) -> Self {
         let mut samples: Vec<(i64, UnitQuaternion<f64>)> = Vec::new();
         for (stamp_ns, orientation) in orientations {
@@ -81,13 +82,13 @@ impl OrientationSeries {
         Self { samples, is_noisy: false }
     }
 
-    /// The same series, of which only rotations over longer times are precise.
+    /// Marks the series as noisy: only rotations over longer times are precise.
     #[must_use]
     pub fn with_noise(self) -> Self {
         Self { is_noisy: true, ..self }
     }
 
-    /// The integral of angular velocities in rad/s with stamps in nanoseconds.
+    /// Integral of angular velocities in rad/s with stamps in nanoseconds.
     pub fn from_angular_velocities(rates: impl IntoIterator<Item = (i64, Vector3<f64>)>) -> Self {
         let mut orientation = UnitQuaternion::identity();
         let mut previous: Option<(i64, Vector3<f64>)> = None;
@@ -104,12 +105,12 @@ impl OrientationSeries {
         Self { samples: integrated.collect(), is_noisy: false }
     }
 
-    /// First and last stamp, `None` without samples.
+    /// First and last stamp; `None` without samples.
     fn range_ns(&self) -> Option<(i64, i64)> {
         Some((self.samples.first()?.0, self.samples.last()?.0))
     }
 
-    /// Interpolated orientation, `None` outside of the series.
+    /// Interpolated orientation; `None` outside the series.
     fn at(&self, stamp_ns: i64) -> Option<UnitQuaternion<f64>> {
         rotation_at(&self.samples, stamp_ns, i64::MAX)
     }
@@ -125,21 +126,19 @@ impl OrientationSeries {
 pub struct ClockAlignment {
     /// Offset at the middle, in seconds.
     pub offset_s: f64,
-    /// Its standard deviation.
     pub offset_sigma_s: f64,
     /// Drift of the reference's clock against the camera's, 10⁻⁶.
     pub drift_ppm: f64,
-    /// Its standard deviation.
     pub drift_sigma_ppm: f64,
-    /// The middle of the image rotations on the camera's clock, in seconds.
+    /// Middle of the image rotations on the camera's clock, in seconds.
     pub middle_s: f64,
     /// Ratio of the squared rotations of the images that the reference explains, at most 1.
     pub explained: f64,
-    /// The next offset and the ratio that it explains, if there is one.
+    /// Next offset and the ratio that it explains, if there is one.
     pub next: Option<(f64, f64)>,
     /// Rotation from the reference's body frame to the camera frame, as a rotation vector in radians.
     pub camera_from_body_rad: [f64; 3],
-    /// Ratio of the rotations of the images to those of the reference; with a focal length that is too long it is below 1.
+    /// Ratio of the rotations of the images to those of the reference; below 1 if the focal length is too long.
     pub scale: f64,
     /// Number of image rotations that overlap with the reference.
     pub rotations: usize,
@@ -156,71 +155,64 @@ pub struct ClockAlignment {
 }
 
 impl ClockAlignment {
-    /// The time in nanoseconds to add to a stamp of the camera.
+    /// Time in nanoseconds to add to a stamp of the camera.
     pub fn shift_ns(&self, camera_ns: i64) -> i64 {
         let since_middle_s = seconds_from_ns(camera_ns) - self.middle_s;
         ns_from_seconds(self.offset_s + self.drift_ppm * 1e-6 * since_middle_s)
     }
 }
 
-/// Reason why two clocks cannot be aligned.
+/// Reason that two clocks cannot be aligned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum AlignmentError {
-    /// Too few image rotations.
     #[error("only {found} rotations between images could be measured, {MIN_ROTATIONS} are needed")]
     TooFewRotations {
-        /// Their number.
+        /// Number of image rotations.
         found: usize,
     },
     /// The camera does not rotate.
     #[error(
         "the camera rotates by {rotation_deg:.3}° from image to image in the median, which is too little to compare"
     )]
-    TooLittleRotation {
-        /// Median rotation between two images.
-        rotation_deg: f64,
-    },
-    /// No offset of the search lets images and reference overlap.
+    TooLittleRotation { rotation_deg: f64 },
+    /// Images and reference do not overlap at any offset of the search.
     #[error("within ±{search_s:.0} s no offset lets at least {MIN_ROTATIONS} image rotations overlap with it")]
     NoOverlap {
         /// Half the range of the search.
         search_s: f64,
     },
-    /// The best offset explains too little.
     #[error(
         "the best offset, {offset_s:+.2} s, explains {:.0} % of the images' rotation, {:.0} % are needed",
         100.0 * explained,
         100.0 * MIN_EXPLAINED
     )]
     NoAgreement {
-        /// The best offset.
         offset_s: f64,
-        /// Ratio of the squared rotations that it explains.
+        /// Ratio of the squared rotations that the offset explains.
         explained: f64,
     },
-    /// Two offsets explain the rotations nearly as well.
+    /// Two offsets explain the rotations almost equally well.
     #[error(
         "it is ambiguous: {offset_s:+.2} s explains {:.1} % of the images' rotation, {next_s:+.2} s explains {:.1} %",
         100.0 * explained,
         100.0 * next_explained
     )]
     Ambiguous {
-        /// The best offset.
         offset_s: f64,
-        /// Ratio of the squared rotations that it explains.
+        /// Ratio of the squared rotations that the best offset explains.
         explained: f64,
-        /// The next one.
+        /// Second best offset.
         next_s: f64,
-        /// Ratio that the next one explains.
+        /// Ratio that the second best offset explains.
         next_explained: f64,
     },
 }
 
-/// Finds the offset of a camera's clock within ±`search_s` around `guess_s` from the rotations of its images, which are in the
-/// order of their times.
+/// Finds the offset of a camera's clock within ±`search_s` around `guess_s` from the rotations of its images, which are
+/// ordered by time.
 ///
 /// # Errors
-/// When there are too few rotations, or no single offset explains them.
+/// If there are too few rotations, or no single offset explains them.
 pub fn align_clocks(
     images: &[ImageRotation],
     reference: &OrientationSeries,
@@ -242,7 +234,6 @@ pub fn align_clocks(
     best
 }
 
-/// The rotation between each pair of images.
 fn single(images: &[ImageRotation]) -> Vec<Measured> {
     let measured = |image: &ImageRotation| Measured {
         from_ns: image.from_ns,
@@ -253,8 +244,8 @@ fn single(images: &[ImageRotation]) -> Vec<Measured> {
     images.iter().filter(|image| image.to_ns > image.from_ns).map(measured).collect()
 }
 
-/// The image rotations without those that differ from both neighbours far more than usual: one wrong rotation would spoil every
-/// longer one that contains it.
+/// Image rotations without those that differ from both neighbours much more than usual: one outlier would corrupt every
+/// longer rotation that contains it.
 fn without_outliers(images: &[ImageRotation]) -> Vec<ImageRotation> {
     let rate = |image: &ImageRotation| {
         so3::log(&image.second_from_first) / seconds_from_ns(image.to_ns - image.from_ns).max(1e-9)
@@ -269,7 +260,8 @@ fn without_outliers(images: &[ImageRotation]) -> Vec<ImageRotation> {
     images.iter().zip(&distances).filter(|(_, distance)| **distance <= limit).map(|(image, _)| image.clone()).collect()
 }
 
-/// Rotations over at least a length from those of consecutive images; the next one starts in the middle of the one before.
+/// Rotations over at least `length_s`, composed from those of consecutive images; each one starts in the middle of the
+/// previous one.
 fn composed(images: &[ImageRotation], length_s: f64) -> Vec<Measured> {
     let half_ns = ns_from_seconds(0.25 * length_s);
     let mut found = Vec::new();
@@ -294,7 +286,7 @@ fn composed(images: &[ImageRotation], length_s: f64) -> Vec<Measured> {
     found
 }
 
-/// Mean rotation per second of the images around a time, `None` without images there.
+/// Mean angular rate of the images around a time; `None` without images there.
 fn mean_rate(images: &[ImageRotation], around_ns: i64, half_ns: i64) -> Option<Vector3<f64>> {
     let first = images.partition_point(|image| image.to_ns <= around_ns - half_ns);
     let near = images[first..].iter().take_while(|image| image.from_ns < around_ns + half_ns);

@@ -1,4 +1,4 @@
-//! The clock of a camera against the IMU of its log.
+//! Clock of a camera against the IMU of its log.
 
 use std::fmt;
 
@@ -10,13 +10,13 @@ use crate::log_check::ImageRotation;
 use crate::log_check::survey::Survey;
 use crate::sensors::{CameraMount, Rig};
 
-/// What the rotations of the images were compared with.
+/// Reference of the image rotations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlignmentReference {
-    /// The gyroscope, for a camera that is rigidly mounted or a gimbal that does not move.
+    /// Gyroscope: for a rigid camera, or a gimbal that does not move.
     Gyroscope,
-    /// The gyroscope and the angles of the gimbal's joints.
+    /// Gyroscope and angles of the gimbal's joints.
     GyroscopeAndJoints,
 }
 
@@ -29,11 +29,11 @@ impl fmt::Display for AlignmentReference {
     }
 }
 
-/// Finds the offset of a camera's clock from that of the log's IMU, by the gyroscope and, for a camera on a gimbal, by gyroscope
-/// and joint angles; the better of both.
+/// Finds the offset of a camera's clock from that of the log's IMU, by the gyroscope and, for a camera on a gimbal, by
+/// gyroscope and joint angles; returns the better of both.
 ///
 /// # Errors
-/// That of the reference which comes closer, when no offset explains the rotations.
+/// That of the better reference, if no offset explains the rotations.
 pub fn align_camera(
     log: &FlightLog,
     rig: &Rig,

@@ -7,24 +7,23 @@ use super::super::statistics::median;
 use super::{ClockAlignment, MIN_ROTATIONS, Measured, OrientationSeries};
 use crate::geometry::{ns_from_seconds, so3};
 
-/// Standard deviation of the drift that is expected of two quartz clocks.
+/// Prior standard deviation of the drift between two quartz clocks.
 const DRIFT_SIGMA: f64 = 1e-4;
-/// Standard deviation of the scale: focal lengths by a field of view are known to some tenths.
+/// Prior standard deviation of the scale: a focal length from a field of view is known to some tenths.
 const SCALE_SIGMA: f64 = 0.3;
-/// Maximum number of iterations.
 const ITERATIONS: usize = 20;
-/// An update of the offset below this ends the iterations.
+/// Update of the offset below which the iterations end.
 const CONVERGED_S: f64 = 1e-7;
 /// Largest update of the offset in one iteration.
 const MAX_UPDATE_S: f64 = 0.05;
-/// Step of the central difference by time.
+/// Step of the central difference by time, in seconds.
 const DIFFERENCE_S: f64 = 0.004;
 /// Huber's threshold in standard deviations.
 const HUBER: f64 = 1.345;
 /// Ratio of a normal distribution's standard deviation to the median norm of three such residuals.
 const SIGMA_PER_MEDIAN_NORM: f64 = 1.0 / 1.538;
 
-/// The best solution near one offset.
+/// Best solution near one offset.
 pub(super) struct Refined {
     pub(super) offset_s: f64,
     pub(super) explained: f64,
@@ -37,7 +36,7 @@ pub(super) struct Refined {
     rotations: usize,
 }
 
-/// A measured rotation vector (camera frame) with the prediction (body frame of the reference).
+/// Measured rotation vector (camera frame) and its prediction (body frame of the reference).
 struct Row {
     measured: Vector3<f64>,
     predicted: Vector3<f64>,
@@ -45,7 +44,7 @@ struct Row {
     since_middle_s: f64,
 }
 
-/// What the derivatives of a prediction are computed from: noise in them would bias the solution and make it look precise.
+/// Source of the derivatives of a prediction: noise in them would bias the solution and make its σ too small.
 enum Derivative {
     /// The reference: derivative of the prediction by the offset, body frame.
     Reference(Vector3<f64>),
@@ -53,7 +52,7 @@ enum Derivative {
     Images(Vector3<f64>),
 }
 
-/// Refines an offset; `None` when too few rotations overlap, or without convergence.
+/// Refines an offset; `None` if too few rotations overlap, or without convergence.
 pub(super) fn refine(measured: &[Measured], reference: &OrientationSeries, offset_s: f64) -> Option<Refined> {
     let middles = measured.iter().map(Measured::middle_s);
     let (first_s, last_s) =
@@ -111,7 +110,7 @@ impl Refined {
         row.measured - self.scale * (self.camera_from_body * row.predicted)
     }
 
-    /// Standard deviation of a residual's coordinate, from the median norm.
+    /// Standard deviation of a coordinate of the residuals, from their median norm.
     fn sigma_rad(&self, rows: &[Row]) -> f64 {
         let norms: Vec<f64> = rows.iter().map(|row| self.residual(row).norm()).collect();
         (SIGMA_PER_MEDIAN_NORM * median(&norms)).max(1e-9)
@@ -153,14 +152,14 @@ impl Refined {
         gradient[1] -= self.drift / (DRIFT_SIGMA * DRIFT_SIGMA);
         information[(5, 5)] += 1.0 / (SCALE_SIGMA * SCALE_SIGMA);
         gradient[5] -= (self.scale - 1.0) / (SCALE_SIGMA * SCALE_SIGMA);
-        // Rotations about one axis leave the rotation about it open.
+        // With rotations about one axis only, the rotation about that axis is unobservable.
         for axis in 2..5 {
             information[(axis, axis)] += 1.0;
         }
         (information, gradient)
     }
 
-    /// One iteration of Gauss and Newton; returns the update of the offset in seconds.
+    /// One Gauss–Newton iteration; returns the update of the offset in seconds.
     fn update(&mut self, rows: &[Row]) -> Option<f64> {
         let (information, gradient) = self.normal_equations(rows);
         let step = information.cholesky()?.solve(&gradient);
@@ -196,7 +195,6 @@ impl Refined {
         Some(())
     }
 
-    /// The result with its evidence.
     pub(super) fn alignment(
         &self,
         measured: &[Measured],
@@ -232,7 +230,7 @@ impl Refined {
     }
 }
 
-/// The constant rotation that explains the rows best.
+/// Constant rotation with the best fit to the rows.
 fn constant_rotation(rows: &[Row]) -> Option<UnitQuaternion<f64>> {
     let pairs: Vec<_> = rows.iter().map(|row| (row.predicted, row.measured)).collect();
     best_rotation(&pairs).filter(|_| rows.len() >= MIN_ROTATIONS).map(|(rotation, _)| rotation)

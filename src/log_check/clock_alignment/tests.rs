@@ -14,7 +14,7 @@ fn rate(time_s: f64) -> Vector3<f64> {
     0.25 * Vector3::new(wave([0.83, 2.17, 5.3], 0.1), wave([0.57, 1.91, 4.4], 1.3), wave([1.13, 2.71, 3.9], 2.2))
 }
 
-/// A gyroscope at 200 Hz with bias and noise over these seconds of its own clock.
+/// Gyroscope at 200 Hz with bias and noise, between two times in seconds of its clock.
 fn gyroscope(from_s: f64, to_s: f64, rate: impl Fn(f64) -> Vector3<f64>) -> OrientationSeries {
     let mut random = Noise(7);
     let samples = (0..((to_s - from_s) * 200.0) as i64).map(|k| {
@@ -26,7 +26,7 @@ fn gyroscope(from_s: f64, to_s: f64, rate: impl Fn(f64) -> Vector3<f64>) -> Orie
 }
 
 struct Video {
-    /// Time of the reference's clock at time 0 of the camera's.
+    /// Time of the reference's clock at time 0 of the camera's clock, in seconds.
     offset_s: f64,
     drift: f64,
     start_s: f64,
@@ -51,7 +51,7 @@ impl Default for Video {
 }
 
 impl Video {
-    /// Rotations between the images of a camera at 30 Hz that is fixed to the body.
+    /// Rotations between the images of a camera at 30 Hz that is rigidly mounted on the body.
     fn rotations(&self, rate: impl Fn(f64) -> Vector3<f64>) -> Vec<ImageRotation> {
         let mut random = Noise(11);
         let stamp_ns = |number: i64| ns_from_seconds(self.start_s) + number * 33_366_667;
@@ -77,7 +77,7 @@ impl Video {
         (0..self.count).map(rotation).collect()
     }
 
-    /// The offset at the middle of the rotations.
+    /// Offset at the middle of the rotations.
     fn offset_at(&self, middle_s: f64) -> f64 {
         self.offset_s + self.drift * middle_s
     }
@@ -105,7 +105,7 @@ fn offset_drift_rotation_and_scale_are_found() {
     }
 }
 
-/// Over many seeds the errors are as large as their standard deviations say.
+/// Over many seeds the errors agree with their standard deviations.
 #[test]
 fn the_standard_deviation_of_the_offset_is_that_of_its_errors() {
     let mut squares = 0.0;
@@ -119,7 +119,8 @@ fn the_standard_deviation_of_the_offset_is_that_of_its_errors() {
     assert!((0.4..1.8).contains(&ratio), "{ratio}");
 }
 
-/// A stabilized camera whose attitude is known to 0.5° at 25 Hz, as from encoders: from one image to the next it rotates less.
+/// Stabilized camera with an attitude from encoders, accurate to 0.5° at 25 Hz: from one image to the next it rotates
+/// less.
 #[test]
 fn a_noisy_reference_gives_neither_a_bias_nor_a_small_standard_deviation() {
     let slow = |time_s: f64| 0.25 * rate(time_s);

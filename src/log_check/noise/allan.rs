@@ -1,8 +1,8 @@
-//! The overlapping Allan variance of evenly sampled stretches, with its equivalent degrees of freedom.
+//! Overlapping Allan variance of evenly sampled stretches, with its equivalent degrees of freedom.
 //!
-//! Estimator and degrees of freedom are those of NIST Special Publication 1065 (W. J. Riley, 2008, §5.2.4 and §5.4.1; Howe,
-//! Allan and Barnes, 1981), applied to inertial sensors as in IEEE Std 952, annex C: the angle or velocity is the phase, the
-//! angular rate or specific force the frequency.
+//! Estimator and degrees of freedom are those of NIST Special Publication 1065 (W. J. Riley, 2008, §5.2.4 and §5.4.1;
+//! Howe, Allan and Barnes, 1981), applied to inertial sensors as in IEEE Std 952, annex C: the angle or velocity is the
+//! phase, the angular rate or specific force the frequency.
 
 use std::collections::BTreeSet;
 
@@ -10,10 +10,10 @@ use crate::geometry::mean_square_quantile;
 
 /// Averaging times per octave.
 const PER_OCTAVE: f64 = 4.0;
-/// Averaging times reach to this fraction of the longest stretch, where the estimate has two degrees of freedom.
+/// Ratio of the longest stretch to the longest averaging time, at which the estimate has two degrees of freedom.
 const LONGEST_RATIO: usize = 4;
 
-/// The noise that dominates an averaging time.
+/// Dominant noise at an averaging time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NoiseKind {
     /// White noise of the integrated signal: quantization, slope −1.
@@ -26,18 +26,18 @@ pub(super) enum NoiseKind {
     RandomWalk,
 }
 
-/// One averaging time.
+/// Allan variance at one averaging time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AllanVariance {
-    /// Samples that are averaged.
+    /// Number of averaged samples.
     pub(super) count: usize,
-    /// Averaging time.
+    /// Averaging time, in seconds.
     pub(super) tau_s: f64,
-    /// The variance, in the squared unit of the samples.
+    /// In the squared unit of the samples.
     pub(super) variance: f64,
 }
 
-/// Integrated samples of one stretch, without their mean: `x(k) = Σ (y − ȳ)·τ0`, one more than there are samples.
+/// Integrated samples of one stretch, without their mean: `x(k) = Σ (y − ȳ)·τ0`, one more than the samples.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Phase(Vec<f64>);
 
@@ -76,7 +76,7 @@ pub(super) fn counts(longest: usize) -> Vec<usize> {
     counts.into_iter().collect()
 }
 
-/// The variance at one averaging time from all stretches that are long enough; `None` without one.
+/// Variance at one averaging time from all stretches that are long enough; `None` without one.
 pub(super) fn overlapping(stretches: &[Phase], count: usize, period_s: f64) -> Option<AllanVariance> {
     let terms: usize = stretches.iter().map(|phase| phase.terms(count)).sum();
     if terms == 0 {
@@ -101,7 +101,7 @@ pub(super) fn degrees_of_freedom(stretches: &[Phase], count: usize, kind: NoiseK
     if spread > 0.0 { all * all / spread } else { 0.0 }
 }
 
-/// Of `n` phases averaged over `m` samples (NIST SP 1065, table 5).
+/// Degrees of freedom of `n` phases averaged over `m` samples (NIST SP 1065, table 5).
 fn of_one_stretch(n: f64, m: f64, kind: NoiseKind) -> f64 {
     match kind {
         NoiseKind::Quantization => (n + 1.0) * (n - 2.0 * m) / (2.0 * (n - m)),
@@ -115,7 +115,8 @@ fn of_one_stretch(n: f64, m: f64, kind: NoiseKind) -> f64 {
     }
 }
 
-/// Limits of the true deviation (68.3 %) from a deviation with these degrees of freedom, by the χ² distribution.
+/// Confidence limits (68.3 %) of the true deviation from a deviation with these degrees of freedom, by the χ²
+/// distribution.
 pub(super) fn confidence(deviation: f64, degrees_of_freedom: f64) -> (f64, f64) {
     const SMALLEST: f64 = 1e-4;
     let limit = |normal: f64| deviation / mean_square_quantile(degrees_of_freedom, normal).max(SMALLEST).sqrt();
@@ -133,7 +134,7 @@ mod tests {
         let samples = [1.0, 4.0, 2.0, 8.0, 5.0, 7.0];
         let phase = [Phase::of(&samples, 0.5)];
         let found = overlapping(&phase, 2, 0.5).unwrap();
-        // Means of pairs 2.5 3 5 6.5 6, those two apart: 2.5, 3.5, 1.0.
+        // Means of pairs are 2.5 3 5 6.5 6; differences of means two apart: 2.5, 3.5, 1.0.
         let expected = (2.5_f64.powi(2) + 3.5_f64.powi(2) + 1.0) / (2.0 * 3.0);
         assert!((found.variance - expected).abs() < 1e-12 && found.tau_s == 1.0, "{found:?}");
         assert_eq!(overlapping(&phase, 4, 0.5), None);

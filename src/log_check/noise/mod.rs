@@ -21,27 +21,27 @@ use crate::flight_log::FlightLog;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::Rig;
 
-/// Less than this is too short for the deviation: white noise would be known to worse than a few percent.
+/// Minimum total duration: with less data white noise would have an error of more than a few percent.
 const SHORTEST_TOTAL_S: f64 = 10.0;
-/// Points to which a vibration may contribute more than this part of the variance are left out of the fit.
+/// Points to which a vibration may contribute more than this ratio of the variance are excluded from the fit.
 const VIBRATION_RATIO: f64 = 0.1;
 /// Standard deviations of a limit at 95 %, one-sided.
 const LIMIT_SIGMAS: f64 = 1.65;
-/// A random walk `K` beside white noise `N` is found in most stretches of this many `N/K` (tested).
+/// A random walk `K` in addition to white noise `N` is identified in most stretches of this many `N/K` (tested).
 const STRETCH_PER_RATIO: f64 = 20.0;
-/// The minimum of the deviation of flicker noise of this bias instability, `√(2 ln 2/π)`.
+/// Ratio of the minimum of the deviation to the bias instability of flicker noise, `√(2 ln 2/π)`.
 const FLICKER: f64 = 0.664;
 
-/// A noise term in its own unit, or why it is not known.
+/// Noise term in its own unit, or the reason that it is not identified.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct NoiseTerm {
-    /// The value, `None` when it is not identified.
+    /// `None` if not identified.
     pub value: Option<f64>,
-    /// Its standard deviation.
+    /// Standard deviation of the value.
     pub sigma: Option<f64>,
-    /// What is not identified is smaller than this (95 %).
+    /// Upper limit (95 %) of a term that is not identified.
     pub limit: Option<f64>,
-    /// Why it is not identified, and what would identify it; empty otherwise.
+    /// Reason that the term is not identified, with the remedy; empty otherwise.
     pub reason: String,
 }
 
@@ -51,7 +51,7 @@ impl NoiseTerm {
     }
 }
 
-/// The terms of one axis, or of all axes of a sensor.
+/// Noise terms of one axis, or of all axes of a sensor.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NoiseTerms {
     /// Angle or velocity random walk `N`, which is the density of the white noise: unit/√Hz.
@@ -64,112 +64,101 @@ pub struct NoiseTerms {
     pub quantization: NoiseTerm,
 }
 
-/// One point of an Allan deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct AllanPoint {
-    /// Averaging time.
+    /// Averaging time, in seconds.
     pub tau_s: f64,
-    /// The deviation, in the unit of the samples.
+    /// In the unit of the samples.
     pub deviation: f64,
-    /// Its standard deviation, by the equivalent degrees of freedom.
+    /// Standard deviation of `deviation`, by the equivalent degrees of freedom.
     pub sigma: f64,
     /// Lower limit of the true deviation (68.3 % between the limits).
     pub low: f64,
-    /// Upper limit.
     pub high: f64,
-    /// The sum of the identified terms; `None` without any, and where a filter bends the curve.
+    /// Sum of the identified terms; `None` without any, and where a filter bends the curve.
     pub model: Option<f64>,
-    /// Whether vibration makes it useless; such points are not fitted.
+    /// True if vibration dominates; such points are not fitted.
     pub vibration: bool,
 }
 
-/// The Allan deviation of one axis with its terms.
+/// Allan deviation of one axis with its noise terms.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AxisNoise {
     /// `x`, `y`, `z`.
     pub axis: &'static str,
-    /// Ascending in the averaging time.
+    /// Ordered by averaging time.
     pub points: Vec<AllanPoint>,
-    /// Its terms.
     pub terms: NoiseTerms,
 }
 
 /// Noise densities of a rig for one sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct GivenNoise {
-    /// White noise.
     pub white: f64,
-    /// Random walk of the bias.
     pub random_walk: f64,
 }
 
-/// One sensor.
+/// Allan deviation of one sensor.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SensorNoise {
     /// `gyroscope` or `accelerometer`.
     pub sensor: &'static str,
     /// Unit of the samples.
     pub unit: &'static str,
-    /// Samples per second.
     pub rate_hz: f64,
-    /// Time covered by the samples that are used.
+    /// Time covered by the used samples, in seconds.
     pub covered_s: f64,
-    /// The axes.
     pub axes: Vec<AxisNoise>,
-    /// The terms of the mean variance of the axes: what a rig states.
+    /// Terms of the mean variance of the axes, as stated in a rig.
     pub terms: NoiseTerms,
-    /// Lines of a vibration while stationary.
+    /// Lines of the vibration while stationary, as text.
     pub vibration: Vec<String>,
     /// Shorter averaging times are not fitted: a low-pass filter of the sensor bends the mean deviation there.
     pub filtered_below_s: Option<f64>,
-    /// What the rig says.
+    /// Noise densities of the rig.
     pub given: Option<GivenNoise>,
 }
 
 impl SensorNoise {
-    /// Unit of the white noise density.
     pub fn density_unit(&self) -> String {
         format!("{}/√Hz", self.unit)
     }
 
-    /// Unit of the random walk of the bias.
     pub fn walk_unit(&self) -> &'static str {
         if self.sensor == "gyroscope" { "rad/s²/√Hz" } else { "m/s³/√Hz" }
     }
 }
 
-/// The noise of an IMU while stationary.
+/// Noise of an IMU while stationary.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AllanReport {
-    /// Path of the log.
     pub log: String,
-    /// Name of the rig, `None` without one.
+    /// Name of the rig; `None` without one.
     pub rig: Option<String>,
-    /// Topic of the IMU.
     pub topic: String,
-    /// Start and end of the stationary stretches, in seconds since the log began.
+    /// Start and end of the stationary stretches, in seconds since the log's start.
     pub stretches_s: Vec<(f64, f64)>,
-    /// Their length together.
+    /// Total length of the stretches, in seconds.
     pub stationary_s: f64,
-    /// Gyroscope and accelerometer; none when the stretches are too short.
+    /// Gyroscope and accelerometer; empty if the stretches are too short.
     pub sensors: Vec<SensorNoise>,
 }
 
 impl AllanReport {
-    /// Whether the stretches are long enough.
+    /// True if the stretches are long enough.
     pub fn is_measured(&self) -> bool {
         !self.sensors.is_empty()
     }
 
-    /// Length of the longest stretch.
+    /// Length of the longest stretch, in seconds.
     pub fn longest_s(&self) -> f64 {
         self.stretches_s.iter().map(|(begin, end)| end - begin).fold(0.0, f64::max)
     }
 }
 
-/// Measures the noise of a log's IMU in its stationary stretches between two times in seconds since the log began.
+/// Measures the noise of a log's IMU in its stationary stretches between two times in seconds since the log's start.
 ///
-/// Without a rig it is the log's only IMU, or the first one by name; `None` without any.
+/// Without a rig the IMU is the log's only one, or the first one by name; `None` without any.
 pub fn measure_noise(log: &FlightLog, rig: Option<&Rig>, span_s: (f64, f64)) -> Option<AllanReport> {
     let series = ImuSeries::of(log, rig)?;
     let report = measure(&series, rig, span_s);
@@ -266,8 +255,8 @@ fn sensor_noise(
     }
 }
 
-/// Whether lines of a vibration contribute to the mean variance of the axes at an averaging time: at most
-/// `2 rms²/(π f τ)²` of a sine of frequency `f`.
+/// True if lines of a vibration contribute to the mean variance of the axes at an averaging time: at most
+/// `2 rms²/(π f τ)²` for a sine of frequency `f`.
 fn is_shaken(point: &AllanVariance, lines: &[VibrationLine]) -> bool {
     let most = |line: &VibrationLine| {
         let periods = std::f64::consts::PI * line.frequency_hz * point.tau_s;
@@ -295,7 +284,7 @@ fn points(variances: &[AllanVariance], shaken: &[bool], phases: &[Phase], fit: O
     variances.iter().zip(shaken).map(point).collect()
 }
 
-/// The terms of a fit, and why others are missing.
+/// Terms of a fit, and the reasons that others are missing.
 fn noise_terms(
     variances: &[AllanVariance],
     fit: Option<&Fit>,
@@ -364,12 +353,13 @@ fn noise_terms(
     NoiseTerms { white, bias_instability, random_walk, quantization }
 }
 
-/// How long a stretch shows the minimum: four times the averaging time at which the rig's random walk equals white noise.
+/// Text with the stretch length that shows the minimum: eight times the averaging time at which the rig's random walk
+/// equals white noise.
 fn stretch_for_minimum(white: &NoiseTerm, given: Option<GivenNoise>, longest_s: f64) -> String {
     let minimum_s =
         white.value.zip(given).map(|(white, given)| 3.0_f64.sqrt() * white / given.random_walk.max(f64::MIN_POSITIVE));
     match minimum_s.map(|minimum_s| 2.0 * 4.0 * minimum_s).filter(|needed_s| *needed_s > longest_s) {
-        Some(needed_s) => format!("with the rig's random walk it takes one stretch of {needed_s:.0} s"),
-        None => format!("it takes a stretch longer than {longest_s:.0} s"),
+        Some(needed_s) => format!("the rig's random walk requires one stretch of {needed_s:.0} s"),
+        None => format!("this requires a stretch longer than {longest_s:.0} s"),
     }
 }

@@ -1,14 +1,14 @@
-//! The noise of an IMU as text, and as lines of a rig.
+//! Noise of an IMU as text, and as lines of a rig.
 
 use std::fmt::{Display, Formatter, Result, Write as _};
 
 use super::{AllanReport, NoiseTerm, NoiseTerms, SensorNoise};
 use crate::flight_log::printable;
 
-/// Stretches that are listed.
+/// Maximum number of listed stretches.
 const MAX_LISTED: usize = 6;
 
-/// A term by name, with its unit.
+/// Term with its name and unit.
 type NamedTerm = (&'static str, fn(&SensorNoise) -> String, fn(&NoiseTerms) -> &NoiseTerm);
 
 const TERMS: [NamedTerm; 4] = [
@@ -89,7 +89,7 @@ fn write_sensor(out: &mut Formatter<'_>, sensor: &SensorNoise) -> Result {
     Ok(())
 }
 
-/// A value without its standard deviation, or its limit.
+/// Value without its standard deviation, or the limit.
 fn short(term: &NoiseTerm) -> String {
     match (term.value, term.limit) {
         (Some(value), _) => format!("{value:.2e}"),
@@ -98,7 +98,7 @@ fn short(term: &NoiseTerm) -> String {
     }
 }
 
-/// `3.40e-4 ± 0.02e-4`: both in the same power of ten, so that they can be compared at a glance.
+/// `3.40e-4 ± 0.02e-4`: both with the same power of ten.
 pub(super) fn with_sigma(value: f64, sigma: f64) -> String {
     let power = value.abs().max(f64::MIN_POSITIVE).log10().floor();
     let scale = 10_f64.powf(power);
@@ -106,8 +106,8 @@ pub(super) fn with_sigma(value: f64, sigma: f64) -> String {
 }
 
 impl AllanReport {
-    /// The lines of a rig's `imu0`, in Kalibr's names; what is not identified keeps the rig's value, or is left as a comment
-    /// with its limit.
+    /// Lines of a rig's `imu0`, in Kalibr's names; a term that is not identified keeps the rig's value, or is written
+    /// as a comment with its limit.
     pub fn rig_lines(&self) -> String {
         let mut lines = String::from("imu0:\n");
         for sensor in self.sensors.iter().rev() {

@@ -1,4 +1,4 @@
-//! The samples of an IMU, gyroscope and accelerometer each at its own stamps.
+//! Samples of an IMU, gyroscope and accelerometer each with its own stamps.
 
 use nalgebra::Vector3;
 
@@ -8,7 +8,7 @@ use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::log_check::imu_facts::Stamped;
 use crate::sensors::Rig;
 
-/// Finite samples in the order of their stamps.
+/// Finite samples, ordered by stamp.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ImuSeries {
     pub(super) topic: String,
@@ -47,7 +47,7 @@ impl ImuSeries {
         Some(series)
     }
 
-    /// Brings the samples into the order of their stamps; what is not finite or repeats a stamp is left out.
+    /// Sorts the samples by stamp; samples that are not finite or repeat a stamp are removed.
     pub(super) fn order(&mut self) {
         for samples in [&mut self.rates, &mut self.forces] {
             let finite = |vector: &Vector3<f64>| vector.iter().all(|value| value.is_finite());

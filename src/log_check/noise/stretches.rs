@@ -1,4 +1,4 @@
-//! Stretches of a log in which the IMU does not move at all.
+//! Stationary stretches of a log.
 
 use nalgebra::Vector3;
 
@@ -8,31 +8,31 @@ use crate::log_check::imu_facts::{
 };
 use crate::log_check::statistics::{mean, median};
 
-/// Largest standard deviation of the smoothed angular rate beside that of its noise; a hovering vehicle has more.
+/// Largest standard deviation of the smoothed angular rate in addition to its noise; a hovering vehicle exceeds it.
 const RATE_RAD_PER_S: f64 = 0.003;
-/// The same of the specific force.
+/// Largest standard deviation of the smoothed specific force in addition to its noise.
 const FORCE_M_PER_S2: f64 = 0.03;
-/// Standard deviations by which smoothed noise may exceed its own.
+/// Tolerance of the smoothed noise, in standard deviations.
 const NOISE_SIGMAS: f64 = 2.0;
-/// Largest change of the mean angular rate from window to window beside that of noise.
+/// Largest change of the mean angular rate from window to window in addition to noise.
 const RATE_STEP_RAD_PER_S: f64 = 0.004;
-/// The same of the specific force: a tilt of 0.3°.
+/// Largest change of the mean specific force from window to window: a tilt of 0.3°.
 const FORCE_STEP_M_PER_S2: f64 = 0.05;
-/// The mean angular rate, bias included, is below this.
+/// Upper bound of the mean angular rate, bias included.
 const LARGEST_BIAS_RAD_PER_S: f64 = 0.08;
-/// Shorter stretches are not used.
+/// Minimum length of a stretch.
 const SHORTEST_NS: i64 = 3_000_000_000;
-/// A longer interval between two samples than this many periods is a gap.
+/// Number of periods between two samples from which the interval is a gap.
 const GAP_PERIODS: f64 = 1.5;
 
-/// One stationary window of half a second.
+/// Stationary window of half a second.
 struct Window {
     range_ns: (i64, i64),
     mean_rate: Vector3<f64>,
     mean_force: Vector3<f64>,
 }
 
-/// Start and end of the stretches in the order of time; the densities are those of white noise of both sensors.
+/// Start and end of the stretches in the order of time; the densities are those of the white noise of both sensors.
 pub(super) fn stationary_stretches(
     rates: &[Stamped],
     forces: &[Stamped],
@@ -41,7 +41,7 @@ pub(super) fn stationary_stretches(
 ) -> Vec<(i64, i64)> {
     let limit = |still: f64, density: f64| still.hypot(NOISE_SIGMAS * smoothed_white(density).sqrt());
     let (rate_limit, force_limit) = (limit(RATE_RAD_PER_S, densities[0]), limit(FORCE_M_PER_S2, densities[1]));
-    // The difference of two means of noise, per axis, at four standard deviations.
+    // Difference of two means of noise, per axis, at four standard deviations.
     let step = |still: f64, density: f64| still.hypot(4.0 * density * (2.0 / seconds_from_ns(WINDOW_NS)).sqrt());
     let (rate_step, force_step) = (step(RATE_STEP_RAD_PER_S, densities[0]), step(FORCE_STEP_M_PER_S2, densities[1]));
     let mut stretches: Vec<Vec<Window>> = vec![Vec::new()];
@@ -70,7 +70,7 @@ pub(super) fn stationary_stretches(
     }
     let ends = stretches.iter().filter_map(|windows| {
         let (first, last) = (windows.first()?.range_ns.0, windows.last()?.range_ns.1);
-        // Motion may have begun within the window before or after.
+        // Motion may have started within the adjacent windows.
         let begin_ns = if first > from_ns { first + SMOOTHING_NS } else { first };
         let end_ns = if last + WINDOW_NS <= to_ns { last - SMOOTHING_NS } else { last };
         (end_ns - begin_ns >= SHORTEST_NS).then_some((begin_ns, end_ns))
@@ -78,7 +78,7 @@ pub(super) fn stationary_stretches(
     ends.collect()
 }
 
-/// The samples of the stretches without gaps, and their period in seconds.
+/// Samples of the stretches, split at gaps, and their period in seconds.
 pub(super) fn evenly_sampled(samples: &[Stamped], stretches: &[(i64, i64)]) -> (Vec<Vec<Vector3<f64>>>, f64) {
     let within = |range: &(i64, i64)| {
         let before = |time_ns: i64| samples.partition_point(|(stamp_ns, _)| *stamp_ns < time_ns);

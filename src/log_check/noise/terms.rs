@@ -1,54 +1,53 @@
 //! Noise terms fitted to an Allan deviation.
 //!
-//! `σ²(τ) = 3 Q²/τ² + N²/τ + (2 ln 2/π) B² + K² τ/3` (IEEE Std 952, annex C), by weighted least squares over octaves of τ,
-//! whose estimates are nearly independent. The relative variance of a point is `2/edf`, with the degrees of freedom of the
-//! noise that dominates there. Terms that are not significant are taken out of the sum.
+//! `σ²(τ) = 3 Q²/τ² + N²/τ + (2 ln 2/π) B² + K² τ/3` (IEEE Std 952, annex C), by weighted least squares over octaves of
+//! τ, whose estimates are nearly independent. The relative variance of a point is `2/edf`, with the degrees of freedom
+//! of the noise that dominates there. Terms that are not significant are removed from the sum.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::allan::{AllanVariance, NoiseKind, Phase, degrees_of_freedom};
 
-/// Standard deviation of `√σ²` by which no sensor follows the sum of terms exactly: filters, temperature.
+/// Relative standard deviation of `√σ²` due to errors of the model: filters, temperature.
 const MODEL_ERROR: f64 = 0.02;
-/// A term is identified when the points are this many standard deviations off the others without it; with few degrees of
-/// freedom they have long tails.
+/// A term is identified if the fit without it is worse by this many standard deviations; with few degrees of freedom
+/// the points have long tails.
 const SIGNIFICANT: f64 = 4.0;
-/// Quantization must make up this part of the variance at the shortest τ: filters of a sensor bend the curve there.
+/// Minimum ratio of quantization in the variance at the shortest τ: filters of a sensor bend the curve there.
 const QUANTIZATION_RATIO: f64 = 0.3;
-/// The sum of terms never falls more steeply at a longer averaging time. Where the slope of the variance does by more than this
-/// (and by more than chance), the shorter averaging times belong to a low-pass filter.
+/// The slope of the sum of terms never decreases with the averaging time. If the slope of the variance decreases by
+/// more than this (and by more than chance), the shorter averaging times belong to a low-pass filter.
 const FILTER_BEND: f64 = 0.35;
-/// Slopes with a larger standard deviation do not show a filter.
+/// Slopes with a larger standard deviation are not tested for a filter.
 const CLEAR_SLOPE: f64 = 0.15;
 /// Factor on the standard deviations of flicker noise and random walk: the estimates of adjacent octaves are correlated there
 /// (found by simulation, tested).
 const CORRELATED: f64 = 1.4;
-/// Refinements of weights and degrees of freedom.
+/// Iterations of weights and degrees of freedom.
 const ROUNDS: usize = 4;
-/// `B²` has this factor in the variance, the square of 0.664.
+/// Factor of `B²` in the variance, the square of 0.664.
 const FLICKER_FACTOR: f64 = 2.0 * std::f64::consts::LN_2 / std::f64::consts::PI;
 
-/// The terms in the order of their slopes.
+/// Terms in the order of their slopes.
 pub(super) const KINDS: [NoiseKind; 4] =
     [NoiseKind::Quantization, NoiseKind::White, NoiseKind::Flicker, NoiseKind::RandomWalk];
 
-/// A coefficient with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Coefficient {
     pub(super) value: f64,
     pub(super) sigma: f64,
 }
 
-/// The fitted sum of terms.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Fit {
-    /// `3 Q²`, `N²`, `0.664² B²` and `K²/3` with their standard deviations; `None` for terms that are not significant. Behind
-    /// a filter the first one is negative: white noise through a low-pass filter has the variance `N²/τ − c/τ²` where τ is
-    /// long against its response, with `c = 1.5 N² T` for one of first order with the time constant `T`.
+    /// `3 Q²`, `N²`, `0.664² B²` and `K²/3` with their standard deviations; `None` for terms that are not significant.
+    /// Above the averaging times of a filter the first one is negative: white noise through a low-pass filter has the
+    /// variance `N²/τ − c/τ²` if τ is long compared with its response, with `c = 1.5 N² T` for a first-order filter
+    /// with the time constant `T`.
     pub(super) coefficients: [Option<Coefficient>; 4],
-    /// Which points were used, by their index.
+    /// Indices of the used points.
     pub(super) used: Vec<usize>,
-    /// Averaging times below this one were left out: a filter of the sensor bends the curve there.
+    /// Excluded averaging times are below this one: a filter of the sensor bends the curve there.
     pub(super) filtered_below_s: Option<f64>,
 }
 
@@ -57,7 +56,7 @@ fn power(kind: usize, tau_s: f64) -> f64 {
 }
 
 impl Fit {
-    /// The variance of the model at an averaging time.
+    /// Variance of the model at an averaging time.
     pub(super) fn variance(&self, tau_s: f64) -> f64 {
         self.coefficients
             .iter()
@@ -66,19 +65,19 @@ impl Fit {
             .sum()
     }
 
-    /// Whether the model holds at an averaging time.
+    /// True if the model is valid at an averaging time.
     pub(super) fn covers(&self, tau_s: f64) -> bool {
         self.filtered_below_s.is_none_or(|below_s| tau_s >= below_s)
     }
 
-    /// The term that dominates at an averaging time; white noise without any.
+    /// Dominant term at an averaging time; white noise without any.
     pub(super) fn dominant(&self, tau_s: f64) -> NoiseKind {
         let size = |kind: usize| self.coefficients[kind].map_or(0.0, |found| found.value * power(kind, tau_s));
         let largest = (0..KINDS.len()).fold(1, |best, kind| if size(kind) > size(best) { kind } else { best });
         KINDS[largest]
     }
 
-    /// A term in its own unit: `Q`, `N`, `B` or `K`.
+    /// Term in its own unit: `Q`, `N`, `B` or `K`.
     pub(super) fn term(&self, kind: NoiseKind) -> Option<Coefficient> {
         let index = KINDS.iter().position(|known| *known == kind)?;
         let Coefficient { value, sigma } = self.coefficients[index].filter(|found| found.value > 0.0)?;
@@ -118,7 +117,6 @@ impl Fit {
         Some(fit)
     }
 
-    /// Sign of a coefficient.
     fn sign(&self, kind: usize) -> f64 {
         if kind == 0 && self.filtered_below_s.is_some() { -1.0 } else { 1.0 }
     }
@@ -131,8 +129,8 @@ impl Fit {
         Some(())
     }
 
-    /// The fit without its least significant term, if there is one: without it the points are explained as well, by the
-    /// weights of that smaller model. (A large term has large standard deviations at its own averaging times.)
+    /// The fit without its least significant term; `None` if all terms are significant. Both fits are compared with the
+    /// weights of the smaller model. (A large term has large standard deviations at its own averaging times.)
     fn without_least_significant(
         &self,
         points: &[AllanVariance],
@@ -148,7 +146,7 @@ impl Fit {
             let mut reduced = Self { coefficients: [None; 4], ..self.clone() };
             reduced.refine(points, stretches, &left)?;
             let part = self.coefficients[*kind]?.value * power(*kind, shortest);
-            // Without curvature of its own at the shortest τ it is a filter's.
+            // A term without separate curvature at the shortest τ is due to a filter.
             let is_filter = *kind == 0 && part >= 0.0 && part < QUANTIZATION_RATIO * self.variance(shortest);
             let chi2 = |model: &Self| -> f64 {
                 let score = |index: &usize| {
@@ -170,7 +168,7 @@ impl Fit {
         self.variance(point.tau_s).max(0.05 * point.variance) * (2.0 / freedom + (2.0 * MODEL_ERROR).powi(2)).sqrt()
     }
 
-    /// One weighted least-squares solution over some terms, all of them with the right sign.
+    /// One weighted least-squares solution over some terms, all with the right sign.
     fn solve(
         &mut self,
         points: &[AllanVariance],
@@ -205,7 +203,7 @@ impl Fit {
     }
 }
 
-/// How many of the used points, the shortest first, come before a steeper part of the curve.
+/// Number of the shortest averaging times that precede a steeper part of the curve.
 fn filtered_points(points: &[AllanVariance], used: &[usize], stretches: &[Phase], axes: usize) -> usize {
     let relative_variance = |point: &AllanVariance| {
         2.0 / (degrees_of_freedom(stretches, point.count, NoiseKind::White).max(1.0) * axes as f64)
@@ -223,11 +221,11 @@ fn filtered_points(points: &[AllanVariance], used: &[usize], stretches: &[Phase]
     slopes[..steepest].iter().rposition(bends).map_or(0, |last| last + 1)
 }
 
-/// Least squares without negative unknowns: the best of all subsets of the columns whose solution is not negative. The
-/// covariance is that of all columns.
+/// Nonnegative least squares: the best of all subsets of the columns whose solution is not negative. The covariance is
+/// that of all columns.
 fn nonnegative(design: &DMatrix<f64>, target: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
     let columns = design.ncols();
-    // Columns of one scale keep the normal equations well conditioned.
+    // Columns are scaled to keep the normal equations well conditioned.
     let scales: Vec<f64> = (0..columns).map(|column| design.column(column).norm().max(f64::MIN_POSITIVE)).collect();
     let scaled = DMatrix::from_fn(design.nrows(), columns, |row, column| design[(row, column)] / scales[column]);
     let normal = scaled.tr_mul(&scaled);

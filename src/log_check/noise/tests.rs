@@ -1,4 +1,4 @@
-//! Noise of known densities, found again.
+//! Identification of known noise densities.
 
 use nalgebra::Vector3;
 
@@ -9,7 +9,7 @@ use crate::sensors::{ImuIntrinsics, ImuNoise, ImuRig, Rig};
 
 const RATE_HZ: f64 = 100.0;
 
-/// A normally distributed number, by Box and Muller.
+/// Normal random number, by Box and Muller.
 pub(super) fn normal(random: &mut SplitMix64) -> f64 {
     let radius = (-2.0 * (1.0 - random.next_unit()).ln()).sqrt();
     radius * (std::f64::consts::TAU * random.next_unit()).cos()
@@ -49,7 +49,7 @@ fn series(seed: u64, parts_s: &[(f64, f64)], moving: bool, gyroscope: Truth, acc
             *noise += (white - *noise) * passed;
             let mut value = *bias + *noise + line + Vector3::repeat(motion);
             if truth.step > 0.0 {
-                // The integral in whole steps, as sensors that sum up deliver it.
+                // Integral in whole steps, as output by integrating sensors.
                 let sum: &mut Vector3<f64> = &mut sums[sensor];
                 let before = sum.map(|entry| (entry / truth.step).round());
                 *sum += value / RATE_HZ;
@@ -139,7 +139,7 @@ fn a_term_that_does_not_show_is_limited_with_the_stretch_that_it_takes() {
 
 #[test]
 fn the_stretch_that_is_asked_for_shows_the_random_walk() {
-    // White noise and walk of a ratio that takes 20 N/K = 100 s.
+    // White noise and random walk with 20 N/K = 100 s.
     let truth = Truth { white: 3e-4, walk: 6e-5, ..Truth::default() };
     let shown = |seconds: f64| {
         (1..=8)
@@ -152,7 +152,7 @@ fn the_stretch_that_is_asked_for_shows_the_random_walk() {
 
 #[test]
 fn quantization_is_a_slope_of_minus_one() {
-    // Well below the increments between samples the errors of two sums would be correlated.
+    // Far below the increments between samples: otherwise the errors of two sums would be correlated.
     let step = 6e-5;
     let coarse = Truth { white: 3e-4, walk: 0.0, step, ..Truth::default() };
     let report = report(5, 120.0, coarse, ACCELEROMETER);
@@ -207,7 +207,7 @@ fn several_stretches_between_motion_are_found_and_combined() {
     }
     assert!(score(&report.sensors[0].terms.white, GYROSCOPE.white).abs() < 3.5);
     assert!(score(&report.sensors[1].terms.white, ACCELEROMETER.white).abs() < 3.5);
-    // Up to 40 s only, and none that is long enough.
+    // Up to 40 s only; then a range without a stretch that is long enough.
     assert_eq!(measure(&series, None, (0.0, 42.0)).stretches_s.len(), 1);
     assert!(!measure(&series, None, (41.0, 52.0)).is_measured());
 }

@@ -1,9 +1,9 @@
-//! Other meanings of a gimbal's attitude than the rig's.
+//! Alternative interpretations of a gimbal's attitude.
 
 use crate::flight_log::rig::attitude::entries;
 use crate::sensors::{AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, BodyAxes, GimbalRig, NamedAxes};
 
-/// Other meanings of a source that differ in one respect, by respect.
+/// Interpretations that differ from `source` in one property, grouped by property.
 pub(super) fn changes(source: &AttitudeSource, has_vehicle: bool) -> Vec<Vec<AttitudeSource>> {
     let with = |change: &dyn Fn(&mut AttitudeSource)| {
         let mut other = source.clone();
@@ -68,7 +68,7 @@ pub(super) fn changes(source: &AttitudeSource, has_vehicle: bool) -> Vec<Vec<Att
     all
 }
 
-/// All orders of the numbers below one of at most three.
+/// All permutations of the numbers below `count`, which is at most three.
 fn permutations(count: usize) -> Vec<Vec<usize>> {
     let mut all: Vec<Vec<usize>> = vec![Vec::new()];
     for _ in 0..count {
@@ -81,7 +81,7 @@ fn permutations(count: usize) -> Vec<Vec<usize>> {
     all
 }
 
-/// The entries of `gimbal.source` in which another meaning differs.
+/// Entries of `gimbal.source` in which another interpretation differs.
 pub(super) fn difference(gimbal: &GimbalRig, source: &AttitudeSource, other: &AttitudeSource) -> String {
     let topic = gimbal.topic.as_deref().unwrap_or_default();
     let (given, other) = (entries(topic, source), entries(topic, other));

@@ -1,5 +1,5 @@
-//! The meaning of a gimbal's attitude against the rotations in the images: frame, axes, order, signs, unit and time offset that
-//! predict them, when the rig's do not.
+//! Interpretation of a gimbal's attitude checked by the rotations in the images: frame, axes, order, signs, unit and
+//! time offset that predict them, if those of the rig do not.
 
 mod meanings;
 #[cfg(test)]
@@ -17,61 +17,63 @@ use super::{Area, Findings, ImageRotation, Severity};
 use crate::geometry::{ns_from_seconds, principal_angle, so3};
 use crate::sensors::{AttitudeSource, CameraMount, GimbalRig, Rig};
 
-/// Consecutive image rotations that are joined to one: over a third of a second attitudes of 10 Hz predict more than their errors.
+/// Consecutive image rotations that are joined to one: over a third of a second the rotation exceeds the errors of
+/// attitudes at 10 Hz.
 const JOINED: usize = 6;
 /// Minimum number of joined rotations.
 const MIN_SPANS: usize = 20;
-/// Smallest median rotation of camera or vehicle over such a time that tells one meaning from another.
+/// Minimum median rotation of camera or vehicle over such an interval that distinguishes interpretations.
 const MIN_ROTATION_RAD: f64 = 0.02;
-/// A meaning fits when its misfit is below this ratio of the rotation.
+/// An interpretation fits if its misfit is below this ratio of the rotation.
 const FITTING_RATIO: f64 = 0.25;
-/// Another meaning is preferred when its misfit is below this ratio of the rig's.
+/// Another interpretation is preferred if its misfit is below this ratio of the rig's.
 const BETTER_RATIO: f64 = 0.6;
-/// Time offsets (`t_imu = t_gimbal + shift`) beyond the rig's with which every meaning is tried: delays of gimbals reach 0.2 s.
+/// Time offsets (`t_imu = t_gimbal + shift`) beyond the rig's with which every interpretation is tried: delays of
+/// gimbals reach 0.2 s.
 const COARSE_SHIFTS_S: [f64; 5] = [0.0, -0.05, -0.1, -0.15, -0.2];
 /// Range and step of the search for the time offset.
 const MAX_SHIFT_S: f64 = 0.3;
 const SHIFT_STEP_S: f64 = 0.01;
-/// Time offset that is reported: gimbals at 50 Hz stamp no better.
+/// Smallest reported time offset: stamps of gimbals at 50 Hz are no more accurate.
 const SHIFT_TOLERANCE_S: f64 = 0.01;
-/// Offset of the first joint that is reported.
+/// Smallest reported offset of the first joint.
 const OFFSET_TOLERANCE_RAD: f64 = 0.026;
-/// Minimum relative decrease of the squared misfit by an offset of time or of a joint.
+/// Minimum relative decrease of the squared misfit by a time offset or a joint offset.
 const MIN_GAIN: f64 = 0.2;
 
-/// What was found to be right in place of the rig's.
+/// Interpretation that fits the images, in place of the rig's.
 pub(super) struct FittedSource {
     pub(super) source: AttitudeSource,
     pub(super) timeshift_s: f64,
 }
 
-/// A joined rotation of the camera.
+/// Joined rotation of the camera.
 struct Span {
-    /// On the clock of the IMU.
+    /// In IMU time.
     from_ns: i64,
     to_ns: i64,
-    /// Measured rotation vector, second from first image.
+    /// Rotation vector measured from the images, second from first, in radians.
     measured: Vector3<f64>,
     /// Rotation of the IMU, second from first.
     of_imu: UnitQuaternion<f64>,
 }
 
-/// The rotations of the gimbal camera and the attitudes that should predict them.
+/// Rotations of the gimbal camera and the attitudes that predict them.
 struct SourceFit<'a> {
     attitude: &'a AttitudeSurvey,
     spans: Vec<Span>,
-    /// What the rig's offset of the first joint does to an orientation.
+    /// Rotation of an orientation by the rig's offset of the first joint.
     offset: UnitQuaternion<f64>,
 }
 
-/// A meaning with its misfit in radians, at the time offset at which it is least.
+/// Interpretation with its misfit in radians, at the best time offset.
 #[derive(Clone)]
 struct Meaning {
     source: AttitudeSource,
     misfit_rad: f64,
 }
 
-/// Compares the rig's source with others; returns what fits better, if anything.
+/// Compares the rig's source with alternatives; returns the one that fits, or `None`.
 pub(super) fn check_source(
     survey: &Survey,
     rig: &Rig,
@@ -100,7 +102,7 @@ pub(super) fn check_source(
     let listed = listed(gimbal, source, &given, &others);
     let fits = best.misfit_rad < FITTING_RATIO * rotation_rad;
     if !fits {
-        let title = "no meaning of gimbal.source predicts the rotations in the images";
+        let title = "no interpretation of gimbal.source predicts the rotations in the images";
         let evidence = format!("rotations of {:.2}° in the median; {listed}", rotation_rad.to_degrees());
         let remedy =
             "check its topic, the stamps, and gimbal_axes and imu_axes; then the findings on time and intrinsics";
@@ -116,7 +118,7 @@ pub(super) fn check_source(
     );
     if better {
         let changes = difference(gimbal, source, &chosen.source);
-        let title = format!("gimbal.source means another attitude than the rig says: {changes}");
+        let title = format!("gimbal.source is wrong; correct values: {changes}");
         let remedy = format!("set {changes} in gimbal.source");
         findings.add(Severity::Error, Area::Encoders, title, evidence, remedy);
     } else {
@@ -127,7 +129,7 @@ pub(super) fn check_source(
     Some(FittedSource { source: chosen.source, timeshift_s })
 }
 
-/// Joins consecutive rotations, from every image on, where the IMU covers them.
+/// Joins consecutive rotations, starting at every image, if the IMU covers them.
 fn spans(rotations: &[&ImageRotation], timeshift_s: f64, imu_facts: &ImuFacts) -> Vec<Span> {
     let shift_ns = ns_from_seconds(timeshift_s);
     let joined = |few: &[&ImageRotation]| {
@@ -142,8 +144,8 @@ fn spans(rotations: &[&ImageRotation], timeshift_s: f64, imu_facts: &ImuFacts) -
 }
 
 impl SourceFit<'_> {
-    /// The larger of the median rotations of camera and IMU: a stabilized camera hardly rotates, but a wrong meaning says that it
-    /// does.
+    /// The larger of the median rotations of camera and IMU: a stabilized camera hardly rotates, but a wrong
+    /// interpretation predicts that it does.
     fn rotation_rad(&self) -> f64 {
         let of_camera: Vec<f64> = self.spans.iter().map(|span| span.measured.norm()).collect();
         let of_imu: Vec<f64> = self.spans.iter().map(|span| span.of_imu.angle()).collect();
@@ -155,7 +157,7 @@ impl SourceFit<'_> {
         self.misfit_with(source, shift_s, &self.offset)
     }
 
-    /// The same with another rotation about the axis of the first joint.
+    /// [`Self::misfit`] with another rotation about the axis of the first joint.
     fn misfit_with(&self, source: &AttitudeSource, shift_s: f64, first_joint: &UnitQuaternion<f64>) -> f64 {
         let shift_ns = ns_from_seconds(shift_s);
         let difference = |span: &Span| {
@@ -164,7 +166,7 @@ impl SourceFit<'_> {
             Some((so3::log(&(to.inverse() * span.of_imu * from)) - span.measured).norm())
         };
         let differences: Vec<f64> = self.spans.iter().filter_map(difference).collect();
-        // A meaning for which most times are lacking (no heading, frames that alternate) is none.
+        // An interpretation without a value at most times (no heading, alternating frames) is rejected.
         if differences.len() * 2 < self.spans.len() { f64::INFINITY } else { median(&differences) }
     }
 
@@ -174,7 +176,7 @@ impl SourceFit<'_> {
         Meaning { source: source.clone(), misfit_rad }
     }
 
-    /// The meanings that differ from one in one respect, those of each respect together.
+    /// Interpretations that differ from `source` in one property, grouped by property.
     fn single_changes(&self, source: &AttitudeSource, given_s: f64) -> Vec<Vec<Meaning>> {
         let of = |sources: Vec<AttitudeSource>| {
             sources.iter().map(|source| self.best_shift(source, given_s)).collect::<Vec<_>>()
@@ -182,11 +184,12 @@ impl SourceFit<'_> {
         changes(source, self.attitude.has_vehicle()).into_iter().map(of).collect()
     }
 
-    /// The meaning with the least misfit among one, its single changes, and changes of each of the better of those.
+    /// Interpretation with the least misfit among the given one, its single changes, and second changes of the best of
+    /// these.
     fn best_of(&self, given: &Meaning, others: &[Vec<Meaning>], given_s: f64) -> Meaning {
-        /// Single changes from which a second one is tried.
+        /// Number of single changes from which a second one is tried.
         const FOLLOWED: usize = 12;
-        /// Equal meanings in other words differ by rounding; the one with fewer changes is kept.
+        /// Equivalent interpretations differ by rounding errors; the one with fewer changes is kept.
         const CLEARLY: f64 = 0.95;
         let clearly_better = |best: Meaning, other: &Meaning| {
             if other.misfit_rad < CLEARLY * best.misfit_rad { other.clone() } else { best }
@@ -201,7 +204,7 @@ impl SourceFit<'_> {
         best
     }
 
-    /// The time offset of the gimbal at which the misfit is least, in seconds.
+    /// Time offset of the gimbal with the least misfit, in seconds.
     fn check_shift(&self, chosen: &Meaning, given_s: f64, findings: &mut Findings) -> f64 {
         let steps = (MAX_SHIFT_S / SHIFT_STEP_S).round() as i32;
         let cost = |step: i32| {
@@ -229,7 +232,7 @@ impl SourceFit<'_> {
         shift_s
     }
 
-    /// An offset of the first joint that decreases the misfit: a yaw that is measured from another direction.
+    /// Reports an offset of the first joint that decreases the misfit: a yaw relative to another direction.
     fn check_first_joint(&self, chosen: &Meaning, shift_s: f64, gimbal: &GimbalRig, findings: &mut Findings) {
         let given_rad = chosen.source.first_joint_offset_rad;
         let cost = |change_rad: f64| {
@@ -262,13 +265,13 @@ impl SourceFit<'_> {
     }
 }
 
-/// The rotation about the axis of the first joint in the IMU frame.
+/// Rotation about the axis of the first joint in the IMU frame.
 fn about_first_joint(gimbal: &GimbalRig, angle_rad: f64) -> UnitQuaternion<f64> {
     let axis = Unit::new_normalize(gimbal.chain.imu_from_base.rotation * Vector3::z());
     UnitQuaternion::from_axis_angle(&axis, angle_rad)
 }
 
-/// The misfits of the rig's meaning and of the best change in each respect.
+/// Misfits of the rig's interpretation and of the best change of each property.
 fn listed(gimbal: &GimbalRig, source: &AttitudeSource, given: &Meaning, others: &[Vec<Meaning>]) -> String {
     let degrees = |misfit_rad: f64| {
         if misfit_rad.is_finite() { format!("{:.2}°", misfit_rad.to_degrees()) } else { "not defined".to_owned() }

@@ -1,5 +1,5 @@
-//! A flight whose gimbal records its attitude, with rotations of the camera as the images would show them, checked against
-//! rigs that say what the attitude means rightly and wrongly.
+//! Flight with recorded gimbal attitudes and image rotations of the camera, checked against rigs with right and wrong
+//! interpretations of the attitude.
 
 use std::path::Path;
 
@@ -55,22 +55,22 @@ fn rate_at(time_s: f64) -> Vector3<f64> {
     Vector3::new(0.5 * (1.1 * time_s).cos(), 0.4 * (1.7 * time_s).sin(), 0.3 + 0.4 * (0.7 * time_s).sin())
 }
 
-/// The joint angles: a part of the vehicle's rotation is compensated.
+/// Joint angles that compensate a part of the vehicle's rotation.
 fn angles_at(time_s: f64) -> [f64; 3] {
     [0.4 + 0.5 * (0.8 * time_s).sin(), 0.25 * (1.3 * time_s).sin(), -0.7 + 0.4 * (0.9 * time_s).cos()]
 }
 
-/// What is recorded, from `flu_from_gimbal` and the vehicle's attitude in ENU.
+/// Writes a gimbal attitude, from `flu_from_gimbal` and the vehicle's attitude in ENU.
 type Recorded = fn(&mut LogWriter, MessageTimes, UnitQuaternion<f64>, UnitQuaternion<f64>);
 
-/// The log in a folder, with the rotations of the camera.
+/// Writes the log to a folder; returns it with the rotations of the camera.
 fn recorded(folder: &Path, delay_ms: i64, write: Recorded) -> (FlightLog, Vec<ImageRotation>) {
     let path = folder.join("flight.mcap");
     let mut writer = LogWriter::create(&path, &LogWriterOptions::default()).unwrap();
     let mut noise = Noise(3);
     let chain = rig_with("{topic: /g, type: quaternion, frame: body, axes: flu}").gimbal.unwrap().chain;
     let mut attitude = so3::exp(&Vector3::new(0.1, -0.05, 2.1));
-    // By millisecond: the attitude of the vehicle, and imu_from_camera.
+    // Attitude of the vehicle and imu_from_camera, per millisecond.
     let mut history: Vec<(UnitQuaternion<f64>, UnitQuaternion<f64>)> = Vec::new();
     for millisecond in 0..DURATION_MS {
         let time_s = seconds_from_ns(millisecond * MS);
@@ -141,7 +141,7 @@ fn write_earth_ned(
     writer.write_rotation("/gimbal", "earth", times, &rotation).unwrap();
 }
 
-/// The angles about z, y and x in FRD in degrees: pitch, roll, yaw.
+/// Writes the Euler angles about z, y and x in FRD, in degrees and in the order pitch, roll, yaw.
 fn write_euler(writer: &mut LogWriter, times: MessageTimes, gimbal: UnitQuaternion<f64>, _: UnitQuaternion<f64>) {
     let (roll, pitch, yaw) = in_frd(gimbal).euler_angles();
     // A header with an empty frame, filled up to a multiple of eight bytes, and three numbers.
@@ -155,7 +155,7 @@ fn write_euler(writer: &mut LogWriter, times: MessageTimes, gimbal: UnitQuaterni
 }
 
 const GOOD: &str = "gimbal.source predicts the rotations in the images";
-const WRONG: &str = "gimbal.source means another attitude than the rig says: ";
+const WRONG: &str = "gimbal.source is wrong; correct values: ";
 
 #[test]
 fn frame_and_axes_of_quaternions_are_found() {
@@ -209,7 +209,7 @@ fn delays_and_offsets_of_the_attitude_are_measured() {
     }
     expect(write_earth_ned, 100, earth, Severity::Warning, &["time offset of /gimbal to the IMU: -", delayed]);
     expect(write_earth_ned, 0, earth, Severity::Good, &["/gimbal and the images are synchronized"]);
-    // A yaw that counts from another direction, by 20°.
+    // Yaw relative to another direction, by 20°.
     let turned: Recorded = |writer, times, gimbal, attitude| {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 20_f64.to_radians());
         write_body_frd(writer, times, turn * gimbal, attitude);
@@ -230,5 +230,11 @@ fn an_attitude_of_something_else_fits_in_no_way() {
         writer.write_rotation("/gimbal", "body", times, &rotation).unwrap();
     };
     let source = "{topic: /gimbal, type: quaternion, frame: body, axes: frd}";
-    expect(other, 0, source, Severity::Warning, &["no meaning of gimbal.source predicts the rotations in the images"]);
+    expect(
+        other,
+        0,
+        source,
+        Severity::Warning,
+        &["no interpretation of gimbal.source predicts the rotations in the images"],
+    );
 }

@@ -1,4 +1,5 @@
-//! Suggested excitation: candidate motions from here, linearized, and the σ that each leaves of the least observable direction.
+//! Suggested excitation: candidate motions from the present state, linearized, with the σ of the least observable
+//! direction after each.
 
 use std::fmt;
 
@@ -41,15 +42,15 @@ const MIN_SWING_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// The vehicle's velocity at the start decays with this time constant, in seconds.
 const BRAKING_S: f64 = 0.8;
 
-/// Candidate motions by the σ that they leave of the least observable direction.
+/// Candidate motions, sorted by the σ of the least observable direction after each.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Advice {
     /// The least observable direction among those that some motion constrains.
     #[serde(rename = "weakest")]
     pub least_observable: WeakDirection,
-    /// Every candidate, the best one first.
+    /// Best candidate first.
     pub candidates: Vec<CandidateReport>,
-    /// Duration of each, in seconds.
+    /// Duration of each candidate, in seconds.
     pub duration_s: f64,
 }
 
@@ -58,16 +59,15 @@ pub struct Advice {
 pub struct WeakDirection {
     /// Names of the columns.
     pub names: Vec<String>,
-    /// Weight of each column in the unit direction, in units of 10° and 3 cm.
+    /// Weights of the unit direction (one per column), in units of 10° and 3 cm.
     pub weights: Vec<f64>,
-    /// Standard deviation along it, in the same units.
+    /// Standard deviation along the direction, in the same units.
     pub sigma: f64,
     /// The parameter with the largest weight.
     pub leading: String,
     /// Standard deviation of the leading parameter that corresponds to one σ along the direction, in radians or
     /// metres.
     pub leading_sigma: f64,
-    /// Dimension of the leading parameter.
     #[serde(rename = "unit")]
     pub dimension: Dimension,
 }
@@ -75,13 +75,12 @@ pub struct WeakDirection {
 /// A candidate motion with the predicted σ.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CandidateReport {
-    /// Description of the motion.
+    /// Motion as an instruction.
     pub words: String,
     /// Predicted standard deviation along the least observable direction after the motion.
     pub sigma_after: f64,
     /// Ratio of the predicted to the present standard deviation.
     pub remaining: f64,
-    /// The motion of vehicle and joint.
     #[serde(skip)]
     pub exercise: Exercise,
 }
@@ -236,7 +235,7 @@ fn forward_of(world_from_imu: &RigidTransform) -> Vector3<f64> {
     ahead.try_normalize(1e-6).unwrap_or_else(Vector3::x)
 }
 
-/// Pose and velocity during a candidate: the vehicle tilts like a multirotor to accelerate (without drag).
+/// Pose and velocity during a candidate: the vehicle tilts like a multirotor to accelerate (no drag).
 fn navigation_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> NavigationState {
     const STEP_S: f64 = 1e-3;
     let at = |steps: f64| position_at(situation, exercise, time_s + steps * STEP_S);
@@ -315,8 +314,8 @@ fn landmarks(situation: &Situation, poses: &[RigidTransform]) -> Vec<Hypothetica
     landmarks
 }
 
-/// Whether the estimator makes a keyframe of any frame after the first, by parallax or by new features. A
-/// camera that hardly translates makes none, whatever its gimbal does, and its observations are dropped.
+/// True if the estimator makes a keyframe of any frame after the first, by parallax or by new features. A camera that
+/// hardly translates makes none, whatever the motion of its gimbal, and its observations are dropped.
 fn makes_keyframes(landmarks: &[HypotheticalLandmark], poses: &[RigidTransform]) -> bool {
     let options = EstimatorOptions::default();
     let is_keyframe = |slot: usize| {
@@ -365,7 +364,7 @@ fn words(exercise: &Exercise, joints: &[LaboratoryJoint]) -> String {
 }
 
 impl Advice {
-    /// The best candidate and its effect in one line:
+    /// Best candidate and its effect in one line:
     /// `roll gimbal ±15°, hover for 4 s → σ(L3.d, with L3.a) 1.68 → 1.26 mm`.
     pub fn sentence(&self) -> Option<String> {
         self.candidates.first().map(|best| self.line(best))

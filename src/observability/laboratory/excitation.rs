@@ -11,33 +11,30 @@ use crate::estimator::{HypotheticalFrame, HypotheticalLandmark, HypotheticalWind
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{Chain, ParameterNames};
 
-/// Information gain of a window by parameter and by motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Excitation {
-    /// The motions: translations along and rotations about the body's axes, then the joints.
+    /// Translations along and rotations about the body's axes, then the joints.
     pub motions: Vec<String>,
-    /// Each parameter.
     pub parameters: Vec<ParameterExcitation>,
-    /// Length of the window.
+    /// Length of the window, in seconds.
     pub duration_s: f64,
 }
 
 /// Information gain of one parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterExcitation {
-    /// Its name.
     pub name: String,
     /// Gain beyond the prior in bits per second: one bit halves the standard deviation.
     pub bits_per_s: f64,
-    /// Loss of that gain without each motion.
+    /// Decrease of that gain without each motion.
     pub by_motion: Vec<f64>,
 }
 
-/// Returns the information gain of a window by parameter and second beyond a prior of 10° and 3 cm, and its
-/// loss without each motion: the window is linearized again without that motion, with the same landmarks and
-/// observations. `None` for windows without duration or finite numbers.
+/// Returns the information gain of a window by parameter and second beyond a prior of 10° and 3 cm, and its decrease
+/// without each motion: the window is linearized again without that motion, with the same landmarks and observations.
+/// `None` for windows without duration or finite numbers.
 ///
-/// The losses need not add up to the gain: two motions may constrain the same parameter alone, or only together.
+/// The decreases need not add up to the gain: two motions may each constrain the same parameter, or only both together.
 pub fn excitation(
     window: &HypotheticalWindow,
     chain: &Chain,

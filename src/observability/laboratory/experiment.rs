@@ -1,4 +1,4 @@
-//! One experiment: a mechanism in a motion, its window linearized and analysed in several forms.
+//! One experiment: a mechanism in a motion; its window is linearized and analysed in several parameterizations.
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -19,19 +19,18 @@ use crate::sensors::ImuNoise;
 /// A parameterization of the mechanism, with or without its joint offsets as columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct LaboratoryForm {
-    /// The parameterization of the chain.
     pub parameterization: Parameterization,
-    /// Whether the joint offsets are estimated.
+    /// True if the joint offsets are estimated.
     pub joint_offsets: bool,
 }
 
 impl LaboratoryForm {
-    /// The form with its offsets.
+    /// The parameterization with its joint offsets.
     pub const fn whole(parameterization: Parameterization) -> Self {
         Self { parameterization, joint_offsets: true }
     }
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub fn name(self) -> String {
         let suffix = if self.joint_offsets { "" } else { "-without-offsets" };
         format!("{}{suffix}", self.parameterization)
@@ -59,43 +58,34 @@ impl std::str::FromStr for LaboratoryForm {
 /// Setup of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaboratorySetup {
-    /// Mechanism of the gimbal.
     pub mechanism: Mechanism,
-    /// Model of the camera.
     pub camera: CameraModel,
-    /// Motion of vehicle and joints.
     pub motion: LaboratoryMotion,
     /// Joints that do not move, counted from 0.
     pub frozen: Vec<usize>,
-    /// Knowledge of the joint angles.
     pub joints: JointKnowledge,
-    /// Knowledge of the poses.
     pub poses: PoseKnowledge,
     /// Number of frames, [`FRAME_PERIOD_S`] apart.
     pub frames: usize,
-    /// Number of landmarks.
     pub landmarks: usize,
-    /// Columns of sensors beside those of the chain.
+    /// Columns of sensors in addition to those of the chain.
     pub columns: SensorColumns,
-    /// Readout time of the camera's rolling shutter, in seconds, where there are columns of sensors.
+    /// Readout time of the camera's rolling shutter, in seconds; used only with columns of sensors.
     pub readout_s: f64,
 }
 
-/// Time between two frames of an experiment.
+/// Time between two frames of an experiment, in seconds.
 pub const FRAME_PERIOD_S: f64 = 0.25;
-/// Magnitude of gravity in an experiment.
 const GRAVITY_M_PER_S2: f64 = 9.81;
-/// Rate of the IMU, in Hz.
 const IMU_RATE_HZ: f64 = 200.0;
-/// Standard deviation of a pixel.
 pub const PIXEL_SIGMA_PX: f64 = 1.0;
-/// Nearest and farthest landmark, along the optical axis of the frame that it was drawn in.
+/// Nearest and farthest landmark, along the optical axis of the frame in whose view it was drawn.
 const DEPTH_M: [f64; 2] = [4.0, 14.0];
-/// Landmarks are drawn within this tangent of the optical axis, across and down.
+/// Landmarks are drawn within this tangent of the optical axis, horizontally and vertically.
 const VIEW: [f64; 2] = [0.6, 0.45];
-/// A landmark is observed by every camera that has it this far in front of it.
+/// A landmark is observed by every camera in front of which it lies by at least this depth.
 const MIN_DEPTH_M: f64 = 1.0;
-/// Standard deviations of the chain's numbers with the priors kept in: 3 cm and 10°, the scale of the columns.
+/// Prior standard deviations of the chain's parameters: 3 cm and 10°, the scale of the columns.
 const CHAIN_PRIOR: (f64, f64) = (Dimension::Length.scale(), Dimension::Angle.scale());
 
 /// The IMU of an experiment without a rig: the ADIS16448 of the paper with the parameters of `RotorS`.
@@ -124,8 +114,8 @@ impl LaboratorySetup {
         }
     }
 
-    /// The experiment with columns of sensors, with the readout time and the lens of docs/mathematics.md, section 11, where
-    /// it has none of its own.
+    /// The experiment with columns of sensors; a missing readout time or lens is that of docs/mathematics.md, section
+    /// 11.
     #[must_use]
     pub fn with_columns(mut self, columns: SensorColumns) -> Self {
         self.columns = columns;
@@ -153,7 +143,7 @@ impl LaboratorySetup {
         results
     }
 
-    /// [`Self::run_all`], passing on each result when it is ready; it stops when `each` returns `false`.
+    /// [`Self::run_all`] with a callback for each result as soon as it is ready; stops when `each` returns `false`.
     pub fn run_each(&self, forms: &[LaboratoryForm], mut each: impl FnMut(LaboratoryResult) -> bool) {
         let window = (!self.columns.any()).then(|| self.window());
         let flight = self.flight();
@@ -175,23 +165,21 @@ impl LaboratorySetup {
         }
     }
 
-    /// Hypothetical window of the experiment.
     pub fn window(&self) -> HypotheticalWindow {
         self.window_from(0)
     }
 
-    /// The motion of vehicle and joints.
     pub(super) fn flight(&self) -> Flight<'_> {
         let gravity_in_world = gravity_in_world(GRAVITY_M_PER_S2);
         Flight { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world }
     }
 
-    /// Time of a frame.
+    /// Time of a frame, in seconds.
     pub(super) fn time_s(slot: usize) -> f64 {
         slot as f64 * FRAME_PERIOD_S
     }
 
-    /// Whether the joint angles are unknown.
+    /// True if the joint angles are unknown.
     pub(super) fn joints_free(&self) -> bool {
         self.joints == JointKnowledge::Unknown && self.mechanism.chain.joint_count() > 0
     }
@@ -258,7 +246,6 @@ impl LaboratorySetup {
 /// Result of an experiment in one parameterization.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaboratoryResult {
-    /// The form.
     pub form: LaboratoryForm,
     /// Ranks, null and weak directions.
     pub rank: RankReport,
@@ -297,5 +284,5 @@ impl LaboratoryResult {
     }
 }
 
-/// Smallest scaled weight that counts in a null direction.
+/// Smallest scaled weight of a parameter that belongs to a null direction.
 const TAKES_PART: f64 = 1e-5;

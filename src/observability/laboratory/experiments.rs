@@ -1,20 +1,19 @@
-//! The experiments of the survey: mechanisms, motions and knowledge under which the rank of the calibration is computed.
+//! Experiments of the survey: mechanisms, motions and known quantities for which the rank of the calibration is
+//! computed.
 
 use super::{LABORATORY_IMU, LaboratoryForm, LaboratoryMotion as Motion, LaboratorySetup, Mechanism};
 use crate::estimator::{JointKnowledge, PoseKnowledge};
 use crate::gimbal::Parameterization;
 
-/// Landmarks of the windows with unknown joint angles; the others have a hundred.
+/// Landmarks of the windows with unknown joint angles; all other windows have a hundred.
 const LANDMARKS_WITHOUT_ENCODER: usize = 130;
 
 /// An experiment of the survey.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Experiment {
-    /// Its label in the table.
+    /// Label in the table.
     pub(super) scenario: &'static str,
-    /// Name of the mechanism.
     pub(super) mechanism: &'static str,
-    /// Motion of vehicle and camera.
     pub(super) motion: Motion,
     /// Joints that do not move, counted from 1.
     frozen: &'static [usize],
@@ -28,13 +27,11 @@ pub(super) struct Experiment {
 /// Experiments under one heading.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Section {
-    /// The heading.
     pub(super) title: &'static str,
-    /// Its experiments.
     pub(super) experiments: &'static [Experiment],
 }
 
-/// The mechanism with exciting motion, known poses and joint angles, in the classical and the minimal form.
+/// Experiment with exciting motion, known poses and joint angles, in the classical and the minimal parameterization.
 const fn experiment(scenario: &'static str, mechanism: &'static str) -> Experiment {
     Experiment {
         scenario,
@@ -77,7 +74,7 @@ impl Experiment {
         Self { forms, ..self }
     }
 
-    /// Setup of the experiment; `None` without a mechanism of that name.
+    /// Setup of the experiment; `None` for an unknown mechanism.
     pub(super) fn setup(&self) -> Option<LaboratorySetup> {
         let mut setup = LaboratorySetup::new(Mechanism::named(self.mechanism).ok()?);
         setup.motion = self.motion;
@@ -117,12 +114,12 @@ const IDEAL: &str = "yaw-roll-pitch-ideal";
 const IMU: PoseKnowledge = PoseKnowledge::Imu { noise: LABORATORY_IMU, biases_known: false };
 const IMU_BIASES_KNOWN: PoseKnowledge = PoseKnowledge::Imu { noise: LABORATORY_IMU, biases_known: true };
 
-/// Two windows of one motion, with and without encoders; see [`super::spurious`].
+/// Mechanism of the two windows of one motion; see [`super::spurious`].
 pub(super) const GENERIC: Experiment = experiment("", "generic");
-/// The same with free joint angles.
+/// [`GENERIC`] with free joint angles.
 pub(super) const GENERIC_WITHOUT_ENCODER: Experiment = GENERIC.without_encoder();
 
-/// Experiments whose least number of frames is searched.
+/// Experiments for which the smallest number of frames with full rank is searched.
 pub(super) const MIN_FRAMES: [Experiment; 6] = [
     experiment("encoder, poses known", "generic"),
     experiment("encoder, IMU, bias known", "generic").poses(IMU_BIASES_KNOWN),
@@ -132,7 +129,7 @@ pub(super) const MIN_FRAMES: [Experiment; 6] = [
     experiment("no encoder, IMU, bias free", "generic").without_encoder().poses(IMU),
 ];
 
-/// The experiments whose ranks are computed.
+/// Experiments whose ranks are computed.
 pub(super) const SECTIONS: [Section; 6] = [
     Section {
         title: "Joint angles and poses (exciting motion)",

@@ -1,4 +1,4 @@
-//! Mechanisms by name, from the axes of their joints.
+//! Named mechanisms, built from the axes of their joints.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,6 @@ use crate::sensors::Rig;
 /// A joint of a mechanism.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaboratoryJoint {
-    /// Name of the joint.
     pub name: String,
     /// Lower and upper limit, in radians.
     pub limits_rad: (f64, f64),
@@ -21,26 +20,23 @@ pub struct LaboratoryJoint {
 /// A gimbal of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mechanism {
-    /// Its name on the command line, or the rig's.
+    /// Name on the command line, or the rig's.
     pub name: String,
     /// The chain between IMU and camera.
     pub chain: ClassicalChain,
-    /// Its joints.
     pub joints: Vec<LaboratoryJoint>,
-    /// Names of its parameters.
     pub names: ParameterNames,
 }
 
-/// A name without a mechanism.
+/// Error: unknown name of a mechanism.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("unknown mechanism '{given}': expected one of {}", Mechanism::NAMES.map(|(name, _)| name).join(", "))]
 pub struct UnknownMechanism {
-    /// The given name.
     pub given: String,
 }
 
 impl Mechanism {
-    /// The names that [`Self::named`] takes, each with its meaning.
+    /// Names accepted by [`Self::named`], each with its meaning.
     pub const NAMES: [(&'static str, &'static str); 19] = [
         ("yaw-roll-pitch-offset", "axes 2 to 8 cm apart and some degrees from perpendicular, optical camera frame"),
         ("yaw-roll-pitch-ideal", "axes intersect at right angles, optical camera frame"),
@@ -63,7 +59,6 @@ impl Mechanism {
         ("generic-5", "five joints, drawn at random"),
     ];
 
-    /// Returns the mechanism with the given name.
     pub fn named(name: &str) -> Result<Self, UnknownMechanism> {
         let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
         let chain = match name {
@@ -150,7 +145,7 @@ fn vector_within(random: &mut SplitMix64, bound: f64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| within(random, bound))
 }
 
-/// Skew axes, centimetres apart, at right angles.
+/// Skew axes at right angles, centimetres apart.
 fn apart(directions: &[Vector3<f64>]) -> Vec<JointAxis> {
     let step = Vector3::new(0.05, 0.02, -0.035);
     let far = Vector3::new(0.003, 0.025, 0.011);
@@ -198,8 +193,8 @@ fn random_chain(joints: usize, seed: u64) -> ClassicalChain {
     ClassicalChain { imu_from_base: transform(), links, effector_from_camera: transform() }
 }
 
-/// Returns the classical chain with these joint axes and this `imu_from_camera` at encoder angles zero, with a last link
-/// that is not trivial.
+/// Returns the classical chain with these joint axes and this `imu_from_camera` at encoder angles zero, with a last
+/// link whose parameters are not zero.
 fn chain_of_axes(axes: &[JointAxis], imu_from_camera: &RigidTransform) -> ClassicalChain {
     let last = DhLink { theta_offset_rad: 0.2, d_m: 0.02, a_m: 0.03, alpha_rad: -0.5 * PI };
     ClassicalChain::from_axes(axes, last, imu_from_camera)

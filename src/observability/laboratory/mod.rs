@@ -1,8 +1,8 @@
-//! The laboratory: which calibration parameters are observable with a mechanism, a parameterization and a motion,
-//! without a log.
+//! Laboratory: observability of the calibration parameters for a mechanism, a parameterization and a motion, without a
+//! log.
 //!
 //! An experiment makes a hypothetical window, linearizes it with the estimator's own factors
-//! ([`crate::estimator::HypotheticalWindow`]) and analyses it as every step is analysed.
+//! ([`crate::estimator::HypotheticalWindow`]) and analyses it in the same way as a step of a run.
 //! [`survey`] runs the built-in experiments.
 
 mod advice;

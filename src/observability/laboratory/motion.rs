@@ -1,4 +1,4 @@
-//! Motions by name: how the vehicle and the joints move, in closed form.
+//! Named motions of the vehicle and the joints, in closed form.
 
 use std::f64::consts::TAU;
 
@@ -59,11 +59,10 @@ pub enum LaboratoryMotion {
     AllJointsFrozen,
 }
 
-/// A name without a motion.
+/// Error: unknown name of a motion.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("unknown motion '{given}': expected one of {}", LaboratoryMotion::ALL.map(|it| it.name()).join(", "))]
 pub struct UnknownMotion {
-    /// The given name.
     pub given: String,
 }
 
@@ -94,7 +93,7 @@ impl LaboratoryMotion {
         Self::AllJointsFrozen,
     ];
 
-    /// The name on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Aggressive => "aggressive",
@@ -122,7 +121,6 @@ impl LaboratoryMotion {
         }
     }
 
-    /// Description of the motion.
     pub fn meaning(self) -> &'static str {
         match self {
             Self::Aggressive => "the vehicle rotates and translates about all axes",
@@ -156,7 +154,7 @@ impl LaboratoryMotion {
         }
     }
 
-    /// Whether the joint with this index is stationary in the motion.
+    /// True if the joint with this index is stationary in the motion.
     fn holds_joint(self, joint: usize, joints: usize) -> bool {
         match self {
             Self::StabilizedTranslationOnly | Self::AllJointsFrozen => true,
@@ -174,7 +172,6 @@ impl std::str::FromStr for LaboratoryMotion {
     }
 }
 
-/// A sine wave.
 #[derive(Clone, Copy, Debug)]
 struct Sine {
     size: f64,
@@ -183,7 +180,7 @@ struct Sine {
 }
 
 impl Sine {
-    /// Value or derivative with respect to time.
+    /// Value (`derivative` 0) or derivative of this order with respect to time.
     fn at(&self, time_s: f64, derivative: i32) -> f64 {
         let quarter_periods = f64::from(derivative) * 0.25 * TAU;
         let phase = self.rate_rad_per_s * time_s + self.phase_rad + quarter_periods;
@@ -197,11 +194,11 @@ const fn sine(size: f64, rate_rad_per_s: f64, phase_rad: f64) -> Sine {
 
 /// Rotation vector of the vehicle, in radians.
 const ROTATION: [Sine; 3] = [sine(0.2, 2.8, 0.4), sine(0.25, 2.0, 1.3), sine(0.3, 1.6, 0.2)];
-/// Its position in metres.
+/// Position of the vehicle, in metres.
 const PATH: [Sine; 3] = [sine(1.2, 1.6, 0.0), sine(0.9, 2.4, 0.7), sine(0.7, 2.0, 1.9)];
-/// Its constant velocity, where it has one.
+/// Velocity of the vehicle in motions with constant velocity.
 const VELOCITY_M_PER_S: Vector3<f64> = Vector3::new(0.9, 0.4, -0.3);
-/// Its constant acceleration, where it has one.
+/// Acceleration of the vehicle in motions with constant acceleration.
 const ACCELERATION_M_PER_S2: Vector3<f64> = Vector3::new(0.5, -0.35, 0.2);
 /// Angular rate of a steady turn about the vertical.
 const TURN_RATE_RAD_PER_S: f64 = 0.6;
@@ -260,13 +257,12 @@ pub(super) struct Flight<'a> {
 }
 
 impl Flight<'_> {
-    /// Joint angles at a time.
     pub(super) fn joints_rad(&self, time_s: f64) -> Vec<f64> {
         let joints = self.mechanism.chain.joint_count();
         (0..joints)
             .map(|joint| {
                 let (low, high) = self.mechanism.joints.get(joint).map_or((-TAU, TAU), |joint| joint.limits_rad);
-                // At zero, or where there is enough range on both sides.
+                // Centre of the motion: zero, moved so that at least a quarter of the range lies on both sides.
                 let quarter = 0.25 * (high - low).max(0.0);
                 let center = 0.0_f64.max(low + quarter).min(high - quarter);
                 if self.frozen.contains(&joint) || self.motion.holds_joint(joint, joints) {
@@ -337,7 +333,6 @@ impl Flight<'_> {
         }
     }
 
-    /// Pose of the IMU at a time.
     pub(super) fn world_from_imu(&self, time_s: f64) -> RigidTransform {
         let joints_rad = self.joints_rad(time_s);
         let rotation = self.rotation(time_s, &joints_rad);
@@ -358,7 +353,7 @@ impl Flight<'_> {
         }
     }
 
-    /// Everything that the sensors measure at a time.
+    /// Pose, velocity, angular rate and joints at a time.
     pub(super) fn kinematics(&self, time_s: f64) -> Kinematics {
         let world_from_imu = self.world_from_imu(time_s);
         let (joints_rad, joint_rates_rad_per_s) = self.joint_motion(time_s);

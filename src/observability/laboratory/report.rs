@@ -1,4 +1,5 @@
-//! One experiment in words and numbers: the forms in columns, then each form's directions and spectrum.
+//! Report of one experiment: a table with one column per parameterization, then the directions and the spectrum of
+//! each.
 
 use std::fmt;
 
@@ -12,32 +13,26 @@ use crate::observability::CalibrationDirection;
 /// Results of an experiment in several parameterizations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LaboratoryReport {
-    /// Name of the mechanism.
     pub mechanism: String,
-    /// Number of its joints.
     pub joint_count: usize,
-    /// Name of the motion.
     pub motion: String,
     /// Description of the motion.
     pub motion_meaning: String,
     /// Names of the joints that do not move.
     pub frozen_joints: Vec<String>,
-    /// Knowledge of the joint angles.
+    /// Source of the joint angles, with its σ.
     pub joint_angles: String,
-    /// Knowledge of the poses.
+    /// Source of the poses.
     pub poses: String,
-    /// Number of frames.
     pub frames: usize,
     /// Time between frames, in seconds.
     pub frame_period_s: f64,
-    /// Number of landmarks.
     pub landmarks: usize,
-    /// Standard deviation of a pixel.
     pub pixel_sigma_px: f64,
-    /// Sets of columns, where there are columns of sensors.
+    /// Sets of sensor columns; `None` without columns of sensors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<String>,
-    /// Readout time of the rolling shutter, where there are columns of sensors.
+    /// Readout time of the rolling shutter, in seconds; `None` without columns of sensors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub readout_s: Option<f64>,
     /// Parameterizations in the requested order.
@@ -47,13 +42,11 @@ pub struct LaboratoryReport {
 /// Results of one parameterization.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FormReport {
-    /// Its name.
+    /// Name of the parameterization.
     pub form: String,
     /// Names of the columns.
     pub names: Vec<String>,
-    /// Structural rank.
     pub rank_structural: usize,
-    /// Informed rank.
     pub rank_informed: usize,
     /// Number of unobservable columns by cause.
     pub deficit: Deficit,
@@ -63,7 +56,6 @@ pub struct FormReport {
     pub structural_threshold: f64,
     /// Directions with a smaller singular value are uninformed.
     pub informed_threshold: f64,
-    /// Singularity margins.
     pub margins: Vec<Margin>,
     /// Null and weak directions, least observable first.
     pub directions: Vec<DirectionReport>,
@@ -78,14 +70,13 @@ pub struct KnownReport {
     pub reason: String,
     /// Response of the window relative to the reference of the rank rule.
     pub response: f64,
-    /// Whether the measurement agrees.
+    /// True if the measurement confirms the direction.
     pub agrees: bool,
 }
 
 /// Singularity margin of the parameterization.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Margin {
-    /// Name of the singularity.
     #[serde(rename = "lock")]
     pub singularity: String,
     /// 0 when singular, 1 at the largest distance.
@@ -95,20 +86,17 @@ pub struct Margin {
 /// A null or weak direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DirectionReport {
-    /// Whether it is structurally unobservable, not only uninformed.
+    /// True if structurally unobservable, false if only uninformed.
     pub null: bool,
-    /// Its singular value.
     pub singular_value: f64,
     /// Parameters by descending weight.
     pub parameters: Vec<ParameterWeight>,
 }
 
-/// Weight of a parameter in a direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterWeight {
-    /// Its name.
     pub name: String,
-    /// Its weight in the unit direction, columns scaled by 10° and 3 cm.
+    /// Weight in the unit direction, columns scaled by 10° and 3 cm.
     pub weight: f64,
 }
 

@@ -1,4 +1,4 @@
-//! State and calibration posterior of a flight, from which excitation is suggested.
+//! State and calibration posterior of a run, from which excitation is suggested.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -13,36 +13,30 @@ use crate::sensors::{ImuNoise, Rig};
 /// State of a run and posterior of its calibration.
 #[derive(Clone, Debug)]
 pub struct Situation {
-    /// The camera.
     pub camera: CameraModel,
     /// The chain in its estimated parameterization.
     pub chain: Chain,
-    /// Its joints.
     pub joints: Vec<LaboratoryJoint>,
-    /// Names of its parameters.
     pub names: ParameterNames,
     /// Posterior of the calibration as the information matrix of its columns (n × n), in units of 10° and 3 cm.
     pub information: DMatrix<f64>,
-    /// Pose, velocity and biases.
     pub navigation: NavigationState,
-    /// Joint angles.
     pub joints_rad: Vec<f64>,
-    /// Knowledge of the joint angles.
+    /// Measurements of the joint angles.
     pub encoders: JointKnowledge,
-    /// Noise of the IMU.
     pub imu_noise: ImuNoise,
     /// Gravity in the world, in m/s².
     pub gravity_in_world: Vector3<f64>,
     /// Standard deviation of a pixel, averaged over the observations.
     pub pixel_sigma_px: f64,
-    /// Distances at which the scene has landmarks, in metres.
+    /// Distances of the scene's landmarks from the camera, in metres.
     pub distances_m: Vec<f64>,
 }
 
-/// Information about a fixed parameter in units of 10° and 3 cm: σ is a millionth of them.
+/// Information about a fixed parameter in units of 10° and 3 cm: σ is a millionth of the unit.
 const KNOWN: f64 = 1e12;
 
-/// Distances of a scene without landmarks, in metres.
+/// Assumed distances of a scene without landmarks, in metres.
 const UNKNOWN_DISTANCE_M: [f64; 3] = [4.0, 7.0, 12.0];
 
 impl Situation {
@@ -85,7 +79,7 @@ impl Situation {
         })
     }
 
-    /// State at the end of an experiment: its prior (10° and 3 cm) and its window are the posterior.
+    /// State at the end of an experiment. Its prior (10° and 3 cm) and its window form the posterior.
     pub fn of_experiment(setup: &LaboratorySetup, form: LaboratoryForm, imu_noise: ImuNoise) -> Option<Self> {
         let window = setup.window();
         let chain = form.chain(&setup.mechanism);
@@ -114,12 +108,12 @@ impl Situation {
         })
     }
 
-    /// Distances of the scene's landmarks, or assumed ones.
+    /// Distances of the scene's landmarks in metres; [`UNKNOWN_DISTANCE_M`] without landmarks.
     pub(super) fn scene_m(&self) -> &[f64] {
         if self.distances_m.is_empty() { &UNKNOWN_DISTANCE_M } else { &self.distances_m }
     }
 
-    /// Whether the joint angles are estimated without encoder readings.
+    /// True if the joint angles are estimated without encoder readings.
     pub(super) fn joints_free(&self) -> bool {
         self.encoders == JointKnowledge::Unknown && self.chain.joint_count() > 0
     }
@@ -131,7 +125,7 @@ impl Situation {
     }
 }
 
-/// Marginal information of the first columns with the others (those of further cameras) eliminated.
+/// Marginal information of the first `count` columns; the others (those of further cameras) are marginalized.
 fn marginal(information: DMatrix<f64>, count: usize) -> Option<DMatrix<f64>> {
     if information.ncols() <= count {
         return Some(information);

@@ -1,5 +1,5 @@
-//! Spurious information: an old window and a new one, linearized at different values of the calibration, together
-//! constrain directions that are unobservable in each of them (docs/mathematics.md, section 9).
+//! Spurious information: an old and a new window, linearized at different values of the calibration, together constrain
+//! directions that are unobservable in each of them (docs/mathematics.md, section 9).
 //!
 //! A marginalization prior and the window do so when the calibration has changed between them. With first-estimate
 //! Jacobians both are linearized at the old value.
@@ -19,7 +19,7 @@ use crate::observability::analysis::measured_block;
 
 /// Frames of each of the two windows.
 const FRAMES: usize = 10;
-/// Random changes of the calibration per row.
+/// Random changes of the calibration per row of the table.
 const DRAWS: u64 = 8;
 /// A direction with a larger scaled singular value counts as constrained: σ below its scale of 10° or 3 cm.
 const KNOWN: f64 = 1.0;
@@ -37,17 +37,17 @@ pub(super) fn title() -> String {
 pub struct SpuriousRow {
     /// Name of the parameterization.
     pub form: String,
-    /// Whether the joint angles are known.
+    /// True if the joint angles are known.
     pub encoder: bool,
-    /// Bound of the uniform change of each angle, in degrees, and of each length, in millimetres.
+    /// Bounds of the uniform random changes: of each angle in degrees, of each length in millimetres.
     pub change: (f64, f64),
     /// Number of directions that are unobservable in both windows.
     pub null: usize,
-    /// Their largest singular value with both windows linearized at the first value.
+    /// Largest singular value of these directions with both windows linearized at the first value.
     pub with_first_estimates: f64,
-    /// The same with each window linearized at its own value: minimum and maximum over the draws.
+    /// Largest singular value with each window linearized at its own value: minimum and maximum over the draws.
     pub without: (f64, f64),
-    /// Number of them over 1: minimum and maximum over the draws.
+    /// Number of singular values over 1: minimum and maximum over the draws.
     pub known: (usize, usize),
 }
 
@@ -66,7 +66,6 @@ const CASES: [Case; 6] = [
     Case { parameterization: Parameterization::Poe, encoder: false, change: (10.0, 30.0) },
 ];
 
-/// The spurious information of every case.
 pub(super) fn measure() -> Vec<SpuriousRow> {
     CASES.par_iter().filter_map(Case::measure).collect()
 }
@@ -108,14 +107,14 @@ impl Case {
     }
 }
 
-/// Singular values of two windows together.
+/// Singular values of the two stacked blocks.
 fn stacked_singular_values(old: &DMatrix<f64>, new: &DMatrix<f64>) -> Option<Vec<f64>> {
     let mut both = old.clone().resize_vertically(old.nrows() + new.nrows(), 0.0);
     both.rows_mut(old.nrows(), new.nrows()).copy_from(new);
     dense::singular_values(&both)
 }
 
-/// The chain with random changes up to these bounds of each angle and each length.
+/// Chain with uniform random changes of each angle and each length, up to these bounds.
 fn changed(chain: &ClassicalChain, (degrees, millimetres): (f64, f64), seed: u64) -> ClassicalChain {
     let chain = Chain::from_classical(chain, Parameterization::Classical);
     let mut random = SplitMix64::new(seed);

@@ -1,4 +1,4 @@
-//! Ranks, losses and null directions of the scenarios of docs/mathematics.md, section 7, in one table.
+//! Ranks, deficits and null directions of the scenarios of docs/mathematics.md, section 7, in one table.
 
 use std::fmt;
 
@@ -11,63 +11,51 @@ use super::spurious::{self, SpuriousRow};
 use super::{Deficit, LaboratoryForm, LaboratoryResult};
 use crate::gimbal::{ParameterNames, Parameterization};
 
-/// Number of frames with which a window reaches its largest rank.
+/// Number of frames for which a window is taken to have its largest rank.
 const MAX_FRAMES: usize = 16;
 const MINIMAL: LaboratoryForm = LaboratoryForm::whole(Parameterization::Minimal);
 
 /// Computed ranks and null directions of the built-in experiments.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Survey {
-    /// Experiments by subject.
     pub sections: Vec<SurveySection>,
-    /// Smallest numbers of frames with which the minimal parameterization has its full rank.
+    /// Smallest numbers of frames for which the minimal parameterization has its full rank.
     pub least_frames: Vec<MinFramesRow>,
     /// Experiments with columns of sensors.
     pub sensors: Vec<SensorSurveySection>,
-    /// Spurious information of two windows that are linearized at different values of the calibration.
+    /// Spurious information of two windows linearized at different values of the calibration.
     pub spurious: Vec<SpuriousRow>,
 }
 
 /// Experiments on one subject.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SurveySection {
-    /// The subject.
     pub title: String,
-    /// One row per experiment.
     pub rows: Vec<SurveyRow>,
 }
 
-/// One experiment.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SurveyRow {
-    /// Label of the experiment.
     pub scenario: String,
-    /// Name of the mechanism.
     pub mechanism: String,
-    /// Name of the motion.
     pub motion: String,
-    /// Rank of each parameterization.
     pub entries: Vec<SurveyEntry>,
     /// Rank deficit of the first parameterization, by cause.
     pub deficit: Option<Deficit>,
     /// Null directions of the first parameterization that are known in closed form.
     pub known: usize,
-    /// How many of these were computed to be null.
+    /// Number of these that the computed Jacobian confirms.
     pub known_agreeing: usize,
     /// Parameters of the null directions of the minimal parameterization.
     pub null_of_minimal: Vec<String>,
 }
 
-/// The rank of an experiment in one parameterization.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SurveyEntry {
-    /// Name of the parameterization.
     pub form: String,
-    /// Its abbreviation in the table.
+    /// Abbreviation in the table.
     pub column: String,
-    /// Number of columns.
     pub columns: usize,
-    /// Structural rank.
     pub rank: usize,
 }
 
@@ -76,9 +64,8 @@ pub struct SurveyEntry {
 pub struct MinFramesRow {
     /// Knowledge of poses and joint angles.
     pub scenario: String,
-    /// Number of columns.
     pub columns: usize,
-    /// The full structural rank.
+    /// Full structural rank.
     pub rank: usize,
     /// Smallest number of frames with full rank.
     pub frames: usize,
@@ -150,7 +137,7 @@ impl MinFramesRow {
     }
 }
 
-/// `C`, `M`, … as the heading of the table explains them.
+/// `C`, `M`, …, as explained in the heading of the table.
 fn abbreviation(form: LaboratoryForm) -> String {
     let name = match form.parameterization {
         Parameterization::Classical => "C",
@@ -214,7 +201,7 @@ impl fmt::Display for SurveyRow {
     }
 }
 
-/// The names, or the first few and how many more.
+/// Names separated by spaces; a long list is shortened to the first names and the number of the others.
 fn short_list(names: &[String]) -> String {
     const SHOWN: usize = 6;
     let shown = names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(" ");
@@ -222,7 +209,7 @@ fn short_list(names: &[String]) -> String {
 }
 
 impl Deficit {
-    /// `G6 F4`, or `-` at full rank.
+    /// Deficits as text, `G6 F4`, or `-` at full rank.
     pub(super) fn short(&self) -> String {
         let parts = [("G", self.parameterization), ("F", self.joints), ("E", self.absorbed), ("M", self.motion)];
         let lost: Vec<String> =

@@ -76,7 +76,8 @@ fn window(random: &mut Random, parameters: &[ParameterId]) -> Linearization {
     }
 }
 
-/// Singular values by the definition: the calibration minus its part in the column space of the nuisance.
+/// Singular values by definition: calibration columns minus their projection onto the column space of the nuisance
+/// columns.
 fn by_definition(jacobian: &DMatrix<f64>, scale: &[f64]) -> Vec<f64> {
     let nuisance = jacobian.columns(CALIBRATION, COLUMNS - CALIBRATION).into_owned();
     let svd = crate::geometry::dense::thin_svd(&nuisance).unwrap();

@@ -33,7 +33,7 @@ fn window(golden: &Value) -> Window {
     }
 }
 
-/// The projector onto the structural null space, from the directions that the report names.
+/// Projector onto the structural null space, from the directions of the report.
 fn null_projector(report: &RankReport) -> DMatrix<f64> {
     let columns = report.parameters.len();
     let null: Vec<_> = report.directions.iter().filter(|direction| direction.structural).collect();
@@ -94,8 +94,8 @@ fn golden_windows() {
                 );
             }
             assert!(matrix(&Value::Null).is_empty());
-            // Closed forms and measurement agree: the six of the classical form, and offsets absorbed by free joint
-            // angles.
+            // Closed forms and measurement agree: the six directions of the classical parameterization, and offsets
+            // absorbed by free joint angles.
             let six = if parameterization == Parameterization::Classical { 6 } else { 0 };
             let absorbed =
                 report.parameters.iter().filter(|parameter| joints_free && parameter.is_joint_offset()).count();

@@ -1,4 +1,4 @@
-//! The causes of rank loss in simulated windows (docs/mathematics.md, section 7).
+//! Causes of rank loss in simulated windows (docs/mathematics.md, section 7).
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 
@@ -116,7 +116,8 @@ fn deficits(report: &RankReport) -> [usize; 4] {
 
 #[test]
 fn every_rank_loss_is_attributed_to_its_cause() {
-    // Offsets, motion, free joints; the deficits of the minimal form. The classical one has six more in the first.
+    // Offsets, motion, free joints; the deficits of the minimal parameterization. The classical one has six more of the
+    // parameterization.
     let table = [
         (true, Motion::Exciting, false, [0, 0, 0, 0]),
         (true, Motion::Exciting, true, [0, 0, 3, 0]),
@@ -203,7 +204,7 @@ fn moving_along_a_redundant_direction_keeps_the_camera_pose() {
             moved.minus(&chain.imu_from_camera(&angles)).norm()
         };
         assert!(shift(1e-4) < 1e-8, "{}", shift(1e-4));
-        // Each parameter alone moves the camera by far more.
+        // Each parameter alone moves the camera by much more.
         let leading = direction.leading(&report.parameters).unwrap();
         let index = report.parameters.iter().position(|parameter| *parameter == leading).unwrap();
         let mut alone = DVector::zeros(24);
@@ -228,7 +229,7 @@ fn known_and_measured_redundancy_agree() {
         "L1.d and the translation of imu_from_base along that axis are the same motion (Eqs. 11–17)"
     );
     assert!(reasons[3].starts_with("L3.d and"), "{reasons:?}");
-    // A linearization that mixes two values of the calibration has spurious information.
+    // A linearization at two values of the calibration has spurious information.
     let elsewhere = chain.plus(&DVector::from_element(24, 0.02));
     let mixed = window.linearize(&elsewhere, false);
     let mut inconsistent = linearization.clone();
@@ -249,7 +250,7 @@ fn known_and_measured_redundancy_agree() {
     assert!(spurious_gains.iter().filter(|known| known.is_claimed()).count() >= 3, "{spurious_gains:?}");
     let rig_prior = DMatrix::identity(24, mixed.jacobian.ncols()) * 100.0;
     assert!(claimed(&rig_prior, 24).iter().all(|known| known.spurious_gain < 1e-3));
-    // The minimal form has no null direction itself; without encoders it has those of its offsets.
+    // The minimal parameterization has no null direction; without encoders it has those of its offsets.
     let minimal = Chain::from_classical(&classical, Parameterization::Minimal);
     let known = |joints_free: bool| {
         let linearization = window.linearize(&minimal, joints_free);
@@ -260,7 +261,7 @@ fn known_and_measured_redundancy_agree() {
     let losses: Vec<_> = free.iter().map(|known| known.loss).collect();
     assert_eq!(losses, [0, 1, 2].map(KnownLoss::FreeAngle));
     assert!(free.iter().all(|known| known.agrees), "{free:?}");
-    // Without offsets and encoders all six directions of the classical form remain, with encoders four.
+    // Without offsets and encoders all six directions of the classical parameterization remain, with encoders four.
     let without = Chain::from_classical(&classical, Parameterization::Classical).without_joint_offsets();
     for (joints_free, count) in [(true, 6), (false, 4)] {
         let linearization = window.linearize(&without, joints_free);

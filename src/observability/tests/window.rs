@@ -1,4 +1,4 @@
-//! A window of known poses as the estimator linearizes it.
+//! Window of known poses, linearized as in the estimator.
 
 use nalgebra::Vector3;
 
@@ -28,8 +28,8 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// The whitened linearization (1 px) with the joint angles known, or free in every frame; the bearings of the
-    /// landmarks count as exact, as in Eq. 9.
+    /// Whitened linearization (1 px) with the joint angles known, or free in every frame; the bearings of the landmarks
+    /// are exact, as in Eq. 9.
     pub(super) fn linearize(&self, chain: &Chain, joints_free: bool) -> Linearization {
         let frames = self.world_from_imu.iter().zip(&self.joint_angles_rad).enumerate();
         let landmarks = self.landmarks.iter().enumerate();

@@ -1,7 +1,8 @@
-//! Images of an environment, rendered on the CPU: z-buffered faces, eight samples per pixel at edges, filtered textures, shadows.
+//! Images of an environment, rendered on the CPU: z-buffered faces, eight samples per pixel at edges, filtered
+//! textures, shadows.
 //!
-//! Faces are first rasterized to a buffer of face numbers with eight samples per pixel; then every pixel is shaded once, or
-//! once per face where several meet, so that edges are smooth and textures cost no more than what is seen.
+//! Faces are first rasterized to a buffer of face numbers with eight samples per pixel; then every pixel is shaded
+//! once, or once per face if it contains several. Edges are smooth, and only visible textures are sampled.
 
 mod raster;
 mod sensor;

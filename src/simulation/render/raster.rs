@@ -1,4 +1,4 @@
-//! Which face is seen at every sample.
+//! Rasterization: the visible face at every sample.
 
 use std::ops::Range;
 
@@ -8,12 +8,12 @@ use super::view::{Grid, Workspace};
 use crate::geometry::RigidTransform;
 use crate::simulation::world::{Affine, Bounds, World};
 
-/// Marks a sample that sees the sky.
+/// Marks a sample of the sky.
 pub(super) const SKY: u32 = u32::MAX;
-/// Nearer than this nothing is drawn.
+/// Distance of the near plane.
 const NEAR_M: f64 = 0.05;
 
-/// A face as this camera sees it: everything over depth is linear in the ray `(x, y, 1)`.
+/// Face in the frame of a camera: all quantities over depth are linear in the ray `(x, y, 1)`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Prepared {
     /// One over depth.
@@ -25,7 +25,7 @@ pub(super) struct Prepared {
     pub(super) material: u32,
 }
 
-/// A world seen from somewhere: points of the world into the camera.
+/// Camera pose: transforms points of the world into the camera frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Eye {
     pub(super) camera_from_world: Matrix3<f64>,
@@ -47,8 +47,8 @@ impl Eye {
     }
 }
 
-/// What some rows of the sample grid show: the space in front of the near plane and between four planes through the centre of
-/// the camera, in its frame.
+/// View frustum of some rows of the sample grid, in the camera frame: the space in front of the near plane and between
+/// four planes through the camera centre.
 struct Frustum {
     /// Unit normals that point outwards.
     sides: [Vector3<f64>; 4],
@@ -69,41 +69,41 @@ impl Frustum {
         Self { sides: sides.map(|side| side.normalize()) }
     }
 
-    /// Whether a sphere may be seen in part.
+    /// True if a part of a sphere may be visible.
     fn may_show(&self, bounds: &Bounds, eye: &Eye) -> bool {
         let centre_m = eye.camera_from_world * (bounds.centre_m - eye.centre_m);
         centre_m.z + bounds.radius_m > NEAR_M && self.sides.iter().all(|side| side.dot(&centre_m) <= bounds.radius_m)
     }
 }
 
-/// A face's outline in the sample grid, ready to be drawn band by band.
+/// Outline of a face in the sample grid, prepared for drawing band by band.
 #[derive(Clone, Debug)]
 pub(super) struct Shape {
-    /// Its corners among all outlines; the first one stands at the end once more.
+    /// Range of its corners in `outline_points`; the first corner is repeated at the end.
     corners: Range<usize>,
     rows: Range<usize>,
-    /// Inverse depth at the grid's first sample, and what it grows by over a row and over a column.
+    /// Inverse depth at the grid's first sample, and its increments per row and per column.
     inverse_depth: f64,
     down: f64,
     right: f64,
-    /// The edges that the row drawn last crossed.
+    /// Edges crossed by the previously drawn row.
     crossed: Option<[usize; 2]>,
 }
 
 impl Workspace {
-    /// Projects the faces of a world that some rows of the grid show: into `prepared` what shading needs, into `shapes` what
-    /// drawing needs.
+    /// Projects the faces of a world that are visible in some rows of the grid: data for shading into `prepared`, data
+    /// for drawing into `shapes`.
     pub(super) fn prepare(&mut self, world: &World, eye: &Eye, grid: &Grid, shown: &Range<usize>) {
         self.prepared.clear();
         self.shapes.clear();
-        self.outlines.clear();
+        self.outline_points.clear();
         let frustum = Frustum::new(grid, shown);
         for face in &world.faces {
-            // Most faces lie elsewhere, above all where a rolling shutter has a pose for every other row.
+            // Most faces are elsewhere, in particular for a rolling shutter, which has a pose for every other row.
             if !frustum.may_show(&face.bounds, eye) {
                 continue;
             }
-            // How far the camera's centre stands before the face.
+            // Distance of the camera centre in front of the face.
             let before_m = face.normal.dot(&eye.centre_m) - face.distance;
             if before_m <= 1e-4 {
                 continue;
@@ -121,7 +121,8 @@ impl Workspace {
         }
     }
 
-    /// Adds a face's corners, cut at the near plane, as a shape; false when it lies outside these rows of the grid.
+    /// Adds a face's corners, clipped at the near plane, as a shape; returns false if it is outside these rows of the
+    /// grid.
     fn outline(
         &mut self,
         corners: &[Vector3<f64>],
@@ -130,7 +131,7 @@ impl Workspace {
         grid: &Grid,
         shown: &Range<usize>,
     ) -> bool {
-        let first = self.outlines.len();
+        let first = self.outline_points.len();
         let seen = |corner: &Vector3<f64>| eye.camera_from_world * (corner - eye.centre_m);
         let Some(last) = corners.last() else { return false };
         let mut before = seen(last);
@@ -138,27 +139,27 @@ impl Workspace {
             let point = seen(corner);
             if (before.z > NEAR_M) != (point.z > NEAR_M) {
                 let fraction = (NEAR_M - before.z) / (point.z - before.z);
-                self.outlines.push(grid.place(&(before + (point - before) * fraction)));
+                self.outline_points.push(grid.place(&(before + (point - before) * fraction)));
             }
             if point.z > NEAR_M {
-                self.outlines.push(grid.place(&point));
+                self.outline_points.push(grid.place(&point));
             }
             before = point;
         }
-        let outline = &self.outlines[first..];
+        let outline = &self.outline_points[first..];
         let bound = |axis: usize, start: f64, pick: fn(f64, f64) -> f64| {
             outline.iter().map(|place| place[axis]).fold(start, pick)
         };
         let (left, right) = (bound(0, f64::MAX, f64::min), bound(0, f64::MIN, f64::max));
         let (top, bottom) = (bound(1, f64::MAX, f64::min), bound(1, f64::MIN, f64::max));
-        let rows = ceiled(top).max(shown.start)..ceiled(bottom).min(shown.end);
+        let rows = ceil_to_usize(top).max(shown.start)..ceil_to_usize(bottom).min(shown.end);
         if outline.len() < 3 || right < -1.0 || left > grid.columns as f64 + 1.0 || rows.is_empty() {
-            self.outlines.truncate(first);
+            self.outline_points.truncate(first);
             return false;
         }
-        self.outlines.push(self.outlines[first]);
+        self.outline_points.push(self.outline_points[first]);
         self.shapes.push(Shape {
-            corners: first..self.outlines.len(),
+            corners: first..self.outline_points.len(),
             rows,
             inverse_depth: inverse_depth.x * grid.origin[0] + inverse_depth.y * grid.origin[1] + inverse_depth.z,
             down: inverse_depth.y * grid.step[1],
@@ -168,8 +169,8 @@ impl Workspace {
         true
     }
 
-    /// Fills the buffers of face numbers (into `prepared`) and inverse depths for some rows of the grid; bands of rows
-    /// are drawn from the top down.
+    /// Fills the buffers of face numbers (indices into `prepared`) and inverse depths for some rows of the grid; bands
+    /// of rows are drawn from the top down.
     pub(super) fn draw(&mut self, grid: &Grid, band: Range<usize>) {
         let samples = grid.columns * band.len();
         self.inverse_depth.clear();
@@ -178,9 +179,9 @@ impl Workspace {
         self.face.resize(samples, SKY);
         for (number, shape) in (0..).zip(&mut self.shapes) {
             for row in shape.rows.start.max(band.start)..shape.rows.end.min(band.end) {
-                let (left, right) = shape.span(&self.outlines, row as f64);
+                let (left, right) = shape.span(&self.outline_points, row as f64);
                 let shift = Grid::shift(row);
-                let (from, to) = (ceiled(left - shift), ceiled(right - shift).min(grid.columns));
+                let (from, to) = (ceil_to_usize(left - shift), ceil_to_usize(right - shift).min(grid.columns));
                 if from >= to {
                     continue;
                 }
@@ -198,16 +199,16 @@ impl Workspace {
 }
 
 impl Shape {
-    /// Where a row of the grid enters and leaves the outline.
+    /// Left and right intersections of a row of the grid with the outline.
     #[inline]
-    fn span(&mut self, outlines: &[[f64; 2]], row: f64) -> (f64, f64) {
-        let outline = &outlines[self.corners.clone()];
+    fn span(&mut self, outline_points: &[[f64; 2]], row: f64) -> (f64, f64) {
+        let outline = &outline_points[self.corners.clone()];
         let crossing = |edge: usize| {
             let (from, to) = (outline[edge], outline[edge + 1]);
             let crosses = (from[1] < row) != (to[1] < row);
             crosses.then(|| from[0] + (to[0] - from[0]) * ((row - from[1]) / (to[1] - from[1])))
         };
-        // A convex outline is crossed twice, mostly where it was crossed before.
+        // A row crosses a convex outline twice, usually at the edges of the previous row.
         if let Some([one, other]) = self.crossed
             && let (Some(one), Some(other)) = (crossing(one), crossing(other))
         {
@@ -228,12 +229,13 @@ impl Shape {
     }
 }
 
-/// Draws a face into a line of samples where it is nearest: inverse depth at the first sample and per sample.
+/// Draws a face into a line of samples where it is nearest: inverse depth at the first sample, and its increment per
+/// sample.
 #[inline]
 fn fill(depths: &mut [f32], faces: &mut [u32], [start, slope]: [f32; 2], number: u32) {
     let faces = &mut faces[..depths.len()];
     for index in 0..depths.len() {
-        // Through 32 bits and masks, so that the loop becomes vector code.
+        // 32-bit masks instead of branches, so that the loop is vectorized.
         let here = start + slope * (index as i32) as f32;
         let nearer = u32::from(here > depths[index]).wrapping_neg();
         depths[index] = f32::from_bits(here.to_bits() & nearer | depths[index].to_bits() & !nearer);
@@ -241,9 +243,9 @@ fn fill(depths: &mut [f32], faces: &mut [u32], [start, slope]: [f32; 2], number:
     }
 }
 
-/// The least whole number that is not below a value, at least 0.
+/// Smallest integer that is not below a value, at least 0.
 #[inline]
-fn ceiled(value: f64) -> usize {
+fn ceil_to_usize(value: f64) -> usize {
     let whole = value as i64;
     whole.saturating_add(i64::from((whole as f64) < value)).max(0) as usize
 }

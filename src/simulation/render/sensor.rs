@@ -2,10 +2,10 @@ use super::view::View;
 use crate::sensors::GrayImage;
 use crate::simulation::random::mix;
 
-/// What a camera's sensor does to the light.
+/// Options of an image sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SensorOptions {
-    /// Standard deviation of the noise in grey values.
+    /// Standard deviation of the noise, in grey values.
     pub(crate) noise: f64,
     /// Drift of the exposure as a ratio of its mean.
     pub(crate) exposure_drift: f64,
@@ -13,7 +13,7 @@ pub(crate) struct SensorOptions {
     pub(crate) vignetting: f64,
 }
 
-/// A sensor: exposure that drifts slowly, corners darker than the middle, noise on every pixel.
+/// Image sensor with slow drift of the exposure, vignetting, and noise on every pixel.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensor {
     options: SensorOptions,
@@ -24,7 +24,7 @@ pub(crate) struct Sensor {
 }
 
 impl Sensor {
-    /// A sensor whose noise is a function of this seed, the frame's number and the pixel.
+    /// Sensor whose noise is a function of this seed, the frame number and the pixel.
     pub(crate) fn new(view: &View, options: SensorOptions, seed: u64) -> Self {
         let half = [0.5 * view.width as f64, 0.5 * view.height as f64];
         let corner = half[0] * half[0] + half[1] * half[1];
@@ -38,7 +38,7 @@ impl Sensor {
         Self { options, width: view.width, height: view.height, shading, seed }
     }
 
-    /// Exposes an image of linear gray values.
+    /// Converts linear gray values to an image.
     pub(crate) fn expose(&self, radiance: &[f32], frame_index: usize, time_s: f64) -> GrayImage {
         let phase = (self.seed % 628) as f64 * 0.01;
         let gain =
@@ -48,7 +48,7 @@ impl Sensor {
         let noise = (self.options.noise / 147.8) as f32;
         let key = mix(self.seed ^ (frame_index as u64).wrapping_mul(0xA24B_AED4_963E_E407));
         let mut pixels = Vec::with_capacity(radiance.len());
-        // One random word serves two pixels.
+        // One random word is used for two pixels.
         for (index, (values, shading)) in (0_u64..).zip(radiance.chunks(2).zip(self.shading.chunks(2))) {
             let word = mix(key.wrapping_add(index));
             for ((value, shading), part) in values.iter().zip(shading).zip([word as u32, (word >> 32) as u32]) {

@@ -8,30 +8,30 @@ use super::view::{OFFSETS_PX, PixelRay, Rays, SAMPLES, View, Workspace};
 use crate::geometry::RigidTransform;
 use crate::simulation::world::{Footprints, World};
 
-/// Rows of pixels whose samples are drawn at once.
+/// Number of rows of pixels whose samples are drawn together.
 const BAND_ROWS: usize = 8;
-/// Pixels that are shaded at once where they see the same face.
+/// Number of pixels that are shaded together if they show the same face.
 const LANES: usize = 8;
-/// Marks a pixel whose samples see several faces.
+/// Marks a pixel whose samples show several faces.
 const MIXED: u32 = SKY - 1;
 
-/// Ratio of the light that comes from the sky on all sides.
+/// Ratio of ambient light from the sky.
 const AMBIENT: f32 = 0.6;
-/// Light of sky and sun together on a surface square to the sun, against the texture's own grey.
+/// Total light of sky and sun on a surface perpendicular to the sun, relative to the texture's grey.
 const BRIGHTNESS: f32 = 1.38;
-/// Grey of the haze, which is that of the horizon.
+/// Grey of the haze, equal to that of the horizon.
 const HAZE: f32 = 186.0;
-/// Distance at which half of a surface's grey has gone into haze.
+/// Distance at which half of a surface's grey is replaced by haze.
 const HAZE_M: f32 = 420.0;
 
-/// An environment prepared for rendering, by any number of threads at once.
+/// Environment prepared for rendering, shared by any number of threads.
 #[derive(Clone, Debug)]
 pub(crate) struct Renderer<'a> {
     world: &'a World,
     shadows: ShadowMap,
 }
 
-/// What shading needs besides the face: the rays' linear maps into the sky and the shadow map.
+/// Data for shading in addition to the face: linear maps from rays into the sky and the shadow map.
 struct Light {
     world_from_ray: [[f32; 3]; 3],
     shadow_from_ray: [[f32; 3]; 3],
@@ -48,7 +48,7 @@ fn rows(matrix: &nalgebra::Matrix3<f64>) -> [[f32; 3]; 3] {
 }
 
 impl<'a> Renderer<'a> {
-    /// Prepares a world: its shadows.
+    /// Prepares the shadows of a world.
     pub(crate) fn new(world: &'a World) -> Self {
         Self { world, shadows: ShadowMap::new(world) }
     }
@@ -73,7 +73,7 @@ impl<'a> Renderer<'a> {
             shadow_from_ray: rows(&(self.shadows.linear * world_from_ray)),
             shadow_offset: [offset.x as f32, offset.y as f32, offset.z as f32],
         };
-        // A band's samples stay in the cache; where the lens bends rows, all are needed at once.
+        // The samples of a band stay in the cache; if the lens distorts rows, all are needed at once.
         let band = if view.places.is_some() { view.height } else { BAND_ROWS };
         for top in shown.clone().step_by(band) {
             let bottom = (top + band).min(shown.end);
@@ -101,7 +101,7 @@ impl<'a> Renderer<'a> {
         let faces_of = |face: &[u32], column: usize| -> [u32; SAMPLES] {
             if let Some(places) = &view.places {
                 let first = first_sample * view.grid.columns;
-                // Pixels that the lens does not show have no samples; what stands in for them is not looked at.
+                // Pixels outside the lens have no samples; the placeholders are not used.
                 places[row * view.width + column].map(|place| face[(place as usize).saturating_sub(first)])
             } else {
                 let first = (row * SAMPLES - first_sample) * view.grid.columns + column;
@@ -116,7 +116,7 @@ impl<'a> Renderer<'a> {
                 if faces.iter().all(|other| *other == faces[0]) { faces[0] } else { MIXED }
             }));
         } else {
-            // Line by line, as vector code wants it.
+            // Line by line, so that the loops are vectorized.
             let line = |sample: usize| {
                 &face[(row * SAMPLES - first_sample + sample) * view.grid.columns..][..view.grid.columns]
             };
@@ -159,7 +159,7 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// The mean over a pixel's samples; each face in it is shaded once, in the middle of its samples.
+    /// Mean over a pixel's samples; each visible face is shaded once, at the mean of its samples.
     fn mixed(&self, prepared: &[Prepared], light: &Light, faces: [u32; SAMPLES], ray: PixelRay) -> f32 {
         let mut sum = 0.0;
         for (index, face) in faces.iter().enumerate() {
@@ -187,7 +187,7 @@ impl<'a> Renderer<'a> {
         sum / SAMPLES as f32
     }
 
-    /// The greys of a face along the first `count` rays.
+    /// Grey values of a face along the first `count` rays.
     fn shade<const N: usize>(&self, face: &Prepared, light: &Light, at: &Rays<N>, count: usize) -> [f32; N] {
         let along = |linear: &[f32; 3]| -> [f32; N] {
             std::array::from_fn(|k| linear[0] * at.ray[0][k] + linear[1] * at.ray[1][k] + linear[2])

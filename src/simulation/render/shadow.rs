@@ -1,12 +1,12 @@
-//! Where the sun reaches: a map of the highest surface along the sun's direction.
+//! Shadows: a map of the highest surface along the sun's direction.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::simulation::world::World;
 
-/// Cells per side.
+/// Number of cells per side.
 const CELLS: usize = 2048;
-/// A surface this far under the highest one is still lit.
+/// A surface within this distance below the highest one is still lit.
 const BIAS_M: f32 = 0.09;
 
 /// Heights towards the sun over a square around the origin.
@@ -36,7 +36,7 @@ impl ShadowMap {
         map
     }
 
-    /// Raises the map to a face whose corners are given in cells and heights.
+    /// Raises the map to a face with these corners in cells and heights.
     fn raise(&mut self, outline: &[Vector3<f64>]) {
         let mut normal = Vector3::zeros();
         for k in 1..outline.len() - 1 {
@@ -69,7 +69,7 @@ impl ShadowMap {
         }
     }
 
-    /// How much of the sun reaches a place, 0 to 1, smoothed over three cells.
+    /// Fraction of the sunlight at a position, 0 to 1, smoothed over three cells.
     #[inline]
     pub(super) fn lit(&self, column: f32, row: f32, height: f32) -> f32 {
         let (x, y) = (column - 0.5, row - 0.5);

@@ -4,17 +4,17 @@ use nalgebra::Vector2;
 
 use crate::camera::CameraModel;
 
-/// Samples per pixel. Each lies on a row and a column of its own, so that edges in any direction move smoothly.
+/// Samples per pixel. Each has its own row and column in the pixel, so that edges in any direction are smooth.
 pub(super) const SAMPLES: usize = 8;
 
-/// Where the samples lie in their pixel, in pixels from its centre.
+/// Offsets of the samples from the pixel centre, in pixels.
 pub(super) const OFFSETS_PX: [[f32; 2]; SAMPLES] = offsets();
 
 const fn offsets() -> [[f32; 2]; SAMPLES] {
     let mut offsets = [[0.0; 2]; SAMPLES];
     let mut k = 0;
     while k < SAMPLES {
-        // Eight rooks that do not threaten each other.
+        // Eight rooks that do not attack each other.
         let column = (3 * k) % SAMPLES;
         offsets[k] = [(column as f32 + 0.5) / SAMPLES as f32 - 0.5, (k as f32 + 0.5) / SAMPLES as f32 - 0.5];
         k += 1;
@@ -22,24 +22,24 @@ const fn offsets() -> [[f32; 2]; SAMPLES] {
     offsets
 }
 
-/// Marks a pixel that the lens does not show.
+/// Marks a pixel outside the lens.
 const DARK: f32 = f32::NAN;
 
-/// A camera prepared for rendering: the ray of every pixel and where its four samples lie in the sample grid.
+/// Camera prepared for rendering: the ray of every pixel, and the positions of its eight samples in the sample grid.
 ///
 /// The grid is that of a pinhole camera wide enough for all rays.
 #[derive(Clone, Debug)]
 pub(crate) struct View {
     pub(super) width: usize,
     pub(super) height: usize,
-    /// `x/z` and `y/z` per pixel; NaN where the lens shows nothing.
+    /// `x/z` and `y/z` per pixel; NaN outside the lens.
     pub(super) rays: Vec<[f32; 2]>,
     pub(super) grid: Grid,
-    /// Per pixel its samples' places in the grid; `None` when they simply are the rows of its column.
+    /// Positions of each pixel's samples in the grid; `None` if they are the rows of its column.
     pub(super) places: Option<Vec<[u32; SAMPLES]>>,
 }
 
-/// The sample grid, with one column and [`SAMPLES`] rows per pixel: sample `(i, j)` has the ray
+/// Sample grid, with one column and [`SAMPLES`] rows per pixel: sample `(i, j)` has the ray
 /// `(origin.x + (i + shift)·step.x, origin.y + j·step.y, 1)`, where the shift is that of row `j`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
@@ -49,7 +49,7 @@ pub(super) struct Grid {
     pub(super) step: [f64; 2],
 }
 
-/// The ray of a pixel and how it changes to the neighbours.
+/// Ray of a pixel and its differences to the neighbours.
 #[derive(Clone, Copy)]
 pub(super) struct PixelRay {
     pub(super) ray: [f32; 2],
@@ -57,7 +57,7 @@ pub(super) struct PixelRay {
     pub(super) down: [f32; 2],
 }
 
-/// The rays of some pixels, component by component, as vector code wants them.
+/// Rays of some pixels by component, for vectorization.
 #[derive(Clone, Copy)]
 pub(super) struct Rays<const N: usize> {
     pub(super) ray: [[f32; N]; 2],
@@ -72,23 +72,22 @@ impl From<PixelRay> for Rays<1> {
     }
 }
 
-/// Buffers that a thread keeps between images.
+/// Buffers of a thread, reused between images.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Workspace {
-    /// Of a band of the sample grid.
+    /// For a band of the sample grid.
     pub(super) inverse_depth: Vec<f32>,
     pub(super) face: Vec<u32>,
     pub(super) prepared: Vec<super::raster::Prepared>,
     pub(super) shapes: Vec<super::raster::Shape>,
-    pub(super) outlines: Vec<[f64; 2]>,
-    /// What the pixels of a row see.
+    pub(super) outline_points: Vec<[f64; 2]>,
+    /// Face of each pixel of a row, or `MIXED`.
     pub(super) seen: Vec<u32>,
-    /// Not 0 where a row's pixels see several faces.
+    /// Not 0 for the pixels of a row that show several faces.
     pub(super) differs: Vec<u32>,
 }
 
 impl View {
-    /// Prepares a camera.
     pub(crate) fn new(model: &CameraModel) -> Self {
         let [width, height] = model.resolution_px;
         let ray = |u: f64, v: f64| {
@@ -146,20 +145,20 @@ impl View {
         (0..height).step_by(rows.min(height)).map(move |top| top..(top + rows.min(height)).min(height))
     }
 
-    /// The rows of the grid in which the samples of some rows of pixels lie.
+    /// Rows of the grid that contain the samples of some rows of pixels.
     pub(super) fn sample_rows(&self, pixels: Range<usize>) -> Range<usize> {
         let Some(places) = &self.places else { return pixels.start * SAMPLES..pixels.end * SAMPLES };
         if pixels.len() == self.height {
             return 0..self.grid.rows;
         }
         let places = places[pixels.start * self.width..pixels.end * self.width].iter().flatten();
-        // Pixels that the lens does not show have their samples at 0.
+        // Pixels outside the lens have their samples at 0.
         let seen = places.filter(|place| **place > 0).map(|place| *place as usize / self.grid.columns);
         let (first, last) = seen.fold((self.grid.rows, 0), |(first, last), row| (first.min(row), last.max(row)));
         first.min(last)..last + 1
     }
 
-    /// The ray of a pixel with its differences to the neighbours; `None` where the lens shows nothing.
+    /// Ray of a pixel with its differences to the neighbours; `None` outside the lens.
     #[inline]
     pub(super) fn pixel_ray(&self, column: usize, row: usize) -> Option<PixelRay> {
         let at = |x: usize, y: usize| self.rays[y * self.width + x];
@@ -179,7 +178,7 @@ impl View {
         seen.then_some(PixelRay { ray, right, down })
     }
 
-    /// The rays of `N` pixels from a column on that the lens all shows; past `end` the last one stands in.
+    /// Rays of `N` pixels from a column on, all inside the lens; those past `end` repeat the last one.
     #[inline]
     pub(super) fn rays<const N: usize>(&self, columns: std::ops::Range<usize>, row: usize) -> Rays<N> {
         let line = |row: usize| &self.rays[row * self.width..][..self.width];
@@ -207,7 +206,6 @@ impl View {
         rays
     }
 
-    /// Number of pixels.
     pub(crate) fn pixels(&self) -> usize {
         self.width * self.height
     }
@@ -215,7 +213,6 @@ impl View {
 
 #[cfg(test)]
 impl View {
-    /// Pixels in a row.
     pub(crate) fn width(&self) -> usize {
         self.width
     }
@@ -223,7 +220,7 @@ impl View {
 
 #[cfg(test)]
 impl Workspace {
-    /// Depth of what the first sample of every pixel sees from a pose.
+    /// Depth of the face at the first sample of every pixel, from a pose.
     pub(crate) fn depths_m(
         &mut self,
         view: &View,
@@ -242,13 +239,13 @@ impl Workspace {
 }
 
 impl Grid {
-    /// How far the samples of a row lie to the right of whole columns.
+    /// Distance of the samples of a row to the right of whole columns.
     #[inline]
     pub(super) fn shift(row: usize) -> f64 {
         f64::from(OFFSETS_PX[row % SAMPLES][0])
     }
 
-    /// The place of the sample nearest to a ray.
+    /// Position of the sample nearest to a ray.
     fn nearest(&self, ray: [f64; 2]) -> u32 {
         let [x, y] = [0, 1].map(|axis: usize| (ray[axis] - self.origin[axis]) / self.step[axis]);
         let middle = (y.round().max(0.0) as usize).min(self.rows - 1);

@@ -17,7 +17,7 @@ pub(super) fn experiment_trajectory(experiment: Experiment, seed: u64, duration_
     Trajectory::new(flight.as_ref(), &mut random, &VehicleLimits::default(), duration_s, GRAVITY_M_PER_S2)
 }
 
-/// An experiment with a static camera, and with the camera on its gimbal where asked for.
+/// Experiment with a static camera, optionally also with the gimbal camera.
 pub(super) fn experiment_scenario(experiment: Experiment, seed: u64, duration_s: f64, gimbal_camera: bool) -> Scenario {
     let look = experiment.look_around(&mut RandomStream::new(seed, stream::LOOK));
     let equipment = Equipment {
@@ -161,7 +161,7 @@ fn the_gimbal_keeps_its_limits_and_stabilizes_the_image() {
             swing[0] = swing[0].max((angles[0] - before[0]).abs() / 0.01);
             for camera in 0..2 {
                 let pose = scenario.world_from_camera(&rig.cameras[camera], time_s);
-                // The optical x axis points right: level is no height.
+                // The optical x axis points right: its vertical component is zero if level.
                 roll_squares[camera] += (pose.rotation * Vector3::x()).z.powi(2);
             }
         }
@@ -179,7 +179,7 @@ fn slew_and_spin_reach_their_rates_in_their_intervals_only() {
     trajectory.spin([5.0, 2.0], 3.0);
     let rate = |trajectory: &Trajectory| (trajectory.at(6.05).heading_rad - trajectory.at(5.95).heading_rad) / 0.1;
     let added = rate(&trajectory) - rate(&plain);
-    // The flight's spline rounds the ends of the stretch, which reaches a little into its middle.
+    // The flight's spline rounds the ends of the interval, which extends slightly into its middle.
     assert!((added / 3.0 - 1.0).abs() < 0.05, "{added} rad/s");
     for (time_s, turned_rad) in [(1.0, 0.0), (10.0, 6.0)] {
         let rotated_rad = trajectory.at(time_s).heading_rad - plain.at(time_s).heading_rad;
@@ -220,7 +220,7 @@ fn rotors_shake_the_imu_less_on_the_ground() {
         let sum = squares.fold((0.0, 0.0), |sum, (rate, force)| (sum.0 + rate, sum.1 + force));
         (((sum.0 / (to - from) as f64).sqrt()), (sum.1 / (to - from) as f64).sqrt())
     };
-    // A sine has 0.71 of its amplitude as RMS; the filter takes 13 % at 60 Hz, the harmonics add some.
+    // A sine has an RMS of 0.71 of its amplitude; the filter removes 13 % at 60 Hz, the harmonics add some.
     let (rate, force) = rms(1600, 3600);
     assert!((0.28..0.45).contains(&rate), "{rate} rad/s");
     assert!((2.8..4.5).contains(&force), "{force} m/s²");

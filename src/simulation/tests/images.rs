@@ -9,7 +9,7 @@ use super::flight::experiment_trajectory;
 use crate::geometry::{RigidTransform, so3};
 use crate::sensors::GrayImage;
 
-/// An image from a position along a heading, 8° down.
+/// Image from a position along a heading, 8° down.
 fn radiance(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> GrayImage {
     let view = View::new(&camera_model(0, lens, [640, 480]));
     let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
@@ -29,7 +29,8 @@ fn radiance(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> G
     Sensor::new(&view, options, 5).expose(&grey, 0, 0.0)
 }
 
-/// Cells of 32 × 32 pixels that hold a strong corner (smaller eigenvalue of the gradient's 7 × 7 structure tensor).
+/// Number of cells of 32 × 32 pixels with a strong corner (smaller eigenvalue of the gradient's 7 × 7 structure
+/// tensor).
 fn cells_with_corners(image: &GrayImage) -> usize {
     let at = |x: usize, y: usize| f64::from(image.pixels[y * image.width + x]);
     let mut cells = std::collections::BTreeSet::new();
@@ -77,7 +78,7 @@ fn both_worlds_have_many_corners_and_good_exposure() {
 
 #[test]
 fn a_pixel_sees_what_its_ray_hits() {
-    // A point of the house's corner edge projects to where the image changes from wall to wall.
+    // A point of the house's corner edge projects to the image edge between two walls.
     let world = world::build(Environment::House, 1);
     let model = camera_model(0, Lens::Radtan, [640, 480]);
     let view = View::new(&model);
@@ -91,7 +92,7 @@ fn a_pixel_sees_what_its_ray_hits() {
     for height_m in [1.9, 2.3, 2.9, 3.4] {
         let edge = Vector3::new(corner.x, corner.y, height_m);
         let uv = model.project(&pose.inverse().transform(&edge)).unwrap();
-        // Left of the edge the western wall (x = −6) is seen, right of it the southern one (y = −4.5).
+        // Left of the edge lies the western wall (x = −6), right of it the southern one (y = −4.5).
         let mut sides = [0.0; 2];
         for (side, offset) in [(0, -2.0), (1, 2.0)] {
             let ray = pose.rotation * model.unproject(&(uv + nalgebra::Vector2::new(offset, 0.0))).unwrap();
@@ -111,8 +112,8 @@ fn a_pixel_sees_what_its_ray_hits() {
 
 #[test]
 fn textures_do_not_flicker_under_slow_motion() {
-    // Moving by a hundredth of a pixel at a time, a tracked patch must change smoothly: neighbouring images are far
-    // more alike than images a pixel apart.
+    // Between shifts of a hundredth of a pixel, a tracked patch must change smoothly: neighbouring images are much more
+    // similar than images a pixel apart.
     let world = world::build(Environment::Town, 1);
     let renderer = Renderer::new(&world);
     let view = View::new(&camera_model(0, Lens::Pinhole, [320, 240]));

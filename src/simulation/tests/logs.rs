@@ -210,7 +210,7 @@ fn noise_compression_vignetting_and_exposure_drift_change_images() {
         let frames = FrameStream::new(log, &rig, "cam0", 0.0, None).unwrap();
         frames.map(|frame| frame.image).collect::<Vec<_>>()
     };
-    // Without an effect: the images as they are without disturbances.
+    // A disturbance without effect: images without disturbances.
     let plain = images("exposure-drift=0");
     let difference = |images: &[Arc<crate::sensors::GrayImage>]| {
         let pixels = |images: &[Arc<crate::sensors::GrayImage>]| -> Vec<f64> {
@@ -236,7 +236,7 @@ fn noise_compression_vignetting_and_exposure_drift_change_images() {
     assert!((1.0..20.0).contains(&difference(&images("jpeg=10"))));
     assert!((5.0..80.0).contains(&difference(&images("exposure-drift=0.8"))));
     let darker = corner_over_middle(&images("vignetting=0.6")) / corner_over_middle(&plain);
-    // The middle of a patch in the corner is at 0.82 of the squared distance of the corner.
+    // The centre of a patch in the corner is at 0.82 of the squared distance of the corner.
     let expected = (1.0 - 0.82 * 0.6) / (1.0 - 0.82 * 0.12);
     assert!((darker - expected).abs() < 0.02, "{darker} instead of {expected}");
     let mut options = small(Experiment::T1);
@@ -265,7 +265,7 @@ fn light_and_fog_change_images_only_while_active() {
     options.disturbances.blank_s = Some([0.75, 0.1]);
     let disturbed = means_and_spreads(&options);
     assert_eq!(plain[..7], disturbed[..7]);
-    // Frame 8 is taken at 0.403 s, just after the light has halved; frames 15 and 16 see fog.
+    // Frame 8 is taken at 0.403 s, just after the light has halved; frames 15 and 16 show fog.
     let fraction = disturbed[8].0 / plain[8].0;
     assert!((fraction - 0.5).abs() < 0.02, "{fraction}");
     assert!(disturbed[12].0 / plain[12].0 > fraction + 0.05);

@@ -40,7 +40,7 @@ fn with_a_readout_each_landmark_is_observed_at_the_time_of_its_row() {
         let flight = synthetic_tracks(&options);
         let camera = &flight.true_rig.cameras[0];
         assert_eq!((camera.readout_s, flight.given_rig.cameras[0].readout_s), (readout_s, 0.0));
-        // Poses of many times, from the frames' first rows of a flight with a shifted clock.
+        // Poses at many times, from the first rows of the frames of a flight with a shifted clock.
         let rows = [90.0, 240.0, 400.0];
         let shifted = rows.map(|row_px| {
             let clock_offsets_s = [camera.row_time_s(row_px), 0.0];

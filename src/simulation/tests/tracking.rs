@@ -1,4 +1,4 @@
-//! Tracks of the front end on simulated images against the surfaces that the images show.
+//! Tracks of the front end on simulated images, compared with the visible surfaces.
 
 #![expect(clippy::print_stdout, reason = "docs/accuracy.md states the errors that are printed with --nocapture")]
 
@@ -18,7 +18,7 @@ use crate::geometry::{RigidTransform, median};
 const IMAGES: usize = 120;
 const PERIOD_S: f64 = 0.05;
 
-/// The plane that a feature lies on, seen from the camera that observed it first.
+/// Plane of a feature, in the frame of the camera that observed it first.
 struct Surface {
     uv_px: Vector2<f64>,
     world_from_camera: RigidTransform,
@@ -27,7 +27,7 @@ struct Surface {
 }
 
 impl Surface {
-    /// `None` where the window about the feature shows more than one plane.
+    /// `None` if the window around the feature shows more than one plane.
     fn new(
         world: &World,
         model: &CameraModel,
@@ -57,7 +57,7 @@ impl Surface {
         Some(Self { uv_px, world_from_camera, normal: face.normal, distance: face.distance })
     }
 
-    /// Where a pixel of the first image lies in the image of another pose.
+    /// Position of a pixel of the first image in the image from another pose.
     fn seen_from(&self, model: &CameraModel, pose: &RigidTransform, uv_px: &Vector2<f64>) -> Option<Vector2<f64>> {
         let centre_m = self.world_from_camera.translation_m;
         let ray = self.world_from_camera.rotation * model.unproject(uv_px)?;
@@ -65,7 +65,7 @@ impl Surface {
         model.project(&pose.inverse().transform(&(centre_m + ray * along_m)))
     }
 
-    /// Factor by which areas about the feature have grown since the first image.
+    /// Factor by which areas around the feature have grown since the first image.
     fn growth(&self, model: &CameraModel, pose: &RigidTransform) -> Option<f64> {
         let side = |axis: Vector2<f64>| {
             let from = self.seen_from(model, pose, &(self.uv_px - axis))?;
@@ -106,7 +106,7 @@ fn tracks_follow_the_surfaces() {
             let Some(seen) = surface.seen_from(model, &pose, &surface.uv_px) else { continue };
             let error_px = (feature.uv_px - seen).norm();
             all.push(error_px);
-            // Past a factor of two the reference is a new one.
+            // Past a factor of two the reference has been replaced.
             if surface.growth(model, &pose).is_some_and(|growth| growth > 2.2 && growth < 4.0) {
                 grown.push(error_px);
             }

@@ -1,9 +1,9 @@
-//! A surface being painted: grey values over metres, with noise, strokes and shapes.
+//! Painted surface: grey values over metres, with noise, strokes and shapes.
 
 use super::texture::Texture;
 use crate::simulation::random::{RandomStream, mix};
 
-/// Grey values from 0 to 255 over a rectangle of the real world, rows from top to bottom.
+/// Grey values from 0 to 255 over a rectangle in metres, rows from top to bottom.
 #[derive(Clone, Debug)]
 pub(crate) struct Canvas {
     width: usize,
@@ -13,7 +13,7 @@ pub(crate) struct Canvas {
     values: Vec<f32>,
 }
 
-/// A rectangle on a canvas: left, top, width and height in metres.
+/// Rectangle on a canvas: left, top, width and height in metres.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Area {
     pub(crate) x: f32,
@@ -27,20 +27,21 @@ impl Area {
         Self { x, y, w, h }
     }
 
-    /// The area with a margin taken off on every side (added when negative).
+    /// The area, reduced by a margin on every side (enlarged if negative).
     pub(crate) fn inset(self, margin: f32) -> Self {
         Self::new(self.x + margin, self.y + margin, self.w - 2.0 * margin, self.h - 2.0 * margin)
     }
 }
 
-/// A lattice of random values in `[−1, 1]`, as wide and high as it has cells.
+/// Lattice of random values in `[−1, 1]`, with as many columns and rows as cells.
 fn lattice(cells: [usize; 2], seed: u64) -> Vec<f32> {
     (0..cells[0] * cells[1])
         .map(|index| (mix(seed ^ (index as u64)) >> 40) as f32 * (2.0 / 16_777_216.0) - 1.0)
         .collect()
 }
 
-/// Where a texel lies on a lattice along one axis: the cells before and after, and the eased share of the latter.
+/// Position of each texel on a lattice along one axis: the cells before and after, and the smoothed weight of the
+/// latter.
 fn stations(texels: usize, cells: usize) -> Vec<(usize, usize, f32)> {
     (0..texels)
         .map(|index| {
@@ -53,7 +54,7 @@ fn stations(texels: usize, cells: usize) -> Vec<(usize, usize, f32)> {
 }
 
 impl Canvas {
-    /// A canvas of this size in metres. A wrapping one gets sides that are powers of two, its scale is then rounded.
+    /// Canvas of this size in metres. The sides of a wrapping one are rounded to powers of two.
     pub(crate) fn new(width_m: f32, height_m: f32, texels_per_m: f32, wrap: bool, value: f32) -> Self {
         let side = |length_m: f32| (length_m * texels_per_m).round().max(1.0) as usize;
         let (mut width, mut height) = (side(width_m), side(height_m));
@@ -65,18 +66,15 @@ impl Canvas {
         Self { width, height, texels_per_m: scale, wrap, values: vec![value; width * height] }
     }
 
-    /// Size in metres.
     pub(crate) fn size_m(&self) -> [f32; 2] {
         [self.width as f32 / self.texels_per_m, self.height as f32 / self.texels_per_m]
     }
 
-    /// The whole canvas.
     pub(crate) fn area(&self) -> Area {
         let [w, h] = self.size_m();
         Area::new(0.0, 0.0, w, h)
     }
 
-    /// The finished texture.
     pub(crate) fn finish(self) -> Texture {
         let texels: Vec<u8> = self.values.iter().map(|value| value.round().clamp(0.0, 255.0) as u8).collect();
         Texture::new(self.width, self.height, &texels, self.wrap, self.texels_per_m)
@@ -94,7 +92,7 @@ impl Canvas {
         *slot += (value - *slot) * fraction;
     }
 
-    /// Adds fractal noise of this grain (size of the coarsest blotches) everywhere.
+    /// Adds fractal noise everywhere; `grain_m` is the size of the coarsest blotches.
     pub(crate) fn noise(&mut self, grain_m: f32, amplitude: f32, octaves: u32, random: &mut RandomStream) {
         let [w, h] = self.size_m();
         let mut cells = [w, h].map(|side| (side / grain_m).round().max(1.0) as usize);
@@ -123,7 +121,7 @@ impl Canvas {
         }
     }
 
-    /// Fills a rectangle through `paint(x, y)` of metres from its corner, which gives a value and a share.
+    /// Fills a rectangle by `paint(x, y)` of metres from its corner, which returns a grey value and its weight.
     pub(crate) fn fill(&mut self, area: Area, mut paint: impl FnMut(f32, f32) -> (f32, f32)) {
         let scale = self.texels_per_m;
         let first = |from: f32| (from * scale - 0.5).ceil() as i64;
@@ -137,12 +135,11 @@ impl Canvas {
         }
     }
 
-    /// A plain rectangle.
     pub(crate) fn rectangle(&mut self, area: Area, value: f32) {
         self.fill(area, |_, _| (value, 1.0));
     }
 
-    /// Brightens (or darkens) a rectangle by a factor, its texture kept.
+    /// Multiplies a rectangle by a brightness factor; its texture is kept.
     pub(crate) fn shade(&mut self, area: Area, factor: f32) {
         let scale = self.texels_per_m;
         let range = |from: f32, length: f32, size: usize| {
@@ -157,7 +154,7 @@ impl Canvas {
         }
     }
 
-    /// An ellipse, rotated by an angle, its border softened over a texel.
+    /// Ellipse, rotated by an angle, with a border smoothed over a texel.
     pub(crate) fn ellipse(&mut self, centre: [f32; 2], radii: [f32; 2], angle: f32, value: f32, fraction: f32) {
         let reach = radii[0].max(radii[1]);
         let (sine, cosine) = angle.sin_cos();
@@ -172,7 +169,7 @@ impl Canvas {
         });
     }
 
-    /// A straight stroke of this width, softened over a texel.
+    /// Straight stroke of this width, smoothed over a texel.
     pub(crate) fn stroke(&mut self, from: [f32; 2], to: [f32; 2], width: f32, value: f32, fraction: f32) {
         let half = 0.5 * width;
         let margin = half + 1.0 / self.texels_per_m;
@@ -193,7 +190,7 @@ impl Canvas {
         });
     }
 
-    /// A wandering line, as a crack or a twig.
+    /// Random curved line, such as a crack or a twig.
     pub(crate) fn wander(&mut self, start: [f32; 2], length: f32, width: f32, value: f32, random: &mut RandomStream) {
         let mut at = start;
         let mut angle = random.uniform(0.0, std::f64::consts::TAU) as f32;
@@ -241,7 +238,7 @@ impl Canvas {
         }
     }
 
-    /// Lines of made-up letters that fill an area.
+    /// Lines of random letters that fill an area.
     pub(crate) fn letters(&mut self, area: Area, letter_height: f32, value: f32, random: &mut RandomStream) {
         let cell = letter_height / 6.0;
         let mut y = area.y;

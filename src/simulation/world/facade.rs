@@ -5,7 +5,7 @@ use super::surface::{Wall, wall};
 use super::texture::Texture;
 use crate::simulation::random::RandomStream;
 
-/// What a front is to look like.
+/// Options of a front.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Front {
     pub(crate) wall: Wall,
@@ -22,7 +22,6 @@ fn number(random: &mut RandomStream, low: f32, high: f32) -> f32 {
     random.uniform(f64::from(low), f64::from(high)) as f32
 }
 
-/// Paints a front.
 pub(crate) fn front(front: &Front, random: &mut RandomStream) -> Texture {
     let mut canvas = Canvas::new(front.width_m, front.height_m, front.texels_per_m, false, 128.0);
     wall(&mut canvas, front.wall, random);
@@ -57,7 +56,7 @@ pub(crate) fn front(front: &Front, random: &mut RandomStream) -> Texture {
     canvas.finish()
 }
 
-/// A window: frame, bars, dark glass with something behind it, sill, sometimes blinds or shutters.
+/// Window: frame, bars, dark glass with varied content, sill, sometimes blinds or shutters.
 fn window(canvas: &mut Canvas, area: Area, random: &mut RandomStream) {
     let frame = number(random, 175.0, 232.0);
     let glass = number(random, 24.0, 58.0);
@@ -70,7 +69,7 @@ fn window(canvas: &mut Canvas, area: Area, random: &mut RandomStream) {
     }
     canvas.rectangle(area.inset(-0.07), frame);
     canvas.rectangle(area, glass);
-    // A slanted reflection, and sometimes a curtain or a plant.
+    // Slanted reflection, and sometimes a curtain or a plant.
     let slope = number(random, 0.3, 1.2);
     let start = number(random, 0.0, area.w);
     canvas.fill(area, |u, v| {
@@ -102,13 +101,13 @@ fn window(canvas: &mut Canvas, area: Area, random: &mut RandomStream) {
     canvas.rectangle(Area::new(area.x, crossing, area.w, bar), frame);
     canvas.rectangle(Area::new(area.x - 0.14, area.y + area.h + 0.06, area.w + 0.28, 0.07), 215.0);
     canvas.rectangle(Area::new(area.x - 0.12, area.y + area.h + 0.13, area.w + 0.24, 0.05), 48.0);
-    // What the rain has washed off the sill.
+    // Rain streaks below the sill.
     for side in [area.x - 0.1, area.x + area.w + 0.02] {
         canvas.shade(Area::new(side, area.y + area.h + 0.18, 0.08, number(random, 0.1, 0.5)), 0.72);
     }
 }
 
-/// A door with panels, a handle, a number and a step.
+/// Door with panels, a handle, a number and a step.
 fn door(canvas: &mut Canvas, area: Area, random: &mut RandomStream) {
     let leaf = number(random, 42.0, 105.0);
     canvas.rectangle(Area::new(area.x - 0.1, area.y - 0.1, area.w + 0.2, area.h + 0.1), number(random, 170.0, 225.0));
@@ -125,7 +124,7 @@ fn door(canvas: &mut Canvas, area: Area, random: &mut RandomStream) {
     canvas.rectangle(Area::new(area.x - 0.2, area.y + area.h - 0.09, area.w + 0.4, 0.09), 165.0);
 }
 
-/// A shop window with a sign over it and goods behind the glass.
+/// Shop window with a sign above it and goods behind the glass.
 fn shop(canvas: &mut Canvas, area: Area, random: &mut RandomStream) {
     canvas.rectangle(area.inset(-0.06), number(random, 45.0, 85.0));
     canvas.rectangle(Area::new(area.x, area.y + 0.5, area.w, area.h - 0.5), 36.0);
@@ -150,7 +149,7 @@ fn shop(canvas: &mut Canvas, area: Area, random: &mut RandomStream) {
     canvas.rectangle(Area::new(area.x, area.y + area.h - bar, area.w, bar), 170.0);
 }
 
-/// Posters, graffiti, cracks, pipes, vents and stains, kept off nothing in particular.
+/// Posters, graffiti, cracks, pipes, vents and stains at any position.
 fn clutter(canvas: &mut Canvas, front: &Front, random: &mut RandomStream) {
     let (w, h) = (front.width_m, front.height_m);
     let area = w * h;
@@ -202,7 +201,7 @@ fn clutter(canvas: &mut Canvas, front: &Front, random: &mut RandomStream) {
         canvas.letters(text, 0.085, 35.0, random);
     }
     if front.shops && random.chance(0.6) {
-        // Graffiti: thick wandering strokes at arm's height.
+        // Graffiti: thick curved strokes at arm's height.
         let value = if random.chance(0.5) { 230.0 } else { 32.0 };
         let x = number(random, 0.3, w - 1.6);
         for letter in 0..4 {

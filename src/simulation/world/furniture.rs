@@ -1,4 +1,4 @@
-//! Things that stand around: fences, cars, lamps, benches, crates, sheds, plain houses.
+//! Objects: fences, cars, lamps, benches, crates, sheds, plain houses.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -6,7 +6,7 @@ use super::landscape::Palette;
 use super::mesh::{MaterialId, World};
 use crate::simulation::random::RandomStream;
 
-/// A board fence with posts between two points, seen from both sides.
+/// Board fence with posts between two points, visible from both sides.
 pub(crate) fn fence(
     world: &mut World,
     palette: &Palette,
@@ -30,7 +30,7 @@ pub(crate) fn fence(
     }
 }
 
-/// A car: body, cabin, wheels, windows.
+/// Car: body, cabin, wheels, windows.
 pub(crate) fn car(world: &mut World, palette: &Palette, place: [f64; 2], yaw_rad: f64, random: &mut RandomStream) {
     let body = if random.chance(0.5) { palette.light_metal } else { palette.dark_metal };
     let (sine, cosine) = yaw_rad.sin_cos();
@@ -47,7 +47,7 @@ pub(crate) fn car(world: &mut World, palette: &Palette, place: [f64; 2], yaw_rad
     }
 }
 
-/// A lamp post with its head towards `yaw_rad`.
+/// Lamp post with its head towards `yaw_rad`.
 pub(crate) fn lamp(world: &mut World, palette: &Palette, place: [f64; 2], yaw_rad: f64, random: &mut RandomStream) {
     let foot = Vector3::new(place[0], place[1], 0.0);
     world.column(foot, 0.14, 0.5, 8, palette.concrete, random);
@@ -56,7 +56,6 @@ pub(crate) fn lamp(world: &mut World, palette: &Palette, place: [f64; 2], yaw_ra
     world.cuboid(head, Vector3::new(1.1, 0.22, 0.12), yaw_rad, palette.light_metal, random);
 }
 
-/// A bench.
 pub(crate) fn bench(world: &mut World, palette: &Palette, place: [f64; 2], yaw_rad: f64, random: &mut RandomStream) {
     let (sine, cosine) = yaw_rad.sin_cos();
     let at =
@@ -68,7 +67,6 @@ pub(crate) fn bench(world: &mut World, palette: &Palette, place: [f64; 2], yaw_r
     }
 }
 
-/// A pile of crates.
 pub(crate) fn crates(world: &mut World, palette: &Palette, place: [f64; 2], count: usize, random: &mut RandomStream) {
     let materials = [palette.planks, palette.light_metal, palette.bark, palette.dark_metal];
     let mut height = 0.0;
@@ -85,14 +83,14 @@ pub(crate) fn crates(world: &mut World, palette: &Palette, place: [f64; 2], coun
     }
 }
 
-/// The four fronts of a building (south, east, north, west) and its roof.
+/// Fronts of a building (south, east, north, west) and its roof.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shell {
     pub(crate) fronts: [MaterialId; 4],
     pub(crate) roof: MaterialId,
 }
 
-/// The walls of a rectangular building; each front's texture starts at its upper left corner.
+/// Walls of a rectangular building; each front's texture starts at its upper left corner.
 pub(crate) fn walls(world: &mut World, low: [f64; 2], high: [f64; 2], height_m: [f64; 2], fronts: &[MaterialId; 4]) {
     let corners = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]].map(Vector2::from);
     for (side, front) in fronts.iter().enumerate() {
@@ -100,7 +98,7 @@ pub(crate) fn walls(world: &mut World, low: [f64; 2], high: [f64; 2], height_m: 
     }
 }
 
-/// A roof with its ridge along x, boards in the gables and under the eaves.
+/// Roof with its ridge along x, boards in the gables and under the eaves.
 pub(crate) fn gable_roof(
     world: &mut World,
     low: [f64; 2],
@@ -124,7 +122,7 @@ pub(crate) fn gable_roof(
         let under = vec![origin, origin + right, origin + right + down, origin + down];
         let under = under.into_iter().map(|corner| corner - Vector3::z() * 0.09).collect();
         world.polygon(under, -right.normalize(), down.normalize(), [0.0, 0.0], boards);
-        // The eaves' edge.
+        // Edge of the eaves.
         let edge = origin + down;
         world.quad(edge, right, Vector3::new(0.0, 0.0, -0.14), [0.0, 0.0], boards);
         let back = vec![edge, edge + right, edge + right - Vector3::z() * 0.14, edge - Vector3::z() * 0.14];
@@ -138,7 +136,7 @@ pub(crate) fn gable_roof(
     }
 }
 
-/// A plain house with a gable roof.
+/// Plain house with a gable roof.
 pub(crate) fn plain_house(
     world: &mut World,
     palette: &Palette,

@@ -1,6 +1,6 @@
 //! Environment 1: a house in its garden, with neighbours beyond the fence.
 //!
-//! Experiments T1 and T2 keep to the lawn between the house (6 m and 4.5 m from the middle) and the fence (22 m).
+//! Experiments T1 and T2 stay above the lawn between the house (6 m and 4.5 m from the centre) and the fence (22 m).
 
 use nalgebra::{Vector2, Vector3};
 
@@ -11,15 +11,14 @@ use super::mesh::{MaterialId, World};
 use super::surface::{Wall, roof};
 use crate::simulation::random::RandomStream;
 
-/// Half the house's length and width.
+/// Half of the house's length and width.
 const HALF_M: [f64; 2] = [6.0, 4.5];
 /// Height of the eaves and of the ridge.
 const EAVES_M: f64 = 5.2;
 const RIDGE_M: f64 = 8.0;
-/// Distance of the fence from the middle.
+/// Distance of the fence from the centre.
 const FENCE_M: f64 = 22.5;
 
-/// Builds the world.
 pub(super) fn build(seed: u64) -> World {
     let random = &mut RandomStream::new(seed, 101);
     let (mut world, palette) = begin(Vector3::new(-0.45, -0.62, 0.72), 46.0, random);
@@ -93,7 +92,7 @@ fn house(world: &mut World, palette: &Palette, random: &mut RandomStream) {
     let bay = painted(world, Wall::Boards, [3.0, 2.6], [1, 2], random);
     world.cuboid(Vector3::new(-2.0, y + 0.6, 0.0), Vector3::new(3.0, 1.2, 2.6), 0.0, palette.planks, random);
     world.wall(Vector2::new(-0.5, y + 1.21), Vector2::new(-3.5, y + 1.21), [0.0, 2.6], [0.0, 0.0], bay);
-    // Balcony and boxes on the walls give depth to the fronts.
+    // Balcony and boxes on the walls add depth to the fronts.
     for (place, size) in [
         ([-6.5, 0.4, 2.5], [1.0, 3.2, 0.16]),
         ([-6.95, 0.4, 2.66], [0.08, 3.2, 0.85]),
@@ -159,7 +158,7 @@ fn garden(world: &mut World, palette: &Palette, random: &mut RandomStream) {
     ] {
         fence(world, palette, from, to, 1.5, random);
     }
-    // Trees inside the fence, where nobody flies.
+    // Trees inside the fence, outside the flight area.
     for (x, y) in [
         (-20.0, -19.6),
         (-19.8, -11.0),

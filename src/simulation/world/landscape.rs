@@ -1,4 +1,4 @@
-//! Parts of both environments: materials, ground, hills and trees.
+//! Common parts of both environments: materials, ground, hills and trees.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -6,7 +6,7 @@ use super::mesh::{MaterialId, World};
 use super::surface;
 use crate::simulation::random::RandomStream;
 
-/// Materials of everything but fronts.
+/// Materials of everything except fronts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Palette {
     pub(crate) grass: MaterialId,
@@ -22,7 +22,7 @@ pub(crate) struct Palette {
     pub(crate) paint: MaterialId,
 }
 
-/// An empty world under a sky, and its palette.
+/// Empty world with a sky, and its palette.
 pub(crate) fn begin(to_sun: Vector3<f64>, shadow_reach_m: f64, random: &mut RandomStream) -> (World, Palette) {
     let mut world = World::new(to_sun, shadow_reach_m, surface::clouds(random));
     let blotches = world.material(surface::blotches(random));
@@ -44,7 +44,7 @@ pub(crate) fn begin(to_sun: Vector3<f64>, shadow_reach_m: f64, random: &mut Rand
     (world, Palette { grass, asphalt, slabs, leaves, bark, planks, concrete, light_metal, dark_metal, woods, paint })
 }
 
-/// A level rectangle that is seen from above, from its lower left to its upper right corner.
+/// Horizontal rectangle visible from above, from its lower left to its upper right corner.
 pub(crate) fn ground(world: &mut World, low: [f64; 2], high: [f64; 2], height_m: f64, material: MaterialId) {
     let origin = Vector3::new(low[0], high[1], height_m);
     let start = [low[0].rem_euclid(640.0), (-high[1]).rem_euclid(640.0)];
@@ -72,7 +72,7 @@ pub(crate) fn hills(world: &mut World, palette: &Palette, random: &mut RandomStr
                 (Vector2::new(radius_m * angle.cos(), radius_m * angle.sin()), rise(angle))
             };
             let ((from, from_rise), (to, to_rise)) = (place(k), place(k + 1));
-            // Seen from the inside: the left end is the one further round.
+            // Visible from the inside: the left end has the larger angle.
             let corners = vec![
                 Vector3::new(to.x, to.y, to_rise),
                 Vector3::new(to.x, to.y, -1.0),
@@ -86,7 +86,7 @@ pub(crate) fn hills(world: &mut World, palette: &Palette, random: &mut RandomStr
     }
 }
 
-/// A tree: trunk and a crown of several lumps within `crown_m` of the trunk.
+/// Tree: trunk and a crown of several lumps within `crown_m` of the trunk.
 pub(crate) fn tree(
     world: &mut World,
     palette: &Palette,
@@ -110,7 +110,6 @@ pub(crate) fn tree(
     }
 }
 
-/// A bush.
 pub(crate) fn bush(world: &mut World, palette: &Palette, foot: [f64; 2], radius_m: f64, random: &mut RandomStream) {
     for _ in 0..2 {
         let shift = [random.uniform(-0.3, 0.3) * radius_m, random.uniform(-0.3, 0.3) * radius_m];
@@ -120,7 +119,7 @@ pub(crate) fn bush(world: &mut World, palette: &Palette, foot: [f64; 2], radius_
     }
 }
 
-/// Stones, tufts and other small flat things over a rectangle, away from where `taken` says so.
+/// Stones, tufts and other small flat objects over a rectangle, except where `taken` is true.
 pub(crate) fn litter(
     world: &mut World,
     materials: &[MaterialId],

@@ -5,20 +5,19 @@ use nalgebra::{Vector2, Vector3};
 use super::texture::Texture;
 use crate::simulation::random::RandomStream;
 
-/// Number of a material in its world.
+/// Index of a material in its world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct MaterialId(pub(crate) usize);
 
-/// How a face looks.
 #[derive(Clone, Debug)]
 pub(crate) struct Material {
-    /// Number of its texture.
+    /// Index of the texture.
     pub(crate) texture: usize,
-    /// A second texture that the first is multiplied with (128 leaves it as it is).
+    /// Second texture that multiplies the first (128: factor 1).
     pub(crate) overlay: Option<usize>,
 }
 
-/// An affine function of a point of the world: `gradient · point + offset`.
+/// Affine function of a point of the world: `gradient · point + offset`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Affine {
     pub(crate) gradient: Vector3<f64>,
@@ -30,13 +29,13 @@ impl Affine {
         Self { gradient: Vector3::zeros(), offset }
     }
 
-    /// The function that grows by one per metre along `axis` from `origin`.
+    /// Function with the value `start` at `origin` that grows by one per metre along `axis`.
     fn along(axis: Vector3<f64>, origin: &Vector3<f64>, start: f64) -> Self {
         Self { gradient: axis, offset: start - axis.dot(origin) }
     }
 }
 
-/// A convex planar polygon that is seen from its front only, where its corners run counter-clockwise.
+/// Convex planar polygon that is visible from its front only, where its corners are counter-clockwise.
 #[derive(Clone, Debug)]
 pub(crate) struct Face {
     pub(crate) corners: Vec<Vector3<f64>>,
@@ -46,12 +45,12 @@ pub(crate) struct Face {
     pub(crate) distance: f64,
     /// Texture coordinates in metres.
     pub(crate) texture_m: [Affine; 2],
-    /// How squarely the sun meets the surface, 0 to 1.
+    /// Cosine of the angle between the normal and the sun, 0 to 1.
     pub(crate) sun: Affine,
     pub(crate) material: MaterialId,
 }
 
-/// A sphere around a face.
+/// Bounding sphere of a face.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
     pub(crate) centre_m: Vector3<f64>,
@@ -66,7 +65,7 @@ impl Bounds {
     }
 }
 
-/// A world: faces, materials, textures, sun and sky.
+/// World: faces, materials, textures, sun and sky.
 #[derive(Clone, Debug)]
 pub(crate) struct World {
     pub(crate) faces: Vec<Face>,
@@ -74,9 +73,9 @@ pub(crate) struct World {
     pub(crate) textures: Vec<Texture>,
     /// Unit direction towards the sun.
     pub(crate) to_sun: Vector3<f64>,
-    /// Half the side of the square around the origin that has shadows.
+    /// Half the side of the square around the origin with shadows.
     pub(crate) shadow_reach_m: f64,
-    /// Number of the texture of the clouds.
+    /// Index of the texture of the clouds.
     pub(crate) clouds: usize,
 }
 
@@ -92,21 +91,21 @@ impl World {
         }
     }
 
-    /// Adds a texture as a material of its own.
+    /// Adds a texture as a separate material.
     pub(crate) fn material(&mut self, texture: Texture) -> MaterialId {
         self.textures.push(texture);
         self.materials.push(Material { texture: self.textures.len() - 1, overlay: None });
         MaterialId(self.materials.len() - 1)
     }
 
-    /// Adds a material of a repeating texture whose repetition a second one hides.
+    /// Adds a material with a repeating texture and a second one that hides the repetition.
     pub(crate) fn overlaid(&mut self, material: MaterialId, overlay: MaterialId) -> MaterialId {
         let (texture, overlay) = (self.materials[material.0].texture, self.materials[overlay.0].texture);
         self.materials.push(Material { texture, overlay: Some(overlay) });
         MaterialId(self.materials.len() - 1)
     }
 
-    /// A face from its corners (counter-clockwise from outside) with texture axes along `right` and `down`, whose
+    /// Adds a face with these corners (counter-clockwise from outside) and texture axes along `right` and `down`, whose
     /// coordinates at the first corner are `start_m`.
     pub(crate) fn polygon(
         &mut self,
@@ -131,7 +130,7 @@ impl World {
         });
     }
 
-    /// A parallelogram seen as an image: its upper left corner, its side to the right and its side downwards.
+    /// Adds a parallelogram with an image: its upper left corner, its side to the right and its side downwards.
     pub(crate) fn quad(
         &mut self,
         origin: Vector3<f64>,
@@ -144,7 +143,7 @@ impl World {
         self.polygon(corners, right.normalize(), down.normalize(), start_m, material);
     }
 
-    /// An upright wall over the foot line from `from` to `to` as seen from outside, left to right.
+    /// Adds an upright wall over the foot line from `from` to `to`, left to right from outside.
     pub(crate) fn wall(
         &mut self,
         from: Vector2<f64>,
@@ -159,7 +158,8 @@ impl World {
         self.quad(origin, Vector3::new(along.x, along.y, 0.0), down, start_m, material);
     }
 
-    /// A box on its foot's centre, rotated about the vertical; the texture starts at a random place on every side.
+    /// Adds a box centred on its foot and rotated about the vertical; the texture of each side starts at a random
+    /// position.
     pub(crate) fn cuboid(
         &mut self,
         foot: Vector3<f64>,
@@ -176,12 +176,12 @@ impl World {
                 foot.y + sine * x * half.x + cosine * y * half.y,
             )
         };
-        // Counter-clockwise from above, so that each side is seen left to right from outside.
+        // Counter-clockwise from above: each side runs from left to right from outside.
         let plan = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
         self.prism(&plan, [foot.z, foot.z + size.z], material, random);
     }
 
-    /// An upright prism over a convex plan (counter-clockwise from above) with a lid.
+    /// Adds an upright prism over a convex plan (counter-clockwise from above) with a lid.
     pub(crate) fn prism(
         &mut self,
         plan: &[Vector2<f64>],
@@ -199,7 +199,7 @@ impl World {
         self.polygon(lid, Vector3::x(), -Vector3::y(), start, material);
     }
 
-    /// A regular upright prism: trunks, posts, barrels.
+    /// Adds a regular upright prism: trunks, posts, barrels.
     pub(crate) fn column(
         &mut self,
         foot: Vector3<f64>,
@@ -219,7 +219,7 @@ impl World {
         self.prism(&plan, [foot.z, foot.z + height_m], material, random);
     }
 
-    /// A flat patch on the ground: manhole lids, stones, puddles.
+    /// Adds a flat patch on the ground: manhole lids, stones, puddles.
     pub(crate) fn patch(
         &mut self,
         centre: Vector3<f64>,
@@ -241,7 +241,7 @@ impl World {
         self.polygon(corners, Vector3::x(), -Vector3::y(), start, material);
     }
 
-    /// A rounded lump, smooth in light: foliage, bushes, boulders.
+    /// Adds a rounded lump with smooth shading: foliage, bushes, boulders.
     pub(crate) fn blob(
         &mut self,
         centre: Vector3<f64>,
@@ -258,7 +258,7 @@ impl World {
             .collect();
         let sunlit = |point: &Vector3<f64>| {
             let outward = (point - centre).component_div(&radii_m).component_div(&radii_m).normalize();
-            // Wrapped around, as light filters through leaves.
+            // Extended beyond the terminator, as light passes through leaves.
             ((outward.dot(&self.to_sun) + 0.35) / 1.35).max(0.0)
         };
         let light: Vec<f64> = points.iter().map(sunlit).collect();
@@ -277,7 +277,7 @@ impl World {
     }
 }
 
-/// Sum of the corner triangles' normals: outward, twice the area long.
+/// Sum of the corner triangles' normals: outward, with twice the area as length.
 fn area_normal(corners: &[Vector3<f64>]) -> Vector3<f64> {
     let mut sum = Vector3::zeros();
     for k in 1..corners.len() - 1 {
@@ -286,7 +286,7 @@ fn area_normal(corners: &[Vector3<f64>]) -> Vector3<f64> {
     sum
 }
 
-/// The affine function with these values at a triangle's corners and no change across its plane.
+/// Affine function with these values at a triangle's corners, constant along its normal.
 fn through(corners: &[Vector3<f64>; 3], values: [f64; 3]) -> Affine {
     let (first, second) = (corners[1] - corners[0], corners[2] - corners[0]);
     let normal = first.cross(&second);
@@ -296,7 +296,7 @@ fn through(corners: &[Vector3<f64>; 3], values: [f64; 3]) -> Affine {
     Affine { gradient, offset: values[0] - gradient.dot(&corners[0]) }
 }
 
-/// A unit sphere of 42 points and 80 triangles: an icosahedron divided once.
+/// Unit sphere of 42 points and 80 triangles: an icosahedron subdivided once.
 fn sphere() -> (Vec<Vector3<f64>>, Vec<[usize; 3]>) {
     let golden = 0.5 * (1.0 + 5_f64.sqrt());
     let mut points = Vec::new();

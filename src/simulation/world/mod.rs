@@ -1,4 +1,4 @@
-//! The environments of the experiments, built from textured surfaces.
+//! Environments of the experiments, built from textured surfaces.
 
 mod canvas;
 mod facade;
@@ -15,7 +15,7 @@ pub(crate) use texture::Footprints;
 
 use super::experiment::Environment;
 
-/// Builds a world; its looks follow from the seed, its plan does not.
+/// Builds a world; textures depend on the seed, the plan does not.
 pub(crate) fn build(environment: Environment, seed: u64) -> World {
     match environment {
         Environment::House => house::build(seed),

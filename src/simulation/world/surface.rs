@@ -1,10 +1,10 @@
-//! What surfaces are made of: bricks, boards, plaster, tiles, slabs, grass, asphalt, leaves.
+//! Materials of surfaces: bricks, boards, plaster, tiles, slabs, grass, asphalt, leaves.
 
 use super::canvas::{Area, Canvas};
 use super::texture::Texture;
 use crate::simulation::random::RandomStream;
 
-/// What a wall is built of.
+/// Material of a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wall {
     Brick,
@@ -61,7 +61,7 @@ pub(crate) fn wall(canvas: &mut Canvas, kind: Wall, random: &mut RandomStream) {
     canvas.shade(Area::new(0.0, area.h - 0.28, area.w, 0.28), 0.8);
 }
 
-/// Rows of stones, every other one shifted by half a stone, each with its own grey.
+/// Rows of stones, every other one shifted by half a stone, each stone with a random grey.
 fn courses(
     canvas: &mut Canvas,
     area: Area,
@@ -133,7 +133,7 @@ pub(crate) fn roof(width_m: f32, height_m: f32, texels_per_m: f32, random: &mut 
     canvas.finish()
 }
 
-/// A lawn that repeats.
+/// Repeating lawn.
 pub(crate) fn grass(random: &mut RandomStream) -> Texture {
     let mut canvas = Canvas::new(10.0, 10.0, 102.4, true, 96.0);
     canvas.noise(2.5, 22.0, 4, random);
@@ -144,7 +144,6 @@ pub(crate) fn grass(random: &mut RandomStream) -> Texture {
     canvas.finish()
 }
 
-/// Asphalt that repeats.
 pub(crate) fn asphalt(random: &mut RandomStream) -> Texture {
     let mut canvas = Canvas::new(10.0, 10.0, 102.4, true, 92.0);
     canvas.noise(3.3, 16.0, 5, random);
@@ -164,7 +163,7 @@ pub(crate) fn asphalt(random: &mut RandomStream) -> Texture {
     canvas.finish()
 }
 
-/// Paving slabs that repeat.
+/// Repeating paving slabs.
 pub(crate) fn slabs(random: &mut RandomStream) -> Texture {
     let mut canvas = Canvas::new(8.0, 8.0, 64.0, true, 75.0);
     for row in 0..16 {
@@ -185,7 +184,7 @@ pub(crate) fn slabs(random: &mut RandomStream) -> Texture {
     canvas.finish()
 }
 
-/// Foliage that repeats: leaves in light and shade.
+/// Repeating foliage: leaves in light and shade.
 pub(crate) fn leaves(random: &mut RandomStream) -> Texture {
     let mut canvas = Canvas::new(4.0, 4.0, 128.0, true, 58.0);
     canvas.noise(0.7, 26.0, 3, random);
@@ -196,7 +195,7 @@ pub(crate) fn leaves(random: &mut RandomStream) -> Texture {
     canvas.finish()
 }
 
-/// Bark, weathered wood or any rough dark matter that repeats.
+/// Repeating bark, weathered wood or other rough dark material.
 pub(crate) fn bark(random: &mut RandomStream) -> Texture {
     let mut canvas = Canvas::new(2.0, 2.0, 128.0, true, 82.0);
     let area = canvas.area();
@@ -207,7 +206,7 @@ pub(crate) fn bark(random: &mut RandomStream) -> Texture {
     canvas.finish()
 }
 
-/// Boards that repeat, for fences and sheds.
+/// Repeating boards, for fences and sheds.
 pub(crate) fn planks(random: &mut RandomStream) -> Texture {
     let mut canvas = Canvas::new(8.0, 4.0, 64.0, true, 100.0);
     let area = canvas.area();
@@ -218,7 +217,7 @@ pub(crate) fn planks(random: &mut RandomStream) -> Texture {
     canvas.finish()
 }
 
-/// Rough stone or concrete that repeats.
+/// Repeating rough stone or concrete.
 pub(crate) fn concrete(random: &mut RandomStream) -> Texture {
     let mut canvas = Canvas::new(4.0, 4.0, 64.0, true, 130.0);
     canvas.noise(0.9, 30.0, 5, random);
@@ -250,7 +249,7 @@ pub(crate) fn metal(base: f32, random: &mut RandomStream) -> Texture {
     canvas.finish()
 }
 
-/// Worn white paint that repeats, for road markings.
+/// Repeating worn white paint, for road markings.
 pub(crate) fn paint(random: &mut RandomStream) -> Texture {
     let mut canvas = Canvas::new(4.0, 4.0, 64.0, true, 188.0);
     canvas.noise(0.8, 20.0, 4, random);
@@ -263,7 +262,7 @@ pub(crate) fn paint(random: &mut RandomStream) -> Texture {
     canvas.finish()
 }
 
-/// Slow blotches around mid grey that repeat: laid over other textures so that their repetition does not show.
+/// Repeating slow blotches around mid grey; as an overlay they hide the repetition of other textures.
 pub(crate) fn blotches(random: &mut RandomStream) -> Texture {
     let mut canvas = Canvas::new(64.0, 64.0, 8.0, true, 128.0);
     canvas.noise(9.0, 40.0, 5, random);
@@ -271,7 +270,7 @@ pub(crate) fn blotches(random: &mut RandomStream) -> Texture {
     canvas.finish()
 }
 
-/// Wooded hills far away, hazy.
+/// Wooded hills in the distance, hazy.
 pub(crate) fn woods(random: &mut RandomStream) -> Texture {
     let mut canvas = Canvas::new(256.0, 64.0, 4.0, true, 118.0);
     canvas.noise(24.0, 13.0, 5, random);
@@ -279,7 +278,7 @@ pub(crate) fn woods(random: &mut RandomStream) -> Texture {
     canvas.finish()
 }
 
-/// Soft clouds that repeat.
+/// Repeating soft clouds.
 pub(crate) fn clouds(random: &mut RandomStream) -> Texture {
     let mut canvas = Canvas::new(512.0, 512.0, 1.0, true, 128.0);
     canvas.noise(128.0, 42.0, 6, random);

@@ -1,4 +1,4 @@
-/// A grey texture with its mipmap.
+/// Grey texture with its mipmap.
 ///
 /// Texel `(x, y)` covers `[x, x + 1) × [y, y + 1)`; a wrapping texture repeats and its sides are powers of two.
 #[derive(Clone, Debug)]
@@ -14,12 +14,12 @@ struct Level {
     height: usize,
     /// Texels of this level per texel of the finest one, along a side.
     scale: f32,
-    /// Rows of one texel more than the width, and one row more than the height: what follows when the texture repeats,
-    /// the border again when it does not.
+    /// Rows with one more texel than the width, and one more row than the height: a copy of the opposite border for a
+    /// wrapping texture, otherwise of the border itself.
     texels: Vec<u8>,
 }
 
-/// The footprints of some pixels in a texture: centres and two sides, in texels of the finest level.
+/// Footprints of some pixels in a texture: centres and two sides, in texels of the finest level.
 #[derive(Clone, Copy)]
 pub(crate) struct Footprints<const N: usize> {
     pub(crate) centre: [[f32; N]; 2],
@@ -27,7 +27,7 @@ pub(crate) struct Footprints<const N: usize> {
 }
 
 impl<const N: usize> Footprints<N> {
-    /// Scaled from other units to texels.
+    /// Converts from other units to texels.
     #[inline]
     pub(crate) fn scaled(&self, scale: f32) -> Self {
         let scaled = |values: [[f32; N]; 2]| values.map(|axis| axis.map(|value| value * scale));
@@ -41,19 +41,19 @@ impl<const N: usize> Footprints<N> {
     }
 }
 
-/// Most samples along the stretched direction of a footprint.
+/// Maximum number of samples along the longer side of a footprint.
 const LARGEST_ANISOTROPY: usize = 8;
-/// One over the number of samples.
-const SHARES: [f32; LARGEST_ANISOTROPY + 1] =
+/// Inverse of the number of samples.
+const RECIPROCALS: [f32; LARGEST_ANISOTROPY + 1] =
     [0.0, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0, 1.0 / 7.0, 1.0 / 8.0];
-/// Places in a texture are held to this part of a texel.
+/// Number of fractional bits of a position in texels.
 const FRACTION_BITS: i32 = 10;
 const FRACTION: f32 = (1 << FRACTION_BITS) as f32;
-/// Levels of detail are this much finer than exact, for images as sharp as a lens gives.
+/// Offset of the level of detail: finer than exact, for images as sharp as those of a lens.
 const LEVEL_BIAS: f32 = -0.2;
 
 impl Texture {
-    /// From the finest level, rows top to bottom.
+    /// Texture from the finest level, rows top to bottom.
     pub(crate) fn new(width: usize, height: usize, texels: &[u8], wrap: bool, texels_per_m: f32) -> Self {
         debug_assert!(!wrap || (width.is_power_of_two() && height.is_power_of_two()));
         let mut levels = vec![Level::new([width, height], 1.0, texels, wrap)];
@@ -66,15 +66,16 @@ impl Texture {
         Self { levels, wrap, texels_per_m }
     }
 
-    /// Finest texels per metre.
+    /// Texels per metre of the finest level.
     #[inline]
     pub(crate) fn texels_per_m(&self) -> f32 {
         self.texels_per_m
     }
 
-    /// The means over the first `count` footprints.
+    /// Means over the first `count` footprints.
     ///
-    /// Trilinear samples are spread along the longer side, so that slanted surfaces stay sharp without shimmer.
+    /// Trilinear samples are distributed along the longer side, so that slanted surfaces are sharp and free of
+    /// aliasing.
     pub(crate) fn sample<const N: usize>(&self, footprints: &Footprints<N>, count: usize) -> [f32; N] {
         let [across, down] = footprints.squares();
         let turned: [bool; N] = std::array::from_fn(|k| down[k] > across[k]);
@@ -84,7 +85,7 @@ impl Texture {
         });
         let long2: [f32; N] = std::array::from_fn(|k| pick(turned[k], across[k], down[k]));
         let short2: [f32; N] = std::array::from_fn(|k| pick(turned[k], down[k], across[k]));
-        // One sample more for every whole time that the longer side exceeds the shorter one.
+        // One additional sample for each multiple of the shorter side that the longer side exceeds.
         let mut counts = [1_i32; N];
         for times in 1..LARGEST_ANISOTROPY {
             let square = (times * times) as f32;
@@ -105,7 +106,7 @@ impl Texture {
         means
     }
 
-    /// The mean of `count` samples along a side of a footprint, between two levels of detail.
+    /// Mean of `count` samples along a side of a footprint, interpolated between two levels of detail.
     #[inline]
     fn trilinear(&self, level: f32, centre: [f32; 2], side: [f32; 2], count: usize) -> f32 {
         let last = self.levels.len() - 1;
@@ -115,12 +116,12 @@ impl Texture {
         if blend < 0.02 || fine == last {
             return near;
         }
-        // Half as many samples of the coarser level cover the footprint as well.
+        // Half as many samples of the coarser level cover the footprint.
         let far = self.along(&self.levels[fine + 1], centre, side, count.div_ceil(2));
         near + (far - near) * blend
     }
 
-    /// As [`Texture::sample`] with one sample as wide as the footprint is long: for textures without detail.
+    /// [`Texture::sample`] with one sample as wide as the longer side, for textures without detail.
     pub(crate) fn sample_roughly<const N: usize>(&self, footprints: &Footprints<N>, count: usize) -> [f32; N] {
         let [across, down] = footprints.squares();
         let mut values = [0.0; N];
@@ -133,10 +134,10 @@ impl Texture {
         values
     }
 
-    /// The mean of `count` bilinear samples spread along a side of the footprint, in fixed point.
+    /// Mean of `count` bilinear samples along a side of the footprint, in fixed point.
     #[inline]
     fn along(&self, level: &Level, centre: [f32; 2], side: [f32; 2], count: usize) -> f32 {
-        let fraction = SHARES[count];
+        let fraction = RECIPROCALS[count];
         let first = 0.5 * fraction - 0.5;
         let start = |axis: usize| ((centre[axis] + side[axis] * first) * level.scale - 0.5) * FRACTION;
         let step = |axis: usize| (side[axis] * fraction * level.scale * FRACTION) as i32;
@@ -153,7 +154,6 @@ impl Texture {
 }
 
 impl Level {
-    /// From rows of texels.
     fn new([width, height]: [usize; 2], scale: f32, texels: &[u8], wrap: bool) -> Self {
         let after = |size: usize| if wrap { 0 } else { size - 1 };
         let mut padded = Vec::with_capacity((width + 1) * (height + 1));
@@ -165,7 +165,7 @@ impl Level {
         Self { width, height, scale, texels: padded }
     }
 
-    /// The value between four texels times `FRACTION²`, at a place in fixed point.
+    /// Interpolated value between four texels times `FRACTION²`, at a position in fixed point.
     #[inline]
     fn bilinear<const WRAP: bool>(&self, u: i32, v: i32) -> i32 {
         const MASK: i32 = (1 << FRACTION_BITS) - 1;
@@ -180,8 +180,8 @@ impl Level {
         mix(across(upper), across(lower), v & MASK)
     }
 
-    /// The next coarser level by a 2 × 2 box. Where a side is odd, its last texel reaches past the border: stretched to end
-    /// there, the texture would move on its face with the distance of the camera.
+    /// Next coarser level by a 2 × 2 box. If a side is odd, its last texel extends past the border: scaled to end at
+    /// the border, the texture would move on its face with the distance of the camera.
     fn halved(&self, wrap: bool) -> Self {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let mut texels = Vec::with_capacity(width * height);
@@ -199,7 +199,7 @@ impl Level {
     }
 }
 
-/// The binary logarithm of a positive number to about 0.01, the same on every machine.
+/// Binary logarithm of a positive number to about 0.01, equal on all platforms.
 #[inline]
 fn fast_log2(value: f32) -> f32 {
     let bits = value.to_bits();
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn levels_of_sides_that_are_no_powers_of_two_lie_on_each_other() {
-        // Half a grey value per texel, so that a grey value says which texel is seen.
+        // Half a grey value per texel: the grey value identifies the texel.
         for size in [509_u16, 385, 301] {
             let texels: Vec<u8> = (0..size).map(|x| (x / 2) as u8).collect();
             let texture = Texture::new(texels.len(), 1, &texels, false, 1.0);

@@ -1,7 +1,7 @@
 //! Environment 2: blocks of buildings between roads.
 //!
 //! Roads lie on a grid (see the experiments' streets); 4 m of carriageway and 2 m of pavement to each side of the axis
-//! stay free of walls.
+//! are free of walls.
 
 use nalgebra::Vector3;
 
@@ -13,11 +13,11 @@ use super::surface::Wall;
 use crate::simulation::experiment::{TOWN_PITCH_M, TOWN_ROADS};
 use crate::simulation::random::RandomStream;
 
-/// Half a block with its pavement.
+/// Half the side of a block with its pavement.
 const BLOCK_HALF_M: f64 = 11.0;
-/// Half a block without.
+/// Half the side of a block without pavement.
 const LOT_HALF_M: f64 = 9.0;
-/// Height of the pavement over the road.
+/// Height of the pavement above the road.
 const KERB_M: f64 = 0.12;
 /// Width of a painted front.
 const FRONT_M: f64 = 9.0;
@@ -28,7 +28,6 @@ struct Storeys {
     fronts: Vec<MaterialId>,
 }
 
-/// Builds the world.
 pub(super) fn build(seed: u64) -> World {
     let random = &mut RandomStream::new(seed, 102);
     let (mut world, palette) = begin(Vector3::new(0.52, -0.4, 0.8), 78.0, random);
@@ -74,7 +73,7 @@ fn paint_fronts(world: &mut World, random: &mut RandomStream) -> Vec<Storeys> {
     pool
 }
 
-/// A block: pavement with its kerb, and buildings, a yard or a small park on it.
+/// Block: pavement with its kerb, with buildings, a yard or a small park.
 fn block(world: &mut World, palette: &Palette, pool: &[Storeys], centre: [f64; 2], random: &mut RandomStream) {
     let around = |half: f64| ([centre[0] - half, centre[1] - half], [centre[0] + half, centre[1] + half]);
     let (low, high) = around(BLOCK_HALF_M);
@@ -98,7 +97,7 @@ fn block(world: &mut World, palette: &Palette, pool: &[Storeys], centre: [f64; 2
             }
         }
     }
-    // Street furniture near the kerb, none near the crossings' inner corners.
+    // Street furniture near the kerb, except near the inner corners of the crossings.
     for side in 0..4 {
         let (out, along) =
             ([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]][side], [[1.0, 0.0], [0.0, 1.0]][side % 2]);
@@ -123,7 +122,7 @@ fn block(world: &mut World, palette: &Palette, pool: &[Storeys], centre: [f64; 2
     }
 }
 
-/// A building on a quarter of a block, drawn back from its corner by `back`, with things on its walls and its roof.
+/// Building on a quarter of a block, set back from its corner by `back`, with objects on its walls and its roof.
 fn building(
     world: &mut World,
     palette: &Palette,
@@ -153,7 +152,7 @@ fn building(
         let out = [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]][side];
         let yaw = f64::atan2(out[1], out[0]);
         for _ in 0..2 {
-            // Boxes, balconies and awnings: shallow, and above head height.
+            // Boxes, balconies and awnings: shallow, above head height.
             let shift = random.uniform(-3.4, 3.4);
             let deep = random.uniform(0.25, 0.6);
             let off = half + 0.5 * deep;
@@ -166,7 +165,7 @@ fn building(
     }
 }
 
-/// The block in the middle: lawn, trees, benches and a kiosk.
+/// Block in the centre: lawn, trees, benches and a kiosk.
 fn park(world: &mut World, palette: &Palette, centre: [f64; 2], random: &mut RandomStream) {
     let half = LOT_HALF_M - 0.5;
     let (low, high) = ([centre[0] - half, centre[1] - half], [centre[0] + half, centre[1] + half]);

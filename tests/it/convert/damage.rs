@@ -1,4 +1,4 @@
-//! Damaged and hostile sources: what can be read is converted and what is lost is counted, or nothing is written.
+//! Damaged and hostile sources: readable parts are converted and losses are counted, or nothing is written.
 
 use std::fs;
 use std::ops::Range;
@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 
 const MESSAGES: i64 = 2000;
 
-/// A log of IMU samples alone, in chunks of about 30 messages.
+/// Writes a log of IMU samples alone, in chunks of about 30 messages.
 fn write_imu_log(path: &Path, compression: LogCompression, indexed: bool) {
     let options = LogWriterOptions { compression, chunk_bytes: Some(10_000), indexed };
     let mut log = LogWriter::create(path, &options).expect("the log can be created");
@@ -26,7 +26,7 @@ fn write_imu_log(path: &Path, compression: LogCompression, indexed: bool) {
     log.finish().expect("the log can be completed");
 }
 
-/// The bytes of each chunk's record, after its operation code and length.
+/// Ranges of the chunk records, after operation code and length.
 fn chunks(bytes: &[u8]) -> Vec<Range<usize>> {
     const CHUNK: u8 = 6;
     let mut chunks = Vec::new();
@@ -42,7 +42,7 @@ fn chunks(bytes: &[u8]) -> Vec<Range<usize>> {
     chunks
 }
 
-/// Numbers of messages in the log and lost, as the report counts them.
+/// Numbers of messages in the log and of lost messages, from the report.
 fn counts(source: &Path, log: &Path) -> (u64, u64) {
     let report = run(source, log).expect("it is converted");
     let imu = topic(&report, "/imu");
@@ -129,7 +129,7 @@ fn compressed_sources_are_unpacked_within_the_limit() {
         convert_with(&source, &log, &options, &mut |_| std::ops::ControlFlow::Continue(())).unwrap_err().to_string();
     assert!(problem.contains("--limit unpacked-bytes="), "{problem}");
 
-    // A compressed ROS 1 bag, and messages that are compressed one by one.
+    // A compressed ROS 1 bag, and individually compressed messages.
     let source = folder.path().join("flight.bag.zstd");
     let packed = bag(&ros1_messages(), 4, Compression::None, "");
     fs::write(&source, zstd::encode_all(&packed[..], 1).unwrap()).unwrap();
@@ -165,7 +165,7 @@ fn a_truncated_database_gives_the_rows_that_are_left() {
     let (plain, log) = (folder.path().join("plain.mcap"), folder.path().join("flight.mcap"));
     write_imu_log(&plain, LogCompression::None, true);
     let source = folder.path().join("bag_0.db3");
-    // Compressed or not, the rows are written backwards; the last ones are lost.
+    // Compressed or not, the rows are written in reverse order; the last ones are lost.
     write_database(&plain, &source, <[u8]>::to_vec);
     let bytes = fs::read(&source).unwrap();
     fs::write(&source, &bytes[..bytes.len() * 8 / 10]).unwrap();
@@ -173,7 +173,7 @@ fn a_truncated_database_gives_the_rows_that_are_left() {
     assert!(taken > MESSAGES as u64 / 2 && taken < MESSAGES as u64, "{taken} of {MESSAGES}");
     let report = run(&source, &log).unwrap();
     assert!(report.notes.iter().any(|note| note.contains("is truncated")), "{report}");
-    // A page in the middle that is overwritten costs its rows.
+    // Rows of an overwritten page in the middle are lost.
     let mut damaged = bytes.clone();
     let middle = (bytes.len() / 2).next_multiple_of(4096);
     damaged[middle..middle + 4096].fill(0xFF);

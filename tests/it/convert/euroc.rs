@@ -1,4 +1,4 @@
-//! A small EuRoC folder, written here.
+//! Small EuRoC folder, written by the test.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -32,7 +32,7 @@ accelerometer_noise_density: 2.0000e-3
 accelerometer_random_walk: 3.0000e-3
 ";
 
-/// A camera that looks forwards (z along the body's x), 0.1 m ahead.
+/// Camera that looks forward (z along the body's x), 0.1 m ahead.
 const CAMERA_YAML: &str = "\
 %YAML:1.0
 # General sensor definitions.
@@ -174,7 +174,7 @@ fn image_names_stay_inside_their_folder() {
             .unwrap();
         let report = run(&source, &path).unwrap();
         let images = topic(&report, "/cam0/image_raw/compressed");
-        // A name without an ending is an image all the same.
+        // A file without an extension is also read as an image.
         let expected = if name == "no_ending" { (2, 0) } else { (1, 1) };
         assert_eq!((images.taken, images.left), expected, "{name}\n{report}");
         let reasons = ["leads out of the folder", "neither PNG nor JPEG", "no image", "link that leads out"];

@@ -1,5 +1,5 @@
-//! `convert`: bags, databases and folders made here, held against the log that the same values give when they are
-//! written directly.
+//! `convert`: generated bags, databases and folders, compared with the log that the same values give when written
+//! directly.
 
 mod damage;
 mod euroc;
@@ -42,7 +42,7 @@ fn camera() -> CameraModel {
     }
 }
 
-/// One message of every type as the log writer writes it.
+/// Writes one message of every type with the log writer.
 fn write_directly(path: &Path) {
     let mut log = LogWriter::create(path, &LogWriterOptions::default()).expect("the log can be created");
     let (pose, rate, force) = values();
@@ -184,7 +184,7 @@ fn a_damaged_bag_converts_as_far_as_it_can_be_read() {
     assert_eq!(topic(&report, "/imu").taken, 1);
     assert!(report.notes.iter().any(|note| note.contains("damaged at byte")), "{report}");
 
-    // A message that is shorter than its type is left out, and the next one is taken.
+    // A message shorter than its type is skipped, and the next one is read.
     let mut messages = ros1_messages();
     messages[0].data.truncate(40);
     messages[8].data.push(0);
@@ -195,7 +195,7 @@ fn a_damaged_bag_converts_as_far_as_it_can_be_read() {
     assert_eq!((imu.taken, imu.left), (1, 2), "{report}");
     assert!(imu.reason.as_ref().is_some_and(|reason| reason.contains("ends at byte 40")), "{report}");
 
-    // A chunk whose bytes were changed is left out.
+    // A chunk with changed bytes is skipped.
     let mut changed = bag(&ros1_messages(), 4, Compression::Bz2, "");
     let chunk = changed.windows(3).position(|bytes| bytes == b"BZh").unwrap();
     changed[chunk + 40] ^= 0xff;
@@ -203,11 +203,11 @@ fn a_damaged_bag_converts_as_far_as_it_can_be_read() {
     let report = run(&source, &log).unwrap();
     assert!(report.notes.iter().any(|note| note.contains("chunk at byte")), "{report}");
     assert_eq!(topic(&report, "/joints").taken, 1, "{report}");
-    // The chunk described the IMU's connection, and the bag has no index that would do it again.
+    // The chunk described the IMU's connection, and the bag has no index with another description.
     assert!(report.notes.iter().any(|note| note.contains("1 messages belong to no connection")), "{report}");
 }
 
-/// The messages of a log, as a ROS 2 recorder would put them into its database.
+/// Writes the messages of a log into a database, as a ROS 2 recorder does.
 fn write_database(log: &Path, database: &Path, change: impl Fn(&[u8]) -> Vec<u8>) {
     let file = fs::read(log).expect("the log can be read");
     let database = Connection::open(database).expect("the database can be created");
@@ -219,7 +219,7 @@ fn write_database(log: &Path, database: &Path, change: impl Fn(&[u8]) -> Vec<u8>
     database.execute_batch(tables).expect("the tables can be made");
     let messages =
         mcap::MessageStream::new(&file).expect("the log is MCAP").map(|message| message.expect("it is whole"));
-    // Written backwards: the times order them, not the rows.
+    // In reverse order: the messages are sorted by time, not by row.
     let mut messages: Vec<_> = messages.collect();
     messages.reverse();
     for message in messages {

@@ -1,13 +1,13 @@
-//! Small recordings of autopilots and cameras, as their recorders write them: for the tests of `convert` and the seeds of its
-//! fuzz targets.
+//! Small recordings in the formats of autopilots and cameras, for the tests of `convert` and the seeds of its fuzz
+//! targets.
 
-/// Angular velocity in rad/s of a sample, exact in thousandths.
+/// Angular velocity of a sample in rad/s, exact in thousandths.
 pub(crate) fn rate(index: usize) -> [f64; 3] {
     let index = index as f64;
     [0.125 * index, -0.25, 0.001 * index]
 }
 
-/// Specific force in m/s² of a sample.
+/// Specific force of a sample in m/s².
 pub(crate) fn force(index: usize) -> [f64; 3] {
     [0.5, -0.125 * index as f64, -9.75]
 }
@@ -156,7 +156,7 @@ fn checksum(bytes: &[u8]) -> u16 {
     })
 }
 
-/// A telemetry log: the same sensors in `MAVLink` 2, heartbeats in `MAVLink` 1; the gimbal has a clock of its own.
+/// A telemetry log: the same sensors in `MAVLink` 2, heartbeats in `MAVLink` 1; the gimbal has a separate clock.
 pub(crate) fn telemetry_log(samples: usize) -> Vec<u8> {
     let mut out = Vec::new();
     let mut put = |received_us: u64, component: u8, message: u32, checksum_byte: u8, payload: &[u8]| {
@@ -165,7 +165,7 @@ pub(crate) fn telemetry_log(samples: usize) -> Vec<u8> {
             vec![0xFE, payload.len() as u8, 0, 1, component, 0]
         } else {
             let [low, middle, high, _] = message.to_le_bytes();
-            // Zeros at the end of a payload are not sent.
+            // Zeros at the end of a payload are omitted.
             let length = payload.iter().rposition(|byte| *byte != 0).map_or(1, |last| last + 1);
             vec![0xFD, length as u8, 0, 0, 0, 1, component, low, middle, high]
         };
@@ -208,21 +208,19 @@ pub(crate) fn telemetry_log(samples: usize) -> Vec<u8> {
 pub(crate) struct Track<'a> {
     /// Handler, `vide` or `meta`.
     pub(crate) handler: &'a [u8; 4],
-    /// The sample description, a box.
+    /// Sample description box.
     pub(crate) description: Vec<u8>,
-    /// Units of time in a second.
+    /// Time units per second.
     pub(crate) timescale: u32,
     /// Duration of a sample in these units.
     pub(crate) duration: u32,
     /// Time from decoding to presentation of each sample, empty for 0.
     pub(crate) delays: Vec<u32>,
-    /// Its samples.
     pub(crate) samples: Vec<Vec<u8>>,
-    /// First time of the media that is shown.
+    /// First presented time of the media.
     pub(crate) media_start: u32,
 }
 
-/// A box.
 pub(crate) fn mp4_box(kind: &[u8; 4], parts: &[&[u8]]) -> Vec<u8> {
     let content = parts.concat();
     [&((content.len() + 8) as u32).to_be_bytes()[..], kind, &content].concat()
@@ -235,7 +233,7 @@ fn words(values: &[u32]) -> Vec<u8> {
 /// Seconds from 1904 to 1970.
 const EPOCH_1904_S: u32 = 2_082_844_800;
 
-/// A movie with its tables at the end, as cameras write it, or at the start.
+/// A movie with its tables at the end, as written by cameras, or at the start.
 pub(crate) fn movie(tracks: &[Track<'_>], tables_first: bool) -> Vec<u8> {
     let start = mp4_box(b"ftyp", &[b"mp41", &[0; 4], b"mp41"]);
     let build = |data_start: u32| {
@@ -243,7 +241,7 @@ pub(crate) fn movie(tracks: &[Track<'_>], tables_first: bool) -> Vec<u8> {
         let mut traks = Vec::new();
         for track in tracks {
             let sizes: Vec<u32> = track.samples.iter().map(|sample| sample.len() as u32).collect();
-            // Three samples in a chunk.
+            // Three samples per chunk.
             let mut offsets = Vec::new();
             for (index, size) in sizes.iter().enumerate() {
                 if index % 3 == 0 {
@@ -332,7 +330,7 @@ pub(crate) fn item(key: &[u8; 4], kind: u8, size: usize, data: &[u8]) -> Vec<u8>
     out
 }
 
-/// An item that holds others.
+/// An item that contains others.
 pub(crate) fn nested(key: &[u8; 4], items: &[Vec<u8>]) -> Vec<u8> {
     item(key, 0, 4, &items.concat())
 }

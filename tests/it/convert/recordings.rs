@@ -1,4 +1,4 @@
-//! Recordings of autopilots and cameras, made by `recorders.rs`: every number arrives, and what is lost is counted.
+//! Recordings of autopilots and cameras, made by `recorders.rs`: every number is converted, and losses are counted.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -18,11 +18,11 @@ use super::recorders::{
 };
 use super::topic;
 
-/// Samples of the recordings.
+/// Number of samples of the recordings.
 const SAMPLES: usize = 200;
 const MS: i64 = 1_000_000;
 
-/// The messages of a log by topic: header stamp, log time, and the numbers behind the header.
+/// Messages of a log by topic: header stamp, log time, and the numbers after the header.
 type Messages = BTreeMap<String, Vec<(i64, i64, Vec<f64>)>>;
 
 fn messages(log: &Path) -> Messages {
@@ -65,7 +65,7 @@ fn assert_near(found: &[f64], expected: &[f64], tolerance: f64, what: &str) {
     }
 }
 
-/// The rig beside a log.
+/// Rig written with a log.
 fn rig_of(report: &ConversionReport) -> Rig {
     let path = report.rig.as_deref().expect("there is a rig");
     Rig::from_yaml(&fs::read_to_string(path).expect("the rig is valid"), path).expect("the rig is valid")
@@ -76,19 +76,19 @@ fn imu(numbers: &[f64]) -> ([f64; 3], [f64; 3]) {
     (numbers[13..16].try_into().expect("three numbers"), numbers[25..28].try_into().expect("three numbers"))
 }
 
-/// x, y, z, w of an attitude in degrees.
+/// Quaternion x, y, z, w of an attitude in degrees.
 fn rotation(angles_deg: [f64; 3]) -> [f64; 4] {
     let [w, x, y, z] = quaternion(angles_deg);
     [x, y, z, w]
 }
 
-/// Checks what all three autopilots record, with the tolerance of their numbers.
+/// Checks the common data of all three autopilots, with the tolerance of their numbers.
 fn check_autopilot(messages: &Messages, imu_topic: &str, samples: usize, tolerance: f64) {
     let start_ns = START_UTC_S as i64 * 1_000_000_000;
     let samples_of_imu = &messages[imu_topic];
     assert_eq!(samples_of_imu.len(), samples);
     for (index, (stamp_ns, log_time_ns, numbers)) in samples_of_imu.iter().enumerate() {
-        // The receiver's milliseconds and a double's microseconds since the epoch.
+        // Resolution: the receiver's milliseconds, and microseconds of a double since the epoch.
         assert!((stamp_ns - start_ns - index as i64 * PERIOD_US as i64 * 1000).abs() < 1000, "{index}: {stamp_ns}");
         assert_eq!(stamp_ns, log_time_ns);
         let (found_rate, found_force) = imu(numbers);
@@ -145,7 +145,7 @@ fn telemetry_logs_are_converted() {
     // Thousandths of g and of rad/s.
     check_autopilot(&messages, "/imu", SAMPLES, 0.5e-3);
     assert_eq!(topic(&report, "message 74").left, 20);
-    // The gimbal has its own clock: the fastest of its messages took 30 ms.
+    // The gimbal has a separate clock: the fastest of its messages took 30 ms.
     let (stamp_ns, _, _) = messages["/gimbal/attitude"][0];
     assert_eq!(stamp_ns - START_UTC_S as i64 * 1_000_000_000, 30 * MS);
 }
@@ -175,7 +175,7 @@ fn damage_in_logs_of_autopilots_is_counted() {
         let count = found[imu_topic].len();
         assert!((SAMPLES - 6..SAMPLES).contains(&count), "{name}: {count}");
         assert!(found[imu_topic].iter().all(|message| expected[imu_topic].contains(message)), "{name}");
-        // One byte changed at many places: never a panic, never a wrong kind of message.
+        // One byte changed at many positions: never a panic, never a wrong kind of message.
         for at in (16..whole.len()).step_by(whole.len() / 97) {
             let mut damaged = whole.clone();
             damaged[at] ^= 0x55;
@@ -184,7 +184,7 @@ fn damage_in_logs_of_autopilots_is_counted() {
     }
 }
 
-/// Messages of a stream of `tests/data/video`, and the places of its pictures in the order of their times.
+/// Messages of a stream of `tests/data/video`, and the indices of its frames in the order of their times.
 fn stream(name: &str) -> (Vec<&'static [u8]>, Vec<usize>) {
     let mut data: &'static [u8] = match name {
         "h264" => include_bytes!("../../data/video/h264.bin"),
@@ -212,7 +212,7 @@ fn video(name: &str) -> Track<'static> {
     let (messages, order) = stream(name);
     let mut track = video_track(&messages, [96, 64]);
     if name != "h264" {
-        // Decoded two pictures before the first is shown.
+        // Two frames are decoded before the first one is presented.
         track.delays = order.iter().enumerate().map(|(number, place)| 50 * (place + 2 - number) as u32).collect();
         track.media_start = 100;
     }
@@ -249,13 +249,13 @@ fn movies_with_telemetry_are_converted() {
             }
         }
         assert_eq!(topic(&report, "SHUT").left, 36);
-        // The rig beside it reads both sensors and asks for the rest.
+        // The rig of the log contains both sensors and lists assumed values.
         let written = rig_of(&report);
         assert_eq!(written.imu.topic, "/camera/imu/gyroscope");
         assert_eq!(written.imu.accelerometer_topic.as_deref(), Some("/camera/imu/accelerometer"));
         assert_eq!(written.cameras[0].model.resolution_px, [96, 64]);
         assert!(written.gimbal.is_none() && written.assumed.iter().any(|assumed| assumed.field == "cam0.intrinsics"));
-        // Every picture is decoded, together with both sensors of the IMU.
+        // Every frame is decoded, together with both sensors of the IMU.
         let log = Arc::new(FlightLog::open(&report.log).unwrap());
         let frames: Vec<_> = dcvins::flight_log::FrameStream::new(log, &written, "cam0", 0.0, None).unwrap().collect();
         assert_eq!(frames.len(), 24, "{name}");
@@ -278,7 +278,7 @@ fn a_video_is_placed_in_the_log_of_the_autopilot() {
         let start_ns = START_UTC_S as i64 * 1_000_000_000;
         (stamps[0] - start_ns, stamps[23] - stamps[0], report)
     };
-    // Both knew the time: the camera's creation time is the autopilot's first sample.
+    // Both clocks were set: the camera's creation time is the autopilot's first sample.
     let (first, length, report) = first_ns(None);
     assert!(first.abs() < 1000 && length == 1150 * MS, "{first} {length}");
     assert!(
@@ -312,7 +312,7 @@ fn damaged_movies_are_named() {
     let error = |bytes: &[u8]| {
         converted(folder.path(), "flight.mp4", bytes, &ConvertOptions::default()).unwrap_err().to_string()
     };
-    // Power lost: the tables would have come last.
+    // Power lost: the tables at the end are missing.
     let whole = movie(&tracks(), false);
     let problem = error(&whole[..whole.len() * 2 / 3]);
     assert!(problem.starts_with("the MP4 has no moov box") && problem.contains("untrunc"), "{problem}");
@@ -323,14 +323,14 @@ fn damaged_movies_are_named() {
     let pictures = messages["/camera/video"].len();
     assert_eq!(lost.map(|note| note.starts_with(&format!("{} of 24 ", 24 - pictures))), Some(true), "{pictures}");
     assert!(pictures > 0 && !messages.contains_key("/camera/imu/gyroscope"));
-    // A fragmented one, one without a video, and one of another compression.
+    // A fragmented movie, one without a video, and one with another compression.
     let fragmented = [whole.clone(), super::recorders::mp4_box(b"moof", &[])].concat();
     assert!(error(&fragmented).contains("fragmented MP4"));
     assert!(error(&movie(&tracks()[1..], true)).contains("has no video track"));
     let mut other = video("h264");
     other.description[4..8].copy_from_slice(b"av01");
     assert!(error(&movie(&[other], true)).contains("the video is of type \"av01\""));
-    // One byte changed at many places.
+    // One byte changed at many positions.
     for at in (0..whole.len()).step_by(whole.len() / 199) {
         let mut damaged = whole.clone();
         damaged[at] ^= 0x81;

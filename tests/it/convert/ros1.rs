@@ -1,8 +1,8 @@
-//! A writer of small ROS 1 bags, after the format's description.
+//! Writer of small ROS 1 bags, after the description of the format.
 
 use std::io::Write as _;
 
-/// How the chunks are compressed.
+/// Compression of the chunks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Compression {
     None,
@@ -20,7 +20,7 @@ pub(super) fn text(text: &str) -> Vec<u8> {
     [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat()
 }
 
-/// `std_msgs/Header` with a sequence number that has to disappear.
+/// `std_msgs/Header` with a sequence number that the conversion must drop.
 pub(super) fn header(stamp_ns: i64, frame_id: &str) -> Vec<u8> {
     [&77_u32.to_le_bytes()[..], &time(stamp_ns), &text(frame_id)].concat()
 }
@@ -44,7 +44,7 @@ pub(super) fn record(fields: &[(&str, &[u8])], data: &[u8]) -> Vec<u8> {
     [&(header.len() as u32).to_le_bytes()[..], &header, &(data.len() as u32).to_le_bytes(), data].concat()
 }
 
-/// A message to be put into a bag.
+/// Message for a bag.
 pub(super) struct Message {
     pub(super) topic: &'static str,
     pub(super) message_type: &'static str,

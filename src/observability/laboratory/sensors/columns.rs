@@ -1,4 +1,4 @@
-//! Which columns of sensors an experiment has beside those of the chain.
+//! Sets of sensor columns of an experiment, in addition to those of the chain.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,36 +7,33 @@ use thiserror::Error;
 
 use crate::gimbal::{ParameterId, ParameterPart, Quantity};
 
-/// Sets of sensor columns of an experiment; the chain's columns are always there.
+/// Sets of sensor columns of an experiment; the chain's columns are always present.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SensorColumns {
     /// Readout time of the camera's rolling shutter.
     pub readout: bool,
-    /// Time offset of the camera, and of the encoders where there are some.
+    /// Time offset of the camera, and of the encoders if there are any.
     pub timeshift: bool,
-    /// `fx fy cx cy k1 k2`, as far as the camera has them.
+    /// `fx fy cx cy k1 k2`, those that the camera has.
     pub intrinsics: bool,
     /// Scale and misalignment of gyroscope and accelerometer, and the gyroscope's rotation relative to the accelerometer.
     pub imu_intrinsics: bool,
 }
 
-/// A name without a set of columns.
+/// Error: unknown name of a set of columns.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("unknown columns '{given}': expected chain or some of {}, separated by commas", SensorColumns::NAMES.join(", "))]
 pub struct UnknownColumns {
-    /// The given name.
     pub given: String,
 }
 
 impl SensorColumns {
-    /// Names of the sets.
     pub const NAMES: [&'static str; 4] = ["readout", "timeshift", "intrinsics", "imu-intrinsics"];
     /// The chain alone.
     pub const NONE: Self = Self { readout: false, timeshift: false, intrinsics: false, imu_intrinsics: false };
-    /// Every set.
     pub const ALL: Self = Self { readout: true, timeshift: true, intrinsics: true, imu_intrinsics: true };
 
-    /// Whether there is any column but the chain's.
+    /// True if there is any sensor column.
     pub fn any(self) -> bool {
         self != Self::NONE
     }
@@ -45,7 +42,7 @@ impl SensorColumns {
         [self.readout, self.timeshift, self.intrinsics, self.imu_intrinsics]
     }
 
-    /// Whether a parameter of a sensor belongs to one of the sets.
+    /// True if a sensor parameter belongs to one of the sets.
     pub fn has(self, parameter: ParameterId) -> bool {
         match (parameter.part, parameter.quantity) {
             (_, Quantity::Readout) => self.readout,

@@ -1,4 +1,4 @@
-//! Which motion makes the columns of sensors observable.
+//! Motions that make the columns of sensors observable.
 
 use std::fmt;
 
@@ -23,31 +23,27 @@ const MOTIONS: [LaboratoryMotion; 8] = [
     LaboratoryMotion::Stabilized,
     LaboratoryMotion::Aggressive,
 ];
-/// Posterior σ over prior σ below which a parameter counts as known.
+/// Ratio of posterior and prior σ below which a parameter counts as known.
 const KNOWN: f64 = 0.3;
 
 /// Posterior σ of sensor columns after motions of the same duration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SensorExcitation {
-    /// Names of the motions.
     pub motions: Vec<String>,
-    /// Each sensor parameter.
     pub parameters: Vec<ParameterSigmas>,
 }
 
-/// Posterior σ of one parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterSigmas {
-    /// Its name.
     pub name: String,
     /// Posterior σ after each motion in units of the column scale: 1 where the motion does not constrain it.
     pub sigmas: Vec<f64>,
-    /// First motion that makes it known: the one that excites least.
+    /// First motion in the order of the table that makes the parameter known.
     pub suggested: Option<String>,
 }
 
-/// Posterior σ of an experiment's sensor columns after several motions, from a prior of the column scale; `None` when
-/// the experiment has no such column or a value is not finite.
+/// Posterior σ of an experiment's sensor columns after several motions, from a prior of the column scale; `None` if the
+/// experiment has no such column or a value is not finite.
 pub fn sensor_excitation(setup: &LaboratorySetup, form: LaboratoryForm) -> Option<SensorExcitation> {
     let results: Vec<(Vec<ParameterId>, Vec<f64>)> =
         MOTIONS.par_iter().map(|motion| sigmas(setup, form, *motion)).collect::<Option<_>>()?;

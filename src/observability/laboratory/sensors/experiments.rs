@@ -1,4 +1,4 @@
-//! The experiments of the table of docs/mathematics.md, section 11.
+//! Experiments of the table of docs/mathematics.md, section 11.
 
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::estimator::{JointKnowledge, PoseKnowledge};
@@ -6,9 +6,9 @@ use crate::observability::laboratory::{LABORATORY_IMU, LaboratoryMotion as Motio
 
 /// Frames of an experiment: enough for every set of columns.
 const FRAMES: usize = 16;
-/// Landmarks of an experiment, of which an image shows a part.
+/// Landmarks of an experiment; each image shows only some of them.
 const LANDMARKS: usize = 160;
-/// Readout time of the rolling shutter.
+/// Readout time of the rolling shutter, in seconds.
 pub(crate) const READOUT_S: f64 = 0.02;
 /// Radial distortion of the lens: `k1 k2`, without tangential terms.
 const LENS: [f64; 2] = [-0.28, 0.07];
@@ -16,15 +16,15 @@ const LENS: [f64; 2] = [-0.28, 0.07];
 const RIGID: &str = "rigid";
 const GIMBAL: &str = "yaw-roll-pitch-offset";
 
-/// An experiment with every sensor column, and why what it loses is lost.
+/// Experiment with every sensor column, and the cause of its rank loss.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SensorExperiment {
     pub(crate) mechanism: &'static str,
     pub(crate) motion: Motion,
     pub(crate) joints: JointKnowledge,
-    /// Whether the camera has a lens with radial distortion.
+    /// True if the camera has a lens with radial distortion.
     pub(crate) lens: bool,
-    /// Why sensor columns are lost, empty where none is.
+    /// Reason that sensor columns are unobservable; empty if all are observable.
     pub(crate) cause: &'static str,
 }
 
@@ -52,7 +52,7 @@ impl SensorExperiment {
         Self { joints: JointKnowledge::Unknown, ..self }
     }
 
-    /// Setup of the experiment; `None` without a mechanism of that name.
+    /// Setup of the experiment; `None` for an unknown mechanism.
     pub(crate) fn setup(&self) -> Option<LaboratorySetup> {
         let mut setup = LaboratorySetup::new(Mechanism::named(self.mechanism).ok()?);
         setup.motion = self.motion;
@@ -68,7 +68,7 @@ impl SensorExperiment {
     }
 }
 
-/// A camera with radial distortion in place of none.
+/// The camera with the radial distortion [`LENS`] in place of none.
 pub(crate) fn with_lens(camera: &CameraModel) -> Option<CameraModel> {
     let [k1, k2] = LENS;
     let lens = Distortion::Radtan([k1, k2, 0.0, 0.0]);

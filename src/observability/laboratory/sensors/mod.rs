@@ -2,7 +2,7 @@
 //!
 //! The laboratory linearizes these windows itself, from the continuous motion: an image row is exposed at its own time,
 //! the camera's pose at that time follows from the IMU, and the preintegration between frames carries its derivatives
-//! by the intrinsics along (docs/mathematics.md, section 11).
+//! with respect to the intrinsics (docs/mathematics.md, section 11).
 
 mod columns;
 mod excitation;

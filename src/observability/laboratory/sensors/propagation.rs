@@ -1,7 +1,8 @@
 //! Preintegration of a continuous IMU, with derivatives by its biases and intrinsics.
 //!
-//! The measured rate and force are functions of time, so that the integral, its derivatives and the poses between
-//! frames belong to one exact motion: a null direction of the motion is one of the window to rounding errors.
+//! The measured rate and force are functions of time. The integral, its derivatives and the poses between frames
+//! therefore belong to one exact motion: a null direction of the motion is a null direction of the window up to
+//! rounding errors.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -10,17 +11,17 @@ use crate::estimator::ImuBias;
 use crate::geometry::so3;
 use crate::sensors::ImuNoise;
 
-/// Columns that the integral depends on: gyroscope bias and intrinsics, accelerometer bias and intrinsics.
+/// Columns on which the integral depends: gyroscope bias and intrinsics, accelerometer bias and intrinsics.
 pub(super) const IMU_COLUMNS: usize = 3 + GYROSCOPE_COLUMNS + 3 + ACCELEROMETER_COLUMNS;
 /// Columns of the gyroscope's bias and intrinsics.
 const RATE_COLUMNS: usize = 3 + GYROSCOPE_COLUMNS;
-/// Largest step of the integration, in seconds: fourth order leaves about 1e-12.
+/// Largest step of the integration, in seconds; its fourth-order error is about 1e-12.
 const STEP_S: f64 = 5e-3;
 
-/// Measured angular rate in rad/s and specific force in m/s² at one time, with the errors of the sensors but no bias.
+/// Measured angular rate in rad/s and specific force in m/s² at one time, with intrinsics errors, without bias.
 pub(super) type Measured = (Vector3<f64>, Vector3<f64>);
 
-/// Change of rotation, velocity and position from an instant on, in the IMU frame of that instant and without gravity.
+/// Change of rotation, velocity and position since a start time, in the IMU frame at that time and without gravity.
 #[derive(Clone, Debug)]
 pub(super) struct Change {
     pub(super) rotation: Matrix3<f64>,
@@ -30,7 +31,7 @@ pub(super) struct Change {
     pub(super) rotation_by: SMatrix<f64, 3, IMU_COLUMNS>,
     pub(super) velocity_by: SMatrix<f64, 3, IMU_COLUMNS>,
     pub(super) position_by: SMatrix<f64, 3, IMU_COLUMNS>,
-    /// Covariance of rotation, velocity and position by white noise.
+    /// Covariance (9 × 9) of rotation, velocity and position due to white noise.
     pub(super) covariance: SMatrix<f64, 9, 9>,
 }
 
@@ -91,7 +92,7 @@ impl Change {
         }
     }
 
-    /// Derivative by time.
+    /// Derivative with respect to time.
     fn rate(&self, input: &Input, noise: Option<&ImuNoise>) -> Self {
         let (spin, force) = (so3::hat(&input.rate), so3::hat(&input.force));
         Self {

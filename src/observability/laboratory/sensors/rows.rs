@@ -12,7 +12,7 @@ use crate::gimbal::ParameterId;
 use crate::observability::laboratory::PIXEL_SIGMA_PX;
 use crate::sensors::ImuNoise;
 
-/// A pivot below this ratio of a landmark's columns marks a coordinate that its observations do not constrain.
+/// A pivot below this ratio of a landmark's columns marks an unobservable coordinate of the landmark.
 const DEPENDENT: f64 = 1e-11;
 
 /// Rows of one landmark or of one other factor.
@@ -34,7 +34,7 @@ impl Rows {
         }
     }
 
-    /// Projects the landmark out by an orthogonal transformation: residuals (first column) with the Jacobian.
+    /// Projects the landmark out by an orthogonal transformation: residuals (first column) and Jacobian.
     fn without_landmark(&self) -> DMatrix<f64> {
         let (rows, columns) = self.jacobian.shape();
         let mut both = DMatrix::zeros(rows, columns + 1);
@@ -123,7 +123,7 @@ impl SensorWindow<'_> {
         }
     }
 
-    /// One reading per joint at the time of the frame.
+    /// Rows of one encoder reading per joint at the time of the frame.
     fn encoder_rows(&self, state: &State, frame: usize, sigma_rad: f64) -> Rows {
         let columns = &self.columns;
         let joints = self.truth.chain.joint_count();
@@ -140,7 +140,7 @@ impl SensorWindow<'_> {
         rows
     }
 
-    /// The weight of the preintegrated motion to each frame but the first, at the true state.
+    /// Weights of the preintegrated motion to each frame but the first, at the true state.
     pub(super) fn imu_weights(&self) -> Vec<SMatrix<f64, 9, 9>> {
         let PoseKnowledge::Imu { noise, .. } = self.setup.poses else { return Vec::new() };
         let measured = |time_s: f64| self.measured(time_s);
@@ -153,7 +153,7 @@ impl SensorWindow<'_> {
             .collect()
     }
 
-    /// Preintegrated motion from the frame before.
+    /// Rows of the preintegrated motion from the previous frame.
     fn imu_rows(&self, state: &State, frame: usize) -> Rows {
         let columns = &self.columns;
         let (start_s, end_s) = (self.times_s[frame - 1], self.times_s[frame]);
@@ -217,7 +217,7 @@ impl SensorWindow<'_> {
         rows
     }
 
-    /// Random walk of the biases.
+    /// Rows of the random walk of the biases.
     fn bias_rows(&self, state: &State, frame: usize, noise: &ImuNoise) -> Rows {
         let columns = &self.columns;
         let root_s = (self.times_s[frame] - self.times_s[frame - 1]).sqrt();
@@ -238,7 +238,7 @@ impl SensorWindow<'_> {
         rows
     }
 
-    /// The linearization at a state with all its columns, as [`crate::observability::analyse`] takes it.
+    /// Linearization at a state with all its columns, as input of [`crate::observability::analyse`].
     pub(super) fn linearization(&self, state: &State) -> Option<Linearization> {
         let rows = self.rows(state)?;
         let count = self.columns.calibration();
@@ -291,7 +291,7 @@ impl SensorWindow<'_> {
     }
 }
 
-/// Residuals and Jacobians of all factors below each other, the landmarks projected out.
+/// Residuals and Jacobians of all factors stacked, the landmarks projected out.
 pub(super) fn stacked(rows: &[Rows]) -> DMatrix<f64> {
     let parts: Vec<DMatrix<f64>> = rows.iter().map(Rows::without_landmark).collect();
     let count = parts.iter().map(DMatrix::nrows).sum();
@@ -304,7 +304,7 @@ pub(super) fn stacked(rows: &[Rows]) -> DMatrix<f64> {
     whole
 }
 
-/// Column of the preintegration for a bias column of a frame, whose first three are the velocity.
+/// Column of the preintegration for a bias column of a frame; the first three columns of the frame are the velocity.
 fn bias_column(column: usize) -> usize {
     if column < 6 { column - 3 } else { column - 6 + 3 + super::values::GYROSCOPE_COLUMNS }
 }
@@ -321,7 +321,6 @@ fn whitening(covariance: &SMatrix<f64, 9, 9>) -> SMatrix<f64, 9, 9> {
 }
 
 impl Change {
-    /// The rotation as a quaternion.
     pub(super) fn rotation(&self) -> nalgebra::UnitQuaternion<f64> {
         let matrix: Matrix3<f64> = self.rotation;
         nalgebra::UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(matrix))

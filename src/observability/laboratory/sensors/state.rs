@@ -21,20 +21,19 @@ pub(super) struct State {
 pub(super) struct FrameState {
     pub(super) navigation: NavigationState,
     pub(super) joints_rad: Vec<f64>,
-    /// Unknown only without encoders, which give them elsewhere.
+    /// Unknowns only without encoders; measured by the encoders otherwise.
     pub(super) joint_rates_rad_per_s: Vec<f64>,
 }
 
 /// Columns of a window: calibration, then joints, poses, and velocities with biases of all frames. Landmarks have none:
-/// their rows are projected.
+/// they are projected out.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Columns {
-    /// Columns of the chain.
     pub(super) chain: usize,
-    /// Sensor columns: place among all of them, and parameter.
+    /// Sensor columns: index among all sensor columns, and parameter.
     pub(super) sensors: Vec<(usize, ParameterId)>,
     pub(super) frames: usize,
-    /// Joint angles of a frame, and their rates.
+    /// Joint angles of a frame and their rates.
     pub(super) joints: usize,
     /// 6, or 0 with known poses.
     pub(super) pose: usize,
@@ -43,7 +42,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Numbers of columns of pose, and of velocity with biases.
+    /// Numbers of columns of a frame's pose, and of its velocity with biases.
     pub(super) fn of_poses(poses: &PoseKnowledge) -> (usize, usize) {
         match poses {
             PoseKnowledge::Known => (0, 0),

@@ -13,20 +13,17 @@ use crate::gimbal::{ParameterGroup, ParameterNames, Parameterization};
 /// Experiments with columns of sensors under one heading.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SensorSurveySection {
-    /// The heading.
     pub title: String,
-    /// One row per experiment.
     pub rows: Vec<SensorSurveyRow>,
 }
 
 /// Ranks of one experiment for each set of columns, in the minimal parameterization.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SensorSurveyRow {
-    /// Name of the motion.
     pub motion: String,
-    /// Each set of columns, the chain alone first.
+    /// Sets of columns, the chain alone first.
     pub sets: Vec<SensorSurveyEntry>,
-    /// Why sensor columns are lost, empty where none is.
+    /// Reason that sensor columns are unobservable; empty if all are observable.
     pub cause: String,
     /// Sensor parameters in the null directions of all columns together.
     pub lost: Vec<String>,
@@ -35,13 +32,11 @@ pub struct SensorSurveyRow {
 /// Rank of one set of columns.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SensorSurveyEntry {
-    /// The sets of columns.
     pub columns: String,
     /// Number of columns, those of the chain included.
     pub count: usize,
-    /// Structural rank.
     pub rank: usize,
-    /// Null directions that the chain alone does not have.
+    /// Number of null directions that the chain alone does not have.
     pub added: usize,
 }
 
@@ -55,7 +50,7 @@ const SETS: [(&str, SensorColumns); 7] = [
     ("IMU", SensorColumns { imu_intrinsics: true, ..SensorColumns::NONE }),
     ("all", SensorColumns::ALL),
 ];
-/// Smallest scaled weight that counts in a null direction.
+/// Smallest scaled weight of a parameter that belongs to a null direction.
 const TAKES_PART: f64 = 0.02;
 
 /// Runs every experiment with columns of sensors.
@@ -92,7 +87,7 @@ impl SensorSurveyRow {
     }
 }
 
-/// Names of the sensor parameters that take part in null directions.
+/// Names of the sensor parameters that belong to null directions.
 fn lost(rank: &SetRank) -> Vec<String> {
     let takes_part = |column: usize| rank.null.iter().any(|direction| direction.weights[column].abs() > TAKES_PART);
     let names = ParameterNames::default();
@@ -101,7 +96,7 @@ fn lost(rank: &SetRank) -> Vec<String> {
     sensors.filter(|(column, _)| takes_part(*column)).map(|(_, parameter)| names.name(*parameter)).collect()
 }
 
-/// The names with the members of one sensor behind its name: `gyroscope.sx sy, readout`.
+/// Names, those of one sensor grouped after its name: `gyroscope.sx sy, readout`.
 fn grouped(names: &[String]) -> String {
     let mut text = String::new();
     let mut last = "";
@@ -132,7 +127,7 @@ impl fmt::Display for SensorSurveySection {
             write!(out, "  {:<28}{chain:<9}", row.motion)?;
             for (place, set) in sensors.iter().enumerate() {
                 let added = format!("+{}", set.added);
-                // Nothing follows the last one where nothing is lost.
+                // No padding after the last entry if no parameters follow.
                 let width = if place + 1 == sensors.len() && row.lost.is_empty() { 0 } else { 11 };
                 write!(out, "{added:<width$}")?;
             }

@@ -8,14 +8,12 @@ use crate::observability::CalibrationDirection;
 use crate::observability::analysis::measured_block;
 use crate::observability::directions::weak_directions;
 
-/// Rank of one set of columns, those of the chain included.
+/// Rank for one set of columns, those of the chain included.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SetRank {
-    /// The set.
     pub(crate) columns: SensorColumns,
     /// Columns of the chain, then of the sensors.
     pub(crate) parameters: Vec<ParameterId>,
-    /// Structural rank.
     pub(crate) rank: usize,
     /// Singular values, largest first.
     pub(crate) singular_values: Vec<f64>,
@@ -55,7 +53,6 @@ pub(crate) fn set_ranks(setup: &LaboratorySetup, form: LaboratoryForm, sets: &[S
 }
 
 impl SetRank {
-    /// Number of null directions.
     pub(crate) fn deficit(&self) -> usize {
         self.parameters.len() - self.rank
     }

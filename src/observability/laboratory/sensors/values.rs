@@ -9,20 +9,20 @@ use crate::geometry::so3;
 pub(super) const GYROSCOPE_COLUMNS: usize = 9;
 /// Columns of the accelerometer: scale and misalignment.
 pub(super) const ACCELEROMETER_COLUMNS: usize = 6;
-/// Place of the first column of the camera's intrinsics.
+/// Index of the first column of the camera's intrinsics.
 pub(super) const INTRINSICS: usize = 3;
-/// Place of the first column of the gyroscope.
+/// Index of the first column of the gyroscope.
 pub(super) const GYROSCOPE: usize = 9;
-/// Place of the first column of the accelerometer.
+/// Index of the first column of the accelerometer.
 pub(super) const ACCELEROMETER: usize = GYROSCOPE + GYROSCOPE_COLUMNS;
 
-/// Rows and columns of scale and misalignment `sx sy sz mxy mxz myz` in an upper triangular matrix.
+/// Row and column of `sx sy sz mxy mxz myz` (scale and misalignment) in an upper triangular matrix.
 const TRIANGLE: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
 /// Times and intrinsics of the sensors of one camera and one IMU.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SensorValues {
-    /// `t_imu = t_camera + timeshift`, relative to the time that the frames are placed at.
+    /// `t_imu = t_camera + timeshift`, relative to the nominal times of the frames.
     pub(super) timeshift_s: f64,
     /// Time from the first to one past the last image row.
     pub(super) readout_s: f64,
@@ -36,7 +36,7 @@ pub(super) struct SensorValues {
 }
 
 impl SensorValues {
-    /// `R·U·ω` of a measured angular rate, and its derivative by the nine columns.
+    /// Corrected angular rate `R·U·ω`, and its derivative by the nine columns.
     pub(super) fn correct_rate(&self, measured: &Vector3<f64>) -> (Vector3<f64>, Matrix3xX<f64>) {
         let [sx, sy, sz, mxy, mxz, myz, rx, ry, rz] = self.gyroscope;
         let rotation_vector = Vector3::new(rx, ry, rz);
@@ -53,12 +53,12 @@ impl SensorValues {
         (corrected, by_columns)
     }
 
-    /// `U·f` of a measured specific force, and its derivative by the six columns.
+    /// Corrected specific force `U·f`, and its derivative by the six columns.
     pub(super) fn correct_force(&self, measured: &Vector3<f64>) -> (Vector3<f64>, Matrix3xX<f64>) {
         (triangular(&self.accelerometer) * measured, by_triangle(measured))
     }
 
-    /// The measured angular rate and specific force of true ones, without bias.
+    /// Measured angular rate and specific force from the true ones, without bias.
     pub(super) fn measure(&self, rate: &Vector3<f64>, force: &Vector3<f64>) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let [sx, sy, sz, mxy, mxz, myz, rx, ry, rz] = self.gyroscope;
         let rotation = so3::exp(&Vector3::new(rx, ry, rz));
@@ -77,7 +77,7 @@ fn triangular(values: &[f64; 6]) -> Matrix3<f64> {
     matrix
 }
 
-/// Derivative of `U·w` by the six numbers of U.
+/// Derivative of `U·w` by the six parameters of U.
 fn by_triangle(vector: &Vector3<f64>) -> Matrix3xX<f64> {
     let mut derivative = Matrix3xX::zeros(TRIANGLE.len());
     for (column, (row, factor)) in TRIANGLE.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! A window of exact measurements by a rolling shutter camera, encoders and a continuous IMU.
+//! Window of exact measurements of a rolling-shutter camera, encoders and a continuous IMU.
 
 use nalgebra::{Matrix2xX, Matrix3, SMatrix, Vector2, Vector3};
 
@@ -12,16 +12,17 @@ use crate::gimbal::ParameterId;
 use crate::observability::laboratory::experiment::{LaboratoryForm, LaboratorySetup};
 use crate::observability::laboratory::motion::{Flight, Kinematics};
 
-/// Iterations that find the image row in which a landmark is exposed: the camera moves little in a readout.
+/// Largest number of iterations that find the image row in which a landmark is exposed; the camera moves little within
+/// a readout.
 const ROW_ITERATIONS: usize = 25;
-/// Change of the row, as a ratio of the image height, that ends the iterations.
+/// Change of the row, as a ratio of the image height, at which the iterations end.
 const ROW_TOLERANCE: f64 = 1e-12;
-/// One landmark in one image.
+/// Observation of one landmark in one image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Observation {
     pub(super) frame: usize,
     pub(super) uv_px: Vector2<f64>,
-    /// Row of the image as a ratio of its height.
+    /// Row of the pixel as a ratio of the image height.
     pub(super) row_ratio: f64,
 }
 
@@ -30,13 +31,13 @@ pub(super) struct Observation {
 pub(super) struct SensorWindow<'a> {
     pub(super) flight: Flight<'a>,
     pub(super) setup: &'a LaboratorySetup,
-    /// Times of the frames: of their first row at the true time offset.
+    /// Times of the frames: exposure of the first row at the true time offset.
     pub(super) times_s: Vec<f64>,
-    /// Observations of each landmark.
+    /// Observations by landmark.
     pub(super) observations: Vec<Vec<Observation>>,
     pub(super) truth: State,
     pub(super) columns: Columns,
-    /// Weights of the preintegrated motion to each frame but the first, by its covariance at the true state.
+    /// Weights of the preintegrated motion to each frame but the first: inverse of its covariance at the true state.
     pub(super) weights: Vec<SMatrix<f64, 9, 9>>,
 }
 
@@ -57,7 +58,7 @@ pub(super) struct Prediction {
     pub(super) by_velocity: SMatrix<f64, 2, 3>,
     /// By biases and intrinsics of the IMU.
     pub(super) by_imu: SMatrix<f64, 2, IMU_COLUMNS>,
-    /// By the time of the exposure.
+    /// By the exposure time.
     pub(super) by_time: Vector2<f64>,
     /// By the time offset of the encoders.
     pub(super) by_encoder_time: Vector2<f64>,
@@ -78,7 +79,7 @@ struct Exposure {
     position_by_imu: SMatrix<f64, 3, IMU_COLUMNS>,
 }
 
-/// Joint angles at an exposure and their rate, and the rate by the time offset of the encoders.
+/// Joint angles at an exposure, their rates, and the derivative of the angles by the time offset of the encoders.
 struct JointsAt {
     angles_rad: Vec<f64>,
     rates_rad_per_s: Vec<f64>,
@@ -86,7 +87,7 @@ struct JointsAt {
 }
 
 impl<'a> SensorWindow<'a> {
-    /// The window of an experiment in one parameterization, with every sensor column that its measurements can have.
+    /// Window of an experiment in one parameterization, with every sensor column that its measurements can have.
     pub(super) fn new(setup: &'a LaboratorySetup, form: LaboratoryForm) -> Self {
         let flight = setup.flight();
         let chain = form.chain(&setup.mechanism);
@@ -147,7 +148,7 @@ impl<'a> SensorWindow<'a> {
         }
     }
 
-    /// The observation of a position in one frame; `None` outside the image.
+    /// Observation of a position in one frame; `None` outside the image.
     fn observation(&self, position: &Vector3<f64>, frame: usize, height: f64) -> Option<Observation> {
         let readout_s = self.truth.sensors.readout_s;
         let mut row_ratio = 0.5;
@@ -173,13 +174,13 @@ impl<'a> SensorWindow<'a> {
         self.truth.sensors.camera.project(&world_from_camera.inverse().transform(position))
     }
 
-    /// What the IMU measures at a time.
+    /// Measured angular rate and specific force at a time.
     pub(super) fn measured(&self, time_s: f64) -> Measured {
         let (rate, force) = self.flight.rate_and_force(time_s);
         self.truth.sensors.measure(&rate, &force).expect("the true corrections of an experiment are invertible")
     }
 
-    /// Pixel of a position in a frame, at the row that it was observed in; `None` behind the camera.
+    /// Predicted pixel of a position in a frame, at the row in which it was observed; `None` behind the camera.
     pub(super) fn predict(
         &self,
         state: &State,
@@ -286,7 +287,7 @@ impl<'a> SensorWindow<'a> {
                 }
             }
             JointKnowledge::Unknown => {
-                // What the constant rate leaves out of the true motion within the image is a known number.
+                // Deviation of the true motion from a constant rate within the image: a known number.
                 let true_since_s = self.truth.sensors.timeshift_s + row_ratio * self.truth.sensors.readout_s;
                 let (angles_before, rates_before) = self.flight.joint_motion(time_s);
                 let (angles, _) = self.flight.joint_motion(time_s + true_since_s);
@@ -305,7 +306,6 @@ impl<'a> SensorWindow<'a> {
     }
 }
 
-/// The true unknowns of a frame.
 fn frame_at(kinematics: &Kinematics) -> FrameState {
     FrameState {
         navigation: NavigationState {

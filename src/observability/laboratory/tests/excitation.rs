@@ -11,11 +11,11 @@ use crate::simulation::{
     Exercise, SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks,
 };
 
-/// Start of the exercise.
+/// Start of the motion, in seconds.
 const START_S: f64 = 6.0;
-/// Flights are equal up to here: a spline depends on the next three knots.
+/// Flights are equal up to this time: a spline depends on the next three knots.
 const SHARED_S: f64 = START_S - 0.4;
-/// Duration of the exercise, that of the candidates.
+/// Duration of the motion, that of the candidates.
 const MOTION_S: f64 = super::super::ADVICE_DURATION_S;
 
 pub(super) fn flight(exercise: Exercise, seed: u64) -> SyntheticFlight {
@@ -153,7 +153,7 @@ fn advice_is_repeatable_and_rendered_as_text() {
     assert!(hover.remaining > 0.999, "{advice}");
     assert!(!advice.candidates[0].words.contains("hover"), "{advice}");
     assert!(advice.candidates[0].remaining < 0.9, "{advice}");
-    // Redundant directions cannot be excited: the classical form gets suggestions for the other directions.
+    // Redundant directions cannot be excited: for the classical parameterization the other directions get suggestions.
     let classical = LaboratoryForm::whole(Parameterization::Classical);
     let situation = Situation::of_experiment(&setup, classical, LABORATORY_IMU).unwrap();
     let advice = advise(&situation).unwrap();

@@ -1,18 +1,18 @@
-//! The tables of docs/mathematics.md, sections 7 and 9, against what the program computes.
+//! Computed values against the tables of docs/mathematics.md, sections 7 and 9.
 //!
-//! Its column A, the paper's swap taken literally, is left out: that form cannot represent every mechanism and is not one
-//! of the program's.
+//! Column A of these tables, the paper's literal swap, is omitted: that parameterization cannot represent every
+//! mechanism and is not implemented.
 
 use super::super::{Survey, SurveyRow, survey};
 
-/// What the mathematics gives for one experiment.
+/// Expected ranks of one experiment.
 struct Expected {
     scenario: &'static str,
     /// Structural rank of each parameterization.
     ranks: &'static [usize],
     /// Deficit of the first parameterization: parameterization, joints, absorbed, motion.
     deficit: [usize; 4],
-    /// Parameters of the null directions of the minimal form, where the table names them all.
+    /// Parameters of the null directions of the minimal parameterization; `None` where the table does not list all.
     null_of_minimal: Option<&'static [&'static str]>,
 }
 
@@ -140,7 +140,7 @@ const SECTIONS: [(&str, &[Expected]); 6] = [
     ),
 ];
 
-/// Columns, full rank, and the least number of frames for it, from and to where the table leaves it open.
+/// Columns, full rank, and the range of the smallest number of frames for it.
 const MIN_FRAMES: [(&str, usize, [usize; 2]); 6] = [
     ("encoder, poses known", 18, [5, 5]),
     ("encoder, IMU, bias known", 18, [6, 6]),
@@ -150,7 +150,7 @@ const MIN_FRAMES: [(&str, usize, [usize; 2]); 6] = [
     ("no encoder, IMU, bias free", 15, [11, 11]),
 ];
 
-/// Largest spurious singular value without first-estimate Jacobians, and how many are over 1, from and to.
+/// Largest spurious singular value without first-estimate Jacobians, and the range of the number over 1.
 const SPURIOUS: [(&str, f64, [usize; 2]); 6] = [
     ("classical", 0.7, [0, 0]),
     ("classical", 5.7, [1, 2]),
@@ -159,7 +159,7 @@ const SPURIOUS: [(&str, f64, [usize; 2]); 6] = [
     ("minimal", 0.0, [0, 0]),
     ("poe", 0.48, [0, 0]),
 ];
-/// Numerically zero singular values are at most this.
+/// Upper bound of numerically zero singular values.
 const ROUNDING: f64 = 1e-9;
 
 fn check(row: &SurveyRow, expected: &Expected) -> usize {

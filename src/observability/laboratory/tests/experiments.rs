@@ -17,7 +17,7 @@ fn mechanisms_match_their_names() {
     for link in &ideal.links[..2] {
         assert!(link.a_m.abs() < 1e-12 && link.alpha_rad.cos().abs() < 1e-12, "{link:?}");
     }
-    // All angles zero: the camera looks ahead, level.
+    // All angles zero: the optical axis points forward and is level.
     let ahead = ideal.imu_from_camera(&[0.0; 3]).rotation * nalgebra::Vector3::z();
     assert!((ahead - nalgebra::Vector3::x()).norm() < 1e-12, "{ahead}");
 }

@@ -7,12 +7,12 @@ use crate::observability::{
 };
 use crate::simulation::{Exercise, VehicleSwing};
 
-/// Processes a flight up to 4 s and returns the ranks of its last step, and the effect of moving its last chain.
+/// Processes a flight up to 4 s. Returns the ranks of its last step, and a function that moves the last chain.
 fn moves(parameterization: Parameterization, encoder: bool) -> (RankReport, impl Fn(&SlideDirection) -> ChainSlide) {
     let flight = flight(Exercise { vehicle: VehicleSwing::Hover, joint: None }, 7);
     let like = estimator(&flight.given_rig, parameterization, encoder);
     let mut config = like.config().clone();
-    // First estimates belong to an earlier chain, whose directions are close to those of the present one.
+    // First estimates belong to an earlier chain, whose directions differ slightly from those of the present one.
     config.options.calibration_first_estimates = false;
     config.options.first_estimate_reach_rad = 0.0;
     let mut estimator = Estimator::new(config);
@@ -38,8 +38,8 @@ fn reprojections_are_unchanged_along_a_redundant_direction() {
         assert!(slid.largest_first_order_px < 1e-5, "{index}: {} px", slid.largest_first_order_px);
         assert!(slid.predictions_px.len() > 20 && slid.changes.iter().any(|change| change.abs() > 0.01), "{index}");
     }
-    // Directions in closed form: translations along an axis leave all pixels and the camera unchanged at any
-    // amount, rotations too when they are not coupled.
+    // Directions in closed form: translations along an axis leave all pixels and the camera unchanged at any amount;
+    // rotations too unless they are coupled.
     for known in &rank.known {
         let slid = moved(&SlideDirection::Known(known.loss));
         assert!(slid.largest_first_order_px < 1e-5, "{:?}: {} px", known.loss, slid.largest_first_order_px);
@@ -48,7 +48,7 @@ fn reprojections_are_unchanged_along_a_redundant_direction() {
             assert!(slid.camera_moves.0 < 1e-12 && slid.camera_moves.1 < 1e-7, "{:?}", slid.camera_moves);
         }
     }
-    // An observable parameter changes both.
+    // An observable parameter changes pixels and camera.
     for name in ["L2.alpha", "EC.rx"] {
         let seen = moved(&SlideDirection::Parameter(parameter(name)));
         assert!(seen.largest_px > 10.0 && seen.largest_first_order_px > 10.0, "{name}: {} px", seen.largest_px);
@@ -63,7 +63,7 @@ fn fixed_parameters_count_as_known() {
     let (_, before) = run_flight(&mut estimator, &flight, -1.0, 4.0);
     assert_eq!((before.parameters.len(), before.rank_structural, before.deficit_parameterization), (24, 18, 6));
     let mut from_s = 4.0;
-    // Each fixes one of the six redundant directions; without the columns that Eqs. 18–20 drop there is none left.
+    // Each fixes one of the six redundant directions; without the columns that Eqs. 18–20 drop none is left.
     let dropped = ["L1.d", "L1.theta", "L3.theta", "L3.d", "L3.a", "L3.alpha"];
     for (count, name) in dropped.into_iter().enumerate() {
         let fixed = parameter(name);

@@ -20,7 +20,7 @@ fn setup(mechanism: &str, joints: JointKnowledge, imu: bool) -> LaboratorySetup 
     setup
 }
 
-/// Derivatives of all rows by all columns and landmarks, at a state away from the truth.
+/// Checks the derivatives of all rows by all columns and landmarks, at a state that differs from ground truth.
 fn check(setup: &LaboratorySetup) {
     let form = LaboratoryForm::whole(Parameterization::Minimal);
     let window = SensorWindow::new(setup, form);

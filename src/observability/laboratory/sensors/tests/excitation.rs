@@ -1,4 +1,4 @@
-//! The motions that are suggested for sensors, by predicted standard deviations.
+//! Suggested motions for sensors, checked by predicted standard deviations.
 
 use crate::estimator::PoseKnowledge;
 use crate::gimbal::Parameterization;
@@ -21,7 +21,7 @@ fn the_motion_suggested_for_a_sensor_determines_it_better_than_others() {
     let setup = LaboratorySetup { poses, ..LaboratorySetup::new(Mechanism::named("rigid").unwrap()) };
     let setup = setup.with_columns(SensorColumns::ALL);
     let table = sensor_excitation(&setup, LaboratoryForm::whole(Parameterization::Minimal)).unwrap();
-    // Parameter, motion of its words, motion that determines it less.
+    // Parameter, suggested motion, motion that determines the parameter less.
     let rows = [
         ("readout", RollOnly, TranslationOnly),
         ("timeshift", RollOnly, TranslationOnly),

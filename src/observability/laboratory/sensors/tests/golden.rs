@@ -66,7 +66,7 @@ impl Case {
         Self { encoders: false, ..self }
     }
 
-    /// Its name in the file.
+    /// Name in the golden file.
     pub(super) fn name(&self) -> String {
         let encoders = if self.encoders { "" } else { ", no encoder" };
         let lens = if self.lens { "" } else { ", no lens" };
@@ -100,7 +100,7 @@ struct Golden {
     rank_of_chain: usize,
     /// Participation of each parameter in the null space: diagonal of its projector, in units of the column scale.
     null_projector: BTreeMap<String, f64>,
-    /// Smallest singular value kept.
+    /// Smallest singular value above the structural threshold.
     smallest: f64,
 }
 
@@ -123,7 +123,7 @@ fn null_projector(rank: &SetRank) -> Vec<f64> {
     let count = rank.parameters.len();
     let basis = DMatrix::from_fn(count, rank.null.len(), |row, column| rank.null[column].weights[row]);
     let orthonormal = basis.qr().q();
-    // Six digits: the rest is rounding.
+    // Six digits: the remaining digits are rounding errors.
     (0..count).map(|row| (orthonormal.row(row).norm_squared() * 1e6).round() * 1e-6).collect()
 }
 

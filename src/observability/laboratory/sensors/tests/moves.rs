@@ -1,4 +1,4 @@
-//! States moved by numbers per column.
+//! States changed by one number per column.
 
 use nalgebra::{DMatrix, Vector3, Vector6};
 
@@ -10,7 +10,7 @@ use super::super::window::SensorWindow;
 use crate::camera::CameraError;
 
 impl SensorValues {
-    /// The values moved by one number per sensor column.
+    /// Values changed by one number per sensor column.
     pub(super) fn plus(&self, delta: &[f64]) -> Result<Self, CameraError> {
         let mut intrinsics = self.camera.intrinsics();
         for (value, change) in intrinsics.iter_mut().zip(&delta[INTRINSICS..]) {
@@ -34,7 +34,7 @@ impl SensorValues {
 }
 
 impl State {
-    /// The state moved by one number per column.
+    /// State changed by one number per column.
     pub(super) fn plus(&self, columns: &Columns, delta: &[f64]) -> Result<Self, CameraError> {
         let mut by_sensor = vec![0.0; all_parameters().len()];
         for (change, (place, _)) in delta[columns.chain..].iter().zip(&columns.sensors) {
@@ -69,7 +69,8 @@ impl State {
 }
 
 impl SensorWindow<'_> {
-    /// Residuals (first column) with the Jacobian, the landmarks projected out; `None` as [`SensorWindow::rows`].
+    /// Residuals (first column) with the Jacobian, the landmarks projected out; `None` under the condition of
+    /// [`SensorWindow::rows`].
     pub(super) fn reduced(&self, state: &State) -> Option<DMatrix<f64>> {
         Some(stacked(&self.rows(state)?))
     }

@@ -13,15 +13,16 @@ use crate::gimbal::Parameterization;
 
 /// Length of a step in units of the column scale: 0.2°, 0.6 mm, 0.4 ms, 0.2 px, 0.02 % for the IMU.
 const STEP: f64 = 0.02;
-/// Relative size of a singular value that counts as zero in a least-squares step.
+/// Relative size of a singular value that is treated as zero in a least-squares step.
 const ZERO: f64 = 1e-10;
 
-/// The least change of all columns with the smallest linearized residual; `fixed` columns keep the change given in `delta`.
+/// Minimum-norm change of all columns with the smallest linearized residual; the first `fixed` columns keep their
+/// change in `delta`.
 fn step(reduced: &DMatrix<f64>, delta: &DVector<f64>, fixed: usize) -> DVector<f64> {
     let jacobian = reduced.columns_range(1..);
     let target = -(reduced.column(0) + jacobian * delta);
     let mut open = jacobian.columns_range(fixed..).into_owned();
-    // A column of rounding errors stays zero.
+    // A column of rounding errors keeps a zero change.
     let largest = open.column_iter().map(|column| column.norm()).fold(0.0, f64::max);
     let scales: Vec<f64> =
         open.column_iter().map(|it| it.norm()).map(|it| if it > ZERO * largest { it.recip() } else { 0.0 }).collect();
@@ -40,7 +41,7 @@ fn step(reduced: &DMatrix<f64>, delta: &DVector<f64>, fixed: usize) -> DVector<f
     whole
 }
 
-/// The state after a step of the columns, with the landmarks that fit best.
+/// State after a step of the columns, with the landmarks that fit best.
 fn moved(window: &SensorWindow<'_>, state: &State, delta: &DVector<f64>) -> State {
     let rows = window.rows(state).unwrap();
     let mut next = state.plus(&window.columns, delta.as_slice()).unwrap();
@@ -61,14 +62,14 @@ fn residual(window: &SensorWindow<'_>, state: &State) -> f64 {
     window.rows(state).unwrap().iter().map(|rows| rows.residual.amax()).fold(0.0, f64::max)
 }
 
-/// What a finite step along the null directions does to the residuals.
+/// Effect of a finite step along the null directions on the residuals.
 #[derive(Debug)]
 struct Moved {
-    /// Largest whitened residual after a step and after half of it, linearized.
+    /// Largest whitened residual after a linear step and after half of it.
     first_order: [f64; 2],
-    /// Largest after the same step with all unknowns following.
+    /// Largest whitened residual after the same step and iterations over all unknowns.
     followed: f64,
-    /// Ratio of the step that remains.
+    /// Ratio of the step that remains after these iterations.
     remaining: f64,
 }
 
@@ -119,7 +120,7 @@ fn residuals_are_unchanged_along_null_directions() {
         assert!(half < 0.3 * whole + 1e-8, "{}: {moved:?}", case.name());
         assert!(whole < 1e-2, "{}: {moved:?}", case.name());
         assert!(moved.followed < 1e-7, "{}: {moved:?}", case.name());
-        // The other unknowns do not undo the step; rounding errors may carry it further.
+        // The other unknowns do not undo the step; rounding errors may extend it.
         assert!(moved.remaining.abs() > 0.5, "{}: {moved:?}", case.name());
     });
 }

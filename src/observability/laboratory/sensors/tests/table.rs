@@ -1,4 +1,4 @@
-//! The table of docs/mathematics.md, section 11, against what the program computes.
+//! Computed ranks against the table of docs/mathematics.md, section 11.
 
 use super::super::experiments::SECTIONS;
 use super::super::survey::survey_sensors;
