@@ -200,5 +200,5 @@ fn positions_of_an_antenna_are_ground_truth() {
     let out = at("refused");
     let refused = ["run", &log, "--out", &out, "--truth-trajectory", &poses_file, "--lever-arm", "estimate"];
     let (code, text) = dcvins(&refused);
-    assert!(code == 1 && text.contains("it has attitudes, and a lever arm belongs to positions"), "{text}");
+    assert!(code == 1 && text.contains("it has attitudes, but a lever arm applies only to positions"), "{text}");
 }
