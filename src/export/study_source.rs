@@ -31,7 +31,7 @@ pub enum StudySourceError {
         path: PathBuf,
     },
     /// A table without the column by which runs are told apart.
-    #[error("the table has no column 'run': it is no table of runs of a study: {}", .0.display())]
+    #[error("the table has no column 'run': not a table of runs of a study: {}", .0.display())]
     NoRuns(PathBuf),
 }
 
@@ -56,7 +56,7 @@ impl OpenedStudy {
     /// parameters may be missing.
     ///
     /// # Errors
-    /// When there is no table of runs, or a table cannot be read.
+    /// If there is no table of runs, or a table cannot be read.
     pub fn read(path: &Path) -> Result<Self, StudySourceError> {
         let (folder, runs_path) = if path.is_dir() {
             let found = ["parquet", "csv"].map(|kind| path.join(format!("{RUNS}.{kind}")));

@@ -8,7 +8,7 @@ use dcvins::export::OpenedStudy;
 use dcvins::export::study::read_parquet;
 use dcvins::flight_log::FlightLog;
 use dcvins::gui::app::StudySource;
-use dcvins::study::view::rows_beside;
+use dcvins::study::view::comparable_rows;
 use serde_json::Value;
 
 use crate::sample_folder;
@@ -111,7 +111,7 @@ fn a_sweep_evaluates_trajectories_beside_its_runs() {
     assert_eq!(table.text(4, "trajectory_path"), Some("topic:/ground_truth/odometry"));
     // A row of a trajectory opens the run on the same log, with both trajectories beside it.
     let study = OpenedStudy::read(&folder.path().join("study")).unwrap();
-    let rows = rows_beside(&study.study().runs, 3, 4);
+    let rows = comparable_rows(&study.study().runs, 3, 4);
     assert_eq!(rows, [3, 0, 4]);
     let opened = StudySource::open_runs(&study, &rows).unwrap();
     let recording = opened.recording();
