@@ -130,7 +130,7 @@ impl Computation {
         while recording.memory_bytes() > recording.memory_budget_bytes {
             // The largest run goes first; forks come after the run that they share steps with.
             let mut runs: Vec<usize> = (0..recording.runs.len()).collect();
-            runs.sort_by_key(|run| std::cmp::Reverse(recording.runs[*run].memory.own));
+            runs.sort_by_key(|run| std::cmp::Reverse(recording.runs[*run].memory.steps));
             let summarized = runs.into_iter().any(|run| {
                 let run = &mut recording.runs[run];
                 let history = self.histories.get(&run.id);

@@ -253,13 +253,15 @@ impl Comparison {
         while let Some(step) = reference.steps.get(self.read.0) {
             self.read.0 += 1;
             let Some(pose) = lane.track.at(step.report.stamp_ns) else { continue };
-            let own = step.report.newest().map(|newest| newest.world_from_imu);
-            self.align_at(own.as_ref(), Some(&pose));
-            let differences = |gauge: &RigidTransform, quantity: Quantity| match (own, quantity) {
-                (Some(own), Quantity::Position) => {
-                    Some((gauge.transform(&pose.translation_m) - own.translation_m).norm())
+            let reference_pose = step.report.newest().map(|newest| newest.world_from_imu);
+            self.align_at(reference_pose.as_ref(), Some(&pose));
+            let differences = |gauge: &RigidTransform, quantity: Quantity| match (reference_pose, quantity) {
+                (Some(reference_pose), Quantity::Position) => {
+                    Some((gauge.transform(&pose.translation_m) - reference_pose.translation_m).norm())
                 }
-                (Some(own), Quantity::Attitude) => Some(angle(&own.rotation, &(gauge.rotation * pose.rotation))),
+                (Some(reference_pose), Quantity::Attitude) => {
+                    Some(angle(&reference_pose.rotation, &(gauge.rotation * pose.rotation)))
+                }
                 _ => None,
             };
             self.push_row(step.report.stamp_ns, differences);
@@ -267,8 +269,8 @@ impl Comparison {
     }
 
     fn push(&mut self, a: &StepRecord, b: &StepRecord) {
-        let [own, other] = [a, b].map(|step| step.report.newest().map(|newest| &newest.world_from_imu));
-        self.align_at(own, other);
+        let [reference_pose, other] = [a, b].map(|step| step.report.newest().map(|newest| &newest.world_from_imu));
+        self.align_at(reference_pose, other);
         let same_camera = self.same_camera;
         self.push_row(a.report.stamp_ns, |gauge, quantity| {
             let comparable = same_camera || quantity.is_of_the_vehicle();
@@ -277,11 +279,11 @@ impl Comparison {
     }
 
     /// Aligns the worlds at the first stamp at which both have a pose.
-    fn align_at(&mut self, own: Option<&RigidTransform>, other: Option<&RigidTransform>) {
+    fn align_at(&mut self, reference_pose: Option<&RigidTransform>, other: Option<&RigidTransform>) {
         if self.gauge.is_none()
-            && let (Some(own), Some(other)) = (own, other)
+            && let (Some(reference_pose), Some(other)) = (reference_pose, other)
         {
-            self.gauge = Some(yaw_and_position(own, other));
+            self.gauge = Some(yaw_and_position(reference_pose, other));
         }
     }
 

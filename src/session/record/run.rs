@@ -23,7 +23,7 @@ pub(super) static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunMemory {
     /// Steps without their tracks.
-    pub own: usize,
+    pub steps: usize,
     /// Tracks, which runs on the same camera share.
     pub tracks: usize,
     /// Step inputs and estimator snapshots for recomputation.
@@ -140,7 +140,7 @@ impl RunRecord {
             self.antenna.push(truth, newest.stamp_ns, newest.world_from_imu);
             self.alignment = self.antenna.alignment.map(|alignment| alignment.true_from_estimate);
         }
-        self.memory.own += record.own_bytes();
+        self.memory.steps += record.own_bytes();
         self.memory.tracks += record.tracks_bytes();
         add_warnings(&mut self.warnings, &record.report);
         self.steps.push(Arc::new(record));
@@ -154,7 +154,7 @@ impl RunRecord {
         }
         let steps = self.steps.split_off(count);
         let back = |bytes: fn(&StepRecord) -> usize| steps.iter().map(|step| bytes(step)).sum::<usize>();
-        self.memory.own -= back(StepRecord::own_bytes);
+        self.memory.steps -= back(StepRecord::own_bytes);
         self.memory.tracks -= back(StepRecord::tracks_bytes);
         self.finished = true;
         self.warnings = warnings_of(&self.steps);
@@ -222,7 +222,7 @@ impl RunRecord {
     /// Bytes of the steps and the history, without tracks, which runs share.
     pub fn own_bytes(&self) -> usize {
         let recomputed = self.recomputed.values().chain(self.trace.iter().flat_map(|trace| &trace.records));
-        self.memory.own + recomputed.map(|step| step.own_bytes()).sum::<usize>() + self.memory.history
+        self.memory.steps + recomputed.map(|step| step.own_bytes()).sum::<usize>() + self.memory.history
     }
 
     /// Replaces one more of the run's steps (from `begin` on) by its summary; `spacing` is the number of steps between
@@ -234,7 +234,7 @@ impl RunRecord {
                 continue;
             }
             let summary = step.summary(number);
-            self.memory.own -= step.own_bytes() - summary.own_bytes();
+            self.memory.steps -= step.own_bytes() - summary.own_bytes();
             self.memory.summaries += 1;
             self.steps[number] = Arc::new(summary);
             return true;

@@ -341,7 +341,7 @@ fn parallel_axes_place_names_and_numbers() {
 }
 
 #[test]
-fn runs_beside_share_log_rig_errors_and_seed() {
+fn comparable_runs_have_equal_log_rig_errors_and_seed() {
     let study = synthetic_study(3);
     let rows = comparable_rows(&study.runs, 7, 4);
     assert_eq!((rows.len(), rows[0]), (4, 7));
