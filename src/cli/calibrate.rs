@@ -34,8 +34,7 @@ pub(crate) struct CalibrateArguments {
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub duration: Option<f64>,
     /// Also write the estimated trajectory with covariances: trajectory.tum, a reference for runs (--truth-trajectory),
-    /// and
-    /// covariance.csv.
+    /// and covariance.csv.
     #[arg(long)]
     pub trajectory: bool,
     /// Overwrite any existing files. Without it, only a calibration of a log of the same name is replaced.

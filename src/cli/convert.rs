@@ -30,13 +30,11 @@ pub(crate) struct ConvertArguments {
     #[arg(long, value_name = "LOG.tlog", group = "autopilot_log")]
     pub tlog: Option<PathBuf>,
     /// Start of the video minus the first measurement of the autopilot's log. Default: estimated by comparing the
-    /// rotations of
-    /// the images with the gyroscope, up to 60 s from the times recorded by camera and autopilot.
+    /// rotations of the images with the gyroscope, up to 60 s from the times recorded by camera and autopilot.
     #[arg(long, value_name = "SECONDS", requires = "autopilot_log", allow_hyphen_values = true, value_parser = offset)]
     pub video_offset: Option<f64>,
     /// Overwrite any existing file with the name of the log. Without it, only a log written by this command is
-    /// replaced; an
-    /// edited rig next to the log is always kept.
+    /// replaced; an edited rig next to the log is always kept.
     #[arg(long)]
     pub force: bool,
     /// Print the converted and skipped topics as JSON.

@@ -47,8 +47,7 @@ pub(crate) struct DegeneracyArguments {
     #[arg(long, value_enum)]
     pub poses: Option<PosesArgument>,
     /// Sensor columns in addition to those of the chain: readout, timeshift, intrinsics, imu-intrinsics, all;
-    /// intrinsics of the
-    /// IMU need `--poses imu` [default: chain].
+    /// intrinsics of the IMU need `--poses imu` [default: chain].
     #[arg(long, value_name = "NAME,…")]
     pub columns: Option<SensorColumns>,
     /// Number of frames, 0.25 s apart [default: 10].

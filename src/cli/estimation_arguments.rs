@@ -19,8 +19,7 @@ pub(crate) struct EstimationArguments {
     #[arg(long = "run", value_name = "SPEC")]
     pub runs: Vec<RunSpec>,
     /// A trajectory of another program, aligned and evaluated like the runs: FILE[:LABEL] in TUM's or EuRoC's format
-    /// with
-    /// header stamps of the log, or topic:NAME[:LABEL] for a topic of odometry, stamped poses or transforms. Up to
+    /// with header stamps of the log, or topic:NAME[:LABEL] for a topic of odometry, stamped poses or transforms. Up to
     /// four.
     #[arg(long = "trajectory", value_name = "FILE[:LABEL]")]
     pub trajectories: Vec<TrajectorySpec>,

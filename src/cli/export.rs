@@ -28,8 +28,7 @@ pub(crate) struct ExportArguments {
     #[arg(long = "camera", value_name = "KEY")]
     pub cameras: Vec<String>,
     /// Fixed angles of the gimbal in degrees, as in yaw=10,pitch=-30; other joints stay neutral, at 0 or at the limit
-    /// nearest
-    /// to it.
+    /// nearest to it.
     #[arg(long, value_name = "NAME=DEG,…", value_delimiter = ',', value_parser = joint_angle, conflicts_with = "at")]
     pub joints: Vec<(String, f64)>,
     /// Use the joint angles measured in the log at this time.

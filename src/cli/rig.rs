@@ -37,8 +37,7 @@ pub(crate) struct NewArguments {
     #[arg(long, value_name = "AXES", value_parser = parsed::<MechanismAxes>, required_unless_present = "list")]
     pub mechanism: Option<MechanismAxes>,
     /// The camera: fov:DEG (horizontal field of view), a model with published intrinsics (--list prints all), or
-    /// info[:TOPIC] for
-    /// the log's `CameraInfo`.
+    /// info[:TOPIC] for the log's `CameraInfo`.
     #[arg(long, value_name = "CAMERA", value_parser = parsed::<CameraChoice>, required_unless_present = "list")]
     pub camera: Option<CameraChoice>,
     /// The rig to write [default: the name of the log with .rig.yaml].
@@ -52,8 +51,7 @@ pub(crate) struct NewArguments {
     #[arg(long, value_name = "X,Y,Z", value_parser = position, allow_hyphen_values = true)]
     pub at: Option<[f64; 3]>,
     /// Sign of the joint angles: frd (positive yaw to the right, pitch up, as of autopilots and DJI) or flu (positive
-    /// yaw to the
-    /// left, pitch down, as in ROS) [default: frd].
+    /// yaw to the left, pitch down, as in ROS) [default: frd].
     #[arg(long, value_name = "frd|flu", value_parser = body_axes)]
     pub positive: Option<BodyAxes>,
     /// Axes of the IMU: flu or frd [default: from gravity in the log].

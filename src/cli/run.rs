@@ -26,8 +26,7 @@ pub(crate) struct RunArguments {
     #[command(flatten)]
     pub estimation: EstimationArguments,
     /// Stop when this condition becomes true in a run, as in "rank < 18 or features < 40", write the files up to that
-    /// step and
-    /// print the values; docs/manual.md lists the quantities.
+    /// step and print the values; docs/manual.md lists the quantities.
     #[arg(long = "break", value_name = "CONDITION", value_parser = condition)]
     pub break_at: Option<Condition>,
     /// Omit measured times from frames.csv and summary.json, so that two runs give the same bytes in every file.
@@ -41,8 +40,7 @@ pub(crate) struct RunArguments {
     #[arg(long)]
     pub euroc: bool,
     /// Overwrite any content of the runs' folders. Without it, only a run on a log of the same name is replaced, in a
-    /// folder that
-    /// contains nothing else.
+    /// folder that contains nothing else.
     #[arg(long)]
     pub force: bool,
     /// Print the summaries as JSON instead of a table.

@@ -32,8 +32,7 @@ pub(crate) struct ScreenshotArguments {
     /// The log, a saved session (LOG.session.json) with its forks and breakpoints, or the folder of a study.
     pub log: PathBuf,
     /// Seconds since the first message of the log; may be given several times, then the time is part of the file names.
-    /// Required
-    /// for a log unless --every is given.
+    /// Required for a log unless --every is given.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub at: Vec<f64>,
     /// Period of the screenshots, from the start to the end of the log (or from --start, for --duration).
@@ -355,8 +354,7 @@ impl Shown {
     }
 
     /// Cache entry of the screenshots; `None` for a saved session, and for a graphics adapter, because its images
-    /// differ from
-    /// those of other adapters.
+    /// differ from those of other adapters.
     fn cached(&self, arguments: &ScreenshotArguments, format: FormatArgument) -> Option<CachedResult> {
         let Source::Log(plan, _) = &self.source else { return None };
         if arguments.renderer == RendererArgument::Wgpu {

@@ -39,8 +39,7 @@ pub(crate) struct SimulateArguments {
     #[arg(long)]
     pub no_static_camera: bool,
     /// Overwrite any existing log, rig or ground truth of that name. Without it, only a simulated log with its
-    /// unmodified rigs
-    /// is replaced.
+    /// unmodified rigs is replaced.
     #[arg(long)]
     pub force: bool,
     /// A disturbance, in seconds and SI units; may be given several times: camera-offset=S, joint-lag=S,

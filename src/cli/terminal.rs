@@ -15,8 +15,7 @@ const PROGRESS_STEPS: u64 = 1000;
 const SPINNER_PERIOD: Duration = Duration::from_millis(100);
 
 /// Writes text for users to standard output, without control characters that names in it may contain; a closed pipe is
-/// not an
-/// error.
+/// not an error.
 pub(crate) fn print(text: &str) -> Result<()> {
     write(&printable_lines(text))
 }
@@ -35,8 +34,7 @@ pub(crate) fn print_json<T: Serialize + ?Sized>(value: &T) -> Result<()> {
 }
 
 /// JSON text in which every unprintable character is escaped as `\uXXXX`: they occur only inside strings, and the
-/// serializer
-/// has already escaped those below U+0020.
+/// serializer has already escaped those below U+0020.
 fn escaped_json(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     let mut units = [0; 2];

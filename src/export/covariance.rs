@@ -28,8 +28,7 @@ pub(super) fn covariance_of_calibration(run: &CalibrationRun) -> String {
 }
 
 /// Upper triangle of each covariance in the order of ROS messages: position before rotation, both about the world axes;
-/// with
-/// `with_nees` also the normalized squared error.
+/// with `with_nees` also the normalized squared error.
 fn table(poses: impl Iterator<Item = (i64, Matrix6<f64>, Option<f64>)>, with_nees: bool) -> String {
     const AXES: [(&str, &str); 6] = [("x", "m"), ("y", "m"), ("z", "m"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad")];
     let upper = || (0..AXES.len()).flat_map(|row| (row..AXES.len()).map(move |column| (row, column)));

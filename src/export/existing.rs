@@ -1,8 +1,7 @@
 //! Existing output: files that a run may overwrite.
 //!
 //! Results are replaced without `--force` only by results of the same command for the same log. The folder of a run
-//! must
-//! contain only such files; `report` and `calibrate` check only files with their own names.
+//! must contain only such files; `report` and `calibrate` check only files with their own names.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -72,8 +71,7 @@ pub fn check_calibration_folder(folder: &Path, log: &Path, force: bool) -> Resul
 }
 
 /// Checks that `simulate` may write a log and its rigs: an existing log must be a simulation of the same experiment,
-/// and its
-/// rigs must be unmodified.
+/// and its rigs must be unmodified.
 ///
 /// # Errors
 /// If a file cannot be written or, without `force`, is something else.
@@ -139,8 +137,7 @@ enum LogOrigin {
 }
 
 /// Origin of a log according to its first bytes: the header names the program, and the metadata marks a simulation.
-/// `None`
-/// for files of other programs.
+/// `None` for files of other programs.
 fn writer_of(log: &Path) -> Option<LogOrigin> {
     const START_BYTES: u64 = 512;
     let mut start = Vec::new();

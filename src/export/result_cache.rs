@@ -2,10 +2,8 @@
 //! immediately.
 //!
 //! The name of an entry is the SHA-256 of everything on which its content depends: the program itself, the content of
-//! the
-//! input files and the options. An entry contains the files written by the command; its own SHA-256 is checked when it
-//! is
-//! read.
+//! the input files and the options. An entry contains the files written by the command; its own SHA-256 is checked when
+//! it is read.
 
 use std::fs::{self, File};
 use std::io;

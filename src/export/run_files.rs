@@ -39,8 +39,7 @@ impl Default for RunFileOptions {
 /// Writes the files of one run into `folder/LABEL/` and returns that folder and the summary.
 ///
 /// All files are complete before the first one replaces an older one; files of an earlier run that are not written
-/// again are
-/// removed.
+/// again are removed.
 pub fn write_run(
     recording: &Recording,
     run: &RunRecord,

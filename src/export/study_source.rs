@@ -51,8 +51,7 @@ pub fn is_study(path: &Path) -> bool {
 
 impl OpenedStudy {
     /// Reads the tables of a study: results.parquet and parameters.parquet, or CSV files with the same names. The table
-    /// of
-    /// parameters may be missing.
+    /// of parameters may be missing.
     ///
     /// # Errors
     /// If there is no table of runs, or a table cannot be read.
@@ -183,8 +182,7 @@ fn with_meanings(table: StudyTable, known: &StudyTable) -> StudyTable {
 }
 
 /// Reads comma-separated values. Columns of `known` have the types given there; the type of another column is the
-/// narrowest
-/// that fits all its values.
+/// narrowest that fits all its values.
 fn read_csv(path: &Path, known: &StudyTable) -> Result<StudyTable, StudySourceError> {
     let failed = |problem: String| StudySourceError::Csv { problem, path: path.to_owned() };
     let text = fs::read(path).map_err(|error| failed(error.to_string()))?;

@@ -519,8 +519,7 @@ fn real_time_factor(run: &RunRecord) -> Option<f64> {
 }
 
 /// Warnings about the log, then of the run, each with its stamp; a repeated warning is listed once with its count and
-/// its
-/// last stamp.
+/// its last stamp.
 fn warnings(recording: &Recording, run: &RunRecord) -> Vec<String> {
     let mut texts: Vec<String> = recording
         .warnings

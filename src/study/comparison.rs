@@ -1,12 +1,9 @@
 //! Comparison of two studies: a metric is worse if it changed beyond its tolerance and beyond its noise.
 //!
 //! Runs are paired by log, disturbance, perturbation, seed and settings, see [`super::pairing`]. The difference of a
-//! pair is
-//! the logarithm of the ratio of its two values, so that easy and difficult flights have equal weight. The mean over
-//! all
-//! pairs and its 95 % interval (Student's t) are computed. A metric is worse when its mean ratio is beyond the
-//! tolerance
-//! and the interval excludes 1.
+//! pair is the logarithm of the ratio of its two values, so that easy and difficult flights have equal weight. The mean
+//! over all pairs and its 95 % interval (Student's t) are computed. A metric is worse when its mean ratio is beyond the
+//! tolerance and the interval excludes 1.
 
 use std::collections::BTreeMap;
 use std::fmt;

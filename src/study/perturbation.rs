@@ -295,8 +295,7 @@ impl RigPerturbation {
     ///
     /// # Errors
     /// If the rig does not have a changed quantity, a camera would have impossible intrinsics, or the perturbation
-    /// starts
-    /// from a ground truth that is missing.
+    /// starts from a ground truth that is missing.
     pub fn apply(&self, given: &Rig, truth: Option<&Rig>, seed: u64) -> Result<Rig, PerturbationError> {
         let mut rig = match self.start {
             PerturbationStart::Rig | PerturbationStart::Calibrated => given.clone(),

@@ -18,8 +18,7 @@ const TAIL: f64 = 0.025;
 
 impl MeanInterval {
     /// Student's t interval of the mean, for independent differences with a normally distributed mean. `None` for fewer
-    /// than
-    /// two.
+    /// than two.
     pub fn of(differences: &[f64]) -> Option<Self> {
         let pairs = differences.len();
         if pairs < 2 {

@@ -64,8 +64,7 @@ pub struct SummaryTable {
     /// Values of columns that a run must have to be included.
     pub only: BTreeMap<String, Vec<String>>,
     /// Column values that define the reference of each run, for [`Statistic::Ratio`]: the run with these values and
-    /// otherwise
-    /// the same inputs.
+    /// otherwise the same inputs.
     pub against: BTreeMap<String, String>,
     pub columns: Vec<SummaryColumn>,
     /// Reference values from other sources.
@@ -102,8 +101,7 @@ impl<'a> Runs<'a> {
 
 impl SummaryTable {
     /// The table as Markdown. Groups are in the order of their first run; runs without a result are counted but
-    /// excluded from
-    /// the statistics.
+    /// excluded from the statistics.
     pub fn markdown(&self, runs: &StudyTable) -> String {
         let (groups, known) = (self.groups(runs), Runs::of(runs));
         let mut titles: Vec<&str> = Vec::new();

@@ -1,8 +1,7 @@
 //! Configuration files of other estimators from a rig, with the gimbal fixed at given joint angles.
 //!
 //! Each module writes the text of one program's files from a rig of static cameras; [`Format`] describes the
-//! capabilities of
-//! the program. Unsupported properties are noted at the head of the files, or are an error.
+//! capabilities of the program. Unsupported properties are noted at the head of the files, or are an error.
 
 mod basalt;
 mod error;
@@ -71,8 +70,7 @@ pub struct Configuration {
 /// The configuration of another program for a rig.
 ///
 /// `cameras` are keys of the rig in the order of the program's cameras; if empty, every camera is used, up to the
-/// number
-/// that the program supports.
+/// number that the program supports.
 ///
 /// # Errors
 /// If a key or the joint angles do not belong to the rig, or the program does not support a lens or the number of
@@ -121,8 +119,7 @@ pub fn configure(
 }
 
 /// Writes configuration files into a folder; returns their paths. Existing files are replaced if they were written by
-/// this
-/// program.
+/// this program.
 ///
 /// # Errors
 /// If a file cannot be written or, without `force`, is something else.

@@ -64,8 +64,7 @@ pub struct ReportOptions {
 }
 
 /// Writes `report.html`, `report.json` and, as `run --no-timing`, a folder for each run; returns the paths of all
-/// files,
-/// that of the HTML last.
+/// files, that of the HTML last.
 ///
 /// # Errors
 /// If a file cannot be read or written.
@@ -99,8 +98,7 @@ pub fn write_report(
 }
 
 /// Writes the files of a report from the cache, given by paths relative to the folder with their contents, for runs
-/// with these
-/// labels; otherwise as [`write_report`].
+/// with these labels; otherwise as [`write_report`].
 ///
 /// # Errors
 /// If a file cannot be written.

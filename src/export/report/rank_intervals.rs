@@ -11,8 +11,7 @@ use crate::sensors::Rig;
 use crate::session::RunRecord;
 
 /// Minimum length of an interval, summarized by its most frequent ranks: on a real flight the informed rank changes
-/// from
-/// frame to frame.
+/// from frame to frame.
 const MIN_INTERVAL_NS: i64 = 1_000_000_000;
 
 /// An interval of constant ranks.

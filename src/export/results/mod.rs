@@ -1,6 +1,5 @@
 //! A run as an MCAP file for Foxglove, Rerun and RViz, to be opened with the log: poses, frames of the chain,
-//! landmarks,
-//! tracks and residuals over the image, calibration, rank and frame statistics as time series, and events.
+//! landmarks, tracks and residuals over the image, calibration, rank and frame statistics as time series, and events.
 //!
 //! Topics and frames begin with the run's label, so that the files of several runs can be opened together. Log times
 //! are those of the images, so that playback is synchronous with the log; stamps are the estimator's.

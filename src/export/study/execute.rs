@@ -25,12 +25,10 @@ use crate::session::{
 use crate::study::{JobLog, JobSubject, KeyedJob, PerturbationStart, StudyJob, StudyOutput, TableError};
 
 /// Number of frames between two samples of the consistency of poses: about the length of a window, so that samples have
-/// few
-/// common measurements.
+/// few common measurements.
 const CONSISTENCY_EVERY: usize = 30;
 /// Memory budget of the record of a job in bytes: beyond it only the summaries of steps are kept, from which the rows
-/// are
-/// made.
+/// are made.
 const RECORD_BYTES: usize = 64 << 20;
 
 /// Reason why a job has no result.
@@ -244,8 +242,7 @@ impl StudyFolder {
     }
 
     /// Runs the offline calibration on the log of a job, writes the files of `dcvins calibrate` into its folder, and
-    /// uses the
-    /// result as its rig.
+    /// uses the result as its rig.
     fn calibrate(&self, key: &str, job: &StudyJob, files: &mut JobFiles) -> Result<CalibrationReport, JobError> {
         let (start_s, duration_s) = span(job);
         let request = CalibrationRequest {

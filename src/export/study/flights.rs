@@ -50,8 +50,7 @@ impl StudyFolder {
     /// Renders a flight unless it is rendered, or waits while another process renders it.
     ///
     /// The flight is written into a temporary folder that is renamed when it is complete. A lock keeps two processes
-    /// from
-    /// rendering the same flight; on a file system without locks both do, and the first one is kept.
+    /// from rendering the same flight; on a file system without locks both do, and the first one is kept.
     ///
     /// # Errors
     /// As [`simulate_interruptible`], and if the folders cannot be written.

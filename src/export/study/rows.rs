@@ -295,8 +295,7 @@ fn worst_frame(run: &RunRecord) -> Cells {
 }
 
 /// Position error in metres and angle in radians of every step by stamp, after the alignment of the whole run; `None`
-/// without
-/// a pose or ground truth.
+/// without a pose or ground truth.
 pub(super) fn position_errors(run: &RunRecord) -> Vec<(i64, Option<[f64; 2]>)> {
     let error_of = |step: &crate::session::StepRecord| {
         let (alignment, truth) = (run.alignment?, step.ground_truth?);

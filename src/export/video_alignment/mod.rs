@@ -95,8 +95,7 @@ impl fmt::Display for VideoAlignment {
 }
 
 /// Estimates the time offset of a video in the autopilot's log of `options` within ±60 s of the first guess, which is
-/// that of
-/// the conversion. If there is a rig next to `output`, its camera model is used.
+/// that of the conversion. If there is a rig next to `output`, its camera model is used.
 ///
 /// # Errors
 /// If the sources cannot be converted, or the rotations do not determine a unique offset.

@@ -2,8 +2,7 @@
 //!
 //! `rank < 18 or features < 40` compares quantities of a step with numbers and joins comparisons by `and`, `or` and
 //! `not`. A comparison is false if the step lacks its quantity (a rank during initialization). A breakpoint is hit
-//! where
-//! its condition becomes true.
+//! where its condition becomes true.
 
 mod evaluate;
 mod expression;

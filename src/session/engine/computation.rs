@@ -10,8 +10,7 @@ use crate::session::plan::SessionPlan;
 use crate::session::record::{Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord};
 
 /// Divisor of the memory budget: estimator snapshots may take half of it. They take precedence over complete steps:
-/// from a
-/// snapshot any step is recomputed quickly, while a complete step helps only at the cursor.
+/// from a snapshot any step is recomputed quickly, while a complete step helps only at the cursor.
 const SNAPSHOT_BUDGET_DIVISOR: usize = 2;
 
 /// Runs of a session as far as they are computed: their record, and for each run the history from which any of its

@@ -18,9 +18,8 @@ use crate::session::record::tracks_bytes;
 /// camera from the log: it owns the image, which is not needed after the front end, and has no tracks. The estimator's
 /// [`StepInput`](crate::estimator::StepInput) borrows its measurements for the call, because a fork changes some of
 /// them first. `OwnedStepInput` owns the same measurements: tracker threads send it to the runs, and their histories
-/// keep
-/// it, so that steps are recomputed without tracking features again. The front end does not depend on the estimator, so
-/// the tracks are the same for every run. Runs on the same camera share the input.
+/// keep it, so that steps are recomputed without tracking features again. The front end does not depend on the
+/// estimator, so the tracks are the same for every run. Runs on the same camera share the input.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::session) struct OwnedStepInput {
     /// Index of the main camera's image; where that image is missing, an index that no image has.

@@ -94,8 +94,7 @@ impl SynchronizedFrames {
     }
 
     /// Merges the inputs of the cameras into one. Values common to all cameras are taken from the main camera if it has
-    /// an
-    /// image.
+    /// an image.
     fn combined(&mut self, frames: &[Option<Arc<OwnedStepInput>>]) -> Option<OwnedStepInput> {
         let main = frames.first()?.as_deref();
         let any = main.or_else(|| frames.iter().flatten().map(|frame| &**frame).next())?;

@@ -177,8 +177,7 @@ struct RunOverLog {
 
 impl RunOverLog {
     /// Runs the passes over the synchronized frame sets, stores each set in the history, and reports each step of the
-    /// last
-    /// pass.
+    /// last pass.
     fn start(self, mut frames: SynchronizedFrames) {
         let history = &self.history;
         let tracked = std::iter::from_fn(|| match frames.next() {

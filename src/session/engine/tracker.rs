@@ -34,8 +34,7 @@ const RIGID_EXTRINSICS_SIGMA_RAD: f64 = 0.01;
 const FEATURES_ON_GIMBAL: usize = 180;
 
 /// Time after a stamp for which IMU samples are kept for the rows of a rolling shutter: the readout takes at most 40
-/// ms,
-/// and a time offset may be added. A run or a fork may estimate the readout on any log.
+/// ms, and a time offset may be added. A run or a fork may estimate the readout on any log.
 const LONGEST_READOUT_S: f64 = 0.06;
 /// Additional time after the readout stated in the rig.
 const READOUT_MARGIN_S: f64 = 0.03;

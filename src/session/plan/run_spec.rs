@@ -152,8 +152,7 @@ impl RunSpec {
     }
 
     /// Text of all settings that affect the results, without the name. Keys with default values are omitted and the
-    /// others
-    /// have a fixed order, so that equivalent specifications have the same text.
+    /// others have a fixed order, so that equivalent specifications have the same text.
     pub fn settings(&self) -> String {
         let standard = Self::default();
         let mut options = Vec::new();

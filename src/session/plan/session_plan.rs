@@ -187,8 +187,7 @@ impl SessionPlan {
     }
 
     /// Poses that replace the ground truth of the log's frames, empty if the ground truth is antenna positions; `None`
-    /// keeps
-    /// the log's.
+    /// keeps the log's.
     pub(in crate::session) fn replaced_ground_truth(&self) -> Option<Arc<PoseTrack>> {
         self.truth_request.0.as_ref().map(|_| self.ground_truth_track.clone().unwrap_or_default())
     }

@@ -97,8 +97,7 @@ pub(super) enum LoadedTruth {
 ///
 /// # Errors
 /// If the requested ground truth cannot be read or has nothing within the time of the log, or if a lever arm was given
-/// with
-/// poses.
+/// with poses.
 pub(super) fn ground_truth(
     log: &FlightLog,
     rig: &Rig,

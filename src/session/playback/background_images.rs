@@ -11,8 +11,7 @@ use crate::sensors::GrayImage;
 use crate::session::plan::SessionError;
 
 /// Longest time that a window waits for an image; the next image of a video is decoded within it, so that playback
-/// shows
-/// every image.
+/// shows every image.
 const WINDOW_WAITS: Duration = Duration::from_millis(25);
 /// Number of decoded images that are kept: those of all panels of a window.
 const DELIVERED: usize = 8;
@@ -41,8 +40,7 @@ impl FrameImage {
 type Key = (String, usize);
 
 /// Images of a log. In a log without videos each image is decoded alone, so images are read synchronously; a video is
-/// decoded
-/// from its last keyframe on, which can take longer than a window may wait.
+/// decoded from its last keyframe on, which can take longer than a window may wait.
 #[derive(Debug)]
 pub(super) struct BackgroundImages {
     reader: Arc<ImageReader>,

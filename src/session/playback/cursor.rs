@@ -162,8 +162,7 @@ impl Cursor {
     }
 
     /// Moves to the `count`-th stamp after the cursor (before it if negative), or to the last one in that direction;
-    /// does not
-    /// move if there is none.
+    /// does not move if there is none.
     fn step_over(&self, stamps_ns: &[i64], count: i64) -> Self {
         let places = usize::try_from(count.unsigned_abs()).unwrap_or(usize::MAX);
         let target = if count >= 0 {

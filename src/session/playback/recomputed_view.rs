@@ -20,8 +20,7 @@ impl Session {
     }
 
     /// Waits a few milliseconds for the data that the view at the cursor needs: most steps are recomputed within that
-    /// time, so
-    /// the window draws one frame instead of one before and one after.
+    /// time, so the window draws one frame instead of one before and one after.
     pub fn settle_shortly(&self) {
         self.recompute.settle_within(WINDOW_WAITS);
     }
@@ -74,8 +73,7 @@ impl Session {
                 requests.push(request(step, step, Detail::FactorRows, false));
             }
             // The steps that will be shown next are prefetched, the nearest first: during playback those ahead, else
-            // those before the
-            // cursor.
+            // those before the cursor.
             let next: Vec<usize> = if cursor.playing {
                 (last + 1..last + STEPS_AT_ONCE).filter(missing).collect()
             } else {

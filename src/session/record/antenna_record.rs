@@ -39,8 +39,7 @@ impl PositionTruth {
 }
 
 /// Estimated antenna position (world of the estimate) and ground-truth position (world of the ground truth) as poses
-/// without
-/// rotation.
+/// without rotation.
 fn stamped(pair: &AntennaPair, alignment: &AntennaAlignment) -> (StampedPose, StampedPose) {
     let stamp_s = seconds_from_ns(pair.stamp_ns);
     let at = |position_m| StampedPose { stamp_s, pose: RigidTransform::new(UnitQuaternion::identity(), position_m) };

@@ -243,8 +243,7 @@ impl Comparison {
     }
 
     /// Compares a trajectory with a run at the stamps of the run's steps, in position and attitude, the only quantities
-    /// of a
-    /// trajectory. Only the new steps are read; restarts if one of the two was replaced.
+    /// of a trajectory. Only the new steps are read; restarts if one of the two was replaced.
     pub fn read_trajectory(&mut self, reference: &RunRecord, lane: &TrajectoryLane) {
         let ids = Some((reference.id, lane.id));
         if self.runs != ids || self.read.0 > reference.steps.len() {

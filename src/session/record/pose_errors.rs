@@ -16,8 +16,7 @@ pub struct PoseError {
     /// Stamp of the frame in nanoseconds since the log began.
     pub stamp_ns: i64,
     /// Estimate minus ground truth in the rows of [`PoseCovariance`]: rotation vector in the IMU frame (rad), position
-    /// in the
-    /// world of the run (m).
+    /// in the world of the run (m).
     pub error: Vector6<f64>,
     /// Covariance of the estimate.
     pub covariance: PoseCovariance,
@@ -61,8 +60,7 @@ impl RunRecord {
     }
 
     /// `run_from_true`: alignment of the ground truth with the oldest frame of a step's window by position and yaw;
-    /// `None` if
-    /// that frame has no ground truth.
+    /// `None` if that frame has no ground truth.
     fn run_from_true(&self, step: usize) -> Option<RigidTransform> {
         let oldest = self.steps[step].report.window.first()?;
         let place = self.steps[..=step].binary_search_by_key(&oldest.stamp_ns, |step| step.report.stamp_ns).ok()?;

@@ -7,12 +7,10 @@ use crate::sensors::{CameraMount, Rig};
 
 impl RunRecord {
     /// The rig's values of the run's calibration parameters in the parameterization of `estimate`, each in the unit of
-    /// its
-    /// dimension; angles lie in (−π, π]. Returns `None` if the rig does not have the cameras.
+    /// its dimension; angles lie in (−π, π]. Returns `None` if the rig does not have the cameras.
     ///
     /// The classical parameterization has several equivalent values; the result is nearest to `given`, the rig of the
-    /// run's
-    /// prior, because the run estimates near its values.
+    /// run's prior, because the run estimates near its values.
     pub fn values_in(&self, rig: &Rig, given: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(ParameterId, f64)>> {
         let main = rig.chain_of_camera(&self.camera_key)?;
         let conversion = self.conversion_for(given, estimate, estimate.parameterization)?;

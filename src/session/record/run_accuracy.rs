@@ -94,8 +94,7 @@ impl RunRecord {
     }
 
     /// Distances in metres between the aligned run and the ground truth at the estimated frames, or at the antenna
-    /// positions
-    /// if these are the ground truth; empty before the alignment.
+    /// positions if these are the ground truth; empty before the alignment.
     pub fn position_errors_m(&self) -> Vec<f64> {
         if self.position_truth.is_some() {
             let errors_m = |alignment| antenna_errors_m(&self.antenna.pairs, alignment);

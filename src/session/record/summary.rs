@@ -12,9 +12,8 @@ const NEWEST_KEPT: usize = 64;
 impl StepRecord {
     /// The step without features, older frames of the window, and (except in every fourth step) landmarks, which only
     /// drawings of this step need. If the step keeps its linearization, the window is kept, because the columns refer
-    /// to its
-    /// frames; so is the window of the first step after an initialization, because all poses and their covariances are
-    /// relative to its oldest frame.
+    /// to its frames; so is the window of the first step after an initialization, because all poses and their
+    /// covariances are relative to its oldest frame.
     ///
     /// All values that are plotted over time or written to tables are kept: events, χ², iterations, calibration, ranks.
     pub(in crate::session) fn summary(&self, number: usize) -> Self {
@@ -62,8 +61,7 @@ impl StepRecord {
 }
 
 /// Order in which a run's steps are summarized, over the whole run: steps directly after a snapshot first, because
-/// their
-/// recomputation is cheapest.
+/// their recomputation is cheapest.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SummaryOrder {
     /// Steps between two snapshots when the order was computed.

@@ -103,8 +103,7 @@ impl TrajectoryLane {
     }
 
     /// Transform from the trajectory's world to that of the scene: the alignment with the ground truth; without one,
-    /// the
-    /// alignment with a run at the first common frame.
+    /// the alignment with a run at the first common frame.
     pub fn world_from_own(&self, run: Option<&RunRecord>) -> RigidTransform {
         let onto_run = || {
             let run = run.filter(|run| run.alignment.is_none())?;
@@ -117,8 +116,7 @@ impl TrajectoryLane {
     }
 
     /// Distance between the aligned pose and the ground truth in metres, at the last pose with ground truth at or
-    /// before a
-    /// stamp; `None` without one within 0.5 s.
+    /// before a stamp; `None` without one within 0.5 s.
     pub fn error_m(&self, stamp_ns: i64) -> Option<f64> {
         let now_s = seconds_from_ns(stamp_ns);
         // Stamps in seconds are rounded in the same way as those of the pairs.

@@ -75,8 +75,7 @@ fn sigmas_of_the_last_pass_are_near_those_of_one_pass_and_priors_are_the_rigs() 
         run.steps.last().unwrap().report.calibration.clone()
     };
     // The sensor columns are carried over together with the chain's. `poe` is left out: the σ of its inner columns
-    // depend on the
-    // values at which a pass is linearized (0.75, 0.38 and 0.53 of the prior in three passes over 7 s).
+    // depend on the values at which a pass is linearized (0.75, 0.38 and 0.53 of the prior in three passes over 7 s).
     for columns in ["auto:timeshift=on", "classical"] {
         let separator = if columns.contains(':') { ',' } else { ':' };
         let [one, two, three] = [1, 2, 3].map(|passes| last(&format!("{columns}{separator}passes={passes}")));

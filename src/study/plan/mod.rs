@@ -32,8 +32,7 @@ pub struct LogSource {
     /// Seconds to process from there, `None` for the rest.
     pub duration_s: Option<f64>,
     /// Trajectories of other programs on these logs. Paths are relative to the folder of the plan, and [`LOG_PLACE`] in
-    /// them
-    /// stands for the name of a log's file without its extension.
+    /// them stands for the name of a log's file without its extension.
     pub trajectories: Vec<TrajectorySpec>,
 }
 
@@ -140,8 +139,7 @@ impl StudyPlan {
     ///
     /// # Errors
     /// For invalid TOML, an unknown key, a value of the wrong type or out of its range, and for a plan without logs or
-    /// with two
-    /// levels of the same name.
+    /// with two levels of the same name.
     pub fn from_toml(text: &str) -> Result<Self, PlanError> {
         read::plan(text)
     }

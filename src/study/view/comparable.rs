@@ -18,12 +18,10 @@ const SAME: [&str; 10] = [
 ];
 
 /// Row `row`, then the other rows with equal log, rig and start and other specifications, in the order of the table; at
-/// most
-/// `most` in all.
+/// most `most` in all.
 ///
 /// Rigs with errors are stored in the folders of the jobs, so their paths differ even if the errors are equal; for
-/// perturbed
-/// runs, the name of the errors and the seed are compared instead.
+/// perturbed runs, the name of the errors and the seed are compared instead.
 pub fn comparable_rows(table: &StudyTable, row: usize, most: usize) -> Vec<usize> {
     let perturbed = table.text(row, "rig_path").is_some_and(|path| path.starts_with("jobs/"));
     let same = |other: usize| {

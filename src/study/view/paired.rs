@@ -42,8 +42,7 @@ pub struct GroupDifference {
 }
 
 /// Columns in which the two rows of a pair agree: those that identify a run, without the grouping column and without
-/// columns
-/// that determine the group (the specification of a run when runs are grouped by one of its keys).
+/// columns that determine the group (the specification of a run when runs are grouped by one of its keys).
 fn shared_columns(table: &StudyTable, group: &str) -> Vec<&'static str> {
     let decides = |column: &str| {
         let mut group_of: BTreeMap<String, Cell> = BTreeMap::new();

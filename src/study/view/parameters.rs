@@ -53,8 +53,7 @@ pub enum SigmaVerdict {
 
 impl ParameterErrors {
     /// Verdict on the RMS ratio of error to σ: consistent between 0.5 and 1.5, or within the 99 % interval for this
-    /// number of
-    /// runs.
+    /// number of runs.
     pub fn verdict(&self) -> SigmaVerdict {
         const NORMAL_QUANTILE: f64 = 2.58;
         let by_chance = |normal: f64| mean_square_quantile(self.points.len().max(1) as f64, normal).sqrt();

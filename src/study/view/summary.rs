@@ -20,8 +20,7 @@ pub struct GroupSummary {
     /// Number of pairs with the reference group.
     pub pairs: usize,
     /// Mean difference to the reference group on equal inputs with the ends of its 95 % interval: lower end, mean,
-    /// upper end, in
-    /// the shown unit.
+    /// upper end, in the shown unit.
     pub difference: Option<[f64; 3]>,
 }
 

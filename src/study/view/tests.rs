@@ -24,10 +24,8 @@ fn table(columns: &[(&str, ColumnType, &str)]) -> StudyTable {
 }
 
 /// A study of 8 logs × 5 specifications × 5 perturbations × `seeds` seeds: `auto` is best, without encoders the error
-/// is
-/// 1.5 times as large, a static camera is ten times worse and often fails, and σ of `pitch.alpha` is half of the
-/// correct
-/// value.
+/// is 1.5 times as large, a static camera is ten times worse and often fails, and σ of `pitch.alpha` is half of the
+/// correct value.
 pub(crate) fn synthetic_study(seeds: usize) -> Study {
     use ColumnType::{Bool, Integer, Number, Text};
     let mut runs = table(&[
