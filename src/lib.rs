@@ -1,47 +1,48 @@
 //! A debugger for visual-inertial navigation with a camera on a gimbal.
 //!
-//! A flight log goes in at one end and a screenshot comes out at the other.
+//! The input is a flight log, the output a window, screenshots and result files.
 //! A folder may use the folders above it in this list and none below it; `tests/it/layering.rs` reads the imports and
-//! fails on one that points the wrong way.
+//! fails on an import in the other direction.
 //!
-//! | folder | promises | does not know of |
+//! | folder | contents | does not depend on |
 //! | --- | --- | --- |
 //! | [`geometry`] | rotations, rigid transforms, the one perturbation rule, time units | cameras, logs |
 //! | [`camera`] | projection and back-projection with their Jacobians | gimbals, images |
 //! | [`gimbal`] | the actuated chain in each parameterization, its Jacobians, conversions and singularity margins | measurements |
-//! | [`sensors`] | plain types of what sensors deliver and of the rig that describes them | where they come from |
-//! | [`optimization`] | robust loss, reprojection residual with its Jacobians, elimination of landmarks, damped solver | whose unknowns they are |
-//! | `flight_log` | MCAP in and out as typed events in time order; rig files; logs of other recorders | what the events are used for |
+//! | [`sensors`] | plain types of sensor measurements and of the rig that describes the sensors | the source of the data |
+//! | [`optimization`] | robust loss, reprojection residual with its Jacobians, elimination of landmarks, damped solver | the meaning of the unknowns |
+//! | `flight_log` | MCAP in and out as typed events in time order; rig files; logs of other recorders | the use of the events |
 //! | [`frontend`] | image in, feature tracks out | the estimator, so that runs share tracks |
 //! | [`simulation`] | a synthetic flight with ground truth, as tracks or written as a flight log | the estimator |
 //! | [`estimator`] | window state, residuals, solver, marginalization; each step returns a `StepReport` | logs, screens, the wall clock |
-//! | [`observability`] | a linearization with typed columns in, ranks and null directions out | how it was made |
+//! | [`observability`] | a linearization with typed columns in, ranks and null directions out | the origin of the linearization |
 //! | [`calibration`] | a whole flight of both cameras in, the offline calibration of extrinsics and gimbal out | logs, files |
-//! | `log_check` | what is wrong with a log, with evidence and remedy | the estimator |
-//! | `session` | a cursor over a log, runs side by side, stored reports | pixels on a screen |
-//! | `study` | the runs that a plan asks for, the tables of their results and the comparison of two of them | files, processes, screens |
-//! | `gui` | panels, 3D scene, theme: reads reports, sends commands | the inside of the estimator |
+//! | `log_check` | problems of a log, with evidence and remedy | the estimator |
+//! | `session` | a cursor over a log, several runs, stored reports | pixels on a screen |
+//! | `study` | the runs defined by a plan, the tables of their results and the comparison of two studies | files, processes, screens |
+//! | `gui` | panels, 3D scene, theme: reads reports, sends commands | the internals of the estimator |
 //! | `export` | the same tables and panels without a window | windows |
 //!
-//! Two places differ from the way of the data, each for a reason: `simulation` stands below `frontend`, whose track types
-//! it writes for flights without images; `calibration` stands below `observability`, by which it says what its flight
-//! could not constrain.
+//! Two folders differ from the order of the data flow: `simulation` comes after `frontend`, because flights without images
+//! use its track types; `calibration` comes after `observability`, with which it reports the unobservable parameters of
+//! its flight.
 //!
-//! Four absences hold the shape: nothing above `gui` names egui or wgpu; [`frontend`], [`estimator`] and [`calibration`]
-//! do not know `flight_log`; [`frontend`] does not know the estimator; only `flight_log`, `export` and the command line
-//! touch the file system, and only `gui` asks the wall clock for anything but the stage timings of a report.
+//! Four rules: nothing above `gui` uses egui or wgpu; [`frontend`], [`estimator`] and [`calibration`] do not depend on
+//! `flight_log`; [`frontend`] does not depend on the estimator; only `flight_log`, `export` and the command line access
+//! the file system, and only `gui` reads the wall clock for anything but the stage timings of a report.
 //!
 //! Equations and parameterizations: docs/mathematics.md, sections 2 and 3; rank rule: docs/mathematics.md, section 8.
 //!
-//! Documents beside the source: `docs/tutorial.md` and `docs/manual.md` (the window), `docs/recordings.md` (from a recording
+//! Documents: `docs/tutorial.md` and `docs/manual.md` (the window), `docs/recordings.md` (from a recording
 //! to a run), `docs/commands.md`, `docs/formats.md` (logs, rigs, written files), `docs/accuracy.md`, `docs/architecture.md`, `docs/coming_from.md` (Kalibr,
 //! VINS-Fusion, OpenVINS), `docs/packages.md`.
 //!
 //! # The estimator as a library
 //!
-//! Without default features the crate holds what an estimator needs, and builds without MCAP, SQLite, clap and egui.
-//! This estimates eight seconds of a simulated flight with a gimballed camera and compares the velocity, seen in the IMU
-//! frame and hence without any alignment, with the ground truth:
+//! Without default features the crate contains only the estimator and its dependencies, without MCAP, SQLite, clap and
+//! egui.
+//! This example estimates eight seconds of a simulated flight with a gimbal camera and compares the velocity with the
+//! ground truth, in the IMU frame and therefore without alignment:
 //!
 //! ```
 //! use dcvins::estimator::{Estimator, EstimatorConfig, StepInput};

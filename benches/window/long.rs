@@ -51,7 +51,7 @@ pub(crate) fn memory(recording: &Recording) -> Table {
     for run in &recording.runs {
         let steps = run.steps.len().max(1);
         let figure =
-            format!("{} steps of {} and {}", steps, kib(run.memory.own / steps), kib(run.memory.tracks / steps));
+            format!("{} steps of {} and {}", steps, kib(run.memory.steps / steps), kib(run.memory.tracks / steps));
         table.row(format!("{}: steps, their tracks", run.spec.label), [figure]);
     }
     table

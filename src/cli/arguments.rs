@@ -23,7 +23,7 @@ use crate::cli::view::ViewArguments;
 #[derive(Debug, Parser)]
 #[command(version, about, propagate_version = true)]
 pub(crate) struct Arguments {
-    /// What to do; without a command the window opens.
+    /// Command; without one the window opens.
     #[command(subcommand)]
     pub command: Option<Command>,
 }
@@ -41,13 +41,13 @@ pub(crate) enum Command {
     #[cfg(feature = "gui")]
     #[command(after_help = exit::INTERRUPTIBLE)]
     Screenshot(ScreenshotArguments),
-    /// Write a report on a log: one HTML file with figures and tables, with CSV and JSON beside it.
+    /// Write a report on a log: one HTML file with figures and tables, and CSV and JSON files.
     #[command(after_help = exit::REPORT)]
     Report(ReportArguments),
     /// Calibrate static camera and gimbal offline from a flight with both, as the paper's baseline does.
     #[command(after_help = exit::INTERRUPTIBLE)]
     Calibrate(CalibrateArguments),
-    /// Check a log and its rig: content, timing, calibration, noise, each finding with evidence and remedy.
+    /// Check a log and its rig: content, timing, calibration, noise; each finding with evidence and remedy.
     #[command(after_help = exit::CHECK)]
     Check(CheckArguments),
     /// Measure the noise densities of the IMU: Allan deviation of stationary stretches, or fitted to a flight.

@@ -14,7 +14,6 @@ use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, notify, print, print_json};
 use crate::cli::value_parsers::seconds;
 
-/// `dcvins calibrate`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct CalibrateArguments {
     /// The log; its rig names a static camera, a gimbal camera and encoders.
@@ -22,10 +21,10 @@ pub(crate) struct CalibrateArguments {
     /// Folder for rig.yaml, calibration.json and report.txt.
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: PathBuf,
-    /// The rig, when it is not beside the log (LOG with .rig.yaml) or attached to it.
+    /// Rig file; default: next to the log (LOG with .rig.yaml) or attached to it.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
-    /// The ground truth of the rig, when it is not beside the log (LOG with .truth.yaml).
+    /// Ground-truth rig file; default: next to the log (LOG with .truth.yaml).
     #[arg(long = "truth", value_name = "FILE")]
     pub ground_truth: Option<PathBuf>,
     /// Skip this many seconds at the start of the log.
@@ -34,23 +33,20 @@ pub(crate) struct CalibrateArguments {
     /// Duration to process from there.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub duration: Option<f64>,
-    /// Also write the trajectory that the calibration finds, with covariances: trajectory.tum, a reference for runs
-    /// (--truth-trajectory), and covariance.csv.
+    /// Also write the estimated trajectory with covariances: trajectory.tum, a reference for runs (--truth-trajectory),
+    /// and covariance.csv.
     #[arg(long)]
     pub trajectory: bool,
-    /// Overwrite the files whatever they are. Without it only a calibration of a log of the
-    /// same name is replaced.
+    /// Overwrite any existing files. Without it, only a calibration of a log of the same name is replaced.
     #[arg(long)]
     pub force: bool,
     /// Print calibration.json instead of the report.
     #[arg(long)]
     pub json: bool,
-    /// Limits on the log.
     #[command(flatten)]
     pub limits: LimitArguments,
 }
 
-/// Runs `dcvins calibrate`.
 pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<Outcome> {
     export::check_calibration_folder(&arguments.out, &arguments.log, arguments.force)?;
     let request = CalibrationRequest {

@@ -15,29 +15,26 @@ use crate::cli::exit::Outcome;
 use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, notify, print_report};
 
-/// `dcvins check`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct CheckArguments {
     /// The log.
     pub log: PathBuf,
-    /// The rig, when it is not beside the log or attached to it.
+    /// Rig file; default: next to the log or attached to it.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
-    /// Write a mask for each camera in whose images a part never moves into this folder, as CAMERA.mask.png.
+    /// Folder for proposed masks, CAMERA.mask.png, of each camera with an image region that never moves.
     #[arg(long, value_name = "FOLDER")]
     pub write_masks: Option<PathBuf>,
-    /// Overwrite masks that exist.
+    /// Overwrite existing masks.
     #[arg(long, requires = "write_masks")]
     pub force: bool,
     /// Print the findings as JSON.
     #[arg(long)]
     pub json: bool,
-    /// Limits on the log.
     #[command(flatten)]
     pub limits: LimitArguments,
 }
 
-/// Runs `dcvins check`.
 pub(crate) fn check(arguments: &CheckArguments) -> Result<Outcome> {
     let progress = Progress::spinner("reading the log");
     let log = Arc::new(FlightLog::open_with(&arguments.log, &arguments.limits.limits())?);
@@ -55,7 +52,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<Outcome> {
         let written = export::write_masks(&report.proposed_masks, folder, arguments.force)?;
         let mut names = written.iter().map(|path| path.display().to_string());
         notify(&names.next().map_or_else(
-            || "no camera needs a mask that it does not have".to_owned(),
+            || "no camera needs a new mask".to_owned(),
             |first| names.fold(first, |all, name| format!("{all}\n{name}")),
         ));
     }

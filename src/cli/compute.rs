@@ -22,7 +22,7 @@ pub(crate) fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Compu
     Ok(computation)
 }
 
-/// Runs the estimators of a plan until a condition becomes true; returns the hit, if there is one.
+/// Runs the estimators of a plan until a condition becomes true; returns the hit, `None` if there is none.
 pub(crate) fn compute_until(plan: &SessionPlan, condition: &Condition) -> Result<(Recording, Option<BreakpointHit>)> {
     let (names, parameters) = (plan.rig.parameter_names(), plan.parameters());
     let unknown = condition.unknown_names(&names, &parameters);
@@ -40,7 +40,7 @@ pub(crate) fn compute_until(plan: &SessionPlan, condition: &Condition) -> Result
     Ok((computation.into_recording(), hit))
 }
 
-/// The pass of the run that is furthest behind, for a run with several, and the time of the log that it has reached.
+/// The pass and log time of the run that is furthest behind, the pass only for runs with several.
 fn progress_of(recording: &Recording) -> (String, f64) {
     let open = recording.runs.iter().filter(|run| !run.finished);
     let behind = open.min_by(|one, other| {

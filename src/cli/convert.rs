@@ -12,7 +12,6 @@ use crate::cli::interrupt::Interrupt;
 use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, notify, print_report};
 
-/// `dcvins convert`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ConvertArguments {
     /// A EuRoC/ASL folder (with mav0), a ROS 1 bag, a ROS 2 bag (its folder, one .db3 or one .mcap), an MP4 video (H.264 or
@@ -21,32 +20,31 @@ pub(crate) struct ConvertArguments {
     /// The log to write; the rig, where the source describes one, gets the same name with .rig.yaml.
     #[arg(short, long, visible_alias = "out", value_name = "LOG.mcap")]
     pub output: PathBuf,
-    /// PX4's ULog of the flight that the video shows.
+    /// PX4's ULog of the flight in the video.
     #[arg(long, value_name = "LOG.ulg", group = "autopilot_log")]
     pub ulog: Option<PathBuf>,
-    /// ArduPilot's DataFlash log of the flight that the video shows.
+    /// ArduPilot's DataFlash log of the flight in the video.
     #[arg(long, value_name = "LOG.bin", group = "autopilot_log")]
     pub dataflash: Option<PathBuf>,
-    /// The telemetry log (MAVLink) of the flight that the video shows.
+    /// The telemetry log (MAVLink) of the flight in the video.
     #[arg(long, value_name = "LOG.tlog", group = "autopilot_log")]
     pub tlog: Option<PathBuf>,
-    /// Start of the video minus the first measurement of the autopilot's log. Without it it is found by comparing the
-    /// rotations of the images with the gyroscope, up to 60 s from the times that camera and autopilot recorded.
+    /// Start of the video minus the first measurement of the autopilot's log. Default: estimated by comparing the
+    /// rotations of the images with the gyroscope, up to 60 s from the times recorded by camera and autopilot.
     #[arg(long, value_name = "SECONDS", requires = "autopilot_log", allow_hyphen_values = true, value_parser = offset)]
     pub video_offset: Option<f64>,
-    /// Overwrite whatever has the name of the log. Without it only a log is replaced that this command wrote; a rig beside the
-    /// log that was edited is always kept.
+    /// Overwrite any existing file with the name of the log. Without it, only a log written by this command is
+    /// replaced; an edited rig next to the log is always kept.
     #[arg(long)]
     pub force: bool,
     /// Print the converted and skipped topics as JSON.
     #[arg(long)]
     pub json: bool,
-    /// Limits on the source.
     #[command(flatten)]
     pub limits: LimitArguments,
 }
 
-/// Largest distance of a video from the start of the autopilot's log, in seconds (about four months).
+/// Largest offset of a video from the start of the autopilot's log, in seconds (about four months).
 const MAX_OFFSET_S: f64 = 1e7;
 
 /// Parses the offset of a video.
@@ -71,7 +69,6 @@ impl ConvertArguments {
     }
 }
 
-/// Runs `dcvins convert`.
 pub(crate) fn convert(arguments: &ConvertArguments) -> Result<Outcome> {
     let interrupt = Interrupt::watch()?;
     export::check_converted_log(&arguments.output, arguments.force)?;

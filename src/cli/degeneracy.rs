@@ -14,7 +14,6 @@ use dcvins::sensors::Rig;
 
 use crate::cli::terminal::{print, print_report};
 
-/// `dcvins degeneracy`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct DegeneracyArguments {
     /// Compute ranks, losses and null directions of every scenario of docs/mathematics.md, section 7; the default without
@@ -47,8 +46,8 @@ pub(crate) struct DegeneracyArguments {
     /// Source of the vehicle's poses [default: known].
     #[arg(long, value_enum)]
     pub poses: Option<PosesArgument>,
-    /// Columns of sensors beside those of the chain: readout, timeshift, intrinsics, imu-intrinsics, all; intrinsics of the
-    /// IMU need `--poses imu` [default: chain].
+    /// Sensor columns in addition to those of the chain: readout, timeshift, intrinsics, imu-intrinsics, all;
+    /// intrinsics of the IMU need `--poses imu` [default: chain].
     #[arg(long, value_name = "NAME,…")]
     pub columns: Option<SensorColumns>,
     /// Number of frames, 0.25 s apart [default: 10].
@@ -93,7 +92,6 @@ fn joint_knowledge(text: &str) -> Result<JointKnowledge, String> {
     }
 }
 
-/// Runs `dcvins degeneracy`.
 pub(crate) fn degeneracy(arguments: &DegeneracyArguments) -> Result<()> {
     if arguments.list {
         return print(&list());
@@ -122,7 +120,7 @@ pub(crate) fn degeneracy(arguments: &DegeneracyArguments) -> Result<()> {
     print_report(&Advised::new(report, &setup, form)?, arguments.json)
 }
 
-/// The results of an experiment and the excitation suggested for it.
+/// Results of an experiment and the excitation suggested for it.
 #[derive(Debug, serde::Serialize)]
 struct Advised {
     experiment: LaboratoryReport,

@@ -18,21 +18,22 @@ pub(crate) struct EstimationArguments {
     /// encoder-noise=F, loss=none|huber-K|cauchy-K, iterations=N, camera=KEY, name=LABEL. Up to four.
     #[arg(long = "run", value_name = "SPEC")]
     pub runs: Vec<RunSpec>,
-    /// A trajectory of another program beside the runs, aligned and evaluated like them: FILE[:LABEL] in TUM's or EuRoC's format
-    /// with header stamps of the log, or topic:NAME[:LABEL] for a topic of odometry, stamped poses or transforms. Up to four.
+    /// A trajectory of another program, aligned and evaluated like the runs: FILE[:LABEL] in TUM's or EuRoC's format
+    /// with header stamps of the log, or topic:NAME[:LABEL] for a topic of odometry, stamped poses or transforms. Up to
+    /// four.
     #[arg(long = "trajectory", value_name = "FILE[:LABEL]")]
     pub trajectories: Vec<TrajectorySpec>,
-    /// The rig, when it is not beside the log (LOG with .rig.yaml) or attached to it.
+    /// Rig file; default: next to the log (LOG with .rig.yaml) or attached to it.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
-    /// The ground truth of the rig, when it is not beside the log (LOG with .truth.yaml).
+    /// Ground-truth rig file; default: next to the log (LOG with .truth.yaml).
     #[arg(long = "truth", value_name = "FILE")]
     pub ground_truth: Option<PathBuf>,
     /// Ground truth of the trajectory instead of the rig's topic: a file in TUM's or EuRoC's format, or topic:NAME. Poses of
     /// the IMU, or positions of an antenna (without attitudes, stamped points, satellite fixes).
     #[arg(long, value_name = "FILE", value_parser = truth_trajectory)]
     pub truth_trajectory: Option<TrajectorySource>,
-    /// Where the antenna is whose positions are the ground truth: X,Y,Z in metres in the IMU frame, or estimate.
+    /// Lever arm of the antenna whose positions are the ground truth: X,Y,Z in metres in the IMU frame, or estimate.
     #[arg(long, value_name = "X,Y,Z|estimate", value_parser = lever_arm, allow_hyphen_values = true)]
     pub lever_arm: Option<LeverArm>,
     /// Skip this many seconds at the start of the log.
@@ -41,7 +42,6 @@ pub(crate) struct EstimationArguments {
     /// Duration to process from there.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub duration: Option<f64>,
-    /// Limits on the log.
     #[command(flatten)]
     pub limits: LimitArguments,
 }

@@ -10,10 +10,9 @@ use dcvins::session::accuracy::{Alignment, RelativeDelta};
 use crate::cli::terminal::print_report;
 use crate::cli::value_parsers::seconds;
 
-/// `dcvins evaluate`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct EvaluateArguments {
-    /// The estimated trajectory: TUM (t x y z qx qy qz qw) or a table of EuRoC.
+    /// The estimated trajectory: TUM (t x y z qx qy qz qw) or a table in EuRoC's format.
     pub estimate: PathBuf,
     /// The reference trajectory.
     pub reference: PathBuf,
@@ -64,7 +63,6 @@ fn delta(text: &str) -> Result<RelativeDelta, String> {
         .ok_or_else(|| "expected frames as in 5f, or metres as in 10m".to_owned())
 }
 
-/// Runs `dcvins evaluate`.
 pub(crate) fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
     let options = EvaluationOptions {
         alignment: arguments.align.into(),

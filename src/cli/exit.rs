@@ -2,10 +2,9 @@
 
 use std::process::ExitCode;
 
-/// How a command ended without an error of its own; an error is 1, and wrong arguments are 2.
+/// Outcome of a command that ended without an error; an error is exit code 1, wrong arguments are 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// Everything was done.
     Success,
     /// A run never initialized.
     NeverInitialized,
@@ -13,9 +12,9 @@ pub(crate) enum Outcome {
     ErrorsFound,
     /// The condition of `--break` became true.
     BreakHit,
-    /// Jobs of a study have no result; the others have.
+    /// Some jobs of a study have no result.
     JobsFailed,
-    /// Ended by Ctrl+C; what was computed is written.
+    /// Ended by Ctrl+C; the results so far are written.
     Interrupted,
 }
 
@@ -32,27 +31,27 @@ impl From<Outcome> for ExitCode {
     }
 }
 
-/// Exit code of an interrupted command, as of a shell's.
+/// Exit code of an interrupted command, as in shells.
 pub(crate) const INTERRUPTED: u8 = 130;
 
-/// Exit code of a sweep some of whose jobs have no result.
+/// Exit code of a sweep in which some jobs have no result.
 pub(crate) const JOBS_FAILED: u8 = 6;
 
-/// Exit codes of the commands that only do their work or fail, for `--help`.
+/// Exit codes of commands without special ones, for `--help`.
 pub(crate) const PLAIN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use.";
-/// Those of `simulate`, `convert`, `calibrate`, `noise` and `screenshot`.
+/// Exit codes of `simulate`, `convert`, `calibrate`, `noise` and `screenshot`.
 pub(crate) const INTERRUPTIBLE: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 130 interrupted (Ctrl+C; files \
     that are not complete are not written; a second Ctrl+C ends at once).";
-/// Those of `run`.
+/// Exit codes of `run`.
 pub(crate) const RUN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 3 a run never initialized, 5 the condition of \
     --break became true, 130 interrupted (Ctrl+C; the steps so far are written; a second Ctrl+C ends at once).";
-/// Those of `report`.
+/// Exit codes of `report`.
 pub(crate) const REPORT: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 3 a run never initialized, 130 \
     interrupted (Ctrl+C; the steps so far are written; a second Ctrl+C ends at once).";
-/// Those of `sweep`.
+/// Exit codes of `sweep`.
 pub(crate) const SWEEP: &str = "Exit codes: 0 success, 1 failure, worse than the baseline, or jobs that have not run, 2 wrong \
-    use, 6 jobs without a result (their rows say why), 130 interrupted (Ctrl+C; the next sweep goes on; a second Ctrl+C ends \
+    use, 6 jobs without a result (reasons in their rows), 130 interrupted (Ctrl+C; the next sweep resumes; a second Ctrl+C ends \
     at once).";
-/// Those of `check`.
+/// Exit codes of `check`.
 pub(crate) const CHECK: &str =
-    "Exit codes: 0 no errors found (warnings and notes may be), 1 failure, 2 wrong use, 4 errors found.";
+    "Exit codes: 0 no errors found (possibly warnings and notes), 1 failure, 2 wrong use, 4 errors found.";

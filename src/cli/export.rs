@@ -14,10 +14,9 @@ use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{print, print_json};
 use crate::cli::value_parsers::seconds;
 
-/// `dcvins export`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ExportArguments {
-    /// The rig, or a log (.mcap) with its rig beside it or attached to it.
+    /// The rig, or a log (.mcap) with its rig next to it or attached to it.
     pub rig: PathBuf,
     /// The program.
     #[arg(long = "to", value_enum, value_name = "PROGRAM")]
@@ -28,23 +27,22 @@ pub(crate) struct ExportArguments {
     /// A camera of the rig, in the order of the program's cameras [default: all; the first for vins-fusion and orb-slam3].
     #[arg(long = "camera", value_name = "KEY")]
     pub cameras: Vec<String>,
-    /// Angles in degrees at which the gimbal is taken to stay, as in yaw=10,pitch=-30; other joints stay neutral, at 0 or at
-    /// the limit nearest to it.
+    /// Fixed angles of the gimbal in degrees, as in yaw=10,pitch=-30; other joints stay neutral, at 0 or at the limit
+    /// nearest to it.
     #[arg(long, value_name = "NAME=DEG,…", value_delimiter = ',', value_parser = joint_angle, conflicts_with = "at")]
     pub joints: Vec<(String, f64)>,
-    /// Take the joint angles that the log measures at this time.
+    /// Use the joint angles measured in the log at this time.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub at: Option<f64>,
-    /// The log for --at, and for intrinsics and rates that the rig does not give.
+    /// The log for --at, and for intrinsics and rates that are missing in the rig.
     #[arg(long, value_name = "LOG")]
     pub log: Option<PathBuf>,
-    /// Overwrite files that this command has not written.
+    /// Overwrite files that were not written by this command.
     #[arg(long)]
     pub force: bool,
     /// Print paths and notes as JSON.
     #[arg(long)]
     pub json: bool,
-    /// Limits on the log.
     #[command(flatten)]
     pub limits: LimitArguments,
 }
@@ -87,7 +85,7 @@ fn joint_angle(text: &str) -> Result<(String, f64), String> {
         .ok_or_else(|| "expected a joint and its angle in degrees, as in pitch=-30".to_owned())
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Written<'a> {
     program: &'static str,
@@ -96,7 +94,6 @@ struct Written<'a> {
     notes: &'a [String],
 }
 
-/// Runs `dcvins export`.
 pub(crate) fn export(arguments: &ExportArguments) -> Result<()> {
     let is_log = arguments.rig.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
     let log_path = arguments.log.as_ref().or_else(|| is_log.then_some(&arguments.rig));

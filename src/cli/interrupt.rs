@@ -1,4 +1,4 @@
-//! Ctrl+C: the first one asks the command to end, the second one ends the process.
+//! Ctrl+C: the first interrupt requests the end of the command, the second one ends the process.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -15,12 +15,13 @@ use crate::cli::exit::INTERRUPTED;
 pub(crate) struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// From now on the first interrupt (or request to terminate) sets a flag, and the second one ends the process at once;
-    /// without this call the first one does.
+    /// From now on the first interrupt (or request to terminate) sets the flag, and the second one ends the process at
+    /// once;
+    /// without this call the first one ends it.
     pub(crate) fn watch() -> Result<Self> {
         let interrupted = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
-            // In this order: the first signal finds the flag unset.
+            // The order of registration matters: at the first signal, the flag is still unset here.
             flag::register_conditional_shutdown(signal, i32::from(INTERRUPTED), Arc::clone(&interrupted))
                 .and_then(|_| flag::register(signal, Arc::clone(&interrupted)))
                 .context("cannot watch for Ctrl+C")?;
@@ -28,17 +29,16 @@ impl Interrupt {
         Ok(Self(interrupted))
     }
 
-    /// The flag itself.
     pub(crate) fn flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.0)
     }
 
-    /// Whether to go on, for callbacks.
+    /// Continue or break, for callbacks.
     pub(crate) fn control_flow(&self) -> ControlFlow<()> {
         if self.is_set() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    /// Whether there was a signal.
+    /// True after a signal.
     pub(crate) fn is_set(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

@@ -18,15 +18,15 @@ use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, notify, print, print_json};
 use crate::cli::value_parsers::seconds;
 
-/// `dcvins noise`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct NoiseArguments {
     /// The log.
     pub log: PathBuf,
-    /// Folder for noise.json, the lines of the rig (imu0.yaml) and, of stationary stretches, allan.csv, allan.png, allan.svg.
+    /// Folder for noise.json, the lines of the rig (imu0.yaml) and, from stationary stretches, allan.csv, allan.png,
+    /// allan.svg.
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// The rig, when it is not beside the log or attached to it.
+    /// Rig file; default: next to the log or attached to it.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
     /// Skip this many seconds at the start of the log.
@@ -35,13 +35,12 @@ pub(crate) struct NoiseArguments {
     /// Duration to use from there.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub duration: Option<f64>,
-    /// Where the noise is taken from.
+    /// Source of the noise densities.
     #[arg(long, value_enum, default_value_t = Method::Auto)]
     pub method: Method,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
-    /// Limits on the log.
     #[command(flatten)]
     pub limits: LimitArguments,
 }
@@ -49,15 +48,14 @@ pub(crate) struct NoiseArguments {
 /// Values of `--method`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Method {
-    /// The Allan deviation where at least 10 s are stationary, else the flight.
+    /// The Allan deviation if at least 10 s are stationary, else the flight.
     Auto,
     /// The Allan deviation of stationary stretches.
     Allan,
-    /// Residuals of the estimator in flight, equal to their degrees of freedom.
+    /// Residuals of the estimator in flight, with χ² equal to their degrees of freedom.
     Flight,
 }
 
-/// Runs `dcvins noise`.
 pub(crate) fn noise(arguments: &NoiseArguments) -> Result<Outcome> {
     let progress = Progress::spinner("reading the log");
     let log = Arc::new(FlightLog::open_with(&arguments.log, &arguments.limits.limits())?);
@@ -86,7 +84,7 @@ pub(crate) fn noise(arguments: &NoiseArguments) -> Result<Outcome> {
 }
 
 fn too_short(report: &AllanReport) -> String {
-    // Adding zero turns −0 into 0.
+    // Adding zero converts −0 to 0.
     format!(
         "{:.1} s of stationary stretches in the log, at least 10 s of stretches of 3 s are needed for an Allan deviation",
         report.stationary_s + 0.0

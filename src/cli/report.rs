@@ -23,7 +23,6 @@ use crate::cli::study_report::study_report;
 use crate::cli::terminal::{Progress, notify, print};
 use crate::cli::value_parsers::seconds;
 
-/// `dcvins report`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ReportArguments {
     /// The log, or the folder of a study.
@@ -35,7 +34,8 @@ pub(crate) struct ReportArguments {
     /// end].
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub at: Vec<f64>,
-    /// Overwrite whatever is in the folder. Without it a report replaces only a report on a log of the same name and its runs.
+    /// Overwrite any content of the folder. Without it, only a report on a log of the same name and its runs are
+    /// replaced.
     #[arg(long)]
     pub force: bool,
     #[cfg(feature = "gui")]
@@ -47,7 +47,6 @@ pub(crate) struct ReportArguments {
     pub cache: CacheArguments,
 }
 
-/// Runs `dcvins report`.
 pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     #[cfg(feature = "gui")]
     if export::is_study(&arguments.log) {
@@ -78,7 +77,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
         notify("dcvins: interrupted before the first step; nothing is written");
         return Ok(Outcome::Interrupted);
     };
-    // The verdict needs the complete last steps.
+    // The verdict needs complete last steps.
     computation.fill_in(computation.recording().last_stamp_ns());
     let options = ReportOptions {
         command: own_command_line(),
@@ -108,19 +107,17 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Path of the page.
 fn page_of(arguments: &ReportArguments) -> PathBuf {
     arguments.output.join("report.html")
 }
 
-/// Notes a written file for the cache; `None` when it lies elsewhere, behind a link, or cannot be read again.
+/// Adds a written file to the cached result; `None` if the file is outside `folder` or cannot be read again.
 fn add_written(cached: &mut CachedResult, path: &Path, folder: &Path) -> Option<()> {
     let name = path.strip_prefix(folder).ok()?.to_str()?;
     cached.add(name.to_owned(), std::fs::read(path).ok()?);
     Some(())
 }
 
-/// The report of a study.
 #[cfg(feature = "gui")]
 fn of_study(arguments: &ReportArguments) -> Result<Outcome> {
     if !arguments.at.is_empty() || !arguments.estimation.runs.is_empty() {
@@ -137,7 +134,7 @@ fn own_command_line() -> String {
     command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
 }
 
-/// Does the work and, at the same time, checks the log and its rig.
+/// Runs `work` while another thread checks the log and its rig.
 fn beside_check<T>(plan: &SessionPlan, work: impl FnOnce() -> Result<T>) -> (Result<T>, CheckReport) {
     std::thread::scope(|scope| {
         let checking = scope.spawn(|| {
@@ -150,7 +147,6 @@ fn beside_check<T>(plan: &SessionPlan, work: impl FnOnce() -> Result<T>) -> (Res
     })
 }
 
-/// The figures of the page.
 #[cfg(feature = "gui")]
 fn figures_of(
     arguments: &ReportArguments,
@@ -160,14 +156,14 @@ fn figures_of(
     report_figures::draw(arguments, plan, computation)
 }
 
-/// Without the window no figures can be drawn.
+/// Figures cannot be drawn in a build without the window.
 #[cfg(not(feature = "gui"))]
 #[expect(clippy::unnecessary_wraps, reason = "with the window it can fail")]
 fn figures_of(_: &ReportArguments, _: &SessionPlan, _: &mut Computation) -> Result<Vec<ReportFigure>> {
     Ok(Vec::new())
 }
 
-/// The command line in a form that can be typed again, with the program's name without its folder.
+/// The command line in a form that can be typed again; the program's name is without its folder.
 fn command_line(mut words: impl Iterator<Item = String>) -> String {
     let program = words.next().unwrap_or_default();
     let program = Path::new(&program).file_name().unwrap_or_default().to_string_lossy().into_owned();

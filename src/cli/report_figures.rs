@@ -16,7 +16,7 @@ use super::terminal::Progress;
 const WIDTH: u32 = 720;
 /// Pixels per point of images and of the scene: 215 dpi in print.
 const PIXELS_PER_POINT: u32 = 2;
-/// Height in points of a plot in the convergence figure, three of which stand side by side, and the limits of the figure.
+/// Height in points of a plot in the convergence figure, which has three plots per row, and the limits of the figure.
 const PLOT_HEIGHT: usize = 116;
 const PLOTS_PER_ROW: usize = 3;
 const MIN_CONVERGENCE_HEIGHT: usize = 240;
@@ -28,7 +28,6 @@ const MAX_HEIGHT: usize = 860;
 /// Colours and dashes of the runs in the print theme, in words.
 const RUN_STYLES: [&str; 4] = ["blue, solid", "orange, long dashes", "green, dash-dotted", "purple, short dashes"];
 
-/// A figure to be drawn.
 struct Wanted {
     panel: &'static str,
     run: usize,
@@ -38,13 +37,13 @@ struct Wanted {
 }
 
 impl Wanted {
-    /// Whether it is drawn as SVG; images and the scene are drawn as pixels.
+    /// True if the figure is drawn as SVG; images and the scene are drawn as pixels.
     fn is_plot(&self) -> bool {
         !matches!(self.panel, "image" | "scene")
     }
 }
 
-/// The figures of a report: of the whole log, then of each stamp (without one, of the end).
+/// Figures of a report: of the whole log, then of each stamp (of the end if there is none).
 pub(crate) fn draw(
     arguments: &ReportArguments,
     plan: &SessionPlan,
@@ -92,7 +91,7 @@ pub(crate) fn draw(
     Ok(figures)
 }
 
-/// The figures of the whole log, with the values at its end.
+/// Figures of the whole log, with the values at its end.
 fn whole_log(recording: &Recording, end_ns: i64) -> Vec<Wanted> {
     let end_s = seconds_from_ns(end_ns);
     let truth = if recording.ground_truth_rig.is_some() { "; grey dashed line: ground truth" } else { "" };
@@ -119,8 +118,8 @@ fn whole_log(recording: &Recording, end_ns: i64) -> Vec<Wanted> {
             reading: format!(
                 "One plot per parameter, in the order of the chain; horizontally time, vertically the value in degrees or \
                  millimetres. Lines: {runs}{truth}. Band: ±3σ of run {label}. Hatched: initializing. The strip below \
-                 each plot is amber where the window of that time alone leaves the parameter weak (constrained less than by a \
-                 prior of 10° or 3 cm) and red where it leaves it unobservable. Above each plot: value and σ at {end_s:.2} s.{error}"
+                 each plot is amber where the window at that time alone constrains the parameter less than a prior of 10° or \
+                 3 cm, and red where the parameter is unobservable in it. Above each plot: value and σ at {end_s:.2} s.{error}"
             ),
         });
     }
@@ -143,13 +142,13 @@ fn whole_log(recording: &Recording, end_ns: i64) -> Vec<Wanted> {
         reading: format!(
             "A lane for each run: hatched while it initializes, a tick for each keyframe. Below: events, informed rank, \
              number of features, reprojection RMS in px, outliers and warnings; {runs}. The vertical line and the \
-             numbers beside the lanes are at {end_s:.2} s."
+             numbers next to the lanes are at {end_s:.2} s."
         ),
     });
     wanted
 }
 
-/// The figures of one stamp.
+/// Figures of one stamp.
 fn at_stamp(recording: &Recording, cursor_ns: i64) -> Vec<Wanted> {
     let at_s = seconds_from_ns(cursor_ns);
     let runs = styles(recording);
@@ -169,9 +168,9 @@ fn at_stamp(recording: &Recording, cursor_ns: i64) -> Vec<Wanted> {
                 record.camera_key, record.spec.label
             ),
             reading:
-                "Ring: feature used in the solve; dot: tracked only; cross: rejected. The colour is the age of the \
-                      track in frames, the thin line behind it where the track was. Orange line: residual after the \
-                      solve (prediction minus measurement), magnified 20 times."
+                "Circle: feature used in the solve; dot: tracked only; cross: rejected. Colour: age of the track in \
+                      frames. Thin line: track trail. Orange line: residual after the solve (prediction minus \
+                      measurement), magnified 20 times."
                     .to_owned(),
         });
     }
@@ -227,7 +226,7 @@ fn styles(recording: &Recording) -> String {
     runs.map(|(run, style)| format!("{} {style}", run.spec.label)).collect::<Vec<_>>().join("; ")
 }
 
-/// ` of run auto`, nothing for a single run.
+/// ` of run auto`, empty for a single run.
 fn of_run(recording: &Recording, run: usize) -> String {
     match recording.runs.get(run) {
         Some(record) if recording.runs.len() > 1 => format!(" of run {}", record.spec.label),

@@ -1,4 +1,4 @@
-//! `--no-cache`: pictures and reports of earlier commands, for the same command on the same files.
+//! `--no-cache`: cached screenshots and reports, reused for the same command on the same files.
 
 use std::path::{Path, PathBuf};
 
@@ -9,31 +9,31 @@ use dcvins::session::{SessionPlan, TrajectorySource};
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::terminal::notify;
 
-/// Environment variable that names another folder for the cache; empty, there is none.
+/// Environment variable with another folder for the cache; an empty value disables the cache.
 const FOLDER_VARIABLE: &str = "DCVINS_CACHE_DIR";
-/// Results of more bytes are not kept.
+/// Size limit in bytes of a cached result.
 const MAX_RESULT_BYTES: usize = 64 << 20;
 
-/// Whether results are kept and found again.
+/// Use of the cache.
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct CacheArguments {
-    /// Compute anew what an earlier command has written from the same files with the same options, and keep nothing of it.
+    /// Compute the result again even if it is in the cache, and do not cache it.
     #[arg(long)]
     pub no_cache: bool,
 }
 
-/// The place of a command's result in the cache.
+/// Cache entry of a command's result.
 pub(crate) struct CachedResult {
     cache: ResultCache,
     key: ResultKey,
-    /// What was written so far; `None` when it is too much to be kept.
+    /// Files written so far; `None` once they exceed the size limit.
     written: Option<Vec<CachedFile>>,
     bytes: usize,
 }
 
 impl CacheArguments {
-    /// The place of a result that depends on the files of a plan and on these options; `None` where nothing is kept: with
-    /// `--no-cache`, with an empty name of the folder, without a home folder, or when an input is no regular file.
+    /// Cache entry of a result that depends on the files of a plan and on `options`. `None` if nothing is cached: with
+    /// `--no-cache`, with an empty folder name, without a home folder, or if an input is not a regular file.
     pub(crate) fn result_of(
         &self,
         options: &str,
@@ -54,11 +54,11 @@ impl CacheArguments {
     }
 }
 
-/// `None` when a file cannot be read; the command itself then says why.
+/// `None` if a file cannot be read; the command itself then reports the reason.
 fn key(options: &str, log: &Path, estimation: &EstimationArguments, plan: &SessionPlan) -> Option<ResultKey> {
     let mut key = ResultKeyBuilder::new().ok()?;
     key.add_text(options);
-    // The rigs as they were read, wherever they come from.
+    // The parsed rigs, whatever their source.
     key.add_text(&format!("{:?} {:?} {}", plan.rig, plan.ground_truth_rig, plan.truth_is_batch));
     let mut files = estimation.input_files(log);
     if let Some(TrajectorySource::File(path)) = &estimation.truth_trajectory {
@@ -66,7 +66,7 @@ fn key(options: &str, log: &Path, estimation: &EstimationArguments, plan: &Sessi
     }
     let rig = estimation.rig.clone().unwrap_or_else(|| log.to_owned());
     let masks = plan.rig.cameras.iter().filter_map(|camera| camera.mask.as_ref());
-    // A mask that is no file beside the rig is attached to the log.
+    // A mask that is not a file next to the rig is attached to the log.
     files.extend(masks.map(|mask| rig.with_file_name(&mask.file)).filter(|path| path.exists()));
     for path in files {
         if !path.is_file() {
@@ -79,7 +79,7 @@ fn key(options: &str, log: &Path, estimation: &EstimationArguments, plan: &Sessi
 }
 
 impl CachedResult {
-    /// The files of the same command on the same files, if it was kept. A damaged entry is told.
+    /// Cached files of the same command on the same inputs. A damaged entry is reported on the terminal.
     pub(crate) fn load(&self) -> Option<Vec<CachedFile>> {
         self.cache.load(&self.key).unwrap_or_else(|problem| {
             notify(&format!("dcvins: {problem}"));
@@ -87,7 +87,7 @@ impl CachedResult {
         })
     }
 
-    /// Notes a file of the result.
+    /// Adds a file to the result.
     pub(crate) fn add(&mut self, name: String, content: Vec<u8>) {
         self.bytes += content.len();
         if self.bytes > MAX_RESULT_BYTES {
@@ -98,7 +98,7 @@ impl CachedResult {
         }
     }
 
-    /// Keeps the complete result. A cache that cannot be written is told, and the command has succeeded all the same.
+    /// Stores the complete result. A failure is reported on the terminal, but the command still succeeds.
     pub(crate) fn store(self) {
         let Some(written) = self.written else { return };
         if let Err(error) = self.cache.store(&self.key, &written) {

@@ -14,64 +14,62 @@ use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::print;
 use crate::cli::value_parsers::sides;
 
-/// `dcvins rig`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct RigArguments {
-    /// What to do with a rig.
+    /// Command for rigs.
     #[command(subcommand)]
     pub command: RigCommand,
 }
 
-/// The sub-commands of `dcvins rig`.
 #[derive(Clone, Debug, Subcommand)]
 pub(crate) enum RigCommand {
-    /// Write a commented rig for a recording without one, and say what is only assumed in it.
+    /// Write a commented rig for a recording without one, and list the values that are only assumed.
     #[command(after_help = exit::PLAIN)]
     New(Box<NewArguments>),
 }
 
-/// `dcvins rig new`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct NewArguments {
-    /// The log: its topics, joint names, rates, image size and the direction of gravity are taken from it.
+    /// The log; its topics, joint names, rates, image size and the direction of gravity are used.
     pub log: Option<PathBuf>,
     /// Axes of the gimbal from the vehicle to the camera, as in yaw-roll-pitch, yaw-pitch or pitch; rigid for a camera without
     /// a gimbal.
     #[arg(long, value_name = "AXES", value_parser = parsed::<MechanismAxes>, required_unless_present = "list")]
     pub mechanism: Option<MechanismAxes>,
-    /// The camera: fov:DEG (horizontal field of view), a name whose maker publishes it (--list prints all), or info[:TOPIC] for
-    /// the log's `CameraInfo`.
+    /// The camera: fov:DEG (horizontal field of view), a model with published intrinsics (--list prints all), or
+    /// info[:TOPIC] for the log's `CameraInfo`.
     #[arg(long, value_name = "CAMERA", value_parser = parsed::<CameraChoice>, required_unless_present = "list")]
     pub camera: Option<CameraChoice>,
     /// The rig to write [default: the name of the log with .rig.yaml].
     #[arg(short, long, visible_alias = "out", value_name = "FILE", required_unless_present_any = ["log", "list"])]
     pub output: Option<PathBuf>,
-    /// Size of the images, when it cannot be read from the log.
+    /// Size of the images, if it cannot be read from the log.
     #[arg(long, value_name = "WxH", value_parser = image_size)]
     pub size: Option<[usize; 2]>,
-    /// Position of the gimbal, or of a rigid camera: metres forward, left and up of the IMU. A ruler is good enough.
+    /// Position of the gimbal, or of a rigid camera: metres forward, left and up of the IMU. A ruler is accurate
+    /// enough.
     #[arg(long, value_name = "X,Y,Z", value_parser = position, allow_hyphen_values = true)]
     pub at: Option<[f64; 3]>,
-    /// Which joint angles are positive: frd (yaw to the right, pitch up, as of autopilots and DJI) or flu (yaw to the left, pitch
-    /// down, as in ROS) [default: frd].
+    /// Sign of the joint angles: frd (positive yaw to the right, pitch up, as of autopilots and DJI) or flu (positive
+    /// yaw to the left, pitch down, as in ROS) [default: frd].
     #[arg(long, value_name = "frd|flu", value_parser = body_axes)]
     pub positive: Option<BodyAxes>,
     /// Axes of the IMU: flu or frd [default: from gravity in the log].
     #[arg(long, value_name = "frd|flu", value_parser = body_axes)]
     pub imu_axes: Option<BodyAxes>,
-    /// Topic of the IMU, where the log has several.
+    /// Topic of the IMU, if the log has several.
     #[arg(long, value_name = "TOPIC")]
     pub imu_topic: Option<String>,
-    /// Topic of the images, where the log has several.
+    /// Topic of the images, if the log has several.
     #[arg(long, value_name = "TOPIC")]
     pub image_topic: Option<String>,
-    /// Topic of the joint angles, where the log has several.
+    /// Topic of the joint angles, if the log has several.
     #[arg(long, value_name = "TOPIC", conflicts_with = "attitude")]
     pub joint_topic: Option<String>,
-    /// Names of the joints in the order of the mechanism, where they do not contain yaw, roll or pitch.
+    /// Names of the joints in the order of the mechanism, if they do not contain yaw, roll or pitch.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     pub joints: Vec<String>,
-    /// Attitude topic from which the joint angles follow, with entries of gimbal.source, as in
+    /// Attitude topic from which the joint angles are computed, with entries of gimbal.source, as in
     /// /gimbal/attitude,type=quaternion,frame=body,axes=frd.
     #[arg(long, value_name = "TOPIC[,KEY=VALUE…]", value_parser = attitude)]
     pub attitude: Option<Attitude>,
@@ -81,7 +79,6 @@ pub(crate) struct NewArguments {
     /// Print the names of the cameras.
     #[arg(long)]
     pub list: bool,
-    /// Limits on the log.
     #[command(flatten)]
     pub limits: LimitArguments,
 }
@@ -142,7 +139,6 @@ fn attitude(text: &str) -> Result<Attitude, String> {
         .ok_or_else(|| format!("expected a topic and entries {}=VALUE between commas", KEYS.join("=VALUE, ")))
 }
 
-/// Runs `dcvins rig`.
 pub(crate) fn rig(arguments: &RigArguments) -> Result<Outcome> {
     let RigCommand::New(arguments) = &arguments.command;
     if arguments.list {

@@ -16,21 +16,20 @@ use crate::cli::interrupt::Interrupt;
 use crate::cli::run_summary::{describe, describe_trajectory};
 use crate::cli::terminal::{notify, print, print_json};
 
-/// `dcvins run`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct RunArguments {
     /// The log.
     pub log: PathBuf,
-    /// Folder for the files; each run gets a folder of its name in it.
+    /// Folder for the files; each run gets a sub-folder with its name.
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: PathBuf,
     #[command(flatten)]
     pub estimation: EstimationArguments,
-    /// Stop where this condition becomes true in a run, as in "rank < 18 or features < 40", write the files up to there and
-    /// print the values; docs/manual.md lists the quantities.
+    /// Stop when this condition becomes true in a run, as in "rank < 18 or features < 40", write the files up to that
+    /// step and print the values; docs/manual.md lists the quantities.
     #[arg(long = "break", value_name = "CONDITION", value_parser = condition)]
     pub break_at: Option<Condition>,
-    /// Leave measured times out of frames.csv and summary.json, so that two runs give the same bytes in every file.
+    /// Omit measured times from frames.csv and summary.json, so that two runs give the same bytes in every file.
     #[arg(long)]
     pub no_timing: bool,
     /// Also write results.mcap for Foxglove and Rerun: poses, frames of the chain, image annotations, landmarks,
@@ -40,8 +39,8 @@ pub(crate) struct RunArguments {
     /// Also write trajectory.euroc.csv, a table like EuRoC's ground truth.
     #[arg(long)]
     pub euroc: bool,
-    /// Overwrite whatever is in the folders of the runs. Without it a run replaces only a run on a log of the same name, in a
-    /// folder that holds nothing else.
+    /// Overwrite any content of the runs' folders. Without it, only a run on a log of the same name is replaced, in a
+    /// folder that contains nothing else.
     #[arg(long)]
     pub force: bool,
     /// Print the summaries as JSON instead of a table.
@@ -53,16 +52,16 @@ fn condition(text: &str) -> Result<Condition, String> {
     text.parse::<Condition>().map_err(|problem| problem.to_string())
 }
 
-/// Memory budget where only tables are written: beyond it the steps are kept as summaries.
+/// Memory budget if only tables are written: beyond it, steps are kept as summaries.
 const SUMMARY_BUDGET_BYTES: usize = 16 << 20;
 
-/// Runs `dcvins run`.
 pub(crate) fn run(arguments: &RunArguments) -> Result<Outcome> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
     let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
     export::check_run_folders(&arguments.out, &labels, &arguments.log, arguments.force)?;
     let interrupt = Interrupt::watch()?;
-    // Whole steps are needed for results.mcap and for the conditions of `--break`; all other files are made of summaries.
+    // Complete steps are needed for results.mcap and for the conditions of `--break`; all other files need only
+    // summaries.
     let needs_whole_steps = arguments.mcap || arguments.break_at.is_some();
     let memory_budget_bytes = if needs_whole_steps { plan.memory_budget_bytes } else { SUMMARY_BUDGET_BYTES };
     let plan = SessionPlan { interrupted: interrupt.flag(), memory_budget_bytes, ..plan.clone() };
@@ -125,13 +124,13 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Outcome> {
     Ok(if recording.runs.iter().all(is_initialized) { Outcome::Success } else { Outcome::NeverInitialized })
 }
 
-/// What an interrupted command has computed, as a notice.
+/// Notice about the computed part of an interrupted command.
 pub(crate) fn interrupted(recording: &Recording) -> String {
     let (done_s, end_s) = (seconds_from_ns(recording.last_stamp_ns()), seconds_from_ns(recording.duration_ns));
     format!("dcvins: interrupted at {done_s:.2} s of {end_s:.2} s; the results up to this time are written")
 }
 
-/// Whether a run has estimated anything.
+/// True if a run has estimated a pose.
 pub(crate) fn is_initialized(run: &RunRecord) -> bool {
     run.steps.iter().any(|step| step.report.newest().is_some())
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use dcvins::export::{self, Accuracy, AntennaSummary, RunSummary, TrajectorySummary};
 use dcvins::observability::{Estimability, MIN_SPURIOUS_GAIN};
 
-/// The text of a trajectory beside the runs for the terminal.
+/// Text of a trajectory of another program for the terminal.
 pub(crate) fn describe_trajectory(lane: &TrajectorySummary) -> String {
     let accuracy = match (&lane.accuracy, &lane.accuracy_missing) {
         (Some(accuracy), _) => accuracy_text(accuracy, lane.length_m),
@@ -24,7 +24,7 @@ fn accuracy_text(accuracy: &Accuracy, length_m: f64) -> String {
     )
 }
 
-/// The lever arm of the antenna whose positions are the ground truth.
+/// Lever arm of the antenna whose positions are the ground truth.
 fn antenna_text(antenna: &AntennaSummary) -> String {
     let [x, y, z] = antenna.lever_arm_m;
     match antenna.lever_arm_sigma_m {
@@ -35,7 +35,7 @@ fn antenna_text(antenna: &AntennaSummary) -> String {
     }
 }
 
-/// The text of a run's summary for the terminal.
+/// Text of a run's summary for the terminal.
 pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
     let frames = &summary.frames;
     let mut lines = vec![format!("{} on {} ({})\n", summary.run, summary.log, summary.camera)];
@@ -110,7 +110,7 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
     lines.concat()
 }
 
-/// The parameters by verdict, those of a group together.
+/// Parameters by verdict; those of a group are listed together.
 fn estimability_lines(parameters: &[export::EstimabilitySummary]) -> Vec<String> {
     let verdicts = [Estimability::Known, Estimability::Weak, Estimability::NotFromThisFlight, Estimability::Fixed];
     let line = |verdict: Estimability| {

@@ -27,13 +27,12 @@ use crate::cli::study_arguments::{StudyArguments, StudyPicture, write_study_pict
 use crate::cli::terminal::{notify, print};
 use crate::cli::value_parsers::{seconds, sides};
 
-/// `dcvins screenshot`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ScreenshotArguments {
     /// The log, a saved session (LOG.session.json) with its forks and breakpoints, or the folder of a study.
     pub log: PathBuf,
-    /// Seconds since the first message of the log; may be given several times. The time is then part of
-    /// the file names. Needed for a log unless --every is given.
+    /// Seconds since the first message of the log; may be given several times, then the time is part of the file names.
+    /// Required for a log unless --every is given.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub at: Vec<f64>,
     /// Period of the screenshots, from the start to the end of the log (or from --start, for --duration).
@@ -42,16 +41,16 @@ pub(crate) struct ScreenshotArguments {
     /// Panel to draw; `all`: the whole window.
     #[arg(long, value_name = "NAME", default_value = "all")]
     pub panel: String,
-    /// Layout of the whole window, as its keys 1 to 5: overview, calibration, front end, scene, comparison.
+    /// Layout of the whole window, as with keys 1 to 5: overview, calibration, front end, scene, comparison.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=5))]
     pub layout: u8,
     /// The file to write: a PNG, or an SVG with the extension .svg.
     #[arg(short, long, visible_alias = "out", value_name = "FILE.png")]
     pub output: PathBuf,
-    /// File format, when it does not follow from the extension.
+    /// File format, if it does not follow from the extension.
     #[arg(long, value_enum)]
     pub format: Option<FormatArgument>,
-    /// Also write the values of the panel as CSV beside the screenshot.
+    /// Also write the values of the panel as CSV, next to the screenshot.
     #[arg(long)]
     pub csv: bool,
     /// Size in pixels.
@@ -74,7 +73,8 @@ pub(crate) struct ScreenshotArguments {
     /// Draw a single panel with its buttons and selectors, as in the window, instead of as a figure.
     #[arg(long)]
     pub controls: bool,
-    /// Overwrite whatever has the name of the screenshot. Without it only PNG, SVG and CSV files are replaced.
+    /// Overwrite any existing file with the name of the screenshot. Without it, only PNG, SVG and CSV files are
+    /// replaced.
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]
@@ -128,10 +128,9 @@ fn size(text: &str) -> Result<[usize; 2], String> {
     sides(text, 64..=8192).ok_or_else(|| "expected WIDTHxHEIGHT, each from 64 to 8192, as in 1920x1080".to_owned())
 }
 
-/// Maximum number of screenshots of one command; more is probably a mistyped period.
+/// Maximum number of screenshots of one command; more are probably due to a mistyped period.
 const MAX_SCREENSHOTS: usize = 100_000;
 
-/// Runs `dcvins screenshot`.
 pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
     if is_study(&arguments.log) {
         return of_study(arguments);
@@ -273,7 +272,7 @@ fn drawing_options(arguments: &ScreenshotArguments) -> ScreenshotOptions {
     }
 }
 
-/// A panel of a study, or its whole view.
+/// Screenshot of a panel of a study, or of its whole view.
 fn of_study(arguments: &ScreenshotArguments) -> Result<Outcome> {
     if !arguments.at.is_empty() || arguments.every.is_some() || !arguments.estimation.runs.is_empty() {
         bail!("{} is a study: leave --at, --every and --run out", arguments.log.display());
@@ -305,7 +304,7 @@ fn format_of(arguments: &ScreenshotArguments) -> Result<FormatArgument> {
     };
     if named.is_none() && arguments.format.is_none() && extension.is_some() {
         bail!(
-            "the extension of {} is neither .png nor .svg: rename it or give --format; --csv writes the panel's values beside it",
+            "the extension of {} is neither .png nor .svg: rename it or give --format; --csv also writes the panel's values",
             arguments.output.display()
         );
     }
@@ -354,14 +353,14 @@ impl Shown {
         Ok(Self { source, log_end_ns, start_s, duration_s })
     }
 
-    /// The place of the pictures in the cache; `None` for a saved session, and for a graphics adapter, whose pictures differ from
-    /// those of others.
+    /// Cache entry of the screenshots; `None` for a saved session, and for a graphics adapter, because its images
+    /// differ from those of other adapters.
     fn cached(&self, arguments: &ScreenshotArguments, format: FormatArgument) -> Option<CachedResult> {
         let Source::Log(plan, _) = &self.source else { return None };
         if arguments.renderer == RendererArgument::Wgpu {
             return None;
         }
-        // Where the pictures are written does not matter.
+        // The output path does not affect the images.
         let options =
             ScreenshotArguments { output: PathBuf::new(), format: Some(format), force: false, ..arguments.clone() };
         arguments.cache.result_of(&format!("{options:?}"), &arguments.log, &arguments.estimation, plan)
@@ -397,7 +396,7 @@ impl Shown {
     }
 }
 
-/// `rank.png` at 12.5 s as `rank-0012.500.png`: names that sort by time.
+/// `rank.png` at 12.5 s becomes `rank-0012.500.png`: the names sort by time.
 fn numbered(path: &Path, cursor_ns: i64) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push(format!("-{:08.3}.", seconds_from_ns(cursor_ns)));

@@ -12,7 +12,6 @@ use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{Progress, notify, print};
 use crate::cli::value_parsers::{seconds, sides};
 
-/// `dcvins simulate`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct SimulateArguments {
     /// The paper's experiment: T1, T2, T3 or T4.
@@ -36,11 +35,11 @@ pub(crate) struct SimulateArguments {
     /// Frame rate of the cameras in Hz.
     #[arg(long, value_name = "HZ", default_value_t = 20.0)]
     pub rate: f64,
-    /// Leave out the static camera: half the computing time and half the file size.
+    /// Omit the static camera: half the computing time and half the file size.
     #[arg(long)]
     pub no_static_camera: bool,
-    /// Overwrite whatever has the names of the log, its rig and its ground truth. Without it only a simulated log with its rigs as
-    /// they were written is replaced.
+    /// Overwrite any existing log, rig or ground truth of that name. Without it, only a simulated log with its
+    /// unmodified rigs is replaced.
     #[arg(long)]
     pub force: bool,
     /// A disturbance, in seconds and SI units; may be given several times: camera-offset=S, joint-lag=S,
@@ -52,7 +51,6 @@ pub(crate) struct SimulateArguments {
     pub disturb: Vec<String>,
 }
 
-/// Names of the experiments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ExperimentArgument {
     /// The paper's T1.
@@ -86,7 +84,6 @@ fn encoder_sigma(text: &str) -> Result<EncoderArgument, String> {
     value.map(EncoderArgument::Sigma).ok_or_else(|| "expected degrees, a number above 0, or none".to_owned())
 }
 
-/// Runs `dcvins simulate`.
 pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<Outcome> {
     let experiment = match arguments.experiment {
         ExperimentArgument::T1 => Experiment::T1,

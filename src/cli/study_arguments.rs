@@ -14,10 +14,10 @@ use dcvins::gui::study::StudyOptions;
 /// Filter, groups and metric of a study.
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct StudyArguments {
-    /// Runs of a study that are shown, as a condition on the columns of its table: 'seed < 3 and run = auto'.
+    /// Runs of a study to show, as a condition on the columns of its table: 'seed < 3 and run = auto'.
     #[arg(long, value_name = "CONDITION", help_heading = "Options of a study")]
     pub filter: Option<String>,
-    /// Column of the groups, 'none' for no groups [default: the first input that varies].
+    /// Grouping column, 'none' for no groups [default: the first input that varies].
     #[arg(long, value_name = "COLUMN", help_heading = "Options of a study")]
     pub group: Option<String>,
     /// Column of the metric [default: the RMS of the absolute trajectory error].
@@ -32,7 +32,6 @@ pub(crate) struct StudyArguments {
 }
 
 impl StudyArguments {
-    /// The options of the view.
     pub(crate) fn options(&self) -> StudyOptions {
         StudyOptions {
             filter: self.filter.clone().unwrap_or_default(),
@@ -43,7 +42,7 @@ impl StudyArguments {
         }
     }
 
-    /// Refuses these options for a log, where they mean nothing.
+    /// Returns an error if one of these options is given for a log.
     pub(crate) fn require_none(&self, path: &Path) -> Result<()> {
         let given = [
             ("--filter", &self.filter),
@@ -53,13 +52,13 @@ impl StudyArguments {
             ("--success", &self.success),
         ];
         if let Some((name, _)) = given.into_iter().find(|(_, value)| value.is_some()) {
-            bail!("{name} is for studies, and {} is none: it has no results.parquet", path.display());
+            bail!("{name} is for studies, but {} has no results.parquet", path.display());
         }
         Ok(())
     }
 }
 
-/// A panel of a study that is written to a file.
+/// A panel of a study to be written to a file.
 pub(crate) struct StudyPicture<'a> {
     pub(crate) panel: &'a str,
     pub(crate) svg: bool,
@@ -67,7 +66,7 @@ pub(crate) struct StudyPicture<'a> {
     pub(crate) output: &'a Path,
 }
 
-/// Writes a picture of a study.
+/// Writes a screenshot of a study.
 pub(crate) fn write_study_picture(
     study: &OpenedStudy,
     view: &StudyOptions,
@@ -88,7 +87,7 @@ pub(crate) fn write_study_picture(
     Ok(())
 }
 
-/// Writes a picture of every panel of a study into a folder and returns the paths.
+/// Writes a screenshot of every panel of a study into a folder and returns the paths.
 pub(crate) fn write_study_pictures(study: &Arc<dcvins::study::view::Study>, folder: &Path) -> Result<Vec<String>> {
     let mut paths = Vec::new();
     for name in STUDY_PANEL_NAMES {

@@ -15,14 +15,14 @@ use crate::cli::terminal::{Progress, print};
 
 /// Width of every figure in points.
 const WIDTH: u32 = 720;
-/// Pixels per point of figures that are drawn as pixels.
+/// Pixels per point of figures drawn as pixels.
 const PIXELS_PER_POINT: u32 = 2;
-/// Runs from which figures are drawn as pixels: a drawing with an element per run would be larger.
+/// Number of runs from which on figures are drawn as pixels: a drawing with an element per run would be larger.
 const MANY_RUNS: usize = 1500;
-/// Height in points of a figure with a strip per group: axis, and each strip.
+/// Heights in points of a figure with one strip per group: axis, and each strip.
 const STRIPS: [u32; 2] = [70, 60];
 
-/// A figure: panel, height, heading, title and reading.
+/// A figure: panel, height, heading, title and explanation.
 type Wanted = (&'static str, u32, &'static str, String, String);
 
 /// Writes the report of a study into `output`.
@@ -115,7 +115,7 @@ fn figures_of(options: &StudyOptions, metric: &str, groups: usize, parameters: b
         420,
         "Results",
         "All runs over their inputs and results".to_owned(),
-        format!("Every run is a line; its colour is its place on the last axis, {metric}."),
+        format!("Every run is a line; its colour is its value on the last axis, {metric}."),
     ));
     if parameters {
         wanted.push((

@@ -14,8 +14,8 @@ const PROGRESS_STEPS: u64 = 1000;
 /// Period of the animation for work of unknown length.
 const SPINNER_PERIOD: Duration = Duration::from_millis(100);
 
-/// Writes text for people to standard output, without the control characters that names in it may have; a closed pipe is
-/// no failure.
+/// Writes text for users to standard output, without control characters that names in it may contain; a closed pipe is
+/// not an error.
 pub(crate) fn print(text: &str) -> Result<()> {
     write(&printable_lines(text))
 }
@@ -28,13 +28,13 @@ fn write(text: &str) -> Result<()> {
     }
 }
 
-/// Writes a value as JSON to standard output; characters that control a terminal are written as JSON's own escapes.
+/// Writes a value as JSON to standard output; characters that control a terminal are written as JSON escapes.
 pub(crate) fn print_json<T: Serialize + ?Sized>(value: &T) -> Result<()> {
     write(&format!("{}\n", escaped_json(&serde_json::to_string_pretty(value)?)))
 }
 
-/// JSON text in which every unprintable character is a `\uXXXX`: they occur inside strings only, and below U+0020 the
-/// serializer has escaped them.
+/// JSON text in which every unprintable character is escaped as `\uXXXX`: they occur only inside strings, and the
+/// serializer has already escaped those below U+0020.
 fn escaped_json(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     let mut units = [0; 2];
@@ -55,7 +55,7 @@ pub(crate) fn print_report<T: Serialize + Display>(report: &T, json: bool) -> Re
 
 /// Writes a line to standard error.
 pub(crate) fn notify(text: &str) {
-    // A closed standard error loses the notice and nothing else.
+    // With a closed standard error only the notice is lost.
     drop(writeln!(io::stderr(), "{}", printable_lines(text)));
 }
 

@@ -1,4 +1,4 @@
-//! `dcvins view`: the window, or screenshots of its panels where there is no display.
+//! `dcvins view`: the window, or screenshots of its panels without a display.
 
 use std::path::PathBuf;
 
@@ -6,15 +6,15 @@ use clap::Args;
 
 use crate::cli::estimation_arguments::EstimationArguments;
 
-/// `dcvins view`.
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct ViewArguments {
-    /// The log, the saved session or the folder of a study; without one the window lists the sample logs and the recent files.
+    /// The log, a saved session or the folder of a study; without one the window lists the sample logs and recent
+    /// files.
     pub log: Option<PathBuf>,
-    /// Folder of the screenshots when there is no display [default: dcvins-output/NAME].
+    /// Folder of the screenshots if there is no display [default: dcvins-output/NAME].
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Begin with the tour: six steps over the log, or over the sample flight without a log.
+    /// Start with the tour: six steps on the log, or on the sample flight without a log.
     #[arg(long)]
     pub tour: bool,
     #[command(flatten)]
@@ -53,7 +53,7 @@ mod window {
     use crate::cli::study_arguments::write_study_pictures;
     use crate::cli::terminal::{notify, print};
 
-    /// Opens the window, or writes screenshots where there is no display.
+    /// Opens the window, or writes screenshots if there is no display.
     pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
         // Errors of the log or its rig are reported here, before a window opens.
         let request = |log: &Path| arguments.estimation.request(log.to_owned());
@@ -70,7 +70,7 @@ mod window {
         let estimation = arguments.estimation.clone();
         let open_log = move |path: &Path| {
             let mut opened = opened.lock();
-            // The log of the command line is open already; other logs are opened here.
+            // The log of the command line is already open; other logs are opened here.
             let session = match opened.take().filter(|plan| plan.log_path == path) {
                 Some(plan) => Session::start(plan),
                 None if is_session(path) => {
@@ -84,7 +84,7 @@ mod window {
         };
         let first_study = Mutex::new(study.clone().zip(arguments.log.clone()));
         let open_study = move |path: &Path| {
-            // The study of the command line is read already.
+            // The study of the command line is already read.
             let read = first_study.lock().take().filter(|(_, of)| of == path);
             let shown = |study: Arc<OpenedStudy>| study as Arc<dyn StudySource>;
             if let Some((study, _)) = read {

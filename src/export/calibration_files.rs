@@ -1,4 +1,4 @@
-//! The files that `dcvins calibrate` writes.
+//! Output files of `dcvins calibrate`.
 
 use std::fs;
 use std::path::Path;
@@ -11,14 +11,14 @@ use super::trajectory::tum_of_calibration;
 use crate::flight_log::output::OutputSet;
 use crate::session::CalibrationRun;
 
-/// Names of the files of a trajectory.
+/// Files of a trajectory.
 pub(super) const TRAJECTORY_FILES: [&str; 2] = ["trajectory.tum", "covariance.csv"];
 
-/// Writes `rig.yaml`, `calibration.json` and `report.txt` into a folder, and where it was asked for the trajectory with its
+/// Writes `rig.yaml`, `calibration.json` and `report.txt` into a folder, and on request the trajectory with its
 /// covariances.
 ///
 /// # Errors
-/// When a file or the folder cannot be written.
+/// If a file or the folder cannot be written.
 pub fn write_calibration(
     run: &CalibrationRun,
     report: &CalibrationReport,
@@ -58,7 +58,7 @@ pub fn write_calibration(
     Ok(())
 }
 
-/// The standard deviations as an additional entry of the rig file, which readers of rigs ignore.
+/// Standard deviations as an additional entry of the rig file, which readers of rigs ignore.
 fn sigmas_yaml(report: &CalibrationReport) -> String {
     let sigma_of = |parameter: &ParameterReport| {
         let key = format!("{}_{}", parameter.name, parameter.dimension.unit());

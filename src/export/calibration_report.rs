@@ -17,15 +17,11 @@ use crate::session::CalibrationRun;
 /// Statistics of a series of lengths, in the unit of the field's name.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StatisticsReport {
-    /// Number of values.
     pub count: usize,
-    /// Arithmetic mean.
     pub mean: f64,
-    /// Middle of the sorted values.
     pub median: f64,
     /// Standard deviation about the mean.
     pub std: f64,
-    /// Root mean square.
     pub rms: f64,
 }
 
@@ -39,9 +35,9 @@ impl From<Statistics> for StatisticsReport {
 /// One parameter before and after the calibration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterReport {
-    /// Its name, with the names of joints and cameras.
+    /// Name, with the names of joints and cameras.
     pub name: String,
-    /// Its dimension, serialized as its unit.
+    /// Serialized as its unit.
     #[serde(rename = "unit")]
     pub dimension: Dimension,
     /// Value in the given rig.
@@ -66,7 +62,7 @@ pub struct ParameterReport {
 pub struct ReprojectionReport {
     /// Key of the camera.
     pub camera: String,
-    /// Number of landmarks that it observed.
+    /// Number of landmarks observed by the camera.
     pub landmarks: usize,
     /// Lengths of the reprojection errors in pixels, one per observation.
     pub error_px: StatisticsReport,
@@ -126,7 +122,6 @@ pub struct LoopReport {
 pub struct CalibrationRank {
     /// Number of parameters.
     pub columns: usize,
-    /// Structural rank.
     pub rank_structural: usize,
     /// Number of directions with σ below 10° and 3 cm from the log alone.
     pub rank_informed: usize,
@@ -164,14 +159,12 @@ pub struct CalibrationReport {
     pub gimbal_t_imu_cam_at_zero: [[f64; 4]; 4],
     /// Observability of the chain's calibration.
     pub rank: Option<CalibrationRank>,
-    /// Errors against ground truth, where it is known.
+    /// Errors against ground truth, `None` if there is none.
     #[serde(rename = "truth")]
     pub ground_truth: Option<GroundTruthReport>,
-    /// Warnings about the log.
     pub warnings: Vec<String>,
 }
 
-/// The report of a calibration.
 pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
     let outcome = &run.outcome;
     let zero = vec![0.0; outcome.chain.joint_count()];

@@ -6,7 +6,7 @@ use super::csv_table::{CsvTable, number_cell};
 use super::tables::{optional_cell, seconds_text};
 use crate::session::{CalibrationRun, RunRecord};
 
-/// The covariances of the poses of a run, with ground truth also the squared errors over the covariances.
+/// Covariances of the poses of a run; with ground truth also the normalized squared errors.
 pub(super) fn covariance_csv(run: &RunRecord) -> String {
     let errors = run.pose_errors();
     let poses = run.steps.iter().filter_map(|step| {
@@ -18,7 +18,7 @@ pub(super) fn covariance_csv(run: &RunRecord) -> String {
     table(poses, true)
 }
 
-/// The covariances of the adjusted poses of an offline calibration.
+/// Covariances of the adjusted poses of an offline calibration.
 pub(super) fn covariance_of_calibration(run: &CalibrationRun) -> String {
     let poses = run.outcome.trajectory.iter().filter_map(|pose| {
         let covariance = pose.covariance?.in_world(&pose.world_from_imu.rotation);
@@ -27,8 +27,8 @@ pub(super) fn covariance_of_calibration(run: &CalibrationRun) -> String {
     table(poses, false)
 }
 
-/// The upper triangle of each covariance as ROS messages have it, position before rotation and both about the axes of the
-/// world, and the squared error over it where the table has that column.
+/// Upper triangle of each covariance in the order of ROS messages: position before rotation, both about the world axes;
+/// with `with_nees` also the normalized squared error.
 fn table(poses: impl Iterator<Item = (i64, Matrix6<f64>, Option<f64>)>, with_nees: bool) -> String {
     const AXES: [(&str, &str); 6] = [("x", "m"), ("y", "m"), ("z", "m"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad")];
     let upper = || (0..AXES.len()).flat_map(|row| (row..AXES.len()).map(move |column| (row, column)));

@@ -14,12 +14,12 @@ use super::session_file::is_session;
 use crate::flight_log::output;
 use crate::gui::desktop::{Desktop, PanelExport, PathEntry, SampleProgress};
 
-/// Maximum number of entries of a folder that are read.
+/// Maximum number of entries read from a folder.
 const MAX_ENTRIES: usize = 5000;
 /// Number of parent folders of the program that are searched for sample logs: `target/release/dcvins` is three folders
 /// deep.
 const LEVELS_ABOVE: usize = 4;
-/// Where sample logs lie there: in the repository, and below the prefix of an installed package.
+/// Folders of sample logs below these: in the repository, and below the prefix of an installed package.
 const SAMPLE_FOLDERS: [&str; 2] = ["sample_logs", "share/dcvins/sample_logs"];
 
 /// File of the saved layouts in the user's state folder.
@@ -27,18 +27,18 @@ const LAYOUTS: &str = "layouts.json";
 /// File of the settings in the user's state folder.
 const SETTINGS: &str = "settings.json";
 
-/// File of the window's size, place and layout in the user's state folder.
+/// File of the window's size, position and layout in the user's state folder.
 const WINDOW: &str = "window.json";
 
-/// The real machine.
+/// The desktop implementation for the real machine.
 #[derive(Clone, Debug)]
 pub struct Machine {
     recent: RecentFiles,
-    /// Folder of layouts and settings, if the user has one.
+    /// Folder of layouts and settings, `None` if the user has no home folder.
     state: Option<PathBuf>,
     /// Folder of exported panels.
     output: PathBuf,
-    /// Folder of the sample flight that this program simulates.
+    /// Folder of the sample flight simulated by this program.
     samples: PathBuf,
 }
 
@@ -112,7 +112,7 @@ impl Desktop for Machine {
         let (sender, receiver) = channel();
         let wait = move || {
             let file = pollster::block_on(answer);
-            // The receiver is gone when the window was closed meanwhile.
+            // The receiver is dropped if the window was closed in the meantime.
             drop(sender.send(file.map(|file| file.path().to_path_buf())));
         };
         std::thread::Builder::new().name("file-dialog".to_owned()).spawn(wait).ok().map(|_| receiver)
@@ -194,7 +194,7 @@ impl Desktop for Machine {
     }
 }
 
-/// Whether the window opens it: a log, also under Zstandard, or a saved session.
+/// True if the window can open the file: a log, also compressed by Zstandard, or a saved session.
 fn is_log(path: &Path) -> bool {
     let is = |path: &Path, wanted: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(wanted));
     let packed = is(path, "zstd") || is(path, "zst");

@@ -6,42 +6,23 @@ use thiserror::Error;
 use crate::flight_log::LogError;
 use crate::session::SavedSessionError;
 
-/// The reason why a file could not be written or evaluated.
+/// Reason why a file could not be written or evaluated.
 #[derive(Debug, Error)]
 pub enum ExportError {
-    /// A file or folder could not be written.
     #[error("cannot write: {source}: {path}")]
-    Write {
-        /// The error of the operating system.
-        source: io::Error,
-        /// Path of the file or folder.
-        path: PathBuf,
-    },
-    /// The folder or file holds something else than results that may be replaced.
-    #[error("{problem}; give --force to overwrite, or another place to write to: {path}")]
+    Write { source: io::Error, path: PathBuf },
+    /// The folder or file contains something other than results that may be replaced.
+    #[error("{problem}; give --force to overwrite, or another output path: {path}")]
     Existing {
-        /// What is there.
+        /// Description of the existing content.
         problem: String,
-        /// Where.
         path: PathBuf,
     },
-    /// A file could not be read.
     #[error("cannot read: {source}: {path}")]
-    Read {
-        /// The error of the operating system.
-        source: io::Error,
-        /// Path of the file.
-        path: PathBuf,
-    },
-    /// A file is no saved session that this version can read.
+    Read { source: io::Error, path: PathBuf },
+    /// A file is not a saved session that this version can read.
     #[error("cannot open: {problem}: {path}")]
-    Session {
-        /// The problem.
-        problem: Box<SavedSessionError>,
-        /// Path of the file.
-        path: PathBuf,
-    },
-    /// An MCAP file could not be written.
+    Session { problem: Box<SavedSessionError>, path: PathBuf },
     #[error(transparent)]
     Log(#[from] LogError),
     /// Two trajectories cannot be compared.

@@ -1,4 +1,4 @@
-//! Which calibration parameters the flight of a run determines.
+//! Estimability of the calibration parameters of a run.
 
 use serde::Serialize;
 
@@ -7,21 +7,17 @@ use crate::gimbal::{ParameterGroup, ParameterId, Quantity};
 use crate::observability::{Estimability, ParameterEstimability, estimability};
 use crate::session::{Recording, RunRecord};
 
-/// A calibration parameter with what the flight tells of it.
+/// A calibration parameter and its estimability from the flight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EstimabilitySummary {
-    /// Its name.
     pub name: String,
     /// `chain`, `camera`, `IMU` or `clocks`.
     pub group: &'static str,
-    /// Its dimension, serialized as its unit.
+    /// Serialized as its unit.
     #[serde(rename = "unit")]
     pub dimension: Dimension,
-    /// Final value.
     pub value: f64,
-    /// Posterior standard deviation.
     pub sigma: Option<f64>,
-    /// Prior standard deviation.
     pub prior_sigma: Option<f64>,
     /// Posterior divided by prior standard deviation.
     pub ratio: Option<f64>,
@@ -29,12 +25,11 @@ pub struct EstimabilitySummary {
     pub verdict: &'static str,
     /// Null or weak direction of the last window, or correlation, that explains a large ratio; empty without one.
     pub reason: String,
-    /// The verdict.
     #[serde(skip)]
     pub estimability: Estimability,
 }
 
-/// The verdicts at the end of a run, in groups.
+/// Verdicts at the end of a run, in groups.
 pub(super) fn estimability_summary(recording: &Recording, run: &RunRecord) -> Vec<EstimabilitySummary> {
     let Some(last) = run.steps.last() else { return Vec::new() };
     let rank = run.steps.iter().rev().find_map(|step| step.rank.as_ref());
@@ -55,7 +50,7 @@ pub(super) fn estimability_summary(recording: &Recording, run: &RunRecord) -> Ve
     estimability(&last.report.calibration, rank, &names).into_iter().map(summary).collect()
 }
 
-/// The same for a run that estimates a shutter or the intrinsics of a sensor, else nothing.
+/// As [`estimability_summary`] for a run that estimates a shutter or the intrinsics of a sensor, else empty.
 pub(super) fn sensor_estimability(recording: &Recording, run: &RunRecord) -> Vec<EstimabilitySummary> {
     let of_sensor = |parameter: &ParameterId| {
         let group = parameter.group();

@@ -32,17 +32,11 @@ impl Default for EvaluationOptions {
 /// Statistics as written to JSON.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Statistics {
-    /// Root mean square.
     pub rmse: f64,
-    /// Arithmetic mean.
     pub mean: f64,
-    /// Median.
     pub median: f64,
-    /// Standard deviation.
     pub std: f64,
-    /// Smallest error.
     pub min: f64,
-    /// Largest error.
     pub max: f64,
 }
 
@@ -78,7 +72,7 @@ pub struct EvaluationReport {
     pub rpe_pairs: usize,
 }
 
-/// The name of an alignment in files.
+/// Name of an alignment in files.
 pub(super) fn alignment_name(alignment: Alignment) -> &'static str {
     match alignment {
         Alignment::None => "none",

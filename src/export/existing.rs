@@ -1,8 +1,7 @@
-//! What lies already where results are to be written, and what of it may be replaced.
+//! Existing output: files that a run may overwrite.
 //!
-//! Results are replaced without a question where they are results of the same command for the same log: a folder of a run
-//! must hold nothing but such files, `report` and `calibrate` look at the files of their own names. Anything else needs
-//! `--force`.
+//! Results are replaced without `--force` only by results of the same command for the same log. The folder of a run
+//! must contain only such files; `report` and `calibrate` check only files with their own names.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -18,7 +17,7 @@ use super::summary::log_name;
 use crate::flight_log::output;
 use crate::flight_log::{FlightLog, shortened};
 
-/// Names of all files that a run can write.
+/// Names of all files of a run.
 pub(super) const RUN_FILES: [&str; 10] = [
     "summary.json",
     "trajectory.tum",
@@ -34,13 +33,13 @@ pub(super) const RUN_FILES: [&str; 10] = [
 const REPORT_FILES: [&str; 2] = ["report.json", "report.html"];
 const CALIBRATION_FILES: [&str; 5] =
     ["calibration.json", "rig.yaml", "report.txt", TRAJECTORY_FILES[0], TRAJECTORY_FILES[1]];
-/// Largest file that is read for the name of its log.
+/// Size limit of a file that is read for the name of its log.
 const LARGEST_INDEX_BYTES: u64 = 64 << 20;
 
-/// Whether the results of runs on a log may be written into the folders of their labels, below `folder`.
+/// Checks that the results of runs on a log may be written into the folders of their labels, below `folder`.
 ///
 /// # Errors
-/// When a folder cannot be written or, without `force`, holds something else than a run on the same log.
+/// If a folder cannot be written or, without `force`, contains anything other than a run on the same log.
 pub fn check_run_folders(folder: &Path, labels: &[&str], log: &Path, force: bool) -> Result<(), ExportError> {
     output::check_folder(folder).map_err(ExportError::write(folder))?;
     for label in labels {
@@ -53,7 +52,7 @@ pub fn check_run_folders(folder: &Path, labels: &[&str], log: &Path, force: bool
     Ok(())
 }
 
-/// The same for a report and the runs in it.
+/// Checks that a report and its runs may be written into a folder.
 ///
 /// # Errors
 /// As [`check_run_folders`], and for another log's report in the folder.
@@ -62,7 +61,7 @@ pub fn check_report_folder(folder: &Path, labels: &[&str], log: &Path, force: bo
     if force { Ok(()) } else { check_files(folder, &REPORT_FILES, &log_name(log)) }
 }
 
-/// The same for an offline calibration.
+/// Checks that an offline calibration may be written into a folder.
 ///
 /// # Errors
 /// As [`check_run_folders`], and for another log's calibration, or a rig, in the folder.
@@ -71,11 +70,11 @@ pub fn check_calibration_folder(folder: &Path, log: &Path, force: bool) -> Resul
     if force { Ok(()) } else { check_files(folder, &CALIBRATION_FILES, &log_name(log)) }
 }
 
-/// Whether a log and its rigs may be written by `simulate`: an existing log must be a simulation of the same experiment, and
-/// the rigs beside it must be as the simulation wrote them.
+/// Checks that `simulate` may write a log and its rigs: an existing log must be a simulation of the same experiment,
+/// and its rigs must be unmodified.
 ///
 /// # Errors
-/// When a file cannot be written or, without `force`, is something else.
+/// If a file cannot be written or, without `force`, is something else.
 pub fn check_simulated_log(log: &Path, force: bool) -> Result<(), ExportError> {
     output::check_file(log).map_err(ExportError::write(log))?;
     let beside = ["rig.yaml", "truth.yaml"].map(|ending| (format!(".{ending}"), log.with_extension(ending)));
@@ -89,7 +88,7 @@ pub fn check_simulated_log(log: &Path, force: bool) -> Result<(), ExportError> {
         |problem: &str, path: &Path| ExportError::Existing { problem: problem.to_owned(), path: path.to_owned() };
     let simulated = if log.exists() {
         let simulated = (writer_of(log) == Some(LogOrigin::Simulation)).then(|| FlightLog::open(log).ok()).flatten();
-        Some(simulated.ok_or_else(|| existing("the file exists and is no simulated log", log))?)
+        Some(simulated.ok_or_else(|| existing("the file exists and is not a simulated log", log))?)
     } else {
         None
     };
@@ -103,23 +102,24 @@ pub fn check_simulated_log(log: &Path, force: bool) -> Result<(), ExportError> {
     Ok(())
 }
 
-/// Whether a log may be written by `convert`: an existing file must be a log that this program has written, and no simulation.
+/// Checks that `convert` may write a log: an existing file must be a log that this program has written, and not a
+/// simulation.
 ///
 /// # Errors
-/// When the file cannot be written or, without `force`, is something else.
+/// If the file cannot be written or, without `force`, is something else.
 pub fn check_converted_log(log: &Path, force: bool) -> Result<(), ExportError> {
     output::check_file(log).map_err(ExportError::write(log))?;
     if force || !log.exists() || writer_of(log) == Some(LogOrigin::Other) {
         return Ok(());
     }
-    let problem = "the file exists and is no log that 'dcvins convert' wrote".to_owned();
+    let problem = "the file exists and was not written by 'dcvins convert'".to_owned();
     Err(ExportError::Existing { problem, path: log.to_owned() })
 }
 
-/// Writes the text of a new rig; an existing file is kept unless `force`.
+/// Writes the text of a new rig; an existing file is only replaced with `force`.
 ///
 /// # Errors
-/// When the file cannot be written or, without `force`, exists.
+/// If the file cannot be written or, without `force`, exists.
 pub fn write_new_rig(path: &Path, text: &str, force: bool) -> Result<(), ExportError> {
     output::check_file(path).map_err(ExportError::write(path))?;
     if !force && path.exists() {
@@ -129,15 +129,15 @@ pub fn write_new_rig(path: &Path, text: &str, force: bool) -> Result<(), ExportE
     staged.commit().map_err(ExportError::write(path))
 }
 
-/// What a log of this program is.
+/// Origin of a log written by this program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LogOrigin {
     Simulation,
     Other,
 }
 
-/// What a log is by its first bytes, the header with the program that wrote it and the metadata of a simulation; `None` for
-/// files of other programs.
+/// Origin of a log according to its first bytes: the header names the program, and the metadata marks a simulation.
+/// `None` for files of other programs.
 fn writer_of(log: &Path) -> Option<LogOrigin> {
     const START_BYTES: u64 = 512;
     let mut start = Vec::new();
@@ -149,10 +149,10 @@ fn writer_of(log: &Path) -> Option<LogOrigin> {
     Some(if holds(b"dcvins simulate") { LogOrigin::Simulation } else { LogOrigin::Other })
 }
 
-/// Whether a screenshot or table may be written: an existing file must be of the same format.
+/// Checks that a screenshot or table may be written: an existing file must have the same format.
 ///
 /// # Errors
-/// When the file cannot be written or, without `force`, is something else.
+/// If the file cannot be written or, without `force`, is something else.
 pub fn check_screenshot(path: &Path, force: bool) -> Result<(), ExportError> {
     let folder = output::folder_of(path);
     output::check_folder(&folder).map_err(ExportError::write(&folder))?;
@@ -178,12 +178,12 @@ pub fn check_screenshot(path: &Path, force: bool) -> Result<(), ExportError> {
         return Ok(());
     }
     Err(ExportError::Existing {
-        problem: "the file exists and is no screenshot or table".to_owned(),
+        problem: "the file exists and is not a screenshot or table".to_owned(),
         path: path.to_owned(),
     })
 }
 
-/// Labels of runs in a folder other than the given ones, in the order of their names.
+/// Labels of runs in a folder other than the given ones, in alphabetical order.
 pub fn other_runs(folder: &Path, labels: &[&str]) -> Vec<String> {
     let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
     let names = entries.filter(|entry| entry.path().join(RUN_FILES[0]).is_file()).map(|entry| entry.file_name());
@@ -193,7 +193,7 @@ pub fn other_runs(folder: &Path, labels: &[&str]) -> Vec<String> {
     names
 }
 
-/// A folder of a run must hold nothing, or a run on this log and nothing else.
+/// Checks that the folder of a run is empty or contains only a run on this log.
 pub(super) fn check_run_folder(folder: &Path, log: &str) -> Result<(), ExportError> {
     let existing = |problem: String| ExportError::Existing { problem, path: folder.to_owned() };
     for entry in fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok) {
@@ -211,7 +211,7 @@ pub(super) fn check_run_folder(folder: &Path, log: &str) -> Result<(), ExportErr
     check_files(folder, &RUN_FILES, log)
 }
 
-/// Where one of the files exists, the first one must exist and name the log.
+/// If one of the files exists, the first one must exist and name the log.
 fn check_files(folder: &Path, names: &[&str], log: &str) -> Result<(), ExportError> {
     let existing = |problem: String| Err(ExportError::Existing { problem, path: folder.to_owned() });
     let Some(found) = names.iter().find(|name| folder.join(name).exists()) else { return Ok(()) };
@@ -223,13 +223,13 @@ fn check_files(folder: &Path, names: &[&str], log: &str) -> Result<(), ExportErr
     }
 }
 
-/// The log that a file of results names.
+/// Name of the log in an index file of results.
 fn log_of(index: &Path) -> Option<String> {
     let value = read_index(index)?;
     value.get("log").and_then(Value::as_str).map(str::to_owned)
 }
 
-/// A JSON file of results.
+/// Parses an index file of results.
 pub(super) fn read_index(index: &Path) -> Option<Value> {
     let file = fs::File::open(index).ok()?;
     let mut text = String::new();
@@ -285,7 +285,7 @@ mod tests {
         let path = folder.path().join("flight.mcap");
         check_screenshot(&path, false).unwrap();
         fs::write(&path, b"\x89MCAP0\r\n").unwrap();
-        assert!(problem(check_screenshot(&path, false)).starts_with("the file exists and is no screenshot"));
+        assert!(problem(check_screenshot(&path, false)).starts_with("the file exists and is not a screenshot"));
         check_screenshot(&path, true).unwrap();
         fs::write(&path, b"\x89PNG\r\n").unwrap();
         check_screenshot(&path, false).unwrap();

@@ -6,13 +6,13 @@ use std::path::Path;
 
 use sha2::{Digest as _, Sha256};
 
-/// Bytes that are hashed at a time.
+/// Number of bytes that are hashed at a time.
 const BLOCK_BYTES: usize = 1 << 20;
 
 /// Adds the content of a file block by block; returns its number of bytes.
 ///
 /// # Errors
-/// When it cannot be read.
+/// If the file cannot be read.
 pub(super) fn add_file(hash: &mut Sha256, path: &Path) -> io::Result<u64> {
     let mut file = File::open(path)?;
     let mut block = vec![0; BLOCK_BYTES];

@@ -13,47 +13,42 @@ use crate::geometry::seconds_from_ns;
 pub struct DensityReport {
     /// Key in the rig's `imu0`.
     pub key: &'static str,
-    /// Its unit.
     pub unit: &'static str,
-    /// Value of the rig.
     pub rig: f64,
-    /// Value with which the residuals agree with their degrees of freedom; the rig's where the flight does not show it.
+    /// Value with which χ² of the residuals equals their degrees of freedom; the rig's value if it is unobservable in
+    /// this flight.
     pub found: f64,
-    /// Standard deviation; `None` where the flight does not show it.
+    /// Standard deviation; `None` if the density is unobservable in this flight.
     pub sigma: Option<f64>,
-    /// Squared whitened residuals per degree of freedom with the rig's value.
+    /// Normalized innovation squared (NIS) per degree of freedom with the rig's value.
     pub nis_before: f64,
-    /// The same with the value found.
+    /// NIS per degree of freedom with the fitted value.
     pub nis_after: f64,
-    /// Degrees of freedom.
     pub degrees_of_freedom: f64,
 }
 
 /// Noise densities of a rig fitted to a flight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FlightNoiseReport {
-    /// Path of the log.
     pub log: String,
-    /// Name of the rig.
     pub rig: String,
     /// Key of the camera whose images were used.
     pub camera: String,
-    /// Start and end of the flight that was used, in seconds since the log began.
+    /// Start and end of the used part of the flight, in seconds since the log began.
     pub span_s: (f64, f64),
     /// Number of intervals between keyframes.
     pub intervals: usize,
-    /// Their mean length.
+    /// Mean length of these intervals in seconds.
     pub mean_interval_s: f64,
-    /// Runs of the estimator.
+    /// Number of runs of the estimator.
     pub runs: usize,
-    /// Whether the densities have converged.
     pub converged: bool,
     /// White noise of gyroscope and accelerometer, then the random walks of their biases.
     pub densities: Vec<DensityReport>,
 }
 
 impl FlightNoiseReport {
-    /// The report of a fit on a log, by the names of log, rig and camera.
+    /// Report of a fit; the texts are the names of log, rig and camera.
     pub fn new(noise: &FlightNoise, [log, rig, camera]: [String; 3]) -> Self {
         let density = |fitted: &FittedDensity| DensityReport {
             key: fitted.density.key(),
@@ -78,7 +73,7 @@ impl FlightNoiseReport {
         }
     }
 
-    /// The lines of a rig's `imu0`, in Kalibr's names.
+    /// Lines of a rig's `imu0`, in Kalibr's names.
     pub fn rig_lines(&self) -> String {
         let mut lines = String::from("imu0:\n");
         let order = [
@@ -90,7 +85,7 @@ impl FlightNoiseReport {
         for found in order.iter().filter_map(|density| self.densities.iter().find(|it| it.key == density.key())) {
             let note = found
                 .sigma
-                .map_or_else(|| "as before: not seen in this flight".to_owned(), |sigma| format!("σ {sigma:.1e}"));
+                .map_or_else(|| "unchanged: unobservable in this flight".to_owned(), |sigma| format!("σ {sigma:.1e}"));
             let _infallible = writeln!(lines, "  {}: {:.3e}  # {}, {note}", found.key, found.found, found.unit);
         }
         lines
@@ -119,7 +114,7 @@ impl Display for FlightNoiseReport {
         for found in &self.densities {
             let label = format!("{}, {}", found.key, found.unit);
             let value = found.sigma.map_or_else(
-                || "not seen".to_owned(),
+                || "unobservable".to_owned(),
                 |sigma| {
                     let scale = 10_f64.powf(found.found.log10().floor());
                     let power = scale.log10().round();

@@ -9,19 +9,19 @@ use crate::flight_log::output::OutputSet;
 use crate::log_check::ProposedMask;
 use crate::sensors::{ImageMask, Rig};
 
-/// Name of a camera's mask beside a rig that is written.
+/// File name of a camera's mask next to a rig file.
 fn file_name(camera_key: &str) -> String {
     format!("{camera_key}.mask.png")
 }
 
-/// Whether a file may be a mask beside the rig of a run.
+/// True if a file name can be that of a mask of a run's rig.
 pub(super) fn is_mask_name(name: &str) -> bool {
     name.strip_suffix(".mask.png")
         .and_then(|key| key.strip_prefix("cam"))
         .is_some_and(|number| number.parse::<u32>().is_ok())
 }
 
-/// Names the masks of a rig as they lie beside it in a new folder, and returns them with their content.
+/// Sets the names of a rig's masks to their files next to the rig in a new folder, and returns names and contents.
 pub(super) fn beside(rig: &mut Rig) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
     let mut files = Vec::new();
     for camera in &mut rig.cameras {
@@ -51,7 +51,7 @@ pub(super) fn png(mask: &ImageMask) -> Result<Vec<u8>, ExportError> {
 /// Writes proposed masks into a folder, each as `CAMERA.mask.png`, and returns their paths.
 ///
 /// # Errors
-/// When a file cannot be written or, without `force`, exists.
+/// If a file cannot be written or, without `force`, exists.
 pub fn write_masks(masks: &[ProposedMask], folder: &Path, force: bool) -> Result<Vec<PathBuf>, ExportError> {
     fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     let mut outputs = OutputSet::default();

@@ -1,4 +1,4 @@
-//! The noise of an IMU as files: the Allan deviation as a table and as a figure, and the lines for a rig.
+//! Noise of an IMU as files: the Allan deviation as a table and as a figure, and lines for a rig.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,6 @@ use super::flight_noise::FlightNoiseReport;
 use crate::flight_log::output::OutputSet;
 use crate::log_check::AllanReport;
 
-/// Names of the files.
 const TABLE: &str = "allan.csv";
 const RIG_LINES: &str = "imu0.yaml";
 const REPORT: &str = "noise.json";
@@ -18,7 +17,7 @@ const PNG: &str = "allan.png";
 #[cfg(feature = "gui")]
 const SVG: &str = "allan.svg";
 
-/// The points of all axes, one row each.
+/// Points of all axes, one row each.
 fn table(report: &AllanReport) -> String {
     let mut table =
         CsvTable::new(["sensor", "axis", "tau_s", "deviation", "sigma", "low", "high", "fitted", "vibration"]);
@@ -37,11 +36,11 @@ fn table(report: &AllanReport) -> String {
     table.into_text()
 }
 
-/// Writes `allan.csv`, `imu0.yaml` and `noise.json` into a folder, with the window's drawing also `allan.png` and
+/// Writes `allan.csv`, `imu0.yaml` and `noise.json` into a folder, in a build with the window also `allan.png` and
 /// `allan.svg`; returns their paths.
 ///
 /// # Errors
-/// When the folder or a file cannot be written.
+/// If the folder or a file cannot be written.
 pub fn write_allan(report: &AllanReport, json: &str, folder: &Path) -> Result<Vec<PathBuf>, ExportError> {
     let files = vec![
         (TABLE, table(report).into_bytes()),
@@ -86,7 +85,7 @@ fn figures(report: &AllanReport) -> Vec<(&'static str, Vec<u8>)> {
     let image = headless::draw(options, |ui| allan_ui(ui, &theme, report));
     let drawing = headless::svg_of(options, "allan", "Allan deviation", |ui| allan_ui(ui, &theme, report));
     let mut files = vec![(SVG, drawing.into_bytes())];
-    // An image of this size can be encoded.
+    // Encoding an image of this size cannot fail.
     files.extend(super::png_bytes(&image).ok().map(|png| (PNG, png)));
     files
 }

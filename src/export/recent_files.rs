@@ -1,5 +1,4 @@
-//! The list of recently opened logs, a file in the user's state folder. A list that cannot be read or written counts as
-//! empty.
+//! List of recently opened logs, a file in the user's state folder. An unreadable list counts as empty.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,7 +7,7 @@ use directories::ProjectDirs;
 
 use crate::flight_log::output;
 
-/// Most logs in the list.
+/// Maximum number of entries.
 const MAX_LOGS: usize = 12;
 
 /// The list as a file: one path per line, the newest first.
@@ -30,7 +29,6 @@ impl RecentFiles {
         Self { file: state_folder().map(|folder| folder.join("recent")) }
     }
 
-    /// A list in a file.
     pub fn in_file(file: PathBuf) -> Self {
         Self { file: Some(file) }
     }
@@ -46,7 +44,7 @@ impl RecentFiles {
         lines.map(path_of_line).take(MAX_LOGS).collect()
     }
 
-    /// Moves a log to the head of the list; a state folder that cannot be written leaves the list unchanged.
+    /// Moves a log to the head of the list; if the state folder cannot be written, the list remains unchanged.
     pub fn remember(&self, path: &Path) {
         let Some(file) = &self.file else { return };
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
@@ -70,7 +68,7 @@ impl RecentFiles {
     }
 }
 
-/// A path as a line of the list: its bytes on Unix, where it need not be UTF-8.
+/// A path as a line of the list: on Unix its raw bytes, which may not be UTF-8.
 #[cfg(unix)]
 fn line_of_path(path: &Path) -> Vec<u8> {
     use std::os::unix::ffi::OsStrExt as _;

@@ -1,7 +1,9 @@
-//! Finished pictures and reports of earlier commands, so that the same command on the same files is done at once.
+//! Cache of screenshots and reports of earlier commands, so that the same command on the same files returns
+//! immediately.
 //!
-//! An entry is named by the SHA-256 of everything that its content depends on: the program itself, the content of the input
-//! files and the options. It holds the files that the command wrote, and is checked by its own SHA-256 when it is read.
+//! The name of an entry is the SHA-256 of everything on which its content depends: the program itself, the content of
+//! the input files and the options. An entry contains the files written by the command; its own SHA-256 is checked when
+//! it is read.
 
 use std::fs::{self, File};
 use std::io;
@@ -16,14 +18,13 @@ use super::file_hash;
 use crate::flight_log::output;
 use crate::study::hex;
 
-/// Most bytes of all entries; those unused for longest go first.
+/// Size limit of all entries together, in bytes; the least recently used entries are removed first.
 const MAX_BYTES: u64 = 256 << 20;
-/// Ending of an entry's file.
+/// File extension of an entry.
 const ENDING: &str = "result";
-/// Bytes of a SHA-256.
 const HASH_BYTES: usize = 32;
 
-/// The folder of the entries.
+/// Folder of the entries.
 #[derive(Clone, Debug)]
 pub struct ResultCache {
     folder: PathBuf,
@@ -33,21 +34,20 @@ pub struct ResultCache {
 /// A file of an entry: its path relative to the command's output, and its content.
 pub type CachedFile = (String, Vec<u8>);
 
-/// Collects what a result depends on.
+/// Builder of the key of a result from its inputs.
 #[derive(Clone, Debug)]
 pub struct ResultKeyBuilder {
     hash: Sha256,
     inputs: Vec<InputState>,
 }
 
-/// Name of an entry.
 #[derive(Clone, Debug)]
 pub struct ResultKey {
     name: String,
     inputs: Vec<InputState>,
 }
 
-/// An input file as it was when its content was hashed.
+/// State of an input file when its content was hashed: size and modification time.
 type InputState = (PathBuf, Option<(u64, SystemTime)>);
 
 fn state_of(path: &Path) -> Option<(u64, SystemTime)> {
@@ -56,10 +56,10 @@ fn state_of(path: &Path) -> Option<(u64, SystemTime)> {
 }
 
 impl ResultKeyBuilder {
-    /// With the program itself, so that another build has entries of its own.
+    /// A key that includes the program itself, so that each build has separate entries.
     ///
     /// # Errors
-    /// When the program cannot be read.
+    /// If the program cannot be read.
     pub fn new() -> io::Result<Self> {
         let mut builder = Self { hash: Sha256::new(), inputs: Vec::new() };
         builder.add_file(&std::env::current_exe()?)?;
@@ -75,30 +75,30 @@ impl ResultKeyBuilder {
     /// Adds the content of a file.
     ///
     /// # Errors
-    /// When it cannot be read.
+    /// If the file cannot be read.
     pub fn add_file(&mut self, path: &Path) -> io::Result<()> {
         self.inputs.push((path.to_owned(), state_of(path)));
         let bytes = file_hash::add_file(&mut self.hash, path)?;
-        // Behind the content, so that the ends of files cannot be mistaken for each other's beginnings.
+        // The length separates the contents of consecutive files.
         self.hash.update(bytes.to_le_bytes());
         Ok(())
     }
 
-    /// The name of what depends on all this.
+    /// Returns the key.
     pub fn finish(self) -> ResultKey {
         ResultKey { name: hex(&self.hash.finalize()), inputs: self.inputs }
     }
 }
 
 impl ResultCache {
-    /// That of the user, in a folder of the program's own: `$XDG_CACHE_HOME/dcvins` or `~/.cache/dcvins` on Linux; `None` for a
-    /// user without a home folder.
+    /// The user's cache: `$XDG_CACHE_HOME/dcvins` or `~/.cache/dcvins` on Linux; `None` for a user without a home
+    /// folder.
     pub fn of_user() -> Option<Self> {
         let folders = ProjectDirs::from("", "", "dcvins")?;
         Some(Self::in_folder(folders.cache_dir().join("results")))
     }
 
-    /// In a folder, which need not exist yet.
+    /// A cache in a folder, which does not have to exist yet.
     pub fn in_folder(folder: PathBuf) -> Self {
         Self { folder, max_bytes: MAX_BYTES }
     }
@@ -107,32 +107,32 @@ impl ResultCache {
         self.folder.join(format!("{}.{ENDING}", key.name))
     }
 
-    /// The files of an entry; `None` where there is none.
+    /// Files of an entry; `None` if there is no entry.
     ///
     /// # Errors
-    /// When the entry is damaged, in one sentence; it is removed.
+    /// A message if the entry is damaged; it is removed.
     pub fn load(&self, key: &ResultKey) -> Result<Option<Vec<CachedFile>>, String> {
         let path = self.path_of(key);
         let Ok(bytes) = fs::read(&path) else { return Ok(None) };
         let Some(files) = files_of(&bytes) else {
             drop(fs::remove_file(&path));
-            return Err(format!("a damaged entry of the cache is made anew: {}", path.display()));
+            return Err(format!("a damaged entry of the cache was removed: {}", path.display()));
         };
-        // From now on it is the one used last; where that cannot be written it only goes earlier.
+        // Marks the entry as the most recently used; a failure only makes its removal earlier.
         drop(self.touch(&path));
         Ok(Some(files))
     }
 
-    /// Gives a file the present time of its file system.
+    /// Sets the modification time of a file to the present time of its file system.
     fn touch(&self, path: &Path) -> io::Result<()> {
         let now = NamedTempFile::new_in(&self.folder)?.as_file().metadata()?.modified()?;
         File::options().append(true).open(path)?.set_modified(now)
     }
 
-    /// Keeps the files of a result, unless one of its inputs has changed since it was hashed.
+    /// Stores the files of a result, unless one of its inputs has changed since it was hashed.
     ///
     /// # Errors
-    /// When the entry cannot be written.
+    /// If the entry cannot be written.
     pub fn store(&self, key: &ResultKey, files: &[CachedFile]) -> io::Result<()> {
         if key.inputs.iter().any(|(path, state)| state.is_none() || state_of(path) != *state) {
             return Ok(());
@@ -146,7 +146,7 @@ impl ResultCache {
         output::write_file(&self.path_of(key), &bytes)
     }
 
-    /// Removes the entries unused for longest until so many bytes fit.
+    /// Removes the least recently used entries until `bytes` fit.
     fn make_room(&self, bytes: u64) -> io::Result<()> {
         let mut entries = Vec::new();
         for entry in fs::read_dir(&self.folder)? {
@@ -171,7 +171,7 @@ impl ResultCache {
     }
 }
 
-/// SHA-256 of what follows, then for each file the lengths of name and content, name and content.
+/// SHA-256 of the remaining bytes, then for each file the lengths of name and content, name and content.
 fn bytes_of(files: &[CachedFile]) -> Vec<u8> {
     let mut body = Vec::new();
     for (name, content) in files {
@@ -185,7 +185,7 @@ fn bytes_of(files: &[CachedFile]) -> Vec<u8> {
     bytes
 }
 
-/// The files of an entry, `None` when it is not as it was written.
+/// Files of an entry, `None` if it is damaged.
 fn files_of(bytes: &[u8]) -> Option<Vec<CachedFile>> {
     let (hash, mut rest) = bytes.split_at_checked(HASH_BYTES)?;
     if Sha256::digest(rest).as_slice() != hash {

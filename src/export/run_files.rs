@@ -1,4 +1,4 @@
-//! The files that `dcvins run` writes for each run.
+//! Output files of `dcvins run` for each run.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use super::trajectory::{euroc_of_run, tum_of_run};
 use crate::flight_log::output::OutputSet;
 use crate::session::{Recording, RunRecord};
 
-/// The trajectory as a table like EuRoC's.
+/// Trajectory as a table in EuRoC's format.
 const EUROC_TRAJECTORY: &str = "trajectory.euroc.csv";
 /// The run for Foxglove and Rerun.
 const RESULTS: &str = "results.mcap";
@@ -21,11 +21,11 @@ const RESULTS: &str = "results.mcap";
 /// Options of the files of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RunFileOptions {
-    /// Write measured times; without them two runs give the same bytes in every file.
+    /// True to write measured times; without them two runs give the same bytes in every file.
     pub timing: bool,
-    /// Also write `results.mcap` for Foxglove and Rerun.
+    /// True to write `results.mcap` for Foxglove and Rerun.
     pub mcap: bool,
-    /// Also write `trajectory.euroc.csv`.
+    /// True to write `trajectory.euroc.csv`.
     pub euroc_trajectory: bool,
 }
 
@@ -38,8 +38,8 @@ impl Default for RunFileOptions {
 
 /// Writes the files of one run into `folder/LABEL/` and returns that folder and the summary.
 ///
-/// All files are complete before the first one replaces an older one; files of an earlier run that this one does not write
-/// are removed.
+/// All files are complete before the first one replaces an older one; files of an earlier run that are not written
+/// again are removed.
 pub fn write_run(
     recording: &Recording,
     run: &RunRecord,
@@ -53,7 +53,7 @@ pub fn write_run(
     Ok((folder, summary))
 }
 
-/// Prepares the files of one run without giving them their names.
+/// Prepares the files of one run under temporary names.
 pub(super) fn stage_run(
     recording: &Recording,
     run: &RunRecord,
@@ -68,7 +68,7 @@ pub(super) fn stage_run(
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("summary.json") })?;
     let mut rig = run.calibrated_rig(&recording.rig);
     let masks = masks::beside(&mut rig)?;
-    // The summary says of which log the files are, and comes first.
+    // The summary contains the name of the log, so it is the first file.
     let mut files = vec![
         ("summary.json", json),
         ("trajectory.tum", tum_of_run(run, recording.epoch_ns)),
@@ -96,7 +96,7 @@ pub(super) fn stage_run(
     Ok((folder, summary))
 }
 
-/// Removes the files that an earlier run with other options left in the folder of a run.
+/// Removes files that an earlier run with other options left in the folder of a run.
 pub(super) fn remove_unwritten(folder: &Path, options: RunFileOptions) -> Result<(), ExportError> {
     for (name, written) in [(EUROC_TRAJECTORY, options.euroc_trajectory), (RESULTS, options.mcap)] {
         let path = folder.join(name);

@@ -1,4 +1,4 @@
-//! The sample flight, simulated on this machine for a program that stands alone.
+//! The sample flight, simulated on this machine for a program without the sample logs of the repository.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -10,11 +10,10 @@ use directories::ProjectDirs;
 use crate::gui::desktop::SampleProgress;
 use crate::simulation::{Experiment, SimulationOptions, simulate_interruptible};
 
-/// Name of the log.
 const NAME: &str = "garden.mcap";
 /// Duration of the flight in seconds.
 const DURATION_S: f64 = 8.5;
-/// Messages that may wait for the window; progress beyond is left out.
+/// Capacity of the channel to the window; further progress messages are dropped.
 const WAITING_MESSAGES: usize = 4;
 
 /// Folder of the user's sample logs: `sample_logs` in `~/.local/share/dcvins` on Linux, in the user's local application
@@ -33,14 +32,14 @@ fn options() -> SimulationOptions {
 /// Starts to simulate the flight into a folder, on a thread that ends early when the receiver is dropped.
 ///
 /// # Errors
-/// When the thread cannot be started.
+/// If the thread cannot be started.
 pub(super) fn start(folder: &Path) -> Result<Receiver<SampleProgress>, String> {
     let (sender, receiver) = sync_channel(WAITING_MESSAGES);
     let folder = folder.to_path_buf();
     let thread = std::thread::Builder::new().name("sample-flight".to_owned());
     let started = thread.spawn(move || {
         let result = write(&folder, &options(), &sender);
-        // The receiver is gone when the user has cancelled.
+        // The receiver is dropped if the user has cancelled.
         drop(sender.send(SampleProgress::Done(result)));
     });
     started.map(|_| receiver).map_err(|error| format!("Cannot start a thread: {error}"))

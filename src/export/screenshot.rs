@@ -19,7 +19,7 @@ use crate::gui::{ImageSource, PanelContext, Playback, Presentation, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
 
-/// The name of the whole window.
+/// Name of the whole window.
 const WHOLE_WINDOW: &str = "all";
 
 /// Names of the panels; `all` is the whole window.
@@ -53,9 +53,7 @@ pub struct ScreenshotOptions {
     pub size_px: [u32; 2],
     /// Pixels per point: 1 as on an ordinary screen, 2 for twice the size.
     pub pixels_per_point: f32,
-    /// Theme of the screenshot.
     pub theme: ThemeName,
-    /// Renderer of the screenshot.
     pub renderer: Renderer,
     /// Index of the run in panels that show one run.
     pub run: usize,
@@ -65,7 +63,7 @@ pub struct ScreenshotOptions {
     pub layout: Preset,
     /// Markers, breakpoints and state of playback of a saved session.
     pub playback: Playback,
-    /// Whether a single panel is drawn as a figure or with its controls; the whole window always has its controls.
+    /// Presentation of a single panel: as a figure or with its controls; the whole window always has its controls.
     pub presentation: Presentation,
 }
 
@@ -85,51 +83,32 @@ impl Default for ScreenshotOptions {
     }
 }
 
-/// The reason why a screenshot cannot be made.
+/// Reason why a screenshot cannot be made.
 #[derive(Debug, Error)]
 pub enum ScreenshotError {
-    /// There is no panel of that name.
+    /// There is no panel with this name.
     #[error("unknown panel '{name}': expected one of {}", PANEL_NAMES.join(", "))]
-    UnknownPanel {
-        /// The name as written.
-        name: String,
-    },
-    /// There is no panel of that name in the view of a study.
+    UnknownPanel { name: String },
+    /// The view of a study has no panel with this name.
     #[error("unknown panel '{name}' of a study: expected one of {}", super::STUDY_PANEL_NAMES.join(", "))]
-    UnknownStudyPanel {
-        /// The name as written.
-        name: String,
-    },
-    /// Filter, groups or metric of a study cannot be used.
+    UnknownStudyPanel { name: String },
+    /// Filter, groups or metric of a study are invalid.
     #[error("{problem}")]
     StudyOptions {
-        /// What is wrong and what was expected.
+        /// The problem and the expected input.
         problem: String,
     },
     /// The size is out of range.
     #[error("a screenshot of {width}×{height} pixels cannot be drawn: expected 16 to {MAX_SIDE_PX} each way")]
-    Size {
-        /// Width in pixels.
-        width: u32,
-        /// Height in pixels.
-        height: u32,
-    },
+    Size { width: u32, height: u32 },
     /// The scale is out of range.
     #[error("a scale of {scale} cannot be drawn: expected 0.25 to 8 pixels per point")]
-    Scale {
-        /// Pixels per point.
-        scale: f32,
-    },
+    Scale { scale: f32 },
     /// The graphics adapter could not paint it.
     #[error(transparent)]
     Graphics(#[from] OffscreenError),
-    /// The PNG encoder failed.
     #[error("cannot encode the screenshot as PNG: {source}")]
-    Encode {
-        /// The error of the encoder.
-        source: image::ImageError,
-    },
-    /// The file could not be written.
+    Encode { source: image::ImageError },
     #[error(transparent)]
     Write(#[from] ExportError),
 }
@@ -155,7 +134,7 @@ pub fn draw_panel(
 
 /// The same panel as an SVG drawing; images and the 3D scene are embedded as pixels.
 ///
-/// `prefix` begins the ids of its elements, so that one page can hold several; `title` is its title.
+/// `prefix` is prepended to the ids of its elements, so that one page can contain several; `title` is its title.
 pub fn draw_panel_svg(
     name: &str,
     recording: &Recording,
@@ -169,10 +148,10 @@ pub fn draw_panel_svg(
     })
 }
 
-/// The values of a panel, comma separated; of the options only the slide has an effect.
+/// The values of a panel as CSV; of the options only the slide has an effect.
 ///
 /// # Errors
-/// For a name that is not the name of a single panel.
+/// If the name is not that of a single panel.
 pub fn panel_csv(
     name: &str,
     recording: &Recording,
@@ -263,7 +242,7 @@ pub fn write_csv(table: &str, path: &Path) -> Result<(), ScreenshotError> {
     write_screenshot(table.as_bytes(), path)
 }
 
-/// Writes an encoded picture, or its table, and creates its folder if necessary.
+/// Writes an encoded screenshot or its table, and creates its folder if necessary.
 pub fn write_screenshot(bytes: &[u8], path: &Path) -> Result<(), ScreenshotError> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         fs::create_dir_all(folder).map_err(ExportError::write(folder))?;

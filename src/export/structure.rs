@@ -11,19 +11,19 @@ use crate::session::RunRecord;
 pub struct KnownLossSummary {
     /// The cause in one sentence with its equation.
     pub reason: String,
-    /// Number of steps whose parameterization has it.
+    /// Number of steps with a parameterization that has this null direction.
     pub steps: usize,
     /// Number of these steps in which the measured response is null.
     pub agreeing: usize,
-    /// The window's largest response to it, relative to the reference of the rank rule.
+    /// Largest response of the window to the direction, relative to the reference of the rank rule.
     pub largest_response: f64,
-    /// Largest spurious information of the priors along it (1 corresponds to σ of 10° or 3 cm); zero with
+    /// Largest spurious information of the priors along the direction (1 corresponds to σ of 10° or 3 cm); zero with
     /// first-estimate Jacobians.
     #[serde(rename = "largest_false_gain")]
     pub largest_spurious_gain: f64,
 }
 
-/// The known losses of a run in the order of their first step.
+/// Known losses of a run in the order of their first step.
 pub(super) fn known_losses(run: &RunRecord, names: &ParameterNames) -> Vec<KnownLossSummary> {
     let mut found: Vec<(KnownLoss, KnownLossSummary)> = Vec::new();
     for rank in run.steps.iter().filter_map(|step| step.rank.as_ref()) {

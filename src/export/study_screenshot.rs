@@ -12,7 +12,7 @@ use crate::gui::study::{StudyOptions, StudyPanel, StudyState, study_panel_ui, st
 use crate::gui::theme::Theme;
 use crate::study::view::Study;
 
-/// The name of the whole view.
+/// Name of the whole view.
 const WHOLE_VIEW: &str = "all";
 
 /// Names of the panels of a study; `all` is the whole view.
@@ -41,7 +41,7 @@ fn state_of(study: &Arc<Study>, view: &StudyOptions) -> Result<StudyState, Scree
 /// Draws one panel, or the whole view, of a study.
 ///
 /// # Errors
-/// For an unknown panel, a size out of range, and for columns that the study does not have.
+/// For an unknown panel, a size out of range, or columns that the study does not have.
 pub fn draw_study_panel(
     name: &str,
     study: &Arc<Study>,
@@ -54,7 +54,7 @@ pub fn draw_study_panel(
     })
 }
 
-/// The same panel as an SVG drawing; `prefix` begins the ids of its elements, `title` is its title.
+/// The same panel as an SVG drawing; `prefix` is prepended to the ids of its elements, `title` is its title.
 ///
 /// # Errors
 /// As [`draw_study_panel`].
@@ -68,10 +68,10 @@ pub fn draw_study_panel_svg(
     with_panel(name, study, view, options, |headless, ui| Ok(headless::svg_of(headless, prefix, title, ui)))
 }
 
-/// The values of a panel of a study, comma separated.
+/// The values of a panel of a study as CSV.
 ///
 /// # Errors
-/// For a name that is not the name of a single panel, and for columns that the study does not have.
+/// If the name is not that of a single panel, or the study does not have the columns.
 pub fn study_panel_csv(name: &str, study: &Arc<Study>, view: &StudyOptions) -> Result<String, ScreenshotError> {
     let panel = panel_of(name)?.ok_or_else(|| ScreenshotError::UnknownStudyPanel { name: name.to_owned() })?;
     Ok(state_of(study, view)?.csv_table(panel))

@@ -1,4 +1,4 @@
-//! Studies that are opened: their tables, and their runs as sessions.
+//! Opened studies: their tables, and their runs as sessions.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,10 +13,9 @@ const RUNS: &str = "results";
 /// Name of the table of parameters without its extension.
 const PARAMETERS: &str = "parameters";
 
-/// The reason why a study cannot be opened.
+/// Reason why a study cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum StudySourceError {
-    /// There is no table of runs.
     #[error("no table of runs in the folder: expected results.parquet or results.csv, as 'dcvins sweep' writes them: {}", .0.display())]
     NoTable(PathBuf),
     /// A table cannot be read.
@@ -27,22 +26,21 @@ pub enum StudySourceError {
     Csv {
         /// The problem, with its line.
         problem: String,
-        /// Path of the table.
         path: PathBuf,
     },
-    /// A table without the column by which runs are told apart.
-    #[error("the table has no column 'run': it is no table of runs of a study: {}", .0.display())]
+    /// A table without the column that identifies runs.
+    #[error("the table has no column 'run': not a table of runs of a study: {}", .0.display())]
     NoRuns(PathBuf),
 }
 
-/// A study on the disk.
+/// A study in a folder.
 #[derive(Clone, Debug)]
 pub struct OpenedStudy {
     root: PathBuf,
     study: Arc<Study>,
 }
 
-/// Whether a path is a study: a folder with a table of runs, or such a table.
+/// True if a path is a study: a folder with a table of runs, or such a table.
 pub fn is_study(path: &Path) -> bool {
     if path.is_dir() {
         return ["parquet", "csv"].iter().any(|kind| path.join(format!("{RUNS}.{kind}")).is_file())
@@ -52,11 +50,11 @@ pub fn is_study(path: &Path) -> bool {
 }
 
 impl OpenedStudy {
-    /// Reads the tables of a study: results.parquet and parameters.parquet, or the CSV files of these names. The table of
-    /// parameters may be missing.
+    /// Reads the tables of a study: results.parquet and parameters.parquet, or CSV files with the same names. The table
+    /// of parameters may be missing.
     ///
     /// # Errors
-    /// When there is no table of runs, or a table cannot be read.
+    /// If there is no table of runs, or a table cannot be read.
     pub fn read(path: &Path) -> Result<Self, StudySourceError> {
         let (folder, runs_path) = if path.is_dir() {
             let found = ["parquet", "csv"].map(|kind| path.join(format!("{RUNS}.{kind}")));
@@ -82,12 +80,10 @@ impl OpenedStudy {
         Ok(Self { study: Arc::new(Study { name, runs, parameters }), root })
     }
 
-    /// The tables.
     pub fn study(&self) -> &Arc<Study> {
         &self.study
     }
 
-    /// The folder of the study.
     pub fn folder(&self) -> &Path {
         &self.root
     }
@@ -100,17 +96,17 @@ mod sessions {
     use crate::gui::app::{PlayingLog, StudySource};
     use crate::session::{MAX_TRAJECTORIES, RunSpec, Session, SessionRequest, TrajectorySource, TrajectorySpec};
 
-    /// Column with the path of the log, relative to the folder of the study where it lies in it.
+    /// Column with the path of the log, relative to the folder of the study if the log is in it.
     const LOG_PATH: &str = "log_path";
     /// Column with the file of a trajectory, likewise, or its topic.
     const TRAJECTORY_PATH: &str = "trajectory_path";
     /// Column with the name of a run or of a trajectory.
     const LABEL: &str = "label";
-    /// Folder of the simulated flights of a study, which are processed whole.
+    /// Folder of the simulated flights of a study, which are processed in full.
     const FLIGHTS: &str = "flights";
 
     impl OpenedStudy {
-        /// The request that opens the log of the first row with the rig of its job, the runs and the trajectories of all
+        /// Session request for the log of the first row with the rig of its job, and the runs and trajectories of all
         /// rows.
         fn request(&self, rows: &[usize]) -> Result<SessionRequest, String> {
             let table = &self.study.runs;
@@ -135,7 +131,7 @@ mod sessions {
             let mut trajectories: Vec<TrajectorySpec> = rows.iter().filter_map(trajectory).collect();
             trajectories.truncate(MAX_TRAJECTORIES);
             let mut specs = if trajectory(&first).is_some() { Vec::new() } else { vec![spec(&first)?] };
-            // A run beside it that this version does not know is left out.
+            // Further runs with a specification unknown to this version are omitted.
             specs.extend(rows.iter().skip(1).filter_map(|row| spec(row).ok()));
             let whole = log_path.starts_with(self.root.join(FLIGHTS));
             Ok(SessionRequest {
@@ -172,7 +168,7 @@ fn read_table(path: &Path, known: &StudyTable) -> Result<StudyTable, StudySource
     if is_csv { read_csv(path, known) } else { Ok(with_meanings(read_parquet(path)?, known)) }
 }
 
-/// Units and descriptions of known columns, where the file has none.
+/// Adds units and descriptions of known columns if the file has none.
 fn with_meanings(table: StudyTable, known: &StudyTable) -> StudyTable {
     let complete = |column: &StudyColumn| {
         let mut column = column.clone();
@@ -185,8 +181,8 @@ fn with_meanings(table: StudyTable, known: &StudyTable) -> StudyTable {
     StudyTable::new(columns).unwrap_or(table)
 }
 
-/// Reads comma-separated values. Columns of `known` have their types from there; of others the type is the narrowest that
-/// holds all their values.
+/// Reads comma-separated values. Columns of `known` have the types given there; the type of another column is the
+/// narrowest that fits all its values.
 fn read_csv(path: &Path, known: &StudyTable) -> Result<StudyTable, StudySourceError> {
     let failed = |problem: String| StudySourceError::Csv { problem, path: path.to_owned() };
     let text = fs::read(path).map_err(|error| failed(error.to_string()))?;
@@ -211,7 +207,7 @@ fn read_csv(path: &Path, known: &StudyTable) -> Result<StudyTable, StudySourceEr
     StudyTable::new(columns).map_err(|error| failed(error.to_string()))
 }
 
-/// Whether every text is empty or a value of the type.
+/// True if every text is empty or a value of the type.
 fn fits(kind: ColumnType, texts: &[String]) -> bool {
     texts.iter().all(|text| text.is_empty() || cell_of(kind, text) != Cell::Empty)
 }
@@ -221,7 +217,7 @@ fn narrowest(texts: &[String]) -> ColumnType {
     kinds.into_iter().find(|kind| fits(*kind, texts)).unwrap_or(ColumnType::Text)
 }
 
-/// The value of a text; empty where it has another type.
+/// The value of a text; empty if it does not have the type.
 fn cell_of(kind: ColumnType, text: &str) -> Cell {
     match kind {
         ColumnType::Number => text.parse::<f64>().ok().into(),

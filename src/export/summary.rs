@@ -46,13 +46,12 @@ pub struct RelativeError {
 /// Trajectory errors against ground truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Accuracy {
-    /// Alignment of the estimate with the ground truth.
     pub alignment: &'static str,
     /// Root mean square of the absolute position error.
     pub ate_rmse_m: f64,
     /// Mean of the absolute position error.
     pub ate_mean_m: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the absolute position error.
     pub ate_std_m: f64,
     /// Median of the absolute position error.
     pub ate_median_m: f64,
@@ -60,9 +59,9 @@ pub struct Accuracy {
     pub ate_max_m: f64,
     /// Root mean square of the absolute position error in percent of the path length.
     pub ate_percent_of_length: f64,
-    /// Relative errors by path length; none where the ground truth is positions.
+    /// Relative errors by path length; empty if the ground truth is positions.
     pub rpe: Vec<RelativeError>,
-    /// The antenna whose positions are the ground truth.
+    /// Antenna whose positions are the ground truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub antenna: Option<AntennaSummary>,
 }
@@ -72,16 +71,16 @@ pub struct Accuracy {
 pub struct AntennaSummary {
     /// Position in the IMU frame in metres.
     pub lever_arm_m: [f64; 3],
-    /// Standard deviations, where it was estimated.
+    /// Standard deviations, `None` if the lever arm was given.
     pub lever_arm_sigma_m: Option<[f64; 3]>,
 }
 
 /// One calibration parameter, initial and final.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterSummary {
-    /// Its name, with the names of joints.
+    /// Name, with the names of joints.
     pub name: String,
-    /// Its dimension, serialized as its unit.
+    /// Serialized as its unit.
     #[serde(rename = "unit")]
     pub dimension: Dimension,
     /// Value in the rig.
@@ -121,7 +120,7 @@ pub struct CalibrationSummary {
     pub columns: usize,
     /// The parameters in column order.
     pub parameters: Vec<ParameterSummary>,
-    /// What the flight determines of them, for a run that estimates more than chain and time offsets.
+    /// Estimability of the parameters, for a run that estimates more than chain and time offsets.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub estimability: Vec<EstimabilitySummary>,
     /// Final error of the whole chain against ground truth.
@@ -131,7 +130,7 @@ pub struct CalibrationSummary {
 }
 
 impl CalibrationSummary {
-    /// Root mean square of error over σ of the parameters that have both; `None` without any.
+    /// Root mean square of error over σ of the parameters that have both; `None` if there are none.
     pub fn parameter_error_sigma(&self) -> Option<f64> {
         let ratios = self.parameters.iter().filter_map(|parameter| {
             let sigma = parameter.sigma.filter(|sigma| *sigma > 0.0)?;
@@ -158,7 +157,6 @@ pub struct DeficitSummary {
 /// Weight of one parameter in a direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DirectionWeight {
-    /// Name of the parameter.
     pub name: String,
     /// Signed weight in the prior-scaled unit direction.
     pub weight: f64,
@@ -169,15 +167,13 @@ pub struct DirectionWeight {
 pub struct RankSummary {
     /// Number of calibration columns.
     pub columns: usize,
-    /// Structural rank.
     pub rank_structural: usize,
-    /// Informed rank.
     pub rank_informed: usize,
     /// Rank deficit by cause.
     pub deficit: DeficitSummary,
     /// Structural null directions, each by its parameters with a weight above 0.01.
     pub null_directions: Vec<Vec<DirectionWeight>>,
-    /// Null directions of the parameterization that are known in closed form, compared with every step.
+    /// Null directions of the parameterization known in closed form, compared with every step.
     pub known: Vec<KnownLossSummary>,
     /// Information gain of all images by parameter and by motion.
     pub information: Option<InformationSummary>,
@@ -188,7 +184,7 @@ pub struct RankSummary {
 pub struct InformationSummary {
     /// Total length of the steps in seconds.
     pub duration_s: f64,
-    /// Names of the motions in `by_motion`, in its order.
+    /// Names of the motions in the order of `by_motion`.
     pub motions: Vec<String>,
     /// Gain by parameter; a gain of one bit halves the standard deviation.
     pub parameters: Vec<ParameterInformation>,
@@ -197,24 +193,21 @@ pub struct InformationSummary {
 /// Information gain of one parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterInformation {
-    /// Its name.
     pub name: String,
     /// Gain in bits per second.
     pub bits_per_s: f64,
     /// Contribution of each motion in bits per second; negative for a motion that reduces the contribution of others.
     pub by_motion: Vec<f64>,
-    /// The remainder: gain from images that confirm earlier ones outside the window.
+    /// Remaining gain, from images that confirm earlier ones outside the window.
     pub earlier: f64,
 }
 
 /// Percentiles of one stage's time in milliseconds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageSummary {
-    /// Median.
     pub p50: f64,
     /// 95th percentile.
     pub p95: f64,
-    /// Maximum.
     pub max: f64,
 }
 
@@ -242,20 +235,18 @@ pub struct TimingSummary {
 pub struct RunSummary {
     /// File name of the log.
     pub log: String,
-    /// Specification of the run on the command line.
+    /// Specification of the run in the syntax of the command line.
     pub run: String,
-    /// Keys of its cameras.
+    /// Keys of the cameras.
     pub camera: String,
-    /// Frame counts.
     pub frames: FrameCounts,
-    /// Path length over the estimated frames in metres, of the ground truth where there is one, else of the estimate.
+    /// Path length over the estimated frames in metres, of the ground truth if there is one, else of the estimate.
     pub length_m: f64,
     /// Errors against ground truth, if there is one and the run was initialized.
     pub accuracy: Option<Accuracy>,
-    /// The reason why there is no accuracy.
+    /// Reason why there is no accuracy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy_missing: Option<String>,
-    /// The calibration.
     pub calibration: CalibrationSummary,
     /// Observability, `None` before the first solve.
     pub rank: Option<RankSummary>,
@@ -265,7 +256,7 @@ pub struct RunSummary {
     pub real_time_factor: Option<f64>,
     /// Warnings about the log and of the run.
     pub warnings: Vec<String>,
-    /// Trajectories of other programs beside the runs, evaluated like them.
+    /// Trajectories of other programs, evaluated like the runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub trajectories: Vec<TrajectorySummary>,
 }
@@ -273,23 +264,20 @@ pub struct RunSummary {
 /// A trajectory of another program.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrajectorySummary {
-    /// Its name.
     pub label: String,
-    /// The file or the topic that it was read from.
+    /// The file or topic from which it was read.
     pub source: String,
-    /// Number of its poses within the time of the session.
+    /// Number of poses within the time of the session.
     pub poses: usize,
-    /// Path length in metres, of the ground truth at its stamps where there is one, else its own.
+    /// Path length in metres: of the ground truth at the trajectory's stamps if there is one, else of the trajectory.
     pub length_m: f64,
-    /// Errors against ground truth.
     pub accuracy: Option<Accuracy>,
-    /// The reason why there is no accuracy.
+    /// Reason why there is no accuracy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy_missing: Option<String>,
 }
 
 impl TrajectorySummary {
-    /// The summary of a trajectory beside the runs.
     pub(super) fn of(lane: &TrajectoryLane) -> Self {
         Self {
             label: lane.label.clone(),
@@ -302,7 +290,6 @@ impl TrajectorySummary {
     }
 }
 
-/// The summary of one run of a recording.
 pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSummary {
     let estimated: Vec<_> = run.steps.iter().filter(|step| step.report.newest().is_some()).collect();
     let positions: Vec<_> = estimated.iter().filter_map(|step| step.report.newest()).collect();
@@ -342,7 +329,7 @@ fn cameras(run: &RunRecord) -> String {
     rigid.fold(run.camera_key.clone(), |cameras, (key, _)| format!("{cameras}, {key}"))
 }
 
-/// The reasons of the last initialization attempt.
+/// Reasons of the last failed initialization attempt.
 fn never_initialized(run: &RunRecord) -> String {
     let waits = run.steps.iter().rev().find_map(|step| {
         let reasons: Vec<&str> = step
@@ -531,8 +518,8 @@ fn real_time_factor(run: &RunRecord) -> Option<f64> {
     (work_ms > 0.0).then(|| log_s * 1e3 / work_ms)
 }
 
-/// Warnings about the log, then of the run, each with its stamp; a repeated warning once with its count and its last
-/// stamp.
+/// Warnings about the log, then of the run, each with its stamp; a repeated warning is listed once with its count and
+/// its last stamp.
 fn warnings(recording: &Recording, run: &RunRecord) -> Vec<String> {
     let mut texts: Vec<String> = recording
         .warnings

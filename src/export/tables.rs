@@ -13,7 +13,7 @@ pub(super) fn seconds_text(stamp_ns: i64) -> String {
 }
 
 /// `calibration.csv`: each parameter and its σ, then the joint angles. A switch of the parameterization changes the
-/// parameters: the columns are those of all parameterizations of the run, empty while another one is in use.
+/// parameters: there are columns for all parameterizations of the run, empty while another one is in use.
 pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
     let names = rig.parameter_names();
     let mut columns: Vec<ParameterId> = Vec::new();

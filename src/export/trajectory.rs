@@ -1,4 +1,4 @@
-//! Trajectories as TUM writes them (`t x y z qx qy qz qw`, seconds and metres) and as tables of EuRoC.
+//! Trajectories in TUM's format (`t x y z qx qy qz qw`, seconds and metres) and as tables in EuRoC's format.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -20,14 +20,14 @@ fn absolute_seconds(epoch_ns: i64, stamp_ns: i64) -> String {
     format!("{sign}{}.{:09}", absolute_ns / 1_000_000_000, absolute_ns % 1_000_000_000)
 }
 
-/// The trajectory of a run, one line per estimated frame: pose of the IMU in the estimator's world at the stamp of the
+/// Trajectory of a run, one line per estimated frame: pose of the IMU in the estimator's world at the stamp of the
 /// step.
 pub fn tum_of_run(run: &RunRecord, epoch_ns: i64) -> String {
     let newest = run.steps.iter().filter_map(|step| step.report.newest());
     tum(newest.map(|newest| (newest.stamp_ns, newest.world_from_imu)), epoch_ns)
 }
 
-/// The trajectory of an offline calibration, marked by its first line as a reference.
+/// Trajectory of an offline calibration, marked by its first line as a reference.
 pub(super) fn tum_of_calibration(run: &CalibrationRun) -> String {
     let poses = run.outcome.trajectory.iter().map(|pose| (pose.stamp_ns, pose.world_from_imu));
     format!("{BATCH_REFERENCE} by dcvins calibrate: t x y z qx qy qz qw\n{}", tum(poses, run.epoch_ns))
@@ -49,7 +49,7 @@ fn tum(poses: impl Iterator<Item = (i64, RigidTransform)>, epoch_ns: i64) -> Str
     text
 }
 
-/// The trajectory of a run as a table like EuRoC's `state_groundtruth_estimate0`: stamp in nanoseconds, position,
+/// Trajectory of a run as a table like EuRoC's `state_groundtruth_estimate0`: stamp in nanoseconds, position,
 /// orientation (w first) and velocity of the IMU in the estimator's world, gyroscope and accelerometer bias.
 pub fn euroc_of_run(run: &RunRecord, epoch_ns: i64) -> String {
     let mut table = CsvTable::new([
@@ -86,7 +86,7 @@ pub fn euroc_of_run(run: &RunRecord, epoch_ns: i64) -> String {
 /// Reads a trajectory in TUM's or EuRoC's format, see [`read_trajectory_file`]. Every pose must have an attitude.
 ///
 /// # Errors
-/// When the file cannot be read, or a line is no pose.
+/// If the file cannot be read, or a line is not a pose.
 pub fn read_trajectory(path: &Path) -> Result<Vec<StampedPose>, ExportError> {
     let recorded = read_trajectory_file(path).map_err(|error| match error {
         LogError::Io { source, path, .. } => ExportError::Read { source, path },
@@ -94,7 +94,7 @@ pub fn read_trajectory(path: &Path) -> Result<Vec<StampedPose>, ExportError> {
     })?;
     let stamped = |pose: &RecordedPose| {
         let rotation = pose.rotation?;
-        // Whole seconds and their fraction apart: a double resolves the sum to 240 ns only.
+        // Whole seconds and their fraction are converted separately: a double resolves the sum only to 240 ns.
         let whole_s = pose.stamp_ns.div_euclid(1_000_000_000) as f64;
         let stamp_s = whole_s + seconds_from_ns(pose.stamp_ns.rem_euclid(1_000_000_000));
         Some(StampedPose { stamp_s, pose: RigidTransform::new(rotation, pose.position_m) })

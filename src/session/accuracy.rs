@@ -7,13 +7,12 @@ use crate::geometry::{RigidTransform, so3};
 /// A stamped pose. Stamps are in seconds, on a clock that both trajectories share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StampedPose {
-    /// Stamp in seconds.
     pub stamp_s: f64,
     /// `world_from_body`.
     pub pose: RigidTransform,
 }
 
-/// How the estimate is aligned with the reference before positions are compared.
+/// Alignment of the estimate with the reference before positions are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Alignment {
     /// No alignment: both trajectories are already in one world.
@@ -31,22 +30,18 @@ pub enum Alignment {
 pub struct ErrorStatistics {
     /// Number of errors.
     pub count: usize,
-    /// Root mean square.
     pub rmse: f64,
-    /// Arithmetic mean.
     pub mean: f64,
     /// Middle of the sorted errors; of an even number, the mean of the middle two.
     pub median: f64,
-    /// Standard deviation (of the population, as numpy's default).
+    /// Standard deviation of the population (numpy's default).
     pub std: f64,
-    /// Smallest error.
     pub min: f64,
-    /// Largest error.
     pub max: f64,
 }
 
 impl ErrorStatistics {
-    /// Statistics of the errors, `None` without any.
+    /// Statistics of the errors, `None` if there are none.
     pub fn of(errors: &[f64]) -> Option<Self> {
         if errors.is_empty() {
             return None;
@@ -70,8 +65,7 @@ impl ErrorStatistics {
     }
 }
 
-/// A similarity transform that maps the estimate onto the reference: `reference ≈ scale · rotation · estimate +
-/// translation`.
+/// Similarity transform from estimate to reference: `reference ≈ scale · rotation · estimate + translation`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AlignmentTransform {
     /// `reference_from_estimate`.
@@ -81,7 +75,7 @@ pub struct AlignmentTransform {
 }
 
 impl AlignmentTransform {
-    /// A pose of the estimate in the frame of the reference: `reference_from_body`.
+    /// Pose of the estimate in the frame of the reference: `reference_from_body`.
     pub fn apply(&self, pose: &RigidTransform) -> RigidTransform {
         let position = self.rigid.rotation * pose.translation_m * self.scale + self.rigid.translation_m;
         RigidTransform::new(self.rigid.rotation * pose.rotation, position)

@@ -1,4 +1,4 @@
-//! Trajectory errors against positions of an antenna: ground truth without attitudes, beside the IMU by a lever arm.
+//! Trajectory errors against antenna positions: ground truth without attitude, at a lever arm from the IMU.
 
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
 use thiserror::Error;
@@ -7,18 +7,17 @@ use super::accuracy::{Alignment, AlignmentSums, ErrorStatistics, path_length_m};
 use crate::geometry::{RigidTransform, so3};
 use crate::sensors::{LeverArm, PoseTrack, PositionSample};
 
-/// Weakest mean excitation of the lever arm by rotations, in degrees: below it, the arm follows from the noise.
+/// Smallest mean excitation of the lever arm by rotations, in degrees; below it, noise dominates the lever arm.
 const MIN_EXCITATION_DEG: f64 = 5.0;
-/// Gauss–Newton steps of the estimated lever arm; a handful do.
+/// Limit of Gauss–Newton steps for the estimated lever arm; a few usually suffice.
 const MAX_STEPS: usize = 30;
-/// A step this small ends them, in metres and radians.
+/// Norm of the step at which the iteration stops, in metres and radians.
 const STEP_TOLERANCE: f64 = 1e-12;
-/// Fewest pairs.
 const MIN_PAIRS: usize = 10;
-/// Largest correlation of consecutive residuals that is believed.
+/// Upper limit on the correlation of consecutive residuals.
 const MAX_CORRELATION: f64 = 0.999;
 
-/// An estimated pose of the IMU at the stamp of an antenna's position.
+/// Estimated pose of the IMU at the stamp of an antenna position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AntennaPair {
     /// Stamp in nanoseconds since the log began.
@@ -29,37 +28,34 @@ pub struct AntennaPair {
     pub antenna_m: Vector3<f64>,
 }
 
-/// What maps an estimated trajectory onto the positions of an antenna.
+/// Alignment of an estimated trajectory with antenna positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AntennaAlignment {
     /// `true_from_estimate`, a rotation about the vertical and a translation.
     pub true_from_estimate: RigidTransform,
     /// Position of the antenna in the IMU frame, in metres.
     pub lever_arm_m: Vector3<f64>,
-    /// Standard deviation of each of its coordinates, where it was estimated.
+    /// Standard deviation of each coordinate, `None` if the lever arm was given.
     pub lever_arm_sigma_m: Option<Vector3<f64>>,
 }
 
-/// Why a trajectory cannot be aligned with the positions of an antenna.
+/// Reason why a trajectory cannot be aligned with antenna positions.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum AntennaError {
-    /// Too few pairs, or all at one place.
+    /// Too few pairs, or positions that do not determine the alignment.
     #[error("{pairs} poses with a position of the antenna do not determine the alignment")]
-    NotDetermined {
-        /// Number of pairs.
-        pairs: usize,
-    },
+    NotDetermined { pairs: usize },
     /// The rotations of the flight do not determine the lever arm.
     #[error(
-        "the lever arm cannot be estimated: along ({:.2}, {:.2}, {:.2}) of the IMU the rotations of the flight excite it by \
-         {excitation_deg:.1}° only, {MIN_EXCITATION_DEG}° are needed; measure it with a ruler and give it as \
+        "lever arm not observable: the rotations of the flight excite direction ({:.2}, {:.2}, {:.2}) of the IMU frame by only \
+         {excitation_deg:.1}° (at least {MIN_EXCITATION_DEG}° needed); measure it with a ruler and give it as \
          ground_truth.lever_arm or --lever-arm X,Y,Z",
         direction.x, direction.y, direction.z
     )]
     NotExcited {
         /// Direction in the IMU frame along which it is least determined.
         direction: Vector3<f64>,
-        /// How much the rotations excite it.
+        /// Mean excitation of this direction by the rotations, in degrees.
         excitation_deg: f64,
     },
 }
@@ -73,11 +69,11 @@ pub fn antenna_pairs(estimate: &PoseTrack, positions: &[PositionSample]) -> Vec<
     positions.iter().filter_map(pair).collect()
 }
 
-/// Aligns an estimate with the positions of an antenna by yaw and position, together with the lever arm where it is to be
-/// estimated (least squares).
+/// Aligns an estimate with antenna positions by yaw and translation, and estimates the lever arm unless it is given
+/// (least squares).
 ///
 /// # Errors
-/// When the pairs do not determine the alignment, or the rotations do not determine the lever arm.
+/// If the pairs do not determine the alignment, or the rotations do not determine the lever arm.
 pub fn align_antenna(pairs: &[AntennaPair], lever_arm: LeverArm) -> Result<AntennaAlignment, AntennaError> {
     match lever_arm {
         LeverArm::Known(lever_arm_m) => {
@@ -88,7 +84,7 @@ pub fn align_antenna(pairs: &[AntennaPair], lever_arm: LeverArm) -> Result<Anten
     }
 }
 
-/// Distances between the estimated and the true positions of the antenna, in metres.
+/// Distances between the estimated and the ground-truth positions of the antenna, in metres.
 pub fn antenna_errors_m(pairs: &[AntennaPair], alignment: &AntennaAlignment) -> Vec<f64> {
     pairs.iter().map(|pair| residual(pair, &alignment.true_from_estimate, &alignment.lever_arm_m).norm()).collect()
 }
@@ -99,7 +95,7 @@ pub fn antenna_statistics(pairs: &[AntennaPair], alignment: &AntennaAlignment) -
     Some((statistics, path_length_m(pairs.iter().map(|pair| &pair.antenna_m))))
 }
 
-/// The alignment with a known lever arm.
+/// Alignment with a known lever arm.
 fn aligned(pairs: &[AntennaPair], lever_arm_m: &Vector3<f64>) -> Result<RigidTransform, AntennaError> {
     let mut sums = AlignmentSums::default();
     for pair in pairs {
@@ -109,7 +105,7 @@ fn aligned(pairs: &[AntennaPair], lever_arm_m: &Vector3<f64>) -> Result<RigidTra
     solved.map(|transform| transform.rigid).ok_or(AntennaError::NotDetermined { pairs: pairs.len() })
 }
 
-/// Estimated minus true position of the antenna.
+/// Estimated minus ground-truth position of the antenna, in metres.
 fn residual(pair: &AntennaPair, true_from_estimate: &RigidTransform, lever_arm_m: &Vector3<f64>) -> Vector3<f64> {
     true_from_estimate.transform(&pair.pose.transform(lever_arm_m)) - pair.antenna_m
 }
@@ -146,7 +142,7 @@ fn with_lever_arm(pairs: &[AntennaPair]) -> Result<AntennaAlignment, AntennaErro
     Ok(AntennaAlignment { true_from_estimate, lever_arm_m, lever_arm_sigma_m })
 }
 
-/// `JᵀJ` and `Jᵀr` of all residuals; a step of the yaw rotates about the origin of the true world.
+/// `JᵀJ` and `Jᵀr` of all residuals; the yaw perturbation rotates about the origin of the ground truth's world.
 fn normal_equations(
     pairs: &[AntennaPair],
     true_from_estimate: &RigidTransform,
@@ -167,8 +163,8 @@ fn normal_equations(
     (normal, gradient)
 }
 
-/// Refuses a lever arm that the rotations leave undetermined. The information per pair, without what alignment can take up,
-/// is the mean square of the sine of the rotations that excite a direction.
+/// Returns an error if the rotations do not determine the lever arm. The information per pair, after marginalizing the
+/// alignment, is the mean square of the sine of the rotations that excite a direction.
 fn check_excitation(lever_information: &Matrix3<f64>, pairs: usize) -> Result<(), AntennaError> {
     let eigen = SymmetricEigen::new(lever_information / pairs.max(1) as f64);
     let weakest = eigen.eigenvalues.imin();
@@ -182,8 +178,8 @@ fn check_excitation(lever_information: &Matrix3<f64>, pairs: usize) -> Result<()
     Err(AntennaError::NotExcited { direction, excitation_deg })
 }
 
-/// Variance of one coordinate of the residuals in m², larger by what their correlation in time takes of their number: errors
-/// of a trajectory drift, so that consecutive residuals are nearly one measurement.
+/// Variance of one coordinate of the residuals in m², scaled up for their correlation in time: trajectory errors drift,
+/// so consecutive residuals are almost one measurement.
 fn variance_of(residuals: &[Vector3<f64>]) -> f64 {
     let freedom = (3 * residuals.len()).saturating_sub(COLUMNS).max(1) as f64;
     let squares: f64 = residuals.iter().map(Vector3::norm_squared).sum();
@@ -200,7 +196,7 @@ mod tests {
     use crate::geometry::SplitMix64;
     use crate::sensors::PoseSample;
 
-    /// 60 s at 20 Hz that turn, roll and pitch by `tilt_rad`, and a world of their own.
+    /// 60 s at 20 Hz with yaw motion, and roll and pitch of `tilt_rad`, in its own world frame.
     fn estimate(tilt_rad: f64) -> PoseTrack {
         let sample = |frame: i64| {
             let time_s = frame as f64 * 0.05;
@@ -215,7 +211,7 @@ mod tests {
 
     const LEVER_ARM_M: [f64; 3] = [0.12, -0.05, 0.31];
 
-    /// Positions of the antenna at 5 Hz in another world, between the frames, wrong by white noise.
+    /// Antenna positions at 5 Hz in another world frame, between the frames, with white noise.
     fn positions(estimate: &PoseTrack, sigma_m: f64) -> Vec<PositionSample> {
         let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.1);
         let true_from_estimate = RigidTransform::new(yaw, Vector3::new(100.0, -40.0, 7.0));
@@ -267,7 +263,7 @@ mod tests {
 
     #[test]
     fn rotations_that_do_not_excite_the_lever_arm_are_refused() {
-        // Level flight: what is above the IMU is the same as a height.
+        // In level flight, the vertical lever arm is indistinguishable from a height offset.
         let estimate = estimate(0.01);
         let pairs = antenna_pairs(&estimate, &positions(&estimate, 0.0));
         let refused = align_antenna(&pairs, LeverArm::Estimated).unwrap_err();

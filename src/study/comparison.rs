@@ -1,8 +1,9 @@
-//! Comparison of two studies: whether a metric got worse, beyond its tolerance and beyond its noise.
+//! Comparison of two studies: a metric is worse if it changed beyond its tolerance and beyond its noise.
 //!
-//! Runs are paired by log, disturbance, perturbation, seed and settings, see [`super::pairing`]. The difference of a pair is
-//! the logarithm of the ratio of its two values, so that easy and hard flights count alike; of all pairs the mean and its 95 % interval
-//! (Student's t) are computed. A metric is worse when its mean ratio is beyond the tolerance and the interval excludes 1.
+//! Runs are paired by log, disturbance, perturbation, seed and settings, see [`super::pairing`]. The difference of a
+//! pair is the logarithm of the ratio of its two values, so that easy and difficult flights have equal weight. The mean
+//! over all pairs and its 95 % interval (Student's t) are computed. A metric is worse when its mean ratio is beyond the
+//! tolerance and the interval excludes 1.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,25 +16,22 @@ use super::schema::PAIRING_COLUMNS;
 use super::statistics::MeanInterval;
 use super::table::StudyTable;
 
-/// The metric that compares how many runs have a result.
+/// Metric that compares the numbers of runs with a result.
 pub const SUCCESS: &str = "success";
-/// Fewest pairs from which a metric is judged.
+/// Minimum number of pairs for a verdict on a metric.
 const LEAST_PAIRS: usize = 3;
 
-/// Which change of a metric is worse.
+/// Direction of change of a metric that is worse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
-    /// A larger value.
     Larger,
-    /// A smaller value.
     Smaller,
-    /// Any change: a consistent estimator has an expected value, and an optimistic one may come from both sides.
+    /// Any change: a consistent estimator has an expected value, and deviations in both directions are worse.
     Either,
 }
 
 impl Direction {
-    /// The direction of a column.
     fn of(column: &str) -> Self {
         match column {
             "pose_nees" | "parameter_error_sigma" => Self::Either,
@@ -45,7 +43,7 @@ impl Direction {
     }
 }
 
-/// The judgement of a metric.
+/// Verdict on a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -55,12 +53,12 @@ pub enum Verdict {
     Better,
     /// Worse beyond the tolerance and the noise.
     Worse,
-    /// Too few pairs to tell.
+    /// Too few pairs for a verdict.
     TooFewPairs,
 }
 
 impl Verdict {
-    /// Its name for people.
+    /// Name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Unchanged => "unchanged",
@@ -71,24 +69,23 @@ impl Verdict {
     }
 }
 
-/// One metric over all pairs.
+/// Comparison of one metric over all pairs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetricComparison {
     /// Column of the table of runs, or [`SUCCESS`].
     pub metric: String,
-    /// Which change is worse.
+    /// Direction of change that is worse.
     pub direction: Direction,
     /// Allowed relative change.
     pub tolerance: f64,
-    /// Pairs with a positive value in both studies.
+    /// Number of pairs with a positive value in both studies.
     pub pairs: usize,
     /// Geometric mean of new over old.
     pub ratio: Option<f64>,
-    /// Its 95 % interval.
+    /// 95 % interval of `ratio`.
     pub interval: Option<[f64; 2]>,
-    /// The pair whose ratio is farthest in the worse direction, for people who look for it.
+    /// Pair whose ratio is farthest in the worse direction, as a starting point for an investigation.
     pub worst_pair: Option<WorstPair>,
-    /// The judgement.
     pub verdict: Verdict,
 }
 
@@ -106,41 +103,39 @@ pub struct WorstPair {
 /// The result of a comparison.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StudyComparison {
-    /// Runs of the baseline.
+    /// Number of runs of the baseline.
     pub old_runs: usize,
-    /// Runs of the new study.
+    /// Number of runs of the new study.
     pub new_runs: usize,
-    /// Runs that both have.
+    /// Number of runs in both studies.
     pub pairs: usize,
     /// Pairs of which only the baseline has a result.
     pub newly_failed: Vec<String>,
     /// Pairs of which only the new study has a result.
     pub newly_succeeded: Vec<String>,
-    /// Pairs on logs of different content.
+    /// Number of pairs on logs of different content.
     pub other_logs: usize,
-    /// Pairs of runs of one name with different settings.
+    /// Number of pairs of runs with the same name and different settings.
     pub other_settings: usize,
-    /// The metrics in the order of their names, [`SUCCESS`] last.
+    /// Metrics in the order of their names, [`SUCCESS`] last.
     pub metrics: Vec<MetricComparison>,
 }
 
-/// The reason why two studies cannot be compared.
+/// Reason why two studies cannot be compared.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum ComparisonError {
-    /// A tolerance names no numeric column.
+    /// A tolerance does not name a numeric column.
     #[error("tolerance '{name}': the table of runs has no column of numbers of that name; it has {}", known.join(", "))]
     UnknownMetric {
-        /// The name.
         name: String,
-        /// The columns that it may name.
+        /// Numeric columns of the table of runs.
         known: Vec<String>,
     },
     /// A column by which runs are paired is missing.
-    #[error("the {which} has no column '{column}': it is no table of runs of a study (results.parquet)")]
+    #[error("the {which} has no column '{column}': not a table of runs of a study (results.parquet)")]
     MissingColumn {
-        /// Baseline or new study.
+        /// The baseline or the new study.
         which: &'static str,
-        /// The column.
         column: &'static str,
     },
     /// No run of the new study is in the baseline.
@@ -151,11 +146,11 @@ pub enum ComparisonError {
     Unpaired,
 }
 
-/// Compares a study with a baseline; `tolerances` are relative changes by column. [`SUCCESS`] is always compared, and the
-/// rows of a table that occur twice count once.
+/// Compares a study with a baseline; `tolerances` are relative changes by column. [`SUCCESS`] is always compared, and
+/// duplicate rows of a table count once.
 ///
 /// # Errors
-/// For a tolerance of an unknown column, and when no runs can be paired.
+/// For a tolerance of an unknown column, and if no runs can be paired.
 pub fn compare(
     old: &StudyTable,
     new: &StudyTable,
@@ -221,7 +216,7 @@ fn check_metric(table: &StudyTable, name: &str) -> Result<(), ComparisonError> {
 /// Compares one metric; `values` are the run, the old and the new value of each pair.
 fn compare_metric(name: &str, tolerance: f64, values: &[(&str, f64, f64)]) -> MetricComparison {
     let direction = Direction::of(name);
-    // Ratios of values that are zero or negative mean nothing.
+    // The logarithm of the ratio needs positive values.
     let positive: Vec<_> = values.iter().filter(|(_, old, new)| *old > 0.0 && *new > 0.0).collect();
     let ratios: Vec<f64> = positive.iter().map(|(_, old, new)| (new / old).ln()).collect();
     let badness = |ratio: f64| match direction {
@@ -245,7 +240,7 @@ fn compare_metric(name: &str, tolerance: f64, values: &[(&str, f64, f64)]) -> Me
     }
 }
 
-/// The judgement of an interval of log-ratios.
+/// Verdict on an interval of log-ratios.
 fn judge(interval: &MeanInterval, direction: Direction, tolerance: f64) -> Verdict {
     let limit = tolerance.ln_1p();
     let rises = interval.mean > limit && interval.low > 0.0;
@@ -257,7 +252,7 @@ fn judge(interval: &MeanInterval, direction: Direction, tolerance: f64) -> Verdi
     }
 }
 
-/// Compares how many runs have a result: a run that had one and has none any more counts, whatever the others do.
+/// Compares the numbers of runs with a result: newly failed minus newly succeeded pairs, relative to all pairs.
 fn compare_success(tolerance: f64, pairs: usize, failed: usize, succeeded: usize) -> MetricComparison {
     let allowed = tolerance * pairs as f64;
     let change = failed as f64 - succeeded as f64;
@@ -279,7 +274,7 @@ fn compare_success(tolerance: f64, pairs: usize, failed: usize, succeeded: usize
 }
 
 impl StudyComparison {
-    /// Whether a metric got worse, or could not be judged: a guard that cannot decide does not pass.
+    /// True if a metric got worse or there are too few pairs for a verdict.
     pub fn fails(&self) -> bool {
         self.metrics.iter().any(|metric| matches!(metric.verdict, Verdict::Worse | Verdict::TooFewPairs))
     }

@@ -1,4 +1,5 @@
-//! The jobs of a plan: one run of the estimator, or one trajectory of another program, each; named by the hash of its inputs.
+//! The jobs of a plan: each is one run of the estimator or one trajectory of another program, named by the hash of its
+//! inputs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -12,25 +13,24 @@ use super::plan::{Exclusion, StudyPlan};
 use super::recipe::FlightRecipe;
 use crate::session::{RunSpec, TrajectorySpec};
 
-/// Number of the rules by which keys are made; another number gives other keys.
+/// Version of the rules by which keys are made; another version gives other keys.
 const KEY_RULES: u32 = 1;
 
-/// A recorded log of a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecordedLog {
     /// Name in the tables.
     pub name: String,
-    /// The log.
+    /// Path of the log.
     pub path: PathBuf,
     /// SHA-256 of its content, in hexadecimal.
     pub sha256: String,
-    /// The rig, when it is not beside the log or in it.
+    /// Path of the rig; `None` if it is next to the log or inside it.
     pub rig: Option<PathBuf>,
-    /// SHA-256 of the rig file that is used, with its masks; empty when the rig is in the log.
+    /// SHA-256 of the rig file that is used, with its masks; empty if the rig is inside the log.
     pub rig_sha256: String,
-    /// The ground-truth rig, when it is not beside the log or in it.
+    /// Path of the ground-truth rig; `None` if it is next to the log or inside it.
     pub truth: Option<PathBuf>,
-    /// SHA-256 of the ground-truth file that is used; empty when it is in the log or not known.
+    /// SHA-256 of the ground-truth file that is used; empty if it is inside the log or unknown.
     pub truth_sha256: String,
     /// Seconds to skip at the start.
     pub start_s: f64,
@@ -46,39 +46,34 @@ pub struct RecordedLog {
 /// A trajectory of another program on a recorded log.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StudyTrajectory {
-    /// Where it is, and its name in the tables.
+    /// Source and name in the tables.
     #[serde(with = "as_text")]
     pub spec: TrajectorySpec,
     /// SHA-256 of its file; empty for a topic of the log.
     pub sha256: String,
 }
 
-/// A simulated flight of a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SimulatedFlight {
-    /// The recipe.
     pub recipe: FlightRecipe,
-    /// Disturbances beside the recipe's.
+    /// Disturbances in addition to the recipe's.
     pub disturb: Vec<String>,
-    /// Seed of the simulation.
     pub seed: u64,
 }
 
 impl SimulatedFlight {
-    /// Name of its folder: the hash of everything that decides about its bytes.
+    /// Name of the flight's folder: the hash of everything that determines the bytes of its log.
     pub fn id(&self) -> String {
         let text = serde_json::to_string(self).expect("plain values have a JSON text");
         hex(&Sha256::digest(format!("flight {KEY_RULES} {text}"))[..8])
     }
 }
 
-/// The log of a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JobLog {
-    /// A recorded one.
     Recorded(Box<RecordedLog>),
-    /// A simulated one, which is rendered once for all jobs.
+    /// A simulated log, which is rendered once for all jobs.
     Simulated(Box<SimulatedFlight>),
 }
 
@@ -91,7 +86,7 @@ impl JobLog {
         }
     }
 
-    /// Seconds that are processed, where it is known before the log exists.
+    /// Processed duration in seconds, `None` if it is unknown before the log exists.
     pub fn duration_s(&self) -> Option<f64> {
         match self {
             Self::Recorded(log) => {
@@ -103,13 +98,11 @@ impl JobLog {
     }
 }
 
-/// What a job evaluates on its log.
+/// Subject that a job evaluates on its log.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JobSubject {
-    /// A run of the estimator.
     Run(#[serde(with = "as_text")] RunSpec),
-    /// A trajectory of another program.
     Trajectory(StudyTrajectory),
 }
 
@@ -131,7 +124,7 @@ impl JobSubject {
     }
 }
 
-/// The normalized specification of a run, or `trajectory:LABEL`, which no run has.
+/// The normalized specification of a run, or `trajectory:LABEL`, which is never a run specification.
 impl fmt::Display for JobSubject {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -141,20 +134,16 @@ impl fmt::Display for JobSubject {
     }
 }
 
-/// One run of one specification on one log, or one trajectory of another program on it.
+/// One run specification, or one trajectory of another program, on one log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StudyJob {
     /// Name of the study.
     pub study: String,
-    /// The log.
     pub log: JobLog,
-    /// Name of the disturbances.
     pub disturbance: String,
-    /// Errors of the rig.
     pub perturbation: RigPerturbation,
-    /// The seed, `None` where nothing is random.
+    /// Seed, `None` if nothing is random.
     pub seed: Option<u64>,
-    /// The run, or the trajectory.
     pub subject: JobSubject,
 }
 
@@ -178,7 +167,7 @@ mod as_text {
     }
 }
 
-/// The inputs of a job that decide about its results, without paths.
+/// Inputs of a job that determine its results, without paths.
 #[derive(Serialize)]
 struct KeyInputs<'a> {
     rules: u32,
@@ -196,7 +185,7 @@ struct KeyInputs<'a> {
 
 impl StudyJob {
     /// SHA-256 of the inputs, in hexadecimal: content of log and rig, normalized specification, perturbation, seed and
-    /// program; not where the files lie.
+    /// program. File paths are not included.
     pub fn key(&self, program: &str) -> String {
         let flight;
         let (content, span) = match &self.log {
@@ -230,7 +219,7 @@ impl StudyJob {
         hex(&Sha256::digest(text))
     }
 
-    /// One line for a person: log, levels, seed and specification.
+    /// One line of text: log, levels, seed and specification.
     pub fn describe(&self) -> String {
         let mut parts = vec![self.log.name().to_owned()];
         let levels = [&self.disturbance, &self.perturbation.name];
@@ -249,17 +238,17 @@ pub fn hex(bytes: &[u8]) -> String {
 /// A job with its key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeyedJob {
-    /// [`StudyJob::key`].
+    /// See [`StudyJob::key`].
     pub key: String,
-    /// The job.
     pub job: StudyJob,
 }
 
-/// The jobs of a plan in the order of its tables: logs as found, then flights; of each the disturbances, perturbations,
-/// seeds and specifications, and of a recorded log its trajectories.
+/// Jobs of a plan in the order of its tables: logs as found, then flights; for each the disturbances, perturbations,
+/// seeds and specifications, and for a recorded log its trajectories.
 ///
-/// Recorded logs are run without disturbances, their trajectories are evaluated once, and what the plan excludes is left out. Where neither the log nor the perturbation is random there is one job
-/// without a seed instead of one for each seed.
+/// Recorded logs are run without disturbances, their trajectories are evaluated once, and the plan's exclusions are
+/// omitted. If neither the log nor the perturbation is random, there is one job without a seed instead of one for each
+/// seed.
 pub fn expand(plan: &StudyPlan, logs: &[RecordedLog], program: &str) -> Vec<KeyedJob> {
     let mut jobs = Vec::new();
     let recorded = logs.iter().map(|log| JobLog::Recorded(Box::new(log.clone())));
@@ -302,7 +291,7 @@ pub fn expand(plan: &StudyPlan, logs: &[RecordedLog], program: &str) -> Vec<Keye
 }
 
 impl Exclusion {
-    /// Whether a job is in each list that is not empty.
+    /// True if each non-empty list contains the job's level.
     fn has(&self, job: &StudyJob) -> bool {
         let named = |names: &[String], name: &str| names.is_empty() || names.iter().any(|known| known == name);
         named(&self.logs, job.log.name())
@@ -331,9 +320,10 @@ fn add_specs(
     }));
 }
 
-/// The jobs of one shard: every `count`-th flight with all its jobs, from number `index` (from 1) on.
+/// Jobs of one shard: every `count`-th flight with all its jobs, starting with number `index` (from 1).
 ///
-/// Jobs on one flight stay together, so that it is rendered by one shard; the shards' shares differ by at most one flight.
+/// Jobs on one flight stay together, so that only one shard renders it; the sizes of shards differ by at most one
+/// flight.
 pub fn shard(jobs: Vec<KeyedJob>, index: usize, count: usize) -> Vec<KeyedJob> {
     let mut flights: BTreeMap<String, usize> = BTreeMap::new();
     let mut groups = 0;

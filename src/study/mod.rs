@@ -1,4 +1,4 @@
-//! Studies: the runs that a plan asks for, and the tables of their results.
+//! Studies: the runs that a plan defines, and the tables of their results.
 //!
 //! Everything here is plain data and computation on it; files are read and written by `export/study/`, processes are
 //! started by the command line.
@@ -9,7 +9,7 @@
 //! - `baseline`, `comparison`, `pairing`, `statistics`: a study against a baseline, paired and with intervals.
 //! - `summary_table`: statistics of groups of runs as Markdown.
 //! - `table`, `schema`: columns with units and descriptions, and those of the tables of a study.
-//! - `view/`: what the study view shows: filters, groups, distributions, differences.
+//! - `view/`: the models of the study view: filters, groups, distributions, differences.
 
 mod baseline;
 mod comparison;

@@ -1,9 +1,9 @@
-//! Which run of a study belongs to which run of another one.
+//! Pairing of the runs of two studies.
 //!
-//! Two runs belong together when log, disturbance, perturbation and seed are equal and the settings of their specifications
-//! mean the same: `auto`, `auto:window=10` and `auto:name=before` do, as 10 keyframes are the standard. A run without such a
-//! partner belongs to the one of its name, so that `auto:pixel-noise=2,name=auto` is compared with `auto`. Neither the key of
-//! a job, which has the hash of the program in it, nor paths take part.
+//! Two runs are paired if log, disturbance, perturbation and seed are equal and the settings of their specifications
+//! are equivalent: those of `auto`, `auto:window=10` and `auto:name=before` are, because 10 keyframes are the default.
+//! A run without such a partner is paired with the run of the same name, so that `auto:pixel-noise=2,name=auto` is
+//! compared with `auto`. The key of a job, which contains the hash of the program, and paths are not used.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +11,7 @@ use super::schema::PAIRING_COLUMNS;
 use super::table::{Cell, StudyTable};
 use crate::session::RunSpec;
 
-/// One run of each of two tables.
+/// Rows of two tables with the same inputs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct RunPair {
     /// Log, levels, seed and specification in the new table.
@@ -20,11 +20,11 @@ pub(super) struct RunPair {
     pub(super) old: usize,
     /// Row of the new table.
     pub(super) new: usize,
-    /// Whether their settings mean the same.
+    /// True if their settings are equivalent.
     pub(super) same_settings: bool,
 }
 
-/// A row by what decides about its pair.
+/// A row with the values by which it is paired.
 struct Candidate {
     row: usize,
     /// Log, disturbance, perturbation and seed.
@@ -37,14 +37,14 @@ impl Candidate {
     fn of(table: &StudyTable, row: usize) -> Self {
         let inputs = ["log", "disturbance", "perturbation", "seed"].map(|column| table.cell(row, column).to_string());
         let run = table.text(row, "run").unwrap_or_default();
-        // What is no specification of this version means itself.
+        // A text that this version cannot parse is compared literally.
         let spec = run.parse::<RunSpec>().ok();
         let settings = spec.as_ref().map_or_else(|| run.to_owned(), RunSpec::settings);
         let label = spec.map_or_else(|| run.to_owned(), |spec| spec.label);
         Self { row, inputs: inputs.into(), settings, label }
     }
 
-    /// The rows of a table; one that occurs twice counts once, and the last one stays.
+    /// Rows of a table; of duplicate rows the last one is used.
     fn all(table: &StudyTable) -> Vec<Self> {
         let rows = (0..table.rows()).map(|row| Self::of(table, row));
         let distinct: BTreeMap<_, Self> =
@@ -53,7 +53,7 @@ impl Candidate {
     }
 }
 
-/// The pairs of two tables of runs, in the order of log, levels, seed and settings; a row is in one pair at most.
+/// Pairs of two tables of runs, in the order of log, levels, seed and settings; a row is in at most one pair.
 pub(super) fn pair_runs(old: &StudyTable, new: &StudyTable) -> Vec<RunPair> {
     type Rule = fn(&Candidate, &Candidate) -> bool;
     const RULES: [Rule; 3] = [

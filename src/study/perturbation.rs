@@ -1,4 +1,4 @@
-//! Errors that are added to a rig on purpose: named quantity, distribution, magnitude, seed.
+//! Simulated errors of a rig: named quantity, distribution, magnitude, seed.
 
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -29,7 +29,7 @@ pub enum RigQuantity {
     /// The time offset of the joint angles.
     #[serde(rename = "gimbal.timeshift")]
     GimbalTimeshift,
-    /// The standard deviation of the encoders that the rig states.
+    /// The standard deviation of the encoders stated in the rig.
     #[serde(rename = "gimbal.encoder_sigma")]
     EncoderSigma,
     /// The positions of rigid cameras.
@@ -38,7 +38,7 @@ pub enum RigQuantity {
     /// The orientations of rigid cameras.
     #[serde(rename = "static.rotation")]
     StaticRotation,
-    /// The focal lengths, fx and fy of a camera alike.
+    /// The focal lengths; fx and fy of a camera change by the same factor.
     #[serde(rename = "camera.focal")]
     Focal,
     /// The principal points.
@@ -53,12 +53,12 @@ pub enum RigQuantity {
     /// The readout times of the cameras.
     #[serde(rename = "camera.readout")]
     Readout,
-    /// The four noise densities of the IMU that the rig states, all by one factor.
+    /// The four noise densities of the IMU stated in the rig, all by one factor.
     #[serde(rename = "imu.noise")]
     ImuNoise,
 }
 
-/// Quantities with their names and what a perturbation does to them.
+/// Quantities with their names in plans.
 const QUANTITIES: [(RigQuantity, &str); 13] = [
     (RigQuantity::GimbalTranslation, "gimbal.translation"),
     (RigQuantity::GimbalRotation, "gimbal.rotation"),
@@ -76,7 +76,7 @@ const QUANTITIES: [(RigQuantity, &str); 13] = [
 ];
 
 impl RigQuantity {
-    /// Its name in plans.
+    /// Name in plans.
     pub fn name(self) -> &'static str {
         QUANTITIES.iter().find(|(quantity, _)| *quantity == self).map_or("", |(_, name)| name)
     }
@@ -111,7 +111,7 @@ impl RigQuantity {
 }
 
 impl FromStr for RigQuantity {
-    /// What was expected.
+    /// Expected names.
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -121,7 +121,7 @@ impl FromStr for RigQuantity {
     }
 }
 
-/// Dimension of a magnitude, which reads texts such as `5 mm`.
+/// Dimension of a magnitude, for parsing texts such as `5 mm`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MagnitudeDimension(pub Dimension);
 
@@ -132,7 +132,7 @@ pub(super) struct MagnitudeError {
 }
 
 impl MagnitudeDimension {
-    /// Units that a text may end in, with their size in the unit of the dimension.
+    /// Unit suffixes, with their size in the unit of the dimension.
     fn units(self) -> &'static [(&'static str, f64)] {
         match self.0 {
             Dimension::Length => &[("m", 1.0), ("cm", 0.01), ("mm", 0.001)],
@@ -143,7 +143,7 @@ impl MagnitudeDimension {
         }
     }
 
-    /// Reads a number with a unit, `5 mm` or `5mm`.
+    /// Parses a number with a unit, `5 mm` or `5mm`.
     pub(super) fn parse(self, text: &str) -> Option<f64> {
         let end = text.find(|letter: char| letter.is_alphabetic() && letter != 'e' || letter == '%')?;
         let (number, unit) = text.split_at(end);
@@ -177,7 +177,7 @@ pub enum Distribution {
     Uniform,
     /// Normal with the magnitude as its standard deviation.
     Normal,
-    /// The magnitude itself, whatever the seed.
+    /// The magnitude itself, independent of the seed.
     Constant,
 }
 
@@ -186,13 +186,13 @@ pub enum Distribution {
 pub struct RigChange {
     /// The perturbed quantity.
     pub quantity: RigQuantity,
-    /// Distribution of each of its values, which are independent.
+    /// Distribution of each value of the quantity; the values are independent.
     pub distribution: Distribution,
     /// Magnitude, in the unit of the quantity's dimension.
     pub magnitude: f64,
 }
 
-/// The rig that errors are added to.
+/// Rig to which errors are added.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PerturbationStart {
@@ -201,56 +201,48 @@ pub enum PerturbationStart {
     Rig,
     /// The ground-truth rig of the log, with the noise and the prior of the log's rig.
     Truth,
-    /// The rig that the offline calibration finds from the log itself.
+    /// The rig that the offline calibration estimates from the log itself.
     Calibrated,
 }
 
-/// A named set of errors, one level of that factor of a study.
+/// A named set of errors, one level of the factor "perturbation" of a study.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RigPerturbation {
     /// Name in the tables.
     pub name: String,
-    /// The rig that errors are added to.
+    /// Rig to which errors are added.
     pub start: PerturbationStart,
-    /// Whether the prior of the gimbal chain gets the bounds of the changes of the chain.
+    /// True if the prior of the gimbal chain is set to the bounds of the chain's changes.
     pub match_prior: bool,
-    /// The errors.
     pub changes: Vec<RigChange>,
 }
 
-/// The reason why a rig cannot be perturbed.
+/// Reason why a rig cannot be perturbed.
 #[derive(Debug, Error)]
 pub enum PerturbationError {
-    /// The rig has nothing that the quantity names.
-    #[error("perturbation '{perturbation}' changes {quantity}, and the rig has {missing}")]
+    /// The rig does not have the quantity.
+    #[error("perturbation '{perturbation}' changes {quantity}, but the rig has {missing}")]
     NothingToChange {
-        /// Name of the perturbation.
         perturbation: String,
-        /// The quantity.
         quantity: &'static str,
-        /// What the rig has not.
+        /// The missing entry of the rig.
         missing: &'static str,
     },
     /// A camera would have impossible intrinsics.
     #[error("perturbation '{perturbation}' gives {camera} impossible intrinsics: {source}")]
     Camera {
-        /// Name of the perturbation.
         perturbation: String,
         /// Key of the camera.
         camera: String,
-        /// What is wrong with them.
         source: CameraError,
     },
-    /// The perturbation starts from the ground truth, which is not known.
-    #[error("perturbation '{perturbation}' starts from the truth, and the log has no ground-truth rig")]
-    NoGroundTruth {
-        /// Name of the perturbation.
-        perturbation: String,
-    },
+    /// The perturbation starts from the ground truth, which is unknown.
+    #[error("perturbation '{perturbation}' starts from the truth, but the log has no ground-truth rig")]
+    NoGroundTruth { perturbation: String },
 }
 
-/// Random numbers of one change: they depend on the seed and the quantity alone, so that two magnitudes of one quantity
-/// draw the same errors but for their size.
+/// Random numbers of one change. They depend only on the seed and the quantity, so that two magnitudes of one quantity
+/// draw the same errors except for their scale.
 struct Draw {
     random: SplitMix64,
     distribution: Distribution,
@@ -281,29 +273,29 @@ impl Draw {
         Vector3::from_fn(|_, _| self.next())
     }
 
-    /// A factor of 1 plus the error, at least a hundredth.
+    /// 1 plus the error, at least 0.01.
     fn factor(&mut self) -> f64 {
         (1.0 + self.next()).max(0.01)
     }
 }
 
 impl RigPerturbation {
-    /// Whether the seed decides about the result.
+    /// True if the result depends on the seed.
     pub fn is_random(&self) -> bool {
         self.changes.iter().any(|change| change.distribution != Distribution::Constant)
     }
 
-    /// Whether the rig stays as it is.
+    /// True if the rig remains unchanged.
     pub fn is_none(&self) -> bool {
         self.changes.is_empty() && self.start == PerturbationStart::Rig
     }
 
-    /// The rig with the errors that a seed draws. `given` is the rig of the log, or that of its offline calibration for
+    /// The rig with the errors drawn with a seed. `given` is the rig of the log, or that of its offline calibration for
     /// [`PerturbationStart::Calibrated`].
     ///
     /// # Errors
-    /// When the rig has nothing that a change names, when a camera would have impossible intrinsics, and without the
-    /// ground truth that the perturbation starts from.
+    /// If the rig does not have a changed quantity, a camera would have impossible intrinsics, or the perturbation
+    /// starts from a ground truth that is missing.
     pub fn apply(&self, given: &Rig, truth: Option<&Rig>, seed: u64) -> Result<Rig, PerturbationError> {
         let mut rig = match self.start {
             PerturbationStart::Rig | PerturbationStart::Calibrated => given.clone(),
@@ -452,7 +444,7 @@ fn perturb_chain(chain: &mut ClassicalChain, quantity: RigQuantity, draw: &mut D
     }
 }
 
-/// The true calibration, with the topics, the noise and the priors that the log's rig states.
+/// The ground-truth calibration, with the topics, the noise and the priors of the log's rig.
 fn with_values_of(given: &Rig, truth: &Rig) -> Rig {
     let mut rig = given.clone();
     for camera in &mut rig.cameras {

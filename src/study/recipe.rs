@@ -1,4 +1,4 @@
-//! A simulated flight of a plan, as plain values from which the options of the simulation follow.
+//! A simulated flight of a plan, as plain values that determine the options of the simulation.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use crate::simulation::{Experiment, Lens, SimulationError, SimulationOptions};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EncoderNoise {
-    /// As in the experiment.
+    /// The encoder noise of the experiment.
     OfExperiment,
     /// No encoders in the log.
     None,
@@ -17,7 +17,7 @@ pub enum EncoderNoise {
     Degrees(f64),
 }
 
-/// A simulated flight, but for its seed and the disturbances of the plan.
+/// A simulated flight, without its seed and the disturbances of the plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FlightRecipe {
     /// Name in the tables.
@@ -26,15 +26,14 @@ pub struct FlightRecipe {
     pub experiment: String,
     /// Duration in seconds, `None` for the experiment's.
     pub duration_s: Option<f64>,
-    /// Noise of the encoders.
     pub encoder: EncoderNoise,
     /// Width and height of the images in pixels.
     pub size_px: [usize; 2],
     /// Frame rate of the cameras.
     pub rate_hz: f64,
-    /// Whether the static camera is recorded as well.
+    /// True if the static camera is recorded as well.
     pub static_camera: bool,
-    /// Disturbances of every flight of this recipe, as `dcvins simulate --disturb` takes them.
+    /// Disturbances of every flight of this recipe, in the syntax of `dcvins simulate --disturb`.
     pub disturb: Vec<String>,
     /// Bound of the error of each translation of the given chain in metres, `None` for the experiment's.
     pub start_error_m: Option<f64>,
@@ -47,7 +46,7 @@ pub struct FlightRecipe {
 }
 
 impl FlightRecipe {
-    /// Checks names and ranges; the error has the key and the problem.
+    /// Checks names and ranges; the error contains the key and the problem.
     pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
         if self.experiment().is_none() {
             return Err(("experiment", format!("is '{}', expected T1, T2, T3 or T4", self.experiment)));
@@ -71,10 +70,10 @@ impl FlightRecipe {
         }
     }
 
-    /// The options of the simulation with a seed and further disturbances.
+    /// Options of the simulation with a seed and additional disturbances.
     ///
     /// # Errors
-    /// For a disturbance that cannot be read.
+    /// For a disturbance that cannot be parsed.
     pub fn options(&self, seed: u64, disturb: &[String]) -> Result<SimulationOptions, SimulationError> {
         let mut options = SimulationOptions::new(self.experiment().unwrap_or(Experiment::T3));
         options.seed = seed;

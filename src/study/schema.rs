@@ -1,4 +1,4 @@
-//! Columns of the tables of a study; docs/formats.md lists them too.
+//! Columns of the tables of a study; also listed in docs/formats.md.
 
 use super::table::{ColumnType, StudyColumn, StudyTable};
 use crate::session::RELATIVE_LENGTHS_M;
@@ -42,7 +42,7 @@ const RUNS: &[Column] = &[
     ("truth_path", Text, "", "path of the ground-truth rig where it is not the log's own, likewise"),
     ("trajectory_path", Text, "", "file of the trajectory, likewise, or topic:/TOPIC in the log; empty for a run"),
     ("start_s", Number, "s", "start in the log"),
-    ("duration_s", Number, "s", "duration that was asked for; empty for the rest of the log"),
+    ("duration_s", Number, "s", "requested duration; empty for the rest of the log"),
     ("program", Text, "", "version and SHA-256 of the program"),
     ("initialized_at_s", Number, "s", "time of the first pose since the log began"),
     ("frames", Integer, "", "images passed to the estimator"),
@@ -65,7 +65,7 @@ const RUNS: &[Column] = &[
     ("ate_percent", Number, "%", "ate_rmse_m over length_m"),
 ];
 
-/// One row per run, behind the relative errors: consistency, calibration and times.
+/// One row per run, after the relative errors: consistency, calibration and times.
 const RUNS_REST: &[Column] = &[
     (
         "pose_nees",
@@ -186,7 +186,6 @@ fn table(columns: impl Iterator<Item = StudyColumn>) -> StudyTable {
     StudyTable::new(columns.collect()).expect("columns are empty and have different names")
 }
 
-/// An empty table of runs.
 pub fn runs_table() -> StudyTable {
     let relative = RELATIVE_LENGTHS_M.into_iter().flat_map(|length_m| {
         let [translation, rotation] = relative_error_columns(length_m);
@@ -199,12 +198,10 @@ pub fn runs_table() -> StudyTable {
     table(columns(RUNS).chain(relative).chain(columns(RUNS_REST)))
 }
 
-/// An empty table of parameters.
 pub fn parameters_table() -> StudyTable {
     table(columns(PARAMETERS))
 }
 
-/// An empty table of frames.
 pub fn frames_table() -> StudyTable {
     table(columns(FRAMES))
 }

@@ -9,15 +9,16 @@ pub struct MeanInterval {
     pub mean: f64,
     /// Lower end of the two-sided 95 % interval of the mean.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of that interval.
     pub high: f64,
 }
 
-/// Probability that a two-sided interval leaves out on each side.
+/// Probability beyond each end of a two-sided interval.
 const TAIL: f64 = 0.025;
 
 impl MeanInterval {
-    /// Student's t interval of the mean: differences are independent and, on average, normal. `None` with fewer than two.
+    /// Student's t interval of the mean, for independent differences with a normally distributed mean. `None` for fewer
+    /// than two.
     pub fn of(differences: &[f64]) -> Option<Self> {
         let pairs = differences.len();
         if pairs < 2 {
@@ -48,7 +49,7 @@ fn t_quantile(probability: f64, degrees: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Distribution function of Student's t at a value from 0 up.
+/// Distribution function of Student's t for values from 0.
 fn t_distribution(t: f64, degrees: f64) -> f64 {
     1.0 - 0.5 * incomplete_beta(degrees / (degrees + t * t), 0.5 * degrees, 0.5)
 }
@@ -71,14 +72,14 @@ fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
             -(a + k) * (a + b + k) * x / ((a + 2.0 * k) * (a + 2.0 * k + 1.0))
         }
     };
-    // From the inside out, with more terms than the parameters here need.
+    // Evaluated from the innermost term, with more terms than the parameters here need.
     let fraction = (1..=200).rev().fold(1.0, |inner, m| 1.0 + term(m) / inner);
     front / fraction
 }
 
 /// Natural logarithm of the gamma function of a positive number: Stirling's series after shifting the argument up.
 fn ln_gamma(x: f64) -> f64 {
-    /// Beyond it the series below is exact to rounding.
+    /// Argument from which the series below is exact to rounding.
     const LARGE: f64 = 16.0;
     let (mut large, mut shift) = (x, 0.0);
     while large < LARGE {

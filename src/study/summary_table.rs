@@ -1,4 +1,4 @@
-//! Tables of a study for people: runs in groups, statistics of their columns, values from elsewhere beside them.
+//! Markdown tables of a study: runs in groups, statistics of their columns, and reference values from other sources.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use super::table::ColumnType::{Integer, Number};
 use super::table::StudyTable;
 use crate::geometry::median;
 
-/// How the values of a group become one cell.
+/// Statistic that reduces the values of a group to one cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Statistic {
     /// Median (the upper one of an even count), with the lowest and the highest value.
@@ -15,9 +15,9 @@ pub enum Statistic {
     Median,
     /// Arithmetic mean, with the lowest and the highest value.
     Mean,
-    /// Sum.
     Sum,
-    /// Geometric mean of the ratios to the runs that [`SummaryTable::against`] names, with the lowest and the highest one.
+    /// Geometric mean of the ratios to the runs selected by [`SummaryTable::against`], with the lowest and the highest
+    /// one.
     Ratio,
 }
 
@@ -26,7 +26,6 @@ const STATISTICS: [(Statistic, &str); 4] =
     [(Statistic::Median, "median"), (Statistic::Mean, "mean"), (Statistic::Sum, "sum"), (Statistic::Ratio, "ratio")];
 
 impl Statistic {
-    /// The statistic of a name.
     pub(super) fn of_name(name: &str) -> Option<Self> {
         STATISTICS.iter().find(|(_, known)| *known == name).map(|(statistic, _)| *statistic)
     }
@@ -37,52 +36,49 @@ impl Statistic {
 pub struct SummaryColumn {
     /// Numeric column of the table of runs.
     pub column: String,
-    /// Its head.
+    /// Heading of the column.
     pub title: String,
-    /// How the values of a group become one cell.
     pub statistic: Statistic,
-    /// Factor on the values, for another unit.
+    /// Factor applied to the values, to convert their unit.
     pub factor: f64,
-    /// Digits behind the decimal point.
+    /// Digits after the decimal point.
     pub digits: usize,
 }
 
-/// A value from elsewhere, such as a publication, beside a group.
+/// A value from another source, such as a publication, for one group.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReferenceValue {
-    /// Head of its column.
+    /// Heading of its column.
     pub title: String,
-    /// The group: the values of [`SummaryTable::rows`].
+    /// Group to which it belongs: the values of [`SummaryTable::rows`].
     pub row: Vec<String>,
-    /// The value as text.
     pub value: String,
 }
 
-/// A table: one row for each group of runs.
+/// A table with one row for each group of runs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SummaryTable {
-    /// Its title.
     pub title: String,
     /// Columns of the table of runs by which runs are grouped.
     pub rows: Vec<String>,
-    /// Values of columns that a run must have to be counted.
+    /// Values of columns that a run must have to be included.
     pub only: BTreeMap<String, Vec<String>>,
-    /// Values of the columns that make a run the reference of those that are otherwise equal, for [`Statistic::Ratio`].
+    /// Column values that define the reference of each run, for [`Statistic::Ratio`]: the run with these values and
+    /// otherwise the same inputs.
     pub against: BTreeMap<String, String>,
-    /// The columns.
     pub columns: Vec<SummaryColumn>,
-    /// Values from elsewhere.
+    /// Reference values from other sources.
     pub references: Vec<ReferenceValue>,
 }
 
-/// The runs of a table with what ratios need.
+/// The runs of a table, indexed for ratios.
 struct Runs<'a> {
     table: &'a StudyTable,
     /// Row of each run with a result, by the columns that distinguish runs.
     places: BTreeMap<Vec<String>, usize>,
 }
 
-/// Columns by which a run is found: names instead of specifications, as a plan names its runs.
+/// Columns that identify a run: names instead of specifications, because plans refer to runs by name.
 fn identity_columns() -> impl Iterator<Item = &'static str> {
     PAIRING_COLUMNS.into_iter().map(|column| if column == "run" { "label" } else { column })
 }
@@ -95,7 +91,7 @@ impl<'a> Runs<'a> {
         Self { table, places: done.map(|row| (identity(row), row)).collect() }
     }
 
-    /// The run that differs from this one in these columns only.
+    /// Row of the run that differs from this one only in the columns of `against`.
     fn reference(&self, row: usize, against: &BTreeMap<String, String>) -> Option<usize> {
         let cell =
             |column: &str| against.get(column).cloned().unwrap_or_else(|| self.table.cell(row, column).to_string());
@@ -104,8 +100,8 @@ impl<'a> Runs<'a> {
 }
 
 impl SummaryTable {
-    /// The table as Markdown. Groups are in the order of their first run; runs without a result are counted and take no
-    /// part in the statistics.
+    /// The table as Markdown. Groups are in the order of their first run; runs without a result are counted but
+    /// excluded from the statistics.
     pub fn markdown(&self, runs: &StudyTable) -> String {
         let (groups, known) = (self.groups(runs), Runs::of(runs));
         let mut titles: Vec<&str> = Vec::new();
@@ -180,17 +176,17 @@ impl SummaryTable {
     }
 }
 
-/// A row of Markdown.
+/// Formats a row of a Markdown table.
 fn line(cells: &[String]) -> String {
     format!("| {} |", cells.join(" | "))
 }
 
-/// A text that ends no cell of Markdown.
+/// Replaces characters that would end a cell of a Markdown table.
 fn plain(text: &str) -> String {
     text.replace('|', "/").replace(['\n', '\r'], " ")
 }
 
-/// Whether a name is a column of the table of runs, and one of numbers if asked for.
+/// True if `name` is a column of the table of runs (with `numeric`: a numeric one).
 pub(super) fn is_run_column(name: &str, numeric: bool) -> bool {
     let table = runs_table();
     table.column(name).is_some_and(|column| !numeric || matches!(column.values.column_type(), Number | Integer))

@@ -1,6 +1,6 @@
 //! A table of a study: named columns of one type each, with unit and description, and rows of equal length.
 //!
-//! Every cell may be empty, so that a run that crashed is a row like any other. Numbers are finite or empty.
+//! Every cell may be empty, so that a run that crashed is an ordinary row. Numbers are finite or empty.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -8,7 +8,6 @@ use std::fmt;
 
 use thiserror::Error;
 
-/// Type of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ColumnType {
     /// 64-bit floating point.
@@ -17,12 +16,11 @@ pub enum ColumnType {
     Integer,
     /// UTF-8 text.
     Text,
-    /// True or false.
     Bool,
 }
 
 impl ColumnType {
-    /// Its name in messages and documents.
+    /// Name in messages and documents.
     pub fn name(self) -> &'static str {
         match self {
             Self::Number => "number",
@@ -33,23 +31,20 @@ impl ColumnType {
     }
 }
 
-/// One cell by value, for rows.
+/// One cell as a value.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
     /// No value, of any type.
     Empty,
-    /// A number; one that is not finite is stored as [`Cell::Empty`].
+    /// A number; a non-finite one is stored as [`Cell::Empty`].
     Number(f64),
-    /// An integer.
     Integer(i64),
-    /// A text.
     Text(String),
-    /// True or false.
     Bool(bool),
 }
 
 impl Cell {
-    /// Its type; `None` when it is empty.
+    /// `None` for an empty cell.
     pub fn column_type(&self) -> Option<ColumnType> {
         match self {
             Self::Empty => None,
@@ -85,7 +80,7 @@ impl Cell {
     }
 }
 
-/// The value as a program reads it, with all digits of a number; empty for an empty cell.
+/// The value in machine-readable form, with all digits of a number; empty for an empty cell.
 impl fmt::Display for Cell {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -145,16 +140,12 @@ impl<T: Into<Self>> From<Option<T>> for Cell {
 pub enum ColumnValues {
     /// Finite numbers.
     Number(Vec<Option<f64>>),
-    /// Integers.
     Integer(Vec<Option<i64>>),
-    /// Texts.
     Text(Vec<Option<String>>),
-    /// True or false.
     Bool(Vec<Option<bool>>),
 }
 
 impl ColumnValues {
-    /// An empty column.
     pub fn new(column_type: ColumnType) -> Self {
         match column_type {
             ColumnType::Number => Self::Number(Vec::new()),
@@ -164,7 +155,6 @@ impl ColumnValues {
         }
     }
 
-    /// Its type.
     pub fn column_type(&self) -> ColumnType {
         match self {
             Self::Number(_) => ColumnType::Number,
@@ -174,7 +164,6 @@ impl ColumnValues {
         }
     }
 
-    /// Number of rows.
     pub fn len(&self) -> usize {
         match self {
             Self::Number(values) => values.len(),
@@ -184,7 +173,6 @@ impl ColumnValues {
         }
     }
 
-    /// Whether there is no row.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -199,11 +187,11 @@ impl ColumnValues {
         }
     }
 
-    /// Appends a cell; `false` when it has another type, and then the column is as before.
+    /// Appends a cell; returns `false` and leaves the column unchanged if the type differs.
     fn push(&mut self, cell: Cell) -> bool {
         match (self, cell) {
             (Self::Number(values), Cell::Number(number)) => values.push(Some(number).filter(|it| it.is_finite())),
-            // A program that writes 1 for 1.0 means the number.
+            // Some programs write 1 for 1.0.
             (Self::Number(values), Cell::Integer(integer)) => values.push(Some(integer as f64)),
             (Self::Number(values), Cell::Empty) => values.push(None),
             (Self::Integer(values), Cell::Integer(integer)) => values.push(Some(integer)),
@@ -218,21 +206,20 @@ impl ColumnValues {
     }
 }
 
-/// Name, unit and meaning of a column, with its values.
+/// A column: name, unit, description and values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StudyColumn {
-    /// Name, unique in its table: lower case, with the unit at its end where there is one (`ate_rmse_m`).
+    /// Name, unique in its table: lower case, ending with the unit if there is one (`ate_rmse_m`).
     pub name: String,
     /// Unit, empty for numbers without one and for text.
     pub unit: String,
-    /// One line that says what a cell holds.
+    /// Meaning of a cell in one line.
     pub description: String,
     /// One value per row.
     pub values: ColumnValues,
 }
 
 impl StudyColumn {
-    /// An empty column.
     pub fn new(name: &str, column_type: ColumnType, unit: &str, description: &str) -> Self {
         Self {
             name: name.to_owned(),
@@ -243,35 +230,27 @@ impl StudyColumn {
     }
 }
 
-/// The reason why rows or columns do not fit into a table.
+/// Reason why rows or columns do not fit into a table.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum TableError {
-    /// Two columns of one name.
+    /// Two columns have the same name.
     #[error("two columns are named '{name}'")]
-    TwoColumns {
-        /// The name.
-        name: String,
-    },
-    /// A column with another number of rows than the first one.
+    TwoColumns { name: String },
+    /// A column has another number of rows than the first one.
     #[error("column '{name}' has {found} rows, the first column {expected}")]
     UnequalLength {
-        /// Name of the column.
         name: String,
-        /// Its number of rows.
+        /// Number of rows of this column.
         found: usize,
-        /// That of the first column.
+        /// Number of rows of the first column.
         expected: usize,
     },
     /// A value for a column that does not exist.
     #[error("there is no column '{name}'")]
-    NoColumn {
-        /// The name.
-        name: String,
-    },
+    NoColumn { name: String },
     /// A value of another type than its column.
     #[error("column '{name}' holds {expected}, not {found}")]
     WrongType {
-        /// Name of the column.
         name: String,
         /// Type of the column.
         expected: &'static str,
@@ -284,16 +263,16 @@ pub enum TableError {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StudyTable {
     columns: Vec<StudyColumn>,
-    /// Place of each column by its name.
+    /// Index of each column by its name.
     places: BTreeMap<String, usize>,
     rows: usize,
 }
 
 impl StudyTable {
-    /// A table of columns that are filled already, or all empty.
+    /// A table from columns of equal length.
     ///
     /// # Errors
-    /// For two columns of one name, and for columns of different lengths.
+    /// If two columns have the same name, or columns have different lengths.
     pub fn new(columns: Vec<StudyColumn>) -> Result<Self, TableError> {
         let rows = columns.first().map_or(0, |column| column.values.len());
         let mut places = BTreeMap::new();
@@ -309,32 +288,28 @@ impl StudyTable {
         Ok(Self { columns, places, rows })
     }
 
-    /// The columns in order.
     pub fn columns(&self) -> &[StudyColumn] {
         &self.columns
     }
 
-    /// Number of rows.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Whether there is no row.
     pub fn is_empty(&self) -> bool {
         self.rows == 0
     }
 
-    /// Place of a column in [`Self::columns`].
+    /// Index of a column in [`Self::columns`].
     pub fn place(&self, name: &str) -> Option<usize> {
         self.places.get(name).copied()
     }
 
-    /// The column of a name.
     pub fn column(&self, name: &str) -> Option<&StudyColumn> {
         self.columns.get(self.place(name)?)
     }
 
-    /// A cell; empty when there is no such row or column.
+    /// A cell; empty if there is no such row or column.
     pub fn cell(&self, row: usize, column: &str) -> Cell {
         self.column(column).map_or(Cell::Empty, |column| column.values.cell(row))
     }
@@ -349,7 +324,7 @@ impl StudyTable {
         }
     }
 
-    /// A cell of a text column.
+    /// A cell of a text column, `None` if it is empty or the column has another type.
     pub fn text(&self, row: usize, column: &str) -> Option<&str> {
         match &self.column(column)?.values {
             ColumnValues::Text(values) => values.get(row)?.as_deref(),
@@ -357,7 +332,7 @@ impl StudyTable {
         }
     }
 
-    /// A cell of an integer column.
+    /// A cell of an integer column, `None` if it is empty or the column has another type.
     pub fn integer(&self, row: usize, column: &str) -> Option<i64> {
         match &self.column(column)?.values {
             ColumnValues::Integer(values) => values.get(row).copied().flatten(),
@@ -365,7 +340,7 @@ impl StudyTable {
         }
     }
 
-    /// A cell of a column of true and false.
+    /// A cell of a Boolean column, `None` if it is empty or the column has another type.
     pub fn boolean(&self, row: usize, column: &str) -> Option<bool> {
         match &self.column(column)?.values {
             ColumnValues::Bool(values) => values.get(row).copied().flatten(),
@@ -378,10 +353,10 @@ impl StudyTable {
         self.columns.iter().map(move |column| column.values.cell(row))
     }
 
-    /// Appends a row of named cells; columns that are not named get an empty cell.
+    /// Appends a row of named cells; other columns get an empty cell.
     ///
     /// # Errors
-    /// For an unknown column, or a value of another type than its column; the table is then as before.
+    /// For an unknown column, or a value of another type than its column; the table is then unchanged.
     pub fn push<'a>(&mut self, cells: impl IntoIterator<Item = (&'a str, Cell)>) -> Result<(), TableError> {
         let mut row: BTreeMap<usize, Cell> = BTreeMap::new();
         for (name, cell) in cells {
@@ -404,10 +379,11 @@ impl StudyTable {
         Ok(())
     }
 
-    /// Appends the rows of another table: columns are found by name, a column that one of the two lacks is empty there.
+    /// Appends the rows of another table. Columns are matched by name; a column missing in one of the tables is empty
+    /// there.
     ///
     /// # Errors
-    /// When a column has another type in the other table; this table is then as before.
+    /// If a column has another type in the other table; this table is then unchanged.
     pub fn append(&mut self, other: &Self) -> Result<(), TableError> {
         for column in &other.columns {
             let (found, expected) = (column.values.column_type(), self.column(&column.name));
@@ -436,7 +412,7 @@ impl StudyTable {
         Ok(())
     }
 
-    /// The rows of these numbers in this order, with all columns; numbers beyond the end give empty rows.
+    /// The rows with these indices in this order, with all columns; indices beyond the end give empty rows.
     #[must_use]
     pub fn select(&self, rows: &[usize]) -> Self {
         let select = |column: &StudyColumn| {
@@ -449,7 +425,7 @@ impl StudyTable {
         Self { columns: self.columns.iter().map(select).collect(), places: self.places.clone(), rows: rows.len() }
     }
 
-    /// Row numbers in the order of these columns' values, ascending, empty cells last; equal rows keep their order.
+    /// Row indices sorted by the values of these columns, ascending, empty cells last; equal rows keep their order.
     pub fn sorted_by(&self, columns: &[&str]) -> Vec<usize> {
         let mut rows: Vec<usize> = (0..self.rows).collect();
         let columns: Vec<&ColumnValues> =
@@ -461,7 +437,7 @@ impl StudyTable {
         rows
     }
 
-    /// Row numbers by the text of a column's cell, in the order of the texts; an empty cell is an empty text.
+    /// Row indices by the text of a column's cell, in the order of the texts; an empty cell is an empty text.
     pub fn groups(&self, column: &str) -> BTreeMap<String, Vec<usize>> {
         let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for row in 0..self.rows {

@@ -93,5 +93,5 @@ fn refusals_say_what_to_do() {
     check(&["--to", "orb-slam3", "--camera", "cam0", "--camera", "cam1"], 1, "ORB-SLAM3 takes one camera");
     check(&["--to", "rovio"], 2, "possible values: kalibr, vins-fusion, openvins, basalt, orb-slam3");
     std::fs::write(folder.path().join("basalt_calib.json"), "{}").unwrap();
-    check(&["--to", "basalt"], 1, "the file exists and is none that 'dcvins export' wrote; give --force");
+    check(&["--to", "basalt"], 1, "the file exists and was not written by 'dcvins export'; give --force");
 }

@@ -88,8 +88,8 @@ fn outputs_that_cannot_be_written_are_noticed_before_the_work() {
     check(&["report", "garden.mcap", "-o", "garden.mcap/x"], &["'garden.mcap' is a file, not a folder"]);
     check(&["simulate", "T1", "-o", "."], &["it is a folder"]);
     check(&["simulate", "T1", "-o", "none/x.mcap"], &["its folder 'none' does not exist"]);
-    check(&["simulate", "T1", "-o", "garden.rig.yaml"], &["is no simulated log", "--force"]);
-    check(&["convert", "garden.mcap", "-o", "garden.truth.yaml"], &["no log that 'dcvins convert' wrote", "--force"]);
+    check(&["simulate", "T1", "-o", "garden.rig.yaml"], &["is not a simulated log", "--force"]);
+    check(&["convert", "garden.mcap", "-o", "garden.truth.yaml"], &["was not written by 'dcvins convert'", "--force"]);
     check(&["run", "garden.mcap", "--out", "out", "--start", "100"], &["--start 100 s is after the end", "8.500 s"]);
     assert_eq!(names(folder.path()), ["garden.mcap", "garden.rig.yaml", "garden.truth.yaml"]);
 }

@@ -8,7 +8,7 @@ use dcvins::export::OpenedStudy;
 use dcvins::export::study::read_parquet;
 use dcvins::flight_log::FlightLog;
 use dcvins::gui::app::StudySource;
-use dcvins::study::view::rows_beside;
+use dcvins::study::view::comparable_rows;
 use serde_json::Value;
 
 use crate::sample_folder;
@@ -112,7 +112,7 @@ fn a_sweep_evaluates_trajectories_beside_its_runs() {
     assert_eq!(table.text(4, "trajectory_path"), Some("topic:/ground_truth/odometry"));
     // The row of a trajectory opens the run on the same log, with both trajectories.
     let study = OpenedStudy::read(&folder.path().join("study")).unwrap();
-    let rows = rows_beside(&study.study().runs, 3, 4);
+    let rows = comparable_rows(&study.study().runs, 3, 4);
     assert_eq!(rows, [3, 0, 4]);
     let opened = StudySource::open_runs(&study, &rows).unwrap();
     let recording = opened.recording();
@@ -201,5 +201,5 @@ fn positions_of_an_antenna_are_ground_truth() {
     let out = at("refused");
     let refused = ["run", &log, "--out", &out, "--truth-trajectory", &poses_file, "--lever-arm", "estimate"];
     let (code, text) = dcvins(&refused);
-    assert!(code == 1 && text.contains("it has attitudes, and a lever arm belongs to positions"), "{text}");
+    assert!(code == 1 && text.contains("it has attitudes, but a lever arm applies only to positions"), "{text}");
 }

@@ -1,4 +1,4 @@
-//! `--dry-run`: the jobs of a plan, and what they will take.
+//! `--dry-run`: the jobs of a plan, and their expected time and memory.
 
 use std::collections::BTreeMap;
 
@@ -12,10 +12,9 @@ use crate::cli::exit::Outcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{notify, print, print_json};
 
-/// Characters of a key that a list shows.
+/// Number of characters of a key in a list.
 const SHOWN_KEY: usize = 12;
 
-/// One job in the list.
 #[derive(Debug, Serialize)]
 struct ListedJob {
     key: String,
@@ -23,31 +22,30 @@ struct ListedJob {
     done: bool,
 }
 
-/// What the jobs will take.
+/// Expected cost of the jobs.
 #[derive(Debug, Serialize)]
 struct Estimate {
-    /// Jobs that are not done.
+    /// Number of jobs that are not done.
     jobs: usize,
-    /// Flights that are not rendered.
+    /// Number of flights that are not rendered.
     flights: usize,
-    /// Jobs at a time.
+    /// Number of jobs that run at the same time.
     at_once: usize,
     /// Wall time in seconds.
     wall_s: f64,
-    /// Largest memory of a job that was measured.
+    /// Largest measured memory of a job, in bytes.
     memory_per_job_bytes: u64,
-    /// Jobs from which it is estimated.
+    /// Number of jobs on which the estimate is based.
     measured_jobs: usize,
 }
 
-/// The output of `--dry-run --json`.
 #[derive(Debug, Serialize)]
 struct DryRun {
     jobs: Vec<ListedJob>,
     estimate: Estimate,
 }
 
-/// What the jobs that are done have taken.
+/// Measured cost of the jobs that are done.
 #[derive(Clone, Copy, Debug, Default)]
 struct Measured {
     jobs: usize,
@@ -60,12 +58,12 @@ struct Measured {
     rendered_log_s: f64,
 }
 
-/// Lists the jobs; where none is done yet the first one runs, so that there is something to estimate from.
+/// Lists the jobs with an estimate of their cost; if none is done yet, the first one is run for the estimate.
 pub(super) fn dry_run(sweep: &Sweep, limits: &PoolLimits, interrupt: &Interrupt, json: bool) -> Result<Outcome> {
     let mut measured = measure(sweep)?;
     if measured.jobs == 0 {
         let Some(first) = sweep.jobs.first() else { bail!("the plan has no jobs") };
-        notify(&format!("dcvins: runs the first job to estimate the others: {}", first.job.describe()));
+        notify(&format!("dcvins: running the first job to estimate the others: {}", first.job.describe()));
         let one = PoolLimits { jobs: 1, processors: (limits.processors / limits.jobs).max(1), ..*limits };
         let first = std::slice::from_ref(first);
         let outcome = Pool::new(&sweep.folder, &sweep.plan, &sweep.program, first, one).run(interrupt)?;
@@ -108,7 +106,7 @@ pub(super) fn dry_run(sweep: &Sweep, limits: &PoolLimits, interrupt: &Interrupt,
     Ok(Outcome::Success)
 }
 
-/// Reads what has been measured.
+/// Reads the measured cost of the jobs.
 fn measure(sweep: &Sweep) -> Result<Measured> {
     let mut measured = Measured::default();
     let mut flights = BTreeMap::new();
@@ -116,7 +114,7 @@ fn measure(sweep: &Sweep) -> Result<Measured> {
         if let JobLog::Simulated(flight) = &job.job.log {
             flights.insert(flight.id(), flight);
         }
-        // Trajectories of other programs are read in no time.
+        // Reading trajectories of other programs takes negligible time.
         if job.job.subject.run().is_none() {
             continue;
         }
@@ -137,7 +135,7 @@ fn measure(sweep: &Sweep) -> Result<Measured> {
     Ok(measured)
 }
 
-/// Seconds of log of a job; 0 while they are not known.
+/// Seconds of log of a job; 0 while they are unknown.
 fn log_s(sweep: &Sweep, job: &KeyedJob) -> f64 {
     let of_flight = || match &job.job.log {
         JobLog::Simulated(flight) => sweep.folder.rendered(flight).map(|rendered| rendered.duration_s),
@@ -146,7 +144,7 @@ fn log_s(sweep: &Sweep, job: &KeyedJob) -> f64 {
     job.job.log.duration_s().or_else(of_flight).unwrap_or(0.0)
 }
 
-/// Time by the seconds of log where they are known, else by the number of jobs.
+/// Estimates the time from the seconds of log if they are known, else from the number of jobs.
 fn estimate(sweep: &Sweep, limits: &PoolLimits, measured: &Measured) -> Estimate {
     let left: Vec<&KeyedJob> = sweep.jobs.iter().filter(|job| !sweep.folder.is_done(&job.key, &sweep.plan)).collect();
     let mut flights = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! The hidden command of one job, which `sweep` starts as a child process.
+//! The hidden command for one job, which `sweep` starts as a child process.
 
 use std::io::{self, Read as _};
 use std::ops::ControlFlow;
@@ -11,7 +11,6 @@ use dcvins::study::{SimulatedFlight, StudyOutput};
 
 use crate::cli::exit::{INTERRUPTED, Outcome};
 
-/// `dcvins sweep-job`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct SweepJobArguments {
     /// Folder of the study.
@@ -36,7 +35,6 @@ pub(crate) struct SweepJobArguments {
     pub files: bool,
 }
 
-/// Runs `dcvins sweep-job`.
 pub(crate) fn sweep_job(arguments: &SweepJobArguments) -> Result<Outcome> {
     end_with_parent()?;
     let folder = StudyFolder::open(&arguments.folder)?;
@@ -54,7 +52,7 @@ pub(crate) fn sweep_job(arguments: &SweepJobArguments) -> Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Ends this process when its standard input closes: when the process that has started it is gone, also if that was killed.
+/// Ends this process when its standard input closes, which happens when the parent process ends, even if it is killed.
 fn end_with_parent() -> Result<()> {
     #[expect(clippy::exit, reason = "nobody is left to whom an outcome could be returned")]
     let wait = || {

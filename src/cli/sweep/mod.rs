@@ -23,40 +23,39 @@ pub(crate) use job::{SweepJobArguments, sweep_job};
 use pool::{Pool, PoolLimits, PoolOutcome};
 use tolerance::Tolerance;
 
-/// Part of the available memory that jobs may take by default.
+/// Fraction of the available memory that jobs may use by default.
 const MEMORY_PART: f64 = 0.8;
 
-/// `dcvins sweep`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct SweepArguments {
     /// The plan: logs, runs, perturbations, disturbances and seeds; docs/commands.md describes it.
     #[arg(value_name = "PLAN.toml")]
     pub plan: PathBuf,
-    /// Folder of the study; a study that is there already is resumed.
+    /// Folder of the study; an existing study is resumed.
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: PathBuf,
     /// List the jobs and estimate time and memory, from jobs that are done or from the first one.
     #[arg(long)]
     pub dry_run: bool,
-    /// Jobs at a time [default: the processors of this machine].
+    /// Number of jobs at a time [default: the processors of this machine].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
-    /// Memory that the jobs may take together [default: 80 % of the available memory].
+    /// Memory in GiB for all jobs together [default: 80 % of the available memory].
     #[arg(long, value_name = "GIB", value_parser = positive)]
     pub memory: Option<f64>,
-    /// Run again what has failed in an earlier sweep.
+    /// Run jobs again that failed in an earlier sweep.
     #[arg(long)]
     pub retry_failed: bool,
     /// Run only part I of N (1 to N) of the jobs and write no tables, for other engines.
     #[arg(long, value_name = "I/N", value_parser = shard, conflicts_with_all = ["dry_run", "collect", "slurm", "baseline"])]
     pub shard: Option<(usize, usize)>,
-    /// Run nothing; write the tables of the jobs that are done.
+    /// Run no jobs; write the tables of the jobs that are done.
     #[arg(long, conflicts_with_all = ["dry_run", "slurm"])]
     pub collect: bool,
     /// Run the jobs as an array of the cluster manager Slurm, wait for it and write the tables.
     #[arg(long, conflicts_with = "dry_run")]
     pub slurm: bool,
-    /// Compare with the results.parquet of an earlier study; exit code 1 when a metric got worse.
+    /// Compare with the results.parquet of an earlier study; exit code 1 if a metric got worse.
     #[arg(long, value_name = "OLD.parquet", conflicts_with = "dry_run")]
     pub baseline: Option<PathBuf>,
     /// Allowed relative change of a column of the table of runs, or of "success"; may be given several times
@@ -93,26 +92,25 @@ struct Sweep {
     jobs: Vec<KeyedJob>,
 }
 
-/// The result of a sweep, for `--json`.
+/// Result of a sweep, for `--json`.
 #[derive(Debug, Serialize)]
 struct SweepReport {
     study: String,
     folder: PathBuf,
     jobs: usize,
-    /// Done before this sweep.
+    /// Number of jobs done before this sweep.
     skipped: usize,
-    /// Done by this sweep.
+    /// Number of jobs done by this sweep.
     done: usize,
-    /// Without a result, of all rows.
+    /// Number of rows without a result.
     failed: usize,
-    /// Not run yet.
+    /// Number of jobs that have not run yet.
     missing: usize,
     files: Vec<PathBuf>,
     #[serde(skip_serializing_if = "Option::is_none")]
     comparison: Option<study::StudyComparison>,
 }
 
-/// Runs `dcvins sweep`.
 pub(crate) fn sweep(arguments: &SweepArguments) -> Result<Outcome> {
     let interrupt = Interrupt::watch()?;
     let baseline = arguments.baseline.as_deref().map(read_parquet).transpose()?;
@@ -138,7 +136,7 @@ pub(crate) fn sweep(arguments: &SweepArguments) -> Result<Outcome> {
         let outcome = run_jobs(&sweep, arguments, &interrupt, &mut report)?;
         if outcome.interrupted {
             let command = format!("dcvins sweep {} -o {}", arguments.plan.display(), arguments.out.display());
-            notify(&format!("dcvins: interrupted; what is done stays, go on with '{command}'"));
+            notify(&format!("dcvins: interrupted; finished jobs are kept, resume with '{command}'"));
             return Ok(Outcome::Interrupted);
         }
         if arguments.shard.is_some() {
@@ -162,7 +160,6 @@ fn open(arguments: &SweepArguments) -> Result<Sweep> {
     Ok(Sweep { plan, folder, program, jobs })
 }
 
-/// Removes the rows of jobs that have no result.
 fn forget_failed(sweep: &Sweep) -> Result<()> {
     for job in &sweep.jobs {
         let row = sweep.folder.run_of(&job.key)?;
@@ -199,14 +196,14 @@ fn run_jobs(
     Ok(outcome)
 }
 
-/// The bounds of the pool on this machine.
+/// Limits of the pool on this machine.
 fn limits(arguments: &SweepArguments) -> PoolLimits {
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let memory_bytes = arguments.memory.map_or_else(available_memory, |gib| (gib * f64::from(1 << 30)) as u64);
     PoolLimits { jobs: arguments.jobs.map_or(processors, usize::from), processors, memory_bytes }
 }
 
-/// Part of the memory that the system has available, or no bound where it does not say.
+/// Fraction [`MEMORY_PART`] of the system's available memory in bytes, unlimited if it is unknown.
 fn available_memory() -> u64 {
     let available = || -> Option<u64> {
         let text = std::fs::read_to_string("/proc/meminfo").ok()?;
@@ -252,7 +249,7 @@ fn finish(
         }
     }
     if missing > 0 {
-        bail!("{missing} of {} jobs are not done; the tables hold the others", sweep.jobs.len());
+        bail!("{missing} of {} jobs are not done; the tables contain the others", sweep.jobs.len());
     }
     Ok(if report.failed > 0 { Outcome::JobsFailed } else { Outcome::Success })
 }
@@ -261,7 +258,7 @@ fn baseline_name(arguments: &SweepArguments) -> String {
     arguments.baseline.as_deref().map_or_else(String::new, |path| path.display().to_string())
 }
 
-/// Rows of jobs without a result.
+/// Number of jobs without a result.
 fn failed_rows(runs: &StudyTable) -> usize {
     let failed = |row: &usize| !matches!(runs.text(*row, "status"), Some("ok" | "not-initialized"));
     (0..runs.rows()).filter(failed).count()

@@ -1,4 +1,4 @@
-//! The local engine: jobs as child processes, bounded by processors and memory.
+//! The local engine: jobs as child processes, limited by processors and memory.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::File;
@@ -14,47 +14,46 @@ use dcvins::study::{JobLog, KeyedJob, SimulatedFlight, StudyPlan};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::Progress;
 
-/// Times that a job is started before it is given up.
+/// Number of times that a job is started before it is given up.
 const MAX_ATTEMPTS: usize = 2;
-/// Time between two looks at the children.
+/// Period of checking the children.
 const POLL: Duration = Duration::from_millis(20);
-/// Lines of standard error that the row of a failed job keeps.
+/// Number of lines of standard error in the row of a failed job.
 const KEPT_LINES: usize = 8;
-/// Bytes of standard error that are read for them.
+/// Number of bytes at the end of standard error that are read for these lines.
 const KEPT_BYTES: usize = 4096;
 
-/// Bounds of the pool.
+/// Limits of the pool.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PoolLimits {
-    /// Jobs at a time.
+    /// Number of jobs at a time.
     pub(super) jobs: usize,
-    /// Processors that the jobs share.
+    /// Number of processors for all jobs together.
     pub(super) processors: usize,
-    /// Memory that the jobs may take together, in bytes.
+    /// Memory for all jobs together, in bytes.
     pub(super) memory_bytes: u64,
 }
 
-/// How the jobs of a pool ended.
+/// Numbers of jobs of a pool by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct PoolOutcome {
-    /// Jobs that have run to their end.
+    /// Number of finished jobs.
     pub(super) done: usize,
-    /// Jobs without a result.
+    /// Number of jobs without a result.
     pub(super) failed: usize,
-    /// Whether the pool was interrupted.
+    /// True if the pool was interrupted.
     pub(super) interrupted: bool,
 }
 
-/// Work of one child process.
+/// Task of one child process.
 #[derive(Clone, Debug)]
 enum Task {
     /// Rendering of a flight.
     Flight(Box<SimulatedFlight>),
-    /// A job, by its place among the jobs of the pool.
+    /// A job, by its index among the jobs of the pool.
     Job(usize),
 }
 
-/// A child process and its task.
 struct Running {
     child: Child,
     task: Task,
@@ -63,23 +62,23 @@ struct Running {
     memory_bytes: u64,
 }
 
-/// The pool: what is to be done, and what is being done.
+/// The pool: waiting and running tasks.
 pub(super) struct Pool<'a> {
     folder: &'a StudyFolder,
     plan: &'a StudyPlan,
     program: &'a str,
     jobs: &'a [KeyedJob],
     limits: PoolLimits,
-    /// Jobs that wait, with the number of their next attempt.
+    /// Waiting jobs, with the number of their next attempt.
     waiting: VecDeque<(usize, usize)>,
     running: Vec<Running>,
-    /// Flights of the jobs by their ids.
+    /// Flight id of each job, `None` for recorded logs.
     flight_ids: Vec<Option<String>>,
-    /// Attempts at flights by their id.
+    /// Number of attempts to render a flight, by its id.
     flight_attempts: BTreeMap<String, usize>,
-    /// Why flights could not be rendered, by their id.
+    /// Reasons why flights could not be rendered, by their id.
     failed_flights: BTreeMap<String, (JobStatus, String)>,
-    /// Flights that are known to be rendered.
+    /// Ids of flights that are known to be rendered.
     rendered: BTreeSet<String>,
     /// Largest measured memory of a job by the name of its log.
     peaks: BTreeMap<String, u64>,
@@ -87,7 +86,6 @@ pub(super) struct Pool<'a> {
 }
 
 impl<'a> Pool<'a> {
-    /// A pool for these jobs.
     pub(super) fn new(
         folder: &'a StudyFolder,
         plan: &'a StudyPlan,
@@ -112,12 +110,12 @@ impl<'a> Pool<'a> {
         }
     }
 
-    /// Runs all jobs. The first interrupt ends the children; what they have not finished runs in the next sweep.
+    /// Runs all jobs. The first interrupt ends the children; their unfinished jobs run in the next sweep.
     pub(super) fn run(mut self, interrupt: &Interrupt) -> Result<PoolOutcome> {
         let (progress, clock) = (Progress::new(), Stopwatch::start());
         let run = self.run_all(interrupt, &progress, &clock);
         for running in &mut self.running {
-            // A child that has just ended cannot be killed, and need not be.
+            // Killing a child that has just ended fails, which is harmless.
             drop(running.child.kill());
             drop(running.child.wait());
         }
@@ -144,7 +142,7 @@ impl<'a> Pool<'a> {
         Ok(())
     }
 
-    /// Jobs and the time that is left, on the terminal.
+    /// Shows the number of finished jobs and the remaining time on the terminal.
     fn show(&self, progress: &Progress, clock: &Stopwatch) {
         let PoolOutcome { done, failed, .. } = self.outcome;
         let (ended, all) = (done + failed, self.jobs.len());
@@ -160,7 +158,7 @@ impl<'a> Pool<'a> {
         });
     }
 
-    /// Starts one more child if there is something to do and memory for it.
+    /// Starts one more child if there is a waiting task and enough memory for it.
     fn start_next(&mut self) -> Result<bool> {
         let mut place = 0;
         let mut in_work: BTreeSet<String> = BTreeSet::new();
@@ -208,19 +206,20 @@ impl<'a> Pool<'a> {
         rendered
     }
 
-    /// Memory that a job will take: the most that one on the same log has taken, else on any log, else as planned.
+    /// Expected memory of a job: the maximum of earlier jobs on the same log, else on any log, else the value of the
+    /// plan.
     fn expected_memory(&self, job: usize) -> u64 {
         let known = self.peaks.get(self.jobs[job].job.log.name()).or_else(|| self.peaks.values().max());
         known.copied().unwrap_or(self.plan.limits.memory_bytes)
     }
 
-    /// Whether there is memory for one more child; the first one always runs.
+    /// True if there is memory for one more child; the first one always runs.
     fn fits(&self, memory_bytes: u64) -> bool {
         let taken: u64 = self.running.iter().map(|running| running.memory_bytes).sum();
         self.running.is_empty() || taken.saturating_add(memory_bytes) <= self.limits.memory_bytes
     }
 
-    /// Threads of one child, so that the children fill the processors.
+    /// Number of threads of one child, so that the children use all processors.
     fn threads(&self) -> usize {
         let at_once = self.limits.jobs.min(self.waiting.len() + self.running.len() + 1);
         (self.limits.processors / at_once.max(1)).max(1)
@@ -255,14 +254,14 @@ impl<'a> Pool<'a> {
         self.spawn(command, Task::Job(job), attempt, memory_bytes)
     }
 
-    /// The program itself with the hidden command for one task.
+    /// Command line of the program itself with the hidden command for one task.
     fn command(&self, stderr: &Path) -> Result<Command> {
         let program = std::env::current_exe().context("cannot find the program's own file")?;
         let stderr = File::create(stderr).with_context(|| format!("cannot write: {}", stderr.display()))?;
         let mut command = Command::new(program);
         command.arg("sweep-job").arg(self.folder.root()).args(["--program", self.program]);
         command.env("RAYON_NUM_THREADS", self.threads().to_string());
-        // A child ends when its standard input closes, and so with this process, however that ends.
+        // A child ends when its standard input closes, so it ends with this process, however that ends.
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(stderr);
         Ok(command)
     }
@@ -273,13 +272,13 @@ impl<'a> Pool<'a> {
         Ok(())
     }
 
-    /// Takes the results of children that have ended, and ends those that take too long.
+    /// Collects the results of children that have ended, and kills those that exceed the time limit.
     fn finish_ended(&mut self, interrupt: &Interrupt) -> Result<()> {
         let mut place = 0;
         while place < self.running.len() {
             let running = &mut self.running[place];
             let elapsed_s = running.started.elapsed_ms() * 1e-3;
-            // A flight may be awaited that another process renders.
+            // A flight may be waiting for another process that renders it.
             let limited = matches!(running.task, Task::Job(_));
             let timeout = limited && elapsed_s > self.plan.limits.timeout_s;
             if timeout {
@@ -337,7 +336,7 @@ impl<'a> Pool<'a> {
         Ok(())
     }
 
-    /// Learns the memory of a run from its row; a trajectory of another program says nothing about those of its log.
+    /// Updates the peak memory of a log from the row of a run; a trajectory of another program is no measure for runs.
     fn measure(&mut self, job: usize) -> Result<()> {
         let keyed = &self.jobs[job];
         if keyed.job.subject.run().is_none() {
@@ -364,7 +363,6 @@ impl<'a> Pool<'a> {
     }
 }
 
-/// The simulated flight of a job.
 fn flight_of(job: &KeyedJob) -> Option<&SimulatedFlight> {
     match &job.job.log {
         JobLog::Simulated(flight) => Some(flight),
@@ -372,7 +370,7 @@ fn flight_of(job: &KeyedJob) -> Option<&SimulatedFlight> {
     }
 }
 
-/// How a child failed; `None` for success.
+/// Failure of a child; `None` for success.
 fn failure_of(status: ExitStatus) -> Option<JobStatus> {
     /// Exit code of a Rust program after a panic.
     const PANIC: i32 = 101;
@@ -397,7 +395,7 @@ fn ended_by_signal(_status: ExitStatus) -> JobStatus {
     JobStatus::Killed
 }
 
-/// The last lines of a file in one text; empty when there is none.
+/// Last lines of a file as one text; empty if there are none.
 pub(super) fn last_lines(path: &Path) -> String {
     let Ok(bytes) = std::fs::read(path) else { return String::new() };
     let end = String::from_utf8_lossy(&bytes[bytes.len().saturating_sub(KEPT_BYTES)..]).into_owned();
@@ -405,7 +403,7 @@ pub(super) fn last_lines(path: &Path) -> String {
     lines[lines.len().saturating_sub(KEPT_LINES)..].join("\n")
 }
 
-/// A duration for people: `50 s`, `12 min`, `3 h 20 min`.
+/// A duration as text: `50 s`, `12 min`, `3 h 20 min`.
 pub(super) fn duration_text(duration_s: f64) -> String {
     let (minutes, seconds) = ((duration_s / 60.0).round() as u64, duration_s.round() as u64);
     match (seconds, minutes) {

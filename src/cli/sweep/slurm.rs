@@ -1,4 +1,4 @@
-//! The engine of a cluster: an array job of Slurm, one task per shard of the jobs.
+//! The cluster engine: a Slurm array job, one task per shard of the jobs.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -15,16 +15,16 @@ use crate::cli::exit::JOBS_FAILED;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{Progress, notify};
 
-/// Times that the array is submitted: again for tasks that were killed as a whole.
+/// Maximum number of submissions of the array: again for tasks that were killed as a whole.
 const SUBMISSIONS: usize = 2;
-/// Time between two questions to the controller.
+/// Period of queries to the controller.
 const POLL: Duration = Duration::from_secs(2);
-/// Part of [`POLL`] after which an interrupt is noticed.
+/// Period of checks for an interrupt within [`POLL`].
 const INTERRUPT_POLL: Duration = Duration::from_millis(100);
-/// Questions without an answer after which the controller counts as gone.
+/// Number of unanswered queries after which the controller counts as unreachable.
 const UNANSWERED: usize = 60;
 
-/// Submits the array, waits for it and for a second one of the tasks that left jobs undone.
+/// Submits the array and waits for it; submits a second array of the tasks that left jobs undone.
 pub(super) fn run(
     sweep: &Sweep,
     arguments: &SweepArguments,
@@ -73,7 +73,7 @@ fn groups(jobs: &[KeyedJob]) -> usize {
     alone.count()
 }
 
-/// Tasks of the array that have jobs to do, with these jobs.
+/// Tasks of the array that still have jobs, with these jobs.
 fn undone_by_task(sweep: &Sweep, tasks: usize) -> Vec<(usize, Vec<KeyedJob>)> {
     let undone = |task: usize| {
         let mut jobs = study::shard(sweep.jobs.clone(), task, tasks);
@@ -87,12 +87,12 @@ fn tasks_of_undone(sweep: &Sweep, tasks: usize) -> Vec<usize> {
     undone_by_task(sweep, tasks).into_iter().map(|(task, _)| task).collect()
 }
 
-/// A text as one word of a shell.
+/// Quotes a text as one word for a shell.
 fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\'', r"'\''"))
 }
 
-/// The batch script of the array.
+/// Batch script of the array.
 fn script(sweep: &Sweep, plan: &Path, program: &Path, tasks: usize) -> String {
     let SlurmOptions { partition, time, memory, cpus_per_task, options, .. } = &sweep.plan.slurm;
     let name: String =
@@ -118,7 +118,7 @@ fn script(sweep: &Sweep, plan: &Path, program: &Path, tasks: usize) -> String {
     lines.join("\n")
 }
 
-/// Memory in GiB as `sbatch --mem` takes it: a number of MiB, or with a unit K, M, G or T.
+/// Memory in GiB from the syntax of `sbatch --mem`: a number of MiB, or with a unit K, M, G or T.
 fn gib_of(memory: &str) -> Option<f64> {
     let digits = memory.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
     let per_gib = match memory[digits.len()..].to_ascii_uppercase().as_str() {
@@ -150,7 +150,7 @@ fn slurm(command: &mut Command) -> Result<Output> {
     })
 }
 
-/// Submits the tasks and returns the number of the job.
+/// Submits the tasks and returns the job id.
 fn submit(script: &Path, tasks: &[usize]) -> Result<String> {
     let array = tasks.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
     let log = script.with_file_name("task-%a.log");
@@ -160,12 +160,12 @@ fn submit(script: &Path, tasks: &[usize]) -> Result<String> {
     if !output.status.success() {
         bail!("sbatch refused '{}': {}", script.display(), String::from_utf8_lossy(&output.stderr).trim());
     }
-    // JOB or JOB;CLUSTER
+    // The output is JOB or JOB;CLUSTER.
     let text = String::from_utf8_lossy(&output.stdout);
     Ok(text.trim().split(';').next().unwrap_or_default().to_owned())
 }
 
-/// Waits until no task of the array is left; returns whether it was interrupted, in which case the array is cancelled.
+/// Waits until no task of the array is left. Returns true if it was interrupted; the array is then cancelled.
 fn watch(sweep: &Sweep, jobs: &[KeyedJob], submitted: &str, interrupt: &Interrupt) -> Result<bool> {
     let progress = Progress::new();
     let mut unanswered = 0;
@@ -186,7 +186,7 @@ fn watch(sweep: &Sweep, jobs: &[KeyedJob], submitted: &str, interrupt: &Interrup
             unanswered += 1;
             if unanswered > UNANSWERED {
                 bail!(
-                    "squeue does not answer: {}; the array {submitted} goes on, collect with --collect",
+                    "squeue does not answer: {}; the array {submitted} continues, collect with --collect",
                     problem.trim()
                 );
             }
@@ -206,12 +206,12 @@ fn watch(sweep: &Sweep, jobs: &[KeyedJob], submitted: &str, interrupt: &Interrup
     }
 }
 
-/// Writes the rows of jobs whose tasks were killed twice, with what Slurm says of them.
+/// Writes the rows of jobs whose tasks were killed twice, with the state reported by Slurm.
 fn give_up_undone(sweep: &Sweep, tasks: usize, submitted: &str) -> Result<()> {
     for (task, jobs) in undone_by_task(sweep, tasks) {
         let log = last_lines(&sweep.folder.slurm().join(format!("task-{task}.log")));
         let id = format!("{submitted}_{task}");
-        // A cluster without accounting has no more to say than the log.
+        // On a cluster without accounting, only the log is available.
         let state = slurm(Command::new("sacct").args(["-n", "-X", "-P", "-o", "State", "-j", &id]));
         let state = state.ok().filter(|output| output.status.success());
         let state = state.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned()).unwrap_or_default();

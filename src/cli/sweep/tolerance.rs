@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use dcvins::study::StudyPlan;
 
-/// Metrics that are compared when neither the plan nor the command line names one.
+/// Metrics that are compared if neither the plan nor the command line names one.
 const STANDARD: [(&str, f64); 1] = [("ate_rmse_m", 0.1)];
 
 /// Allowed relative change of a metric.
@@ -27,7 +27,7 @@ impl FromStr for Tolerance {
     }
 }
 
-/// The tolerances of the command line, else of the plan, else the standard ones.
+/// Tolerances of the command line, else of the plan, else the defaults.
 pub(super) fn tolerances(plan: &StudyPlan, given: &[Tolerance]) -> BTreeMap<String, f64> {
     let standard = || STANDARD.map(|(metric, ratio)| (metric.to_owned(), ratio)).into();
     match (given, plan.tolerances.is_empty()) {

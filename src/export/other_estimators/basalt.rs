@@ -1,4 +1,4 @@
-//! Basalt: a calibration as cereal's JSON.
+//! Basalt: a calibration in the JSON format of cereal.
 
 use serde::Serialize;
 
@@ -13,7 +13,7 @@ struct Archive<'a> {
     value0: Calibration<'a>,
 }
 
-/// Basalt's calibration. Its reader looks members up by their names and passes over `comment`.
+/// Basalt's calibration. Its reader looks up members by name and ignores `comment`.
 #[derive(Serialize)]
 struct Calibration<'a> {
     comment: &'a [String],
@@ -123,8 +123,8 @@ fn lens(model: &CameraModel) -> Camera {
     Camera { camera_type, intrinsics: Intrinsics { fx: fx / scale, fy: fy / scale, cx, cy, lens } }
 }
 
-/// `calibrated = raw + S · raw − bias`: zero biases, then the columns of `S = C − I`, of the accelerometer without what is
-/// above the diagonal.
+/// `calibrated = raw + S · raw − bias`: zero biases, then the columns of `S = C − I`, for the accelerometer without the
+/// elements above the diagonal.
 fn imu_parameters(intrinsics: &ImuIntrinsics) -> ([f64; 9], [f64; 12]) {
     let a = intrinsics.accelerometer_correction - nalgebra::Matrix3::identity();
     let g = intrinsics.gyroscope_correction - nalgebra::Matrix3::identity();

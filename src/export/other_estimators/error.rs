@@ -2,76 +2,59 @@ use thiserror::Error;
 
 use crate::sensors::UnknownCamera;
 
-/// Why a rig cannot be written as the configuration of another program.
+/// Reason why a rig cannot be written as the configuration of another program.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum ConfigurationError {
     /// The rig has no such camera.
     #[error(transparent)]
     Camera(#[from] UnknownCamera),
-    /// The program cannot project through this lens.
+    /// The program does not support this lens.
     #[error(
         "{camera} is {model}, which {program} lacks; it takes {takes}. Calibrate the camera with one of these models (Kalibr \
          fits any of its own to the same images), or undistort its images and describe them as pinhole with none"
     )]
     Lens {
-        /// Key of the camera.
         camera: String,
-        /// Its projection and distortion in Kalibr's names.
+        /// Projection and distortion of the camera in Kalibr's names.
         model: String,
-        /// The program.
         program: &'static str,
-        /// What the program takes.
+        /// Lenses that the program supports.
         takes: &'static str,
     },
-    /// More cameras than the program takes.
-    #[error("{program} takes {}, {given} were asked for", cameras(*most))]
+    /// More cameras than the program supports.
+    #[error("{program} takes {}, {given} were requested", cameras(*most))]
     TooManyCameras {
-        /// The program.
         program: &'static str,
-        /// How many it takes.
+        /// Supported number of cameras.
         most: usize,
-        /// How many were asked for.
+        /// Requested number of cameras.
         given: usize,
     },
     /// A camera was named twice.
     #[error("--camera {camera} is given twice")]
-    CameraTwice {
-        /// Key of the camera.
-        camera: String,
-    },
-    /// No joint of this name.
+    CameraTwice { camera: String },
+    /// The rig has no joint with this name.
     #[error("the rig has no joint '{name}'; {}", joints(available))]
-    UnknownJoint {
-        /// What was asked for.
-        name: String,
-        /// Joints of the rig.
-        available: Vec<String>,
-    },
+    UnknownJoint { name: String, available: Vec<String> },
     /// A joint was named twice.
     #[error("the angle of joint '{name}' is given twice")]
-    JointTwice {
-        /// Its name.
-        name: String,
-    },
+    JointTwice { name: String },
     /// An angle beyond the joint's limits.
     #[error("{name}={angle_deg} lies beyond the joint's limits, {:.1}° to {:.1}°", limits_deg.0, limits_deg.1)]
     BeyondLimits {
-        /// Name of the joint.
         name: String,
-        /// The angle in degrees.
         angle_deg: f64,
         /// Lower and upper limit in degrees.
         limits_deg: (f64, f64),
     },
-    /// The number of angles is not that of the joints.
+    /// The number of angles differs from the number of joints.
     #[error("{given} joint angles, expected {expected} as in the rig")]
     AngleCount {
-        /// How many were given.
         given: usize,
-        /// How many joints there are.
+        /// Number of joints.
         expected: usize,
     },
-    /// Measured angles were asked for, and no camera is on a gimbal.
+    /// Measured angles were requested, but no camera is on a gimbal.
     #[error("the rig has no camera on a gimbal, so there are no joint angles to take from a log")]
     NoGimbal,
     /// The log has no joint angles at that time.
@@ -79,7 +62,7 @@ pub enum ConfigurationError {
         "the log has no joint angles within 1 s after {time_s} s; give another time with --at, or the angles with --joints"
     )]
     NoAngles {
-        /// Seconds since the log began.
+        /// In seconds since the log began.
         time_s: f64,
     },
     /// The log could not be read.

@@ -1,32 +1,32 @@
-//! What each program's configuration can express.
+//! Capabilities of each program's configuration format.
 
 use super::{ConfigurationError, OtherEstimator};
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::sensors::{CameraMount, Rig};
 
-/// How a program takes the offsets between the clocks of cameras and IMU.
+/// Support of a program for time offsets between cameras and IMU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum TimeOffset {
     PerCamera,
-    /// One for all cameras: the first one's.
+    /// One for all cameras, that of the first.
     One,
     None,
 }
 
-/// What a program's configuration can express.
+/// Capabilities of a program's configuration format.
 pub(super) struct Format {
     title: &'static str,
     most_cameras: usize,
     lens: fn(&CameraModel) -> bool,
     lenses: &'static str,
     time_offset: TimeOffset,
-    /// Whether scale and misalignment of the IMU have a place.
+    /// True if the format has scale and misalignment of the IMU.
     pub(super) has_imu_intrinsics: bool,
     has_readout: bool,
     pub(super) has_masks: bool,
 }
 
-/// Radial–tangential lenses of at most four coefficients, and none.
+/// Radial–tangential lenses with at most four coefficients, and lenses without distortion.
 fn is_radtan(lens: &Distortion) -> bool {
     matches!(lens, Distortion::None | Distortion::Radtan(_))
 }
@@ -110,7 +110,7 @@ impl Format {
     pub(super) fn choose_cameras(&self, rig: &Rig, keys: &[String]) -> Result<Rig, ConfigurationError> {
         let mut chosen = rig.clone();
         if keys.is_empty() {
-            // Two cameras of one program are a stereo pair, which a user has to ask for.
+            // A program takes two cameras as a stereo pair, which the user has to request explicitly.
             let count = if self.most_cameras <= 2 { 1 } else { rig.cameras.len() };
             chosen.cameras.truncate(count);
             return Ok(chosen);
@@ -126,7 +126,7 @@ impl Format {
         Ok(chosen)
     }
 
-    /// Refuses a lens that the program lacks.
+    /// Returns an error for a lens that the program does not support.
     pub(super) fn check_lenses(&self, rig: &Rig) -> Result<(), ConfigurationError> {
         let lacking = rig.cameras.iter().find(|camera| !(self.lens)(&camera.model));
         lacking.map_or(Ok(()), |camera| {
@@ -139,7 +139,7 @@ impl Format {
         })
     }
 
-    /// What of the rig the program cannot express; `rig` has the cameras that were chosen out of `whole`.
+    /// Properties of the rig that the program cannot express; `rig` has the cameras chosen from `whole`.
     pub(super) fn notes(&self, whole: &Rig, rig: &Rig, by_default: bool) -> Vec<String> {
         let title = self.title;
         let mut notes = Vec::new();
@@ -193,7 +193,7 @@ impl Format {
     }
 }
 
-/// Which cameras were left out.
+/// Note about the omitted cameras.
 fn other_cameras(whole: &Rig, rig: &Rig) -> String {
     let left: Vec<&str> = whole.cameras[rig.cameras.len()..].iter().map(|camera| camera.key.as_str()).collect();
     let is_carried = rig.cameras.iter().any(|camera| camera.mount == CameraMount::Gimbal);

@@ -1,4 +1,4 @@
-//! The joint angles at which a gimbal is fixed, and what a reader of the files has to know of them.
+//! Joint angles at which a gimbal is fixed, and the notes about them in the files.
 
 use std::sync::Arc;
 
@@ -7,31 +7,29 @@ use crate::flight_log::{FlightLog, FrameStream};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{CameraMount, Rig};
 
-/// How long after the asked time an image with joint angles is looked for.
+/// Search range in seconds after the requested time for an image with joint angles.
 const SEARCHED_S: f64 = 1.0;
 
-/// Where joint angles come from.
+/// Source of joint angles.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AngleOrigin {
     /// The neutral angles of the rig.
     Neutral,
-    /// Given by the user, neutral where they were not.
+    /// Given by the user, neutral for the other joints.
     Given,
     /// Measured in a log.
     Measured {
-        /// Name of the log.
         log: String,
         /// Seconds since the log began.
         time_s: f64,
     },
 }
 
-/// Encoder angles of all joints, at which the gimbal is taken to stay.
+/// Encoder angles of all joints, at which the gimbal is assumed fixed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FixedJointAngles {
-    /// One per joint, in radians; none without a gimbal.
+    /// One per joint, in radians; empty without a gimbal.
     pub angles_rad: Vec<f64>,
-    /// Where they come from.
     pub origin: AngleOrigin,
 }
 
@@ -44,7 +42,7 @@ impl FixedJointAngles {
     /// The angles in degrees of the named joints, neutral for the others.
     ///
     /// # Errors
-    /// When a joint is unknown, named twice, or an angle lies beyond its limits.
+    /// If a joint is unknown, named twice, or an angle lies beyond its limits.
     pub fn given(rig: &Rig, named_deg: &[(String, f64)]) -> Result<Self, ConfigurationError> {
         let mut angles = Self { origin: AngleOrigin::Given, ..Self::neutral(rig) };
         let joints: Vec<_> = rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).collect();
@@ -66,10 +64,10 @@ impl FixedJointAngles {
         Ok(angles)
     }
 
-    /// The angles at the first image of the gimbal's camera from a time of the log on, in seconds since it began.
+    /// The angles at the first image of the gimbal's camera at or after `time_s`, in seconds since the log began.
     ///
     /// # Errors
-    /// When the rig has no camera on a gimbal, the log cannot be read, or it has no joint angles at that time.
+    /// If the rig has no camera on a gimbal, the log cannot be read, or it has no joint angles at that time.
     pub fn measured(log: &Arc<FlightLog>, rig: &Rig, time_s: f64) -> Result<Self, ConfigurationError> {
         let camera = rig.cameras.iter().find(|camera| camera.mount == CameraMount::Gimbal);
         let camera = camera.ok_or(ConfigurationError::NoGimbal)?;
@@ -81,7 +79,7 @@ impl FixedJointAngles {
         Ok(Self { angles_rad, origin: AngleOrigin::Measured { log, time_s: seconds_from_ns(stamp_ns) } })
     }
 
-    /// The rig with its gimbal at these angles.
+    /// The rig with its gimbal fixed at these angles.
     pub(super) fn fix(&self, rig: &Rig) -> Result<Rig, ConfigurationError> {
         rig.at_joint_angles(&self.angles_rad).ok_or_else(|| ConfigurationError::AngleCount {
             given: self.angles_rad.len(),
@@ -89,7 +87,7 @@ impl FixedJointAngles {
         })
     }
 
-    /// What holds of the extrinsics.
+    /// Notes about the validity of the extrinsics.
     pub(super) fn notes(&self, rig: &Rig) -> Vec<String> {
         let carried: Vec<&str> = rig
             .cameras
@@ -113,7 +111,7 @@ impl FixedJointAngles {
         };
         let (keys, are) = (carried.join(" and "), if carried.len() == 1 { "is" } else { "are" });
         vec![format!(
-            "the extrinsics are static: {keys} {are} carried by the gimbal, which is taken to stay at {}, {origin}; at other \
+            "the extrinsics are static: {keys} {are} carried by the gimbal, which is assumed fixed at {}, {origin}; at other \
              angles they are wrong by the rotation of the joints",
             angles.join(", ")
         )]

@@ -1,4 +1,4 @@
-//! Kalibr's camera chain and IMU, in the keys that `kalibr_calibrate_imu_camera` reads and writes.
+//! Kalibr's camera chain and IMU, with the keys that `kalibr_calibrate_imu_camera` reads and writes.
 
 use super::text;
 use super::{OtherEstimator, text::imu_from_camera};

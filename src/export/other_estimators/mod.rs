@@ -1,7 +1,7 @@
 //! Configuration files of other estimators from a rig, with the gimbal fixed at given joint angles.
 //!
-//! Each module makes the text of one program's files out of a rig of static cameras; [`Format`] says what the program can
-//! express, and what it cannot is a note at the head of the files or a refusal.
+//! Each module writes the text of one program's files from a rig of static cameras; [`Format`] describes the
+//! capabilities of the program. Unsupported properties are noted at the head of the files, or are an error.
 
 mod basalt;
 mod error;
@@ -46,7 +46,7 @@ impl OtherEstimator {
     /// All programs.
     pub const ALL: [Self; 5] = [Self::Kalibr, Self::VinsFusion, Self::OpenVins, Self::Basalt, Self::OrbSlam3];
 
-    /// What its authors call it.
+    /// Name used by its authors.
     pub fn title(self) -> &'static str {
         match self {
             Self::Kalibr => "Kalibr",
@@ -58,22 +58,23 @@ impl OtherEstimator {
     }
 }
 
-/// Configuration files that are not written yet.
+/// Configuration files before they are written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Configuration {
     /// Name and content of each file.
     pub files: Vec<(String, Vec<u8>)>,
-    /// What holds only under a condition, or could not be expressed; the text files start with the same lines.
+    /// Conditions and unsupported properties; the text files start with the same lines.
     pub notes: Vec<String>,
 }
 
 /// The configuration of another program for a rig.
 ///
-/// `cameras` are keys of the rig in the order of the program's cameras; without one it is every camera, as many as the
-/// program takes from the first.
+/// `cameras` are keys of the rig in the order of the program's cameras; if empty, every camera is used, up to the
+/// number that the program supports.
 ///
 /// # Errors
-/// When a key or the joint angles do not belong to the rig, or the program has no such lens or takes fewer cameras.
+/// If a key or the joint angles do not belong to the rig, or the program does not support a lens or the number of
+/// cameras.
 pub fn configure(
     rig: &Rig,
     program: OtherEstimator,
@@ -117,10 +118,11 @@ pub fn configure(
     Ok(Configuration { files, notes })
 }
 
-/// Writes configuration files into a folder; returns their paths. Existing files are replaced where this program wrote them.
+/// Writes configuration files into a folder; returns their paths. Existing files are replaced if they were written by
+/// this program.
 ///
 /// # Errors
-/// When a file cannot be written or, without `force`, is something else.
+/// If a file cannot be written or, without `force`, is something else.
 pub fn write_configuration(
     configuration: &Configuration,
     folder: &Path,
@@ -130,14 +132,14 @@ pub fn write_configuration(
     let ours = |path: &Path| {
         std::fs::read(path).is_ok_and(|bytes| bytes.windows(text::MARK.len()).any(|part| part == text::MARK.as_bytes()))
     };
-    // Masks have no mark; they go with the first file.
+    // Masks have no mark; they are treated like the first file.
     let replaces = force || configuration.files.first().is_some_and(|(name, _)| ours(&folder.join(name)));
     for (name, _) in &configuration.files {
         let path = folder.join(name);
         let is_text = path.extension().is_none_or(|extension| extension != "png");
         if path.exists() && !(force || replaces && !is_text || is_text && ours(&path)) {
             return Err(ExportError::Existing {
-                problem: "the file exists and is none that 'dcvins export' wrote".to_owned(),
+                problem: "the file exists and was not written by 'dcvins export'".to_owned(),
                 path,
             });
         }

@@ -10,7 +10,7 @@ use crate::camera::Distortion;
 use crate::flight_log::yaml::{number, numbers};
 use crate::sensors::{CameraRig, ImuRig, KalibrImuMatrices, Rig};
 
-/// Settings that do not depend on the rig, OpenVINS's usual values.
+/// Settings that do not depend on the rig, with OpenVINS's usual values.
 const SETTINGS: &[(&str, &str)] = &[
     ("verbosity", "\"INFO\""),
     ("use_fej", "true"),
@@ -110,7 +110,7 @@ fn estimator(rig: &Rig, head: &[String]) -> String {
         ("use_stereo", stereo.to_string()),
         ("max_cameras", rig.cameras.len().to_string()),
         ("gravity_mag", number(rig.gravity_m_per_s2)),
-        // Images at their own rate: a frame is dropped only when it is early by more than 5 %.
+        // Images at their own rate: a frame is dropped only if it is early by more than 5 %.
         ("track_frequency", number(1.05 * rate_hz)),
         ("use_mask", has_masks.to_string()),
     ]));
@@ -135,7 +135,7 @@ fn camera(rig: &Rig, index: usize) -> String {
     let (name, coefficients) = match &camera.model.distortion {
         Distortion::Equidistant(coefficients) => ("equidistant", *coefficients),
         Distortion::Radtan(coefficients) => ("radtan", *coefficients),
-        // OpenVINS knows no lens without distortion.
+        // OpenVINS has no lens without distortion.
         _ => ("radtan", [0.0; 4]),
     };
     let mut out = format!("cam{index}:\n");

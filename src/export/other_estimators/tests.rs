@@ -1,4 +1,4 @@
-//! Key lists are those of the programs' own example files (EuRoC, TUM-VI, T265), read by a parser of their format.
+//! Key lists are those of the programs' example files (EuRoC, TUM-VI, T265), parsed by a parser of their format.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
 use crate::sensors::{CameraMask, CameraMount, GrayImage, ImageMask, ImuIntrinsics, ImuIntrinsicsParameters};
 
-/// A gimbal with two joints, a camera on it, a rigid one, and all that a format may have a place for.
+/// A gimbal with two joints, a camera on it, a rigid camera, and every property that a format may support.
 fn rig() -> Rig {
     let text = "
 rig_version: 1
@@ -64,7 +64,7 @@ gimbal:
     rig
 }
 
-/// The same with a calibrated IMU.
+/// The same rig with a calibrated IMU.
 fn calibrated() -> Rig {
     let mut rig = rig();
     rig.imu.intrinsics = ImuIntrinsics::default();
@@ -84,7 +84,7 @@ fn text_of<'a>(configuration: &'a Configuration, file: &str) -> &'a str {
     std::str::from_utf8(bytes).unwrap()
 }
 
-/// A file as its program's parser sees it: plain YAML, YAML of `OpenCV` (version, then types in exclamation marks), or JSON.
+/// A file as parsed by its program: plain YAML, YAML of `OpenCV` (version, then types in exclamation marks), or JSON.
 fn parsed(configuration: &Configuration, file: &str) -> Value {
     let text = text_of(configuration, file);
     if Path::new(file).extension().is_some_and(|extension| extension == "json") {
@@ -329,7 +329,7 @@ fn basalt_takes_its_own_lens_models() {
     let comment = calibration["comment"][0].as_str().unwrap();
     assert!(comment.starts_with("Written by dcvins export for Basalt"), "{comment}");
 
-    // The unified model as Basalt computes it, π(x) = f · x / (α · d + (1 − α) · z) + c.
+    // The unified model as computed by Basalt, π(x) = f · x / (α · d + (1 − α) · z) + c.
     let lens = &calibration["intrinsics"][0]["intrinsics"];
     let [fx, fy, cx, cy, alpha] = ["fx", "fy", "cx", "cy", "alpha"].map(|key| number(&lens[key]));
     let point = Vector3::new(0.4, -0.3, 1.2);
@@ -369,7 +369,7 @@ fn orb_slam3_takes_one_camera_and_no_time_offset() {
     check_near(number(&settings["IMU.GyroWalk"]), 3.9e-5);
     let notes = pinhole.notes.join("\n");
     for expected in [
-        "cam0 is carried by the gimbal, which is taken to stay at yaw 0.000°, pitch -5.730°, its neutral angles",
+        "cam0 is carried by the gimbal, which is assumed fixed at yaw 0.000°, pitch -5.730°, its neutral angles",
         "cam1 of the rig is left out; cam1 is rigid, its extrinsics hold at every joint angle (--camera cam1)",
         "add +12.500 ms to the stamps of cam0 first",
         "the readout of cam0, 18.000 ms, is left out",
@@ -377,7 +377,7 @@ fn orb_slam3_takes_one_camera_and_no_time_offset() {
     ] {
         assert!(notes.contains(expected), "'{expected}' is not in\n{notes}");
     }
-    // Every note is at the head of the file, behind the version that OpenCV wants first.
+    // Every note is at the head of the file, after the version line that OpenCV requires first.
     let text = text_of(&pinhole, "orb_slam3.yaml");
     assert!(text.starts_with("%YAML:1.0\n# Written by dcvins export for ORB-SLAM3 from the rig 'city'.\n"), "{text}");
     assert_eq!(text.lines().skip(2).take_while(|line| line.starts_with("# ")).count(), pinhole.notes.len() + 1);
@@ -404,7 +404,7 @@ fn what_a_program_lacks_is_refused() {
          ucm), eucm and ds with none. Calibrate the camera with one of these models (Kalibr fits any of its own to the same \
          images), or undistort its images and describe them as pinhole with none"
     );
-    assert_eq!(refused(OtherEstimator::OrbSlam3, &["cam0", "cam1"]), "ORB-SLAM3 takes one camera, 2 were asked for");
+    assert_eq!(refused(OtherEstimator::OrbSlam3, &["cam0", "cam1"]), "ORB-SLAM3 takes one camera, 2 were requested");
     assert_eq!(refused(OtherEstimator::Kalibr, &["cam2"]), "the rig has no camera 'cam2'; it has 'cam0', 'cam1'");
     assert_eq!(refused(OtherEstimator::Kalibr, &["cam1", "cam1"]), "--camera cam1 is given twice");
 }
@@ -442,6 +442,6 @@ fn files_of_others_are_kept() {
     write_configuration(&configuration, folder.path(), false).unwrap();
     std::fs::write(folder.path().join("estimator_config.yaml"), "%YAML:1.0\nuse_fej: true\n").unwrap();
     let problem = write_configuration(&configuration, folder.path(), false).unwrap_err().to_string();
-    assert!(problem.starts_with("the file exists and is none that 'dcvins export' wrote; give --force"), "{problem}");
+    assert!(problem.starts_with("the file exists and was not written by 'dcvins export'; give --force"), "{problem}");
     write_configuration(&configuration, folder.path(), true).unwrap();
 }

@@ -1,4 +1,4 @@
-//! What the files of several programs share: the lines at their head, matrices, masks.
+//! Common parts of the files of several programs: head lines, matrices, masks.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use crate::flight_log::yaml::{number, numbers};
 use crate::geometry::RigidTransform;
 use crate::sensors::{CameraMount, CameraRig, GrayImage, ImageMask, Rig};
 
-/// In the first line of every file, by which it is known as one of this program.
+/// Text in the first line of every file, which identifies files of this program.
 pub(super) const MARK: &str = "Written by dcvins export";
 
 /// The first lines of every file.
@@ -19,7 +19,7 @@ pub(super) fn head(program: OtherEstimator, rig: &str, notes: &[String]) -> Vec<
     head.extend(notes.iter().map(|note| {
         let mut letters = note.chars();
         let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
-        // A key of a camera stays as it is written in the rig.
+        // The key of a camera keeps its case, as in the rig.
         let first = if note.starts_with("cam") { note.chars().take(1).collect() } else { first };
         format!("{}.", printable(&format!("{first}{}", letters.as_str())))
     }));
@@ -31,7 +31,7 @@ pub(super) fn comments(head: &[String]) -> String {
     head.iter().map(|line| format!("# {line}\n")).collect::<Vec<_>>().concat()
 }
 
-/// The head of a YAML file that `OpenCV` reads, which requires the version in the first line.
+/// The head of a YAML file for `OpenCV`, which requires the version in the first line.
 pub(super) fn opencv_comments(head: &[String]) -> String {
     format!("%YAML:1.0\n{}", comments(head))
 }
@@ -45,7 +45,7 @@ pub(super) fn imu_from_camera(camera: &CameraRig) -> RigidTransform {
     }
 }
 
-/// A matrix as a list of rows behind its key, which is indented by `depth` steps.
+/// A matrix as a list of rows after its key; the key is indented by `depth` levels.
 pub(super) fn rows<const N: usize>(depth: usize, key: &str, matrix: &SMatrix<f64, N, N>) -> String {
     let indentation = " ".repeat(2 * depth);
     let mut out = format!("{indentation}{key}:\n");
@@ -57,7 +57,7 @@ pub(super) fn rows<const N: usize>(depth: usize, key: &str, matrix: &SMatrix<f64
     out
 }
 
-/// A 4 × 4 matrix as `OpenCV` writes it; `kind` is `d` for doubles, `f` for floats.
+/// A 4 × 4 matrix in the format of `OpenCV`; `kind` is `d` for doubles, `f` for floats.
 pub(super) fn opencv_matrix(key: &str, transform: &RigidTransform, kind: char) -> String {
     let matrix = transform.to_matrix();
     let rows: Vec<String> =
@@ -66,7 +66,7 @@ pub(super) fn opencv_matrix(key: &str, transform: &RigidTransform, kind: char) -
     format!("{key}: !!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: {kind}\n   data: [{data}]\n")
 }
 
-/// Text in double quotes with escapes, as JSON and YAML have them.
+/// Text in double quotes, with the escapes of JSON and YAML.
 pub(super) fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
@@ -76,7 +76,7 @@ pub(super) fn entries(entries: &[(&str, String)]) -> String {
     entries.iter().map(|(key, value)| format!("{key}: {value}\n")).collect::<Vec<_>>().concat()
 }
 
-/// Whether the centre of one camera's image lies in the image of the other, for things far away.
+/// True if the centre of one camera's image is visible in the other, for distant objects.
 pub(super) fn overlap(one: &CameraRig, other: &CameraRig) -> bool {
     let sees_centre_of = |camera: &CameraRig, other: &CameraRig| {
         let camera_from_other = imu_from_camera(camera).inverse() * imu_from_camera(other);
@@ -89,7 +89,7 @@ pub(super) fn overlap(one: &CameraRig, other: &CameraRig) -> bool {
     sees_centre_of(one, other) || sees_centre_of(other, one)
 }
 
-/// Numbers of the cameras that overlap with one, as a list in brackets.
+/// Indices of the cameras that overlap with one camera, as a list in brackets.
 pub(super) fn overlaps(rig: &Rig, number: usize) -> String {
     let camera = &rig.cameras[number];
     let others = rig.cameras.iter().enumerate().filter(|(other, _)| *other != number);
@@ -98,12 +98,12 @@ pub(super) fn overlaps(rig: &Rig, number: usize) -> String {
     format!("[{}]", numbers.join(", "))
 }
 
-/// Name of a camera's mask.
 pub(super) fn mask_name(program: OtherEstimator, number: usize) -> String {
     if program == OtherEstimator::OpenVins { format!("mask{number}.png") } else { format!("cam{number}.mask.png") }
 }
 
-/// The masks that go with the files. OpenVINS wants one of every camera or none: cameras without one get an empty mask.
+/// Masks that belong to the files. OpenVINS requires masks of all cameras or none: cameras without one get an empty
+/// mask.
 pub(super) fn masks(program: OtherEstimator, rig: &Rig) -> Vec<(String, ImageMask)> {
     let any = rig.cameras.iter().any(|camera| camera.mask.is_some());
     let of_camera = |(number, camera): (usize, &CameraRig)| {
@@ -121,7 +121,7 @@ fn empty_mask([width, height]: [usize; 2]) -> ImageMask {
     ImageMask::from_image(&GrayImage { width, height, pixels: vec![0; width * height] })
 }
 
-/// The matrix with zeros above its diagonal, where rounding may have left something else.
+/// The matrix with exact zeros above its diagonal, where rounding may have left small values.
 pub(super) fn lower_triangle(matrix: &nalgebra::Matrix3<f64>) -> nalgebra::Matrix3<f64> {
     matrix.lower_triangle()
 }

@@ -23,7 +23,7 @@ fn configuration(rig: &Rig, head: &[String]) -> String {
     let [width, height] = first.model.resolution_px;
     let mut out = text::opencv_comments(head);
     let topic = |camera: Option<&crate::sensors::CameraRig>| {
-        // VINS-Fusion subscribes to a second topic in any case, and stores what arrives there.
+        // VINS-Fusion always subscribes to a second topic and stores its messages.
         text::quoted(camera.map_or("/unused_image1", |camera| camera.topic.as_str()))
     };
     out.push_str(&text::entries(&[
@@ -59,7 +59,7 @@ fn configuration(rig: &Rig, head: &[String]) -> String {
         ]
         .map(|(key, value)| (key, value.to_owned())),
     ));
-    // Per sample: VINS-Fusion's covariance takes neither 1/dt nor dt.
+    // Noise per sample: VINS-Fusion's covariance has neither 1/dt nor dt.
     let root = rig.imu.rate_hz.sqrt();
     let noise = &rig.imu.noise;
     let discrete =
@@ -101,7 +101,7 @@ fn camodocal(model: &CameraModel) -> String {
                 ("projection_parameters", vec![("gamma1", fx), ("gamma2", fy), ("u0", cx), ("v0", cy)]),
             ],
         ),
-        // Its k2 … k5 belong to θ³ … θ⁹, Kalibr's k1 … k4.
+        // Its k2 … k5 are coefficients of θ³ … θ⁹, Kalibr's k1 … k4.
         (_, Distortion::Equidistant([k1, k2, k3, k4])) => (
             "KANNALA_BRANDT",
             vec![(

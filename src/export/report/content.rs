@@ -17,26 +17,23 @@ use crate::session::{Recording, RunRecord};
 /// A notable event of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct ReportEvent {
-    /// Stamp of the first frame with it, in seconds since the log began.
+    /// Stamp of its first frame, in seconds since the log began.
     pub(super) time_s: f64,
-    /// Kind of the event.
     pub(super) kind: String,
-    /// Its reason in one sentence.
+    /// Reason in one sentence.
     pub(super) message: String,
-    /// Number of consecutive frames with it.
+    /// Number of consecutive frames with the event.
     pub(super) times: usize,
 }
 
-/// The content of one run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct RunContent {
-    /// Label of the run.
     pub(super) label: String,
     /// The verdict at the top of the page.
     pub(super) verdict: RunVerdict,
     /// The summary, as in `summary.json`.
     pub(super) summary: RunSummary,
-    /// What the flight determines of the calibration, in groups.
+    /// Estimability of the calibration parameters, in groups.
     pub(super) estimability: Vec<EstimabilitySummary>,
     /// Intervals of constant rank.
     #[serde(rename = "rank_story")]
@@ -52,19 +49,17 @@ pub(super) struct RunContent {
 pub(super) struct ReportContent {
     /// Program and version.
     pub(super) program: &'static str,
-    /// The command line.
+    /// Command line of the report.
     pub(super) command: String,
-    /// File name of the log.
     pub(super) log: String,
-    /// Name of the rig.
     pub(super) rig: String,
-    /// Length of the log.
+    /// Length of the log in seconds.
     pub(super) duration_s: f64,
     /// Input files with their hashes.
     pub(super) inputs: Vec<InputFile>,
     /// The verdict on the log and the rig.
     pub(super) log_verdict: Statement,
-    /// The runs in the order of the command line.
+    /// Runs in the order of the command line.
     pub(super) runs: Vec<RunContent>,
     /// Findings about the log and its rig, as printed by `check --json`.
     pub(super) check: Option<CheckReport>,
@@ -115,7 +110,7 @@ impl ReportContent {
 fn events(run: &RunRecord) -> (Vec<ReportEvent>, BTreeMap<String, usize>) {
     let mut notable: Vec<ReportEvent> = Vec::new();
     let mut frequent = BTreeMap::new();
-    // By kind: index of the last frame with it, and its index in `notable`.
+    // By kind: index of its last frame, and its index in `notable`.
     let mut latest: BTreeMap<String, (usize, usize)> = BTreeMap::new();
     for (number, step) in run.steps.iter().enumerate() {
         for event in &step.report.events {
@@ -141,7 +136,7 @@ fn events(run: &RunRecord) -> (Vec<ReportEvent>, BTreeMap<String, usize>) {
     (notable, frequent)
 }
 
-/// `InitializedFromMotion` as `initialized from motion`.
+/// Converts `InitializedFromMotion` to `initialized from motion`.
 fn words(name: &str) -> String {
     let mut words = String::new();
     for letter in name.chars() {

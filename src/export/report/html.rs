@@ -7,12 +7,11 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::verdict::Mark;
 use super::{ReportDrawing, ReportFigure};
 
-/// Tables with at most so many rows are not split between printed pages.
+/// Maximum number of rows of a table that is not split between printed pages.
 const MAX_UNBROKEN_ROWS: usize = 14;
 /// Style sheet for screens and for paper, where rows of tables and figures are not split between pages.
 const STYLE: &str = include_str!("../../../assets/report/style.css");
 
-/// A whole page.
 pub(super) fn document(title: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
@@ -29,7 +28,7 @@ pub(super) fn document(title: &str, body: &Markup) -> String {
     page.into_string()
 }
 
-/// An unordered list of texts, nothing for none.
+/// An unordered list of texts, empty if there are none.
 pub(super) fn list(items: &[String]) -> Markup {
     html! {
         @if !items.is_empty() {
@@ -38,7 +37,7 @@ pub(super) fn list(items: &[String]) -> Markup {
     }
 }
 
-/// A table whose first column has the names of the rows; cells that begin with a digit, a sign or ± are aligned as
+/// A table whose first column contains the names of the rows; cells that begin with a digit, a sign or ± are aligned as
 /// numbers.
 pub(super) fn table<S: AsRef<str>>(caption: &str, header: &[S], rows: &[Vec<String>]) -> Markup {
     let number = |cell: &str| cell.starts_with(|first: char| first.is_ascii_digit() || "−-±".contains(first));
@@ -95,7 +94,7 @@ pub(super) fn icon(mark: Mark) -> Markup {
     PreEscaped(svg.trim_end().to_owned())
 }
 
-/// The text with its numbers and their units on one line.
+/// The text with non-breaking spaces between numbers and their units.
 pub(super) fn unbroken(text: &str) -> String {
     const UNITS: [&str; 5] = [" mm", " m", " s", " px", " %"];
     let mut words = String::new();
@@ -109,7 +108,7 @@ pub(super) fn unbroken(text: &str) -> String {
     words
 }
 
-/// A number with so many decimals and a true minus sign; a negative zero is 0.
+/// A number with this number of decimals and a true minus sign; a negative zero is 0.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {

@@ -7,12 +7,12 @@ use crate::export::error::ExportError;
 use crate::export::file_hash;
 use crate::study::hex;
 
-/// A file that went into a report, recognizable again.
+/// An input file of a report, identified by its hash.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(super) struct InputFile {
-    /// Its name without the folder.
+    /// File name without the folder.
     pub(super) name: String,
-    /// Its size.
+    /// Size in bytes.
     pub(super) bytes: u64,
     /// SHA-256 of its content, in hexadecimal.
     pub(super) sha256: String,
@@ -22,7 +22,7 @@ impl InputFile {
     /// Reads a file block by block.
     ///
     /// # Errors
-    /// When it cannot be read.
+    /// If the file cannot be read.
     pub(super) fn read(path: &Path) -> Result<Self, ExportError> {
         let failed = |source| ExportError::Read { source, path: path.to_owned() };
         let mut hash = Sha256::new();

@@ -1,6 +1,6 @@
-//! `dcvins report`: one HTML file with all figures and tables, with CSV and JSON beside it.
+//! `dcvins report`: one HTML file with all figures and tables, and CSV and JSON files.
 //!
-//! The same log, rig, runs and command give the same bytes: it contains no dates and no measured times.
+//! The same log, rig, runs and command give the same bytes: the report contains no dates and no measured times.
 
 mod content;
 mod html;
@@ -31,20 +31,17 @@ use crate::session::Recording;
 /// The files of each run, without measured times.
 const RUN_OPTIONS: RunFileOptions = RunFileOptions { timing: false, mcap: false, euroc_trajectory: false };
 
-/// A figure of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReportFigure {
-    /// Heading above it; consecutive figures with the same heading share it.
+    /// Heading above the figure, once for consecutive figures with the same heading.
     pub heading: String,
-    /// What is shown, of which run and at which time; the page adds the number of the figure.
+    /// Content, run and time; the page adds the number of the figure.
     pub title: String,
-    /// How to read it: colours, dashes, units.
+    /// Legend: colours, dashes, units.
     pub reading: String,
-    /// Its drawing.
     pub drawing: ReportDrawing,
 }
 
-/// The drawing of a figure.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ReportDrawing {
     /// A PNG file, for images and the 3D scene.
@@ -56,7 +53,7 @@ pub enum ReportDrawing {
 /// Contents of a report in addition to the recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReportOptions {
-    /// The command line.
+    /// Command line of the report.
     pub command: String,
     /// Input files, listed with their hashes.
     pub inputs: Vec<PathBuf>,
@@ -66,11 +63,11 @@ pub struct ReportOptions {
     pub check: Option<CheckReport>,
 }
 
-/// Writes `report.html`, `report.json` and a folder for each run as `run --no-timing` does; returns the paths of all files,
-/// that of the HTML last.
+/// Writes `report.html`, `report.json` and, as `run --no-timing`, a folder for each run; returns the paths of all
+/// files, that of the HTML last.
 ///
 /// # Errors
-/// When a file cannot be read or written.
+/// If a file cannot be read or written.
 pub fn write_report(
     recording: &Recording,
     folder: &Path,
@@ -100,11 +97,11 @@ pub fn write_report(
     Ok(paths)
 }
 
-/// Writes the files of a report of which all is known: paths relative to the folder with their contents, for runs of these
-/// labels; otherwise as [`write_report`].
+/// Writes the files of a report from the cache, given by paths relative to the folder with their contents, for runs
+/// with these labels; otherwise as [`write_report`].
 ///
 /// # Errors
-/// When a file cannot be written.
+/// If a file cannot be written.
 pub fn write_known_report(
     files: &[CachedFile],
     folder: &Path,
@@ -126,7 +123,7 @@ pub fn write_known_report(
     Ok(paths)
 }
 
-/// Removes what a report written before has and this one, with runs of these labels, has not.
+/// Removes files of an earlier report that are not part of this one, which has runs with these labels.
 fn remove_earlier(folder: &Path, labels: &[&str], earlier_runs: &[String], log: &str) -> Result<(), ExportError> {
     for label in labels {
         remove_unwritten(&folder.join(label), RUN_OPTIONS)?;
@@ -137,7 +134,7 @@ fn remove_earlier(folder: &Path, labels: &[&str], earlier_runs: &[String], log: 
     Ok(())
 }
 
-/// The labels of the runs of a report that was written before, where they are plain names of folders.
+/// Labels of the runs of an earlier report, as far as they are plain folder names.
 fn labels_in(json: &Path) -> Vec<String> {
     let report = read_index(json).unwrap_or_default();
     let runs = report.get("runs").and_then(Value::as_array).into_iter().flatten();
@@ -150,7 +147,7 @@ fn is_folder_name(label: &str) -> bool {
     !label.trim_matches('.').is_empty() && label.chars().all(plain)
 }
 
-/// Removes the folder of a run of the earlier report, unless it holds anything else.
+/// Removes the folder of a run of the earlier report, unless it contains anything else.
 fn remove_run(folder: &Path, log: &str) -> Result<(), ExportError> {
     if !folder.is_dir() || check_run_folder(folder, log).is_err() {
         return Ok(());
@@ -161,7 +158,7 @@ fn remove_run(folder: &Path, log: &str) -> Result<(), ExportError> {
             fs::remove_file(&path).map_err(ExportError::write(&path))?;
         }
     }
-    // Only an empty folder can be removed so.
+    // Removes the folder only if it is empty.
     drop(fs::remove_dir(folder));
     Ok(())
 }

@@ -8,7 +8,6 @@ use super::html::{document, figure, icon, list, number, unbroken};
 use super::verdict::Statement;
 use super::{RankInterval, tables};
 
-/// The whole page.
 pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String {
     let title = format!("Flight report: {}", content.log);
     let body = html! {
@@ -42,7 +41,7 @@ pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String 
         pre { (content.command) }
         (tables::inputs(content))
         p {
-            "Version: " (content.program) ". The same files, command and version give the same bytes. Files beside \
+            "Version: " (content.program) ". The same files, command and version give the same bytes. Files next to \
              this page: report.json and, for each run, trajectory.tum, covariance.csv, calibration.csv, rank.csv, information.csv, \
              frames.csv, rig.yaml and summary.json."
         }
@@ -67,7 +66,7 @@ fn lead(content: &ReportContent) -> String {
     )
 }
 
-/// What a reader needs to know before any figure: one table for each run and one for the log.
+/// The verdicts, before any figure: one table for each run and one for the log.
 fn verdict_section(content: &ReportContent) -> Markup {
     html! {
         h2 #verdict { "Verdict" }
@@ -100,7 +99,6 @@ fn statements(statements: &[Statement]) -> Markup {
     }
 }
 
-/// Links to the sections.
 fn contents(content: &ReportContent) -> Markup {
     html! {
         nav {
@@ -119,7 +117,7 @@ fn contents(content: &ReportContent) -> Markup {
     }
 }
 
-/// The figures, numbered over all groups.
+/// The figures with their headings, numbered over all groups.
 fn grouped(figures: &[ReportFigure]) -> Markup {
     let numbered: Vec<(usize, &ReportFigure)> = (1..).zip(figures).collect();
     html! {

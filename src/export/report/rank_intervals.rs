@@ -10,8 +10,8 @@ use crate::observability::RankReport;
 use crate::sensors::Rig;
 use crate::session::RunRecord;
 
-/// Ranks are summarized over intervals of at least this length, each by its most frequent result: on a real flight the
-/// informed rank changes from frame to frame.
+/// Minimum length of an interval, summarized by its most frequent ranks: on a real flight the informed rank changes
+/// from frame to frame.
 const MIN_INTERVAL_NS: i64 = 1_000_000_000;
 
 /// An interval of constant ranks.
@@ -23,19 +23,17 @@ pub(super) struct RankInterval {
     pub(super) to_s: f64,
     /// Number of calibration columns.
     pub(super) columns: usize,
-    /// Structural rank.
     pub(super) structural: usize,
-    /// Informed rank.
     pub(super) informed: usize,
     /// Rank deficit by cause: parameterization, joints that did not move, absorbed by free joint angles, motion of the
     /// vehicle.
     pub(super) lost: [usize; 4],
-    /// The parameter that is least observable in most of its frames.
+    /// Parameter that is least observable in most of the interval's frames.
     pub(super) least_observable: Option<String>,
 }
 
 impl RankInterval {
-    /// The interval in words: `3.2 to 8.5 s: structural rank 18 of 18, informed rank 15, least observable yaw.d`.
+    /// The interval as a sentence: `3.2 to 8.5 s: structural rank 18 of 18, informed rank 15, least observable yaw.d`.
     pub(super) fn sentence(&self) -> String {
         let causes = ["parameterization", "stationary joints", "free joint angles", "vehicle motion"];
         let lost = self.lost.iter().zip(causes).filter(|(count, _)| **count > 0);
@@ -58,7 +56,7 @@ fn finding(rank: &RankReport) -> Finding {
     (rank.parameters.len(), rank.rank_structural, rank.rank_informed, lost)
 }
 
-/// The most frequent item; the smaller one of equally frequent items.
+/// The most frequent item; of equally frequent items the smallest.
 fn most_frequent<T: Ord + Clone>(items: impl Iterator<Item = T>) -> Option<T> {
     let mut counts: BTreeMap<T, usize> = BTreeMap::new();
     for item in items {
@@ -68,7 +66,7 @@ fn most_frequent<T: Ord + Clone>(items: impl Iterator<Item = T>) -> Option<T> {
     counts.into_iter().find(|(_, count)| *count == largest).map(|(item, _)| item)
 }
 
-/// The intervals of a run in time order.
+/// Intervals of a run in time order.
 pub(super) fn rank_intervals(run: &RunRecord, rig: &Rig) -> Vec<RankInterval> {
     let ranked: Vec<(i64, &RankReport)> =
         run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.rank.as_ref()?))).collect();

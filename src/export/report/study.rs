@@ -1,4 +1,4 @@
-//! The report of a study: one HTML file with tables and figures, with JSON and CSV beside it.
+//! The report of a study: one HTML file with tables and figures, and JSON and CSV files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,48 +13,40 @@ use crate::export::existing::read_index;
 use crate::flight_log::output::{self, OutputSet};
 use crate::study::view::{GroupSummary, ParameterErrors};
 
-/// The file by which the report of a study is recognized.
+/// File that identifies the report of a study.
 const INDEX: &str = "report.json";
 
-/// Contents of the report of a study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StudyReport {
-    /// Name of the study.
     pub study: String,
-    /// Runs of the study.
+    /// Number of runs of the study.
     pub runs: usize,
-    /// Runs that pass the filter.
+    /// Number of runs that pass the filter.
     pub shown: usize,
-    /// The filter, empty for all runs.
+    /// Filter condition, empty for all runs.
     pub filter: String,
-    /// Column of the groups.
+    /// Grouping column.
     pub group: Option<String>,
     /// Title of the metric with its unit.
     pub metric: String,
-    /// Name of the reference group of the differences.
     pub reference: Option<String>,
-    /// Condition of a success.
     pub success: String,
-    /// The groups.
     pub groups: Vec<GroupSummary>,
-    /// The calibration parameters.
     pub parameters: Vec<ParameterErrors>,
-    /// The command line.
     pub command: String,
-    /// Version of the program.
     pub program: String,
     /// Figures in the order of the page.
     #[serde(skip)]
     pub figures: Vec<ReportFigure>,
-    /// Names and texts of the tables beside the page.
+    /// Names and texts of the CSV tables of the report.
     #[serde(skip)]
     pub tables: Vec<(String, String)>,
 }
 
-/// Whether a folder may take the report of a study: it holds no other report.
+/// Checks that a folder contains no other report.
 ///
 /// # Errors
-/// When the folder cannot be written or, without `force`, holds another report.
+/// If the folder cannot be written or, without `force`, contains another report.
 pub fn check_study_report(folder: &Path, study: &str, force: bool) -> Result<(), ExportError> {
     output::check_folder(folder).map_err(ExportError::write(folder))?;
     let path = folder.join(INDEX);
@@ -66,14 +58,14 @@ pub fn check_study_report(folder: &Path, study: &str, force: bool) -> Result<(),
     if known.as_deref() == Some(study) {
         return Ok(());
     }
-    let problem = format!("the folder holds a report on something else than the study '{study}'");
+    let problem = format!("the folder holds a report that is not of the study '{study}'");
     Err(ExportError::Existing { problem, path })
 }
 
 /// Writes report.html, report.json and the tables; returns the path of the page.
 ///
 /// # Errors
-/// When a file cannot be written.
+/// If a file cannot be written.
 pub fn write_study_report(report: &StudyReport, folder: &Path) -> Result<PathBuf, ExportError> {
     fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     let mut outputs = OutputSet::default();
@@ -111,7 +103,7 @@ fn page(report: &StudyReport) -> String {
         p { "Command" }
         pre { (report.command) }
         p {
-            "Version: " (report.program) ". The same tables, command and version give the same bytes. Files beside \
+            "Version: " (report.program) ". The same tables, command and version give the same bytes. Files next to \
              this page: report.json and, for each figure, a table of its values (CSV)."
         }
     };

@@ -10,11 +10,9 @@ use crate::export::summary::{ParameterSummary, TrajectorySummary};
 use crate::geometry::Dimension;
 use crate::log_check::{CheckReport, Severity};
 
-/// Millimetres per metre.
 const MM_PER_M: f64 = 1e3;
 /// Number of columns of the calibration table before the prior: name, unit, values and σ.
 const VALUE_COLUMNS: usize = 5;
-/// Milliseconds per second.
 const MS_PER_S: f64 = 1e3;
 
 /// Frame counts of each run.
@@ -41,13 +39,13 @@ pub(super) fn frames(content: &ReportContent) -> Markup {
     table("Frames and path length", &header, &rows)
 }
 
-/// Trajectory errors of each run, and of each trajectory beside the runs.
+/// Trajectory errors of each run, and of each trajectory of another program.
 pub(super) fn accuracy(content: &ReportContent) -> Markup {
     let mut header =
         ["run", "ATE RMSE, m", "mean, m", "median, m", "max, m", "RMSE, % of length"].map(str::to_owned).to_vec();
     // All runs have relative errors over the same lengths, as far as their paths are long enough.
     let mut lengths_m: Vec<f64> = Vec::new();
-    // Every summary has the trajectories.
+    // The trajectories are the same in every summary.
     let trajectories = content.runs.first().map_or(&[][..], |run| &run.summary.trajectories);
     let of_runs = content.runs.iter().map(|run| (&run.label, &run.summary.accuracy, &run.summary.accuracy_missing));
     let of_trajectories = trajectories.iter().map(|lane| (&lane.label, &lane.accuracy, &lane.accuracy_missing));
@@ -89,7 +87,7 @@ pub(super) fn accuracy(content: &ReportContent) -> Markup {
     )
 }
 
-/// The trajectories of other programs, `None` without one.
+/// Trajectories of other programs, `None` if there are none.
 pub(super) fn trajectories(content: &ReportContent) -> Option<Markup> {
     let lanes = &content.runs.first()?.summary.trajectories;
     let row = |lane: &TrajectorySummary| {
@@ -123,7 +121,7 @@ pub(super) fn calibration(run: &RunContent) -> Markup {
     table(&caption, &header, &rows)
 }
 
-/// Which parameters the flight of one run determines, in groups.
+/// Estimability of the parameters of one run, in groups.
 pub(super) fn estimability(run: &RunContent) -> Markup {
     let header = ["parameter", "group", "unit", "final", "± σ", "prior ± σ", "σ / prior", "verdict", "reason"];
     let row = |parameter: &EstimabilitySummary| {
@@ -150,7 +148,7 @@ pub(super) fn estimability(run: &RunContent) -> Markup {
     table(&caption, &header, &rows)
 }
 
-/// The shown unit of a dimension, shown units per stored unit, and decimals in tables.
+/// Shown unit of a dimension, number of shown units per stored unit, and decimals in tables.
 pub(super) fn shown_unit(dimension: Dimension) -> (&'static str, f64, usize) {
     match dimension {
         Dimension::Angle => ("°", 1f64.to_degrees(), 3),
@@ -188,7 +186,7 @@ pub(super) fn events(run: &RunContent) -> Markup {
     table(&format!("Events of run {}", run.label), &["time, s", "event", "message", ""], &rows)
 }
 
-/// Findings of `check` about the log and its rig, most severe first; findings without a problem as a list.
+/// Findings of `check` about the log and its rig, most severe first; checks without a problem as a list.
 pub(super) fn findings(check: &CheckReport) -> Markup {
     let (good, others): (Vec<_>, Vec<_>) = check.findings.iter().partition(|found| found.severity == Severity::Good);
     let rows: Vec<Vec<String>> = others
@@ -212,7 +210,6 @@ pub(super) fn findings(check: &CheckReport) -> Markup {
     }
 }
 
-/// Topics of the log.
 pub(super) fn topics(check: &CheckReport) -> Markup {
     let rows: Vec<Vec<String>> = check
         .topics
@@ -232,7 +229,6 @@ pub(super) fn topics(check: &CheckReport) -> Markup {
     table("Topics", &["topic", "type", "role", "messages", "rate, Hz", "stamps, s", "median delay, ms"], &rows)
 }
 
-/// Input files.
 pub(super) fn inputs(content: &ReportContent) -> Markup {
     let row = |input: &super::InputFile| vec![input.name.clone(), input.bytes.to_string(), input.sha256.clone()];
     let rows: Vec<Vec<String>> = content.inputs.iter().map(row).collect();

@@ -1,4 +1,4 @@
-//! The verdict at the top of a report: what a reader needs to know before any figure.
+//! The verdict at the top of a report, before any figure.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -13,23 +13,22 @@ use crate::observability::laboratory::{Situation, advise};
 use crate::observability::{ParameterState, RankReport, parameter_states, parameters_of};
 use crate::session::{LostSince, PoseError, Recording, RunRecord, StepRecord};
 
-/// A parameter counts as informed when its posterior σ is at most this ratio of its prior σ: the measurements then
-/// contribute at least as much information as the prior.
+/// A parameter is informed if its posterior σ is at most this ratio of its prior σ: the measurements then contribute at
+/// least as much information as the prior.
 const INFORMED_RATIO: f64 = FRAC_1_SQRT_2;
-/// Trajectory errors up to this percentage of the path length are in order for visual-inertial odometry.
+/// Largest trajectory error, in percent of the path length, with a good mark.
 const MAX_ATE_PERCENT: f64 = 1.0;
-/// Number of parameters that name a direction.
+/// Number of parameters by which a direction is named.
 const NAMED: usize = 4;
 
-/// The weight of a statement.
+/// Severity of a statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Mark {
-    /// In order.
+    /// No problem.
     Good,
-    /// For information.
     Note,
-    /// Limits the use of the result.
+    /// The use of the result is limited.
     Warning,
     /// The result is missing or invalid.
     Error,
@@ -40,43 +39,39 @@ pub(super) enum Mark {
 pub(super) struct Statement {
     /// Subject in one word.
     pub(super) topic: &'static str,
-    /// Its weight.
     pub(super) mark: Mark,
     /// The statement in one sentence.
     pub(super) text: String,
-    /// The values and reasons behind it, one sentence each.
+    /// Underlying values and reasons, one sentence each.
     pub(super) details: Vec<String>,
 }
 
-/// One calibration parameter against its prior.
+/// Comparison of a calibration parameter with its prior.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct ParameterVerdict {
-    /// Its name.
     pub(super) name: String,
-    /// Its dimension, serialized as its unit.
+    /// Serialized as its unit.
     #[serde(rename = "unit")]
     pub(super) dimension: Dimension,
     /// Posterior standard deviation.
     pub(super) sigma: Option<f64>,
     /// Prior standard deviation.
     pub(super) prior_sigma: Option<f64>,
-    /// Whether the posterior σ is at most 0.71 of the prior σ.
+    /// True if the posterior σ is at most 0.71 of the prior σ.
     pub(super) informed: bool,
     /// `weak` or `unobservable` in the last window, empty otherwise.
     pub(super) state: &'static str,
 }
 
-/// The verdict on one run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct RunVerdict {
-    /// The statements in the order of the page.
+    /// Statements in the order of the page.
     pub(super) statements: Vec<Statement>,
-    /// The calibration parameters in column order.
+    /// Calibration parameters in column order.
     pub(super) parameters: Vec<ParameterVerdict>,
 }
 
 impl RunVerdict {
-    /// The verdict on a run.
     pub(super) fn new(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Self {
         let parameters = parameters(recording, run);
         let mut statements = vec![accuracy(recording, run, summary)];
@@ -91,7 +86,7 @@ fn statement(topic: &'static str, mark: Mark, text: String, details: Vec<String>
     Statement { topic, mark, text, details }
 }
 
-/// Errors against the ground truth, without one the covariance of the last pose.
+/// Errors against the ground truth, or the covariance of the last pose if there is none.
 fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Statement {
     let nees = PoseError::mean_nees(&run.pose_errors());
     let last = run.steps.iter().rev().find_map(|step| Some((step, step.report.newest_pose_covariance?)));
@@ -131,7 +126,7 @@ fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Sta
             let relative: Vec<String> = relative.collect();
             let mut details = Vec::new();
             if recording.truth_is_batch {
-                let of = "The errors are distances to the batch reference (dcvins calibrate --trajectory), which is from the same measurements and no independent ground truth.";
+                let of = "The errors are distances to the batch reference (dcvins calibrate --trajectory), which uses the same measurements and is not an independent ground truth.";
                 details.push(of.to_owned());
             }
             if !relative.is_empty() {
@@ -153,7 +148,7 @@ fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Sta
     }
 }
 
-/// Posterior against prior of every parameter at the end of the run.
+/// Posterior against prior σ of every parameter at the end of the run.
 fn parameters(recording: &Recording, run: &RunRecord) -> Vec<ParameterVerdict> {
     let Some(last) = run.steps.last() else { return Vec::new() };
     let calibration = &last.report.calibration;
@@ -209,7 +204,7 @@ fn calibration(parameters: &[ParameterVerdict], summary: &RunSummary) -> Stateme
     if !informed.is_empty() {
         details.push(format!("Informed: {}.", listed(&informed)));
     }
-    // By their observability in the last window.
+    // Grouped by their observability in the last window.
     let mut states: Vec<&str> = others.iter().map(|parameter| parameter.state).collect();
     states.sort_unstable();
     states.dedup();
@@ -232,14 +227,14 @@ fn calibration(parameters: &[ParameterVerdict], summary: &RunSummary) -> Stateme
 }
 
 impl ParameterVerdict {
-    /// `yaw.alpha ±0.12°`.
+    /// For example `yaw.alpha ±0.12°`.
     fn text(&self) -> String {
         let sigma = self.sigma.map_or_else(String::new, |sigma| format!(" ±{}", sigma_text(self.dimension, sigma)));
         format!("{}{sigma}", self.name)
     }
 }
 
-/// The ranks at the end of the run: what is least observable, since when, why, and what helps.
+/// Ranks at the end of the run: the least observable direction, since when, the cause, and suggested excitation.
 fn observability(recording: &Recording, run: &RunRecord) -> Option<Statement> {
     let place = run.steps.iter().rposition(|step| step.rank.is_some())?;
     let (earlier, step) = (&run.steps[..place], run.steps.get(place)?);
@@ -281,7 +276,7 @@ fn observability(recording: &Recording, run: &RunRecord) -> Option<Statement> {
     Some(statement("Observability", mark, text, details))
 }
 
-/// The causes of null and of weak directions.
+/// Causes of null and of weak directions.
 fn why(rank: &RankReport, step: &StepRecord) -> Vec<String> {
     let causes = [
         (rank.deficit_parameterization, "redundant in the parameterization"),
@@ -331,7 +326,7 @@ fn estimation(run: &RunRecord, summary: &RunSummary) -> Statement {
     statement("Estimation", mark, text, run.error.iter().cloned().collect())
 }
 
-/// The problems of the log and the rig that `check` found, and those of the reader.
+/// Problems of the log and the rig found by `check`, and those of the reader.
 pub(super) fn log_statement(check: Option<&CheckReport>, reader_warnings: &[String]) -> Statement {
     let of = |severity: Severity| {
         let findings = check.into_iter().flat_map(|check| &check.findings);
@@ -359,7 +354,7 @@ pub(super) fn log_statement(check: Option<&CheckReport>, reader_warnings: &[Stri
     statement("Log and rig", mark, text, details)
 }
 
-/// Millimetres below a decimetre, else metres.
+/// A length in millimetres below a decimetre, else in metres.
 fn length(value_m: f64) -> String {
     if value_m < 0.1 { format!("{} mm", number(1e3 * value_m, 1)) } else { format!("{} m", number(value_m, 2)) }
 }
@@ -390,7 +385,7 @@ fn capitalized(text: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// `σ(yaw.d) 1.68 → 1.26 mm` without the arrow, which not every font has.
+/// `σ(yaw.d) 1.68 → 1.26 mm` without the arrow, which some fonts lack.
 fn in_words(sentence: &str) -> String {
     let mut parts = sentence.splitn(2, " → ");
     match (parts.next(), parts.next()) {

@@ -19,7 +19,7 @@ const REJECTED: Rgba = [0.90, 0.62, 0.0, 1.0];
 const TRACKED: Rgba = [0.34, 0.71, 0.91, 1.0];
 const RESIDUAL: Rgba = [0.84, 0.37, 0.0, 1.0];
 
-/// The result of the solve for a feature of the image.
+/// Result of the solve for a feature of the image.
 struct Solved {
     rejected: bool,
     /// Line from the measurement along the magnified residual.

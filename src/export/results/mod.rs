@@ -1,5 +1,5 @@
-//! A run as an MCAP file for Foxglove, Rerun and RViz beside the log: poses, frames of the chain, landmarks, tracks and
-//! residuals over the image, calibration, rank and frame statistics as time series, and events.
+//! A run as an MCAP file for Foxglove, Rerun and RViz, to be opened with the log: poses, frames of the chain,
+//! landmarks, tracks and residuals over the image, calibration, rank and frame statistics as time series, and events.
 //!
 //! Topics and frames begin with the run's label, so that the files of several runs can be opened together. Log times
 //! are those of the images, so that playback is synchronous with the log; stamps are the estimator's.
@@ -17,7 +17,7 @@ use crate::gimbal::ClassicalChain;
 use crate::session::{Recording, RunRecord, StepRecord};
 use series::Series;
 
-/// The frame common to all runs: that of the ground truth where there is one.
+/// World frame common to all runs: that of the ground truth if there is one.
 const WORLD: &str = "world";
 /// Period of the path messages in nanoseconds.
 const PATH_PERIOD_NS: i64 = 1_000_000_000;
@@ -26,7 +26,7 @@ const PATH_POSES: usize = 300;
 
 /// Names of the topics and frames of one run.
 struct Names {
-    /// The label with the characters that ROS allows in a topic.
+    /// The label; characters that ROS does not allow in a topic are replaced.
     label: String,
 }
 
@@ -51,18 +51,18 @@ impl Names {
 /// Writes one run of a recording.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// If the file cannot be written.
 pub fn write_results(recording: &Recording, run: &RunRecord, path: &Path) -> Result<(), LogError> {
     let staged = stage_results(recording, run, path)?;
     staged.commit().map_err(|source| LogError::Io { action: "write the log", source, path: path.to_owned() })
 }
 
-/// The same without giving the file its name.
+/// Writes one run of a recording under a temporary name.
 pub(super) fn stage_results(recording: &Recording, run: &RunRecord, path: &Path) -> Result<StagedFile, LogError> {
     let mut results = Results {
         log: LogWriter::create(path, &LogWriterOptions::default())?,
         names: Names::new(&run.spec.label),
-        // Without ground truth the run's world is the world.
+        // Without ground truth, the run's world is used as the common world.
         world_from_run: run.alignment.unwrap_or_else(RigidTransform::identity),
         trajectory: Vec::new(),
         path_due_ns: i64::MIN,
@@ -180,7 +180,7 @@ impl Results {
     }
 }
 
-/// The id of a feature as a four-byte point field, which is enough for four thousand million features.
+/// Id of a feature as a four-byte point field, which suffices for four thousand million features.
 fn short_id(id: FeatureId) -> u32 {
     id.0 as u32
 }

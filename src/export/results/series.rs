@@ -6,7 +6,7 @@ use crate::gimbal::ParameterId;
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
-/// The columns that all rows have.
+/// Columns of all rows.
 pub(super) struct Series {
     /// Parameters of all parameterizations of the run, with the names of their two fields.
     parameters: Vec<(ParameterId, String, String)>,

@@ -9,79 +9,42 @@ use thiserror::Error;
 use crate::flight_log::LogError;
 use crate::study::{PerturbationError, PlanError, TableError};
 
-/// The reason why a file of a study could not be read or written.
+/// Reason why a file of a study could not be read or written.
 #[derive(Debug, Error)]
 pub enum StudyFileError {
-    /// A file or folder could not be written.
     #[error("cannot write: {source}: {path}")]
-    Write {
-        /// The error of the operating system.
-        source: io::Error,
-        /// Path of the file or folder.
-        path: PathBuf,
-    },
-    /// A file could not be read.
+    Write { source: io::Error, path: PathBuf },
     #[error("cannot read: {source}: {path}")]
-    Read {
-        /// The error of the operating system.
-        source: io::Error,
-        /// Path of the file.
-        path: PathBuf,
-    },
-    /// A table could not be read or written.
-    #[error("the table is damaged, or no table of a study: {source}: {path}")]
-    Parquet {
-        /// What the reader or writer found.
-        source: ParquetError,
-        /// Path of the file.
-        path: PathBuf,
-    },
-    /// A plan cannot be used.
+    Read { source: io::Error, path: PathBuf },
+    #[error("the table is damaged, or not a table of a study: {source}: {path}")]
+    Parquet { source: ParquetError, path: PathBuf },
     #[error("{source}: {path}")]
     Plan {
         /// The problem with its line.
         source: Box<PlanError>,
-        /// Path of the plan.
         path: PathBuf,
     },
-    /// A pattern of a plan matches no log, or is no pattern.
+    /// A pattern of a plan matches no log, or is invalid.
     #[error("logs '{pattern}' of the plan: {problem}: {path}")]
-    Logs {
-        /// The pattern.
-        pattern: String,
-        /// The problem.
-        problem: String,
-        /// Path of the plan.
-        path: PathBuf,
-    },
-    /// The rig of a job cannot be perturbed.
+    Logs { pattern: String, problem: String, path: PathBuf },
     #[error(transparent)]
     Perturbation(Box<PerturbationError>),
-    /// A log or a rig cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The description of a job is damaged.
     #[error("the description of the job is damaged: {problem}; remove its folder: {path}")]
-    Job {
-        /// The problem.
-        problem: String,
-        /// Path of the description.
-        path: PathBuf,
-    },
-    /// Tables do not fit together.
+    Job { problem: String, path: PathBuf },
     #[error("the tables of two jobs differ: {source}: {path}")]
     Table {
         /// The difference.
         source: Box<TableError>,
-        /// Path of the second one.
+        /// Path of the second table.
         path: PathBuf,
     },
-    /// The folder holds something else than a study.
+    /// The folder contains something other than a study.
     #[error("the folder holds '{found}' and no {}; give another folder, or an empty one: {path}", super::folder::INDEX)]
     NoStudy {
-        /// What is in it.
+        /// Name of an existing entry.
         found: String,
-        /// The folder.
         path: PathBuf,
     },
 }

@@ -24,37 +24,36 @@ use crate::session::{
 };
 use crate::study::{JobLog, JobSubject, KeyedJob, PerturbationStart, StudyJob, StudyOutput, TableError};
 
-/// Frames between two samples of the consistency of poses: about as long as a window, so that samples share few
-/// measurements.
+/// Number of frames between two samples of the consistency of poses: about the length of a window, so that samples have
+/// few common measurements.
 const CONSISTENCY_EVERY: usize = 30;
-/// Memory of the record of a job: beyond it only the summaries of steps are kept, from which the rows are made.
+/// Memory budget of the record of a job in bytes: beyond it only the summaries of steps are kept, from which the rows
+/// are made.
 const RECORD_BYTES: usize = 64 << 20;
 
-/// The reason why a job has no result.
+/// Reason why a job has no result.
 #[derive(Debug, thiserror::Error)]
 pub enum JobError {
     /// The log cannot be opened, or has no camera for the run.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// A file could not be read or written.
     #[error(transparent)]
     File(Box<StudyFileError>),
     /// The files of the run could not be written.
     #[error(transparent)]
     Export(#[from] ExportError),
-    /// The offline calibration that the job starts from failed.
+    /// The offline calibration for the job's rig failed.
     #[error(transparent)]
     Calibration(Box<CalibrationRunError>),
-    /// The log cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
     /// The rows do not fit into the tables.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// The estimator has stopped early.
+    /// The estimator stopped early.
     #[error("{0}")]
     Estimator(String),
-    /// The simulated flight of the job is not there.
+    /// The simulated flight of the job is missing.
     #[error("the flight of the job is not rendered: {}", .0.display())]
     NoFlight(PathBuf),
     /// No image of the log could be used.
@@ -74,7 +73,6 @@ impl From<StudyFileError> for JobError {
     }
 }
 
-/// Files of a job.
 struct JobFiles {
     log: PathBuf,
     rig: Option<PathBuf>,
@@ -92,7 +90,7 @@ impl StudyFolder {
     /// Runs a job in this process and writes its rows; returns its status.
     ///
     /// # Errors
-    /// When the log or its rig cannot be read, the estimator stops early, or the rows cannot be written.
+    /// If the log or its rig cannot be read, the estimator stops early, or the rows cannot be written.
     pub fn run_job(
         &self,
         key: &str,
@@ -225,7 +223,7 @@ impl StudyFolder {
     /// Writes the row of a job without a result.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If the row cannot be written.
     pub fn write_failure(
         &self,
         KeyedJob { key, job }: &KeyedJob,
@@ -243,8 +241,8 @@ impl StudyFolder {
         Ok(self.write_rows(key, &tables, output)?)
     }
 
-    /// Calibrates offline from the log of a job, writes the files of `dcvins calibrate` into its folder, and makes the
-    /// result its rig.
+    /// Runs the offline calibration on the log of a job, writes the files of `dcvins calibrate` into its folder, and
+    /// uses the result as its rig.
     fn calibrate(&self, key: &str, job: &StudyJob, files: &mut JobFiles) -> Result<CalibrationReport, JobError> {
         let (start_s, duration_s) = span(job);
         let request = CalibrationRequest {
@@ -262,7 +260,7 @@ impl StudyFolder {
         Ok(report)
     }
 
-    /// Writes the rig of a job with its errors, and the masks beside it.
+    /// Writes the rig of a job with its errors, and its masks.
     fn write_perturbed_rig(&self, key: &str, job: &StudyJob, files: &JobFiles) -> Result<PathBuf, JobError> {
         let log = FlightLog::open(&files.log)?;
         let given = Rig::for_log(&log, files.rig.as_deref())?;
@@ -291,7 +289,7 @@ fn span(job: &StudyJob) -> (f64, Option<f64>) {
     }
 }
 
-/// Largest resident memory of this process so far, where the system says it.
+/// Largest resident memory of this process so far; `None` if the system does not report it.
 fn peak_memory_bytes() -> Option<u64> {
     let status = fs::read_to_string(Path::new("/proc/self/status")).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -1,4 +1,4 @@
-//! Simulated flights of a study: rendered once, whatever number of jobs and processes wants them.
+//! Simulated flights of a study: rendered once for all jobs and processes.
 
 use std::fs::{self, File};
 use std::ops::ControlFlow;
@@ -14,10 +14,10 @@ use crate::session::Stopwatch;
 use crate::simulation::{SimulationError, SimulationProgress, simulate_interruptible};
 use crate::study::SimulatedFlight;
 
-/// The file beside a rendered flight that says what is known of it.
+/// File with the metadata of a rendered flight.
 const NOTES: &str = "rendered.json";
 
-/// What is known of a rendered flight.
+/// Metadata of a rendered flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RenderedFlight {
     /// SHA-256 of the log.
@@ -28,7 +28,7 @@ pub struct RenderedFlight {
     pub rendered_in_s: f64,
 }
 
-/// The name of a flight as the name of a file.
+/// File name of a flight.
 fn file_name(flight: &SimulatedFlight) -> String {
     let plain = |letter: char| if letter.is_ascii_alphanumeric() || "-_".contains(letter) { letter } else { '-' };
     let name: String = flight.recipe.name.chars().map(plain).collect();
@@ -36,24 +36,24 @@ fn file_name(flight: &SimulatedFlight) -> String {
 }
 
 impl StudyFolder {
-    /// The log of a flight, whether or not it is rendered.
+    /// Path of the log of a flight, which may not be rendered yet.
     pub fn flight_log(&self, flight: &SimulatedFlight) -> PathBuf {
         self.flight_folder(flight).join(file_name(flight))
     }
 
-    /// What is known of a flight, `None` before it is rendered.
+    /// Metadata of a flight, `None` before it is rendered.
     pub fn rendered(&self, flight: &SimulatedFlight) -> Option<RenderedFlight> {
         let text = fs::read(self.flight_folder(flight).join(NOTES)).ok()?;
         serde_json::from_slice(&text).ok()
     }
 
-    /// Renders a flight if no other process has done so or is at it; returns when it is there.
+    /// Renders a flight unless it is rendered, or waits while another process renders it.
     ///
-    /// The flight is written into a temporary folder that is renamed when it is complete. A lock keeps two processes from
-    /// rendering one flight; on a file system without locks both do, and the first one stays.
+    /// The flight is written into a temporary folder that is renamed when it is complete. A lock keeps two processes
+    /// from rendering the same flight; on a file system without locks both do, and the first one is kept.
     ///
     /// # Errors
-    /// As [`simulate_interruptible`], and when the folders cannot be written.
+    /// As [`simulate_interruptible`], and if the folders cannot be written.
     pub fn render(
         &self,
         flight: &SimulatedFlight,
@@ -64,7 +64,7 @@ impl StudyFolder {
         let lock_path = flights.join(format!("{}.lock", flight.id()));
         let lock = File::options().create(true).append(true).open(&lock_path);
         let lock = lock.map_err(StudyFileError::write(&lock_path))?;
-        // Without locks the rename decides.
+        // Without locks, the first rename is kept.
         let locked = lock.lock().is_ok();
         if self.rendered(flight).is_some() {
             return Ok(());
@@ -95,19 +95,19 @@ impl StudyFolder {
     }
 }
 
-/// Gives a temporary folder, which only its owner may read, the rights of any new folder.
+/// Sets the permissions of a temporary folder, readable only by its owner, to those of a new folder.
 fn share(folder: &Path) {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt as _;
-        // A folder that stays private works for its owner.
+        // A folder that remains private still works for its owner.
         drop(fs::set_permissions(folder, fs::Permissions::from_mode(0o755)));
     }
     #[cfg(not(unix))]
     drop(folder);
 }
 
-/// Removes what killed processes have left; this process holds the lock of the flight.
+/// Removes files left by killed processes; this process holds the lock of the flight.
 fn remove_leftovers(folder: &Path, prefix: &str) {
     for entry in fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok) {
         if entry.file_name().to_string_lossy().starts_with(prefix) {
@@ -116,13 +116,12 @@ fn remove_leftovers(folder: &Path, prefix: &str) {
     }
 }
 
-/// The reason why a flight could not be rendered.
+/// Reason why a flight could not be rendered.
 #[derive(Debug, thiserror::Error)]
 pub enum FlightError {
     /// The simulation failed or was interrupted.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// A file could not be written.
     #[error(transparent)]
     File(Box<StudyFileError>),
 }

@@ -1,12 +1,12 @@
 //! The folder of a study: its plan, flights, jobs and tables.
 //!
 //! ```text
-//! DIR/study.json            what the folder is
+//! DIR/study.json            marks the folder as a study
 //! DIR/plan.toml             copy of the plan
 //! DIR/results.parquet, results.csv, parameters.parquet, parameters.csv, frames.parquet, tables.md
 //! DIR/flights/ID/           a simulated flight with its rig and ground truth
 //! DIR/jobs/KEY/job.json     inputs of a job
-//! DIR/jobs/KEY/stderr.txt   what its last attempt wrote to standard error
+//! DIR/jobs/KEY/stderr.txt   standard error of its last attempt
 //! DIR/jobs/KEY/*.parquet    its rows; results.parquet is written last, and marks the job as done
 //! ```
 
@@ -22,7 +22,7 @@ use crate::study::{
     KeyedJob, SimulatedFlight, StudyJob, StudyOutput, StudyPlan, StudyTable, frames_table, parameters_table, runs_table,
 };
 
-/// The file by which a folder of a study is recognized.
+/// File that identifies the folder of a study.
 pub(super) const INDEX: &str = "study.json";
 /// The table of runs; the rows of a job have the same name in its folder.
 const RUNS: &str = "results";
@@ -30,27 +30,26 @@ const RUNS: &str = "results";
 const PARAMETERS: &str = "parameters";
 /// The table of frames.
 const FRAMES: &str = "frames";
-/// The tables for people.
+/// The Markdown tables of the plan.
 const SUMMARY: &str = "tables.md";
 
 /// Content of [`INDEX`].
 #[derive(Debug, Serialize, Deserialize)]
 struct StudyIndex {
-    /// Number of the layout of the folder.
+    /// Version of the folder's layout.
     dcvins_study: u32,
     name: String,
     /// Absolute path of the plan.
     plan: PathBuf,
 }
 
-/// The tables of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StudyTables {
     /// One row per run.
     pub runs: StudyTable,
     /// One row per run and calibration parameter.
     pub parameters: StudyTable,
-    /// One row per run and frame; empty unless the plan asks for it.
+    /// One row per run and frame; empty unless the plan requests it.
     pub frames: StudyTable,
 }
 
@@ -60,7 +59,6 @@ impl Default for StudyTables {
     }
 }
 
-/// The folder of a study.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StudyFolder {
     root: PathBuf,
@@ -70,7 +68,7 @@ impl StudyFolder {
     /// A new folder for the study of a plan, or the folder of an earlier sweep, which is resumed.
     ///
     /// # Errors
-    /// When the folder holds something else, or cannot be written.
+    /// If the folder contains something else, or cannot be written.
     pub fn create(root: &Path, plan: &StudyPlan, plan_path: &Path) -> Result<Self, StudyFileError> {
         output::check_folder(root).map_err(StudyFileError::write(root))?;
         let mut names = fs::read_dir(root).into_iter().flatten().filter_map(Result::ok).map(|entry| entry.file_name());
@@ -99,57 +97,54 @@ impl StudyFolder {
     /// An existing folder of a study.
     ///
     /// # Errors
-    /// When there is no study in the folder.
+    /// If there is no study in the folder.
     pub fn open(root: &Path) -> Result<Self, StudyFileError> {
         let index = root.join(INDEX);
         fs::metadata(&index).map_err(StudyFileError::read(&index))?;
         Ok(Self { root: fs::canonicalize(root).map_err(StudyFileError::read(root))? })
     }
 
-    /// The folder itself.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// The file with the hashes of logs.
+    /// File with the hashes of logs.
     pub fn hash_cache(&self) -> PathBuf {
         self.root.join("hashes.json")
     }
 
-    /// The folder of a job.
     pub fn job(&self, key: &str) -> PathBuf {
         self.root.join("jobs").join(key)
     }
 
-    /// What the last attempt of a job wrote to standard error.
+    /// File with the standard error of the last attempt of a job.
     pub fn job_stderr(&self, key: &str) -> PathBuf {
         self.job(key).join("stderr.txt")
     }
 
-    /// The folder of a simulated flight.
     pub(super) fn flight_folder(&self, flight: &SimulatedFlight) -> PathBuf {
         self.root.join("flights").join(flight.id())
     }
 
-    /// What the rendering of a flight wrote to standard error.
+    /// File with the standard error of the rendering of a flight.
     pub fn flight_stderr(&self, flight: &SimulatedFlight) -> PathBuf {
         self.root.join("flights").join(format!("{}.stderr.txt", flight.id()))
     }
 
-    /// The batch script and the logs of Slurm.
+    /// Folder of the batch script and the logs of Slurm.
     pub fn slurm(&self) -> PathBuf {
         self.root.join("slurm")
     }
 
-    /// Path of a file as tables name it: relative to the folder of the study if it lies in it.
+    /// Path of a file for the tables: relative to the folder of the study if the file is in it.
     pub(super) fn relative(&self, path: &Path) -> String {
         path.strip_prefix(&self.root).unwrap_or(path).display().to_string()
     }
 
-    /// Writes the inputs of a job where its process reads them.
+    /// Writes the inputs of a job for its process.
     ///
     /// # Errors
-    /// When they cannot be written.
+    /// If they cannot be written.
     pub fn write_job(&self, job: &KeyedJob) -> Result<(), StudyFileError> {
         let folder = self.job(&job.key);
         fs::create_dir_all(&folder).map_err(StudyFileError::write(&folder))?;
@@ -161,7 +156,7 @@ impl StudyFolder {
     /// Reads the inputs of a job.
     ///
     /// # Errors
-    /// When there is no such job, or its description is damaged.
+    /// If there is no such job, or its description is damaged.
     pub fn read_job(&self, key: &str) -> Result<StudyJob, StudyFileError> {
         let path = self.job(key).join("job.json");
         let text = fs::read(&path).map_err(StudyFileError::read(&path))?;
@@ -169,17 +164,17 @@ impl StudyFolder {
             .map_err(|error| StudyFileError::Job { problem: error.to_string(), path: path.clone() })
     }
 
-    /// Whether a job has its rows.
+    /// True if the rows of a job exist.
     pub fn is_done(&self, key: &str, plan: &StudyPlan) -> bool {
         let folder = self.job(key);
         let table = |name: &str| folder.join(format!("{name}.parquet")).is_file();
         table(RUNS) && (!plan.output.frames || table(FRAMES))
     }
 
-    /// The row of a job in the table of runs, `None` when it is not done.
+    /// Row of a job in the table of runs, `None` if the job is not done.
     ///
     /// # Errors
-    /// When the row cannot be read.
+    /// If the row cannot be read.
     pub fn run_of(&self, key: &str) -> Result<Option<StudyTable>, StudyFileError> {
         let path = self.job(key).join(format!("{RUNS}.parquet"));
         path.is_file().then(|| read_parquet(&path)).transpose()
@@ -203,19 +198,19 @@ impl StudyFolder {
         outputs.commit().map_err(StudyFileError::commit)
     }
 
-    /// Forgets the rows of a job, so that it runs again.
+    /// Removes the rows of a job, so that it runs again.
     ///
     /// # Errors
-    /// When the rows cannot be removed.
+    /// If the rows cannot be removed.
     pub fn forget(&self, key: &str) -> Result<(), StudyFileError> {
         let path = self.job(key).join(format!("{RUNS}.parquet"));
         if path.is_file() { fs::remove_file(&path).map_err(StudyFileError::write(&path)) } else { Ok(()) }
     }
 
-    /// The rows of all jobs that are done, in the order of the jobs, and the number of those that are not.
+    /// Rows of all jobs that are done, in the order of the jobs, and the number of the other jobs.
     ///
     /// # Errors
-    /// When rows cannot be read.
+    /// If rows cannot be read.
     pub fn collect(&self, jobs: &[KeyedJob], plan: &StudyPlan) -> Result<(StudyTables, usize), StudyFileError> {
         let (mut tables, mut missing) = (StudyTables::default(), 0);
         for job in jobs {
@@ -241,7 +236,7 @@ impl StudyFolder {
     /// Writes the tables of the study and returns their paths.
     ///
     /// # Errors
-    /// When they cannot be written.
+    /// If they cannot be written.
     pub fn write_tables(&self, tables: &StudyTables, plan: &StudyPlan) -> Result<Vec<PathBuf>, StudyFileError> {
         let mut outputs = OutputSet::default();
         let mut paths = Vec::new();

@@ -1,4 +1,4 @@
-//! The inputs of a study: the plan, the logs that it names and the hashes of their content.
+//! Inputs of a study: the plan, its logs and the hashes of their content.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -17,13 +17,13 @@ use crate::sensors::Rig;
 use crate::session::{TrajectorySource, TrajectorySpec};
 use crate::study::{LOG_PLACE, LogSource, RecordedLog, StudyPlan, StudyTrajectory, hex};
 
-/// Largest plan that is read.
+/// Size limit of a plan in bytes.
 const LARGEST_PLAN_BYTES: u64 = 16 << 20;
 
-/// Reads a plan; a plan without a name gets that of its file.
+/// Reads a plan; a plan without a name gets the name of its file.
 ///
 /// # Errors
-/// When the file cannot be read, or the plan cannot be used.
+/// If the file cannot be read, or the plan is invalid.
 pub fn read_plan(path: &Path) -> Result<StudyPlan, StudyFileError> {
     let mut text = String::new();
     let file = File::open(path).map_err(StudyFileError::read(path))?;
@@ -43,16 +43,16 @@ pub(super) fn file_sha256(path: &Path) -> Result<String, StudyFileError> {
     Ok(hex(&hash.finalize()))
 }
 
-/// Version of the program and SHA-256 of its file, which decide about results.
+/// Version of the program and SHA-256 of its file; results depend on both.
 ///
 /// # Errors
-/// When the program cannot read its own file.
+/// If the program cannot read its own file.
 pub fn program_identity() -> Result<String, StudyFileError> {
     let path = std::env::current_exe().map_err(StudyFileError::read(Path::new("the program")))?;
     Ok(format!("{} {}", env!("CARGO_PKG_VERSION"), file_sha256(&path)?))
 }
 
-/// Hashes of files that were hashed before, by path, as long as size and time of change are the same.
+/// Hashes of files by path, valid while size and modification time are unchanged.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct HashCache(BTreeMap<String, CachedHash>);
 
@@ -65,7 +65,7 @@ struct CachedHash {
 
 impl HashCache {
     fn read(path: &Path) -> Self {
-        // What cannot be read is hashed again.
+        // Without a readable cache, files are hashed again.
         fs::read(path).ok().and_then(|text| serde_json::from_slice(&text).ok()).unwrap_or_default()
     }
 
@@ -83,9 +83,9 @@ impl HashCache {
     }
 }
 
-/// The logs that a plan names, in the order of its entries and of their paths, with the hashes of their content.
+/// Logs of a plan, in the order of its entries and of their paths, with the hashes of their content.
 ///
-/// Hashes are kept in `cache`, so that a study that is resumed reads no log again only to hash it.
+/// Hashes are kept in `cache`, so that a resumed study does not read logs only to hash them.
 ///
 /// # Errors
 /// For a pattern that matches nothing, and for files that cannot be read.
@@ -109,7 +109,7 @@ pub fn find_logs(plan: &StudyPlan, plan_path: &Path, cache: &Path) -> Result<Vec
     Ok(logs)
 }
 
-/// The files that match a pattern, in the order of their paths.
+/// Files that match a pattern, in the order of their paths.
 fn matching(source: &LogSource, folder: &Path, plan: &Path) -> Result<Vec<PathBuf>, StudyFileError> {
     let failed =
         |problem: String| StudyFileError::Logs { pattern: source.pattern.clone(), problem, path: plan.to_owned() };
@@ -119,7 +119,7 @@ fn matching(source: &LogSource, folder: &Path, plan: &Path) -> Result<Vec<PathBu
     }
     let pattern = format!("{}/{}", glob::Pattern::escape(&folder.display().to_string()), source.pattern);
     let pattern = if Path::new(&source.pattern).is_absolute() { source.pattern.clone() } else { pattern };
-    let found = glob::glob(&pattern).map_err(|error| failed(format!("is no pattern: {error}")))?;
+    let found = glob::glob(&pattern).map_err(|error| failed(format!("is not a valid pattern: {error}")))?;
     let mut paths: Vec<PathBuf> = found.filter_map(Result::ok).filter(|path| path.is_file()).collect();
     paths.sort();
     if paths.is_empty() {
@@ -163,7 +163,7 @@ fn recorded(
     })
 }
 
-/// The trajectories of a log with the hashes of their files.
+/// Trajectories of a log with the hashes of their files.
 fn trajectories(
     source: &LogSource,
     folder: &Path,
@@ -184,7 +184,7 @@ fn trajectories(
     source.trajectories.iter().map(found).collect()
 }
 
-/// SHA-256 of a rig as the estimator sees it, with the pixels of its masks.
+/// SHA-256 of a rig as used by the estimator, with the pixels of its masks.
 pub(super) fn rig_sha256(rig: &Rig) -> String {
     let mut hash = Sha256::new();
     hash.update(rig.to_yaml());
@@ -194,7 +194,7 @@ pub(super) fn rig_sha256(rig: &Rig) -> String {
     hex(&hash.finalize())
 }
 
-/// Gives logs of equal names the names of their folders as well, and then a number.
+/// Makes equal names of logs distinct, with the names of their folders and then with a number.
 fn distinct_names(logs: &mut [RecordedLog]) {
     let names: Vec<String> = logs.iter().map(|log| log.name.clone()).collect();
     let twice = |name: &String, names: &[String]| names.iter().filter(|other| *other == name).count() > 1;

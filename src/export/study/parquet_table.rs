@@ -1,7 +1,8 @@
-//! Tables of studies as Apache Parquet, which `DuckDB`, pandas and polars read.
+//! Tables of studies as Apache Parquet, readable by `DuckDB`, pandas and polars.
 //!
-//! All columns are optional `DOUBLE`, `INT64`, `BYTE_ARRAY (STRING)` or `BOOLEAN`, under Zstandard. Units and descriptions
-//! are the file's metadata `dcvins.columns`, a JSON list of objects with `name`, `unit` and `description`.
+//! All columns are optional `DOUBLE`, `INT64`, `BYTE_ARRAY (STRING)` or `BOOLEAN`, compressed by Zstandard. Units and
+//! descriptions are in the file's metadata `dcvins.columns`, a JSON list of objects with `name`, `unit` and
+//! `description`.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -25,9 +26,9 @@ use crate::study::{Cell, ColumnType, ColumnValues, StudyColumn, StudyTable};
 
 /// Key of the metadata with units and descriptions.
 const COLUMNS_KEY: &str = "dcvins.columns";
-/// Rows that are read at once.
+/// Number of rows read at once.
 const BATCH_ROWS: usize = 1 << 16;
-/// Most rows of a table that is read, so that a damaged file does not fill the memory.
+/// Maximum number of rows of a table that is read, so that a damaged file does not exhaust the memory.
 const MOST_ROWS: i64 = 100_000_000;
 
 /// Unit and description of a column in the metadata of a file.
@@ -38,12 +39,12 @@ struct ColumnNote {
     description: String,
 }
 
-/// Writes a table without giving it its name yet.
+/// Writes a table under a temporary name.
 ///
 /// The same table gives the same bytes.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// If the file cannot be written.
 pub(super) fn stage_parquet(table: &StudyTable, path: &Path) -> Result<StagedFile, StudyFileError> {
     let file = OutputFile::create(path).map_err(StudyFileError::write(path))?;
     let file = write(table, file).map_err(|source| StudyFileError::Parquet { source, path: path.to_owned() })?;
@@ -53,7 +54,7 @@ pub(super) fn stage_parquet(table: &StudyTable, path: &Path) -> Result<StagedFil
 /// Writes a table.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// If the file cannot be written.
 pub fn write_parquet(table: &StudyTable, path: &Path) -> Result<(), StudyFileError> {
     stage_parquet(table, path)?.commit().map_err(StudyFileError::write(path))
 }
@@ -121,16 +122,16 @@ fn write(table: &StudyTable, file: OutputFile) -> ParquetResult<OutputFile> {
     writer.into_inner()
 }
 
-/// The cells that are not empty, and for every cell whether it is one of them.
+/// The non-empty cells, and the definition level of every cell: 1 for a value, 0 for an empty cell.
 fn split<T, V>(cells: &[Option<T>], value: impl Fn(&T) -> V) -> (Vec<V>, Vec<i16>) {
     let levels = cells.iter().map(|cell| i16::from(cell.is_some())).collect();
     (cells.iter().flatten().map(value).collect(), levels)
 }
 
-/// Reads a table of this program, or of another one with flat columns of numbers, integers, texts and booleans.
+/// Reads a table of this program, or of another one with flat columns of numbers, integers, texts and Booleans.
 ///
 /// # Errors
-/// When the file cannot be read or is no such table.
+/// If the file cannot be read or is not such a table.
 pub fn read_parquet(path: &Path) -> Result<StudyTable, StudyFileError> {
     let file = std::fs::File::open(path).map_err(StudyFileError::read(path))?;
     read(file).map_err(|source| StudyFileError::Parquet { source, path: path.to_owned() })
@@ -239,10 +240,10 @@ pub fn csv_text(table: &StudyTable) -> String {
     csv.into_text()
 }
 
-/// Writes a text, in place of an older file.
+/// Writes a text file; an older one is replaced.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// If the file cannot be written.
 pub fn write_text(path: &Path, text: &str) -> Result<(), StudyFileError> {
     output::write_file(path, text.as_bytes()).map_err(StudyFileError::write(path))
 }

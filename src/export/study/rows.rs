@@ -1,4 +1,4 @@
-//! The rows of one job: its inputs, and the results of its run.
+//! Rows of one job: its inputs, and the results of its run.
 
 use super::folder::StudyTables;
 use crate::estimator::{EventKind, FailureCause};
@@ -8,25 +8,25 @@ use crate::geometry::{median, seconds_from_ns, so3};
 use crate::session::{Recording, RunRecord, TrajectoryLane};
 use crate::study::{Cell, JobLog, StudyJob, TableError, relative_error_columns};
 
-/// How a job ended.
+/// Outcome of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum JobStatus {
-    /// It has results.
+    /// The job has results.
     Ok,
-    /// It ran, and the estimator never initialized.
+    /// The estimator never initialized.
     NotInitialized,
-    /// It ended with an error.
+    /// The job ended with an error.
     Failed,
-    /// It ended by a panic, or by a signal of a fault.
+    /// The job ended by a panic, or by a signal of a fault.
     Crashed,
-    /// It was killed.
+    /// The job was killed.
     Killed,
-    /// It took longer than the plan allows, and was killed for that.
+    /// The job exceeded the plan's time limit and was killed.
     Timeout,
 }
 
 impl JobStatus {
-    /// Its text in the column `status`.
+    /// Text in the column `status`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ok => "ok",
@@ -38,24 +38,23 @@ impl JobStatus {
         }
     }
 
-    /// Whether the job has run to its end.
+    /// True if the job has run to its end.
     pub fn has_run(self) -> bool {
         matches!(self, Self::Ok | Self::NotInitialized)
     }
 }
 
-/// The files and the costs of a job.
+/// Files and costs of a job.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JobCosts {
-    /// SHA-256 of the log, where it is known.
+    /// SHA-256 of the log, if it is known.
     pub log_sha256: Option<String>,
     /// SHA-256 of the rig that was used.
     pub rig_sha256: Option<String>,
-    /// Path of the log.
     pub log_path: String,
-    /// Path of the rig, where it is not the log's own.
+    /// Path of the rig, `None` for the default rig of the log.
     pub rig_path: Option<String>,
-    /// Path of the ground-truth rig, where it is not the log's own.
+    /// Path of the ground-truth rig, `None` for the default one of the log.
     pub truth_path: Option<String>,
     /// File of the trajectory, or its topic; `None` for a run.
     pub trajectory_path: Option<String>,
@@ -65,7 +64,7 @@ pub struct JobCosts {
     pub attempts: usize,
     /// Wall time in seconds.
     pub wall_s: f64,
-    /// Largest resident memory.
+    /// Largest resident memory in bytes.
     pub peak_memory_bytes: Option<u64>,
 }
 
@@ -123,7 +122,7 @@ fn pairing(key: &str, job: &StudyJob) -> Cells {
     ]
 }
 
-/// The row of a job without results.
+/// Row of a job without results.
 pub(super) fn failed_rows(
     key: &str,
     job: &StudyJob,
@@ -136,7 +135,7 @@ pub(super) fn failed_rows(
     Ok(tables)
 }
 
-/// The rows of a job with results; `offline` is the calibration that its rig comes from.
+/// Rows of a job with results; `offline` is the calibration that estimated its rig.
 pub(super) fn run_rows(
     key: &str,
     job: &StudyJob,
@@ -175,7 +174,7 @@ pub(super) fn run_rows(
     Ok(tables)
 }
 
-/// The row of a trajectory of another program.
+/// Row of a trajectory of another program.
 pub(super) fn trajectory_rows(
     key: &str,
     job: &StudyJob,
@@ -295,8 +294,8 @@ fn worst_frame(run: &RunRecord) -> Cells {
     ]
 }
 
-/// Position error in metres and angle in radians of every step by stamp, after the alignment of the whole run; `None` where
-/// there is no pose or no ground truth.
+/// Position error in metres and angle in radians of every step by stamp, after the alignment of the whole run; `None`
+/// without a pose or ground truth.
 pub(super) fn position_errors(run: &RunRecord) -> Vec<(i64, Option<[f64; 2]>)> {
     let error_of = |step: &crate::session::StepRecord| {
         let (alignment, truth) = (run.alignment?, step.ground_truth?);

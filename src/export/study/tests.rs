@@ -51,7 +51,7 @@ fn a_damaged_table_is_an_error() {
     for length in [0, 3, 4, whole.len() / 2, whole.len() - 1] {
         fs::write(&path, &whole[..length]).unwrap();
         let error = read_parquet(&path).unwrap_err().to_string();
-        assert!(error.starts_with("the table is damaged, or no table of a study"), "{error}");
+        assert!(error.starts_with("the table is damaged, or not a table of a study"), "{error}");
     }
     assert!(read_parquet(&folder.path().join("none.parquet")).unwrap_err().to_string().starts_with("cannot read"));
 }

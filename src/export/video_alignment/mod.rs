@@ -1,4 +1,4 @@
-//! Where a video lies in an autopilot's log, by the rotations that both recorded.
+//! Time alignment of a video with an autopilot's log, by the rotations that both recorded.
 
 mod plot;
 
@@ -19,26 +19,26 @@ use crate::log_check::{AlignmentError, AlignmentReference, ClockAlignment, align
 use crate::sensors::Rig;
 use crate::session::camera_rotations;
 
-/// Range of the search around the first guess, either sign.
+/// Search range in seconds on either side of the first guess.
 const SEARCH_S: f64 = 60.0;
-/// Sections of the video whose rotations are measured, and the length of each.
+/// Number of sections of the video with measured rotations, and the length of each in seconds.
 const SECTIONS: usize = 6;
 const SECTION_S: f64 = 12.0;
-/// Part of the progress that the first conversion takes.
+/// Fraction of the progress that the first conversion takes.
 const CONVERTED: f64 = 0.5;
 
-/// The clock of a video against that of an autopilot's log, with its evidence.
+/// Alignment of a video's clock with that of an autopilot's log, with its evidence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VideoAlignment {
-    /// What the images were compared with.
+    /// Reference with which the images were compared.
     pub reference: AlignmentReference,
-    /// Where the video lies.
+    /// Clock of the video relative to the log.
     pub clock: VideoClock,
-    /// The alignment relative to the first guess.
+    /// Alignment relative to the first guess.
     pub alignment: ClockAlignment,
 }
 
-/// The reason why a video could not be aligned.
+/// Reason why a video could not be aligned.
 #[derive(Debug, Error)]
 pub enum VideoAlignmentError {
     /// The sources cannot be converted.
@@ -49,25 +49,18 @@ pub enum VideoAlignmentError {
     Log(#[from] LogError),
     /// No single offset explains the rotations.
     #[error(
-        "the video cannot be aligned with the log of the autopilot: {source}; give its place with --video-offset SECONDS (by the \
+        "the video cannot be aligned with the log of the autopilot: {source}; give its offset with --video-offset SECONDS (by the \
          times of camera and autopilot it would be {guess_s:.3}): {path}"
     )]
     NotAligned {
-        /// Why not.
         source: AlignmentError,
-        /// Offset of the video by the times that both recorded, or where both start together.
+        /// Offset of the video from the recorded times, or with a common start.
         guess_s: f64,
-        /// The video.
         path: PathBuf,
     },
     /// The log for the first guess cannot be written.
     #[error("cannot write a log for the alignment: {source}: {path}")]
-    Write {
-        /// The error of the operating system.
-        source: io::Error,
-        /// The folder.
-        path: PathBuf,
-    },
+    Write { source: io::Error, path: PathBuf },
 }
 
 impl fmt::Display for VideoAlignment {
@@ -93,7 +86,7 @@ impl fmt::Display for VideoAlignment {
         }
         let percent = 100.0 * (found.scale - 1.0);
         if percent.abs() > 3.0 {
-            // Rotations are as much too small as the focal length is too long.
+            // A focal length that is too large makes rotations too small by the same ratio.
             let word = if percent < 0.0 { "long" } else { "short" };
             write!(out, "; the focal length of the rig seems to be {:.0} % too {word}", percent.abs())?;
         }
@@ -101,11 +94,11 @@ impl fmt::Display for VideoAlignment {
     }
 }
 
-/// Finds where a video lies in the autopilot's log of `options` within ±60 s of the first guess, which is that of the
-/// conversion. A rig beside `output` is used for the camera's model.
+/// Estimates the time offset of a video in the autopilot's log of `options` within ±60 s of the first guess, which is
+/// that of the conversion. If there is a rig next to `output`, its camera model is used.
 ///
 /// # Errors
-/// When the sources cannot be converted, or the rotations do not tell one offset from the others.
+/// If the sources cannot be converted, or the rotations do not determine a unique offset.
 pub fn align_video(
     source: &Path,
     output: &Path,

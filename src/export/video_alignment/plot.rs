@@ -1,4 +1,4 @@
-//! The alignment of a video as a drawing.
+//! Drawing of the alignment of a video.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -9,18 +9,18 @@ use super::VideoAlignment;
 use crate::export::ExportError;
 use crate::flight_log::output::write_file;
 
-/// Size of the drawing, and the frame of both plots in it.
+/// Size of the drawing, and margins of both plots in it.
 const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 560.0;
 const LEFT: f64 = 60.0;
 const RIGHT: f64 = 940.0;
-/// Speeds that are drawn; a longer recording is drawn with gaps between them.
+/// Maximum number of drawn points; points of a longer recording are skipped.
 const MAX_POINTS: usize = 4000;
-/// Colors of images and reference.
+/// Colours of images and reference.
 const IMAGES: &str = "#c2410c";
 const REFERENCE: &str = "#1d4ed8";
 
-/// One plot: ranges of its axes and its place.
+/// One plot: ranges of its axes and its position.
 struct Plot {
     x: (f64, f64),
     y: (f64, f64),
@@ -128,10 +128,10 @@ fn summary(aligned: &VideoAlignment) -> String {
     )
 }
 
-/// Draws the search and the angular speeds at the offset found, as SVG.
+/// Draws the search and the angular rates at the estimated offset, as SVG.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// If the file cannot be written.
 pub fn write_alignment_plot(aligned: &VideoAlignment, path: &Path) -> Result<(), ExportError> {
     write_file(path, drawing(aligned).as_bytes()).map_err(ExportError::write(path))
 }

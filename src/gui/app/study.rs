@@ -9,7 +9,7 @@ use super::{App, Opened, PlayingLog};
 use crate::gui::study::{StudyOptions, StudyRequest, StudyState, study_ui};
 use crate::gui::theme::MAX_RUNS;
 use crate::gui::window::NoticeLevel;
-use crate::study::view::{Study, rows_beside};
+use crate::study::view::{Study, comparable_rows};
 
 /// A study on the disk: its tables, and its runs as sessions.
 pub trait StudySource: Send + Sync {
@@ -96,7 +96,7 @@ impl App {
     fn open_run(&mut self, row: usize) {
         let Some(study) = self.study.as_ref().filter(|_| self.opening.is_none()) else { return };
         let table = study.state.study();
-        let rows = rows_beside(&table.runs, row, MAX_RUNS);
+        let rows = comparable_rows(&table.runs, row, MAX_RUNS);
         let title = table.title_of(row);
         let source = Arc::clone(&study.source);
         self.state.notices.show_message(NoticeLevel::Info, format!("Opening {title}"));

@@ -9,7 +9,7 @@ use crate::session::record::StepRecord;
 /// The inputs of the evaluation of a condition.
 #[derive(Clone, Copy, Debug)]
 pub struct StepContext<'a> {
-    /// The step. Its summary suffices.
+    /// The current step; its summary suffices.
     pub step: &'a StepRecord,
     /// The step before it.
     pub previous: Option<&'a StepRecord>,
@@ -27,12 +27,12 @@ pub struct NamedValue {
 }
 
 impl Condition {
-    /// Whether the condition is true in the step, `None` when the step lacks a quantity that decides it.
+    /// True if the condition holds in the step; `None` if the step lacks a quantity that decides it.
     pub fn holds(&self, context: &StepContext<'_>) -> Option<bool> {
         self.predicate.holds(context)
     }
 
-    /// Every quantity of the condition once, in the order of the text.
+    /// Every quantity of the condition once, in textual order.
     pub fn values(&self, context: &StepContext<'_>) -> Vec<NamedValue> {
         let mut values_by_span = Vec::new();
         self.predicate.visit(&mut |span, number| values_by_span.push((span, number.value(context))));

@@ -14,7 +14,7 @@ use crate::estimator::EventKind;
 pub struct ConditionProblem {
     /// The text of the whole condition.
     pub text: String,
-    /// Column of the error in characters, from 1; behind the last character where something is missing.
+    /// Column of the error in characters, from 1; after the last character if something is missing.
     pub column: usize,
     /// The error and what was expected.
     pub message: String,
@@ -28,7 +28,6 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// The text from which it was parsed.
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -51,7 +50,6 @@ pub(crate) struct Span {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Number {
     Literal(f64),
-    /// A quantity of the step.
     Quantity(NumberName, Span),
     /// A quantity with an argument: `sigma(yaw.alpha)`.
     Named(NamedNumber, String, Span),
@@ -110,7 +108,7 @@ impl Comparison {
         }
     }
 
-    /// Whether it holds for two values in this order.
+    /// True if the comparison holds for two values in this order.
     pub(crate) fn holds_for(self, order: Ordering) -> bool {
         match self {
             Self::Less => order.is_lt(),

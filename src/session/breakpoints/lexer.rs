@@ -2,12 +2,10 @@
 
 use super::expression::{Comparison, ConditionProblem, Span};
 
-/// A token of the text.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Token {
     Number(f64),
     Name(String),
-    /// A quoted name.
     Quoted(String),
     Compare(Comparison),
     Plus,
@@ -52,7 +50,7 @@ pub(super) fn tokens(text: &str) -> Result<Vec<(Token, Span)>, ConditionProblem>
     scan(text, false)
 }
 
-/// The same tokens, where a single `=` compares, too.
+/// As [`tokens`], but a single `=` is also accepted as a comparison.
 pub(crate) fn tokens_with_single_equals(text: &str) -> Result<Vec<(Token, Span)>, ConditionProblem> {
     scan(text, true)
 }

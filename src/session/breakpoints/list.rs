@@ -12,11 +12,9 @@ use crate::session::record::{Recording, RunRecord};
 pub struct Hit {
     /// Stamp of the step, in nanoseconds since the log began.
     pub stamp_ns: i64,
-    /// Index of the run.
     pub run: usize,
     /// Index of the step in the run.
     pub step: usize,
-    /// Index of the breakpoint.
     pub breakpoint: usize,
 }
 
@@ -32,9 +30,9 @@ struct Track {
 /// A condition at which the cursor stops.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Breakpoint {
-    /// It is hit where this becomes true.
+    /// Condition that triggers the breakpoint when it becomes true.
     pub condition: Condition,
-    /// Whether the cursor stops at its hits.
+    /// True if the cursor stops at its hits.
     pub enabled: bool,
     /// By [`RunRecord::id`].
     tracks: BTreeMap<u64, Track>,
@@ -46,12 +44,12 @@ impl Breakpoint {
         Self { condition, enabled: true, tracks: BTreeMap::new() }
     }
 
-    /// Number of its hits in a run so far.
+    /// Number of hits in a run so far.
     pub fn hit_count(&self, run: &RunRecord) -> usize {
         self.tracks.get(&run.id).map_or(0, |track| track.hits.len())
     }
 
-    /// Stamps of its hits in a run so far, in ascending order.
+    /// Stamps of the hits in a run so far, in ascending order.
     pub fn hits_ns(&self, run: &RunRecord) -> impl Iterator<Item = i64> {
         self.tracks.get(&run.id).into_iter().flat_map(|track| track.hits.iter().map(|(stamp_ns, _)| *stamp_ns))
     }
@@ -133,7 +131,7 @@ impl Breakpoints {
         }
     }
 
-    /// Whether there are steps that have not been evaluated.
+    /// True if there are steps that have not been evaluated.
     pub fn is_behind(&self, recording: &Recording) -> bool {
         let read = |breakpoint: &Breakpoint, run: &RunRecord| breakpoint.tracks.get(&run.id).map(|track| track.read);
         self.list.iter().any(|breakpoint| {

@@ -1,8 +1,8 @@
 //! Conditions on the reports of a run, and the steps in which they become true.
 //!
 //! `rank < 18 or features < 40` compares quantities of a step with numbers and joins comparisons by `and`, `or` and
-//! `not`. A quantity that a step does not have (a rank during initialization) makes no condition true. A breakpoint is
-//! hit where its condition becomes true.
+//! `not`. A comparison is false if the step lacks its quantity (a rank during initialization). A breakpoint is hit
+//! where its condition becomes true.
 
 mod evaluate;
 mod expression;

@@ -12,8 +12,8 @@ use crate::flight_log::nearest_name;
 const MAX_DEPTH: usize = 60;
 /// Limit of the characters of a condition.
 const MAX_CHARACTERS: usize = 1_000_000;
-/// Limit of the operators that join terms: a chain of `and` is a tree as deep as it is long, and evaluating it takes that
-/// much stack.
+/// Limit on the operators that join terms: the tree of a chain of `and` is as deep as the chain is long, and its
+/// evaluation needs stack in proportion.
 const MAX_OPERATORS: usize = 500;
 /// Unit suffixes and their factors to radians, metres, seconds or pixels.
 const UNITS: [(&str, f64); 11] = [
@@ -34,7 +34,6 @@ pub(crate) fn factor_of_unit(unit: &str) -> Option<f64> {
     UNITS.iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor)
 }
 
-/// Functions that return numbers.
 const FUNCTIONS: [&str; 5] = ["singular", "rise", "abs", "min", "max"];
 
 /// A sub-expression that may be a number or a predicate.
@@ -61,13 +60,12 @@ impl FromStr for Condition {
     }
 }
 
-/// A problem of a text that is too long to be shown.
+/// Error for a text that is too long to be shown.
 fn too_long(text: &str, message: &str) -> ConditionProblem {
     let text = format!("{}…", text.chars().take(60).collect::<String>());
     ConditionProblem { text, column: 1, message: format!("the condition is too long: {message}") }
 }
 
-/// Parses a condition.
 fn parse(text: &str) -> Result<Condition> {
     if text.len() > MAX_CHARACTERS {
         return Err(too_long(text, &format!("{} bytes, expected at most {MAX_CHARACTERS}", text.len())));
@@ -80,7 +78,7 @@ fn parse(text: &str) -> Result<Condition> {
     let expression = parser.alternatives()?;
     match parser.peek() {
         Token::End => {}
-        Token::Close => return Err(parser.problem("unmatched bracket: it closes nothing")),
+        Token::Close => return Err(parser.problem("unmatched closing bracket")),
         Token::Compare(_) => return Err(parser.problem("comparisons do not chain: write 'a < b and b < c'")),
         _ => return Err(parser.problem("expected 'and', 'or' or the end of the condition")),
     }
@@ -101,7 +99,7 @@ impl Parser<'_> {
         self.span().begin
     }
 
-    /// End of the previous token.
+    /// End position of the previous token.
     fn end(&self) -> usize {
         self.tokens[self.at.saturating_sub(1)].1.end
     }
@@ -136,7 +134,7 @@ impl Parser<'_> {
     fn number(&self, expression: Expression, begin: usize) -> Result<Number> {
         match expression {
             Expression::Number(number) => Ok(number),
-            Expression::Predicate(_) => Err(self.problem_at(begin, "this is true or false, where a number is needed")),
+            Expression::Predicate(_) => Err(self.problem_at(begin, "this is true or false, expected a number")),
         }
     }
 
@@ -240,7 +238,7 @@ impl Parser<'_> {
 
     fn deeper(&mut self, expression: fn(&mut Self) -> Result<Expression>) -> Result<Expression> {
         if self.depth == MAX_DEPTH {
-            return Err(self.problem(format!("more than {MAX_DEPTH} brackets and signs within each other")));
+            return Err(self.problem(format!("brackets and signs are nested more than {MAX_DEPTH} deep")));
         }
         self.depth += 1;
         let result = expression(self);
@@ -267,7 +265,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Factor of the unit behind a number; 1 without a unit.
+    /// Factor of the unit after a number; 1 without a unit.
     fn unit(&mut self) -> Result<f64> {
         if self.take(&Token::Percent) {
             return Ok(0.01);
@@ -400,7 +398,7 @@ impl Parser<'_> {
         if self.take(&Token::Close) {
             return Ok(());
         }
-        Err(self.problem(format!("expected ')' for what begins at column {}", begin + 1)))
+        Err(self.problem(format!("expected ')' for the expression that begins at column {}", begin + 1)))
     }
 }
 

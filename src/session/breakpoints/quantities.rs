@@ -118,7 +118,7 @@ pub(super) const NAMED: [(&str, NamedNumber, &str, &str); 8] = [
     ("nis", NamedNumber::Nis, "imu", "χ² per residual of a factor after the solve"),
 ];
 
-/// Causes of lost rank.
+/// Causes of rank loss.
 pub(super) const CAUSES: [&str; 4] = ["parameterization", "joints", "absorbed", "motion"];
 
 /// A Boolean property of a step.
@@ -149,7 +149,6 @@ pub(super) const FLAGS: &[FlagName] = &[
     FlagName { name: "warning", meaning: "the step has warnings", value: |step| !step.report.warnings.is_empty() },
 ];
 
-/// Names of event kinds.
 pub(super) const EVENTS: [(&str, &[EventKind]); 10] = [
     ("waits", &[EventKind::InitializationWaits]),
     ("initialized", &[EventKind::InitializedFromMotion, EventKind::InitializedFromStationary]),

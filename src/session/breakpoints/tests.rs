@@ -134,7 +134,7 @@ fn mistakes_are_reported_with_their_column() {
     check("rank < 18 or", 13, &["ends here"]);
     check("rank < 18 features > 2", 11, &["'and', 'or'"]);
     check("(rank < 18", 11, &["')'", "column 1"]);
-    check("rank < 18)", 10, &["closes nothing"]);
+    check("rank < 18)", 10, &["unmatched closing bracket"]);
     check("1 < rank < 18", 10, &["chain"]);
     check("rank = 18", 6, &["=="]);
     check("rank < 18 and tracking + 1 > 2", 15, &["true or false"]);

@@ -39,7 +39,7 @@ impl AlteredMeasurements {
         self.encoder_noise *= other.encoder_noise;
     }
 
-    /// Whether encoder readings are not used.
+    /// True if encoder readings are not used.
     pub(super) fn encoder_off(&self) -> bool {
         self.encoder_off
     }

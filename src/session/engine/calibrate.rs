@@ -20,7 +20,7 @@ use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError, check_
 
 /// Fraction of the progress that feature tracking takes.
 const TRACKING_RATIO: f64 = 0.6;
-/// Name of that part in messages.
+/// Name of the tracking stage in messages.
 const TRACKING: &str = "tracking both cameras";
 /// Ratio of the bound of a uniform error to its standard deviation: √3.
 const BOUND_PER_SIGMA: f64 = 1.732_050_807_568_877_2;
@@ -36,42 +36,22 @@ pub enum CalibrationRunError {
     Session(#[from] SessionError),
     /// The rig lacks something that is to be calibrated.
     #[error("the rig '{rig}' has no {missing}; {remedy}: {path}")]
-    Missing {
-        /// Name of the rig.
-        rig: String,
-        /// The missing entry.
-        missing: &'static str,
-        /// The remedy.
-        remedy: &'static str,
-        /// Path of the log.
-        path: PathBuf,
-    },
+    Missing { rig: String, missing: &'static str, remedy: &'static str, path: PathBuf },
     /// The calibration is not observable from the log, or does not converge.
     #[error("{reason}: {path}")]
-    Calibration {
-        /// The reason.
-        reason: CalibrationError,
-        /// Path of the log.
-        path: PathBuf,
-    },
+    Calibration { reason: CalibrationError, path: PathBuf },
     /// The camera's images could not be read to the end.
     #[error("internal error while tracking {camera}; please report it with the log: {path}")]
-    Tracking {
-        /// Key of the camera.
-        camera: String,
-        /// Path of the log.
-        path: PathBuf,
-    },
+    Tracking { camera: String, path: PathBuf },
 }
 
 /// The arguments of an offline calibration, as on the command line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CalibrationRequest {
-    /// Path of the log.
     pub log_path: PathBuf,
-    /// Path of the rig file, when it is not beside the log or in it.
+    /// Path of the rig file; `None` if it is next to the log or inside it.
     pub rig_path: Option<PathBuf>,
-    /// Path of the ground-truth rig file, when it is not beside the log.
+    /// Path of the ground-truth rig file; `None` if it is next to the log.
     pub ground_truth_path: Option<PathBuf>,
     /// Seconds to skip at the start of the log.
     pub start_s: f64,
@@ -84,7 +64,6 @@ pub struct CalibrationRequest {
 /// The result of an offline calibration.
 #[derive(Clone, Debug)]
 pub struct CalibrationRun {
-    /// Path of the log.
     pub log_path: PathBuf,
     /// Time of the log's first message, to which stamps are relative, in nanoseconds.
     pub epoch_ns: i64,
@@ -107,7 +86,7 @@ pub struct CalibrationRun {
 /// Tracks both cameras over the log and calibrates.
 ///
 /// # Errors
-/// When the log cannot be read, the rig lacks a camera or encoders, the calibration is not observable, or `on_progress`
+/// If the log cannot be read, the rig lacks a camera or encoders, the calibration is not observable, or `on_progress`
 /// breaks ([`CalibrationError::Interrupted`]).
 pub fn calibrate(
     request: &CalibrationRequest,
@@ -185,8 +164,8 @@ impl CalibratedEntries {
     }
 }
 
-/// Tracks the features of both cameras, each on its own thread; on a third one the static camera's trajectory is estimated as
-/// its images are tracked.
+/// Tracks the features of both cameras, each on its own thread; a third thread estimates the static camera's trajectory
+/// while its images are tracked.
 fn track(
     log: &Arc<FlightLog>,
     rig: &Rig,
@@ -224,7 +203,7 @@ fn track(
             let fraction = TRACKING_RATIO * (seconds_from_ns(view.stamp_ns) - request.start_s) / length_s;
             let flow = on_progress(CalibrationProgress { stage: TRACKING, fraction });
             interrupted.fetch_or(flow.is_break(), Ordering::Relaxed);
-            // Only a thread that has panicked does not receive; the scope then panics, too.
+            // The receiver is missing only after a thread has panicked; the scope then panics, too.
             drop(tracked.send(view.clone()));
             flow
         });

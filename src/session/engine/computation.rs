@@ -9,12 +9,12 @@ use super::recompute::{Detail, RecomputeRequest, Recomputed};
 use crate::session::plan::SessionPlan;
 use crate::session::record::{Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord};
 
-/// Inverse of the ratio of the memory budget that estimator snapshots may take. They go before whole steps: with them any
-/// step is recomputed soon, and a whole step only helps where the cursor is.
+/// Divisor of the memory budget: estimator snapshots may take half of it. They take precedence over complete steps:
+/// from a snapshot any step is recomputed quickly, while a complete step helps only at the cursor.
 const SNAPSHOT_BUDGET_DIVISOR: usize = 2;
 
-/// The runs of a session as far as they are computed: their record, and for each run the history from which any of its
-/// steps can be recomputed to the same bits.
+/// Runs of a session as far as they are computed: their record, and for each run the history from which any of its
+/// steps can be recomputed bit by bit.
 ///
 /// A clone shares record and histories.
 #[derive(Clone, Debug)]
@@ -25,7 +25,7 @@ pub struct Computation {
 }
 
 impl Computation {
-    /// The runs of a plan before their first step.
+    /// Runs of a plan before their first step.
     pub(in crate::session) fn new(plan: &SessionPlan) -> Self {
         let recording = Arc::new(Recording::new(plan));
         let history = |run: &RunRecord| (run.id, Arc::new(History::new(plan.memory_budget_bytes)));
@@ -35,22 +35,19 @@ impl Computation {
         computation
     }
 
-    /// The reports so far.
     pub fn recording(&self) -> &Arc<Recording> {
         &self.recording
     }
 
-    /// The reports without the histories.
     pub fn into_recording(self) -> Recording {
         Arc::unwrap_or_clone(self.recording)
     }
 
-    /// The reports for modification (copy on write: clones keep the old state).
+    /// The record for modification (copy on write: clones keep the old state).
     pub(in crate::session) fn recording_mut(&mut self) -> &mut Recording {
         Arc::make_mut(&mut self.recording)
     }
 
-    /// The history of a run by its index.
     pub(in crate::session) fn history(&self, run: usize) -> Option<&Arc<History>> {
         self.histories.get(&self.recording.runs.get(run)?.id)
     }
@@ -62,7 +59,6 @@ impl Computation {
         self.divide_snapshot_memory();
     }
 
-    /// Removes the last run.
     pub(in crate::session) fn remove_last_run(&mut self) {
         if let Some(run) = self.recording_mut().runs.pop() {
             self.histories.remove(&run.id);
@@ -133,13 +129,13 @@ impl Computation {
         while recording.memory_bytes() > recording.memory_budget_bytes {
             // The largest run goes first; forks come after the run that they share steps with.
             let mut runs: Vec<usize> = (0..recording.runs.len()).collect();
-            runs.sort_by_key(|run| std::cmp::Reverse(recording.runs[*run].memory.own));
+            runs.sort_by_key(|run| std::cmp::Reverse(recording.runs[*run].memory.steps));
             let summarized = runs.into_iter().any(|run| {
                 let run = &mut recording.runs[run];
                 let history = self.histories.get(&run.id);
                 history.is_some_and(|history| run.summarize_one(history.begin(), history.spacing()))
             });
-            // Without a step left to summarize the snapshots give way, down to half of their share.
+            // If no step is left to summarize, snapshots are evicted, down to half of their budget.
             let least_bytes =
                 recording.memory_budget_bytes / (2 * SNAPSHOT_BUDGET_DIVISOR) / recording.runs.len().max(1);
             let evicted = !summarized && self.histories.values().any(|history| history.evict_above(least_bytes));
@@ -170,7 +166,7 @@ impl Computation {
         self.history(run).map_or_else(Vec::new, |history| history.recompute(last, max_count))
     }
 
-    /// A complete step of a run, recomputed where only its summary is kept. The result is the same to the bit except
+    /// A complete step of a run, recomputed where only its summary is kept. The result is identical to the bit except
     /// for the measured times.
     pub fn whole_step(&self, run: usize, number: usize) -> Option<Arc<StepRecord>> {
         let step = self.recording.runs.get(run)?.steps.get(number)?;
@@ -187,7 +183,7 @@ impl Computation {
         self.history(run).map_or_else(Vec::new, |history| history.solver_states(number))
     }
 
-    /// Number and memory of the estimator snapshots of a run; forks count their own.
+    /// Number and memory of the estimator snapshots of a run; a fork counts its own snapshots separately.
     pub fn snapshots(&self, run: usize) -> Option<SnapshotUse> {
         self.history(run).map(|history| history.snapshots())
     }

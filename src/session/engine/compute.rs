@@ -1,4 +1,4 @@
-//! Computation of runs to their end or to a stamp; the caller waits.
+//! Computation of runs to their end or to a stamp; blocks until done.
 
 use std::sync::atomic::Ordering;
 
@@ -12,9 +12,8 @@ use crate::session::record::Recording;
 /// The hit that ended [`compute_until`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct BreakpointHit {
-    /// The step.
     pub hit: Hit,
-    /// The quantities of the condition and their values in that step.
+    /// Quantities of the condition and their values in that step.
     pub values: Vec<NamedValue>,
     /// One line of text for the terminal.
     pub description: String,
@@ -52,7 +51,7 @@ pub fn compute_until(
     for run in &mut recording.runs {
         run.finished = true;
     }
-    // The threads are ahead by the length of their queues.
+    // The threads may be ahead by the length of their queues.
     recording.warnings.retain(|warning| warning.stamp_ns <= until_ns);
     let hit = breakpoints.next_after(recording, i64::MIN).map(|hit| {
         let values = breakpoints.values_at(recording, hit);
@@ -81,7 +80,7 @@ pub fn compute(
         }
     }
     if let Some(until_ns) = until_ns {
-        // The threads are ahead by the length of their queues.
+        // The threads may be ahead by the length of their queues.
         computation.recording_mut().warnings.retain(|warning| warning.stamp_ns <= until_ns);
     }
     Ok(computation)

@@ -7,7 +7,6 @@ use crate::gimbal::{Parameterization, auto_parameterization};
 use crate::sensors::Rig;
 use crate::session::plan::{ParameterizationChoice, RunCameras, RunSpec, SessionError, cameras_of_run};
 
-/// The configuration of the estimator of a run.
 pub(in crate::session) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
     let RunCameras { main: camera, rigid } = cameras_of_run(rig, spec)?;
     let chain = rig.chain_of_camera(&camera.key).unwrap_or_default();

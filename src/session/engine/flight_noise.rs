@@ -14,25 +14,25 @@ use crate::geometry::seconds_from_ns;
 use crate::sensors::{CameraMount, Rig};
 use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError, cameras_of_run, check_start};
 
-/// Part of the progress that feature tracking takes.
+/// Fraction of the progress that feature tracking takes.
 const TRACKING_RATIO: f64 = 0.5;
 
-/// The reason why no densities were fitted to a flight.
+/// Reason why no noise densities were fitted to a flight.
 #[derive(Debug, Error)]
 pub enum FlightNoiseError {
     /// The log cannot be read, or the rig has no camera.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The flight does not show them.
+    /// The fit failed; the densities are not observable from this flight.
     #[error("no noise densities can be fitted to the flight: {0}")]
     Fit(#[from] ImuNoiseError),
 }
 
-/// Fits the noise densities of a rig to a flight from `start_s` on. The camera is a rigid one where there is one, else the
-/// gimballed one; its key is returned, too.
+/// Fits the noise densities of a rig to a flight from `start_s` on, with a rigid camera if there is one, else with the
+/// gimbal camera. Also returns the key of that camera.
 ///
 /// # Errors
-/// When the log or the rig do not allow a run, the flight is too short, or `on_progress` breaks.
+/// If the log or the rig does not allow a run, the flight is too short, or `on_progress` breaks.
 pub fn fit_flight_noise(
     log: &Arc<FlightLog>,
     rig: &Rig,

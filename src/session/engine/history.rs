@@ -15,7 +15,7 @@ use crate::session::record::StepRecord;
 
 /// Steps between two snapshots while the budget allows all of them.
 const MIN_SPACING: usize = 5;
-/// Number of steps before a snapshot among which it finds its measurements again: ten seconds and more.
+/// Number of steps before a snapshot in which it looks up its measurements: at least ten seconds.
 const PAST: usize = 256;
 
 /// Number and memory of the kept estimator snapshots.
@@ -35,7 +35,7 @@ pub(in crate::session) struct History {
     inputs: Arc<StepInputs>,
     /// Index of the first step that is not shared with the parent.
     begin: usize,
-    /// The history of a fork's parent, which has the steps before `begin`.
+    /// History of a fork's parent, which holds the steps before `begin`.
     parent: Option<Arc<Self>>,
     snapshots: Mutex<Snapshots>,
 }
@@ -56,7 +56,7 @@ impl History {
         Self::with(Arc::default(), 0, None, budget_bytes)
     }
 
-    /// The history of a fork whose first own step is `begin`.
+    /// History of a fork whose first step after the parent's is `begin`.
     pub(in crate::session) fn fork(parent: &Arc<Self>, begin: usize, budget_bytes: usize) -> Self {
         Self::with(Arc::clone(&parent.inputs), begin, Some(Arc::clone(parent)), budget_bytes)
     }
@@ -67,7 +67,6 @@ impl History {
         Self { inputs, begin, parent, snapshots: Mutex::new(snapshots) }
     }
 
-    /// The inputs of all steps.
     pub(in crate::session) fn inputs(&self) -> &Arc<StepInputs> {
         &self.inputs
     }
@@ -95,7 +94,7 @@ impl History {
         snapshots.keep_within_budget(self.begin);
     }
 
-    /// The inputs of the steps before one, in which its snapshot finds measurements.
+    /// Inputs of the steps before `step`, in which its snapshot looks up measurements.
     fn past(&self, step: usize) -> Vec<Arc<OwnedStepInput>> {
         self.inputs.range(step.saturating_sub(PAST)..step)
     }
@@ -107,7 +106,7 @@ impl History {
         snapshots.keep_within_budget(self.begin);
     }
 
-    /// Evicts one more snapshot; returns whether there was one, and more than so many bytes of them.
+    /// Evicts one more snapshot if the snapshots take more than `least_bytes`. Returns true if one was evicted.
     pub(super) fn evict_above(&self, least_bytes: usize) -> bool {
         let mut snapshots = self.snapshots.lock();
         snapshots.bytes > least_bytes && snapshots.evict_one(self.begin)
@@ -118,7 +117,7 @@ impl History {
         self.snapshots.lock().spacing
     }
 
-    /// Number and memory of the snapshots of this run's own steps.
+    /// Number and memory of the snapshots of this run, without its parent's.
     pub(in crate::session) fn snapshots(&self) -> SnapshotUse {
         let snapshots = self.snapshots.lock();
         SnapshotUse { count: snapshots.kept.len(), bytes: snapshots.bytes, spacing: snapshots.spacing }
@@ -142,7 +141,7 @@ impl History {
         Some(engine)
     }
 
-    /// The last snapshot that helps to compute a step, and the step before which it was taken.
+    /// Last snapshot at or before a step, and the step before which it was taken.
     fn snapshot_before(&self, step: usize) -> Option<(usize, RunEngine)> {
         let snapshots = self.snapshots.lock();
         let (at, packed) =
@@ -215,13 +214,14 @@ impl History {
 }
 
 impl Snapshots {
-    /// Evicts every other snapshot, the oldest first, until the rest fits into the budget. The first one of all stays:
+    /// Evicts every other snapshot, the oldest first, until the rest fits into the budget. The first snapshot is always
+    /// kept:
     /// every recomputation could need it.
     fn keep_within_budget(&mut self, begin: usize) {
         while self.bytes > self.budget_bytes && self.evict_one(begin) {}
     }
 
-    /// Evicts the next snapshot; returns whether there was one beside the first.
+    /// Evicts the next snapshot; returns true if there was one other than the first.
     fn evict_one(&mut self, begin: usize) -> bool {
         while self.kept.len() > 1 {
             let doubled = 2 * self.spacing;

@@ -18,7 +18,7 @@ use crate::sensors::{CameraRig, GrayImage, Rig};
 const SECTIONS: usize = 3;
 /// Length of a section in seconds.
 const SECTION_S: f64 = 5.0;
-/// Standard deviation of a tracked feature's position, per coordinate.
+/// Standard deviation of a tracked feature's position, per coordinate, in pixels.
 const PIXEL_SIGMA_PX: f64 = 0.5;
 /// Standard deviation of a camera's rotation between consecutive images, per axis. It does not depend on the rig,
 /// because the rig is checked.
@@ -33,7 +33,7 @@ const MIN_INLIER_RATIO: f64 = 0.6;
 /// They do not depend on gyroscope, encoders and extrinsics. A camera whose images cannot be read has none; `check`
 /// reports the reason.
 pub fn image_rotations(log: &Arc<FlightLog>, rig: &Rig) -> Vec<ImageRotation> {
-    // Nor do they end with a topic of joint angles that cannot be read.
+    // An unreadable topic of joint angles must not prevent reading the images.
     let mut rig = rig.clone();
     if let Some(gimbal) = &mut rig.gimbal {
         gimbal.topic = None;
@@ -65,11 +65,11 @@ fn rotations_of(
     between(camera, std::iter::from_fn(|| stream.next_frame().map(|frame| (frame.stamp_ns, frame.image))))
 }
 
-/// Rotations between consecutive images of one camera in evenly spaced sections of its images. Only the camera's model is
-/// needed of the rig: the stamps may be those of a clock that is not the IMU's.
+/// Rotations between consecutive images of one camera in evenly spaced sections of its images. Of the rig, only the
+/// camera model is needed: the stamps may be on another clock than the IMU's.
 ///
 /// # Errors
-/// When the log has no such camera.
+/// If the log has no such camera.
 pub fn camera_rotations(
     log: &Arc<FlightLog>,
     rig: &Rig,
@@ -119,7 +119,7 @@ fn between(camera: &CameraRig, images: impl Iterator<Item = (i64, Arc<GrayImage>
     rotations
 }
 
-/// The features observed in both images with their rows.
+/// Features observed in both images, with their image rows.
 fn row_tracks(camera: &CameraRig, first: &TrackedFrame, second: &TrackedFrame) -> Vec<RowTrack> {
     let height_px = camera.model.resolution_px[1] as f64;
     let observation =

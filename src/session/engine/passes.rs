@@ -1,6 +1,7 @@
-//! Several passes of a run over the log (`passes=2`): what one finds of calibration and biases is the prior of the next.
+//! Several passes of a run over the log (`passes=2`): calibration and biases estimated in one pass are the prior of the
+//! next.
 //!
-//! Only the last pass is recorded. The others run over the same inputs without the observability analysis.
+//! Only the last pass is recorded. The others process the same inputs without the observability analysis.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -18,13 +19,12 @@ const STEPS_BETWEEN_READINGS: usize = 20;
 
 /// The passes of a run before its last one.
 pub(in crate::session) struct EarlierPasses<'a> {
-    /// Index of the run.
     pub(in crate::session) run: usize,
-    /// Receives the progress.
+    /// Channel for the progress.
     pub(in crate::session) results: &'a SyncSender<EngineMessage>,
 }
 
-/// Why there is no result of a pass.
+/// Reason why a pass has no result.
 pub(in crate::session) enum PassFailure {
     /// The session was closed.
     Closed,
@@ -33,8 +33,8 @@ pub(in crate::session) enum PassFailure {
 }
 
 impl EarlierPasses<'_> {
-    /// Runs pass `number`, counted from 1, and returns the configuration of the next one. A pass without a window
-    /// leaves it as it was.
+    /// Runs pass `number`, counted from 1, and returns the configuration of the next one; unchanged if the pass has not
+    /// initialized a window.
     pub(in crate::session) fn run(
         &self,
         number: usize,
@@ -50,21 +50,25 @@ impl EarlierPasses<'_> {
             begin_ns.get_or_insert(newest_ns);
             guarded(newest_ns, || engine.step_without_rank(&input)).map_err(PassFailure::Failed)?;
             if step.is_multiple_of(STEPS_BETWEEN_READINGS) {
-                found = newer(found, &engine, begin_ns, newest_ns);
+                found = latest_findings(found, &engine, begin_ns, newest_ns);
                 let progress = PassProgress { number, reached_ns: newest_ns };
                 self.results
                     .send(EngineMessage::Pass { run: self.run, progress })
                     .map_err(|_closed| PassFailure::Closed)?;
             }
         }
-        let found = newer(found, &engine, begin_ns, newest_ns).map(Arc::new);
+        let found = latest_findings(found, &engine, begin_ns, newest_ns).map(Arc::new);
         Ok(EstimatorConfig { earlier_pass: found.or_else(|| config.earlier_pass.clone()), ..config.clone() })
     }
 }
 
-/// What an engine has found by now since the start of the log, with the best biases so far; what was found before where it
-/// has no window.
-fn newer(before: Option<EarlierPass>, engine: &RunEngine, begin_ns: Option<i64>, now_ns: i64) -> Option<EarlierPass> {
+/// Findings of the engine since `begin_ns`, with the best biases so far, or `before` while it is not initialized.
+fn latest_findings(
+    before: Option<EarlierPass>,
+    engine: &RunEngine,
+    begin_ns: Option<i64>,
+    now_ns: i64,
+) -> Option<EarlierPass> {
     let now = begin_ns.and_then(|begin_ns| engine.estimator().findings(seconds_from_ns(now_ns - begin_ns)));
     match (now, before) {
         (Some(now), Some(before)) => Some(now.with_best_bias(&before)),
@@ -72,7 +76,7 @@ fn newer(before: Option<EarlierPass>, engine: &RunEngine, begin_ns: Option<i64>,
     }
 }
 
-/// A step whose panic ends the run with a message instead of the program.
+/// Runs a step; a panic inside it ends the run with a message instead of the program.
 pub(super) fn guarded<T>(stamp_ns: i64, step: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(step)).map_err(|_panic| {
         let time_s = seconds_from_ns(stamp_ns);

@@ -13,18 +13,17 @@ use crate::estimator::FactorRows;
 use crate::session::plan::SessionError;
 use crate::session::record::{SolverPosition, StepRecord};
 
-/// Steps before the cursor, or behind it while it plays, that are recomputed ahead of need.
+/// Number of steps that are recomputed in advance: before the cursor, or after it during playback.
 pub(in crate::session) const STEPS_AT_ONCE: usize = 32;
 
-/// The window first draws what was delivered, on a processor that a prefetch would take.
+/// Delay before prefetching, so that the window can first draw the delivered steps without competing for a processor.
 const PREFETCHED_AFTER: Duration = Duration::from_millis(80);
 
 /// The requested data of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::session) enum Detail {
-    /// The complete record.
     Step,
-    /// The states of the solver; this one is shown.
+    /// States of the solver; the position selects the state that is shown.
     SolverStates(SolverPosition),
     /// The linearized rows of the factors other than reprojection.
     FactorRows,
@@ -35,19 +34,16 @@ pub(in crate::session) enum Detail {
 pub(in crate::session) struct RecomputeRequest {
     /// [`RunRecord::id`](crate::session::RunRecord::id).
     pub(in crate::session) run: u64,
-    /// History of the run.
     pub(in crate::session) history: Arc<History>,
-    /// Index of the step.
     pub(in crate::session) step: usize,
-    /// Number of steps up to this one whose complete records are requested.
+    /// Number of complete records requested: this step and those before it.
     pub(in crate::session) count: usize,
-    /// The requested data.
     pub(in crate::session) detail: Detail,
-    /// Whether it is a prefetch, which is cancelled by a request at the cursor.
+    /// True for a prefetch, which a request at the cursor cancels.
     pub(in crate::session) prefetch: bool,
 }
 
-/// Two requests are equal if they need the same computation, whichever solver state is shown.
+/// Two requests are equal if they need the same computation, regardless of the solver state that is shown.
 impl PartialEq for RecomputeRequest {
     fn eq(&self, other: &Self) -> bool {
         let detail = std::mem::discriminant(&self.detail) == std::mem::discriminant(&other.detail);
@@ -55,12 +51,11 @@ impl PartialEq for RecomputeRequest {
     }
 }
 
-/// The result of a request.
 #[derive(Debug)]
 pub(in crate::session) enum Recomputed {
     /// Steps with their indices.
     Steps(Vec<(usize, StepRecord)>),
-    /// The solver's states of one step.
+    /// Solver states of one step.
     SolverStates(Vec<StepRecord>),
     /// The factor rows of one step, `None` where it has none.
     FactorRows(Option<Vec<FactorRows>>),
@@ -70,13 +65,13 @@ pub(in crate::session) enum Recomputed {
 struct Queue {
     waiting: VecDeque<RecomputeRequest>,
     working: Option<RecomputeRequest>,
-    /// Whether the request in progress is still requested.
+    /// True if the request in progress is still requested.
     working_wanted: bool,
     closed: bool,
 }
 
 impl Queue {
-    /// Whether the request in progress is still requested and, if it is a prefetch, no request at the cursor waits.
+    /// True if the request in progress is still requested and, if it is a prefetch, no request at the cursor waits.
     fn is_wanted(&self) -> bool {
         let at_cursor = self.working.as_ref().is_some_and(|working| !working.prefetch);
         let others = self.waiting.iter().any(|waiting| !waiting.prefetch);
@@ -141,7 +136,7 @@ impl RecomputeThread {
         Ok(Self { shared, thread: Some(thread.map_err(|source| SessionError::Thread { source })?) })
     }
 
-    /// Replaces all requests by these, in this order.
+    /// Replaces all requests by `requests`, in this order.
     pub(in crate::session) fn request(&self, requests: Vec<RecomputeRequest>) {
         let mut queue = self.shared.queue.lock();
         queue.waiting.clear();
@@ -168,14 +163,14 @@ impl RecomputeThread {
         self.shared.changed.wait_while(&mut queue, |queue| !queue.closed && queue.has_work_at_cursor());
     }
 
-    /// As [`Self::settle`], but for no longer than this.
+    /// As [`Self::settle`], but waits at most `time`.
     pub(in crate::session) fn settle_within(&self, time: Duration) {
         let mut queue = self.shared.queue.lock();
         let waits = |queue: &mut Queue| !queue.closed && queue.has_work_at_cursor();
         self.shared.changed.wait_while_for(&mut queue, waits, time);
     }
 
-    /// Whether a request at the cursor is waiting or in progress.
+    /// True if a request at the cursor is waiting or in progress.
     pub(in crate::session) fn is_busy(&self) -> bool {
         self.shared.queue.lock().has_work_at_cursor()
     }

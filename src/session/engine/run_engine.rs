@@ -13,21 +13,20 @@ use crate::session::record::StepRecord;
 /// Jacobian columns of the extrinsics of a second, rigid camera.
 const RIGID_COLUMNS: usize = 6;
 
-/// One estimator with the observability analysis of its steps.
+/// An estimator with the observability analysis of its steps.
 #[derive(Clone, Debug)]
 pub(in crate::session) struct RunEngine {
     estimator: Estimator,
     settings: EngineSettings,
 }
 
-/// What an engine knows beside its estimator.
+/// Constant settings of an engine.
 #[derive(Clone, Debug)]
 struct EngineSettings {
     has_joints: bool,
     joints_free: bool,
-    /// One report in this many frames keeps its linearization.
+    /// Every n-th report keeps its linearization; `None` keeps none.
     keep_linearization_every: Option<usize>,
-    /// Changes of a fork to the measurements.
     altered_measurements: AlteredMeasurements,
 }
 
@@ -39,7 +38,7 @@ pub(super) struct PackedEngine {
 }
 
 impl PackedEngine {
-    /// The engine as it was; `past` are the steps that it was packed with.
+    /// Restores the engine; `past` are the steps that it was packed with.
     pub(super) fn unpacked(&self, past: &[Arc<OwnedStepInput>]) -> RunEngine {
         RunEngine { estimator: self.estimator.unpacked(&measurements(past)), settings: self.settings.clone() }
     }
@@ -50,13 +49,13 @@ impl PackedEngine {
     }
 }
 
-/// The steps as the estimator reads them.
+/// Steps as measurements of the estimator.
 fn measurements(past: &[Arc<OwnedStepInput>]) -> Vec<&dyn StepMeasurements> {
     past.iter().map(|step| &**step as &dyn StepMeasurements).collect()
 }
 
 impl RunEngine {
-    /// An engine with an estimator that has not been initialized.
+    /// An engine whose estimator is not initialized yet.
     pub(in crate::session) fn new(config: EstimatorConfig, keep_linearization_every: Option<usize>) -> Self {
         let has_joints = !config.chain.links.is_empty();
         let joints_free = has_joints && !config.use_encoder;
@@ -75,7 +74,6 @@ impl RunEngine {
         &mut self.estimator
     }
 
-    /// The estimator.
     pub(super) fn estimator(&self) -> &Estimator {
         &self.estimator
     }
@@ -115,7 +113,7 @@ impl RunEngine {
         }
     }
 
-    /// Runs the same step without the observability analysis. The estimator ends in the same state.
+    /// Runs the same step without the observability analysis; the estimator ends in the same state.
     pub(in crate::session) fn step_without_rank(&mut self, input: &OwnedStepInput) {
         let keep = self.estimator.config().options.keep_linearization;
         self.estimator.set_keep_linearization(false);
@@ -128,7 +126,7 @@ impl RunEngine {
         self.estimator.set_iterations(iterations);
     }
 
-    /// A snapshot; `past` are steps before the next one, the newest last.
+    /// Snapshot of the engine; `past` are the steps before the next one, the newest last.
     pub(super) fn packed(&self, past: &[Arc<OwnedStepInput>]) -> PackedEngine {
         PackedEngine { estimator: self.estimator.packed(&measurements(past)), settings: self.settings.clone() }
     }

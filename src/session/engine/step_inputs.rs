@@ -12,14 +12,14 @@ use crate::geometry::RigidTransform;
 use crate::sensors::{ImuSample, JointAngles};
 use crate::session::record::tracks_bytes;
 
-/// The input of one step: measurements of one camera or of a synchronized frame set.
+/// Input of one step: measurements of one camera or of a synchronized frame set.
 ///
-/// On the way from the log to the estimator there are three such types. A [`SensorFrame`] is what the log has for one
-/// image of one camera: it owns the image, which is not needed after the front end, and has no tracks. The estimator's
+/// Three types carry measurements from the log to the estimator. A [`SensorFrame`] holds the data of one image of one
+/// camera from the log: it owns the image, which is not needed after the front end, and has no tracks. The estimator's
 /// [`StepInput`](crate::estimator::StepInput) borrows its measurements for the call, because a fork changes some of
-/// them first. This one owns the same measurements: tracker threads send it to the runs, and their histories keep it,
-/// so that steps are recomputed without tracking features again (the front end does not know the estimator, so that its
-/// tracks do not depend on the run). Runs on the same camera share it.
+/// them first. `OwnedStepInput` owns the same measurements: tracker threads send it to the runs, and their histories
+/// keep it, so that steps are recomputed without tracking features again. The front end does not depend on the
+/// estimator, so the tracks are the same for every run. Runs on the same camera share the input.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::session) struct OwnedStepInput {
     /// Index of the main camera's image; where that image is missing, an index that no image has.
@@ -43,7 +43,6 @@ pub(in crate::session) struct OwnedStepInput {
 }
 
 impl OwnedStepInput {
-    /// The input from one camera.
     pub(in crate::session) fn of_camera(frame: SensorFrame, tracks: TrackedFrame, frontend_ms: f64) -> Self {
         Self {
             frame_index: frame.index,
@@ -58,7 +57,6 @@ impl OwnedStepInput {
         }
     }
 
-    /// Tracks of the main camera.
     pub(in crate::session) fn main_tracks(&self) -> &Arc<TrackedFrame> {
         &self.tracks[0]
     }
@@ -94,7 +92,7 @@ impl StepMeasurements for OwnedStepInput {
     }
 }
 
-/// The inputs of a run's steps so far, shared with its forks.
+/// Inputs of a run's steps so far, shared with its forks.
 #[derive(Debug, Default)]
 pub(in crate::session) struct StepInputs {
     state: Mutex<State>,
@@ -120,19 +118,19 @@ impl StepInputs {
         self.grown.notify_all();
     }
 
-    /// The input of a step, `None` if it has not been computed.
+    /// Input of a step, `None` if it has not been computed.
     pub(in crate::session) fn get(&self, step: usize) -> Option<Arc<OwnedStepInput>> {
         self.state.lock().steps.get(step).cloned()
     }
 
-    /// The inputs of these steps; fewer where they have not been computed.
+    /// Inputs of a range of steps; fewer if some have not been computed.
     pub(super) fn range(&self, steps: Range<usize>) -> Vec<Arc<OwnedStepInput>> {
         let state = self.state.lock();
         let end = steps.end.min(state.steps.len());
         state.steps[steps.start.min(end)..end].to_vec()
     }
 
-    /// The input of a step. Waits until it is there; `None` behind the last one.
+    /// Input of a step. Blocks until it is available; `None` after the last one.
     pub(in crate::session) fn wait_for(&self, step: usize) -> Option<Arc<OwnedStepInput>> {
         let mut state = self.state.lock();
         self.grown.wait_while(&mut state, |state| state.steps.len() <= step && !state.ended);

@@ -9,11 +9,11 @@ use super::step_inputs::OwnedStepInput;
 use crate::sensors::ImuSample;
 
 /// Largest difference of stamps in a synchronized frame set. At an angular rate of 3 rad/s the vehicle rotates by 0.1°
-/// in that time, which is about one pixel.
+/// in that time, about one pixel.
 const MAX_STAMP_DIFFERENCE_NS: i64 = 500_000;
-/// After this many images of each camera without a partner, the cameras are not synchronized.
+/// Number of images of each camera without a partner after which the cameras count as not synchronized.
 const MAX_UNPAIRED_IMAGES: usize = 10;
-/// Offset of the indices of images where the main camera has none; larger than any index of the main camera.
+/// Offset of the indices of sets without an image of the main camera; larger than any index of the main camera.
 const MISSING_IMAGE_OFFSET: usize = 1 << 30;
 
 /// The reason why a run cannot use its cameras together.
@@ -56,7 +56,7 @@ impl CameraInputs {
     }
 }
 
-/// The step inputs of a run in time order, one per synchronized frame set.
+/// Step inputs of a run in time order, one per synchronized frame set.
 #[derive(Debug)]
 pub(super) struct SynchronizedFrames {
     cameras: Vec<CameraInputs>,
@@ -67,7 +67,7 @@ pub(super) struct SynchronizedFrames {
 }
 
 impl SynchronizedFrames {
-    /// The inputs of the run's cameras with their keys, the main camera first.
+    /// Inputs of the run's cameras with their keys, the main camera first.
     pub(super) fn new(cameras: impl IntoIterator<Item = (String, Receiver<Arc<OwnedStepInput>>)>) -> Self {
         let cameras = cameras
             .into_iter()
@@ -76,7 +76,7 @@ impl SynchronizedFrames {
         Self { cameras, end: None, main_shift_ns: None }
     }
 
-    /// The next set; waits for it. `None` at the end of all streams.
+    /// The next set; blocks until it is available. `None` at the end of all streams.
     pub(super) fn next(&mut self) -> Result<Option<Arc<OwnedStepInput>>, SynchronizationError> {
         self.cameras.iter_mut().for_each(CameraInputs::wait);
         if let [camera] = self.cameras.as_mut_slice() {
@@ -93,16 +93,16 @@ impl SynchronizedFrames {
         Ok(self.combined(&frames).map(Arc::new))
     }
 
-    /// One input from those of the cameras. Values that all cameras have are taken from the main camera where it has an
-    /// image.
+    /// Merges the inputs of the cameras into one. Values common to all cameras are taken from the main camera if it has
+    /// an image.
     fn combined(&mut self, frames: &[Option<Arc<OwnedStepInput>>]) -> Option<OwnedStepInput> {
         let main = frames.first()?.as_deref();
         let any = main.or_else(|| frames.iter().flatten().map(|frame| &**frame).next())?;
         if let Some(main) = main {
             self.main_shift_ns = Some(main.imu_stamp_ns() - main.stamp_ns);
         }
-        // An input has the samples since the previous image of its own camera; another camera may have an image in
-        // between.
+        // An input has the samples since the previous image of its own camera, but another camera may have had an image
+        // since then.
         let imu: Vec<ImuSample> = match self.end {
             None => any.imu.clone(),
             Some(end) => std::iter::once(end)
@@ -146,7 +146,7 @@ impl SynchronizedFrames {
     }
 }
 
-/// Offset of a stamp from the nearest of `others_ns`.
+/// Signed offset of a stamp from the nearest of `others_ns`.
 fn nearest_offset(at_ns: i64, others_ns: &[i64]) -> Option<i64> {
     others_ns.iter().map(|other_ns| at_ns - other_ns).min_by_key(|offset_ns| offset_ns.abs())
 }

@@ -55,7 +55,7 @@ impl Engine {
         Ok(engine)
     }
 
-    /// Starts these runs of the plan at the start of the log. Runs on the same camera share one tracker.
+    /// Starts the given runs at the start of the log. Runs on the same camera share one tracker.
     pub(in crate::session) fn start_runs(
         &mut self,
         plan: &SessionPlan,
@@ -119,7 +119,7 @@ impl Engine {
         self.receiver.take()
     }
 
-    /// The next message; waits for it. `None` when every thread has ended.
+    /// Next message; blocks until it is available. `None` when every thread has ended.
     pub(in crate::session) fn receive(&self) -> Option<EngineMessage> {
         self.receiver.as_ref().and_then(|receiver| receiver.recv().ok())
     }
@@ -131,7 +131,7 @@ impl Drop for Engine {
         self.sender = None;
         self.receiver = None;
         for thread in self.threads.drain(..) {
-            // A thread that panicked has already been reported as failed.
+            // The panic of a thread has already been reported as a failed run.
             drop(thread.join());
         }
     }
@@ -150,7 +150,7 @@ fn track_thread(
 ) {
     while !cancelled.load(Ordering::Relaxed) {
         let Some((input, warnings)) = tracker.next_input() else {
-            // The receiver is gone when the session was closed.
+            // The receiver is dropped when the session is closed.
             drop(results.send(EngineMessage::Warnings(tracker.remaining_warnings().to_vec())));
             return;
         };
@@ -176,8 +176,8 @@ struct RunOverLog {
 }
 
 impl RunOverLog {
-    /// Runs its passes over the synchronized frame sets, stores each set in the history, and reports each step of the last
-    /// pass.
+    /// Runs the passes over the synchronized frame sets, stores each set in the history, and reports each step of the
+    /// last pass.
     fn start(self, mut frames: SynchronizedFrames) {
         let history = &self.history;
         let tracked = std::iter::from_fn(|| match frames.next() {
@@ -201,7 +201,7 @@ impl RunOverLog {
         }
         match config {
             Ok(config) => self.last_pass(config, again()),
-            // The receiver is gone when the session was closed.
+            // The receiver is dropped when the session is closed.
             Err(PassFailure::Closed) => {}
             Err(PassFailure::Failed(reason)) => {
                 drop(self.results.send(EngineMessage::Finished { run: self.run, error: Some(reason) }));
@@ -241,7 +241,7 @@ fn run_steps(
             }
         };
         if results.send(EngineMessage::Step { run, record: Box::new(record) }).is_err() {
-            // The receiver is gone when the session was closed.
+            // The receiver is dropped when the session is closed.
             return;
         }
     }

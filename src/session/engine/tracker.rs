@@ -14,7 +14,6 @@ use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, PoseTrack, Rig};
 use crate::session::plan::SessionError;
 
-/// Reads a camera's stream and tracks its features.
 pub(super) struct CameraTracker {
     stream: FrameStream,
     front_end: FrontEnd,
@@ -22,7 +21,7 @@ pub(super) struct CameraTracker {
     noise: PredictionNoise,
     readout_s: f64,
     previous_orientation: Option<ChainOrientation>,
-    /// Ground truth instead of that of the log.
+    /// Ground truth that replaces that of the log; `None` keeps the log's.
     ground_truth: Option<Arc<PoseTrack>>,
 }
 
@@ -31,13 +30,13 @@ const GYROSCOPE_BIAS_SIGMA_RAD_PER_S: f64 = 0.02;
 /// Standard deviation of the orientation of a rigid camera's extrinsics, in radians (0.6°).
 const RIGID_EXTRINSICS_SIGMA_RAD: f64 = 0.01;
 
-/// Features of a camera on a gimbal, a fifth more than of a rigid camera: they also determine its joint angles.
+/// Features of a camera on a gimbal, a fifth more than for a rigid camera: they also constrain its joint angles.
 const FEATURES_ON_GIMBAL: usize = 180;
 
-/// Time after a stamp over which the motion of the vehicle is kept for the rows of a rolling shutter: shutters read an image
-/// in at most 40 ms, and a time offset may be added. A run or a fork may estimate the readout on any log.
+/// Time after a stamp for which IMU samples are kept for the rows of a rolling shutter: the readout takes at most 40
+/// ms, and a time offset may be added. A run or a fork may estimate the readout on any log.
 const LONGEST_READOUT_S: f64 = 0.06;
-/// The same beyond the readout that the rig states.
+/// Additional time after the readout stated in the rig.
 const READOUT_MARGIN_S: f64 = 0.03;
 
 impl CameraTracker {
@@ -64,7 +63,7 @@ impl CameraTracker {
         })
     }
 
-    /// With ground truth instead of that of the log, `None` to keep it.
+    /// Replaces the ground truth of the log; `None` keeps it.
     pub(super) fn with_ground_truth(self, ground_truth: Option<Arc<PoseTrack>>) -> Self {
         Self { ground_truth, ..self }
     }
@@ -107,7 +106,7 @@ impl CameraTracker {
         }
     }
 
-    /// Warnings about the log behind the last image.
+    /// Warnings about the log after the last image.
     pub(super) fn remaining_warnings(&self) -> &[LogWarning] {
         self.stream.remaining_warnings()
     }
@@ -115,7 +114,7 @@ impl CameraTracker {
     /// Orientation `imu_from_camera` from rig and encoders, `None` when a joint angle is missing.
     fn camera_orientation(&self, frame: &SensorFrame) -> Option<ChainOrientation> {
         match &frame.joint_angles {
-            // Encoder readings of a gimbal rig do not concern its rigid camera.
+            // Encoder readings of a gimbal rig do not affect its rigid camera.
             _ if self.chain.links.is_empty() => Some(ChainOrientation::new(&self.chain, &[], &[])),
             Some(angles) => Some(
                 ChainOrientation::new(&self.chain, &angles.angles_rad, &angles.sigmas_rad)
@@ -126,7 +125,8 @@ impl CameraTracker {
     }
 }
 
-/// Options of the front end of a camera. All runs on a camera share its tracks, so that they depend on the camera alone.
+/// Options of the front end of a camera. All runs on a camera share its tracks, so the options depend only on the
+/// camera.
 fn front_end_options(mount: &CameraMount) -> FrontEndOptions {
     let mut options = FrontEndOptions::default();
     if *mount == CameraMount::Gimbal {

@@ -20,11 +20,11 @@ pub struct ForkChanges {
     pub frozen: Vec<String>,
     /// Names and new values of parameters, in radians or metres (`set=`).
     pub values: Vec<(String, f64)>,
-    /// Ids of features that are not used any more (`drop=`).
+    /// Ids of features that are no longer used (`drop=`).
     pub dropped: BTreeSet<u64>,
-    /// Keys of cameras that are not used any more, for a run with two (`without=`).
+    /// Keys of cameras that are no longer used, for a run with two (`without=`).
     pub without: BTreeSet<String>,
-    /// Whether encoder readings are not used any more (`encoder=off`).
+    /// True if encoder readings are no longer used (`encoder=off`).
     pub encoder_off: bool,
     /// Standard deviation of noise added to every joint angle, in radians; the estimator's σ stays as it is.
     pub joint_noise_rad: f64,
@@ -54,7 +54,7 @@ impl Default for ForkChanges {
     }
 }
 
-/// The reason why a fork cannot be made.
+/// Reason why a fork cannot be made.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum ForkError {
     /// A change that is not supported, or an invalid value.
@@ -62,50 +62,38 @@ pub enum ForkError {
     BadChange {
         /// The change as written.
         text: String,
-        /// The problem, and what was expected.
+        /// The problem, and the expected input.
         problem: String,
     },
     /// The run does not use this camera.
     #[error("the run uses no camera '{camera}', only {present}")]
     NoCamera {
-        /// The given key.
         camera: String,
-        /// Keys of the cameras that the run uses.
+        /// Keys of the cameras of the run.
         present: String,
     },
     /// The fork would have no camera.
     #[error("without {without} the run has no visual measurements: keep one of its cameras")]
-    Blind {
-        /// The given keys.
-        without: String,
-    },
+    Blind { without: String },
     /// The run has no such parameter.
     #[error(
         "cannot fork this run: no parameter '{name}' in this parameterization; expected one of {}",
         known.join(", ")
     )]
-    UnknownParameter {
-        /// The given name.
-        name: String,
-        /// Names of the run's parameters.
-        known: Vec<String>,
-    },
+    UnknownParameter { name: String, known: Vec<String> },
     /// The estimator rejected the change.
     #[error("cannot fork this run: {0}")]
     Estimator(#[from] InterventionError),
     /// There is no step at the cursor, or it cannot be recomputed.
     #[error("run '{run}' has no step at the cursor to fork from")]
-    NoStep {
-        /// Label of the run.
-        run: String,
-    },
+    NoStep { run: String },
 }
 
-/// The reason why a fork cannot use another camera.
+/// Reason why a fork cannot use another camera.
 pub(super) const OTHER_CAMERA: &str = "the window of the run contains features that only its own cameras have observed, so that a \
                             fork can exclude one of two cameras (without=cam1) but not add another one";
 
-/// Parameterizations that a fork can change to. Those on another camera would need other tracks.
+/// Parameterizations to which a fork can change. Those of another camera would need other tracks.
 pub const FORK_PARAMETERIZATIONS: [ParameterizationChoice; 5] = [
     ParameterizationChoice::Auto,
     ParameterizationChoice::Minimal,
@@ -115,7 +103,7 @@ pub const FORK_PARAMETERIZATIONS: [ParameterizationChoice; 5] = [
 ];
 
 impl ForkChanges {
-    /// The specification of the fork: the parent's, with the changes that a specification has.
+    /// Specification of the fork: the parent's, with the changes that a specification can express and a new label.
     pub(in crate::session) fn spec(&self, parent: &RunSpec, time_s: f64) -> RunSpec {
         let parameterization = self.parameterization.unwrap_or(parent.parameterization);
         let name = self.parameterization.map_or(&*parent.label, |choice| choice.name());

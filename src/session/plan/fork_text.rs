@@ -19,7 +19,7 @@ impl FromStr for ForkChanges {
                 let known = FORK_PARAMETERIZATIONS.map(ParameterizationChoice::name).join(", ");
                 let expected = || {
                     if ParameterizationChoice::all().any(|(name, _)| name == item) {
-                        bad(format!("'{item}' uses other cameras: {OTHER_CAMERA}; run {item} beside it instead"))
+                        bad(format!("'{item}' uses other cameras: {OTHER_CAMERA}; add a run {item} instead"))
                     } else {
                         bad(format!("unknown parameterization '{item}', expected one of {known}"))
                     }
@@ -193,7 +193,7 @@ mod tests {
             assert!(words.iter().all(|word| message.contains(word)), "{text}: {message}");
         };
         check("statik", &["'statik'", "minimal-swapped"]);
-        check("static", &["'static'", "features that only its own cameras have observed", "run static beside it"]);
+        check("static", &["'static'", "features that only its own cameras have observed", "add a run static"]);
         check("camera=cam1", &["without=cam1", "a run with camera=cam1"]);
         check("encoder=on", &["'on'", "joint offsets", "add a run with encoder=on"]);
         check("set=yaw.alpha", &["no value", "set=yaw.alpha:1deg"]);

@@ -12,7 +12,7 @@ use crate::sensors::Rig;
 pub enum ParameterizationChoice {
     /// The minimal parameterization; switches to the other end block near a singularity.
     Auto,
-    /// Eqs. 18–20 as printed (corrected).
+    /// Eqs. 18–20 as printed (with the sign corrected).
     Minimal,
     /// The minimal parameterization with the swapped end block, whose singularity is elsewhere.
     MinimalSwapped,
@@ -50,7 +50,7 @@ impl ParameterizationChoice {
         NAMES.iter().find(|(_, choice)| *choice == self).map_or("auto", |(name, _)| name)
     }
 
-    /// Whether its runs switch to the other end block near a singularity. A rig may demand that for every minimal run.
+    /// True if runs switch to the other end block near a singularity. A rig may require that for every minimal run.
     pub fn switches_parameterization(self, rig: &Rig) -> bool {
         match self {
             Self::Auto | Self::Cluster => true,
@@ -70,34 +70,34 @@ impl ParameterizationChoice {
 /// One `--run NAME[:key=value,…]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunSpec {
-    /// Its name in the window and of its folder: `name=…`, or the specification as written.
+    /// Name in the window and of the result folder: `name=…`, or the specification as written.
     pub label: String,
     /// The parameterization in which the calibration is estimated.
     pub parameterization: ParameterizationChoice,
-    /// Whether encoder readings are used (`encoder=off` clears it).
+    /// True if encoder readings are used (`encoder=off` clears it).
     pub encoder: bool,
-    /// Whether the calibration is estimated (`calibrate=off` clears it).
+    /// True if the calibration is estimated (`calibrate=off` clears it).
     pub calibrate: bool,
-    /// Whether the time offsets of cameras and encoders are estimated (`timeshift=on` sets it).
+    /// True if the time offsets of cameras and encoders are estimated (`timeshift=on` sets it).
     pub timeshift: bool,
-    /// Whether the readout times of rolling shutters are estimated (`readout=on` sets it).
+    /// True if the readout times of rolling shutters are estimated (`readout=on` sets it).
     pub readout: bool,
-    /// Whether the intrinsics of the cameras are estimated (`intrinsics=on` sets it).
+    /// True if the intrinsics of the cameras are estimated (`intrinsics=on` sets it).
     pub intrinsics: bool,
-    /// Whether the intrinsics of the IMU are estimated (`imu-intrinsics=on` sets it).
+    /// True if the intrinsics of the IMU are estimated (`imu-intrinsics=on` sets it).
     pub imu_intrinsics: bool,
-    /// Whether Jacobians are evaluated at first estimates, FEJ (`first-estimates=off` clears it). Without FEJ the prior
+    /// True if Jacobians are evaluated at first estimates, FEJ (`first-estimates=off` clears it). Without FEJ the prior
     /// gains spurious information.
     pub first_estimates: bool,
     /// Number of keyframes in the window (`window=10`).
     pub window: usize,
-    /// Number of passes over the log (`passes=2`): each starts with what the one before found of calibration and biases. The
-    /// last one is recorded.
+    /// Number of passes over the log (`passes=2`): each starts from the calibration and biases estimated by the
+    /// previous one.
+    /// The last one is recorded.
     pub passes: usize,
     /// Key of the main camera (`camera=cam1`). `None` means the gimballed camera, or the first rigid one for `static`
     /// and for rigs without a gimbal. A `cluster` also uses the first rigid camera.
     pub camera_key: Option<String>,
-    /// Deviations from the estimator's standard options.
     pub tuning: EstimatorTuning,
 }
 
@@ -126,25 +126,22 @@ impl Default for RunSpec {
 pub enum RunSpecError {
     /// Unknown parameterization.
     #[error("unknown run '{name}': expected one of auto, minimal, minimal-swapped, classical, poe, static, cluster")]
-    UnknownName {
-        /// The name as written.
-        name: String,
-    },
+    UnknownName { name: String },
     /// Unknown key, or invalid value.
     #[error("run '{spec}': {problem}")]
     BadOption {
         /// The whole specification.
         spec: String,
-        /// The problem, and what was expected.
+        /// The problem, and the expected input.
         problem: String,
     },
 }
 
 impl RunSpec {
-    /// Range of the number of passes: more than three change little.
+    /// Range of the number of passes: more than three passes change little.
     pub const PASSES: std::ops::RangeInclusive<usize> = 1..=3;
 
-    /// Whether these columns are estimated beside the chain's.
+    /// True if these columns are estimated in addition to the chain's.
     pub fn estimates(&self, columns: SensorColumns) -> bool {
         match columns {
             SensorColumns::Timeshift => self.timeshift,
@@ -154,8 +151,8 @@ impl RunSpec {
         }
     }
 
-    /// What decides about the results, as text without the name: keys with their standard value are left out and the others
-    /// have one order, so that two specifications of one meaning have one text.
+    /// Text of all settings that affect the results, without the name. Keys with default values are omitted and the
+    /// others have a fixed order, so that equivalent specifications have the same text.
     pub fn settings(&self) -> String {
         let standard = Self::default();
         let mut options = Vec::new();
@@ -182,7 +179,7 @@ impl RunSpec {
         if options.is_empty() { name.to_owned() } else { format!("{name}:{}", options.join(",")) }
     }
 
-    /// [`Self::estimates`] to be changed.
+    /// Mutable reference to the flag of [`Self::estimates`].
     pub(super) fn estimates_mut(&mut self, columns: SensorColumns) -> &mut bool {
         match columns {
             SensorColumns::Timeshift => &mut self.timeshift,
@@ -245,7 +242,7 @@ impl FromStr for RunSpec {
     }
 }
 
-/// The normalized text: [`RunSpec::settings`], and the name where it is not the standard one.
+/// Normalized text: [`RunSpec::settings`], and the name unless it is the default.
 impl fmt::Display for RunSpec {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let settings = self.settings();
@@ -283,7 +280,7 @@ pub(in crate::session) fn distinct_labels(specs: &mut [RunSpec]) {
     }
 }
 
-/// The wanted label, with a number appended where it is taken.
+/// The desired label, with a number appended if it is taken.
 pub(in crate::session) fn distinct_label(wanted: &str, is_taken: impl Fn(&str) -> bool) -> String {
     let numbered = (2..).map(|number| format!("{wanted}-{number}"));
     let mut candidates = std::iter::once(wanted.to_owned()).chain(numbered);

@@ -20,7 +20,7 @@ use crate::sensors::{CameraMount, CameraRig, LeverArm, PoseTrack, Rig};
 /// Maximum number of runs of a session.
 pub const MAX_RUNS: usize = 4;
 
-/// The reason why a session cannot start.
+/// Reason why a session cannot start.
 #[derive(Debug, Error)]
 pub enum SessionError {
     /// The log, its rig or its ground truth cannot be read.
@@ -29,69 +29,56 @@ pub enum SessionError {
     /// The rig has no camera for the run.
     #[error("run '{run}' needs {wanted}, but the rig '{rig}' has only {present}")]
     NoCamera {
-        /// Label of the run.
         run: String,
         /// Description of the required camera.
         wanted: String,
-        /// Name of the rig.
         rig: String,
         /// Keys and kinds of the rig's cameras.
         present: String,
     },
     /// More than [`MAX_RUNS`] runs.
     #[error("{count} runs requested, at most {MAX_RUNS} are possible")]
-    TooManyRuns {
-        /// Requested number of runs.
-        count: usize,
-    },
+    TooManyRuns { count: usize },
     /// More than [`MAX_TRAJECTORIES`] trajectories.
     #[error("{count} trajectories requested, at most {MAX_TRAJECTORIES} are possible")]
-    TooManyTrajectories {
-        /// Requested number of trajectories.
-        count: usize,
-    },
-    /// A trajectory does not belong to the log.
+    TooManyTrajectories { count: usize },
+    /// A trajectory cannot be used with the log.
     #[error("cannot use the trajectory '{source_name}': {problem}")]
     Trajectory {
         /// The file or topic.
         source_name: String,
-        /// What is wrong with it, and what to do.
+        /// The problem and its remedy.
         problem: String,
     },
-    /// The part of the log that is to be read begins behind its end.
+    /// The start is after the end of the log.
     #[error("--start {start_s} s is after the end of the log ({end_s:.3} s): {}", path.display())]
     StartBeyondEnd {
-        /// Where it begins.
+        /// Requested start in seconds.
         start_s: f64,
-        /// Length of the log.
+        /// Length of the log in seconds.
         end_s: f64,
-        /// The log.
         path: PathBuf,
     },
     /// A thread could not be started.
     #[error("cannot start a thread: {source}")]
-    Thread {
-        /// The error of the operating system.
-        source: std::io::Error,
-    },
+    Thread { source: std::io::Error },
 }
 
 /// The arguments of a session, as on the command line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SessionRequest {
-    /// Path of the log.
     pub log_path: PathBuf,
-    /// Path of the rig file, when it is not beside the log or in it.
+    /// Path of the rig file; `None` if it is next to the log or inside it.
     pub rig_path: Option<PathBuf>,
-    /// Path of the ground-truth rig file, when it is not beside the log.
+    /// Path of the ground-truth rig file; `None` if it is next to the log.
     pub ground_truth_path: Option<PathBuf>,
-    /// The runs; none means one `auto`.
+    /// Specifications of the runs; empty means one `auto`.
     pub specs: Vec<RunSpec>,
-    /// Trajectories of other programs beside the runs.
+    /// Trajectories of other programs, shown with the runs.
     pub trajectories: Vec<TrajectorySpec>,
     /// Ground truth of the trajectory, poses or positions, instead of the rig's topic.
     pub truth_trajectory: Option<TrajectorySource>,
-    /// Where the antenna is whose positions are the ground truth, instead of the rig's `ground_truth.lever_arm`.
+    /// Lever arm of the antenna whose positions are the ground truth, instead of the rig's `ground_truth.lever_arm`.
     pub lever_arm: Option<LeverArm>,
     /// Seconds to skip at the start of the log.
     pub start_s: f64,
@@ -104,29 +91,27 @@ pub struct SessionRequest {
 /// A request with its log opened and a camera found for each run.
 #[derive(Clone, Debug)]
 pub struct SessionPlan {
-    /// The opened log.
     pub log: Arc<FlightLog>,
-    /// Path of the log.
     pub log_path: PathBuf,
-    /// Path of the rig file, when it was given.
+    /// Path of the rig file, if it was given.
     pub rig_path: Option<PathBuf>,
-    /// Path of the ground-truth rig file, when it was given.
+    /// Path of the ground-truth rig file, if it was given.
     pub ground_truth_path: Option<PathBuf>,
     /// The rig whose calibration gives the priors of the runs.
     pub rig: Arc<Rig>,
-    /// The ground-truth rig, when known.
+    /// The ground-truth rig, if known.
     pub ground_truth_rig: Option<Arc<Rig>>,
     /// The runs, each with the key of its main camera.
     pub runs: Vec<(RunSpec, String)>,
-    /// Trajectories of other programs beside the runs.
+    /// Trajectories of other programs, shown with the runs.
     pub trajectories: Vec<LoadedTrajectory>,
-    /// Ground truth of the trajectory that was asked for, and the lever arm.
+    /// Requested ground truth of the trajectory, and requested lever arm.
     pub truth_request: (Option<TrajectorySource>, Option<LeverArm>),
-    /// Poses that are the ground truth, over the whole log; `None` where nothing needs them.
+    /// Ground-truth poses over the whole log; `None` if nothing needs them.
     pub ground_truth_track: Option<Arc<PoseTrack>>,
-    /// Whether the ground truth is the reference of an offline calibration.
+    /// True if the ground truth is the reference of an offline calibration.
     pub truth_is_batch: bool,
-    /// Positions of an antenna that are the ground truth.
+    /// Antenna positions that are the ground truth.
     pub position_truth: Option<LoadedPositions>,
     /// Seconds to skip at the start of the log.
     pub start_s: f64,
@@ -137,7 +122,7 @@ pub struct SessionPlan {
     /// Memory budget of record and histories in bytes. Beyond it, only summaries of steps are kept, and steps at the
     /// cursor are recomputed.
     pub memory_budget_bytes: usize,
-    /// Ends the computation after the current step when it is set, from any thread or a signal; what is computed stays.
+    /// Ends the computation after the current step once it is set, by any thread or a signal; computed steps are kept.
     pub interrupted: Arc<AtomicBool>,
 }
 
@@ -201,8 +186,8 @@ impl SessionPlan {
         })
     }
 
-    /// Ground truth that stands in for that of the log's frames, without a pose where it is positions; `None` to keep
-    /// the log's.
+    /// Poses that replace the ground truth of the log's frames, empty if the ground truth is antenna positions; `None`
+    /// keeps the log's.
     pub(in crate::session) fn replaced_ground_truth(&self) -> Option<Arc<PoseTrack>> {
         self.truth_request.0.as_ref().map(|_| self.ground_truth_track.clone().unwrap_or_default())
     }
@@ -225,7 +210,7 @@ impl SessionPlan {
     }
 }
 
-/// Whether there is something to read of a log from a time on.
+/// Returns an error if the start is after the end of the log.
 pub(in crate::session) fn check_start(log: &FlightLog, start_s: f64) -> Result<(), SessionError> {
     let end_s = seconds_from_ns(log.duration_ns());
     if start_s > 0.0 && start_s >= end_s {
@@ -234,7 +219,6 @@ pub(in crate::session) fn check_start(log: &FlightLog, start_s: f64) -> Result<(
     Ok(())
 }
 
-/// The cameras of a run.
 #[derive(Clone, Debug)]
 pub(in crate::session) struct RunCameras<'rig> {
     /// The camera whose image is shown.

@@ -8,19 +8,19 @@ use crate::flight_log::{FlightLog, LogError, RecordedPose, read_trajectory_file}
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{LeverArm, PoseSample, PoseTrack, PositionSample, Rig};
 
-/// A trajectory as it was read, on the clock of the log.
+/// A loaded trajectory, on the clock of the log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadedTrajectory {
-    /// Where it was read from and its label, which no other trajectory and no run has.
+    /// Source and label; the label is unique among trajectories and runs.
     pub spec: TrajectorySpec,
-    /// Its poses within the time of the session.
+    /// Poses within the time of the session.
     pub track: PoseTrack,
 }
 
-/// The trajectories of a request.
+/// Loads the trajectories of a request.
 ///
 /// # Errors
-/// When there are too many, one cannot be read, has no attitudes, or no pose within the time of the session.
+/// If there are too many, or if one cannot be read, has no attitudes, or has no pose within the time of the session.
 pub(super) fn load(
     log: &FlightLog,
     specs: &[TrajectorySpec],
@@ -43,7 +43,7 @@ pub(super) fn load(
             (begin_ns..=end_ns).contains(&stamp_ns).then_some(PoseSample { stamp_ns, world_from_imu })
         };
         if poses.iter().all(|pose| pose.rotation.is_none()) {
-            return Err(refuse("it has positions without attitudes, which no estimator is compared by".to_owned()));
+            return Err(refuse("it has positions without attitudes; a comparison needs poses".to_owned()));
         }
         let samples: Vec<PoseSample> = poses.iter().filter_map(sample).collect();
         if samples.is_empty() {
@@ -61,7 +61,7 @@ fn recorded(log: &FlightLog, source: &TrajectorySource) -> Result<Vec<RecordedPo
     }
 }
 
-/// Why no pose lies in a span of the log, in nanoseconds since it began.
+/// Message that no pose lies within a span of the log, in nanoseconds since the log began.
 fn no_overlap(log: &FlightLog, poses: &[RecordedPose], (begin_ns, end_ns): (i64, i64)) -> String {
     let absolute_s = |ns: i64| seconds_from_ns(log.epoch_ns().saturating_add(ns));
     let stamps_s = |pose: Option<&RecordedPose>| pose.map_or(0.0, |pose| seconds_from_ns(pose.stamp_ns));
@@ -75,31 +75,29 @@ fn no_overlap(log: &FlightLog, poses: &[RecordedPose], (begin_ns, end_ns): (i64,
     )
 }
 
-/// Positions of an antenna as ground truth.
+/// Antenna positions as ground truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadedPositions {
     /// The file or the topic.
     pub source: String,
-    /// The positions within the time of the log, in the order of their stamps.
+    /// Positions within the time of the log, in the order of their stamps.
     pub samples: Vec<PositionSample>,
-    /// Where the antenna is.
     pub lever_arm: LeverArm,
 }
 
-/// Ground truth beside what the frames of the log have.
+/// Ground truth from another source than the frames of the log.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum LoadedTruth {
     /// Poses of the IMU.
     Poses(PoseTrack),
-    /// Positions of an antenna.
     Positions(LoadedPositions),
 }
 
-/// The ground truth that was asked for, or that of the rig's topic; `None` when there is neither.
+/// The requested ground truth, else that of the rig's topic; `None` if there is neither.
 ///
 /// # Errors
-/// When the one that was asked for cannot be read, or has nothing within the time of the log; when a lever arm was given with
-/// poses.
+/// If the requested ground truth cannot be read or has nothing within the time of the log, or if a lever arm was given
+/// with poses.
 pub(super) fn ground_truth(
     log: &FlightLog,
     rig: &Rig,
@@ -111,7 +109,7 @@ pub(super) fn ground_truth(
     let poses = match (recorded(log, &source), asked) {
         (Ok(poses), _) => poses,
         (Err(error), Some(_)) => return Err(error.into()),
-        // The reader of the frames warns of a topic that is not there.
+        // The reader of the frames warns of a missing topic.
         (Err(_), None) => return Ok(None),
     };
     let refuse = |problem: String| SessionError::Trajectory { source_name: source.to_string(), problem };
@@ -137,7 +135,7 @@ pub(super) fn ground_truth(
     }
     if lever_arm.is_some() {
         let problem =
-            "it has attitudes, and a lever arm belongs to positions: leave out --lever-arm, or give positions";
+            "it has attitudes, but a lever arm applies only to positions: omit --lever-arm, or give positions";
         return Err(refuse(problem.to_owned()));
     }
     let sample = |pose: &&RecordedPose| {

@@ -1,4 +1,4 @@
-//! A trajectory of another program beside the runs, as on the command line.
+//! A trajectory of another program, as on the command line.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -8,14 +8,14 @@ use thiserror::Error;
 
 use super::run_spec::distinct_label;
 
-/// Maximum number of trajectories beside the runs.
+/// Maximum number of trajectories in a session.
 pub const MAX_TRAJECTORIES: usize = 4;
-/// Before the name of a topic.
+/// Prefix of a topic name.
 const TOPIC: &str = "topic:";
 /// Longest label in characters.
 const MAX_LABEL: usize = 40;
 
-/// Where a trajectory is.
+/// Source of a trajectory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TrajectorySource {
     /// A file in TUM's or EuRoC's format.
@@ -27,28 +27,25 @@ pub enum TrajectorySource {
 /// A trajectory with its name: `FILE[:LABEL]` or `topic:/TOPIC[:LABEL]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TrajectorySpec {
-    /// Where it is.
     pub source: TrajectorySource,
-    /// Its name in tables and in the window.
+    /// Name in tables and in the window.
     pub label: String,
 }
 
-/// A text is no [`TrajectorySpec`].
+/// The text is not a valid [`TrajectorySpec`].
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{text}': {problem}; expected FILE or FILE:LABEL (TUM or EuRoC), or topic:/TOPIC or topic:/TOPIC:LABEL")]
 pub struct TrajectorySpecError {
-    /// What was given.
     text: String,
-    /// What is wrong with it.
     problem: String,
 }
 
 impl TrajectorySource {
-    /// The name of a trajectory without a label: of the file, or of the topic.
+    /// Label if none is given: name of the file or of the topic.
     fn default_label(&self) -> String {
         match self {
             Self::File(path) => {
-                // Of trajectory.tum in the folder of a run, the folder tells more.
+                // For trajectory.tum in the folder of a run, the name of the folder is more informative.
                 let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
                 let folder = path.parent().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
                 folder.filter(|_| stem == "trajectory").unwrap_or(stem)
@@ -86,7 +83,7 @@ impl FromStr for TrajectorySpec {
     fn from_str(text: &str) -> Result<Self, TrajectorySpecError> {
         let bad = |problem: String| TrajectorySpecError { text: text.to_owned(), problem };
         let (prefix, rest) = text.strip_prefix(TOPIC).map_or(("", text), |rest| (TOPIC, rest));
-        // What follows the last colon is a label unless it is a part of a path, as behind a drive letter.
+        // The text after the last colon is a label unless it is part of a path, as after a drive letter.
         let label = rest.rsplit_once(':').filter(|(_, label)| !label.contains(['/', '\\']));
         let (place, label) = label.map_or((rest, None), |(place, label)| (place, Some(label)));
         let source: TrajectorySource = format!("{prefix}{place}").parse()?;

@@ -12,7 +12,8 @@ const LOSS_SCALES: RangeInclusive<f64> = 0.05..=100.0;
 /// Range of the iterations of a solve.
 const ITERATIONS: RangeInclusive<usize> = 1..=100;
 
-/// Deviations from the estimator's standard options. Keys of a specification, as of a fork, where both have them.
+/// Deviations from the estimator's default options. Keys of a specification; a fork uses the same keys where it has
+/// them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatorTuning {
     /// Factor on the standard deviation of a tracked pixel (`pixel-noise=2`).
@@ -21,9 +22,9 @@ pub struct EstimatorTuning {
     pub imu_noise: f64,
     /// Factor on the standard deviation of the encoders (`encoder-noise=2`).
     pub encoder_noise: f64,
-    /// Robust loss of the visual residuals, `None` for the standard one (`loss=none`, `loss=huber-1.5`, `loss=cauchy-2`).
+    /// Robust loss of the visual residuals, `None` for the default (`loss=none`, `loss=huber-1.5`, `loss=cauchy-2`).
     pub loss: Option<RobustLoss>,
-    /// Largest number of iterations of a solve, `None` for the standard one (`iterations=12`).
+    /// Largest number of iterations of a solve, `None` for the default (`iterations=12`).
     pub iterations: Option<usize>,
 }
 
@@ -37,10 +38,9 @@ impl Default for EstimatorTuning {
 }
 
 impl EstimatorTuning {
-    /// The keys.
     pub(super) const KEYS: [&'static str; 5] = ["pixel-noise", "imu-noise", "encoder-noise", "loss", "iterations"];
 
-    /// Reads the value of one of [`Self::KEYS`]; the error says what was expected.
+    /// Parses and sets the value of one of [`Self::KEYS`]; the error states the expected value.
     pub(super) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
         let factor = || {
             let factor = value.parse::<f64>().ok().filter(|factor| FACTORS.contains(factor));
@@ -56,7 +56,7 @@ impl EstimatorTuning {
         Ok(())
     }
 
-    /// Its keys with their values, without those that are standard.
+    /// Keys with their values, without defaults.
     pub(super) fn options(&self) -> impl Iterator<Item = String> {
         let factors =
             [("pixel-noise", self.pixel_noise), ("imu-noise", self.imu_noise), ("encoder-noise", self.encoder_noise)];
@@ -66,7 +66,7 @@ impl EstimatorTuning {
         factors.chain(loss).chain(self.iterations.map(|count| format!("iterations={count}")))
     }
 
-    /// Changes a configuration.
+    /// Applies the options to a configuration.
     pub(in crate::session) fn apply(&self, config: &mut EstimatorConfig) {
         let options = &mut config.options;
         options.pixel_sigma_px *= self.pixel_noise;
@@ -77,7 +77,7 @@ impl EstimatorTuning {
     }
 }
 
-/// Reads the value of a key as a number within a range; the error says what was expected.
+/// Parses the value of a key as an integer within a range; the error states the expected value.
 pub(super) fn read_count(key: &str, value: &str, range: &RangeInclusive<usize>) -> Result<usize, String> {
     value.parse().ok().filter(|count| range.contains(count)).ok_or_else(|| {
         let (low, high) = (range.start(), range.end());

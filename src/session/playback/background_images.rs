@@ -1,4 +1,4 @@
-//! Images for a window that must not wait: pictures of videos are decoded on a thread of their own.
+//! Images for a window that must not block: images of videos are decoded on a separate thread.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -10,25 +10,24 @@ use crate::flight_log::ImageReader;
 use crate::sensors::GrayImage;
 use crate::session::plan::SessionError;
 
-/// Longest time that a window waits for an image; the next picture of a video is decoded within it, so that playing shows
-/// every picture.
+/// Longest time that a window waits for an image; the next image of a video is decoded within it, so that playback
+/// shows every image.
 const WINDOW_WAITS: Duration = Duration::from_millis(25);
-/// Number of delivered images that are kept: those of all panels of a window.
+/// Number of decoded images that are kept: those of all panels of a window.
 const DELIVERED: usize = 8;
 
-/// The image of a frame, as far as it is decoded.
+/// Decoding state of a frame's image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FrameImage {
-    /// The decoded image.
     Ready(Arc<GrayImage>),
-    /// It is being decoded: ask again a little later.
+    /// Decoding is in progress: request the image again a little later.
     Decoding,
-    /// It is missing, or cannot be decoded.
+    /// The image is missing or cannot be decoded.
     Missing,
 }
 
 impl FrameImage {
-    /// The decoded image, `None` without one.
+    /// The decoded image, `None` in the other states.
     pub fn ready(self) -> Option<Arc<GrayImage>> {
         match self {
             Self::Ready(image) => Some(image),
@@ -37,11 +36,11 @@ impl FrameImage {
     }
 }
 
-/// Camera and number of an image.
+/// Camera key and index of an image.
 type Key = (String, usize);
 
-/// The images of a log. Logs without a video are read at once, because each of their images is decoded alone; a video from
-/// its last keyframe on, which can take longer than a window may wait.
+/// Images of a log. In a log without videos each image is decoded alone, so images are read synchronously; a video is
+/// decoded from its last keyframe on, which can take longer than a window may wait.
 #[derive(Debug)]
 pub(super) struct BackgroundImages {
     reader: Arc<ImageReader>,
@@ -62,27 +61,27 @@ struct Shared {
 
 #[derive(Debug, Default)]
 struct State {
-    /// The image of each camera that was asked for last and is not delivered yet; the oldest request is the first.
+    /// Last requested image of each camera that is not delivered yet, the oldest request first.
     wanted: Vec<Key>,
-    /// Delivered images, ready or missing; the one used last is the last.
+    /// Delivered images, ready or missing, the most recently used last.
     delivered: Vec<(Key, FrameImage)>,
     ended: bool,
 }
 
 impl BackgroundImages {
-    /// Starts the thread when the log has a video.
+    /// Starts the thread if the log has a video.
     pub(super) fn start(reader: ImageReader) -> Result<Self, SessionError> {
         let reader = Arc::new(reader);
         let worker = reader.has_video().then(|| Worker::start(Arc::clone(&reader))).transpose()?;
         Ok(Self { reader, worker })
     }
 
-    /// One image of one camera; of a video when it is decoded in a few milliseconds.
+    /// Image of a camera; for a video, only if it is decoded within a few milliseconds.
     pub(super) fn image(&self, camera_key: &str, index: usize) -> FrameImage {
         self.image_within(camera_key, index, Some(WINDOW_WAITS))
     }
 
-    /// One image of one camera, however long its decoding takes.
+    /// Image of a camera; blocks until it is decoded.
     pub(super) fn decoded_image(&self, camera_key: &str, index: usize) -> FrameImage {
         self.image_within(camera_key, index, None)
     }
@@ -126,14 +125,15 @@ impl Drop for Worker {
         self.shared.state.lock().ended = true;
         self.shared.changed.notify_all();
         if let Some(thread) = self.thread.take() {
-            // A panic has been printed by the thread itself; there is nothing left to do for it.
+            // The thread has already printed its panic; nothing else has to be done.
             let _printed = thread.join();
         }
     }
 }
 
 impl Shared {
-    /// Decodes what is asked for until the session ends. A newer request for a camera ends the decoding of an older one.
+    /// Decodes requested images until the session ends. A newer request for a camera cancels the decoding of an older
+    /// one.
     fn decode(&self, reader: &ImageReader) {
         loop {
             let mut state = self.state.lock();
@@ -157,7 +157,7 @@ impl Shared {
 }
 
 impl State {
-    /// A delivered image, `None` when it is not there.
+    /// Delivered image, `None` if there is none.
     fn delivered(&mut self, key: &Key) -> Option<FrameImage> {
         let found = self.delivered.iter().position(|(delivered, _)| delivered == key)?;
         let entry = self.delivered.remove(found);
@@ -165,7 +165,7 @@ impl State {
         Some(entry.1)
     }
 
-    /// Asks for an image instead of the one of its camera that was asked for before.
+    /// Requests an image; replaces the previous request for the same camera.
     fn want(&mut self, key: Key) {
         self.wanted.retain(|(camera, _)| *camera != key.0);
         self.wanted.push(key);
@@ -184,7 +184,7 @@ mod tests {
     use super::*;
     use crate::flight_log::tests::video::{crc32, sample_video};
 
-    /// Asks for an image until it is decoded, as a window does at every frame.
+    /// Requests an image until it is decoded, as a window does at every frame.
     fn shown(images: &BackgroundImages, index: usize) -> Option<Arc<GrayImage>> {
         loop {
             match images.image("cam0", index) {

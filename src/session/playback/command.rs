@@ -14,7 +14,6 @@ pub enum Command {
     Pause,
     /// Toggle between playback and pause.
     TogglePlay,
-    /// Set the speed of playback.
     SetSpeed(PlaybackSpeed),
     /// Move the cursor to a stamp.
     Seek {
@@ -34,20 +33,16 @@ pub enum Command {
         /// Next (`true`) or previous.
         forward: bool,
     },
-    /// Add a breakpoint.
     AddBreakpoint(Condition),
     /// Replace the condition of a breakpoint.
     ChangeBreakpoint {
-        /// Index of the breakpoint.
         number: usize,
-        /// The new condition.
         condition: Condition,
     },
     /// Enable or disable a breakpoint.
     EnableBreakpoint {
-        /// Index of the breakpoint.
         number: usize,
-        /// Whether it stops the cursor.
+        /// True if it stops the cursor.
         enabled: bool,
     },
     /// Remove a breakpoint by its index.
@@ -71,9 +66,7 @@ pub enum Command {
     AddRun(RunSpec),
     /// Fork a run: a new run continues it from the step at the cursor with changes.
     Fork {
-        /// Index of the parent run.
         run: usize,
-        /// The changes against the parent.
         changes: ForkChanges,
         /// Label of the fork; `None` derives it from the changes and the stamp.
         label: Option<String>,
@@ -83,9 +76,7 @@ pub enum Command {
     /// Recompute the linearized rows of a step's factors. They are stored in `RunRecord::factor_rows` and stay
     /// requested while the cursor is at the step.
     RequestFactorRows {
-        /// Index of the run.
         run: usize,
-        /// Index of the step.
         step: usize,
     },
     /// Set the memory budget of the recording in bytes.

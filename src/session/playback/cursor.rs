@@ -10,15 +10,13 @@ use crate::session::record::{Recording, SolverPosition, StepRecord};
 pub struct Cursor {
     /// Position, in nanoseconds since the log began.
     pub stamp_ns: i64,
-    /// Whether playback runs.
     pub playing: bool,
-    /// Speed of playback.
     pub speed: PlaybackSpeed,
     /// Start and end of the loop range, in nanoseconds since the log began.
     pub loop_range_ns: Option<(i64, i64)>,
     /// The solver iteration at which the step is shown, `None` for the converged step.
     pub solver: Option<SolverPosition>,
-    /// Whether it runs to a breakpoint that the estimators have not reached yet.
+    /// True while the cursor runs to a breakpoint that the estimators have not reached yet.
     pub running_to_breakpoint: bool,
 }
 
@@ -40,7 +38,7 @@ pub enum MoveOutcome {
 }
 
 impl MoveOutcome {
-    /// The text of the message.
+    /// Message for the user.
     pub fn message(self, recording: &Recording, breakpoints: &Breakpoints) -> String {
         match self {
             Self::Hit(hit) => format!("Breakpoint {}", breakpoints.describe(recording, hit)),
@@ -57,7 +55,7 @@ impl MoveOutcome {
 pub type Moved = (Cursor, Option<MoveOutcome>);
 
 impl Cursor {
-    /// Paused at a position, in nanoseconds since the log began.
+    /// A paused cursor at a position, in nanoseconds since the log began.
     pub fn new(stamp_ns: i64) -> Self {
         Self {
             stamp_ns,
@@ -69,7 +67,7 @@ impl Cursor {
         }
     }
 
-    /// The cursor after a command, `None` for a command that does not concern it.
+    /// The cursor after a command, `None` for a command that does not affect it.
     pub fn apply(&self, command: &Command, recording: &Recording, breakpoints: &Breakpoints) -> Option<Moved> {
         let paused = Self { playing: false, ..*self };
         let (mut cursor, outcome) = match *command {
@@ -163,8 +161,8 @@ impl Cursor {
         self.step_over(&stamps_ns(recording, notable), if forward { 1 } else { -1 })
     }
 
-    /// Moves to the stamp `count` places after the cursor (before it when negative), or to the last one in that
-    /// direction; stays where there is none.
+    /// Moves to the `count`-th stamp after the cursor (before it if negative), or to the last one in that direction;
+    /// does not move if there is none.
     fn step_over(&self, stamps_ns: &[i64], count: i64) -> Self {
         let places = usize::try_from(count.unsigned_abs()).unwrap_or(usize::MAX);
         let target = if count >= 0 {
@@ -299,7 +297,7 @@ mod tests {
         assert_eq!(after(at_start, &Command::Seek { stamp_ns: i64::MAX }).stamp_ns, last);
         let playing = after(at_start, &Command::Play);
         assert!(playing.playing && !after(playing, &Command::StepFrames(1)).playing);
-        // Other commands are left to the session.
+        // Other commands are handled by the session.
         assert_eq!(at_start.apply(&Command::ToggleMarker, sample(), &Breakpoints::default()), None);
     }
 

@@ -11,21 +11,21 @@ use crate::session::record::RunRecord;
 const WINDOW_WAITS: Duration = Duration::from_millis(25);
 
 impl Session {
-    /// Waits until the record has everything that the view at the cursor needs.
+    /// Blocks until the record has all data that the view at the cursor needs.
     pub fn settle(&self) {
         self.request_recomputation();
         self.recompute.settle();
-        // A solver state that was requested meanwhile is shown from here on.
+        // Solver states may have been requested in the meantime; they are shown from here on.
         self.request_recomputation();
     }
 
-    /// Waits a few milliseconds for what the view at the cursor needs: most steps are recomputed within them, so that a
-    /// window draws one picture and not one before and one after.
+    /// Waits a few milliseconds for the data that the view at the cursor needs: most steps are recomputed within that
+    /// time, so the window draws one frame instead of one before and one after.
     pub fn settle_shortly(&self) {
         self.recompute.settle_within(WINDOW_WAITS);
     }
 
-    /// Whether steps at the cursor are being recomputed.
+    /// True while steps at the cursor are being recomputed.
     pub fn is_recomputing(&self) -> bool {
         self.recompute.is_busy()
     }
@@ -72,7 +72,8 @@ impl Session {
             if rows.is_some() && run.factor_rows.as_ref().is_none_or(|rows| rows.step != step) {
                 requests.push(request(step, step, Detail::FactorRows, false));
             }
-            // Playback goes on, and users step back: the steps that are shown next are prefetched, the nearest first.
+            // The steps that will be shown next are prefetched, the nearest first: during playback those ahead, else
+            // those before the cursor.
             let next: Vec<usize> = if cursor.playing {
                 (last + 1..last + STEPS_AT_ONCE).filter(missing).collect()
             } else {
@@ -94,7 +95,7 @@ impl Session {
             }
         };
         let stale = computation.recording().runs.iter().any(is_stale);
-        // Released before the record changes, which would copy it otherwise.
+        // Released before the record changes; otherwise the record would be copied.
         drop(computation);
         if stale {
             self.shared.change(|computation| {

@@ -81,9 +81,8 @@ impl Session {
         }
     }
 
-    /// Waits until all runs are computed, all forks of a saved session are started, and the cursor is at its position.
+    /// Blocks until all runs are computed, all forks of a saved session are started, and the cursor is at its position.
     pub fn finish(&mut self) {
-        /// Period of the check, in milliseconds.
         const CHECK_MS: u64 = 5;
         let open = |session: &Self| {
             let pending = !session.pending.forks.is_empty() || session.pending.cursor_ns.is_some();
@@ -96,7 +95,6 @@ impl Session {
         self.advance(0.0);
     }
 
-    /// The panel layout of the saved session.
     pub fn layout(&self) -> Option<&serde_json::Value> {
         self.layout.as_ref()
     }
@@ -198,7 +196,7 @@ mod tests {
         assert_eq!(again.saved(Some(layout)), saved);
         let (before, after) = (session.recording(), again.recording());
         assert_eq!(before.runs.len(), after.runs.len());
-        // A smaller memory budget summarizes older steps at once.
+        // A smaller memory budget summarizes older steps immediately.
         assert!(after.runs.iter().all(|run| run.memory.summaries == 0));
         again.apply(Command::SetMemoryBudget(1 << 20));
         let thin = again.recording();

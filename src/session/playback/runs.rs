@@ -27,7 +27,7 @@ impl Session {
         self.engine.start_runs(&self.plan, &self.computation(), &[self.plan.runs.len() - 1])
     }
 
-    /// Forks a run at a stamp: the step there is the fork's first own step.
+    /// Forks a run at a stamp; the step there is the first step of the fork.
     pub(super) fn fork_at(
         &mut self,
         run: usize,
@@ -50,7 +50,7 @@ impl Session {
         let fork = RunRecord::fork(parent, spec.clone(), step, changes.clone());
         let history = Arc::new(History::fork(history, step, self.plan.memory_budget_bytes));
         self.plan.runs.push((spec, fork.camera_key.clone()));
-        // Released before the record changes, which would copy it otherwise.
+        // Released before the record changes; otherwise the record would be copied.
         drop(computation);
         self.shared.change(|computation| computation.add_run(fork, Arc::clone(&history)));
         let number = self.plan.runs.len() - 1;
@@ -62,7 +62,7 @@ impl Session {
         if count > MAX_RUNS { Err(SessionError::TooManyRuns { count }) } else { Ok(()) }
     }
 
-    /// The specification with a label that no run and no trajectory has.
+    /// The specification with a label that no other run or trajectory has.
     fn distinct(&self, spec: RunSpec) -> RunSpec {
         let recording = self.recording();
         let is_taken = |label: &str| {

@@ -1,6 +1,6 @@
 //! A session as a file: paths, runs, forks, breakpoints, markers and the position of the cursor.
 //!
-//! Results are not stored: they are recomputed to the same bits.
+//! Results are not stored; they are recomputed to the same bits.
 
 use std::path::PathBuf;
 
@@ -11,32 +11,23 @@ use crate::flight_log::LogLimits;
 use crate::sensors::LeverArm;
 use crate::session::plan::{ForkChanges, RunSpec, SessionError, SessionRequest, TrajectorySource, TrajectorySpec};
 
-/// The version of the format that this program writes.
+/// Version of the file format that this program writes.
 pub(super) const VERSION: u32 = 1;
 
-/// The reason why a text is not a saved session, or its session cannot be opened.
+/// Reason why a text is not a saved session, or its session cannot be opened.
 #[derive(Debug, Error)]
 pub enum SavedSessionError {
     /// The text does not have the format of a session.
     #[error("not a saved session: {problem}")]
-    Format {
-        /// The problem.
-        problem: String,
-    },
+    Format { problem: String },
     /// The file was written by a later version of the program.
     #[error(
         "session version {found}, but this program reads version {VERSION}: open it with the program that saved it"
     )]
-    Version {
-        /// Version of the file's format.
-        found: u32,
-    },
+    Version { found: u32 },
     /// A run, a fork or a breakpoint in it cannot be parsed.
     #[error("invalid saved session: {problem}")]
-    Entry {
-        /// The problem.
-        problem: String,
-    },
+    Entry { problem: String },
     /// The log cannot be opened.
     #[error(transparent)]
     Session(#[from] SessionError),
@@ -45,20 +36,19 @@ pub enum SavedSessionError {
 /// A session as it is written to JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SavedSession {
-    /// Version of the format.
     pub session_version: u32,
-    /// The log, with a checksum to recognize it.
+    /// The log, with a checksum to identify it.
     pub log: SavedLog,
-    /// Path of the rig file, when it was given.
+    /// Path of the rig file, if it was given.
     #[serde(default, with = "super::saved_path::optional")]
     pub rig: Option<PathBuf>,
-    /// Path of the ground-truth rig file, when it was given.
+    /// Path of the ground-truth rig file, if it was given.
     #[serde(default, rename = "truth", with = "super::saved_path::optional")]
     pub ground_truth: Option<PathBuf>,
     /// Ground truth of the trajectory, as on the command line.
     #[serde(default)]
     pub truth_trajectory: Option<String>,
-    /// Where the antenna is whose positions are the ground truth, as on the command line.
+    /// Lever arm of the antenna whose positions are the ground truth, as on the command line.
     #[serde(default)]
     pub lever_arm: Option<String>,
     /// Seconds to skip at the start of the log.
@@ -72,23 +62,20 @@ pub struct SavedSession {
     pub trajectories: Vec<String>,
     /// The forks, each after its parent.
     pub forks: Vec<SavedFork>,
-    /// Conditions of the breakpoints.
     pub breakpoints: Vec<SavedBreakpoint>,
     /// Stamps of the markers, in nanoseconds since the log began.
     pub markers_ns: Vec<i64>,
     /// Position of the cursor, in nanoseconds since the log began.
     pub cursor_ns: i64,
-    /// The layout of the panels, in the window's own format.
+    /// Layout of the panels, in the window's format.
     pub layout: Option<serde_json::Value>,
 }
 
 /// A log with its size and checksum.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SavedLog {
-    /// Path of the log.
     #[serde(with = "super::saved_path")]
     pub path: PathBuf,
-    /// Size of the file in bytes.
     pub bytes: u64,
     /// CRC-32 of its first and last mebibyte.
     pub crc32: u32,
@@ -97,27 +84,24 @@ pub struct SavedLog {
 /// A fork of a saved session.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SavedFork {
-    /// Label of the parent run.
     pub parent: String,
-    /// Label of the fork.
     pub name: String,
-    /// Stamp of its first own step, in nanoseconds since the log began.
+    /// Stamp of the first step of the fork, in nanoseconds since the log began.
     pub stamp_ns: i64,
-    /// The changes against the parent, as [`ForkChanges`] writes them.
+    /// Changes against the parent, in the text format of [`ForkChanges`].
     pub changes: String,
 }
 
 /// A breakpoint of a saved session.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SavedBreakpoint {
-    /// The text of its condition.
     pub condition: String,
-    /// Whether the cursor stops at its hits.
+    /// True if the cursor stops at its hits.
     pub enabled: bool,
 }
 
 impl SavedSession {
-    /// Reads what [`SavedSession::to_text`] wrote.
+    /// Parses the output of [`SavedSession::to_text`].
     pub fn from_text(text: &str) -> Result<Self, SavedSessionError> {
         let no_session = |error: serde_json::Error| SavedSessionError::Format { problem: error.to_string() };
         let value: serde_json::Value = serde_json::from_str(text).map_err(no_session)?;
@@ -135,7 +119,7 @@ impl SavedSession {
         text
     }
 
-    /// The request that opens its log and runs.
+    /// Request that opens the log and its runs.
     pub fn request(&self) -> Result<SessionRequest, SavedSessionError> {
         let specs: Result<Vec<RunSpec>, _> = self.runs.iter().map(|run| run.parse()).collect();
         let trajectories: Result<Vec<TrajectorySpec>, _> = self.trajectories.iter().map(|text| text.parse()).collect();
@@ -161,7 +145,7 @@ pub(super) fn entry_error(error: impl ToString) -> SavedSessionError {
     SavedSessionError::Entry { problem: error.to_string() }
 }
 
-/// The forks and the cursor position of a saved session that are still to be restored.
+/// Forks and cursor position of a saved session that are still to be restored.
 #[derive(Clone, Debug, Default)]
 pub(in crate::session) struct PendingRestore {
     pub(in crate::session) forks: Vec<(SavedFork, ForkChanges)>,

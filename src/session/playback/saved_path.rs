@@ -1,10 +1,10 @@
-//! Paths in a saved session: as text, or as bytes where a path of Unix is no UTF-8.
+//! Paths in a saved session: as text, or as bytes if a Unix path is not valid UTF-8.
 
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// A path as JSON holds it.
+/// Representation of a path in JSON.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
 enum Written {
@@ -46,7 +46,7 @@ pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<
     Written::deserialize(deserializer).map(PathBuf::from)
 }
 
-/// The same for a path that may be missing.
+/// The same representation for an optional path.
 pub(super) mod optional {
     use super::{Deserialize as _, Deserializer, PathBuf, Serialize as _, Serializer, Written};
 

@@ -20,14 +20,13 @@ use crate::session::record::{Recording, SolverPosition};
 pub(super) struct FactorRowsView {
     /// [`RunRecord::id`](crate::session::RunRecord::id).
     pub(super) run: u64,
-    /// Index of the step.
     pub(super) step: usize,
 }
 
 /// A log with its runs, computed on their own threads, and a cursor over the results.
 ///
-/// It connects three things: the [`Cursor`], a plain value; the engine, which computes and recomputes steps; and the
-/// record that both read. No method except those that say so waits for the estimators.
+/// It connects the [`Cursor`], a plain value, the engine, which computes and recomputes steps, and the record that both
+/// read. Only methods documented as blocking wait for the estimators.
 #[derive(Debug)]
 pub struct Session {
     pub(super) plan: SessionPlan,
@@ -39,9 +38,8 @@ pub struct Session {
     pub(super) markers_ns: Vec<i64>,
     /// The step whose factor rows are shown.
     pub(super) factor_rows: Option<FactorRowsView>,
-    /// The forks and cursor position of a saved session that are still to be restored.
+    /// Forks and cursor position of a saved session that are still to be restored.
     pub(super) pending: PendingRestore,
-    /// The panel layout of the saved session.
     pub(super) layout: Option<serde_json::Value>,
     pub(super) notices: Vec<String>,
     images: BackgroundImages,
@@ -102,12 +100,10 @@ impl Session {
         self.recording().memory_bytes()
     }
 
-    /// Path of the log.
     pub fn log_path(&self) -> &Path {
         &self.plan.log_path
     }
 
-    /// The cursor.
     pub fn cursor(&self) -> &Cursor {
         &self.cursor
     }
@@ -122,12 +118,10 @@ impl Session {
         self.cursor.stamp_ns
     }
 
-    /// Whether playback runs.
     pub fn is_playing(&self) -> bool {
         self.cursor.playing
     }
 
-    /// Speed of playback.
     pub fn speed(&self) -> PlaybackSpeed {
         self.cursor.speed
     }
@@ -137,7 +131,7 @@ impl Session {
         self.cursor.loop_range_ns
     }
 
-    /// Whether the cursor runs to a breakpoint that the estimators have not reached yet.
+    /// True while the cursor runs to a breakpoint that the estimators have not reached yet.
     pub fn is_running_to_breakpoint(&self) -> bool {
         self.cursor.running_to_breakpoint
     }
@@ -162,12 +156,12 @@ impl Session {
         std::mem::take(&mut self.notices)
     }
 
-    /// An image of the log by camera and index in its stream; waits a few milliseconds for a picture of a video.
+    /// Image of the log by camera key and index in its stream; waits a few milliseconds for an image of a video.
     pub fn image(&self, camera_key: &str, frame_index: usize) -> FrameImage {
         self.images.image(camera_key, frame_index)
     }
 
-    /// An image of the log by camera and index in its stream; waits until it is decoded.
+    /// Image of the log by camera key and index in its stream; blocks until it is decoded.
     pub fn decoded_image(&self, camera_key: &str, frame_index: usize) -> FrameImage {
         self.images.decoded_image(camera_key, frame_index)
     }
@@ -201,9 +195,9 @@ impl Session {
         self.notices.extend(outcome.map(|outcome| outcome.message(recording, &self.breakpoints)));
     }
 
-    /// Executes a command that does not concern the cursor.
+    /// Executes a command that does not affect the cursor.
     fn perform(&mut self, command: Command) {
-        // A panel may request factor rows while it draws; that does not cancel a run to a breakpoint.
+        // A panel may request factor rows while it is drawn; that does not cancel a run to a breakpoint.
         self.cursor.running_to_breakpoint &= matches!(command, Command::RequestFactorRows { .. });
         match command {
             Command::AddBreakpoint(condition) => self.change_breakpoints(|all| all.add(condition)),

@@ -19,7 +19,7 @@ struct State {
     wake: Mutex<Option<Wake>>,
 }
 
-/// A function that asks a window for a frame, from any thread.
+/// Function that requests a new frame from a window, callable from any thread.
 pub type Wake = Box<dyn Fn() + Send>;
 
 impl State {
@@ -61,7 +61,7 @@ impl SharedComputation {
         Ok(())
     }
 
-    /// A function for the recompute thread that stores its results.
+    /// Function for the recompute thread that stores its results.
     pub(super) fn receiver_of_recomputed(&self) -> impl FnMut(&RecomputeRequest, Recomputed) + Send + 'static {
         let state = Arc::clone(&self.state);
         move |request, recomputed| {
@@ -72,7 +72,7 @@ impl SharedComputation {
         }
     }
 
-    /// Sets what is called when a step at the cursor has been recomputed.
+    /// Sets the function that is called when a step at the cursor has been recomputed.
     pub(super) fn wake_with(&self, wake: Wake) {
         *self.state.wake.lock() = Some(wake);
     }

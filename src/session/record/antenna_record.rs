@@ -1,4 +1,4 @@
-//! The positions of an antenna as ground truth of a run that is still growing.
+//! Antenna positions as ground truth of a run that is still growing.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -9,25 +9,24 @@ use crate::sensors::{LeverArm, NEAREST_POSE_NS, PoseSample, PoseTrack, PositionS
 use crate::session::accuracy::{Alignment, AlignmentSums, StampedPose};
 use crate::session::antenna::{AntennaAlignment, AntennaError, AntennaPair, align_antenna, antenna_pairs};
 
-/// Number of new pairs, as a ratio of those so far, after which a lever arm is estimated again.
+/// Ratio of new pairs to previous pairs after which the lever arm is estimated again.
 const NEW_PAIRS_RATIO: f64 = 0.05;
 
-/// Ground truth that is the position of an antenna, as of a satellite receiver.
+/// Ground truth given as positions of an antenna, for example of a GNSS receiver.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PositionTruth {
-    /// The file or the topic.
+    /// The file or topic.
     pub source: String,
-    /// The positions in the order of their stamps.
+    /// Positions in the order of their stamps.
     pub samples: Vec<PositionSample>,
-    /// Where the antenna is.
     pub lever_arm: LeverArm,
 }
 
 impl PositionTruth {
-    /// Evaluates a trajectory against the positions of the antenna.
+    /// Evaluates a trajectory against the antenna positions.
     ///
     /// # Errors
-    /// When the positions do not determine the alignment, or the rotations do not determine the lever arm.
+    /// If the positions do not determine the alignment, or the rotations do not determine the lever arm.
     pub fn evaluate(&self, estimate: &PoseTrack) -> Result<TrajectoryEvaluation, AntennaError> {
         let pairs = antenna_pairs(estimate, &self.samples);
         let alignment = align_antenna(&pairs, self.lever_arm)?;
@@ -39,30 +38,31 @@ impl PositionTruth {
     }
 }
 
-/// Both positions of the antenna as poses without a rotation, the estimated one in the world of the estimate.
+/// Estimated antenna position (world of the estimate) and ground-truth position (world of the ground truth) as poses
+/// without rotation.
 fn stamped(pair: &AntennaPair, alignment: &AntennaAlignment) -> (StampedPose, StampedPose) {
     let stamp_s = seconds_from_ns(pair.stamp_ns);
     let at = |position_m| StampedPose { stamp_s, pose: RigidTransform::new(UnitQuaternion::identity(), position_m) };
     (at(pair.pose.transform(&alignment.lever_arm_m)), at(pair.antenna_m))
 }
 
-/// The pairs of a run and its alignment, updated with every pose.
+/// Pairs of a run and its alignment, updated with every pose.
 #[derive(Clone, Debug, Default)]
 pub(super) struct AntennaRecord {
     pub(super) pairs: Vec<AntennaPair>,
     pub(super) alignment: Option<AntennaAlignment>,
     sums: AlignmentSums,
     last: Option<PoseSample>,
-    /// Number of pairs from which on a lever arm is estimated again.
+    /// Number of pairs at which the lever arm is estimated again.
     next_estimate: usize,
 }
 
 impl AntennaRecord {
-    /// Takes the next pose of the run; stamps must increase.
+    /// Adds the next pose of the run; stamps must increase.
     pub(super) fn push(&mut self, truth: &PositionTruth, stamp_ns: i64, world_from_imu: RigidTransform) {
         let next = PoseSample { stamp_ns, world_from_imu };
         let Some(last) = self.last.replace(next) else { return };
-        // Between poses that are further apart nothing is interpolated.
+        // Poses further apart are not interpolated.
         if stamp_ns - last.stamp_ns > 2 * NEAREST_POSE_NS {
             return;
         }
@@ -85,7 +85,7 @@ impl AntennaRecord {
         }
     }
 
-    /// Aligns with the pairs from `first` on as new ones.
+    /// Aligns, with the pairs from `first` on as new ones.
     fn align(&mut self, lever_arm: LeverArm, first: usize) {
         match lever_arm {
             LeverArm::Known(lever_arm_m) => {
@@ -101,7 +101,7 @@ impl AntennaRecord {
             LeverArm::Estimated if self.pairs.len() >= self.next_estimate => {
                 self.next_estimate = self.pairs.len() + (NEW_PAIRS_RATIO * self.pairs.len() as f64).ceil() as usize;
                 let estimated = align_antenna(&self.pairs, lever_arm);
-                // Before the rotations determine the lever arm, the antenna is taken to be at the IMU.
+                // Until the rotations determine the lever arm, the antenna is assumed at the IMU.
                 let aligned = estimated.or_else(|_| align_antenna(&self.pairs, LeverArm::Known(Vector3::zeros())));
                 self.alignment = aligned.ok();
             }

@@ -10,7 +10,6 @@ use super::trajectory_lane::{TrajectoryLane, yaw_and_position};
 use crate::estimator::{FrameStateReport, Phase};
 use crate::geometry::{RigidTransform, so3, wrap_angle};
 
-/// A compared quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
     /// Phase of the estimator, initializing or tracking; 1 where they differ.
@@ -25,9 +24,7 @@ pub enum Quantity {
     Attitude,
     /// Velocity of the newest frame.
     Velocity,
-    /// Accelerometer bias.
     AccelerometerBias,
-    /// Gyroscope bias.
     GyroscopeBias,
     /// Joint angles of the newest frame.
     JointAngles,
@@ -63,7 +60,7 @@ impl Quantity {
     ];
 
     /// Name, unit as stored, and threshold of a notable difference: 1 cm and 0.1° for a trajectory, 1 mm and 0.1° for a
-    /// calibration; for biases, the values that change the trajectory by as much within a second.
+    /// calibration; for biases, the values that change the trajectory by the same amount within a second.
     const fn facts(self) -> (&'static str, &'static str, f64) {
         match self {
             Self::Phase => ("phase", "", 1.0),
@@ -168,7 +165,7 @@ impl Quantity {
         }
     }
 
-    /// Whether runs on different cameras can be compared in it.
+    /// True if runs on different cameras can be compared in this quantity.
     const fn is_of_the_vehicle(self) -> bool {
         !matches!(
             self,
@@ -196,39 +193,38 @@ fn track_difference(a: &StepRecord, b: &StepRecord) -> f64 {
     ids(a).symmetric_difference(&ids(b)).count() as f64
 }
 
-/// The divergence of two runs in one quantity.
+/// First divergence of two runs in one quantity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Divergence {
-    /// Stamp of the first difference: the values are not equal.
+    /// Stamp of the first exact difference (values not equal), `None` without one.
     pub exact_ns: Option<i64>,
-    /// Stamp of the first notable difference: it reaches [`Quantity::notable`].
+    /// Stamp of the first notable difference (at least [`Quantity::notable`]), `None` without one.
     pub notable_ns: Option<i64>,
-    /// The largest difference and its stamp.
+    /// Largest difference and its stamp.
     pub largest: Option<(f64, i64)>,
 }
 
-/// A run compared with a reference run, updated as both are computed.
+/// Comparison of a run with a reference run, updated as both are computed.
 ///
 /// At the first stamp at which both have a pose, the run's world is aligned with the reference's by yaw and position,
-/// the gauge freedom of visual-inertial odometry. A fork shares its parent's world.
+/// the gauge freedom of visual-inertial odometry. A fork uses its parent's world.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
     runs: Option<(u64, u64)>,
     read: (usize, usize),
     gauge: Option<RigidTransform>,
     same_camera: bool,
-    /// Stamps that both runs have, in nanoseconds since the log began.
+    /// Stamps common to both runs, in nanoseconds since the log began.
     pub stamps_ns: Vec<i64>,
     /// Differences by quantity and row; NaN where a run does not have the quantity.
     pub columns: [Vec<f64>; Quantity::ALL.len()],
-    /// Divergences by quantity.
     pub divergences: [Divergence; Quantity::ALL.len()],
-    /// Changes when rows were removed.
+    /// Counter that changes when rows are removed.
     pub epoch: u64,
 }
 
 impl Comparison {
-    /// Compares the steps that are new since the last call; restarts when a run was replaced.
+    /// Compares the steps that are new since the last call; restarts if a run was replaced.
     pub fn read(&mut self, reference: &RunRecord, run: &RunRecord) {
         let shrunk = self.read.0 > reference.steps.len() || self.read.1 > run.steps.len();
         if self.runs != Some((reference.id, run.id)) || shrunk {
@@ -246,8 +242,8 @@ impl Comparison {
         }
     }
 
-    /// Compares a trajectory with a run at the stamps of the run's steps, in position and attitude: a trajectory has nothing
-    /// else. Only the new steps are read; restarts when one of them was replaced.
+    /// Compares a trajectory with a run at the stamps of the run's steps, in position and attitude, the only quantities
+    /// of a trajectory. Only the new steps are read; restarts if one of the two was replaced.
     pub fn read_trajectory(&mut self, reference: &RunRecord, lane: &TrajectoryLane) {
         let ids = Some((reference.id, lane.id));
         if self.runs != ids || self.read.0 > reference.steps.len() {
@@ -256,13 +252,15 @@ impl Comparison {
         while let Some(step) = reference.steps.get(self.read.0) {
             self.read.0 += 1;
             let Some(pose) = lane.track.at(step.report.stamp_ns) else { continue };
-            let own = step.report.newest().map(|newest| newest.world_from_imu);
-            self.align_at(own.as_ref(), Some(&pose));
-            let differences = |gauge: &RigidTransform, quantity: Quantity| match (own, quantity) {
-                (Some(own), Quantity::Position) => {
-                    Some((gauge.transform(&pose.translation_m) - own.translation_m).norm())
+            let reference_pose = step.report.newest().map(|newest| newest.world_from_imu);
+            self.align_at(reference_pose.as_ref(), Some(&pose));
+            let differences = |gauge: &RigidTransform, quantity: Quantity| match (reference_pose, quantity) {
+                (Some(reference_pose), Quantity::Position) => {
+                    Some((gauge.transform(&pose.translation_m) - reference_pose.translation_m).norm())
                 }
-                (Some(own), Quantity::Attitude) => Some(angle(&own.rotation, &(gauge.rotation * pose.rotation))),
+                (Some(reference_pose), Quantity::Attitude) => {
+                    Some(angle(&reference_pose.rotation, &(gauge.rotation * pose.rotation)))
+                }
                 _ => None,
             };
             self.push_row(step.report.stamp_ns, differences);
@@ -270,8 +268,8 @@ impl Comparison {
     }
 
     fn push(&mut self, a: &StepRecord, b: &StepRecord) {
-        let [own, other] = [a, b].map(|step| step.report.newest().map(|newest| &newest.world_from_imu));
-        self.align_at(own, other);
+        let [reference_pose, other] = [a, b].map(|step| step.report.newest().map(|newest| &newest.world_from_imu));
+        self.align_at(reference_pose, other);
         let same_camera = self.same_camera;
         self.push_row(a.report.stamp_ns, |gauge, quantity| {
             let comparable = same_camera || quantity.is_of_the_vehicle();
@@ -280,15 +278,15 @@ impl Comparison {
     }
 
     /// Aligns the worlds at the first stamp at which both have a pose.
-    fn align_at(&mut self, own: Option<&RigidTransform>, other: Option<&RigidTransform>) {
+    fn align_at(&mut self, reference_pose: Option<&RigidTransform>, other: Option<&RigidTransform>) {
         if self.gauge.is_none()
-            && let (Some(own), Some(other)) = (own, other)
+            && let (Some(reference_pose), Some(other)) = (reference_pose, other)
         {
-            self.gauge = Some(yaw_and_position(own, other));
+            self.gauge = Some(yaw_and_position(reference_pose, other));
         }
     }
 
-    /// Appends the differences at a stamp, as functions of the alignment of the other world.
+    /// Appends the differences at a stamp; `difference` is a function of the alignment of the other world.
     fn push_row(&mut self, stamp_ns: i64, difference: impl Fn(&RigidTransform, Quantity) -> Option<f64>) {
         self.stamps_ns.push(stamp_ns);
         let gauge = self.gauge.unwrap_or_default();
@@ -297,7 +295,7 @@ impl Comparison {
             self.columns[index].push(apart.unwrap_or(f64::NAN));
             let Some(apart) = apart else { continue };
             let divergence = &mut self.divergences[index];
-            // Without the gauge transform, whose rounding errors are no difference between the runs.
+            // Without the gauge transform, because its rounding errors are not a difference between the runs.
             if divergence.exact_ns.is_none() {
                 let as_they_are = difference(&RigidTransform::default(), quantity);
                 divergence.exact_ns = as_they_are.filter(|apart| *apart != 0.0).map(|_| stamp_ns);
@@ -322,7 +320,6 @@ impl Comparison {
         &self.columns[quantity as usize]
     }
 
-    /// The divergence in a quantity.
     pub fn divergence(&self, quantity: Quantity) -> &Divergence {
         &self.divergences[quantity as usize]
     }

@@ -1,4 +1,4 @@
-//! Since when a direction of the calibration has been unobservable.
+//! Time since which a direction of the calibration has been unobservable.
 
 use std::fmt;
 use std::sync::Arc;
@@ -7,17 +7,18 @@ use super::StepRecord;
 use crate::geometry::seconds_from_ns;
 use crate::observability::steps_lost;
 
-/// Since when the least observable direction of a step has been null or weak without interruption.
+/// Time since which the least observable direction of a step has been null or weak without interruption.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LostSince {
-    /// Stamp of the first step, since the log began.
+    /// Stamp of the first such step, in nanoseconds since the log began.
     pub stamp_ns: i64,
-    /// Whether the direction is a structural null direction, not only a weak one.
+    /// True for a structural null direction, false for a weak direction.
     pub structural: bool,
 }
 
 impl LostSince {
-    /// Since when the least observable direction of `step` has been lost; `earlier` are the run's steps before it.
+    /// Time since which the least observable direction of `step` has been lost; `earlier` are the run's steps before
+    /// it.
     ///
     /// Returns `None` for a step without a rank, and for a full informed rank.
     pub fn of(earlier: &[Arc<StepRecord>], step: &StepRecord) -> Option<Self> {
@@ -31,7 +32,7 @@ impl LostSince {
 }
 
 impl fmt::Display for LostSince {
-    /// `weak since 5.55 s`.
+    /// For example `weak since 5.55 s`.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let kind = if self.structural { "unobservable" } else { "weak" };
         write!(out, "{kind} since {:.2} s", seconds_from_ns(self.stamp_ns))

@@ -1,18 +1,18 @@
-//! Progress of a run, with its passes before the one that is recorded.
+//! Progress of a run, including its passes before the recorded one.
 
 use super::run::RunRecord;
 
-/// How far a pass before the last one is.
+/// Progress of a pass before the last one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PassProgress {
     /// Number of the pass, counted from 1.
     pub number: usize,
-    /// Stamp that it has reached, in nanoseconds since the log began.
+    /// Latest stamp of the pass, in nanoseconds since the log began.
     pub reached_ns: i64,
 }
 
 impl RunRecord {
-    /// Ratio of the run that is computed, all passes together, from 0 to 1; `duration_ns` is that of the log.
+    /// Computed fraction of the run, all passes together, from 0 to 1; `duration_ns` is that of the log.
     pub fn computed_fraction(&self, duration_ns: i64) -> f64 {
         let passes = self.spec.passes.max(1);
         let before = match self.running_pass() {
@@ -32,13 +32,13 @@ impl RunRecord {
         }
     }
 
-    /// Stamp that the running pass has reached, in nanoseconds since the log began.
+    /// Latest stamp of the running pass, in nanoseconds since the log began.
     pub fn reached_ns(&self) -> i64 {
         let last_ns = self.steps.last().map_or(0, |step| step.report.stamp_ns);
         self.running_pass().map_or(last_ns, |pass| pass.reached_ns)
     }
 
-    /// A pass before the last one, until that has its first step.
+    /// The pass before the last one that runs; `None` once the last pass has its first step.
     fn running_pass(&self) -> Option<PassProgress> {
         self.earlier_pass.filter(|_| self.steps.is_empty())
     }

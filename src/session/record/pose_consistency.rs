@@ -1,7 +1,7 @@
 //! Consistency of poses: their errors against ground truth over their covariances.
 //!
-//! Poses are compared relative to each other, newest against oldest frame of a window: that difference does not depend on
-//! the four unobservable directions (position, yaw) and needs no alignment.
+//! The newest pose of a window is compared relative to the oldest: that relative pose does not depend on the four
+//! unobservable directions (position, yaw) and needs no alignment.
 
 use std::collections::BTreeMap;
 
@@ -11,18 +11,18 @@ use super::run::RunRecord;
 use crate::estimator::{ColumnGroup, Linearization, StepReport};
 use crate::geometry::{RigidTransform, so3};
 
-/// Information that all poses are given about their absolute position and orientation, in 1/m² and 1/rad², so that the
-/// matrix can be inverted: σ of a hundred metres and a hundred radians.
+/// Information added to the absolute position and orientation of all poses, in 1/m² and 1/rad², so that the matrix is
+/// invertible: σ of a hundred metres and a hundred radians.
 const WEAK_INFORMATION: f64 = 1e-4;
 
-/// Normalized estimation error squared (NEES) of the newest pose of a window in its oldest one.
+/// Normalized estimation error squared (NEES) of the newest pose of a window relative to its oldest one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseConsistency {
-    /// Of all six components; 6 on average for a consistent estimator.
+    /// NEES of all six components; 6 on average for a consistent estimator.
     pub pose: f64,
-    /// Of the rotation; 3 on average.
+    /// NEES of the rotation; 3 on average.
     pub rotation: f64,
-    /// Of the translation; 3 on average.
+    /// NEES of the translation; 3 on average.
     pub translation: f64,
 }
 
@@ -36,7 +36,7 @@ impl RunRecord {
     }
 }
 
-/// The consistency of one step; `truths` are `world_from_imu` by stamp.
+/// Consistency of one step; `truths` are `world_from_imu` by stamp.
 fn consistency(report: &StepReport, truths: &BTreeMap<i64, RigidTransform>) -> Option<PoseConsistency> {
     let [oldest, .., newest] = report.window.as_slice() else { return None };
     let (true_oldest, true_newest) = (truths.get(&oldest.stamp_ns)?, truths.get(&newest.stamp_ns)?);
@@ -54,7 +54,8 @@ fn consistency(report: &StepReport, truths: &BTreeMap<i64, RigidTransform>) -> O
     })
 }
 
-/// Covariance of `oldest_from_newest` in the perturbation rule, rotation first; all other unknowns marginalized.
+/// Covariance of `oldest_from_newest` (6 × 6) in the perturbation rule, rotation first; all other unknowns
+/// marginalized.
 fn relative_covariance(report: &StepReport, oldest_from_newest: &RigidTransform) -> Option<Matrix6<f64>> {
     let linearization = report.linearization.as_ref()?;
     let poses = || linearization.columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose);
@@ -77,7 +78,7 @@ fn relative_covariance(report: &StepReport, oldest_from_newest: &RigidTransform)
     Some(Matrix6::from_iterator((right.transpose() * solved).iter().copied()))
 }
 
-/// Information of all columns of a step, of the measurements and the priors, with [`WEAK_INFORMATION`] on poses.
+/// Information of all columns of a step, from measurements and priors, with [`WEAK_INFORMATION`] on poses.
 fn information(linearization: &Linearization) -> DMatrix<f64> {
     let (measured, prior) = (&linearization.jacobian, &linearization.prior_jacobian);
     let mut information = measured.tr_mul(measured);

@@ -1,4 +1,4 @@
-//! Errors of estimated poses against ground truth, with the covariances that the estimator gives them.
+//! Errors of estimated poses against ground truth, with the covariances of the estimator.
 
 use nalgebra::Vector6;
 
@@ -7,16 +7,16 @@ use super::trajectory_lane::yaw_and_position;
 use crate::estimator::PoseCovariance;
 use crate::geometry::RigidTransform;
 
-/// The error of the newest pose of a step.
+/// Error of the newest pose of a step.
 ///
 /// Position and yaw of a visual-inertial estimate are relative to the oldest frame of the first window, and so is the
-/// covariance: the ground truth is moved onto the estimate by position and yaw at that frame.
+/// covariance: the ground truth is aligned with the estimate by position and yaw at that frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseError {
     /// Stamp of the frame in nanoseconds since the log began.
     pub stamp_ns: i64,
-    /// Estimate minus truth in the rows of [`PoseCovariance`]: rotation vector in the IMU frame (rad), position in the world
-    /// of the run (m).
+    /// Estimate minus ground truth in the rows of [`PoseCovariance`]: rotation vector in the IMU frame (rad), position
+    /// in the world of the run (m).
     pub error: Vector6<f64>,
     /// Covariance of the estimate.
     pub covariance: PoseCovariance,
@@ -28,7 +28,7 @@ impl PoseError {
         self.covariance.nees(&self.error)
     }
 
-    /// Mean of [`PoseError::nees`], `None` without an error.
+    /// Mean of [`PoseError::nees`], `None` if there are no errors.
     pub fn mean_nees(errors: &[Self]) -> Option<f64> {
         let nees: Vec<f64> = errors.iter().filter_map(Self::nees).collect();
         (!nees.is_empty()).then(|| nees.iter().sum::<f64>() / nees.len() as f64)
@@ -36,11 +36,12 @@ impl PoseError {
 }
 
 impl RunRecord {
-    /// Errors of the newest poses of all steps with ground truth, after initializations whose first window begins at a frame
-    /// with ground truth.
+    /// Errors of the newest poses of all steps with ground truth, after initializations whose oldest frame has ground
+    /// truth.
     pub fn pose_errors(&self) -> Vec<PoseError> {
         let mut errors = Vec::new();
-        // The number of restarts, and what moves the ground truth onto the oldest frame of the window after the last one.
+        // Number of restarts, and the alignment of the ground truth with the oldest frame of the window after the last
+        // one.
         let mut origin: Option<(usize, Option<RigidTransform>)> = None;
         for (number, step) in self.steps.iter().enumerate() {
             let report = &step.report;
@@ -58,8 +59,8 @@ impl RunRecord {
         errors
     }
 
-    /// What moves the ground truth onto the oldest frame of a step's window by position and yaw; `None` where that frame has
-    /// no ground truth.
+    /// `run_from_true`: alignment of the ground truth with the oldest frame of a step's window by position and yaw;
+    /// `None` if that frame has no ground truth.
     fn run_from_true(&self, step: usize) -> Option<RigidTransform> {
         let oldest = self.steps[step].report.window.first()?;
         let place = self.steps[..=step].binary_search_by_key(&oldest.stamp_ns, |step| step.report.stamp_ns).ok()?;

@@ -10,14 +10,13 @@ use crate::geometry::ns_from_seconds;
 use crate::sensors::Rig;
 use crate::session::plan::{LoadedTrajectory, RunSpec, SessionPlan};
 
-/// The reports of all runs on one log so far.
+/// Reports of all runs on one log so far.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Path of the log.
     pub log_path: PathBuf,
-    /// The rig of the runs.
+    /// Rig of the runs.
     pub rig: Arc<Rig>,
-    /// The ground-truth rig, when known.
+    /// The ground-truth rig, if known.
     pub ground_truth_rig: Option<Arc<Rig>>,
     /// Length of the log in nanoseconds.
     pub duration_ns: i64,
@@ -27,15 +26,14 @@ pub struct Recording {
     pub epoch_ns: i64,
     /// The runs in the order of the request; added runs and forks follow.
     pub runs: Vec<RunRecord>,
-    /// Whether the ground truth of the trajectory is the reference of an offline calibration of the same log.
+    /// True if the ground truth of the trajectory is the reference of an offline calibration of the same log.
     pub truth_is_batch: bool,
-    /// Positions of an antenna that are the ground truth instead of poses.
+    /// Antenna positions that are the ground truth instead of poses.
     pub position_truth: Option<Arc<PositionTruth>>,
-    /// Trajectories of other programs beside the runs.
+    /// Trajectories of other programs, shown with the runs.
     pub trajectories: Vec<Arc<TrajectoryLane>>,
     /// Warnings about the log so far, in time order.
     pub warnings: Vec<LogWarning>,
-    /// Memory budget in bytes.
     pub memory_budget_bytes: usize,
 }
 
@@ -75,12 +73,12 @@ impl Recording {
         recording
     }
 
-    /// What the trajectories are compared with, in words.
+    /// Name of the reference of the trajectories.
     pub fn truth_name(&self) -> &'static str {
         if self.truth_is_batch { "batch reference" } else { "ground truth" }
     }
 
-    /// Adds warnings about the log in time order without duplicates: two cameras read the same log and find the same
+    /// Adds warnings about the log in time order without duplicates: two cameras read the same log and report the same
     /// problems, in an order that depends on the scheduling of threads.
     pub(in crate::session) fn add_warnings(&mut self, warnings: Vec<LogWarning>) {
         for warning in warnings {
@@ -109,19 +107,18 @@ impl Recording {
         tracks.values().sum::<usize>() + self.runs.iter().map(RunRecord::own_bytes).sum::<usize>()
     }
 
-    /// The stamp that every run has reached, in nanoseconds since the log began; the last stamp when all are finished.
+    /// Latest stamp computed by every run, in nanoseconds since the log began; the last stamp if all are finished.
     pub fn computed_ns(&self) -> i64 {
         let reached = |run: &RunRecord| run.steps.last().map_or(0, |step| step.report.stamp_ns);
         self.runs.iter().filter(|run| !run.finished).map(reached).min().unwrap_or_else(|| self.last_stamp_ns())
     }
 
-    /// Stamp of the first step of any run; the start of the runs before there is one.
+    /// Stamp of the first step of any run; the start of the runs if there is none.
     pub fn first_stamp_ns(&self) -> i64 {
         let first = self.runs.iter().filter_map(|run| run.steps.first()).map(|step| step.report.stamp_ns).min();
         first.unwrap_or(self.start_ns)
     }
 
-    /// Whether all runs are finished.
     pub fn is_finished(&self) -> bool {
         self.runs.iter().all(|run| run.finished)
     }

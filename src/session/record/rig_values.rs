@@ -1,4 +1,4 @@
-//! The rig's values of the calibration parameters that a run estimates, and a rig with the estimated ones.
+//! The rig's values of the calibration parameters that a run estimates, and a rig with the estimated values.
 
 use super::run::RunRecord;
 use crate::estimator::{CalibrationEstimate, imu_columns, imu_intrinsics, rigid_columns};
@@ -6,11 +6,11 @@ use crate::gimbal::{Chain, NearestForm, ParameterGroup, ParameterId, ParameterPa
 use crate::sensors::{CameraMount, Rig};
 
 impl RunRecord {
-    /// The rig's values of the run's calibration parameters in the parameterization of `estimate`, each in the unit of its
-    /// dimension; angles lie in (−π, π]. Returns `None` when the rig does not have the cameras.
+    /// The rig's values of the run's calibration parameters in the parameterization of `estimate`, each in the unit of
+    /// its dimension; angles lie in (−π, π]. Returns `None` if the rig does not have the cameras.
     ///
-    /// The classical parameterization has several equivalent values; the result has those nearest to `given`, the rig
-    /// of the run's prior, because the run estimates near those.
+    /// The classical parameterization has several equivalent values; the result is nearest to `given`, the rig of the
+    /// run's prior, because the run estimates near its values.
     pub fn values_in(&self, rig: &Rig, given: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(ParameterId, f64)>> {
         let main = rig.chain_of_camera(&self.camera_key)?;
         let conversion = self.conversion_for(given, estimate, estimate.parameterization)?;
@@ -73,15 +73,15 @@ impl RunRecord {
         rig
     }
 
-    /// Keys of the cameras by the number that their parameters have, the main camera first.
+    /// Keys of the cameras, indexed by the camera number of their parameters, the main camera first.
     pub fn camera_keys<'a>(&'a self, estimate: &'a CalibrationEstimate) -> Vec<&'a str> {
         let rigid = estimate.rigid_cameras.iter().map(|(key, _)| key.as_str());
         std::iter::once(self.camera_key.as_str()).chain(rigid).collect()
     }
 
-    /// The conversion of mechanisms to a parameterization. Of several equivalent values it returns those nearest to the
+    /// Conversion of mechanisms to a parameterization. Of several equivalent values it returns those nearest to the
     /// rig's, weighted by the estimate's prior standard deviations if these are in that parameterization. Returns
-    /// `None` when the rig does not have the camera.
+    /// `None` if the rig does not have the camera.
     pub fn conversion_for(
         &self,
         given: &Rig,

@@ -14,17 +14,16 @@ use crate::geometry::RigidTransform;
 use crate::session::accuracy::{Alignment, AlignmentSums};
 use crate::session::plan::{ForkChanges, RunSpec};
 
-/// Maximum number of recomputed steps that a run keeps beside their summaries.
+/// Maximum number of recomputed complete steps of a run.
 const MAX_RECOMPUTED: usize = 96;
 
-/// Id of the next run or trajectory.
 pub(super) static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 
 /// Memory of a run in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunMemory {
     /// Steps without their tracks.
-    pub own: usize,
+    pub steps: usize,
     /// Tracks, which runs on the same camera share.
     pub tracks: usize,
     /// Step inputs and estimator snapshots for recomputation.
@@ -33,16 +32,15 @@ pub struct RunMemory {
     pub summaries: usize,
 }
 
-/// The origin of a fork.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForkOrigin {
     /// [`RunRecord::id`] of the parent.
     pub parent: u64,
-    /// Index of the fork's first own step.
+    /// Index of the first step of the fork that is not the parent's.
     pub step: usize,
     /// Stamp of that step, in nanoseconds since the log began.
     pub stamp_ns: i64,
-    /// The changes against the parent.
+    /// Changes against the parent.
     pub changes: ForkChanges,
 }
 
@@ -55,34 +53,34 @@ pub struct RunRecord {
     pub camera_key: String,
     /// Steps in time order; some may be summaries.
     pub steps: Vec<Arc<StepRecord>>,
-    /// Whether it has reached the end of the log, or has failed.
+    /// True if the run has reached the end of the log or has failed.
     pub finished: bool,
-    /// The pass before the last one that runs or ran last, for runs with several.
+    /// The current or latest pass before the last one, for runs with several passes.
     pub earlier_pass: Option<PassProgress>,
-    /// The reason of an early end.
+    /// Reason of an early end.
     pub error: Option<String>,
     /// `true_from_estimate`: the yaw rotation and translation that align the estimated trajectory with the ground
     /// truth, `None` with too few frames.
     pub alignment: Option<RigidTransform>,
     /// Running sums over the frames with ground truth, from which `alignment` is computed.
     pub alignment_sums: AlignmentSums,
-    /// Positions of an antenna that are the ground truth instead of poses.
+    /// Antenna positions that are the ground truth instead of poses.
     pub position_truth: Option<Arc<PositionTruth>>,
-    /// The run at the stamps of these positions.
+    /// Pairs of run poses and these positions, with their alignment.
     pub(super) antenna: AntennaRecord,
     /// Warnings of its steps, each message once.
     pub warnings: Vec<RunWarning>,
-    /// Memory of its steps and its history.
+    /// Memory of the steps and the history.
     pub memory: RunMemory,
     /// Complete steps by index, recomputed where `steps` has only the summary.
     pub recomputed: BTreeMap<usize, Arc<StepRecord>>,
-    /// The solver states of the step at the cursor, while they are shown.
+    /// Solver states of the step at the cursor, while they are shown.
     pub trace: Option<SolverTrace>,
     /// The factor rows of the last request, of any step.
     pub factor_rows: Option<StepFactorRows>,
     /// Unique among all runs of the process.
     pub id: u64,
-    /// The origin, for a fork.
+    /// `None` unless the run is a fork.
     pub origin: Option<ForkOrigin>,
     summary_order: SummaryOrder,
 }
@@ -112,14 +110,14 @@ impl RunRecord {
         }
     }
 
-    /// The run with positions of an antenna as its ground truth; it must have no step yet.
+    /// Sets antenna positions as the ground truth; the run must not have steps yet.
     #[must_use]
     pub fn with_position_truth(mut self, truth: Option<Arc<PositionTruth>>) -> Self {
         self.position_truth = truth;
         self
     }
 
-    /// A fork before its first own step; the steps before are the parent's.
+    /// A fork before its first step; the steps before it are the parent's.
     pub(in crate::session) fn fork(parent: &Self, spec: RunSpec, step: usize, changes: ForkChanges) -> Self {
         let stamp_ns = parent.steps.get(step).map_or(0, |step| step.report.stamp_ns);
         let mut fork = Self::new(spec, parent.camera_key.clone()).with_position_truth(parent.position_truth.clone());
@@ -142,7 +140,7 @@ impl RunRecord {
             self.antenna.push(truth, newest.stamp_ns, newest.world_from_imu);
             self.alignment = self.antenna.alignment.map(|alignment| alignment.true_from_estimate);
         }
-        self.memory.own += record.own_bytes();
+        self.memory.steps += record.own_bytes();
         self.memory.tracks += record.tracks_bytes();
         add_warnings(&mut self.warnings, &record.report);
         self.steps.push(Arc::new(record));
@@ -156,14 +154,14 @@ impl RunRecord {
         }
         let steps = self.steps.split_off(count);
         let back = |bytes: fn(&StepRecord) -> usize| steps.iter().map(|step| bytes(step)).sum::<usize>();
-        self.memory.own -= back(StepRecord::own_bytes);
+        self.memory.steps -= back(StepRecord::own_bytes);
         self.memory.tracks -= back(StepRecord::tracks_bytes);
         self.finished = true;
         self.warnings = warnings_of(&self.steps);
         self.align();
     }
 
-    /// Whether its last step is at a stamp or after it.
+    /// True if the last step is at a stamp or after it.
     pub(in crate::session) fn ends_at(&self, stamp_ns: i64) -> bool {
         self.steps.last().is_some_and(|step| step.report.stamp_ns >= stamp_ns)
     }
@@ -203,7 +201,7 @@ impl RunRecord {
         traced.or_else(|| self.recomputed.get(&number)).or_else(|| self.steps.get(number))
     }
 
-    /// Whether only the summary of a step is stored.
+    /// True if only the summary of a step is stored.
     pub(in crate::session) fn has_only_summary(&self, number: usize) -> bool {
         self.steps.get(number).is_some_and(|step| step.summary_only) && !self.recomputed.contains_key(&number)
     }
@@ -221,14 +219,14 @@ impl RunRecord {
         }
     }
 
-    /// Bytes of its steps and its history, without tracks that runs share.
+    /// Bytes of the steps and the history, without tracks, which runs share.
     pub fn own_bytes(&self) -> usize {
         let recomputed = self.recomputed.values().chain(self.trace.iter().flat_map(|trace| &trace.records));
-        self.memory.own + recomputed.map(|step| step.own_bytes()).sum::<usize>() + self.memory.history
+        self.memory.steps + recomputed.map(|step| step.own_bytes()).sum::<usize>() + self.memory.history
     }
 
-    /// Replaces one more of its own steps (from `begin` on) by its summary; `spacing` is the number of steps between
-    /// two estimator snapshots. Returns whether a step was left.
+    /// Replaces one more of the run's steps (from `begin` on) by its summary; `spacing` is the number of steps between
+    /// two estimator snapshots. Returns true if there was a step left to summarize.
     pub(in crate::session) fn summarize_one(&mut self, begin: usize, spacing: usize) -> bool {
         while let Some(number) = self.summary_order.next(begin, self.steps.len(), spacing) {
             let step = &self.steps[number];
@@ -236,7 +234,7 @@ impl RunRecord {
                 continue;
             }
             let summary = step.summary(number);
-            self.memory.own -= step.own_bytes() - summary.own_bytes();
+            self.memory.steps -= step.own_bytes() - summary.own_bytes();
             self.memory.summaries += 1;
             self.steps[number] = Arc::new(summary);
             return true;

@@ -11,7 +11,7 @@ use crate::session::antenna::{AntennaAlignment, AntennaPair, align_antenna, ante
 
 const NO_GROUND_TRUTH: &str = "no ground truth for the estimated frames in the log";
 
-/// Largest age of a position of the antenna beside a pose, in nanoseconds.
+/// Largest difference of stamps between a step and the last antenna position before it, in nanoseconds.
 pub(super) const MAX_POSITION_AGE_NS: i64 = 500_000_000;
 
 /// Path lengths of the relative errors, in metres.
@@ -24,9 +24,9 @@ pub struct TrajectoryAccuracy {
     pub length_m: f64,
     /// Absolute position errors in metres.
     pub absolute_m: ErrorStatistics,
-    /// Relative errors by path length, for lengths that the trajectory has; none against positions of an antenna.
+    /// Relative errors by path length, for the lengths that the trajectory reaches; empty against antenna positions.
     pub relative: Vec<RelativeAccuracy>,
-    /// The lever arm of the antenna whose positions the ground truth is, `None` of poses of the IMU.
+    /// Lever arm of the antenna whose positions are the ground truth, `None` for poses of the IMU.
     pub antenna: Option<AntennaAlignment>,
 }
 
@@ -70,7 +70,7 @@ impl TrajectoryAccuracy {
         })
     }
 
-    /// Errors of the position of an antenna, `None` without a pair.
+    /// Errors of the antenna position, `None` if there are no pairs.
     pub fn of_antenna(pairs: &[AntennaPair], alignment: &AntennaAlignment) -> Option<Self> {
         let (absolute_m, length_m) = antenna_statistics(pairs, alignment)?;
         Some(Self { length_m, absolute_m, relative: Vec::new(), antenna: Some(*alignment) })
@@ -78,11 +78,10 @@ impl TrajectoryAccuracy {
 }
 
 impl RunRecord {
-    /// Errors of the trajectory: of the poses of the IMU, or of the positions of the antenna where these are the ground
-    /// truth.
+    /// Errors of the trajectory: of the poses of the IMU, or of the antenna positions if these are the ground truth.
     ///
     /// # Errors
-    /// The reason in words, when there is no ground truth or it does not determine the alignment.
+    /// A message if there is no ground truth or it does not determine the alignment.
     pub fn accuracy(&self) -> Result<TrajectoryAccuracy, String> {
         let Some(truth) = &self.position_truth else {
             let pairs = self.pairs_with_ground_truth();
@@ -94,8 +93,8 @@ impl RunRecord {
         TrajectoryAccuracy::of_antenna(pairs, &alignment).ok_or_else(|| NO_GROUND_TRUTH.to_owned())
     }
 
-    /// Distances in metres between the aligned run and the ground truth at the estimated frames, or at the positions of the
-    /// antenna where these are the ground truth; none before the alignment.
+    /// Distances in metres between the aligned run and the ground truth at the estimated frames, or at the antenna
+    /// positions if these are the ground truth; empty before the alignment.
     pub fn position_errors_m(&self) -> Vec<f64> {
         if self.position_truth.is_some() {
             let errors_m = |alignment| antenna_errors_m(&self.antenna.pairs, alignment);
@@ -104,8 +103,8 @@ impl RunRecord {
         self.steps.iter().filter_map(|step| self.pose_error_m(step)).collect()
     }
 
-    /// The same distance at one step: at its frame, or at the last position of the antenna at or before it that is at most
-    /// 0.5 s old.
+    /// The same distance at one step: at its frame, or at the last antenna position at or before it that is at most 0.5
+    /// s old.
     pub fn position_error_m(&self, step: &StepRecord) -> Option<f64> {
         if self.position_truth.is_none() {
             return self.pose_error_m(step);
@@ -122,7 +121,7 @@ impl RunRecord {
         Some((estimate - step.ground_truth?.translation_m).norm())
     }
 
-    /// Length of the path in metres over the frames with ground truth, of the ground truth; `None` without ground truth.
+    /// Length of the ground-truth path in metres over the frames with ground truth; `None` without ground truth.
     pub fn true_length_m(&self) -> Option<f64> {
         if self.position_truth.is_some() && !self.antenna.pairs.is_empty() {
             return Some(path_length_m(self.antenna.pairs.iter().map(|pair| &pair.antenna_m)));

@@ -14,7 +14,7 @@ pub enum SolverPosition {
 }
 
 impl SolverPosition {
-    /// The number of completed iterations, in a step of `iterations`.
+    /// Number of completed iterations, in a step with `iterations` iterations.
     pub fn of(self, iterations: usize) -> usize {
         match self {
             Self::AfterFirst(count) => count.min(iterations),
@@ -22,7 +22,7 @@ impl SolverPosition {
         }
     }
 
-    /// One iteration further (or back), `None` beyond the first or last of `iterations`.
+    /// One iteration forward or back, `None` beyond the first or last of `iterations`.
     pub fn moved(self, forward: bool, iterations: usize) -> Option<Self> {
         let at = self.of(iterations);
         let next = if forward { at.checked_add(1) } else { at.checked_sub(1) };
@@ -30,24 +30,20 @@ impl SolverPosition {
     }
 }
 
-/// The states of the solver in one step of a run, as records.
 #[derive(Clone, Debug)]
 pub struct SolverTrace {
-    /// Index of the step.
     pub step: usize,
-    /// Before the first iteration and after each iteration.
+    /// States before the first iteration and after each iteration.
     pub records: Vec<Arc<StepRecord>>,
     /// Index of the shown state.
     pub at: usize,
 }
 
 impl SolverTrace {
-    /// The shown state.
     pub fn shown(&self) -> Option<&Arc<StepRecord>> {
         self.records.get(self.at)
     }
 
-    /// Number of iterations of the step.
     pub fn iterations(&self) -> usize {
         self.records.len().saturating_sub(1)
     }

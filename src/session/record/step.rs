@@ -18,13 +18,14 @@ pub struct StepRecord {
     pub ground_truth: Option<RigidTransform>,
     /// Log time of the image in nanoseconds since the log began; the report has its header stamp.
     pub log_time_ns: i64,
-    /// Whether features, older frames of the window and most landmarks were evicted to save memory; see
+    /// True if features, older frames of the window and most landmarks were evicted to save memory; see
     /// [`RunRecord::step_at`](super::RunRecord::step_at).
     pub summary_only: bool,
 }
 
 impl StepRecord {
-    /// The calibration's columns and the image's information gain in them; `None` before the estimator tracks.
+    /// Rank report of the calibration and the image's information gain in its columns; `None` before the estimator
+    /// tracks.
     pub fn gain(&self) -> Option<(&RankReport, &InformationGain)> {
         Some((self.rank.as_ref()?, self.report.gain.as_ref()?))
     }
@@ -32,7 +33,7 @@ impl StepRecord {
     /// Memory in bytes without the tracks, which runs on the same camera share.
     pub fn own_bytes(&self) -> usize {
         let reference_counts = 2 * size_of::<usize>();
-        // The record contains the report itself.
+        // The size of the record already includes the report itself.
         let fields = size_of::<Self>() - size_of::<StepReport>();
         allocated_bytes(reference_counts + fields)
             + self.report.bytes().total()
@@ -48,13 +49,12 @@ impl StepRecord {
 /// The linearized rows of one step's factors other than reprojection, which records do not keep.
 #[derive(Clone, Debug)]
 pub struct StepFactorRows {
-    /// Index of the step.
     pub step: usize,
     /// Rows by factor, `None` where the step has no window.
     pub rows: Option<Vec<FactorRows>>,
 }
 
-/// Memory of one camera's tracks behind an [`Arc`], in bytes.
+/// Heap memory of one camera's tracks behind an [`Arc`], in bytes.
 pub(in crate::session) fn tracks_bytes(tracks: &TrackedFrame) -> usize {
     allocated_bytes(size_of::<TrackedFrame>() + 2 * size_of::<usize>())
         + allocated_bytes(tracks.features.capacity() * size_of::<TrackedFeature>())

@@ -1,20 +1,21 @@
-//! The summary of a step, kept instead of the complete step when memory is short, and the order in which steps are
+//! Summaries of steps, kept instead of complete steps when memory is short, and the order in which steps are
 //! summarized.
 
 use super::step::StepRecord;
 use crate::estimator::StepReport;
 
-/// One summary in this many keeps its landmarks: the 3D scene draws landmarks of earlier steps.
+/// Every n-th summary keeps its landmarks: the 3D scene draws landmarks of earlier steps.
 const LANDMARKS_EVERY: usize = 4;
-/// This many of the newest steps are not summarized, because they are shown most often.
+/// Number of newest steps that are never summarized, because they are shown most often.
 const NEWEST_KEPT: usize = 64;
 
 impl StepRecord {
     /// The step without features, older frames of the window, and (except in every fourth step) landmarks, which only
-    /// drawings of this step need. A kept linearization keeps the window, to whose frames its columns belong, and so does the
-    /// first step after an initialization, whose oldest frame all poses and their covariances are relative to.
+    /// drawings of this step need. If the step keeps its linearization, the window is kept, because the columns refer
+    /// to its frames; so is the window of the first step after an initialization, because all poses and their
+    /// covariances are relative to its oldest frame.
     ///
-    /// All values that are plotted over time or written to tables stay: events, χ², iterations, calibration, ranks.
+    /// All values that are plotted over time or written to tables are kept: events, χ², iterations, calibration, ranks.
     pub(in crate::session) fn summary(&self, number: usize) -> Self {
         let report = &self.report;
         let keeps_landmarks = number.is_multiple_of(LANDMARKS_EVERY);
@@ -42,7 +43,7 @@ impl StepRecord {
                 reprojection_median_after_px: report.reprojection_median_after_px,
                 iterations: report.iterations.clone(),
                 linearization: report.linearization.clone(),
-                // Useless without the features.
+                // Not usable without the features.
                 jacobian_source: None,
                 factor_rows: None,
                 gain: report.gain.clone(),
@@ -59,7 +60,7 @@ impl StepRecord {
     }
 }
 
-/// The order in which a run's steps are summarized: over the whole run, those right behind a snapshot first, because
+/// Order in which a run's steps are summarized, over the whole run: steps directly after a snapshot first, because
 /// their recomputation is cheapest.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SummaryOrder {
@@ -70,7 +71,7 @@ pub(super) struct SummaryOrder {
 }
 
 impl SummaryOrder {
-    /// The next step to be summarized, `None` when only the newest ones are left.
+    /// The next step to be summarized, `None` if only the newest ones are left.
     pub(super) fn next(&mut self, begin: usize, steps: usize, spacing: usize) -> Option<usize> {
         if self.spacing != spacing {
             self.spacing = spacing;
@@ -98,7 +99,7 @@ mod tests {
         };
         assert_eq!(numbers(40 + NEWEST_KEPT, 16, 5), [0, 16, 32, 1, 17]);
         assert_eq!(numbers(50 + NEWEST_KEPT, 16, 2), [48, 33]);
-        // With fewer snapshots the order restarts, and returns steps that are summarized already.
+        // With fewer snapshots the order restarts, and returns steps that are already summarized.
         assert_eq!(numbers(50 + NEWEST_KEPT, 32, 3), [0, 32, 1]);
         assert_eq!(numbers(50 + NEWEST_KEPT, 32, 1000).len(), 50 - 3);
         assert!(numbers(NEWEST_KEPT, 32, 1).is_empty());

@@ -1,4 +1,4 @@
-//! A trajectory of another program beside the runs: its poses, aligned with the ground truth and evaluated like a run.
+//! A trajectory of another program: its poses, aligned with the ground truth and evaluated like a run.
 
 use std::sync::atomic::Ordering;
 
@@ -14,7 +14,7 @@ use crate::session::accuracy::{Alignment, StampedPose, align, path_length_m};
 /// A trajectory evaluated against ground truth.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrajectoryEvaluation {
-    /// Estimated and ground-truth poses with one stamp, in seconds since the log began.
+    /// Estimated and ground-truth poses with equal stamps, in seconds since the log began.
     pub pairs: Vec<(StampedPose, StampedPose)>,
     /// `true_from_estimate`, a rotation about the vertical and a translation; `None` with too few pairs.
     pub alignment: Option<RigidTransform>,
@@ -43,33 +43,33 @@ pub fn evaluate_trajectory(estimate: &[PoseSample], ground_truth: &PoseTrack) ->
     TrajectoryEvaluation { alignment, accuracy: TrajectoryAccuracy::of(&pairs), pairs }
 }
 
-/// A trajectory beside the runs. It has poses only: no calibration, no features, no residuals.
+/// A trajectory of another program. It has only poses: no calibration, no features, no residuals.
 #[derive(Clone, Debug)]
 pub struct TrajectoryLane {
-    /// Its name.
     pub label: String,
-    /// The file or the topic that it was read from.
+    /// The file or topic from which it was read.
     pub source: String,
     /// Poses `world_from_imu` in the trajectory's own world, in time order.
     pub track: PoseTrack,
-    /// Its errors against the ground truth.
+    /// Errors against the ground truth.
     pub evaluation: TrajectoryEvaluation,
-    /// Why it has no accuracy.
+    /// Reason why there is no accuracy.
     pub accuracy_missing: Option<String>,
-    /// Path length in metres: of the ground truth at its stamps where there is one, else its own.
+    /// Path length in metres: of the ground truth at the trajectory's stamps if there is ground truth, else of the
+    /// trajectory.
     pub length_m: f64,
     /// Unique among runs and trajectories of the process.
     pub id: u64,
 }
 
 impl TrajectoryLane {
-    /// A lane of poses within the time of the session, evaluated against the ground truth of the log, if there is one.
+    /// A lane of poses within the time of the session, evaluated against the ground truth of the log if there is one.
     pub fn new(label: String, source: String, track: PoseTrack, ground_truth: Option<&PoseTrack>) -> Self {
         let evaluation = ground_truth.map(|actual| evaluate_trajectory(track.samples(), actual)).unwrap_or_default();
         Self::evaluated(label, source, track, evaluation, ground_truth.is_some())
     }
 
-    /// The same against positions of an antenna.
+    /// A lane evaluated against antenna positions.
     pub fn against_positions(label: String, source: String, track: PoseTrack, truth: &PositionTruth) -> Self {
         match truth.evaluate(&track) {
             Ok(evaluation) => Self::evaluated(label, source, track, evaluation, true),
@@ -102,8 +102,8 @@ impl TrajectoryLane {
         Self { label, source, track, evaluation, accuracy_missing, length_m, id }
     }
 
-    /// What maps its world to that of the scene: the alignment with the ground truth; without one, what puts it onto a run
-    /// at the first frame that both have.
+    /// Transform from the trajectory's world to that of the scene: the alignment with the ground truth; without one,
+    /// the alignment with a run at the first common frame.
     pub fn world_from_own(&self, run: Option<&RunRecord>) -> RigidTransform {
         let onto_run = || {
             let run = run.filter(|run| run.alignment.is_none())?;
@@ -115,19 +115,18 @@ impl TrajectoryLane {
         self.evaluation.alignment.or_else(onto_run).unwrap_or_default()
     }
 
-    /// Distance between the aligned pose and the ground truth in metres, at its last pose with ground truth at or before a
-    /// stamp; `None` without one within 0.5 s.
+    /// Distance between the aligned pose and the ground truth in metres, at the last pose with ground truth at or
+    /// before a stamp; `None` without one within 0.5 s.
     pub fn error_m(&self, stamp_ns: i64) -> Option<f64> {
         let now_s = seconds_from_ns(stamp_ns);
-        // Stamps in seconds are rounded the same way as those of the pairs.
+        // Stamps in seconds are rounded in the same way as those of the pairs.
         let index = self.evaluation.pairs.partition_point(|(estimate, _)| estimate.stamp_s <= now_s).checked_sub(1)?;
         let recent = now_s - self.evaluation.pairs[index].0.stamp_s <= seconds_from_ns(MAX_POSITION_AGE_NS);
         self.evaluation.error_m(index).filter(|_| recent)
     }
 }
 
-/// The rotation about the vertical and the translation that align pose `from` with pose `onto`; the identity for equal
-/// poses.
+/// Rotation about the vertical and translation that align pose `from` with pose `onto`; the identity for equal poses.
 pub(super) fn yaw_and_position(onto: &RigidTransform, from: &RigidTransform) -> RigidTransform {
     if onto == from {
         return RigidTransform::default();

@@ -1,4 +1,4 @@
-//! Covariances of poses: against the window's own rows, and against the errors of many flights.
+//! Covariances of poses: against the window's rows, and against the errors of many flights.
 
 use super::memory::{recorded, recorded_with};
 use crate::estimator::{ColumnGroup, Linearization};

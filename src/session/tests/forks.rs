@@ -236,7 +236,7 @@ fn encoder_readings_can_be_disabled() {
     for (number, step) in fork.iter().enumerate() {
         let read = |index: usize| step.report.window[index].encoder_angles_rad.is_some();
         let own = |index: usize| step.report.window[index].frame_index >= parent.steps[FORK_AT].report.frame_index;
-        // Frames from before keep their measurements, later frames have none.
+        // Earlier frames keep their measurements; later frames have none.
         assert!((0..step.report.window.len()).all(|index| read(index) != own(index)), "step {number}");
         assert_eq!(step.report.calibration.parameters, parent.steps[FORK_AT].report.calibration.parameters);
     }

@@ -26,7 +26,7 @@ pub(crate) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
     recorded_with(flight, spec, None)
 }
 
-/// A recorded run of which one report in this many frames keeps its linearization.
+/// A recorded run in which every n-th report keeps its linearization.
 pub(super) fn recorded_with(
     flight: &SyntheticFlight,
     spec: &str,
@@ -56,9 +56,9 @@ fn a_recorded_frame_stays_small() {
     assert!(observations / steps.len() > 500, "a full window: {} observations", observations / steps.len());
     let bytes = steps.iter().map(|step| step.own_bytes() + step.tracks_bytes()).sum::<usize>() / steps.len();
     assert!(bytes < 90_000, "{bytes} bytes a frame: {:?}", steps[0].report.bytes());
-    // The running sum is the same.
+    // The running sum has the same value.
     let summed: usize = run.steps.iter().map(|step| step.own_bytes() + step.tracks_bytes()).sum();
-    assert_eq!(run.memory.own + run.memory.tracks, summed);
+    assert_eq!(run.memory.steps + run.memory.tracks, summed);
 }
 
 /// A covariance refers to the frames of the window, so the summary must keep both.
@@ -75,14 +75,14 @@ fn a_summary_with_a_linearization_keeps_the_frames_of_its_columns() {
         let poses = columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose).count();
         assert!(poses > 1 && poses == summary.report.window.len(), "{poses} poses");
     }
-    // The window of the initialization stays too: all poses are relative to its oldest frame.
+    // The window of the initialization is kept too: all poses are relative to its oldest frame.
     let initialized =
         plain.iter().position(|summary| summary.report.events.iter().any(|event| event.kind.initializes_window()));
     let whole: Vec<usize> = (0..plain.len()).filter(|place| plain[*place].report.window.len() > 1).collect();
     assert_eq!(whole, Vec::from_iter(initialized));
 }
 
-/// A budget for a few snapshots is used up, and every step is recomputed to the same bits from those that are left.
+/// A budget for a few snapshots is used up, and every step is recomputed to the same bits from the remaining snapshots.
 #[test]
 fn snapshots_fill_their_budget_and_give_back_every_step() {
     const BUDGET_BYTES: usize = 800_000;

@@ -1,4 +1,4 @@
-//! Runs of several passes: the next one starts from what the one before found, and its σ stay those of one flight.
+//! Runs of several passes: each pass starts from the findings of the previous one, and its σ stay those of one flight.
 
 use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
@@ -9,11 +9,11 @@ use crate::session::engine::{EarlierPasses, EngineMessage, OwnedStepInput, RunEn
 use crate::session::record::{PoseError, RunRecord};
 use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
 
-/// Degrees and metres by which the chain of a mechanism that was measured with a ruler is wrong.
+/// Error bounds of the chain of a mechanism measured with a ruler: 3 cm and 0.17 rad (10°).
 const RULER: crate::sensors::ChainPrior =
     crate::sensors::ChainPrior { translation_bound_m: 0.03, rotation_bound_rad: 0.17 };
 
-/// The last of several passes, and the progress that the others reported.
+/// The last of several passes, and the reported progress of the others.
 fn recorded_in_passes(flight: &SyntheticFlight, text: &str) -> (RunRecord, Vec<EngineMessage>) {
     let spec: crate::session::RunSpec = text.parse().unwrap();
     let mut config = estimator_config(&flight.given_rig, &spec).unwrap();
@@ -74,8 +74,8 @@ fn sigmas_of_the_last_pass_are_near_those_of_one_pass_and_priors_are_the_rigs() 
         let (run, _) = recorded_in_passes(&flight, spec);
         run.steps.last().unwrap().report.calibration.clone()
     };
-    // The sensor columns are carried over with the chain's. Not `poe`: the σ of its inner columns depend on the values at which
-    // a pass is linearized (0.75, 0.38 and 0.53 of the prior in three passes over 7 s).
+    // The sensor columns are carried over together with the chain's. `poe` is left out: the σ of its inner columns
+    // depend on the values at which a pass is linearized (0.75, 0.38 and 0.53 of the prior in three passes over 7 s).
     for columns in ["auto:timeshift=on", "classical"] {
         let separator = if columns.contains(':') { ',' } else { ':' };
         let [one, two, three] = [1, 2, 3].map(|passes| last(&format!("{columns}{separator}passes={passes}")));
@@ -104,7 +104,7 @@ fn a_pass_reports_its_progress_and_one_that_never_initializes_changes_nothing() 
     assert!(reached.len() == 6 && reached.is_sorted(), "{reached:?}");
     assert!(run.steps.iter().any(|step| step.report.phase == Phase::Tracking));
 
-    // Too short for a window.
+    // Too short to initialize a window.
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 0.5, ..SyntheticOptions::default() });
     let [one, two] = ["auto", "auto:passes=2"].map(|spec| recorded_in_passes(&flight, spec).0);
     let steps = one.steps.iter().zip(&two.steps);

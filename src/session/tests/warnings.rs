@@ -5,7 +5,7 @@ use crate::session::record::{RunRecord, warnings_of};
 use crate::session::tests::memory::recorded;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
-/// A time offset of 15 ms of a camera is reported from some step on, and only by records that contain that step.
+/// A camera time offset of 15 ms is reported from some step on, and only by records that contain that step.
 #[test]
 fn a_warning_is_kept_once_with_its_first_time_and_its_count() {
     let flight = synthetic_tracks(&SyntheticOptions { clock_offsets_s: [0.015, 0.0], ..SyntheticOptions::default() });

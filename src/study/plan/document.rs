@@ -1,4 +1,4 @@
-//! A plan's TOML text as tables whose errors name line, key and what is allowed.
+//! A plan's TOML text as tables whose errors state the line, the key and the allowed values.
 
 use std::ops::{Range, RangeInclusive};
 
@@ -6,33 +6,32 @@ use thiserror::Error;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// The reason why a plan cannot be used.
+/// Reason why a plan cannot be used.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("line {line}: {problem}")]
 pub struct PlanError {
     /// Line of the text, from 1.
     pub line: usize,
-    /// The key with its value, and what is allowed.
+    /// The key with its value, and the allowed values.
     pub problem: String,
 }
 
-/// Line of a byte, from 1.
+/// Line number of a byte, from 1.
 fn line_of(text: &str, byte: usize) -> usize {
     1 + text.as_bytes().iter().take(byte).filter(|byte| **byte == b'\n').count()
 }
 
-/// Parses the text of a plan.
 pub(super) fn parse(text: &str) -> Result<Spanned<DeTable<'_>>, PlanError> {
     DeTable::parse(text).map_err(|error| PlanError {
         line: error.span().map_or(1, |span| line_of(text, span.start)),
-        problem: format!("no TOML: {}", error.message().replace('\n', "; ")),
+        problem: format!("invalid TOML: {}", error.message().replace('\n', "; ")),
     })
 }
 
-/// A table with the place where it stands, as in `flights[2]`.
+/// A table with its path, as in `flights[2]`.
 pub(super) struct Section<'a> {
     text: &'a str,
-    /// Path of its keys, empty for the whole plan.
+    /// Path of its keys, empty for the root table.
     path: String,
     span: Range<usize>,
     table: &'a DeTable<'a>,
@@ -46,12 +45,12 @@ struct Entry<'a> {
 }
 
 impl<'a> Section<'a> {
-    /// The whole plan.
+    /// Root table of the plan.
     pub(super) fn root(text: &'a str, table: &'a Spanned<DeTable<'a>>) -> Self {
         Self { text, path: String::new(), span: table.span(), table: table.get_ref() }
     }
 
-    /// Refuses keys that are not among these.
+    /// Returns an error if there are keys other than these.
     pub(super) fn allow(&self, keys: &[&str]) -> Result<(), PlanError> {
         let unknown = self.table.keys().find(|key| !keys.contains(&key.get_ref().as_ref()));
         unknown.map_or(Ok(()), |key| {
@@ -61,18 +60,16 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// The path of a key of this table.
+    /// Full path of a key of this table.
     fn key(&self, name: &str) -> String {
         if self.path.is_empty() { name.to_owned() } else { format!("{}.{name}", self.path) }
     }
 
-    /// An error about the whole table.
     pub(super) fn error(&self, problem: &str) -> PlanError {
         let place = if self.path.is_empty() { "the plan".to_owned() } else { format!("'{}'", self.path) };
         PlanError { line: line_of(self.text, self.span.start), problem: format!("{place} {problem}") }
     }
 
-    /// An error about the value of a key.
     pub(super) fn error_at(&self, name: &str, problem: &str) -> PlanError {
         match self.entry(name) {
             Some(entry) => self.refuse(&entry, problem),
@@ -85,7 +82,7 @@ impl<'a> Section<'a> {
         PlanError { line, problem: format!("'{}' {problem}", entry.key) }
     }
 
-    /// The error of a value of the wrong type or range.
+    /// Error for a value of the wrong type or range.
     fn expected(&self, entry: &Entry<'_>, expected: &str) -> PlanError {
         let found = match entry.value.get_ref() {
             DeValue::String(text) => format!("the text '{text}'"),
@@ -104,17 +101,15 @@ impl<'a> Section<'a> {
         Some(Entry { key: self.key(name), value })
     }
 
-    /// The keys of this table.
     pub(super) fn keys(&self) -> impl Iterator<Item = &'a str> {
         self.table.keys().map(|key| key.get_ref().as_ref())
     }
 
-    /// Whether there is such a key.
     pub(super) fn has(&self, name: &str) -> bool {
         self.entry(name).is_some()
     }
 
-    /// A text.
+    /// The text of a key, `None` if the key is missing.
     pub(super) fn text(&self, name: &str) -> Result<Option<String>, PlanError> {
         self.entry(name).map(|entry| self.text_of(&entry)).transpose()
     }
@@ -126,12 +121,12 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// A text that must be there.
+    /// The text of a mandatory key.
     pub(super) fn required_text(&self, name: &str) -> Result<String, PlanError> {
         self.text(name)?.ok_or_else(|| self.error(&format!("lacks the key '{name}'")))
     }
 
-    /// A number within a range; integers are numbers as well.
+    /// A number within a range; integers are accepted as well.
     pub(super) fn number(&self, name: &str, range: RangeInclusive<f64>) -> Result<Option<f64>, PlanError> {
         self.entry(name).map(|entry| self.number_of(&entry, &range)).transpose()
     }
@@ -147,7 +142,7 @@ impl<'a> Section<'a> {
             .ok_or_else(|| self.expected(entry, &format!("a number from {} to {}", range.start(), range.end())))
     }
 
-    /// A number, or a text that `read` understands.
+    /// A number, or a text that `read` parses.
     pub(super) fn number_or<T>(
         &self,
         name: &str,
@@ -165,7 +160,6 @@ impl<'a> Section<'a> {
         found.map(Some).ok_or_else(|| self.expected(&entry, expected))
     }
 
-    /// True or false.
     pub(super) fn boolean(&self, name: &str) -> Result<Option<bool>, PlanError> {
         let Some(entry) = self.entry(name) else { return Ok(None) };
         match entry.value.get_ref() {
@@ -189,7 +183,7 @@ impl<'a> Section<'a> {
             .ok_or_else(|| self.expected(entry, &format!("an integer from {} to {}", range.start(), range.end())))
     }
 
-    /// The entries of a list, each named by its number from 1.
+    /// The entries of a list, each with its number (from 1) in its path.
     fn list(&self, name: &str, expected: &str) -> Result<Vec<Entry<'a>>, PlanError> {
         let Some(entry) = self.entry(name) else { return Ok(Vec::new()) };
         let DeValue::Array(values) = entry.value.get_ref() else { return Err(self.expected(&entry, expected)) };
@@ -197,7 +191,7 @@ impl<'a> Section<'a> {
         Ok(numbered.map(|(value, number)| Entry { key: format!("{}[{number}]", entry.key), value }).collect())
     }
 
-    /// A list of texts, each read by `read`, whose error says what is wrong with the text.
+    /// A list of texts, each parsed by `read`, whose error describes the problem.
     pub(super) fn texts<T>(&self, name: &str, read: impl Fn(&str) -> Result<T, String>) -> Result<Vec<T>, PlanError> {
         let entries = self.list(name, "a list of texts, as in [\"a\", \"b\"]")?;
         let read_one = |entry: &Entry<'_>| {
@@ -213,14 +207,12 @@ impl<'a> Section<'a> {
         entries.iter().map(|entry| self.integer_of(entry, &range)).collect()
     }
 
-    /// A list of tables.
     pub(super) fn sections(&self, name: &str) -> Result<Vec<Self>, PlanError> {
         let expected = format!("tables, each under [[{}]]", self.key(name));
         let entries = self.list(name, &expected)?;
         entries.iter().map(|entry| self.section_of(entry, &expected)).collect()
     }
 
-    /// A table.
     pub(super) fn section(&self, name: &str) -> Result<Option<Self>, PlanError> {
         let expected = format!("a table under [{}]", self.key(name));
         self.entry(name).map(|entry| self.section_of(&entry, &expected)).transpose()

@@ -1,4 +1,4 @@
-//! The plan of a study: which runs there are, read from TOML.
+//! The plan of a study, parsed from TOML: it defines the runs.
 
 mod document;
 mod read;
@@ -21,9 +21,9 @@ use crate::session::{RunSpec, TrajectorySpec};
 pub struct LogSource {
     /// Path or pattern with `*`, `?` and `**`, relative to the folder of the plan.
     pub pattern: String,
-    /// Name in the tables, for a pattern that matches one file; otherwise the names of the files are used.
+    /// Name in the tables, for a pattern that matches one file; `None` uses the names of the files.
     pub name: Option<String>,
-    /// Path of the rig, relative to the folder of the plan, when it is not beside the logs or in them.
+    /// Path of the rig, relative to the folder of the plan; `None` if it is next to the logs or inside them.
     pub rig: Option<String>,
     /// Path of the ground-truth rig, likewise.
     pub truth: Option<String>,
@@ -31,24 +31,24 @@ pub struct LogSource {
     pub start_s: f64,
     /// Seconds to process from there, `None` for the rest.
     pub duration_s: Option<f64>,
-    /// Trajectories of other programs on these logs; in paths, which are relative to the folder of the plan, [`LOG_PLACE`]
-    /// stands for the name of a log's file without its extension.
+    /// Trajectories of other programs on these logs. Paths are relative to the folder of the plan, and [`LOG_PLACE`] in
+    /// them stands for the name of a log's file without its extension.
     pub trajectories: Vec<TrajectorySpec>,
 }
 
-/// Stands for the name of a log's file without its extension in the path of a trajectory.
+/// Placeholder for the name of a log's file without its extension in the path of a trajectory.
 pub const LOG_PLACE: &str = "{log}";
 
-/// A named set of disturbances, one level of that factor; only simulated flights have them.
+/// A named set of disturbances, one level of the factor "disturbance"; only simulated flights have disturbances.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DisturbanceSet {
     /// Name in the tables.
     pub name: String,
-    /// Disturbances as `dcvins simulate --disturb` takes them, in addition to the flight's own.
+    /// Disturbances in the syntax of `dcvins simulate --disturb`, in addition to the flight's.
     pub disturb: Vec<String>,
 }
 
-/// Combinations of levels that a plan leaves out: those that are in each list that is not empty.
+/// Combinations of levels that a plan omits: those that are in each non-empty list.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Exclusion {
     /// Names of logs and flights.
@@ -59,14 +59,12 @@ pub struct Exclusion {
     pub perturbations: Vec<String>,
     /// Names of runs.
     pub specs: Vec<String>,
-    /// Seeds.
     pub seeds: Vec<u64>,
 }
 
-/// Limits on one job.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JobLimits {
-    /// Wall time after which a job is ended, in seconds.
+    /// Wall time in seconds after which a job is terminated.
     pub timeout_s: f64,
     /// Expected memory of a job in bytes, before one has been measured.
     pub memory_bytes: u64,
@@ -78,25 +76,25 @@ impl Default for JobLimits {
     }
 }
 
-/// What is written beside the tables of runs and parameters.
+/// Output in addition to the tables of runs and parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StudyOutput {
-    /// A third table with one row per run and frame.
+    /// True for a third table with one row per run and frame.
     pub frames: bool,
-    /// The files of `dcvins run` for each job.
+    /// True for the files of `dcvins run` for each job.
     pub files: bool,
 }
 
-/// How a plan runs under Slurm.
+/// Slurm options of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SlurmOptions {
     /// Partition, `None` for the cluster's default.
     pub partition: Option<String>,
-    /// Time limit of one array task, as `sbatch --time` takes it.
+    /// Time limit of one array task, in the syntax of `sbatch --time`.
     pub time: Option<String>,
-    /// Memory of one array task, as `sbatch --mem` takes it.
+    /// Memory of one array task, in the syntax of `sbatch --mem`.
     pub memory: Option<String>,
-    /// Number of array tasks, among which the jobs are divided.
+    /// Number of array tasks among which the jobs are divided.
     pub tasks: usize,
     /// Processors of one array task.
     pub cpus_per_task: usize,
@@ -110,17 +108,14 @@ impl Default for SlurmOptions {
     }
 }
 
-/// A plan: every combination of logs, disturbances, perturbations, seeds and specifications is one run, but for those left
-/// out.
+/// A plan: every combination of logs, disturbances, perturbations, seeds and specifications is one run, except for the
+/// exclusions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StudyPlan {
-    /// Name of the study.
     pub name: String,
-    /// Recorded logs.
     pub logs: Vec<LogSource>,
-    /// Simulated flights.
     pub flights: Vec<FlightRecipe>,
-    /// Runs over each log.
+    /// Runs on each log.
     pub specs: Vec<RunSpec>,
     /// Levels of the rig's errors.
     pub perturbations: Vec<RigPerturbation>,
@@ -128,31 +123,28 @@ pub struct StudyPlan {
     pub disturbances: Vec<DisturbanceSet>,
     /// Seeds of simulated flights and of random perturbations.
     pub seeds: Vec<u64>,
-    /// Combinations that are left out.
+    /// Combinations that are omitted.
     pub exclusions: Vec<Exclusion>,
-    /// Limits on one job.
     pub limits: JobLimits,
-    /// What is written beside the tables.
     pub output: StudyOutput,
-    /// How it runs under Slurm.
     pub slurm: SlurmOptions,
-    /// Tolerances of the comparison with a baseline, by column.
+    /// Relative tolerances of the comparison with a baseline, by column.
     pub tolerances: BTreeMap<String, f64>,
-    /// Tables for people.
+    /// Markdown tables of the results.
     pub tables: Vec<SummaryTable>,
 }
 
 impl StudyPlan {
-    /// Reads a plan.
+    /// Parses a plan.
     ///
     /// # Errors
-    /// For text that is no TOML, an unknown key, a value of the wrong type or out of its range, and for a plan without
-    /// logs or with two levels of one name.
+    /// For invalid TOML, an unknown key, a value of the wrong type or out of its range, and for a plan without logs or
+    /// with two levels of the same name.
     pub fn from_toml(text: &str) -> Result<Self, PlanError> {
         read::plan(text)
     }
 
-    /// Its tables for people of a table of runs, as Markdown.
+    /// The plan's tables of a table of runs, as Markdown.
     pub fn tables_text(&self, runs: &StudyTable) -> String {
         self.tables.iter().map(|table| table.markdown(runs)).collect::<Vec<_>>().join("\n")
     }

@@ -1,4 +1,4 @@
-//! Reading a plan: its keys, their types and ranges.
+//! Parsing of a plan: its keys, their types and ranges.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,12 +27,11 @@ const PLAN_KEYS: [&str; 13] = [
     "tolerance",
     "tables",
 ];
-/// Range of seeds: integers that every reader of the tables represents.
+/// Range of seeds: integers that every program that reads the tables can represent.
 pub(super) const SEEDS: std::ops::RangeInclusive<u64> = 0..=i64::MAX as u64;
 /// Range of times in a plan, in seconds.
 const SECONDS: std::ops::RangeInclusive<f64> = 0.0..=1e6;
 
-/// Reads a plan.
 pub(super) fn plan(text: &str) -> Result<StudyPlan, PlanError> {
     let document = parse(text)?;
     let root = Section::root(text, &document);
@@ -74,7 +73,7 @@ pub(super) fn plan(text: &str) -> Result<StudyPlan, PlanError> {
     Ok(plan)
 }
 
-/// Refuses two levels of one name.
+/// Returns an error if two levels have the same name.
 fn distinct<'a>(root: &Section<'_>, key: &str, names: impl Iterator<Item = &'a str>) -> Result<(), PlanError> {
     let mut known = BTreeSet::new();
     for name in names {
@@ -126,7 +125,7 @@ fn log(section: &Section<'_>) -> Result<LogSource, PlanError> {
     })
 }
 
-/// Trajectories of other programs, each with a name of its own.
+/// Trajectories of other programs, each with a unique name.
 fn trajectories(section: &Section<'_>) -> Result<Vec<TrajectorySpec>, PlanError> {
     let trajectories = section.texts("trajectories", |text| {
         let spec: TrajectorySpec = text.parse().map_err(|problem: TrajectorySpecError| problem.to_string())?;
@@ -189,7 +188,7 @@ fn flight(section: &Section<'_>) -> Result<FlightRecipe, PlanError> {
     Ok(recipe)
 }
 
-/// A list of disturbances, each as `dcvins simulate --disturb` takes it.
+/// A list of disturbances in the syntax of `dcvins simulate --disturb`.
 fn disturb(section: &Section<'_>) -> Result<Vec<String>, PlanError> {
     section.texts("disturb", |text| {
         Disturbances::default().set(text).map(|()| text.to_owned()).map_err(|problem| problem.to_string())

@@ -1,4 +1,4 @@
-//! Reading what a plan leaves out and which tables for people it makes.
+//! Parsing of the exclusions and Markdown tables of a plan.
 
 use std::collections::BTreeMap;
 
@@ -9,12 +9,12 @@ use crate::study::summary_table::{ReferenceValue, Statistic, SummaryColumn, Summ
 
 /// Range of the factor of a column.
 const FACTORS: std::ops::RangeInclusive<f64> = -1e12..=1e12;
-/// Most digits behind a decimal point.
+/// Maximum number of digits after the decimal point.
 const MOST_DIGITS: u64 = 12;
-/// Digits behind the decimal point where a plan names none.
+/// Default number of digits after the decimal point.
 const DIGITS: usize = 3;
 
-/// Reads `[[exclude]]`.
+/// Parses `[[exclude]]`.
 pub(super) fn exclusions(root: &Section<'_>) -> Result<Vec<Exclusion>, PlanError> {
     root.sections("exclude")?.iter().map(exclusion).collect()
 }
@@ -37,7 +37,7 @@ fn exclusion(section: &Section<'_>) -> Result<Exclusion, PlanError> {
     Ok(exclusion)
 }
 
-/// Refuses exclusions that name no level of the plan. Names of recorded logs are known when their files are found.
+/// Returns an error for exclusions of unknown levels. Names of recorded logs are unknown until their files are found.
 pub(super) fn check_exclusions(root: &Section<'_>, plan: &StudyPlan) -> Result<(), PlanError> {
     let sections = root.sections("exclude")?;
     for (section, exclusion) in sections.iter().zip(&plan.exclusions) {
@@ -63,7 +63,7 @@ pub(super) fn check_exclusions(root: &Section<'_>, plan: &StudyPlan) -> Result<(
     Ok(())
 }
 
-/// Reads `[[tables]]`.
+/// Parses `[[tables]]`.
 pub(super) fn tables(root: &Section<'_>) -> Result<Vec<SummaryTable>, PlanError> {
     root.sections("tables")?.iter().map(table).collect()
 }
@@ -91,7 +91,7 @@ fn table(section: &Section<'_>) -> Result<SummaryTable, PlanError> {
     })
 }
 
-/// The name of a column of the table of runs.
+/// Checks that a name is a column of the table of runs.
 fn run_column(name: &str) -> Result<String, String> {
     if is_run_column(name, false) {
         Ok(name.to_owned())

@@ -4,7 +4,7 @@ use crate::geometry::SplitMix64;
 use crate::study::{Cell, SUCCESS, StudyTable, Verdict, baseline_table, compare, runs_table};
 
 /// A study of 4 logs × 5 seeds: errors differ between logs by a factor of ten, and between two studies by noise of this
-/// relative size, all times `factor`.
+/// relative size. ATE is multiplied by `factor`, NEES divided by its square.
 fn study(noise: f64, factor: f64, random: &mut SplitMix64) -> StudyTable {
     let mut normal = || (0..12).map(|_| random.next_unit()).sum::<f64>() - 6.0;
     let mut table = runs_table();
@@ -32,7 +32,7 @@ fn tolerances(metrics: &[&str]) -> BTreeMap<String, f64> {
     metrics.iter().map(|metric| ((*metric).to_owned(), 0.1)).collect()
 }
 
-/// In how many of `count` repetitions a metric is judged worse.
+/// Number of `count` repetitions in which the verdict on a metric is worse.
 fn times_worse(metric: &str, noise: f64, factor: f64, count: u64) -> u64 {
     let worse = |seed: &u64| {
         let mut random = SplitMix64::new(*seed);
@@ -52,9 +52,9 @@ fn a_planted_regression_is_found_and_a_harmless_change_is_not() {
     assert_eq!(times_worse("ate_rmse_m", 0.10, 1.3, 200), 200);
     // 5 % worse is within the tolerance of 10 %.
     assert!(times_worse("ate_rmse_m", 0.05, 1.05, 200) <= 1);
-    // Under noise of a factor of two, 20 pairs cannot tell 10 %: few false alarms are left.
+    // With noise of a factor of two, 20 pairs cannot resolve 10 %; few false alarms remain.
     assert!(times_worse("ate_rmse_m", 0.5, 1.0, 200) <= 10);
-    // An estimator that doubles its σ is four times too careful.
+    // An estimator that doubles its σ is too conservative by a factor of four in NEES.
     assert_eq!(times_worse("pose_nees", 0.2, 2.0, 200), 200);
     assert_eq!(times_worse("pose_nees", 0.1, 1.0, 200), 0);
 }
@@ -111,7 +111,7 @@ fn what_cannot_be_compared_is_said() {
     assert_eq!((few.metrics[0].verdict, few.fails()), (Verdict::TooFewPairs, true));
 }
 
-/// A table with one run of each specification, whose ATE is 1 m times its number.
+/// A table with one run of each specification; its ATE is 1 m times its number.
 fn runs(specs: &[&str]) -> StudyTable {
     let mut table = runs_table();
     for (place, spec) in specs.iter().enumerate() {
@@ -136,7 +136,7 @@ fn runs_are_paired_by_the_meaning_of_their_settings_and_then_by_name() {
     // A run is in one pair; equal settings come before equal names.
     check(&["auto", "auto:window=8"], &["auto:window=8,name=auto", "auto:name=a"], 2, 0);
     check(&["auto"], &["auto", "auto:name=a"], 1, 0);
-    // What this version cannot read is paired as it stands.
+    // A specification that this version cannot parse is paired literally.
     check(&["neural:depth=3"], &["neural:depth=3"], 1, 0);
     let unpaired = compare(&runs(&["auto"]), &runs(&["auto:window=8"]), &tolerances(&[])).unwrap_err();
     assert!(unpaired.to_string().contains("the settings or the name of the run"), "{unpaired}");

@@ -55,7 +55,7 @@ fn a_key_is_that_of_the_inputs_and_not_of_the_place() {
             JobLog::Simulated(_) => unreachable!("the plan has no flights"),
         })
     };
-    // A change of the rules by which keys are made runs every study again: it must be on purpose.
+    // A change of the rules by which keys are made repeats every study, so it must be on purpose.
     assert_eq!(job.key, "e412786a9c3f3cc7ffc949e454c89803f28c67e6161af557b65aa9f23df0b026");
     assert_eq!(key(&|_| ()), job.key);
     assert_eq!(recorded(|log| log.path = PathBuf::from("/elsewhere/a.mcap")), job.key);
@@ -106,7 +106,7 @@ fn trajectories_are_evaluated_once_for_each_log() {
         change(&mut log.trajectories[0]);
         of(log)[0].key.clone()
     };
-    // Neither the place of a file nor the other trajectories of the log matter, its content does.
+    // The path of a file and the other trajectories of the log have no effect on the key; the file's content has.
     assert_eq!(changed(&|it| it.spec = "/elsewhere/vins.csv:vins".parse().unwrap()), jobs[0].key);
     assert_ne!(changed(&|it| it.sha256 = "other".to_owned()), jobs[0].key);
     let runs = |log: RecordedLog| -> Vec<String> {

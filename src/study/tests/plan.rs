@@ -1,6 +1,5 @@
 use crate::study::{Distribution, EncoderNoise, PerturbationStart, RigQuantity, Statistic, StudyPlan};
 
-/// A plan with every key.
 pub(super) const WHOLE: &str = r#"
 name = "encoders"
 seeds = [1, 2, 3]
@@ -135,7 +134,7 @@ fn errors_name_line_key_and_what_is_allowed() {
     let flight = |line: &str| format!("[[flights]]\nexperiment = \"T3\"\n{line}\n");
     let changes = |change: &str| format!("{}[[perturbations]]\nname = \"a\"\nchanges = [{{ {change} }}]\n", flight(""));
     check("", "line 1: the plan has no logs: expected [[logs]] with a path, or [[flights]]");
-    check("seeds = [1]\nname", "line 2: no TOML: key with no value");
+    check("seeds = [1]\nname", "line 2: invalid TOML: key with no value");
     check("name = \"a\"\nspec = [\"auto\"]", "line 2: unknown key 'spec', expected one of name, seeds, specs");
     check("seeds = [1, \"b\"]", "line 1: 'seeds[2]' is the text 'b', expected an integer from 0");
     check("seeds = 3", "'seeds' is 3, expected a list of integers");

@@ -1,4 +1,4 @@
-//! The rows that pass the filter, in their order and their groups.
+//! The rows that pass the filter, sorted and grouped.
 
 use std::cmp::Ordering;
 
@@ -9,31 +9,30 @@ use crate::study::{Cell, ColumnType, ColumnValues, StudyTable};
 /// A column by which rows are sorted.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SortKey {
-    /// Name of the column.
     pub column: String,
-    /// Largest first; empty cells come last in both directions.
+    /// True for largest first; empty cells are last in both directions.
     pub descending: bool,
 }
 
-/// Rows with the same value in the column of groups.
+/// Rows with the same value in the grouping column.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RowGroup {
-    /// The value as text; empty without a column of groups, and for empty cells.
+    /// The value as text; empty without a grouping column, and for empty cells.
     pub name: String,
-    /// Its rows in the order of the sort keys.
+    /// Row indices in the order of the sort keys.
     pub rows: Vec<usize>,
 }
 
-/// The rows of a table as they are shown.
+/// The rows of a table as shown.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Arranged {
     /// All rows that pass, in the order of the sort keys.
     pub rows: Vec<usize>,
-    /// The same rows by group, groups in the order of their values; one group without a column of groups.
+    /// The same rows by group, groups in the order of their values; one group without a grouping column.
     pub groups: Vec<RowGroup>,
 }
 
-/// Most groups of a column that is offered for grouping.
+/// Maximum number of groups of a column that is offered for grouping.
 const MAX_GROUPS: usize = 200;
 
 /// Rank of each row by a column's values: equal values have equal ranks, empty cells the largest.
@@ -72,7 +71,7 @@ fn ranks(table: &StudyTable, column: &str, descending: bool) -> Vec<u32> {
     ranks
 }
 
-/// The rows that pass `filter`, sorted by `sort` and then by their number, and grouped by the column `group`.
+/// The rows that pass `filter`, sorted by `sort` and then by index, and grouped by the column `group`.
 pub fn arrange(table: &StudyTable, filter: &RowFilter, sort: &[SortKey], group: Option<&str>) -> Arranged {
     let mut rows: Vec<usize> = (0..table.rows()).filter(|row| filter.passes(table, *row)).collect();
     let keys: Vec<Vec<u32>> = sort.iter().map(|key| ranks(table, &key.column, key.descending)).collect();
@@ -92,7 +91,7 @@ pub fn arrange(table: &StudyTable, filter: &RowFilter, sort: &[SortKey], group: 
     Arranged { rows, groups: by_rank.into_values().collect() }
 }
 
-/// The columns by which rows can be grouped: texts, integers and flags with at least two and not too many values, inputs
+/// Columns by which rows can be grouped: texts, integers and Booleans with at least two and not too many values, inputs
 /// of the runs first.
 pub fn group_columns(table: &StudyTable) -> Vec<String> {
     let few = |name: &str| {

@@ -9,14 +9,14 @@ use crate::session::breakpoints::{
 };
 use crate::study::{ColumnType, StudyTable};
 
-/// Most characters of a condition.
+/// Maximum number of characters of a condition.
 const MAX_CHARACTERS: usize = 10_000;
-/// Most nested brackets, signs and `not`.
+/// Maximum nesting depth of brackets, signs and `not`.
 const MAX_DEPTH: usize = 60;
-/// Most operators that join terms.
+/// Maximum number of operators that join terms.
 const MAX_OPERATORS: usize = 300;
 
-/// A condition on rows; without one every row passes.
+/// A condition on rows; an empty one lets every row pass.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RowFilter {
     predicate: Option<Predicate>,
@@ -24,11 +24,11 @@ pub struct RowFilter {
 
 #[derive(Clone, Debug, PartialEq)]
 enum Predicate {
-    /// A column of true and false.
+    /// A Boolean column.
     Flag(String),
-    /// Whether a cell is not empty.
+    /// True if a cell is not empty.
     Has(String),
-    /// A column of texts that contains a text, in any case.
+    /// True if a text column contains a text, case-insensitive.
     Contains(String, String),
     Texts(Comparison, Text, Text),
     Numbers(Comparison, Number, Number),
@@ -63,7 +63,8 @@ impl RowFilter {
     /// Parses a condition for the columns of a table; an empty text lets every row pass.
     ///
     /// # Errors
-    /// For a syntax error, an unknown column, and a comparison of a text with a number, with its column in the text.
+    /// For a syntax error, an unknown column, or a comparison of a text with a number; the error has its column in the
+    /// text.
     pub fn parse(text: &str, table: &StudyTable) -> Result<Self, ConditionProblem> {
         if text.trim().is_empty() {
             return Ok(Self::default());
@@ -78,17 +79,17 @@ impl RowFilter {
         let predicate = parser.any()?;
         match parser.peek() {
             Token::End => Ok(Self { predicate: Some(predicate) }),
-            Token::Close => Err(parser.problem("unmatched bracket: it closes nothing")),
+            Token::Close => Err(parser.problem("unmatched closing bracket")),
             _ => Err(parser.problem("expected 'and', 'or' or the end of the condition")),
         }
     }
 
-    /// Whether a row passes.
+    /// True if a row passes.
     pub fn passes(&self, table: &StudyTable, row: usize) -> bool {
         self.predicate.as_ref().is_none_or(|predicate| predicate.holds(table, row))
     }
 
-    /// Whether every row passes without a test.
+    /// True if the filter has no condition.
     pub fn is_empty(&self) -> bool {
         self.predicate.is_none()
     }
@@ -175,7 +176,7 @@ impl Parser<'_> {
         ConditionProblem { text: self.text.to_owned(), column: self.span().begin + 1, message: message.into() }
     }
 
-    /// Parses below one more bracket, sign or `not`.
+    /// Parses inside one more bracket, sign or `not`.
     fn deeper<T>(&mut self, parse: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         if self.depth == MAX_DEPTH {
             return Err(self.problem(format!("more than {MAX_DEPTH} nested brackets, signs and 'not'")));
@@ -250,7 +251,7 @@ impl Parser<'_> {
         Ok(Predicate::Numbers(comparison, left, self.sum()?))
     }
 
-    /// Whether the bracket here holds a condition, and not the beginning of a calculation.
+    /// True if the bracket at this position contains a condition, false if it begins an arithmetic expression.
     fn bracket_is_condition(&self) -> bool {
         let mut open = 0_usize;
         for (token, _) in &self.tokens[self.at..] {
@@ -271,13 +272,13 @@ impl Parser<'_> {
         self.table.column(name).is_some_and(|column| column.values.column_type() == ColumnType::Bool)
     }
 
-    /// The column whose name stands here.
+    /// The column named by the token at this position.
     fn column_here(&self) -> Option<(String, ColumnType)> {
         let Token::Name(name) = self.peek() else { return None };
         self.table.column(name).map(|column| (name.clone(), column.values.column_type()))
     }
 
-    /// Takes the name of a column.
+    /// Consumes the name of a column.
     fn column(&mut self) -> Result<(String, ColumnType)> {
         let found = self.column_here().ok_or_else(|| self.no_column())?;
         self.at += 1;
@@ -292,7 +293,7 @@ impl Parser<'_> {
         self.problem(format!("there is no column '{name}'{near}"))
     }
 
-    /// A comparison of a column of true and false, or the column alone.
+    /// A comparison of a Boolean column, or the column alone.
     fn flag(&mut self, column: String) -> Result<Predicate> {
         self.at += 1;
         let Token::Compare(comparison) = *self.peek() else { return Ok(Predicate::Flag(column)) };
@@ -311,7 +312,7 @@ impl Parser<'_> {
         Ok(Predicate::Numbers(comparison, Number::Column(column), Number::Literal(wanted)))
     }
 
-    /// A comparison whose left side is a text; `skip` tokens of it are still to be passed.
+    /// A comparison whose left side is a text; `skip` of its tokens are not yet consumed.
     fn text_comparison(&mut self, left: Text, skip: usize) -> Result<Predicate> {
         self.at += skip;
         if let (Token::Name(word), Text::Column(column)) = (self.peek(), &left)
@@ -335,7 +336,7 @@ impl Parser<'_> {
         Ok(Predicate::Texts(comparison, left, right))
     }
 
-    /// A text in quotes, or everything up to the next space or bracket: `not-initialized`.
+    /// A quoted text, or everything up to the next space or bracket: `not-initialized`.
     fn text_literal(&mut self) -> Result<String> {
         if let Token::Quoted(text) = self.peek().clone() {
             self.at += 1;
@@ -348,7 +349,7 @@ impl Parser<'_> {
             self.at += 1;
         }
         if end == begin {
-            return Err(self.problem("expected a text; one with spaces stands in quotes"));
+            return Err(self.problem("expected a text; put a text with spaces in quotes"));
         }
         Ok(self.text.chars().skip(begin).take(end - begin).collect())
     }
@@ -399,7 +400,7 @@ impl Parser<'_> {
         let (column, kind) = self.column()?;
         if matches!(kind, ColumnType::Text | ColumnType::Bool) {
             self.at = begin;
-            return Err(self.problem(format!("'{column}' holds {}, where a number is needed", kind.name())));
+            return Err(self.problem(format!("'{column}' holds {}, expected a number", kind.name())));
         }
         Ok(Number::Column(column))
     }

@@ -1,34 +1,33 @@
-//! Columns of numbers in the units that people read, and axes of their values.
+//! Numeric columns in the units that are shown, and axes over their values.
 
 use super::study::columns;
 use crate::study::{ColumnType, StudyColumn, StudyTable};
 
-/// A column of numbers with its shown unit.
+/// A numeric column with the unit that is shown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Metric {
-    /// Name of the column.
     pub column: String,
     /// Shown value per stored value.
     pub factor: f64,
-    /// The shown unit, empty for numbers without one.
+    /// The shown unit, empty for dimensionless numbers.
     pub unit: &'static str,
-    /// What the column holds.
+    /// Description of the column.
     pub description: String,
 }
 
 impl Metric {
-    /// The metric of a column; `None` for texts.
+    /// The metric of a column; `None` for text columns.
     pub fn of(column: &StudyColumn) -> Option<Self> {
         if column.values.column_type() == ColumnType::Text {
             return None;
         }
-        // Errors of the extrinsics are millimetres, those of trajectories metres.
+        // Errors of the extrinsics are shown in millimetres, those of trajectories in metres.
         let fine = column.name.starts_with("chain_error");
         let (factor, unit) = Self::shown_unit(&column.unit, fine);
         Some(Self { column: column.name.clone(), factor, unit, description: column.description.clone() })
     }
 
-    /// Factor and name of the unit that is shown for a stored unit; `fine` shows lengths in millimetres.
+    /// Factor and name of the unit shown for a stored unit; `fine` shows lengths in millimetres.
     pub fn shown_unit(stored: &str, fine: bool) -> (f64, &'static str) {
         match stored {
             "rad" => (180.0 / std::f64::consts::PI, "°"),
@@ -43,7 +42,7 @@ impl Metric {
         }
     }
 
-    /// Name with the shown unit: `ate_rmse_m` as `ate_rmse [m]`.
+    /// Name with the shown unit: `ate_rmse_m` gives `ate_rmse [m]`.
     pub fn title(&self) -> String {
         let stored = ["_rad", "_m", "_s", "_ms", "_px", "_percent", "_bytes"];
         let name = stored.iter().find_map(|suffix| self.column.strip_suffix(suffix)).unwrap_or(&self.column);
@@ -55,13 +54,13 @@ impl Metric {
         table.number(row, &self.column).map(|stored| stored * self.factor)
     }
 
-    /// The shown values of these rows, with the rows; rows without a value are left out.
+    /// The shown values of these rows, with the row indices; rows without a value are omitted.
     pub fn values(&self, table: &StudyTable, rows: &[usize]) -> Vec<(usize, f64)> {
         rows.iter().filter_map(|row| Some((*row, self.value(table, *row)?))).collect()
     }
 }
 
-/// The columns of numbers with at least one value, without the seed: a name and no quantity.
+/// Numeric columns with at least one value, except the seed, which is an identifier.
 pub fn metrics(table: &StudyTable) -> Vec<Metric> {
     let used = |column: &&StudyColumn| {
         matches!(column.values.column_type(), ColumnType::Number | ColumnType::Integer)
@@ -74,21 +73,21 @@ pub fn metrics(table: &StudyTable) -> Vec<Metric> {
 /// An axis over values: linear, or logarithmic over positive values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ValueAxis {
-    /// Whether equal distances are equal ratios.
+    /// True for a logarithmic scale.
     pub logarithmic: bool,
-    /// Value at the beginning.
+    /// Value at the lower end.
     pub low: f64,
-    /// Value at the end, larger than `low`.
+    /// Value at the upper end, larger than `low`.
     pub high: f64,
 }
 
-/// Ratio of the largest to the median value from which an axis is logarithmic.
+/// Ratio of the largest to the median value above which an axis is logarithmic.
 const LOGARITHMIC_FROM: f64 = 20.0;
-/// Room beyond the extreme values as a ratio of the range.
+/// Margin beyond the extreme values, as a ratio of the range.
 const MARGIN: f64 = 0.03;
 
 impl ValueAxis {
-    /// A linear axis from `low` to `high` with room on both sides; an empty range is extended.
+    /// A linear axis from `low` to `high` with a margin on both sides; an empty range is extended.
     pub fn linear(low: f64, high: f64) -> Self {
         let margin = MARGIN * (high - low);
         let margin = match low.abs().max(high.abs()) {
@@ -115,19 +114,19 @@ impl ValueAxis {
         if low > 0.0 && high > LOGARITHMIC_FROM * values[values.len() / 2] {
             return Self::logarithmic(low, high);
         }
-        // Zero belongs to the axis when it is near, so that lengths can be compared.
+        // Zero is included if it is near, so that lengths can be compared.
         let low = if low > 0.0 && low < 0.5 * high { 0.0 } else { low };
         let axis = Self::linear(low, high);
         if low == 0.0 { Self { low: 0.0, ..axis } } else { axis }
     }
 
-    /// The axis with zero in its middle part, for differences.
+    /// An axis with zero in its middle part, for differences.
     pub fn around_zero(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = values.fold((0.0_f64, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
         Self::linear(low, high)
     }
 
-    /// Position of a value, 0 at `low` and 1 at `high`; a value that the axis cannot show is at its nearer end.
+    /// Position of a value, 0 at `low` and 1 at `high`; values outside the axis are clamped to the nearer end.
     pub fn position(&self, value: f64) -> f64 {
         let map = |value: f64| if self.logarithmic { value.max(f64::MIN_POSITIVE).ln() } else { value };
         ((map(value) - map(self.low)) / (map(self.high) - map(self.low))).clamp(-0.02, 1.02)

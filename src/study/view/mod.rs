@@ -1,18 +1,18 @@
-//! What the study view shows, without a window: filters, order and groups of the rows, distributions, paired
+//! Models of the study view, without a window: filters, order and groups of the rows, distributions, paired
 //! differences, success rates and errors against σ.
 //!
 //! - `study`: the tables of one study, and the names of the columns that the view relies on.
 //! - `filter`: conditions on rows, `ate_rmse_m < 0.1 and run = auto`.
 //! - `arrange`: rows that pass, their order and their groups.
-//! - `metric`: columns of numbers with their shown unit; ranges of values and axes.
+//! - `metric`: numeric columns with the shown unit; ranges of values and axes.
 //! - `spread`, `success`, `paired`: quantiles, Wilson intervals, differences between groups on equal inputs.
-//! - `summary`: the groups in numbers.
+//! - `summary`: statistics of the groups.
 //! - `parallel`: rows as lines over several axes.
 //! - `parameters`: errors of calibration parameters against their σ.
-//! - `beside`: the runs that are opened together with a run.
+//! - `comparable`: the runs that are opened together with a run.
 
 mod arrange;
-mod beside;
+mod comparable;
 mod filter;
 mod metric;
 mod paired;
@@ -26,7 +26,7 @@ mod summary;
 pub(crate) mod tests;
 
 pub use arrange::{Arranged, RowGroup, SortKey, arrange, group_columns};
-pub use beside::rows_beside;
+pub use comparable::comparable_rows;
 pub use filter::RowFilter;
 pub use metric::{Metric, ValueAxis, metrics};
 pub use paired::{GroupDifference, PairedDifference, paired_differences};

@@ -12,9 +12,9 @@ use crate::study::{Cell, MeanInterval, PAIRING_COLUMNS, StudyTable};
 pub struct PairedDifference {
     /// The row of the group.
     pub row: usize,
-    /// Its value in the shown unit.
+    /// Value of the row in the shown unit.
     pub value: f64,
-    /// The value of the reference.
+    /// Value of the reference in the shown unit.
     pub reference: f64,
 }
 
@@ -25,25 +25,24 @@ impl PairedDifference {
     }
 }
 
-/// A group against the reference.
+/// Comparison of a group with the reference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroupDifference {
-    /// Name of the group.
     pub name: String,
     /// The pairs in the order of the group's rows.
     pub pairs: Vec<PairedDifference>,
-    /// Rows of the group without a partner, or without a value on one of the sides.
+    /// Number of rows of the group without a partner, or without a value on one of the sides.
     pub unpaired: usize,
     /// Quantiles of the differences.
     pub spread: Option<Spread>,
     /// Mean difference with its 95 % interval (Student's t), `None` with fewer than two pairs.
     pub mean: Option<MeanInterval>,
-    /// Pairs in which the value is below that of the reference.
+    /// Number of pairs in which the value is below that of the reference.
     pub below: usize,
 }
 
-/// The columns that two rows of a pair share: those that identify a run, without the column of groups and without columns
-/// from which the group follows (the specification of a run when runs are grouped by one of its keys).
+/// Columns in which the two rows of a pair agree: those that identify a run, without the grouping column and without
+/// columns that determine the group (the specification of a run when runs are grouped by one of its keys).
 fn shared_columns(table: &StudyTable, group: &str) -> Vec<&'static str> {
     let decides = |column: &str| {
         let mut group_of: BTreeMap<String, Cell> = BTreeMap::new();
@@ -63,10 +62,10 @@ fn shared_columns(table: &StudyTable, group: &str) -> Vec<&'static str> {
         .collect()
 }
 
-/// Differences of `metric` between each group and the group named `reference`, on rows that agree in everything else
-/// that identifies a run. Where several rows of the reference agree, their mean is the reference.
+/// Differences of `metric` between each group and the group named `reference`, on rows that agree in all other columns
+/// that identify a run. If several rows of the reference agree, their mean is the reference value.
 ///
-/// The groups are those of the column `group`; the reference itself is left out. Empty without such a group.
+/// The groups are those of the column `group`; the reference itself is omitted. Empty without such a group.
 pub fn paired_differences(
     table: &StudyTable,
     groups: &[RowGroup],

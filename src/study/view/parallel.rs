@@ -8,29 +8,27 @@ use crate::study::{ColumnType, StudyTable};
 /// The scale of a parallel axis.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AxisScale {
-    /// Numbers.
+    /// A numeric scale.
     Values(ValueAxis),
-    /// Texts, each at its own place, from below in this order.
+    /// Texts in this order from below, at equal distances.
     Names(Vec<String>),
 }
 
 /// One axis with the positions of rows on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParallelAxis {
-    /// Name of the column.
     pub column: String,
-    /// Its title, with the shown unit.
+    /// Title of the axis, with the shown unit.
     pub title: String,
-    /// Its scale.
     pub scale: AxisScale,
-    /// Position of each row that was asked for in 0 to 1 from below; `None` for an empty cell.
+    /// Position of each requested row, from 0 (bottom) to 1; `None` for an empty cell.
     pub positions: Vec<Option<f64>>,
 }
 
-/// Most texts on an axis; beyond them names cannot be read.
+/// Maximum number of texts on an axis; with more, the names are illegible.
 const MAX_NAMES: usize = 40;
 
-/// The axis of a column with the positions of `rows`; `None` for an unknown column, and for too many different texts.
+/// The axis of a column with the positions of `rows`; `None` for an unknown column or too many different texts.
 pub fn parallel_axis(table: &StudyTable, column: &str, rows: &[usize]) -> Option<ParallelAxis> {
     let found = table.column(column)?;
     if matches!(found.values.column_type(), ColumnType::Text | ColumnType::Bool) || column == columns::SEED {
@@ -62,12 +60,12 @@ pub fn parallel_axis(table: &StudyTable, column: &str, rows: &[usize]) -> Option
     Some(ParallelAxis { column: column.to_owned(), title: metric.title(), scale: AxisScale::Values(axis), positions })
 }
 
-/// Numbers before texts, by value.
+/// Sort key that orders numbers before texts, and numbers by value.
 fn natural(text: &str) -> (Option<i64>, &str) {
     (text.parse().ok(), text)
 }
 
-/// The axes that are shown at first: inputs that vary, then the most important results with values.
+/// The initial axes: inputs that vary, then the most important results that have values.
 pub fn default_axes(table: &StudyTable) -> Vec<String> {
     const INPUTS: [&str; 4] = [columns::RUN, columns::LOG, columns::DISTURBANCE, columns::PERTURBATION];
     const RESULTS: [&str; 6] =

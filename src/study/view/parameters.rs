@@ -22,9 +22,7 @@ pub struct ParameterPoint {
 /// A parameter over many runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterErrors {
-    /// Name of the parameter.
     pub name: String,
-    /// The shown unit.
     pub unit: &'static str,
     /// Runs with a ground truth and a σ above zero.
     #[serde(skip)]
@@ -33,9 +31,9 @@ pub struct ParameterErrors {
     pub ratio_rms: f64,
     /// Mean of error over σ; 0 without a bias.
     pub ratio_mean: f64,
-    /// Ratio of points within 1 σ, 0.683 when consistent.
+    /// Fraction of points within 1 σ, 0.683 when consistent.
     pub within_1: f64,
-    /// Ratio of points within 3 σ, 0.997 when consistent.
+    /// Fraction of points within 3 σ, 0.997 when consistent.
     pub within_3: f64,
     /// Root mean square of the errors, in the shown unit.
     pub error_rms: f64,
@@ -43,19 +41,19 @@ pub struct ParameterErrors {
     pub sigma_median: f64,
 }
 
-/// Whether the standard deviations of a parameter agree with its errors.
+/// Agreement of the standard deviations of a parameter with its errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SigmaVerdict {
-    /// The errors are larger than σ says.
+    /// The errors are larger than σ implies.
     TooSmall,
-    /// They agree.
     Consistent,
-    /// The errors are smaller than σ says.
+    /// The errors are smaller than σ implies.
     TooLarge,
 }
 
 impl ParameterErrors {
-    /// Whether the ratio of error to σ is between 0.5 and 1.5, or what as many runs give by chance (99 %).
+    /// Verdict on the RMS ratio of error to σ: consistent between 0.5 and 1.5, or within the 99 % interval for this
+    /// number of runs.
     pub fn verdict(&self) -> SigmaVerdict {
         const NORMAL_QUANTILE: f64 = 2.58;
         let by_chance = |normal: f64| mean_square_quantile(self.points.len().max(1) as f64, normal).sqrt();

@@ -5,17 +5,13 @@ use serde::Serialize;
 /// Extremes, quartiles and median of values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// Number of values.
     pub count: usize,
-    /// Smallest value.
     pub min: f64,
     /// First quartile.
     pub q1: f64,
-    /// Median.
     pub median: f64,
     /// Third quartile.
     pub q3: f64,
-    /// Largest value.
     pub max: f64,
 }
 

@@ -20,11 +20,11 @@ pub mod columns {
     pub const SEED: &str = "seed";
     /// Specification of the run.
     pub const RUN: &str = "run";
-    /// How the run ended; [`STATUS_OK`] with a result.
+    /// Outcome of the run; [`STATUS_OK`] with a result.
     pub const STATUS: &str = "status";
     /// The status of a run with a result.
     pub const STATUS_OK: &str = "ok";
-    /// Why there is no result.
+    /// Reason why there is no result.
     pub const MESSAGE: &str = "message";
     /// Time of the frame with the largest error, in seconds since the log began.
     pub const WORST_FRAME_S: &str = "worst_frame_s";
@@ -32,18 +32,18 @@ pub mod columns {
     pub const ATE: &str = "ate_rmse_m";
     /// Name of a calibration parameter, in the table of parameters.
     pub const PARAMETER: &str = "parameter";
-    /// Its unit.
+    /// Unit of the parameter.
     pub const UNIT: &str = "unit";
-    /// Its standard deviation at the end.
+    /// Final standard deviation of the parameter.
     pub const SIGMA: &str = "sigma";
-    /// Its final minus its true value.
+    /// Final minus ground-truth value of the parameter.
     pub const ERROR: &str = "error";
 }
 
 /// A study: one row per run, and one row per run and calibration parameter.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Study {
-    /// Name for people.
+    /// Name shown to users.
     pub name: String,
     /// One row per run.
     pub runs: StudyTable,
@@ -52,7 +52,8 @@ pub struct Study {
 }
 
 impl Study {
-    /// The row of the table of runs for every row of the table of parameters, `None` for a key without a run.
+    /// For each row of the table of parameters, the row of its run in the table of runs; `None` for a key without a
+    /// run.
     pub fn run_of_parameter_rows(&self) -> Vec<Option<usize>> {
         let rows = 0..self.runs.rows();
         let of_key: BTreeMap<&str, usize> =
@@ -61,8 +62,7 @@ impl Study {
         (0..self.parameters.rows()).map(run_of).collect()
     }
 
-    /// What identifies a run for people: its specification, log, disturbances, errors of the rig and seed, as far as
-    /// they are known.
+    /// Title of a run: its specification, log, disturbances, errors of the rig and seed, as far as they are known.
     pub fn title_of(&self, row: usize) -> String {
         let text = |column: &str| self.runs.text(row, column).filter(|text| !text.is_empty());
         let run = text(columns::RUN).map_or_else(|| format!("row {}", row + 1), str::to_owned);

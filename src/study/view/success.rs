@@ -2,18 +2,16 @@
 
 use serde::Serialize;
 
-/// How many of a number of runs succeeded.
+/// Success rate of a number of runs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SuccessRate {
-    /// Runs that succeeded.
     pub successes: usize,
-    /// All runs.
     pub runs: usize,
     /// Rate in 0 to 1, 0 without runs.
     pub rate: f64,
     /// Lower end of the 95 % interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of the 95 % interval.
     pub high: f64,
 }
 
@@ -21,7 +19,7 @@ pub struct SuccessRate {
 const Z: f64 = 1.959_963_984_540_054;
 
 /// The rate with Wilson's score interval (Wilson 1927), which stays within 0 and 1 and is valid for few runs and for
-/// rates near its ends.
+/// rates near 0 or 1.
 pub fn success_rate(successes: usize, runs: usize) -> SuccessRate {
     if runs == 0 {
         return SuccessRate { successes, runs, rate: 0.0, low: 0.0, high: 1.0 };
@@ -30,7 +28,7 @@ pub fn success_rate(successes: usize, runs: usize) -> SuccessRate {
     let scale = 1.0 / (1.0 + Z * Z / count);
     let center = scale * (rate + Z * Z / (2.0 * count));
     let half = scale * Z * (rate * (1.0 - rate) / count + Z * Z / (4.0 * count * count)).sqrt();
-    // The ends are exact where rounding would leave them beside 0 and 1.
+    // The ends are set exactly where rounding would miss 0 or 1.
     let low = if successes == 0 { 0.0 } else { (center - half).max(0.0) };
     let high = if successes == runs { 1.0 } else { (center + half).min(1.0) };
     SuccessRate { successes, runs, rate, low, high }

@@ -1,4 +1,4 @@
-//! The groups of a study in numbers.
+//! Statistics of the groups of a study.
 
 use serde::Serialize;
 
@@ -10,23 +10,22 @@ use super::spread::Spread;
 use super::study::Study;
 use super::success::{SuccessRate, success_rate};
 
-/// One group.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GroupSummary {
-    /// Its name.
     pub name: String,
-    /// Runs that meet the condition of success.
+    /// Rate of runs that meet the condition of success.
     pub success: SuccessRate,
     /// Quantiles of the metric in the shown unit.
     pub spread: Option<Spread>,
     /// Number of pairs with the reference group.
     pub pairs: usize,
-    /// Mean difference to the reference group on equal inputs and the ends of its 95 % interval, lower end first, mean in
-    /// the middle, in the shown unit.
+    /// Mean difference to the reference group on equal inputs with the ends of its 95 % interval: lower end, mean,
+    /// upper end, in the shown unit.
     pub difference: Option<[f64; 3]>,
 }
 
-/// The groups of arranged rows; differences are `None` without a column of groups and for the reference itself.
+/// Statistics of the groups of arranged rows; differences are `None` without a grouping column and for the reference
+/// itself.
 pub fn summarize_groups(
     study: &Study,
     arranged: &Arranged,

@@ -1,4 +1,4 @@
-//! A synthetic study, and the models over it.
+//! Tests on a synthetic study.
 
 use std::collections::BTreeSet;
 
@@ -23,9 +23,9 @@ fn table(columns: &[(&str, ColumnType, &str)]) -> StudyTable {
     StudyTable::new(columns.iter().map(column).collect()).unwrap()
 }
 
-/// A study of 8 logs × 5 specifications × 5 perturbations × `seeds` seeds: `auto` is best, without encoders the error is
-/// half as large again, a static camera is ten times worse and often fails, and σ of `pitch.alpha` is half as large as it
-/// should be.
+/// A study of 8 logs × 5 specifications × 5 perturbations × `seeds` seeds: `auto` is best, without encoders the error
+/// is 1.5 times as large, a static camera is ten times worse and often fails, and σ of `pitch.alpha` is half of the
+/// correct value.
 pub(crate) fn synthetic_study(seeds: usize) -> Study {
     use ColumnType::{Bool, Integer, Number, Text};
     let mut runs = table(&[
@@ -177,7 +177,7 @@ fn wrong_conditions_say_what_and_where() {
         ("run", 4, "this is a text"),
         ("run =", 6, "expected a text"),
         ("encoder = maybe", 11, "on or off"),
-        ("seed = 1)", 9, "closes nothing"),
+        ("seed = 1)", 9, "unmatched closing bracket"),
         ("(seed = 1", 10, "expected ')'"),
         ("seed = 1 run = auto", 10, "expected 'and', 'or'"),
         ("seed < 1 ; seed", 10, "has no meaning"),
@@ -288,7 +288,7 @@ fn parameter_errors_show_a_sigma_that_is_too_small() {
         assert!(of.ratio_mean.abs() < 0.2 && of.within_1 <= of.within_3);
         let verdict = if expected > 1.0 { SigmaVerdict::TooSmall } else { SigmaVerdict::Consistent };
         assert_eq!(of.verdict(), verdict, "{}", of.name);
-        // One run alone says nothing about σ unless its error is far off.
+        // One run alone is no evidence about σ unless its error is very large.
         let of_one =
             |ratio_rms: f64| ParameterErrors { points: of.points[..1].to_vec(), ratio_rms, ..of.clone() }.verdict();
         let verdicts = [0.1, 2.4, 3.5].map(of_one);
@@ -339,9 +339,9 @@ fn parallel_axes_place_names_and_numbers() {
 }
 
 #[test]
-fn runs_beside_share_log_rig_errors_and_seed() {
+fn comparable_runs_have_equal_log_rig_errors_and_seed() {
     let study = synthetic_study(3);
-    let rows = rows_beside(&study.runs, 7, 4);
+    let rows = comparable_rows(&study.runs, 7, 4);
     assert_eq!((rows.len(), rows[0]), (4, 7));
     let specs: BTreeSet<&str> = rows.iter().map(|row| study.runs.text(*row, "run").unwrap()).collect();
     assert_eq!(specs.len(), 4, "each specification once");

@@ -1,4 +1,4 @@
-//! The runs that are opened together.
+//! Selection of the runs that are opened together.
 
 use super::study::columns;
 use crate::study::StudyTable;
@@ -17,12 +17,12 @@ const SAME: [&str; 10] = [
     "duration_s",
 ];
 
-/// A run and the runs beside it: the rows on the same log with the same rig and other specifications, at most `most` in
-/// all. The row itself comes first, the others in the order of the table.
+/// Row `row`, then the other rows with equal log, rig and start and other specifications, in the order of the table; at
+/// most `most` in all.
 ///
-/// Rigs with errors lie in the folders of the jobs, so that their paths differ between runs with equal errors; perturbed
-/// runs are recognized by the name of the errors and the seed.
-pub fn rows_beside(table: &StudyTable, row: usize, most: usize) -> Vec<usize> {
+/// Rigs with errors are stored in the folders of the jobs, so their paths differ even if the errors are equal; for
+/// perturbed runs, the name of the errors and the seed are compared instead.
+pub fn comparable_rows(table: &StudyTable, row: usize, most: usize) -> Vec<usize> {
     let perturbed = table.text(row, "rig_path").is_some_and(|path| path.starts_with("jobs/"));
     let same = |other: usize| {
         let compared = SAME.into_iter().filter(|column| !(perturbed && *column == "rig_path"));
