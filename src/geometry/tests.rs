@@ -154,7 +154,7 @@ fn wrap_angle_maps_to_one_revolution() {
         for angle in [-3.0, -0.5, 0.0, 0.7, 3.1] {
             assert!(
                 (wrap_angle(angle + f64::from(revolutions) * TAU) - angle).abs() < 1e-14,
-                "{angle} and {revolutions} turns"
+                "{angle} and {revolutions} revolutions"
             );
         }
     }
