@@ -39,7 +39,7 @@ pub enum CameraError {
     )]
     UnknownDistortion { name: String },
     /// Distortion that is not defined for the projection.
-    #[error("camera_model '{model}' does not go with distortion_model '{distortion}': it takes {expected}")]
+    #[error("camera_model '{model}' does not support distortion_model '{distortion}': expected {expected}")]
     Combination {
         model: &'static str,
         distortion: &'static str,

@@ -302,7 +302,7 @@ fn invalid_descriptions_name_the_faulty_field() {
         "equi",
         &[0.0; 4],
         RESOLUTION_PX,
-        "camera_model 'ds' does not go with distortion_model 'equidistant': it takes none",
+        "camera_model 'ds' does not support distortion_model 'equidistant': expected none",
     );
     check(
         "eucm",
