@@ -1,4 +1,5 @@
-//! Recordings of vehicles: an MP4 video with `GoPro`'s telemetry or beside an autopilot's log, and autopilots' logs alone.
+//! Recordings of vehicles: an MP4 video with `GoPro`'s telemetry or with an autopilot's log, and autopilots' logs
+//! alone.
 
 mod attitude;
 mod damage;
@@ -41,7 +42,7 @@ pub(super) fn autopilot_log_kind(start: &[u8]) -> Option<AutopilotLogKind> {
 
 pub(super) use mp4::is_movie;
 
-/// Bytes by which a log is recognized.
+/// Number of bytes at the start that identify the kind of a log.
 const START_BYTES: u64 = 16;
 
 /// Reads an autopilot's log.
@@ -50,7 +51,7 @@ fn read_autopilot(log: &AutopilotLog, sink: &mut Sink<'_>) -> Result<Recorded, C
     let file = File::open(&log.path).map_err(ConvertError::io("open the log of the autopilot", &log.path))?;
     file.take(START_BYTES).read_to_end(&mut start).map_err(ConvertError::io("read", &log.path))?;
     let found = autopilot_log_kind(&start);
-    // A file under Zstandard begins otherwise.
+    // The start of a Zstandard file does not show its kind.
     if found != Some(log.kind) && !start.starts_with(&ZSTD_MAGIC) {
         let found = found.map_or("and no log of another autopilot either", AutopilotLogKind::name);
         return Err(ConvertError::NotThatLog {
@@ -75,7 +76,7 @@ pub(super) fn convert_autopilot(log: &AutopilotLog, sink: &mut Sink<'_>) -> Resu
     topics.write(None, sink)
 }
 
-/// Brings the times to UTC where the recorder knew it.
+/// Converts the times to UTC if the recorder had UTC.
 fn to_utc(recorded: &mut Recorded) {
     match recorded.utc_offset_ns() {
         Some(offset_ns) => recorded.shift(offset_ns),
@@ -84,12 +85,12 @@ fn to_utc(recorded: &mut Recorded) {
 }
 
 const NO_UTC: &str = "the log has no UTC: its times count from the start of the autopilot";
-/// Start of a video whose camera knew no time, in nanoseconds since the epoch: stamps of 0 would be stamps that were never set.
+/// Start of a video without recorded time, in nanoseconds since the epoch, because stamps of 0 count as never set.
 const UNKNOWN_START_NS: i64 = 1_000_000_000;
-/// UTC of a satellite receiver and the clock of a camera may differ by a time zone.
+/// Largest time zone offset between a camera's clock and UTC of a satellite receiver.
 const TIME_ZONES_NS: i64 = 14 * 3600 * 1_000_000_000;
 
-/// Converts a video with its own telemetry, and an autopilot's log beside it.
+/// Converts a video with its telemetry, and with an autopilot's log.
 pub(super) fn convert_video(
     source: &Path,
     options: &ConvertOptions,
@@ -137,12 +138,12 @@ pub(super) fn convert_video(
     Ok(facts)
 }
 
-/// Where the video lies in the log.
+/// Relation of the video's clock to the log's clock.
 #[derive(Clone, Copy, Debug)]
 struct Place {
-    /// Time of the log at the start of the video.
+    /// Log time at the start of the video.
     start_ns: i64,
-    /// Seconds of the log in a second of the video.
+    /// Log seconds per video second.
     rate: f64,
 }
 
@@ -153,7 +154,7 @@ impl Place {
     }
 }
 
-/// The place of a video in an autopilot's log: as it was given, by UTC where both know it, else both start together.
+/// Relates a video to an autopilot's log: by the given clock, else by UTC if both have it, else both start together.
 fn place_video(
     recorded: &Recorded,
     (first_ns, last_ns): (i64, i64),
