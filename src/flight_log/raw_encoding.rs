@@ -171,7 +171,7 @@ impl Mosaic<'_> {
             let (above, this, below) = (line(above), line(row), line(below));
             let in_red_row = row % 2 == self.red[1];
             // Color of this row that is not green, and that of the rows above and below.
-            let (own, other) = if in_red_row { (red, blue) } else { (blue, red) };
+            let (in_row, other) = if in_red_row { (red, blue) } else { (blue, red) };
             for column in 0..self.width {
                 let [left, right] = mirrored(column, self.width);
                 let at = |line: &[u16], column: usize| u64::from(line[column]);
@@ -180,10 +180,10 @@ impl Mosaic<'_> {
                 let vertical = at(above, column) + at(below, column);
                 let is_green = (column % 2 == self.red[0]) != in_red_row;
                 let sum = if is_green {
-                    4 * green * center + 2 * own * horizontal + 2 * other * vertical
+                    4 * green * center + 2 * in_row * horizontal + 2 * other * vertical
                 } else {
                     let diagonal = at(above, left) + at(above, right) + at(below, left) + at(below, right);
-                    4 * own * center + green * (horizontal + vertical) + other * diagonal
+                    4 * in_row * center + green * (horizontal + vertical) + other * diagonal
                 };
                 pixels.push(narrow(((sum + (1 << 17)) >> 18) as u16));
             }

@@ -79,7 +79,7 @@ enum Entries {
     /// In the message index record at this byte of the file.
     Record(usize),
     /// Log time and offset, from a scan of the file.
-    Own(Vec<(u64, u64)>),
+    Scanned(Vec<(u64, u64)>),
 }
 
 /// Blocks, channels and messages of an MCAP file.
@@ -300,7 +300,9 @@ impl ContainerIndex {
         }
         for message in &decoded.messages {
             let entry = (message.log_time_ns, message.offset as u64);
-            if let Entries::Own(list) = entries.entry(message.channel_id).or_insert_with(|| Entries::Own(Vec::new())) {
+            if let Entries::Scanned(list) =
+                entries.entry(message.channel_id).or_insert_with(|| Entries::Scanned(Vec::new()))
+            {
                 list.push(entry);
             }
         }
@@ -350,7 +352,7 @@ impl ContainerIndex {
             block.log_time_ns.0 = block.log_time_ns.0.min(log_time_ns);
             block.log_time_ns.1 = block.log_time_ns.1.max(log_time_ns);
             let offset = (position - block.bytes.start) as u64;
-            if let Entries::Own(list) = entries.entry(channel_id).or_insert_with(|| Entries::Own(Vec::new())) {
+            if let Entries::Scanned(list) = entries.entry(channel_id).or_insert_with(|| Entries::Scanned(Vec::new())) {
                 list.push((log_time_ns, offset));
             }
         }
@@ -428,7 +430,7 @@ impl ContainerIndex {
         for number in blocks.iter().copied() {
             for (channel_id, entries) in self.entries[number].iter().filter(|(id, _)| channel_ids.contains(id)) {
                 let indexed = match entries {
-                    Entries::Own(list) => Some(list.clone()),
+                    Entries::Scanned(list) => Some(list.clone()),
                     Entries::Record(at) => self.message_index(file, *at, *channel_id, number),
                 };
                 let list = indexed.unwrap_or_else(|| {
@@ -452,7 +454,7 @@ impl ContainerIndex {
             return promises.clone();
         }
         let count = |channel_id: u16, entries: &Entries| match entries {
-            Entries::Own(list) => Some(list.len() as u64),
+            Entries::Scanned(list) => Some(list.len() as u64),
             Entries::Record(at) => self.message_index(file, *at, channel_id, number).map(|list| list.len() as u64),
         };
         let counts = self.entries[number].iter().filter_map(|(id, entries)| Some((*id, count(*id, entries)?)));

@@ -161,10 +161,10 @@ impl Recorded {
     /// Adds measurements of another recorder with the same clock.
     pub(super) fn append(&mut self, other: Self) {
         for (record, mut imu) in other.imus {
-            let own = self.imu(&record);
-            own.combined.append(&mut imu.combined);
-            own.gyroscope.append(&mut imu.gyroscope);
-            own.accelerometer.append(&mut imu.accelerometer);
+            let merged = self.imu(&record);
+            merged.combined.append(&mut imu.combined);
+            merged.gyroscope.append(&mut imu.gyroscope);
+            merged.accelerometer.append(&mut imu.accelerometer);
         }
         self.attitudes.append(other.attitudes);
         self.gimbal.append(other.gimbal);

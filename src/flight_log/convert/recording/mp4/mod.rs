@@ -1,4 +1,4 @@
-//! MP4 files: the pictures of their video with their times, and the payloads of their telemetry.
+//! MP4 files: the frames of their video with their times, and the payloads of their telemetry.
 
 mod annex_b;
 mod boxes;
@@ -15,21 +15,21 @@ use annex_b::UnitFormat;
 use boxes::{child, children, descendant, file_boxes, u32_at, u64_at};
 use track::{Sample, Track};
 
-/// Seconds from 1904, from which MP4 counts, to the epoch.
+/// Seconds from 1904, the origin of MP4 times, to the epoch.
 const EPOCH_1904_S: u64 = 2_082_844_800;
 
-/// A picture of a video.
+/// Frame of a video.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Picture {
-    /// When it was taken, in nanoseconds since the start of the video.
+    /// Time of exposure, in nanoseconds since the start of the video.
     pub(super) presented_ns: i64,
-    /// When its message is in the log: in the order of decoding, never before it was taken.
+    /// Time of the message in the log: in the order of decoding, never before the exposure.
     pub(super) decoded_ns: i64,
     start: usize,
     length: usize,
 }
 
-/// The video of a file.
+/// Video of a file.
 #[derive(Debug)]
 pub(super) struct Video {
     file: LogFile,
@@ -40,7 +40,7 @@ pub(super) struct Video {
     has_reordered_pictures: bool,
 }
 
-/// A payload of telemetry.
+/// Payload of telemetry.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Payload {
     /// Nanoseconds from the start of the video to its first sample, and to the next payload.
@@ -49,20 +49,20 @@ pub(super) struct Payload {
     pub(super) bytes: Vec<u8>,
 }
 
-/// What is read of a file.
+/// Content of a file.
 #[derive(Debug)]
 pub(super) struct Movie {
     pub(super) video: Video,
-    /// `GoPro`'s telemetry.
+    /// `GoPro` telemetry.
     pub(super) telemetry: Vec<Payload>,
-    /// When the recording started by the camera's clock, in nanoseconds since the epoch.
+    /// Start of the recording by the camera's clock, in nanoseconds since the epoch.
     pub(super) created_ns: Option<i64>,
     /// Version of a `GoPro`'s firmware.
     pub(super) firmware: Option<String>,
     pub(super) notes: Vec<String>,
 }
 
-/// Whether a file begins like an MP4 or `QuickTime` file.
+/// True if a file begins like an MP4 or `QuickTime` file.
 pub(in super::super) fn is_movie(start: &[u8]) -> bool {
     start
         .get(4..8)
@@ -122,7 +122,7 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     Ok(Movie { video, telemetry, created_ns, firmware, notes })
 }
 
-/// The first video track that can be read, how its units are stored, and its resolution.
+/// First video track of a supported type, with the format of its units and its resolution.
 fn video_track<'a>(tracks: &'a [Track<'a>]) -> Result<(&'a Track<'a>, UnitFormat, [usize; 2]), String> {
     let mut others = Vec::new();
     for track in tracks.iter().filter(|track| &track.handler == b"vide") {
@@ -151,14 +151,14 @@ fn video_track<'a>(tracks: &'a [Track<'a>]) -> Result<(&'a Track<'a>, UnitFormat
     })
 }
 
-/// The pictures that lie in the file, and whether they are shown in another order than decoded.
+/// Frames that lie in the file, and true if their display order differs from the decoding order.
 fn pictures(track: &Track<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (Vec<Picture>, bool) {
-    // Pictures that wait for others are written when the last of those that they wait for is decoded.
+    // Frames that depend on later ones are written when the last of these is decoded.
     let delay_ns = track.samples.iter().map(|sample| sample.presented_ns.saturating_sub(sample.decoded_ns)).max();
     let delay_ns = delay_ns.unwrap_or(0);
     let mut lost = track.undescribed;
     let mut pictures = Vec::with_capacity(track.samples.len());
-    // Pictures do not overlap: together they cannot be longer than the file.
+    // Frames do not overlap: together they cannot be longer than the file.
     let mut budget = file_bytes;
     for sample in &track.samples {
         match place(sample, file_bytes).filter(|(_, length)| *length <= budget) {
@@ -180,13 +180,13 @@ fn pictures(track: &Track<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (V
     (pictures, reordered)
 }
 
-/// Place of a sample that lies in the file.
+/// Position and length of a sample that lies in the file.
 fn place(sample: &Sample, file_bytes: usize) -> Option<(usize, usize)> {
     let (start, length) = (usize::try_from(sample.start).ok()?, usize::try_from(sample.length).ok()?);
     (length > 0 && start.checked_add(length)? <= file_bytes).then_some((start, length))
 }
 
-/// The payloads of `GoPro`'s telemetry.
+/// Payloads of `GoPro` telemetry.
 fn telemetry(tracks: &[Track<'_>], file: &LogFile, notes: &mut Vec<String>) -> Vec<Payload> {
     let Some(track) = tracks.iter().find(|track| &track.description.0 == b"gpmd") else { return Vec::new() };
     let mut payloads = Vec::new();
@@ -214,13 +214,13 @@ fn telemetry(tracks: &[Track<'_>], file: &LogFile, notes: &mut Vec<String>) -> V
 }
 
 impl Video {
-    /// A picture in Annex B.
+    /// Frame in Annex B.
     pub(super) fn access_unit(&self, number: usize) -> Result<Vec<u8>, String> {
         let Picture { start, length, .. } = self.pictures[number];
         self.format.access_unit(&self.file.read(start..start + length)?)
     }
 
-    /// `h264, 854×480, 29.97 fps`.
+    /// Description such as `h264, 854×480, 29.97 fps`.
     pub(super) fn description(&self) -> String {
         let times: Samples<()> = self.pictures.iter().map(|picture| (picture.decoded_ns, ())).collect();
         let [width, height] = self.resolution_px;
@@ -228,7 +228,7 @@ impl Video {
         format!("{}, {width}×{height}, {:.2} fps{order}", self.codec.name(), super::topics::rate_hz(&times))
     }
 
-    /// First and last time of its pictures in nanoseconds since its start.
+    /// First and last time of the frames in nanoseconds since the start of the video.
     pub(super) fn span_ns(&self) -> (i64, i64) {
         let times = || self.pictures.iter().map(|picture| picture.presented_ns);
         (times().min().unwrap_or(0), times().max().unwrap_or(0))
