@@ -1,14 +1,14 @@
-//! The text of a template: the rig as it is written anywhere else, with comments.
+//! Text of a template: the rig in its usual format, with comments.
 
 use std::fmt::Write as _;
 
 use super::RigTemplate;
 
-/// Numbers of a rotation matrix that differ less from a whole one by rounding.
+/// Numbers of a rotation matrix within this distance of an integer differ from it by rounding only.
 const ROUNDING: f64 = 1e-9;
 
 impl RigTemplate {
-    /// The rig as YAML with comments.
+    /// Returns the rig as YAML with comments.
     pub fn to_yaml(&self) -> String {
         let rig = self.rig();
         let mut out = String::from(HEADER);
@@ -31,7 +31,7 @@ impl RigTemplate {
         out
     }
 
-    /// The comments above a field.
+    /// Comments above a field.
     fn comments(path: &str) -> Vec<String> {
         let text = match path {
             "gravity" => "m/s²; 9.78 at the equator to 9.83 at the poles.",
@@ -65,12 +65,12 @@ impl RigTemplate {
 const HEADER: &str =
     "# A rig before calibration. Usual values stand where nothing is known: see `assumed` at the end.\n";
 
-/// A row of a matrix whose numbers are whole but for rounding, as it is read best; any other line as it is.
+/// Rounds a matrix row whose numbers differ from integers by rounding only; returns any other line unchanged.
 fn with_whole_numbers(line: &str) -> String {
     let Some((head, row)) = line.split_once("- [") else { return line.to_owned() };
     let Some(row) = row.strip_suffix(']') else { return line.to_owned() };
     let number = |text: &str| match text.parse::<f64>() {
-        // Adding zero removes the sign of a negative one.
+        // Adding zero turns −0 into 0.
         Ok(value) if (value - value.round()).abs() < ROUNDING => format!("{:?}", value.round() + 0.0),
         _ => text.to_owned(),
     };
