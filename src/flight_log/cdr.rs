@@ -47,8 +47,7 @@ impl<'a> CdrReader<'a> {
             [0, 0, _, _, ..] => true,
             [0, 1, _, _, ..] => false,
             _ if message.starts_with(&ZSTD_MAGIC) => {
-                let what =
-                    "a message that is compressed on its own (zstd): convert the log with `dcvins convert`".into();
+                let what = "a separately compressed message (zstd): convert the log with `dcvins convert`".into();
                 return Err(CdrError { what, offset: 0 });
             }
             [first, second, _, _, ..] => {

@@ -28,7 +28,7 @@ pub enum LogError {
     #[error("{exceeded}: {}", path.display())]
     Limit { exceeded: LimitExceeded, path: PathBuf },
     /// Another process shortened the file while it was read.
-    #[error("{problem}; what was read before is incomplete: {}", path.display())]
+    #[error("{problem}; data read before are incomplete: {}", path.display())]
     Shortened {
         /// Present end of the file, and its length when it was opened.
         problem: String,
@@ -97,9 +97,9 @@ pub enum LogError {
     NoTransform { topic: String, problem: String, path: PathBuf },
     /// The clock of a topic has no known relation to that of the log.
     #[error(
-        "'{topic}': the first stamp is {stamp_s:.3} s since an unknown start (PX4 counts from its start), the first log \
-         time is {log_s:.3} s after the first stamp of the log; neither lies within the log, so the two clocks cannot be \
-         related; record with synchronized clocks (UXRCE_DDS_SYNCT 1): {}",
+        "'{topic}': the first stamp is {stamp_s:.3} s since an unknown start (PX4 counts from its start), the \
+         first log time is {log_s:.3} s after the first stamp of the log; neither lies within the log, so the two \
+         clocks cannot be related; record with synchronized clocks (UXRCE_DDS_SYNCT 1): {}",
         path.display()
     )]
     UnknownClock {

@@ -144,7 +144,7 @@ pub(super) fn check_resolution(
 /// Remedy for an unsupported encoding.
 fn encoding_remedy(encoding: &str) -> &'static str {
     if encoding.starts_with("32F") || encoding.starts_with("64F") {
-        "numbers such as depths, no grey levels: name the topic of the camera's images"
+        "numbers such as depths, not gray values: give the topic of the camera's images"
     } else {
         "expected mono8, mono16, rgb8, bgr8, rgba8, bgra8, rgb16, bgr16, yuv422, yuyv, nv12, bayer_* or 8UC1 to 16UC4"
     }

@@ -177,7 +177,7 @@ fn cached<V: Clone>(entries: &mut Vec<((usize, usize), V)>, key: (usize, usize))
 impl ImageCache {
     fn picture(&mut self, log: &FlightLog, camera: usize, kind: MessageKind, index: usize) -> Picture {
         self.decode_pictures(log, camera, kind, index, &|| true);
-        cached(&mut self.pictures, (camera, index)).unwrap_or_else(|| Err("it is no picture of a video".to_owned()))
+        cached(&mut self.pictures, (camera, index)).unwrap_or_else(|| Err("it is not a frame of a video".to_owned()))
     }
 
     /// Decodes a video up to frame `index`, starting at the last decoded frame or at the keyframe, while `go_on`

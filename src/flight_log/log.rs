@@ -305,12 +305,12 @@ impl FlightLog {
         for (_, topic, first_ns, _) in stamps {
             if *first_ns == 0 {
                 let message =
-                    format!("{topic}: first header stamp 0 (never set); the topic does not count for the log's start");
+                    format!("{topic}: first header stamp 0 (never set); the topic does not define the log's start");
                 self.warn(WarningKind::Stamps, 0, message);
             } else if *first_ns < earliest_ns || *first_ns < 0 {
                 let message = format!(
                     "{topic}: first header stamp {:.3} s before the log's start (another clock, or a stamp that was never \
-                     set); the topic does not count for the log's start",
+                     set); the topic does not define the log's start",
                     seconds_from_ns(self.epoch_ns.saturating_sub(*first_ns))
                 );
                 self.warn(WarningKind::Stamps, 0, message);

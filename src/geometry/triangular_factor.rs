@@ -1,6 +1,6 @@
 //! QR factorization of rows that arrive in portions, by Householder reflections.
 
-#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+#![expect(clippy::inline_always, reason = "code that is not inlined is not compiled for the registers of its caller")]
 
 use std::ops::Range;
 

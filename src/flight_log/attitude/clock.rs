@@ -54,8 +54,9 @@ impl StampClock {
     pub(crate) fn warning(self, topic: &str) -> Option<String> {
         let Self::LogTimes { first_stamp_ns } = self else { return None };
         Some(format!(
-            "{topic}: the stamps count from PX4's start (the first is {:.3} s), and how they relate to the other topics is unknown; the \
-             times of recording are used, with their delay and jitter (let the bridge synchronize: UXRCE_DDS_SYNCT 1)",
+            "{topic}: the stamps count from PX4's start (the first is {:.3} s), with an unknown offset to \
+             the other topics; the log times are used, with their delay and jitter (synchronize the clocks: \
+             UXRCE_DDS_SYNCT 1)",
             seconds_from_ns(first_stamp_ns)
         ))
     }

@@ -106,6 +106,6 @@ pub(crate) fn read_vehicle(
     message: &[u8],
 ) -> Result<(i64, UnitQuaternion<f64>), String> {
     let attitude = messages::read_vehicle_attitude(kind, message).map_err(|error| error.to_string())?;
-    let rotation = attitude.content.ok_or("not finite, a zero quaternion, or said to be unknown")?;
+    let rotation = attitude.content.ok_or("not finite, a zero quaternion, or marked as unknown")?;
     Ok((attitude.stamp_ns, source.enu_from_flu(&rotation, kind == MessageKind::Px4VehicleAttitude)))
 }

@@ -116,7 +116,7 @@ pub fn convert_with(
         match fs::read(&path) {
             // The file was edited, or is a rig of the user.
             Ok(existing) if existing != text.as_bytes() => report.notes.push(format!(
-                "the rig beside the log is kept; it differs from what the source says: {}",
+                "the rig next to the log is kept; it differs from the calibration of the source: {}",
                 path.display()
             )),
             Ok(_) => report.notes.extend(assumed),
@@ -162,7 +162,7 @@ fn rig_of_video(
         Ok(template) => {
             let fields: Vec<String> = template.assumed_fields().into_iter().map(|assumed| assumed.field).collect();
             let note = format!(
-                "the rig assumes {}; `dcvins check` asks for each, and `dcvins rig new --camera … --force` writes another one",
+                "the rig assumes {}; `dcvins check` reports each, and `dcvins rig new --camera … --force` writes another one",
                 fields.join(", ")
             );
             (Some(template.to_yaml()), vec![note])

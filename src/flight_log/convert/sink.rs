@@ -253,16 +253,16 @@ impl<'a> Sink<'a> {
                     let message_type = MessageType::ros2(message_type, definition);
                     Ok(self.writer.write_typed(topic, &message_type, times, bytes)?)
                 }
-                None => Err("the program reads no such type, and the bag does not hold its definition".to_owned()),
+                None => Err("unsupported type, and the bag does not contain its definition".to_owned()),
             },
-            (None, Payload::Ros1(_)) => Err("the program reads no such type".to_owned()),
+            (None, Payload::Ros1(_)) => Err("unsupported type".to_owned()),
             (_, Payload::Other(encoding)) => Err(format!("encoded as {encoding:?}, expected CDR or ROS 1")),
         };
         match written {
             Ok(()) => {
                 let tally = self.taken(topic, message_type);
                 if kind.is_none() {
-                    tally.reason.get_or_insert_with(|| "copied as it is; the program does not read it".to_owned());
+                    tally.reason.get_or_insert_with(|| "copied unchanged; the program does not use it".to_owned());
                 }
             }
             Err(reason) => self.leave(topic, message_type, 1, reason),

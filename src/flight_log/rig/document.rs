@@ -195,7 +195,7 @@ fn syntax_problem(error: &Error, text: &str) -> String {
     let found = text.lines().nth(line as usize - 1).unwrap_or_default();
     let field = field_at(text, line as usize - 1).map(|field| format!(", in {field}")).unwrap_or_default();
     let what = match error.without_snippet() {
-        Error::DuplicateMappingKey { .. } => "the key is there already, expected each key once",
+        Error::DuplicateMappingKey { .. } => "the key is repeated, expected each key once",
         Error::MultipleDocuments { .. } => "a second document ('---'), expected one",
         Error::Eof { .. } => "the text ends here, expected a mapping with rig_version, imu0, cam0, …",
         Error::Budget { .. } => "too many values or aliases, expected a rig of some kilobytes",
@@ -288,7 +288,7 @@ mod tests {
         );
         check(
             "imu0:\n  rostopic: /imu\n  rostopic: /imu\n",
-            "line 3, in imu0.rostopic: 'rostopic: /imu': the key is there already, expected each key once",
+            "line 3, in imu0.rostopic: 'rostopic: /imu': the key is repeated, expected each key once",
         );
     }
 }

@@ -100,7 +100,7 @@ fn from_document(document: &Document, facts: &dyn CameraFacts) -> Result<RigWith
             .filter_map(|path| path.file_name())
             .map(|name| name.to_string_lossy().into_owned())
             .collect();
-        let expected = format!("the IMU in one of {} beside this camera chain", names.join(", "));
+        let expected = format!("the IMU in one of {} next to this camera chain", names.join(", "));
         return Err(root.field("imu0").unexpected(&expected));
     };
     let imu = Document::read(imu_file)?;

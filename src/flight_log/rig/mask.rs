@@ -80,11 +80,11 @@ pub(super) fn read(
     facts: &dyn CameraFacts,
 ) -> Result<Option<CameraMask>, LogError> {
     let Some(field) = camera.field("mask").optional() else { return Ok(None) };
-    let file = field.text("the file of a PNG image beside the rig")?;
+    let file = field.text("the name of a PNG image next to the rig")?;
     let bytes = facts.file_beside_rig(file).map_err(|problem| field.error(format!("names '{file}': {problem}")))?;
     let decoded = decode_within(&bytes, ImageFormat::Png, &LogLimits::default(), None);
-    let gray = decoded
-        .map_err(|problem| field.error(format!("names '{file}', which is no PNG that can be read: {problem}")))?;
+    let gray =
+        decoded.map_err(|problem| field.error(format!("names '{file}', which is not a readable PNG: {problem}")))?;
     let gray = gray.into_luma8();
     let [width, height] = [gray.width() as usize, gray.height() as usize];
     if [width, height] != resolution_px {

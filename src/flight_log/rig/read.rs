@@ -105,14 +105,14 @@ fn read_lever_arm(field: Field<'_>) -> Result<Option<LeverArm>, LogError> {
 
 /// Reads the assumed fields; an error if the rig lacks one of them.
 fn read_assumed(root: &Field<'_>) -> Result<Vec<AssumedField>, LogError> {
-    const EXPECTED: &str = "a mapping of fields of the rig, such as cam0.intrinsics, to what is assumed";
+    const EXPECTED: &str = "a mapping of fields of the rig, such as cam0.intrinsics, to the assumption";
     let Some(assumed) = root.field("assumed").optional() else { return Ok(Vec::new()) };
     let paths = assumed.keys(EXPECTED)?;
     if paths.len() > MAX_ASSUMED {
         return Err(assumed.error(format!("{} entries, expected at most {MAX_ASSUMED}", paths.len())));
     }
     let entry = |path: &str| {
-        let reason = assumed.field(path).text("a sentence that says what is assumed")?.to_owned();
+        let reason = assumed.field(path).text("a sentence that states the assumption")?.to_owned();
         if !root.has_path(path) {
             let problem = format!(
                 "the rig has no field '{}'; remove the entry, or name a field as in cam0.intrinsics",
@@ -278,7 +278,7 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
         .transpose()?;
     let source = gimbal.field("source").optional().map(|source| attitude::read(&source)).transpose()?;
     if joint_topic.is_some() && source.is_some() {
-        let problem = "is there beside gimbal.source; expected one of them: joint angles, or an attitude";
+        let problem = "is given together with gimbal.source; expected one of them: joint angles, or an attitude";
         return Err(gimbal.field("rostopic").error(problem));
     }
     let (topic, attitude) = source.map_or((joint_topic, None), |(topic, source)| (Some(topic), Some(source)));

@@ -26,7 +26,7 @@ pub(super) fn read_shutter(camera: &Field<'_>, height_px: usize) -> Result<Shutt
     let [readout, line_delay] = ["readout", "line_delay"].map(|key| camera.field(key));
     let (field, readout_s) = match (readout.is_present(), line_delay.is_present()) {
         (true, true) => {
-            let problem = "is there beside readout; expected one of them: readout = line_delay · height";
+            let problem = "is given together with readout; expected one of them: readout = line_delay · height";
             return Err(line_delay.error(problem));
         }
         (false, true) => {

@@ -99,7 +99,7 @@ fn what_a_source_lacks_is_named_with_the_possible_values() {
     let error = parse(&with_source("{topic: /tf, type: tf, frame: body, axes: flu, parent: a}")).unwrap_err();
     assert!(error.starts_with("gimbal.source.child: missing, expected the name of the gimbal's frame"), "{error}");
     let both = RIG.replace("rostopic: /joints", &format!("rostopic: /joints\n  source: {full}"));
-    assert!(parse(&both).unwrap_err().starts_with("gimbal.rostopic: is there beside gimbal.source"));
+    assert!(parse(&both).unwrap_err().starts_with("gimbal.rostopic: is given together with gimbal.source"));
     let far = RIG.replace("rostopic: /joints", "rostopic: /joints\n  timeshift_gimbal_imu: 100");
     assert!(parse(&far).unwrap_err().starts_with("gimbal.timeshift_gimbal_imu: holds 100, expected seconds"));
 }
@@ -179,7 +179,7 @@ fn wrong_shutters_and_intrinsics_are_named() {
     };
     check("  readout: 30\n", "", "cam0.readout: a readout of 30 s, expected seconds, at most 0.2 either way");
     check("  line_delay: 30\n", "", "cam0.line_delay: a readout of 1440 s, expected seconds");
-    check("  line_delay: 1e-5\n  readout: 0.03\n", "", "cam0.line_delay: is there beside readout");
+    check("  line_delay: 1e-5\n  readout: 0.03\n", "", "cam0.line_delay: is given together with readout");
     check("  readout_sigma: 0\n", "", "cam0.readout_sigma: holds 0, expected a standard deviation greater than 0");
     check("  intrinsics_sigma: {focal: 0.01, centre: 5}\n", "", "cam0.intrinsics_sigma.distortion: missing, expected");
     check(

@@ -172,8 +172,8 @@ impl AttitudeJoints {
     fn report_unreachable(&mut self, context: &mut ReadContext, now_ns: i64) {
         let Some((first_ns, last_ns, largest_rad)) = self.unreachable.ended_before(now_ns) else { return };
         let message = format!(
-            "{}: up to {:.1}° of the attitude from {:.3} s to {:.3} s are a rotation that the joints cannot make within their limits; \
-             joint angles are the nearest (check gimbal.source, links and limits)",
+            "{}: up to {:.1}° of the attitude from {:.3} s to {:.3} s cannot be reached by the \
+             joints within their limits; the nearest joint angles are used (check gimbal.source, links and limits)",
             self.topic,
             largest_rad.to_degrees(),
             seconds_from_ns(first_ns),

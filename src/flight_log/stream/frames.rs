@@ -385,7 +385,7 @@ fn picture_decoder(log: &FlightLog, kind: MessageKind, camera: &CameraRig) -> De
         let packet = messages::read_video_packet(kind, source.data).map_err(|error| Refusal::not_decodable(&error));
         let packet = packet.inspect_err(|_| stream.lose_message())?;
         let image = stream.decode(source.number, &packet, &limits, Some(resolution_px)).map_err(|problem| Refusal {
-            reason: "the picture cannot be decoded",
+            reason: "the frame cannot be decoded",
             detail: problem_text(problem, resolution_px, &key),
         })?;
         let log_time_ns = relative_ns(i64::try_from(source.position.log_time_ns).unwrap_or(i64::MAX), epoch_ns);

@@ -518,7 +518,7 @@ fn attitudes_without_a_vehicle_or_beyond_the_joints_are_named() {
     let source = "source: {topic: /gimbal, type: quaternion, frame: body, axes: flu}";
     let (_, warnings) = beyond.play(&rig_text(source), 0.0);
     // 0.8 rad are 45.8°, the limit with its tolerance is at 27.0°.
-    warning_with(&warnings, &["/gimbal: up to 18.8° of the attitude from 2.004 s to 2.384 s", "cannot make"]);
+    warning_with(&warnings, &["/gimbal: up to 18.8° of the attitude from 2.004 s to 2.384 s", "cannot be reached"]);
 }
 
 #[test]

@@ -85,7 +85,7 @@ fn raw_images_of_every_encoding_become_grey() {
     let message = encode::image(0, "camera", [1, 1], "bayer_rggb8", &[9]);
     let problem = decode_image(MessageKind::Image, &message, BitDepth::default()).unwrap_err();
     assert!(problem.contains("bayer_rggb8 image of 1×1 pixels"));
-    assert!(decode("32FC1", &[0; 16]).unwrap_err().contains("no grey levels"));
+    assert!(decode("32FC1", &[0; 16]).unwrap_err().contains("not gray values"));
     assert!(decode("\u{1b}[2J", &[0; 4]).unwrap_err().contains(r#""\u{1b}[2J" is not read: expected mono8"#));
     assert!(decode("mono8", &[0; 2]).unwrap_err().contains("2 bytes with 1 per row for 2×2 mono8"));
 }

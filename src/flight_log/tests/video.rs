@@ -220,7 +220,7 @@ fn pictures_behind_a_lost_one_are_left_out_up_to_the_next_keyframe() {
         assert_eq!(crc32(&frame.image), stream.luma_crc32[place]);
     }
     let warning = warning_with(&warnings, &["/camera: 4 messages from 0.627 s to 0.777 s dropped"]);
-    assert!(warning.message.contains("the picture cannot be decoded"), "{}", warning.message);
+    assert!(warning.message.contains("the frame cannot be decoded"), "{}", warning.message);
     let log = FlightLog::open(&path).unwrap();
     let (read, missing) = missing_pictures(&log, "/camera", MessageKind::CompressedVideo, 100);
     // Message 11 is the first one after the lost frame; the keyframe is message 15.
@@ -240,7 +240,7 @@ fn a_video_without_a_keyframe_or_of_another_compression_is_named() {
     let (path, _) = write(folder.path(), "h264", Storage::Ros, &[0, 8, 16]);
     let (frames, warnings) = play_file(&path, &rig_text(), 0.0);
     assert!(frames.is_empty());
-    warning_with(&warnings, &["/camera: 21 messages", "it depends on a picture that is damaged or missing"]);
+    warning_with(&warnings, &["/camera: 21 messages", "it depends on a damaged or missing frame"]);
     let path = folder.path().join("other.mcap");
     let mut writer = LogWriter::create(&path, &LogWriterOptions::default()).unwrap();
     for number in 0..10 {

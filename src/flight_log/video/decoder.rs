@@ -137,9 +137,7 @@ impl VideoDecoder {
         if self.codec.is_keyframe(access_unit) {
             self.at_first_keyframe = !self.synchronized;
         } else if !self.synchronized || (self.at_first_keyframe && self.codec.is_leading(access_unit)) {
-            return Err(unreadable(
-                "it depends on a picture that is damaged or missing; reading continues at the next keyframe",
-            ));
+            return Err(unreadable("it depends on a damaged or missing frame; reading continues at the next keyframe"));
         }
         let (stream, limits) = (&mut self.stream, &self.limits);
         let decoded = without_panic_message(|| stream.picture(access_unit, limits));
@@ -218,7 +216,7 @@ fn damaged(error: impl std::fmt::Debug) -> ImageProblem {
 
 fn one<T>(pictures: Vec<T>) -> Result<[T; 1], ImageProblem> {
     <[T; 1]>::try_from(pictures)
-        .map_err(|pictures| unreadable(format!("{} pictures in one message, expected 1", pictures.len())))
+        .map_err(|pictures| unreadable(format!("{} frames in one message, expected 1", pictures.len())))
 }
 
 fn narrowed(sample: u16, bit_depth: u8) -> u8 {
@@ -227,7 +225,7 @@ fn narrowed(sample: u16, bit_depth: u8) -> u8 {
 
 fn gray_image(width: usize, height: usize, pixels: Vec<u8>) -> Result<GrayImage, ImageProblem> {
     if pixels.len() != width * height {
-        return Err(unreadable(format!("{} samples of a picture of {width}×{height} pixels", pixels.len())));
+        return Err(unreadable(format!("{} samples of a frame of {width}×{height} pixels", pixels.len())));
     }
     Ok(GrayImage { width, height, pixels })
 }

@@ -44,7 +44,7 @@ impl FrameNumbers {
         if follows {
             Ok(())
         } else {
-            Err(format!("pictures before it are missing: number {number}, expected {expected}"))
+            Err(format!("frames before it are missing: number {number}, expected {expected}"))
         }
     }
 }

@@ -53,7 +53,7 @@ fn read_autopilot(log: &AutopilotLog, sink: &mut Sink<'_>) -> Result<Recorded, C
     let found = autopilot_log_kind(&start);
     // The start of a Zstandard file does not show its kind.
     if found != Some(log.kind) && !start.starts_with(&ZSTD_MAGIC) {
-        let found = found.map_or("and no log of another autopilot either", AutopilotLogKind::name);
+        let found = found.map_or("nor a log of another autopilot", AutopilotLogKind::name);
         return Err(ConvertError::NotThatLog {
             expected: log.kind.name(),
             found: found.to_owned(),
@@ -116,7 +116,7 @@ pub(super) fn convert_video(
     } else {
         let start_ns = video_utc_ns.or(created_ns).unwrap_or(UNKNOWN_START_NS);
         if video_utc_ns.is_none() && created_ns.is_none() {
-            sink.note("the camera knew no time: the video starts 1 s after the epoch");
+            sink.note("the camera recorded no time: the video starts 1 s after the epoch");
         }
         if let Some(mut drone) = drone {
             drone.shift(start_ns);
@@ -177,19 +177,19 @@ fn place_video(
         Some(start_ns) if has_utc => {
             let distance_ns = start_ns.saturating_sub(log_start_ns).saturating_abs();
             let reason = if distance_ns < TIME_ZONES_NS {
-                "start with start: by the camera's clock they do not overlap (is it set to local time?)"
+                "starts aligned: by the camera's clock they do not overlap (is it set to local time?)"
             } else {
-                "start with start: by the camera's clock they do not overlap"
+                "starts aligned: by the camera's clock they do not overlap"
             };
             (log_start_ns.saturating_sub(first_ns), reason)
         }
-        _ => (log_start_ns.saturating_sub(first_ns), "start with start: camera or autopilot knew no time"),
+        _ => (log_start_ns.saturating_sub(first_ns), "starts aligned: camera or autopilot recorded no time"),
     };
     let offset_s = seconds_from_ns(start_ns.saturating_sub(log_start_ns));
     sink.video_clock = Some(VideoClock { offset_s, drift_ppm: 0.0 });
     sink.note(format!(
-        "the video is placed {offset_s:.3} s after the first measurement of the autopilot's log ({reason}); this is good to \
-         seconds at best, give a better one with --video-offset"
+        "the video is placed {offset_s:.3} s after the first measurement of the autopilot's log ({reason}), accurate to \
+         seconds at best; give a better offset with --video-offset"
     ));
     Place { start_ns, rate: 1.0 }
 }

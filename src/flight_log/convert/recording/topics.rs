@@ -69,7 +69,7 @@ fn chosen<T>(candidates: Candidates<T>, format: &str, topic: &str, sink: &mut Si
     let (best, others) = candidates.into_best();
     let (record, samples) = best?;
     for (other, samples) in others {
-        sink.leave(&other, format, samples.len() as u64, format!("{topic} is made of {record}"));
+        sink.leave(&other, format, samples.len() as u64, format!("{topic} uses {record}"));
     }
     Some((record.clone(), in_order(samples, format, &record, sink)))
 }
@@ -250,7 +250,7 @@ impl Topics {
             let left = (count - poses.len()) as u64;
             sink.leave(&record, format, left, "without the vehicle's attitude at that time");
         }
-        let rotation = if vehicle.is_empty() { "; no rotation is known" } else { "" };
+        let rotation = if vehicle.is_empty() { "; rotation unknown" } else { "" };
         let remark = format!("{record}, {:.1} Hz; east, north, up{rotation}", rate_hz(&poses));
         self.add(topic, [POSE_TYPE, "world"], remark, poses, Content::Pose);
     }

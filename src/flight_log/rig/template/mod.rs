@@ -58,7 +58,7 @@ pub enum TemplateError {
     },
     /// Invalid field of view.
     #[error(
-        "'{given}' is no field of view: expected fov:DEG with degrees across the image from 1 to 220, as in fov:84"
+        "'{given}' is not a field of view: expected fov:DEG with degrees across the image from 1 to 220, as in fov:84"
     )]
     FieldOfView { given: String },
     #[error(
@@ -293,16 +293,16 @@ impl RigTemplate {
             AngleTemplate::None => {}
         }
         if gimbal.angles != AngleTemplate::None {
-            let reason = "a usual standard deviation; the gimbal's own is not known";
+            let reason = "usual standard deviation, not measured for this gimbal";
             add("gimbal.encoder_sigma", Some(reason.to_owned()));
         }
         add("gimbal.T_I_B", place);
         let meeting = format!(
-            "the axes {} meet in one point at right angles, with zero where the camera looks forward",
+            "the axes {} meet in one point at right angles; at angles zero the camera looks forward",
             gimbal.axes
         );
         add("gimbal.links", both(&Some(meeting), &gimbal.positive.assumed));
-        add("gimbal.T_E_C", Some("the camera's centre is where the axes meet".to_owned()));
+        add("gimbal.T_E_C", Some("the camera's centre is at the intersection of the axes".to_owned()));
         fields
     }
 }

@@ -40,22 +40,20 @@ impl RigTemplate {
             }
             "cam0.intrinsics" => "fx fy cx cy in pixels; a calibration with a target also gives the distortion.",
             "cam0.intrinsics_sigma" => {
-                "How wrong they may be: ratio of fx and fy, pixels of cx and cy, each coefficient of the distortion."
+                "Standard deviations: relative of fx and fy, in pixels of cx and cy, of each distortion coefficient."
             }
             "cam0.timeshift_cam_imu" => "Seconds: t_imu = t_cam + shift. `dcvins check` measures it.",
             "cam0.T_cam_imu" => "Kalibr's direction: maps points from the IMU to the camera.",
-            "gimbal.source" => "No joint angles: they follow from this attitude.",
-            "gimbal.rostopic" => "Joint angles (sensor_msgs/msg/JointState), null when there are none.",
+            "gimbal.source" => "No joint angles: they are computed from this attitude.",
+            "gimbal.rostopic" => "Joint angles (sensor_msgs/msg/JointState), null without encoders.",
             "gimbal.encoder_sigma" => "Standard deviation of a joint angle in rad; `dcvins check` measures it.",
-            "gimbal.prior" => "How wrong T_I_B, links and T_E_C may be: bounds in m and rad.",
+            "gimbal.prior" => "Error bounds of T_I_B, links and T_E_C in m and rad.",
             "gimbal.T_I_B" => "Pose of the first joint in the IMU frame; its z is the first axis.",
             "gimbal.links" => {
                 "Joints from the vehicle to the camera: Rz(angle + theta_offset) Tz(d) Tx(a) Rx(alpha), limits in rad."
             }
-            "gimbal.T_E_C" => "Pose of the camera (x right, y down, z forward) behind the last link.",
-            "assumed" => {
-                "What nobody has measured yet. `dcvins check` asks for each; remove an entry once it is known."
-            }
+            "gimbal.T_E_C" => "Pose of the camera (x right, y down, z forward) after the last link.",
+            "assumed" => "Values not measured yet. `dcvins check` reports each; delete an entry once it is measured.",
             _ => return Vec::new(),
         };
         vec![text.to_owned()]
@@ -63,7 +61,7 @@ impl RigTemplate {
 }
 
 const HEADER: &str =
-    "# A rig before calibration. Usual values stand where nothing is known: see `assumed` at the end.\n";
+    "# Rig before calibration, with usual values for what is not measured: see `assumed` at the end.\n";
 
 /// Rounds a matrix row whose numbers differ from integers by rounding only; returns any other line unchanged.
 fn with_whole_numbers(line: &str) -> String {

@@ -66,8 +66,7 @@ impl RigTemplate {
         let imu = imu(choices, log)?;
         let camera = camera(choices, log)?;
         let gimbal = if choices.mechanism.0.is_empty() { None } else { Some(gimbal(choices, imu.axes.value, log)?) };
-        let nothing_known =
-            "nobody has measured where the gimbal is; it is taken to be at the IMU, give or take 3 cm per link";
+        let nothing_known = "gimbal position not measured: assumed at the IMU, ±3 cm per link";
         let position_m = choices.position_m.map_or_else(
             || Sourced::assumed(Vector3::zeros(), nothing_known),
             |position_m| Sourced::assumed(position_m, "position measured by hand"),
@@ -123,8 +122,7 @@ fn one_topic<'a>(
 }
 
 fn imu(choices: &RigChoices, log: Option<&FlightLog>) -> Result<ImuTemplate, TemplateError> {
-    let typical =
-        "usual noise of an autopilot's MEMS IMU in flight, with its random walk; nobody has measured this one";
+    let typical = "usual noise and random walk of an autopilot's MEMS IMU in flight, not measured for this IMU";
     let noise = choices.noise.map_or_else(|| Sourced::assumed(TYPICAL_IMU_NOISE, typical), Sourced::known);
     let Some(log) = log else {
         let topic = choices.imu_topic.clone();
@@ -189,18 +187,18 @@ fn imu_axes(choices: &RigChoices, force: Option<Vector3<f64>>) -> Sourced<BodyAx
     match vertical {
         Some(ratio) if ratio.abs() > VERTICAL_RATIO => {
             let (axes, word) = if ratio > 0.0 { (flu, "up") } else { (frd, "down") };
-            let reason = format!("gravity shows that the IMU's z points {word}; its x is taken to point forward");
+            let reason = format!("gravity shows that the IMU's z points {word}; its x is assumed to point forward");
             Sourced::assumed(axes, reason)
         }
-        Some(_) => Sourced::assumed(flu, "gravity is not along the IMU's z; it is taken for x forward, y left, z up"),
-        None => Sourced::assumed(flu, "the IMU is taken for x forward, y left, z up"),
+        Some(_) => Sourced::assumed(flu, "gravity is not along the IMU's z; assumed axes: x forward, y left, z up"),
+        None => Sourced::assumed(flu, "assumed IMU axes: x forward, y left, z up"),
     }
 }
 
-const NO_LOG: &str = "a usual name; there was no log to take it from";
+const NO_LOG: &str = "usual name, since no log was given";
 
 fn camera(choices: &RigChoices, log: Option<&FlightLog>) -> Result<CameraTemplate, TemplateError> {
-    let timeshift_cam_imu_s = Sourced::assumed(0.0, "the time offset between camera and IMU is taken to be zero");
+    let timeshift_cam_imu_s = Sourced::assumed(0.0, "the time offset between camera and IMU is assumed to be zero");
     let Some(log) = log else {
         let topic = choices.image_topic.clone();
         return Ok(CameraTemplate {
@@ -269,7 +267,7 @@ fn gimbal(choices: &RigChoices, imu_axes: BodyAxes, log: Option<&FlightLog>) -> 
         (Some(positive), _) => Sourced::known(*positive),
         (None, AngleTemplate::Joints { .. }) => Sourced::assumed(
             BodyAxes::Frd,
-            "angles are taken to be positive to the right (yaw, roll) and upwards (pitch)",
+            "angles are assumed to be positive to the right (yaw, roll) and upwards (pitch)",
         ),
         (None, _) => Sourced::known(BodyAxes::Frd),
     };
@@ -302,7 +300,7 @@ fn attitude(
             error => error.to_string(),
         },
     })?;
-    let reason = "frame, axes, order and unit of the attitude are as they were given, and not confirmed";
+    let reason = "frame, axes, order and unit of the attitude are as given, not confirmed";
     Ok(AttitudeTemplate { topic: topic.to_owned(), rate_hz, source: Sourced::assumed(source, reason) })
 }
 

@@ -33,7 +33,7 @@ impl Karma {
         };
         for row in item.rows(&properties.letters, &properties.scales) {
             if self.take_row(key, &row, payload).is_none() {
-                self.recorded.leave(key, "with numbers that cannot be");
+                self.recorded.leave(key, "with invalid numbers");
             }
         }
         true
@@ -74,7 +74,7 @@ impl Karma {
         let offset_ns = i64::midpoint(lower, upper);
         recorded.shift(offset_ns);
         recorded.notes.push(format!(
-            "the drone's clock is aligned with the video by the payloads of its samples, to {:.3} s",
+            "the drone's clock is aligned with the video by the payloads of its samples, within {:.3} s",
             (upper.abs_diff(lower) / 2) as f64 * 1e-9
         ));
         Some(recorded)

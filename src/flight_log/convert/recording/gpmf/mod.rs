@@ -89,7 +89,7 @@ pub(super) fn read(payloads: &[Payload]) -> Telemetry {
     let State { mut camera, karma, gyroscope, accelerometer, damaged_payloads, problem, axes, field_of_view } = state;
     if let Some(problem) = problem {
         camera.notes.push(format!(
-            "{damaged_payloads} of {} payloads of telemetry are damaged, of which what lies before the damage is read: {problem}",
+            "{damaged_payloads} of {} payloads of telemetry are damaged and read up to the damage only: {problem}",
             payloads.len()
         ));
     }

@@ -77,7 +77,7 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     let has = |kind: &[u8; 4]| found.iter().any(|found| &found.kind == kind);
     let Some(moov) = found.iter().find(|found| &found.kind == b"moov") else {
         return Err(unreadable(
-            "the MP4 has no moov box, the table of its pictures: the recording was not closed (power lost, card removed) or \
+            "the MP4 has no moov box, the table of its frames: the recording was not closed (power lost, card removed) or \
              the copy is incomplete; copy it again, let the camera repair it, or rebuild the table with untrunc and an \
              intact recording of the same camera"
                 .to_owned(),
@@ -108,10 +108,10 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     let (track, format, resolution_px) = video_track(&tracks).map_err(unreadable)?;
     let (pictures, has_reordered_pictures) = pictures(track, file.len(), &mut notes);
     if pictures.is_empty() {
-        return Err(unreadable(format!("the video has no picture within the file; {}", notes.join("; "))));
+        return Err(unreadable(format!("the video has no frame within the file; {}", notes.join("; "))));
     }
     if !track.is_upright {
-        notes.push("the video is marked to be shown rotated; its pictures are taken as they are stored".to_owned());
+        notes.push("the video is marked for rotated display; its frames are used as stored".to_owned());
     }
     if track.edits > 1 {
         notes.push(format!("the video has an edit list of {} parts; only its first time is applied", track.edits));
@@ -144,7 +144,7 @@ fn video_track<'a>(tracks: &'a [Track<'a>]) -> Result<(&'a Track<'a>, UnitFormat
         "the MP4 has no video track".to_owned()
     } else {
         format!(
-            "the video is of type {:?}, of which no description is read; expected H.264 (avc1) or H.265 (hvc1, hev1): \
+            "unsupported video type {:?}; expected H.264 (avc1) or H.265 (hvc1, hev1): \
              re-encode it with 'ffmpeg -i IN.mp4 -map 0 -c:v libx264 -bf 0 -c:d copy -copy_unknown OUT.mp4'",
             others.join(", ")
         )
@@ -172,9 +172,7 @@ fn pictures(track: &Track<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (V
     }
     if lost > 0 {
         let all = track.samples.len() as u64 + track.undescribed;
-        notes.push(format!(
-            "{lost} of {all} pictures lie beyond the end of the file (cut off) or are not described: lost"
-        ));
+        notes.push(format!("{lost} of {all} frames are lost: beyond the end of the file (truncated) or not described"));
     }
     let reordered = pictures.windows(2).any(|pair| pair[1].presented_ns < pair[0].presented_ns);
     (pictures, reordered)
@@ -208,7 +206,7 @@ fn telemetry(tracks: &[Track<'_>], file: &LogFile, notes: &mut Vec<String>) -> V
         }
     }
     if lost > 0 {
-        notes.push(format!("{lost} payloads of telemetry lie beyond the end of the file (cut off): lost"));
+        notes.push(format!("{lost} payloads of telemetry are lost: beyond the end of the file (truncated)"));
     }
     payloads
 }

@@ -117,7 +117,7 @@ pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, Convert
     if autopilot != Some(ARDUPILOT)
         && let Some(raw) = recorded.imus.remove(RAW_IMU)
     {
-        let reason = "its units are those of the sensor; only ArduPilot's are known";
+        let reason = "in units of the sensor, which are known for ArduPilot only";
         recorded.leave_many(RAW_IMU, raw.combined.len() as u64, reason);
     }
     recorded.notes.extend(

@@ -73,7 +73,7 @@ fn report(state: &State, damage: &Damage, recorded: &mut Recorded) {
     }));
     if state.dropouts > 0 {
         recorded.notes.push(format!(
-            "the autopilot could not write {} times, {:.3} s together (dropouts)",
+            "dropouts of the autopilot's log: {}, {:.3} s in total",
             state.dropouts,
             state.dropouts_ms as f64 * 1e-3
         ));
@@ -118,7 +118,7 @@ fn take(kind: u8, content: &[u8], state: &mut State, recorded: &mut Recorded) {
             };
             let read = match state.layouts.get(&subscription.name) {
                 Some(layout) => {
-                    measure(&Record { subscription, layout, message }, recorded).ok_or("with numbers that cannot be")
+                    measure(&Record { subscription, layout, message }, recorded).ok_or("with invalid numbers")
                 }
                 None => Err("not read"),
             };
@@ -203,7 +203,7 @@ fn measure(record: &Record<'_>, recorded: &mut Recorded) -> Option<Result<(), &'
         "vehicle_local_position" => {
             let is_valid = |name: &str| record.number(name).is_none_or(|valid| valid != 0.0);
             if !is_valid("xy_valid") || !is_valid("z_valid") {
-                return Some(Err("not valid, as the autopilot says"));
+                return Some(Err("marked as invalid by the autopilot"));
             }
             let position_m = finite([record.number("x")?, record.number("y")?, record.number("z")?])?;
             recorded.positions.push(0, name, time_ns, position_m);
