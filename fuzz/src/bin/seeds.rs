@@ -15,7 +15,7 @@ use dcvins::flight_log::{
 use dcvins::geometry::RigidTransform;
 use dcvins::sensors::Rig;
 use dcvins_fuzz::{EUROC_FILES, RIG, SOURCES, recordings, rig_with_source, topic_of};
-use libfuzzer_sys as _; // it defines what the counters of the build call
+use libfuzzer_sys as _; // defines the functions that the coverage counters call
 use nalgebra::Vector3;
 use ros1::{Compression, Message, bag, f64_sequence, f64s, header, text};
 use rusqlite::Connection;

@@ -74,7 +74,7 @@ fn copy_fields(fields: &[Field], reader: &mut Ros1Reader<'_>, out: &mut CdrWrite
     for field in fields {
         match *field {
             Field::Header => {
-                reader.u32()?; // sequence number, which ROS 2 has not
+                reader.u32()?; // sequence number, absent in ROS 2
                 let seconds = reader.u32()?;
                 let seconds =
                     i32::try_from(seconds).map_err(|_too_late| format!("a stamp of {seconds} s, after 2038"))?;

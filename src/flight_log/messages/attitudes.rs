@@ -43,7 +43,7 @@ fn read_stamped_rotation(
 ) -> Result<(i64, Option<UnitQuaternion<f64>>), CdrError> {
     if kind == MessageKind::Px4VehicleAttitude {
         let stamp_ns = read_px4_stamp(reader)?;
-        reader.read_u64()?; // the stamp of the sample that the estimate was made from
+        reader.read_u64()?; // stamp of the sample used for the estimate
         return Ok((stamp_ns, read_px4_rotation(reader)?));
     }
     let header = read_header(reader)?;

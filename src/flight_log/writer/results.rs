@@ -173,7 +173,7 @@ impl LogWriter {
             out.u32(2 * group.lines_px.len() as u32);
             group.lines_px.iter().flatten().for_each(|point_px| put_point(&mut out, point_px));
             out.f64s(&group.color);
-            out.u32(0); // no colours of their own
+            out.u32(0); // no separate colours
             out.f64s(&TRANSPARENT);
             out.f64s(&[THICKNESS_PX]);
         }
