@@ -1,7 +1,8 @@
-//! One function for each reader of foreign bytes, called by the fuzz target of the same name.
+//! Functions that fuzz the readers of external data, each called by the fuzz target of the same name.
 //!
-//! Each takes the bytes of one input, hands them to the reader as a file or as text, and drops the result: an input is a
-//! finding when the reader panics, aborts, runs for seconds, or takes more memory than the fuzzer allows.
+//! Each takes the bytes of one input, passes them to the reader as a file or as text, and drops the result: an input is
+//! a
+//! finding if the reader panics, aborts, runs for seconds, or takes more memory than the fuzzer allows.
 //! `src/bin/seeds.rs` writes valid inputs to start from.
 
 use std::fs;
@@ -19,10 +20,10 @@ use dcvins::session::breakpoints::Condition;
 use dcvins::session::{RunSpec, SavedSession};
 use tempfile::TempDir;
 
-/// The rig of the logs that the seeds hold: a gimballed and a rigid camera of 16 × 12 pixels.
+/// Rig of the seed logs: a gimballed and a rigid camera of 16 × 12 pixels.
 pub const RIG: &str = include_str!("rig.yaml");
 
-/// Sources of the gimbal's attitude that are read in place of its joint angles, each from the topic of [`topic_of`].
+/// Gimbal attitude sources that replace its joint angles, each from the topic of [`topic_of`].
 pub const SOURCES: [&str; 6] = [
     "{topic: /gimbal/quaternion, type: quaternion, frame: earth, axes: frd, vehicle: /vehicle/attitude}",
     "{topic: /pose, type: pose, frame: body, axes: flu, gimbal_axes: rdf}",
@@ -32,7 +33,7 @@ pub const SOURCES: [&str; 6] = [
     "{topic: /gimbal/status, type: px4, vehicle: /vehicle/attitude}",
 ];
 
-/// The rig of the seeds with an attitude in place of joint angles.
+/// Rig of the seeds with an attitude in place of joint angles.
 pub fn rig_with_source(source: &str) -> String {
     RIG.replace("rostopic: /gimbal/joint_states", &format!("source: {source}"))
 }
@@ -41,13 +42,13 @@ pub fn rig_with_source(source: &str) -> String {
 #[path = "../../tests/it/convert/recorders.rs"]
 mod recorders;
 
-/// The first message of an H.264 stream of 96 × 64 pixels.
+/// First message of an H.264 stream of 96 × 64 pixels.
 const KEYFRAME: &[u8] = include_bytes!("../../tests/data/video/h264.bin").as_slice().split_at(859).0;
 
-/// Images and frames that are read of one input.
+/// Largest number of images and frames that are read per input.
 const MAX_READ: usize = 40;
 
-/// An empty folder that is removed again when the value is dropped.
+/// Empty folder that is removed when the value is dropped.
 fn folder() -> TempDir {
     tempfile::tempdir().expect("a temporary folder can be made")
 }
@@ -60,7 +61,7 @@ fn write(path: &Path, bytes: &[u8]) -> PathBuf {
     path.to_owned()
 }
 
-/// A flight log in MCAP: opened, checked, its frames and images read.
+/// Fuzzes a flight log in MCAP: opens and checks it, reads frames and images.
 pub fn log(bytes: &[u8]) {
     let folder = folder();
     read_log(&write(&folder.path().join("input.mcap"), bytes));
@@ -95,7 +96,9 @@ fn read_log(path: &Path) {
     }
 }
 
-/// A video: the first byte picks H.264 or H.265, then follow its messages (Annex B), each behind its length in two bytes.
+/// Fuzzes a video: the first byte selects H.264 or H.265, followed by its messages (Annex B), each after its length in
+/// two
+/// bytes.
 pub fn video(bytes: &[u8]) {
     let Some((codec, mut rest)) = bytes.split_first() else { return };
     let format = if codec % 2 == 0 { "h264" } else { "h265" };
@@ -114,7 +117,7 @@ pub fn video(bytes: &[u8]) {
     read_log(&path);
 }
 
-/// A message in CDR, wrapped into a log: the first byte picks the type, the rest is the message.
+/// Fuzzes a message in CDR, wrapped into a log: the first byte selects the type, the rest is the message.
 pub fn message(bytes: &[u8]) {
     let Some((kind, message)) = bytes.split_first() else { return };
     let kind = MessageKind::ALL[usize::from(*kind) % MessageKind::ALL.len()];
@@ -130,7 +133,7 @@ pub fn message(bytes: &[u8]) {
     read_log(&path);
 }
 
-/// The topic of the rig of the seeds that carries messages of a kind.
+/// Topic of the seed rig that carries messages of a kind.
 pub fn topic_of(kind: MessageKind) -> &'static str {
     match kind {
         MessageKind::Imu => "/imu",
@@ -151,7 +154,7 @@ pub fn topic_of(kind: MessageKind) -> &'static str {
     }
 }
 
-/// A source of `convert` under a file name that its reader recognizes.
+/// Converts a source under a file name that its reader recognizes.
 fn converted(name: &str, bytes: &[u8]) {
     let folder = folder();
     let source = write(&folder.path().join(name), bytes);
@@ -159,27 +162,24 @@ fn converted(name: &str, bytes: &[u8]) {
     drop(convert(&source, &output, &mut |_| {}));
 }
 
-/// A ROS 1 bag.
 pub fn bag(bytes: &[u8]) {
     converted("input.bag", bytes);
 }
 
-/// A `DataFlash` log of `ArduPilot`.
 pub fn dataflash(bytes: &[u8]) {
     converted("input.bin", bytes);
 }
 
-/// A `ULog` of PX4.
 pub fn ulog(bytes: &[u8]) {
     converted("input.ulg", bytes);
 }
 
-/// A telemetry log of a ground station.
+/// Fuzzes a telemetry log of a ground station.
 pub fn tlog(bytes: &[u8]) {
     converted("input.tlog", bytes);
 }
 
-/// An MP4 video.
+/// Fuzzes an MP4 video.
 pub fn movie(bytes: &[u8]) {
     converted("input.mp4", bytes);
 }
@@ -200,7 +200,7 @@ pub fn recordings() -> Vec<(&'static str, &'static str, Vec<u8>)> {
     ]
 }
 
-/// A payload with what cameras with a satellite receiver and a Karma drone add.
+/// GPMF payload of a camera with a satellite receiver and of a Karma drone.
 fn receiver() -> Vec<u8> {
     use recorders::{item, nested};
     let words = |values: &[i32]| values.iter().flat_map(|value| value.to_be_bytes()).collect::<Vec<u8>>();
@@ -219,7 +219,7 @@ fn receiver() -> Vec<u8> {
     nested(b"DEVC", &[nested(b"STRM", &fix), nested(b"STRM", &attitude)])
 }
 
-/// The second and last payload of the telemetry in an MP4 video.
+/// Fuzzes the second and last telemetry payload of an MP4 video.
 pub fn gpmf(bytes: &[u8]) {
     let video = recorders::video_track(&[KEYFRAME], [96, 64]);
     let mut payloads = recorders::telemetry(1, "ZXY");
@@ -227,12 +227,12 @@ pub fn gpmf(bytes: &[u8]) {
     converted("input.mp4", &recorders::movie(&[video, recorders::telemetry_track(payloads)], true));
 }
 
-/// An SQLite file of a ROS 2 bag.
+/// Fuzzes an SQLite file of a ROS 2 bag.
 pub fn database(bytes: &[u8]) {
     converted("input.db3", bytes);
 }
 
-/// The files of an `EuRoC` folder, in the order of the first byte of an input of [`euroc`], each with a valid content.
+/// Files of an `EuRoC` folder, each with valid content, in the order of the first byte of an input of [`euroc`].
 pub const EUROC_FILES: [(&str, &str); 6] = [
     (
         "imu0/data.csv",
@@ -258,7 +258,7 @@ pub const EUROC_FILES: [(&str, &str); 6] = [
     ("cam0/data/1000.png", "no image"),
 ];
 
-/// An `EuRoC` folder with one file replaced: the first byte picks the file, the rest is its content.
+/// Fuzzes an `EuRoC` folder with one file replaced: the first byte selects the file, the rest is its content.
 pub fn euroc(bytes: &[u8]) {
     let Some((picked, content)) = bytes.split_first() else { return };
     let picked = usize::from(*picked) % EUROC_FILES.len();
@@ -270,14 +270,13 @@ pub fn euroc(bytes: &[u8]) {
     drop(convert(folder.path(), &folder.path().join("output.mcap"), &mut |_| {}));
 }
 
-/// A rig in the program's own format or in Kalibr's; what is written of a rig that was read can be read too.
+/// Fuzzes a rig in the program's format or in Kalibr's; a rig that was read and written must be readable again.
 pub fn rig(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     let Ok(rig) = Rig::from_yaml(text, Path::new("rig.yaml")) else { return };
     Rig::from_yaml(&rig.to_yaml(), Path::new("rig.yaml")).expect("a rig that was written can be read");
 }
 
-/// A saved session.
 pub fn session(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     if let Ok(session) = SavedSession::from_text(text) {
@@ -288,14 +287,14 @@ pub fn session(bytes: &[u8]) {
     }
 }
 
-/// Text of the command line: the condition of a breakpoint, and the specification of a run.
+/// Fuzzes texts of the command line: the condition of a breakpoint, and the specification of a run.
 pub fn condition(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     drop(text.parse::<Condition>());
     drop(text.parse::<RunSpec>());
 }
 
-/// A TUM trajectory that is evaluated against one of five poses.
+/// Fuzzes a TUM trajectory that is evaluated against a reference of five poses.
 pub fn trajectory(bytes: &[u8]) {
     let folder = folder();
     let estimate = write(&folder.path().join("input.tum"), bytes);

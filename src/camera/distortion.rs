@@ -2,19 +2,18 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::{CameraError, RationalLens};
 
-/// Newton steps before an inversion is given up; convergence is quadratic, so that five do in practice.
+/// Newton steps before an inversion fails; convergence is quadratic, in practice five steps suffice.
 const MAXIMUM_STEPS: usize = 30;
-/// A step this small relative to `1 + radius` ends an inversion.
+/// An inversion has converged when a step is below this, relative to `1 + radius`.
 const STEP_TOLERANCE: f64 = 1e-15;
-/// The largest mismatch on the normalized plane that an inversion may leave, relative to `1 + radius`.
+/// Largest remaining error of an inversion on the normalized plane, relative to `1 + radius`.
 const MISMATCH_TOLERANCE: f64 = 1e-11;
 /// Below this radius on the normalized plane the radial models are the identity to double precision.
 const SMALL_RADIUS: f64 = 1e-9;
 
-/// How the lens distorts (Kalibr's `distortion_model` and its coefficients).
+/// Lens distortion: Kalibr's `distortion_model` and its coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Distortion {
-    /// None.
     None,
     /// Radial–tangential `k1 k2 p1 p2`.
     Radtan([f64; 4]),
@@ -52,7 +51,7 @@ impl Distortion {
         }
     }
 
-    /// Where the lens moves a point of the normalized plane, `None` beyond the fold of its polynomial.
+    /// Distorted point of a point of the normalized plane, `None` beyond the fold of the polynomial.
     #[inline]
     pub fn distort(&self, plane: &Vector2<f64>) -> Option<Vector2<f64>> {
         match self {
@@ -105,7 +104,7 @@ impl Distortion {
         }
     }
 
-    /// The point of the normalized plane that the lens moves to `distorted`, `None` when there is none.
+    /// Undistorted point on the normalized plane, `None` if no point is distorted to `distorted`.
     #[inline]
     pub fn undistort(&self, distorted: &Vector2<f64>) -> Option<Vector2<f64>> {
         match self {
@@ -146,7 +145,7 @@ impl Distortion {
         }
     }
 
-    /// The distorted radius and its slope, for the purely radial models.
+    /// Distorted radius and its slope, for the purely radial models.
     fn radial(&self, radius: f64) -> Option<(f64, f64)> {
         match self {
             Self::Equidistant(coefficients) => {
@@ -164,8 +163,8 @@ impl Distortion {
     }
 }
 
-/// Whether a squared radius lies inside the first fold of the radial polynomial `r·(1 + k1·r² + k2·r⁴)`, beyond which
-/// the lens would show the same pixel twice.
+/// True if a squared radius lies inside the first fold of the radial polynomial `r·(1 + k1·r² + k2·r⁴)`, beyond which
+/// two points would project to the same pixel.
 fn radtan_invertible(&[k1, k2, _, _]: &[f64; 4], square: f64) -> bool {
     if k1 >= 0.0 && k2 >= 0.0 {
         return true;
@@ -176,7 +175,7 @@ fn radtan_invertible(&[k1, k2, _, _]: &[f64; 4], square: f64) -> bool {
     if discriminant < 0.0 {
         return true;
     }
-    // 2c / (−b ± √…) is the form that stays exact for a → 0.
+    // 2c / (−b ± √…) stays exact for a → 0.
     let root = discriminant.sqrt();
     let fold = [2.0 / (-b + root), 2.0 / (-b - root)].into_iter().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
     square < fold
@@ -213,7 +212,8 @@ fn check_finite(coefficients: &[f64]) -> Result<(), CameraError> {
     }
 }
 
-/// The point that a lens with this distortion and derivative, at a point and its squared radius, moves to `distorted`.
+/// Returns the point that `distort` maps to `distorted`; `distort` takes a point and its squared radius and returns the
+/// distorted point with its derivative.
 ///
 /// Newton's method from the distorted point, which lies on the near side of the solution for a barrel and on the convex
 /// side for a pincushion, so that it approaches from one side.
@@ -250,14 +250,14 @@ fn equidistant(&[k1, k2, k3, k4]: &[f64; 4], theta: f64) -> (f64, f64) {
     (value, slope)
 }
 
-/// The angle below a right angle whose distorted value is given: Newton's method, kept inside a shrinking bracket.
+/// Angle below a right angle with the given distorted value: Newton's method, kept inside a shrinking bracket.
 fn undistort_angle(coefficients: &[f64; 4], distorted: f64) -> Option<f64> {
     let (mut low, mut high) = (0.0, std::f64::consts::FRAC_PI_2);
     let mut theta = distorted.min(0.9 * high);
     for _ in 0..2 * MAXIMUM_STEPS {
         let (value, slope) = equidistant(coefficients, theta);
         let mismatch = value - distorted;
-        // Beyond the fold the polynomial falls again; the solution that counts lies before it.
+        // Beyond the fold the polynomial falls again; the valid solution lies before it.
         if mismatch > 0.0 || slope <= 0.0 {
             high = theta;
         } else {

@@ -1,11 +1,11 @@
-//! The intrinsics of a camera that a calibration can estimate: their values and the projection's derivatives.
+//! Camera intrinsics that a calibration can estimate: their values and the projection's derivatives.
 
 use nalgebra::{Matrix2x3, Matrix2x6, Vector2, Vector3};
 
 use super::{CameraError, CameraModel, Distortion, RationalLens};
 
 impl CameraModel {
-    /// How many of `[fx, fy, cx, cy, k1, k2]` the model has, counted from the first: 4, 5 (field of view) or 6.
+    /// Number of `[fx, fy, cx, cy, k1, k2]` in the model, counted from the first: 4, 5 (field of view) or 6.
     pub fn intrinsic_count(&self) -> usize {
         4 + self.distortion.leading_coefficients().map_or(0, |(_, count)| count)
     }
@@ -19,7 +19,7 @@ impl CameraModel {
         [fx, fy, cx, cy, k1, k2]
     }
 
-    /// The same camera with these `[fx, fy, cx, cy, k1, k2]`; values that the model does not have are ignored.
+    /// Returns the camera with these `[fx, fy, cx, cy, k1, k2]`; values that the model does not have are ignored.
     ///
     /// # Errors
     /// When a value is not finite or out of its range.
@@ -28,8 +28,9 @@ impl CameraModel {
         Self::new(self.projection, distortion, [fx, fy, cx, cy], self.resolution_px)
     }
 
-    /// The pixel, its derivative by the point (2 × 3, px/m) and by `[fx, fy, cx, cy, k1, k2]` (2 × 6, px per unit of
-    /// each), with zero columns for coefficients that the model does not have.
+    /// Returns the pixel, its derivative with respect to the point (2 × 3, px/m) and to `[fx, fy, cx, cy, k1, k2]` (2 ×
+    /// 6,
+    /// px per unit of each), with zero columns for coefficients that the model does not have.
     pub fn project_with_intrinsics_jacobian(
         &self,
         point_in_camera: &Vector3<f64>,
@@ -49,7 +50,7 @@ impl CameraModel {
 }
 
 impl Distortion {
-    /// The first two coefficients, or the only one, and their number; `None` without distortion.
+    /// First two coefficients (or the only one) and their number; `None` without distortion.
     fn leading_coefficients(&self) -> Option<([f64; 2], usize)> {
         match self {
             Self::None => None,
@@ -76,7 +77,8 @@ impl Distortion {
         }
     }
 
-    /// Derivatives of the distorted point by the first two coefficients, at a point of the normalized plane.
+    /// Derivatives of the distorted point with respect to the first two coefficients, at a point of the normalized
+    /// plane.
     fn by_leading_coefficients(&self, plane: &Vector2<f64>) -> [Vector2<f64>; 2] {
         let square = plane.norm_squared();
         match self {
@@ -86,7 +88,7 @@ impl Distortion {
                 let by_k1 = plane * (square / lens.denominator(square));
                 [by_k1, by_k1 * square]
             }
-            // θ³ / r and θ⁵ / r along the plane's point, which vanish on the axis.
+            // θ³ / r and θ⁵ / r times the plane's point, which vanish on the axis.
             Self::Equidistant(_) => {
                 let radius = square.sqrt();
                 if radius == 0.0 {
@@ -101,11 +103,12 @@ impl Distortion {
     }
 }
 
-/// Derivative of `atan(q) / (w r)` with `q = 2 r tan(w/2)`, the ratio of the distorted radius to the radius `r`, by `w`.
+/// Derivative of `atan(q) / (w r)` with `q = 2 r tan(w/2)`, the ratio of the distorted radius to the radius `r`, with
+/// respect to `w`.
 fn fov_scale_by_angle(w: f64, radius: f64) -> f64 {
     let tangent = (0.5 * w).tan();
     let stretched = 2.0 * tangent * radius;
-    // atan(q) / r, whose limit on the axis is 2 tan(w/2).
+    // atan(q) / r, with the limit 2 tan(w/2) on the axis.
     let angle_per_radius = if radius > 0.0 { stretched.atan() / radius } else { 2.0 * tangent };
     ((1.0 + tangent * tangent) / (1.0 + stretched * stretched) - angle_per_radius / w) / w
 }

@@ -1,13 +1,14 @@
-//! Cameras as Kalibr writes them: names and flat lists of numbers.
+//! Kalibr's notation of cameras: names and flat lists of numbers.
 
 use super::{CameraError, CameraModel, Distortion, Projection, RationalLens};
 
 impl CameraModel {
-    /// A camera from Kalibr's `camera_model`, `intrinsics`, `distortion_model`, `distortion_coeffs` and `resolution`.
+    /// Creates a camera from Kalibr's `camera_model`, `intrinsics`, `distortion_model`, `distortion_coeffs` and
+    /// `resolution`.
     ///
     /// `intrinsics` holds `fx fy cx cy`, preceded by `xi` for omni, `alpha beta` for eucm and `xi alpha` for ds.
     /// `plumb_bob` and `rational_polynomial` are those of ROS and `OpenCV`, with 4 or 5 and with 8 coefficients;
-    /// `radial-tangential`, `equi`, `fisheye` and an empty distortion name are understood too.
+    /// `radial-tangential`, `equi`, `fisheye` and an empty distortion name are accepted too.
     ///
     /// # Errors
     /// When a name is unknown, a list has the wrong length, or a number is out of its range.
@@ -39,7 +40,7 @@ impl CameraModel {
             name => return Err(CameraError::UnknownModel { name: name.to_owned() }),
         };
         let distortion = match distortion_model {
-            // Kalibr's own files leave zeros behind for a camera without distortion.
+            // Kalibr writes zeros for a camera without distortion.
             "none" | "" => match distortion_coeffs.iter().find(|value| **value != 0.0) {
                 None => Distortion::None,
                 Some(&value) => {
@@ -107,7 +108,7 @@ impl CameraModel {
     }
 }
 
-/// A list of exactly `N` numbers.
+/// Checks that a list has exactly `N` numbers.
 fn numbers<const N: usize>(
     field: &'static str,
     model: &'static str,

@@ -1,8 +1,8 @@
 //! Camera models: projection and back-projection with their Jacobians, Kalibr's models and conventions.
 //!
 //! Pixel centres lie at integer coordinates (`OpenCV`, Kalibr). The camera looks along +z, x to the right, y down.
-//! A point becomes a pixel in three steps: the [`Projection`] takes it to the normalized image plane, the
-//! [`Distortion`] moves it there, and focal lengths and principal point make pixels of it.
+//! A point becomes a pixel in three steps: the [`Projection`] maps it to the normalized image plane, the
+//! [`Distortion`] moves it there, and focal lengths and principal point convert it to pixels.
 
 mod distortion;
 mod intrinsics;
@@ -19,12 +19,9 @@ pub use rational::RationalLens;
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 use thiserror::Error;
 
-/// A calibrated camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraModel {
-    /// Projection.
     pub projection: Projection,
-    /// Distortion.
     pub distortion: Distortion,
     /// `fx fy cx cy` in pixels.
     pub intrinsics_px: [f64; 4],
@@ -32,64 +29,48 @@ pub struct CameraModel {
     pub resolution_px: [usize; 2],
 }
 
-/// Why a description of a camera was refused.
+/// Invalid description of a camera.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum CameraError {
-    /// No such projection.
     #[error("unknown camera_model '{name}': expected one of pinhole, omni, eucm, ds")]
-    UnknownModel {
-        /// What was written.
-        name: String,
-    },
-    /// No such distortion.
+    UnknownModel { name: String },
     #[error(
         "unknown distortion_model '{name}': expected one of none, radtan, plumb_bob, rational_polynomial, equidistant, fov"
     )]
-    UnknownDistortion {
-        /// What was written.
-        name: String,
-    },
-    /// A distortion that the projection does not go with.
-    #[error("camera_model '{model}' does not go with distortion_model '{distortion}': it takes {expected}")]
+    UnknownDistortion { name: String },
+    /// Distortion that is not defined for the projection.
+    #[error("camera_model '{model}' does not support distortion_model '{distortion}': expected {expected}")]
     Combination {
-        /// The projection.
         model: &'static str,
-        /// The distortion.
         distortion: &'static str,
-        /// What would go.
+        /// Distortions of this projection.
         expected: &'static str,
     },
-    /// Too few or too many numbers.
     #[error("{field} of '{model}' holds {found} numbers, expected {expected}: {meaning}")]
     Count {
         /// `intrinsics` or `distortion_coeffs`.
         field: &'static str,
-        /// The model they belong to.
         model: &'static str,
-        /// How many there are.
         found: usize,
-        /// How many there should be.
         expected: usize,
-        /// Their order.
+        /// Names of the numbers, in order.
         meaning: &'static str,
     },
-    /// A number out of its range.
+    /// Number out of its range.
     #[error("{field} is {value}, expected {expected}")]
     Value {
-        /// Which number.
         field: &'static str,
-        /// What it is.
         value: f64,
-        /// Its range.
+        /// Valid range.
         expected: &'static str,
     },
 }
 
 impl CameraModel {
-    /// A camera from its parts, each checked.
+    /// Creates a camera from its checked parts.
     ///
     /// # Errors
-    /// When a number is not finite or out of its range, or the distortion does not go with the projection.
+    /// When a number is not finite or out of its range, or the distortion is not defined for the projection.
     pub fn new(
         projection: Projection,
         distortion: Distortion,
@@ -125,7 +106,7 @@ impl CameraModel {
         Ok(Self { projection, distortion, intrinsics_px, resolution_px })
     }
 
-    /// An undistorted pinhole camera.
+    /// Undistorted pinhole camera.
     ///
     /// # Errors
     /// As [`CameraModel::new`].
@@ -133,7 +114,9 @@ impl CameraModel {
         Self::new(Projection::Pinhole, Distortion::None, intrinsics_px, resolution_px)
     }
 
-    /// The pixel of a point in the camera frame, `None` when it cannot be seen (behind, or outside the model's domain).
+    /// Projects a point of the camera frame to a pixel; `None` if the point is not visible (behind the camera, or
+    /// outside
+    /// the model's domain).
     ///
     /// The pixel may lie outside the image; see [`CameraModel::contains`].
     pub fn project(&self, point_in_camera: &Vector3<f64>) -> Option<Vector2<f64>> {
@@ -144,7 +127,7 @@ impl CameraModel {
         (uv_px.x.is_finite() && uv_px.y.is_finite()).then_some(uv_px)
     }
 
-    /// The pixel and its derivative by the point (2 × 3, px/m).
+    /// Returns the pixel and its derivative with respect to the point (2 × 3, px/m).
     pub fn project_with_jacobian(&self, point_in_camera: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
         let (undistorted, by_point) = self.projection.project_with_jacobian(point_in_camera)?;
         let [fx, fy, cx, cy] = self.intrinsics_px;
@@ -162,7 +145,7 @@ impl CameraModel {
         (uv_px.x.is_finite() && uv_px.y.is_finite()).then_some((uv_px, jacobian))
     }
 
-    /// The unit bearing of a pixel, `None` outside the model's domain.
+    /// Unit bearing of a pixel, `None` outside the model's domain.
     pub fn unproject(&self, uv_px: &Vector2<f64>) -> Option<Vector3<f64>> {
         let [fx, fy, cx, cy] = self.intrinsics_px;
         let distorted = Vector2::new((uv_px.x - cx) / fx, (uv_px.y - cy) / fy);
@@ -170,7 +153,7 @@ impl CameraModel {
         self.projection.unproject(&undistorted)
     }
 
-    /// Whether a pixel lies on the image, at least `border_px` inside the outermost pixel centres.
+    /// True if a pixel lies on the image, at least `border_px` inside the outermost pixel centres.
     pub fn contains(&self, uv_px: &Vector2<f64>, border_px: f64) -> bool {
         let [width, height] = self.resolution_px;
         uv_px.x >= border_px

@@ -2,7 +2,7 @@ use nalgebra::{Matrix2x3, Vector2, Vector3};
 
 use super::CameraError;
 
-/// How a bearing becomes an image point before the lens distorts it (Kalibr's `camera_model`).
+/// Map from bearings to the normalized image plane, before distortion (Kalibr's `camera_model`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
     /// Pinhole, `(x/z, y/z)`.
@@ -55,7 +55,7 @@ impl Projection {
         }
     }
 
-    /// The divisor of x and y for a point, `None` when the model cannot see it.
+    /// Divisor of x and y for a point, `None` outside the model's domain.
     fn divisor(&self, x: f64, y: f64, z: f64) -> Option<f64> {
         let radial = x * x + y * y;
         match *self {
@@ -80,14 +80,14 @@ impl Projection {
         .filter(|divisor| *divisor > 0.0)
     }
 
-    /// The point on the normalized image plane.
+    /// Point on the normalized image plane, `None` outside the model's domain.
     #[inline]
     pub fn project(&self, point: &Vector3<f64>) -> Option<Vector2<f64>> {
         let divisor = self.divisor(point.x, point.y, point.z)?;
         Some(Vector2::new(point.x / divisor, point.y / divisor))
     }
 
-    /// The point on the normalized image plane and its derivative by the point (2 × 3, 1/m).
+    /// Point on the normalized image plane and its derivative with respect to the point (2 × 3, 1/m).
     #[inline]
     pub fn project_with_jacobian(&self, point: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
         let (x, y, z) = (point.x, point.y, point.z);
@@ -125,7 +125,7 @@ impl Projection {
         Some((Vector2::new(u, v), jacobian))
     }
 
-    /// The unit bearing of a point of the normalized image plane, `None` where no bearing leads.
+    /// Unit bearing of a point of the normalized image plane, `None` if no bearing projects there.
     #[inline]
     pub fn unproject(&self, plane: &Vector2<f64>) -> Option<Vector3<f64>> {
         let square = plane.norm_squared();
@@ -165,7 +165,7 @@ impl Projection {
     }
 }
 
-/// How far behind the image plane a blended model sees: points with `z > -limit · distance`.
+/// Limit of a blended model's domain behind the image plane: points with `z > -limit · distance` project.
 fn blend_limit(alpha: f64) -> f64 {
     if alpha <= 0.5 { alpha / (1.0 - alpha) } else { (1.0 - alpha) / alpha }
 }

@@ -1,24 +1,26 @@
 use nalgebra::{Matrix2, Vector2};
 
-/// Largest squared radius on the normalized plane at which the turning point of a lens is looked for (89.4° off the axis).
+/// Largest squared radius on the normalized plane at which the turning point of a lens is searched (89.4° off the
+/// axis).
 const LARGEST_SQUARE: f64 = 1e4;
-/// Bisection steps of a root: more than a double has digits.
+/// Bisection steps per root: more than the digits of a double.
 const BISECTIONS: usize = 100;
 
-/// Radial–tangential lens whose radial part is a quotient of polynomials (`OpenCV`, `rational_polynomial` in ROS):
+/// Radial–tangential lens with a quotient of polynomials as radial part (`OpenCV`, `rational_polynomial` in ROS):
 ///
 /// `x_d = x·(1 + k1·s + k2·s² + k3·s³) / (1 + k4·s + k5·s² + k6·s³) + 2·p1·x·y + p2·(s + 2·x²)`, `s = x² + y²`, and the
-/// same for `y` with `p1` and `p2` exchanged. With `k4 = k5 = k6 = 0` it is `plumb_bob` with a third radial coefficient.
+/// same for `y` with `p1` and `p2` exchanged. With `k4 = k5 = k6 = 0` it is `plumb_bob` with a third radial
+/// coefficient.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RationalLens {
     /// `k1 k2 p1 p2 k3 k4 k5 k6`, the order of `OpenCV`.
     coefficients: [f64; 8],
-    /// The squared radius at which the distorted radius stops growing, or the denominator is zero.
+    /// Squared radius at which the distorted radius stops growing, or the denominator is zero.
     turning_square: f64,
 }
 
 impl RationalLens {
-    /// A lens from `k1 k2 p1 p2 k3 k4 k5 k6`, the order of `OpenCV`.
+    /// Creates a lens from `k1 k2 p1 p2 k3 k4 k5 k6`, the order of `OpenCV`.
     pub fn new(coefficients: [f64; 8]) -> Self {
         let [k1, k2, _, _, k3, k4, k5, k6] = coefficients;
         let (numerator, denominator) = ([1.0, k1, k2, k3], [1.0, k4, k5, k6]);
@@ -39,12 +41,12 @@ impl RationalLens {
         &self.coefficients
     }
 
-    /// Whether the radial part is a polynomial: `k4`, `k5` and `k6` are zero.
+    /// True if the radial part is a polynomial: `k4`, `k5` and `k6` are zero.
     pub fn is_polynomial(&self) -> bool {
         self.coefficients[5..].iter().all(|value| *value == 0.0)
     }
 
-    /// Whether a squared radius lies before the turning point, beyond which the lens would show a pixel twice.
+    /// True if a squared radius lies before the turning point, beyond which two points would project to the same pixel.
     pub(super) fn is_invertible(&self, square: f64) -> bool {
         square < self.turning_square
     }
@@ -55,7 +57,7 @@ impl RationalLens {
         1.0 + square * (k4 + square * (k5 + square * k6))
     }
 
-    /// The distorted point of a point with squared radius `square`, and its derivative (2 × 2).
+    /// Distorted point of a point with squared radius `square`, and its derivative (2 × 2).
     pub(super) fn distort(&self, plane: &Vector2<f64>, square: f64) -> (Vector2<f64>, Matrix2<f64>) {
         let [k1, k2, p1, p2, k3, k4, k5, k6] = self.coefficients;
         let (x, y, s) = (plane.x, plane.y, square);
@@ -80,7 +82,7 @@ impl RationalLens {
     }
 }
 
-/// The smallest positive root of a polynomial up to [`LARGEST_SQUARE`], coefficients in ascending order.
+/// Smallest positive root of a polynomial up to [`LARGEST_SQUARE`], coefficients in ascending order.
 fn smallest_positive_root(coefficients: &[f64]) -> Option<f64> {
     positive_roots(coefficients).first().copied()
 }

@@ -216,13 +216,13 @@ fn invisible_points_do_not_project() {
         }
         assert_eq!(camera.unproject(&Vector2::new(f64::NAN, 1.0)), None, "{camera:?}");
     }
-    // A barrel polynomial folds: beyond its turning point a direction must not show up inside the image again.
+    // A barrel polynomial folds: a direction beyond its turning point must not project into the image again.
     let barrel = Distortion::Radtan([-0.3, 0.02, 1e-4, -2e-4]);
     let barrel = CameraModel::new(Projection::Pinhole, barrel, INTRINSICS_PX, RESOLUTION_PX).unwrap();
     assert!(barrel.project(&bearing(0.8, 0.2)).is_some());
     assert_eq!(barrel.project(&bearing(1.35, 0.2)), None);
     assert_eq!(barrel.unproject(&Vector2::new(2000.0, 300.0)), None);
-    // The equidistant lens ends at a right angle, the wide models go on behind it.
+    // The equidistant model ends at a right angle; the wide-angle models continue behind it.
     assert_eq!(cameras()[5].unproject(&Vector2::new(322.4 + 352.6 * 1.7, 238.1)), None);
     let behind = bearing(1.7, 0.4);
     let wide = &cameras()[11];
@@ -302,7 +302,7 @@ fn invalid_descriptions_name_the_faulty_field() {
         "equi",
         &[0.0; 4],
         RESOLUTION_PX,
-        "camera_model 'ds' does not go with distortion_model 'equidistant': it takes none",
+        "camera_model 'ds' does not support distortion_model 'equidistant': expected none",
     );
     check(
         "eucm",

@@ -1,15 +1,14 @@
-//! The Common Data Representation (OMG, XCDR1 plain) that ROS 2 writes: aligned little- or big-endian fields after a
+//! Common Data Representation (OMG, XCDR1 plain) of ROS 2: aligned little- or big-endian fields after a
 //! 4-byte encapsulation header.
 
 use thiserror::Error;
 
 use super::file::ZSTD_MAGIC;
 
-/// The reason why a message could not be decoded.
+/// Reason why a message could not be decoded.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{what} at byte {offset} of the message")]
 pub(crate) struct CdrError {
-    /// The problem.
     pub(crate) what: String,
     /// Byte offset from the start of the message.
     pub(crate) offset: usize,
@@ -48,8 +47,7 @@ impl<'a> CdrReader<'a> {
             [0, 0, _, _, ..] => true,
             [0, 1, _, _, ..] => false,
             _ if message.starts_with(&ZSTD_MAGIC) => {
-                let what =
-                    "a message that is compressed on its own (zstd): convert the log with `dcvins convert`".into();
+                let what = "a separately compressed message (zstd): convert the log with `dcvins convert`".into();
                 return Err(CdrError { what, offset: 0 });
             }
             [first, second, _, _, ..] => {
@@ -88,7 +86,6 @@ impl<'a> CdrReader<'a> {
     read_number!(read_f64, f64);
     read_number!(read_u64, u64);
 
-    /// A fixed number of doubles.
     pub(crate) fn read_f64s<const N: usize>(&mut self) -> Result<[f64; N], CdrError> {
         let mut values = [0.0; N];
         for value in &mut values {
@@ -97,7 +94,6 @@ impl<'a> CdrReader<'a> {
         Ok(values)
     }
 
-    /// A fixed number of 32-bit numbers.
     pub(crate) fn read_f32s<const N: usize>(&mut self) -> Result<[f32; N], CdrError> {
         let mut values = [0.0; N];
         for value in &mut values {
@@ -106,7 +102,7 @@ impl<'a> CdrReader<'a> {
         Ok(values)
     }
 
-    /// The length of a sequence; an error when the rest of the message is shorter.
+    /// Reads the length of a sequence; an error if the rest of the message is shorter.
     fn read_length(&mut self, element_size: usize, what: &str) -> Result<usize, CdrError> {
         let offset = self.position;
         let count = self.read_u32()? as usize;
@@ -117,7 +113,7 @@ impl<'a> CdrReader<'a> {
         Ok(count)
     }
 
-    /// A string without its terminating zero.
+    /// Reads a string without its terminating zero.
     pub(crate) fn read_string(&mut self) -> Result<&'a str, CdrError> {
         let count = self.read_length(1, "string")?;
         let offset = self.position;
@@ -126,19 +122,17 @@ impl<'a> CdrReader<'a> {
         std::str::from_utf8(text).map_err(|error| CdrError { what: format!("string is not UTF-8 ({error})"), offset })
     }
 
-    /// A sequence of bytes, borrowed.
+    /// Reads a sequence of bytes, borrowed.
     pub(crate) fn read_bytes(&mut self) -> Result<&'a [u8], CdrError> {
         let count = self.read_length(1, "byte sequence")?;
         self.take(count, "byte sequence")
     }
 
-    /// A sequence of strings.
     pub(crate) fn read_strings(&mut self) -> Result<Vec<&'a str>, CdrError> {
         let count = self.read_length(4, "string sequence")?;
         (0..count).map(|_| self.read_string()).collect()
     }
 
-    /// A sequence of doubles.
     pub(crate) fn read_f64_sequence(&mut self) -> Result<Vec<f64>, CdrError> {
         let count = self.read_length(8, "number sequence")?;
         (0..count).map(|_| self.read_f64()).collect()
@@ -152,7 +146,7 @@ pub(crate) struct CdrWriter {
 }
 
 impl CdrWriter {
-    /// Starts with the encapsulation header.
+    /// Starts a message with the encapsulation header.
     pub(crate) fn new() -> Self {
         Self { message: vec![0, 1, 0, 0] }
     }
@@ -222,7 +216,6 @@ impl CdrWriter {
         self.f64s(values);
     }
 
-    /// The finished message.
     pub(crate) fn finish(self) -> Vec<u8> {
         self.message
     }

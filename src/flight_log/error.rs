@@ -6,73 +6,55 @@ use super::LimitExceeded;
 use super::text::printable;
 use crate::sensors::UnknownCamera;
 
-/// Why a log or a rig could not be read or written; every message names the problem, its place and the remedy, the path
+/// Failure to read or write a log or a rig; every message names the problem, its location and the remedy, the path
 /// last.
 #[derive(Debug, Error)]
 pub enum LogError {
-    /// An error of the operating system.
     #[error("cannot {action}: {source}: {}", path.display())]
     Io {
-        /// The attempted operation: `open the log`, `write the log`, ….
+        /// Attempted operation: `open the log`, `write the log`, ….
         action: &'static str,
-        /// The error of the system.
         source: std::io::Error,
-        /// The file.
         path: PathBuf,
     },
-    /// The file is no MCAP log.
     #[error("not an MCAP log: {found}; {remedy}: {}", path.display())]
     NotALog {
         /// Description of the file.
         found: String,
-        /// The remedy.
         remedy: &'static str,
-        /// The file.
         path: PathBuf,
     },
-    /// The file holds or claims more than a limit allows.
+    /// The file contains or declares more than a limit allows.
     #[error("{exceeded}: {}", path.display())]
-    Limit {
-        /// The limit, the number found and the way to raise the limit.
-        exceeded: LimitExceeded,
-        /// The file.
-        path: PathBuf,
-    },
+    Limit { exceeded: LimitExceeded, path: PathBuf },
     /// Another process shortened the file while it was read.
-    #[error("{problem}; what was read before is incomplete: {}", path.display())]
+    #[error("{problem}; data read before are incomplete: {}", path.display())]
     Shortened {
-        /// Where the file ends now, and its length when it was opened.
+        /// Present end of the file, and its length when it was opened.
         problem: String,
-        /// The log.
         path: PathBuf,
     },
-    /// An MCAP file in which no message of use could be read.
+    /// No usable message of an MCAP file could be read.
     #[error("nothing in the log can be used: {problem}: {}", path.display())]
     NothingReadable {
-        /// The problem, with its byte offset where there is one.
+        /// Problem with its byte offset, if there is one.
         problem: String,
-        /// The log.
         path: PathBuf,
     },
-    /// A trajectory cannot be used.
     #[error("cannot use the trajectory: {problem}: {}", path.display())]
     Trajectory {
-        /// What is wrong with it.
         problem: String,
-        /// The file, or the log.
+        /// Trajectory file or log.
         path: PathBuf,
     },
-    /// A line of a trajectory is no pose.
     #[error("line {line} {problem}; expected 't x y z qx qy qz qw': {}", path.display())]
     TrajectoryLine {
-        /// Line number, from 1.
+        /// Counted from 1.
         line: usize,
-        /// The problem.
         problem: String,
-        /// The file.
         path: PathBuf,
     },
-    /// The rig names a topic that is not in the log.
+    /// The log lacks a topic of the rig.
     #[error(
         "{field} names the topic '{topic}', which is not in the log; its topics of type {expected} are {}; name one of them in \
          the rig: {}",
@@ -80,18 +62,16 @@ pub enum LogError {
         path.display()
     )]
     MissingTopic {
-        /// Field of the rig, `cam0.rostopic`.
+        /// Field of the rig, such as `cam0.rostopic`.
         field: String,
-        /// The topic that it names.
+        /// Topic in that field.
         topic: String,
-        /// The message types that are accepted.
+        /// Accepted message types.
         expected: String,
         /// Topics of those types in the log.
         available: Vec<String>,
-        /// The log.
         path: PathBuf,
     },
-    /// The rig has no such camera.
     #[error(transparent)]
     UnknownCamera(#[from] UnknownCamera),
     /// A joint of the rig does not occur in the joint messages.
@@ -101,15 +81,12 @@ pub enum LogError {
         path.display()
     )]
     UnknownJoint {
-        /// Number of the link.
         link: usize,
         /// Name of the joint in the rig.
         joint: String,
-        /// Topic of the joint angles.
         topic: String,
         /// Names of the joints in the messages.
         available: Vec<String>,
-        /// The log.
         path: PathBuf,
     },
     /// The frames of a gimbal's attitude are not connected in the log.
@@ -117,90 +94,68 @@ pub enum LogError {
         "gimbal.source: parent and child are not connected by '{topic}' and '/tf_static': {problem}: {}",
         path.display()
     )]
-    NoTransform {
-        /// Topic of the transforms.
-        topic: String,
-        /// What is missing.
-        problem: String,
-        /// The log.
-        path: PathBuf,
-    },
-    /// The times of a topic have no known relation to those of the log.
+    NoTransform { topic: String, problem: String, path: PathBuf },
+    /// The clock of a topic has no known relation to that of the log.
     #[error(
-        "'{topic}': the first stamp is {stamp_s:.3} s since an unknown start (PX4 counts from its own), the first time of recording          {log_s:.3} s after the first stamp of the log; neither lies within the log, so that the two clocks cannot be related; record with          synchronized clocks (UXRCE_DDS_SYNCT 1): {}",
+        "'{topic}': the first stamp is {stamp_s:.3} s since an unknown start (PX4 counts from its start), the \
+         first log time is {log_s:.3} s after the first stamp of the log; neither lies within the log, so the two \
+         clocks cannot be related; record with synchronized clocks (UXRCE_DDS_SYNCT 1): {}",
         path.display()
     )]
     UnknownClock {
-        /// The topic.
         topic: String,
-        /// Its first stamp in seconds.
+        /// First stamp of the topic in seconds.
         stamp_s: f64,
-        /// Its first log time since the log began in seconds.
+        /// First log time of the topic since the start of the log, in seconds.
         log_s: f64,
-        /// The log.
         path: PathBuf,
     },
-    /// A field of a rig is missing or wrong.
     #[error("{field}: {problem}: {}", path.display())]
     Rig {
-        /// Path of the field, `cam0.intrinsics`.
+        /// Path of the field, such as `cam0.intrinsics`.
         field: String,
-        /// Its value and the expected one.
+        /// Value of the field and the expected one.
         problem: String,
-        /// The rig.
         path: PathBuf,
     },
-    /// A rig that is no YAML.
+    /// The rig is not valid YAML.
     #[error("the rig is not valid YAML: {problem}: {}", path.display())]
     RigSyntax {
         /// The parser's error with line and column.
         problem: String,
-        /// The rig.
         path: PathBuf,
     },
-    /// There is no rig.
     #[error("no rig for the log: neither {} nor an attachment named *.rig.yaml exists; give one with --rig FILE: {}",
         beside.display(), path.display())]
     NoRig {
-        /// The expected path of the rig file.
+        /// Expected path of the rig file.
         beside: PathBuf,
-        /// The log.
+        /// Path of the log.
         path: PathBuf,
     },
-    /// One message could not be decoded.
     #[error("message at {second:.3} s on '{topic}' (block at byte {byte}): {problem}: {}", path.display())]
     BadMessage {
-        /// Its topic.
         topic: String,
-        /// Log time in seconds since the log began.
+        /// Log time in seconds since the start of the log.
         second: f64,
         /// Byte offset of the message's chunk in the file.
         byte: usize,
-        /// What is wrong.
         problem: String,
-        /// The log.
         path: PathBuf,
     },
-    /// The requested image is not in the log.
     #[error("'{topic}' has {count} images, none with number {index}: {}", path.display())]
     NoSuchImage {
         /// Topic of the camera.
         topic: String,
-        /// The requested number.
+        /// Requested number.
         index: usize,
-        /// Number of its images.
+        /// Number of images on the topic.
         count: usize,
-        /// The log.
         path: PathBuf,
     },
     /// The MCAP writer or the image encoder failed.
     #[error("cannot write the log: {problem}: {}", path.display())]
-    Write {
-        /// The problem.
-        problem: String,
-        /// The log.
-        path: PathBuf,
-    },
+    Write { problem: String, path: PathBuf },
 }
 
 /// `'a', 'b'`, or `none`.

@@ -6,24 +6,24 @@ use std::path::{Path, PathBuf};
 use super::LogError;
 use super::limits::{LimitExceeded, LimitKind, LogLimits};
 
-/// First bytes of every file and message under Zstandard.
+/// First bytes of Zstandard data.
 pub(crate) const ZSTD_MAGIC: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
 /// Bytes that a [`FileWindow`] reads ahead.
 const WINDOW_BYTES: usize = 16 << 10;
-/// Bytes that are unpacked at a time.
+/// Bytes that are decompressed at a time.
 const UNPACK_BYTES: usize = 1 << 20;
 
-/// The bytes of a log, read from the file when they are needed: a file that another process shortens gives an error.
+/// Bytes of a log, read from the file on demand: a file that another process shortens gives an error.
 #[derive(Debug)]
 pub(crate) struct LogFile {
     file: File,
-    /// Length when it was opened.
+    /// In bytes, when the file was opened.
     length: usize,
     limits: LogLimits,
 }
 
 impl LogFile {
-    /// Opens a regular file; one under Zstandard is unpacked into a temporary file.
+    /// Opens a regular file; a Zstandard file is decompressed into a temporary file.
     pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Self, LogError> {
         let failed = |source| LogError::Io { action: "open the log", source, path: path.to_owned() };
         let metadata = std::fs::metadata(path).map_err(failed)?;
@@ -53,17 +53,17 @@ impl LogFile {
         Ok(Self { file, length, limits: limits.clone() })
     }
 
-    /// Length in bytes when it was opened.
+    /// Length in bytes when the file was opened.
     pub(crate) fn len(&self) -> usize {
         self.length
     }
 
-    /// Limits on what is read from it.
+    /// Limits that apply to reading the file.
     pub(crate) fn limits(&self) -> &LogLimits {
         &self.limits
     }
 
-    /// The bytes at a range, which may not be longer than a record; the error says what is wrong.
+    /// Reads a range of bytes, at most the size of a record; the error is a description of the problem.
     pub(crate) fn read(&self, range: Range<usize>) -> Result<Vec<u8>, String> {
         let length = range.end.saturating_sub(range.start);
         if range.end > self.length {
@@ -77,7 +77,7 @@ impl LogFile {
         Ok(bytes)
     }
 
-    /// Fills a buffer with the bytes from a position on.
+    /// Fills a buffer with the bytes from `start` on.
     fn read_into(&self, start: usize, buffer: &mut [u8]) -> Result<(), String> {
         let mut done = 0;
         while done < buffer.len() {
@@ -101,7 +101,7 @@ impl LogFile {
         )
     }
 
-    /// An error when the file is shorter than when it was opened.
+    /// Returns an error if the file is shorter than when it was opened.
     pub(crate) fn require_unshortened(&self, path: &Path) -> Result<(), LogError> {
         let failed = |source| LogError::Io { action: "read the log", source, path: path.to_owned() };
         let now = self.file.metadata().map_err(failed)?.len();
@@ -123,7 +123,7 @@ fn read_at(file: &File, buffer: &mut [u8], start: u64) -> io::Result<usize> {
     std::os::windows::fs::FileExt::seek_read(file, buffer, start)
 }
 
-/// What a path names that is neither a file nor a folder.
+/// Description of a path that is neither a file nor a folder.
 pub(super) fn kind_of(metadata: &std::fs::Metadata) -> &'static str {
     #[cfg(unix)]
     {
@@ -139,7 +139,7 @@ pub(super) fn kind_of(metadata: &std::fs::Metadata) -> &'static str {
     if metadata.is_dir() { "a folder" } else { "a device" }
 }
 
-/// Unpacks a file under Zstandard into a temporary one, which vanishes when it is closed.
+/// Decompresses a Zstandard file into a temporary one, which is removed when it is closed.
 fn unpack(packed: File, packed_bytes: u64, path: &Path, limits: &LogLimits) -> Result<File, LogError> {
     let failed = |source| LogError::Io { action: "unpack the log", source, path: path.to_owned() };
     let mut decoder = zstd::Decoder::new(BufReader::new(packed)).map_err(failed)?;
@@ -156,7 +156,7 @@ fn unpack(packed: File, packed_bytes: u64, path: &Path, limits: &LogLimits) -> R
             Ok(0) => break,
             Ok(count) => count,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-            // What was unpacked before the damage is a truncated log.
+            // The data before the damage form a truncated log.
             Err(_) if found > 0 => break,
             Err(error) => return Err(failed(error)),
         };
@@ -179,13 +179,13 @@ fn unpack(packed: File, packed_bytes: u64, path: &Path, limits: &LogLimits) -> R
     Ok(plain)
 }
 
-/// The path without the ending of a compressed file: `a.mcap` for `a.mcap.zstd`.
+/// Path without the extension of a compressed file: `a.mcap` for `a.mcap.zstd`.
 pub(crate) fn unpacked_name(path: &Path) -> PathBuf {
     let packed = path.extension().is_some_and(|extension| extension == "zstd" || extension == "zst");
     if packed { path.with_extension("") } else { path.to_owned() }
 }
 
-/// Small reads from front to back: records are walked without a call of the system for each.
+/// Buffered sequential reader, so that small records do not need a system call each.
 pub(crate) struct FileWindow<'a> {
     file: &'a LogFile,
     start: usize,
@@ -197,7 +197,7 @@ impl<'a> FileWindow<'a> {
         Self { file, start: 0, bytes: Vec::new() }
     }
 
-    /// The bytes at a range that lies in the file.
+    /// Reads a range of bytes that lies in the file.
     pub(crate) fn read(&mut self, range: Range<usize>) -> Result<&[u8], String> {
         let held = self.start..self.start + self.bytes.len();
         if range.start < held.start || range.end > held.end {

@@ -5,7 +5,7 @@ const SEMI_MAJOR_AXIS_M: f64 = 6_378_137.0;
 /// Flattening of the ellipsoid, WGS 84.
 const FLATTENING: f64 = 1.0 / 298.257_223_563;
 
-/// A place on the earth, WGS 84.
+/// Position on the earth, WGS 84.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::flight_log) struct Geodetic {
     pub(in crate::flight_log) latitude_rad: f64,
@@ -14,7 +14,7 @@ pub(in crate::flight_log) struct Geodetic {
 }
 
 impl Geodetic {
-    /// From degrees and metres; `None` beyond a sphere's range, and at 0° 0°, which receivers give without a fix.
+    /// Converts degrees and metres; `None` out of range, and at 0° 0°, which receivers output without a fix.
     pub(in crate::flight_log) fn from_deg(latitude_deg: f64, longitude_deg: f64, altitude_m: f64) -> Option<Self> {
         let valid = latitude_deg.abs() <= 90.0
             && longitude_deg.abs() <= 180.0
@@ -27,7 +27,7 @@ impl Geodetic {
         })
     }
 
-    /// Earth-centred, earth-fixed, in metres.
+    /// Earth-centred, earth-fixed position, in metres.
     fn in_earth_m(self) -> Vector3<f64> {
         let (sin_latitude, cos_latitude) = self.latitude_rad.sin_cos();
         let (sin_longitude, cos_longitude) = self.longitude_rad.sin_cos();
@@ -38,7 +38,7 @@ impl Geodetic {
         Vector3::new(radius_m * cos_longitude, radius_m * sin_longitude, z_m)
     }
 
-    /// In the tangent plane at an origin: east, north, up, in metres.
+    /// Position in the tangent plane at an origin: east, north, up, in metres.
     pub(in crate::flight_log) fn east_north_up_m(self, origin: Self) -> Vector3<f64> {
         let (sin_latitude, cos_latitude) = origin.latitude_rad.sin_cos();
         let (sin_longitude, cos_longitude) = origin.longitude_rad.sin_cos();

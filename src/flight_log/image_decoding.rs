@@ -1,4 +1,4 @@
-//! Decoding of images to grey levels.
+//! Decoding of images to gray values.
 
 use std::io::Cursor;
 
@@ -11,18 +11,18 @@ use super::raw_encoding::{RawEncoding, luma};
 use super::video::VideoDecoder;
 use crate::sensors::GrayImage;
 
-/// Larger images are refused: no camera has them, so the header is damaged.
+/// Larger images are rejected: no camera has them, so the header is damaged.
 const LARGEST_SIDE_PX: usize = 65_535;
-/// Bytes that the decoders may take for a pixel: 16 bits of red, green, blue and opacity.
+/// Memory limit of the decoders per pixel: 16 bits of red, green, blue and alpha.
 const DECODER_BYTES_PER_PIXEL: u64 = 8;
-/// The first bytes of every PNG.
+/// First bytes of a PNG file.
 const PNG: [u8; 4] = [0x89, b'P', b'N', b'G'];
 
-/// Number of bits that a camera uses of a 16-bit grey level: its sensor has 8, 10, 12, 14 or 16.
+/// Number of bits that a camera uses of a 16-bit gray value: its sensor has 8, 10, 12, 14 or 16.
 ///
-/// A 12-bit sensor leaves the upper four at zero, and the upper eight of its 16 bits have 16 grey levels only. So the
-/// eight bits below the highest one in use are taken, determined by the brightest pixel of the topic's first image: the
-/// same for all images of a log, wherever reading starts. Brighter pixels of later images saturate.
+/// A 12-bit sensor leaves the upper four bits at zero, so that the upper eight bits have 16 values only. Therefore the
+/// eight bits below the highest used bit are taken. The brightest pixel of the topic's first image determines that bit:
+/// the same for all images of a log, wherever reading starts. Brighter pixels of later images saturate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct BitDepth(u32);
 
@@ -33,13 +33,13 @@ impl Default for BitDepth {
 }
 
 impl BitDepth {
-    /// From the first image of a topic that can be decoded; 16 without one.
+    /// Bit depth of the first image of a topic that can be decoded; 16 without one.
     pub(crate) fn of_topic(log: &FlightLog, topic: &str, kind: MessageKind) -> Self {
         let limits = log.file().limits();
         log.find_message(topic, |message| Self::of(kind, message, limits)).unwrap_or_default()
     }
 
-    /// From one image message; `None` when it cannot be decoded or is black. Images of 8 bits have the default.
+    /// Bit depth of one image message; `None` if it cannot be decoded or is black. Images of 8 bits have the default.
     pub(crate) fn of(kind: MessageKind, message: &[u8], limits: &LogLimits) -> Option<Self> {
         if kind.is_video() {
             return Some(Self::default());
@@ -63,7 +63,7 @@ impl BitDepth {
         Self::of_brightest(brightest)
     }
 
-    /// From the brightest pixel of an image; `None` when it is black.
+    /// Bit depth for the brightest pixel of an image; `None` if it is black.
     pub(super) fn of_brightest(brightest: u16) -> Option<Self> {
         let used = u16::BITS - brightest.leading_zeros();
         (used > 0).then(|| Self(used.next_multiple_of(2).max(8)))
@@ -74,18 +74,18 @@ impl BitDepth {
         self.0
     }
 
-    /// A 16-bit grey level as one of 8 bits.
+    /// Converts a 16-bit gray value to 8 bits.
     pub(super) fn narrowed(self, value: u16) -> u8 {
         u8::try_from(value >> (self.0 - 8)).unwrap_or(u8::MAX)
     }
 }
 
-/// Why an image message gives no image.
+/// Reason why an image message cannot be decoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum ImageProblem {
-    /// It has another resolution than the expected one; it was not decoded.
+    /// The resolution differs from the expected one; the image was not decoded.
     OtherResolution([usize; 2]),
-    /// What is wrong with it.
+    /// Description of the problem.
     Unreadable(String),
 }
 
@@ -103,7 +103,8 @@ pub(super) fn unreadable(problem: impl ToString) -> ImageProblem {
     ImageProblem::Unreadable(problem.to_string())
 }
 
-/// Decodes a raw or compressed image message, or a keyframe of a video, into 8-bit grey levels, when it has the expected resolution, if there is one.
+/// Decodes a raw or compressed image message, or a keyframe of a video, into 8-bit gray values. If a resolution is
+/// expected, other resolutions are an error.
 ///
 /// The resolution is read before anything is allocated.
 pub(crate) fn decode_image(
@@ -124,7 +125,7 @@ pub(crate) fn decode_image(
     gray_from_compressed(format, data, depth, limits, expected_px)
 }
 
-/// Checks the resolution that an image claims.
+/// Checks the resolution in an image's header.
 pub(super) fn check_resolution(
     claimed_px: [usize; 2],
     limits: &LogLimits,
@@ -140,10 +141,10 @@ pub(super) fn check_resolution(
     limits.check_image(claimed_px).map_err(unreadable)
 }
 
-/// What to do about an encoding that is not read.
+/// Remedy for an unsupported encoding.
 fn encoding_remedy(encoding: &str) -> &'static str {
     if encoding.starts_with("32F") || encoding.starts_with("64F") {
-        "numbers such as depths, no grey levels: name the topic of the camera's images"
+        "numbers such as depths, not gray values: give the topic of the camera's images"
     } else {
         "expected mono8, mono16, rgb8, bgr8, rgba8, bgra8, rgb16, bgr16, yuv422, yuyv, nv12, bayer_* or 8UC1 to 16UC4"
     }
@@ -176,7 +177,7 @@ fn gray_from_raw(
     Ok(GrayImage { width, height, pixels: encoding.gray(raw, depth) })
 }
 
-/// Decodes a compressed image whose header claims a resolution that its bytes and the limits allow.
+/// Decodes a compressed image if its number of bytes and the limits allow the resolution in its header.
 pub(super) fn decode_within(
     data: &[u8],
     codec: ImageFormat,
@@ -198,7 +199,7 @@ pub(super) fn decode_within(
     DynamicImage::from_decoder(decoder).map_err(damaged)
 }
 
-/// The codec of a compressed image, known by its first bytes.
+/// Codec of a compressed image, by its first bytes.
 fn codec_of(data: &[u8]) -> Option<ImageFormat> {
     match data {
         [0xFF, 0xD8, ..] => Some(ImageFormat::Jpeg),
@@ -207,7 +208,7 @@ fn codec_of(data: &[u8]) -> Option<ImageFormat> {
     }
 }
 
-/// Name of the format of a compressed image in a message, `None` when it is of no format that is read.
+/// Format name of a compressed image in a message, `None` for an unsupported format.
 pub(crate) fn compressed_format(data: &[u8]) -> Option<&'static str> {
     codec_of(data).map(|codec| if codec == ImageFormat::Png { "png" } else { "jpeg" })
 }
@@ -219,7 +220,7 @@ fn gray_from_compressed(
     limits: &LogLimits,
     expected_px: Option<[usize; 2]>,
 ) -> Result<GrayImage, ImageProblem> {
-    // The format field is free text ("jpeg", "rgb8; jpeg compressed bgr8"), the bytes are not.
+    // The format field is free text ("jpeg", "rgb8; jpeg compressed bgr8"), so the bytes decide.
     let codec = codec_of(data).ok_or_else(|| {
         unreadable(format!("{} bytes of format {format:?} that are neither JPEG nor PNG", data.len()))
     })?;

@@ -15,7 +15,7 @@ use crate::sensors::{GrayImage, Rig, UnknownCamera};
 const BLOCKS: usize = 2;
 /// Number of cached images of topics whose images do not depend on each other.
 const IMAGES: usize = 8;
-/// Pixels of the cached pictures of all videos: stepping back within a group of pictures decodes it once.
+/// Pixels of the cached frames of all videos, so that stepping back within a group of pictures decodes it only once.
 const VIDEO_PIXELS: usize = 64 << 20;
 
 /// Random access to the images of a log by camera and number.
@@ -37,22 +37,22 @@ struct CameraImages {
 
 #[derive(Debug)]
 struct ImageCache {
-    /// Messages by camera.
+    /// Index of messages by camera.
     topics: Vec<TopicIndex>,
     blocks: BlockCache,
     /// Cached images by camera and index; the most recently used is the last.
     images: Vec<((usize, usize), Arc<GrayImage>)>,
-    /// Where decoding of each camera's video stands, by camera.
+    /// State of each camera's video decoder.
     streams: Vec<PictureStream>,
-    /// Cached pictures of videos, as `images`.
+    /// Cached video frames by camera and index; the most recently used is the last.
     pictures: Vec<((usize, usize), Picture)>,
 }
 
-/// A decoded picture of a video, or what is wrong with it.
+/// Decoded video frame, or a description of the problem.
 type Picture = Result<Arc<GrayImage>, String>;
 
 impl ImageReader {
-    /// Finds the images of all cameras of a rig that the log has.
+    /// Indexes the images of all cameras of a rig whose topics are in the log.
     pub fn new(log: Arc<FlightLog>, rig: &Rig) -> Self {
         let cameras: Vec<CameraImages> = rig
             .cameras
@@ -82,13 +82,13 @@ impl ImageReader {
         self.cameras.iter().find(|camera| camera.key == camera_key).map_or(0, |camera| camera.count)
     }
 
-    /// Whether a camera's images are a video, so that one of them can take as long as all since its keyframe.
+    /// True if a camera's images are a video, where decoding one image can require all images since its keyframe.
     pub fn has_video(&self) -> bool {
         self.cameras.iter().any(|camera| camera.kind.is_video())
     }
 
-    /// Decodes the pictures that one image of a video depends on, while `go_on` holds. Returns whether
-    /// [`image`](Self::image) is short then, as it always is for images that do not depend on others.
+    /// Decodes the video frames that an image depends on, while `go_on` returns true. Returns true if
+    /// [`image`](Self::image) is fast then, as for all images that do not depend on others.
     pub fn decode_before(&self, camera_key: &str, index: usize, go_on: &dyn Fn() -> bool) -> bool {
         let Ok(number) = self.number_of(camera_key) else { return true };
         let camera = &self.cameras[number];
@@ -98,8 +98,9 @@ impl ImageReader {
         self.cache.lock().decode_pictures(&self.log, number, camera.kind, index, go_on)
     }
 
-    /// Numbers and header stamps of a camera's images in the order of the stamps, in nanoseconds since the log began; an image
-    /// whose stamp cannot be read is left out.
+    /// Numbers and header stamps of a camera's images in the order of the stamps, in nanoseconds since the start of the
+    /// log;
+    /// images with unreadable stamps are left out.
     pub fn stamps_ns(&self, camera_key: &str) -> Vec<(usize, i64)> {
         let Ok(number) = self.number_of(camera_key) else { return Vec::new() };
         let camera = &self.cameras[number];
@@ -123,7 +124,7 @@ impl ImageReader {
         })
     }
 
-    /// One image of one camera, numbered as in [`SensorFrame::index`](super::SensorFrame::index).
+    /// Returns an image of a camera, numbered as in [`SensorFrame::index`](super::SensorFrame::index).
     pub fn image(&self, camera_key: &str, index: usize) -> Result<Arc<GrayImage>, LogError> {
         let number = self.number_of(camera_key)?;
         let camera = &self.cameras[number];
@@ -165,7 +166,7 @@ impl ImageReader {
     }
 }
 
-/// A cached image by camera and index, which becomes the most recently used one.
+/// Returns a cached entry by camera and index, and makes it the most recently used one.
 fn cached<V: Clone>(entries: &mut Vec<((usize, usize), V)>, key: (usize, usize)) -> Option<V> {
     let found = entries.iter().position(|(cached, _)| *cached == key)?;
     let entry = entries.remove(found);
@@ -174,14 +175,14 @@ fn cached<V: Clone>(entries: &mut Vec<((usize, usize), V)>, key: (usize, usize))
 }
 
 impl ImageCache {
-    /// A picture of a video.
     fn picture(&mut self, log: &FlightLog, camera: usize, kind: MessageKind, index: usize) -> Picture {
         self.decode_pictures(log, camera, kind, index, &|| true);
-        cached(&mut self.pictures, (camera, index)).unwrap_or_else(|| Err("it is no picture of a video".to_owned()))
+        cached(&mut self.pictures, (camera, index)).unwrap_or_else(|| Err("it is not a frame of a video".to_owned()))
     }
 
-    /// Decodes a video up to a picture, from the picture before it or from its keyframe, while `go_on` holds. Returns whether
-    /// the picture is cached.
+    /// Decodes a video up to frame `index`, starting at the last decoded frame or at the keyframe, while `go_on`
+    /// returns true.
+    /// Returns true if the frame is cached.
     fn decode_pictures(
         &mut self,
         log: &FlightLog,
@@ -209,7 +210,7 @@ impl ImageCache {
         true
     }
 
-    /// Decodes the message with this number, which follows the one decoded last.
+    /// Decodes message `number`, which follows the last decoded one.
     fn next_picture(
         &mut self,
         log: &FlightLog,
@@ -229,7 +230,7 @@ impl ImageCache {
         stream.decode(number, &packet, log.file().limits(), None).map_err(|problem| problem.to_string())
     }
 
-    /// Drops the pictures that were used longest ago.
+    /// Drops the least recently used frames.
     fn release(&mut self) {
         let pixels = |entry: &Picture| entry.as_ref().map_or(1, |image| image.pixels.len());
         let mut held: usize = self.pictures.iter().map(|(_, picture)| pixels(picture)).sum();

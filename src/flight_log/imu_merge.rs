@@ -1,4 +1,4 @@
-//! Gyroscope and accelerometer of separate topics as IMU samples at the gyroscope's stamps.
+//! Merges gyroscope and accelerometer of separate topics to IMU samples at the gyroscope's stamps.
 
 use std::cmp::Ordering;
 use std::collections::VecDeque;
@@ -7,16 +7,16 @@ use nalgebra::Vector3;
 
 use crate::sensors::ImuSample;
 
-/// Largest distance of two accelerometer samples that are interpolated between; an accelerometer has at least 50 Hz.
+/// Largest gap between two accelerometer samples for interpolation; an accelerometer has at least 50 Hz.
 const MAX_GAP_NS: i64 = 50_000_000;
 
-/// Merges the samples of two sensors, each in the order of its stamps: the specific force at a gyroscope stamp is interpolated
-/// between the accelerometer samples around it. Gyroscope samples without such a pair are left out.
+/// Merges the samples of two sensors, each in the order of its stamps: the specific force at a gyroscope stamp is
+/// interpolated between the accelerometer samples around it. Gyroscope samples without such a pair are left out.
 #[derive(Debug, Default)]
 pub(crate) struct ImuMerge {
     /// Angular velocities in rad/s that are not released yet.
     gyroscope: VecDeque<(i64, Vector3<f64>)>,
-    /// Specific forces in m/s² from the last one before the first of `gyroscope` on.
+    /// Specific forces in m/s², starting with the last one before the first of `gyroscope`.
     accelerometer: VecDeque<(i64, Vector3<f64>)>,
 }
 
@@ -31,12 +31,12 @@ impl ImuMerge {
         self.accelerometer.push_back((stamp_ns, specific_force_m_per_s2));
     }
 
-    /// Whether the next sample needs another angular velocity.
+    /// True if the next sample needs another angular velocity.
     pub(crate) fn needs_gyroscope(&self) -> bool {
         self.gyroscope.is_empty()
     }
 
-    /// The next sample, `None` while a sample of either sensor is missing.
+    /// Next sample, `None` while a sample of either sensor is missing.
     pub(crate) fn pop(&mut self) -> Option<ImuSample> {
         loop {
             let (stamp_ns, angular_velocity_rad_per_s) = *self.gyroscope.front()?;

@@ -1,4 +1,5 @@
-//! Samples of all joints from messages with only some of them: several drivers can publish on one topic, one joint
+//! Merges messages with some of the joints to samples of all joints: several drivers can publish on one topic, one
+//! joint
 //! each.
 
 use std::collections::VecDeque;
@@ -9,7 +10,7 @@ use crate::sensors::JointSample;
 /// Larger gaps between readings of a joint are not interpolated.
 const MAX_GAP_NS: i64 = 200_000_000;
 
-/// One message: an angle in radians for each of the rig's joints that it names.
+/// Message with an angle in radians for each of the rig's joints that it contains.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct JointReading {
     pub(crate) stamp_ns: i64,
@@ -18,10 +19,10 @@ pub(crate) struct JointReading {
 
 /// Merges readings by joint name at the stamps of the first joint; those of the others are interpolated.
 ///
-/// Messages that name all joints pass unchanged.
+/// Messages with all joints pass unchanged.
 #[derive(Clone, Debug)]
 pub(crate) struct JointMerge {
-    /// By joint: readings from the last one at or before the next sample on.
+    /// Readings by joint, starting with the last one at or before the next sample.
     readings: Vec<VecDeque<(i64, f64)>>,
     /// Stamp of the last reading.
     newest_ns: i64,
@@ -33,7 +34,8 @@ impl JointMerge {
         Self { readings: vec![VecDeque::new(); joints], newest_ns: i64::MIN, ended: false }
     }
 
-    /// Takes the next reading; stamps must not decrease. Returns `false` for a joint's second reading of one stamp, which is
+    /// Adds the next reading; stamps must not decrease. Returns `false` for a joint's second reading of one stamp,
+    /// which is
     /// ignored.
     pub(crate) fn push(&mut self, reading: &JointReading) -> bool {
         self.newest_ns = reading.stamp_ns;
@@ -54,7 +56,7 @@ impl JointMerge {
         self.ended = true;
     }
 
-    /// The next sample with an angle for every joint, `None` while later readings are needed.
+    /// Next sample with an angle for every joint, `None` while later readings are needed.
     pub(crate) fn pop(&mut self) -> Option<JointSample> {
         loop {
             let (stamp_ns, _) = *self.readings.first()?.front()?;
@@ -77,7 +79,7 @@ impl JointMerge {
     }
 }
 
-/// The angle at a stamp from the reading at it, or from one on either side.
+/// Angle at a stamp, from the reading at the stamp or interpolated between the readings around it.
 fn angle_at(readings: &VecDeque<(i64, f64)>, stamp_ns: i64) -> Option<f64> {
     let (before_ns, before) = *readings.front().filter(|(first_ns, _)| *first_ns <= stamp_ns)?;
     if before_ns == stamp_ns {

@@ -1,7 +1,8 @@
-//! Limits on what a foreign file may make the program read into memory or unpack.
+//! Limits on the memory and disk space that reading an external file may take.
 //!
-//! Sizes and counts in a file are claims: they are compared with what the file can hold, with the machine's memory and with
-//! the limits below before anything is allocated. Each limit can be set by name (`--limit record-bytes=2G`).
+//! Sizes and counts in a file are not trusted: they are compared with the size of the file, with the machine's memory
+//! and
+//! with the limits below before anything is allocated. Each limit can be set by name (`--limit record-bytes=2G`).
 
 use std::fs;
 use std::str::FromStr;
@@ -9,55 +10,53 @@ use std::sync::OnceLock;
 
 use thiserror::Error;
 
-/// A record may always be this large when it is unpacked: larger chunks are rare, smaller ones compress at any ratio.
+/// Decompressed size that is allowed for every record: larger chunks are rare, smaller ones compress at any ratio.
 const RECORD_FLOOR_BYTES: u64 = 32 << 20;
-/// A larger record may be unpacked to so many times its stored size. Sensor data compress to a tenth; a record that
+/// Largest compression ratio of a record above that size. Sensor data compress to a tenth; a record that
 /// compresses to a hundredth holds no measurements.
 const RECORD_RATIO: u64 = 256;
-/// Ratio of the machine's memory that one record may take.
+/// Divisor of the machine's memory that gives the limit of one record.
 const RECORD_MEMORY_RATIO: u64 = 32;
-/// Unpacked blocks that are kept may always take this much together.
+/// Size of cached blocks that is always allowed.
 const CACHE_FLOOR_BYTES: u64 = 96 << 20;
-/// Unpacked blocks that are kept take at most so many times the size of the file.
+/// Largest ratio of cached blocks to the size of the file.
 const CACHE_RATIO: u64 = 64;
-/// Ratio of the machine's memory that the unpacked blocks may take together.
+/// Divisor of the machine's memory that gives the limit of all cached blocks.
 const CACHE_MEMORY_RATIO: u64 = 16;
-/// A compressed file may always be unpacked to this size.
+/// Decompressed size that is allowed for every compressed file.
 const UNPACKED_FLOOR_BYTES: u64 = 256 << 20;
-/// A compressed file may be unpacked to so many times its size.
+/// Largest compression ratio of a compressed file above that size.
 const UNPACKED_RATIO: u64 = 64;
-/// A file may always have this many messages.
+/// Number of messages that is allowed for every file.
 const MESSAGES_FLOOR: u64 = 1 << 20;
-/// Bytes of the file for each further message: the smallest message of use takes more even when it is compressed.
+/// Bytes of the file for each further message: the smallest useful message takes more, even compressed.
 const BYTES_PER_MESSAGE: u64 = 8;
-/// Topics of a log; recorders of whole robots have hundreds.
+/// Topics of a log; logs of whole robots have hundreds.
 const TOPICS: u64 = 4096;
 /// Length of a topic's or a type's name; ROS 2 allows 255 bytes.
 const NAME_BYTES: u64 = 1024;
 /// Pixels of an image, such as 7000 × 4700.
 const IMAGE_PIXELS: u64 = 1 << 25;
-/// Pixels that one byte of a compressed image can hold: PNG's compression reaches 1032 bytes per byte, with 8 pixels each.
+/// Pixels per byte of a compressed image: PNG's compression reaches 1032 bytes per byte, with 8 pixels each.
 const PIXELS_PER_BYTE: u64 = 1032 * 8;
-/// Memory that is assumed where the system does not tell.
+/// Memory that is assumed if the system does not report it.
 const UNKNOWN_MEMORY_BYTES: u64 = 8 << 30;
 
-/// Definitions of all message types of a log together; those of one type take some kilobytes.
+/// Size of all message definitions of a log together; those of one type take some kilobytes.
 pub(crate) const DEFINITION_BYTES: usize = 64 << 20;
-/// Text files that describe a source, such as a bag's `metadata.yaml`.
+/// Size of text files that describe a source, such as a bag's `metadata.yaml`.
 pub(crate) const DESCRIPTION_BYTES: u64 = 16 << 20;
-/// A line of a table, such as EuRoC's `data.csv`.
+/// Length of a line of a table, such as EuRoC's `data.csv`.
 pub(crate) const LINE_BYTES: u64 = 64 << 10;
 
-/// What a limit is on.
+/// Limited quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LimitKind {
-    /// Bytes of one record in memory: an unpacked chunk, a message, an attachment, a row of a database.
+    /// Bytes of one record in memory: a decompressed chunk, a message, an attachment, a row of a database.
     RecordBytes,
-    /// Bytes that a compressed file is unpacked to, in the folder for temporary files.
+    /// Bytes of a decompressed file, in the folder for temporary files.
     UnpackedBytes,
-    /// Messages of a log.
     Messages,
-    /// Topics of a log.
     Topics,
     /// Bytes of a topic's or a type's name.
     NameBytes,
@@ -66,11 +65,10 @@ pub enum LimitKind {
 }
 
 impl LimitKind {
-    /// Every kind.
     pub const ALL: [Self; 6] =
         [Self::RecordBytes, Self::UnpackedBytes, Self::Messages, Self::Topics, Self::NameBytes, Self::ImagePixels];
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::RecordBytes => "record-bytes",
@@ -82,7 +80,7 @@ impl LimitKind {
         }
     }
 
-    /// What it counts.
+    /// Unit of the limited number.
     fn unit(self) -> &'static str {
         match self {
             Self::RecordBytes | Self::UnpackedBytes | Self::NameBytes => "bytes",
@@ -93,26 +91,21 @@ impl LimitKind {
     }
 }
 
-/// A file holds or claims more than a limit allows.
+/// Error: a file contains or declares more than a limit allows.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{subject} of {found} {}, more than the limit of {allowed}; raise it with --limit {}={found}", kind.unit(), kind.name())]
 pub struct LimitExceeded {
-    /// The limit.
     pub kind: LimitKind,
-    /// What exceeds it, `a chunk`.
+    /// Subject that exceeds the limit, such as `a chunk`.
     pub subject: &'static str,
-    /// The number found.
     pub found: u64,
-    /// The largest one allowed.
     pub allowed: u64,
 }
 
-/// One limit set by the user, `image-pixels=100M`; K, M and G multiply by powers of 1024.
+/// Limit set by the user, `image-pixels=100M`; K, M and G multiply by powers of 1024.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LimitSetting {
-    /// The limit.
     pub kind: LimitKind,
-    /// Its value.
     pub value: u64,
 }
 
@@ -137,10 +130,9 @@ impl FromStr for LimitSetting {
     }
 }
 
-/// The limits of one reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LogLimits {
-    /// The limits that were set; the last one of a kind counts.
+    /// Limits set by the user; the last one of a kind is used.
     pub settings: Vec<LimitSetting>,
 }
 
@@ -153,7 +145,7 @@ impl LogLimits {
         if found > allowed { Err(LimitExceeded { kind, subject, found, allowed }) } else { Ok(()) }
     }
 
-    /// The most bytes that a record stored in `stored` bytes may have in memory.
+    /// Largest size in memory of a record that is stored in `stored` bytes.
     pub(crate) fn record_bytes(&self, stored: u64) -> u64 {
         self.set(LimitKind::RecordBytes).unwrap_or_else(|| {
             let budget = (memory_bytes() / RECORD_MEMORY_RATIO).max(RECORD_FLOOR_BYTES);
@@ -161,57 +153,54 @@ impl LogLimits {
         })
     }
 
-    /// Checks the claimed size of a record that is stored in `stored` bytes.
+    /// Checks the declared size of a record that is stored in `stored` bytes.
     pub(crate) fn check_record(&self, subject: &'static str, claimed: u64, stored: u64) -> Result<(), LimitExceeded> {
         Self::check(LimitKind::RecordBytes, subject, claimed, self.record_bytes(stored))
     }
 
-    /// The most bytes that a compressed file of `stored` bytes is unpacked to.
+    /// Largest decompressed size of a compressed file of `stored` bytes.
     pub(crate) fn unpacked_bytes(&self, stored: u64) -> u64 {
         let by_ratio = || stored.saturating_mul(UNPACKED_RATIO).max(UNPACKED_FLOOR_BYTES);
         self.set(LimitKind::UnpackedBytes).unwrap_or_else(by_ratio)
     }
 
-    /// The most bytes of unpacked blocks of a file that are kept.
+    /// Largest size of the cached blocks of a file.
     pub(crate) fn cache_bytes(file_bytes: u64) -> u64 {
         let budget = (memory_bytes() / CACHE_MEMORY_RATIO).max(CACHE_FLOOR_BYTES);
         file_bytes.saturating_mul(CACHE_RATIO).clamp(CACHE_FLOOR_BYTES, budget)
     }
 
-    /// The most messages of a file.
+    /// Largest number of messages of a file.
     pub(crate) fn messages(&self, file_bytes: u64) -> u64 {
         self.set(LimitKind::Messages).unwrap_or_else(|| MESSAGES_FLOOR.saturating_add(file_bytes / BYTES_PER_MESSAGE))
     }
 
-    /// The most topics.
     pub(crate) fn topics(&self) -> u64 {
         self.set(LimitKind::Topics).unwrap_or(TOPICS)
     }
 
-    /// Checks a topic's or a type's name.
+    /// Checks the length of a topic's or a type's name.
     pub(crate) fn check_name(&self, subject: &'static str, name: &str) -> Result<(), LimitExceeded> {
         let allowed = self.set(LimitKind::NameBytes).unwrap_or(NAME_BYTES);
         Self::check(LimitKind::NameBytes, subject, name.len() as u64, allowed)
     }
 
-    /// The most pixels of an image.
     pub(crate) fn image_pixels(&self) -> u64 {
         self.set(LimitKind::ImagePixels).unwrap_or(IMAGE_PIXELS)
     }
 
-    /// Checks the size of an image.
     pub(crate) fn check_image(&self, [width, height]: [usize; 2]) -> Result<(), LimitExceeded> {
         let pixels = (width as u64).saturating_mul(height as u64);
         Self::check(LimitKind::ImagePixels, "an image", pixels, self.image_pixels())
     }
 }
 
-/// Whether so many bytes of a compressed image can hold an image of a size.
+/// True if `stored` bytes of a compressed image can hold an image of this size.
 pub(crate) fn can_hold_image(stored: usize, [width, height]: [usize; 2]) -> bool {
     (width as u64).saturating_mul(height as u64) <= (stored as u64).saturating_mul(PIXELS_PER_BYTE)
 }
 
-/// Memory of the machine in bytes, or of the container that the program runs in.
+/// Memory in bytes of the machine, or of the container in which the program runs.
 fn memory_bytes() -> u64 {
     static MEMORY_BYTES: OnceLock<u64> = OnceLock::new();
     *MEMORY_BYTES.get_or_init(|| {

@@ -8,32 +8,31 @@ use super::messages::{self, MessageKind};
 use super::{LogError, LogWarning};
 use crate::geometry::seconds_from_ns;
 
-/// First stamps further than this before the IMU's first one do not count for the log's start: they are of another clock.
+/// First stamps further than this before the IMU's first one belong to another clock and do not define the log's start.
 const CLOCK_TOLERANCE_NS: i64 = 60_000_000_000;
 
-/// Bytes at the start by which a file is recognized.
+/// Number of bytes at the start that identify the kind of a file.
 const START_BYTES: usize = 512;
 
-/// One topic of a log.
+/// Topic of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TopicInfo {
-    /// Topic name.
     pub topic: String,
-    /// Name of its schema, `sensor_msgs/msg/Imu`.
+    /// Schema name, such as `sensor_msgs/msg/Imu`.
     pub schema: String,
-    /// Kind of its messages, `None` when they are ignored.
+    /// Kind of the messages, `None` if they are ignored.
     pub kind: Option<MessageKind>,
-    /// Number of messages, from the log's index.
+    /// Number of messages by the log's index.
     pub count: u64,
-    /// Log time of the first message since the log began.
+    /// Log time of the first message since the start of the log.
     pub first_ns: i64,
-    /// Log time of the last message since the log began.
+    /// Log time of the last message since the start of the log.
     pub last_ns: i64,
-    /// Mean rate over its log times in Hz, 0 for fewer than two messages.
+    /// Mean rate over the log times in Hz, 0 for fewer than two messages.
     pub rate_hz: f64,
 }
 
-/// An open flight log: an MCAP file with the index of its chunks.
+/// Open flight log: an MCAP file with the index of its chunks.
 #[derive(Debug)]
 pub struct FlightLog {
     path: PathBuf,
@@ -45,32 +44,33 @@ pub struct FlightLog {
     epoch_ns: i64,
     duration_ns: i64,
     warnings: Vec<LogWarning>,
-    /// What each warning is about.
+    /// Kind of each warning.
     warning_kinds: Vec<WarningKind>,
 }
 
-/// What a warning of an open log is about.
+/// Subject of a warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WarningKind {
-    /// Bytes that cannot be read.
+    /// Unreadable bytes.
     Damage,
-    /// Header stamps of another clock, or none.
+    /// Header stamps of another clock, or without stamp.
     Stamps,
     /// Topics that are not read.
     Topics,
 }
 
 impl FlightLog {
-    /// Opens a log. An indexed log is not read, only its index, its first and its last messages; one without an index
+    /// Opens a log. Of an indexed log only the index, the first and the last messages are read; a log without an index
     /// (or truncated) is scanned once.
     ///
-    /// The log starts (time zero) at the smallest header stamp among the first messages of all topics that are read, except
+    /// The log starts (time zero) at the smallest header stamp among the first messages of all topics that are read,
+    /// except
     /// stamps more than a minute before the first IMU message, which are of another clock.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         Self::open_with(path, &LogLimits::default())
     }
 
-    /// Opens a log within limits other than the usual ones.
+    /// Opens a log with other limits than the default ones.
     pub fn open_with(path: &Path, limits: &LogLimits) -> Result<Self, LogError> {
         let file = LogFile::open(path, limits)?;
         check_magic(&file, path)?;
@@ -96,34 +96,32 @@ impl FlightLog {
         Ok(log)
     }
 
-    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Size of the file in bytes.
     pub fn size_bytes(&self) -> u64 {
         self.file.len() as u64
     }
 
-    /// Checksum (CRC-32) of its first and its last mebibyte, which identifies the log without reading all of it.
+    /// Checksum (CRC-32) of the first and the last mebibyte, which identifies the log without reading all of it.
     pub fn checksum(&self) -> u32 {
         const PART_BYTES: usize = 1 << 20;
         let length = self.file.len();
         let mut hasher = crc32fast::Hasher::new();
         for part in [0..length.min(PART_BYTES), length.saturating_sub(PART_BYTES)..length] {
-            // A part that cannot be read any more makes it another log.
+            // An unreadable part changes the checksum.
             hasher.update(&self.file.read(part).unwrap_or_default());
         }
         hasher.finalize()
     }
 
-    /// Its topics in the order of their names.
+    /// Topics in the order of their names.
     pub fn topics(&self) -> &[TopicInfo] {
         &self.topics
     }
 
-    /// One topic, when the log has messages on it.
+    /// Topic with this name, if the log has messages on it.
     pub fn topic(&self, name: &str) -> Option<&TopicInfo> {
         self.topics.iter().find(|info| info.topic == name)
     }
@@ -133,7 +131,7 @@ impl FlightLog {
         self.epoch_ns
     }
 
-    /// From the log's start to the latest header stamp among the last messages of its topics, in nanoseconds.
+    /// Time from the log's start to the latest header stamp among the last messages of its topics, in nanoseconds.
     pub fn duration_ns(&self) -> i64 {
         self.duration_ns
     }
@@ -143,7 +141,7 @@ impl FlightLog {
         &self.warnings
     }
 
-    /// The warnings of [`FlightLog::warnings`] with what each is about.
+    /// Warnings of [`FlightLog::warnings`] with their kind.
     pub(crate) fn warnings_by_kind(&self) -> impl Iterator<Item = (WarningKind, &LogWarning)> {
         self.warning_kinds.iter().copied().zip(&self.warnings)
     }
@@ -153,19 +151,19 @@ impl FlightLog {
         self.warnings.push(LogWarning { stamp_ns, message });
     }
 
-    /// The content of the first attachment whose name ends so, with its name.
+    /// Name and content of the first attachment whose name ends with `name_ends_with`.
     pub fn attachment(&self, name_ends_with: &str) -> Option<(&str, Vec<u8>)> {
         let place = self.index.attachments.iter().find(|place| place.name.ends_with(name_ends_with))?;
         Some((&place.name, ContainerIndex::attachment(&self.file, place)?))
     }
 
-    /// Names of the topics whose messages are read as one of these kinds.
+    /// Names of the topics with messages of one of these kinds.
     pub fn topics_of(&self, kinds: &[MessageKind]) -> Vec<String> {
         let of_kind = self.topics.iter().filter(|info| info.kind.is_some_and(|kind| kinds.contains(&kind)));
         of_kind.map(|info| info.topic.clone()).collect()
     }
 
-    /// The topic that a field of the rig names, when the log has it with one of these types.
+    /// Returns the topic of a rig field, if the log has it with one of these types.
     pub(crate) fn require_topic(
         &self,
         field: &str,
@@ -187,28 +185,28 @@ impl FlightLog {
         TopicIndex::new(&self.index, self.channel_ids.get(topic).map_or(&[], |ids| ids))
     }
 
-    /// An error when another process has shortened the file since it was opened: what was read of it is then incomplete.
+    /// Returns an error if another process has shortened the file since it was opened, so that data read from it are
+    /// incomplete.
     pub fn require_unshortened(&self) -> Result<(), LogError> {
         self.file.require_unshortened(&self.path)
     }
 
-    /// The file.
     pub(crate) fn file(&self) -> &LogFile {
         &self.file
     }
 
-    /// Index of the container.
     pub(crate) fn index(&self) -> &ContainerIndex {
         &self.index
     }
 
-    /// A log time since the log began.
+    /// Converts a log time to nanoseconds since the start of the log.
     pub(crate) fn since_start(&self, log_time_ns: u64) -> i64 {
         relative_ns(i64::try_from(log_time_ns).unwrap_or(i64::MAX), self.epoch_ns)
     }
 
-    /// Calls `visit` for every readable message of a topic in the order of log times, with its log time since the log
-    /// began, until it returns `false`.
+    /// Calls `visit` for every readable message of a topic in the order of log times, with its log time since the start
+    /// of
+    /// the log, until it returns `false`.
     pub(super) fn for_each_message(&self, topic: &str, mut visit: impl FnMut(i64, &[u8]) -> bool) {
         let mut cache = BlockCache::new(2);
         let mut topic = self.topic_index(topic);
@@ -224,7 +222,7 @@ impl FlightLog {
         }
     }
 
-    /// The block of the message at a position and its range in the block, `None` when it cannot be read.
+    /// Block of the message at a position, and the message's range in the block; `None` if it cannot be read.
     pub(super) fn message(
         &self,
         cache: &mut BlockCache,
@@ -235,7 +233,7 @@ impl FlightLog {
         Some((block, message))
     }
 
-    /// The first message of a topic for which `test` returns a value, and that value.
+    /// Returns the value of `test` for the first message of a topic with `Some`.
     pub(crate) fn find_message<T>(&self, topic: &str, mut test: impl FnMut(&[u8]) -> Option<T>) -> Option<T> {
         let mut found = None;
         self.for_each_message(topic, |_, data| {
@@ -247,7 +245,7 @@ impl FlightLog {
 
     fn find_topics_and_times(&mut self) -> Result<(), LogError> {
         let mut cache = BlockCache::new(4);
-        // Stamps of the first and last messages of the topics that are read, with whether the topic is an IMU's.
+        // Per topic that is read: true for an IMU, name, and stamps of the first and last message.
         let mut stamps: Vec<(bool, String, i64, i64)> = Vec::new();
         let mut infos = Vec::new();
         for (topic, ids) in &self.channel_ids {
@@ -268,7 +266,7 @@ impl FlightLog {
                     stamps.push((kind == MessageKind::Imu, topic.clone(), first_stamp, last_stamp));
                 }
             }
-            // The statistics are claims, too.
+            // The statistics may be wrong, too.
             let most = self.file.limits().messages(self.file.len() as u64);
             let counted = self.index.statistics.as_ref().map(|counts| {
                 let counts = ids.iter().filter_map(|id| counts.get(id));
@@ -307,12 +305,12 @@ impl FlightLog {
         for (_, topic, first_ns, _) in stamps {
             if *first_ns == 0 {
                 let message =
-                    format!("{topic}: first header stamp 0 (never set); the topic does not count for the log's start");
+                    format!("{topic}: first header stamp 0 (never set); the topic does not define the log's start");
                 self.warn(WarningKind::Stamps, 0, message);
             } else if *first_ns < earliest_ns || *first_ns < 0 {
                 let message = format!(
                     "{topic}: first header stamp {:.3} s before the log's start (another clock, or a stamp that was never \
-                     set); the topic does not count for the log's start",
+                     set); the topic does not define the log's start",
                     seconds_from_ns(self.epoch_ns.saturating_sub(*first_ns))
                 );
                 self.warn(WarningKind::Stamps, 0, message);
@@ -343,15 +341,16 @@ impl FlightLog {
     }
 }
 
-/// Times further from the log's start are damage; they count as so far, and differences of two of them cannot overflow.
+/// Times further from the log's start are damaged; they are clamped to this, so that differences of two cannot
+/// overflow.
 const FARTHEST_NS: i64 = i64::MAX / 4;
 
-/// An absolute time since the log began.
+/// Converts an absolute time to nanoseconds since the start of the log.
 pub(crate) fn relative_ns(absolute_ns: i64, epoch_ns: i64) -> i64 {
     absolute_ns.saturating_sub(epoch_ns).clamp(-FARTHEST_NS, FARTHEST_NS)
 }
 
-/// Leaves out the topics beyond the limit, with a warning.
+/// Removes the topics beyond the limit, with a warning.
 fn refuse_topics(channel_ids: &mut BTreeMap<String, Vec<u16>>, limits: &LogLimits) -> Option<LogWarning> {
     let (found, allowed) = (channel_ids.len() as u64, limits.topics());
     if found <= allowed {
@@ -389,7 +388,7 @@ fn check_magic(file: &LogFile, path: &Path) -> Result<(), LogError> {
     Err(LogError::NotALog { found, remedy, path: path.to_owned() })
 }
 
-/// The size of the file that a pointer of Git's Large File Storage stands for, when these are the first bytes of one.
+/// Size of the file behind a Git LFS pointer, `None` if these first bytes are not a pointer.
 pub(super) fn lfs_pointer(start: &[u8]) -> Option<&str> {
     let text = std::str::from_utf8(start.get(..start.len().min(START_BYTES))?).ok()?;
     let mut lines = text.lines();

@@ -11,7 +11,7 @@ use super::protobuf::{ProtobufReader, ProtobufValue};
 use super::video::VideoCodec;
 use crate::geometry::RigidTransform;
 
-/// A message type that is read.
+/// Supported message type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum MessageKind {
     /// `sensor_msgs/msg/Imu`.
@@ -51,7 +51,6 @@ pub enum MessageKind {
 }
 
 impl MessageKind {
-    /// Every kind.
     pub const ALL: [Self; 17] = [
         Self::Imu,
         Self::Image,
@@ -72,7 +71,7 @@ impl MessageKind {
         Self::Px4VehicleAttitude,
     ];
 
-    /// The schema's name in the log.
+    /// Name of the schema in the log.
     pub fn schema_name(self) -> &'static str {
         match self {
             Self::Imu => "sensor_msgs/msg/Imu",
@@ -95,7 +94,7 @@ impl MessageKind {
         }
     }
 
-    /// The kind with this schema name; `sensor_msgs/Imu` equals `sensor_msgs/msg/Imu`.
+    /// Kind with this schema name; `sensor_msgs/Imu` equals `sensor_msgs/msg/Imu`.
     pub fn from_schema_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| {
             let full = kind.schema_name();
@@ -103,43 +102,44 @@ impl MessageKind {
         })
     }
 
-    /// The kind of a channel with this schema name, when its messages are encoded as that kind is read.
+    /// Kind of a channel with this schema name, `None` if its encoding is not the kind's.
     pub fn of_channel(schema_name: &str, encoding: &str) -> Option<Self> {
         Self::from_schema_name(schema_name).filter(|kind| kind.encoding() == encoding)
     }
 
-    /// The encoding in which its messages are read.
+    /// Supported message encoding.
     pub fn encoding(self) -> &'static str {
         if self == Self::CompressedVideoProtobuf { "protobuf" } else { "cdr" }
     }
 
-    /// The kinds whose messages are images or pictures of a video.
+    /// Kinds whose messages are images or video frames.
     pub const IMAGES: [Self; 5] =
         [Self::Image, Self::CompressedImage, Self::CompressedVideo, Self::CompressedVideoProtobuf, Self::FfmpegPacket];
 
-    /// Whether its messages are images or pictures of a video.
+    /// True if the messages are images or video frames.
     pub fn is_image(self) -> bool {
         Self::IMAGES.contains(&self)
     }
 
-    /// Whether its messages are pictures of a video, which depend on those before them.
+    /// True if the messages are video frames, which depend on earlier ones.
     pub fn is_video(self) -> bool {
         matches!(self, Self::CompressedVideo | Self::CompressedVideoProtobuf | Self::FfmpegPacket)
     }
 
-    /// Whether its messages are attitudes: those of a gimbal, or of the vehicle that carries it. Robots record such messages for
-    /// many purposes, with stamps of other times (static transforms) and clocks (PX4), so that a log does not start by them.
+    /// True if the messages are attitudes of a gimbal or of the vehicle. Robots record such messages for many purposes,
+    /// with
+    /// stamps of other times (static transforms) and clocks (PX4), so that they do not define the start of a log.
     pub fn is_attitude(self) -> bool {
         matches!(self, Self::QuaternionStamped | Self::Vector3Stamped | Self::Transforms | Self::MavrosGimbalAttitude)
             || self.counts_since_boot()
     }
 
-    /// Whether its stamps are in microseconds, by default of PX4's own clock, which counts from its start.
+    /// True if the stamps are in microseconds, by default of PX4's clock, which counts from its start.
     pub fn counts_since_boot(self) -> bool {
         matches!(self, Self::Px4GimbalAttitude | Self::Px4VehicleAttitude)
     }
 
-    /// Whether its messages are poses.
+    /// True if the messages are poses.
     pub fn is_pose(self) -> bool {
         matches!(self, Self::Odometry | Self::PoseStamped | Self::TransformStamped)
     }
@@ -160,7 +160,7 @@ pub(in crate::flight_log) fn read_header<'a>(reader: &mut CdrReader<'a>) -> Resu
     Ok(Header { stamp_ns: seconds * 1_000_000_000 + nanoseconds, frame_id })
 }
 
-/// The header stamp of any message that starts with a header, in nanoseconds since the epoch.
+/// Header stamp of any message that starts with a header, in nanoseconds since the epoch.
 pub(crate) fn stamp_ns(kind: MessageKind, message: &[u8]) -> Result<i64, CdrError> {
     if kind == MessageKind::CompressedVideoProtobuf {
         return read_compressed_video_protobuf(message).map(|packet| packet.stamp_ns);
@@ -175,7 +175,7 @@ pub(crate) fn stamp_ns(kind: MessageKind, message: &[u8]) -> Result<i64, CdrErro
     Ok(read_header(&mut reader)?.stamp_ns)
 }
 
-/// `sensor_msgs/msg/Imu` without its orientation and covariances.
+/// `sensor_msgs/msg/Imu` without orientation and covariances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ImuMessage {
     pub(crate) stamp_ns: i64,
@@ -198,7 +198,7 @@ pub(crate) fn read_imu(message: &[u8]) -> Result<ImuMessage, CdrError> {
     })
 }
 
-/// `sensor_msgs/msg/Image`, its pixels borrowed.
+/// `sensor_msgs/msg/Image` with borrowed pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ImageMessage<'a> {
     pub(crate) width: usize,
@@ -222,7 +222,7 @@ pub(crate) fn read_image(message: &[u8]) -> Result<ImageMessage<'_>, CdrError> {
     Ok(ImageMessage { width, height, encoding, big_endian, step, data })
 }
 
-/// `sensor_msgs/msg/CompressedImage`: its format and its bytes, borrowed.
+/// Returns format and bytes of a `sensor_msgs/msg/CompressedImage`, borrowed.
 pub(crate) fn read_compressed_image(message: &[u8]) -> Result<(&str, &[u8]), CdrError> {
     let mut reader = CdrReader::new(message)?;
     read_header(&mut reader)?;
@@ -230,31 +230,31 @@ pub(crate) fn read_compressed_image(message: &[u8]) -> Result<(&str, &[u8]), Cdr
     Ok((format, reader.read_bytes()?))
 }
 
-/// A message of a video topic: one picture, borrowed.
+/// Message of a video topic with one frame, borrowed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct VideoPacket<'a> {
     /// Nanoseconds since the epoch.
     pub(crate) stamp_ns: i64,
     pub(crate) frame_id: &'a str,
-    /// Name of the compression, of which one is read or not.
+    /// Name of the compression, supported or not.
     pub(crate) format: &'a str,
     /// Annex B.
     pub(crate) data: &'a [u8],
 }
 
 impl VideoPacket<'_> {
-    /// The compression, or the problem with it.
+    /// Returns the codec, or a description of an unsupported one.
     pub(crate) fn codec(&self) -> Result<VideoCodec, String> {
         VideoCodec::from_name(self.format)
             .ok_or_else(|| format!("video of format {:?} is not read, expected h264 or h265", self.format))
     }
 
-    /// Whether it depends on pictures before the keyframe that it follows.
+    /// True if the frame depends on frames before the keyframe that it follows.
     pub(crate) fn is_leading(&self) -> bool {
         self.codec().is_ok_and(|codec| codec.is_leading(self.data))
     }
 
-    /// Whether decoding can start with it.
+    /// True if decoding can start with the frame.
     pub(crate) fn is_keyframe(&self) -> bool {
         self.codec().is_ok_and(|codec| codec.is_keyframe(self.data))
     }
@@ -345,12 +345,12 @@ pub(crate) struct JointMessage<'a> {
 }
 
 impl JointMessage<'_> {
-    /// Whether joints are named that have no position.
+    /// True if a joint has no position.
     pub(crate) fn lacks_positions(&self) -> bool {
         self.positions_rad.len() < self.names.len()
     }
 
-    /// The numbers of names and positions, for a message in which they differ.
+    /// Description of a message in which the numbers of names and positions differ.
     pub(crate) fn length_problem(&self) -> String {
         format!("it names {} joints and has {} positions", self.names.len(), self.positions_rad.len())
     }
@@ -364,7 +364,7 @@ pub(crate) fn read_joint_state(message: &[u8]) -> Result<JointMessage<'_>, CdrEr
     Ok(JointMessage { stamp_ns: header.stamp_ns, names, positions_rad })
 }
 
-/// The pose in any of the pose messages, `None` when its numbers are no pose (not finite, or a zero quaternion).
+/// Pose of any of the pose messages, `None` for numbers that are not finite or a zero quaternion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PoseMessage {
     pub(crate) stamp_ns: i64,

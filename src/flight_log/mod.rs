@@ -1,7 +1,8 @@
-//! Flight logs: MCAP in and out as typed events in time order, the rigs that describe their sensors, and the logs of other
+//! Flight logs: MCAP in and out as typed events in time order, the rigs that describe their sensors, and the logs of
+//! other
 //! recorders.
 //!
-//! Time is nanoseconds since the first message of the log (header stamps; the log time is kept beside them).
+//! Time is nanoseconds since the first message of the log (header stamps; the log time is kept too).
 
 pub(crate) mod attitude;
 mod cdr;

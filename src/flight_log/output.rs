@@ -1,11 +1,13 @@
-//! How every file is written: beside its name under a unique temporary one, flushed to the disk, then renamed.
+//! Atomic writing of files: each is written to a temporary file in the same folder, flushed to the disk, then renamed.
 //!
-//! Whatever happens before the rename (an error, a full disk, an interrupt, a killed process), the file under the final name
-//! is the old one, or there is none; afterwards it is the new one. Of several processes that write one file each leaves a
-//! whole one, and the last rename stays.
+//! If anything fails before the rename (an error, a full disk, an interrupt, a killed process), the final name has the
+//! old file, or none; afterwards it has the new one. If several processes write one file, each writes a complete one,
+//! and
+//! the last rename wins.
 //!
-//! A temporary file is named `.NAME.dcvins-XXXXXX.tmp` and is locked as long as its process lives. What a killed process
-//! left is therefore recognized by its free lock, and removed by the next one that writes the same file.
+//! A temporary file is named `.NAME.dcvins-XXXXXX.tmp` and is locked as long as its process lives. A leftover of a
+//! killed
+//! process has a free lock, and the next process that writes the same file removes it.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};
@@ -14,21 +16,21 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, NamedTempFile};
 
-/// Between the name of the file and six random characters.
+/// Part of the temporary name between the name of the file and six random characters.
 const MARK: &str = ".dcvins-";
-/// At the end of a temporary file's name.
+/// End of a temporary file's name.
 const ENDING: &str = ".tmp";
-/// How often a temporary file is made anew when another process takes it for a leftover.
+/// Number of attempts to create a temporary file, since another process can remove it as a leftover.
 const ATTEMPTS: usize = 8;
 
-/// A file that is being written and has not got its name yet; dropping it removes it.
+/// File that is being written under a temporary name; dropping it removes it.
 #[derive(Debug)]
 pub struct OutputFile {
     temporary: NamedTempFile,
     target: PathBuf,
 }
 
-/// A complete file that has not got its name yet; dropping it removes it.
+/// Complete file under a temporary name; dropping it removes it.
 #[derive(Debug)]
 pub struct StagedFile {
     temporary: NamedTempFile,
@@ -36,7 +38,7 @@ pub struct StagedFile {
 }
 
 impl OutputFile {
-    /// A new file for a path; an existing file there stays until [`StagedFile::commit`].
+    /// Creates a file for a path; an existing file stays until [`StagedFile::commit`].
     ///
     /// # Errors
     /// When the path is a folder or no regular file, or its folder cannot be written.
@@ -48,7 +50,7 @@ impl OutputFile {
         Ok(Self { temporary, target })
     }
 
-    /// Completes the content: everything is on the disk when this returns.
+    /// Completes the content and flushes it to the disk.
     pub fn stage(self) -> io::Result<StagedFile> {
         let Self { mut temporary, target } = self;
         let written = temporary.flush().and_then(|()| temporary.as_file().sync_all());
@@ -74,7 +76,7 @@ impl Seek for OutputFile {
 }
 
 impl StagedFile {
-    /// A complete file with this content.
+    /// Creates a complete file with this content.
     pub fn with_content(path: &Path, content: &[u8]) -> io::Result<Self> {
         let OutputFile { mut temporary, target } = OutputFile::create(path)?;
         let written = temporary.write_all(content).and_then(|()| temporary.as_file().sync_all());
@@ -82,42 +84,40 @@ impl StagedFile {
         Ok(Self { temporary, target })
     }
 
-    /// The path that it will have.
+    /// Final path.
     pub fn path(&self) -> &Path {
         &self.target
     }
 
-    /// Gives it its name, in place of an older file.
+    /// Renames the file to its final path, replacing an older file.
     pub fn commit(self) -> io::Result<()> {
         self.temporary.persist(&self.target).map(drop).map_err(|error| error.error)
     }
 }
 
-/// Files that belong together: all are complete before the first one gets its name.
+/// Files that belong together: all are complete before the first one is renamed.
 #[derive(Debug, Default)]
 pub struct OutputSet(Vec<StagedFile>);
 
 impl OutputSet {
-    /// Adds a file with its content.
     pub fn write(&mut self, path: &Path, content: &[u8]) -> io::Result<()> {
         self.0.push(StagedFile::with_content(path, content)?);
         Ok(())
     }
 
-    /// Adds a complete file.
     pub fn add(&mut self, staged: StagedFile) {
         self.0.push(staged);
     }
 
-    /// The paths that the files will have, in the order in which they were added.
+    /// Final paths in the order in which the files were added.
     pub fn paths(&self) -> Vec<PathBuf> {
         self.0.iter().map(|staged| staged.path().to_owned()).collect()
     }
 
-    /// Gives all files their names, in the order in which they were added.
+    /// Renames all files to their final paths, in the order in which they were added.
     ///
     /// # Errors
-    /// The first file that could not be renamed, and why; those before it have their names.
+    /// The first file that could not be renamed, with the error; the files before it have their final names.
     pub fn commit(self) -> Result<(), (PathBuf, io::Error)> {
         for staged in self.0 {
             let path = staged.path().to_owned();
@@ -127,18 +127,18 @@ impl OutputSet {
     }
 }
 
-/// Whether a name is that of a temporary file, of a living process or a leftover.
+/// True for the name of a temporary file, of a running process or a leftover.
 pub fn is_temporary(name: &OsStr) -> bool {
     let name = name.to_string_lossy();
     name.starts_with('.') && name.contains(MARK) && name.ends_with(ENDING)
 }
 
-/// Writes a whole file, in place of an older one.
+/// Writes a complete file, replacing an older one.
 pub fn write_file(path: &Path, content: &[u8]) -> io::Result<()> {
     StagedFile::with_content(path, content)?.commit()
 }
 
-/// Whether a file can be written under this name, before any work is done for it.
+/// Checks that a file can be written under this name, before any work is done for it.
 ///
 /// # Errors
 /// When it is a folder or no regular file, or its folder is missing or cannot be written.
@@ -152,7 +152,7 @@ pub fn check_file(path: &Path) -> io::Result<()> {
     temporary_file(&folder, file_name(&target)?).map(drop)
 }
 
-/// Whether files can be written into this folder, which need not exist yet, before any work is done for them.
+/// Checks that files can be written into this folder, which need not exist yet, before any work is done for them.
 ///
 /// # Errors
 /// When it is a file, or the nearest existing folder above it cannot be written.
@@ -178,7 +178,7 @@ pub fn check_folder(folder: &Path) -> io::Result<()> {
     temporary_file(nearest, OsStr::new("output")).map(drop)
 }
 
-/// Where a file really lies: behind a link. Folders, devices and pipes are no files that can be replaced.
+/// Resolves a link to the actual file. Folders, devices and pipes are errors, since they cannot be replaced.
 fn target_of(path: &Path) -> io::Result<PathBuf> {
     let Ok(metadata) = fs::metadata(path) else { return Ok(path.to_owned()) };
     if metadata.is_dir() {
@@ -191,7 +191,7 @@ fn target_of(path: &Path) -> io::Result<PathBuf> {
     if fs::symlink_metadata(path)?.is_symlink() { fs::canonicalize(path) } else { Ok(path.to_owned()) }
 }
 
-/// The folder that a file lies in, `.` for a name alone.
+/// Folder of a file, `.` for a name alone.
 pub fn folder_of(path: &Path) -> PathBuf {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
@@ -204,15 +204,15 @@ fn file_name(path: &Path) -> io::Result<&OsStr> {
     path.file_name().ok_or_else(missing)
 }
 
-/// How the names of the temporary files of a file begin: `.NAME.dcvins-`, a long name cut.
+/// Prefix of the names of a file's temporary files: `.NAME.dcvins-`, with a long name cut.
 fn prefix_of(name: &OsStr) -> OsString {
-    /// Names end at 255 bytes on most file systems; a character takes up to four.
+    /// In characters: names end at 255 bytes on most file systems, and a character takes up to four.
     const LONGEST: usize = 48;
     let name: String = name.to_string_lossy().chars().take(LONGEST).collect();
     OsString::from(format!(".{name}{MARK}"))
 }
 
-/// A new temporary file beside a file, locked.
+/// Creates a locked temporary file in the folder of a file.
 fn temporary_file(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
     let prefix = prefix_of(name);
     let mut builder = Builder::new();
@@ -220,23 +220,23 @@ fn temporary_file(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt as _;
-        // As for any new file: the process's mask is taken off.
+        // As for any new file, the process's umask is applied.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     for _ in 0..ATTEMPTS {
         let temporary = builder.tempfile_in(folder)?;
         match temporary.as_file().try_lock() {
-            // Between its making and its lock another process may have taken it for a leftover.
+            // Another process removed it as a leftover before it was locked.
             Err(TryLockError::WouldBlock) => {}
             Ok(()) if !temporary.path().exists() => {}
-            // A file system without locks: leftovers on it stay.
+            // On a file system without locks, leftovers remain.
             Ok(()) | Err(TryLockError::Error(_)) => return Ok(temporary),
         }
     }
     Err(io::Error::new(io::ErrorKind::ResourceBusy, "its temporary file is removed by another process"))
 }
 
-/// Removes the temporary files of a file whose processes are gone; what cannot be removed stays.
+/// Removes a file's temporary files whose processes have ended; ignores those that cannot be removed.
 fn remove_leftovers(folder: &Path, name: &OsStr) {
     let prefix = prefix_of(name);
     let prefix = prefix.to_string_lossy();
@@ -255,7 +255,7 @@ fn remove_leftovers(folder: &Path, name: &OsStr) {
     }
 }
 
-/// Says what a full disk lacks, where the system only says that it is full.
+/// Adds the required size to an error about missing space.
 fn described(error: io::Error, bytes: Option<usize>) -> io::Error {
     let what = match error.kind() {
         io::ErrorKind::StorageFull => "the disk is full",

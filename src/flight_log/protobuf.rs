@@ -1,18 +1,17 @@
-//! Fields of protobuf messages (the wire format of Protocol Buffers).
+//! Reader of protobuf messages (wire format of Protocol Buffers).
 
 use super::cdr::CdrError;
 
-/// Reads the fields of a message in their order.
+/// Reads the fields of a message in order.
 #[derive(Clone, Debug)]
 pub(crate) struct ProtobufReader<'a> {
     message: &'a [u8],
     position: usize,
 }
 
-/// The value of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ProtobufValue<'a> {
-    /// A varint or a number of fixed size.
+    /// Varint or number of fixed size.
     Number(u64),
     /// Bytes, text or another message.
     Bytes(&'a [u8]),
@@ -43,7 +42,7 @@ impl<'a> ProtobufReader<'a> {
         Ok(Some((tag >> 3, value)))
     }
 
-    /// Bytes of this message as text.
+    /// Converts bytes of this message to text.
     pub(crate) fn text(&self, bytes: &'a [u8]) -> Result<&'a str, CdrError> {
         std::str::from_utf8(bytes)
             .map_err(|error| CdrError { what: format!("string is not UTF-8 ({error})"), offset: self.position })

@@ -1,9 +1,9 @@
-//! Pixel encodings of raw images (`sensor_msgs/msg/Image`) and their grey levels.
+//! Pixel encodings of raw images (`sensor_msgs/msg/Image`) and their gray values.
 
 use super::image_decoding::BitDepth;
 use super::messages::ImageMessage;
 
-/// How the pixels of a raw image are stored, by the names of ROS (`sensor_msgs/image_encodings.hpp`).
+/// Storage of a raw image's pixels, by the names of ROS (`sensor_msgs/image_encodings.hpp`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct RawEncoding {
     layout: PixelLayout,
@@ -13,17 +13,16 @@ pub(super) struct RawEncoding {
 /// Order of the samples in a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum PixelLayout {
-    /// `samples` samples per pixel, grey level at `first`: one grey level per pixel, or the luma of a YUV image.
+    /// `samples` samples per pixel, gray value at `first`: one gray value per pixel, or the luma of a YUV image.
     Luma { samples: usize, first: usize },
     /// `samples` samples per pixel, red, green and blue at these.
     Color { samples: usize, rgb: [usize; 3] },
-    /// One sample per pixel under a mosaic of color filters, `red` the column and row of a red one.
+    /// One sample per pixel with a Bayer filter; `red` is the column and row of a red sample.
     Bayer { red: [usize; 2] },
-    /// A plane of luma samples before planes of color.
+    /// Plane of luma samples before planes of color.
     LumaPlane,
 }
 
-/// Size of one sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum SampleWidth {
     Byte,
@@ -31,11 +30,11 @@ enum SampleWidth {
     Wide,
 }
 
-/// Weights of red, green and blue in a grey level, in 1/65536 (ITU-R BT.601, as in JPEG).
+/// Weights of red, green and blue in a gray value, in 1/65536 (ITU-R BT.601, as in JPEG).
 const LUMA_WEIGHTS: [u64; 3] = [19_595, 38_470, 7_471];
 
 impl RawEncoding {
-    /// The encoding with a name, `None` when it has no grey levels or is not read.
+    /// Encoding with a ROS name, `None` if it has no gray values or is not supported.
     pub(super) fn from_name(name: &str) -> Option<Self> {
         let color = |samples, rgb| PixelLayout::Color { samples, rgb };
         let luma = |samples, first| PixelLayout::Luma { samples, first };
@@ -68,12 +67,12 @@ impl RawEncoding {
         Some(Self { layout, sample })
     }
 
-    /// Whether a sample has 16 bits.
+    /// True if a sample has 16 bits.
     pub(super) fn is_wide(self) -> bool {
         self.sample == SampleWidth::Wide
     }
 
-    /// Smallest width and height of an image: a filter mosaic needs both neighbours of a pixel's colors.
+    /// Smallest width and height of an image: demosaicing needs both neighbours of a pixel's colors.
     pub(super) fn smallest_side_px(self) -> usize {
         if matches!(self.layout, PixelLayout::Bayer { .. }) { 2 } else { 1 }
     }
@@ -92,7 +91,7 @@ impl RawEncoding {
         self.rows(raw).flat_map(|row| self.samples(row, raw.big_endian)).max()
     }
 
-    /// Grey levels of all pixels, row by row. The image has at least [`Self::row_bytes`] in each of its rows.
+    /// Gray values of all pixels, row by row. Each row of the image must have at least [`Self::row_bytes`].
     pub(super) fn gray(self, raw: &ImageMessage<'_>, depth: BitDepth) -> Vec<u8> {
         if self == (Self { layout: PixelLayout::Luma { samples: 1, first: 0 }, sample: SampleWidth::Byte }) {
             return self.rows(raw).flatten().copied().collect();
@@ -132,7 +131,7 @@ impl RawEncoding {
         row.chunks_exact(bytes).map(move |sample| Self::sample(sample, big_endian))
     }
 
-    /// The value of a sample's one or two bytes.
+    /// Value of a sample of one or two bytes.
     fn sample(bytes: &[u8], big_endian: bool) -> u16 {
         match *bytes {
             [low, high] if !big_endian => u16::from_le_bytes([low, high]),
@@ -142,13 +141,13 @@ impl RawEncoding {
     }
 }
 
-/// Grey level of a color, rounded.
+/// Gray value of a color, rounded.
 pub(super) fn luma(rgb: [u16; 3]) -> u16 {
     let sum: u64 = rgb.into_iter().zip(LUMA_WEIGHTS).map(|(value, weight)| u64::from(value) * weight).sum();
     ((sum + 32_768) >> 16) as u16
 }
 
-/// Samples under a mosaic of color filters: rows of red and green alternate with rows of green and blue.
+/// Samples with a Bayer filter: rows of red and green alternate with rows of green and blue.
 struct Mosaic<'a> {
     width: usize,
     height: usize,
@@ -158,7 +157,8 @@ struct Mosaic<'a> {
 }
 
 impl Mosaic<'_> {
-    /// Grey levels from bilinear interpolation of the three colors. Beyond a side the image is mirrored at its outermost
+    /// Gray values from bilinear interpolation of the three colors. At the border the image is mirrored at its
+    /// outermost
     /// samples, which keeps the pattern.
     fn gray(&self, narrow: impl Fn(u16) -> u8) -> Vec<u8> {
         let mirrored =
@@ -170,8 +170,8 @@ impl Mosaic<'_> {
             let [above, below] = mirrored(row, self.height);
             let (above, this, below) = (line(above), line(row), line(below));
             let in_red_row = row % 2 == self.red[1];
-            // The color of this row's filters that are not green, and that of the rows above and below.
-            let (own, other) = if in_red_row { (red, blue) } else { (blue, red) };
+            // Color of this row that is not green, and that of the rows above and below.
+            let (in_row, other) = if in_red_row { (red, blue) } else { (blue, red) };
             for column in 0..self.width {
                 let [left, right] = mirrored(column, self.width);
                 let at = |line: &[u16], column: usize| u64::from(line[column]);
@@ -180,10 +180,10 @@ impl Mosaic<'_> {
                 let vertical = at(above, column) + at(below, column);
                 let is_green = (column % 2 == self.red[0]) != in_red_row;
                 let sum = if is_green {
-                    4 * green * center + 2 * own * horizontal + 2 * other * vertical
+                    4 * green * center + 2 * in_row * horizontal + 2 * other * vertical
                 } else {
                     let diagonal = at(above, left) + at(above, right) + at(below, left) + at(below, right);
-                    4 * own * center + green * (horizontal + vertical) + other * diagonal
+                    4 * in_row * center + green * (horizontal + vertical) + other * diagonal
                 };
                 pixels.push(narrow(((sum + (1 << 17)) >> 18) as u16));
             }
@@ -199,7 +199,7 @@ mod tests {
     const PATTERNS: [(&str, [usize; 2]); 4] =
         [("bayer_rggb", [0, 0]), ("bayer_grbg", [1, 0]), ("bayer_gbrg", [0, 1]), ("bayer_bggr", [1, 1])];
 
-    /// The mosaic of an image whose colors are a function of column and row.
+    /// Mosaic of an image whose colors are a function of column and row.
     fn mosaic(size: [usize; 2], red: [usize; 2], color: impl Fn(usize, usize) -> [u16; 3]) -> Vec<u16> {
         let mut samples = Vec::new();
         for row in 0..size[1] {

@@ -1,9 +1,10 @@
-//! Names of logs and rigs as text for people: safe for a terminal, short enough for a table, and the nearest known one.
+//! Names of logs and rigs as readable text: safe for a terminal, short enough for a table, with a search of similar
+//! names.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// Whether a character can change how a terminal shows the text around it: control characters (C0, DEL, C1), line and
+/// True if a character can change the display of the text around it: control characters (C0, DEL, C1), line and
 /// paragraph separators, marks that reorder text (bidirectional overrides, embeddings and isolates).
 fn is_unprintable(letter: char) -> bool {
     letter.is_control()
@@ -29,18 +30,18 @@ fn escaped(text: &str, keeps: impl Fn(char) -> bool) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// A name of foreign origin (topic, frame, joint, file) for one line of text: characters that control a terminal or
+/// Name of external origin (topic, frame, joint, file) for one line of text: characters that control a terminal or
 /// reorder text are written as escapes such as `\u{1b}` and `\n`.
 pub fn printable(name: &str) -> Cow<'_, str> {
     escaped(name, |_| false)
 }
 
-/// The same for a text of several lines, whose line breaks and tabs are kept.
+/// [`printable`] for a text of several lines, whose line breaks and tabs are kept.
 pub fn printable_lines(text: &str) -> Cow<'_, str> {
     escaped(text, |letter| letter == '\n' || letter == '\t')
 }
 
-/// A printable name of at most `max_length` characters, its middle replaced by an ellipsis where it is longer.
+/// Printable name of at most `max_length` characters; the middle of a longer one is replaced by an ellipsis.
 pub fn shortened(name: &str, max_length: usize) -> Cow<'_, str> {
     let name = printable(name);
     let count = name.chars().count();
@@ -53,7 +54,7 @@ pub fn shortened(name: &str, max_length: usize) -> Cow<'_, str> {
     Cow::Owned(format!("{head}…{tail}"))
 }
 
-/// Edit distance: how many characters have to be replaced, inserted or deleted.
+/// Edit distance: number of characters to replace, insert or delete.
 pub fn edit_distance(from: &str, to: &str) -> usize {
     let to: Vec<char> = to.chars().collect();
     let mut row: Vec<usize> = (0..=to.len()).collect();
@@ -68,9 +69,9 @@ pub fn edit_distance(from: &str, to: &str) -> usize {
     row[to.len()]
 }
 
-/// The known name with the smallest edit distance, with that distance; the first in the alphabet among equals.
+/// Known name with the smallest edit distance, and that distance; the first in the alphabet among equals.
 pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<(usize, &'a str)> {
-    // A name of a megabyte is near nothing, and takes no time to say so.
+    // Bounds the time for a name of a megabyte.
     let name: String = name.chars().take(256).collect();
     known.into_iter().map(|known| (edit_distance(&name, known), known)).min()
 }

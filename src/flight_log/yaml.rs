@@ -1,6 +1,6 @@
 //! Numbers and names as YAML scalars.
 
-/// The shortest decimal that reads back as the same number, in the notation of YAML 1.1 (`PyYAML`), which requires a
+/// Shortest decimal that reads back as the same number, in the notation of YAML 1.1 (`PyYAML`), which requires a
 /// point before an exponent, and a sign in it.
 pub(crate) fn number(value: f64) -> String {
     let written = format!("{value:?}");
@@ -10,12 +10,12 @@ pub(crate) fn number(value: f64) -> String {
     format!("{mantissa}{point}e{sign}{exponent}")
 }
 
-/// A list in brackets.
+/// List in brackets.
 pub(crate) fn numbers(values: &[f64]) -> String {
     format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
 }
 
-/// A plain scalar where YAML reads it as a string, else a quoted one.
+/// Plain scalar if YAML reads it as a string, else a quoted one.
 pub(crate) fn text(value: &str) -> String {
     let plain = value.starts_with(|first: char| first.is_ascii_alphabetic() || first == '/')
         && value.chars().all(|letter| letter.is_ascii_alphanumeric() || "/_-.".contains(letter))

@@ -9,7 +9,7 @@ pub fn wrap_angle(angle_rad: f64) -> f64 {
     angle_rad - revolutions * TAU
 }
 
-/// Returns the equivalent angle in (−π, π], in radians: the form in which angles are shown and written.
+/// Returns the equivalent angle in (−π, π], in radians, for display and files.
 pub fn principal_angle(angle_rad: f64) -> f64 {
     let revolutions = ((angle_rad - PI) / TAU).ceil();
     angle_rad - revolutions * TAU

@@ -14,7 +14,7 @@ mod tests {
 
     #[test]
     fn quantiles_are_those_of_tables() {
-        // 2.5 % and 97.5 % of χ² with so many degrees of freedom.
+        // 2.5 % and 97.5 % of χ² at each number of degrees of freedom.
         for (degrees, low, high) in [(10.0, 3.247, 20.483), (30.0, 16.791, 46.979)] {
             let found = [-1.96, 1.96].map(|normal| degrees * mean_square_quantile(degrees, normal));
             assert!((found[0] / low - 1.0).abs() < 0.01 && (found[1] / high - 1.0).abs() < 0.001, "{found:?}");

@@ -4,19 +4,18 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::{Conj, Mat, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 
-/// `A = U·diag(s)·Vᵀ` with as many columns as the smaller side has, largest singular value first.
+/// Thin singular value decomposition `A = U·diag(s)·Vᵀ` of an m × n matrix, with k = min(m, n) singular values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ThinSvd {
-    /// Left singular vectors, one column each.
+    /// m × k.
     pub u: DMatrix<f64>,
-    /// Singular values in descending order.
+    /// In descending order.
     pub singular_values: DVector<f64>,
-    /// Right singular vectors, one column each.
+    /// n × k.
     pub v: DMatrix<f64>,
 }
 
-/// The thin singular value decomposition of an m × n matrix: `u` is m × k, `v` is n × k with k = min(m, n). `None` for a
-/// matrix that is not finite.
+/// Returns the thin singular value decomposition, `None` for a matrix that is not finite.
 pub fn thin_svd(matrix: &DMatrix<f64>) -> Option<ThinSvd> {
     let (rows, columns) = matrix.shape();
     if rows == 0 || columns == 0 {
@@ -38,7 +37,7 @@ pub fn thin_svd(matrix: &DMatrix<f64>) -> Option<ThinSvd> {
     })
 }
 
-/// The singular values in descending order, `None` for a matrix that is not finite.
+/// Singular values in descending order, `None` for a matrix that is not finite.
 pub fn singular_values(matrix: &DMatrix<f64>) -> Option<Vec<f64>> {
     if matrix.is_empty() {
         return Some(vec![]);
@@ -53,26 +52,26 @@ fn is_finite(matrix: &DMatrix<f64>) -> bool {
     matrix.iter().all(|entry| entry.is_finite())
 }
 
-/// A view of a matrix for faer, without a copy.
+/// View of a matrix for faer, without a copy.
 pub fn as_faer(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
     MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
 }
 
-/// A copy of a matrix from faer.
 pub fn from_faer(matrix: MatRef<'_, f64>) -> DMatrix<f64> {
     DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, column| matrix[(row, column)])
 }
 
-/// A copy of a matrix for faer.
 pub fn to_faer(matrix: &DMatrix<f64>) -> Mat<f64> {
     as_faer(matrix).to_owned()
 }
 
-/// Multiplies `rest` (m × n) in place by `Qᵀ` of `spanning` (m × k) `= Q·R·Pᵀ` and returns the rank r of `spanning`: the
-/// first r rows of the product are the part of `rest` within the column space of `spanning`, the other m − r rows the part
+/// Multiplies `rest` (m × n) in place by `Qᵀ` of `spanning` (m × k) `= Q·R·Pᵀ` and returns the rank r of `spanning`:
+/// the
+/// first r rows of the product are the part of `rest` within the column space of `spanning`, the other m − r rows the
+/// part
 /// orthogonal to it.
 ///
-/// Column-pivoted Householder QR, hence also correct for dependent columns: a pivot counts when it exceeds `tolerance`, so
+/// Column-pivoted Householder QR, also correct for dependent columns: a pivot counts when it exceeds `tolerance`, so
 /// the columns of `spanning` should have norms around 1. Both matrices must be finite.
 pub fn split_by_column_space(spanning: MatRef<'_, f64>, rest: MatMut<'_, f64>, tolerance: f64) -> usize {
     use faer::linalg::householder::{

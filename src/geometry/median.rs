@@ -1,4 +1,4 @@
-/// The median by total order, the upper one of an even count; `None` of no values.
+/// Median by total order, the upper one for an even count; `None` without values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     if values.is_empty() {

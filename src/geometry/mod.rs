@@ -27,12 +27,11 @@ pub use rigid_transform::RigidTransform;
 pub use split_mix::SplitMix64;
 pub use tangent::tangent_basis;
 
-/// Seconds of a time stamp or duration in nanoseconds.
 pub fn seconds_from_ns(time_ns: i64) -> f64 {
     time_ns as f64 * 1e-9
 }
 
-/// Nanoseconds of a time stamp or duration in seconds, rounded to the nearest.
+/// Rounded to the nearest nanosecond.
 pub fn ns_from_seconds(time_s: f64) -> i64 {
     (time_s * 1e9).round() as i64
 }

@@ -4,13 +4,13 @@ use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, UnitQuaternion, Vector3, Vec
 
 use super::so3;
 
-/// A rigid transform that maps points from one frame to another; a value is named `to_from_from`, as in
+/// Rigid transform that maps points from one frame to another; a value is named `to_from_from`, as in
 /// `world_from_imu`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidTransform {
     /// Rotates vectors into the outer frame.
     pub rotation: UnitQuaternion<f64>,
-    /// Origin of the inner frame seen in the outer one, in metres.
+    /// Origin of the inner frame in the outer frame, in metres.
     pub translation_m: Vector3<f64>,
 }
 
@@ -21,12 +21,10 @@ impl Default for RigidTransform {
 }
 
 impl RigidTransform {
-    /// A transform from its two parts.
     pub fn new(rotation: UnitQuaternion<f64>, translation_m: Vector3<f64>) -> Self {
         Self { rotation, translation_m }
     }
 
-    /// The transform that changes nothing.
     pub fn identity() -> Self {
         Self::new(UnitQuaternion::identity(), Vector3::zeros())
     }
@@ -47,7 +45,7 @@ impl RigidTransform {
         Some(Self::new(rotation, matrix.fixed_view::<3, 1>(0, 3).into_owned()))
     }
 
-    /// The 4×4 homogeneous matrix.
+    /// 4×4 homogeneous matrix.
     pub fn to_matrix(self) -> Matrix4<f64> {
         let mut matrix = Matrix4::identity();
         matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.rotation_matrix());
@@ -55,28 +53,26 @@ impl RigidTransform {
         matrix
     }
 
-    /// The rotation as a 3×3 matrix.
     pub fn rotation_matrix(&self) -> Matrix3<f64> {
         self.rotation.to_rotation_matrix().into_inner()
     }
 
-    /// The transform the other way round.
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.inverse();
         Self::new(rotation, -(rotation * self.translation_m))
     }
 
-    /// A point of the inner frame, in the outer frame.
+    /// Transforms a point from the inner to the outer frame.
     pub fn transform_point(&self, point: &Point3<f64>) -> Point3<f64> {
         self.rotation * point + self.translation_m
     }
 
-    /// A position vector of the inner frame, in the outer frame (rotated and shifted).
+    /// Transforms a position vector from the inner to the outer frame (rotation and translation).
     pub fn transform(&self, position: &Vector3<f64>) -> Vector3<f64> {
         self.rotation * position + self.translation_m
     }
 
-    /// The pose at a fraction (0 to 1) of the way to another one: positions along a line, rotations at a constant rate.
+    /// Interpolates at a fraction (0 to 1) of the way to `to`: positions along a line, rotations at a constant rate.
     pub fn interpolate(&self, to: &Self, fraction: f64) -> Self {
         // Two attitudes 180° apart have no shortest rotation between them; the earlier one is kept.
         let rotation = self.rotation.try_slerp(&to.rotation, fraction, 1e-9).unwrap_or(self.rotation);

@@ -1,16 +1,15 @@
-//! Random numbers that are the same everywhere.
+//! Random numbers that are equal on all platforms.
 
 /// The `splitmix64` generator (Steele, Lea, Flood 2014): small, seeded, and good enough for samples and test data.
 #[derive(Clone, Debug)]
 pub struct SplitMix64(u64);
 
 impl SplitMix64 {
-    /// The sequence of a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// The next 64 random bits.
+    /// Next 64 random bits.
     #[inline]
     pub fn next_u64(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -20,7 +19,7 @@ impl SplitMix64 {
         z ^ (z >> 31)
     }
 
-    /// The next number from 0 (included) to 1 (not), in steps of 2⁻⁵³.
+    /// Next number in [0, 1), in steps of 2⁻⁵³.
     #[inline]
     pub fn next_unit(&mut self) -> f64 {
         (self.next_u64() >> 11) as f64 / (1_u64 << 53) as f64

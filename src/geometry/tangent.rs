@@ -1,6 +1,7 @@
 use nalgebra::{Matrix3x2, Vector3};
 
-/// An orthonormal basis of the plane tangent to the unit sphere at a unit vector, one basis vector a column (3 × 2).
+/// Returns an orthonormal basis of the plane tangent to the unit sphere at `direction`, one basis vector per column
+/// (3 × 2).
 ///
 /// With `direction` as third column the two form a right-handed frame: `first × second = direction`.
 #[inline]

@@ -120,7 +120,7 @@ fn rows_are_split_by_a_column_space_even_with_dependent_columns() {
     let mut transformed = to_faer(&rest);
     let rank = split_by_column_space(to_faer(&spanning).as_ref(), transformed.as_mut(), 1e-11);
     assert_eq!(rank, 4);
-    // What is left has the Gram matrix of the part orthogonal to the columns.
+    // The remaining rows have the Gram matrix of the part orthogonal to the columns.
     let svd = thin_svd(&spanning).unwrap();
     let basis = svd.u.columns(0, 4);
     let outside = &rest - basis * basis.tr_mul(&rest);
@@ -154,7 +154,7 @@ fn wrap_angle_maps_to_one_revolution() {
         for angle in [-3.0, -0.5, 0.0, 0.7, 3.1] {
             assert!(
                 (wrap_angle(angle + f64::from(revolutions) * TAU) - angle).abs() < 1e-14,
-                "{angle} and {revolutions} turns"
+                "{angle} and {revolutions} revolutions"
             );
         }
     }

@@ -1,6 +1,6 @@
 //! QR factorization of rows that arrive in portions, by Householder reflections.
 
-#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+#![expect(clippy::inline_always, reason = "code that is not inlined is not compiled for the registers of its caller")]
 
 use std::ops::Range;
 
@@ -11,32 +11,33 @@ use pulp::{Arch, Simd, WithSimd};
 const PANEL: usize = 4;
 /// Rows of a portion are padded with zeros to a multiple of this, so that they fill vector registers.
 const LANES: usize = 8;
-/// Rows that are merged together at most, so that they stay in the nearest caches.
+/// Largest number of rows that are merged together, so that they stay in the nearest caches.
 pub(crate) const PORTION: usize = 128;
 
-/// The upper triangular factor `R` (n × n) of rows `A`: `RᵀR = AᵀA`.
+/// Upper triangular factor `R` (n × n) of rows `A`: `RᵀR = AᵀA`.
 ///
-/// A row costs nothing in the columns before its first entry, and little in columns in which neither its portion nor the
+/// A row costs nothing in the columns before its first entry, and little in columns in which neither its portion nor
+/// the
 /// rows of `R` above have entries: merge rows that begin at the same column together.
 #[derive(Clone, Debug)]
 pub(crate) struct TriangularFactor {
     columns: usize,
     /// Column-major, n × n.
     entries: Vec<f64>,
-    /// Whether a row of `R` has been set.
+    /// True for each row of `R` that has been set.
     is_set: Vec<bool>,
     portion: Portion,
 }
 
-/// The rows to merge, and the reflections that clear them.
+/// Rows to merge, and the reflections that clear them.
 #[derive(Clone, Debug, Default)]
 struct Portion {
-    /// Column-major, [`Self::stride`] rows a column.
+    /// Column-major, [`Self::stride`] rows per column.
     entries: Vec<f64>,
     stride: usize,
-    /// Whether a column has entries.
+    /// True for each column with entries.
     is_filled: Vec<bool>,
-    /// The vectors of the reflections, [`Self::stride`] entries each.
+    /// Vectors of the reflections, [`Self::stride`] entries each.
     vectors: Vec<f64>,
     /// Columns that a panel changes.
     changed: Vec<usize>,
@@ -46,14 +47,14 @@ struct Portion {
 #[derive(Clone, Copy, Debug, Default)]
 struct Reflection {
     tau: f64,
-    /// The entry of `v` at the row of `R`: 1 when that row is part of the reflection, else 0.
+    /// Entry of `v` at the row of `R`: 1 when that row is part of the reflection, else 0.
     top: f64,
-    /// The row of the portion that becomes the row of `R`.
+    /// Row of the portion that becomes the row of `R`.
     taken: Option<usize>,
 }
 
 impl TriangularFactor {
-    /// The factor of no rows.
+    /// Factor of a matrix without rows.
     pub(crate) fn new(columns: usize) -> Self {
         Self {
             columns,
@@ -97,7 +98,7 @@ impl TriangularFactor {
         }
     }
 
-    /// The reflection that clears a column of the portion, the one with this index in its panel.
+    /// Returns the reflection that clears a column of the portion; `index` counts within its panel.
     fn reflection(
         &mut self,
         column: usize,
@@ -144,8 +145,8 @@ impl TriangularFactor {
         reflection
     }
 
-    /// Applies the reflections of a panel from this index on, which belong to the rows of `R` from `row` on, to some columns
-    /// behind.
+    /// Applies the reflections of a panel from `index` on, which belong to the rows of `R` from `row` on, to a block of
+    /// later columns.
     fn apply<const N: usize>(
         &mut self,
         panel: [Reflection; N],
@@ -175,7 +176,7 @@ impl TriangularFactor {
     /// Adds the rows of a matrix; column `k` of the factor is column `order[k]` of the matrix.
     pub(crate) fn merge_rows(&mut self, matrix: &DMatrix<f64>, order: &[usize]) {
         let mut begins = vec![order.len(); matrix.nrows()];
-        // Rows that have not begun yet, and those that have.
+        // Rows before their first entry, and rows from their first entry on.
         let mut open: Vec<usize> = (0..matrix.nrows()).collect();
         let mut rows = Vec::with_capacity(open.len());
         for (place, column) in order.iter().enumerate() {
@@ -210,13 +211,13 @@ impl TriangularFactor {
         DMatrix::from_column_slice(self.columns, self.columns, &self.entries)
     }
 
-    /// The first `count` rows of `R`, without those that no row was merged into.
+    /// First `count` rows of `R`, without those that no row was merged into.
     pub(crate) fn leading_rows(&self, count: usize) -> DMatrix<f64> {
         let rows: Vec<usize> = (0..count).filter(|row| self.is_set[*row]).collect();
         DMatrix::from_fn(rows.len(), self.columns, |row, column| self.entries[column * self.columns + rows[row]])
     }
 
-    /// The factor of the columns from `first` on, the others being projected out.
+    /// Factor of the columns from `first` on, with the others projected out.
     pub(crate) fn trailing(&self, first: usize) -> Self {
         let columns = self.columns - first;
         let mut entries = Vec::with_capacity(columns * columns);
@@ -231,10 +232,10 @@ fn portion_is_empty(portion: &Portion, columns: Range<usize>) -> bool {
     portion.is_filled[columns].iter().all(|filled| !filled)
 }
 
-/// Some reflections, one after the other, on the changed columns of the portion and on their rows of `R`.
+/// Consecutive reflections, applied to the changed columns of the portion and to their rows of `R`.
 struct Application<'a, const N: usize> {
     panel: [Reflection; N],
-    /// Index of the first one's vector.
+    /// Index of the first reflection's vector.
     index: usize,
     factor: &'a mut [f64],
     /// Columns of `R`.
@@ -251,7 +252,7 @@ struct Application<'a, const N: usize> {
 impl<const N: usize> WithSimd for Application<'_, N> {
     type Output = ();
 
-    // Without closures: they would not be compiled for the registers of their caller.
+    // Without closures, which would not be compiled for the registers of their caller.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { panel, index, factor, count, row, rows, first, portion } = self;
@@ -263,7 +264,7 @@ impl<const N: usize> WithSimd for Application<'_, N> {
             of_panel[k] = &S::as_simd_f64s(&vectors[(index + k) * stride..(index + k + 1) * stride]).0[..length];
         }
         let zero = simd.splat_f64s(0.0);
-        // Products of the vectors, those of each one with the ones before it.
+        // Products of each vector with the vectors before it.
         let mut products = [[0.0; N]; N];
         for k in 1..N {
             for before in 0..k {
@@ -332,7 +333,7 @@ impl<const N: usize> WithSimd for Application<'_, N> {
                 own[place] = entry;
             }
         }
-        // Rows of the portion that are rows of `R` from now on.
+        // Rows of the portion that become rows of `R`.
         for (k, reflection) in panel.iter().enumerate() {
             if let Some(taken) = reflection.taken {
                 for column in changed.iter() {
@@ -343,7 +344,8 @@ impl<const N: usize> WithSimd for Application<'_, N> {
     }
 }
 
-/// Turns the products of the vectors with a column into their factors in the reflected column; reflects the rows of `R`.
+/// Converts the products of the vectors with a column into their factors in the reflected column; reflects the rows of
+/// `R`.
 #[inline(always)]
 fn finish<const N: usize>(
     panel: &[Reflection; N],
@@ -361,9 +363,10 @@ fn finish<const N: usize>(
     }
 }
 
-/// Reflects an upper triangular matrix so that a column which depends on those before it takes up no row, and returns the
-/// columns among the first `columns` that do not: as many leading rows begin in them, one each, and the other rows are
-/// zero in all of these columns.
+/// Reflects an upper triangular matrix so that a column that depends on those before it takes up no row. Returns the
+/// independent columns among the first `columns`: one leading row begins in each of them, and the other rows are zero
+/// in
+/// all of these columns.
 ///
 /// A column depends on those before it when no more than `tolerance` of its norm is independent of them.
 pub(crate) fn skip_dependent_columns(
@@ -376,7 +379,7 @@ pub(crate) fn skip_dependent_columns(
     let mut independent = Vec::with_capacity(columns);
     for column in 0..columns {
         let rank = independent.len();
-        // Below this the triangle is empty, and dependent columns have left it one row deeper each.
+        // Below this row the triangle is empty; each dependent column has left it one row deeper.
         let end = (column + 1).min(height);
         if rank == end {
             break;
@@ -391,7 +394,7 @@ pub(crate) fn skip_dependent_columns(
         if norm <= tolerance * norms[column] {
             continue;
         }
-        // A reflection onto the first row; a row alone needs none.
+        // Reflection onto the first row; a single row needs none.
         let pivot = if end - rank == 1 { axis[0] } else { -norm.copysign(axis[0]) };
         axis[0] -= pivot;
         if axis[0] != 0.0 {

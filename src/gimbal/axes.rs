@@ -1,11 +1,11 @@
-//! The classical chain of a mechanism that is described by the axes of its joints.
+//! Classical chain of a mechanism that is described by the axes of its joints.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::{ClassicalChain, DhLink};
 use crate::geometry::RigidTransform;
 
-/// An axis of a joint at angle zero, in the IMU frame: its direction and a point on it in metres.
+/// Axis of a joint at angle zero, in the IMU frame: its direction and a point on it in metres.
 pub type JointAxis = (Vector3<f64>, Vector3<f64>);
 
 impl ClassicalChain {
@@ -31,7 +31,7 @@ impl ClassicalChain {
     }
 }
 
-/// The link from a joint's frame to the next joint's axis, along their common normal.
+/// Link from a joint's frame to the next joint's axis, along their common normal.
 fn link_to(frame: &RigidTransform, next: &Vector3<f64>, next_point: &Vector3<f64>) -> DhLink {
     let (x, z) = (frame.rotation * Vector3::x(), frame.rotation * Vector3::z());
     let origin = frame.translation_m;
@@ -54,13 +54,13 @@ fn link_to(frame: &RigidTransform, next: &Vector3<f64>, next_point: &Vector3<f64
     }
 }
 
-/// A unit vector orthogonal to the given one.
+/// Unit vector orthogonal to the given one.
 fn across(direction: &Vector3<f64>) -> Vector3<f64> {
     let helper = if direction.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
     (helper - direction * direction.dot(&helper)).normalize()
 }
 
-/// The orientation with these x and z axes.
+/// Orientation with these x and z axes.
 fn frame_about(x: &Vector3<f64>, z: &Vector3<f64>) -> UnitQuaternion<f64> {
     let z = z.normalize();
     let matrix = Matrix3::from_columns(&[*x, z.cross(x), z]);

@@ -11,7 +11,7 @@ pub(super) struct MinimalChain {
     pub(super) base_angles_rad: [f64; 2],
     /// Base translation `tx ty` after those rotations, in metres.
     pub(super) base_shift_m: [f64; 2],
-    /// All links; the last one's `alpha` belongs to the end block.
+    /// All links; `alpha` of the last one belongs to the end block.
     pub(super) links: Vec<DhLink>,
     /// Rotation β about y in the end block.
     pub(super) beta_rad: f64,
@@ -19,31 +19,31 @@ pub(super) struct MinimalChain {
     pub(super) y_m: f64,
 }
 
-/// Values of a chain, one variant for each kind of columns.
+/// Values of a chain, one variant for each set of columns.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Form {
     Classical(ClassicalChain),
     Minimal(MinimalChain),
     /// `X0 … XN`.
     Poe(Vec<RigidTransform>),
-    /// No joints: every form but the classical one is a single rigid transform.
+    /// Chain without joints: a single rigid transform in every parameterization but the classical one.
     Rigid(RigidTransform),
 }
 
-/// A gimbal chain in one parameterization: its static calibration as named columns.
+/// Gimbal chain in one parameterization: its static calibration as named columns.
 ///
 /// Updates follow the rule of [`crate::geometry`]: rigid-transform blocks take `[φ; δt]` on the right, scalars add, and
 /// the inner blocks of `poe` take `(wx, wy, vx, vy)`, `R ← R·Exp([wx, wy, 0])`, `t ← t + R·[vx, vy, 0]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain {
     pub(super) parameterization: Parameterization,
-    /// Whether the joint offsets are excluded from the columns.
+    /// True if the joint offsets are excluded from the columns.
     pub(super) offsets_hidden: bool,
     pub(super) form: Form,
 }
 
 impl Chain {
-    /// Converts the classical form to `parameterization`. The conversion is exact for every chain, also at a
+    /// Converts a classical chain to `parameterization`. The conversion is exact for every chain, also at a
     /// singularity.
     pub fn from_classical(classical: &ClassicalChain, parameterization: Parameterization) -> Self {
         let form = if parameterization == Parameterization::Classical {
@@ -58,7 +58,7 @@ impl Chain {
         Self { parameterization, offsets_hidden: false, form }
     }
 
-    /// The chain in the classical form, with the same forward kinematics.
+    /// Converts to the classical parameterization, with the same forward kinematics.
     pub fn to_classical(&self) -> ClassicalChain {
         match &self.form {
             Form::Classical(chain) => chain.clone(),
@@ -82,24 +82,22 @@ impl Chain {
     /// Fixes the joint offsets: names, values, derivatives and updates no longer have their columns.
     ///
     /// Without encoders and without a prior on the joint angles, unknown joint angles absorb the offsets, so that
-    /// only one of the two can be estimated. The columns of `poe` are no offsets; it keeps all of them.
+    /// only one of the two can be estimated. No column of `poe` is an offset; it keeps all columns.
     #[must_use]
     pub fn without_joint_offsets(mut self) -> Self {
         self.offsets_hidden = true;
         self
     }
 
-    /// Whether the joint offsets are excluded from the columns.
+    /// True if the joint offsets are excluded from the columns.
     pub fn hides_joint_offsets(&self) -> bool {
         self.offsets_hidden
     }
 
-    /// Parameterization of the columns.
     pub fn parameterization(&self) -> Parameterization {
         self.parameterization
     }
 
-    /// Number of joints.
     pub fn joint_count(&self) -> usize {
         match &self.form {
             Form::Classical(chain) => chain.links.len(),
@@ -183,7 +181,7 @@ impl Chain {
         parameters
     }
 
-    /// Value of each column: scalars as they are, rigid transforms as rotation vector and translation, inner blocks of
+    /// Value of each column: scalars unchanged, rigid transforms as rotation vector and translation, inner blocks of
     /// `poe` as the x and y parts of the rotation vector and of the translation in the block's own axes.
     pub fn values(&self) -> DVector<f64> {
         let mut values = Vec::with_capacity(self.dof());

@@ -2,7 +2,7 @@ use crate::geometry::RigidTransform;
 
 use super::frame::{Axis, Frame};
 
-/// One Denavit–Hartenberg link, `Rz(θ + theta_offset)·Tz(d)·Tx(a)·Rx(α)` (Eq. 2).
+/// Denavit–Hartenberg link, `Rz(θ + theta_offset)·Tz(d)·Tx(a)·Rx(α)` (Eq. 2).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DhLink {
     /// Static joint offset θ, added to the encoder angle.
@@ -31,7 +31,7 @@ impl DhLink {
     }
 }
 
-/// The chain of Eqs. 5–6 as rigs define it; without links it is the extrinsics of a rigid camera.
+/// Chain of Eqs. 5–6, the parameterization of rig files; without links the extrinsics of a rigid camera.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ClassicalChain {
     /// `T^{I:B}` of the paper.
@@ -43,7 +43,6 @@ pub struct ClassicalChain {
 }
 
 impl ClassicalChain {
-    /// Number of joints N.
     pub fn joint_count(&self) -> usize {
         self.links.len()
     }

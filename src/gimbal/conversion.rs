@@ -1,4 +1,4 @@
-//! Conversions between the classical form and the other parameterizations, in closed forms that exist for every
+//! Conversions between the classical and the other parameterizations, in closed forms that exist for every
 //! chain (docs/mathematics.md, section 5).
 
 use std::f64::consts::PI;
@@ -16,7 +16,7 @@ const SINGULAR_COSINE: f64 = 1e-12;
 
 /// Converts a chain with at least one joint to a minimal parameterization.
 ///
-/// At a singularity of the base its first angle is set to zero; at one of the end block `y` (or `alpha`) is.
+/// At a singularity of the base, the first base angle is set to zero; at one of the end block, `y` (or `alpha`) is.
 pub(super) fn minimal(classical: &ClassicalChain, parameterization: Parameterization) -> MinimalChain {
     let base = split_base(&Frame::of(&classical.imu_from_base), parameterization.base_yx());
     let mut links = classical.links.clone();
@@ -34,7 +34,7 @@ pub(super) fn minimal(classical: &ClassicalChain, parameterization: Parameteriza
     }
 }
 
-/// Transform of the last link and the camera behind it, at joint angle zero of that link.
+/// Transform of the last link and the camera after it, at joint angle zero of that link.
 pub(super) fn end_block(link: &DhLink, effector_from_camera: &RigidTransform) -> Frame {
     let mut frame = Frame::identity();
     link.extend(&mut frame, 0.0);
@@ -45,7 +45,7 @@ pub(super) fn end_block(link: &DhLink, effector_from_camera: &RigidTransform) ->
 struct Base {
     angles_rad: [f64; 2],
     shift_m: [f64; 2],
-    /// Rotation about and translation along z that the first joint takes over.
+    /// Rotation about and translation along z that are moved to the first joint.
     joint_rotation_rad: f64,
     joint_translation_m: f64,
 }
@@ -130,8 +130,9 @@ fn rotated_back(angle_rad: f64, v: &Vector3<f64>) -> Vector3<f64> {
     Vector3::new(cosine * v.x + sine * v.y, cosine * v.y - sine * v.x, v.z)
 }
 
-/// Converts a minimal chain to the classical form: the base keeps its rotations, and the transform behind the
-/// last link (with the swapped end block: behind its translation along y) becomes `effector_from_camera`.
+/// Converts a minimal chain to the classical parameterization: the base keeps its rotations, and the transform after
+/// the
+/// last link (with the swapped end block: after its translation along y) becomes `effector_from_camera`.
 pub(super) fn classical_of_minimal(chain: &MinimalChain, parameterization: Parameterization) -> ClassicalChain {
     let mut base = Frame::identity();
     let order = if parameterization.base_yx() { [Axis::Y, Axis::X] } else { [Axis::X, Axis::Y] };
@@ -165,10 +166,10 @@ pub(super) fn poe_blocks(classical: &ClassicalChain) -> Vec<RigidTransform> {
     blocks
 }
 
-/// Converts a product of exponentials to the classical form.
+/// Converts a product of exponentials to the classical parameterization.
 ///
 /// Inner transforms become links. The screw along its own z axis that a link cannot represent moves on to the
-/// next transform. The last transform becomes a link with a rotation about and a translation along y behind it,
+/// next transform. The last transform becomes a link followed by a rotation about and a translation along y,
 /// in the end block with the larger singularity margin.
 pub(super) fn classical_of_poe(blocks: &[RigidTransform]) -> ClassicalChain {
     let last = blocks.len() - 1;
@@ -217,8 +218,9 @@ fn split_inner(block: &Frame) -> (DhLink, f64, f64) {
 }
 
 impl Chain {
-    /// Returns the representative of all equal mechanisms: middle angles of base and end within ±π/2, twists of the
-    /// middle links within 0 to π, offsets and other rotations within ±π. Parameterizations that are not minimal
+    /// Returns the canonical one of all chains of the same mechanism: middle angles of base and end within ±π/2, twists
+    /// of
+    /// the middle links within 0 to π, offsets and other rotations within ±π. Parameterizations that are not minimal
     /// return unchanged.
     ///
     /// Unique away from singularities and from parallel neighbouring axes.

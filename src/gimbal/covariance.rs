@@ -1,4 +1,4 @@
-//! Covariances between parameterizations, through the camera motions that their columns produce at many joint angles.
+//! Covariances between parameterizations, computed from the camera motions of their columns at many joint angles.
 
 use std::f64::consts::PI;
 
@@ -84,11 +84,11 @@ pub fn transport(from: &Chain, to: &Chain) -> DMatrix<f64> {
     motion.select_rows(&to.kept_columns()).select_columns(&from.kept_columns())
 }
 
-/// Transforms a covariance of `from`'s columns (`from.dof()` square) to one of `to`'s columns (`to.dof()`
+/// Transforms a covariance of the columns of `from` (`from.dof()` square) to one of the columns of `to` (`to.dof()`
 /// square), for a switch of parameterization.
 ///
 /// Directions of `to` that no motion of `from` reaches, at a singularity or where a parameterization is
-/// redundant, get standard deviations of 10° and 3 cm: they stay estimable instead of becoming certain.
+/// redundant, get standard deviations of 10° and 3 cm, so that they stay estimable instead of becoming certain.
 ///
 /// # Panics
 ///
@@ -119,7 +119,7 @@ fn transported(from: &Chain, covariance: &DMatrix<f64>, to: &Chain, sigma: impl 
     (&result + result.transpose()) * 0.5
 }
 
-/// Returns one value per column, by its dimension.
+/// Returns one value per column, computed from the column's dimension.
 fn by_column(chain: &Chain, value: impl Fn(Dimension) -> f64) -> DVector<f64> {
     let parameters = chain.parameters();
     DVector::from_iterator(parameters.len(), parameters.iter().map(|parameter| value(parameter.dimension())))
@@ -132,8 +132,8 @@ fn scale_columns(matrix: &mut DMatrix<f64>, scale: &DVector<f64>) {
 }
 
 impl Chain {
-    /// Returns the prior covariance of the columns (dof × dof, in rad and m) when every value of the rig's
-    /// classical form has an independent error with these standard deviations; diagonal for the classical form.
+    /// Returns the prior covariance of the columns (dof × dof, in rad and m) for independent errors with these standard
+    /// deviations of the rig's classical values; diagonal for the classical parameterization.
     ///
     /// `classical` is the mechanism from which this chain was converted.
     ///

@@ -2,7 +2,6 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::geometry::RigidTransform;
 
-/// A coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Axis {
     X,
@@ -20,7 +19,7 @@ impl Axis {
     }
 }
 
-/// A frame that moves along the chain: its orientation and origin in the start frame.
+/// Frame that moves along the chain: its orientation and origin in the start frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     pub(super) rotation: Matrix3<f64>,
@@ -36,12 +35,12 @@ impl Frame {
         Self { rotation: transform.rotation_matrix(), origin: transform.translation_m }
     }
 
-    /// Direction of one of its axes in the start frame.
+    /// Direction of one of the frame's axes in the start frame.
     pub(super) fn axis(&self, axis: Axis) -> Vector3<f64> {
         self.rotation.column(axis.index()).into_owned()
     }
 
-    /// Rotates the frame about its own axis.
+    /// Rotates about an axis of the frame.
     pub(super) fn rotate(&mut self, axis: Axis, angle_rad: f64) {
         let (sine, cosine) = angle_rad.sin_cos();
         let (next, after) = ((axis.index() + 1) % 3, (axis.index() + 2) % 3);
@@ -51,12 +50,12 @@ impl Frame {
         self.rotation.set_column(after, &second);
     }
 
-    /// Translates the frame along its own axis.
+    /// Translates along an axis of the frame.
     pub(super) fn translate(&mut self, axis: Axis, distance_m: f64) {
         self.origin += self.rotation.column(axis.index()) * distance_m;
     }
 
-    /// Moves the frame by a transform in its own axes.
+    /// Appends a transform that is given in the axes of the frame.
     pub(super) fn then(&mut self, inner: &RigidTransform) {
         self.origin += self.rotation * inner.translation_m;
         self.rotation *= inner.rotation_matrix();

@@ -1,4 +1,4 @@
-//! Joint angles from the orientation of the camera: the inverse of the chain's rotation.
+//! Joint angles from the orientation of the camera (inverse kinematics of the rotation).
 
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
@@ -7,32 +7,32 @@ use crate::geometry::{so3, wrap_angle};
 use super::frame::{Axis, Frame};
 use super::{ClassicalChain, DhLink};
 
-/// Joint angles this far beyond the limits are accepted: measurements have errors, and so have limits.
+/// Joint angles this far beyond the limits are accepted, because measurements and limits have errors.
 const LIMIT_TOLERANCE_RAD: f64 = 0.035;
-/// Solutions whose errors differ by less than this fit alike.
+/// Solutions whose errors differ by less than this fit equally well.
 const ALIKE_RAD: f64 = 0.05;
-/// Below this margin the previous solution decides. The margin of two perpendicular outer axes falls to it at 6° from
-/// parallel; there an error of the orientation appears ten times as large in the joint angles.
+/// Below this margin the previous solution decides. Two perpendicular outer axes have this margin at 6° from
+/// parallel; an error of the orientation then appears ten times as large in the joint angles.
 const SINGULAR_MARGIN: f64 = 0.07;
-/// Weight of the previous solution at the singularity, relative to the orientation's: small enough to pull the joints that the
-/// orientation constrains by a thousandth of their motion only.
+/// Weight of the previous solution at the singularity, relative to the orientation's weight: small enough to pull the
+/// joints that the orientation constrains by a thousandth of their motion only.
 const PREVIOUS_WEIGHT: f64 = 1e-3;
-/// Largest number of steps of a solution.
+/// Largest number of iterations of a solution.
 const STEPS: usize = 60;
-/// Steps below this are rounding errors.
+/// Iterations with a step below this have converged.
 const CONVERGED_RAD: f64 = 1e-13;
-/// Starts per joint over its range, for chains of less than three joints.
+/// Initial angles per joint over its range, for chains of less than three joints.
 const STARTS_PER_JOINT: usize = 8;
-/// Solutions closer than this are the same one.
+/// Solutions closer than this are equal.
 const SAME_RAD: f64 = 1e-4;
 
-/// The rotation of a chain with one to three joints within its limits, to be inverted.
+/// Inverse rotation of a chain with one to three joints within their limits.
 #[derive(Clone, Debug)]
 pub struct InverseChain {
     imu_from_base: UnitQuaternion<f64>,
     links: Vec<DhLink>,
     effector_from_camera: UnitQuaternion<f64>,
-    /// Middle of each joint's limits and half their distance with the tolerance, in radians.
+    /// Middle of each joint's limits, and half the distance of the limits plus the tolerance, in radians.
     ranges: Vec<(f64, f64)>,
 }
 
@@ -41,27 +41,27 @@ pub struct InverseChain {
 pub struct InverseSolution {
     /// One angle per joint in radians, without the static offsets; within half a rotation of the middle of the limits.
     pub joint_angles_rad: Vec<f64>,
-    /// The rotation that the joints cannot make, in radians.
+    /// Remaining rotation that the joints cannot reach, in radians.
     pub unreachable_rad: f64,
-    /// The least singular value of the joint axes (columns of unit length): 0 at a singularity.
+    /// Smallest singular value of the joint axes (columns of unit length): 0 at a singularity.
     pub margin: f64,
-    /// Whether the orientation alone decides, so that the previous solution has no influence on it.
+    /// True if the orientation alone determines the solution, without influence of the previous one.
     pub decided: bool,
 }
 
-/// Orientation of the camera and the joint axes in it, at joint angles.
+/// Orientation error of the camera and the joint axes, at given joint angles.
 struct Pose {
-    /// Rotation vector that is missing to the wanted orientation, in the camera frame.
+    /// Rotation vector from the pose to the wanted orientation, in the camera frame.
     missing: Vector3<f64>,
     /// Unit axis of each joint in the camera frame.
     axes: Vec<Vector3<f64>>,
 }
 
 impl InverseChain {
-    /// Largest number of joints: an orientation does not determine more.
+    /// Largest number of joints that an orientation determines.
     pub const MAX_JOINTS: usize = 3;
 
-    /// The inverse of a chain with limits (lower, upper) for each joint; `None` unless it has one to three joints.
+    /// Inverse of a chain with limits (lower, upper) for each joint; `None` unless it has one to three joints.
     pub fn new(chain: &ClassicalChain, limits_rad: &[(f64, f64)]) -> Option<Self> {
         let joints = chain.links.len();
         if !(1..=Self::MAX_JOINTS).contains(&joints) || limits_rad.len() != joints {
@@ -76,18 +76,20 @@ impl InverseChain {
         })
     }
 
-    /// The same for orientations that are rotated by a constant angle about the axis of the first joint.
+    /// Returns the inverse for orientations that are rotated by a constant angle about the axis of the first joint.
     pub fn with_first_joint_offset(self, offset_rad: f64) -> Self {
         let offset = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), offset_rad);
         Self { imu_from_base: self.imu_from_base * offset, ..self }
     }
 
-    /// The joint angles for a rotation `imu_from_camera`, least squares where the joints cannot make it.
+    /// Joint angles for a rotation `imu_from_camera`, least squares where the joints cannot reach it.
     ///
-    /// Two solutions may exist, on either side of a singularity. Where only one is within the limits, and the chain is not
-    /// near the singularity, it does not depend on `previous`. Otherwise the one nearest to `previous` is taken, near the
-    /// singularity held to it as far as the orientation does not constrain it; without a previous solution the middle of the
-    /// limits stands for it.
+    /// Two solutions may exist, on either side of a singularity. If only one is within the limits, and the chain is not
+    /// near the singularity, it does not depend on `previous`. Otherwise the solution nearest to `previous` is
+    /// returned; near
+    /// the singularity it is also pulled to `previous` in the directions that the orientation does not constrain.
+    /// Without a
+    /// previous solution, the middle of the limits is used instead.
     pub fn solve(&self, imu_from_camera: &UnitQuaternion<f64>, previous: Option<&[f64]>) -> InverseSolution {
         let solutions = self.solutions(imu_from_camera);
         let middle: Vec<f64> = self.ranges.iter().map(|(middle, _)| *middle).collect();
@@ -108,7 +110,7 @@ impl InverseChain {
         self.refined(&near_rad, imu_from_camera, Some((&near_rad, weight)))
     }
 
-    /// The solutions that fit alike, in a fixed order.
+    /// Solutions that fit equally well, in a fixed order.
     fn solutions(&self, wanted: &UnitQuaternion<f64>) -> Vec<InverseSolution> {
         let starts =
             if self.links.len() == Self::MAX_JOINTS { self.closed_form(wanted) } else { self.best_start(wanted) };
@@ -128,8 +130,10 @@ impl InverseChain {
         solutions
     }
 
-    /// Starts of both solutions of three joints: with `R = Rz(ψ₁)·M(ψ₂)·Rz(ψ₃)`, `M = Rx(α₁)·Rz(ψ₂)·Rx(α₂)`, the lower right
-    /// corner of `R` is `cos α₁·cos α₂ − sin α₁·sin α₂·cos ψ₂`; its last column and row then give ψ₁ and ψ₃.
+    /// Initial angles of both solutions of three joints: with `R = Rz(ψ₁)·M(ψ₂)·Rz(ψ₃)`, `M = Rx(α₁)·Rz(ψ₂)·Rx(α₂)`,
+    /// the
+    /// lower right corner of `R` is `cos α₁·cos α₂ − sin α₁·sin α₂·cos ψ₂`; its last column and row then give ψ₁ and
+    /// ψ₃.
     fn closed_form(&self, wanted: &UnitQuaternion<f64>) -> Vec<Vec<f64>> {
         let about_x = |angle_rad: f64| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), angle_rad);
         let about_z = |angle_rad: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad);
@@ -149,7 +153,7 @@ impl InverseChain {
         vec![start(second_rad), start(-second_rad)]
     }
 
-    /// The best of evenly spaced angles, for one or two joints.
+    /// Best of evenly spaced angles, for one or two joints.
     fn best_start(&self, wanted: &UnitQuaternion<f64>) -> Vec<Vec<f64>> {
         let at = |(middle, half): &(f64, f64), step: usize| {
             let half = half.min(std::f64::consts::PI);
@@ -179,7 +183,9 @@ impl InverseChain {
         Pose { missing, axes }
     }
 
-    /// Least squares of the missing rotation, and of the distance from angles in radians with a weight, within the limits.
+    /// Minimizes the squared rotation error, plus with `held` the weighted squared distance from given angles (rad),
+    /// within
+    /// the limits.
     fn refined(&self, start: &[f64], wanted: &UnitQuaternion<f64>, held: Option<(&[f64], f64)>) -> InverseSolution {
         let joints = self.links.len();
         let (held_rad, weight) = held.unwrap_or((start, 0.0));
@@ -237,17 +243,17 @@ impl InverseChain {
     }
 }
 
-/// The equivalent angle within half a rotation of the middle of a range.
+/// Equivalent angle within half a revolution of the middle of a range.
 fn around((middle, _): (f64, f64), angle_rad: f64) -> f64 {
     middle + wrap_angle(angle_rad - middle)
 }
 
-/// The equivalent angle nearest to a range's middle, at most at its end.
+/// Equivalent angle nearest to the middle of a range, clamped to the range.
 fn within(range: (f64, f64), angle_rad: f64) -> f64 {
     clamped(range, around(range, angle_rad))
 }
 
-/// The angle, at most at the end of a range; a joint that rotates fully has none.
+/// Clamps an angle to a range; a range of a full revolution has no limits.
 fn clamped((middle, half): (f64, f64), angle_rad: f64) -> f64 {
     if half >= std::f64::consts::PI { angle_rad } else { angle_rad.clamp(middle - half, middle + half) }
 }
@@ -268,7 +274,7 @@ mod tests {
         chain.imu_from_camera(angles_rad).rotation
     }
 
-    /// Axes z, x, y or z, y, x at right angles as gimbals have them, with the camera looking along x.
+    /// Chain with perpendicular axes z, x, y or z, y, x as gimbals have them, and the camera looking along x.
     fn gimbal(order: &str, limits_deg: [f64; 6]) -> (ClassicalChain, Vec<(f64, f64)>) {
         let quarter = FRAC_PI_2;
         let angles: [(f64, f64); 3] = match order {
@@ -331,13 +337,13 @@ mod tests {
 
     #[test]
     fn the_part_that_the_joints_cannot_make_is_reported() {
-        // Two joints, yaw and pitch: a roll of the camera is beyond them.
+        // Two joints, yaw and pitch, cannot compensate a roll of the camera.
         let (mut chain, mut limits) = gimbal("zyx", [-180.0, 180.0, -120.0, 30.0, 0.0, 1.0]);
         chain.links.truncate(2);
         limits.truncate(2);
         let inverse = InverseChain::new(&chain, &limits).unwrap();
         for (yaw, pitch, roll_deg) in [(0.3, -0.5, 5.0_f64), (-2.0, 0.1, -12.0), (1.0, -0.9, 20.0)] {
-            // The axis that a third joint would have is the camera's z axis.
+            // A third joint would rotate about the camera's z axis.
             let about = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll_deg.to_radians());
             let wanted = rotation(&chain, &[yaw, pitch]) * about;
             let solution = inverse.solve(&wanted, None);

@@ -12,7 +12,7 @@ use super::chain::Form;
 use super::frame::{Axis, Frame};
 use super::{Chain, DhLink};
 
-/// Forward kinematics and its derivatives at one set of joint angles.
+/// Forward kinematics and its derivatives at given joint angles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainLinearization {
     /// Pose of the camera in the IMU frame.
@@ -150,7 +150,7 @@ impl Sink for Recorder {
     }
 }
 
-/// Columns before the camera pose is known: axis and point of a rotation, or zero and axis of a translation.
+/// Columns before the camera pose is computed: axis and point of a rotation, or zero and axis of a translation.
 struct Columns {
     matrix: Matrix6xX<f64>,
     filled: usize,
@@ -172,7 +172,7 @@ impl Columns {
         debug_assert_eq!(self.filled, self.matrix.ncols(), "the walk met every column");
         for mut column in self.matrix.column_iter_mut() {
             let axis: Vector3<f64> = column.fixed_rows::<3>(0).into_owned();
-            // The axis of a rotation has unit length; the axis of a translation is stored in the place of the point.
+            // The axis of a rotation has unit length; the axis of a translation is stored in place of the point.
             if axis != Vector3::zeros() {
                 let arm = camera.origin - column.fixed_rows::<3>(3);
                 column.fixed_rows_mut::<3>(0).copy_from(&camera.rotation.tr_mul(&axis));

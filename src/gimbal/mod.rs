@@ -1,4 +1,4 @@
-//! The actuated chain between the IMU and a gimballed camera, in each parameterization.
+//! Actuated chain between the IMU and a gimballed camera, in each parameterization.
 //!
 //! Rigs define a [`ClassicalChain`]. The estimator works with a [`Chain`]: the same mechanism in one
 //! [`Parameterization`], with the parameters ([`ParameterId`]), values, derivatives, update rule and

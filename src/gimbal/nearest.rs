@@ -1,4 +1,4 @@
-//! Among all classical values of one mechanism, those nearest to given ones.
+//! Conversion to the classical parameterization with the values nearest to given ones.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,7 +6,7 @@ use crate::geometry::dense;
 
 use super::{Chain, Parameterization, generic_joint_angles, stacked_jacobian};
 
-/// Joint angles per joint at which two chains are compared.
+/// Number of joint angles per joint at which two chains are compared.
 const ANGLES_PER_JOINT: usize = 4;
 /// Largest number of iterations; each reduces the remaining error by a factor about as large as the distance of
 /// the mechanism from the given one, in radians.
@@ -16,16 +16,16 @@ const GAP: f64 = 1e-11;
 /// Singular values below this fraction of the largest one belong to redundant directions.
 const REDUNDANT: f64 = 1e-9;
 
-/// Converts mechanisms to one parameterization, to the classical one with the values nearest to given ones.
+/// Converts mechanisms to one parameterization, for the classical one to the values nearest to given ones.
 ///
-/// The classical form has six redundant directions, so that many values describe the same mechanism; a plain
+/// The classical parameterization has six redundant directions: many values describe the same mechanism, and a plain
 /// conversion picks one of them without regard to the rig. The other parameterizations are unique.
 #[derive(Clone, Debug)]
 pub struct NearestForm {
     near: Chain,
     angles: Vec<Vec<f64>>,
     /// Pseudo-inverse of the stacked Jacobian (dof × 6·count): the shortest step of the scaled columns for a pose
-    /// error; empty for other parameterizations than the classical one.
+    /// error; empty for parameterizations other than the classical one.
     inverse: DMatrix<f64>,
 }
 

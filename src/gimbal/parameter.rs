@@ -4,26 +4,22 @@ use crate::geometry::{Dimension, principal_angle};
 
 use super::Singularity;
 
-/// A scalar parameter of the static calibration: one column of its Jacobian.
+/// Scalar parameter of the static calibration: one column of its Jacobian.
 ///
-/// Cameras are numbered as the estimator has them: 0 is the main camera, whose chain may have joints, the rigid cameras
-/// beside it follow from 1.
+/// Cameras are numbered as in the estimator: 0 is the main camera, whose chain may have joints; further rigid cameras
+/// follow from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ParameterId {
-    /// Transform, link or sensor of the parameter.
     pub part: ParameterPart,
-    /// Quantity within that transform, link or sensor.
     pub quantity: Quantity,
 }
 
-/// Calibration parameters of one kind, which are switched on together.
+/// Calibration parameters of one kind, which are enabled together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ParameterGroup {
     /// Gimbal chain and extrinsics of cameras.
     Chain,
-    /// Camera intrinsics.
     Camera,
-    /// IMU intrinsics.
     Imu,
     /// Time offsets, and readout times of rolling shutters.
     Clocks,
@@ -33,7 +29,6 @@ impl ParameterGroup {
     /// In the order of display.
     pub const ALL: [Self; 4] = [Self::Chain, Self::Camera, Self::Imu, Self::Clocks];
 
-    /// Label.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Chain => "chain",
@@ -47,13 +42,13 @@ impl ParameterGroup {
 /// Transform, link or sensor that has calibration parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ParameterPart {
-    /// `imu_from_base` of the classical form.
+    /// `imu_from_base` of the classical parameterization.
     ImuFromBase,
     /// Base block of the minimal parameterizations: rotations about and translations along x and y of the IMU.
     Base,
     /// Denavit–Hartenberg link, counted from 0; the last one includes the end block of the minimal parameterizations.
     Link(u8),
-    /// `effector_from_camera` of the classical form.
+    /// `effector_from_camera` of the classical parameterization.
     EffectorFromCamera,
     /// Transform between joint axes in the product of exponentials, counted from 0.
     Exponential(u8),
@@ -65,11 +60,10 @@ pub enum ParameterPart {
     Encoder,
     /// Intrinsics of the gyroscope, and its rotation relative to the accelerometer.
     Gyroscope,
-    /// Intrinsics of the accelerometer, whose axes are those of the IMU.
+    /// Intrinsics of the accelerometer; its axes define those of the IMU.
     Accelerometer,
 }
 
-/// Quantity of a calibration parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Quantity {
     /// Rotation about x: of a rotation vector, or an angle of the minimal base block.
@@ -92,9 +86,9 @@ pub enum Quantity {
     A,
     /// Twist α of a link.
     Alpha,
-    /// Rotation β about y in the end block of the minimal forms.
+    /// Rotation β about y in the end block of the minimal parameterizations.
     Beta,
-    /// Translation along y in the end block of the minimal forms.
+    /// Translation along y in the end block of the minimal parameterizations.
     Y,
     /// Local rotation about x of a block of the product of exponentials.
     Wx,
@@ -120,7 +114,8 @@ pub enum Quantity {
     K1,
     /// Second coefficient of the distortion.
     K2,
-    /// Scale error of the x axis of an inertial sensor: the corrected value is `1 + Sx` times the measured one.
+    /// Scale error of the x axis of a gyroscope or accelerometer: the corrected value is `1 + Sx` times the measured
+    /// one.
     Sx,
     /// Scale error of the y axis.
     Sy,
@@ -135,12 +130,10 @@ pub enum Quantity {
 }
 
 impl ParameterId {
-    /// Time offset of a camera.
     pub const fn timeshift(camera: u8) -> Self {
         Self { part: ParameterPart::Camera(camera), quantity: Quantity::Timeshift }
     }
 
-    /// Time offset of the joint encoders.
     pub const ENCODER_TIMESHIFT: Self = Self { part: ParameterPart::Encoder, quantity: Quantity::Timeshift };
 
     /// Readout time of a camera's rolling shutter.
@@ -148,7 +141,6 @@ impl ParameterId {
         Self { part: ParameterPart::Camera(camera), quantity: Quantity::Readout }
     }
 
-    /// Physical dimension, which gives unit and scale.
     pub const fn dimension(self) -> Dimension {
         self.quantity.dimension()
     }
@@ -156,7 +148,7 @@ impl ParameterId {
     /// Scale of the observability analysis, in the unit of its dimension: [`Dimension::scale`], and one percent or a
     /// hundredth of a radian for the intrinsics of the IMU.
     ///
-    /// Columns of a Jacobian are multiplied by it, so that columns of different dimensions compare.
+    /// Columns of a Jacobian are multiplied by it, so that columns of different dimensions are comparable.
     pub const fn scale(self) -> f64 {
         const IMU_INTRINSICS: f64 = 0.01;
         match self.group() {
@@ -165,7 +157,6 @@ impl ParameterId {
         }
     }
 
-    /// The sensor or mechanism that it describes.
     pub const fn group(self) -> ParameterGroup {
         match (self.part, self.quantity) {
             (_, Quantity::Timeshift | Quantity::Readout) => ParameterGroup::Clocks,
@@ -175,20 +166,20 @@ impl ParameterId {
         }
     }
 
-    /// A value as it is shown and written: angles of the base block and of links in (−π, π], in radians; everything
-    /// else unchanged, because components of rotation vectors have no period.
+    /// Value for display and files: angles of the base block and of links in (−π, π], in radians; all others
+    /// unchanged, because components of rotation vectors have no period.
     pub fn principal_value(self, value: f64) -> f64 {
         let is_angle =
             self.dimension() == Dimension::Angle && matches!(self.part, ParameterPart::Base | ParameterPart::Link(_));
         if is_angle { principal_angle(value) } else { value }
     }
 
-    /// Whether it is the offset of a joint angle.
+    /// True for the offset of a joint angle.
     pub const fn is_joint_offset(self) -> bool {
         matches!(self.quantity, Quantity::Theta)
     }
 
-    /// Index of its link, counted from 0.
+    /// Index of its link, counted from 0; `None` if the parameter belongs to no link.
     pub const fn link(self) -> Option<usize> {
         match self.part {
             ParameterPart::Link(link) => Some(link as usize),
@@ -196,7 +187,7 @@ impl ParameterId {
         }
     }
 
-    /// Returns the corresponding parameter of another camera.
+    /// Corresponding parameter of another camera.
     #[must_use]
     pub const fn of_camera(self, camera: u8) -> Self {
         let part = match self.part {
@@ -209,7 +200,7 @@ impl ParameterId {
 }
 
 impl ParameterPart {
-    /// Number of the camera whose chain, extrinsics or clock it is.
+    /// Number of the camera that the parameter belongs to.
     pub const fn camera(self) -> usize {
         match self {
             Self::ImuFromCamera(camera) | Self::Camera(camera) => camera as usize,
@@ -217,7 +208,7 @@ impl ParameterPart {
         }
     }
 
-    /// Whether some parameterization has the quantity in this transform, link or sensor.
+    /// True if some parameterization has the quantity in this transform, link or sensor.
     fn has(self, quantity: Quantity) -> bool {
         use Quantity::{
             A, Alpha, Beta, Cx, Cy, D, Fx, Fy, K1, K2, Mxy, Mxz, Myz, Readout, Rx, Ry, Rz, Sx, Sy, Sz, Theta,
@@ -248,7 +239,7 @@ impl Quantity {
 
     /// Columns of the intrinsics of a camera; a lens without coefficients has the first four.
     pub const INTRINSICS: [Self; 6] = [Self::Fx, Self::Fy, Self::Cx, Self::Cy, Self::K1, Self::K2];
-    /// Columns of scale and misalignment of an inertial sensor.
+    /// Columns of scale and misalignment of a gyroscope or accelerometer.
     pub const SCALE_MISALIGNMENT: [Self; 6] = [Self::Sx, Self::Sy, Self::Sz, Self::Mxy, Self::Mxz, Self::Myz];
 
     const ALL: [Self; 30] = [
@@ -320,7 +311,6 @@ impl Quantity {
         }
     }
 
-    /// Physical dimension, which gives unit and scale.
     pub const fn dimension(self) -> Dimension {
         match self {
             Self::Rx | Self::Ry | Self::Rz | Self::Theta | Self::Alpha | Self::Beta | Self::Wx | Self::Wy => {

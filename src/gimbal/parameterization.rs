@@ -52,17 +52,17 @@ impl Parameterization {
         }
     }
 
-    /// Whether it is one of the four minimal parameterizations.
+    /// True for the four minimal parameterizations.
     pub fn is_minimal(self) -> bool {
         !matches!(self, Self::Classical | Self::Poe)
     }
 
-    /// Whether the base rotates about y first.
+    /// True if the base rotates about y first.
     pub(super) fn base_yx(self) -> bool {
         matches!(self, Self::MinimalYx | Self::MinimalSwappedYx)
     }
 
-    /// Whether beta and y precede alpha in the end block.
+    /// True if beta and y precede alpha in the end block.
     pub(super) fn end_swapped(self) -> bool {
         matches!(self, Self::MinimalSwapped | Self::MinimalSwappedYx)
     }
@@ -74,7 +74,6 @@ impl fmt::Display for Parameterization {
     }
 }
 
-/// A name that is no parameterization.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
     "unknown parameterization '{0}': expected one of classical, minimal, minimal-yx, minimal-swapped, minimal-swapped-yx, poe"

@@ -2,7 +2,8 @@ use nalgebra::{DMatrix, Vector3};
 
 use super::ClassicalChain;
 
-/// Returns the redundant directions of the classical form: steps that leave the camera pose unchanged at all
+/// Returns the redundant directions of the classical parameterization: steps that leave the camera pose unchanged at
+/// all
 /// joint angles, in closed form (Eqs. 11–17).
 ///
 /// (12 + 4N) × 6, one direction per column, in radians and metres and in the order of the classical columns.
@@ -18,7 +19,7 @@ pub fn redundant_directions(chain: &ClassicalChain) -> DMatrix<f64> {
     let base_rotation = chain.imu_from_base.rotation_matrix();
     let camera_rotation = chain.effector_from_camera.rotation_matrix();
     let camera_position = chain.effector_from_camera.translation_m;
-    // A rotation about an axis through a point of the effector, compensated by `effector_from_camera`.
+    // Rotation about an axis through a point of the effector, compensated by `effector_from_camera`.
     let undo_rotation = |directions: &mut DMatrix<f64>, direction: usize, axis: &Vector3<f64>, arm: &Vector3<f64>| {
         set(directions, direction, camera, &-camera_rotation.tr_mul(axis));
         set(directions, direction, camera + 3, &-axis.cross(arm));

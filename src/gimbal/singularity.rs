@@ -1,4 +1,4 @@
-//! Singularity margins of the minimal parameterizations, and the choice among them.
+//! Singularity margins of the minimal parameterizations, and the choice between these parameterizations.
 
 use super::chain::Form;
 use super::conversion::end_block;
@@ -8,7 +8,7 @@ use super::{Chain, ClassicalChain, Parameterization};
 /// A minimal parameterization is replaced when its margin at base or end falls below this.
 pub const SWITCH_MARGIN: f64 = 0.3;
 
-/// Margins that differ by less than this (two angles of about 2.6° where both are best) count as equal: the
+/// Margins that differ by less than this (two angles of about 2.6° at the best margin) count as equal: the
 /// printed parameterization is preferred.
 const TIE: f64 = 1e-3;
 
@@ -25,14 +25,14 @@ pub fn auto_parameterization(classical: &ClassicalChain) -> Parameterization {
     Parameterization::minimal(margin_yx > margin_xy + TIE, margin_swapped > margin_printed + TIE)
 }
 
-/// Place of a singularity.
+/// Location of a singularity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Singularity {
-    /// In the base block of a minimal parameterization.
+    /// Base block of a minimal parameterization.
     Base,
-    /// In the end block of a minimal parameterization.
+    /// End block of a minimal parameterization.
     End,
-    /// Where the joint axes at both ends of this link, counted from 0, are parallel.
+    /// Link, counted from 0, with parallel joint axes at both ends.
     ParallelAxes(u8),
 }
 
@@ -40,7 +40,7 @@ impl Chain {
     /// Returns the margins to the singularities, 0 when singular and 1 at the largest distance; for parallel axes
     /// the absolute sine of the link's twist.
     ///
-    /// The classical form has margins of parallel axes only, `poe` and rigid cameras have none.
+    /// The classical parameterization has margins of parallel axes only, `poe` and rigid cameras have none.
     pub fn margins(&self) -> Vec<(Singularity, f64)> {
         let twists = |links: &[super::DhLink]| -> Vec<(Singularity, f64)> {
             let middle = links.len().saturating_sub(1);
@@ -67,8 +67,8 @@ impl Chain {
     }
 
     /// Returns the parameterization to switch to when the margin of base or end is below [`SWITCH_MARGIN`] and
-    /// another minimal parameterization has a larger one; `None` otherwise, and for all others than the minimal
-    /// ones.
+    /// another minimal parameterization has a larger one; `None` otherwise, and for parameterizations that are not
+    /// minimal.
     pub fn should_switch(&self) -> Option<Parameterization> {
         let Form::Minimal(_) = self.form else { return None };
         let close = self.margins().iter().take(2).any(|(_, margin)| *margin < SWITCH_MARGIN);

@@ -6,7 +6,7 @@ pub(crate) mod random;
 
 use super::{ParameterId, ParameterNames};
 
-/// The parameter of a name, links by number: `L1.alpha`.
+/// Parses a parameter name, with links by number: `L1.alpha`.
 pub(crate) fn parameter(name: &str) -> ParameterId {
     ParameterNames::default().parse(name).unwrap_or_else(|| panic!("'{name}' is no parameter"))
 }

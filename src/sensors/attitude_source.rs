@@ -1,49 +1,50 @@
-//! How a rig says that the gimbal's attitude is recorded where no joint angles are.
+//! Recorded gimbal attitude as a replacement of joint angles: its description in a rig.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{BodyAxes, NamedAxes};
 use crate::gimbal::ClassicalChain;
 
-/// Where the attitude of a gimbal is recorded and what it means (`gimbal.source` of a rig); its topic is the gimbal's.
+/// Message type, frame and axes of a recorded gimbal attitude (`gimbal.source` of a rig); its topic is the gimbal's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AttitudeSource {
-    /// Message type and how its values make a rotation.
+    /// Message type and conversion of its values to a rotation.
     pub message: AttitudeMessage,
-    /// The frame that the attitude is relative to.
+    /// Frame that the attitude is relative to.
     pub frame: AttitudeFrame,
-    /// Axes of that frame and of the gimbal, x forward in both; of the earth, NED goes with FRD and ENU with FLU.
+    /// Axes of that frame and of the gimbal, x forward in both; for the earth frame, NED with FRD and ENU with FLU.
     pub axes: BodyAxes,
-    /// Axes of the gimbal where they are others than [`AttitudeSource::axes`].
+    /// Axes of the gimbal if they differ from [`AttitudeSource::axes`].
     pub gimbal_axes: Option<NamedAxes>,
     /// Axes of the rig's IMU relative to the vehicle.
     pub imu_axes: NamedAxes,
-    /// Topic of the vehicle's attitude; frames other than the body need it.
+    /// Topic of the vehicle's attitude, required by frames other than the body.
     pub vehicle_topic: Option<String>,
-    /// Axes of the vehicle's attitude where they are others than [`AttitudeSource::axes`].
+    /// Axes of the vehicle's attitude if they differ from [`AttitudeSource::axes`].
     pub vehicle_axes: Option<BodyAxes>,
-    /// Constant rotation of the attitude about the axis of the first joint, in radians: a yaw that counts from another direction
-    /// than forward.
+    /// Constant rotation of the attitude about the axis of the first joint, in radians, for a yaw whose zero is not
+    /// forward.
     pub first_joint_offset_rad: f64,
-    /// The chain by which joint angles follow from the attitude; `None` while it is the rig's own. A calibrated rig keeps the
-    /// one that its joint angles followed from: by the calibrated one they would be others, and undo the calibration.
+    /// Chain that converts the attitude to joint angles; `None` for the rig's chain. A calibrated rig keeps the chain
+    /// from
+    /// before the calibration: the calibrated chain would give other joint angles, and so undo the calibration.
     pub chain: Option<Box<ClassicalChain>>,
 }
 
-/// A message type for the gimbal's attitude.
+/// Message type of the gimbal's attitude.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AttitudeMessage {
     /// `geometry_msgs/msg/QuaternionStamped`.
     Quaternion,
-    /// The orientation of a `PoseStamped`, an `Odometry` or a `TransformStamped`.
+    /// Orientation of a `PoseStamped`, an `Odometry` or a `TransformStamped`.
     Pose,
     /// `geometry_msgs/msg/Vector3Stamped` with Euler angles.
     Euler(EulerAngles),
-    /// `tf2_msgs/msg/TFMessage`: the transforms between two frames.
+    /// Transforms between two frames in `tf2_msgs/msg/TFMessage`.
     Transforms {
-        /// The frame that the attitude is relative to.
+        /// Frame that the attitude is relative to.
         parent: String,
-        /// The gimbal's frame.
+        /// Frame of the gimbal.
         child: String,
     },
     /// `mavros_msgs/msg/GimbalDeviceAttitudeStatus`.
@@ -53,7 +54,7 @@ pub enum AttitudeMessage {
 }
 
 impl AttitudeMessage {
-    /// Its name as `type` of a rig's source.
+    /// Value of `type` in a rig's source.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Quaternion => "quaternion",
@@ -66,19 +67,18 @@ impl AttitudeMessage {
     }
 }
 
-/// A recorded attitude of a gimbal, before the rig says what it means.
+/// Recorded attitude of a gimbal, not yet interpreted by the rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AttitudeValue {
-    /// A rotation from the gimbal to the frame of the source, in the axes of the source.
+    /// Rotation from the gimbal to the frame of the source, in the axes of the source.
     Rotation(UnitQuaternion<f64>),
-    /// Euler angles.
     Vector(Vector3<f64>),
-    /// A rotation with the flags of a `MAVLink` message.
+    /// Rotation with the flags of a `MAVLink` message.
     Flagged(UnitQuaternion<f64>, u16),
 }
 
 impl AttitudeSource {
-    /// The frame of a recorded attitude.
+    /// Frame of a recorded attitude.
     pub fn frame_of(&self, value: &AttitudeValue) -> AttitudeFrame {
         match (self.frame, value) {
             (AttitudeFrame::Flags, AttitudeValue::Flagged(_, flags)) => AttitudeFrame::of_flags(*flags),
@@ -86,7 +86,7 @@ impl AttitudeSource {
         }
     }
 
-    /// The rotation from the gimbal to the frame of a recorded attitude, in the axes of the source.
+    /// Rotation from the gimbal to the frame of a recorded attitude, in the axes of the source.
     fn frame_from_gimbal(&self, value: &AttitudeValue) -> Option<UnitQuaternion<f64>> {
         match (value, &self.message) {
             (AttitudeValue::Rotation(rotation) | AttitudeValue::Flagged(rotation, _), _) => Some(*rotation),
@@ -95,7 +95,7 @@ impl AttitudeSource {
         }
     }
 
-    /// The attitude between two recorded ones, at a fraction of the time between them; `None` when their frames differ.
+    /// Interpolates two recorded attitudes at a fraction of the time between them; `None` if their frames differ.
     pub fn between(&self, first: &AttitudeValue, second: &AttitudeValue, fraction: f64) -> Option<AttitudeValue> {
         let frame = self.frame_of(first);
         if self.frame_of(second) != frame {
@@ -109,10 +109,11 @@ impl AttitudeSource {
         })
     }
 
-    /// The rotation `imu_from_camera` (camera: x right, y down, z forward) that a recorded attitude stands for.
+    /// Converts a recorded attitude to the rotation `imu_from_camera` (camera: x right, y down, z forward).
     ///
-    /// `enu_from_flu` is the vehicle's attitude by [`AttitudeSource::enu_from_flu`], which frames other than the body need.
-    /// Returns `None` without it, and for the vehicle frame where the vehicle points up or down and has no heading.
+    /// `enu_from_flu` is the vehicle's attitude by [`AttitudeSource::enu_from_flu`], required by frames other than the
+    /// body.
+    /// Returns `None` without it, and for the vehicle frame if the vehicle points up or down and has no heading.
     pub fn imu_from_camera(
         &self,
         value: &AttitudeValue,
@@ -137,7 +138,7 @@ impl AttitudeSource {
         Some(self.imu_axes.flu_from_axes().inverse() * vehicle_from_gimbal * NamedAxes::RDF.flu_from_axes())
     }
 
-    /// The vehicle's attitude in axes forward, left, up and east, north, up, from the recorded `earth_from_vehicle`; PX4's
+    /// Vehicle's attitude in axes forward, left, up and east, north, up, from the recorded `earth_from_vehicle`; PX4's
     /// messages are in FRD and NED.
     pub fn enu_from_flu(&self, earth_from_vehicle: &UnitQuaternion<f64>, of_px4: bool) -> UnitQuaternion<f64> {
         let axes = if of_px4 { BodyAxes::Frd } else { self.vehicle_axes.unwrap_or(self.axes) };
@@ -145,27 +146,26 @@ impl AttitudeSource {
     }
 }
 
-/// The vehicle frame needs a heading: the horizontal part of the forward direction, at least 1°.
+/// Smallest horizontal part of the forward direction that defines a heading for the vehicle frame (1°).
 const MIN_HORIZONTAL: f64 = 0.0175;
 
-/// The frame that a gimbal's attitude is relative to.
+/// Frame that a gimbal's attitude is relative to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AttitudeFrame {
-    /// The vehicle's body.
+    /// Body of the vehicle.
     Body,
     /// `MAVLink`'s vehicle frame: levelled, x towards the vehicle's heading.
     Vehicle,
-    /// North and east.
+    /// North and east of the earth.
     Earth,
-    /// Vehicle or earth by the `MAVLink` flags of each message.
+    /// Vehicle or earth frame by the `MAVLink` flags of each message.
     Flags,
 }
 
 impl AttitudeFrame {
-    /// Every frame.
     pub const ALL: [Self; 4] = [Self::Body, Self::Vehicle, Self::Earth, Self::Flags];
 
-    /// Its name in a rig.
+    /// Value of `frame` in a rig's source.
     pub fn name(self) -> &'static str {
         match self {
             Self::Body => "body",
@@ -175,7 +175,7 @@ impl AttitudeFrame {
         }
     }
 
-    /// By the flags of a `GIMBAL_DEVICE_ATTITUDE_STATUS`: the one that names the frame of the yaw; without one, the yaw lock.
+    /// Frame by the flags of a `GIMBAL_DEVICE_ATTITUDE_STATUS`: the flag of the yaw's frame; without one, the yaw lock.
     pub fn of_flags(flags: u16) -> Self {
         const YAW_LOCK: u16 = 16;
         const YAW_IN_VEHICLE_FRAME: u16 = 32;
@@ -192,17 +192,14 @@ impl AttitudeFrame {
 /// Unit of recorded angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AngleUnit {
-    /// Radians.
     Radians,
-    /// Degrees.
     Degrees,
 }
 
 impl AngleUnit {
-    /// Both.
     pub const ALL: [Self; 2] = [Self::Radians, Self::Degrees];
 
-    /// Its name in a rig.
+    /// Value of `unit` in a rig's source.
     pub fn name(self) -> &'static str {
         match self {
             Self::Radians => "rad",
@@ -218,10 +215,10 @@ impl AngleUnit {
     }
 }
 
-/// Euler angles in the fields of a vector: rotations about moved axes, from the frame to the gimbal.
+/// Euler angles in the fields of a vector: intrinsic rotations, from the frame to the gimbal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EulerAngles {
-    /// At most one rotation about each axis, in their order.
+    /// At most one rotation about each axis, in the order of the rotations.
     pub order: Vec<EulerRotation>,
     /// Unit of the fields.
     pub unit: AngleUnit,
@@ -230,21 +227,21 @@ pub struct EulerAngles {
 /// One of the rotations of Euler angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EulerRotation {
-    /// The axis: 0 (x, roll), 1 (y, pitch) or 2 (z, yaw).
+    /// 0 (x, roll), 1 (y, pitch) or 2 (z, yaw).
     pub axis: usize,
-    /// The field of the vector that holds the angle: 0 (x), 1 (y) or 2 (z).
+    /// Field of the vector with the angle: 0 (x), 1 (y) or 2 (z).
     pub field: usize,
-    /// Whether the field holds the negative angle.
+    /// True if the field holds the negative angle.
     pub negative: bool,
 }
 
 impl EulerAngles {
     /// Names of the rotations about x, y and z.
     const ROTATIONS: [&'static str; 3] = ["roll", "pitch", "yaw"];
-    /// Names of the fields.
+    /// Names of the vector's fields.
     const FIELDS: [&'static str; 3] = ["x", "y", "z"];
 
-    /// The order of a rig, such as `yaw=z roll=y pitch=-x`; `None` for another text.
+    /// Parses the order of a rig, such as `yaw=z roll=y pitch=-x`; `None` for another text.
     pub fn parse_order(text: &str) -> Option<Vec<EulerRotation>> {
         let mut order: Vec<EulerRotation> = Vec::new();
         for word in text.split_whitespace() {
@@ -260,7 +257,7 @@ impl EulerAngles {
         (!order.is_empty()).then_some(order)
     }
 
-    /// The order as a rig has it.
+    /// Order in the notation of a rig.
     pub fn order_text(&self) -> String {
         let word = |rotation: &EulerRotation| {
             let sign = if rotation.negative { "-" } else { "" };
@@ -269,7 +266,7 @@ impl EulerAngles {
         self.order.iter().map(word).collect::<Vec<_>>().join(" ")
     }
 
-    /// The rotation from the gimbal to the frame that a vector stands for.
+    /// Rotation from the gimbal to the frame for a vector of Euler angles.
     pub fn rotation(&self, vector: &Vector3<f64>) -> UnitQuaternion<f64> {
         let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
         self.order.iter().fold(UnitQuaternion::identity(), |before, rotation| {

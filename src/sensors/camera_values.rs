@@ -1,10 +1,10 @@
-//! Calibration parameters of a camera's clock, shutter and intrinsics as a rig has them.
+//! Rig values of the calibration parameters of a camera's clock, shutter and intrinsics.
 
 use super::CameraRig;
 use crate::gimbal::Quantity;
 
 impl CameraRig {
-    /// The rig's value of time offset, readout time or an intrinsic, in the unit of its dimension; `None` for another
+    /// Rig value of time offset, readout time or an intrinsic, in the unit of its dimension; `None` for another
     /// quantity.
     pub fn value(&self, quantity: Quantity) -> Option<f64> {
         match quantity {
@@ -17,7 +17,8 @@ impl CameraRig {
         }
     }
 
-    /// Takes calibrated values of [`CameraRig::value`]; intrinsics outside of their range leave the camera model as it is.
+    /// Sets calibrated values of [`CameraRig::value`]; intrinsics outside of their range leave the camera model
+    /// unchanged.
     pub fn set_values(&mut self, values: &[(Quantity, f64)]) {
         let mut intrinsics = self.model.intrinsics();
         for (quantity, value) in values {

@@ -1,4 +1,4 @@
-//! A rig whose gimbal does not move, for programs with static extrinsics.
+//! Rig with a fixed gimbal, for programs with static extrinsics.
 
 use nalgebra::UnitQuaternion;
 
@@ -6,15 +6,16 @@ use super::{CameraMount, Rig};
 use crate::geometry::RigidTransform;
 
 impl Rig {
-    /// The neutral joint angles in radians, one per joint: 0 as the encoder counts, or the limit nearest to it. Empty
+    /// Neutral joint angles in radians, one per joint: encoder angle 0, or the limit nearest to it. Empty
     /// without a gimbal.
     pub fn neutral_joint_angles_rad(&self) -> Vec<f64> {
         let joints = self.gimbal.iter().flat_map(|gimbal| &gimbal.joints);
         joints.map(|joint| 0.0_f64.clamp(joint.limits_rad.0, joint.limits_rad.1)).collect()
     }
 
-    /// The same rig with its gimbal fixed at encoder angles in radians, one per joint: its cameras are static and there is
-    /// no gimbal. `None` when the number of angles is not that of the joints.
+    /// Returns the rig with its gimbal fixed at encoder angles in radians, one per joint: its cameras are static and
+    /// there is
+    /// no gimbal. `None` if the number of angles is not that of the joints.
     pub fn at_joint_angles(&self, angles_rad: &[f64]) -> Option<Self> {
         let mut rig = self.clone();
         let Some(gimbal) = rig.gimbal.take() else { return angles_rad.is_empty().then_some(rig) };
@@ -29,9 +30,10 @@ impl Rig {
         Some(rig)
     }
 
-    /// The same static cameras and IMU in Kalibr's IMU frame, in which the accelerometer's matrix is lower triangular, and
-    /// `kalibr_from_imu`: the identity, and the same bits, where the matrix is that already (so for a calibrated IMU).
-    /// Cameras on a gimbal stay as they are.
+    /// Returns the rig with static cameras and IMU in Kalibr's IMU frame, in which the accelerometer's matrix is lower
+    /// triangular, and `kalibr_from_imu`. If the matrix is lower triangular already (as for a calibrated IMU), that is
+    /// the
+    /// identity and all values keep their bits. Cameras on a gimbal are unchanged.
     pub fn in_kalibr_imu_frame(&self) -> (Self, UnitQuaternion<f64>) {
         let (kalibr_from_imu, intrinsics) = self.imu.intrinsics.in_lower_triangular_frame();
         let mut rig = self.clone();

@@ -1,9 +1,9 @@
-/// An 8-bit gray image, rows top to bottom without padding.
+/// 8-bit gray image, rows top to bottom without padding.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GrayImage {
-    /// Columns.
+    /// In pixels.
     pub width: usize,
-    /// Rows.
+    /// In pixels.
     pub height: usize,
     /// `width · height` gray values.
     pub pixels: Vec<u8>,

@@ -1,4 +1,4 @@
-//! Pixels of a camera's images that show the vehicle itself.
+//! Mask of the pixels of a camera that show the vehicle itself.
 
 use std::fmt;
 use std::sync::Arc;
@@ -7,10 +7,10 @@ use nalgebra::Vector2;
 
 use super::GrayImage;
 
-/// A grey level from which on a pixel of a mask image is masked.
+/// Smallest gray value of a masked pixel in a mask image.
 const MASKED_FROM: u8 = 128;
 
-/// A mask over a camera's images: no feature is detected in a masked pixel, and no track continues into one.
+/// Mask of a camera's images: no feature is detected in a masked pixel, and no track continues into one.
 ///
 /// White is masked, as in OpenVINS; the masks of `OpenCV`'s detectors are the inverse.
 #[derive(Clone, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub struct ImageMask {
 }
 
 impl ImageMask {
-    /// Masks the pixels of a grey level of 128 and above.
+    /// Masks the pixels with a gray value of 128 and above.
     pub fn from_image(image: &GrayImage) -> Self {
         let masked = image.pixels.iter().map(|pixel| *pixel >= MASKED_FROM).collect();
         Self { width: image.width, height: image.height, masked }
@@ -33,24 +33,24 @@ impl ImageMask {
         [self.width, self.height]
     }
 
-    /// Whether a pixel is masked; none outside is.
+    /// True if a pixel is masked; pixels outside of the image are not.
     pub fn is_masked(&self, column: usize, row: usize) -> bool {
         column < self.width && row < self.height && self.masked.get(row * self.width + column).copied().unwrap_or(false)
     }
 
-    /// Whether the pixel that a point lies in is masked; pixel centres are at integers.
+    /// True if the pixel that contains a point is masked; pixel centres are at integers.
     pub fn covers(&self, uv_px: &Vector2<f64>) -> bool {
         let [u, v] = [uv_px.x, uv_px.y].map(f64::round);
         u >= 0.0 && v >= 0.0 && self.is_masked(u as usize, v as usize)
     }
 
-    /// Masked pixels as a ratio of all.
+    /// Ratio of masked pixels to all pixels.
     pub fn ratio(&self) -> f64 {
         let masked = self.masked.iter().filter(|masked| **masked).count();
         masked as f64 / self.masked.len().max(1) as f64
     }
 
-    /// The mask as an image: 255 where it is masked, else 0.
+    /// Mask as an image: 255 for masked pixels, else 0.
     pub fn to_image(&self) -> GrayImage {
         let pixels = self.masked.iter().map(|masked| if *masked { u8::MAX } else { 0 }).collect();
         GrayImage { width: self.width, height: self.height, pixels }

@@ -1,17 +1,16 @@
 use nalgebra::Vector3;
 
-/// One IMU sample in the IMU frame.
+/// IMU sample in the IMU frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuSample {
-    /// Header stamp in nanoseconds since the log began.
+    /// Header stamp in nanoseconds since the start of the log.
     pub stamp_ns: i64,
-    /// Angular velocity.
     pub angular_velocity_rad_per_s: Vector3<f64>,
     /// Specific force: +g upwards when stationary.
     pub specific_force_m_per_s2: Vector3<f64>,
 }
 
-/// IMU noise, as the continuous-time densities that Kalibr uses.
+/// Continuous-time noise densities of an IMU, as in Kalibr.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuNoise {
     /// White noise of the accelerometer in m/s²/√Hz.

@@ -3,7 +3,8 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use super::ImuSample;
 use crate::geometry::so3;
 
-/// Scale and misalignment of both inertial sensors: `true = C · measured - bias`, with the identity for a calibrated IMU.
+/// Scale and misalignment of gyroscope and accelerometer: `true = C · measured - bias`, with the identity for a
+/// calibrated IMU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuIntrinsics {
     /// `C_g`, maps measured angular velocities to those in the IMU frame (3 × 3).
@@ -27,7 +28,7 @@ pub struct ScaleMisalignment {
     pub misalignment: Vector3<f64>,
 }
 
-/// The 15 independent parameters of [`ImuIntrinsics`]: `C_a = U_a` and `C_g = Exp(r) · U_g`.
+/// Independent parameters (15) of [`ImuIntrinsics`]: `C_a = U_a` and `C_g = Exp(r) · U_g`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuIntrinsicsParameters {
     /// `U_g`.
@@ -38,7 +39,7 @@ pub struct ImuIntrinsicsParameters {
     pub accelerometer: ScaleMisalignment,
 }
 
-/// The matrices of Kalibr's IMU file: `measured = M · C_gyro_i · true + bias`.
+/// Matrices of Kalibr's IMU file: `measured = M · C_gyro_i · true + bias`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KalibrImuMatrices {
     /// `gyroscopes.M` (3 × 3).
@@ -56,7 +57,7 @@ impl ScaleMisalignment {
         Matrix3::identity() + Matrix3::new(s.x, m.x, m.y, 0.0, s.y, m.z, 0.0, 0.0, s.z)
     }
 
-    /// The inverse of [`Self::matrix`]; what is below the diagonal is not looked at.
+    /// Inverse of [`Self::matrix`]; entries below the diagonal are ignored.
     fn of_matrix(upper: &Matrix3<f64>) -> Self {
         let u = upper - Matrix3::identity();
         Self { scale: u.diagonal(), misalignment: Vector3::new(u[(0, 1)], u[(0, 2)], u[(1, 2)]) }
@@ -64,12 +65,12 @@ impl ScaleMisalignment {
 }
 
 impl ImuIntrinsics {
-    /// Whether both sensors are taken as they measure.
+    /// True if neither sensor is corrected.
     pub fn is_identity(&self) -> bool {
         *self == Self::default()
     }
 
-    /// The corrected sample, `C · measured` of both sensors; the same bits for the identity.
+    /// Corrected sample, `C · measured` of both sensors; the same bits for the identity.
     pub fn correct(&self, sample: &ImuSample) -> ImuSample {
         ImuSample {
             stamp_ns: sample.stamp_ns,
@@ -94,7 +95,7 @@ impl ImuIntrinsics {
         self.gyroscope_correction * measured_rad_per_s
     }
 
-    /// The intrinsics of raw samples, when `self` belongs to samples that `first` has corrected.
+    /// Intrinsics of raw samples, if `self` belongs to samples that `first` has corrected.
     pub fn after(&self, first: &Self) -> Self {
         Self {
             gyroscope_correction: self.gyroscope_correction * first.gyroscope_correction,
@@ -102,8 +103,9 @@ impl ImuIntrinsics {
         }
     }
 
-    /// What is left of `self` when samples have been corrected by `first`: `self = left.after(first)`. `None` where a matrix of
-    /// `first` is singular.
+    /// Remaining correction of `self` for samples that `first` has corrected: `self = left.after(first)`. `None` if a
+    /// matrix
+    /// of `first` is singular.
     pub fn left_after(&self, first: &Self) -> Option<Self> {
         Some(Self {
             gyroscope_correction: self.gyroscope_correction * first.gyroscope_correction.try_inverse()?,
@@ -111,8 +113,10 @@ impl ImuIntrinsics {
         })
     }
 
-    /// The same correction in the IMU frame of `given`, as [`Self::parameters`] may rotate it: what is then left after `given`
-    /// has an upper triangular matrix of the accelerometer. `None` where a matrix of `given` is singular.
+    /// Returns the correction in the IMU frame of `given`, since [`Self::parameters`] may rotate it: the correction
+    /// that
+    /// remains after `given` then has an upper triangular matrix of the accelerometer. `None` if a matrix of `given` is
+    /// singular.
     pub fn in_frame_of(&self, given: &Self) -> Option<Self> {
         let left = self.left_after(given)?;
         let (own_from_given, _) = rotation_and_upper(&left.accelerometer_correction);
@@ -123,8 +127,10 @@ impl ImuIntrinsics {
         })
     }
 
-    /// The same correction in the frame in which the accelerometer's matrix is lower triangular, which is Kalibr's IMU frame,
-    /// after the rotation `triangle_from_imu`; the identity, and the same bits, where it is lower triangular already. The
+    /// Returns the correction in the frame in which the accelerometer's matrix is lower triangular, which is Kalibr's
+    /// IMU
+    /// frame, after the rotation `triangle_from_imu`; the identity, and the same bits, if it is lower triangular
+    /// already. The
     /// matrix must have a positive determinant.
     pub fn in_lower_triangular_frame(&self) -> (UnitQuaternion<f64>, Self) {
         let c = &self.accelerometer_correction;
@@ -144,7 +150,6 @@ impl ImuIntrinsics {
         (UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(triangle_from_imu)), rotated)
     }
 
-    /// From the independent parameters.
     pub fn from_parameters(parameters: &ImuIntrinsicsParameters) -> Self {
         let rotation = so3::exp(&parameters.gyroscope_rotation_rad).to_rotation_matrix().into_inner();
         Self {
@@ -153,7 +158,7 @@ impl ImuIntrinsics {
         }
     }
 
-    /// The independent parameters, in the IMU frame in which the accelerometer's matrix is upper triangular: where it is
+    /// Independent parameters, in the IMU frame in which the accelerometer's matrix is upper triangular: for
     /// `C_a = Q · U`, that frame is rotated by `Q`. Both matrices must have a positive determinant.
     pub fn parameters(&self) -> ImuIntrinsicsParameters {
         let (imu_from_triangle, accelerometer) = rotation_and_upper(&self.accelerometer_correction);
@@ -166,7 +171,7 @@ impl ImuIntrinsics {
         }
     }
 
-    /// From the matrices of Kalibr's file; `None` where one cannot be inverted.
+    /// Creates intrinsics from the matrices of Kalibr's file; `None` if one of them is singular.
     pub fn from_kalibr(kalibr: &KalibrImuMatrices) -> Option<Self> {
         Some(Self {
             gyroscope_correction: (kalibr.gyroscope_m * kalibr.gyroscope_from_imu).try_inverse()?,
@@ -174,8 +179,8 @@ impl ImuIntrinsics {
         })
     }
 
-    /// The matrices of Kalibr's file, the gyroscope's `M` lower triangular as Kalibr has it; `None` where a correction cannot
-    /// be inverted.
+    /// Matrices of Kalibr's file, with the gyroscope's `M` lower triangular as in Kalibr; `None` if a correction is
+    /// singular.
     pub fn to_kalibr(self) -> Option<KalibrImuMatrices> {
         let measured_from_true = self.gyroscope_correction.try_inverse()?;
         // `A = L · Q` from the transpose, `Aᵀ = Qᵀ · Lᵀ`.
@@ -188,8 +193,8 @@ impl ImuIntrinsics {
     }
 }
 
-/// `A = Q · U` (each 3 × 3) with a rotation and an upper triangular matrix of positive diagonal, by Gram–Schmidt on the
-/// columns; exact for an upper triangular matrix with a positive diagonal.
+/// Decomposes `A = Q · U` (each 3 × 3) into a rotation and an upper triangular matrix of positive diagonal, by
+/// Gram–Schmidt on the columns; exact for an upper triangular matrix with a positive diagonal.
 fn rotation_and_upper(matrix: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     let (mut q, mut u) = (Matrix3::zeros(), Matrix3::zeros());
     for column in 0..3 {
@@ -243,7 +248,7 @@ mod tests {
         assert!((found.accelerometer.matrix() - some().accelerometer.matrix()).amax() < 1e-15);
         let kalibr = intrinsics.to_kalibr().unwrap();
         check_near(&ImuIntrinsics::from_kalibr(&kalibr).unwrap(), &intrinsics);
-        // Kalibr's own form: M lower triangular, C_gyro_i a rotation.
+        // Kalibr's structure: M lower triangular, C_gyro_i a rotation.
         assert_eq!([(0, 1), (0, 2), (1, 2)].map(|entry| kalibr.gyroscope_m[entry]), [0.0; 3]);
         let rotation = kalibr.gyroscope_from_imu;
         assert!((rotation.transpose() * rotation - Matrix3::identity()).amax() < 1e-14 && rotation.determinant() > 0.0);
@@ -286,7 +291,7 @@ mod tests {
         );
         assert_eq!([(0, 1), (0, 2), (1, 2)].map(|entry| rotated.accelerometer_correction[entry]), [0.0; 3]);
         assert!(triangle_from_imu.angle() > 0.005);
-        // Kalibr's M is lower triangular as well, and nothing is left to rotate.
+        // Kalibr's M is lower triangular as well, and no rotation remains.
         let kalibr = rotated.to_kalibr().unwrap();
         assert!([(0, 1), (0, 2), (1, 2)].iter().all(|entry| kalibr.accelerometer_m[*entry].abs() < 1e-16));
         assert_eq!(rotated.in_lower_triangular_frame(), (UnitQuaternion::identity(), rotated));
@@ -306,7 +311,7 @@ mod tests {
         assert!((rotation.transpose() * rotation - Matrix3::identity()).amax() < 1e-14);
         assert!((rotation - Matrix3::identity()).amax() > 0.01);
         assert!((rotation * intrinsics.gyroscope_correction - again.gyroscope_correction).amax() < 1e-14);
-        // What a calibration of corrected samples finds leads back to the frame of the given intrinsics.
+        // A calibration of corrected samples is transformed back to the frame of the given intrinsics.
         let whole = ImuIntrinsics::from_parameters(&some()).after(&intrinsics);
         let rotated = ImuIntrinsics::from_parameters(&whole.parameters());
         assert!((rotated.accelerometer_correction - whole.accelerometer_correction).amax() > 0.01);

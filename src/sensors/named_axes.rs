@@ -1,4 +1,4 @@
-//! Axes by the directions that they point to, seen from a vehicle.
+//! Axes named by their directions, seen from a vehicle.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,17 +8,16 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 /// Axes of a body, x forward.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BodyAxes {
-    /// Forward, right, down; its earth is north, east, down.
+    /// Forward, right, down; with north, east, down as earth frame.
     Frd,
-    /// Forward, left, up; its earth is east, north, up.
+    /// Forward, left, up; with east, north, up as earth frame.
     Flu,
 }
 
 impl BodyAxes {
-    /// Both.
     pub const ALL: [Self; 2] = [Self::Frd, Self::Flu];
 
-    /// Its name in a rig.
+    /// Name in a rig.
     pub fn name(self) -> &'static str {
         match self {
             Self::Frd => "frd",
@@ -31,7 +30,7 @@ impl BodyAxes {
         NamedAxes::from(self).flu_from_axes()
     }
 
-    /// Rotates vectors from the earth that belongs to these axes to east, north, up.
+    /// Rotates vectors from the earth frame of these axes to east, north, up.
     pub fn enu_from_earth(self) -> UnitQuaternion<f64> {
         match self {
             Self::Frd => rotation_of(&Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0)),
@@ -81,11 +80,11 @@ impl Direction {
 }
 
 impl NamedAxes {
-    /// Forward, left, up: a body's in ROS.
+    /// Forward, left, up: body axes of ROS.
     pub const FLU: Self = Self([Direction::Forward, Direction::Left, Direction::Up]);
-    /// Forward, right, down: a body's in `MAVLink`.
+    /// Forward, right, down: body axes of `MAVLink`.
     pub const FRD: Self = Self([Direction::Forward, Direction::Right, Direction::Down]);
-    /// Right, down, forward: a camera's.
+    /// Right, down, forward: camera axes.
     pub const RDF: Self = Self([Direction::Right, Direction::Down, Direction::Forward]);
 
     fn matrix(self) -> Matrix3<f64> {

@@ -5,36 +5,35 @@ use nalgebra::Vector3;
 
 use crate::geometry::RigidTransform;
 
-/// Largest distance in nanoseconds of a stamp from the nearest pose of a track that is interpolated there.
+/// Largest distance in nanoseconds between a stamp and the nearest pose of a track for interpolation.
 pub const NEAREST_POSE_NS: i64 = 100_000_000;
 
-/// An antenna is on the vehicle: larger coordinates of it are millimetres.
+/// Largest coordinate of an antenna on the vehicle; a larger one is given in millimetres by mistake.
 pub const MAX_LEVER_ARM_M: f64 = 100.0;
 
-/// A ground-truth pose, or one of a trajectory of another program.
+/// Ground-truth pose, or pose of a trajectory of another program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseSample {
-    /// Header stamp in nanoseconds since the log began.
+    /// Header stamp in nanoseconds since the start of the log.
     pub stamp_ns: i64,
-    /// Pose of the IMU in the world.
     pub world_from_imu: RigidTransform,
 }
 
-/// A ground-truth position of an antenna.
+/// Ground-truth position of an antenna.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionSample {
-    /// Header stamp in nanoseconds since the log began.
+    /// Header stamp in nanoseconds since the start of the log.
     pub stamp_ns: i64,
-    /// Position in the world, in metres.
+    /// In the world frame.
     pub position_m: Vector3<f64>,
 }
 
-/// Where an antenna is on the vehicle.
+/// Position of an antenna on the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LeverArm {
-    /// At this position in the IMU frame, in metres.
+    /// In the IMU frame, in metres.
     Known(Vector3<f64>),
-    /// To be estimated together with the alignment of a trajectory.
+    /// Estimated together with the alignment of a trajectory.
     Estimated,
 }
 
@@ -70,20 +69,20 @@ impl fmt::Display for LeverArm {
 pub struct PoseTrack(Vec<PoseSample>);
 
 impl PoseTrack {
-    /// The poses in the order of their stamps; of several with one stamp the first is kept.
+    /// Sorts the poses by stamp; of several with one stamp the first is kept.
     pub fn new(mut samples: Vec<PoseSample>) -> Self {
         samples.sort_by_key(|sample| sample.stamp_ns);
         samples.dedup_by_key(|sample| sample.stamp_ns);
         Self(samples)
     }
 
-    /// The poses.
     pub fn samples(&self) -> &[PoseSample] {
         &self.0
     }
 
-    /// The pose at a stamp, interpolated between the poses before and after it; `None` before the first, after the last, and
-    /// where the nearest of the two is further than [`NEAREST_POSE_NS`] away.
+    /// Pose at a stamp, interpolated between the poses before and after it; `None` before the first, after the last,
+    /// and
+    /// if the nearest of the two is further than [`NEAREST_POSE_NS`] away.
     pub fn at(&self, stamp_ns: i64) -> Option<RigidTransform> {
         let after = self.0.partition_point(|sample| sample.stamp_ns <= stamp_ns);
         let from = self.0.get(after.checked_sub(1)?)?;

@@ -1,4 +1,4 @@
-//! The rig: which sensors a log holds and where they are mounted, in Kalibr's names.
+//! Rig: sensors of a log and their calibration, with Kalibr's names.
 
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
@@ -6,13 +6,12 @@ use crate::gimbal::{ClassicalChain, InverseChain, ParameterNames};
 
 use super::{AttitudeFrame, AttitudeSource, ImageMask, ImuIntrinsics, ImuNoise, LeverArm};
 
-/// The rig has no camera with this key.
+/// Error: the rig has no camera with this key.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the rig has no camera '{key}'; it has {}", quoted(available))]
 pub struct UnknownCamera {
-    /// What was asked for.
     pub key: String,
-    /// The keys that the rig has.
+    /// Keys of the rig's cameras.
     pub available: Vec<String>,
 }
 
@@ -23,67 +22,57 @@ fn quoted(keys: &[String]) -> String {
     keys.iter().map(|key| format!("'{key}'")).collect::<Vec<_>>().join(", ")
 }
 
-/// The IMU with its noise densities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImuRig {
-    /// Topic of its `sensor_msgs/msg/Imu`; only the angular velocities are read of it when the accelerometer is apart.
+    /// Topic of `sensor_msgs/msg/Imu`; only its angular velocities are read if `accelerometer_topic` is given.
     pub topic: String,
-    /// Topic of the specific forces (`sensor_msgs/msg/Imu`), when they are apart from the angular velocities.
+    /// Topic of the specific forces (`sensor_msgs/msg/Imu`), if they are recorded separately from the angular
+    /// velocities.
     pub accelerometer_topic: Option<String>,
-    /// Frame name.
     pub frame_id: String,
     /// Nominal rate.
     pub rate_hz: f64,
-    /// Noise densities.
     pub noise: ImuNoise,
-    /// Scale and misalignment, the identity when nothing is known of them.
+    /// Scale and misalignment, the identity if they are not given.
     pub intrinsics: ImuIntrinsics,
 }
 
-/// How a camera is carried.
+/// Extrinsics of a camera: rigid, or by the gimbal.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CameraMount {
     /// At the end of the rig's gimbal.
     Gimbal,
-    /// Rigidly, at this pose (the inverse of Kalibr's `T_cam_imu`).
-    Static {
-        /// Maps points from the camera to the IMU.
-        imu_from_camera: RigidTransform,
-    },
+    /// Rigid, at this pose (the inverse of Kalibr's `T_cam_imu`).
+    Static { imu_from_camera: RigidTransform },
 }
 
-/// One camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraRig {
     /// Key in the rig file, `cam0`, `cam1`, ….
     pub key: String,
-    /// How it is carried.
     pub mount: CameraMount,
-    /// Topic of its images.
     pub topic: String,
-    /// Frame name.
     pub frame_id: String,
     /// Nominal rate.
     pub rate_hz: f64,
-    /// Projection model with its resolution.
     pub model: CameraModel,
     /// Kalibr's `timeshift_cam_imu`: `t_imu = t_cam + shift`.
     pub timeshift_cam_imu_s: f64,
-    /// Time from the exposure of the first row to that of a row behind the last one: 0 for a global shutter, negative where
+    /// Time from the exposure of the first row to that of a row after the last one: 0 for a global shutter, negative if
     /// rows are read upwards.
     pub readout_s: f64,
-    /// Standard deviation of `readout_s`, `None` when nobody has measured it.
+    /// Standard deviation of `readout_s`, `None` if it has not been measured.
     pub readout_sigma_s: Option<f64>,
-    /// How wrong the intrinsics of `model` may be, `None` when the rig does not say.
+    /// Standard deviations of the intrinsics of `model`, `None` if the rig does not give them.
     pub intrinsics_sigma: Option<IntrinsicsSigma>,
-    /// Pixels that show the vehicle, `None` without.
+    /// Mask of the pixels that show the vehicle.
     pub mask: Option<CameraMask>,
 }
 
 /// Standard deviations of a camera's intrinsics.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntrinsicsSigma {
-    /// Of each focal length, as a ratio of it.
+    /// Of each focal length, relative to the focal length.
     pub focal_ratio: f64,
     /// Of each coordinate of the principal point.
     pub centre_px: f64,
@@ -92,23 +81,23 @@ pub struct IntrinsicsSigma {
 }
 
 impl CameraRig {
-    /// Time in seconds from an image's stamp to the exposure of a row (0 is the centre of the first one), in the camera's
-    /// clock: `row / height · readout`.
+    /// Time in seconds from an image's stamp to the exposure of a row (0 is the centre of the first one), in camera
+    /// time: `row / height · readout`.
     pub fn row_time_s(&self, row_px: f64) -> f64 {
         row_px / self.model.resolution_px[1] as f64 * self.readout_s
     }
 }
 
-/// The mask of a camera with the file that it came from.
+/// Mask of a camera, with the name of its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CameraMask {
-    /// Name of the PNG, relative to the folder of the rig; the same name as an attachment of a log.
+    /// Name of the PNG, relative to the folder of the rig; also the name of the attachment in a log.
     pub file: String,
-    /// The mask, of the size of the images.
+    /// Mask with the size of the camera's images.
     pub image: ImageMask,
 }
 
-/// How wrong the rig's chain may be: bounds of a uniform error on each parameter.
+/// Prior of the rig's chain: bounds of a uniform error on each parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChainPrior {
     /// Bound on every translation, in metres.
@@ -118,7 +107,7 @@ pub struct ChainPrior {
 }
 
 impl ChainPrior {
-    /// Prior on a rigid camera's extrinsics when the rig has none: calibrations with a target are better than this.
+    /// Prior on a rigid camera's extrinsics if the rig has none: calibrations with a target are better than this.
     const RIGID_CAMERA: Self = Self { translation_bound_m: 0.01, rotation_bound_rad: 0.0175 };
 
     /// Standard deviations of the uniform errors, `bound / √3`: of every translation in metres and of every angle in
@@ -129,7 +118,7 @@ impl ChainPrior {
     }
 }
 
-/// One joint's name and range.
+/// Name and range of a joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// Name in the `JointState` messages.
@@ -138,12 +127,11 @@ pub struct Joint {
     pub limits_rad: (f64, f64),
 }
 
-/// The gimbal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GimbalRig {
-    /// Topic of its `sensor_msgs/msg/JointState` or of its attitude, `None` when there is neither.
+    /// Topic of `sensor_msgs/msg/JointState` or of the gimbal's attitude, `None` without either.
     pub topic: Option<String>,
-    /// What the topic's messages mean when they are attitudes, `None` for joint angles.
+    /// Interpretation of the topic's messages as attitudes, `None` for joint angles.
     pub attitude: Option<AttitudeSource>,
     /// `timeshift_gimbal_imu`: `t_imu = t_gimbal + shift`, for the stamps of `topic`.
     pub timeshift_gimbal_imu_s: f64,
@@ -151,18 +139,19 @@ pub struct GimbalRig {
     pub rate_hz: f64,
     /// Standard deviation of a reading, `None` without encoders.
     pub encoder_sigma_rad: Option<f64>,
-    /// How wrong `chain` may be.
+    /// Prior of `chain`.
     pub prior: ChainPrior,
-    /// Whether runs in a minimal parameterization switch to another one near a singularity (`parameterization: auto`).
+    /// True if runs in a minimal parameterization switch to another one near a singularity (`parameterization: auto`).
     pub switches_parameterization: bool,
-    /// The chain in the classical form (Eqs. 5–6), links in order.
+    /// Classical chain (Eqs. 5–6), links in order.
     pub chain: ClassicalChain,
-    /// The joints, one per link of `chain`.
+    /// One joint per link of `chain`.
     pub joints: Vec<Joint>,
 }
 
 impl GimbalRig {
-    /// The inverse of the chain by which joint angles follow from an attitude; `None` unless the rig names one and has one to
+    /// Inverse of the chain that converts attitudes to joint angles; `None` unless the rig has an attitude source and
+    /// one to
     /// three joints.
     pub fn inverse_chain(&self) -> Option<InverseChain> {
         let source = self.attitude.as_ref()?;
@@ -171,7 +160,7 @@ impl GimbalRig {
         Some(InverseChain::new(chain, &limits)?.with_first_joint_offset(source.first_joint_offset_rad))
     }
 
-    /// Takes a calibrated chain; joint angles go on to follow from an attitude as before.
+    /// Sets a calibrated chain; attitudes are still converted to joint angles by the previous chain.
     pub fn set_chain(&mut self, chain: ClassicalChain) {
         let before = std::mem::replace(&mut self.chain, chain);
         if let Some(source) = &mut self.attitude {
@@ -180,38 +169,34 @@ impl GimbalRig {
     }
 }
 
-/// A field of the rig whose value is only assumed.
+/// Field of the rig with an assumed value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssumedField {
-    /// Its path in the rig file, as in `gimbal.T_I_B`.
+    /// Path in the rig file, such as `gimbal.T_I_B`.
     pub field: String,
-    /// What is assumed, as one sentence without a full stop.
+    /// Assumption, as one sentence without a full stop.
     pub reason: String,
 }
 
-/// A whole rig.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
-    /// Its name.
     pub name: String,
     /// Magnitude of gravity in m/s².
     pub gravity_m_per_s2: f64,
-    /// The IMU with its noise densities.
     pub imu: ImuRig,
     /// Cameras in the order of their keys.
     pub cameras: Vec<CameraRig>,
-    /// The gimbal, when there is one.
     pub gimbal: Option<GimbalRig>,
-    /// Topic of the true pose of the IMU in the world, or of the true position of an antenna.
+    /// Topic of the ground-truth pose of the IMU in the world, or of the ground-truth position of an antenna.
     pub ground_truth_topic: Option<String>,
-    /// Where that antenna is, `None` when the rig does not say.
+    /// Position of that antenna, `None` if the rig does not give it.
     pub ground_truth_lever_arm: Option<LeverArm>,
-    /// Fields that nobody has measured yet.
+    /// Fields that have not been measured yet.
     pub assumed: Vec<AssumedField>,
 }
 
 impl Rig {
-    /// The camera with a key such as `cam0`.
+    /// Camera with a key such as `cam0`.
     pub fn camera(&self, key: &str) -> Result<&CameraRig, UnknownCamera> {
         self.cameras.iter().find(|camera| camera.key == key).ok_or_else(|| UnknownCamera {
             key: key.to_owned(),
@@ -219,24 +204,24 @@ impl Rig {
         })
     }
 
-    /// Topic of the vehicle's attitude, when the gimbal's is relative to another frame than the body.
+    /// Topic of the vehicle's attitude, required if the gimbal's attitude is relative to a frame other than the body.
     pub fn vehicle_topic(&self) -> Option<&str> {
         let source = self.gimbal.as_ref()?.attitude.as_ref()?;
         source.vehicle_topic.as_deref().filter(|_| source.frame != AttitudeFrame::Body)
     }
 
-    /// Names of the gimbal's joints, from the base on; none without a gimbal.
+    /// Names of the gimbal's joints, starting at the base; empty without a gimbal.
     pub fn joint_names(&self) -> Vec<String> {
         self.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect()
     }
 
-    /// What calibration parameters are called: links by the joints, rigid cameras beside a gimballed one by their keys.
+    /// Names of calibration parameters: links by their joints, further rigid cameras by their keys.
     pub fn parameter_names(&self) -> ParameterNames {
         let rigid = self.cameras.iter().filter(|camera| camera.mount != CameraMount::Gimbal);
         ParameterNames { joints: self.joint_names(), cameras: rigid.map(|camera| camera.key.clone()).collect() }
     }
 
-    /// The chain that carries the camera with a key: the gimbal's, or one without links for a rigid camera. `None` for an
+    /// Chain of the camera with a key: the gimbal's, or one without links for a rigid camera. `None` for an
     /// unknown key, or for a camera on a gimbal that the rig does not describe.
     pub fn chain_of_camera(&self, key: &str) -> Option<ClassicalChain> {
         let camera = self.cameras.iter().find(|camera| camera.key == key)?;
@@ -248,12 +233,13 @@ impl Rig {
         }
     }
 
-    /// How wrong the rig's extrinsics of one of its cameras may be.
+    /// Prior of the rig's extrinsics of one of its cameras.
     pub fn extrinsics_prior(&self, camera: &CameraRig) -> ChainPrior {
         match (&self.gimbal, &camera.mount) {
             (Some(gimbal), CameraMount::Gimbal) => gimbal.prior,
-            // The rigid camera of a gimbal rig was calibrated with the same care as the gimbal, but never worse than a
-            // rigid camera usually is.
+            // The rigid camera of a gimbal rig is assumed to be calibrated as well as the gimbal, but never worse than
+            // the
+            // usual rigid camera.
             (Some(gimbal), CameraMount::Static { .. }) => ChainPrior {
                 translation_bound_m: gimbal.prior.translation_bound_m.min(ChainPrior::RIGID_CAMERA.translation_bound_m),
                 rotation_bound_rad: gimbal.prior.rotation_bound_rad.min(ChainPrior::RIGID_CAMERA.rotation_bound_rad),

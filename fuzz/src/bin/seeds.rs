@@ -15,14 +15,14 @@ use dcvins::flight_log::{
 use dcvins::geometry::RigidTransform;
 use dcvins::sensors::Rig;
 use dcvins_fuzz::{EUROC_FILES, RIG, SOURCES, recordings, rig_with_source, topic_of};
-use libfuzzer_sys as _; // it defines what the counters of the build call
+use libfuzzer_sys as _; // defines the functions that the coverage counters call
 use nalgebra::Vector3;
 use ros1::{Compression, Message, bag, f64_sequence, f64s, header, text};
 use rusqlite::Connection;
 
 type Failed = Box<dyn std::error::Error>;
 
-/// An H.264 stream, the size of its first message and the end of its second.
+/// H.264 stream, with the size of its first message and the end of its second.
 const VIDEO: &[u8] = include_bytes!("../../../tests/data/video/h264.bin");
 const VIDEO_LISTING: &str = include_str!("../../../tests/data/video/streams.json");
 const KEYFRAME_BYTES: usize = 859;
@@ -31,7 +31,7 @@ const PICTURE_END: usize = 979;
 const EPOCH_NS: i64 = 1_700_000_000_250_000_000;
 /// Width and height of the images.
 const RESOLUTION_PX: [usize; 2] = [16, 12];
-/// A PNG image of 16 × 12 gray pixels, all 0.
+/// PNG image of 16 × 12 gray pixels, all 0.
 const PNG: &[u8] = include_bytes!("../gray.png");
 
 fn times(index: i64) -> MessageTimes {
@@ -39,7 +39,7 @@ fn times(index: i64) -> MessageTimes {
     MessageTimes { stamp_ns, log_time_ns: stamp_ns + 1_000_000 }
 }
 
-/// A log with messages of every type over 0.5 s.
+/// Writes a log with messages of every type over 0.5 s.
 fn write_log(path: &Path, options: &LogWriterOptions) -> Result<(), Failed> {
     let mut log = LogWriter::create(path, options)?;
     let camera = CameraModel {
@@ -74,7 +74,7 @@ fn write_log(path: &Path, options: &LogWriterOptions) -> Result<(), Failed> {
                 "mono8",
                 &pixels,
             )?;
-            // A keyframe and a picture that depends on it.
+            // A keyframe and a frame that depends on it.
             let picture = if index % 20 == 0 { &VIDEO[..KEYFRAME_BYTES] } else { &VIDEO[KEYFRAME_BYTES..PICTURE_END] };
             log.write_compressed_video(topic_of(MessageKind::CompressedVideo), "video", times(index), "h264", picture)?;
             log.write_odometry(topic_of(MessageKind::Odometry), times(index), &odometry)?;
@@ -88,7 +88,7 @@ fn write_log(path: &Path, options: &LogWriterOptions) -> Result<(), Failed> {
     Ok(())
 }
 
-/// A message in CDR, little-endian.
+/// Message in CDR, little-endian.
 struct Cdr(Vec<u8>);
 
 impl Cdr {
@@ -121,7 +121,7 @@ impl Cdr {
     }
 }
 
-/// The attitude of gimbal and vehicle in every message that is read.
+/// Writes the attitude of gimbal and vehicle in every supported message type.
 fn write_attitudes(log: &mut LogWriter, times: MessageTimes) -> Result<(), Failed> {
     let start = || Cdr(vec![0, 1, 0, 0]);
     let stamp_ns = times.stamp_ns;
@@ -155,7 +155,7 @@ fn write_attitudes(log: &mut LogWriter, times: MessageTimes) -> Result<(), Faile
     Ok(())
 }
 
-/// The folder of a target's seeds.
+/// Folder of a target's seeds.
 fn target(corpus: &Path, name: &str) -> Result<PathBuf, Failed> {
     let folder = corpus.join(name);
     fs::create_dir_all(&folder)?;
@@ -176,7 +176,7 @@ fn logs(corpus: &Path) -> Result<PathBuf, Failed> {
     Ok(folder.join("none-true-true"))
 }
 
-/// One message of each type from a log, as an input of the target `message`.
+/// Writes one message of each type of a log as an input of the target `message`.
 fn messages(corpus: &Path, log: &Path) -> Result<(), Failed> {
     let folder = target(corpus, "message")?;
     let file = fs::read(log)?;
@@ -191,7 +191,7 @@ fn messages(corpus: &Path, log: &Path) -> Result<(), Failed> {
     Ok(())
 }
 
-/// The streams of the tests, as inputs of the target `video`.
+/// Writes the streams of the tests as inputs of the target `video`.
 fn videos(corpus: &Path) -> Result<(), Failed> {
     let folder = target(corpus, "video")?;
     let streams: [(&str, u8, &[u8]); 4] = [
@@ -201,7 +201,7 @@ fn videos(corpus: &Path) -> Result<(), Failed> {
         ("h265", 1, include_bytes!("../../../tests/data/video/h265.bin")),
     ];
     for (name, codec, mut rest) in streams {
-        // The sizes of the messages are the first list of numbers behind the name.
+        // The sizes of the messages are the first list of numbers after the name.
         let listing = VIDEO_LISTING.split_once(&format!("\"{name}\":")).ok_or("no such stream")?.1;
         let sizes = listing.split_once('[').and_then(|(_, numbers)| numbers.split_once(']')).ok_or("no sizes")?.0;
         let mut input = vec![codec];
@@ -288,7 +288,7 @@ fn databases(corpus: &Path, log: &Path) -> Result<(), Failed> {
     Ok(())
 }
 
-/// The seeds of the targets that read text.
+/// Writes the seeds of the targets that read text.
 fn texts(corpus: &Path) -> Result<(), Failed> {
     let rigs = target(corpus, "rig")?;
     fs::write(rigs.join("commented"), RIG)?;

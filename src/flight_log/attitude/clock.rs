@@ -3,24 +3,25 @@ use super::super::messages::{self, MessageKind};
 use super::super::{FlightLog, LogError};
 use crate::geometry::seconds_from_ns;
 
-/// Stamps and log times this far outside of the log's stamps are of another clock.
+/// Stamps and log times this far outside of the log's stamps belong to another clock.
 const TOLERANCE_NS: i64 = 60_000_000_000;
 
-/// Where the times of a topic's messages are taken from.
+/// Source of the times of a topic's messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum StampClock {
-    /// The stamps of the messages.
+    /// Header stamps of the messages.
     Stamps,
-    /// The log times: the stamps are of a clock whose relation to the log's is unknown.
+    /// Log times, since the clock of the stamps has no known relation to the log's.
     LogTimes {
-        /// The first stamp since that clock's zero.
+        /// First stamp since the zero of that clock.
         first_stamp_ns: i64,
     },
 }
 
 impl StampClock {
-    /// Of a topic. Stamps of PX4 count from its start unless its bridge has converted them; they are used when the first one lies
-    /// within the times of the log. Fails when neither stamps nor log times do.
+    /// Selects the clock of a topic. Stamps of PX4 count from its start unless its bridge has converted them; they are
+    /// used if
+    /// the first one lies within the times of the log. An error if neither stamps nor log times do.
     pub(crate) fn of(log: &FlightLog, topic: &str, kind: MessageKind) -> Result<Self, LogError> {
         if !kind.counts_since_boot() {
             return Ok(Self::Stamps);
@@ -41,7 +42,7 @@ impl StampClock {
         }
     }
 
-    /// The stamp of a message, both since the epoch.
+    /// Selects the stamp or the log time of a message, both since the epoch.
     pub(crate) fn stamp_ns(self, stamp_ns: i64, log_time_ns: u64) -> i64 {
         match self {
             Self::Stamps => stamp_ns,
@@ -49,12 +50,13 @@ impl StampClock {
         }
     }
 
-    /// The warning about stamps that are not used.
+    /// Warning about unused stamps.
     pub(crate) fn warning(self, topic: &str) -> Option<String> {
         let Self::LogTimes { first_stamp_ns } = self else { return None };
         Some(format!(
-            "{topic}: the stamps count from PX4's start (the first is {:.3} s), and how they relate to the other topics is unknown; the \
-             times of recording are used, with their delay and jitter (let the bridge synchronize: UXRCE_DDS_SYNCT 1)",
+            "{topic}: the stamps count from PX4's start (the first is {:.3} s), with an unknown offset to \
+             the other topics; the log times are used, with their delay and jitter (synchronize the clocks: \
+             UXRCE_DDS_SYNCT 1)",
             seconds_from_ns(first_stamp_ns)
         ))
     }

@@ -1,5 +1,4 @@
-//! The attitude of a gimbal as a log has it: topics, clocks, chains of transforms, and the vehicle's attitude between two
-//! messages.
+//! Gimbal attitude of a log: topics, clocks, chains of transforms, and the vehicle's attitude between two messages.
 
 mod clock;
 mod transforms;
@@ -13,7 +12,8 @@ use super::messages::{self, MessageKind};
 use super::{FlightLog, LogError};
 use crate::sensors::{AttitudeFrame, AttitudeMessage, AttitudeSource, BodyAxes, GimbalRig};
 
-/// Vehicle attitudes further apart are not interpolated: an agile vehicle deviates by 3° from a constant rate meanwhile.
+/// Vehicle attitudes further apart are not interpolated: an agile vehicle deviates by 3° from a constant rate in this
+/// time.
 pub(crate) const MAX_VEHICLE_GAP_NS: i64 = 200_000_000;
 
 /// Message types of a vehicle's attitude.
@@ -39,12 +39,12 @@ pub(crate) fn gimbal_kinds(gimbal: &GimbalRig) -> &'static [MessageKind] {
     }
 }
 
-/// The rig's field that names the gimbal's topic.
+/// Rig field of the gimbal's topic.
 pub(crate) fn topic_field(gimbal: &GimbalRig) -> &'static str {
     if gimbal.attitude.is_some() { "gimbal.source.topic" } else { "gimbal.rostopic" }
 }
 
-/// The vehicle's topic of a source and its type, `None` when every attitude is relative to the body.
+/// Returns the topic and message type of the vehicle's attitude, `None` if every attitude is relative to the body.
 pub(crate) fn vehicle_topic<'a>(
     log: &FlightLog,
     source: &'a AttitudeSource,
@@ -54,7 +54,7 @@ pub(crate) fn vehicle_topic<'a>(
     };
     let info = log.require_topic("gimbal.source.vehicle", topic, &VEHICLE_KINDS)?;
     let kind = info.kind.unwrap_or(MessageKind::QuaternionStamped);
-    // By ROS's conventions these are in FLU, but not all programs follow them.
+    // By ROS conventions these are in FLU, but not all programs follow them.
     let conventional = matches!(kind, MessageKind::Imu | MessageKind::Odometry);
     if conventional && source.axes == BodyAxes::Frd && source.vehicle_axes.is_none() {
         let problem = format!(
@@ -67,7 +67,7 @@ pub(crate) fn vehicle_topic<'a>(
     Ok(Some((topic, kind)))
 }
 
-/// The rotation at a stamp between samples in the order of their stamps, as [`rotation_between`].
+/// Interpolates samples, in the order of their stamps, at a stamp by [`rotation_between`].
 pub(crate) fn rotation_at(
     samples: &[(i64, UnitQuaternion<f64>)],
     stamp_ns: i64,
@@ -78,7 +78,7 @@ pub(crate) fn rotation_at(
     rotation_between(before, samples.get(after), stamp_ns, max_gap_ns)
 }
 
-/// The rotation between two samples at a stamp; `None` outside of them or when they are too far apart.
+/// Interpolates two samples at a stamp; `None` outside of them or if they are too far apart.
 pub(crate) fn rotation_between(
     before: Option<&(i64, UnitQuaternion<f64>)>,
     after: Option<&(i64, UnitQuaternion<f64>)>,
@@ -98,13 +98,14 @@ pub(crate) fn rotation_between(
     first.try_slerp(second, fraction, 1e-9)
 }
 
-/// Reads the vehicle's attitude from one message: its stamp since the epoch and the rotation in FLU and ENU, or what is wrong.
+/// Reads the vehicle's attitude from a message: the stamp since the epoch and the rotation in FLU and ENU, or a
+/// description of the problem.
 pub(crate) fn read_vehicle(
     source: &AttitudeSource,
     kind: MessageKind,
     message: &[u8],
 ) -> Result<(i64, UnitQuaternion<f64>), String> {
     let attitude = messages::read_vehicle_attitude(kind, message).map_err(|error| error.to_string())?;
-    let rotation = attitude.content.ok_or("not finite, a zero quaternion, or said to be unknown")?;
+    let rotation = attitude.content.ok_or("not finite, a zero quaternion, or marked as unknown")?;
     Ok((attitude.stamp_ns, source.enu_from_flu(&rotation, kind == MessageKind::Px4VehicleAttitude)))
 }

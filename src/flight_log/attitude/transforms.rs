@@ -1,4 +1,4 @@
-//! A rotation along a chain of frames whose transforms are in messages of their own.
+//! Rotation along a chain of frames whose transforms are in separate messages.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -8,34 +8,35 @@ use super::super::messages::{MessageKind, bare_name, read_transforms};
 use super::super::{FlightLog, LogError};
 use super::rotation_between;
 
-/// Messages of a topic within which every frame must occur.
+/// Number of messages of a topic within which every frame must occur.
 const MESSAGES_SEARCHED: usize = 5000;
-/// Frames of a robot; further ones are not looked at.
+/// Largest number of frames of a robot; further ones are ignored.
 const MAX_FRAMES: usize = 4096;
 /// Larger gaps between readings of a transform are not interpolated.
 const MAX_GAP_NS: i64 = 200_000_000;
 
-/// The transforms from a gimbal's frame to the one that its attitude is relative to.
+/// Transforms from a gimbal's frame to the frame that its attitude is relative to.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TransformPath {
     edges: Vec<Edge>,
 }
 
-/// A transform between a frame and its parent.
+/// Transform between a frame and its parent.
 #[derive(Clone, Debug, PartialEq)]
 struct Edge {
     child: String,
-    /// Whether the path goes from the parent to the child.
+    /// True if the path goes from the parent to the child.
     inverted: bool,
-    /// `parent_from_child` when it is static.
+    /// `parent_from_child` of a static transform.
     fixed: Option<UnitQuaternion<f64>>,
 }
 
-/// Every frame's parent, with the rotation when it is static.
+/// Parent of every frame, with the rotation of a static transform.
 type Tree = BTreeMap<String, (String, Option<UnitQuaternion<f64>>)>;
 
 impl TransformPath {
-    /// The path between two frames of a log: static transforms of `/tf_static` (or the topic with `_static`), others of
+    /// Finds the path between two frames of a log: static transforms of `/tf_static` (or the topic with `_static`),
+    /// others of
     /// `topic`.
     pub(crate) fn find(log: &FlightLog, topic: &str, parent: &str, child: &str) -> Result<Self, LogError> {
         let (parent, child) = (bare_name(parent), bare_name(child));
@@ -60,7 +61,7 @@ impl TransformPath {
         let ancestors = |frame: &str| {
             let mut frames = vec![frame.to_owned()];
             while let Some((above, _)) = frames.last().and_then(|last| tree.get(last)) {
-                // A loop of frames has no end.
+                // Stop at a loop of frames.
                 if frames.contains(above) {
                     break;
                 }
@@ -95,7 +96,7 @@ impl TransformPath {
         Ok(Self { edges })
     }
 
-    /// Number of the transform with this child frame among those that change.
+    /// Index among the changing transforms of the one with this child frame.
     pub(crate) fn moving(&self, child: &str) -> Option<usize> {
         self.edges.iter().filter(|edge| edge.fixed.is_none()).position(|edge| edge.child == child)
     }
@@ -104,7 +105,7 @@ impl TransformPath {
         self.edges.iter().filter(|edge| edge.fixed.is_none()).count()
     }
 
-    /// The rotation from the last frame to the first with one rotation for each transform that changes.
+    /// Rotation from the last frame to the first, given one rotation for each changing transform.
     fn rotation(&self, moving: &[UnitQuaternion<f64>]) -> UnitQuaternion<f64> {
         let mut next = moving.iter();
         self.edges.iter().fold(UnitQuaternion::identity(), |before, edge| {
@@ -114,7 +115,7 @@ impl TransformPath {
     }
 }
 
-/// Adds the transforms of a topic to the tree until `complete`.
+/// Adds the transforms of a topic to the tree until `complete` returns true.
 fn collect(log: &FlightLog, topic: &str, fixed: bool, tree: &mut Tree, mut complete: impl FnMut(&Tree) -> bool) {
     let mut searched = 0;
     log.for_each_message(topic, |_, data| {
@@ -129,11 +130,11 @@ fn collect(log: &FlightLog, topic: &str, fixed: bool, tree: &mut Tree, mut compl
     });
 }
 
-/// Joins the transforms that change at the stamps of the first of them; the others are interpolated.
+/// Merges the changing transforms at the stamps of the first of them; the others are interpolated.
 #[derive(Clone, Debug)]
 pub(crate) struct TransformMerge {
     path: TransformPath,
-    /// By transform: readings from the last one at or before the next stamp on.
+    /// Readings by transform, starting with the last one at or before the next stamp.
     readings: Vec<VecDeque<(i64, UnitQuaternion<f64>)>>,
     newest_ns: i64,
     ended: bool,
@@ -145,7 +146,7 @@ impl TransformMerge {
         Self { path, readings, newest_ns: i64::MIN, ended: false }
     }
 
-    /// Takes the next reading of a transform; a second one with the same stamp or an older one is left out.
+    /// Adds the next reading of a transform; one with the same stamp or an older one is left out.
     pub(crate) fn push(&mut self, transform: usize, stamp_ns: i64, rotation: UnitQuaternion<f64>) {
         self.newest_ns = self.newest_ns.max(stamp_ns);
         if let Some(queue) = self.readings.get_mut(transform)
@@ -159,7 +160,7 @@ impl TransformMerge {
         self.ended = true;
     }
 
-    /// The next rotation along the path with its stamp, `None` while later readings are needed.
+    /// Next rotation along the path with its stamp, `None` while later readings are needed.
     pub(crate) fn pop(&mut self) -> Option<(i64, UnitQuaternion<f64>)> {
         loop {
             let (stamp_ns, _) = *self.readings.first()?.front()?;

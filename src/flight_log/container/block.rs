@@ -8,29 +8,29 @@ use super::super::limits::LogLimits;
 use super::unpack::unpack_chunk;
 use super::{RECORD_HEADER, record_at};
 
-/// A range of the file with messages: one chunk record, or message records outside of chunks.
+/// Range of the file with messages: one chunk record, or message records outside of chunks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Block {
-    /// Its bytes in the file; the end lies beyond the file's when the log was cut inside it.
+    /// Range in the file; its end lies beyond the file's end if the log is truncated inside the block.
     pub(crate) bytes: Range<usize>,
-    /// Whether it is a chunk record.
+    /// True for a chunk record.
     pub(crate) is_chunk: bool,
-    /// Smallest and largest log time of its messages.
+    /// Smallest and largest log time of the messages.
     pub(crate) log_time_ns: (u64, u64),
 }
 
-/// One message in a decoded block.
+/// Message of a decoded block.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct MessageSpan {
     pub(crate) channel_id: u16,
     pub(crate) log_time_ns: u64,
-    /// Start of its record in the block's records.
+    /// Start of the message record in the block's records.
     pub(crate) offset: usize,
-    /// Range of its data in the block's records.
+    /// Range of the message data in the block's records.
     pub(crate) data: Range<usize>,
 }
 
-/// The records of a block, decompressed and checked.
+/// Records of a block, decompressed and checked.
 #[derive(Debug)]
 pub(crate) struct DecodedBlock {
     records: Vec<u8>,
@@ -38,12 +38,12 @@ pub(crate) struct DecodedBlock {
     pub(crate) messages: Vec<MessageSpan>,
     /// Schema and channel records, as opcode and body.
     pub(crate) definitions: Vec<(u8, Range<usize>)>,
-    /// Damage of the block; its readable messages, if any, are those before it.
+    /// Damage of the block; `messages` are those before it.
     pub(crate) damage: Option<String>,
 }
 
 impl DecodedBlock {
-    /// Decodes one block of a file. A chunk whose checksum fails has no message; one truncated by the file's end has
+    /// Decodes a block of a file. A chunk with a wrong checksum has no message; one truncated by the file's end has
     /// those before the end.
     pub(crate) fn decode(file: &LogFile, block: &Block) -> Self {
         let end = block.bytes.end.min(file.len());
@@ -92,12 +92,12 @@ impl DecodedBlock {
         Self { records, messages, definitions, damage }
     }
 
-    /// The bytes at a range of a [`MessageSpan`] or a definition.
+    /// Bytes at a range of a [`MessageSpan`] or a definition.
     pub(crate) fn bytes(&self, range: &Range<usize>) -> &[u8] {
         &self.records[range.clone()]
     }
 
-    /// The message whose record starts at an offset of the message index.
+    /// Message whose record starts at an offset of the message index.
     pub(crate) fn message_at(&self, offset: u64) -> Option<&MessageSpan> {
         let index = self.messages.binary_search_by_key(&offset, |message| message.offset as u64).ok()?;
         self.messages.get(index)
@@ -122,7 +122,7 @@ const COMPRESSION_NAME_AT: usize = 28;
 /// Longest name of a compression; `zstd` and `lz4` are in use.
 const COMPRESSION_NAME_BYTES: usize = 64;
 
-/// The header of the chunk record at a block, with the range of its data in the file (cut at the file's end).
+/// Returns the header of a block's chunk record, with the range of its data in the file (cut at the file's end).
 pub(crate) fn chunk_header(file: &LogFile, block: &Block) -> Result<(ChunkHeader, Range<usize>), String> {
     const LARGEST: usize = RECORD_HEADER + COMPRESSION_NAME_AT + 4 + COMPRESSION_NAME_BYTES + 8;
     let record_end = block.bytes.end.min(file.len());
@@ -142,8 +142,7 @@ pub(crate) fn chunk_header(file: &LogFile, block: &Block) -> Result<(ChunkHeader
         .filter(|length| *length < COMPRESSION_NAME_BYTES)
         .map(|length| COMPRESSION_NAME_AT + 4 + length + 8);
     let header = header_length.and_then(|length| body.get(..length)).ok_or("a damaged chunk header")?;
-    // An empty chunk's record with this header is a chunk header that `parse_record` accepts only with its data, so the
-    // fields are read one by one.
+    // `parse_record` accepts a chunk header only with its data, so the fields are read one by one.
     let number = |at: usize| {
         let mut bytes = [0; 8];
         bytes.copy_from_slice(&header[at..at + 8]);
@@ -169,7 +168,7 @@ pub(crate) fn chunk_header(file: &LogFile, block: &Block) -> Result<(ChunkHeader
     Ok((parsed, data_start..promised_end.min(file.len())))
 }
 
-/// Reads a chunk, decompresses and checks it: its records, and the damage when it is truncated.
+/// Reads, decompresses and checks a chunk: returns its records, and the damage if it is truncated.
 fn read_chunk(file: &LogFile, block: &Block) -> Result<(Vec<u8>, Option<String>), String> {
     const CUT: &str = "the file ends inside this chunk";
     let (header, range) = chunk_header(file, block)?;
@@ -202,28 +201,28 @@ fn read_chunk(file: &LogFile, block: &Block) -> Result<(Vec<u8>, Option<String>)
     Ok((records, None))
 }
 
-/// The blocks decoded last.
+/// Cache of recently decoded blocks.
 #[derive(Debug)]
 pub(crate) struct BlockCache {
     /// The most recently used block is the last.
     entries: Vec<(usize, Arc<DecodedBlock>)>,
     capacity: usize,
-    /// More than two blocks are kept only within so many bytes.
+    /// Largest size of a cache with more than two blocks.
     capacity_bytes: u64,
 }
 
 impl BlockCache {
-    /// A cache of `capacity` blocks.
+    /// Creates a cache of `capacity` blocks.
     pub(crate) fn new(capacity: usize) -> Self {
         Self { entries: Vec::with_capacity(capacity + 1), capacity, capacity_bytes: u64::MAX }
     }
 
-    /// The same cache that keeps more than two blocks only within so many bytes.
+    /// Limits the size of a cache with more than two blocks.
     pub(crate) fn with_capacity_bytes(self, capacity_bytes: u64) -> Self {
         Self { capacity_bytes, ..self }
     }
 
-    /// The block with a number, decoded now or before. The oldest ones make room, by number and by bytes.
+    /// Returns a block, decoded now or cached. The least recently used blocks are dropped, by number and by bytes.
     pub(crate) fn get(&mut self, file: &LogFile, blocks: &[Block], number: usize) -> Option<Arc<DecodedBlock>> {
         if let Some(found) = self.entries.iter().position(|(cached, _)| *cached == number) {
             let entry = self.entries.remove(found);
@@ -248,7 +247,7 @@ impl BlockCache {
     }
 }
 
-/// Reads a chunk's schema and channel records by parsing them as MCAP records.
+/// Parses a chunk's schema or channel record as an MCAP record.
 pub(crate) fn parse_definition(opcode: u8, body: &[u8]) -> Option<Record<'_>> {
     mcap::parse_record(opcode, body).ok()
 }

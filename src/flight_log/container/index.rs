@@ -16,51 +16,50 @@ const NO_END_MAGIC: &str = "the file does not end with the MCAP magic";
 /// Messages outside of chunks are gathered into blocks of about this size.
 const PLAIN_BLOCK_BYTES: usize = 1 << 20;
 
-/// A channel of the log.
+/// Channel of a log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ChannelRecord {
     pub(crate) topic: String,
-    /// `sensor_msgs/msg/Imu`; empty without a schema.
+    /// Such as `sensor_msgs/msg/Imu`; empty without a schema.
     pub(crate) schema_name: String,
-    /// `cdr`.
+    /// Such as `cdr`.
     pub(crate) encoding: String,
-    /// The definition of its type, when it is in the language `ros2msg`.
+    /// Message definition in the language `ros2msg`, `None` for another language.
     pub(crate) definition: Option<Arc<str>>,
 }
 
-/// A schema of the log, with its definition when that is in the language `ros2msg`.
+/// Schema of a log, with its definition if that is in the language `ros2msg`.
 #[derive(Clone, Debug)]
 struct SchemaRecord {
     name: String,
     definition: Option<Arc<str>>,
 }
 
-/// What [`ContainerIndex::define`] has to know of the definitions before.
+/// State of [`ContainerIndex::define`] from earlier definitions.
 #[derive(Debug, Default)]
 struct Definitions {
     schemas: BTreeMap<u16, SchemaRecord>,
-    /// Bytes of the definitions held.
+    /// Size of all stored definitions.
     bytes: usize,
-    /// Channels that are refused, reported once.
+    /// Rejected channels, reported once.
     refused: BTreeSet<u16>,
 }
 
-/// Position of one message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct MessagePosition {
     /// Nanoseconds since the epoch.
     pub(crate) log_time_ns: u64,
-    /// Number of its block.
+    /// Number of the block.
     pub(crate) block: usize,
-    /// Offset of its record in the block's records.
+    /// Offset of the message record in the block's records.
     pub(crate) offset: u64,
 }
 
-/// A file attached to the log.
+/// File attached to the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct AttachmentRef {
     pub(crate) name: String,
-    /// Range of its record in the file.
+    /// Range of the attachment record in the file.
     pub(crate) bytes: Range<usize>,
 }
 
@@ -80,7 +79,7 @@ enum Entries {
     /// In the message index record at this byte of the file.
     Record(usize),
     /// Log time and offset, from a scan of the file.
-    Own(Vec<(u64, u64)>),
+    Scanned(Vec<(u64, u64)>),
 }
 
 /// Blocks, channels and messages of an MCAP file.
@@ -92,20 +91,20 @@ pub(crate) struct ContainerIndex {
     pub(crate) blocks: Vec<Block>,
     entries: Vec<BTreeMap<u16, Entries>>,
     pub(crate) attachments: Vec<AttachmentRef>,
-    /// Messages by channel, as the file's statistics count them.
+    /// Number of messages by channel, by the file's statistics.
     pub(crate) statistics: Option<BTreeMap<u16, u64>>,
     /// Damage, in the order of the file.
     pub(crate) damages: Vec<Damage>,
-    /// Whether the file's own index is used.
+    /// True if the index of the file is used.
     pub(crate) from_summary: bool,
-    /// Messages indexed by scanning the file.
+    /// Number of messages indexed by scanning the file.
     scanned_messages: u64,
-    /// Messages by channel that the index records behind a damaged block count, from scanning the file.
+    /// Number of messages by block and channel, by the message indexes after a damaged block, from scanning the file.
     scanned_promises: BTreeMap<usize, BTreeMap<u16, u64>>,
 }
 
 impl ContainerIndex {
-    /// Reads the file's index, or builds one when the file has no valid one.
+    /// Reads the index of the file, or builds one if the file has no valid one.
     pub(crate) fn read(file: &LogFile) -> Self {
         match Self::from_summary(file) {
             Ok(index) => index,
@@ -113,7 +112,7 @@ impl ContainerIndex {
                 let mut index = Self::from_scan(file);
                 if let Some(problem) = reason {
                     let after_log_time_ns = index.blocks.iter().map(|block| block.log_time_ns.1).max().unwrap_or(0);
-                    // A truncated file has no index either: the truncation is reported alone.
+                    // A truncated file has no index either, so only the truncation is reported.
                     if index.damages.is_empty() {
                         index.damages.push(Damage { byte: file.len(), after_log_time_ns, problem });
                     }
@@ -123,7 +122,7 @@ impl ContainerIndex {
         }
     }
 
-    /// The index at the end of the file. The error is the damage to report, `None` when the file simply has no index.
+    /// Reads the index at the end of the file. The error is the damage to report, `None` for a file without index.
     fn from_summary(file: &LogFile) -> Result<Self, Option<String>> {
         // Footer: opcode, length, summary start (8 bytes), summary offsets' start (8), checksum (4); then the magic.
         const FOOTER: usize = RECORD_HEADER + 20;
@@ -146,7 +145,7 @@ impl ContainerIndex {
         let Some(start) = start else {
             return Err(Some(format!("the footer places the index at byte {}", footer.summary_start)));
         };
-        // The checksum covers everything from the summary's start to its own place in the footer.
+        // The checksum covers everything from the summary's start to its own position in the footer.
         let summary = file.read(start..footer_start + RECORD_HEADER + 16).map_err(Some)?;
         let checksum = crc32fast::hash(&summary);
         if footer.summary_crc != 0 && checksum != footer.summary_crc {
@@ -242,7 +241,7 @@ impl ContainerIndex {
                     let header = window.read(body.start..body.end.min(body.start + MESSAGE_HEADER));
                     index.scan_plain_message(position, end, header.unwrap_or_default());
                 }
-                // Our own entries are there already, except for what a damaged block held.
+                // Entries of readable blocks exist already; only the counts of damaged blocks are needed.
                 op::MESSAGE_INDEX => {
                     if let Ok(head) = window.read(body.start..body.end.min(body.start + MESSAGE_INDEX_HEAD)) {
                         index.scan_message_index(head);
@@ -301,7 +300,9 @@ impl ContainerIndex {
         }
         for message in &decoded.messages {
             let entry = (message.log_time_ns, message.offset as u64);
-            if let Entries::Own(list) = entries.entry(message.channel_id).or_insert_with(|| Entries::Own(Vec::new())) {
+            if let Entries::Scanned(list) =
+                entries.entry(message.channel_id).or_insert_with(|| Entries::Scanned(Vec::new()))
+            {
                 list.push(entry);
             }
         }
@@ -314,7 +315,7 @@ impl ContainerIndex {
         self.entries.push(entries);
     }
 
-    /// Takes the number of messages of a message index record behind a damaged chunk.
+    /// Stores the number of messages of a message index record after a damaged chunk.
     fn scan_message_index(&mut self, head: &[u8]) {
         let Some(number) = self.blocks.len().checked_sub(1) else { return };
         if let (Some(promises), &[c0, c1, s0, s1, s2, s3]) = (self.scanned_promises.get_mut(&number), head) {
@@ -351,13 +352,14 @@ impl ContainerIndex {
             block.log_time_ns.0 = block.log_time_ns.0.min(log_time_ns);
             block.log_time_ns.1 = block.log_time_ns.1.max(log_time_ns);
             let offset = (position - block.bytes.start) as u64;
-            if let Entries::Own(list) = entries.entry(channel_id).or_insert_with(|| Entries::Own(Vec::new())) {
+            if let Entries::Scanned(list) = entries.entry(channel_id).or_insert_with(|| Entries::Scanned(Vec::new())) {
                 list.push((log_time_ns, offset));
             }
         }
     }
 
-    /// Takes a schema or a channel; the first definition of a channel counts, and names beyond the limits are refused.
+    /// Stores a schema or a channel; the first definition of a channel is used, and names beyond the limits are
+    /// rejected.
     fn define(&mut self, file: &LogFile, definitions: &mut Definitions, record: &Record<'_>, byte: usize) {
         let limits = file.limits();
         match record {
@@ -409,7 +411,7 @@ impl ContainerIndex {
         self.damages.push(Damage { byte, after_log_time_ns, problem });
     }
 
-    /// The content of an attachment, `None` when it is damaged.
+    /// Content of an attachment, `None` if it is damaged.
     pub(crate) fn attachment(file: &LogFile, place: &AttachmentRef) -> Option<Vec<u8>> {
         let bytes = file.read(place.bytes.start..place.bytes.end.min(file.len())).ok()?;
         let record = record_at(&bytes, 0).ok().filter(|record| record.opcode == op::ATTACHMENT)?;
@@ -422,17 +424,17 @@ impl ContainerIndex {
         self.entries.iter().enumerate().filter(|(_, entries)| has(entries)).map(|(number, _)| number).collect()
     }
 
-    /// The positions of the messages of some channels in some blocks, in the order of their log times.
+    /// Positions of the messages of some channels in some blocks, in the order of their log times.
     pub(super) fn positions(&self, file: &LogFile, blocks: &[usize], channel_ids: &[u16]) -> Vec<MessagePosition> {
         let mut positions = Vec::new();
         for number in blocks.iter().copied() {
             for (channel_id, entries) in self.entries[number].iter().filter(|(id, _)| channel_ids.contains(id)) {
                 let indexed = match entries {
-                    Entries::Own(list) => Some(list.clone()),
+                    Entries::Scanned(list) => Some(list.clone()),
                     Entries::Record(at) => self.message_index(file, *at, *channel_id, number),
                 };
                 let list = indexed.unwrap_or_else(|| {
-                    // The index record is damaged; the block itself is read.
+                    // The index record is damaged, so the block itself is read.
                     let decoded = DecodedBlock::decode(file, &self.blocks[number]);
                     let own = decoded.messages.iter().filter(|message| message.channel_id == *channel_id);
                     own.map(|message| (message.log_time_ns, message.offset as u64)).collect()
@@ -445,21 +447,21 @@ impl ContainerIndex {
         positions
     }
 
-    /// Number of messages of each channel that a block has by its message indexes; channels whose index is damaged are
+    /// Number of messages of each channel of a block, by its message indexes; channels with a damaged index are
     /// missing.
     pub(crate) fn promised(&self, file: &LogFile, number: usize) -> BTreeMap<u16, u64> {
         if let Some(promises) = self.scanned_promises.get(&number) {
             return promises.clone();
         }
         let count = |channel_id: u16, entries: &Entries| match entries {
-            Entries::Own(list) => Some(list.len() as u64),
+            Entries::Scanned(list) => Some(list.len() as u64),
             Entries::Record(at) => self.message_index(file, *at, channel_id, number).map(|list| list.len() as u64),
         };
         let counts = self.entries[number].iter().filter_map(|(id, entries)| Some((*id, count(*id, entries)?)));
         counts.collect()
     }
 
-    /// Log times and offsets in the message index record at a byte, `None` when there is no such record or it is
+    /// Log times and offsets of the message index record at a byte, `None` if there is no such record or it is
     /// inconsistent with the block: message indexes have no checksum. They lie between their chunk and the next one, so
     /// that no two chunks share one.
     fn message_index(&self, file: &LogFile, at: usize, channel_id: u16, number: usize) -> Option<Vec<(u64, u64)>> {
@@ -489,7 +491,7 @@ impl ContainerIndex {
     }
 }
 
-/// Name and content of an attachment record's body, `None` when it is damaged (its checksum counts too).
+/// Name and content of an attachment record's body, `None` if it is damaged or its checksum is wrong.
 fn attachment(body: &[u8]) -> Option<(&str, &[u8])> {
     let text = |at: usize| {
         let length = u32::from_le_bytes(body.get(at..at + 4)?.try_into().ok()?) as usize;
@@ -506,7 +508,7 @@ fn attachment(body: &[u8]) -> Option<(&str, &[u8])> {
     (checksum == 0 || checksum == crc32fast::hash(&body[..content_end])).then_some((name, content))
 }
 
-/// The record's bytes from the offset and length of an index.
+/// Range of a record by the offset and length in an index.
 fn chunk_bytes(offset: u64, length: u64) -> Option<Range<usize>> {
     let start = usize::try_from(offset).ok()?;
     Some(start..start.checked_add(usize::try_from(length).ok()?)?)

@@ -1,4 +1,4 @@
-//! The MCAP container: positions of the messages of each channel, and the bytes of one block of them at a time.
+//! MCAP container: positions of the messages of each channel, and the bytes of one block at a time.
 
 mod block;
 mod index;
@@ -17,16 +17,16 @@ use super::file::{FileWindow, LogFile};
 /// Every record starts with its opcode (1 byte) and the length of its body (8 bytes).
 const RECORD_HEADER: usize = 9;
 
-/// One record in memory.
+/// Record in memory.
 #[derive(Clone, Copy, Debug)]
 struct RawRecord<'a> {
     opcode: u8,
     body: &'a [u8],
-    /// Offset of the first byte after it.
+    /// Offset of the first byte after the record.
     end: usize,
 }
 
-/// Opcode of a record header and the range of the body behind it, when that lies before `end`.
+/// Opcode of a record header and range of the body after it; an error unless the body ends before `end`.
 fn record_header(header: &[u8], start: usize, end: usize) -> Result<(u8, Range<usize>), String> {
     let &[opcode, l0, l1, l2, l3, l4, l5, l6, l7] = header else {
         return Err("the file ends inside a record's header".into());
@@ -42,14 +42,14 @@ fn record_header(header: &[u8], start: usize, end: usize) -> Result<(u8, Range<u
     }
 }
 
-/// The record that starts at a byte, or why there is none.
+/// Returns the record that starts at a byte, or a description of the problem.
 fn record_at(bytes: &[u8], start: usize) -> Result<RawRecord<'_>, String> {
     let header = start.checked_add(RECORD_HEADER).and_then(|end| bytes.get(start..end)).unwrap_or_default();
     let (opcode, body) = record_header(header, start, bytes.len())?;
     Ok(RawRecord { opcode, body: &bytes[body.clone()], end: body.end })
 }
 
-/// Opcode and body of the record that starts at a byte of the file, or why there is none.
+/// Returns opcode and body of the record that starts at a byte of the file, or a description of the problem.
 fn record_in_file(window: &mut FileWindow<'_>, file: &LogFile, start: usize) -> Result<(u8, Range<usize>), String> {
     let end = start.saturating_add(RECORD_HEADER).min(file.len());
     let header = window.read(start.min(end)..end)?;

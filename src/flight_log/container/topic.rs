@@ -1,7 +1,7 @@
 use super::super::file::LogFile;
 use super::index::{ContainerIndex, MessagePosition};
 
-/// The messages of one topic in the order of their log times. They are read in groups on demand, because the message
+/// Messages of one topic in the order of their log times. They are read in groups on demand, because the message
 /// indexes of a log of gigabytes are far apart.
 #[derive(Clone, Debug)]
 pub(crate) struct TopicIndex {
@@ -30,7 +30,7 @@ impl TopicIndex {
         Self { channel_ids: channel_ids.to_vec(), groups, next_group: 0, loaded: Vec::new() }
     }
 
-    /// The position of a message, counted from the first one (or from the position of [`TopicIndex::skip_to`]).
+    /// Position of a message, counted from the first one (or from the position of [`TopicIndex::skip_to`]).
     pub(crate) fn get(&mut self, index: &ContainerIndex, file: &LogFile, number: usize) -> Option<MessagePosition> {
         while self.loaded.len() <= number && self.load_group(index, file) {}
         self.loaded.get(number).copied()
@@ -50,13 +50,12 @@ impl TopicIndex {
         self.groups.drain(..count);
     }
 
-    /// The positions in the first group and in the last one.
+    /// Positions in the first and in the last group.
     pub(crate) fn ends(&self, index: &ContainerIndex, file: &LogFile) -> [Vec<MessagePosition>; 2] {
         [self.groups.first(), self.groups.last()]
             .map(|group| group.map(|group| index.positions(file, group, &self.channel_ids)).unwrap_or_default())
     }
 
-    /// Number of messages.
     pub(crate) fn count(&mut self, index: &ContainerIndex, file: &LogFile) -> usize {
         while self.load_group(index, file) {}
         self.loaded.len()
@@ -64,7 +63,7 @@ impl TopicIndex {
 
     fn load_group(&mut self, index: &ContainerIndex, file: &LogFile) -> bool {
         let Some(group) = self.groups.get(self.next_group) else { return false };
-        // Every message has an entry in the file; more of them come from indexes that overlap.
+        // Every message has an entry in the file; a larger number is caused by overlapping indexes.
         if self.loaded.len() as u64 > file.limits().messages(file.len() as u64) {
             return false;
         }

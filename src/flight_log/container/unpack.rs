@@ -6,13 +6,14 @@ use std::io::{ErrorKind, Read};
 use super::super::file::ZSTD_MAGIC;
 use super::super::limits::{LimitExceeded, LimitKind, LogLimits};
 
-/// Decompresses a chunk as far as possible, at most `claimed` bytes; the second value is the error that stopped it early.
+/// Decompresses a chunk as far as possible, at most `claimed` bytes; the second value is the error that stopped it
+/// early.
 pub(super) fn unpack_chunk(compression: &str, data: &[u8], claimed: usize) -> (Vec<u8>, Option<String>) {
     let mut records = Vec::new();
     if let Err(error) = records.try_reserve_exact(claimed) {
         return (records, Some(format!("{claimed} bytes do not fit into memory: {error}")));
     }
-    // One byte more shows that a chunk holds more than it claims.
+    // One byte more shows that a chunk is larger than declared.
     let limit = claimed as u64 + 1;
     let problem = match compression {
         "zstd" => match zstd::Decoder::with_buffer(data) {
@@ -25,7 +26,7 @@ pub(super) fn unpack_chunk(compression: &str, data: &[u8], claimed: usize) -> (V
     (records, problem)
 }
 
-/// The frames of LZ4, one after another.
+/// Decompresses consecutive LZ4 frames.
 fn unpack_lz4(mut data: &[u8], limit: u64, records: &mut Vec<u8>) -> Option<String> {
     while !data.is_empty() && (records.len() as u64) < limit {
         let mut decoder = match lz4::Decoder::new(data) {
@@ -50,14 +51,14 @@ fn unpack_lz4(mut data: &[u8], limit: u64, records: &mut Vec<u8>) -> Option<Stri
     None
 }
 
-/// Appends what a decoder gives, at most `limit` bytes; the error that ended it, if one did.
+/// Appends the output of a decoder, at most `limit` bytes; returns the error that stopped it, if any.
 fn read_up_to(decoder: impl Read, limit: u64, bytes: &mut Vec<u8>) -> Option<String> {
     let error = decoder.take(limit).read_to_end(bytes).err()?;
     Some(if error.kind() == ErrorKind::UnexpectedEof { "it ends early".into() } else { error.to_string() })
 }
 
-/// The message as its type encodes it: rosbag2 can compress every message on its own (`compression_mode: MESSAGE`). No
-/// message in CDR begins like a frame of Zstandard.
+/// Decompresses a message if it is compressed: rosbag2 can compress every message separately
+/// (`compression_mode: MESSAGE`). No message in CDR begins like a frame of Zstandard.
 pub(crate) fn unpack_message<'a>(data: &'a [u8], limits: &LogLimits) -> Result<Cow<'a, [u8]>, String> {
     if !data.starts_with(&ZSTD_MAGIC) {
         return Ok(data.into());
@@ -70,7 +71,7 @@ pub(crate) fn unpack_message<'a>(data: &'a [u8], limits: &LogLimits) -> Result<C
     }
     if message.len() as u64 > allowed {
         let kind = LimitKind::RecordBytes;
-        // Its size is not known; twice the limit is worth a try.
+        // The size is unknown; the error suggests twice the limit.
         let exceeded = LimitExceeded { kind, subject: "a compressed message", found: 2 * allowed, allowed };
         return Err(exceeded.to_string());
     }

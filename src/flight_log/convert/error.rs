@@ -5,23 +5,14 @@ use thiserror::Error;
 
 use super::super::LogError;
 
-/// Why a source could not be converted; every message names the problem, its place and the remedy, the path last.
+/// Failure to convert a source; every message names the problem, its location and the remedy, the path last.
 #[derive(Debug, Error)]
 pub enum ConvertError {
-    /// The log or the rig could not be written, or a sensor's description is wrong.
+    /// The log or the rig could not be written, or a sensor's description is invalid.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// An error of the operating system.
     #[error("cannot {action}: {source}: {}", path.display())]
-    Io {
-        /// The attempted operation.
-        action: &'static str,
-        /// The error of the system.
-        source: io::Error,
-        /// The file.
-        path: PathBuf,
-    },
-    /// The source is of no known kind.
+    Io { action: &'static str, source: io::Error, path: PathBuf },
     #[error(
         "{found}; expected a EuRoC/ASL folder (with mav0), a ROS 1 bag, a ROS 2 bag (its folder, .db3 or .mcap), an MP4 video, \
          or a log of an autopilot (.ulg, .bin, .tlog): {}",
@@ -30,63 +21,57 @@ pub enum ConvertError {
     UnknownSource {
         /// Description of the source.
         found: String,
-        /// The source.
         path: PathBuf,
     },
-    /// A source of a known kind that cannot be read.
+    /// Source of a known kind that cannot be read.
     #[error("{problem}: {}", path.display())]
     Unreadable {
-        /// The problem and its remedy.
+        /// Problem and remedy.
         problem: String,
-        /// The file.
         path: PathBuf,
     },
-    /// An invalid line of a table.
+    /// Invalid line of a table.
     #[error("line {line}: {problem}: {}", path.display())]
     Line {
-        /// Number of the line from 1.
+        /// Counted from 1.
         line: usize,
-        /// Its value and the expected one.
+        /// Value of the line and the expected one.
         problem: String,
-        /// The table.
+        /// Path of the table.
         path: PathBuf,
     },
-    /// No topic could be used.
     #[error("no message can be used ({}): {}", if topics.is_empty() { "it has no topics" } else { topics }, path.display())]
     NothingUsable {
-        /// The topics with their types and why each was skipped.
+        /// Topics with their types and the reason why each was skipped.
         topics: String,
-        /// The source.
         path: PathBuf,
     },
-    /// Options that need a video, for another source.
+    /// Options that need a video, for another kind of source.
     #[error("{kind} has no video: --ulog, --dataflash, --tlog and --video-offset are for an MP4 video as the source: {}", path.display())]
     NoVideo {
         /// Kind of the source.
         kind: &'static str,
-        /// The source.
         path: PathBuf,
     },
-    /// The file beside a video is no log of the named kind.
+    /// The autopilot's log of a video is of another kind than given.
     #[error("no {expected}, {found}: {}", path.display())]
     NotThatLog {
         /// Name of the expected kind.
         expected: &'static str,
-        /// What it is.
+        /// Actual kind.
         found: String,
-        /// The file.
         path: PathBuf,
     },
-    /// The caller has stopped it.
+    /// The caller stopped the conversion.
     #[error("interrupted; nothing is written: {}", path.display())]
     Interrupted {
-        /// The source.
+        /// Path of the source.
         path: PathBuf,
     },
     /// The log would overwrite its source.
     #[error("the log would be inside or overwrite its own source; give another -o: {}", path.display())]
     OntoItself {
-        /// The log.
+        /// Path of the log.
         path: PathBuf,
     },
 }
@@ -98,7 +83,6 @@ impl ConvertError {
         move |source| Self::Io { action, source, path }
     }
 
-    /// A source that cannot be read.
     pub(super) fn unreadable(problem: impl Into<String>, path: &Path) -> Self {
         Self::Unreadable { problem: problem.into(), path: path.to_owned() }
     }

@@ -18,25 +18,25 @@ use crate::sensors::Rig;
 
 /// Sensors with poses, the best ground truth first.
 const POSE_FOLDERS: [&str; 3] = ["state_groundtruth_estimate0", "mocap0", "vicon0"];
-/// Topic type that the report names for files.
+/// Topic type in the report for image files.
 const IMAGE_TYPE: &str = "sensor_msgs/msg/CompressedImage";
 const IMU_TYPE: &str = "sensor_msgs/msg/Imu";
 const POSE_TYPE: &str = "geometry_msgs/msg/PoseStamped";
 
-/// The folder of the sensors: `mav0` in the source, or the source itself.
+/// Folder of the sensors: `mav0` in the source, or the source itself.
 pub(super) fn root(source: &Path) -> Option<PathBuf> {
     let has_sensors = |folder: &Path| folder.join("imu0/data.csv").is_file() || folder.join("cam0/data.csv").is_file();
     [source.join("mav0"), source.to_owned()].into_iter().find(|folder| has_sensors(folder))
 }
 
-/// One row of any sensor.
+/// Row of any sensor.
 enum Sample {
     Imu { angular_velocity_rad_per_s: Vector3<f64>, specific_force_m_per_s2: Vector3<f64> },
     Image { camera: usize, name: String },
     Pose { source: usize, world_from_imu: RigidTransform },
 }
 
-/// Converts a folder into a log and returns its rig, when the sensors are described.
+/// Converts a folder into a log and returns its rig if the sensors are described.
 pub(super) fn convert(source: &Path, sink: &mut Sink<'_>) -> Result<Option<Rig>, ConvertError> {
     let Some(root) = root(source) else { return Ok(None) };
     let mut folders = sensor_folders(&root)?;
@@ -72,7 +72,7 @@ pub(super) fn convert(source: &Path, sink: &mut Sink<'_>) -> Result<Option<Rig>,
             sink.leave(&format!("/{name}"), "data.csv", rows, "no sensor that the program reads");
         }
     }
-    // Stable: sensors with equal stamps stay in the order of their names.
+    // Stable sort: sensors with equal stamps stay in the order of their names.
     samples.sort_by_key(|(stamp_ns, _)| *stamp_ns);
     let count = samples.len();
     for (index, (stamp_ns, sample)) in samples.into_iter().enumerate() {
@@ -133,10 +133,9 @@ fn write(
     Ok(())
 }
 
-/// Format and bytes of an image that lies in a folder; the error says why there is none.
+/// Returns format and bytes of an image in a folder; the error describes the problem.
 ///
-/// Names come from a table that strangers may have written: they must not lead out of the folder, and what they name must
-/// be an image.
+/// The names come from a table of unknown origin: they must not lead out of the folder, and the files must be images.
 fn read_image_file(folder: &Path, name: &str, limits: &LogLimits) -> Result<(&'static str, Vec<u8>), String> {
     let mut parts = Path::new(name).components();
     if !(matches!(parts.next(), Some(Component::Normal(_))) && parts.all(|part| matches!(part, Component::Normal(_)))) {
@@ -202,7 +201,7 @@ fn stamp_of(line: usize, row: &[&str], table: &Path) -> Result<i64, ConvertError
     stamp_ns.ok_or_else(|| bad_line(line, format!("the stamp is '{text}', expected whole nanoseconds"), table))
 }
 
-/// The first numbers after the stamp.
+/// First numbers after the stamp.
 fn numbers<const N: usize>(line: usize, row: &[&str], table: &Path) -> Result<[f64; N], ConvertError> {
     let cells = row.get(1..=N).ok_or_else(|| {
         bad_line(line, format!("{} numbers after the stamp, expected {N}", row.len().saturating_sub(1)), table)
@@ -236,7 +235,7 @@ fn read_images(table: &Path, camera: usize, samples: &mut Vec<(i64, Sample)>) ->
     })
 }
 
-/// Poses of a sensor in the world (`p x y z`, `q w x y z`), transformed to the IMU.
+/// Reads poses of a sensor in the world (`p x y z`, `q w x y z`), transformed to the IMU.
 fn read_poses(
     table: &Path,
     source: usize,

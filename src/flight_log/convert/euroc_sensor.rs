@@ -1,4 +1,4 @@
-//! `sensor.yaml` of EuRoC's sensors as a rig in Kalibr's names.
+//! Conversion of EuRoC's `sensor.yaml` to a rig with Kalibr's names.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,36 +13,34 @@ use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ImuIntrinsics, ImuNoise, ImuRig, Rig};
 
-/// Topic of the IMU.
 pub(super) const IMU_TOPIC: &str = "/imu0";
 
-/// Topic of a camera's images.
 pub(super) fn image_topic(key: &str) -> String {
     format!("/{key}/image_raw/compressed")
 }
 
-/// Gravity that the dataset's authors use.
+/// Gravity used by the dataset's authors.
 const GRAVITY_M_PER_S2: f64 = 9.81;
-/// A rotation block may be this far from orthonormal, by rounding.
+/// Largest distance of a rotation block from orthonormal, by rounding.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
-/// A camera's folder.
+/// Folder of a camera.
 pub(super) struct CameraSensor {
-    /// `cam0`.
+    /// Such as `cam0`.
     pub(super) key: String,
     pub(super) folder: PathBuf,
-    /// Stamps of its images.
+    /// Stamps of the camera's images.
     pub(super) stamps_ns: Vec<i64>,
 }
 
-/// A `sensor.yaml`.
+/// Content of a `sensor.yaml`.
 struct SensorFile {
     document: Value,
     path: PathBuf,
 }
 
 impl SensorFile {
-    /// `None` when there is no such file.
+    /// Reads the file of a folder; `None` without such a file.
     fn read(folder: &Path) -> Result<Option<Self>, ConvertError> {
         let path = folder.join("sensor.yaml");
         if !path.is_file() {
@@ -81,7 +79,7 @@ impl SensorFile {
         self.document.get(field).and_then(Value::as_str).ok_or_else(|| self.wrong(field, expected))
     }
 
-    /// `T_BS`: maps points from the sensor to the body.
+    /// Returns `T_BS`, which maps points from the sensor to the body.
     fn body_from_sensor(&self) -> Result<RigidTransform, ConvertError> {
         const EXPECTED: &str = "a rigid transform as 4×4 matrix, data row by row";
         let data = self.document.get("T_BS").and_then(|matrix| matrix.get("data").or(Some(matrix)));
@@ -96,12 +94,12 @@ fn body_from_sensor(folder: &Path) -> Result<RigidTransform, ConvertError> {
     SensorFile::read(folder)?.map_or_else(|| Ok(RigidTransform::identity()), |file| file.body_from_sensor())
 }
 
-/// `imu_from_sensor` of the sensor in a folder; the identity for one that is not described.
+/// Returns `imu_from_sensor` of the sensor in a folder; the identity if it is not described.
 pub(super) fn sensor_pose(root: &Path, name: &str) -> Result<RigidTransform, ConvertError> {
     Ok(body_from_sensor(&root.join("imu0"))?.inverse() * body_from_sensor(&root.join(name))?)
 }
 
-/// The rig of a folder, `None` with a note when its sensors are not described.
+/// Rig of a folder, `None` with a note if its sensors are not described.
 pub(super) fn rig_of(
     source: &Path,
     root: &Path,

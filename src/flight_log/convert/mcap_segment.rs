@@ -1,6 +1,6 @@
-//! MCAP files of other recorders: ROS 2 messages are copied, ROS 1 messages rewritten.
+//! MCAP files of other recorders: ROS 2 messages are copied, ROS 1 messages converted.
 //!
-//! They are read as every log is, by index and block: a damaged block is left out and counted, the others are copied.
+//! They are read like any log, by index and block: a damaged block is left out and counted, the others are copied.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,10 +11,9 @@ use super::ConvertError;
 use super::sink::{Payload, Sink, SourceMessage};
 use crate::geometry::seconds_from_ns;
 
-/// Why the messages of a damaged block are not in the log.
+/// Reason for the missing messages of a damaged block.
 const IN_DAMAGED_CHUNK: &str = "in a damaged chunk";
 
-/// Opens one file.
 pub(super) fn open(path: &Path, sink: &Sink<'_>) -> Result<LogFile, ConvertError> {
     let file = LogFile::open(path, sink.limits())?;
     let start = file.read(0..file.len().min(mcap::MAGIC.len()));
@@ -25,11 +24,11 @@ pub(super) fn open(path: &Path, sink: &Sink<'_>) -> Result<LogFile, ConvertError
     }
 }
 
-/// Converts one file with its attachments. Of a damaged or unfinished file everything that can be read is converted.
+/// Converts a file with its attachments. All readable data of a damaged or unfinished file are converted.
 pub(super) fn convert(file: &LogFile, path: &Path, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
     let index = ContainerIndex::read(file);
     let is_block = |byte: usize| index.blocks.binary_search_by_key(&byte, |block| block.bytes.start).is_ok();
-    // The damage of blocks is reported with what is lost of them.
+    // Damage of blocks is reported together with the lost messages.
     for damage in index.damages.iter().filter(|damage| !is_block(damage.byte)) {
         sink.note(format!(
             "{} is damaged at byte {} of {}: {}",

@@ -1,7 +1,7 @@
-//! Logs of other recorders as flight logs: EuRoC folders, ROS 1 bags, ROS 2 bags, MP4 videos and logs of autopilots in,
-//! MCAP out.
+//! Conversion of other recorders' logs to flight logs: EuRoC folders, ROS 1 bags, ROS 2 bags, MP4 videos and logs of
+//! autopilots in, MCAP out.
 //!
-//! Messages are rewritten one after another, so that a bag of any size needs little memory.
+//! Messages are converted one after another, so that a bag of any size needs little memory.
 //! The report has a row for every topic, with the number of skipped messages and the reason.
 
 mod error;
@@ -43,10 +43,10 @@ enum SourceKind {
     Ros1Bag,
     Ros2Bag,
     Sqlite,
-    /// SQLite under Zstandard.
+    /// SQLite compressed with Zstandard.
     PackedSqlite,
     Mcap,
-    /// A video in MP4.
+    /// MP4 video.
     Video,
     Autopilot(AutopilotLogKind),
 }
@@ -65,14 +65,14 @@ impl SourceKind {
     }
 }
 
-/// Converts `source` into the log `output`, with a rig beside it where the source has a calibration; `progress` is called
-/// with the fraction that is done, from 0 to 1.
+/// Converts `source` into the log `output`, with a rig next to it if the source has a calibration; `progress` is called
+/// with the completed fraction, from 0 to 1.
 ///
 /// The log appears under its name only when it is complete.
 ///
 /// # Errors
 /// When the source is of no known kind or damaged at its start, when it has no usable message, or when files cannot be
-/// read or written. Of a damaged source everything that can be read is converted; notes in the report count what is lost.
+/// read or written. All readable data of a damaged source are converted; notes in the report count the losses.
 pub fn convert(source: &Path, output: &Path, progress: &mut dyn FnMut(f64)) -> Result<ConversionReport, ConvertError> {
     convert_with(source, output, &ConvertOptions::default(), &mut |ratio| {
         progress(ratio);
@@ -80,7 +80,7 @@ pub fn convert(source: &Path, output: &Path, progress: &mut dyn FnMut(f64)) -> R
     })
 }
 
-/// Converts as [`convert`] does, with options, and ends where `progress` breaks.
+/// Converts like [`convert`], with options, and stops when `progress` breaks.
 ///
 /// # Errors
 /// As [`convert`], [`ConvertError::Interrupted`], in which case no file is written, and
@@ -114,9 +114,9 @@ pub fn convert_with(
     if let Some(text) = text {
         let path = output.with_extension("rig.yaml");
         match fs::read(&path) {
-            // Edited by hand, or a rig of the user's own.
+            // The file was edited, or is a rig of the user.
             Ok(existing) if existing != text.as_bytes() => report.notes.push(format!(
-                "the rig beside the log is kept; it differs from what the source says: {}",
+                "the rig next to the log is kept; it differs from the calibration of the source: {}",
                 path.display()
             )),
             Ok(_) => report.notes.extend(assumed),
@@ -141,16 +141,16 @@ pub fn convert_with(
     Ok(report)
 }
 
-/// What a source says of its rig.
+/// Rig data of a source.
 enum SourceRig {
     None,
-    /// Its calibration.
+    /// Complete calibration.
     Calibrated(Box<Rig>),
-    /// A few facts, from which a rig is written whose other fields are assumed.
+    /// Facts about a video, from which a rig with otherwise assumed fields is written.
     Video(VideoFacts),
 }
 
-/// Text of the rig of a video, and what it assumes as notes; nothing where no rig can be written.
+/// Returns the text of a video's rig and adds its assumptions as notes; `None` if no rig can be written.
 fn rig_of_video(
     facts: &VideoFacts,
     output: &Path,
@@ -162,7 +162,7 @@ fn rig_of_video(
         Ok(template) => {
             let fields: Vec<String> = template.assumed_fields().into_iter().map(|assumed| assumed.field).collect();
             let note = format!(
-                "the rig assumes {}; `dcvins check` asks for each, and `dcvins rig new --camera … --force` writes another one",
+                "the rig assumes {}; `dcvins check` reports each, and `dcvins rig new --camera … --force` writes another one",
                 fields.join(", ")
             );
             (Some(template.to_yaml()), vec![note])
@@ -174,7 +174,7 @@ fn rig_of_video(
     }
 }
 
-/// Writes the log and returns the result of each topic, with the rig where the source describes one.
+/// Writes the log; returns the result of each topic, and the rig if the source describes one.
 fn write(
     kind: SourceKind,
     source: &Path,
@@ -218,7 +218,7 @@ fn write(
     Ok((report, rig))
 }
 
-/// Reads a small text file; a larger one is no description of a source.
+/// Reads a small text file; an error for a larger one.
 fn read_description(path: &Path, action: &'static str) -> Result<String, ConvertError> {
     let metadata = fs::metadata(path).map_err(ConvertError::io(action, path))?;
     if !metadata.is_file() || metadata.len() > DESCRIPTION_BYTES {
@@ -228,14 +228,14 @@ fn read_description(path: &Path, action: &'static str) -> Result<String, Convert
     fs::read_to_string(path).map_err(ConvertError::io(action, path))
 }
 
-/// `a/log.mcap` and `.zstd` make `a/log.mcap.zstd`.
+/// Appends a suffix: `a/log.mcap` and `.zstd` give `a/log.mcap.zstd`.
 fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(suffix);
     PathBuf::from(name)
 }
 
-/// Bytes at the start by which a source is recognized.
+/// Number of bytes at the start that identify the kind of a source.
 const START_BYTES: usize = 512;
 
 /// Kind of the source at a path.
@@ -261,7 +261,7 @@ fn detect(source: &Path, limits: &LogLimits) -> Result<SourceKind, ConvertError>
     file.take(START_BYTES as u64).read_to_end(&mut start).map_err(ConvertError::io("read the source", source))?;
     let packed = start.starts_with(&ZSTD_MAGIC);
     if packed {
-        // The name says what is inside, so that it is not unpacked twice.
+        // The name gives the kind of the content, so that it is not decompressed twice.
         let name = unpacked_name(source);
         let ending = name.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
         match ending.as_deref() {

@@ -9,43 +9,41 @@ use crate::flight_log::text::{printable, shortened};
 /// Result of one topic of a source.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ConvertedTopic {
-    /// Its name in the log.
+    /// Name in the log.
     pub topic: String,
-    /// Its type as the source names it, `sensor_msgs/Imu`.
+    /// Type in the source's notation, such as `sensor_msgs/Imu`.
     pub message_type: String,
     /// Number of messages written to the log.
     pub taken: u64,
     /// Number of messages skipped.
     pub left: u64,
-    /// The reason of the first skipped message, or a remark on the written ones.
+    /// Reason of the first skipped message, or a remark on the written ones.
     pub reason: Option<String>,
 }
 
-/// Result of a conversion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConversionReport {
-    /// Kind of the source: `ROS 1 bag`.
+    /// Kind of the source, such as `ROS 1 bag`.
     pub kind: String,
-    /// The source.
     #[serde(serialize_with = "as_text")]
     pub source: PathBuf,
-    /// The log that was written.
+    /// Path of the written log.
     #[serde(serialize_with = "as_text")]
     pub log: PathBuf,
-    /// The rig beside the log: written from the source's calibration, or found there.
+    /// Rig next to the log: written from the source's calibration, or existing before.
     #[serde(serialize_with = "optional_as_text")]
     pub rig: Option<PathBuf>,
     /// Length of the log in seconds.
     pub duration_s: f64,
-    /// Where the video was placed in the autopilot's log; `None` without both.
+    /// Relation of the video's clock to the autopilot's log; `None` without both.
     pub video_clock: Option<VideoClock>,
-    /// Every topic of the source, in the order of their names.
+    /// All topics of the source, in the order of their names.
     pub topics: Vec<ConvertedTopic>,
     /// Remarks, such as damage or a missing rig.
     pub notes: Vec<String>,
 }
 
-/// A path that need not be UTF-8, as text.
+/// Serializes a path, which need not be UTF-8, as text.
 fn as_text<S: Serializer>(path: &Path, serializer: S) -> std::result::Result<S::Ok, S::Error> {
     path.to_string_lossy().serialize(serializer)
 }
@@ -55,10 +53,10 @@ fn optional_as_text<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> std
     path.as_deref().map(Path::to_string_lossy).serialize(serializer)
 }
 
-/// Characters of a topic or a type in the table; longer ones are cut.
+/// Largest number of characters of a topic or a type in the table; longer ones are cut.
 const WIDEST_NAME: usize = 60;
 
-/// A table of the topics, then the notes and the files.
+/// Table of the topics, then the notes and the files.
 impl Display for ConversionReport {
     fn fmt(&self, out: &mut Formatter<'_>) -> Result {
         writeln!(out, "{}: {}, {:.3} s", self.source.display(), self.kind, self.duration_s)?;

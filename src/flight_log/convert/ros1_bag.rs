@@ -1,5 +1,5 @@
-//! ROS 1 bags, format 2.0, read from the first chunk to the last without their index, so that an unindexed or truncated
-//! bag is converted as well.
+//! Reader of ROS 1 bags, format 2.0, from the first chunk to the last without their index, so that an unindexed or
+//! truncated bag is converted as well.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ use super::sink::{Payload, Sink, SourceMessage};
 /// First bytes of a bag of version 2.0.
 pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 
-/// Opcodes of the records that are read.
+/// Opcodes of the supported records.
 mod op {
     pub(super) const MESSAGE: u8 = 0x02;
     pub(super) const BAG_HEADER: u8 = 0x03;
@@ -25,7 +25,7 @@ mod op {
     pub(super) const CONNECTION: u8 = 0x07;
 }
 
-/// A topic of one publisher.
+/// Topic of one publisher.
 #[derive(Clone, Debug)]
 struct Connection {
     topic: String,
@@ -34,22 +34,21 @@ struct Connection {
 
 type Connections = BTreeMap<u32, Connection>;
 
-/// What the index at the end of a bag says of a chunk: the number of its messages by connection.
+/// Number of a chunk's messages by connection, from the index at the end of a bag.
 type ChunkContents = BTreeMap<u32, u64>;
 
-/// What is read of a bag besides its messages.
+/// Connections, chunks and counts of a bag.
 #[derive(Debug, Default)]
 struct BagState {
     connections: Connections,
-    /// The chunks that the index at the end of the bag lists, by their first byte.
+    /// Chunks in the index at the end of the bag, by their first byte.
     chunks: BTreeMap<usize, ChunkContents>,
-    /// Messages whose connection is not described.
+    /// Number of messages without a described connection.
     orphans: u64,
-    /// Messages read of the present chunk, by connection.
+    /// Number of messages read from the present chunk, by connection.
     read: ChunkContents,
 }
 
-/// Opens a bag.
 pub(super) fn open(path: &Path, sink: &Sink<'_>) -> Result<LogFile, ConvertError> {
     let bag = LogFile::open(path, sink.limits())?;
     if let Ok(record) = record_in_file(&bag, MAGIC.len())
@@ -62,7 +61,7 @@ pub(super) fn open(path: &Path, sink: &Sink<'_>) -> Result<LogFile, ConvertError
     Ok(bag)
 }
 
-/// Converts a bag into a log. Where a record is damaged, reading continues with the next chunk that the bag's index lists.
+/// Converts a bag into a log. After a damaged record, reading continues with the next chunk of the bag's index.
 pub(super) fn convert(bag: &LogFile, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
     let mut state = BagState::default();
     let mut at = MAGIC.len();
@@ -100,7 +99,7 @@ pub(super) fn convert(bag: &LogFile, sink: &mut Sink<'_>) -> Result<(), ConvertE
                 if let Some(problem) = problem {
                     sink.note(format!("the chunk at byte {at} is damaged: {problem}"));
                     state.report_lost(at, sink);
-                    // Its length may be damaged, too.
+                    // The length of the chunk may be damaged, too.
                     end = state.chunks.range(at + 1..end).next().map_or(end, |(next, _)| *next);
                 }
             }
@@ -120,7 +119,7 @@ pub(super) fn convert(bag: &LogFile, sink: &mut Sink<'_>) -> Result<(), ConvertE
 }
 
 impl BagState {
-    /// Counts the messages of the chunk at a byte that were not read, as far as the bag's index tells.
+    /// Counts the messages of the chunk at a byte that were not read, as far as the bag's index lists them.
     fn report_lost(&self, at: usize, sink: &mut Sink<'_>) {
         let Some(promised) = self.chunks.get(&at) else {
             if !self.chunks.is_empty() {
@@ -140,7 +139,7 @@ impl BagState {
     }
 }
 
-/// Takes the connections and chunks that the bag's index lists, when it has one.
+/// Stores the connections and chunks of the bag's index, if it has one.
 fn read_bag_header(bag: &LogFile, record: &BagRecord<'_>, state: &mut BagState, sink: &mut Sink<'_>) {
     let mut at = record.large_number("index_pos").and_then(|at| usize::try_from(at).ok()).unwrap_or(0);
     if at == 0 {
@@ -179,7 +178,7 @@ fn read_connection(record: &BagRecord<'_>, connections: &mut Connections, sink: 
     connections.insert(id, Connection { topic: topic.to_owned(), message_type: message_type.to_owned() });
 }
 
-/// Takes the messages of a chunk; returns its damage.
+/// Converts the messages of a chunk; returns its damage.
 fn take_chunk(chunk: &[u8], state: &mut BagState, sink: &mut Sink<'_>) -> Result<Option<String>, ConvertError> {
     let mut at = 0;
     while at < chunk.len() {
@@ -216,7 +215,7 @@ fn take_message(record: &BagRecord<'_>, state: &mut BagState, sink: &mut Sink<'_
     })
 }
 
-/// The records of a chunk.
+/// Decompresses the records of a chunk.
 fn decompress<'a>(record: &BagRecord<'a>, limits: &LogLimits) -> Result<Cow<'a, [u8]>, String> {
     let size = record.number("size").ok_or_else(|| "its size is missing".to_owned())?;
     let check =
@@ -236,7 +235,7 @@ fn decompress<'a>(record: &BagRecord<'a>, limits: &LogLimits) -> Result<Cow<'a, 
     }
 }
 
-/// The decompressed bytes, when they have the expected size.
+/// Decompressed bytes; an error unless they have the expected size.
 fn read_all(decoder: impl Read, size: u32) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     bytes.try_reserve_exact(size as usize).map_err(|error| format!("{size} bytes do not fit into memory: {error}"))?;

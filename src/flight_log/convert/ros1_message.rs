@@ -1,33 +1,32 @@
 //! Conversion of messages from ROS 1 serialization to CDR.
 //!
 //! ROS 1 writes little-endian fields without padding; strings have no terminating zero, headers have a sequence number,
-//! and stamps are unsigned. Otherwise the message types that are read have the same fields in the same order in both.
+//! and stamps are unsigned. Otherwise the supported message types have the same fields in the same order in both.
 
 use super::super::MessageKind;
 use super::super::cdr::CdrWriter;
 
-/// A field, or several of one kind.
+/// Field, or several fields of one kind.
 #[derive(Clone, Copy, Debug)]
 enum Field {
     Header,
     U8,
     U16,
     U32,
-    /// 32-bit numbers.
     F32s(usize),
     Text,
     Texts,
     Bytes,
     F64s(usize),
     F64Sequence,
-    /// A sequence of `geometry_msgs/TransformStamped`.
+    /// Sequence of `geometry_msgs/TransformStamped`.
     Transforms,
 }
 
 /// Child frame, translation and rotation.
 const TRANSFORM: &[Field] = &[Field::Header, Field::Text, Field::F64s(7)];
 
-/// The fields of a type in order, `None` for one that ROS 1 has with other fields.
+/// Fields of a type in order, `None` if ROS 1 has other fields.
 fn layout(kind: MessageKind) -> Option<&'static [Field]> {
     use Field::{Bytes, F32s, F64Sequence, F64s, Header, Text, Texts, Transforms, U8, U16, U32};
     Some(match kind {
@@ -58,7 +57,7 @@ fn layout(kind: MessageKind) -> Option<&'static [Field]> {
     })
 }
 
-/// The CDR encoding of a message in ROS 1 serialization, or the problem with it.
+/// Converts a message in ROS 1 serialization to CDR, or returns a description of the problem.
 pub(super) fn cdr_from_ros1(kind: MessageKind, message: &[u8]) -> Result<Vec<u8>, String> {
     let mut reader = Ros1Reader { message, position: 0 };
     let mut out = CdrWriter::new();
@@ -75,7 +74,7 @@ fn copy_fields(fields: &[Field], reader: &mut Ros1Reader<'_>, out: &mut CdrWrite
     for field in fields {
         match *field {
             Field::Header => {
-                reader.u32()?; // sequence number, which ROS 2 has not
+                reader.u32()?; // sequence number, absent in ROS 2
                 let seconds = reader.u32()?;
                 let seconds =
                     i32::try_from(seconds).map_err(|_too_late| format!("a stamp of {seconds} s, after 2038"))?;
@@ -146,7 +145,7 @@ impl<'a> Ros1Reader<'a> {
         Ok(u32::from_le_bytes(bytes))
     }
 
-    /// The length of a sequence; an error when the remaining message is too short for it.
+    /// Reads the length of a sequence; an error if the remaining message is too short for it.
     fn length(&mut self, element_size: usize) -> Result<usize, String> {
         let count = self.u32()? as usize;
         if count.saturating_mul(element_size) > self.message.len() - self.position {

@@ -2,16 +2,15 @@
 
 use super::super::file::LogFile;
 
-/// One record.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BagRecord<'a> {
     header: &'a [u8],
     pub(super) data: &'a [u8],
-    /// Offset of the first byte after it.
+    /// Offset of the first byte after the record.
     pub(super) end: usize,
 }
 
-/// The bytes that follow a 4-byte length at `start`, and the first byte after them.
+/// Bytes that follow a 4-byte length at `start`, and the first byte after them.
 fn sized(bytes: &[u8], start: usize) -> Option<(&[u8], usize)> {
     let length = bytes.get(start..start.checked_add(4)?)?;
     let length = u32::from_le_bytes([length[0], length[1], length[2], length[3]]) as usize;
@@ -19,36 +18,35 @@ fn sized(bytes: &[u8], start: usize) -> Option<(&[u8], usize)> {
     Some((bytes.get(start + 4..end)?, end))
 }
 
-/// The record that starts at a byte offset, or the problem with it.
+/// Returns the record that starts at a byte offset, or a description of the problem.
 pub(super) fn record_at(bytes: &[u8], start: usize) -> Result<BagRecord<'_>, String> {
     let ends = || format!("a record ends after the last of {} bytes", bytes.len());
     let (header, after_header) = sized(bytes, start).ok_or_else(ends)?;
     let (data, end) = sized(bytes, after_header).ok_or_else(ends)?;
     let record = BagRecord { header, data, end };
-    // Every record has an opcode; without one these bytes are something else.
+    // Every record has an opcode; bytes without one are not a record.
     record.opcode().map(|_| record).ok_or_else(|| "no record starts here".to_owned())
 }
 
-/// Largest header of a record: those of connections hold the name of a topic.
+/// Largest header of a record: headers of connections contain the name of a topic.
 const LARGEST_HEADER_BYTES: usize = 1 << 20;
 
-/// A record of the file, read into memory.
+/// Record of a file, read into memory.
 #[derive(Clone, Debug)]
 pub(super) struct OwnedRecord {
     /// Header and data, each after its length.
     bytes: Vec<u8>,
-    /// First byte after it in the file.
+    /// First byte after the record in the file.
     pub(super) end: usize,
 }
 
 impl OwnedRecord {
-    /// The record in it.
     pub(super) fn record(&self) -> Result<BagRecord<'_>, String> {
         record_at(&self.bytes, 0)
     }
 }
 
-/// The record that starts at a byte of a file, or why there is none.
+/// Reads the record that starts at a byte of a file, or returns a description of the problem.
 pub(super) fn record_in_file(file: &LogFile, start: usize) -> Result<OwnedRecord, String> {
     let length_at = |at: usize| -> Result<usize, String> {
         let end = at.checked_add(4).filter(|end| *end <= file.len());
@@ -70,7 +68,7 @@ pub(super) fn record_in_file(file: &LogFile, start: usize) -> Result<OwnedRecord
     Ok(owned)
 }
 
-/// The value of a named field among `name=value` fields.
+/// Value of a named field among `name=value` fields.
 pub(super) fn field<'a>(fields: &'a [u8], name: &str) -> Option<&'a [u8]> {
     let mut at = 0;
     while let Some((entry, end)) = sized(fields, at) {
@@ -83,35 +81,32 @@ pub(super) fn field<'a>(fields: &'a [u8], name: &str) -> Option<&'a [u8]> {
     None
 }
 
-/// The value of a text field.
 pub(super) fn text_field<'a>(fields: &'a [u8], name: &str) -> Option<&'a str> {
     field(fields, name).and_then(|value| std::str::from_utf8(value).ok())
 }
 
 impl<'a> BagRecord<'a> {
-    /// Opcode of the record.
     pub(super) fn opcode(&self) -> Option<u8> {
         field(self.header, "op").and_then(|value| value.first().copied())
     }
 
-    /// A numeric field of the header.
+    /// 32-bit field of the header.
     pub(super) fn number(&self, name: &str) -> Option<u32> {
         let value = field(self.header, name)?;
         Some(u32::from_le_bytes(value.try_into().ok()?))
     }
 
-    /// A large numeric field of the header.
+    /// 64-bit field of the header.
     pub(super) fn large_number(&self, name: &str) -> Option<u64> {
         let value = field(self.header, name)?;
         Some(u64::from_le_bytes(value.try_into().ok()?))
     }
 
-    /// A text field of the header.
     pub(super) fn text(&self, name: &str) -> Option<&'a str> {
         text_field(self.header, name)
     }
 
-    /// A time of the header in nanoseconds since the epoch.
+    /// Time field of the header in nanoseconds since the epoch.
     pub(super) fn time_ns(&self, name: &str) -> Option<i64> {
         let [s0, s1, s2, s3, n0, n1, n2, n3] = field(self.header, name)?.try_into().ok()?;
         let (seconds, nanoseconds) = (u32::from_le_bytes([s0, s1, s2, s3]), u32::from_le_bytes([n0, n1, n2, n3]));

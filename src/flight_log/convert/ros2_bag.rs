@@ -1,4 +1,4 @@
-//! ROS 2 bags: a folder with `metadata.yaml` and one or more SQLite or MCAP files, plain or under zstd.
+//! ROS 2 bags: a folder with `metadata.yaml` and one or more SQLite or MCAP files, plain or compressed with zstd.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,10 +14,10 @@ use super::sink::Sink;
 use super::sqlite::BagDatabase;
 use super::{ConvertError, mcap_segment, read_description, sqlite};
 
-/// Bytes that are copied at a time.
+/// Number of bytes that are copied at a time.
 const COPIED_BYTES: usize = 1 << 20;
 
-/// Whether a folder is a ROS 2 bag, also without its `metadata.yaml`.
+/// True if a folder is a ROS 2 bag, also without its `metadata.yaml`.
 pub(super) fn is_bag(folder: &Path) -> bool {
     folder.join("metadata.yaml").is_file() || segments(folder).is_ok_and(|segments| !segments.is_empty())
 }
@@ -30,7 +30,7 @@ fn is_segment(path: &Path) -> bool {
     unpacked_name(path).extension().is_some_and(|extension| extension == "db3" || extension == "mcap")
 }
 
-/// The files of a folder that may belong to a bag, in the order of the numbers in their names.
+/// Files of a folder that may belong to a bag, in the order of the numbers in their names.
 fn segments(folder: &Path) -> Result<Vec<PathBuf>, ConvertError> {
     let entries = fs::read_dir(folder).map_err(ConvertError::io("open the bag", folder))?;
     let mut paths = Vec::new();
@@ -49,9 +49,9 @@ fn segments(folder: &Path) -> Result<Vec<PathBuf>, ConvertError> {
 #[derive(Default)]
 struct BagMetadata {
     segments: Vec<PathBuf>,
-    /// Messages of the whole bag.
+    /// Number of messages of the whole bag.
     messages: Option<u64>,
-    /// Messages of its files by name, which recorders since ROS 2 Galactic write.
+    /// Number of messages by file name, written by recorders since ROS 2 Galactic.
     messages_by_file: BTreeMap<String, u64>,
 }
 
@@ -90,8 +90,8 @@ fn read_metadata(folder: &Path) -> Result<BagMetadata, ConvertError> {
     })
 }
 
-/// Path of a file of the bag: old recorders wrote the folder's name before it, and some omit `.zstd`. It lies in the
-/// bag's folder, whatever the name says.
+/// Path of a file of the bag: old recorders prepended the folder's name, and some omit `.zstd`. The path always lies in
+/// the bag's folder.
 fn find(folder: &Path, name: &str) -> PathBuf {
     let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     let beside = folder.join(Path::new(name).file_name().unwrap_or_default());
@@ -102,7 +102,7 @@ fn find(folder: &Path, name: &str) -> PathBuf {
     candidates.find(|path| path.is_file()).unwrap_or_else(|| beside.clone())
 }
 
-/// An open file of a bag.
+/// Open file of a bag.
 enum Segment {
     Mcap(LogFile),
     Sqlite(BagDatabase, Option<NamedTempFile>),
@@ -118,7 +118,7 @@ fn open_segment(path: &Path, sink: &Sink<'_>) -> Result<Segment, ConvertError> {
     Ok(Segment::Sqlite(database, unpacked))
 }
 
-/// Converts a bag into a log. A file that is missing or cannot be read is left out.
+/// Converts a bag into a log. Missing and unreadable files are left out.
 pub(super) fn convert(folder: &Path, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
     let metadata = read_metadata(folder)?;
     if !folder.join("metadata.yaml").is_file() {
@@ -132,7 +132,7 @@ pub(super) fn convert(folder: &Path, sink: &mut Sink<'_>) -> Result<(), ConvertE
     for path in &metadata.segments {
         match open_segment(path, sink) {
             Ok(Segment::Mcap(file)) => mcap_segment::convert(&file, path, sink)?,
-            // The temporary file, if any, lives as long as the database that reads it.
+            // The temporary file, if any, must exist as long as the database is open.
             Ok(Segment::Sqlite(database, _unpacked)) => sqlite::convert(&database, sink)?,
             Err(problem) => {
                 let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -152,7 +152,7 @@ pub(super) fn convert(folder: &Path, sink: &mut Sink<'_>) -> Result<(), ConvertE
     Ok(())
 }
 
-/// Unpacks a compressed database into a temporary file, which SQLite opens by its path.
+/// Decompresses a database into a temporary file, since SQLite opens a path.
 pub(super) fn unpack_to_path(path: &Path, limits: &LogLimits) -> Result<NamedTempFile, ConvertError> {
     let file = LogFile::open(path, limits)?;
     let mut plain = NamedTempFile::new().map_err(ConvertError::io("make a temporary file for", path))?;

@@ -1,4 +1,4 @@
-//! The output of every conversion: the log, and the number of messages written and skipped by topic.
+//! Output of every conversion: the log, and the number of messages written and skipped by topic.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -13,9 +13,9 @@ use super::super::{LogWriter, MessageKind, MessageTimes};
 use super::ros1_message::cdr_from_ros1;
 use super::{ConversionReport, ConvertError, ConvertedTopic, VideoClock};
 
-/// Characters of a name that is too long which are shown.
+/// Number of characters shown of a too long name.
 const SHOWN_CHARS: usize = 48;
-/// Topics that the error of a source without usable messages describes.
+/// Number of topics in the error of a source without usable messages.
 const DESCRIBED_TOPICS: usize = 16;
 /// Row of the report for the topics beyond their limit.
 const OTHER_TOPICS: &str = "(other topics)";
@@ -29,15 +29,15 @@ pub(super) enum Payload<'a> {
     Cdr(&'a [u8]),
     /// Protobuf, as Foxglove's libraries write it.
     Protobuf(&'a [u8]),
-    /// Anything else, by the name of its encoding.
+    /// Name of another encoding.
     Other(&'a str),
 }
 
-/// One message of a source.
+/// Message of a source.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SourceMessage<'a> {
     pub(super) topic: &'a str,
-    /// `sensor_msgs/Imu` or `sensor_msgs/msg/Imu`.
+    /// Such as `sensor_msgs/Imu` or `sensor_msgs/msg/Imu`.
     pub(super) message_type: &'a str,
     /// Definition of the type as `ros2msg`, for types that are copied without being read.
     pub(super) definition: Option<&'a str>,
@@ -54,26 +54,25 @@ pub(super) struct Tally {
     reason: Option<String>,
 }
 
-/// The log being written.
 pub(super) struct Sink<'a> {
     pub(super) writer: LogWriter,
     tallies: BTreeMap<(String, String), Tally>,
-    /// The message type of each topic in the log.
+    /// Message type of each topic in the log.
     types: BTreeMap<String, String>,
     notes: Vec<String>,
     limits: LogLimits,
-    /// Where the video was placed in the autopilot's log.
+    /// Relation of the video's clock to the autopilot's log.
     pub(super) video_clock: Option<VideoClock>,
-    /// Messages in the log so far.
+    /// Number of messages in the log.
     count: u64,
     progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
-    /// The last fraction that was reported, and messages since then.
+    /// Last reported fraction, and messages since then.
     fraction: f64,
     since: u32,
     interrupted: bool,
 }
 
-/// Messages after which a source that reports no progress is asked whether to go on.
+/// Number of messages between two progress reports of a source that does not report itself.
 const MESSAGES_PER_REPORT: u32 = 64;
 
 impl<'a> Sink<'a> {
@@ -88,28 +87,28 @@ impl<'a> Sink<'a> {
         Self { writer, tallies, types, notes, limits, video_clock, count: 0, progress, fraction, since, interrupted }
     }
 
-    /// Limits on what is read from the source.
+    /// Limits on reading the source.
     pub(super) fn limits(&self) -> &LogLimits {
         &self.limits
     }
 
-    /// Messages found so far: those in the log and those that were skipped.
+    /// Number of messages found: those in the log and those that were skipped.
     pub(super) fn seen(&self) -> u64 {
         self.tallies.values().fold(0, |sum: u64, tally| sum.saturating_add(tally.taken).saturating_add(tally.left))
     }
 
-    /// Messages in the log so far.
+    /// Number of messages in the log.
     pub(super) fn count(&self) -> u64 {
         self.count
     }
 
-    /// Reports the fraction of the source that is done, from 0 to 1.
+    /// Reports the completed fraction of the source, from 0 to 1.
     pub(super) fn progress(&mut self, fraction: f64) {
         (self.fraction, self.since) = (fraction, 0);
         self.interrupted |= (self.progress)(fraction).is_break();
     }
 
-    /// Reports a position in the source now and then; an error when the caller has stopped the conversion.
+    /// Reports a position in the source at intervals; an error if the caller has stopped the conversion.
     pub(super) fn advance(&mut self, at: usize, length: usize) -> Result<(), ConvertError> {
         self.since += 1;
         if self.since >= MESSAGES_PER_REPORT {
@@ -118,7 +117,7 @@ impl<'a> Sink<'a> {
         self.ensure_running()
     }
 
-    /// An error when the caller has stopped the conversion.
+    /// Returns an error if the caller has stopped the conversion.
     pub(super) fn ensure_running(&self) -> Result<(), ConvertError> {
         if self.interrupted {
             return Err(ConvertError::Interrupted { path: self.writer.path().to_owned() });
@@ -154,12 +153,12 @@ impl<'a> Sink<'a> {
         tally
     }
 
-    /// Says something of a topic that is in the log.
+    /// Sets the report's remark on a topic in the log.
     pub(super) fn remark(&mut self, topic: &str, message_type: &str, remark: impl Into<String>) {
         self.tally(topic, message_type).reason.get_or_insert_with(|| remark.into());
     }
 
-    /// The row of a topic in the report; topics beyond their limit share one.
+    /// Row of a topic in the report; topics beyond their limit share one.
     fn tally(&mut self, topic: &str, message_type: &str) -> &mut Tally {
         let name = |name: &str| {
             if self.limits.check_name("a name", name).is_ok() {
@@ -174,7 +173,7 @@ impl<'a> Sink<'a> {
         self.tallies.entry(key).or_default()
     }
 
-    /// Why a topic cannot be in the log: its names, or the number of topics before it.
+    /// Reason why a topic cannot be in the log: its names, or the number of topics before it.
     fn refusal(&self, topic: &str, message_type: &str) -> Option<String> {
         let names = self.limits.check_name("the name of a topic", topic);
         if let Err(exceeded) = names.and_then(|()| self.limits.check_name("the name of a type", message_type)) {
@@ -187,7 +186,7 @@ impl<'a> Sink<'a> {
         })
     }
 
-    /// Writes a message into the log, or counts why it cannot be.
+    /// Writes a message into the log, or counts the reason why it cannot be written.
     pub(super) fn take(&mut self, message: &SourceMessage<'_>) -> Result<(), ConvertError> {
         self.since += 1;
         if self.since >= MESSAGES_PER_REPORT {
@@ -254,16 +253,16 @@ impl<'a> Sink<'a> {
                     let message_type = MessageType::ros2(message_type, definition);
                     Ok(self.writer.write_typed(topic, &message_type, times, bytes)?)
                 }
-                None => Err("the program reads no such type, and the bag does not hold its definition".to_owned()),
+                None => Err("unsupported type, and the bag does not contain its definition".to_owned()),
             },
-            (None, Payload::Ros1(_)) => Err("the program reads no such type".to_owned()),
+            (None, Payload::Ros1(_)) => Err("unsupported type".to_owned()),
             (_, Payload::Other(encoding)) => Err(format!("encoded as {encoding:?}, expected CDR or ROS 1")),
         };
         match written {
             Ok(()) => {
                 let tally = self.taken(topic, message_type);
                 if kind.is_none() {
-                    tally.reason.get_or_insert_with(|| "copied as it is; the program does not read it".to_owned());
+                    tally.reason.get_or_insert_with(|| "copied unchanged; the program does not use it".to_owned());
                 }
             }
             Err(reason) => self.leave(topic, message_type, 1, reason),
@@ -271,7 +270,7 @@ impl<'a> Sink<'a> {
         Ok(())
     }
 
-    /// Completes the log.
+    /// Completes the log and returns the report.
     pub(super) fn finish(self, kind: &str, source: &Path) -> Result<ConversionReport, ConvertError> {
         self.ensure_running()?;
         let topics: Vec<ConvertedTopic> = self

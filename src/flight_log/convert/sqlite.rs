@@ -1,6 +1,6 @@
-//! The SQLite files of ROS 2 bags.
+//! SQLite files of ROS 2 bags.
 //!
-//! A database is a program, too: only real tables are read, values are limited, and a query that takes longer than its
+//! A database can contain code: only plain tables are read, values are limited, and a query that takes longer than its
 //! rows explain is interrupted.
 
 use std::collections::BTreeMap;
@@ -17,13 +17,13 @@ use super::super::limits::{LimitExceeded, LimitKind, LogLimits};
 use super::ConvertError;
 use super::sink::{Payload, Sink, SourceMessage};
 
-/// Steps of SQLite's machine between two looks at the number of steps.
+/// Steps of SQLite's virtual machine between two checks of the number of steps.
 const STEPS_PER_LOOK: i32 = 100_000;
-/// Steps that reading and sorting one message may take.
+/// Largest number of steps to read and sort one message.
 const STEPS_PER_MESSAGE: u64 = 200;
-/// Rows that cannot be read one after another before the search for the next readable one ends.
+/// Largest number of consecutive unreadable rows in the search for the next readable one.
 const LARGEST_HOLE: i64 = 1 << 32;
-/// Damaged places after which a database is given up.
+/// Largest number of damaged places in a database.
 const MOST_HOLES: u32 = 10_000;
 
 /// Row of the report for damaged rows of the database.
@@ -37,31 +37,30 @@ struct Topic {
     definition: Option<String>,
 }
 
-/// An open database of a bag.
+/// Open database of a bag.
 pub(super) struct BagDatabase {
     connection: Connection,
     path: PathBuf,
     topics: BTreeMap<i64, Topic>,
-    /// Size of the file, and the size that its header promises when that is larger.
+    /// Size of the file, and the size in its header if that is larger.
     bytes: u64,
     promised_bytes: Option<u64>,
     most_messages: u64,
 }
 
-/// How far the messages of a database were read.
+/// Progress of reading a database's messages.
 #[derive(Debug, Default)]
 struct ReadState {
-    /// Rows read.
+    /// Number of rows read.
     rows: u64,
     /// Log time and row of the last message in the order of log times.
     last: Option<(i64, i64)>,
-    /// Largest number of a row, for the progress.
+    /// Largest row number, for the progress.
     last_row: i64,
-    /// What went wrong first.
+    /// First problem.
     problem: Option<String>,
 }
 
-/// Opens one file.
 pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<BagDatabase, ConvertError> {
     let failed = |error: rusqlite::Error| ConvertError::unreadable(format!("not a readable ROS 2 bag: {error}"), path);
     let metadata = fs::metadata(path).map_err(ConvertError::io("open the bag", path))?;
@@ -88,7 +87,7 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<BagDatabase, Conve
     Ok(BagDatabase { connection, path: path.to_owned(), topics, bytes, promised_bytes, most_messages })
 }
 
-/// The size that the header of a database promises, `None` when it is not valid.
+/// Size in the header of a database, `None` if it is not valid.
 fn promised_bytes(path: &Path) -> Option<u64> {
     // Size of a page (2 bytes at 16; 1 stands for 65536), change counter (4 at 24), number of pages (4 at 28), and the
     // change counter for which that number is valid (4 at 92).
@@ -102,7 +101,7 @@ fn promised_bytes(path: &Path) -> Option<u64> {
     (number(24) == number(92)).then(|| page_bytes * u64::from(number(28)))
 }
 
-/// Limits what a hostile database can make SQLite do, and lets a truncated one be opened.
+/// Limits the work that a hostile database can cause in SQLite, and allows opening a truncated one.
 fn guard(
     connection: &mut Connection,
     record_bytes: u64,
@@ -114,7 +113,7 @@ fn guard(
     connection.set_limit(Limit::SQLITE_LIMIT_ATTACHED, 0)?;
     connection.execute_batch("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON;")?;
     if truncated {
-        // SQLite opens a file that is shorter than its header says only for repairs.
+        // SQLite opens a file that is shorter than its header declares only with this.
         connection.execute_batch("PRAGMA writable_schema = ON;")?;
     }
     let most_looks = most_messages.saturating_mul(STEPS_PER_MESSAGE) / STEPS_PER_LOOK as u64 + 1000;
@@ -128,7 +127,7 @@ fn guard(
     )
 }
 
-/// Refuses views, virtual tables and computed columns: reading them runs what the database says.
+/// Rejects views, virtual tables and computed columns, because reading them runs code of the database.
 fn require_table(connection: &Connection, table: &str, path: &Path) -> Result<(), ConvertError> {
     let failed = |error: rusqlite::Error| ConvertError::unreadable(format!("not a readable ROS 2 bag: {error}"), path);
     let mut query =
@@ -157,8 +156,8 @@ fn require_table(connection: &Connection, table: &str, path: &Path) -> Result<()
 const ORDERED: &str = "SELECT topic_id, timestamp, data, rowid FROM messages ORDER BY timestamp, rowid";
 const FROM_ROW: &str = "SELECT topic_id, timestamp, data, rowid FROM messages WHERE rowid >= ?1 ORDER BY rowid";
 
-/// Converts one file into a log, in the order of log times. Where the database is damaged, the rows that can be read are
-/// taken in the order of their numbers.
+/// Converts a file into a log, in the order of log times. Where the database is damaged, the readable rows are
+/// converted in the order of their numbers.
 pub(super) fn convert(bag: &BagDatabase, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
     for topic in bag.topics.values() {
         sink.announce(&topic.name, &topic.message_type);
@@ -197,7 +196,7 @@ impl BagDatabase {
         sink.note(format!("{what}; {read}; {lost}"));
     }
 
-    /// Takes one row; `false` when no more may be read.
+    /// Converts a row; `false` if no more may be read.
     fn take(&self, row: &Row<'_>, sink: &mut Sink<'_>, state: &mut ReadState) -> Result<bool, ConvertError> {
         state.rows += 1;
         if state.rows > self.most_messages {
@@ -255,7 +254,7 @@ fn read_ordered(bag: &BagDatabase, sink: &mut Sink<'_>, state: &mut ReadState) -
     }
 }
 
-/// Takes the rows that were not read in the order of log times; returns the number of damaged places.
+/// Converts the rows that were not read in the order of log times; returns the number of damaged places.
 fn salvage(bag: &BagDatabase, sink: &mut Sink<'_>, state: &mut ReadState) -> Result<u32, ConvertError> {
     let failed = |error: rusqlite::Error| ConvertError::unreadable(error.to_string(), &bag.path);
     let already = state.last;
@@ -268,7 +267,7 @@ fn salvage(bag: &BagDatabase, sink: &mut Sink<'_>, state: &mut ReadState) -> Res
                 Ok(Some(row)) => {
                     let place = place_of(row);
                     if let Some((_, number)) = place {
-                        // A row that can be read again after a gap.
+                        // First readable row after a gap.
                         (from_row, step) = (from_row.max(number.saturating_add(1)), 1);
                     }
                     let repeated = place.zip(already).is_some_and(|(place, last)| place <= last);
@@ -291,7 +290,7 @@ fn salvage(bag: &BagDatabase, sink: &mut Sink<'_>, state: &mut ReadState) -> Res
     Ok(holes)
 }
 
-/// The topics by number, at most `most` of them, with their definitions where the recorder wrote them (ROS 2 Iron and
+/// Topics by number, at most `most` of them, with their definitions if the recorder wrote them (ROS 2 Iron and
 /// later).
 fn read_topics(
     connection: &Connection,
@@ -307,7 +306,7 @@ fn read_topics(
     rows.take(usize::try_from(most).unwrap_or(usize::MAX)).collect()
 }
 
-/// The definitions in `ros2msg` by type.
+/// Definitions in `ros2msg` by type.
 fn read_definitions(connection: &Connection) -> Result<BTreeMap<String, String>, rusqlite::Error> {
     let mut query = connection
         .prepare("SELECT topic_type, encoded_message_definition FROM message_definitions WHERE encoding = 'ros2msg'")?;

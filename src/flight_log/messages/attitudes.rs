@@ -6,10 +6,10 @@ use super::super::cdr::{CdrError, CdrReader};
 use super::{MessageKind, read_header};
 use crate::sensors::AttitudeValue;
 
-/// Transforms of one message; robots publish some dozens.
+/// Largest number of transforms in a message; robots publish some dozens.
 const MAX_TRANSFORMS: usize = 4096;
 
-/// A message with an attitude; `None` when its numbers are none (not finite, or a zero quaternion).
+/// Message with an attitude; `None` for numbers that are not finite or a zero quaternion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct StampedRotation<T> {
     /// Nanoseconds since the epoch, or since PX4 started.
@@ -17,20 +17,20 @@ pub(crate) struct StampedRotation<T> {
     pub(crate) content: Option<T>,
 }
 
-/// Microseconds as nanoseconds.
+/// Reads microseconds as nanoseconds.
 pub(super) fn read_px4_stamp(reader: &mut CdrReader<'_>) -> Result<i64, CdrError> {
     let microseconds = i64::try_from(reader.read_u64()?).unwrap_or(i64::MAX);
     Ok(microseconds.saturating_mul(1000))
 }
 
-/// The rotation of a quaternion; its norm may be rounded (32-bit numbers), but not far from 1.
+/// Rotation of a quaternion, `None` if its norm differs from 1 by more than rounding (32-bit numbers).
 fn rotation([x, y, z, w]: [f64; 4]) -> Option<UnitQuaternion<f64>> {
     let quaternion = Quaternion::new(w, x, y, z);
     let norm = quaternion.norm();
     (norm.is_finite() && norm > 0.5).then(|| UnitQuaternion::new_normalize(quaternion))
 }
 
-/// PX4's quaternions begin with w.
+/// Reads a quaternion of PX4, which begins with w.
 fn read_px4_rotation(reader: &mut CdrReader<'_>) -> Result<Option<UnitQuaternion<f64>>, CdrError> {
     let [w, x, y, z] = reader.read_f32s::<4>()?.map(f64::from);
     Ok(rotation([x, y, z, w]))
@@ -43,7 +43,7 @@ fn read_stamped_rotation(
 ) -> Result<(i64, Option<UnitQuaternion<f64>>), CdrError> {
     if kind == MessageKind::Px4VehicleAttitude {
         let stamp_ns = read_px4_stamp(reader)?;
-        reader.read_u64()?; // the stamp of the sample that the estimate was made from
+        reader.read_u64()?; // stamp of the sample used for the estimate
         return Ok((stamp_ns, read_px4_rotation(reader)?));
     }
     let header = read_header(reader)?;
@@ -56,7 +56,7 @@ fn read_stamped_rotation(
     Ok((header.stamp_ns, rotation(reader.read_f64s::<4>()?)))
 }
 
-/// The attitude of a gimbal in a message of any kind but `Transforms`.
+/// Reads the attitude of a gimbal from a message of any kind but `Transforms`.
 pub(crate) fn read_gimbal_attitude(
     kind: MessageKind,
     message: &[u8],
@@ -87,7 +87,7 @@ pub(crate) fn read_gimbal_attitude(
     Ok(StampedRotation { stamp_ns, content })
 }
 
-/// The attitude of a vehicle, `earth_from_vehicle`, in a message of any kind that has an orientation.
+/// Reads the attitude of a vehicle, `earth_from_vehicle`, from a message of any kind with an orientation.
 pub(crate) fn read_vehicle_attitude(
     kind: MessageKind,
     message: &[u8],
@@ -95,14 +95,14 @@ pub(crate) fn read_vehicle_attitude(
     let mut reader = CdrReader::new(message)?;
     let (stamp_ns, mut content) = read_stamped_rotation(kind, &mut reader)?;
     if kind == MessageKind::Imu {
-        // A first covariance of −1 says that there is no orientation.
+        // A first covariance of −1 means that there is no orientation.
         let [first, ..] = reader.read_f64s::<9>()?;
         content = content.filter(|_| first >= 0.0);
     }
     Ok(StampedRotation { stamp_ns, content })
 }
 
-/// One transform of a `tf2_msgs/msg/TFMessage`; without a rotation when its numbers are none.
+/// Transform of a `tf2_msgs/msg/TFMessage`; without a rotation if its numbers are invalid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TransformEntry<'a> {
     pub(crate) stamp_ns: i64,
@@ -112,7 +112,7 @@ pub(crate) struct TransformEntry<'a> {
     pub(crate) rotation: Option<UnitQuaternion<f64>>,
 }
 
-/// The transforms of a message; the slash before names of old frames is left out.
+/// Reads the transforms of a message; a leading slash of frame names is removed.
 pub(crate) fn read_transforms(message: &[u8]) -> Result<Vec<TransformEntry<'_>>, CdrError> {
     let mut reader = CdrReader::new(message)?;
     let count = reader.read_u32()? as usize;
@@ -132,7 +132,7 @@ pub(crate) fn read_transforms(message: &[u8]) -> Result<Vec<TransformEntry<'_>>,
     Ok(entries)
 }
 
-/// A frame's name without the slash before it that ROS 1 once had.
+/// Frame name without the leading slash of early ROS 1.
 pub(crate) fn bare_name(frame: &str) -> &str {
     frame.strip_prefix('/').unwrap_or(frame)
 }

@@ -17,7 +17,7 @@ const UNITS: &str = "rad or deg";
 const VEHICLE: &str = "the topic of the vehicle's attitude (QuaternionStamped, PoseStamped, Odometry, TransformStamped, Imu or px4's \
                        VehicleAttitude)";
 
-/// The source and its topic.
+/// Reads the topic and the source.
 pub(super) fn read(source: &Field<'_>) -> Result<(String, AttitudeSource), LogError> {
     source.keys("a mapping with topic, type, frame, axes, …")?;
     let topic = source.field("topic").text("the topic of the gimbal's attitude")?.to_owned();
@@ -32,7 +32,7 @@ pub(super) fn read(source: &Field<'_>) -> Result<(String, AttitudeSource), LogEr
         }
     };
     let axes = match source.field("axes").optional() {
-        // By the definition of these messages.
+        // These messages are defined in FRD.
         None if by_flags => BodyAxes::Frd,
         _ => one_of(&source.field("axes"), BODY_AXES, BodyAxes::ALL, BodyAxes::name)?,
     };
@@ -110,7 +110,7 @@ fn named_axes(field: &Field<'_>) -> Result<NamedAxes, LogError> {
     field.text(NAMED_AXES)?.parse().map_err(|()| field.unexpected(NAMED_AXES))
 }
 
-/// The value of a name.
+/// Value with the given name.
 fn one_of<T: Copy>(
     field: &Field<'_>,
     expected: &str,
@@ -121,7 +121,7 @@ fn one_of<T: Copy>(
     values.into_iter().find(|value| name(*value) == text).ok_or_else(|| field.unexpected(expected))
 }
 
-/// The keys and values of a source in the order of a rig, without its chain; texts without quotes.
+/// Keys and values of a source in the order of a rig, without its chain; texts without quotes.
 pub(crate) fn entries(topic: &str, source: &AttitudeSource) -> Vec<(&'static str, String)> {
     let mut entries = vec![("topic", topic.to_owned()), ("type", source.message.name().to_owned())];
     entries.push(("frame", source.frame.name().to_owned()));

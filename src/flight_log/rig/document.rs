@@ -1,4 +1,4 @@
-//! The text of a rig file as a tree of values, and the lines of its fields.
+//! Text of a rig file as a tree of values, with the lines of its fields.
 
 use std::fmt;
 use std::io::Read as _;
@@ -15,7 +15,7 @@ use super::fields::Field;
 /// Largest rig file in bytes; the rig of 16 links and 16 cameras takes 16 kB.
 const MAX_RIG_BYTES: u64 = 1 << 20;
 
-/// A parsed file of a rig.
+/// Parsed rig file.
 #[derive(Clone, Debug)]
 pub(super) struct Document {
     pub(super) value: Value,
@@ -47,7 +47,6 @@ impl Document {
         Self::parse(text, file)
     }
 
-    /// Parses a text.
     pub(super) fn parse(text: String, file: &Path) -> Result<Self, LogError> {
         match serde_saphyr::from_str(&text) {
             Ok(value) => Ok(Self { value, file: file.to_owned(), text }),
@@ -55,12 +54,12 @@ impl Document {
         }
     }
 
-    /// The whole document as a field.
+    /// Whole document as a field.
     pub(super) fn root(&self) -> Field<'_> {
         Field::root(&self.value, &self.file)
     }
 
-    /// The error with the line of its field, where it is one of a field of this document.
+    /// Adds the line of its field to an error about a field of this document.
     pub(super) fn with_line(&self, error: LogError) -> LogError {
         match error {
             LogError::Rig { field, problem, path } if path == self.file => {
@@ -72,7 +71,7 @@ impl Document {
         }
     }
 
-    /// Line of a field by its path, `gimbal.links[0].alpha`; of the mapping that lacks it, where it is missing.
+    /// Line of a field by its path, `gimbal.links[0].alpha`; for a missing field, that of its mapping.
     fn line_of(&self, field: &str) -> Option<u64> {
         let mut place: Spanned<Located> = serde_saphyr::from_str(&self.text).ok()?;
         let mut line = None;
@@ -92,7 +91,7 @@ impl Document {
     }
 }
 
-/// A value of a document as far as its place is concerned.
+/// Value of a document, reduced to its location.
 enum Located {
     Scalar,
     List(Vec<Spanned<Self>>),
@@ -182,21 +181,21 @@ impl<'de> Visitor<'de> for LocatedVisitor {
     }
 }
 
-/// A syntax error in the words of a rig: line, field, what was found and what is expected.
+/// Describes a syntax error by line, field, found and expected text.
 fn syntax_problem(error: &Error, text: &str) -> String {
     let location = error.location().filter(|location| location.line() > 0);
     let Some(location) = location else { return "expected a mapping with rig_version, imu0, cam0, …".to_owned() };
-    // What is missing at the end is reported behind the last line.
+    // Errors at the end of the text are reported after the last line.
     let count = text.lines().count() as u64;
     let line = location.line().clamp(1, count.max(1));
     let unclosed = |open, close| line_of_unclosed(text, open, close);
     let (list, mapping) = (unclosed('[', ']'), unclosed('{', '}'));
-    // The parser stops behind the line that lacks a bracket.
+    // The parser stops after the line that lacks a bracket.
     let line = list.or(mapping).map_or(line, |unclosed| unclosed.min(line));
     let found = text.lines().nth(line as usize - 1).unwrap_or_default();
     let field = field_at(text, line as usize - 1).map(|field| format!(", in {field}")).unwrap_or_default();
     let what = match error.without_snippet() {
-        Error::DuplicateMappingKey { .. } => "the key is there already, expected each key once",
+        Error::DuplicateMappingKey { .. } => "the key is repeated, expected each key once",
         Error::MultipleDocuments { .. } => "a second document ('---'), expected one",
         Error::Eof { .. } => "the text ends here, expected a mapping with rig_version, imu0, cam0, …",
         Error::Budget { .. } => "too many values or aliases, expected a rig of some kilobytes",
@@ -210,7 +209,7 @@ fn syntax_problem(error: &Error, text: &str) -> String {
     format!("line {line}{field}: '{}': {what}", shortened(found.trim(), 60))
 }
 
-/// The line of the last bracket that is not closed, comments aside.
+/// Line of the last unclosed bracket, comments aside.
 fn line_of_unclosed(text: &str, open: char, close: char) -> Option<u64> {
     let mut lines: Vec<u64> = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
@@ -229,7 +228,7 @@ fn unclosed_quote(line: &str) -> bool {
     ['"', '\''].into_iter().any(|quote| line.matches(quote).count() % 2 == 1)
 }
 
-/// Path of the field that a line belongs to, by the indentation of the keys above it.
+/// Path of the field of a line, by the indentation of the keys above it.
 fn field_at(text: &str, line: usize) -> Option<String> {
     let lines: Vec<&str> = text.lines().take(line + 1).collect();
     let mut keys: Vec<&str> = Vec::new();
@@ -267,7 +266,7 @@ mod tests {
         check("imu0.update_rate", Some(3));
         check("gimbal.links[0].d", Some(7));
         check("gimbal.links[1].alpha", Some(9));
-        // What is missing is in its mapping.
+        // A missing field is reported at its mapping.
         check("gimbal.links[1].limits", Some(8));
         check("imu0.frame_id", Some(2));
         check("cam0", None);
@@ -289,7 +288,7 @@ mod tests {
         );
         check(
             "imu0:\n  rostopic: /imu\n  rostopic: /imu\n",
-            "line 3, in imu0.rostopic: 'rostopic: /imu': the key is there already, expected each key once",
+            "line 3, in imu0.rostopic: 'rostopic: /imu': the key is repeated, expected each key once",
         );
     }
 }

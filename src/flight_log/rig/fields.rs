@@ -1,4 +1,4 @@
-//! Reading a YAML tree field by field, so that every error names the field, its value and the expected one.
+//! Reader of a YAML tree by fields, so that every error names the field, its value and the expected one.
 
 use std::path::Path;
 
@@ -9,37 +9,38 @@ use super::super::LogError;
 use super::super::text::{nearest_name, printable, shortened};
 use crate::geometry::RigidTransform;
 
-/// A rotation block may be this far from orthonormal (largest entry of `RᵀR − I`); Kalibr writes 1e-16, hand-written files
-/// are rounded.
+/// Largest distance of a rotation block from orthonormal (largest entry of `RᵀR − I`); Kalibr writes 1e-16,
+/// hand-written
+/// files are rounded.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// Longest name of a topic, frame or joint in a rig.
 const MAX_TEXT_BYTES: usize = 1024;
 
-/// One field of a rig, present or not.
+/// Field of a rig, present or not.
 #[derive(Clone, Debug)]
 pub(super) struct Field<'a> {
     path: String,
     value: Option<&'a Value>,
-    /// The mapping that it is, or would be, in.
+    /// Mapping that contains the field, or would contain it.
     parent: Option<&'a Value>,
     file: &'a Path,
 }
 
 impl<'a> Field<'a> {
-    /// The whole document.
+    /// Whole document as a field.
     pub(super) fn root(value: &'a Value, file: &'a Path) -> Self {
         Self { path: String::new(), value: Some(value), parent: None, file }
     }
 
-    /// A field of this mapping, present or not; reading it reports a missing one.
+    /// Field of this mapping, present or not; reading it reports a missing one.
     pub(super) fn field(&self, key: &str) -> Self {
         let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
         let value = self.value.and_then(|value| value.get(key)).filter(|value| !value.is_null());
         Self { path, value, parent: self.value, file: self.file }
     }
 
-    /// Whether this mapping has a field, null or not, by its path (`gimbal.links[0].alpha`).
+    /// True if this mapping has a field, null or not, by its path (`gimbal.links[0].alpha`).
     pub(super) fn has_path(&self, path: &str) -> bool {
         let mut value = self.value;
         for step in path.split('.') {
@@ -53,23 +54,23 @@ impl<'a> Field<'a> {
         value.is_some()
     }
 
-    /// Whether it is there and not null.
+    /// True if the field is present and not null.
     pub(super) fn is_present(&self) -> bool {
         self.value.is_some()
     }
 
-    /// The field when it is there and not null.
+    /// The field if it is present and not null.
     pub(super) fn optional(self) -> Option<Self> {
         self.is_present().then_some(self)
     }
 
-    /// An error about this field.
+    /// Error about this field.
     pub(super) fn error(&self, problem: impl Into<String>) -> LogError {
         let field = if self.path.is_empty() { "the rig" } else { &self.path };
         LogError::Rig { field: field.to_owned(), problem: problem.into(), path: self.file.to_owned() }
     }
 
-    /// `holds X, expected Y`, or `missing, expected Y`.
+    /// Error `holds X, expected Y`, or `missing, expected Y`.
     pub(super) fn unexpected(&self, expected: &str) -> LogError {
         match self.value {
             None => {
@@ -80,9 +81,9 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// A key beside a missing one that looks like a misspelling of it.
+    /// Key in the same mapping that looks like a misspelling of the missing one.
     fn nearest_sibling(&self) -> Option<&'a str> {
-        /// Characters that a misspelling changes at most.
+        /// Largest number of characters changed by a misspelling.
         const MAX_EDIT_DISTANCE: usize = 2;
         let key = self.path.rsplit('.').next()?;
         let siblings = self.parent?.as_object()?.iter().filter(|(_, value)| !value.is_null());
@@ -90,7 +91,7 @@ impl<'a> Field<'a> {
         (1..=MAX_EDIT_DISTANCE).contains(&distance).then_some(nearest)
     }
 
-    /// An angle that was read from this field, when it is one in radians: beyond `largest_rad` it looks like degrees.
+    /// Checks an angle of this field: beyond `largest_rad` it looks like degrees.
     pub(super) fn in_radians(&self, angle: f64, largest_rad: f64) -> Result<f64, LogError> {
         if angle.abs() <= largest_rad {
             return Ok(angle);
@@ -101,7 +102,6 @@ impl<'a> Field<'a> {
         )))
     }
 
-    /// The entries of a list.
     pub(super) fn list(&self, expected: &str) -> Result<Vec<Self>, LogError> {
         let items = self.value.and_then(Value::as_array).ok_or_else(|| self.unexpected(expected))?;
         let item = |(index, value)| {
@@ -111,13 +111,12 @@ impl<'a> Field<'a> {
         Ok(items.iter().enumerate().map(item).collect())
     }
 
-    /// The keys of a mapping.
     pub(super) fn keys(&self, expected: &str) -> Result<Vec<&'a str>, LogError> {
         let mapping = self.value.and_then(Value::as_object).ok_or_else(|| self.unexpected(expected))?;
         Ok(mapping.keys().map(String::as_str).collect())
     }
 
-    /// A text.
+    /// Text of this field, without control characters.
     pub(super) fn text(&self, expected: &str) -> Result<&'a str, LogError> {
         let text = self.value.and_then(Value::as_str).ok_or_else(|| self.unexpected(expected))?;
         if text.len() > MAX_TEXT_BYTES {
@@ -131,19 +130,19 @@ impl<'a> Field<'a> {
         Ok(text)
     }
 
-    /// A finite number.
+    /// Finite number.
     pub(super) fn number(&self, expected: &str) -> Result<f64, LogError> {
         let number = self.value.and_then(Value::as_f64).filter(|number| number.is_finite());
         number.ok_or_else(|| self.unexpected(expected))
     }
 
-    /// A number greater than zero.
+    /// Number greater than zero.
     pub(super) fn positive(&self, expected: &str) -> Result<f64, LogError> {
         let number = self.number(expected)?;
         if number > 0.0 { Ok(number) } else { Err(self.unexpected(expected)) }
     }
 
-    /// A number that is not negative.
+    /// Number that is not negative.
     pub(super) fn not_negative(&self, expected: &str) -> Result<f64, LogError> {
         let number = self.number(expected)?;
         if number >= 0.0 { Ok(number) } else { Err(self.unexpected(expected)) }
@@ -162,7 +161,7 @@ impl<'a> Field<'a> {
             .map_err(|_wrong_count| self.error(format!("{} numbers, expected {expected}", numbers.len())))
     }
 
-    /// A 3×3 matrix, row by row.
+    /// 3×3 matrix, row by row.
     pub(super) fn matrix3(&self) -> Result<Matrix3<f64>, LogError> {
         const EXPECTED: &str = "3 rows of 3 numbers";
         let rows = self.list(EXPECTED)?;
@@ -176,7 +175,7 @@ impl<'a> Field<'a> {
         Ok(matrix)
     }
 
-    /// A rotation as a 3×3 matrix, row by row.
+    /// Rotation as a 3×3 matrix, row by row.
     pub(super) fn rotation(&self) -> Result<Matrix3<f64>, LogError> {
         let matrix = self.matrix3()?;
         let defect = (matrix.transpose() * matrix - Matrix3::identity()).amax();
@@ -190,7 +189,7 @@ impl<'a> Field<'a> {
         )))
     }
 
-    /// A rigid transform as a 4×4 matrix, row by row.
+    /// Rigid transform as a 4×4 matrix, row by row.
     pub(super) fn transform(&self) -> Result<RigidTransform, LogError> {
         const EXPECTED: &str = "4 rows of 4 numbers, a homogeneous matrix";
         let rows = self.list(EXPECTED)?;

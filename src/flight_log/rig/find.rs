@@ -10,7 +10,8 @@ use crate::camera::CameraModel;
 use crate::sensors::Rig;
 
 impl Rig {
-    /// Reads a rig file: the schema of this program, or Kalibr's `camchain-imucam.yaml` with `imu.yaml` beside it.
+    /// Reads a rig file: the schema of this program, or Kalibr's `camchain-imucam.yaml` with `imu.yaml` in the same
+    /// folder.
     pub fn from_file(path: &Path) -> Result<Self, LogError> {
         from_file(path, &NoFacts).map(|(rig, _)| rig)
     }
@@ -21,33 +22,35 @@ impl Rig {
         from_document(&Document::parse(text.to_owned(), file)?, &facts).map(|(rig, _)| rig)
     }
 
-    /// Reads `NAME.rig.yaml` beside `NAME.mcap`, `None` when there is no such file.
+    /// Reads `NAME.rig.yaml` next to `NAME.mcap`, `None` if there is no such file.
     pub fn beside_log(log_path: &Path) -> Result<Option<Self>, LogError> {
         let path = log_path.with_extension("rig.yaml");
         path.is_file().then(|| Self::from_file(&path)).transpose()
     }
 
-    /// The rig to use with a log: the file named by the user, else the one beside the log, else the one attached to it.
-    /// Intrinsics and image rates that it does not contain are taken from the log.
+    /// Finds the rig of a log: the file given by the user, else the one next to the log, else the one attached to it.
+    /// Missing intrinsics and image rates are taken from the log.
     pub fn for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Self, LogError> {
         Self::for_log_with_unused_keys(log, explicit).map(|(rig, _)| rig)
     }
 
-    /// The rig of [`Self::for_log`], with the paths of the keys in its file that other programs write and that are not used.
+    /// Returns the rig of [`Self::for_log`], with the paths of the keys in its file that other programs write and that
+    /// are
+    /// not used.
     pub fn for_log_with_unused_keys(log: &FlightLog, explicit: Option<&Path>) -> Result<(Self, Vec<String>), LogError> {
         let beside = log.path().with_extension("rig.yaml");
         find(log, explicit, &beside, ".rig.yaml")?
             .ok_or_else(|| LogError::NoRig { beside, path: log.path().to_owned() })
     }
 
-    /// The ground-truth rig, found in the same way (`NAME.truth.yaml`, or attached); `None` when there is none.
+    /// Finds the ground-truth rig in the same way (`NAME.truth.yaml`, or attached); `None` if there is none.
     pub fn ground_truth_for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Option<Self>, LogError> {
         let found = find(log, explicit, &log.path().with_extension("truth.yaml"), ".truth.yaml")?;
         Ok(found.map(|(rig, _)| rig))
     }
 }
 
-/// A rig with the paths of those keys of its file that are known and have no use here.
+/// Rig with the paths of known but unused keys of its file.
 type RigWithUnusedKeys = (Rig, Vec<String>);
 
 fn find(
@@ -71,7 +74,7 @@ fn from_file(path: &Path, facts: &dyn CameraFacts) -> Result<RigWithUnusedKeys, 
     from_document(&Document::read(path)?, &InFolder { facts, folder: folder_of(path) })
 }
 
-/// The folder that the files beside a rig are in.
+/// Folder of the files next to a rig.
 fn folder_of(rig: &Path) -> &Path {
     rig.parent().unwrap_or(rig)
 }
@@ -97,7 +100,7 @@ fn from_document(document: &Document, facts: &dyn CameraFacts) -> Result<RigWith
             .filter_map(|path| path.file_name())
             .map(|name| name.to_string_lossy().into_owned())
             .collect();
-        let expected = format!("the IMU in one of {} beside this camera chain", names.join(", "));
+        let expected = format!("the IMU in one of {} next to this camera chain", names.join(", "));
         return Err(root.field("imu0").unexpected(&expected));
     };
     let imu = Document::read(imu_file)?;
@@ -110,7 +113,7 @@ fn from_document(document: &Document, facts: &dyn CameraFacts) -> Result<RigWith
 
 impl CameraFacts for FlightLog {
     fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String> {
-        // By convention `camera_info` is published beside the images: `/ns/image_raw/compressed` → `/ns/camera_info`.
+        // By convention `camera_info` is published next to the images: `/ns/image_raw/compressed` → `/ns/camera_info`.
         let mut parent = image_topic;
         let mut tried = Vec::new();
         while let Some((upper, _)) = parent.rsplit_once('/') {
@@ -131,7 +134,6 @@ impl CameraFacts for FlightLog {
     }
 }
 
-/// Camera model of a `CameraInfo`.
 fn model_of(info: &CameraInfoMessage) -> Result<CameraModel, String> {
     let k = &info.intrinsic_matrix;
     let intrinsics_px = [k[0], k[4], k[2], k[5]];
@@ -146,7 +148,7 @@ fn model_of(info: &CameraInfoMessage) -> Result<CameraModel, String> {
     let (name, coefficients) = match (info.distortion_model.as_str(), coefficients) {
         (_, coefficients) if coefficients.iter().all(|value| *value == 0.0) => ("none", &[][..]),
         ("plumb_bob" | "radtan", [_, _, _, _] | [_, _, _, _, _]) => ("plumb_bob", coefficients),
-        // Behind them lie OpenCV's coefficients of the thin prism and the tilted sensor, which are not modelled.
+        // They are followed by OpenCV's coefficients of the thin prism and the tilted sensor, which are not modelled.
         ("rational_polynomial", coefficients)
             if matches!(coefficients.len(), 8 | 12 | 14) && coefficients[8..].iter().all(|value| *value == 0.0) =>
         {

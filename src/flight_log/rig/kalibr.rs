@@ -1,4 +1,4 @@
-//! Kalibr's own files as a rig: `camchain-imucam.yaml` with `imu.yaml` beside it.
+//! Kalibr's files as a rig: `camchain-imucam.yaml` with `imu.yaml` in the same folder.
 
 use std::path::{Path, PathBuf};
 
@@ -9,10 +9,10 @@ use super::fields::Field;
 use super::read::{self, CameraFacts};
 use crate::sensors::{CameraMount, Rig};
 
-/// Usual file names of Kalibr's IMU file.
+/// Usual names of Kalibr's IMU file.
 const IMU_FILES: [&str; 3] = ["imu.yaml", "imu0.yaml", "imu-calib.yaml"];
 
-/// Whether a document is Kalibr's camera chain.
+/// True for Kalibr's camera chain.
 pub(super) fn is_camera_chain(document: &Value) -> bool {
     document.get("rig_version").is_none()
         && document
@@ -20,7 +20,7 @@ pub(super) fn is_camera_chain(document: &Value) -> bool {
             .is_some_and(|camera| camera.get("mount").is_none() && camera.get("camera_model").is_some())
 }
 
-/// Candidate files for the IMU of a camera chain, most likely first: `imu-RUN.yaml` beside `camchain-imucam-RUN.yaml`,
+/// Candidate files for the IMU of a camera chain, most likely first: `imu-RUN.yaml` next to `camchain-imucam-RUN.yaml`,
 /// then the plain names.
 pub(super) fn imu_files(camera_chain: &Path) -> Vec<PathBuf> {
     let name = camera_chain.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -30,7 +30,7 @@ pub(super) fn imu_files(camera_chain: &Path) -> Vec<PathBuf> {
     names.map(|name| camera_chain.with_file_name(name)).collect()
 }
 
-/// Reads a camera chain with its IMU (`imu` is the document of the IMU's own file, or the chain when it has `imu0`).
+/// Reads a camera chain with its IMU (`imu` is the document of the IMU file, or the chain if it has `imu0`).
 pub(super) fn read_camera_chain(
     chain: &Field<'_>,
     imu: &Field<'_>,

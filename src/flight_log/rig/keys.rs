@@ -1,4 +1,4 @@
-//! The keys of a rig: which are read, which are known and unused, and an error for any other.
+//! Keys of a rig: those that are read, those that are known and unused; any other is an error.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use super::super::text::{nearest_name, printable, shortened};
 struct Keys {
     /// Keys that are read.
     read: &'static [&'static str],
-    /// Keys of other programs without a meaning here, and entries of our own for human readers.
+    /// Keys of other programs without a meaning here, and this program's entries for human readers.
     unused: &'static [&'static str],
 }
 
@@ -22,7 +22,7 @@ const ROOT: Keys = Keys {
 };
 /// Entries that this program appends to a rig for human readers.
 const APPENDICES: &[&str] = &["calibration", "truth"];
-/// With what Kalibr writes for its IMU models, and OpenVINS in the same files.
+/// Includes keys that Kalibr writes for its IMU models, and OpenVINS in the same files.
 const IMU: Keys = Keys {
     read: &[
         "rostopic",
@@ -60,7 +60,7 @@ const CAMERA: Keys = Keys {
     unused: &["cam_overlaps", "T_cn_cnm1", "model"],
 };
 const INTRINSICS_SIGMA: Keys = Keys { read: &["focal", "centre", "distortion"], unused: &[] };
-/// The gyroscope's dependence on acceleration and the places of the accelerometers' axes have no meaning here.
+/// The gyroscope's dependence on acceleration and the positions of the accelerometers' axes are not used.
 const GYROSCOPES: Keys = Keys { read: &["M", "C_gyro_i"], unused: &["A"] };
 const ACCELEROMETERS: Keys = Keys { read: &["M"], unused: &["rx_i", "ry_i", "rz_i"] };
 const GIMBAL: Keys = Keys {
@@ -102,7 +102,7 @@ const PRIOR: Keys = Keys { read: &["translation_bound", "rotation_bound"], unuse
 const LINK: Keys = Keys { read: &["joint", "theta_offset", "d", "a", "alpha", "limits"], unused: &[] };
 const GROUND_TRUTH: Keys = Keys { read: &["rostopic", "lever_arm"], unused: &["frame_id"] };
 
-/// What a document holds beyond the keys that are read.
+/// Keys of a document that are not read.
 #[derive(Default)]
 struct Found {
     /// Paths of unknown keys, with the nearest known key.
@@ -110,7 +110,7 @@ struct Found {
     unused: Vec<String>,
 }
 
-/// Checks every key of a rig or of Kalibr's camera chain; returns the paths of known keys without a use here.
+/// Checks every key of a rig or of Kalibr's camera chain; returns the paths of known but unused keys.
 pub(super) fn check_rig(document: &Value, file: &Path) -> Result<Vec<String>, LogError> {
     let mut found = Found::default();
     check_root(document, &mut found);
@@ -128,7 +128,7 @@ pub(super) fn check_imu_file(document: &Value, file: &Path) -> Result<Vec<String
     found.into_result(file)
 }
 
-/// Whether a key is a name with a number behind it, such as `cam0`.
+/// True for a name followed by a number, such as `cam0`.
 fn is_numbered(key: &str, name: &str) -> bool {
     key.strip_prefix(name).is_some_and(|number| number.parse::<u32>().is_ok())
 }
@@ -202,9 +202,9 @@ impl Found {
         self.unknown.push((full(), nearest));
     }
 
-    /// The unused keys, or an error about the unknown ones.
+    /// Returns the unused keys, or an error about the unknown ones.
     fn into_result(self, file: &Path) -> Result<Vec<String>, LogError> {
-        /// Further unknown keys that one message lists.
+        /// Largest number of further unknown keys in a message.
         const MAX_LISTED: usize = 8;
         let Some(((field, nearest), others)) = self.unknown.split_first() else { return Ok(self.unused) };
         let mut problem = match field.rsplit_once('.') {

@@ -1,4 +1,4 @@
-//! `mask` of a camera: a PNG beside the rig file, or attached to the log like the rig itself.
+//! `mask` of a camera: a PNG next to the rig file, or attached to the log like the rig itself.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -16,7 +16,7 @@ use crate::sensors::{CameraMask, GrayImage, ImageMask};
 /// Largest file of a mask in bytes.
 const MAX_MASK_BYTES: u64 = 64 << 20;
 
-/// The facts of a log, and the files in the folder of a rig.
+/// Facts of a log, and the files in the folder of a rig.
 pub(super) struct InFolder<'a> {
     pub(super) facts: &'a dyn CameraFacts,
     pub(super) folder: &'a Path,
@@ -32,7 +32,7 @@ impl CameraFacts for InFolder<'_> {
     }
 
     fn file_beside_rig(&self, name: &str) -> Result<Vec<u8>, String> {
-        // A rig of somebody else names files of its own folder, and no device.
+        // Only names within the rig's folder are accepted, since a rig may come from elsewhere.
         if !Path::new(name).components().all(|part| matches!(part, Component::Normal(_))) {
             return Err("expected a file in the folder of the rig".into());
         }
@@ -51,7 +51,7 @@ impl CameraFacts for InFolder<'_> {
     }
 }
 
-/// The facts of a log, and its attachments.
+/// Facts of a log, and its attachments.
 pub(super) struct Attached<'a>(pub(super) &'a FlightLog);
 
 impl CameraFacts for Attached<'_> {
@@ -73,18 +73,18 @@ fn file_name(name: &str) -> &str {
     name.rsplit(['/', '\\']).next().unwrap_or(name)
 }
 
-/// The mask that a camera names, `None` when it names none.
+/// Reads the mask of a camera, `None` if the rig has no mask.
 pub(super) fn read(
     camera: &Field<'_>,
     resolution_px: [usize; 2],
     facts: &dyn CameraFacts,
 ) -> Result<Option<CameraMask>, LogError> {
     let Some(field) = camera.field("mask").optional() else { return Ok(None) };
-    let file = field.text("the file of a PNG image beside the rig")?;
+    let file = field.text("the name of a PNG image next to the rig")?;
     let bytes = facts.file_beside_rig(file).map_err(|problem| field.error(format!("names '{file}': {problem}")))?;
     let decoded = decode_within(&bytes, ImageFormat::Png, &LogLimits::default(), None);
-    let gray = decoded
-        .map_err(|problem| field.error(format!("names '{file}', which is no PNG that can be read: {problem}")))?;
+    let gray =
+        decoded.map_err(|problem| field.error(format!("names '{file}', which is not a readable PNG: {problem}")))?;
     let gray = gray.into_luma8();
     let [width, height] = [gray.width() as usize, gray.height() as usize];
     if [width, height] != resolution_px {

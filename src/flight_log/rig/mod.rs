@@ -1,4 +1,4 @@
-//! Rig files: our own schema and Kalibr's, read and written.
+//! Rig files: this program's schema and Kalibr's, read and written.
 
 pub(crate) mod attitude;
 mod document;

@@ -13,40 +13,40 @@ use crate::sensors::{
     Rig,
 };
 
-/// The version of the schema that is read and written.
+/// Version of the schema.
 const RIG_VERSION: u64 = 1;
-/// Most joints of a gimbal: the covariance of the chain grows with the square of its links.
+/// Largest number of joints of a gimbal: the covariance of the chain grows with the square of its links.
 const MAX_LINKS: usize = 16;
-/// Most cameras of a rig.
+/// Largest number of cameras of a rig.
 const MAX_CAMERAS: usize = 16;
-/// Most fields of a rig that are only assumed.
+/// Largest number of assumed fields of a rig.
 const MAX_ASSUMED: usize = 256;
 /// Gravity for Kalibr's files, which do not contain it, in m/s².
 pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.81;
 
-/// A joint offset or twist beyond a full rotation is an angle in degrees.
+/// A joint offset or twist beyond a full revolution is an angle in degrees.
 const MAX_OFFSET_RAD: f64 = std::f64::consts::TAU;
-/// A joint that rotates further than two rotations either way has limits in degrees.
+/// A joint limit beyond two revolutions is an angle in degrees.
 const MAX_LIMIT_RAD: f64 = 2.0 * std::f64::consts::TAU;
-/// An encoder with a larger standard deviation measures nothing; 0.5 to 1 occur as degrees.
+/// An encoder with a larger standard deviation measures nothing; values of 0.5 to 1 are usually degrees.
 const MAX_SIGMA_RAD: f64 = 0.5;
 
-/// Further apart are clocks that were never set, and no delays.
+/// A larger time offset means that a clock was never set.
 const MAX_TIMESHIFT_S: f64 = 10.0;
 
-/// Values of a log for a rig that does not contain them, by image topic.
+/// Values of a log that replace missing values of a rig, by image topic.
 pub(crate) trait CameraFacts {
-    /// Camera model from `CameraInfo`, or why there is none.
+    /// Camera model from `CameraInfo`, or the reason why there is none.
     fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String>;
     /// Mean rate of the images.
     fn rate_hz(&self, image_topic: &str) -> Option<f64>;
-    /// Content of a file that the rig names, beside it or attached with it, or why there is none.
+    /// Content of a file of the rig, next to it or attached with it, or the reason why there is none.
     fn file_beside_rig(&self, _name: &str) -> Result<Vec<u8>, String> {
         Err("there is no folder to take it from".into())
     }
 }
 
-/// Without a log.
+/// Facts without a log.
 pub(super) struct NoFacts;
 
 impl CameraFacts for NoFacts {
@@ -89,7 +89,7 @@ pub(super) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraF
     Ok(Rig { name, gravity_m_per_s2, imu, cameras, gimbal, ground_truth_topic, ground_truth_lever_arm, assumed })
 }
 
-/// Where the antenna of the ground truth is.
+/// Reads the position of the ground-truth antenna.
 fn read_lever_arm(field: Field<'_>) -> Result<Option<LeverArm>, LogError> {
     const EXPECTED: &str = "3 numbers (x y z of the antenna in the IMU frame, in m), or estimate";
     let Some(field) = field.optional() else { return Ok(None) };
@@ -103,16 +103,16 @@ fn read_lever_arm(field: Field<'_>) -> Result<Option<LeverArm>, LogError> {
     Ok(Some(LeverArm::Known(lever_arm_m)))
 }
 
-/// The fields that are only assumed, each of which must be there.
+/// Reads the assumed fields; an error if the rig lacks one of them.
 fn read_assumed(root: &Field<'_>) -> Result<Vec<AssumedField>, LogError> {
-    const EXPECTED: &str = "a mapping of fields of the rig, such as cam0.intrinsics, to what is assumed";
+    const EXPECTED: &str = "a mapping of fields of the rig, such as cam0.intrinsics, to the assumption";
     let Some(assumed) = root.field("assumed").optional() else { return Ok(Vec::new()) };
     let paths = assumed.keys(EXPECTED)?;
     if paths.len() > MAX_ASSUMED {
         return Err(assumed.error(format!("{} entries, expected at most {MAX_ASSUMED}", paths.len())));
     }
     let entry = |path: &str| {
-        let reason = assumed.field(path).text("a sentence that says what is assumed")?.to_owned();
+        let reason = assumed.field(path).text("a sentence that states the assumption")?.to_owned();
         if !root.has_path(path) {
             let problem = format!(
                 "the rig has no field '{}'; remove the entry, or name a field as in cam0.intrinsics",
@@ -125,7 +125,7 @@ fn read_assumed(root: &Field<'_>) -> Result<Vec<AssumedField>, LogError> {
     paths.into_iter().map(entry).collect()
 }
 
-/// `cam0`, `cam1`, … in the order of their numbers.
+/// Keys `cam0`, `cam1`, … in the order of their numbers.
 pub(super) fn camera_keys(root: &Field<'_>) -> Result<Vec<String>, LogError> {
     let number = |key: &str| key.strip_prefix("cam").and_then(|number| number.parse::<u32>().ok());
     let mut keys: Vec<&str> = root.keys("a mapping with imu0, cam0, …")?;
@@ -137,7 +137,7 @@ pub(super) fn camera_keys(root: &Field<'_>) -> Result<Vec<String>, LogError> {
     Ok(keys.into_iter().map(str::to_owned).collect())
 }
 
-/// The IMU; Kalibr's `imu.yaml` has the same fields without a frame name.
+/// Reads the IMU; Kalibr's `imu.yaml` has the same fields without a frame name.
 pub(super) fn read_imu(imu: &Field<'_>, default_topic: Option<&str>) -> Result<ImuRig, LogError> {
     if !imu.is_present() {
         return Err(imu.unexpected("the IMU with its topic and noise densities"));
@@ -174,7 +174,7 @@ fn read_camera(camera: &Field<'_>, key: &str, facts: &dyn CameraFacts) -> Result
     read_camera_as(camera, key, mount, facts)
 }
 
-/// The fields common to rigs of this program and Kalibr's files.
+/// Reads the fields common to rigs of this program and Kalibr's files.
 pub(super) fn read_camera_as(
     camera: &Field<'_>,
     key: &str,
@@ -213,7 +213,7 @@ pub(super) fn read_camera_as(
     })
 }
 
-/// Projection, distortion, intrinsics and resolution in Kalibr's spelling and order.
+/// Reads projection, distortion, intrinsics and resolution in Kalibr's spelling and order.
 fn read_camera_model(camera: &Field<'_>) -> Result<CameraModel, LogError> {
     let model = camera.field("camera_model").text(CAMERA_MODELS)?;
     let intrinsics = camera.field("intrinsics").numbers("4 numbers (fx fy cx cy)")?;
@@ -237,7 +237,7 @@ fn read_camera_model(camera: &Field<'_>) -> Result<CameraModel, LogError> {
 const CAMERA_MODELS: &str = "pinhole, omni, eucm or ds";
 const DISTORTION_MODELS: &str = "none, radtan, plumb_bob, rational_polynomial, equidistant or fov";
 
-/// An error of a camera model with the field of the rig that it concerns.
+/// Error of a camera model with the rig field that it concerns.
 fn name_the_field(camera: &Field<'_>, error: &CameraError) -> LogError {
     match error {
         CameraError::UnknownModel { .. } => camera.field("camera_model").unexpected(CAMERA_MODELS),
@@ -256,7 +256,7 @@ fn name_the_field(camera: &Field<'_>, error: &CameraError) -> LogError {
     }
 }
 
-/// The numbers of one link.
+/// Reads the numbers of a link.
 pub(super) fn read_link(link: &Field<'_>) -> Result<DhLink, LogError> {
     let angle = |key: &str| {
         let angle_rad = link.field(key).number("an angle in rad")?;
@@ -278,7 +278,7 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
         .transpose()?;
     let source = gimbal.field("source").optional().map(|source| attitude::read(&source)).transpose()?;
     if joint_topic.is_some() && source.is_some() {
-        let problem = "is there beside gimbal.source; expected one of them: joint angles, or an attitude";
+        let problem = "is given together with gimbal.source; expected one of them: joint angles, or an attitude";
         return Err(gimbal.field("rostopic").error(problem));
     }
     let (topic, attitude) = source.map_or((joint_topic, None), |(topic, source)| (Some(topic), Some(source)));

@@ -11,7 +11,7 @@ impl Rig {
         staged.commit().map_err(|source| LogError::Io { action: "write the rig", source, path: path.to_owned() })
     }
 
-    /// The same without giving the file its name, so that it can appear together with others.
+    /// [`Self::save`] without the final rename, so that the file can appear together with others.
     pub(crate) fn stage(&self, path: &Path, appended: &str) -> Result<StagedFile, LogError> {
         let text = format!("{}{appended}", self.to_yaml());
         StagedFile::with_content(path, text.as_bytes()).map_err(|source| LogError::Io {

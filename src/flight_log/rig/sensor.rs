@@ -1,4 +1,4 @@
-//! The fields of a rig that describe a sensor beyond its model: shutter, uncertain intrinsics, scale and axes of the IMU.
+//! Rig fields of a sensor beyond its model: shutter, uncertain intrinsics, scale and axes of the IMU.
 
 use nalgebra::Matrix3;
 
@@ -6,27 +6,27 @@ use super::super::LogError;
 use super::fields::Field;
 use crate::sensors::{ImuIntrinsics, IntrinsicsSigma, KalibrImuMatrices};
 
-/// Longest readout: no camera for video reads an image slower; a larger number is one in milliseconds.
+/// Longest readout: no video camera reads an image slower; a larger number is given in milliseconds.
 const MAX_READOUT_S: f64 = 0.2;
-/// Focal lengths and distortion coefficients with a larger standard deviation are unknown.
+/// Largest standard deviation of focal lengths (ratio) and distortion coefficients.
 const MAX_INTRINSICS_RATIO: f64 = 1.0;
-/// A calibrated scale or misalignment is nearer to that of a perfect sensor than this.
+/// Largest deviation of a calibrated scale or misalignment from a perfect sensor.
 const MAX_IMU_ERROR: f64 = 0.3;
 
-/// How a camera reads its rows.
+/// Readout of a camera's rows.
 pub(super) struct Shutter {
-    /// Time in seconds from the first row to behind the last one.
+    /// Time in seconds from the first row to after the last one.
     pub(super) readout_s: f64,
-    /// Its standard deviation in seconds.
+    /// Standard deviation in seconds.
     pub(super) sigma_s: Option<f64>,
 }
 
-/// `readout` and its `readout_sigma`, or Kalibr's `line_delay` in seconds per row.
+/// Reads `readout` and its `readout_sigma`, or Kalibr's `line_delay` in seconds per row.
 pub(super) fn read_shutter(camera: &Field<'_>, height_px: usize) -> Result<Shutter, LogError> {
     let [readout, line_delay] = ["readout", "line_delay"].map(|key| camera.field(key));
     let (field, readout_s) = match (readout.is_present(), line_delay.is_present()) {
         (true, true) => {
-            let problem = "is there beside readout; expected one of them: readout = line_delay · height";
+            let problem = "is given together with readout; expected one of them: readout = line_delay · height";
             return Err(line_delay.error(problem));
         }
         (false, true) => {
@@ -53,7 +53,6 @@ pub(super) fn read_shutter(camera: &Field<'_>, height_px: usize) -> Result<Shutt
 
 const READOUT: &str = "seconds from the first row to the last, negative when read upwards";
 
-/// `intrinsics_sigma`.
 pub(super) fn read_intrinsics_sigma(camera: &Field<'_>) -> Result<Option<IntrinsicsSigma>, LogError> {
     let Some(sigma) = camera.field("intrinsics_sigma").optional() else { return Ok(None) };
     let ratio = |key: &str, expected: &str| {
@@ -68,7 +67,7 @@ pub(super) fn read_intrinsics_sigma(camera: &Field<'_>) -> Result<Option<Intrins
     }))
 }
 
-/// `gyroscopes` and `accelerometers` as Kalibr writes them; a matrix that is not there is the identity.
+/// Reads `gyroscopes` and `accelerometers` in Kalibr's notation; a missing matrix is the identity.
 pub(super) fn read_imu_intrinsics(imu: &Field<'_>) -> Result<ImuIntrinsics, LogError> {
     let (gyroscopes, accelerometers) = (imu.field("gyroscopes"), imu.field("accelerometers"));
     let from_imu = gyroscopes.field("C_gyro_i").optional().map(|field| field.rotation()).transpose()?;
@@ -81,7 +80,7 @@ pub(super) fn read_imu_intrinsics(imu: &Field<'_>) -> Result<ImuIntrinsics, LogE
         .ok_or_else(|| gyroscopes.field("M").error("the matrix cannot be inverted, expected one near the identity"))
 }
 
-/// `M`, scale on the diagonal and misalignment beside it.
+/// Reads `M`, with scales on the diagonal and misalignments off it.
 fn read_scale(field: &Field<'_>) -> Result<Matrix3<f64>, LogError> {
     if !field.is_present() {
         return Ok(Matrix3::identity());

@@ -30,7 +30,7 @@ fn a_rig_reads_back_as_written() {
     check_same(&odd, &parse(&yaml).unwrap());
 }
 
-/// The test rig with a source in place of its topic of joint angles.
+/// Test rig with a source in place of its topic of joint angles.
 fn with_source(source: &str) -> String {
     RIG.replace("rostopic: /joints", &format!("source: {source}"))
 }
@@ -51,7 +51,7 @@ fn every_source_of_the_gimbals_attitude_reads_back_as_written() {
         assert_eq!(gimbal.timeshift_gimbal_imu_s, -0.08);
         check_same(&rig, &parse(&rig.to_yaml()).unwrap());
     }
-    // A calibrated chain leaves the joint angles as they were.
+    // A calibrated chain leaves the joint angles unchanged.
     let mut calibrated = parse(&with_source("{topic: /g, type: quaternion, frame: body, axes: flu}")).unwrap();
     let gimbal = calibrated.gimbal.as_mut().unwrap();
     let given = gimbal.chain.clone();
@@ -99,12 +99,12 @@ fn what_a_source_lacks_is_named_with_the_possible_values() {
     let error = parse(&with_source("{topic: /tf, type: tf, frame: body, axes: flu, parent: a}")).unwrap_err();
     assert!(error.starts_with("gimbal.source.child: missing, expected the name of the gimbal's frame"), "{error}");
     let both = RIG.replace("rostopic: /joints", &format!("rostopic: /joints\n  source: {full}"));
-    assert!(parse(&both).unwrap_err().starts_with("gimbal.rostopic: is there beside gimbal.source"));
+    assert!(parse(&both).unwrap_err().starts_with("gimbal.rostopic: is given together with gimbal.source"));
     let far = RIG.replace("rostopic: /joints", "rostopic: /joints\n  timeshift_gimbal_imu: 100");
     assert!(parse(&far).unwrap_err().starts_with("gimbal.timeshift_gimbal_imu: holds 100, expected seconds"));
 }
 
-/// Equal in every number but the rotations, which are equal to within rounding.
+/// Checks that two rigs are equal in every number but the rotations, which are equal to within rounding.
 fn check_same(a: &Rig, b: &Rig) {
     let (mut b, mut worst) = (b.clone(), 0.0_f64);
     let mut settle = |a: &crate::geometry::RigidTransform, b: &mut crate::geometry::RigidTransform| {
@@ -133,7 +133,7 @@ fn check_same(a: &Rig, b: &Rig) {
     assert_eq!(*a, b);
 }
 
-/// The test rig with further lines in `cam0`, and further keys in `imu0`.
+/// Test rig with further lines in `cam0`, and further keys in `imu0`.
 fn with_sensors(camera: &str, imu: &str) -> String {
     RIG.replace("  timeshift_cam_imu: 0.0\n", &format!("  timeshift_cam_imu: 0.0\n{camera}"))
         .replace("gyroscope_random_walk: 3.9e-5}", &format!("gyroscope_random_walk: 3.9e-5{imu}}}"))
@@ -163,7 +163,7 @@ fn shutter_and_intrinsics_read_back_as_written() {
     assert!((kalibr.accelerometer_m - written.accelerometer_m).amax() < 1e-14, "{yaml}");
     again.imu.intrinsics = rig.imu.intrinsics;
     check_same(&rig, &again);
-    // What is not there is not written.
+    // Missing fields are not written.
     let yaml = parse(RIG).unwrap().to_yaml();
     assert!(["readout", "intrinsics_sigma", "gyroscopes", "accelerometers"].iter().all(|key| !yaml.contains(key)));
     // Kalibr's time from one row to the next.
@@ -179,7 +179,7 @@ fn wrong_shutters_and_intrinsics_are_named() {
     };
     check("  readout: 30\n", "", "cam0.readout: a readout of 30 s, expected seconds, at most 0.2 either way");
     check("  line_delay: 30\n", "", "cam0.line_delay: a readout of 1440 s, expected seconds");
-    check("  line_delay: 1e-5\n  readout: 0.03\n", "", "cam0.line_delay: is there beside readout");
+    check("  line_delay: 1e-5\n  readout: 0.03\n", "", "cam0.line_delay: is given together with readout");
     check("  readout_sigma: 0\n", "", "cam0.readout_sigma: holds 0, expected a standard deviation greater than 0");
     check("  intrinsics_sigma: {focal: 0.01, centre: 5}\n", "", "cam0.intrinsics_sigma.distortion: missing, expected");
     check(
@@ -295,7 +295,7 @@ fn an_unknown_key_is_named_with_the_nearest_known_one() {
             "mount: gimbal\n  T_imu_cam: []",
             "cam0.T_imu_cam: unknown key, expected T_cam_imu, the inverse",
         ),
-        // A required key is missing, and the text says what may be meant for it.
+        // A required key is missing, and the text names the key that may be meant.
         (
             "gravity: 9.81",
             "gravty: 9.81",
@@ -347,7 +347,7 @@ fn angles_in_degrees_are_named_with_their_radians() {
     }
     let message = parse(&RIG.replacen("theta_offset: -1.56", "theta_offset: -90", 1)).unwrap_err();
     assert!(message.contains("(-90° are -1.570796)"), "{message}");
-    // A slip ring that is limited to two rotations, and a full rotation as an offset.
+    // A slip ring with limits of two revolutions, and a full revolution as an offset.
     assert!(parse(&RIG.replacen("[-3.14, 3.14]", "[-12.5, 12.5]", 1)).is_ok());
     assert!(parse(&RIG.replacen("theta_offset: -1.56", "theta_offset: 6.28", 1)).is_ok());
 }
@@ -419,7 +419,7 @@ fn kalibrs_files_are_a_rig() {
     assert!((imu_from_camera.inverse().translation_m.x - 0.065).abs() < 1e-15);
     check_same(&rig, &parse(&rig.to_yaml()).unwrap());
 
-    // The file of a named run, with the IMU nested as Kalibr's result has it.
+    // File of a named run, with the IMU nested as in Kalibr's result.
     let chain = folder.path().join("camchain-imucam-flight.yaml");
     fs::write(&chain, CAMERA_CHAIN).unwrap();
     let nested = format!("  {}", IMU.trim_end().replace('\n', "\n  "));
@@ -443,7 +443,7 @@ fn keys_of_kalibr_without_a_use_are_listed() {
     let log = FlightLog::open(&path).unwrap();
     let (_, unused) = Rig::for_log_with_unused_keys(&log, Some(&chain)).unwrap();
     assert_eq!(unused, ["cam0.T_cn_cnm1", "cam0.cam_overlaps", "T_i_b", "model", "time_offset"]);
-    // An unknown key of the IMU's own file is named with that file.
+    // An unknown key of the IMU file is reported with that file.
     fs::write(folder.path().join("imu.yaml"), format!("{IMU}updaterate: 1\n")).unwrap();
     let message = Rig::for_log(&log, Some(&chain)).unwrap_err().to_string();
     assert!(

@@ -9,8 +9,9 @@ use crate::gimbal::DhLink;
 use crate::sensors::{AssumedField, CameraMount, CameraRig, GimbalRig, ImuIntrinsics, LeverArm, Rig};
 
 impl Rig {
-    /// The rig as a YAML file, its chain in the classical parameterization. Numbers are written so that they read back
-    /// exactly; rotation matrices read back to within rounding.
+    /// Returns the rig as a YAML file, with its chain in the classical parameterization. Numbers read back exactly;
+    /// rotation
+    /// matrices read back to within rounding.
     pub fn to_yaml(&self) -> String {
         let mut out = String::from("# T_a_b maps points from b to a; metres, radians, seconds.\n");
         line(&mut out, 0, "rig_version", "1");
@@ -55,9 +56,9 @@ impl Rig {
     }
 }
 
-/// Kalibr's matrices, where they are not the identity.
+/// Writes Kalibr's matrices, unless they are the identity.
 fn write_imu_intrinsics(out: &mut String, intrinsics: &ImuIntrinsics) {
-    // A rig that was read has invertible corrections; an estimate that has none is no calibration to write down.
+    // A rig that was read has invertible corrections; a singular estimate is not a calibration.
     let Some(kalibr) = intrinsics.to_kalibr().filter(|_| !intrinsics.is_identity()) else { return };
     line(out, 1, "gyroscopes", "");
     write_matrix(out, 2, "M", &kalibr.gyroscope_m);
@@ -143,7 +144,7 @@ fn write_gimbal(out: &mut String, gimbal: &GimbalRig) {
     write_transform(out, 1, "T_E_C", &gimbal.chain.effector_from_camera);
 }
 
-/// What follows `theta_offset` in a link.
+/// Writes the numbers after `theta_offset` of a link.
 fn write_lengths(out: &mut String, depth: usize, link: &DhLink) {
     line(out, depth, "d", &number(link.d_m));
     line(out, depth, "a", &number(link.a_m));

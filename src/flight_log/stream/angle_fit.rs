@@ -1,21 +1,21 @@
-//! A joint's angle at a stamp, estimated from encoder readings around it, and its variance.
+//! Joint angle at a stamp, estimated from encoder readings around it, and its variance.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// A reading: seconds relative to the stamp, and the angle in radians, not wrapped.
+/// Seconds relative to the stamp, and the angle in radians, not wrapped.
 pub(crate) type Reading = (f64, f64);
 
-/// The estimated angle at the stamp.
+/// Estimated angle at the stamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FittedAngle {
     pub(crate) angle_rad: f64,
     pub(crate) rate_rad_per_s: f64,
     /// Variance from white noise of the readings and the prior on the acceleration.
     pub(crate) variance_rad2: f64,
-    /// The same of the rate, in rad²/s².
+    /// Variance of the rate, in rad²/s².
     pub(crate) rate_variance: f64,
     pub(crate) acceleration_rad_per_s2: f64,
-    /// The same of the acceleration, in rad²/s⁴.
+    /// Variance of the acceleration, in rad²/s⁴.
     pub(crate) acceleration_variance: f64,
 }
 
@@ -26,8 +26,8 @@ pub(crate) struct FittedAngle {
 /// fitted with a line (least variance), those finer than about 0.1° with a parabola (least bias).
 const ACCELERATION_RAD_PER_S2: f64 = 10.0;
 
-/// The angle at the stamp from a parabola through the readings: least squares with white noise of the given variance on
-/// every reading and a prior of [`ACCELERATION_RAD_PER_S2`] on the acceleration.
+/// Estimates the angle at the stamp by a parabola through the readings: least squares with white noise of the given
+/// variance on every reading and a prior of [`ACCELERATION_RAD_PER_S2`] on the acceleration.
 ///
 /// It is the linear estimate with minimum mean square error for such a motion, and exact for a constant rate. Returns
 /// `None` for readings at fewer than two stamps.
@@ -63,7 +63,8 @@ struct Parabola {
 }
 
 impl Parabola {
-    /// `curvature_sigma` is the prior standard deviation of the second-order coefficient, in rad/s².
+    /// Fits the coefficients; `curvature_sigma` is the prior standard deviation of the second-order coefficient, in
+    /// rad/s².
     fn fit(readings: &[Reading], variance: f64, curvature_sigma: Option<f64>) -> Option<Self> {
         let span_s = readings.iter().map(|(time_s, _)| time_s.abs()).fold(0.0, f64::max);
         if span_s <= 0.0 || variance <= 0.0 {

@@ -1,4 +1,4 @@
-//! The gimbal's attitude as samples of all joints.
+//! Conversion of the gimbal's attitude to samples of all joints.
 
 use std::sync::Arc;
 
@@ -13,20 +13,22 @@ use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::gimbal::{InverseChain, InverseSolution};
 use crate::sensors::{AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig, JointSample};
 
-/// Rotations that the joints cannot make are reported from this size on: noise and inaccurate chains stay below it.
+/// Smallest reported rotation that the joints cannot reach: noise and inaccurate chains stay below it.
 const UNREACHABLE_RAD: f64 = 0.035;
-/// Stretches of reported samples that are closer together than this are one.
+/// Stretches of reported samples that are closer together than this are merged.
 const STRETCH_NS: i64 = 1_000_000_000;
-/// Reading of the vehicle's attitude starts so much earlier than that of the gimbal's.
+/// Reading of the vehicle's attitude starts this much earlier than that of the gimbal's.
 const VEHICLE_MARGIN_NS: i64 = 1_200_000_000;
-/// Distances before the wanted start from which reading is tried for a sample that does not depend on those before it; after
-/// that it begins with the log.
+/// Times before the wanted start at which reading is tried, to find a sample that does not depend on earlier ones;
+/// after
+/// these it starts at the beginning of the log.
 const EARLIER_NS: [i64; 4] = [0, 4_000_000_000, 16_000_000_000, 64_000_000_000];
 
-/// Samples of all joints in time order, by inverting the rig's chain.
+/// Samples of all joints in time order, computed by inverting the rig's chain.
 ///
-/// A sample depends on the one before it near a singularity, and where the limits admit two solutions. So that the samples are
-/// the same wherever reading starts, it starts with a sample that depends on none, or with the log.
+/// A sample depends on the one before it near a singularity, and where the limits admit two solutions. Reading starts
+/// with
+/// a sample that depends on none, or with the log, so that the samples do not depend on the start of reading.
 pub(super) struct AttitudeJoints {
     gimbal: GimbalReadings,
     vehicle: Option<Lookup<UnitQuaternion<f64>>>,
@@ -41,19 +43,19 @@ pub(super) struct AttitudeJoints {
     warnings: Vec<String>,
 }
 
-/// The readings of the gimbal in time order.
+/// Readings of the gimbal in time order.
 enum GimbalReadings {
     Messages(OrderedSamples<AttitudeValue>),
     Transforms { samples: OrderedSamples<Vec<MovedTransform>>, merge: TransformMerge, ended: bool },
 }
 
-/// A reading of one of the transforms of a path.
+/// Reading of one of the transforms of a path.
 type MovedTransform = (usize, i64, UnitQuaternion<f64>);
 
-/// Consecutive samples with one problem.
+/// Consecutive samples with the same problem.
 #[derive(Debug, Default)]
 struct Stretch {
-    /// First and last stamp, the largest value.
+    /// First and last stamp, and the largest value.
     open: Option<(i64, i64, f64)>,
 }
 
@@ -106,7 +108,7 @@ impl AttitudeJoints {
                 let clock = StampClock::of(log, vehicle, kind)?;
                 warnings.extend(clock.warning(vehicle));
                 let decoder = vehicle_decoder(source.clone(), kind, clock);
-                // The gimbal's stamps may be shifted back against these, and its messages recorded later.
+                // The gimbal's stamps may be shifted back relative to these, and its messages recorded later.
                 let shift_ns = ns_from_seconds(gimbal.timeshift_gimbal_imu_s).min(0);
                 let from_ns = from_ns.saturating_add(shift_ns).saturating_sub(VEHICLE_MARGIN_NS);
                 Some(Lookup::new(OrderedSamples::new(log, vehicle, from_ns, false, decoder)))
@@ -131,7 +133,7 @@ impl AttitudeJoints {
         })
     }
 
-    /// The next sample, `None` at the end of the log.
+    /// Next sample, `None` at the end of the log.
     pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<JointSample> {
         for warning in self.warnings.drain(..) {
             context.warn(0, warning);
@@ -170,8 +172,8 @@ impl AttitudeJoints {
     fn report_unreachable(&mut self, context: &mut ReadContext, now_ns: i64) {
         let Some((first_ns, last_ns, largest_rad)) = self.unreachable.ended_before(now_ns) else { return };
         let message = format!(
-            "{}: up to {:.1}° of the attitude from {:.3} s to {:.3} s are a rotation that the joints cannot make within their limits; \
-             joint angles are the nearest (check gimbal.source, links and limits)",
+            "{}: up to {:.1}° of the attitude from {:.3} s to {:.3} s cannot be reached by the \
+             joints within their limits; the nearest joint angles are used (check gimbal.source, links and limits)",
             self.topic,
             largest_rad.to_degrees(),
             seconds_from_ns(first_ns),
@@ -204,7 +206,7 @@ impl Stretch {
         self.open = Some((first_ns, stamp_ns, largest.max(value)));
     }
 
-    /// The stretch, when it ended long enough before a stamp.
+    /// Returns the stretch if it ended long enough before a stamp.
     fn ended_before(&mut self, now_ns: i64) -> Option<(i64, i64, f64)> {
         self.open.take_if(|(_, last_ns, _)| now_ns.saturating_sub(*last_ns) > STRETCH_NS)
     }
@@ -253,7 +255,7 @@ fn vehicle_decoder(rig: AttitudeSource, kind: MessageKind, clock: StampClock) ->
     })
 }
 
-/// The transforms of the path in a message; messages without one are passed over.
+/// Reads the transforms of the path from a message; messages without one are skipped.
 fn transform_decoder(path: TransformPath, epoch_ns: i64) -> Decoder<Vec<MovedTransform>> {
     Box::new(move |source: MessageSource<'_>| {
         let entries = messages::read_transforms(source.data).map_err(|error| Refusal::not_decodable(&error))?;

@@ -13,23 +13,23 @@ use super::ordered::{Decoder, Lookup, MessageSource, OrderedSamples, ReadContext
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraRig, GrayImage, ImuSample, NEAREST_POSE_NS, PoseSample, Rig};
 
-/// Length of the IMU samples before the first frame.
+/// Duration of the IMU samples before the first frame.
 const FIRST_FRAME_IMU_NS: i64 = 2_000_000_000;
-/// Largest delay of log times after header stamps; reading starts that much earlier.
+/// Largest delay of log times after header stamps; reading starts this much earlier.
 const SEEK_MARGIN_NS: i64 = 1_000_000_000;
 /// Longer gaps between IMU samples, in periods, are reported.
 const IMU_GAP_PERIODS: f64 = 3.5;
 /// Longer gaps between images, in periods, are reported.
 const IMAGE_GAP_PERIODS: f64 = 1.75;
 
-/// An image message that is not decoded yet.
+/// Image message that is not decoded yet.
 struct PendingImage {
     number: usize,
     log_time_ns: i64,
     content: ImageContent,
 }
 
-/// Images are decoded when they are due, pictures of a video in the order of their messages.
+/// Images are decoded on demand, video frames in the order of their messages.
 enum ImageContent {
     Message(Vec<u8>),
     Decoded(GrayImage),
@@ -47,19 +47,19 @@ pub(super) struct FrameSource {
     samples: VecDeque<ImuSample>,
     joints: Option<JointAngleStream>,
     ground_truth: Option<Lookup<PoseSample>>,
-    /// IMU interpolated at the previous frame's end.
+    /// IMU sample interpolated at the previous frame's end.
     previous_end: Option<ImuSample>,
     start_ns: i64,
     end_ns: i64,
-    /// Warnings of the log itself that are not reported yet.
+    /// Warnings of the log that are not reported yet.
     log_warnings: VecDeque<LogWarning>,
-    /// Images before the first IMU sample.
+    /// Number of images before the first IMU sample.
     skipped: usize,
-    /// Length of the samples after a stamp that its frame has.
+    /// Duration of the samples after a stamp in its frame.
     after_ns: i64,
 }
 
-/// A camera's topic and its expected rate and size.
+/// Topic of a camera with its expected rate and size.
 struct CameraStream {
     images: OrderedSamples<PendingImage>,
     /// Number of images in the log.
@@ -137,12 +137,12 @@ impl FrameSource {
         })
     }
 
-    /// Frames with the IMU samples of so many seconds after their stamps, as far as the log has them.
+    /// Adds to each frame the IMU samples of `after_s` seconds after its stamp, as far as the log has them.
     pub(super) fn with_motion_after(self, after_s: f64) -> Self {
         Self { after_ns: ns_from_seconds(after_s), ..self }
     }
 
-    /// The next frame, `None` at the end of the log or of the requested duration.
+    /// Next frame, `None` at the end of the log or of the requested duration.
     pub(super) fn next_frame(&mut self) -> Option<SensorFrame> {
         loop {
             let (stamp_ns, pending) = self.camera.images.next(&mut self.context)?;
@@ -229,7 +229,7 @@ impl FrameSource {
         }
     }
 
-    /// The samples from the previous frame's end to `end_ns`, both ends interpolated.
+    /// Removes and returns the samples from the previous frame's end to `end_ns`, both ends interpolated.
     fn take_imu(&mut self, end_ns: i64) -> Vec<ImuSample> {
         let start_ns = self.previous_end.map_or(end_ns - FIRST_FRAME_IMU_NS, |previous| previous.stamp_ns);
         let mut imu: Vec<ImuSample> = self.previous_end.into_iter().collect();
@@ -250,7 +250,7 @@ impl FrameSource {
         imu
     }
 
-    /// The samples from the end of the frame on, the first one interpolated at it.
+    /// Samples from the end of the frame on, the first one interpolated there.
     fn imu_after(&mut self, end_ns: i64) -> Vec<ImuSample> {
         if self.after_ns == 0 {
             return Vec::new();
@@ -322,7 +322,7 @@ impl CameraStream {
         self.previous_stamp_ns = Some(stamp_ns);
     }
 
-    /// The image, or `None` and a warning with the reason why it is skipped.
+    /// Decoded image, or `None` and a warning with the reason why it is skipped.
     fn decode(&self, context: &mut ReadContext, stamp_ns: i64, pending: PendingImage) -> Option<GrayImage> {
         let message = match pending.content {
             ImageContent::Message(message) => message,
@@ -366,7 +366,7 @@ fn interpolate_imu(from: &ImuSample, to: &ImuSample, stamp_ns: i64) -> ImuSample
     }
 }
 
-/// What is wrong with an image of a camera.
+/// Description of a problem with a camera's image.
 fn problem_text(problem: ImageProblem, resolution_px: [usize; 2], key: &str) -> String {
     match problem {
         ImageProblem::OtherResolution([width, height]) => {
@@ -376,7 +376,7 @@ fn problem_text(problem: ImageProblem, resolution_px: [usize; 2], key: &str) -> 
     }
 }
 
-/// Decodes the pictures of a video topic; a number that is left out is a message that could not be read.
+/// Decodes the frames of a video topic; a skipped number is an unreadable message.
 fn picture_decoder(log: &FlightLog, kind: MessageKind, camera: &CameraRig) -> Decoder<PendingImage> {
     let (epoch_ns, limits) = (log.epoch_ns(), log.file().limits().clone());
     let (resolution_px, key) = (camera.model.resolution_px, camera.key.clone());
@@ -385,7 +385,7 @@ fn picture_decoder(log: &FlightLog, kind: MessageKind, camera: &CameraRig) -> De
         let packet = messages::read_video_packet(kind, source.data).map_err(|error| Refusal::not_decodable(&error));
         let packet = packet.inspect_err(|_| stream.lose_message())?;
         let image = stream.decode(source.number, &packet, &limits, Some(resolution_px)).map_err(|problem| Refusal {
-            reason: "the picture cannot be decoded",
+            reason: "the frame cannot be decoded",
             detail: problem_text(problem, resolution_px, &key),
         })?;
         let log_time_ns = relative_ns(i64::try_from(source.position.log_time_ns).unwrap_or(i64::MAX), epoch_ns);
@@ -405,7 +405,7 @@ fn image_decoder(kind: MessageKind, epoch_ns: i64) -> Decoder<PendingImage> {
     })
 }
 
-/// The gimbal's joint angles, `None` without a gimbal or encoders.
+/// Joint angles of the gimbal, `None` without a gimbal or encoders.
 fn joint_angles(
     log: &Arc<FlightLog>,
     rig: &Rig,
@@ -418,14 +418,14 @@ fn joint_angles(
     Ok(Some(JointAngleStream::new(samples, sigma_rad, half_interval_ns)))
 }
 
-/// Ground-truth poses `world_from_imu`, `None` when the rig names no topic or the log has none.
+/// Ground-truth poses `world_from_imu`, `None` if the rig has no such topic or the log lacks it.
 fn ground_truth_samples(
     log: &FlightLog,
     rig: &Rig,
     from_ns: i64,
     context: &mut ReadContext,
 ) -> Option<OrderedSamples<PoseSample>> {
-    // Positions are no poses of the IMU: they are compared with whole trajectories.
+    // Positions are not poses of the IMU: they are compared with whole trajectories.
     let topic = rig.ground_truth_topic.as_ref().filter(|topic| !log.is_position_topic(topic))?;
     let kinds = [MessageKind::Odometry, MessageKind::PoseStamped, MessageKind::TransformStamped];
     let kind = match log.require_topic("ground_truth.rostopic", topic, &kinds) {

@@ -1,4 +1,4 @@
-//! The IMU of a log: one topic, or gyroscope and accelerometer apart.
+//! IMU of a log: one topic, or separate topics of gyroscope and accelerometer.
 
 use nalgebra::Vector3;
 
@@ -15,11 +15,11 @@ pub(super) struct ImuStream {
     intrinsics: ImuIntrinsics,
 }
 
-/// Samples as they are measured.
+/// Uncorrected samples.
 enum ImuSource {
     /// All six values in each message.
     Together(Box<OrderedSamples<ImuSample>>),
-    /// Angular velocities and specific forces on topics of their own.
+    /// Angular velocities and specific forces on separate topics.
     Apart(Box<SeparateSensors>),
 }
 
@@ -50,7 +50,7 @@ impl ImuStream {
         Ok(Self { source: ImuSource::Apart(Box::new(sensors)), intrinsics: rig.intrinsics })
     }
 
-    /// Reports what was dropped last.
+    /// Reports the last dropped messages.
     pub(super) fn finish(&mut self, context: &mut ReadContext) {
         match &mut self.source {
             ImuSource::Together(samples) => samples.finish(context),
@@ -61,7 +61,7 @@ impl ImuStream {
         }
     }
 
-    /// The next sample, `None` at the end of the log.
+    /// Next sample, `None` at the end of the log.
     pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<ImuSample> {
         let measured = match &mut self.source {
             ImuSource::Together(samples) => samples.next(context).map(|(_, sample)| sample),
@@ -88,7 +88,7 @@ impl SeparateSensors {
     }
 }
 
-/// Samples of all six values.
+/// Decodes samples with all six values.
 fn sample_decoder(epoch_ns: i64) -> Decoder<ImuSample> {
     Box::new(move |source: MessageSource<'_>| {
         let imu = messages::read_imu(source.data).map_err(|error| Refusal::not_decodable(&error))?;
@@ -102,7 +102,7 @@ fn sample_decoder(epoch_ns: i64) -> Decoder<ImuSample> {
     })
 }
 
-/// One of the two vectors; drivers leave the other one unset.
+/// Decodes one of the two vectors; drivers leave the other one unset.
 fn vector_decoder(name: &'static str, value: fn(&ImuMessage) -> Vector3<f64>) -> Decoder<Vector3<f64>> {
     Box::new(move |source: MessageSource<'_>| {
         let imu = messages::read_imu(source.data).map_err(|error| Refusal::not_decodable(&error))?;

@@ -1,4 +1,4 @@
-//! The joint angles at an image's stamp, from all encoder readings around it.
+//! Joint angles at an image's stamp, from all encoder readings around it.
 
 use std::collections::VecDeque;
 
@@ -8,21 +8,23 @@ use super::ordered::ReadContext;
 use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::sensors::{JointAngles, JointMotionFit, JointSample};
 
-/// Largest distance of a reading from the stamp at which it is used.
+/// Largest distance between a stamp and the readings used for it.
 const NEAREST_NS: i64 = 100_000_000;
-/// The same of an attitude, of which some gimbals record 5 per second.
+/// The same for attitudes, which some gimbals record 5 times per second.
 const NEAREST_ATTITUDE_NS: i64 = 150_000_000;
-/// Between two attitudes a joint deviates from a constant rate by about this much of its rotation from one to the other: half way
-/// between them, one standard deviation. A joint that rotates during one half of the time only deviates by four times as much.
+/// Standard deviation, half way between two attitudes, of a joint's deviation from a constant rate, relative to its
+/// rotation
+/// between them. A joint that rotates only during one half of the time deviates four times as much.
 const DEVIATION_OF_ROTATION: f64 = 1.0 / 16.0;
-/// Largest half length of a batch; over longer spans a stabilized joint does not follow a parabola.
+/// Largest half length of a batch; over longer times a stabilized joint does not follow a parabola.
 const MAX_HALF_BATCH_NS: i64 = 25_000_000;
-/// The rate is fitted to this many times the batch on either side, neighbouring batches included: its noise falls with the
+/// The rate is fitted to this many times the batch on either side, neighbouring batches included: its noise falls with
+/// the
 /// length to the power of −3/2, and noise on a rate biases an estimated time offset towards zero.
 const RATE_BATCHES: i64 = 2;
 /// Minimum number of readings of a batch; two cannot be averaged.
 const MIN_BATCH: usize = 3;
-/// Standard deviation of a joint's rate where a single reading does not constrain it.
+/// Standard deviation of a joint's rate if a single reading does not constrain it.
 const UNKNOWN_RATE_RAD_PER_S: f64 = 1.0;
 
 /// Joint angles of a log at the stamps of images.
@@ -33,14 +35,15 @@ pub(super) struct JointAngleStream {
 }
 
 impl JointAngleStream {
-    /// `sigma_rad` is the rig's standard deviation of a reading, `half_interval_ns` half an image interval.
+    /// Creates the stream; `sigma_rad` is the rig's standard deviation of a reading, `half_interval_ns` half an image
+    /// interval.
     pub(super) fn new(samples: JointSamples, sigma_rad: f64, half_interval_ns: i64) -> Self {
         let average = EncoderAverage::new(sigma_rad, half_interval_ns);
         let average = if samples.are_of_attitude() { average.of_attitude() } else { average };
         Self { samples, ended: false, average }
     }
 
-    /// The angles in radians at a stamp, `None` without a reading near it; stamps must not decrease, and `previous_ns` is
+    /// Angles in radians at a stamp, `None` without a reading near it; stamps must not decrease, and `previous_ns` is
     /// the stamp of the previous image.
     pub(super) fn at(
         &mut self,
@@ -70,7 +73,7 @@ pub(super) struct EncoderAverage {
     noise: WhiteNoise,
     sigma_rad: f64,
     half_batch_ns: i64,
-    /// Whether the readings are of an attitude, which may be further apart than images.
+    /// True for readings of an attitude, which may be further apart than images.
     of_attitude: bool,
 }
 
@@ -85,18 +88,19 @@ impl EncoderAverage {
         }
     }
 
-    /// For readings of an attitude: they are interpolated over larger gaps, with an uncertainty that grows with the gap and with
-    /// the rotation in it, and the rate over the gap counts.
+    /// Sets that the readings are attitudes: they are interpolated over larger gaps, with an uncertainty that grows
+    /// with the
+    /// gap and with the rotation in it, and the rate over the gap is used.
     pub(super) fn of_attitude(self) -> Self {
         Self { of_attitude: true, ..self }
     }
 
-    /// Largest distance of a reading from the stamp at which it is used.
+    /// Largest distance between a stamp and the readings used for it.
     fn nearest_ns(&self) -> i64 {
         if self.of_attitude { NEAREST_ATTITUDE_NS } else { NEAREST_NS }
     }
 
-    /// Whether readings that belong to a stamp may still be missing.
+    /// True if readings that belong to a stamp may still be missing.
     pub(super) fn needs_readings(&self, stamp_ns: i64) -> bool {
         let end_ns = stamp_ns.saturating_add(RATE_BATCHES * self.half_batch_ns);
         self.readings.back().is_none_or(|last| last.stamp_ns <= end_ns)
@@ -108,7 +112,7 @@ impl EncoderAverage {
         self.readings.push_back(sample);
     }
 
-    /// The angles in radians at a stamp, with their standard deviations and rates.
+    /// Angles in radians at a stamp, with their standard deviations and rates.
     pub(super) fn at(&mut self, stamp_ns: i64, previous_ns: Option<i64>) -> Option<JointAngles> {
         let end_ns = stamp_ns.saturating_add(self.half_batch_ns);
         let reach_ns = RATE_BATCHES * self.half_batch_ns;
@@ -129,7 +133,7 @@ impl EncoderAverage {
         }
         let span = (pair.len() == 2).then(|| (pair[0].stamp_ns, pair[1].stamp_ns));
         let span = span.filter(|(first_ns, second_ns)| *first_ns <= stamp_ns && second_ns > first_ns);
-        // Of an attitude, the readings on both sides count however the distances are shared.
+        // For an attitude, one reading on either side suffices, if their distance is small enough.
         let between = span.is_some_and(|(first_ns, second_ns)| {
             let farthest_ns = (second_ns - stamp_ns).max(stamp_ns - first_ns);
             if self.of_attitude { second_ns - first_ns <= 2 * nearest_ns } else { farthest_ns <= nearest_ns }
@@ -148,7 +152,7 @@ impl EncoderAverage {
                 let variance = fitted.variance_rad2 + lasting;
                 (variance < given).then_some((fitted.angle_rad, variance, lasting))
             });
-            // Two readings that neighbouring images may use as well: interpolated without averaging.
+            // Two readings that neighbouring images may use as well are interpolated without averaging.
             let interpolated = || {
                 let fitted = angle_fit::fit(&near(&pair), given).filter(|_| between)?;
                 let rotated_rad = wrap_angle(pair[1].angles_rad[joint] - pair[0].angles_rad[joint]);
@@ -185,7 +189,7 @@ impl EncoderAverage {
     }
 }
 
-/// One joint's readings relative to a stamp, unwrapped around `around_rad`.
+/// Readings of one joint relative to a stamp, unwrapped around `around_rad`.
 fn readings_of(samples: &[&JointSample], joint: usize, around_rad: f64, stamp_ns: i64) -> Vec<Reading> {
     samples
         .iter()
@@ -204,16 +208,17 @@ struct MeasuredNoise {
 }
 
 impl MeasuredNoise {
-    /// Two standard deviations of the measurement above the measured variance.
+    /// Measured variance plus two standard deviations of its measurement.
     fn upper_bound(&self) -> f64 {
         self.variance * (1.0 + 2.0 * (2.0 / self.freedom as f64).sqrt())
     }
 }
 
-/// Length of the blocks within which the white noise is measured. They start at multiples of it since the log began: the
-/// result must not depend on where a replay starts.
+/// Length of the blocks within which the white noise is measured. They start at multiples of it since the start of the
+/// log,
+/// so that the result does not depend on the start of a replay.
 const BLOCK_NS: i64 = 50_000_000;
-/// Number of blocks that are pooled; a replay reads that many blocks before its start.
+/// Number of blocks that are pooled; a replay reads this many blocks before its start.
 const BLOCKS: i64 = 40;
 /// Minimum degrees of freedom of a noise measurement.
 const MIN_DEGREES_OF_FREEDOM: usize = 50;
@@ -221,9 +226,9 @@ const MIN_DEGREES_OF_FREEDOM: usize = 50;
 /// Measures the white noise of each joint's readings about a smooth motion.
 #[derive(Debug, Default)]
 struct WhiteNoise {
-    /// The block that is still being filled.
+    /// Readings of the block that is still being filled.
     open: Vec<JointSample>,
-    /// Number of the block, and per joint the squares and their degrees of freedom.
+    /// Number of the block, and per joint the sum of squares and its degrees of freedom.
     blocks: VecDeque<(i64, Vec<(f64, usize)>)>,
 }
 
@@ -237,7 +242,7 @@ impl WhiteNoise {
             }
         }
         self.open.push(sample.clone());
-        // One more than is pooled: reading is ahead of the requested stamps.
+        // More blocks than are pooled, because reading is ahead of the requested stamps.
         while self.blocks.front().is_some_and(|(block, _)| *block < number - 2 * BLOCKS) {
             self.blocks.pop_front();
         }
@@ -254,7 +259,7 @@ impl WhiteNoise {
         self.blocks.push_back((number, (0..first.angles_rad.len()).map(scatter).collect()));
     }
 
-    /// From the blocks before that of a stamp, `None` with too few readings.
+    /// White noise measured in the blocks before that of a stamp, `None` with too few readings.
     fn at(&self, stamp_ns: i64, joint: usize) -> Option<MeasuredNoise> {
         let number = stamp_ns.div_euclid(BLOCK_NS);
         let (squares, freedom) = self

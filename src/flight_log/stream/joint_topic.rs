@@ -1,4 +1,4 @@
-//! The joint angles of a log as samples of all joints, whatever they are recorded as.
+//! Joint angles of a log as samples of all joints, for every kind of recording.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusa
 use crate::geometry::ns_from_seconds;
 use crate::sensors::{GimbalRig, JointSample};
 
-/// Number of messages within which every joint of the rig must be named once.
+/// Number of messages within which every joint of the rig must occur once.
 const MESSAGES_SEARCHED: usize = 1000;
 
 /// Samples of all joints in time order.
@@ -20,7 +20,7 @@ pub(super) struct JointSamples {
     timeshift_ns: i64,
 }
 
-/// What the samples are made of.
+/// Source of the samples.
 enum JointSource {
     Encoders(Box<EncoderJoints>),
     Attitude(Box<AttitudeJoints>),
@@ -38,19 +38,19 @@ impl JointSamples {
         Ok(Self { source, timeshift_ns })
     }
 
-    /// Whether they are made of an attitude, at lower rates than encoders have.
+    /// True for samples computed from an attitude, at lower rates than encoders have.
     pub(super) fn are_of_attitude(&self) -> bool {
         matches!(self.source, JointSource::Attitude(_))
     }
 
-    /// The next sample, `None` at the end of the log.
+    /// Next sample, `None` at the end of the log.
     pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<JointSample> {
         match &mut self.source {
             JointSource::Encoders(joints) => {
                 let sample = joints.next(context)?;
                 Some(JointSample { stamp_ns: sample.stamp_ns.saturating_add(self.timeshift_ns), ..sample })
             }
-            // The shift is of the gimbal alone; the vehicle's attitude has the time of the IMU.
+            // The time offset applies to the gimbal alone; the vehicle's attitude is in IMU time.
             JointSource::Attitude(joints) => joints.next(context),
         }
     }
@@ -102,7 +102,7 @@ impl EncoderJoints {
     }
 }
 
-/// Whether every message names all joints; an error if none of the first messages names one of the rig's joints.
+/// Returns true if every message contains all joints; an error if none of the first messages contains one of them.
 fn named_together(log: &FlightLog, topic: &str, names: &[String]) -> Result<bool, LogError> {
     let mut known: Vec<String> = Vec::new();
     let mut together = true;

@@ -1,4 +1,4 @@
-//! The frames of one camera, each with the samples of the other sensors for it.
+//! Frames of one camera, each with its samples of the other sensors.
 
 pub(crate) mod angle_fit;
 mod attitude;
@@ -24,24 +24,25 @@ const FRAMES_AHEAD: usize = 6;
 /// Messages of the reading thread.
 enum Delivery {
     Frame(Box<SensorFrame>),
-    /// The end of the log, with the warnings after the last frame.
+    /// End of the log, with the warnings after the last frame.
     End(Vec<LogWarning>),
 }
 
-/// The frames of one camera in the order of their stamps.
+/// Frames of one camera in the order of their stamps.
 ///
 /// A thread reads the log chunk by chunk, a few frames ahead; the frames do not depend on the speed of their consumer.
 #[derive(Debug)]
 pub struct FrameStream {
-    /// `None` once the end has been reached.
+    /// `None` after the end has been reached.
     receiver: Option<Receiver<Delivery>>,
     thread: Option<JoinHandle<()>>,
     remaining_warnings: Vec<LogWarning>,
 }
 
 impl FrameStream {
-    /// Starts with the camera's first frame at or after `start_s` (seconds since the log began) and ends `duration_s`
-    /// later, or with the log. Fails when the rig does not match the log; a missing ground truth is a warning.
+    /// Starts with the camera's first frame at or after `start_s` (seconds since the start of the log) and ends
+    /// `duration_s`
+    /// later, or with the log. Fails if the rig does not match the log; a missing ground truth is a warning.
     pub fn new(
         log: Arc<FlightLog>,
         rig: &Rig,
@@ -52,7 +53,8 @@ impl FrameStream {
         Self::with_motion_after(log, rig, camera_key, start_s, duration_s, 0.0)
     }
 
-    /// [`Self::new`] with the IMU samples of so many seconds after each stamp, during which the rows of a rolling shutter
+    /// [`Self::new`] with the IMU samples of `after_s` seconds after each stamp, during which the rows of a rolling
+    /// shutter
     /// are exposed.
     pub fn with_motion_after(
         log: Arc<FlightLog>,
@@ -71,7 +73,7 @@ impl FrameStream {
                     return; // the receiver was dropped
                 }
             }
-            // A dropped receiver needs no warnings either.
+            // The warnings are lost if the receiver was dropped.
             drop(sender.send(Delivery::End(source.finish())));
         };
         let thread = std::thread::Builder::new().name("log-reader".into()).spawn(read_ahead);
@@ -80,7 +82,7 @@ impl FrameStream {
         Ok(Self { receiver: Some(receiver), thread: Some(thread), remaining_warnings: Vec::new() })
     }
 
-    /// The next frame, `None` at the end.
+    /// Next frame, `None` at the end.
     pub fn next_frame(&mut self) -> Option<SensorFrame> {
         match self.receiver.as_ref()?.recv() {
             Ok(Delivery::Frame(frame)) => return Some(*frame),
@@ -94,7 +96,7 @@ impl FrameStream {
         None
     }
 
-    /// Problems of the log after the last frame; complete once `next_frame` has returned `None`.
+    /// Problems of the log after the last frame; complete after `next_frame` has returned `None`.
     pub fn remaining_warnings(&self) -> &[LogWarning] {
         &self.remaining_warnings
     }
@@ -112,7 +114,7 @@ impl Drop for FrameStream {
     fn drop(&mut self) {
         self.receiver = None; // lets the thread's next send fail, so that it ends
         if let Some(thread) = self.thread.take() {
-            // Its panic, if any, has been reported as a missing end.
+            // A panic of the thread has been reported as a missing end.
             drop(thread.join());
         }
     }

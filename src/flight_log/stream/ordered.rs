@@ -10,19 +10,19 @@ use crate::geometry::seconds_from_ns;
 
 /// Messages out of order by up to this are sorted; later ones are dropped.
 const HORIZON_NS: i64 = 100_000_000;
-/// Number of cached blocks: one per topic, and one ahead for topics whose messages are in the next block already.
+/// Number of cached blocks: one per topic, and one ahead for topics whose messages are already in the next block.
 const BLOCKS: usize = 8;
-/// Bytes of cached blocks: the topics of a frame lie in one or two blocks, and large ones hold many frames.
+/// Size of cached blocks: the topics of a frame lie in one or two blocks, and large ones contain many frames.
 const BLOCK_BYTES: u64 = 10 << 20;
 
-/// The log and the warnings that all topics of a stream share.
+/// Log and warnings, shared by all topics of a stream.
 #[derive(Debug)]
 pub(super) struct ReadContext {
     pub(super) log: Arc<FlightLog>,
     cache: BlockCache,
     /// Damaged blocks that have been reported.
     reported: BTreeSet<usize>,
-    /// Warnings since they were last taken.
+    /// Warnings since they were last collected.
     pub(super) warnings: Vec<LogWarning>,
 }
 
@@ -58,19 +58,19 @@ impl ReadContext {
     }
 }
 
-/// The reason why a message was dropped, with its stamp if that could be read.
+/// Reason why a message was dropped, with its stamp if that could be read.
 pub(super) struct Refusal {
     pub(super) reason: &'static str,
     pub(super) detail: String,
 }
 
 impl Refusal {
-    /// For a message that is of no use and no error either: it is passed over without a word.
+    /// Skips the message without a warning (not needed, not faulty).
     pub(super) fn unneeded() -> Self {
         Self { reason: "", detail: String::new() }
     }
 
-    /// For a message whose bytes do not match its schema.
+    /// Drops a message whose bytes do not match its schema.
     pub(super) fn not_decodable(error: &impl ToString) -> Self {
         Self { reason: "it cannot be decoded", detail: error.to_string() }
     }
@@ -79,10 +79,10 @@ impl Refusal {
 /// Decodes a message into its absolute header stamp and a sample.
 pub(super) type Decoder<T> = Box<dyn FnMut(MessageSource<'_>) -> Result<(i64, T), Refusal> + Send>;
 
-/// The input of a decoder.
+/// Input of a decoder.
 pub(super) struct MessageSource<'a> {
     pub(super) data: &'a [u8],
-    /// Its number among the messages of its topic.
+    /// Number among the messages of its topic.
     pub(super) number: usize,
     pub(super) position: MessagePosition,
 }
@@ -97,26 +97,27 @@ struct DroppedRun {
     count: usize,
 }
 
-/// The samples of one topic in the order of their header stamps.
+/// Samples of one topic in the order of their header stamps.
 pub(super) struct OrderedSamples<T> {
     topic: String,
     messages: TopicIndex,
     /// Index of the next message to read.
     next: usize,
-    /// Whether all messages have been read.
+    /// True when all messages have been read.
     exhausted: bool,
     decode: Decoder<T>,
-    /// Samples by stamp since the log began and index.
+    /// Samples by stamp since the start of the log, and message index.
     pending: BTreeMap<(i64, usize), T>,
     released_ns: Option<i64>,
-    /// Whether several samples may have one stamp.
+    /// True if several samples may have one stamp.
     equal_stamps: bool,
     dropped: Option<DroppedRun>,
 }
 
 impl<T> OrderedSamples<T> {
-    /// The messages of a topic whose log time is at or after `from_ns` since the log began. The numbers that the decoder
-    /// gets count from the log's start when `numbered`; that reads the index of everything before.
+    /// Reads the messages of a topic with log times at or after `from_ns` since the start of the log. If `numbered`,
+    /// the
+    /// numbers passed to the decoder count from the log's start, which requires reading the index of everything before.
     pub(super) fn new(log: &FlightLog, topic: &str, from_ns: i64, numbered: bool, decode: Decoder<T>) -> Self {
         let mut messages = log.topic_index(topic);
         let log_time_ns = u64::try_from(log.epoch_ns().saturating_add(from_ns)).unwrap_or(0);
@@ -129,7 +130,7 @@ impl<T> OrderedSamples<T> {
         Self { topic, messages, next, exhausted: false, decode, pending, released_ns, equal_stamps, dropped }
     }
 
-    /// Starts with the keyframe on which the first message depends, when the topic is a video.
+    /// Starts with the keyframe on which the first message depends, for a video topic.
     pub(super) fn starting_at_keyframe(mut self, log: &FlightLog, kind: MessageKind) -> Self {
         self.next = keyframe_before(log, &mut self.messages, kind, self.next);
         self
@@ -140,7 +141,7 @@ impl<T> OrderedSamples<T> {
         Self { equal_stamps: true, ..self }
     }
 
-    /// The next sample with its stamp since the log began.
+    /// Next sample with its stamp since the start of the log.
     pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<(i64, T)> {
         loop {
             let ready = match (self.pending.first_key_value(), self.pending.last_key_value()) {
@@ -243,7 +244,7 @@ impl<T> Lookup<T> {
         Self { samples, before: None, after: None, ended: false }
     }
 
-    /// The last sample at or before a time and the first after it; times must not decrease.
+    /// Last sample at or before a time and the first after it; times must not decrease.
     pub(super) fn around(&mut self, context: &mut ReadContext, stamp_ns: i64) -> [Option<&(i64, T)>; 2] {
         while !self.ended && self.after.as_ref().is_none_or(|(after, _)| *after <= stamp_ns) {
             if let Some(passed) = self.after.take() {

@@ -22,7 +22,7 @@ impl Noise {
     }
 }
 
-/// Angles at images of 20 Hz from readings of 200 Hz, `read` at each stamp, over so many seconds; with the stamps.
+/// Angles at images of 20 Hz from readings of 200 Hz, `read` at each stamp, over `seconds`; with the stamps.
 fn play(seconds: i64, sigma_rad: f64, mut read: impl FnMut(i64) -> Option<f64>) -> Vec<(i64, Option<JointAngles>)> {
     let mut average = EncoderAverage::new(sigma_rad, IMAGE_NS / 2);
     let mut readings = (0..seconds * 200).map(|number| 2_000_000 + number * READING_NS);
@@ -43,7 +43,7 @@ fn play(seconds: i64, sigma_rad: f64, mut read: impl FnMut(i64) -> Option<f64>) 
         .collect()
 }
 
-/// Root mean square of the errors from the tenth second on, and of the sigmas stated there.
+/// Root mean square of the errors, and of the reported standard deviations, starting at the tenth second.
 fn errors(played: &[(i64, Option<JointAngles>)], ground_truth: impl Fn(f64) -> f64) -> (f64, f64) {
     let (mut squares, mut variances, mut count) = (0.0, 0.0, 0.0);
     for (stamp_ns, angles) in &played[200..] {
@@ -55,7 +55,7 @@ fn errors(played: &[(i64, Option<JointAngles>)], ground_truth: impl Fn(f64) -> f
     (f64::sqrt(squares / count), f64::sqrt(variances / count))
 }
 
-/// A joint that swings as under a stabilizing controller: up to 1.3 rad/s and 8 rad/s².
+/// Joint motion as under a stabilizing controller: up to 1.3 rad/s and 8 rad/s².
 fn swing(time_s: f64) -> f64 {
     0.2 * (6.3 * time_s).sin() + 0.4 * (0.9 * time_s).cos()
 }
@@ -108,7 +108,7 @@ fn correlated_noise_does_not_count_as_white() {
 
 #[test]
 fn steps_of_a_coarse_encoder_keep_their_variance() {
-    // Steps of 2°: uniform errors of 0.58°; the joint creeps from one to the next in seconds.
+    // Steps of 2°: uniform errors of 0.58°; the joint moves from one to the next in seconds.
     let step = 2_f64.to_radians();
     let ground_truth = |time_s: f64| 0.01 * time_s;
     let played = play(60, step / 12_f64.sqrt(), |at| Some((ground_truth(seconds_from_ns(at)) / step).round() * step));

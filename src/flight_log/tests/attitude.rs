@@ -1,4 +1,4 @@
-//! Joint angles from every kind of attitude: a flight with a chain and joint angles that are known, written as each of them.
+//! Joint angles from every kind of attitude: a flight with known chain and joint angles, written as each kind.
 
 use nalgebra::UnitQuaternion;
 
@@ -8,7 +8,7 @@ use super::*;
 use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::sensors::{BodyAxes, JointAngles, NamedAxes};
 
-/// Yaw, roll and pitch with a base and a camera that are a little off their axes.
+/// Yaw, roll and pitch with a base and a camera that are slightly misaligned with the axes.
 const GIMBAL_RIG: &str = "\
 rig_version: 1
 name: test
@@ -44,7 +44,7 @@ fn rig_text(source: &str) -> String {
     GIMBAL_RIG.replace("SOURCE", source).replace("ROLL", "[-0.4363, 0.4363]")
 }
 
-/// Joint angles of the flight: yaw beyond half a rotation, roll and pitch as a stabilized gimbal has them.
+/// Joint angles of the flight: yaw beyond half a revolution, roll and pitch like a stabilized gimbal.
 fn true_angles(stamp_ns: i64) -> Vec<f64> {
     let time_s = seconds_from_ns(stamp_ns);
     vec![wrap_angle(2.8 + 0.5 * time_s), 0.3 * (1.7 * time_s).sin(), -0.6 + 0.4 * (2.3 * time_s).cos()]
@@ -57,14 +57,14 @@ fn enu_from_flu(stamp_ns: i64) -> UnitQuaternion<f64> {
     heading * so3::exp(&Vector3::new(0.4 * (1.9 * time_s).sin(), 0.35 * (2.6 * time_s).cos(), 0.0))
 }
 
-/// How a flight is written.
+/// Content of a written flight.
 struct Recording {
     /// Period of the gimbal's attitude.
     period_ms: i64,
-    /// Added to its stamps.
+    /// Added to the stamps of the gimbal's attitude.
     delay_ms: i64,
     angles: fn(i64) -> Vec<f64>,
-    /// Writes the gimbal's attitude `flu_from_gimbal` (FLU too) of the vehicle with the attitude given.
+    /// Writes the gimbal's attitude `flu_from_gimbal` (gimbal in FLU too), given the vehicle's attitude.
     gimbal: fn(&mut LogWriter, MessageTimes, UnitQuaternion<f64>, UnitQuaternion<f64>),
     /// Writes the vehicle's attitude in FLU and ENU.
     vehicle: fn(&mut LogWriter, MessageTimes, UnitQuaternion<f64>),
@@ -102,7 +102,7 @@ impl Recording {
         writer.finish().unwrap();
     }
 
-    /// The joint angles at the images by a rig, and the warnings.
+    /// Joint angles at the images for a rig, and the warnings.
     fn play(&self, rig: &str, start_s: f64) -> (Vec<(i64, Option<JointAngles>)>, Vec<LogWarning>) {
         let folder = TempDir::new().unwrap();
         let path = folder.path().join("flight.mcap");
@@ -153,24 +153,24 @@ fn write_quaternion(writer: &mut LogWriter, topic: &str, times: MessageTimes, ro
     writer.write(topic, MessageKind::QuaternionStamped, times, &out.finish()).unwrap();
 }
 
-/// A rotation between FLU frames as one between FRD frames.
+/// Converts a rotation between FLU frames to one between FRD frames.
 fn in_frd(rotation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let flu_from_frd = BodyAxes::Frd.flu_from_axes();
     flu_from_frd.inverse() * rotation * flu_from_frd
 }
 
-/// An attitude in ENU and FLU as one in NED and FRD.
+/// Converts an attitude in ENU and FLU to one in NED and FRD.
 fn in_ned(rotation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     BodyAxes::Frd.enu_from_earth().inverse() * rotation * BodyAxes::Frd.flu_from_axes()
 }
 
-/// The attitude relative to the levelled frame at the heading.
+/// Attitude relative to the levelled frame at the heading.
 fn levelled(flu_from_gimbal: UnitQuaternion<f64>, attitude: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let (_, _, heading) = attitude.euler_angles();
     UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -heading) * attitude * flu_from_gimbal
 }
 
-/// Angles about z, y and x in this order of a rotation, in degrees.
+/// Angles of a rotation about z, y and x in this order, in degrees.
 fn yaw_pitch_roll_deg(rotation: UnitQuaternion<f64>) -> [f64; 3] {
     let (roll, pitch, yaw) = rotation.euler_angles();
     [yaw, pitch, roll].map(f64::to_degrees)
@@ -191,7 +191,7 @@ fn write_px4_vehicle(writer: &mut LogWriter, times: MessageTimes, attitude: Unit
     writer.write("/vehicle", MessageKind::Px4VehicleAttitude, times, &out.finish()).unwrap();
 }
 
-/// The flags of every other second have the yaw lock, with or without the newer flags that name the frame.
+/// Flags with yaw lock in every other second, with or without the newer flags of the frame.
 fn flags_at(stamp_ns: i64) -> (u16, bool) {
     match (stamp_ns - EPOCH_NS) / 1_000_000_000 % 4 {
         0 => (12, false),
@@ -210,7 +210,7 @@ fn attitudes_relative_to_the_body_return_the_joint_angles() {
     flu.check("source: {topic: /gimbal, type: quaternion, frame: body, axes: flu}", TOLERANCE_RAD);
     let frd = Recording::of(|writer, times, rotation, _| write_quaternion(writer, "/gimbal", times, &in_frd(rotation)));
     frd.check("source: {topic: /gimbal, type: quaternion, frame: body, axes: frd}", TOLERANCE_RAD);
-    // A camera's axes, and the negative quaternion, which is the same rotation.
+    // Camera axes, and the negative quaternion, which is the same rotation.
     let camera = Recording::of(|writer, times, rotation, _| {
         let rotation = rotation * NamedAxes::RDF.flu_from_axes();
         let negative = UnitQuaternion::new_unchecked(-rotation.into_inner());
@@ -244,7 +244,7 @@ fn euler_angles_of_any_order_sign_and_unit_return_the_joint_angles() {
     let source =
         "source: {topic: /gimbal, type: euler, frame: body, axes: flu, order: yaw=z pitch=-y roll=x, unit: rad}";
     radians.check(source, TOLERANCE_RAD);
-    // The camera rolls about the axis that yaw has left, then pitches.
+    // The camera rolls about the axis after yaw, then pitches.
     let yaw_roll_pitch = Recording::of(|writer, times, rotation, _| {
         let matrix = in_frd(rotation).to_rotation_matrix();
         let (yaw, roll) = ((-matrix[(0, 1)]).atan2(matrix[(1, 1)]), matrix[(2, 1)].asin());
@@ -360,7 +360,7 @@ fn write_transforms(
     writer.write(topic, MessageKind::Transforms, times, &out.finish()).unwrap();
 }
 
-/// A static transform between the vehicle and the gimbal's base, and one from the base to the gimbal's housing.
+/// Static transforms from the vehicle to the gimbal's base, and from the base to the gimbal's housing.
 fn mounts() -> [UnitQuaternion<f64>; 2] {
     [so3::exp(&Vector3::new(0.3, -0.2, 2.0)), so3::exp(&Vector3::new(-1.0, 0.4, 0.1))]
 }
@@ -391,7 +391,7 @@ fn transforms_along_a_chain_of_frames_return_the_joint_angles() {
         })
     };
     chain.check("source: {topic: /tf, type: tf, frame: body, axes: flu, parent: body, child: gimbal}", TOLERANCE_RAD);
-    // From the odometry's frame: the way from it to the gimbal goes through the vehicle.
+    // From the odometry's frame: the path to the gimbal leads through the vehicle.
     let rig = |parent: &str, child: &str| {
         let source =
             format!("source: {{topic: /tf, type: tf, frame: body, axes: flu, parent: {parent}, child: {child}}}");
@@ -412,7 +412,8 @@ fn transforms_along_a_chain_of_frames_return_the_joint_angles() {
 
 #[test]
 fn a_replay_from_the_middle_has_the_same_joint_angles() {
-    // Limits that admit both solutions of the roll, and a pitch axis that passes through the yaw axis's direction at 2 s.
+    // Limits that admit both solutions of the roll, and a pitch axis that passes through the yaw axis's direction at 2
+    // s.
     let through = |stamp_ns: i64| {
         let time_s = seconds_from_ns(stamp_ns);
         vec![0.4 + 0.2 * time_s, 1.5 * (0.9 * time_s).sin() + 0.12 * time_s, -0.6 + 0.3 * (2.0 * time_s).cos()]
@@ -517,7 +518,7 @@ fn attitudes_without_a_vehicle_or_beyond_the_joints_are_named() {
     let source = "source: {topic: /gimbal, type: quaternion, frame: body, axes: flu}";
     let (_, warnings) = beyond.play(&rig_text(source), 0.0);
     // 0.8 rad are 45.8°, the limit with its tolerance is at 27.0°.
-    warning_with(&warnings, &["/gimbal: up to 18.8° of the attitude from 2.004 s to 2.384 s", "cannot make"]);
+    warning_with(&warnings, &["/gimbal: up to 18.8° of the attitude from 2.004 s to 2.384 s", "cannot be reached"]);
 }
 
 #[test]

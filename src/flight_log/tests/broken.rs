@@ -230,7 +230,7 @@ fn stamps_that_run_backwards_or_repeat_are_dropped() {
 #[test]
 fn small_disorder_is_sorted() {
     let flight = Flight {
-        // Each second sample is written 30 ms late: neighbours change places.
+        // Each second sample is written 30 ms late, so that neighbours change places.
         imu: |stamp_ns, rate, force| {
             *stamp_ns += if *stamp_ns / (5 * MS) % 2 == 1 { -30 * MS } else { 0 };
             *rate = Vector3::new(*stamp_ns as f64 * 1e-9, 0.0, 0.4);

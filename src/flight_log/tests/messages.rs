@@ -6,13 +6,13 @@ use super::super::messages::{self, MessageKind};
 use super::*;
 use crate::flight_log::writer::testing as encode;
 
-/// The image of a message within the usual limits, or what is wrong with it.
+/// Image of a message within the usual limits, or a description of the problem.
 fn decode_image(kind: MessageKind, message: &[u8], depth: BitDepth) -> Result<GrayImage, String> {
     let limits = LogLimits::default();
     image_decoding::decode_image(kind, message, depth, &limits, None).map_err(|problem| problem.to_string())
 }
 
-/// The little-endian bytes of a message made of 4- and 8-byte numbers after a header, converted to big-endian.
+/// Converts the little-endian bytes of a message with 4- and 8-byte numbers after a header to big-endian.
 fn imu_big_endian(stamp: (i32, u32), frame: &str, numbers: &[f64]) -> Vec<u8> {
     let mut out = vec![0, 0, 0, 0];
     out.extend(stamp.0.to_be_bytes());
@@ -85,7 +85,7 @@ fn raw_images_of_every_encoding_become_grey() {
     let message = encode::image(0, "camera", [1, 1], "bayer_rggb8", &[9]);
     let problem = decode_image(MessageKind::Image, &message, BitDepth::default()).unwrap_err();
     assert!(problem.contains("bayer_rggb8 image of 1×1 pixels"));
-    assert!(decode("32FC1", &[0; 16]).unwrap_err().contains("no grey levels"));
+    assert!(decode("32FC1", &[0; 16]).unwrap_err().contains("not gray values"));
     assert!(decode("\u{1b}[2J", &[0; 4]).unwrap_err().contains(r#""\u{1b}[2J" is not read: expected mono8"#));
     assert!(decode("mono8", &[0; 2]).unwrap_err().contains("2 bytes with 1 per row for 2×2 mono8"));
 }

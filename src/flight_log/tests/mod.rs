@@ -26,16 +26,16 @@ const MS: i64 = 1_000_000;
 const WIDTH: usize = 64;
 const HEIGHT: usize = 48;
 
-/// A flight whose sensors can be omitted or damaged.
+/// Flight whose sensors can be omitted or damaged.
 struct Flight {
     duration_ms: i64,
     options: LogWriterOptions,
-    /// Changes an IMU sample before it is written; `false` leaves it out.
+    /// Changes an IMU sample before it is written; `false` omits it.
     imu: fn(&mut i64, &mut Vector3<f64>, &mut Vector3<f64>) -> bool,
-    /// Changes an image's stamp and size; `false` leaves it out.
+    /// Changes an image's stamp and size; `false` omits it.
     image: fn(&mut i64, &mut [usize; 2]) -> bool,
     joints: bool,
-    /// Period of an accelerometer on a topic of its own, in milliseconds; the IMU's messages then have no force.
+    /// Period of an accelerometer on a separate topic, in milliseconds; the IMU's messages then have no force.
     accelerometer_ms: Option<i64>,
 }
 
@@ -64,7 +64,7 @@ fn true_pose(stamp_ns: i64) -> RigidTransform {
     RigidTransform::new(so3::exp(&Vector3::new(0.0, 0.0, 0.4 * time_s)), Vector3::new(time_s, -2.0 * time_s, 1.0))
 }
 
-/// The image with a stamp, different for each.
+/// Image for a stamp, different for each.
 fn image_at(stamp_ns: i64, [width, height]: [usize; 2]) -> GrayImage {
     let shade = (stamp_ns / (50 * MS)) as usize;
     let pixels = (0..width * height).map(|index| ((index % width) * 2 + shade) as u8).collect();
@@ -150,7 +150,7 @@ fn rig_from(text: &str) -> Rig {
     Rig::from_yaml(text, Path::new("test.rig.yaml")).unwrap()
 }
 
-/// All frames of a flight and all their warnings.
+/// All frames and warnings of a flight.
 fn play(flight: &Flight, rig: &str, start_s: f64) -> (Vec<SensorFrame>, Vec<LogWarning>) {
     let folder = TempDir::new().unwrap();
     play_file(&flight.write(folder.path()), rig, start_s)
@@ -168,7 +168,7 @@ fn play_file(path: &Path, rig: &str, start_s: f64) -> (Vec<SensorFrame>, Vec<Log
     (frames, warnings)
 }
 
-/// The one warning whose message contains all the words.
+/// Returns the only warning whose message contains all the words.
 fn warning_with<'a>(warnings: &'a [LogWarning], words: &[&str]) -> &'a LogWarning {
     let found: Vec<&LogWarning> =
         warnings.iter().filter(|warning| words.iter().all(|word| warning.message.contains(word))).collect();

@@ -1,7 +1,7 @@
 use super::*;
 use crate::camera::{CameraModel, Distortion, Projection, RationalLens};
 
-/// A log with one message of each kind that a rig needs, and attachments.
+/// Writes a log with one message of each kind that a rig needs, and attachments.
 fn write_log(path: &Path, attachments: &[(&str, &str)], camera_info: Option<&CameraModel>) {
     let mut writer = LogWriter::create(path, &LogWriterOptions::default()).unwrap();
     for number in 0..5 {

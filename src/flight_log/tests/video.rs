@@ -6,7 +6,7 @@ use super::*;
 use crate::flight_log::writer::testing as encode;
 use crate::flight_log::{ImageReader, MessageKind, MessageType};
 
-/// How the pictures are stored.
+/// Message type of the video.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Storage {
     /// `foxglove_msgs/msg/CompressedVideo`.
@@ -54,7 +54,7 @@ fn protobuf(stamp_ns: i64, format: &str, data: &[u8]) -> Vec<u8> {
 /// `ffmpeg_image_transport_msgs/msg/FFMPEGPacket` in CDR.
 fn packet(stamp_ns: i64, format: &str, data: &[u8]) -> Vec<u8> {
     let mut out = encode::compressed_video(stamp_ns, "camera", "", &[]);
-    // The header is the same; behind it lie size, encoding, time, flags and data.
+    // After the same header follow size, encoding, time, flags and data.
     out.truncate(4 + 8 + 4 + "camera".len() + 1);
     let mut field = |bytes: &[u8], align: usize| {
         out.resize(4 + (out.len() - 4).next_multiple_of(align), 0);
@@ -72,7 +72,7 @@ fn packet(stamp_ns: i64, format: &str, data: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Writes a flight whose camera is a video of 20 Hz; messages with these numbers are left out.
+/// Writes a flight whose camera is a video of 20 Hz, without the messages of these numbers.
 fn write(folder: &Path, name: &str, storage: Storage, left_out: &[usize]) -> (PathBuf, Stream) {
     let stream = stream(name);
     let path = folder.join("flight.mcap");
@@ -113,7 +113,8 @@ fn write(folder: &Path, name: &str, storage: Storage, left_out: &[usize]) -> (Pa
     (path, stream)
 }
 
-/// A log whose `cam0` is an H.264 video of 24 pictures with a keyframe in every eighth, its rig, and the CRC-32 of each picture.
+/// Log whose `cam0` is an H.264 video of 24 frames with a keyframe in every eighth, its rig, and the CRC-32 of each
+/// frame.
 pub(crate) fn sample_video(folder: &Path) -> (Arc<FlightLog>, Rig, Vec<u32>) {
     let (path, stream) = write(folder, "h264", Storage::Ros, &[]);
     (Arc::new(FlightLog::open(&path).unwrap()), rig_from(&rig_text()), stream.luma_crc32)
@@ -174,7 +175,7 @@ fn decoding_that_is_ended_goes_on_where_it_stands() {
     let go_on = || remaining.replace(remaining.get() - 1) > 0;
     assert!(!reader.decode_before("cam0", 7, &go_on));
     assert_eq!(remaining.replace(5), -1);
-    // Pictures 3 to 7 are left: five questions, all answered with yes.
+    // Frames 3 to 7 remain: five calls of `go_on`, all with the answer true.
     assert!(reader.decode_before("cam0", 7, &go_on));
     assert_eq!(remaining.get(), 0);
     assert!(reader.decode_before("cam0", 2, &go_on), "a decoded picture asks nothing");
@@ -183,7 +184,7 @@ fn decoding_that_is_ended_goes_on_where_it_stands() {
     }
 }
 
-/// A message that cannot be read ends the stream for the images of the window as for the frames of a run.
+/// An unreadable message ends the stream both for the images of the window and for the frames of a run.
 #[test]
 fn pictures_behind_an_unreadable_message_are_missing() {
     for name in ["h264", "h265"] {
@@ -219,10 +220,10 @@ fn pictures_behind_a_lost_one_are_left_out_up_to_the_next_keyframe() {
         assert_eq!(crc32(&frame.image), stream.luma_crc32[place]);
     }
     let warning = warning_with(&warnings, &["/camera: 4 messages from 0.627 s to 0.777 s dropped"]);
-    assert!(warning.message.contains("the picture cannot be decoded"), "{}", warning.message);
+    assert!(warning.message.contains("the frame cannot be decoded"), "{}", warning.message);
     let log = FlightLog::open(&path).unwrap();
     let (read, missing) = missing_pictures(&log, "/camera", MessageKind::CompressedVideo, 100);
-    // Message 11 is the first one behind the lost picture; the keyframe is message 15.
+    // Message 11 is the first one after the lost frame; the keyframe is message 15.
     assert_eq!((read, missing.len()), (23, 1));
     assert_eq!((missing[0].first, missing[0].count), (11, 4));
     assert!(missing[0].problem.contains("missing"), "{}", missing[0].problem);
@@ -239,7 +240,7 @@ fn a_video_without_a_keyframe_or_of_another_compression_is_named() {
     let (path, _) = write(folder.path(), "h264", Storage::Ros, &[0, 8, 16]);
     let (frames, warnings) = play_file(&path, &rig_text(), 0.0);
     assert!(frames.is_empty());
-    warning_with(&warnings, &["/camera: 21 messages", "it depends on a picture that is damaged or missing"]);
+    warning_with(&warnings, &["/camera: 21 messages", "it depends on a damaged or missing frame"]);
     let path = folder.path().join("other.mcap");
     let mut writer = LogWriter::create(&path, &LogWriterOptions::default()).unwrap();
     for number in 0..10 {

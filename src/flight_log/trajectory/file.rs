@@ -10,25 +10,27 @@ use super::super::LogError;
 use super::super::text::shortened;
 use super::RecordedPose;
 
-/// Largest file; a pose in 1 ms steps takes about 100 bytes, so that this is an hour of them.
+/// Largest file: an hour of poses in steps of 1 ms, with about 100 bytes each.
 const MAX_BYTES: u64 = 512 << 20;
 /// Maximum deviation of a quaternion's norm from 1.
 const QUATERNION_TOLERANCE: f64 = 1e-2;
 
-/// How the first line of a trajectory begins that an offline calibration found: it is no independent ground truth.
+/// Start of the first line of a trajectory from an offline calibration, which is no independent ground truth.
 pub const BATCH_REFERENCE: &str = "# batch reference";
 
-/// Whether a trajectory file is the reference of an offline calibration; `false` of a file that cannot be read.
+/// True for the reference of an offline calibration; `false` for an unreadable file.
 pub fn is_batch_reference(path: &Path) -> bool {
     let mut begin = [0; BATCH_REFERENCE.len()];
     let read = File::open(path).and_then(|mut file| file.read_exact(&mut begin));
     read.is_ok() && begin == BATCH_REFERENCE.as_bytes()
 }
 
-/// Poses of a trajectory file in the order of their stamps, of several with one stamp the first.
+/// Reads the poses of a trajectory file in the order of their stamps; of several with one stamp the first is kept.
 ///
-/// Lines with commas are a table of EuRoC: stamps in nanoseconds, the quaternion's w first, further columns ignored. Others
-/// are TUM: stamps in seconds, the quaternion's w last. Lines without a quaternion, or with one of zeros, are positions.
+/// Lines with commas are a table of EuRoC: stamps in nanoseconds, the quaternion's w first, further columns ignored.
+/// Others
+/// are TUM: stamps in seconds, the quaternion's w last. Lines without a quaternion, or with one of zeros, are
+/// positions.
 /// Lines that begin with `#` are comments.
 ///
 /// # Errors
@@ -103,7 +105,7 @@ fn euroc_pose(line: &str) -> Result<RecordedPose, String> {
     }
 }
 
-/// The attitude, `None` of a quaternion of zeros.
+/// Attitude, `None` for a quaternion of zeros.
 fn rotation_of(quaternion: Quaternion<f64>) -> Result<Option<UnitQuaternion<f64>>, String> {
     let norm = quaternion.norm();
     if norm == 0.0 {
@@ -115,8 +117,8 @@ fn rotation_of(quaternion: Quaternion<f64>) -> Result<Option<UnitQuaternion<f64>
     Ok(Some(UnitQuaternion::new_normalize(quaternion)))
 }
 
-/// Nanoseconds of seconds in decimal digits, exact where there are at most nine decimals: a double of today's Unix time
-/// resolves 240 ns only. The text is a finite number.
+/// Converts decimal seconds to nanoseconds, exact up to nine decimals, since a double of today's Unix time
+/// resolves only 240 ns. The text must be a finite number.
 fn ns_of_seconds(text: &str) -> i64 {
     let exact = || {
         let (sign, digits) = text.strip_prefix('-').map_or((1, text), |digits| (-1, digits));

@@ -8,7 +8,7 @@ use super::super::messages::{self, MessageKind};
 use super::super::{FlightLog, LogError};
 use super::RecordedPose;
 
-/// What is read of a topic.
+/// Message types of a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Content {
     Pose(MessageKind),
@@ -18,19 +18,21 @@ enum Content {
     Fix,
 }
 
-/// Names of the message types that are read.
+/// Names of the supported message types.
 const TYPES: &str = "nav_msgs/msg/Odometry, geometry_msgs/msg/PoseStamped, geometry_msgs/msg/TransformStamped, \
     geometry_msgs/msg/PointStamped, sensor_msgs/msg/NavSatFix";
 
 impl FlightLog {
-    /// Whether a topic has positions without attitudes.
+    /// True for a topic with positions without attitudes.
     pub fn is_position_topic(&self, topic: &str) -> bool {
         let content = self.topic(topic).and_then(|info| content_of(&info.schema, info.kind));
         matches!(content, Some(Content::Point | Content::Fix))
     }
 
-    /// Poses or positions of a topic in the order of their header stamps, of several with one stamp the first. Fixes of a
-    /// satellite receiver are metres east, north and up of the first one. Messages that are no pose are passed over.
+    /// Reads poses or positions of a topic in the order of their header stamps; of several with one stamp the first is
+    /// kept.
+    /// Fixes of a satellite receiver are metres east, north and up of the first one. Messages without a pose are
+    /// skipped.
     ///
     /// # Errors
     /// When the log has no such topic, its type is another one, or no message can be used.
@@ -70,7 +72,7 @@ fn content_of(schema: &str, kind: Option<MessageKind>) -> Option<Content> {
     }
 }
 
-/// The pose of a message; `origin` is the first fix of a receiver.
+/// Reads the pose of a message; `origin` is the first fix of a receiver.
 fn read(content: Content, data: &[u8], origin: &mut Option<Geodetic>) -> Result<Option<RecordedPose>, CdrError> {
     let finite = |position_m: &Vector3<f64>| position_m.iter().all(|value| value.is_finite());
     match content {

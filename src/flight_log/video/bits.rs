@@ -2,7 +2,7 @@
 #[derive(Clone, Debug)]
 pub(super) struct BitReader<'a> {
     bytes: &'a [u8],
-    /// Number of bits that have been read.
+    /// Number of bits read.
     position: usize,
 }
 
@@ -11,7 +11,7 @@ impl<'a> BitReader<'a> {
         Self { bytes, position: 0 }
     }
 
-    /// The next bit, `None` at the end.
+    /// Next bit, `None` at the end.
     pub(super) fn bit(&mut self) -> Option<bool> {
         let byte = self.bytes.get(self.position / 8)?;
         let bit = byte >> (7 - self.position % 8) & 1;
@@ -19,12 +19,12 @@ impl<'a> BitReader<'a> {
         Some(bit == 1)
     }
 
-    /// An unsigned number of at most 32 bits.
+    /// Unsigned number of at most 32 bits.
     pub(super) fn number(&mut self, bits: u32) -> Option<u32> {
         (0..bits).try_fold(0_u32, |number, _| Some(number << 1 | u32::from(self.bit()?)))
     }
 
-    /// An unsigned Exp-Golomb code (`ue(v)`).
+    /// Unsigned Exp-Golomb code (`ue(v)`).
     pub(super) fn unsigned(&mut self) -> Option<u32> {
         let mut zeros = 0;
         while !self.bit()? {
@@ -36,7 +36,7 @@ impl<'a> BitReader<'a> {
         Some((1_u32 << zeros) - 1 + self.number(zeros)?)
     }
 
-    /// A signed Exp-Golomb code (`se(v)`).
+    /// Signed Exp-Golomb code (`se(v)`).
     pub(super) fn signed(&mut self) -> Option<i64> {
         let code = i64::from(self.unsigned()?);
         Some(if code % 2 == 0 { -(code / 2) } else { code / 2 + 1 })

@@ -10,7 +10,7 @@ use super::super::limits::LogLimits;
 use super::frame_numbers::FrameNumbers;
 use crate::sensors::GrayImage;
 
-/// A video compression that is read.
+/// Supported video compression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum VideoCodec {
     /// H.264 (AVC).
@@ -20,7 +20,8 @@ pub(crate) enum VideoCodec {
 }
 
 impl VideoCodec {
-    /// From a message's field: `h264`, `libx264`, `hevc_nvenc`, `h265;yuv420p;…`; `None` for a compression that is not read.
+    /// Parses a message field: `h264`, `libx264`, `hevc_nvenc`, `h265;yuv420p;…`; `None` for an unsupported
+    /// compression.
     pub(crate) fn from_name(name: &str) -> Option<Self> {
         let name = name.split(';').next().unwrap_or(name).to_ascii_lowercase();
         let has = |parts: &[&str]| parts.iter().any(|part| name.contains(part));
@@ -33,7 +34,7 @@ impl VideoCodec {
         }
     }
 
-    /// The name that is written into messages.
+    /// Name that is written into messages.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::H264 => "h264",
@@ -41,7 +42,7 @@ impl VideoCodec {
         }
     }
 
-    /// Whether a message (Annex B) holds a picture at which decoding can start, with its sequence parameter set.
+    /// True for a message (Annex B) with a frame at which decoding can start, and its sequence parameter set.
     pub(crate) fn is_keyframe(self, access_unit: &[u8]) -> bool {
         let has = |types: RangeInclusive<u8>| self.unit_types(access_unit).any(|unit| types.contains(&unit));
         match self {
@@ -50,7 +51,7 @@ impl VideoCodec {
         }
     }
 
-    /// Whether a message holds a picture that follows a keyframe and depends on pictures before it (H.265: RASL).
+    /// True for a message with a frame that follows a keyframe and depends on frames before it (H.265: RASL).
     pub(crate) fn is_leading(self, access_unit: &[u8]) -> bool {
         self == Self::H265 && self.unit_types(access_unit).any(|unit| unit == 8 || unit == 9)
     }
@@ -65,14 +66,14 @@ impl VideoCodec {
     }
 }
 
-/// Decodes the messages of one stream, in their order.
+/// Decodes the messages of one stream in order.
 pub(crate) struct VideoDecoder {
     codec: VideoCodec,
     stream: Stream,
     limits: LogLimits,
-    /// Whether all pictures since a keyframe have been decoded.
+    /// True if all frames since a keyframe have been decoded.
     synchronized: bool,
-    /// Whether that keyframe was the first one, so that pictures that depend on others before it are missing.
+    /// True if that keyframe was the first one, so that frames that depend on others before it are missing.
     at_first_keyframe: bool,
 }
 
@@ -85,7 +86,6 @@ impl std::fmt::Debug for VideoDecoder {
     }
 }
 
-/// State of a stream.
 enum Stream {
     H264(Box<rust_h264::decoder::Decoder>, FrameNumbers),
     H265(Box<rust_h265::Decoder>),
@@ -105,7 +105,7 @@ impl Stream {
 }
 
 impl VideoDecoder {
-    /// A decoder that waits for a keyframe.
+    /// Creates a decoder that waits for a keyframe.
     pub(crate) fn new(codec: VideoCodec, limits: &LogLimits) -> Self {
         Self {
             codec,
@@ -116,18 +116,19 @@ impl VideoDecoder {
         }
     }
 
-    /// The compression of the stream.
     pub(crate) fn codec(&self) -> VideoCodec {
         self.codec
     }
 
-    /// Says that a message is missing before the next one: pictures are refused up to the next keyframe.
+    /// Marks a message as missing before the next one: frames are rejected up to the next keyframe.
     pub(super) fn lose_message(&mut self) {
         self.stream = Stream::new(self.codec, &self.limits);
         (self.synchronized, self.at_first_keyframe) = (false, true);
     }
 
-    /// The picture of a message (Annex B), 8-bit grey levels, when it has the expected resolution, if there is one.
+    /// Decodes the frame of a message (Annex B) into 8-bit gray values. If a resolution is expected, other resolutions
+    /// are an
+    /// error.
     pub(crate) fn decode(
         &mut self,
         access_unit: &[u8],
@@ -136,9 +137,7 @@ impl VideoDecoder {
         if self.codec.is_keyframe(access_unit) {
             self.at_first_keyframe = !self.synchronized;
         } else if !self.synchronized || (self.at_first_keyframe && self.codec.is_leading(access_unit)) {
-            return Err(unreadable(
-                "it depends on a picture that is damaged or missing; reading continues at the next keyframe",
-            ));
+            return Err(unreadable("it depends on a damaged or missing frame; reading continues at the next keyframe"));
         }
         let (stream, limits) = (&mut self.stream, &self.limits);
         let decoded = without_panic_message(|| stream.picture(access_unit, limits));
@@ -159,7 +158,7 @@ impl VideoDecoder {
 }
 
 impl Stream {
-    /// Decodes the one picture of a message.
+    /// Decodes the only frame of a message.
     fn picture(&mut self, access_unit: &[u8], limits: &LogLimits) -> Result<GrayImage, ImageProblem> {
         match self {
             Self::H264(decoder, numbers) => {
@@ -217,7 +216,7 @@ fn damaged(error: impl std::fmt::Debug) -> ImageProblem {
 
 fn one<T>(pictures: Vec<T>) -> Result<[T; 1], ImageProblem> {
     <[T; 1]>::try_from(pictures)
-        .map_err(|pictures| unreadable(format!("{} pictures in one message, expected 1", pictures.len())))
+        .map_err(|pictures| unreadable(format!("{} frames in one message, expected 1", pictures.len())))
 }
 
 fn narrowed(sample: u16, bit_depth: u8) -> u8 {
@@ -226,17 +225,17 @@ fn narrowed(sample: u16, bit_depth: u8) -> u8 {
 
 fn gray_image(width: usize, height: usize, pixels: Vec<u8>) -> Result<GrayImage, ImageProblem> {
     if pixels.len() != width * height {
-        return Err(unreadable(format!("{} samples of a picture of {width}×{height} pixels", pixels.len())));
+        return Err(unreadable(format!("{} samples of a frame of {width}×{height} pixels", pixels.len())));
     }
     Ok(GrayImage { width, height, pixels })
 }
 
 thread_local! {
-    /// Whether a panic on this thread is an error message of ours and prints nothing.
+    /// True while a panic on this thread is an error of the input and prints nothing.
     static SILENT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs foreign code whose panic is an error of its input: `None` when it panics. Its message is not printed.
+/// Runs a decoder whose panic is an error of its input: `None` if it panics. Its message is not printed.
 fn without_panic_message<T>(run: impl FnOnce() -> T) -> Option<T> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

@@ -1,9 +1,10 @@
 use super::bits::BitReader;
 
-/// Profiles whose sequence parameter sets say more of the samples (H.264, section 7.3.2.1.1).
+/// Profiles with additional fields in their sequence parameter sets (H.264, section 7.3.2.1.1).
 const HIGH_PROFILES: [u32; 13] = [100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135];
 
-/// Follows `frame_num` of an H.264 stream: it grows by one after every reference picture, so that a lost one is noticed.
+/// Tracks `frame_num` of an H.264 stream: it grows by one after every reference picture, so that a lost one is
+/// detected.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FrameNumbers {
     sequence: Option<Sequence>,
@@ -11,7 +12,7 @@ pub(super) struct FrameNumbers {
     reference: Option<u32>,
 }
 
-/// What a sequence parameter set says of `frame_num`.
+/// Fields of a sequence parameter set that concern `frame_num`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Sequence {
     bits: u32,
@@ -20,12 +21,12 @@ struct Sequence {
 }
 
 impl FrameNumbers {
-    /// Takes the payload of a sequence parameter set.
+    /// Reads the payload of a sequence parameter set.
     pub(super) fn take_sequence(&mut self, payload: &[u8]) {
         self.sequence = sequence(payload);
     }
 
-    /// Takes the payload of a picture's first slice; the error says that a picture before it is missing.
+    /// Reads the payload of a picture's first slice; the error means that a picture before it is missing.
     pub(super) fn take_slice(&mut self, payload: &[u8], is_idr: bool, is_reference: bool) -> Result<(), String> {
         let Some(sequence) = self.sequence else { return Ok(()) };
         let mut bits = BitReader::new(payload);
@@ -43,7 +44,7 @@ impl FrameNumbers {
         if follows {
             Ok(())
         } else {
-            Err(format!("pictures before it are missing: number {number}, expected {expected}"))
+            Err(format!("frames before it are missing: number {number}, expected {expected}"))
         }
     }
 }

@@ -1,7 +1,7 @@
-//! Video topics: the pictures of H.264 and H.265 streams, one in each message.
+//! Video topics: the frames of H.264 and H.265 streams, one in each message.
 //!
-//! A picture depends on those before it, back to a keyframe. Messages are decoded in the order of the log; after a message
-//! that is damaged or missing, pictures are refused up to the next keyframe, because they would be wrong.
+//! A frame depends on those before it, back to a keyframe. Messages are decoded in the order of the log; after a
+//! damaged or missing message, frames are rejected up to the next keyframe, because they would be wrong.
 
 mod bits;
 mod decoder;
@@ -19,11 +19,12 @@ use super::FlightLog;
 use super::container::{BlockCache, TopicIndex};
 use super::messages::{MessageKind, VideoPacket, read_video_packet};
 
-/// Number of cached blocks while a keyframe is looked for.
+/// Number of cached blocks during the search for a keyframe.
 const BLOCKS: usize = 2;
 
-/// The number of the message from which a picture has to be decoded: the last keyframe at or before it, or the one before that
-/// for a picture that depends on pictures before its keyframe; 0 without one.
+/// Number of the message from which a frame has to be decoded: the last keyframe at or before it, or the one before
+/// that
+/// for a frame that depends on frames before its keyframe; 0 without one.
 pub(super) fn keyframe_before(log: &FlightLog, messages: &mut TopicIndex, kind: MessageKind, number: usize) -> usize {
     let mut cache = BlockCache::new(BLOCKS);
     let mut holds = |number: usize, property: fn(&VideoPacket<'_>) -> bool| {

@@ -4,28 +4,29 @@ use super::super::messages::VideoPacket;
 use super::VideoDecoder;
 use crate::sensors::GrayImage;
 
-/// The messages of a video topic, decoded in their order.
+/// Messages of a video topic, decoded in order.
 ///
-/// A message that is left out, unreadable or of another compression ends what can be decoded up to the next keyframe.
+/// After a missing or unreadable message, or one of another compression, frames are rejected up to the next keyframe.
 #[derive(Debug, Default)]
 pub(crate) struct PictureStream {
     decoder: Option<VideoDecoder>,
-    /// Number of the message after the one decoded last.
+    /// Number of the message after the last decoded one.
     next: usize,
 }
 
 impl PictureStream {
-    /// Number of the message that continues the stream, `None` when only a keyframe can.
+    /// Number of the message that continues the stream, `None` if only a keyframe can.
     pub(crate) fn next(&self) -> Option<usize> {
         self.decoder.is_some().then_some(self.next)
     }
 
-    /// Says that the next message cannot be read.
+    /// Marks the next message as unreadable.
     pub(crate) fn lose_message(&mut self) {
         self.decoder = None;
     }
 
-    /// The picture of the message with this number, 8-bit grey levels, when it has the expected resolution, if there is one.
+    /// Decodes the frame of the message with this number into 8-bit gray values. If a resolution is expected, other
+    /// resolutions are an error.
     pub(crate) fn decode(
         &mut self,
         number: usize,

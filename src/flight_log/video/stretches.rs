@@ -3,18 +3,18 @@ use super::super::container::BlockCache;
 use super::super::messages::{MessageKind, read_video_packet};
 use super::{BLOCKS, PictureStream};
 
-/// Consecutive messages of a video whose pictures cannot be decoded.
+/// Consecutive messages of a video whose frames cannot be decoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct MissingPictures {
     /// Number of the first message.
     pub(crate) first: usize,
-    /// Number of messages.
     pub(crate) count: usize,
-    /// Why the first one cannot be decoded.
+    /// Reason why the first one cannot be decoded.
     pub(crate) problem: String,
 }
 
-/// Decodes the first `most` messages of a video topic. Returns how many there were, and the stretches without pictures.
+/// Decodes the first `most` messages of a video topic. Returns the number of messages, and the stretches without
+/// frames.
 pub(crate) fn missing_pictures(
     log: &FlightLog,
     topic: &str,

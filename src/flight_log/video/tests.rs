@@ -1,4 +1,4 @@
-//! Small streams of x264 and x265, compared with what `FFmpeg` decodes.
+//! Small streams of x264 and x265, compared with the output of `FFmpeg`.
 
 use std::collections::BTreeMap;
 
@@ -8,11 +8,11 @@ use super::super::limits::{LimitSetting, LogLimits};
 use super::{VideoCodec, VideoDecoder};
 use crate::geometry::SplitMix64;
 
-/// The messages of a stream, and the CRC-32 of each decoded picture's grey levels.
+/// Messages of a stream, and the CRC-32 of each decoded frame's gray values.
 pub(in super::super) struct Stream {
     pub(in super::super) messages: Vec<&'static [u8]>,
     pub(in super::super) luma_crc32: Vec<u32>,
-    /// Places of the pictures in the order of their times.
+    /// Indices of the frames in time order.
     pub(in super::super) order: Vec<usize>,
 }
 
@@ -23,7 +23,7 @@ struct Listing {
     luma_crc32: Vec<u32>,
 }
 
-/// A stream of `tests/data/video/`.
+/// Stream of `tests/data/video/`.
 pub(in super::super) fn stream(name: &str) -> Stream {
     let data: &'static [u8] = match name {
         "h264" => include_bytes!("../../../tests/data/video/h264.bin"),

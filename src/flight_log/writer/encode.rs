@@ -1,4 +1,4 @@
-//! The messages of a log as CDR.
+//! Encoders of log messages as CDR.
 
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 
@@ -6,7 +6,7 @@ use super::super::cdr::CdrWriter;
 use crate::camera::{CameraModel, Distortion};
 use crate::geometry::RigidTransform;
 
-/// A message that starts with a header.
+/// Starts a message with a header.
 pub(super) fn with_header(stamp_ns: i64, frame_id: &str) -> CdrWriter {
     let mut out = CdrWriter::new();
     out.i32(stamp_ns.div_euclid(1_000_000_000) as i32);
@@ -54,7 +54,7 @@ pub(in super::super) fn image(
     out.finish()
 }
 
-/// `foxglove_msgs/msg/CompressedVideo`: one picture in Annex B.
+/// `foxglove_msgs/msg/CompressedVideo`: one frame in Annex B.
 pub(in super::super) fn compressed_video(stamp_ns: i64, frame_id: &str, format: &str, data: &[u8]) -> Vec<u8> {
     let mut out = with_header(stamp_ns, frame_id);
     out.bytes(data);
@@ -115,16 +115,16 @@ pub(in super::super) fn joint_state(stamp_ns: i64, names: &[String], positions_r
     out.finish()
 }
 
-/// A pose of a frame in another one with its velocity.
+/// Pose of a frame in another one with its velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Odometry<'a> {
-    /// The frame of the pose.
+    /// Frame in which the pose is given.
     pub frame_id: &'a str,
-    /// The frame that has this pose.
+    /// Frame with this pose.
     pub child_frame_id: &'a str,
-    /// The pose `frame_from_child`.
+    /// `frame_from_child`.
     pub pose: RigidTransform,
-    /// Covariance of the pose: position (m), then rotations about the axes of `frame_id` (rad); zero when unknown.
+    /// Covariance of the pose: position (m), then rotations about the axes of `frame_id` (rad); zero if unknown.
     pub pose_covariance: Matrix6<f64>,
     /// Velocity in the child frame, in m/s.
     pub linear_m_per_s: Vector3<f64>,
@@ -133,7 +133,7 @@ pub struct Odometry<'a> {
 }
 
 impl<'a> Odometry<'a> {
-    /// A pose at rest, of unknown covariance.
+    /// Stationary pose of unknown covariance.
     pub fn at_rest(frame_id: &'a str, child_frame_id: &'a str, pose: RigidTransform) -> Self {
         Self {
             frame_id,

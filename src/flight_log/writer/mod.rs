@@ -1,4 +1,4 @@
-//! Writing of flight logs: MCAP with CDR messages and their definitions, in the layout of ROS 2's recorder.
+//! Writer of flight logs: MCAP with CDR messages and their definitions, in the layout of ROS 2's recorder.
 
 mod encode;
 mod results;
@@ -25,25 +25,22 @@ use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
 use crate::sensors::GrayImage;
 
-/// How the chunks of a log are compressed.
+/// Compression of a log's chunks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogCompression {
-    /// Uncompressed.
     None,
-    /// LZ4.
     Lz4,
     /// Zstandard.
     Zstd,
 }
 
-/// Options of writing a log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogWriterOptions {
     /// Compression of the chunks.
     pub compression: LogCompression,
     /// Maximum size of a chunk in bytes; `None` writes messages without chunks.
     pub chunk_bytes: Option<u64>,
-    /// Whether the file ends with an index; without one every reader has to scan the entire file.
+    /// Write an index at the end of the file; without one every reader has to scan the entire file.
     pub indexed: bool,
 }
 
@@ -54,7 +51,7 @@ impl Default for LogWriterOptions {
     }
 }
 
-/// The two times of a message, both in nanoseconds since the epoch.
+/// Times of a message, both in nanoseconds since the epoch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MessageTimes {
     /// Header stamp, the time of measurement.
@@ -63,21 +60,21 @@ pub struct MessageTimes {
     pub log_time_ns: i64,
 }
 
-/// A message type by its name and its definition.
+/// Message type with its definition.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MessageType<'a> {
-    /// `nav_msgs/msg/Path`.
+    /// Such as `nav_msgs/msg/Path`.
     pub name: &'a str,
     /// Language of the definition, `ros2msg` or `jsonschema`.
     pub definition_encoding: &'static str,
-    /// The definition with all types that it needs.
+    /// Definition with all types that it needs.
     pub definition: Cow<'a, str>,
     /// Encoding of the messages, `cdr` or `json`.
     pub message_encoding: &'static str,
 }
 
 impl<'a> MessageType<'a> {
-    /// A type of ROS 2, its messages in CDR.
+    /// ROS 2 type with messages in CDR.
     pub fn ros2(name: &'a str, definition: impl Into<Cow<'a, str>>) -> Self {
         Self { name, definition_encoding: "ros2msg", definition: definition.into(), message_encoding: "cdr" }
     }
@@ -86,7 +83,7 @@ impl<'a> MessageType<'a> {
 /// Writes a log, message by message in the order of log times.
 pub struct LogWriter {
     writer: Writer<BufWriter<OutputFile>>,
-    /// Channel and number of messages so far, by topic.
+    /// Channel and number of written messages by topic.
     channels: BTreeMap<String, (u16, u32)>,
     path: PathBuf,
 }
@@ -101,7 +98,7 @@ impl std::fmt::Debug for LogWriter {
     }
 }
 
-/// The quality of service that ROS 2 recorders store for sensor topics; players need it.
+/// Quality of service that ROS 2 recorders store for sensor topics; players need it.
 const QOS_PROFILE: &str = "\
 - history: 1
   depth: 10
@@ -115,7 +112,7 @@ const QOS_PROFILE: &str = "\
 ";
 
 impl LogWriter {
-    /// Starts a log, which gets its name when it is finished; an older file stays until then.
+    /// Starts a log under a temporary name; an older file stays until the log is finished.
     pub fn create(path: &Path, options: &LogWriterOptions) -> Result<Self, LogError> {
         let failed = |source| LogError::Io { action: "write the log", source, path: path.to_owned() };
         let file = BufWriter::with_capacity(1 << 20, OutputFile::create(path).map_err(failed)?);
@@ -138,7 +135,7 @@ impl LogWriter {
         Ok(Self { writer, channels: BTreeMap::new(), path: path.to_owned() })
     }
 
-    /// The path that it will have.
+    /// Final path.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
@@ -157,7 +154,7 @@ impl LogWriter {
         self.write(topic, MessageKind::Imu, times, &message)
     }
 
-    /// Writes an image as JPEG of a quality from 1 to 100.
+    /// Writes an image as JPEG with a quality from 1 to 100.
     pub fn write_jpeg(
         &mut self,
         topic: &str,
@@ -173,7 +170,7 @@ impl LogWriter {
         self.write_compressed_image(topic, frame_id, times, "jpeg", &jpeg)
     }
 
-    /// Writes an image that is compressed already; `format` is `jpeg` or `png`.
+    /// Writes a compressed image; `format` is `jpeg` or `png`.
     pub fn write_compressed_image(
         &mut self,
         topic: &str,
@@ -186,7 +183,7 @@ impl LogWriter {
         self.write(topic, MessageKind::CompressedImage, times, &message)
     }
 
-    /// Writes one picture of a video, in Annex B; `format` is `h264` or `h265`.
+    /// Writes one frame of a video, in Annex B; `format` is `h264` or `h265`.
     pub fn write_compressed_video(
         &mut self,
         topic: &str,
@@ -305,14 +302,14 @@ impl LogWriter {
         self.writer.write_metadata(&metadata).map_err(|error| write_error(&self.path, &error))
     }
 
-    /// Completes the file, in place of an older one.
+    /// Completes the file, replacing an older one.
     pub fn finish(self) -> Result<(), LogError> {
         let path = self.path.clone();
         let staged = self.finish_staged()?;
         staged.commit().map_err(|source| LogError::Io { action: "write the log", source, path })
     }
 
-    /// Completes the file without giving it its name, so that it can appear together with others.
+    /// Completes the file without the final rename, so that it can appear together with others.
     pub fn finish_staged(mut self) -> Result<StagedFile, LogError> {
         self.writer.finish().map_err(|error| write_error(&self.path, &error))?;
         let flushed = self.writer.into_inner().into_inner().map_err(io::IntoInnerError::into_error);
@@ -320,7 +317,7 @@ impl LogWriter {
         staged.map_err(|source| LogError::Io { action: "write the log", source, path: self.path })
     }
 
-    /// Writes a message that is encoded already.
+    /// Writes an encoded message.
     pub(super) fn write(
         &mut self,
         topic: &str,
@@ -334,7 +331,7 @@ impl LogWriter {
         self.write_to_channel(topic, times, message)
     }
 
-    /// Writes a message of any type, encoded already. A topic keeps the type of its first message.
+    /// Writes an encoded message of any type. A topic keeps the type of its first message.
     pub fn write_typed(
         &mut self,
         topic: &str,
@@ -367,7 +364,7 @@ impl LogWriter {
     }
 }
 
-/// An error of the MCAP writer or the image encoder, by its innermost cause: theirs do not say that a disk is full.
+/// Error of the MCAP writer or the image encoder with its innermost cause, since theirs do not mention a full disk.
 fn write_error(path: &Path, error: &(dyn Error + 'static)) -> LogError {
     let mut cause = error;
     while let Some(source) = cause.source() {
@@ -376,7 +373,7 @@ fn write_error(path: &Path, error: &(dyn Error + 'static)) -> LogError {
     LogError::Write { problem: cause.to_string(), path: path.to_owned() }
 }
 
-/// The encoders, for tests of the decoders.
+/// Encoders for tests of the decoders.
 #[cfg(test)]
 pub(super) mod testing {
     pub(in super::super) use super::encode::*;

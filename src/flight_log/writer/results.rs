@@ -1,4 +1,5 @@
-//! Messages that viewers draw (Foxglove, Rerun, RViz): paths, transform trees, point clouds, image annotations, log
+//! Messages for display in viewers (Foxglove, Rerun, RViz): paths, transform trees, point clouds, image annotations,
+//! log
 //! lines, and rows of named numbers.
 
 use nalgebra::{Vector2, Vector3};
@@ -9,12 +10,10 @@ use super::schemas::{self, compose};
 use super::{LogWriter, MessageTimes, MessageType, encode};
 use crate::geometry::RigidTransform;
 
-/// A frame in its parent's frame.
+/// Pose of a frame in its parent frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedTransform {
-    /// Parent frame.
     pub parent: String,
-    /// Child frame.
     pub child: String,
     /// `parent_from_child`.
     pub pose: RigidTransform,
@@ -23,14 +22,12 @@ pub struct NamedTransform {
 /// Red, green, blue and opacity, each from 0 to 1.
 pub type Rgba = [f64; 4];
 
-/// A keypoint marker in an image, a circle.
+/// Circular keypoint marker in an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CircleAnnotation {
-    /// Its centre in pixels, pixel centres at whole numbers.
+    /// Centre in pixels, pixel centres at whole numbers.
     pub center_px: Vector2<f64>,
-    /// Its diameter in pixels.
     pub diameter_px: f64,
-    /// Colour of the circle.
     pub color: Rgba,
 }
 
@@ -39,7 +36,6 @@ pub struct CircleAnnotation {
 pub struct LinesAnnotation {
     /// Both ends of each line in pixels, pixel centres at whole numbers.
     pub lines_px: Vec<[Vector2<f64>; 2]>,
-    /// Colour of the lines.
     pub color: Rgba,
 }
 
@@ -48,11 +44,10 @@ pub struct LinesAnnotation {
 pub enum LogLevel {
     /// Details for debugging.
     Debug = 10,
-    /// An event.
     Info = 20,
-    /// A problem that did not stop the run.
+    /// Problem that did not stop the run.
     Warning = 30,
-    /// A problem that stopped it.
+    /// Problem that stopped the run.
     Error = 40,
 }
 
@@ -119,7 +114,7 @@ impl LogWriter {
         self.write_typed(topic, &message_type, times, &out.finish())
     }
 
-    /// Writes points with a number each as `sensor_msgs/msg/PointCloud2` (x, y, z as 4-byte floats, id as integer).
+    /// Writes points with ids as `sensor_msgs/msg/PointCloud2` (x, y, z as 4-byte floats, id as integer).
     pub fn write_points(
         &mut self,
         topic: &str,
@@ -178,7 +173,7 @@ impl LogWriter {
             out.u32(2 * group.lines_px.len() as u32);
             group.lines_px.iter().flatten().for_each(|point_px| put_point(&mut out, point_px));
             out.f64s(&group.color);
-            out.u32(0); // no colours of their own
+            out.u32(0); // no separate colours
             out.f64s(&TRANSPARENT);
             out.f64s(&[THICKNESS_PX]);
         }
@@ -230,7 +225,7 @@ impl LogWriter {
     }
 }
 
-/// The names as ROS 2 allows them for fields (lower case, digits, single underscores, a letter first), each once.
+/// Converts names to valid ROS 2 field names (lower case, digits, single underscores, a letter first), each once.
 fn field_names<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut fields: Vec<String> = Vec::new();
     for name in names {

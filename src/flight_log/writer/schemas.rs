@@ -1,17 +1,17 @@
-//! The message definitions that are written into a log, in ROS 2's `ros2msg` format: the type itself, then every type it
+//! Message definitions that are written into a log, in ROS 2's `ros2msg` format: the type itself, then every type it
 //! needs after a line of 80 equals signs.
 //! The fields of each type are a file of `assets/messages/`.
 
 use super::super::MessageKind;
 
-/// The fields of a type, from its file.
+/// Fields of a type, from its file.
 macro_rules! fields {
     ($name:literal) => {
         include_str!(concat!("../../../assets/messages/", $name, ".msg"))
     };
 }
 
-/// A type that others need: its name and its fields.
+/// Name and fields of a type that others need.
 macro_rules! needed {
     ($name:literal) => {
         ($name, fields!($name))
@@ -41,7 +41,7 @@ const TEXT: Needed = needed!("foxglove_msgs/TextAnnotation");
 const COLOR: Needed = needed!("foxglove_msgs/Color");
 const POINT2: Needed = needed!("foxglove_msgs/Point2");
 
-/// The fields of a type, and the types that they need.
+/// Fields of a type, and the types that they need.
 pub(super) type Definition<'a> = (&'a str, &'a [Needed]);
 
 /// Types of a header.
@@ -60,13 +60,13 @@ pub(super) const IMAGE_ANNOTATIONS: Definition<'_> =
 /// `rcl_interfaces/msg/Log`.
 pub(super) const LOG_LINE: Definition<'_> = (fields!("rcl_interfaces/Log"), &[TIME]);
 
-/// The fields of a message, and the types they need.
+/// Fields of a message, and the types they need.
 fn fields(kind: MessageKind) -> Definition<'static> {
     match kind {
         MessageKind::Imu => (fields!("sensor_msgs/Imu"), &[HEADER, TIME, QUATERNION, VECTOR3]),
         MessageKind::Image => (fields!("sensor_msgs/Image"), &[HEADER, TIME]),
         MessageKind::CompressedImage => (fields!("sensor_msgs/CompressedImage"), &[HEADER, TIME]),
-        // Protobuf is written as the same fields of ROS 2.
+        // Protobuf messages are written with the same fields in ROS 2.
         MessageKind::CompressedVideo | MessageKind::CompressedVideoProtobuf => {
             (fields!("foxglove_msgs/CompressedVideo"), &[TIME])
         }
@@ -92,14 +92,14 @@ fn fields(kind: MessageKind) -> Definition<'static> {
     }
 }
 
-/// The whole definition of a message type.
+/// Complete definition of a message type.
 pub(super) fn definition(kind: MessageKind) -> String {
     compose(&fields(kind))
 }
 
-/// A type's own fields, then every type that it needs.
-pub(super) fn compose((own, needed): &Definition<'_>) -> String {
-    let mut text = format!("{}\n", own.trim_end());
+/// Fields of a type, then every type that it needs.
+pub(super) fn compose((root, needed): &Definition<'_>) -> String {
+    let mut text = format!("{}\n", root.trim_end());
     for (name, fields) in *needed {
         text.extend([&"=".repeat(80), "\nMSG: ", name, "\n", fields]);
     }

@@ -61,13 +61,13 @@ fn chains_obey_the_manifold_laws() {
             let delta = DVector::from_fn(chain.dof(), |_, _| random.within(size));
             let moved = chain.plus(&delta);
             let error = (moved.minus(&chain) - &delta).amax();
-            assert!(error < 1e-12, "{name}: (x ⊞ δ) ⊟ x is off by {error}");
+            assert!(error < 1e-12, "{name}: (x ⊞ δ) ⊟ x error {error}");
             // Two updates, so that `poe` leaves the set that one update reaches.
             let far = moved.plus(&DVector::from_fn(chain.dof(), |_, _| random.within(size)));
             let rebuilt = chain.plus(&far.minus(&chain));
             let angles = random.angles(chain.joint_count());
             let error = rebuilt.imu_from_camera(&angles).minus(&far.imu_from_camera(&angles)).amax();
-            assert!(error < 1e-12, "{name}: x ⊞ (y ⊟ x) is off by {error}");
+            assert!(error < 1e-12, "{name}: x ⊞ (y ⊟ x) error {error}");
         }
     }
 }

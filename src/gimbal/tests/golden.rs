@@ -1,4 +1,4 @@
-//! The chains against independently computed poses, Jacobians and ranks.
+//! Chains against independently computed poses, Jacobians and ranks.
 
 use std::path::Path;
 
@@ -49,7 +49,7 @@ pub(crate) fn names(value: &Value) -> Vec<String> {
     array(value).iter().map(|name| name.as_str().unwrap().to_owned()).collect()
 }
 
-/// The chain of a golden `values` object in the classical form.
+/// Classical chain of a golden `values` object.
 pub(crate) fn classical(values: &Value, joints: usize) -> ClassicalChain {
     let links = (1..=joints).map(|index| {
         let number = |name: &str| values[format!("L{index}.{name}")].as_f64().unwrap();
@@ -62,12 +62,12 @@ pub(crate) fn classical(values: &Value, joints: usize) -> ClassicalChain {
     }
 }
 
-/// Names of its columns, links by number.
+/// Column names, with links by number.
 fn names_of(chain: &Chain) -> Vec<String> {
     chain.parameters().into_iter().map(|parameter| ParameterNames::default().name(parameter)).collect()
 }
 
-/// The values of a chain against those of the file: by name, rigid transforms as matrices.
+/// Compares the values of a chain with those of the file: by name, rigid transforms as matrices.
 pub(crate) fn check_values(chain: &Chain, values: &Value, tolerance: f64, context: &str) {
     let found = chain.values();
     let parameters = chain.parameters();
@@ -95,7 +95,7 @@ pub(crate) fn check_values(chain: &Chain, values: &Value, tolerance: f64, contex
 }
 
 fn amax_difference(found: &Matrix6xX<f64>, expected: &DMatrix<f64>) -> f64 {
-    // A matrix without columns comes without a shape.
+    // A matrix without columns is stored without a shape.
     if found.ncols() == 0 { 0.0 } else { (found - expected).amax() }
 }
 
@@ -128,7 +128,7 @@ fn golden_chains() {
             for expected in array(&form["jacobians"]) {
                 let found = canonical.linearize(&numbers(&expected["theta"]));
                 let error = amax_difference(&found.by_parameters, &matrix(&expected["J"]));
-                assert!(error < 1e-11, "{context} (locked: {singular}): {error}");
+                assert!(error < 1e-11, "{context} (singular: {singular}): {error}");
                 assert!(amax_difference(&found.by_joints, &matrix(&expected["J_theta"])) < 1e-11, "{context}");
                 compared += 1;
             }
@@ -198,7 +198,7 @@ fn golden_visual_residuals() {
     assert!(compared >= 18, "only {compared} reprojections were compared");
 }
 
-/// One predicted pixel with its derivatives.
+/// Predicted pixel with its derivatives.
 pub(crate) struct Reprojection {
     pub(crate) uv_px: Vector2<f64>,
     pub(crate) by_parameters: DMatrix<f64>,
@@ -222,8 +222,9 @@ impl Reprojection {
         )
     }
 
-    /// The feature anchored in frame i with `(x/z, y/z, 1)` and its inverse depth, seen from frame j; each frame is its
-    /// `world_from_imu` and its joint angles.
+    /// Predicts the feature that is anchored in frame i with `(x/z, y/z, 1)` and its inverse depth, observed in frame
+    /// j; each
+    /// frame is given by its `world_from_imu` and its joint angles.
     pub(crate) fn new(
         chain: &Chain,
         camera: &CameraModel,
@@ -241,7 +242,7 @@ impl Reprojection {
         let (uv_px, by_point) = camera.project_with_jacobian(&point_in_j).unwrap();
         let world_to_j = world_from_camera_j.rotation_matrix().transpose();
         let by_world: Matrix2x3<f64> = by_point * world_to_j;
-        // The point by [φ; δt] of a camera pose, as seen in the world (i) or in camera j.
+        // Derivative of the point with respect to [φ; δt] of a camera pose, in world (i) or in camera j.
         let by_camera_i =
             block(&(by_world * world_from_camera_i.rotation_matrix() * -so3::hat(&point_in_i)), &by_world);
         let by_camera_j = block(&(by_point * so3::hat(&point_in_j)), &-by_world);
@@ -277,7 +278,8 @@ fn block(by_rotation: &Matrix2x3<f64>, by_translation: &Matrix2x3<f64>) -> DMatr
     )
 }
 
-/// `[φ; δt]` of `world_from_imu · imu_from_camera` by that of `world_from_imu` (the paper's Eq. 13 in the right convention).
+/// Derivative of `[φ; δt]` of `world_from_imu · imu_from_camera` with respect to that of `world_from_imu` (the paper's
+/// Eq. 13 in the right convention).
 fn imu_to_world_camera(world_from_imu: &RigidTransform, imu_from_camera: &RigidTransform) -> DMatrix<f64> {
     let mut jacobian = SMatrix::<f64, 6, 6>::identity();
     let arm = world_from_imu.rotation_matrix() * so3::hat(&imu_from_camera.translation_m);

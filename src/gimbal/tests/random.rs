@@ -5,7 +5,6 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::geometry::{RigidTransform, SplitMix64, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
 
-/// Random numbers for test data.
 pub(crate) struct Random(SplitMix64);
 
 impl Random {

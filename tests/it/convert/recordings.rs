@@ -133,7 +133,7 @@ fn ulogs_are_converted() {
     assert_eq!(report.kind, "PX4 ULog");
     check_autopilot(&messages, "/imu", SAMPLES, 1e-6);
     assert_eq!(topic(&report, "cpuload").left, 20);
-    assert!(report.notes.iter().any(|note| note.contains("0.250 s together (dropouts)")), "{:?}", report.notes);
+    assert!(report.notes.iter().any(|note| note.contains("0.250 s in total")), "{:?}", report.notes);
     assert_eq!(messages["/gps/pose"].len(), 20);
 }
 
@@ -319,7 +319,7 @@ fn damaged_movies_are_named() {
     // An incomplete copy of a movie with its tables at the start.
     let whole = movie(&tracks(), true);
     let (report, messages) = run(folder.path(), "flight.mp4", &whole[..whole.len() - 7000]);
-    let lost = report.notes.iter().find(|note| note.contains("pictures lie beyond the end")).cloned();
+    let lost = report.notes.iter().find(|note| note.contains("frames are lost: beyond the end")).cloned();
     let pictures = messages["/camera/video"].len();
     assert_eq!(lost.map(|note| note.starts_with(&format!("{} of 24 ", 24 - pictures))), Some(true), "{pictures}");
     assert!(pictures > 0 && !messages.contains_key("/camera/imu/gyroscope"));

@@ -1,6 +1,6 @@
 use nalgebra::{Quaternion, UnitQuaternion};
 
-/// Attitudes further apart are not interpolated between.
+/// Attitudes further apart are not interpolated.
 const MAX_GAP_NS: i64 = 1_000_000_000;
 
 /// Rotation from north, east, down to east, north, up.
@@ -15,7 +15,7 @@ pub(super) fn earth_from_heading(earth_from_body: &UnitQuaternion<f64>) -> UnitQ
     UnitQuaternion::from_euler_angles(0.0, 0.0, yaw_rad)
 }
 
-/// Rotations from the vehicle's body to the earth in the order of their times.
+/// Rotations from the vehicle's body to the earth in time order.
 pub(super) struct AttitudeTrack<'a>(&'a [(i64, UnitQuaternion<f64>)]);
 
 impl<'a> AttitudeTrack<'a> {
@@ -27,7 +27,7 @@ impl<'a> AttitudeTrack<'a> {
         self.0.is_empty()
     }
 
-    /// The rotation at a time, interpolated between the two around it; `None` before, behind and in gaps of over a second.
+    /// Rotation at a time, interpolated between the two around it; `None` before, after and in gaps of over a second.
     pub(super) fn at(&self, time_ns: i64) -> Option<UnitQuaternion<f64>> {
         let behind = self.0.partition_point(|(at, _)| *at <= time_ns);
         let (before_ns, before) = self.0.get(behind.checked_sub(1)?)?;
@@ -37,7 +37,7 @@ impl<'a> AttitudeTrack<'a> {
         let (after_ns, after) = self.0.get(behind)?;
         let gap_ns = after_ns.saturating_sub(*before_ns);
         let fraction = time_ns.saturating_sub(*before_ns) as f64 / gap_ns as f64;
-        // Opposite rotations have no shortest way between them.
+        // Opposite rotations have no shortest rotation between them.
         (gap_ns <= MAX_GAP_NS).then(|| before.try_slerp(after, fraction, 1e-9).unwrap_or(*before))
     }
 }

@@ -1,17 +1,17 @@
-/// What was skipped of an autopilot's log.
+/// Skipped bytes of an autopilot's log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Damage {
     skipped_bytes: usize,
-    /// Places at which bytes were skipped.
+    /// Number of places at which bytes were skipped.
     places: u64,
-    /// The first of them.
+    /// Position of the first place.
     first_at: usize,
-    /// Bytes at the end that are nothing whole.
+    /// Number of bytes at the end that form no complete record.
     cut_bytes: usize,
 }
 
 impl Damage {
-    /// Counts bytes that are skipped from a position on.
+    /// Counts skipped bytes at a position.
     pub(super) fn skip(&mut self, at: usize, bytes: usize) {
         if self.places == 0 {
             self.first_at = at;
@@ -20,12 +20,12 @@ impl Damage {
         self.skipped_bytes += bytes;
     }
 
-    /// Counts bytes at the end that are cut off.
+    /// Counts truncated bytes at the end.
     pub(super) fn cut(&mut self, bytes: usize) {
         self.cut_bytes += bytes;
     }
 
-    /// The notes of a report: `skipped` says what the skipped bytes are not, `cut` that a number of bytes at the end is lost.
+    /// Notes for a report: `skipped` describes the skipped bytes, `cut` the loss of a number of bytes at the end.
     pub(super) fn notes(&self, skipped: &str, cut: impl FnOnce(usize) -> String) -> Vec<String> {
         let mut notes = Vec::new();
         if self.skipped_bytes > 0 {

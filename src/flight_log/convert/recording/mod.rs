@@ -1,4 +1,5 @@
-//! Recordings of vehicles: an MP4 video with `GoPro`'s telemetry or beside an autopilot's log, and autopilots' logs alone.
+//! Recordings of vehicles: an MP4 video with `GoPro`'s telemetry or with an autopilot's log, and autopilots' logs
+//! alone.
 
 mod attitude;
 mod damage;
@@ -41,7 +42,7 @@ pub(super) fn autopilot_log_kind(start: &[u8]) -> Option<AutopilotLogKind> {
 
 pub(super) use mp4::is_movie;
 
-/// Bytes by which a log is recognized.
+/// Number of bytes at the start that identify the kind of a log.
 const START_BYTES: u64 = 16;
 
 /// Reads an autopilot's log.
@@ -50,9 +51,9 @@ fn read_autopilot(log: &AutopilotLog, sink: &mut Sink<'_>) -> Result<Recorded, C
     let file = File::open(&log.path).map_err(ConvertError::io("open the log of the autopilot", &log.path))?;
     file.take(START_BYTES).read_to_end(&mut start).map_err(ConvertError::io("read", &log.path))?;
     let found = autopilot_log_kind(&start);
-    // A file under Zstandard begins otherwise.
+    // The start of a Zstandard file does not show its kind.
     if found != Some(log.kind) && !start.starts_with(&ZSTD_MAGIC) {
-        let found = found.map_or("and no log of another autopilot either", AutopilotLogKind::name);
+        let found = found.map_or("nor a log of another autopilot", AutopilotLogKind::name);
         return Err(ConvertError::NotThatLog {
             expected: log.kind.name(),
             found: found.to_owned(),
@@ -75,7 +76,7 @@ pub(super) fn convert_autopilot(log: &AutopilotLog, sink: &mut Sink<'_>) -> Resu
     topics.write(None, sink)
 }
 
-/// Brings the times to UTC where the recorder knew it.
+/// Converts the times to UTC if the recorder had UTC.
 fn to_utc(recorded: &mut Recorded) {
     match recorded.utc_offset_ns() {
         Some(offset_ns) => recorded.shift(offset_ns),
@@ -84,12 +85,12 @@ fn to_utc(recorded: &mut Recorded) {
 }
 
 const NO_UTC: &str = "the log has no UTC: its times count from the start of the autopilot";
-/// Start of a video whose camera knew no time, in nanoseconds since the epoch: stamps of 0 would be stamps that were never set.
+/// Start of a video without recorded time, in nanoseconds since the epoch, because stamps of 0 count as never set.
 const UNKNOWN_START_NS: i64 = 1_000_000_000;
-/// UTC of a satellite receiver and the clock of a camera may differ by a time zone.
+/// Largest time zone offset between a camera's clock and UTC of a satellite receiver.
 const TIME_ZONES_NS: i64 = 14 * 3600 * 1_000_000_000;
 
-/// Converts a video with its own telemetry, and an autopilot's log beside it.
+/// Converts a video with its telemetry, and with an autopilot's log.
 pub(super) fn convert_video(
     source: &Path,
     options: &ConvertOptions,
@@ -115,7 +116,7 @@ pub(super) fn convert_video(
     } else {
         let start_ns = video_utc_ns.or(created_ns).unwrap_or(UNKNOWN_START_NS);
         if video_utc_ns.is_none() && created_ns.is_none() {
-            sink.note("the camera knew no time: the video starts 1 s after the epoch");
+            sink.note("the camera recorded no time: the video starts 1 s after the epoch");
         }
         if let Some(mut drone) = drone {
             drone.shift(start_ns);
@@ -137,12 +138,12 @@ pub(super) fn convert_video(
     Ok(facts)
 }
 
-/// Where the video lies in the log.
+/// Relation of the video's clock to the log's clock.
 #[derive(Clone, Copy, Debug)]
 struct Place {
-    /// Time of the log at the start of the video.
+    /// Log time at the start of the video.
     start_ns: i64,
-    /// Seconds of the log in a second of the video.
+    /// Log seconds per video second.
     rate: f64,
 }
 
@@ -153,7 +154,7 @@ impl Place {
     }
 }
 
-/// The place of a video in an autopilot's log: as it was given, by UTC where both know it, else both start together.
+/// Relates a video to an autopilot's log: by the given clock, else by UTC if both have it, else both start together.
 fn place_video(
     recorded: &Recorded,
     (first_ns, last_ns): (i64, i64),
@@ -176,19 +177,19 @@ fn place_video(
         Some(start_ns) if has_utc => {
             let distance_ns = start_ns.saturating_sub(log_start_ns).saturating_abs();
             let reason = if distance_ns < TIME_ZONES_NS {
-                "start with start: by the camera's clock they do not overlap (is it set to local time?)"
+                "starts aligned: by the camera's clock they do not overlap (is it set to local time?)"
             } else {
-                "start with start: by the camera's clock they do not overlap"
+                "starts aligned: by the camera's clock they do not overlap"
             };
             (log_start_ns.saturating_sub(first_ns), reason)
         }
-        _ => (log_start_ns.saturating_sub(first_ns), "start with start: camera or autopilot knew no time"),
+        _ => (log_start_ns.saturating_sub(first_ns), "starts aligned: camera or autopilot recorded no time"),
     };
     let offset_s = seconds_from_ns(start_ns.saturating_sub(log_start_ns));
     sink.video_clock = Some(VideoClock { offset_s, drift_ppm: 0.0 });
     sink.note(format!(
-        "the video is placed {offset_s:.3} s after the first measurement of the autopilot's log ({reason}); this is good to \
-         seconds at best, give a better one with --video-offset"
+        "the video is placed {offset_s:.3} s after the first measurement of the autopilot's log ({reason}), accurate to \
+         seconds at best; give a better offset with --video-offset"
     ));
     Place { start_ns, rate: 1.0 }
 }

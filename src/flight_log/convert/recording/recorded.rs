@@ -1,4 +1,4 @@
-//! What was measured during a recording, in SI units, by the clock of its recorder.
+//! Measurements of a recording in SI units, in recorder time.
 
 use std::collections::BTreeMap;
 
@@ -12,13 +12,13 @@ pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.80665;
 /// Measurements with their times in nanoseconds of the recorder's clock.
 pub(super) type Samples<T> = Vec<(i64, T)>;
 
-/// Measurements of a record, with its name.
+/// Name and measurements of a record.
 pub(super) type NamedSamples<T> = (String, Samples<T>);
 
-/// One IMU of a recording: angular velocities in rad/s and specific forces in m/s², in the IMU frame.
+/// IMU of a recording: angular velocities in rad/s and specific forces in m/s², in the IMU frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RecordedImu {
-    /// Both in one record.
+    /// Angular velocity and specific force of one record.
     pub(super) combined: Samples<[Vector3<f64>; 2]>,
     /// Angular velocities alone.
     pub(super) gyroscope: Samples<Vector3<f64>>,
@@ -26,7 +26,7 @@ pub(super) struct RecordedImu {
     pub(super) accelerometer: Samples<Vector3<f64>>,
 }
 
-/// The frame of a gimbal's attitude (`MAVLink` gimbal protocol v2), with forward, right and down as its axes.
+/// Frame of a gimbal's attitude (`MAVLink` gimbal protocol v2), with axes forward, right and down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum GimbalFrame {
     /// Levelled, with the heading of the vehicle.
@@ -35,14 +35,14 @@ pub(super) enum GimbalFrame {
     Earth,
 }
 
-/// A gimbal's attitude: the rotation from the camera's axes (forward, right, down) to those of a frame.
+/// Attitude of a gimbal: the rotation from the camera's axes (forward, right, down) to those of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GimbalAttitude {
     pub(super) frame: GimbalFrame,
     pub(super) frame_from_camera: UnitQuaternion<f64>,
 }
 
-/// Measurements of the same quantity by record, of which one is taken: the one with the smallest rank.
+/// Measurements of one quantity by record; the record with the smallest rank is used.
 #[derive(Clone, Debug)]
 pub(super) struct Candidates<T>(BTreeMap<(u8, String), Samples<T>>);
 
@@ -53,7 +53,6 @@ impl<T> Default for Candidates<T> {
 }
 
 impl<T> Candidates<T> {
-    /// Adds a measurement of a record.
     pub(super) fn push(&mut self, rank: u8, record: &str, time_ns: i64, value: T) {
         self.0.entry((rank, record.to_owned())).or_default().push((time_ns, value));
     }
@@ -72,7 +71,7 @@ impl<T> Candidates<T> {
         self.0.values().map(Vec::len).sum()
     }
 
-    /// The name and the measurements of the best record, and the others.
+    /// Name and measurements of the best record, and the other records.
     pub(super) fn into_best(self) -> (Option<NamedSamples<T>>, Vec<NamedSamples<T>>) {
         let mut all = self.0.into_iter().map(|((_, name), samples)| (name, samples));
         (all.next(), all.collect())
@@ -89,22 +88,22 @@ fn map_times<T>(samples: &mut Samples<T>, map: &impl Fn(i64) -> i64) {
     }
 }
 
-/// Records that are not in the log.
+/// Records that are left out of the log.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Left {
     pub(super) count: u64,
-    /// Why the first one is not.
+    /// Reason of the first one.
     pub(super) reason: String,
 }
 
-/// What a recording holds besides its video.
+/// Measurements of a recording, without its video.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Recorded {
-    /// Name of its format, `PX4 ULog`.
+    /// Name of the format, such as `PX4 ULog`.
     pub(super) format: &'static str,
-    /// Before the names of its topics: empty, or `/camera`.
+    /// Prefix of the topic names: empty, or `/camera`.
     pub(super) prefix: &'static str,
-    /// IMUs by the records that they are from.
+    /// IMUs by record.
     pub(super) imus: BTreeMap<String, RecordedImu>,
     /// Rotations from the vehicle's body (forward, right, down) to the earth (north, east, down).
     pub(super) attitudes: Candidates<UnitQuaternion<f64>>,
@@ -114,7 +113,7 @@ pub(super) struct Recorded {
     pub(super) fixes: Candidates<Geodetic>,
     /// UTC in nanoseconds since the epoch.
     pub(super) utc: Samples<i64>,
-    /// Records that are not read, by their names.
+    /// Unused records by name.
     pub(super) left: BTreeMap<String, Left>,
     pub(super) notes: Vec<String>,
 }
@@ -124,17 +123,14 @@ impl Recorded {
         Self { format, prefix, ..Self::default() }
     }
 
-    /// The IMU of a record.
     pub(super) fn imu(&mut self, record: &str) -> &mut RecordedImu {
         self.imus.entry(record.to_owned()).or_default()
     }
 
-    /// Counts a record that is left out.
     pub(super) fn leave(&mut self, record: &str, reason: &str) {
         self.leave_many(record, 1, reason);
     }
 
-    /// Counts records that are left out.
     pub(super) fn leave_many(&mut self, record: &str, count: u64, reason: &str) {
         if let Some(left) = self.left.get_mut(record) {
             left.count = left.count.saturating_add(count);
@@ -148,7 +144,7 @@ impl Recorded {
         self.map_times(|time_ns| time_ns.saturating_add(offset_ns));
     }
 
-    /// Changes all times.
+    /// Maps all times.
     pub(super) fn map_times(&mut self, map: impl Fn(i64) -> i64) {
         for imu in self.imus.values_mut() {
             map_times(&mut imu.combined, &map);
@@ -162,13 +158,13 @@ impl Recorded {
         map_times(&mut self.utc, &map);
     }
 
-    /// Adds what another recorder of the same clock measured.
+    /// Adds measurements of another recorder with the same clock.
     pub(super) fn append(&mut self, other: Self) {
         for (record, mut imu) in other.imus {
-            let own = self.imu(&record);
-            own.combined.append(&mut imu.combined);
-            own.gyroscope.append(&mut imu.gyroscope);
-            own.accelerometer.append(&mut imu.accelerometer);
+            let merged = self.imu(&record);
+            merged.combined.append(&mut imu.combined);
+            merged.gyroscope.append(&mut imu.gyroscope);
+            merged.accelerometer.append(&mut imu.accelerometer);
         }
         self.attitudes.append(other.attitudes);
         self.gimbal.append(other.gimbal);
@@ -179,7 +175,6 @@ impl Recorded {
         other.left.into_iter().for_each(|(record, left)| self.leave_many(&record, left.count, &left.reason));
     }
 
-    /// Number of measurements.
     pub(super) fn count(&self) -> u64 {
         let imu = |imu: &RecordedImu| imu.combined.len() + imu.gyroscope.len() + imu.accelerometer.len();
         let imus: usize = self.imus.values().map(imu).sum();
@@ -187,14 +182,14 @@ impl Recorded {
         (imus + others) as u64
     }
 
-    /// UTC minus the recorder's clock: the median of what it recorded, `None` where it knew no UTC.
+    /// UTC minus recorder time: the median of the recorded values, `None` without UTC.
     pub(super) fn utc_offset_ns(&self) -> Option<i64> {
         let mut offsets: Vec<i64> = self.utc.iter().map(|(time_ns, utc_ns)| utc_ns.saturating_sub(*time_ns)).collect();
         offsets.sort_unstable();
         offsets.get(offsets.len() / 2).copied()
     }
 
-    /// First and last time of the IMUs, of everything where there is none.
+    /// First and last time of the IMUs, or of all measurements without an IMU.
     pub(super) fn span_ns(&self) -> Option<(i64, i64)> {
         let mut times: Vec<i64> = Vec::new();
         for imu in self.imus.values() {
@@ -216,26 +211,26 @@ fn ends<T>(samples: &Samples<T>, times: &mut Vec<i64>) {
     times.extend(samples.first().into_iter().chain(samples.last()).map(|(time_ns, _)| *time_ns));
 }
 
-/// Nanoseconds of a time in a unit of so many nanoseconds; `None` for what is no time, such as a negative number.
+/// Converts a time in units of `unit_ns` to nanoseconds; `None` for invalid times such as negative numbers.
 pub(super) fn nanoseconds(time: f64, unit_ns: f64) -> Option<i64> {
     // 9e18 ns are the year 2255.
     let time_ns = time * unit_ns;
     (time_ns >= 0.0 && time_ns < 9e18).then(|| time_ns.round() as i64)
 }
 
-/// A vector of finite numbers.
+/// Converts to a vector; `None` unless all components are finite.
 pub(super) fn finite(components: [f64; 3]) -> Option<Vector3<f64>> {
     components.iter().all(|value| value.is_finite()).then(|| Vector3::from(components))
 }
 
-/// The rotation of a quaternion with the scalar part first; `None` for numbers that are no rotation.
+/// Rotation of a quaternion with the scalar part first; `None` for numbers that are no rotation.
 pub(super) fn rotation([w, x, y, z]: [f64; 4]) -> Option<UnitQuaternion<f64>> {
     let quaternion = Quaternion::new(w, x, y, z);
     let norm = quaternion.norm();
     (norm > 0.9 && norm < 1.1).then(|| UnitQuaternion::new_normalize(quaternion))
 }
 
-/// The rotation of roll, pitch and yaw in radians (`Rz Ry Rx`); `None` for numbers that are not finite.
+/// Rotation of roll, pitch and yaw in radians (`Rz Ry Rx`); `None` for numbers that are not finite.
 pub(super) fn from_euler(angles_rad: [f64; 3]) -> Option<UnitQuaternion<f64>> {
     let [roll_rad, pitch_rad, yaw_rad] = finite(angles_rad)?.into();
     Some(UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad))

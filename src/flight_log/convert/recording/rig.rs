@@ -1,4 +1,4 @@
-//! The rig of a video: what its recorders say, usual values for the rest.
+//! Rig of a video: recorded facts, and usual values for the rest.
 
 use super::super::super::FlightLog;
 use super::super::super::rig_template::{CameraChoice, MechanismAxes, RigChoices, RigTemplate, TemplateError};
@@ -6,11 +6,11 @@ use super::recorded::GimbalFrame;
 use super::topics::{GIMBAL_TOPIC, VEHICLE_TOPIC, VIDEO_TOPIC};
 use crate::sensors::BodyAxes;
 
-/// Horizontal field of view of a camera that is not known, in degrees: a common one of gimballed cameras.
+/// Horizontal field of view of an unknown camera, in degrees: a common one of gimballed cameras.
 const USUAL_FIELD_OF_VIEW_DEG: f64 = 84.0;
-/// Mechanism of a gimbal that is not known: the usual order of three axes.
+/// Mechanism of an unknown gimbal: the usual order of three axes.
 const USUAL_MECHANISM: &str = "yaw-roll-pitch";
-/// `GoPro`'s cameras by the first letters of their firmware.
+/// `GoPro` cameras by the first letters of their firmware.
 const FIRMWARES: [(&str, &str); 8] = [
     ("HD3", "hero3"),
     ("HD4", "hero4"),
@@ -22,21 +22,21 @@ const FIRMWARES: [(&str, &str); 8] = [
     ("H21", "hero10"),
 ];
 
-/// What a video and its recorders say of their rig.
+/// Facts about the rig from a video and its recorders.
 #[derive(Clone, Debug)]
 pub(in super::super) struct VideoFacts {
     pub(super) resolution_px: [usize; 2],
     /// Version of a `GoPro`'s firmware, and the letter of its field of view.
     pub(super) firmware: Option<String>,
     pub(super) field_of_view: Option<String>,
-    /// The frame of the gimbal's attitude, where it was recorded.
+    /// Frame of the gimbal's attitude, `None` if it was not recorded.
     pub(super) gimbal_frame: Option<GimbalFrame>,
-    /// Whether the IMU is an autopilot's.
+    /// True for the IMU of an autopilot.
     pub(super) has_autopilot: bool,
 }
 
 impl VideoFacts {
-    /// The published camera, else the usual field of view.
+    /// Published camera, else the usual field of view.
     fn camera(&self) -> CameraChoice {
         let usual = CameraChoice::FieldOfView(USUAL_FIELD_OF_VIEW_DEG);
         let Some(firmware) = &self.firmware else { return usual };
@@ -53,7 +53,7 @@ impl VideoFacts {
         format!("gopro-{model}-{lens}").parse().unwrap_or(usual)
     }
 
-    /// The template of a rig for the log.
+    /// Template of a rig for the log.
     pub(in super::super) fn template(&self, name: &str, log: &FlightLog) -> Result<RigTemplate, TemplateError> {
         let prefix = if self.has_autopilot { "/imu" } else { "/camera/imu" };
         let both = |suffix: &str| [format!("{prefix}{suffix}"), format!("{prefix}0{suffix}")];
@@ -82,7 +82,7 @@ impl VideoFacts {
         let choices = RigChoices {
             name: name.to_owned(),
             camera: self.camera(),
-            // That of the pictures, which the container may want to be shown in another.
+            // Size of the decoded images, since the container can declare another display size.
             resolution_px: None,
             mechanism: mechanism.parse::<MechanismAxes>()?,
             positive: Some(frd),

@@ -1,4 +1,4 @@
-/// A number type of a record.
+/// Number type of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scalar {
     I8,
@@ -14,7 +14,7 @@ pub(super) enum Scalar {
 }
 
 impl Scalar {
-    /// Bytes of a number.
+    /// Size in bytes.
     pub(super) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -24,14 +24,14 @@ impl Scalar {
         }
     }
 
-    /// The little-endian number at a byte of a record; `None` beyond its end. Whole numbers are exact up to 2⁵³.
+    /// Little-endian number at a byte of a record; `None` beyond its end. Whole numbers are exact up to 2⁵³.
     pub(super) fn little_endian(self, record: &[u8], offset: usize) -> Option<f64> {
         let mut bytes = [0; 8];
         bytes[..self.size()].copy_from_slice(record.get(offset..offset.checked_add(self.size())?)?);
         Some(self.value(bytes))
     }
 
-    /// The big-endian number at a byte of a record; `None` beyond its end.
+    /// Big-endian number at a byte of a record; `None` beyond its end.
     pub(super) fn big_endian(self, record: &[u8], offset: usize) -> Option<f64> {
         let mut bytes = [0; 8];
         let size = self.size();
@@ -40,7 +40,7 @@ impl Scalar {
         Some(self.value(bytes))
     }
 
-    /// The number in the first of eight bytes, little-endian.
+    /// Number in the first of eight bytes, little-endian.
     fn value(self, bytes: [u8; 8]) -> f64 {
         let whole = u64::from_le_bytes(bytes);
         match self {

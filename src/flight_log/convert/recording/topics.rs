@@ -1,4 +1,4 @@
-//! The topics of the log that a recording becomes.
+//! Log topics of a recording.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -15,34 +15,32 @@ const ROTATION_TYPE: &str = "geometry_msgs/msg/QuaternionStamped";
 const POSE_TYPE: &str = "geometry_msgs/msg/PoseStamped";
 const VIDEO_TYPE: &str = "foxglove_msgs/msg/CompressedVideo";
 
-/// An IMU, without its number.
+/// Topic of an IMU, without its number.
 const IMU_TOPIC: &str = "/imu";
-/// The gimbal's attitude.
 pub(super) const GIMBAL_TOPIC: &str = "/gimbal/attitude";
 /// Rotation from the vehicle's body (forward, right, down) to the earth (north, east, down).
 pub(super) const VEHICLE_TOPIC: &str = "/vehicle/attitude";
-/// Poses by the autopilot's own estimate (east, north, up).
+/// Poses of the autopilot's estimator (east, north, up).
 const VEHICLE_POSE_TOPIC: &str = "/vehicle/pose";
-/// Poses by the satellite receiver (east, north, up from the first fix).
+/// Poses of the satellite receiver (east, north, up from the first fix).
 const GPS_POSE_TOPIC: &str = "/gps/pose";
-/// The video.
 pub(super) const VIDEO_TOPIC: &str = "/camera/video";
 
-/// A time that is so much later than the next one, or than all before at the end, is a damaged one.
+/// A time is damaged if it is this much later than the next one, or at the end than all before.
 const MAX_JUMP_NS: i64 = 60_000_000_000;
 
-/// A message that is to be written.
+/// Content of a message to write.
 #[derive(Clone, Debug)]
 enum Content {
     /// Angular velocity and specific force.
     Imu([Vector3<f64>; 2]),
     Rotation(UnitQuaternion<f64>),
     Pose(RigidTransform),
-    /// The picture of the video with this number.
+    /// Video frame with this number.
     Picture(usize),
 }
 
-/// A message with its header stamp and its log time.
+/// Message with its header stamp and its log time.
 #[derive(Clone, Debug)]
 struct Message {
     stamp_ns: i64,
@@ -50,7 +48,6 @@ struct Message {
     content: Content,
 }
 
-/// A topic of the log.
 #[derive(Clone, Debug)]
 struct Topic {
     name: String,
@@ -60,25 +57,24 @@ struct Topic {
     messages: Vec<Message>,
 }
 
-/// The topics of a log.
 #[derive(Debug, Default)]
 pub(super) struct Topics {
     topics: Vec<Topic>,
-    /// The frame of the gimbal's attitude.
+    /// Frame of the gimbal's attitude.
     pub(super) gimbal_frame: Option<GimbalFrame>,
 }
 
-/// The name and the measurements of the best record; the others are counted as left out.
+/// Name and measurements of the best record; the others are counted as left out.
 fn chosen<T>(candidates: Candidates<T>, format: &str, topic: &str, sink: &mut Sink<'_>) -> Option<NamedSamples<T>> {
     let (best, others) = candidates.into_best();
     let (record, samples) = best?;
     for (other, samples) in others {
-        sink.leave(&other, format, samples.len() as u64, format!("{topic} is made of {record}"));
+        sink.leave(&other, format, samples.len() as u64, format!("{topic} uses {record}"));
     }
     Some((record.clone(), in_order(samples, format, &record, sink)))
 }
 
-/// Measurements in the order of their times: those whose time goes back, or jumps far ahead of the next one, are left out.
+/// Measurements in time order; those whose time goes back, or jumps far ahead of the next one, are left out.
 fn in_order<T>(samples: Samples<T>, format: &str, record: &str, sink: &mut Sink<'_>) -> Samples<T> {
     let times_ns: Vec<i64> = samples.iter().map(|(time_ns, _)| *time_ns).collect();
     let mut before_ns = None;
@@ -136,7 +132,7 @@ impl Topics {
         self.topics.push(Topic { name: name.to_owned(), message_type, frame_id, remark, messages: messages.collect() });
     }
 
-    /// Adds everything that a recorder measured, at the times of the log.
+    /// Adds all measurements of a recorder, at log times.
     pub(super) fn add_recorded(&mut self, recorded: Recorded, sink: &mut Sink<'_>) {
         let Recorded { format, prefix, imus, attitudes, gimbal, positions, fixes, left, notes, utc: _ } = recorded;
         for note in notes {
@@ -146,7 +142,7 @@ impl Topics {
             sink.leave(&record, format, left.count, left.reason);
         }
         let mut imus: Vec<(String, RecordedImu)> = imus.into_iter().collect();
-        // Stable: IMUs of equal rates stay in the order of their names.
+        // Stable sort: IMUs of equal rates stay in the order of their names.
         imus.sort_by(|(_, a), (_, b)| imu_rate_hz(b).total_cmp(&imu_rate_hz(a)));
         let only_one = imus.len() == 1;
         for (number, (record, imu)) in imus.into_iter().enumerate() {
@@ -191,7 +187,7 @@ impl Topics {
         self.add(&format!("{topic}/accelerometer"), [IMU_TYPE, "imu"], text, accelerometer, content);
     }
 
-    /// Adds the gimbal's attitude in the frame that most measurements have; others are brought into it by the vehicle's heading.
+    /// Adds the gimbal's attitude in the frame of most measurements; others are converted by the vehicle's heading.
     fn add_gimbal(
         &mut self,
         topic: &str,
@@ -229,7 +225,7 @@ impl Topics {
         self.add(topic, [ROTATION_TYPE, frame_id], remark, rotations, Content::Rotation);
     }
 
-    /// Adds positions (east, north, up) with the vehicle's attitude at their times, without any where it has none.
+    /// Adds positions (east, north, up) with the vehicle's attitude at their times; without rotation if it has none.
     fn add_poses(
         &mut self,
         topic: &str,
@@ -254,12 +250,12 @@ impl Topics {
             let left = (count - poses.len()) as u64;
             sink.leave(&record, format, left, "without the vehicle's attitude at that time");
         }
-        let rotation = if vehicle.is_empty() { "; no rotation is known" } else { "" };
+        let rotation = if vehicle.is_empty() { "; rotation unknown" } else { "" };
         let remark = format!("{record}, {:.1} Hz; east, north, up{rotation}", rate_hz(&poses));
         self.add(topic, [POSE_TYPE, "world"], remark, poses, Content::Pose);
     }
 
-    /// Adds the pictures of a video, whose time zero has this time in the log.
+    /// Adds the frames of a video; `time_of` converts video time to log time.
     pub(super) fn add_video(&mut self, video: &Video, time_of: impl Fn(i64) -> i64) {
         let messages: Vec<Message> = video
             .pictures
@@ -280,7 +276,7 @@ impl Topics {
         });
     }
 
-    /// Writes everything in the order of log times.
+    /// Writes all messages in the order of log times.
     pub(super) fn write(self, video: Option<&Video>, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
         let Self { topics, .. } = self;
         let mut order: Vec<(i64, usize, usize)> = Vec::new();

@@ -1,4 +1,4 @@
-//! Camera models before a calibration: from a field of view in degrees, or from the one that a maker publishes.
+//! Camera models before a calibration: from a field of view in degrees, or from the one that a manufacturer publishes.
 
 use std::str::FromStr;
 
@@ -6,23 +6,23 @@ use super::TemplateError;
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::flight_log::nearest_name;
 
-/// From this horizontal field of view on a lens is taken for an equidistant one: no rectilinear lens of a camera is wider.
+/// Horizontal field of view from which a lens is assumed equidistant: no rectilinear lens of a camera is wider.
 const WIDEST_RECTILINEAR_DEG: f64 = 110.0;
-/// Aspect ratios that differ by less are the same one.
+/// Aspect ratios that differ by less are equal.
 const ASPECT_TOLERANCE: f64 = 0.03;
 
-/// What is known of a camera.
+/// Source of a camera model.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CameraChoice {
     /// Horizontal field of view in degrees.
     FieldOfView(f64),
-    /// A camera whose maker publishes its field of view.
+    /// Camera with a published field of view.
     Published(PublishedCamera),
-    /// A `CameraInfo` of the log: on this topic, or on the one beside the images.
+    /// `CameraInfo` of the log: on this topic, or on the one next to the images.
     CameraInfo(Option<String>),
 }
 
-/// A camera whose maker publishes its field of view.
+/// Camera with a published field of view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PublishedCamera {
     name: &'static str,
@@ -31,7 +31,7 @@ pub struct PublishedCamera {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum PublishedLens {
-    /// Horizontal fields of view in degrees of `GoPro`'s video modes in 16:9 and 4:3, the latter where it is published.
+    /// Horizontal fields of view in degrees of `GoPro`'s video modes in 16:9 and 4:3, the latter if it is published.
     Video { wide_deg: f64, tall_deg: Option<f64>, fisheye: bool },
     /// Diagonal field of view in degrees of photos with this aspect ratio, as DJI publishes it.
     PhotoDiagonal { deg: f64, aspect: [f64; 2] },
@@ -46,7 +46,8 @@ const fn photo(name: &'static str, deg: f64, aspect: [f64; 2]) -> PublishedCamer
 }
 
 impl PublishedCamera {
-    /// Every camera. Sources: `GoPro`'s support pages "Field of View (FOV) Information" of each model (stabilization off), and
+    /// All cameras. Sources: `GoPro`'s support pages "Field of View (FOV) Information" of each model (stabilization
+    /// off), and
     /// the specifications of DJI's aircraft.
     pub const ALL: [Self; 29] = [
         video("gopro-hero3-wide", 118.2, Some(122.6), true),
@@ -80,13 +81,14 @@ impl PublishedCamera {
         photo("dji-h20-wide", 82.9, [4.0, 3.0]),
     ];
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         self.name
     }
 
-    /// Horizontal field of view in degrees for images of an aspect ratio (width by height), whether the lens is a fisheye,
-    /// and what has to be assumed.
+    /// Horizontal field of view in degrees for images of an aspect ratio (width by height), true for a fisheye lens,
+    /// and the
+    /// assumptions.
     fn horizontal(self, aspect: f64) -> (f64, bool, String) {
         match self.lens {
             PublishedLens::Video { wide_deg, tall_deg, fisheye } => {
@@ -119,7 +121,7 @@ impl PublishedCamera {
 impl FromStr for CameraChoice {
     type Err = TemplateError;
 
-    /// `fov:DEG`, `info`, `info:TOPIC`, or the name of a published camera.
+    /// Parses `fov:DEG`, `info`, `info:TOPIC`, or the name of a published camera.
     fn from_str(text: &str) -> Result<Self, TemplateError> {
         let (kind, value) = text.split_once([':', '=', ' ']).unwrap_or((text, ""));
         match kind.to_ascii_lowercase().as_str() {
@@ -146,7 +148,8 @@ impl FromStr for CameraChoice {
     }
 }
 
-/// The model of a lens with this horizontal field of view, without distortion or equidistant, its principal point in the
+/// Model of a lens with this horizontal field of view, without distortion or equidistant, and its principal point in
+/// the
 /// middle.
 fn lens(horizontal_deg: f64, fisheye: bool, resolution_px: [usize; 2]) -> CameraModel {
     let [width, height] = resolution_px.map(|side| side as f64);
@@ -163,7 +166,7 @@ fn lens(horizontal_deg: f64, fisheye: bool, resolution_px: [usize; 2]) -> Camera
     }
 }
 
-/// The model of a camera of this horizontal field of view for images of this size, and what has to be assumed.
+/// Model of a camera with this horizontal field of view for images of this size, and the assumptions.
 pub(super) fn of_field_of_view(horizontal_deg: f64, resolution_px: [usize; 2]) -> (CameraModel, String) {
     let fisheye = horizontal_deg > WIDEST_RECTILINEAR_DEG;
     let shape = if fisheye { "an equidistant lens" } else { "a lens without distortion" };
@@ -171,7 +174,7 @@ pub(super) fn of_field_of_view(horizontal_deg: f64, resolution_px: [usize; 2]) -
     (lens(horizontal_deg, fisheye, resolution_px), reason)
 }
 
-/// The model of a published camera for images of this size, and what has to be assumed.
+/// Model of a published camera for images of this size, and the assumptions.
 pub(super) fn of_published(camera: PublishedCamera, resolution_px: [usize; 2]) -> (CameraModel, String) {
     let [width, height] = resolution_px.map(|side| side as f64);
     let (horizontal_deg, fisheye, reason) = camera.horizontal(width / height);

@@ -1,4 +1,4 @@
-//! The chain of a gimbal that is described by the order of its axes.
+//! Chain of a gimbal that is described by the order of its axes.
 
 use std::str::FromStr;
 
@@ -9,10 +9,9 @@ use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, DhLink, JointAxis};
 use crate::sensors::{BodyAxes, Joint};
 
-/// Most axes of a mechanism in words.
+/// Largest number of axes of a mechanism.
 const MAX_AXES: usize = 8;
 
-/// An axis of a gimbal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GimbalAxis {
     /// About the vertical of the level vehicle.
@@ -24,7 +23,7 @@ pub enum GimbalAxis {
 }
 
 impl GimbalAxis {
-    /// Its name, which is also that of its joint.
+    /// Name of the axis and of its joint.
     pub fn name(self) -> &'static str {
         match self {
             Self::Yaw => "yaw",
@@ -33,7 +32,7 @@ impl GimbalAxis {
         }
     }
 
-    /// The axis that a joint's name speaks of.
+    /// Rotation axis suggested by the joint's name ('pan' → z).
     pub fn of_joint(name: &str) -> Option<Self> {
         let name = name.to_ascii_lowercase();
         let names = [
@@ -54,7 +53,8 @@ impl GimbalAxis {
         if self != Self::Roll && positive == BodyAxes::Frd { -direction } else { direction }
     }
 
-    /// Usual range in radians: gimbals roll little, and look down further than up. Pitch is positive upwards, or downwards.
+    /// Usual range in radians: gimbals roll little, and look down further than up. Pitch is positive upwards, or
+    /// downwards.
     fn limits_rad(self, positive: BodyAxes) -> (f64, f64) {
         let degrees = |low: f64, high: f64| (low.to_radians(), high.to_radians());
         match (self, positive) {
@@ -66,14 +66,14 @@ impl GimbalAxis {
     }
 }
 
-/// The axes of a gimbal from the vehicle to the camera; none for a rigid camera.
+/// Axes of a gimbal from the vehicle to the camera; empty for a rigid camera.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MechanismAxes(pub Vec<GimbalAxis>);
 
 impl FromStr for MechanismAxes {
     type Err = TemplateError;
 
-    /// Axes between hyphens, such as `yaw-roll-pitch`, or `rigid`.
+    /// Parses axes between hyphens, such as `yaw-roll-pitch`, or `rigid`.
     fn from_str(text: &str) -> Result<Self, TemplateError> {
         let unknown = || TemplateError::UnknownMechanism { given: text.to_owned() };
         if text.eq_ignore_ascii_case("rigid") {
@@ -104,8 +104,9 @@ impl std::fmt::Display for MechanismAxes {
 }
 
 impl MechanismAxes {
-    /// The chain whose axes meet at right angles at `position_m` (forward, left and up of the IMU), which is also where the
-    /// camera is; it looks forward, level, while all angles are zero.
+    /// Chain whose axes meet at right angles at `position_m` (forward, left and up of the IMU), with the camera at the
+    /// same
+    /// position; it looks forward, level, at angles zero.
     pub(super) fn chain(&self, positive: BodyAxes, imu: BodyAxes, position_m: Vector3<f64>) -> ClassicalChain {
         let imu_from_vehicle = imu.flu_from_axes().inverse();
         let position_in_imu_m = imu_from_vehicle * position_m;
@@ -117,14 +118,14 @@ impl MechanismAxes {
         ClassicalChain::from_axes(&axes, last, &camera)
     }
 
-    /// Its joints, by these names.
+    /// Joints with these names.
     pub(super) fn joints(&self, names: &[String], positive: BodyAxes) -> Vec<Joint> {
         let joint =
             |(name, axis): (&String, &GimbalAxis)| Joint { name: name.clone(), limits_rad: axis.limits_rad(positive) };
         names.iter().zip(&self.0).map(joint).collect()
     }
 
-    /// Names of joints that nobody has named: those of the axes, numbered where an axis occurs again.
+    /// Default names of joints: those of the axes, numbered if an axis occurs more than once.
     pub fn default_names(&self) -> Vec<String> {
         let name = |(place, axis): (usize, &GimbalAxis)| {
             let earlier = self.0[..place].iter().filter(|other| *other == axis).count();
@@ -134,7 +135,8 @@ impl MechanismAxes {
     }
 }
 
-/// Orientation of the optical frame (x right, y down, z forward) of a camera that looks forward, in forward-left-up axes.
+/// Orientation of the optical frame (x right, y down, z forward) of a camera that looks forward, in forward-left-up
+/// axes.
 fn optical() -> UnitQuaternion<f64> {
     let matrix = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix))

@@ -1,4 +1,4 @@
-//! A rig for a recording without one: what is known of it, usual values for the rest, and a list of those (`assumed`).
+//! Rig for a recording without one: known facts, usual values for the rest, and a list of those (`assumed`).
 
 mod camera;
 mod mechanism;
@@ -20,22 +20,24 @@ use crate::sensors::{
     ImuRig, IntrinsicsSigma, Rig,
 };
 
-/// Standard deviations of intrinsics that follow from a field of view: of the focal length as a ratio (makers round, crop and
+/// Standard deviations of intrinsics from a field of view: of the focal length as a ratio (manufacturers round, crop
+/// and
 /// stabilize), of the principal point as a ratio of the width, and of distortion coefficients.
 const ASSUMED_FOCAL_RATIO: f64 = 0.1;
 const ASSUMED_CENTRE_RATIO: f64 = 0.02;
 const ASSUMED_DISTORTION: f64 = 0.1;
-/// Standard deviation of a joint angle of a gimbal whose encoders nobody has measured, in radians (0.5°).
+/// Standard deviation of a gimbal's joint angle if it has not been measured, in radians (0.5°).
 const JOINT_SIGMA_RAD: f64 = 0.0087;
-/// The same of an attitude that a gimbal estimates with an IMU of its own (1°).
+/// Standard deviation of an attitude that a gimbal estimates with an additional IMU (1°).
 const ATTITUDE_SIGMA_RAD: f64 = 0.0175;
-/// Bounds of the errors of a chain that was described in words: 3 cm and 10°.
+/// Bounds of the errors of a chain that is described by its axes: 3 cm and 10°.
 const CHAIN_PRIOR: ChainPrior =
     ChainPrior { translation_bound_m: 0.03, rotation_bound_rad: std::f64::consts::PI / 18.0 };
 const GRAVITY_M_PER_S2: f64 = 9.81;
 
-/// Noise of an autopilot's MEMS IMU in flight: about five times the densities in data sheets of the ICM-20689, ICM-42688 and
-/// BMI088 (gyroscope 0.005 to 0.014 °/s/√Hz, accelerometer 70 to 190 µg/√Hz), as estimators need it.
+/// Noise of an autopilot's MEMS IMU in flight: about five times the densities in data sheets of the ICM-20689,
+/// ICM-42688
+/// and BMI088 (gyroscope 0.005 to 0.014 °/s/√Hz, accelerometer 70 to 190 µg/√Hz), as estimators need it.
 pub const TYPICAL_IMU_NOISE: ImuNoise = ImuNoise {
     accelerometer_noise_density: 0.01,
     accelerometer_random_walk: 0.002,
@@ -43,166 +45,123 @@ pub const TYPICAL_IMU_NOISE: ImuNoise = ImuNoise {
     gyroscope_random_walk: 4e-5,
 };
 
-/// Why a rig cannot be written.
+/// Reason why a rig cannot be written.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum TemplateError {
-    /// A camera that is not known.
     #[error(
         "unknown camera '{given}': expected fov:DEG, info, info:TOPIC or a name such as '{nearest}' (--list prints all)"
     )]
     UnknownCamera {
-        /// The given text.
         given: String,
-        /// The nearest name.
+        /// Name with the smallest edit distance.
         nearest: &'static str,
     },
-    /// A field of view that is none.
+    /// Invalid field of view.
     #[error(
-        "'{given}' is no field of view: expected fov:DEG with degrees across the image from 1 to 220, as in fov:84"
+        "'{given}' is not a field of view: expected fov:DEG with degrees across the image from 1 to 220, as in fov:84"
     )]
-    FieldOfView {
-        /// The given text.
-        given: String,
-    },
-    /// A mechanism that is not known.
+    FieldOfView { given: String },
     #[error(
         "unknown mechanism '{given}': expected yaw, roll and pitch in the order from the vehicle to the camera, as in \
          yaw-roll-pitch, no axis twice in a row, or rigid"
     )]
-    UnknownMechanism {
-        /// The given text.
-        given: String,
-    },
+    UnknownMechanism { given: String },
     /// The log has no such topic.
     #[error("the log has no {what}: {remedy}")]
     NoTopic {
-        /// What is missing.
+        /// Kind of topic.
         what: String,
-        /// What to do.
         remedy: String,
     },
     /// The log has several such topics.
     #[error("the log has several {what}: name one with {option}, of {}", available.join(", "))]
     SeveralTopics {
-        /// What there are several of.
+        /// Kind of topic.
         what: String,
-        /// The option that names one.
+        /// Option to select a topic.
         option: &'static str,
-        /// The topics.
         available: Vec<String>,
     },
-    /// There is no camera model in the log.
     #[error("no camera model in the log: {reason}; give one with --camera fov:DEG")]
-    NoCameraInfo {
-        /// Why not.
-        reason: String,
-    },
-    /// The image size is not known.
+    NoCameraInfo { reason: String },
     #[error("the size of the images is unknown: {reason}; give it with --size WxH")]
-    NoSize {
-        /// Why not.
-        reason: String,
-    },
-    /// The meaning of an attitude topic is not complete.
+    NoSize { reason: String },
+    /// The description of an attitude topic is incomplete or invalid.
     #[error("--attitude: {problem}")]
-    Attitude {
-        /// What is missing or wrong.
-        problem: String,
-    },
-    /// The joints of the log do not match the mechanism.
+    Attitude { problem: String },
     #[error("the joints of {topic} ({}) do not match the mechanism {mechanism}: name them in its order with --joints", found.join(", "))]
     Joints {
-        /// The topic.
         topic: String,
-        /// Names of its joints.
+        /// Names of the log's joints.
         found: Vec<String>,
-        /// The axes of the mechanism.
+        /// Axes of the mechanism.
         mechanism: String,
     },
 }
 
-/// A value with where it comes from.
+/// Value with its source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sourced<T> {
-    /// The value.
     pub value: T,
-    /// Why it is only assumed, as one sentence without a full stop; `None` for a known value.
+    /// Reason of an assumption, as one sentence without a full stop; `None` for a known value.
     pub assumed: Option<String>,
 }
 
 impl<T> Sourced<T> {
-    /// A value that is known.
     pub fn known(value: T) -> Self {
         Self { value, assumed: None }
     }
 
-    /// A value that a person must still confirm, with the reason.
+    /// Assumed value that a person must still confirm, with the reason.
     pub fn assumed(value: T, reason: impl Into<String>) -> Self {
         Self { value, assumed: Some(reason.into()) }
     }
 }
 
-/// The IMU of a template.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImuTemplate {
-    /// Topic of its `sensor_msgs/msg/Imu`.
+    /// Topic of `sensor_msgs/msg/Imu`.
     pub topic: Sourced<String>,
-    /// Topic of the specific forces, when they are apart.
+    /// Topic of the specific forces, if they are separate.
     pub accelerometer_topic: Option<String>,
-    /// Rate in Hz.
     pub rate_hz: f64,
-    /// Its axes in the vehicle.
+    /// Axes of the IMU in the vehicle.
     pub axes: Sourced<BodyAxes>,
     /// Noise densities, measured or [`TYPICAL_IMU_NOISE`].
     pub noise: Sourced<ImuNoise>,
 }
 
-/// The camera of a template.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraTemplate {
-    /// Topic of its images.
     pub topic: Sourced<String>,
-    /// Frame name.
     pub frame_id: String,
-    /// Rate in Hz.
     pub rate_hz: f64,
-    /// Its model.
     pub model: Sourced<CameraModel>,
     /// Kalibr's `timeshift_cam_imu`: `t_imu = t_cam + shift`.
     pub timeshift_cam_imu_s: Sourced<f64>,
 }
 
-/// Where the angles of a template's gimbal come from.
+/// Source of joint angles.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AngleTemplate {
     /// Joint angles on a topic of `sensor_msgs/msg/JointState`, by these names in the order of the mechanism.
-    Joints {
-        /// The topic.
-        topic: Sourced<String>,
-        /// Rate in Hz.
-        rate_hz: f64,
-        /// Joint names.
-        names: Vec<String>,
-    },
-    /// An attitude, from which the angles follow (`gimbal.source`).
+    Joints { topic: Sourced<String>, rate_hz: f64, names: Vec<String> },
+    /// Attitude that is converted to joint angles (`gimbal.source`).
     Attitude(AttitudeTemplate),
-    /// Nothing measures them.
+    /// Unmeasured.
     None,
 }
 
-/// The attitude topic of a gimbal: `gimbal.source`.
+/// Attitude topic of a gimbal: `gimbal.source`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AttitudeTemplate {
-    /// The topic.
     pub topic: String,
-    /// Rate in Hz.
     pub rate_hz: f64,
-    /// What its messages mean.
     pub source: Sourced<AttitudeSource>,
 }
 
 impl CameraTemplate {
-    /// How wrong intrinsics from a field of view may be.
+    /// Standard deviations of intrinsics from a field of view.
     fn intrinsics_sigma(&self) -> IntrinsicsSigma {
         IntrinsicsSigma {
             focal_ratio: ASSUMED_FOCAL_RATIO,
@@ -212,38 +171,33 @@ impl CameraTemplate {
     }
 }
 
-/// The gimbal of a template.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GimbalTemplate {
-    /// Its axes from the vehicle to the camera.
+    /// Axes from the vehicle to the camera.
     pub axes: MechanismAxes,
-    /// Which directions of rotation are positive.
+    /// Positive directions of rotation.
     pub positive: Sourced<BodyAxes>,
-    /// Source of its angles.
     pub angles: AngleTemplate,
 }
 
-/// A rig before anything was calibrated.
+/// Rig before any calibration.
 ///
-/// [`Self::to_yaml`] is the commented file; what has to be assumed is its entry `assumed`, and `check` asks for it.
+/// [`Self::to_yaml`] returns the commented file; its entry `assumed` lists the assumptions, which `check` reports.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigTemplate {
-    /// Name of the rig.
     pub name: String,
-    /// The IMU.
     pub imu: ImuTemplate,
-    /// The camera.
     pub camera: CameraTemplate,
-    /// The gimbal; `None` for a camera that is rigidly mounted and looks forward.
+    /// `None` for a rigid camera that looks forward.
     pub gimbal: Option<GimbalTemplate>,
     /// Position of the gimbal, or of the rigid camera: forward, left and up of the IMU, in metres.
     pub position_m: Sourced<Vector3<f64>>,
-    /// Topic of the true pose of the IMU in the world.
+    /// Topic of the ground-truth pose of the IMU in the world.
     pub ground_truth_topic: Option<String>,
 }
 
 impl RigTemplate {
-    /// The rig with its `assumed` fields.
+    /// Rig with its `assumed` fields.
     pub fn rig(&self) -> Rig {
         let imu_axes = self.imu.axes.value;
         let mount = if self.gimbal.is_some() {
@@ -310,7 +264,7 @@ impl RigTemplate {
         }
     }
 
-    /// What a person must still say, in the order of the file.
+    /// Fields that a person must still confirm, in the order of the file.
     pub fn assumed_fields(&self) -> Vec<AssumedField> {
         let mut fields = Vec::new();
         let mut add = |field: &str, reason: Option<String>| {
@@ -339,16 +293,16 @@ impl RigTemplate {
             AngleTemplate::None => {}
         }
         if gimbal.angles != AngleTemplate::None {
-            let reason = "a usual standard deviation; the gimbal's own is not known";
+            let reason = "usual standard deviation, not measured for this gimbal";
             add("gimbal.encoder_sigma", Some(reason.to_owned()));
         }
         add("gimbal.T_I_B", place);
         let meeting = format!(
-            "the axes {} meet in one point at right angles, with zero where the camera looks forward",
+            "the axes {} meet in one point at right angles; at angles zero the camera looks forward",
             gimbal.axes
         );
         add("gimbal.links", both(&Some(meeting), &gimbal.positive.assumed));
-        add("gimbal.T_E_C", Some("the camera's centre is where the axes meet".to_owned()));
+        add("gimbal.T_E_C", Some("the camera's centre is at the intersection of the axes".to_owned()));
         fields
     }
 }

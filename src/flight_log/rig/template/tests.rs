@@ -35,7 +35,7 @@ fn model(camera: &str, resolution_px: [usize; 2]) -> CameraModel {
     RigTemplate::new(&choices, None).unwrap().camera.model.value
 }
 
-/// Degrees between the first and the last column, pixel borders included.
+/// Angle in degrees between the first and the last column, pixel borders included.
 fn across_deg(model: &CameraModel) -> f64 {
     let [width, _] = model.resolution_px.map(|side| side as f64);
     let [_, _, cx, cy] = model.intrinsics_px;
@@ -106,7 +106,7 @@ fn the_camera_looks_forward_at_zero_angles() {
 
 #[test]
 fn positive_angles_rotate_as_stated() {
-    // Where the camera looks after 0.1 rad of one joint, in forward-left-up axes.
+    // Viewing direction of the camera after 0.1 rad of one joint, in forward-left-up axes.
     let look = |positive: BodyAxes, angles: [f64; 2]| {
         let choices = RigChoices { positive: Some(positive), ..choices("yaw-pitch", "fov:84") };
         let rig = RigTemplate::new(&choices, None).unwrap().rig();
@@ -133,7 +133,7 @@ fn the_text_reads_back_with_what_is_assumed() {
         assert!(pose(&read).minus(&pose(&written)).norm() < 1e-12);
         assert!(text.lines().filter(|line| line.trim_start().starts_with('#')).count() >= 6, "{text}");
         assert!(!text.contains("e-1"), "rounding errors: {text}");
-        // Kept by writing.
+        // Writing preserves the entries.
         let again = Rig::from_yaml(&read.to_yaml(), Path::new("again.rig.yaml")).unwrap();
         assert_eq!(again.assumed, read.assumed);
     }

@@ -1,14 +1,14 @@
-//! The text of a template: the rig as it is written anywhere else, with comments.
+//! Text of a template: the rig in its usual format, with comments.
 
 use std::fmt::Write as _;
 
 use super::RigTemplate;
 
-/// Numbers of a rotation matrix that differ less from a whole one by rounding.
+/// Numbers of a rotation matrix within this distance of an integer differ from it by rounding only.
 const ROUNDING: f64 = 1e-9;
 
 impl RigTemplate {
-    /// The rig as YAML with comments.
+    /// Returns the rig as YAML with comments.
     pub fn to_yaml(&self) -> String {
         let rig = self.rig();
         let mut out = String::from(HEADER);
@@ -31,7 +31,7 @@ impl RigTemplate {
         out
     }
 
-    /// The comments above a field.
+    /// Comments above a field.
     fn comments(path: &str) -> Vec<String> {
         let text = match path {
             "gravity" => "m/s²; 9.78 at the equator to 9.83 at the poles.",
@@ -40,22 +40,20 @@ impl RigTemplate {
             }
             "cam0.intrinsics" => "fx fy cx cy in pixels; a calibration with a target also gives the distortion.",
             "cam0.intrinsics_sigma" => {
-                "How wrong they may be: ratio of fx and fy, pixels of cx and cy, each coefficient of the distortion."
+                "Standard deviations: relative of fx and fy, in pixels of cx and cy, of each distortion coefficient."
             }
             "cam0.timeshift_cam_imu" => "Seconds: t_imu = t_cam + shift. `dcvins check` measures it.",
             "cam0.T_cam_imu" => "Kalibr's direction: maps points from the IMU to the camera.",
-            "gimbal.source" => "No joint angles: they follow from this attitude.",
-            "gimbal.rostopic" => "Joint angles (sensor_msgs/msg/JointState), null when there are none.",
+            "gimbal.source" => "No joint angles: they are computed from this attitude.",
+            "gimbal.rostopic" => "Joint angles (sensor_msgs/msg/JointState), null without encoders.",
             "gimbal.encoder_sigma" => "Standard deviation of a joint angle in rad; `dcvins check` measures it.",
-            "gimbal.prior" => "How wrong T_I_B, links and T_E_C may be: bounds in m and rad.",
+            "gimbal.prior" => "Error bounds of T_I_B, links and T_E_C in m and rad.",
             "gimbal.T_I_B" => "Pose of the first joint in the IMU frame; its z is the first axis.",
             "gimbal.links" => {
                 "Joints from the vehicle to the camera: Rz(angle + theta_offset) Tz(d) Tx(a) Rx(alpha), limits in rad."
             }
-            "gimbal.T_E_C" => "Pose of the camera (x right, y down, z forward) behind the last link.",
-            "assumed" => {
-                "What nobody has measured yet. `dcvins check` asks for each; remove an entry once it is known."
-            }
+            "gimbal.T_E_C" => "Pose of the camera (x right, y down, z forward) after the last link.",
+            "assumed" => "Values not measured yet. `dcvins check` reports each; delete an entry once it is measured.",
             _ => return Vec::new(),
         };
         vec![text.to_owned()]
@@ -63,14 +61,14 @@ impl RigTemplate {
 }
 
 const HEADER: &str =
-    "# A rig before calibration. Usual values stand where nothing is known: see `assumed` at the end.\n";
+    "# Rig before calibration, with usual values for what is not measured: see `assumed` at the end.\n";
 
-/// A row of a matrix whose numbers are whole but for rounding, as it is read best; any other line as it is.
+/// Rounds a matrix row whose numbers differ from integers by rounding only; returns any other line unchanged.
 fn with_whole_numbers(line: &str) -> String {
     let Some((head, row)) = line.split_once("- [") else { return line.to_owned() };
     let Some(row) = row.strip_suffix(']') else { return line.to_owned() };
     let number = |text: &str| match text.parse::<f64>() {
-        // Adding zero removes the sign of a negative one.
+        // Adding zero turns −0 into 0.
         Ok(value) if (value - value.round()).abs() < ROUNDING => format!("{:?}", value.round() + 0.0),
         _ => text.to_owned(),
     };

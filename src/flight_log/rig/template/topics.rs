@@ -1,4 +1,4 @@
-//! A template for a log: its topics, rates, image size and the direction of gravity in its IMU.
+//! Template for a log: its topics, rates, image size and the direction of gravity in its IMU.
 
 use std::path::Path;
 
@@ -17,32 +17,29 @@ use crate::flight_log::messages::{self, MessageKind};
 use crate::flight_log::{FlightLog, LogError, TopicInfo};
 use crate::sensors::{BodyAxes, ImuNoise};
 
-/// Messages of the IMU over which gravity is averaged.
+/// Number of IMU messages over which gravity is averaged.
 const GRAVITY_SAMPLES: usize = 2000;
-/// Gravity along an axis, as a ratio of the mean specific force, from which on the axis is taken for the vertical.
+/// Smallest ratio of gravity along an axis to the mean specific force for a vertical axis.
 const VERTICAL_RATIO: f64 = 0.8;
-/// Words in the names of topics with poses that were measured from outside.
+/// Words in the names of topics with externally measured poses.
 const GROUND_TRUTH_WORDS: [&str; 6] = ["truth", "vicon", "optitrack", "mocap", "leica", "qualisys"];
 /// Rates of templates without a log, in Hz.
 const IMU_RATE_HZ: f64 = 200.0;
 const IMAGE_RATE_HZ: f64 = 30.0;
 
-/// What is known beside the log.
+/// Choices of the user for a template.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigChoices {
-    /// Name of the rig.
     pub name: String,
-    /// The camera.
     pub camera: CameraChoice,
-    /// Size of the images, when it is not to be read from the log.
+    /// Size of the images, `None` to read it from the log.
     pub resolution_px: Option<[usize; 2]>,
-    /// The mechanism.
     pub mechanism: MechanismAxes,
-    /// Which rotations are positive; `None` when nobody knows.
+    /// Positive directions of rotation; `None` if unknown.
     pub positive: Option<BodyAxes>,
-    /// Axes of the IMU; `None` to take them from gravity.
+    /// Axes of the IMU; `None` to determine them from gravity.
     pub imu_axes: Option<BodyAxes>,
-    /// Position of the gimbal: forward, left and up of the IMU, in metres; `None` when nobody has measured it.
+    /// Position of the gimbal: forward, left and up of the IMU, in metres; `None` if it has not been measured.
     pub position_m: Option<Vector3<f64>>,
     /// Topic of the IMU, `None` for the log's only one.
     pub imu_topic: Option<String>,
@@ -50,26 +47,26 @@ pub struct RigChoices {
     pub image_topic: Option<String>,
     /// Topic of the joint angles, `None` for the log's only one.
     pub joint_topic: Option<String>,
-    /// Joint names in the order of the mechanism, empty to match them by their words.
+    /// Joint names in the order of the mechanism, empty to match them to the axes by words in the names.
     pub joint_names: Vec<String>,
-    /// Attitude topic of the gimbal with the entries of `gimbal.source`, when its angles are to follow from it.
+    /// Attitude topic of the gimbal with the entries of `gimbal.source`, to compute joint angles from.
     pub attitude: Option<(String, Vec<(String, String)>)>,
-    /// Noise densities that were measured.
+    /// Measured noise densities.
     pub noise: Option<ImuNoise>,
 }
 
 impl RigTemplate {
-    /// The template for these choices and what the log, if there is one, says of the rest.
+    /// Template for these choices, with the rest from the log, if there is one.
     ///
     /// # Errors
-    /// When the log has no images or no IMU, or several of them of which none is chosen, or when the size of the images is
+    /// When the log has no images or no IMU, or several of them of which none is chosen, or when the size of the images
+    /// is
     /// not known.
     pub fn new(choices: &RigChoices, log: Option<&FlightLog>) -> Result<Self, TemplateError> {
         let imu = imu(choices, log)?;
         let camera = camera(choices, log)?;
         let gimbal = if choices.mechanism.0.is_empty() { None } else { Some(gimbal(choices, imu.axes.value, log)?) };
-        let nothing_known =
-            "nobody has measured where the gimbal is; it is taken to be at the IMU, give or take 3 cm per link";
+        let nothing_known = "gimbal position not measured: assumed at the IMU, ±3 cm per link";
         let position_m = choices.position_m.map_or_else(
             || Sourced::assumed(Vector3::zeros(), nothing_known),
             |position_m| Sourced::assumed(position_m, "position measured by hand"),
@@ -85,7 +82,7 @@ impl RigTemplate {
     }
 }
 
-/// A rate as it is written: to a tenth of a percent.
+/// Rounds a rate to a tenth of a percent.
 fn rounded_hz(rate_hz: f64, default_hz: f64) -> f64 {
     if rate_hz <= 0.0 {
         return default_hz;
@@ -98,7 +95,7 @@ fn topics_of<'a>(log: &'a FlightLog, kinds: &[MessageKind]) -> Vec<&'a TopicInfo
     log.topics().iter().filter(|info| info.kind.is_some_and(|kind| kinds.contains(&kind))).collect()
 }
 
-/// The chosen topic, or the only one of these kinds, or the only one whose name contains `preferred`; `None` without any.
+/// Chosen topic, or the only one of these kinds, or the only one whose name contains `preferred`; `None` without any.
 fn one_topic<'a>(
     log: &'a FlightLog,
     kinds: &[MessageKind],
@@ -125,8 +122,7 @@ fn one_topic<'a>(
 }
 
 fn imu(choices: &RigChoices, log: Option<&FlightLog>) -> Result<ImuTemplate, TemplateError> {
-    let typical =
-        "usual noise of an autopilot's MEMS IMU in flight, with its random walk; nobody has measured this one";
+    let typical = "usual noise and random walk of an autopilot's MEMS IMU in flight, not measured for this IMU";
     let noise = choices.noise.map_or_else(|| Sourced::assumed(TYPICAL_IMU_NOISE, typical), Sourced::known);
     let Some(log) = log else {
         let topic = choices.imu_topic.clone();
@@ -139,7 +135,7 @@ fn imu(choices: &RigChoices, log: Option<&FlightLog>) -> Result<ImuTemplate, Tem
         });
     };
     let topics = topics_of(log, &[MessageKind::Imu]);
-    // As of RealSense: angular velocities and specific forces on a topic each.
+    // RealSense: angular velocities and specific forces on separate topics.
     let named = |word: &str| topics.iter().find(|info| info.topic.to_ascii_lowercase().contains(word));
     let apart = match (choices.imu_topic.as_ref(), named("gyro"), named("accel")) {
         (None, Some(gyroscope), Some(accelerometer)) if topics.len() == 2 => Some((*gyroscope, *accelerometer)),
@@ -191,18 +187,18 @@ fn imu_axes(choices: &RigChoices, force: Option<Vector3<f64>>) -> Sourced<BodyAx
     match vertical {
         Some(ratio) if ratio.abs() > VERTICAL_RATIO => {
             let (axes, word) = if ratio > 0.0 { (flu, "up") } else { (frd, "down") };
-            let reason = format!("gravity shows that the IMU's z points {word}; its x is taken to point forward");
+            let reason = format!("gravity shows that the IMU's z points {word}; its x is assumed to point forward");
             Sourced::assumed(axes, reason)
         }
-        Some(_) => Sourced::assumed(flu, "gravity is not along the IMU's z; it is taken for x forward, y left, z up"),
-        None => Sourced::assumed(flu, "the IMU is taken for x forward, y left, z up"),
+        Some(_) => Sourced::assumed(flu, "gravity is not along the IMU's z; assumed axes: x forward, y left, z up"),
+        None => Sourced::assumed(flu, "assumed IMU axes: x forward, y left, z up"),
     }
 }
 
-const NO_LOG: &str = "a usual name; there was no log to take it from";
+const NO_LOG: &str = "usual name, since no log was given";
 
 fn camera(choices: &RigChoices, log: Option<&FlightLog>) -> Result<CameraTemplate, TemplateError> {
-    let timeshift_cam_imu_s = Sourced::assumed(0.0, "the time offset between camera and IMU is taken to be zero");
+    let timeshift_cam_imu_s = Sourced::assumed(0.0, "the time offset between camera and IMU is assumed to be zero");
     let Some(log) = log else {
         let topic = choices.image_topic.clone();
         return Ok(CameraTemplate {
@@ -244,7 +240,8 @@ fn camera_model(
         CameraChoice::CameraInfo(topic) => {
             let missing = |reason: String| TemplateError::NoCameraInfo { reason };
             let (log, info) = images.ok_or_else(|| missing("there is no log".to_owned()))?;
-            // A topic that is named is the one beside images of that folder.
+            // `camera_model` searches the parent namespaces of an image topic, so a given `camera_info` topic works as
+            // well.
             let beside = topic.as_ref().map_or(info.topic.as_str(), String::as_str);
             return log.camera_model(beside).map(Sourced::known).map_err(missing);
         }
@@ -270,14 +267,14 @@ fn gimbal(choices: &RigChoices, imu_axes: BodyAxes, log: Option<&FlightLog>) -> 
         (Some(positive), _) => Sourced::known(*positive),
         (None, AngleTemplate::Joints { .. }) => Sourced::assumed(
             BodyAxes::Frd,
-            "angles are taken to be positive to the right (yaw, roll) and upwards (pitch)",
+            "angles are assumed to be positive to the right (yaw, roll) and upwards (pitch)",
         ),
         (None, _) => Sourced::known(BodyAxes::Frd),
     };
     Ok(GimbalTemplate { axes: choices.mechanism.clone(), positive, angles })
 }
 
-/// The attitude on a topic with these entries of `gimbal.source`; the axes of the IMU need not be among them.
+/// Attitude on a topic with these entries of `gimbal.source`; the axes of the IMU may be missing.
 fn attitude(
     topic: &str,
     entries: &[(String, String)],
@@ -303,7 +300,7 @@ fn attitude(
             error => error.to_string(),
         },
     })?;
-    let reason = "frame, axes, order and unit of the attitude are as they were given, and not confirmed";
+    let reason = "frame, axes, order and unit of the attitude are as given, not confirmed";
     Ok(AttitudeTemplate { topic: topic.to_owned(), rate_hz, source: Sourced::assumed(source, reason) })
 }
 
@@ -331,7 +328,7 @@ fn joints(choices: &RigChoices, log: &FlightLog) -> Result<AngleTemplate, Templa
     Ok(AngleTemplate::Joints { topic, rate_hz: rounded_hz(info.rate_hz, IMU_RATE_HZ), names })
 }
 
-/// The joint of each axis: the only one whose name speaks of it.
+/// Joint name of each axis: the only one that suggests the axis.
 fn names_of_axes(mechanism: &MechanismAxes, found: &[String]) -> Option<Vec<String>> {
     let name = |axis: &GimbalAxis| {
         let mut named = found.iter().filter(|name| GimbalAxis::of_joint(name) == Some(*axis));

@@ -14,7 +14,7 @@ use crate::flight_log::geodesy::Geodetic;
 use records::Record;
 pub(super) use records::START;
 
-/// Reads a log; its clock is the time since the autopilot started.
+/// Reads a log in time since the start of the autopilot.
 pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
     let file = LogFile::open(path, sink.limits())?;
     let mut recorded = Recorded::new("ArduPilot DataFlash", "");
@@ -30,7 +30,7 @@ pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, Convert
     Ok(recorded)
 }
 
-/// Takes what a record measures, or counts it.
+/// Stores the measurements of a record, or counts it as left out.
 fn take(record: &Record<'_>, recorded: &mut Recorded) {
     let name = record.record_type.name.as_str();
     let taken = match name {
@@ -57,7 +57,7 @@ fn time_ns(record: &Record<'_>) -> Result<i64, &'static str> {
     time_ns.ok_or("without a time")
 }
 
-/// The name of an instance: `IMU[1]` for `IMU` records with instance 1, and for `IMU2`.
+/// Name of an instance: `IMU[1]` for `IMU` records with instance 1, and for `IMU2`.
 fn instance(record: &Record<'_>, name: &str) -> String {
     let (base, number) = name.split_at(3);
     let by_name = number.parse::<u64>().ok().map(|number| number.saturating_sub(1));
@@ -79,7 +79,7 @@ fn imu(record: &Record<'_>, name: &str, recorded: &mut Recorded) -> Result<(), &
 
 const NOT_FINITE: &str = "a number that is not finite";
 
-/// `GYR` and `ACC`: the samples of one sensor as they were measured.
+/// Reads `GYR` and `ACC`: raw samples of one sensor.
 fn one_sensor(record: &Record<'_>, name: &str, recorded: &mut Recorded) -> Result<(), &'static str> {
     let sampled = record.raw("SampleUS").filter(|time| *time > 0.0).and_then(|time| nanoseconds(time, 1e3));
     let time_ns = sampled.map_or_else(|| time_ns(record), Ok)?;
@@ -103,7 +103,7 @@ fn attitude(record: &Record<'_>, name: &str, rank: u8, recorded: &mut Recorded) 
     Ok(())
 }
 
-/// The position of the first core of a Kalman filter.
+/// Reads the position of the first core of a Kalman filter.
 fn position(record: &Record<'_>, name: &str, recorded: &mut Recorded) -> Result<(), &'static str> {
     if record.raw("C").is_some_and(|core| core != 0.0) {
         return Err("of another core of the filter");
@@ -119,14 +119,14 @@ fn position(record: &Record<'_>, name: &str, recorded: &mut Recorded) -> Result<
     Ok(())
 }
 
-/// Least status of a receiver with a position in three dimensions.
+/// Smallest status of a receiver with a 3D fix.
 const FIX_3D: f64 = 3.0;
 
 fn fix(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static str> {
     if record.raw("I").is_some_and(|instance| instance != 0.0) {
         return Err("of another receiver");
     }
-    // Before the microseconds came, TimeMS was GPS time and T the time since the start.
+    // In logs without microseconds, TimeMS is GPS time and T the time since the start.
     let time_ns = match record.raw("T") {
         Some(milliseconds) => nanoseconds(milliseconds, 1e6).ok_or("without a time")?,
         None => time_ns(record)?,
@@ -150,17 +150,17 @@ fn fix(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static str>
 
 /// Seconds from the epoch to the start of GPS time, 6 January 1980.
 const GPS_EPOCH_S: f64 = 315_964_800.0;
-/// GPS time minus UTC in seconds from each GPS time on (leap seconds of 2012, 2015 and 2017).
+/// GPS time minus UTC in seconds, starting at each GPS time (leap seconds of 2012, 2015 and 2017).
 const LEAP_SECONDS: [(f64, f64); 3] = [(1_025_136_016.0, 16.0), (1_119_744_017.0, 17.0), (1_167_264_018.0, 18.0)];
 
-/// UTC in nanoseconds since the epoch of a GPS week and the milliseconds in it.
+/// Converts a GPS week and its milliseconds to UTC in nanoseconds since the epoch.
 fn utc_from_gps_ns(week: f64, milliseconds: f64) -> Option<i64> {
     let gps_s = week * 604_800.0 + milliseconds * 1e-3;
     let leap_s = LEAP_SECONDS.iter().rev().find(|(from_s, _)| gps_s >= *from_s)?.1;
     nanoseconds(GPS_EPOCH_S + week * 604_800.0 + milliseconds * 1e-3 - leap_s, 1e9)
 }
 
-/// A gimbal's angles: roll and pitch from the horizon, yaw from the vehicle (`YawB`) or from north (`YawE`, `Yaw`).
+/// Reads gimbal angles: roll and pitch from the horizon, yaw from the vehicle (`YawB`) or from north (`YawE`, `Yaw`).
 fn mount(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static str> {
     if record.raw("I").is_some_and(|instance| instance != 0.0) {
         return Err("of another gimbal");

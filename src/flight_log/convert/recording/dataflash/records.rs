@@ -1,4 +1,4 @@
-//! The records of a `DataFlash` log: each begins with two fixed bytes and a type, whose fields `FMT` records describe.
+//! Records of a `DataFlash` log: each begins with two fixed bytes and a type, whose fields `FMT` records describe.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,35 +10,34 @@ use super::super::scalar::Scalar;
 
 /// First bytes of every record.
 pub(in super::super) const START: [u8; 2] = [0xA3, 0x95];
-/// Bytes before the fields of a record: the two first bytes and the type.
+/// Number of bytes before the fields of a record: the two first bytes and the type.
 const HEADER_BYTES: usize = 3;
-/// Type of the records that describe types.
+/// Type of the `FMT` records.
 const FORMAT_TYPE: u8 = 128;
-/// Bytes of a record that describes a type: type, length, name (4), format (16) and columns (64).
+/// Size of an `FMT` record: type, length, name (4), format (16) and columns (64).
 const FORMAT_BYTES: usize = 89;
 
-/// A field of a record type.
+/// Field of a record type.
 #[derive(Clone, Debug, PartialEq)]
 struct Field {
     name: String,
-    /// Letter of its format.
+    /// Format letter.
     letter: u8,
-    /// From the first byte behind the header.
+    /// In bytes from the end of the header.
     offset: usize,
 }
 
-/// A record type.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct RecordType {
     pub(super) name: String,
-    /// With the header.
+    /// In bytes, including the header.
     length: usize,
     fields: Vec<Field>,
-    /// Letters of the multipliers of its fields (`FMTU`).
+    /// Multiplier letters of the fields (`FMTU`).
     multipliers: Vec<u8>,
 }
 
-/// Bytes of a format letter.
+/// Size in bytes of a format letter.
 fn size(letter: u8) -> Option<usize> {
     Some(match letter {
         b'b' | b'B' | b'M' => 1,
@@ -51,7 +50,7 @@ fn size(letter: u8) -> Option<usize> {
     })
 }
 
-/// The number type of a format letter, and the factor that the letter implies; `None` for text, arrays and half floats.
+/// Number type of a format letter, and the factor implied by the letter; `None` for text, arrays and half floats.
 fn scalar(letter: u8) -> Option<(Scalar, f64)> {
     Some(match letter {
         b'b' => (Scalar::I8, 1.0),
@@ -79,7 +78,8 @@ fn text(bytes: &[u8]) -> String {
 }
 
 impl RecordType {
-    /// Of the content of an `FMT` record: the type's number and description, or the problem with it.
+    /// Parses the content of an `FMT` record: returns the type's number and description, or a description of the
+    /// problem.
     fn parse(content: &[u8]) -> Result<(u8, Self), String> {
         let (Some(number), Some(length), Some(name), Some(letters), Some(columns)) =
             (content.first(), content.get(1), content.get(2..6), content.get(6..22), content.get(22..86))
@@ -106,22 +106,22 @@ impl RecordType {
     }
 }
 
-/// The types of a log, and its multipliers.
+/// Record types and multipliers of a log.
 #[derive(Clone, Debug, Default)]
 struct Types {
     types: BTreeMap<u8, RecordType>,
     multipliers: BTreeMap<u8, f64>,
 }
 
-/// What a record says of others.
-enum Lesson {
-    /// Letters of the multipliers of a type's fields.
+/// Record that describes other record types: field units (FMTU) or multipliers (MULT).
+enum FormatRecord {
+    /// Number of a record type and multiplier letters of its fields.
     Letters(u8, Vec<u8>),
-    /// The multiplier of a letter.
+    /// Letter and its multiplier.
     Multiplier(u8, f64),
 }
 
-impl Lesson {
+impl FormatRecord {
     fn of(record: &Record<'_>) -> Option<Self> {
         match record.record_type.name.as_str() {
             "FMTU" => Some(Self::Letters(record.raw("FmtType")? as u8, record.bytes("MultIds")?.to_vec())),
@@ -132,21 +132,21 @@ impl Lesson {
 }
 
 impl Types {
-    fn learn(&mut self, lesson: Lesson) {
-        match lesson {
-            Lesson::Letters(number, letters) => {
+    fn apply(&mut self, record: FormatRecord) {
+        match record {
+            FormatRecord::Letters(number, letters) => {
                 if let Some(described) = self.types.get_mut(&number) {
                     described.multipliers = letters;
                 }
             }
-            Lesson::Multiplier(letter, factor) => {
+            FormatRecord::Multiplier(letter, factor) => {
                 self.multipliers.insert(letter, factor);
             }
         }
     }
 }
 
-/// A record of a log.
+/// Record of a log.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Record<'a> {
     pub(super) record_type: &'a RecordType,
@@ -159,20 +159,21 @@ impl<'a> Record<'a> {
         self.record_type.fields.iter().enumerate().find(|(_, field)| field.name == name)
     }
 
-    /// A field as it is stored.
+    /// Stored value of a field.
     pub(super) fn raw(&self, name: &str) -> Option<f64> {
         let (_, field) = self.field(name)?;
         scalar(field.letter)?.0.little_endian(self.content, field.offset)
     }
 
-    /// The bytes of a text.
+    /// Bytes of a text field.
     fn bytes(&self, name: &str) -> Option<&'a [u8]> {
         let (_, field) = self.field(name)?;
         let bytes = self.content.get(field.offset..field.offset + size(field.letter)?)?;
         Some(&bytes[..bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len())])
     }
 
-    /// A field in its unit: multiplied as the log's own multipliers say (`FMTU`, `MULT`), else as its format letter implies.
+    /// Value of a field in its unit: scaled by the log's multipliers (`FMTU`, `MULT`), else by the factor of its format
+    /// letter.
     pub(super) fn number(&self, name: &str) -> Option<f64> {
         let (index, field) = self.field(name)?;
         let (scalar, implied) = scalar(field.letter)?;
@@ -184,7 +185,7 @@ impl<'a> Record<'a> {
         Some(if (divisor * factor - 1.0).abs() < 1e-12 { raw / divisor } else { raw * factor })
     }
 
-    /// Several fields.
+    /// Values of several fields in their units.
     pub(super) fn numbers<const N: usize>(&self, names: [&str; N]) -> Option<[f64; N]> {
         let mut numbers = [0.0; N];
         for (number, name) in numbers.iter_mut().zip(names) {
@@ -194,8 +195,8 @@ impl<'a> Record<'a> {
     }
 }
 
-/// Calls `visit` with every record and the position behind it, until it returns an error; what is no record is skipped.
-/// Returns what was skipped, and the first problem with a description.
+/// Calls `visit` with every record and the position after it, until it returns an error; bytes that form no record are
+/// skipped. Returns the skipped bytes, and the first problem with a type description.
 pub(super) fn walk(
     file: &LogFile,
     path: &Path,
@@ -244,14 +245,14 @@ pub(super) fn walk(
                 }
             }
         } else {
-            let mut lesson = None;
+            let mut format_record = None;
             if let Some(record_type) = types.types.get(&number) {
                 let record = Record { record_type, multipliers: &types.multipliers, content };
                 visit(&record, at + length)?;
-                lesson = Lesson::of(&record);
+                format_record = FormatRecord::of(&record);
             }
-            if let Some(lesson) = lesson {
-                types.learn(lesson);
+            if let Some(format_record) = format_record {
+                types.apply(format_record);
             }
         }
         at += length;

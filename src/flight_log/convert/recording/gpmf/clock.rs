@@ -1,24 +1,24 @@
-//! Times of samples that come in payloads of about a second, each with its time but without those of its samples.
+//! Times of samples in payloads of about a second, which have a time per payload but none per sample.
 
 use crate::geometry::seconds_from_ns;
 
-/// A sensor of constant rate is never further than this from a line through its payloads.
+/// Largest residual of a line through the payloads of a sensor with constant rate.
 const MAX_RESIDUAL_NS: f64 = 25e6;
-/// Payloads that a line needs; the first one does not count, because sensors start later than the video.
+/// Smallest number of payloads for a line; the first one does not count, because sensors start later than the video.
 const MIN_PAYLOADS: usize = 4;
 
-/// A payload with samples of a sensor.
+/// Payload with samples of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mark {
-    /// Samples before it.
+    /// Number of samples before the payload.
     pub(super) before: usize,
     pub(super) start_ns: i64,
     pub(super) end_ns: i64,
 }
 
-/// Times of `count` samples in nanoseconds, and whether they are those of a sensor of constant rate.
+/// Times of `count` samples in nanoseconds, and true if they have a constant rate.
 ///
-/// A line through the starts of the payloads gives the times of a constant rate; where it does not fit, the samples of a
+/// A line through the starts of the payloads gives the times of a constant rate; if it does not fit, the samples of a
 /// payload are spread evenly over it.
 pub(super) fn sample_times_ns(marks: &[Mark], count: usize) -> (Vec<i64>, bool) {
     if let Some(line) = line(marks) {
@@ -44,7 +44,7 @@ struct Line {
     period_ns: f64,
 }
 
-/// The least-squares line through the starts of the payloads but the first, when it fits.
+/// Least-squares line through the starts of the payloads without the first, `None` if it does not fit.
 fn line(marks: &[Mark]) -> Option<Line> {
     let marks = marks.get(1..)?;
     if marks.len() < MIN_PAYLOADS {
@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn constant_rates_have_even_times() {
-        // 200 Hz from 20 ms on; the payloads' borders are up to a sample off.
+        // 200 Hz from 20 ms on; the payloads' boundaries deviate by up to one sample.
         let marks = [mark(0, 0), mark(196, 1000), mark(397, 2000), mark(596, 3000), mark(796, 4000), mark(996, 5000)];
         let (times_ns, constant) = sample_times_ns(&marks, 1196);
         assert!(constant && times_ns.len() == 1196);

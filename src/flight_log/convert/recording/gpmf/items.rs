@@ -1,28 +1,27 @@
-//! The items of `GoPro`'s telemetry: a key of four letters, a type, the size of a sample, their number, the samples.
+//! Items of `GoPro` telemetry: a key of four letters, a type, the size of a sample, their number, the samples.
 
 use super::super::scalar::Scalar;
 
-/// Bytes before the samples of an item.
+/// Number of bytes before the samples of an item.
 const HEADER_BYTES: usize = 8;
 
-/// An item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Item<'a> {
     pub(super) key: [u8; 4],
-    /// A letter; 0 for items within an item, `?` for samples whose fields `TYPE` lists.
+    /// Type letter; 0 for items within an item, `?` for samples whose fields `TYPE` lists.
     pub(super) kind: u8,
-    /// Bytes of a sample.
+    /// Size of a sample in bytes.
     size: usize,
     /// Number of samples.
     pub(super) count: usize,
     pub(super) data: &'a [u8],
 }
 
-/// The items in the content of another or of a payload; the last one is an error where the rest is none.
+/// Items in the content of another or of a payload; the last one is an error if the rest is no item.
 pub(super) fn items(content: &[u8]) -> impl Iterator<Item = Result<Item<'_>, String>> {
     let mut rest = content;
     std::iter::from_fn(move || {
-        // Payloads may be filled up with zeros.
+        // Payloads may be padded with zeros.
         if rest.iter().all(|byte| *byte == 0) {
             return None;
         }
@@ -45,7 +44,7 @@ fn next(rest: &[u8]) -> Option<(Item<'_>, &[u8])> {
     Some((Item { key: [header[0], header[1], header[2], header[3]], kind: header[4], size, count, data }, behind))
 }
 
-/// The number type of a letter, and what its numbers are divided by.
+/// Number type of a letter, and the divisor of its numbers.
 fn scalar(letter: u8) -> Option<(Scalar, f64)> {
     Some(match letter {
         b'b' => (Scalar::I8, 1.0),
@@ -71,14 +70,14 @@ impl Item<'_> {
         self.data[..end].iter().map(|byte| char::from(*byte)).collect()
     }
 
-    /// All of its numbers, one after another.
+    /// All numbers of the item in order.
     pub(super) fn numbers(&self) -> Vec<f64> {
         let Some((scalar, divisor)) = scalar(self.kind) else { return Vec::new() };
         let number = |bytes: &[u8]| scalar.big_endian(bytes, 0).map(|number| number / divisor);
         self.data.chunks_exact(scalar.size()).filter_map(number).collect()
     }
 
-    /// The numbers of each sample divided by their scales; `letters` are those of `TYPE`. Samples with text are none.
+    /// Numbers of each sample divided by their scales; `letters` are those of `TYPE`. Samples with text are left out.
     pub(super) fn rows(&self, letters: &str, scales: &[f64]) -> impl Iterator<Item = Vec<f64>> {
         let fields: Vec<(Scalar, f64)> = match self.kind {
             b'?' => letters.bytes().map_while(scalar).collect(),

@@ -1,4 +1,4 @@
-//! What a `GoPro` Karma drone adds to the telemetry of its camera, about four times a second.
+//! Telemetry that a `GoPro` Karma drone adds to that of its camera, about four times a second.
 
 use super::super::mp4::Payload;
 use super::super::recorded::{Recorded, STANDARD_GRAVITY_M_PER_S2, finite, from_euler, nanoseconds};
@@ -6,11 +6,11 @@ use super::Properties;
 use super::items::Item;
 use crate::flight_log::geodesy::Geodetic;
 
-/// What a drone measured, by its own clock, and what that says of the video's clock.
+/// Drone telemetry in drone time, with the samples that relate drone time to video time.
 #[derive(Debug)]
 pub(super) struct Karma {
     recorded: Recorded,
-    /// The largest and the smallest offset of the clocks with which every sample lies in its payload, in nanoseconds.
+    /// Lower and upper bound of video time minus drone time such that every sample lies in its payload, in nanoseconds.
     offset_ns: Option<(i64, i64)>,
 }
 
@@ -21,7 +21,7 @@ impl Default for Karma {
 }
 
 impl Karma {
-    /// Takes the samples of an item, and returns whether it is one of a drone.
+    /// Stores the samples of an item; returns `false` unless it is an item of a drone.
     pub(super) fn take(&mut self, item: &Item<'_>, properties: &Properties, payload: &Payload) -> bool {
         let key = match &item.key {
             b"ATTD" => "ATTD",
@@ -33,13 +33,13 @@ impl Karma {
         };
         for row in item.rows(&properties.letters, &properties.scales) {
             if self.take_row(key, &row, payload).is_none() {
-                self.recorded.leave(key, "with numbers that cannot be");
+                self.recorded.leave(key, "with invalid numbers");
             }
         }
         true
     }
 
-    /// A sample of a stream; the first number is the time in seconds since the drone started.
+    /// Stores a sample of a stream; the first number is the time in seconds since the drone started.
     fn take_row(&mut self, key: &str, row: &[f64], payload: &Payload) -> Option<()> {
         let time_ns = nanoseconds(*row.first()?, 1e9)?;
         let three = |at: usize| finite([*row.get(at)?, *row.get(at + 1)?, *row.get(at + 2)?]);
@@ -55,7 +55,7 @@ impl Karma {
                 let sample = [three(4)?, three(1)? * STANDARD_GRAVITY_M_PER_S2];
                 self.recorded.imu(key).combined.push((time_ns, sample));
             }
-            // Time since the start, and UTC, both in seconds.
+            // SYST: time since the start, and UTC, both in seconds.
             _ => {
                 let utc_ns = nanoseconds(*row.get(1)?, 1e9)?;
                 self.recorded.utc.push((time_ns, utc_ns));
@@ -67,14 +67,14 @@ impl Karma {
         Some(())
     }
 
-    /// What it measured by the video's clock; `None` without a drone.
+    /// Telemetry in video time; `None` without a drone.
     pub(super) fn finish(self) -> Option<Recorded> {
         let Self { mut recorded, offset_ns } = self;
         let (lower, upper) = offset_ns?;
         let offset_ns = i64::midpoint(lower, upper);
         recorded.shift(offset_ns);
         recorded.notes.push(format!(
-            "the drone's clock is aligned with the video by the payloads of its samples, to {:.3} s",
+            "the drone's clock is aligned with the video by the payloads of its samples, within {:.3} s",
             (upper.abs_diff(lower) / 2) as f64 * 1e-9
         ));
         Some(recorded)

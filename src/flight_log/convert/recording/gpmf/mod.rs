@@ -1,5 +1,5 @@
-//! GPMF, the telemetry in videos of `GoPro` cameras: gyroscope, accelerometer and receiver of the camera, and what a Karma
-//! drone adds.
+//! GPMF, the telemetry in videos of `GoPro` cameras: gyroscope, accelerometer and receiver of the camera, and the
+//! telemetry of a Karma drone.
 
 mod clock;
 mod items;
@@ -16,12 +16,12 @@ use karma::Karma;
 
 /// Name of the format in the report.
 const FORMAT: &str = "GoPro GPMF";
-/// Items that say something of the samples behind them.
+/// Items that describe the samples after them.
 const PROPERTIES: [&[u8; 4]; 16] = [
     b"STNM", b"SIUN", b"UNIT", b"SCAL", b"TYPE", b"TSMP", b"EMPT", b"TMPC", b"ORIN", b"ORIO", b"MTRX", b"TICK",
     b"TOCK", b"STMP", b"TIMO", b"RMRK",
 ];
-/// Order of the axes of cameras that do not say it (HERO5).
+/// Order of the axes of cameras that do not record it (HERO5).
 const DEFAULT_AXES: &str = "ZXY";
 
 /// Samples of a sensor in the order of the payloads.
@@ -31,7 +31,7 @@ struct Sensor {
     marks: Vec<Mark>,
 }
 
-/// What has been read so far.
+/// Telemetry read so far.
 #[derive(Debug)]
 struct State {
     camera: Recorded,
@@ -40,13 +40,13 @@ struct State {
     accelerometer: Sensor,
     damaged_payloads: u64,
     problem: Option<String>,
-    /// Axes that the camera names, of the first sensor.
+    /// Recorded axes of the first sensor.
     axes: Option<String>,
     /// Letter of the field of view (`VFOV`).
     field_of_view: Option<String>,
 }
 
-/// What the items of a stream say of its samples.
+/// Description of a stream's samples by its items.
 #[derive(Debug, Default)]
 struct Properties {
     scales: Vec<f64>,
@@ -58,18 +58,17 @@ struct Properties {
     fix: Option<f64>,
 }
 
-/// The telemetry of a video, by nanoseconds since its start.
+/// Telemetry of a video, in nanoseconds since its start.
 #[derive(Debug)]
 pub(super) struct Telemetry {
-    /// What the camera measured.
+    /// Measurements of the camera.
     pub(super) camera: Recorded,
-    /// What its drone measured.
+    /// Measurements of the drone.
     pub(super) drone: Option<Recorded>,
     /// Letter of the field of view.
     pub(super) field_of_view: Option<String>,
 }
 
-/// Reads the telemetry of a video.
 pub(super) fn read(payloads: &[Payload]) -> Telemetry {
     let mut state = State {
         camera: Recorded::new(FORMAT, "/camera"),
@@ -90,7 +89,7 @@ pub(super) fn read(payloads: &[Payload]) -> Telemetry {
     let State { mut camera, karma, gyroscope, accelerometer, damaged_payloads, problem, axes, field_of_view } = state;
     if let Some(problem) = problem {
         camera.notes.push(format!(
-            "{damaged_payloads} of {} payloads of telemetry are damaged, of which what lies before the damage is read: {problem}",
+            "{damaged_payloads} of {} payloads of telemetry are damaged and read up to the damage only: {problem}",
             payloads.len()
         ));
     }
@@ -156,7 +155,7 @@ fn read_stream(stream: &Item<'_>, payload: &Payload, state: &mut State) -> Resul
     Ok(())
 }
 
-/// Takes samples of the camera's gyroscope in rad/s or accelerometer in m/s².
+/// Stores samples of the camera's gyroscope in rad/s or accelerometer in m/s².
 fn take_inertial(item: &Item<'_>, properties: &Properties, payload: &Payload, state: &mut State) {
     let axes = if properties.axes.is_empty() { axes_of_name(&properties.name) } else { Some(properties.axes.clone()) };
     let axes = axes.unwrap_or_else(|| DEFAULT_AXES.to_owned());
@@ -177,14 +176,14 @@ fn take_inertial(item: &Item<'_>, properties: &Properties, payload: &Payload, st
     }
 }
 
-/// The axes that the name of a stream lists: `Gyroscope (z,x,y)`.
+/// Axes in the name of a stream, such as `Gyroscope (z,x,y)`.
 fn axes_of_name(name: &str) -> Option<String> {
     let list = name.split_once('(')?.1.split_once(')')?.0;
     let axes = list.split(',').map(str::trim).collect::<String>().to_ascii_uppercase();
     (axes.len() == 3 && axes.bytes().all(|axis| b"XYZ".contains(&axis))).then_some(axes)
 }
 
-/// Numbers stored along `axes` (`YxZ`: Y, −X, Z) along the camera's axes forward, left, up.
+/// Converts numbers stored along `axes` (`YxZ`: Y, −X, Z) to the camera's axes forward, left, up.
 ///
 /// `GoPro`'s X points to the left of the camera, Y back and Z up, as the images of a HERO5 rotate.
 fn along_axes(row: &[f64], axes: &str) -> Option<Vector3<f64>> {
@@ -199,17 +198,17 @@ fn along_axes(row: &[f64], axes: &str) -> Option<Vector3<f64>> {
 }
 
 impl Sensor {
-    /// Its samples with their times, and whether those are of a constant rate.
+    /// Samples with their times, and true if they have a constant rate.
     fn timed(self) -> (Vec<(i64, Vector3<f64>)>, bool) {
         let (times_ns, constant) = sample_times_ns(&self.marks, self.samples.len());
         (times_ns.into_iter().zip(self.samples).collect(), constant)
     }
 }
 
-/// Kind of a fix in three dimensions.
+/// Smallest value of a 3D fix.
 const FIX_3D: f64 = 3.0;
 
-/// Takes fixes of the camera's receiver: latitude and longitude in degrees, altitude in metres.
+/// Stores fixes of the camera's receiver: latitude and longitude in degrees, altitude in metres.
 fn take_fixes(item: &Item<'_>, properties: &Properties, payload: &Payload, camera: &mut Recorded) {
     let key = String::from_utf8_lossy(&item.key).into_owned();
     let duration_ns = payload.end_ns.saturating_sub(payload.start_ns) as f64;
@@ -234,7 +233,7 @@ fn take_fixes(item: &Item<'_>, properties: &Properties, payload: &Payload, camer
 /// Seconds from the epoch to the first day of 2000.
 const EPOCH_2000_S: f64 = 946_684_800.0;
 
-/// Of `yymmddhhmmss.sss`, nanoseconds since the epoch.
+/// Converts `yymmddhhmmss.sss` to nanoseconds since the epoch.
 fn utc_ns(text: &str) -> Option<i64> {
     let two = |at: usize| text.get(at..at + 2)?.parse::<i64>().ok();
     let (year, month, day) = (2000 + two(0)?, two(2)?, two(4)?);
@@ -242,7 +241,7 @@ fn utc_ns(text: &str) -> Option<i64> {
     if !(1..=12).contains(&month) || !(1..=31).contains(&day) {
         return None;
     }
-    // Days since the epoch in the proleptic Gregorian calendar, years from March on.
+    // Days since the epoch in the proleptic Gregorian calendar, with years that start in March.
     let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
     let days = year * 365 + year / 4 - year / 100 + year / 400 + (month * 153 + 2) / 5 + day - 1 - 719_468;
     let whole_s = days * 86_400 + two(6)? * 3600 + two(8)? * 60;

@@ -1,17 +1,17 @@
-//! Units of a video with their lengths before them (ISO/IEC 14496-15) as a byte stream with start codes (Annex B).
+//! Conversion of video units with length prefixes (ISO/IEC 14496-15) to a byte stream with start codes (Annex B).
 
 use super::super::super::super::video::VideoCodec;
 use super::boxes::u16_at;
 
 const START_CODE: [u8; 4] = [0, 0, 0, 1];
 
-/// How the units of a track are stored.
+/// Storage format of a track's units.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct UnitFormat {
     pub(super) codec: VideoCodec,
-    /// Bytes of a unit's length.
+    /// Size of a unit's length prefix in bytes.
     length_bytes: usize,
-    /// The parameter sets with start codes.
+    /// Parameter sets with start codes.
     parameter_sets: Vec<u8>,
 }
 
@@ -21,7 +21,7 @@ fn put(unit: &[u8], out: &mut Vec<u8>) {
 }
 
 impl UnitFormat {
-    /// From an `avcC` box.
+    /// Reads an `avcC` box.
     pub(super) fn avc(configuration: &[u8]) -> Option<Self> {
         let length_bytes = usize::from(configuration.get(4)? & 3) + 1;
         let mut parameter_sets = Vec::new();
@@ -38,7 +38,7 @@ impl UnitFormat {
         Some(Self { codec: VideoCodec::H264, length_bytes, parameter_sets })
     }
 
-    /// From an `hvcC` box.
+    /// Reads an `hvcC` box.
     pub(super) fn hevc(configuration: &[u8]) -> Option<Self> {
         let length_bytes = usize::from(configuration.get(21)? & 3) + 1;
         let mut parameter_sets = Vec::new();
@@ -55,7 +55,7 @@ impl UnitFormat {
         Some(Self { codec: VideoCodec::H265, length_bytes, parameter_sets })
     }
 
-    /// A sample as a byte stream; a picture at which decoding can start gets the parameter sets where it has none.
+    /// Converts a sample to a byte stream; a keyframe without parameter sets gets them.
     pub(super) fn access_unit(&self, sample: &[u8]) -> Result<Vec<u8>, String> {
         let mut units = Vec::new();
         let mut rest = sample;
@@ -71,7 +71,7 @@ impl UnitFormat {
         let kinds: Vec<UnitKind> = units.iter().map(|unit| self.kind(unit[0])).collect();
         let needs_sets = kinds.contains(&UnitKind::RandomAccess) && !kinds.contains(&UnitKind::ParameterSet);
         let mut out = Vec::with_capacity(sample.len() + self.parameter_sets.len() + 4 * units.len());
-        // An access unit delimiter comes before everything else.
+        // An access unit delimiter must come first.
         let delimiters = kinds.iter().take_while(|kind| **kind == UnitKind::Delimiter).count();
         units[..delimiters].iter().for_each(|unit| put(unit, &mut out));
         if needs_sets {
@@ -94,7 +94,7 @@ impl UnitFormat {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum UnitKind {
     RandomAccess,
-    /// A sequence parameter set.
+    /// Sequence parameter set.
     ParameterSet,
     Delimiter,
     Other,

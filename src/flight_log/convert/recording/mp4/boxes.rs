@@ -2,21 +2,21 @@
 
 use super::super::super::super::file::{FileWindow, LogFile};
 
-/// Bytes of size and type.
+/// Size of the header: size and type.
 const HEADER_BYTES: usize = 8;
-/// Boxes of one level that are looked at.
+/// Largest number of boxes per level.
 const MAX_BOXES: usize = 65_536;
 
-/// A box of the file's first level.
+/// Box of the file's first level.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FileBox {
     pub(super) kind: [u8; 4],
-    /// Range of the content, which may end beyond the file.
+    /// Start of the content, which may end beyond the file.
     pub(super) start: usize,
     pub(super) end: usize,
 }
 
-/// The boxes of the first level, up to one that is no box.
+/// Boxes of the first level, up to invalid bytes.
 pub(super) fn file_boxes(file: &LogFile) -> Result<Vec<FileBox>, String> {
     let mut window = FileWindow::new(file);
     let mut boxes = Vec::new();
@@ -45,7 +45,7 @@ pub(super) fn file_boxes(file: &LogFile) -> Result<Vec<FileBox>, String> {
     Ok(boxes)
 }
 
-/// The boxes in the content of another, up to one that is no box.
+/// Boxes in the content of another, up to invalid bytes.
 pub(super) fn children(content: &[u8]) -> impl Iterator<Item = ([u8; 4], &[u8])> {
     let mut rest = content;
     std::iter::from_fn(move || {
@@ -57,12 +57,12 @@ pub(super) fn children(content: &[u8]) -> impl Iterator<Item = ([u8; 4], &[u8])>
     })
 }
 
-/// The content of the first box of a type.
+/// Content of the first box of a type.
 pub(super) fn child<'a>(content: &'a [u8], kind: &[u8; 4]) -> Option<&'a [u8]> {
     children(content).find(|(other, _)| other == kind).map(|(_, child)| child)
 }
 
-/// The content of a box within boxes.
+/// Content of a box within boxes.
 pub(super) fn descendant<'a>(content: &'a [u8], kinds: &[&[u8; 4]]) -> Option<&'a [u8]> {
     kinds.iter().try_fold(content, |content, kind| child(content, kind))
 }

@@ -1,4 +1,4 @@
-//! MP4 files: the pictures of their video with their times, and the payloads of their telemetry.
+//! MP4 files: the frames of their video with their times, and the payloads of their telemetry.
 
 mod annex_b;
 mod boxes;
@@ -15,21 +15,21 @@ use annex_b::UnitFormat;
 use boxes::{child, children, descendant, file_boxes, u32_at, u64_at};
 use track::{Sample, Track};
 
-/// Seconds from 1904, from which MP4 counts, to the epoch.
+/// Seconds from 1904, the origin of MP4 times, to the epoch.
 const EPOCH_1904_S: u64 = 2_082_844_800;
 
-/// A picture of a video.
+/// Frame of a video.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Picture {
-    /// When it was taken, in nanoseconds since the start of the video.
+    /// Time of exposure, in nanoseconds since the start of the video.
     pub(super) presented_ns: i64,
-    /// When its message is in the log: in the order of decoding, never before it was taken.
+    /// Time of the message in the log: in the order of decoding, never before the exposure.
     pub(super) decoded_ns: i64,
     start: usize,
     length: usize,
 }
 
-/// The video of a file.
+/// Video of a file.
 #[derive(Debug)]
 pub(super) struct Video {
     file: LogFile,
@@ -40,7 +40,7 @@ pub(super) struct Video {
     has_reordered_pictures: bool,
 }
 
-/// A payload of telemetry.
+/// Payload of telemetry.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Payload {
     /// Nanoseconds from the start of the video to its first sample, and to the next payload.
@@ -49,20 +49,20 @@ pub(super) struct Payload {
     pub(super) bytes: Vec<u8>,
 }
 
-/// What is read of a file.
+/// Content of a file.
 #[derive(Debug)]
 pub(super) struct Movie {
     pub(super) video: Video,
-    /// `GoPro`'s telemetry.
+    /// `GoPro` telemetry.
     pub(super) telemetry: Vec<Payload>,
-    /// When the recording started by the camera's clock, in nanoseconds since the epoch.
+    /// Start of the recording by the camera's clock, in nanoseconds since the epoch.
     pub(super) created_ns: Option<i64>,
     /// Version of a `GoPro`'s firmware.
     pub(super) firmware: Option<String>,
     pub(super) notes: Vec<String>,
 }
 
-/// Whether a file begins like an MP4 or `QuickTime` file.
+/// True if a file begins like an MP4 or `QuickTime` file.
 pub(in super::super) fn is_movie(start: &[u8]) -> bool {
     start
         .get(4..8)
@@ -77,7 +77,7 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     let has = |kind: &[u8; 4]| found.iter().any(|found| &found.kind == kind);
     let Some(moov) = found.iter().find(|found| &found.kind == b"moov") else {
         return Err(unreadable(
-            "the MP4 has no moov box, the table of its pictures: the recording was not closed (power lost, card removed) or \
+            "the MP4 has no moov box, the table of its frames: the recording was not closed (power lost, card removed) or \
              the copy is incomplete; copy it again, let the camera repair it, or rebuild the table with untrunc and an \
              intact recording of the same camera"
                 .to_owned(),
@@ -108,10 +108,10 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     let (track, format, resolution_px) = video_track(&tracks).map_err(unreadable)?;
     let (pictures, has_reordered_pictures) = pictures(track, file.len(), &mut notes);
     if pictures.is_empty() {
-        return Err(unreadable(format!("the video has no picture within the file; {}", notes.join("; "))));
+        return Err(unreadable(format!("the video has no frame within the file; {}", notes.join("; "))));
     }
     if !track.is_upright {
-        notes.push("the video is marked to be shown rotated; its pictures are taken as they are stored".to_owned());
+        notes.push("the video is marked for rotated display; its frames are used as stored".to_owned());
     }
     if track.edits > 1 {
         notes.push(format!("the video has an edit list of {} parts; only its first time is applied", track.edits));
@@ -122,7 +122,7 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     Ok(Movie { video, telemetry, created_ns, firmware, notes })
 }
 
-/// The first video track that can be read, how its units are stored, and its resolution.
+/// First video track of a supported type, with the format of its units and its resolution.
 fn video_track<'a>(tracks: &'a [Track<'a>]) -> Result<(&'a Track<'a>, UnitFormat, [usize; 2]), String> {
     let mut others = Vec::new();
     for track in tracks.iter().filter(|track| &track.handler == b"vide") {
@@ -144,21 +144,21 @@ fn video_track<'a>(tracks: &'a [Track<'a>]) -> Result<(&'a Track<'a>, UnitFormat
         "the MP4 has no video track".to_owned()
     } else {
         format!(
-            "the video is of type {:?}, of which no description is read; expected H.264 (avc1) or H.265 (hvc1, hev1): \
+            "unsupported video type {:?}; expected H.264 (avc1) or H.265 (hvc1, hev1): \
              re-encode it with 'ffmpeg -i IN.mp4 -map 0 -c:v libx264 -bf 0 -c:d copy -copy_unknown OUT.mp4'",
             others.join(", ")
         )
     })
 }
 
-/// The pictures that lie in the file, and whether they are shown in another order than decoded.
+/// Frames that lie in the file, and true if their display order differs from the decoding order.
 fn pictures(track: &Track<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (Vec<Picture>, bool) {
-    // Pictures that wait for others are written when the last of those that they wait for is decoded.
+    // Frames that depend on later ones are written when the last of these is decoded.
     let delay_ns = track.samples.iter().map(|sample| sample.presented_ns.saturating_sub(sample.decoded_ns)).max();
     let delay_ns = delay_ns.unwrap_or(0);
     let mut lost = track.undescribed;
     let mut pictures = Vec::with_capacity(track.samples.len());
-    // Pictures do not overlap: together they cannot be longer than the file.
+    // Frames do not overlap: together they cannot be longer than the file.
     let mut budget = file_bytes;
     for sample in &track.samples {
         match place(sample, file_bytes).filter(|(_, length)| *length <= budget) {
@@ -172,21 +172,19 @@ fn pictures(track: &Track<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (V
     }
     if lost > 0 {
         let all = track.samples.len() as u64 + track.undescribed;
-        notes.push(format!(
-            "{lost} of {all} pictures lie beyond the end of the file (cut off) or are not described: lost"
-        ));
+        notes.push(format!("{lost} of {all} frames are lost: beyond the end of the file (truncated) or not described"));
     }
     let reordered = pictures.windows(2).any(|pair| pair[1].presented_ns < pair[0].presented_ns);
     (pictures, reordered)
 }
 
-/// Place of a sample that lies in the file.
+/// Position and length of a sample that lies in the file.
 fn place(sample: &Sample, file_bytes: usize) -> Option<(usize, usize)> {
     let (start, length) = (usize::try_from(sample.start).ok()?, usize::try_from(sample.length).ok()?);
     (length > 0 && start.checked_add(length)? <= file_bytes).then_some((start, length))
 }
 
-/// The payloads of `GoPro`'s telemetry.
+/// Payloads of `GoPro` telemetry.
 fn telemetry(tracks: &[Track<'_>], file: &LogFile, notes: &mut Vec<String>) -> Vec<Payload> {
     let Some(track) = tracks.iter().find(|track| &track.description.0 == b"gpmd") else { return Vec::new() };
     let mut payloads = Vec::new();
@@ -208,19 +206,19 @@ fn telemetry(tracks: &[Track<'_>], file: &LogFile, notes: &mut Vec<String>) -> V
         }
     }
     if lost > 0 {
-        notes.push(format!("{lost} payloads of telemetry lie beyond the end of the file (cut off): lost"));
+        notes.push(format!("{lost} payloads of telemetry are lost: beyond the end of the file (truncated)"));
     }
     payloads
 }
 
 impl Video {
-    /// A picture in Annex B.
+    /// Frame in Annex B.
     pub(super) fn access_unit(&self, number: usize) -> Result<Vec<u8>, String> {
         let Picture { start, length, .. } = self.pictures[number];
         self.format.access_unit(&self.file.read(start..start + length)?)
     }
 
-    /// `h264, 854×480, 29.97 fps`.
+    /// Description such as `h264, 854×480, 29.97 fps`.
     pub(super) fn description(&self) -> String {
         let times: Samples<()> = self.pictures.iter().map(|picture| (picture.decoded_ns, ())).collect();
         let [width, height] = self.resolution_px;
@@ -228,7 +226,7 @@ impl Video {
         format!("{}, {width}×{height}, {:.2} fps{order}", self.codec.name(), super::topics::rate_hz(&times))
     }
 
-    /// First and last time of its pictures in nanoseconds since its start.
+    /// First and last time of the frames in nanoseconds since the start of the video.
     pub(super) fn span_ns(&self) -> (i64, i64) {
         let times = || self.pictures.iter().map(|picture| picture.presented_ns);
         (times().min().unwrap_or(0), times().max().unwrap_or(0))

@@ -1,11 +1,11 @@
-//! Tracks of an MP4 file: where each sample lies, and when it is decoded and shown.
+//! Tracks of an MP4 file: position, decoding time and display time of each sample.
 
 use super::boxes::{child, descendant, u16_at, u32_at, u64_at};
 
-/// One sample of a track: a picture, or a payload of telemetry.
+/// Sample of a track: a video frame, or a payload of telemetry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sample {
-    /// Range in the file, which may end beyond it.
+    /// Start in the file; the end may lie beyond the file.
     pub(super) start: u64,
     pub(super) length: u64,
     /// Nanoseconds since the start of the movie.
@@ -14,23 +14,22 @@ pub(super) struct Sample {
     pub(super) duration_ns: i64,
 }
 
-/// A track.
 #[derive(Clone, Debug)]
 pub(super) struct Track<'a> {
-    /// `vide`, `soun`, `meta`.
+    /// Such as `vide`, `soun`, `meta`.
     pub(super) handler: [u8; 4],
-    /// Type and content of its first sample description.
+    /// Type and content of the first sample description.
     pub(super) description: ([u8; 4], &'a [u8]),
     pub(super) samples: Vec<Sample>,
-    /// Samples that the tables announce without a place or a time.
+    /// Number of samples in the tables without a position or a time.
     pub(super) undescribed: u64,
-    /// Whether the track is shown as it is stored.
+    /// True if the track is displayed as it is stored, without rotation.
     pub(super) is_upright: bool,
-    /// Parts of the edit list; only the first is applied.
+    /// Number of parts of the edit list; only the first is applied.
     pub(super) edits: usize,
 }
 
-/// Reads a `trak` box; `None` when a table is missing. `max_samples` bounds what the tables may announce.
+/// Reads a `trak` box; `None` if a table is missing. `max_samples` bounds the number of samples in the tables.
 pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Option<Track<'_>> {
     let media = child(trak, b"mdia")?;
     let handler: [u8; 4] = child(media, b"hdlr")?.get(8..12)?.try_into().ok()?;
@@ -55,7 +54,7 @@ pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Optio
     let mut decoded = 0_i64;
     for (start, length) in &places.places {
         let Some(duration) = durations.next() else { break };
-        // Offsets are signed in version 1; in version 0 they are below 2³¹ in every file that is in use.
+        // Offsets are signed in version 1; in version 0 they are below 2³¹ in practice.
         let presented = decoded.saturating_add(i64::from(delays.next().unwrap_or(0).cast_signed()));
         let end = decoded.saturating_add(i64::from(duration));
         let (Some(decoded_ns), Some(presented_ns), Some(end_ns)) = (in_ns(decoded), in_ns(presented), in_ns(end))
@@ -71,15 +70,15 @@ pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Optio
     Some(Track { handler, description, samples, undescribed, is_upright, edits })
 }
 
-/// Places of samples in the file.
+/// Positions of samples in the file.
 struct Places {
-    /// First byte and length of each.
+    /// First byte and length of each sample.
     places: Vec<(u64, u64)>,
     /// Number of samples by the table of sizes.
     announced: u64,
 }
 
-/// From the tables of sizes (`stsz`), samples per chunk (`stsc`) and chunks (`stco`, `co64`).
+/// Computes positions from the tables of sizes (`stsz`), samples per chunk (`stsc`) and chunks (`stco`, `co64`).
 fn places(table: &[u8], max_samples: u64) -> Option<Places> {
     let sizes = child(table, b"stsz")?;
     let (uniform, announced) = (u32_at(sizes, 4)?, u64::from(u32_at(sizes, 8)?));
@@ -113,7 +112,7 @@ fn places(table: &[u8], max_samples: u64) -> Option<Places> {
     Some(Places { places, announced })
 }
 
-/// The values of a table of runs (number of samples, value).
+/// Values of a table of runs (number of samples, value).
 fn runs(table: &[u8]) -> impl Iterator<Item = u32> {
     let pairs = table.get(8..).unwrap_or_default().chunks_exact(8);
     pairs.flat_map(|pair| {
@@ -122,7 +121,7 @@ fn runs(table: &[u8]) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Number of parts of the edit list, delay of the track in nanoseconds, and the first time of the media that is shown.
+/// Number of parts of the edit list, delay of the track in nanoseconds, and first displayed media time.
 fn edits(trak: &[u8], movie_timescale: u32) -> (usize, i64, i64) {
     let Some(list) = descendant(trak, &[b"edts", b"elst"]) else { return (0, 0, 0) };
     let is_long = list.first() == Some(&1);
@@ -148,7 +147,7 @@ fn edits(trak: &[u8], movie_timescale: u32) -> (usize, i64, i64) {
     (parts, delay_ns, media_start)
 }
 
-/// Whether the matrix of a track header is no rotation.
+/// True if the matrix of a track header has no rotation.
 fn is_upright(header: &[u8]) -> bool {
     let matrix = if header.first() == Some(&1) { 52 } else { 40 };
     let entry = |index: usize| u32_at(header, matrix + 4 * index).map(u32::cast_signed);
@@ -158,9 +157,9 @@ fn is_upright(header: &[u8]) -> bool {
     }
 }
 
-/// Width and height of a visual sample description, and the boxes behind its fields.
+/// Width and height of a visual sample description, and the boxes after its fields.
 pub(super) fn visual(description: &[u8]) -> Option<([usize; 2], &[u8])> {
-    // Behind size and type: reserved (6), index (2), fields (16), width, height, fields (50).
+    // After size and type: reserved (6), index (2), fields (16), width, height, fields (50).
     let (width, height) = (u16_at(description, 24)?, u16_at(description, 26)?);
     Some(([usize::from(width), usize::from(height)], description.get(78..)?))
 }

@@ -1,48 +1,47 @@
-//! The records of a telemetry log: a time of the ground station, then a `MAVLink` frame of version 1 or 2.
+//! Records of a telemetry log: a time of the ground station, then a `MAVLink` frame of version 1 or 2.
 
 use super::super::super::super::file::{FileWindow, LogFile};
 use super::super::damage::Damage;
 
-/// Bytes of the time before a frame: microseconds since the epoch, big-endian.
+/// Size of the time before a frame: microseconds since the epoch, big-endian.
 const TIME_BYTES: usize = 8;
-/// Bytes of the longest frame: header (10), payload (255), checksum (2), signature (13).
+/// Size of the longest frame: header (10), payload (255), checksum (2), signature (13).
 const MAX_FRAME_BYTES: usize = 280;
 /// First bytes of frames of both versions.
 const VERSION_1: u8 = 0xFE;
 const VERSION_2: u8 = 0xFD;
 /// Flag of a frame with a signature.
 const SIGNED: u8 = 1;
-/// Years 2001 to 2100 in microseconds since the epoch; the time of a record lies between them.
+/// Valid times of a record: the years 2001 to 2100 in microseconds since the epoch.
 const TIMES_US: std::ops::Range<u64> = 1_000_000_000_000_000..4_102_444_800_000_000;
-/// Longest payload; shorter ones are filled up with zeros.
+/// Longest payload; shorter ones are padded with zeros.
 pub(super) const MAX_PAYLOAD_BYTES: usize = 255;
 
-/// A frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Frame {
-    /// When the ground station received it, in nanoseconds since the epoch.
+    /// Reception by the ground station, in nanoseconds since the epoch.
     pub(super) received_ns: i64,
     pub(super) system: u8,
     pub(super) component: u8,
     pub(super) message: u32,
-    /// Filled up with zeros, as version 2 leaves them out at the end.
+    /// Padded with zeros, since version 2 omits them at the end.
     pub(super) payload: [u8; MAX_PAYLOAD_BYTES],
-    /// Position behind it.
+    /// Position after the frame.
     pub(super) end: usize,
 }
 
-/// Whether bytes begin like a record.
+/// True if bytes begin like a record.
 pub(in super::super) fn is_telemetry(start: &[u8]) -> bool {
     let Some((time, behind)) = start.split_first_chunk::<TIME_BYTES>() else { return false };
     TIMES_US.contains(&u64::from_be_bytes(*time))
         && behind.first().is_some_and(|byte| [VERSION_1, VERSION_2].contains(byte))
 }
 
-/// Walks the frames of a log.
+/// Iterates over the frames of a log.
 pub(super) struct Frames<'a> {
     file: &'a LogFile,
     window: FileWindow<'a>,
-    /// The byte behind the checksum of messages that are read, by their number.
+    /// `CRC_EXTRA` byte of a message by its number; `None` for messages that are not read.
     checksum_byte: fn(u32) -> Option<u8>,
     pub(super) damage: Damage,
 }
@@ -52,7 +51,7 @@ impl<'a> Frames<'a> {
         Self { file, window: FileWindow::new(file), checksum_byte, damage: Damage::default() }
     }
 
-    /// The first frame from a position on; what is none is skipped. `None` at the end.
+    /// First frame from a position on; other bytes are skipped. `None` at the end.
     pub(super) fn next(&mut self, from: usize) -> Result<Option<Frame>, String> {
         let mut at = from;
         while at < self.file.len() {
@@ -72,7 +71,7 @@ impl<'a> Frames<'a> {
         Ok(None)
     }
 
-    /// Whether a record can begin at a position: there is one, the file ends, or its end is cut off.
+    /// True if a record begins at a position, possibly truncated by the end of the file, or the file ends there.
     fn continues(&mut self, at: usize) -> Result<bool, String> {
         let end = at.saturating_add(TIME_BYTES + 1);
         if end > self.file.len() {
@@ -82,7 +81,7 @@ impl<'a> Frames<'a> {
     }
 }
 
-/// The frame at the start of bytes that lie at a position.
+/// Frame at the start of `bytes`; `at` is their position in the file.
 fn frame(bytes: &[u8], at: usize, checksum_byte: fn(u32) -> Option<u8>) -> Option<Frame> {
     if !is_telemetry(bytes) {
         return None;
@@ -114,7 +113,7 @@ fn frame(bytes: &[u8], at: usize, checksum_byte: fn(u32) -> Option<u8>) -> Optio
     Some(Frame { received_ns, system, component, message, payload, end: at + TIME_BYTES + whole })
 }
 
-/// CRC-16/MCRF4XX, as `MAVLink` computes it.
+/// CRC-16/MCRF4XX, as in `MAVLink`.
 fn checksum_of<'a>(bytes: impl Iterator<Item = &'a u8>) -> u16 {
     bytes.fold(0xFFFF, |checksum, byte| {
         let low = *byte ^ (checksum & 0xFF) as u8;

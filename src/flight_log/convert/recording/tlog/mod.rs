@@ -19,7 +19,7 @@ use crate::flight_log::geodesy::Geodetic;
 pub(super) use frames::is_telemetry;
 use frames::{Frame, Frames};
 
-/// Numbers of the messages that are read (`MAVLink` common).
+/// Numbers of the supported messages (`MAVLink` common).
 mod id {
     pub(super) const HEARTBEAT: u32 = 0;
     pub(super) const SYSTEM_TIME: u32 = 2;
@@ -37,7 +37,7 @@ mod id {
     pub(super) const GIMBAL_DEVICE_ATTITUDE_STATUS: u32 = 285;
 }
 
-/// Name of a message that is read, and the byte behind its checksum (`CRC_EXTRA`).
+/// Name and `CRC_EXTRA` byte of a supported message.
 fn described(message: u32) -> Option<(&'static str, u8)> {
     Some(match message {
         id::HEARTBEAT => ("HEARTBEAT", 50),
@@ -67,14 +67,14 @@ const RAW_IMU: &str = "RAW_IMU";
 const NO_AUTOPILOT: u8 = 8;
 /// `MAV_AUTOPILOT_ARDUPILOTMEGA`, whose `RAW_IMU` has the units of `SCALED_IMU`.
 const ARDUPILOT: u8 = 3;
-/// Component of the autopilot itself.
+/// Component number of the autopilot.
 const AUTOPILOT_COMPONENT: u8 = 1;
-/// Times of a component that go back by more than this say that it has restarted.
+/// A component has restarted if its times go back by more than this.
 const RESTART_NS: i64 = 10_000_000_000;
 /// Times beyond this are since the epoch, others since the start of the component.
 const EPOCH_TIMES_NS: i64 = 1_000_000_000_000_000_000;
 
-/// What a component sent from one start to the next, by the time since its start.
+/// Measurements of a component from one start to the next, in time since its start.
 #[derive(Debug)]
 struct Session {
     recorded: Recorded,
@@ -85,10 +85,10 @@ struct Session {
 
 #[derive(Debug)]
 struct State {
-    /// What has times since the epoch.
+    /// Measurements with times since the epoch.
     recorded: Recorded,
     sessions: BTreeMap<u8, Session>,
-    /// The vehicle, and the kind of its autopilot.
+    /// Number of the vehicle, and kind of its autopilot.
     system: Option<u8>,
     autopilot: Option<u8>,
     restarts: u64,
@@ -98,7 +98,7 @@ fn empty() -> Recorded {
     Recorded::new("MAVLink telemetry log", "")
 }
 
-/// Reads a log; its clock is UTC, as the autopilot knows it (`SYSTEM_TIME`), else as the ground station does.
+/// Reads a log in UTC of the autopilot (`SYSTEM_TIME`), else of the ground station.
 pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
     let file = LogFile::open(path, sink.limits())?;
     let mut frames = Frames::new(&file, checksum_byte);
@@ -117,7 +117,7 @@ pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, Convert
     if autopilot != Some(ARDUPILOT)
         && let Some(raw) = recorded.imus.remove(RAW_IMU)
     {
-        let reason = "its units are those of the sensor; only ArduPilot's are known";
+        let reason = "in units of the sensor, which are known for ArduPilot only";
         recorded.leave_many(RAW_IMU, raw.combined.len() as u64, reason);
     }
     recorded.notes.extend(
@@ -127,7 +127,7 @@ pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, Convert
     if restarts > 0 {
         recorded.notes.push(format!("the autopilot or the gimbal has restarted {restarts} times during the log"));
     }
-    // Its times are UTC already.
+    // The times are UTC already.
     if let Some((time_ns, _)) = recorded.span_ns() {
         recorded.utc = vec![(time_ns, time_ns)];
     }
@@ -135,7 +135,7 @@ pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, Convert
 }
 
 impl Session {
-    /// What was sent, at times since the epoch.
+    /// All measurements, at times since the epoch.
     fn finish(mut self) -> Recorded {
         let offset_ns = self.recorded.utc_offset_ns().unwrap_or(self.offset_ns);
         self.recorded.shift(offset_ns);
@@ -168,7 +168,7 @@ impl State {
         }
     }
 
-    /// The session of a component at a time since its start.
+    /// Session of a component at a time since its start.
     fn session(&mut self, frame: &Frame, time_ns: i64) -> &mut Recorded {
         let offset_ns = frame.received_ns.saturating_sub(time_ns);
         let new = || Session { recorded: empty(), last_ns: time_ns, offset_ns };
@@ -192,7 +192,7 @@ fn numbers<const N: usize>(frame: &Frame, scalar: Scalar, at: usize) -> [f64; N]
     std::array::from_fn(|index| number(frame, scalar, at + index * scalar.size()))
 }
 
-/// The time of a measurement, since the start of the component or since the epoch.
+/// Time of a measurement, since the start of the component or since the epoch.
 fn time_ns(frame: &Frame) -> Option<i64> {
     match frame.message {
         id::SYSTEM_TIME => nanoseconds(number(frame, Scalar::U32, 8), 1e6),
@@ -223,7 +223,7 @@ fn measure(frame: &Frame, name: &str, time_ns: i64, recorded: &mut Recorded) -> 
             recorded.imu(name).combined.push((time_ns, sample));
         }
         id::HIGHRES_IMU => {
-            // The first six bits say that the accelerations and the angular rates are new.
+            // The first six bits mark new accelerations and angular rates.
             let updated = number(frame, Scalar::U16, 60) as u16;
             if updated != 0 && updated.trailing_zeros() >= 6 {
                 return Err("neither acceleration nor angular rate is new");

@@ -1,13 +1,13 @@
-//! Message formats of a `ULog`: their fields and where they lie in a message.
+//! Message formats of a `ULog`: fields and their offsets in a message.
 
 use std::collections::BTreeMap;
 
 use super::super::scalar::Scalar;
 
-/// Formats within formats; PX4 has at most three.
+/// Largest nesting of formats; PX4 has at most three levels.
 const MAX_DEPTH: usize = 8;
 
-/// A field as its format declares it.
+/// Field in a format's declaration.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Declared {
     type_name: String,
@@ -15,21 +15,21 @@ struct Declared {
     name: String,
 }
 
-/// A number, or an array of numbers, of a message.
+/// Number, or array of numbers, of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Field {
     scalar: Scalar,
     count: usize,
-    /// From the first byte of the message's fields.
+    /// In bytes from the start of the message's fields.
     offset: usize,
 }
 
-/// Where the numbers of a message lie.
+/// Offsets and types of a message's numbers.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Layout(BTreeMap<String, Field>);
 
 impl Layout {
-    /// The numbers of a field of so many, `None` where the message has no such field or ends before it.
+    /// Values of a field with `N` numbers, `None` if the message has no such field or ends before it.
     pub(super) fn numbers<const N: usize>(&self, message: &[u8], name: &str) -> Option<[f64; N]> {
         let field = self.0.get(name).filter(|field| field.count == N)?;
         let mut numbers = [0.0; N];
@@ -39,7 +39,7 @@ impl Layout {
         Some(numbers)
     }
 
-    /// A field of one number.
+    /// Value of a field with one number.
     pub(super) fn number(&self, message: &[u8], name: &str) -> Option<f64> {
         self.numbers::<1>(message, name).map(|[number]| number)
     }
@@ -61,12 +61,12 @@ fn scalar(type_name: &str) -> Option<Scalar> {
     })
 }
 
-/// The formats of a log by their names.
+/// Formats of a log by name.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Formats(BTreeMap<String, Vec<Declared>>);
 
 impl Formats {
-    /// Takes the text of a format, `name:float[3] gyro;uint64_t time;`.
+    /// Adds a format by its text, `name:float[3] gyro;uint64_t time;`.
     pub(super) fn declare(&mut self, text: &str) -> Result<(), String> {
         let (name, fields) = text.split_once(':').ok_or_else(|| "a format without a name".to_owned())?;
         let mut declared = Vec::new();
@@ -89,7 +89,7 @@ impl Formats {
         Ok(())
     }
 
-    /// Where the numbers of a format lie; `None` for a format that is not declared, or whose size cannot be told.
+    /// Layout of a format; `None` for an undeclared format or one of unknown size.
     pub(super) fn layout(&self, name: &str) -> Option<Layout> {
         let mut sizes = BTreeMap::new();
         let mut layout = Layout::default();
@@ -104,7 +104,7 @@ impl Formats {
         Some(layout)
     }
 
-    /// Bytes of a type. `sizes` are those that are known already.
+    /// Size of a type in bytes. `sizes` contains the sizes computed before.
     fn size<'a>(
         &'a self,
         type_name: &'a str,

@@ -1,4 +1,4 @@
-//! The messages of a `ULog`, each with its length and type before it.
+//! Messages of a `ULog`, each after its length and type.
 
 use std::ops::Range;
 
@@ -7,32 +7,31 @@ use super::super::damage::Damage;
 
 /// First bytes of every log.
 pub(in super::super) const MAGIC: [u8; 7] = [0x55, 0x4C, 0x6F, 0x67, 0x01, 0x12, 0x35];
-/// Bytes of the file header: magic, version, time.
+/// Size of the file header: magic, version, time.
 pub(super) const HEADER_BYTES: usize = 16;
-/// Bytes before a message: length and type.
+/// Size of a message header: length and type.
 const MESSAGE_HEADER_BYTES: usize = 3;
-/// Messages in a row that must look right after damage.
+/// Number of consecutive messages that must be plausible after damage.
 const CHAIN: usize = 4;
 
-/// A message.
 pub(super) struct Message<'a> {
-    /// Its type, a letter.
+    /// Type letter.
     pub(super) kind: u8,
     pub(super) content: &'a [u8],
-    /// Position behind it.
+    /// Position after the message.
     pub(super) end: usize,
 }
 
-/// Walks messages from front to back.
+/// Iterates over the messages of a log.
 pub(super) struct Messages<'a> {
     file: &'a LogFile,
     window: FileWindow<'a>,
-    /// Looks at the messages behind a position while damage is skipped.
+    /// Reads the messages after a position while damage is skipped.
     ahead: FileWindow<'a>,
     pub(super) damage: Damage,
 }
 
-/// Whether messages have this type.
+/// True for the message types of a `ULog`.
 fn is_known(kind: u8) -> bool {
     b"FIMPQARDLCSOB".contains(&kind)
 }
@@ -42,7 +41,7 @@ impl<'a> Messages<'a> {
         Self { file, window: FileWindow::new(file), ahead: FileWindow::new(file), damage: Damage::default() }
     }
 
-    /// Type of the message at a position, and the range of its content, when both can be.
+    /// Type of the message at a position, and the range of its content, if both are plausible.
     fn header(window: &mut FileWindow<'a>, at: usize, end: usize) -> Result<Option<(u8, Range<usize>)>, String> {
         let start = at.saturating_add(MESSAGE_HEADER_BYTES);
         if start > end {
@@ -53,7 +52,7 @@ impl<'a> Messages<'a> {
         Ok((is_known(kind) && length > 0 && start + length <= end).then(|| (kind, start..start + length)))
     }
 
-    /// The next message at a position before `end`; `None` at the end.
+    /// Next message at a position before `end`; `None` at the end.
     pub(super) fn next(&mut self, at: usize, end: usize) -> Result<Option<Message<'_>>, String> {
         let end = end.min(self.file.len());
         if at >= end {
@@ -74,7 +73,7 @@ impl<'a> Messages<'a> {
         Ok(Some(Message { kind, content: self.window.read(range)?, end }))
     }
 
-    /// The first position from which several messages look right, up to the end of the log; `end` without one.
+    /// First position followed by several plausible messages, up to the end of the log; `end` without one.
     fn resume(&mut self, from: usize, end: usize) -> Result<usize, String> {
         for start in from..end {
             let mut at = start;

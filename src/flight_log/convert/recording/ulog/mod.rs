@@ -17,32 +17,32 @@ use formats::{Formats, Layout};
 pub(super) use messages::MAGIC;
 use messages::{HEADER_BYTES, Messages};
 
-/// Bit of the flags of a log that has data behind its former end.
+/// Flag of a log with data appended after its former end.
 const APPENDED: u8 = 1;
 
-/// A message that is logged: its format and its instance.
+/// Logged message: its format and its instance.
 #[derive(Clone, Debug)]
 struct Subscription {
     name: String,
     instance: u8,
 }
 
-/// What a log has declared so far.
+/// Declarations of a log up to the present position.
 #[derive(Debug, Default)]
 struct State {
     formats: Formats,
     subscriptions: BTreeMap<u16, Subscription>,
     layouts: BTreeMap<String, Layout>,
-    /// Parts of the log: up to the first, then from each to the next.
+    /// Ends of the parts of the log: up to the first, then from each to the next.
     parts: Vec<usize>,
     dropouts: u64,
     dropouts_ms: u64,
-    /// Messages of data that no subscription describes.
+    /// Number of data messages without a subscription.
     orphans: u64,
     problem: Option<String>,
 }
 
-/// Reads a log; its clock is that of its timestamps, mostly the time since the autopilot started.
+/// Reads a log in the clock of its timestamps, usually the time since the autopilot started.
 pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
     let file = LogFile::open(path, sink.limits())?;
     let mut recorded = Recorded::new("PX4 ULog", "");
@@ -73,7 +73,7 @@ fn report(state: &State, damage: &Damage, recorded: &mut Recorded) {
     }));
     if state.dropouts > 0 {
         recorded.notes.push(format!(
-            "the autopilot could not write {} times, {:.3} s together (dropouts)",
+            "dropouts of the autopilot's log: {}, {:.3} s in total",
             state.dropouts,
             state.dropouts_ms as f64 * 1e-3
         ));
@@ -118,7 +118,7 @@ fn take(kind: u8, content: &[u8], state: &mut State, recorded: &mut Recorded) {
             };
             let read = match state.layouts.get(&subscription.name) {
                 Some(layout) => {
-                    measure(&Record { subscription, layout, message }, recorded).ok_or("with numbers that cannot be")
+                    measure(&Record { subscription, layout, message }, recorded).ok_or("with invalid numbers")
                 }
                 None => Err("not read"),
             };
@@ -141,7 +141,7 @@ fn take(kind: u8, content: &[u8], state: &mut State, recorded: &mut Recorded) {
     }
 }
 
-/// Messages that are read.
+/// True for supported messages.
 fn is_read(name: &str) -> bool {
     [
         "sensor_combined",
@@ -157,7 +157,7 @@ fn is_read(name: &str) -> bool {
     .contains(&name)
 }
 
-/// A message of data.
+/// Data message.
 struct Record<'a> {
     subscription: &'a Subscription,
     layout: &'a Layout,
@@ -173,14 +173,14 @@ impl Record<'_> {
         self.layout.numbers(self.message, name)
     }
 
-    /// Time of the measurement where it is recorded, of the message otherwise.
+    /// Time of the measurement if it is recorded, else of the message.
     fn time_ns(&self) -> Option<i64> {
         let sampled = self.number("timestamp_sample").filter(|time| *time > 0.0);
         sampled.or_else(|| self.number("timestamp")).and_then(|microseconds| nanoseconds(microseconds, 1e3))
     }
 }
 
-/// Takes what a message measures: `None` when its numbers cannot be used, the reason when they are not wanted.
+/// Stores the measurement of a message: `None` for unusable numbers, the reason for a message that is left out.
 fn measure(record: &Record<'_>, recorded: &mut Recorded) -> Option<Result<(), &'static str>> {
     let Subscription { name, instance } = record.subscription;
     let time_ns = record.time_ns()?;
@@ -203,7 +203,7 @@ fn measure(record: &Record<'_>, recorded: &mut Recorded) -> Option<Result<(), &'
         "vehicle_local_position" => {
             let is_valid = |name: &str| record.number(name).is_none_or(|valid| valid != 0.0);
             if !is_valid("xy_valid") || !is_valid("z_valid") {
-                return Some(Err("not valid, as the autopilot says"));
+                return Some(Err("marked as invalid by the autopilot"));
             }
             let position_m = finite([record.number("x")?, record.number("y")?, record.number("z")?])?;
             recorded.positions.push(0, name, time_ns, position_m);
@@ -223,7 +223,7 @@ fn measure(record: &Record<'_>, recorded: &mut Recorded) -> Option<Result<(), &'
     Some(Ok(()))
 }
 
-/// Least type of a fix in three dimensions.
+/// Smallest type of a 3D fix.
 const FIX_3D: f64 = 3.0;
 
 fn fix(record: &Record<'_>, time_ns: i64, recorded: &mut Recorded) -> Option<Result<(), &'static str>> {
