@@ -1,4 +1,4 @@
-//! The trajectories of the scene, one step of one run, or one pose of a trajectory, per row.
+//! Trajectories of the scene; one row per step of a run or pose of a trajectory.
 
 use super::ScenePanel;
 use crate::geometry::seconds_from_ns;
