@@ -1,4 +1,4 @@
-//! The lanes of the timeline, one step or one event per row.
+//! Lanes of the timeline; one row per step or event.
 
 use super::TimelinePanel;
 use crate::gui::PanelContext;
