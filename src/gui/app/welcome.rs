@@ -14,27 +14,23 @@ use crate::gui::theme::Theme;
 /// Maximum width of the content in points.
 const WIDTH: f32 = 760.0;
 
-/// What the user has chosen.
+/// Choice of the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Choice {
-    /// Open a log or a session.
     Open(PathBuf),
     /// Open a log and take the tour over it.
     Tour(PathBuf),
-    /// Read the manual.
     Manual,
-    /// Read the tutorial.
     Tutorial,
 }
 
-/// State of the welcome view.
 pub(super) struct Welcome {
     desktop: Arc<dyn Desktop>,
     path_field: PathField,
     samples: Vec<PathBuf>,
     recent: Vec<PathBuf>,
     flight: SampleFlight,
-    /// Whether the tour begins when the sample flight is simulated.
+    /// True if the tour starts when the sample flight is simulated.
     tour: bool,
 }
 
@@ -46,12 +42,12 @@ impl Welcome {
         Self { desktop, path_field, samples, recent, flight: SampleFlight::default(), tour: false }
     }
 
-    /// Stops a simulation, because another log is shown.
+    /// Stops a simulation; used when another log is shown.
     pub(super) fn stop(&mut self) {
         self.flight = SampleFlight::default();
     }
 
-    /// The sample log to open, simulated first where there is none.
+    /// Path of the sample log; without one, starts its simulation.
     pub(super) fn sample(&mut self, tour: bool) -> Option<Choice> {
         self.tour = tour;
         if let Some(path) = self.samples.first() {
@@ -104,7 +100,7 @@ impl Welcome {
         chosen
     }
 
-    /// The tour, the sample flight and the documents.
+    /// Draws buttons for the tour, the sample flight and the documents.
     fn first_steps_ui(&mut self, ui: &mut Ui, theme: &Theme) -> Option<Choice> {
         let mut chosen = None;
         let running = self.flight.is_running();
@@ -166,7 +162,7 @@ impl App {
         }
     }
 
-    /// Begins the tour: over the log that is open or being opened, else over the sample flight.
+    /// Starts the tour on the log that is open or being opened, else on the sample flight.
     pub fn start_tour(&mut self) {
         if self.log.is_some() {
             self.state.start_tour();
@@ -182,7 +178,7 @@ fn chosen_sample(path: PathBuf, tour: bool) -> Choice {
     if tour { Choice::Tour(path) } else { Choice::Open(path) }
 }
 
-/// The area for dropping a log; it is highlighted while a file is dragged over the window.
+/// Draws the drop area for a log; it is highlighted while a file is dragged over the window.
 fn drop_target_ui(ui: &mut Ui, theme: &Theme) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 92.0), Sense::hover());
     let file_over_window = ui.input(|input| !input.raw.hovered_files.is_empty());
