@@ -1,4 +1,4 @@
-//! Which parameters the flight determines up to the cursor, as a table.
+//! Table of the parameters that the flight determines up to the cursor.
 
 use egui::{Color32, Grid, Label, RichText, ScrollArea, Ui, vec2};
 
@@ -78,7 +78,7 @@ fn row_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, theme: &Theme, row: &Paramete
     ui.add(Label::new(RichText::new(reason).color(theme.text)).extend());
 }
 
-/// Symbol and colour of a verdict: never the colour alone.
+/// Symbol and colour of a verdict; the symbol is unique without the colour.
 fn mark_of(estimability: Estimability, theme: &Theme) -> (&'static str, Color32) {
     match estimability {
         Estimability::Known => ("✔", theme.ok),
