@@ -1,22 +1,20 @@
-//! The shown quantities with their explanations: what it is, its unit, and where it comes from.
+//! Shown quantities with their definition, unit and source.
 
-/// A shown quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Term {
-    /// Its name in the window.
+    /// Name in the window.
     pub(crate) name: &'static str,
-    /// What it is, its unit, and where it comes from.
+    /// Definition, unit and source.
     pub(crate) meaning: &'static str,
 }
 
-/// Constants of the terms, and a list of all.
+/// Declares the terms as constants, and a list of all.
 macro_rules! terms {
     ($($constant:ident: $name:literal => $meaning:literal;)*) => {
         $(
             #[doc = concat!("The quantity `", $name, "`.")]
             pub(crate) const $constant: Term = Term { name: $name, meaning: $meaning };
         )*
-        /// All terms of this list.
         #[cfg(test)]
         pub(super) const ALL: &[Term] = &[$($constant),*];
     };
@@ -201,7 +199,7 @@ pub(crate) mod factors {
     }
 }
 
-/// The status bar, the caption of the image, the scene's table, and what other panels show once.
+/// The status bar, the caption of the image, the scene's table, and terms that other panels show once.
 pub(crate) mod window {
     use super::Term;
 
