@@ -1,4 +1,4 @@
-//! The observations in the image at the cursor, one feature per row.
+//! Observations in the image at the cursor; one feature per row.
 
 use super::ImagePanel;
 use crate::gui::PanelContext;

@@ -28,12 +28,12 @@ use crate::session::FrameImage;
 const MAX_ZOOM: f32 = 16.0;
 /// Width in points of the row with all options.
 const OPTIONS_WIDTH: f32 = 395.0;
-/// Width in points of the option of a mask.
+/// Width in points of the mask option.
 const MASK_WIDTH: f32 = 60.0;
-/// The whole legend in words, for images too narrow for it.
+/// The legend as text, for images that are too narrow for the painted one.
 const LEGEND: &str = "Colour: age of the track in frames\nRing: used in the solve\nDot: tracked only\nCross: rejected\n\
     Line: residual (prediction − measurement), magnified";
-/// Period at which an image that is being decoded is asked for again.
+/// Period at which an image that is being decoded is requested again.
 const DECODING_PERIOD: Duration = Duration::from_millis(15);
 /// Height of legend and caption in points.
 const LINE_HEIGHT: f32 = 18.0;
@@ -44,13 +44,10 @@ pub struct ImagePanel {
     pub side: SolveSide,
     /// Magnification of the residuals.
     pub magnification: f32,
-    /// Draw residuals.
     pub residuals: bool,
-    /// Draw the track trails.
     pub trails: bool,
-    /// Write every feature's id.
     pub ids: bool,
-    /// Tint what the mask of the camera covers.
+    /// Tint the pixels that the mask of the camera covers.
     pub mask: bool,
     view: PanZoom,
     texture: Option<CachedTexture>,
@@ -73,7 +70,7 @@ impl Default for ImagePanel {
 
 struct CachedTexture {
     image: Arc<GrayImage>,
-    /// Whether the mask is tinted in it.
+    /// True if the mask is tinted in the texture.
     masked: bool,
     handle: TextureHandle,
 }
@@ -92,7 +89,7 @@ impl ImagePanel {
         *self = Self { side, magnification, residuals, trails, ids, mask, view, texture };
     }
 
-    /// Whether it has the view of another panel.
+    /// True if it has the view of another panel.
     pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
         let look = |panel: &Self| {
             let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *panel;
@@ -159,7 +156,7 @@ impl ImagePanel {
         });
     }
 
-    /// The options of the overlay: in a row where there is room, else in a menu.
+    /// Draws the options of the overlay: in a row where they fit, else in a menu.
     fn options_ui(&mut self, ui: &mut Ui, has_mask: bool) {
         ui.checkbox(&mut self.residuals, "Residuals")
             .on_hover_text("Reprojection residuals, prediction − measurement, px, magnified");
@@ -228,7 +225,7 @@ impl ImagePanel {
         self.pick_ui(ui, &painter, &place, response, context, model);
     }
 
-    /// Tooltip, click, and the selected feature.
+    /// Handles tooltip, click, and the selected feature.
     fn pick_ui(
         &self,
         ui: &Ui,
