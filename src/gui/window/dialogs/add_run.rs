@@ -17,7 +17,6 @@ const CHOICES: [(&str, &str); 7] = [
     ("cluster", "gimbal camera and static camera in one window"),
 ];
 
-/// State of the dialog.
 #[derive(Debug)]
 pub(super) struct AddRunDialog {
     choice: usize,
@@ -47,7 +46,7 @@ impl Default for AddRunDialog {
 }
 
 impl AddRunDialog {
-    /// The specification of the run, as on the command line.
+    /// Specification of the run, as on the command line.
     fn written(&self) -> String {
         let mut options = Vec::new();
         if !self.encoder {
@@ -75,7 +74,7 @@ impl AddRunDialog {
         if options.is_empty() { name.to_owned() } else { format!("{name}:{}", options.join(",")) }
     }
 
-    /// Draws the dialog and pushes the command that adds the run. Returns whether it stays open.
+    /// Draws the dialog and pushes the command that adds the run. Returns true if it stays open.
     pub(super) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) -> bool {
         let theme = *ctx.theme;
         let title = "Add a run on the same log and tracks";
