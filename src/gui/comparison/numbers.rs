@@ -131,7 +131,7 @@ pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference:
 
 fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, comparison: &Comparison) {
     let theme = *ctx.theme;
-    let grid = Grid::new(("partings", number)).striped(true).min_row_height(ROW_HEIGHT);
+    let grid = Grid::new(("divergences", number)).striped(true).min_row_height(ROW_HEIGHT);
     grid.spacing(vec2(12.0, 2.0)).show(ui, |ui| {
         for term in [
             divergence::QUANTITY,

@@ -155,7 +155,7 @@ impl ConvertedHistory {
 impl ParameterHistory {
     /// An angle plus the multiple of 2π that brings it nearest to the last value: the values of a history are
     /// continuous and may leave (−π, π]. Other quantities are returned unchanged.
-    pub(super) fn on_same_turn(&self, parameter: ParameterId, value: f64) -> f64 {
+    pub(super) fn unwrap_near(&self, parameter: ParameterId, value: f64) -> f64 {
         let last = self.values.iter().rev().find(|known| known.is_finite());
         last.map_or(value, |last| last + parameter.principal_value(value - last))
     }
@@ -217,11 +217,11 @@ mod tests {
     #[test]
     fn the_ground_truth_is_shown_on_the_turn_of_the_values() {
         let history = ParameterHistory { values: vec![-3.145, -3.15, f64::NAN], ..ParameterHistory::default() };
-        let shown = history.on_same_turn(id("I.rx"), 3.13);
+        let shown = history.unwrap_near(id("I.rx"), 3.13);
         assert!((shown - (3.13 - std::f64::consts::TAU)).abs() < 1e-12, "{shown}");
         let length = ParameterHistory { values: vec![-3.15], ..ParameterHistory::default() };
-        assert!((length.on_same_turn(id("I.tx"), 3.13) - 3.13).abs() < 1e-12);
-        assert_eq!(ParameterHistory::default().on_same_turn(id("I.rx"), 3.13), 3.13);
+        assert!((length.unwrap_near(id("I.tx"), 3.13) - 3.13).abs() < 1e-12);
+        assert_eq!(ParameterHistory::default().unwrap_near(id("I.rx"), 3.13), 3.13);
     }
 
     #[test]

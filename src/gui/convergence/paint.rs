@@ -184,7 +184,7 @@ pub(super) fn cell_ui(
         }
     }
     let curve_of = |run: usize| curves.get(&(run, id));
-    let ground_truth = data.ground_truth.get(&id).map(|truth| parameter.on_same_turn(id, *truth));
+    let ground_truth = data.ground_truth.get(&id).map(|truth| parameter.unwrap_near(id, *truth));
     let extent_of = |run: usize| curve_of(run)?.value.extent;
     let others = overlaid.iter().filter(|run| **run != shown_run).filter_map(|run| extent_of(*run));
     let (low, high) = value_range(extent_of(shown_run), ground_truth, others, parameter);

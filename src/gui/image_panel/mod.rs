@@ -16,6 +16,7 @@ use self::model::ImageModel;
 pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
 use super::accessible::describe;
+use super::convergence::empty_ui;
 use super::copied_value::offer;
 use super::help::terms::window;
 use super::pan_zoom::PanZoom;
@@ -101,12 +102,12 @@ impl ImagePanel {
     /// Draws options, image, overlay and legend.
     pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
         let Some(run) = context.recording.runs.get(context.selection.run) else {
-            message_ui(ui, "No runs");
+            empty_ui(ui, "No runs");
             return;
         };
         self.controls_ui(ui, context, &run.spec.label);
         let Some(model) = ImageModel::at(run, context.cursor_ns) else {
-            message_ui(ui, "No image at or before the cursor");
+            empty_ui(ui, "No image at or before the cursor");
             return;
         };
         let size = ui.available_size() - vec2(0.0, 2.0 * LINE_HEIGHT + 2.0 * ui.spacing().item_spacing.y);
@@ -305,8 +306,4 @@ fn mask_of<'a>(context: &PanelContext<'a>) -> Option<&'a ImageMask> {
 fn fitted_size(area: Rect, size_px: [usize; 2]) -> Vec2 {
     let image = vec2(size_px[0].max(1) as f32, size_px[1].max(1) as f32);
     image * (area.width() / image.x).min(area.height() / image.y)
-}
-
-fn message_ui(ui: &mut Ui, text: &str) {
-    ui.centered_and_justified(|ui| ui.weak(text));
 }
