@@ -258,7 +258,7 @@ fn head(painter: &Painter, theme: &Theme, sensor: &SensorNoise, rect: Rect) {
             (Some(value), Some(sigma), _) => {
                 format!("{value:.2e} ± {:.0} % {unit}", 100.0 * sigma / value)
             }
-            (.., Some(limit)) => format!("< {limit:.1e} {unit}, not seen"),
+            (.., Some(limit)) => format!("< {limit:.1e} {unit}, not detected"),
             _ => "not identified".to_owned(),
         };
         let end = painter.text(pos2(left + 118.0, y), Align2::LEFT_TOP, value, font(13.0), theme.text_strong);

@@ -120,7 +120,7 @@ fn arrange_drawing(state: Option<&eframe::egui_wgpu::RenderState>, context: &egu
 fn display_error(problem: String) -> WindowError {
     let remedy = if cfg!(target_os = "linux") {
         format!(
-            "on a machine without a desktop install what the window needs: apt-get install {WINDOW_PACKAGES}\n\
+            "on a machine without a desktop install the packages of the window: apt-get install {WINDOW_PACKAGES}\n\
              'dcvins screenshot' renders panels without a display"
         )
     } else {

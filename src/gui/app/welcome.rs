@@ -107,7 +107,7 @@ impl Welcome {
         ui.horizontal_wrapped(|ui| {
             let big = |text: &str| Button::new(RichText::new(text).size(14.0)).min_size(vec2(178.0, 30.0));
             let tour = big("Take the tour").fill(theme.accent.gamma_multiply(0.35));
-            let hover = "Six steps over the sample flight, up to: which parameter is unobservable, since when, why, and \
+            let hover = "Six steps over the sample flight: which parameter is unobservable, since when, why, and \
                          which motion fixes it";
             if ui.add_enabled(!running, tour).on_hover_text(hover).clicked() {
                 chosen = self.sample(true);
@@ -118,7 +118,11 @@ impl Welcome {
             if ui.add(big("Manual")).on_hover_text("Shift+F1").clicked() {
                 chosen = Some(Choice::Manual);
             }
-            if ui.add(big("Tutorial")).on_hover_text("The sample flight in the window and on the command line").clicked() {
+            if ui
+                .add(big("Tutorial"))
+                .on_hover_text("The sample flight in the window and on the command line")
+                .clicked()
+            {
                 chosen = Some(Choice::Tutorial);
             }
         });
@@ -186,8 +190,8 @@ fn drop_target_ui(ui: &mut Ui, theme: &Theme) {
     ui.painter().rect(rect, 6.0, theme.plot_background, Stroke::new(1.5, color), StrokeKind::Inside);
     let lines = [
         ("Drop a flight log (.mcap, .mcap.zstd) or a saved session (.session.json) here", 14.0, theme.text_strong),
-        ("Rig: NAME.rig.yaml beside NAME.mcap, or attached to the log", 12.0, theme.text_weak),
-        ("ROS bags and EuRoC folders first become a log: dcvins convert SOURCE -o LOG.mcap", 12.0, theme.text_weak),
+        ("Rig: NAME.rig.yaml next to NAME.mcap, or attached to the log", 12.0, theme.text_weak),
+        ("Convert ROS bags and EuRoC folders to a log first: dcvins convert SOURCE -o LOG.mcap", 12.0, theme.text_weak),
     ];
     let spoken = lines.map(|(text, ..)| text).join(". ");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &spoken));

@@ -47,11 +47,11 @@ const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 /// Suggested runs for a comparison: specification as on the command line, and purpose.
 const OFFERS: [(&str, &str); 5] = [
-    ("classical", "which directions are redundant in the classical parameterization"),
-    ("auto:encoder=off", "how much the encoder readings contribute"),
-    ("auto:calibrate=off", "what the online calibration gains over the rig's values"),
-    ("static", "how the rigid camera of the rig does without the gimbal"),
-    ("auto:first-estimates=off", "how much spurious information first-estimate Jacobians avoid"),
+    ("classical", "redundant directions of the classical parameterization"),
+    ("auto:encoder=off", "contribution of the encoder readings"),
+    ("auto:calibrate=off", "gain of the online calibration over the rig's values"),
+    ("static", "accuracy of the rig's rigid camera, without the gimbal"),
+    ("auto:first-estimates=off", "spurious information that first-estimate Jacobians avoid"),
 ];
 
 /// Preview of a comparison.
@@ -266,7 +266,7 @@ fn offers_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord) -> Option
     ui.horizontal(|ui| {
         for (text, dialog, hover) in [
             ("Add another run…", Dialog::AddRun, "Choose parameterization and options (A)"),
-            ("Fork at the cursor…", Dialog::Fork, "Continue from this frame with changes, in a lane of its own (F)"),
+            ("Fork at the cursor…", Dialog::Fork, "Continue from this frame with changes, as a new run (F)"),
         ] {
             if ui.button(text).on_hover_text(hover).clicked() {
                 asked = Some(dialog);

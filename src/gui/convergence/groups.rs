@@ -34,7 +34,7 @@ pub(super) fn choice_ui(ui: &mut Ui, view: &mut View, groups: &[(ParameterGroup,
             ui.selectable_value(view, View::Group(*group), label).on_hover_text("This group fills the panel");
         }
         ui.separator();
-        ui.selectable_value(view, View::Table, "Table").on_hover_text("Which of them the flight determines");
+        ui.selectable_value(view, View::Table, "Table").on_hover_text("Parameters that the flight determines");
     });
 }
 

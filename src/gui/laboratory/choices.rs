@@ -72,7 +72,7 @@ impl Choices {
                 ui.checkbox(chosen, parameterization.name());
             }
             ui.checkbox(&mut self.joint_offsets, "Joint offsets")
-                .on_hover_text("Whether the joint offsets are estimated, as calibration columns");
+                .on_hover_text("Estimate the joint offsets as calibration columns");
         });
         let names = self.mechanism(ctx).map(|mechanism| mechanism.joints).unwrap_or_default();
         self.frozen.resize(names.len(), false);

@@ -12,7 +12,7 @@ use crate::study::view::{ParameterErrors, SigmaVerdict, Study, ValueAxis, parame
 /// Headings of the table with their definitions.
 const HEADS: [(&str, &str); 7] = [
     ("Parameter", "Click: show its runs on the right"),
-    ("error / σ", "Root mean square of error over σ; 1 when σ is honest, above 1 when it is too small"),
+    ("error / σ", "Root mean square of error over σ; 1 when σ is consistent, above 1 when it is too small"),
     ("mean", "Mean of error over σ; 0 without a bias"),
     ("≤ 1σ", "Runs whose error is within 1 σ; 68 % when consistent"),
     ("≤ 3σ", "Runs whose error is within 3 σ; 99.7 % when consistent"),

@@ -144,7 +144,7 @@ impl RunsTablePanel {
                     self.generation = None;
                 }
             }
-            let hint = "head: sort (Shift: also by it); run: open it at its worst frame";
+            let hint = "header: sort (Shift: add key); run: open it at its worst frame";
             ui.add(Label::new(RichText::new(format!("{text} · {hint}")).small().color(ctx.theme.text_weak)).truncate());
         });
     }

@@ -221,7 +221,7 @@ fn painted_elements_have_a_role_and_say_their_content() {
         let mut nodes = harness.query_all(By::new().label_contains(name).predicate(move |node| node.role() == role));
         let node = nodes.next().unwrap_or_else(|| panic!("{role:?} {name}")).accesskit_node();
         assert_eq!(node.value(), node.description(), "{name}");
-        node.description().unwrap_or_else(|| panic!("{name} says nothing"))
+        node.description().unwrap_or_else(|| panic!("{name} has no description"))
     };
     let frame = harness.state().recording.runs[0].step_at(3 * SECOND_NS).unwrap().report.frame_index;
     let timeline = content(&harness, "Timeline", Role::Slider);

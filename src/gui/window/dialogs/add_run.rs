@@ -131,7 +131,7 @@ impl AddRunDialog {
             ui.end_row();
             let name = ui.label("Passes over the log");
             ui.add(egui::DragValue::new(&mut self.passes).range(RunSpec::PASSES)).labelled_by(name.id).on_hover_text(
-                "Each pass starts with the calibration and the biases that the one before found; the last one is shown",
+                "Each pass starts with the calibration and the biases of the previous pass; the last pass is shown",
             );
             ui.end_row();
             let name = ui.label("Name");

@@ -13,7 +13,7 @@ pub(super) fn ui(ui: &Ui, ctx: &PanelContext<'_>, lost: &str, requests: &mut Vec
     let contents = modal.ui(ui, ctx.theme, |ui| {
         ui.add_space(4.0);
         ui.label(format!("Not saved in {}: {lost}", log_name(ctx.recording)));
-        let hint = "A saved session opens like a log; its results are computed anew, to the same bits";
+        let hint = "A saved session opens like a log; its results are recomputed bit for bit";
         ui.label(RichText::new(hint).color(ctx.theme.text_weak));
         ui.add_space(6.0);
         let enter = ui.input(|input| input.key_pressed(Key::Enter));

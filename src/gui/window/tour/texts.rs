@@ -25,7 +25,7 @@ pub(super) struct CardText {
 pub(super) fn of(stop: Stop, story: Story, ctx: &PanelContext<'_>, excitation: Option<&str>) -> CardText {
     let title = match stop {
         Stop::Log => "What is in the log?",
-        Stop::Image => "What does one step see?",
+        Stop::Image => "What does one step contain?",
         Stop::Convergence => "Which parameters does the log calibrate?",
         Stop::Which => "Which parameter is degenerate, and since when?",
         Stop::Why => "Why?",
@@ -227,7 +227,9 @@ fn why_lines(ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord) -> (Vec
 /// Cause of the loss of the tour's direction, as text.
 fn cause_line(run: &RunRecord, step: &StepRecord, rank: &RankReport) -> String {
     let label = &run.spec.label;
-    let Some(direction) = rank.least_observable_direction() else { return format!("Run {label} loses no direction.") };
+    let Some(direction) = rank.least_observable_direction() else {
+        return format!("Run {label}: every direction is informed.");
+    };
     let window = &step.report.window;
     let span_ns = window.first().zip(window.last()).map_or(0, |(first, last)| last.stamp_ns - first.stamp_ns);
     if direction.structural {
@@ -271,7 +273,7 @@ fn remedy_lines(
     };
     lines.push(
         "From here: F forks the run with parameters fixed or another parameterization, 5 compares runs, and \
-         \"dcvins report\" writes it all down. Shift+F1 opens the manual, with the tutorial."
+         \"dcvins report\" writes these results to a report. Shift+F1 opens the manual, with the tutorial."
             .to_owned(),
     );
     (lines, waiting)
