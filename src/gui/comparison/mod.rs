@@ -71,7 +71,7 @@ pub struct ComparisonPanel {
 }
 
 impl ComparisonPanel {
-    /// A panel with the same view and no texture of a window.
+    /// A panel with the same view, without textures of a window.
     pub(in crate::gui) fn view_copy(&self) -> Self {
         let (images, scenes) = (self.images.view_copy(), self.scenes.view_copy());
         Self { reference: self.reference, view: self.view, images, scenes, ..Self::default() }

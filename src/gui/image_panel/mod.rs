@@ -77,7 +77,7 @@ struct CachedTexture {
 }
 
 impl ImagePanel {
-    /// A panel with the same view and no texture of a window.
+    /// A panel with the same view, without textures of a window.
     pub(in crate::gui) fn view_copy(&self) -> Self {
         let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *self;
         Self { side, magnification, residuals, trails, ids, mask, view, texture: None }

@@ -99,7 +99,7 @@ fn default_world_orbit() -> Orbit {
 }
 
 impl ScenePanel {
-    /// A panel with the same view and no texture of a window.
+    /// A panel with the same view, without textures of a window.
     pub(in crate::gui) fn view_copy(&self) -> Self {
         let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, .. } = *self;
         Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, ..Self::default() }

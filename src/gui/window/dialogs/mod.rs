@@ -23,7 +23,6 @@ use super::{WindowRequest, WindowState};
 use crate::gui::PanelContext;
 use crate::gui::desktop::Desktop;
 
-/// A dialog by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dialog {
     /// Opens a log or a saved session.
@@ -32,15 +31,13 @@ pub enum Dialog {
     AddRun,
     /// Forks the selected run at the cursor.
     Fork,
-    /// The command palette.
     Palette,
-    /// The settings.
     Settings,
-    /// The question before unsaved work is left.
+    /// Question asked before unsaved work is discarded.
     Unsaved,
 }
 
-/// The state of all dialogs, open or not.
+/// State of all dialogs, open or not.
 #[derive(Default)]
 pub struct Dialogs {
     open: Option<Dialog>,
