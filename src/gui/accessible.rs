@@ -1,10 +1,10 @@
-//! What a screen reader says about painted elements.
+//! Descriptions of painted elements for screen readers.
 
 use egui::{Response, Role};
 
-/// Gives an element that is painted, and not made of texts, its content as text.
+/// Sets `value` as the accessible content of a painted element without text.
 ///
-/// The content is both value and description: Linux desktops read only the description of an image.
+/// Sets both value and description: Linux desktops read only the description of an image.
 pub(crate) fn describe(response: &Response, value: &str) {
     if value.is_empty() {
         return;

@@ -1,5 +1,5 @@
-//! The Allan deviation of gyroscope and accelerometer as a figure: what the rig should say above each plot, in the plot the
-//! axes with their confidence, the fitted sum of terms, and the rig's densities.
+//! Figure of the Allan deviation of gyroscope and accelerometer. Above each plot: the suggested rig values. In the
+//! plot: the axes with their confidence, the fitted sum of terms, and the rig's densities.
 
 use egui::epaint::{Mesh, Vertex, WHITE_UV};
 use egui::{Align2, Color32, FontFamily, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, pos2, vec2};
@@ -22,13 +22,13 @@ const MARKER: f32 = 4.5;
 /// A plot with both axes logarithmic.
 struct LogLog {
     rect: Rect,
-    /// Powers of ten at the edges.
+    /// Powers of ten at the edges of the plot.
     x: (f64, f64),
     y: (f64, f64),
 }
 
 impl LogLog {
-    /// Axes that hold all deviations of a sensor and its markers.
+    /// Axes whose ranges contain all deviations of a sensor and its markers.
     fn of(sensor: &SensorNoise, rect: Rect) -> Option<Self> {
         let points = || sensor.axes.iter().flat_map(|axis| &axis.points);
         let range = |values: &mut dyn Iterator<Item = f64>| {
@@ -54,7 +54,7 @@ impl LogLog {
         )
     }
 
-    /// Decades with lines and values, and thinner lines at 2 and 5.
+    /// Draws decades with lines and values, and thinner lines at 2 and 5.
     fn grid(&self, painter: &Painter, theme: &Theme) {
         let stroke = |strong: bool| {
             let color = if strong { theme.hatch } else { theme.grid };
@@ -98,7 +98,8 @@ impl LogLog {
     }
 }
 
-/// Where the terms of a sensor are read: white noise at 1 s, the minimum, the random walk at 3 s; with their letters.
+/// Points at which the terms of a sensor are read, with their letters: white noise at 1 s, the minimum, the random walk
+/// at 3 s.
 fn marks(sensor: &SensorNoise) -> impl Iterator<Item = (f64, f64, char)> + '_ {
     let white = sensor.terms.white.value.map(|white| (1.0, white, 'N'));
     let walk = sensor.terms.random_walk.value.map(|walk| (3.0, walk, 'K'));
@@ -207,7 +208,7 @@ fn asymptotes(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &Log
     }
 }
 
-/// The deviation that the rig's densities give: `√(N²/τ + K² τ/3)`.
+/// The deviation of the rig's densities: `√(N²/τ + K² τ/3)`.
 fn given_line(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &LogLog) {
     let Some(given) = sensor.given else { return };
     let steps = 80;
@@ -235,7 +236,7 @@ fn model_line(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &Log
     }
 }
 
-/// What the rig should say, and whether it does.
+/// Writes the suggested rig values and their comparison with the rig's present values.
 fn head(painter: &Painter, theme: &Theme, sensor: &SensorNoise, rect: Rect) {
     let mut name = sensor.sensor.to_owned();
     name[..1].make_ascii_uppercase();
@@ -257,7 +258,7 @@ fn head(painter: &Painter, theme: &Theme, sensor: &SensorNoise, rect: Rect) {
             (Some(value), Some(sigma), _) => {
                 format!("{value:.2e} ± {:.0} % {unit}", 100.0 * sigma / value)
             }
-            (.., Some(limit)) => format!("< {limit:.1e} {unit}, not seen"),
+            (.., Some(limit)) => format!("< {limit:.1e} {unit}, not detected"),
             _ => "not identified".to_owned(),
         };
         let end = painter.text(pos2(left + 118.0, y), Align2::LEFT_TOP, value, font(13.0), theme.text_strong);
@@ -266,7 +267,7 @@ fn head(painter: &Painter, theme: &Theme, sensor: &SensorNoise, rect: Rect) {
     }
 }
 
-/// A rig's value against a measured one.
+/// Comparison of a rig's value with the measured one.
 fn verdict(theme: &Theme, term: &NoiseTerm, given: f64) -> Option<(String, Color32)> {
     let Some(value) = term.value else {
         let limit = term.limit?;

@@ -7,7 +7,6 @@ use crate::geometry::Dimension;
 use crate::gimbal::{Chain, ClassicalChain, NearestForm, ParameterId, ParameterPart, Parameterization, Quantity};
 use crate::session::{Recording, RunRecord};
 
-/// Values by parameter.
 pub(crate) type ParameterValues = BTreeMap<ParameterId, f64>;
 
 /// The values of a chain in a parameterization.
@@ -88,7 +87,7 @@ mod tests {
             let ground_truth = true_values(&recording, run, end.stamp_ns).unwrap();
             assert_eq!(ground_truth.len(), end.calibration.parameters.len());
             if end.calibration.parameterization == Parameterization::Classical {
-                // Of the equivalent values the one nearest to the rig's is shown, and the drawn run has no real
+                // The test compares with the equivalent values nearest to the rig's; the drawn run has no real
                 // estimator.
                 let true_rig = recording.ground_truth_rig.as_ref().unwrap();
                 let squared = |value: &dyn Fn(ParameterId) -> f64| -> f64 {

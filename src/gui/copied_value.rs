@@ -2,7 +2,7 @@
 
 use egui::{Context, Id, Ui};
 
-/// The value that a panel offers in a pass.
+/// The value that a panel offers in one pass of egui.
 #[derive(Clone)]
 struct Offered {
     pass: u64,

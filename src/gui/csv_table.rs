@@ -5,13 +5,12 @@ use std::fmt::Write as _;
 use super::PanelContext;
 use crate::geometry::seconds_from_ns;
 
-/// A panel whose values can be written as a CSV table.
 pub trait CsvTable {
     /// The table with its header line, in seconds, radians, metres and pixels; empty where there are no values.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String;
 }
 
-/// A CSV table that is built row by row.
+/// A CSV table, built row by row.
 pub(super) struct Table {
     /// RFC 4180, with lines that end in `\n` alone.
     text: String,
@@ -40,7 +39,6 @@ impl Table {
         self.text.push('\n');
     }
 
-    /// The text of the table.
     pub(super) fn into_text(self) -> String {
         self.text
     }

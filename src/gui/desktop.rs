@@ -9,9 +9,8 @@ use image::RgbaImage;
 /// A completion of a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PathEntry {
-    /// The whole path as it would be typed.
+    /// Whole path, as typed.
     pub path: String,
-    /// Whether it is a folder.
     pub folder: bool,
 }
 
@@ -28,32 +27,29 @@ pub struct PanelExport {
     pub table: String,
 }
 
-/// News of the sample flight that is being simulated.
+/// Progress of the simulation of the sample flight.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SampleProgress {
-    /// Images rendered so far.
     Images {
-        /// Rendered and written.
+        /// Images rendered and written.
         done: usize,
-        /// In all.
         total: usize,
     },
-    /// The path of the log, or the reason why there is none.
+    /// Path of the log, or the reason of the failure.
     Done(Result<PathBuf, String>),
 }
 
-/// Access to files and memory of the machine.
 pub trait Desktop: Send + Sync {
-    /// Folders and logs whose paths begin with the typed text, in order.
+    /// Folders and logs whose paths start with the typed text, in order.
     fn complete(&self, typed: &str) -> Vec<PathEntry>;
-    /// Opens the desktop's file dialog for a log or a saved session without waiting for it; `None` where there is no
-    /// such dialog.
+    /// Opens the desktop's file dialog for a log or a saved session without waiting for it; `None` if there is no such
+    /// dialog.
     ///
-    /// The receiver gets `None` when nothing is chosen, and at once if the desktop has no such dialog.
+    /// The receiver gets `None` if nothing is chosen, and immediately if the desktop has no such dialog.
     fn pick_log(&self) -> Option<Receiver<Option<PathBuf>>>;
     /// Recently opened logs that still exist, newest first.
     fn recent_logs(&self) -> Vec<PathBuf>;
-    /// Puts a log at the head of the recent ones.
+    /// Moves a log to the head of the recent ones.
     fn remember_log(&self, path: &Path);
     /// Sample logs that come with the program.
     fn sample_logs(&self) -> Vec<PathBuf>;

@@ -5,20 +5,15 @@ use egui::{Color32, Painter, Pos2, Shape, Stroke, pos2};
 use super::theme::Theme;
 use crate::estimator::EventKind;
 
-/// The symbol of an event: kinds differ by shape, not by colour alone.
+/// Symbol of an event. Kinds differ in shape, not only in colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mark {
     /// A line over the whole height of the lane.
     Line,
-    /// An upward triangle.
     Triangle,
-    /// A cross.
     Cross,
-    /// A rhombus.
     Rhombus,
-    /// A disc.
     Disc,
-    /// A square.
     Square,
 }
 

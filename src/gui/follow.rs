@@ -4,17 +4,16 @@ use std::sync::Arc;
 
 use crate::session::{RunRecord, StepRecord};
 
-/// How many steps of a run a panel has read.
+/// Number of steps of a run that a panel has read.
 #[derive(Debug, Default)]
 pub(crate) struct Follower {
     count: usize,
-    /// Id of the run.
     run: Option<u64>,
 }
 
 /// The new steps of a run.
 pub(crate) struct NewSteps<'a> {
-    /// Whether the run was replaced or computed again, so that everything read before is invalid.
+    /// True if the run was replaced or recomputed, so that everything read before is invalid.
     pub(crate) restarted: bool,
     /// The steps not read before.
     pub(crate) steps: &'a [Arc<StepRecord>],
@@ -23,7 +22,7 @@ pub(crate) struct NewSteps<'a> {
 impl Follower {
     /// The steps that are new since the last call.
     pub(crate) fn new_steps<'a>(&mut self, run: &'a RunRecord) -> NewSteps<'a> {
-        // Steps that were read may become summaries later; they are the same steps.
+        // A read step may become a summary later; it still is the same step.
         let same = self.count <= run.steps.len() && self.run.is_none_or(|id| id == run.id);
         let read = if same { self.count } else { 0 };
         self.count = run.steps.len();
@@ -40,7 +39,7 @@ pub(crate) struct StepTable {
     pub(crate) stamps_ns: Vec<i64>,
     /// The columns; NaN where a step does not have the value.
     pub(crate) columns: Vec<Vec<f64>>,
-    /// Changes when rows were removed.
+    /// Changes when rows are removed.
     pub(crate) epoch: u64,
 }
 

@@ -49,18 +49,15 @@ use crate::observability::SlidePosition;
 use crate::session::breakpoints::Breakpoints;
 use crate::session::{Command, FrameImage, Recording, RunRecord, SolverPosition};
 
-/// Gives the images of the log's cameras, by camera key and index in the stream.
+/// Source of camera images, by camera key and index in the stream.
 pub trait ImageSource {
-    /// The image of a camera by its number in the log.
     fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage;
 }
 
 /// The selection, common to all panels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
-    /// The selected feature.
     pub feature: Option<FeatureId>,
-    /// The selected calibration parameter.
     pub parameter: Option<ParameterId>,
     /// Index of the run in panels that show one run.
     pub run: usize,
@@ -68,14 +65,13 @@ pub struct Selection {
     pub visible_ns: Option<(i64, i64)>,
     /// Direction and distance by which the selected run's chain is moved.
     pub slide: Option<SlidePosition>,
-    /// The moved chain at the cursor.
+    /// Moved chain at the cursor.
     pub(crate) moved: slide::MovedChain,
 }
 
-/// The state of playback.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Playback {
-    /// Whether the cursor moves.
+    /// True if the cursor moves.
     pub playing: bool,
     /// Speed in log seconds per second.
     pub speed: f64,
@@ -85,11 +81,11 @@ pub struct Playback {
     pub markers_ns: Vec<i64>,
     /// The solver iteration at which the step is shown, `None` for the converged step.
     pub solver: Option<SolverPosition>,
-    /// Whether steps at the cursor are being recomputed.
+    /// True if steps at the cursor are being recomputed.
     pub recomputing: bool,
-    /// The breakpoints with their hits so far.
+    /// Breakpoints with their hits so far.
     pub breakpoints: Arc<Breakpoints>,
-    /// Whether the cursor runs to a hit that the estimators have not reached yet.
+    /// True while the cursor runs to a hit that the estimators have not reached yet.
     pub running_to_breakpoint: bool,
 }
 
@@ -108,24 +104,24 @@ impl Default for Playback {
     }
 }
 
-/// How a panel is drawn: in the window, or as a figure of a report or of an exported file.
+/// Presentation of a panel: in the window, or as a figure of a report or of an exported file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Presentation {
     /// With toolbars, buttons and selectors.
     #[default]
     Interactive,
-    /// Without them: values, plots and legends only.
+    /// Values, plots and legends only.
     Figure,
 }
 
 impl Presentation {
-    /// Whether buttons, selectors and hints are left out.
+    /// True if buttons, selectors and hints are omitted.
     pub fn is_figure(self) -> bool {
         self == Self::Figure
     }
 
-    /// Sense and accessibility role of a painted element that a click selects: a button in the window; in a figure it
-    /// has the given role and reacts to nothing.
+    /// Sense and accessibility role of a painted element that a click selects. In the window it is a button; in a
+    /// figure it has the given role and does not react.
     pub(crate) fn clickable(self, role_in_figure: Role) -> (Sense, Role) {
         if self.is_figure() { (Sense::hover(), role_in_figure) } else { (Sense::click(), Role::Button) }
     }
@@ -133,19 +129,14 @@ impl Presentation {
 
 /// The inputs and outputs of a panel in one frame.
 pub struct PanelContext<'a> {
-    /// The results so far.
     pub recording: &'a Recording,
     /// Position of the cursor in nanoseconds since the log began; panels show the last step at or before it.
     pub cursor_ns: i64,
-    /// The state of playback.
     pub playback: &'a Playback,
-    /// The source of camera images.
     pub images: &'a mut dyn ImageSource,
     /// The common selection, which a panel may change.
     pub selection: &'a mut Selection,
-    /// Colours and sizes.
     pub theme: &'a Theme,
-    /// Whether the panel is part of the window or a figure.
     pub presentation: Presentation,
     /// Commands of the panel, applied after this frame.
     pub commands: &'a mut Vec<Command>,

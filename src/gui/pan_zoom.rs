@@ -1,4 +1,4 @@
-//! Zooming and panning of a picture with the pointer, the same in the image and in the matrix.
+//! Zooming and panning of an image or matrix with the pointer.
 
 use egui::{LayerId, Order, PointerButton, Rect, Response, Stroke, StrokeKind, Ui, Vec2};
 
@@ -7,7 +7,7 @@ use super::theme::Theme;
 /// Minimum side in points of a box that is selected with the pointer.
 const MIN_BOX: f32 = 8.0;
 
-/// The visible region of a picture.
+/// The visible region of an image or matrix ("picture").
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PanZoom {
     /// Size relative to the fitted size.
@@ -23,8 +23,8 @@ impl Default for PanZoom {
 }
 
 impl PanZoom {
-    /// Rectangle of the whole picture around the centre of `area`, for its size when it is fitted; it may be larger
-    /// than the area.
+    /// Rectangle of the whole picture around the centre of `area`, given its fitted size; it may be larger than the
+    /// area.
     pub(super) fn place(self, area: Rect, fitted: Vec2) -> Rect {
         let size = fitted * self.zoom;
         Rect::from_min_size(area.center() - self.centre * size, size)
@@ -82,7 +82,7 @@ impl PanZoom {
         let Some((origin, pointer)) = origin.zip(response.interact_pointer_pos()) else { return };
         let selected = Rect::from_two_pos(origin, pointer).intersect(area);
         if dragged && !complete {
-            // Above the picture, which is drawn later.
+            // Drawn above the picture, which is painted later.
             let layer = LayerId::new(Order::Foreground, stored);
             let painter = ui.ctx().layer_painter(layer).with_clip_rect(area);
             let line = Stroke::new(1.0, theme.accent);
@@ -151,10 +151,9 @@ mod tests {
         let place = view.place(area, area.size());
         let under = (pointer - place.min) / place.size();
         assert!((under - vec2(0.25, 0.25)).length() < 1e-3, "a quarter of the picture is still under it: {under:?}");
-        // Horizontal scrolling pans.
         scroll(&mut harness, pointer, vec2(-40.0, 0.0), Modifiers::NONE);
         assert!(harness.state().zoom == view.zoom && harness.state().centre.x > view.centre.x);
-        // In one frame, because a test's frame takes a quarter of a second.
+        // In one frame: a frame of the test takes a quarter of a second.
         let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
         let press = |pressed| Event::PointerButton { pos: pointer, button, pressed, modifiers };
         harness.input_mut().events.extend([true, false, true, false].map(press));

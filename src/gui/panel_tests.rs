@@ -1,4 +1,4 @@
-//! Every panel is drawn at stamps with missing data; nothing may panic. The screenshots can be kept for inspection.
+//! Draws every panel at stamps with missing data; no panel may panic. The screenshots can be kept for inspection.
 
 use egui::Ui;
 
@@ -33,7 +33,7 @@ fn screenshot(
     keep_screenshot(name, &image);
 }
 
-/// Recordings and stamps that lack data that a panel may rely on.
+/// Recordings and stamps without data on which a panel may rely.
 fn cases_with_missing_data() -> Vec<(&'static str, Recording, i64)> {
     let whole = sample_recording_of(70, &["auto", "classical"]);
     let mut no_runs = whole.clone();
@@ -68,7 +68,7 @@ fn cases_with_missing_data() -> Vec<(&'static str, Recording, i64)> {
     ]
 }
 
-/// Draws a panel as usual, then in every case, large and tiny.
+/// Draws a panel normally, then for every case in large and tiny sizes.
 fn check<P: Default>(name: &str, size_px: [u32; 2], mut ui: impl FnMut(&mut P, &mut Ui, &mut PanelContext<'_>)) {
     let recording = sample_recording();
     let selection = Selection { parameter: Some(parameter("L2.alpha")), ..Selection::default() };

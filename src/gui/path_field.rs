@@ -17,17 +17,15 @@ pub(crate) struct PathField {
     desktop: Option<Arc<dyn Desktop>>,
     typed: String,
     chosen: Option<usize>,
-    /// The completed text, and its completions.
+    /// Completed text and its completions.
     completed: Option<(String, Vec<PathEntry>)>,
 }
 
 impl PathField {
-    /// An empty text field.
     pub(crate) fn new(desktop: Arc<dyn Desktop>) -> Self {
         Self { desktop: Some(desktop), ..Self::default() }
     }
 
-    /// Whether the text field is empty.
     pub(crate) fn is_empty(&self) -> bool {
         self.typed.trim().is_empty()
     }
@@ -36,7 +34,7 @@ impl PathField {
     pub(crate) fn ui(&mut self, ui: &mut Ui, theme: &Theme, focus: bool, height: f32) -> Option<PathBuf> {
         if self.completed.as_ref().is_none_or(|(typed, _)| *typed != self.typed) {
             let mut entries = self.desktop.as_ref().map_or_else(Vec::new, |desktop| desktop.complete(&self.typed));
-            // A completed folder lists its content next.
+            // After a completed folder, its content is listed.
             for entry in entries.iter_mut().filter(|entry| entry.folder && !entry.path.ends_with('/')) {
                 entry.path.push('/');
             }

@@ -14,13 +14,13 @@ pub(crate) struct MovedChain {
 }
 
 impl PartialEq for MovedChain {
-    /// Always equal: the result follows from the rest of the selection, the recording and the cursor.
+    /// Always equal: the value follows from the rest of the selection, the recording and the cursor.
     fn eq(&self, _other: &Self) -> bool {
         true
     }
 }
 
-/// Computes the moved chain when position, run or step has changed.
+/// Computes the moved chain if position, run or step has changed.
 pub(crate) fn update(ctx: &mut PanelContext<'_>) {
     let run = ctx.recording.runs.get(ctx.selection.run);
     let step = run.and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?)));
@@ -45,7 +45,7 @@ fn moved(ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord, position: &
     slide(&step.report, &camera.model, &chain, &weights, position.amount)
 }
 
-/// The moved chain if it belongs to the step at the cursor.
+/// Moved chain if it belongs to the step at the cursor.
 pub(crate) fn of<'a>(ctx: &'a PanelContext<'_>, stamp_ns: i64) -> Option<&'a Arc<ChainSlide>> {
     ctx.selection.moved.slide.as_ref().filter(|slide| slide.stamp_ns == stamp_ns)
 }

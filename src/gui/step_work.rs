@@ -1,5 +1,5 @@
-//! A slow computation from the report of one step: on its own thread, or while the caller waits. No estimator runs
-//! here: results of an estimator are requested from the session by a command.
+//! Slow computation from the report of one step, on another thread or while the caller waits. No estimator runs here;
+//! results of an estimator are requested from the session by a command.
 
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::sync::{Arc, OnceLock};
@@ -27,17 +27,15 @@ impl<T> Default for StepWork<T> {
 }
 
 impl<T: Send + 'static> StepWork<T> {
-    /// Whether the result of a step is there.
     pub(super) fn has_result(&self, step: &StepRecord) -> bool {
         self.known.as_ref().is_some_and(|(known, _)| std::ptr::eq(Arc::as_ptr(known), step))
     }
 
-    /// Whether a computation is running.
     pub(super) fn is_busy(&self) -> bool {
         self.coming.is_some()
     }
 
-    /// Starts the computation for a step, given by `work`, unless it is running or done, and receives finished results.
+    /// Starts the computation `work` for a step unless it is running or done, and receives finished results.
     pub(super) fn request<W>(
         &mut self,
         step: &Arc<StepRecord>,
@@ -81,13 +79,13 @@ where
     let (later, given) = (sender.clone(), work.clone());
     let background = move || drop(later.send(apart(given)));
     if !(in_background && Builder::new().name(thread_name.to_owned()).spawn(background).is_ok()) {
-        // The receiver belongs to this value alone.
+        // Cannot fail: the receiver is returned below.
         drop(sender.send(work()));
     }
     receiver
 }
 
-/// Does work on one thread apart from those that paint: a picture never waits for a part of it.
+/// Runs work on a separate rayon thread, so that painting never waits for one of its tasks.
 fn apart<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     static APART: OnceLock<Option<ThreadPool>> = OnceLock::new();
     let pool = APART.get_or_init(|| ThreadPoolBuilder::new().num_threads(1).build().ok());
@@ -104,7 +102,7 @@ mod tests {
     #[test]
     fn work_in_the_background_leaves_the_other_threads_to_the_painter() {
         assert_eq!(apart(rayon::current_num_threads), 1);
-        // Parts of it stay there, too.
+        // Its parallel tasks stay on that thread, too.
         let names = apart(|| rayon::join(rayon::current_thread_index, rayon::current_thread_index));
         assert_eq!(names, (Some(0), Some(0)));
     }

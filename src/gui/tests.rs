@@ -21,14 +21,14 @@ fn the_sample_is_consistent() {
     assert_eq!(image.pixels.len(), image.width * image.height);
 }
 
-/// Keeps a screenshot for inspection, in the folder of the environment variable `DCVINS_PICTURES`.
+/// Stores a screenshot for inspection in the folder of the environment variable `DCVINS_PICTURES`.
 pub(crate) fn keep_screenshot(name: &str, screenshot: &image::RgbaImage) {
     if let Some(folder) = std::env::var_os("DCVINS_PICTURES") {
         screenshot.save(std::path::Path::new(&folder).join(format!("{name}.png"))).unwrap();
     }
 }
 
-/// Passes a panel context without playback to a function; commands are dropped.
+/// Calls a function with a panel context without playback; commands are dropped.
 pub(crate) fn with_context(
     recording: &Recording,
     cursor_ns: i64,

@@ -8,12 +8,12 @@ use crate::gimbal::{ParameterGroup, ParameterId};
 pub(crate) struct Shown {
     /// Shown value per stored value.
     pub(crate) factor: f64,
-    /// The shown unit with its leading space.
+    /// Shown unit with its leading space.
     pub(crate) unit: &'static str,
 }
 
 impl Shown {
-    /// The conversion for a dimension: to degrees, millimetres, milliseconds.
+    /// Conversion for a dimension: to degrees, millimetres, milliseconds.
     pub(crate) const fn of(dimension: Dimension) -> Self {
         match dimension {
             Dimension::Angle => Self { factor: 180.0 / std::f64::consts::PI, unit: "°" },
@@ -24,7 +24,7 @@ impl Shown {
         }
     }
 
-    /// The conversion for a parameter: that of its dimension, and percent for scale and misalignment of the IMU.
+    /// Conversion for a parameter: that of its dimension, or percent for scale and misalignment of the IMU.
     pub(crate) fn of_parameter(parameter: ParameterId) -> Self {
         match (parameter.group(), parameter.dimension()) {
             (ParameterGroup::Imu, Dimension::Ratio) => Self { factor: 100.0, unit: " %" },
@@ -32,7 +32,7 @@ impl Shown {
         }
     }
 
-    /// A stored value with its unit, with the precision of two digits of its standard deviation.
+    /// A stored value with its unit; its precision is that of two digits of the standard deviation.
     pub(crate) fn value(self, stored: f64, stored_sigma: f64) -> String {
         format!("{}{}", fixed(stored * self.factor, decimals_for(stored_sigma * self.factor)), self.unit)
     }
@@ -44,12 +44,12 @@ impl Shown {
     }
 }
 
-/// Decimals for two digits of a standard deviation; two when it is unknown.
+/// Decimals for two digits of a standard deviation; two if it is unknown.
 fn decimals_for(sigma: f64) -> usize {
     if sigma.is_finite() && sigma > 0.0 { (1.0 - sigma.log10().floor()).clamp(0.0, 5.0) as usize } else { 2 }
 }
 
-/// A number with this many decimals, a dash if it is not finite, never a negative zero.
+/// A number with `decimals` decimals; a dash if it is not finite; never a negative zero.
 pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return "–".to_owned();

@@ -1,4 +1,4 @@
-//! Size and place of the window and the layout of its panels, kept for the next start.
+//! Size and position of the window and the layout of its panels, restored at the next start.
 
 use egui::{Ui, ViewportBuilder, ViewportCommand, ViewportInfo, pos2, vec2};
 use serde::{Deserialize, Serialize};
@@ -10,23 +10,23 @@ use crate::gui::window::NoticeLevel;
 const FIRST_SIZE: [f32; 2] = [1600.0, 900.0];
 /// Minimum size in logical pixels.
 const MIN_SIZE: [f32; 2] = [640.0, 400.0];
-/// Number of frames after which a window is shown with its frame.
+/// Number of frames after which the window is shown with its decoration.
 const SHOWN_FRAMES: u32 = 4;
 /// Seconds after which a change is stored.
 const STORED_AFTER_S: f64 = 1.0;
 
-/// The window at the end of the last use.
+/// State of the window at the end of the last use.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(default)]
 pub(super) struct KeptWindow {
-    /// Size and place on the screen.
+    /// Size and position on the screen.
     pub(super) place: WindowPlace,
-    /// The layout of the panels, in the window's own format.
+    /// Layout of the panels, in the window's format.
     pub(super) layout: Option<serde_json::Value>,
 }
 
 impl KeptWindow {
-    /// Reads the text of [`KeptWindow::to_text`]; a text of another format counts as none.
+    /// Reads the text of [`KeptWindow::to_text`]; a text of another format gives the default.
     pub(super) fn from_text(text: &str) -> Self {
         let mut kept: Self = serde_json::from_str(text).unwrap_or_default();
         if !kept.place.is_valid() {
@@ -40,15 +40,15 @@ impl KeptWindow {
     }
 }
 
-/// Size and place of a window in logical pixels: points at a scale of 1 of the program's own.
+/// Size and position of a window in logical pixels: points at a program scale of 1.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(default)]
 pub(super) struct WindowPlace {
-    /// Upper left corner of the frame, `None` where the desktop does not report it (Wayland).
+    /// Upper left corner of the frame; `None` where the desktop does not report it (Wayland).
     position: Option<[f32; 2]>,
     /// Size without the frame.
     size: [f32; 2],
-    /// Whether the window is maximized; place and size are those before.
+    /// True if the window is maximized; position and size are those before maximizing.
     maximized: bool,
 }
 
@@ -65,8 +65,8 @@ impl WindowPlace {
         size && self.position.iter().flatten().all(finite)
     }
 
-    /// Reads the place of a window of `size_points` at the program's scale. Minimized and full screens keep the last
-    /// place.
+    /// Reads the position of a window of `size_points` at the program's scale. A minimized or full-screen window keeps
+    /// the last position.
     fn read(&mut self, viewport: &ViewportInfo, size_points: egui::Vec2, scale: f32) {
         let is = |state: Option<bool>| state.unwrap_or(false);
         if is(viewport.minimized) || is(viewport.fullscreen) {
@@ -79,7 +79,7 @@ impl WindowPlace {
         }
     }
 
-    /// The window with this size and place.
+    /// Returns `viewport` with this size and position.
     pub(super) fn of(self, viewport: ViewportBuilder) -> ViewportBuilder {
         let viewport = viewport.with_inner_size(self.size).with_min_inner_size(MIN_SIZE).with_maximized(self.maximized);
         match self.position {
@@ -92,8 +92,8 @@ impl WindowPlace {
 /// A rectangle on the screen in pixels: left, top, width, height.
 pub(super) type PixelRect = [i32; 4];
 
-/// A window's rectangle inside the screen of which it covers most, or inside the first screen: shifted, and smaller
-/// where the screen is smaller. `None` if it is inside already.
+/// A window's rectangle, shifted and if necessary shrunk to lie inside the screen of which it covers most, or inside
+/// the first screen. `None` if it is inside already.
 pub(super) fn inside_screen(window: PixelRect, screens: &[PixelRect]) -> Option<PixelRect> {
     let overlap = |screen: &PixelRect, axis: usize| {
         let end = |rect: &PixelRect| i64::from(rect[axis]) + i64::from(rect[axis + 2]);
@@ -101,7 +101,7 @@ pub(super) fn inside_screen(window: PixelRect, screens: &[PixelRect]) -> Option<
         (end(&window).min(end(screen)) - begin).max(0)
     };
     let area = |screen: &&PixelRect| overlap(screen, 0) * overlap(screen, 1);
-    // Of several equal ones the first: `max_by_key` would give the last.
+    // Of several equal ones the first; `max_by_key` alone would give the last.
     let screen = screens.iter().rev().max_by_key(area)?;
     let mut inside = window;
     for axis in 0..2 {
@@ -112,7 +112,7 @@ pub(super) fn inside_screen(window: PixelRect, screens: &[PixelRect]) -> Option<
     (inside != window).then_some(inside)
 }
 
-/// Moves a window that is partly outside of all screens, because the screens have changed since the last use.
+/// Moves a window that is partly outside of all screens; the screens may have changed since the last use.
 pub(super) fn move_inside_screen(window: &winit::window::Window) {
     use winit::dpi::{PhysicalPosition, PhysicalSize};
     // Wayland neither reports nor accepts a position.
@@ -124,38 +124,38 @@ pub(super) fn move_inside_screen(window: &winit::window::Window) {
     let screens: Vec<PixelRect> =
         window.available_monitors().map(|monitor| rect(monitor.position(), monitor.size())).collect();
     if let Some([left, top, width, height]) = inside_screen(rect(position, window.outer_size()), &screens) {
-        // The size is given without the frame, which is the same before and after.
+        // The size excludes the frame, which does not change.
         let frame = |outer: u32, inner: u32| i32::try_from(outer.saturating_sub(inner)).unwrap_or(0);
         let (outer, inner) = (window.outer_size(), window.inner_size());
         let width = width - frame(outer.width, inner.width);
         let height = height - frame(outer.height, inner.height);
-        // The answer is the size if it is known at once; the window reads it with its next frame anyway.
+        // The call returns the size if it is known immediately; the window reads it in its next frame in any case.
         let _known = window.request_inner_size(PhysicalSize::new(width.max(1), height.max(1)));
         window.set_outer_position(PhysicalPosition::new(left, top));
     }
 }
 
-/// What is kept, and since when it differs from what is stored.
+/// Current window state, and the time since which it differs from the stored one.
 #[derive(Debug, Default)]
 pub(super) struct WindowKeeper {
     kept: KeptWindow,
     changed_s: Option<f64>,
-    /// Whether the window is to be maximized when it is shown.
+    /// True if the window is to be maximized when it is shown.
     maximizes: bool,
-    /// Number of frames in which the window was shown, until it has its place.
+    /// Number of frames in which the window was shown before it was placed.
     shown: u32,
 }
 
 impl WindowKeeper {
-    /// Starts with what was stored.
+    /// Starts with the stored state.
     pub(super) fn new(kept: KeptWindow) -> Self {
         Self { maximizes: kept.place.maximized, kept, changed_s: None, shown: 0 }
     }
 }
 
 impl App {
-    /// Gives the window its place once it is shown: before, X11 ignores the wish to be maximized, and the size of the
-    /// frame is not known.
+    /// Places the window after it is shown: before that, X11 ignores a request to maximize, and the size of the frame
+    /// is not known.
     pub(super) fn place_window(&mut self, ui: &Ui, window: &winit::window::Window) {
         if self.keeper.shown > SHOWN_FRAMES {
             return;

@@ -1,4 +1,4 @@
-//! Leaving a session: quitting, closing the log or opening another one, and what would be lost by it.
+//! Leaving a session (quitting, closing the log, opening another one), and the unsaved work that would be lost.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -11,27 +11,25 @@ use super::{App, PlayingLog};
 use crate::gui::Selection;
 use crate::gui::units::counted;
 
-/// Where the user goes from the open session.
+/// Destination when leaving the open session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Leaving {
-    /// Quit the program.
     Quit,
     /// Close the log and go back to the welcome view.
     CloseLog,
-    /// Open another log.
     Open(PathBuf),
 }
 
-/// The keys of a saved session whose entries exist nowhere else, with the word for one of them.
+/// Keys of a saved session whose entries are stored nowhere else, each with the noun for one entry.
 const WORK: [(&str, &str); 3] = [("forks", "fork"), ("breakpoints", "breakpoint"), ("markers_ns", "marker")];
 
-/// The forks, breakpoints and markers of a session as they are saved. Runs, layout and cursor are not part of it: a
-/// log has them again in a moment.
+/// Forks, breakpoints and markers of a session in saved form. Runs, layout and cursor are not included: they are easily
+/// restored when the log is opened.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Work([Vec<Value>; 3]);
 
 impl Work {
-    /// The work in a session now.
+    /// Current work of a session.
     pub(super) fn of(log: &dyn PlayingLog) -> Self {
         log.saved(None).map(|text| Self::of_text(&text)).unwrap_or_default()
     }
@@ -41,7 +39,7 @@ impl Work {
         Self(WORK.map(|(key, _)| value.get(key).and_then(Value::as_array).cloned().unwrap_or_default()))
     }
 
-    /// What a file with the work `saved` lacks, as text: "1 fork, 2 markers"; `None` if it lacks nothing.
+    /// Entries that are not in the work `saved`, as text: "1 fork, 2 markers"; `None` if there are none.
     fn missing_in(&self, saved: &Self) -> Option<String> {
         let counts = self.0.iter().zip(&saved.0).zip(WORK).filter_map(|((now, saved), (_, word))| {
             let count = now.iter().filter(|entry| !saved.contains(entry)).count();
@@ -52,19 +50,18 @@ impl Work {
     }
 }
 
-/// The state of leaving.
 #[derive(Debug, Default)]
 pub(super) struct Departure {
-    /// The work that is in the log or in the session's file.
+    /// Work stored in the log or in the session's file.
     pub(super) saved: Work,
-    /// Where the user goes after the answer of the dialog.
+    /// Destination after the answer of the dialog.
     asked: Option<Leaving>,
-    /// Whether the window may close without a question.
+    /// True if the window may close without a question.
     pub(super) quits: bool,
 }
 
 impl App {
-    /// Leaves the session, or asks first if work would be lost.
+    /// Leaves the session; asks first if work would be lost.
     pub(super) fn leave(&mut self, ui: &Ui, to: Leaving) {
         let lost = self.log.as_deref().and_then(|log| Work::of(log).missing_in(&self.departure.saved));
         match lost {
@@ -86,7 +83,7 @@ impl App {
         }
     }
 
-    /// A window that is closed by its frame's button asks, too.
+    /// Asks before closing when the window is closed by the button of its frame, too.
     pub(super) fn guard_closing(&mut self, ui: &Ui) {
         if self.departure.quits || !ui.input(|input| input.viewport().close_requested()) {
             return;

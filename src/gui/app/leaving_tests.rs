@@ -1,4 +1,4 @@
-//! Leaving a log, keeping the window, and names in the welcome view.
+//! Tests: leaving a log, restoring the window, and names in the welcome view.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -52,21 +52,20 @@ fn ctrl_w_closes_a_log_without_unsaved_work_at_once() {
 fn unsaved_work_is_asked_about_before_it_is_left() {
     let (mut harness, desktop) = with_marker();
     let question = "Not saved in yard.mcap: 1 marker";
-    // Cancel.
     with_ctrl(&mut harness, Key::Q);
     assert!(!harness.state().departure.quits);
     assert!(harness.query_by_label(question).is_some());
     harness.key_press(Key::Escape);
     harness.run_steps(3);
     assert!(harness.query_by_label(question).is_none() && opened(&harness).is_some());
-    // Opening another log, and saving before.
+    // Opening another log after saving.
     harness.input_mut().dropped_files.push(Arc::new(Dropped(PathBuf::from("/x/b.mcap"))));
     harness.run_steps(3);
     assert!(harness.query_by_label(question).is_some());
     harness.get_by_label("Save").click();
     run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/x/b.mcap")));
     assert!(desktop.sessions.lock().unwrap()[0].contains("markers_ns"));
-    // The new log has a marker of its own; it is left without it.
+    // The new log has its own marker, which is discarded.
     harness.key_press(Key::M);
     harness.run_steps(2);
     with_ctrl(&mut harness, Key::W);

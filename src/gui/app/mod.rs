@@ -1,4 +1,4 @@
-//! The window's program: it owns the session, passes time and commands to it, and draws its results.
+//! The application of the window: it owns the session, passes time and commands to it, and draws its results.
 
 mod kept_window;
 mod leaving;
@@ -42,55 +42,53 @@ use crate::gui::window::{NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Setti
 use crate::gui::{PanelContext, Presentation, Selection};
 use crate::session::{Command, PlaybackSpeed, Recording};
 
-/// After a longer pause between two frames the cursor does not catch up: the window was hidden or the machine
-/// suspended.
+/// Longest pause between two frames in seconds after which the cursor catches up; after a longer one the window was
+/// hidden or the machine suspended.
 const MAX_FRAME_TIME_S: f64 = 2.0;
 /// Period at which the window checks for new steps.
 const POLL_PERIOD: Duration = Duration::from_millis(60);
-/// Period in seconds at which the process's memory is read.
+/// Period in seconds at which the memory of the process is read.
 const MEMORY_PERIOD_S: f64 = 1.0;
 
-/// What has been opened on a thread.
+/// Result of a thread that opens a path.
 enum Opened {
     /// A log or a saved session.
     Log(Box<dyn PlayingLog>),
-    /// A study.
     Study(Arc<dyn StudySource>),
-    /// A run of the open study, with the runs beside it.
+    /// A run of the open study, with comparable runs.
     RunOfStudy(Box<dyn PlayingLog>),
 }
 
-/// A log or a study that is being opened on its own thread.
+/// A log or a study that is being opened on another thread.
 struct Opening {
     path: PathBuf,
     result: Receiver<Result<Opened, String>>,
 }
 
-/// The application of the window.
 pub struct App {
     open_log: OpenLog,
     desktop: Arc<dyn Desktop>,
     log: Option<Box<dyn PlayingLog>>,
-    /// Opens studies, where the program can.
+    /// Opens studies; `None` where this is not supported.
     open_study: Option<OpenStudy>,
     /// The open study; its runs are shown in front of it.
     study: Option<ShownStudy>,
-    /// Whether the cursor has been moved to the first frame of the log.
+    /// True if the cursor has been moved to the first frame of the log.
     at_first_frame: bool,
-    /// Whether the session asks for a frame when it has recomputed steps.
+    /// True if the session requests a frame when it has recomputed steps.
     wakes: bool,
-    /// Clock of the window in its last frame, in seconds, if playback ran then.
+    /// Wall-clock time of the window's last frame in seconds, if playback ran then.
     played_s: Option<f64>,
     opening: Option<Opening>,
     departure: Departure,
     keeper: WindowKeeper,
     welcome: Welcome,
-    /// The log over which the tour begins when it is open.
+    /// Log on which the tour starts when it is open.
     tour_of: Option<PathBuf>,
     state: WindowState,
     selection: Selection,
     theme: Theme,
-    /// The settings in effect, `None` before the first frame.
+    /// Settings in effect; `None` before the first frame.
     applied: Option<Settings>,
     progress: ProgressMeter,
     /// Number of warnings about the log that a notice has reported.
@@ -100,7 +98,7 @@ pub struct App {
 }
 
 impl App {
-    /// A window without a log; `theme` is used until the user chooses another one.
+    /// Creates a window without a log; `theme` is used until the user chooses another one.
     pub fn new(open_log: OpenLog, desktop: Arc<dyn Desktop>, theme: ThemeName) -> Self {
         let mut state = WindowState::default();
         state.show_times = true;
@@ -138,7 +136,7 @@ impl App {
         }
     }
 
-    /// Starts to open a log or a study; the current one stays until the new one is open.
+    /// Starts to open a log or a study; the current one stays open until then.
     pub fn open(&mut self, path: PathBuf) {
         let (open_log, open_study, target) = (Arc::clone(&self.open_log), self.open_study.clone(), path.clone());
         self.open_on_thread(path, move || match open_study.and_then(|open_study| open_study(&target)) {
@@ -150,7 +148,7 @@ impl App {
     fn open_on_thread(&mut self, path: PathBuf, open: impl FnOnce() -> Result<Opened, String> + Send + 'static) {
         let (sender, result) = channel();
         let thread = std::thread::Builder::new().name("open-log".to_owned()).spawn(move || {
-            // The receiver is gone when another log was requested meanwhile.
+            // The receiver has been dropped if another log was requested meanwhile.
             drop(sender.send(open()));
         });
         match thread {
@@ -161,7 +159,7 @@ impl App {
         }
     }
 
-    /// Shows an open session. `path` is the path that was opened if it differs from the log's (a saved session).
+    /// Shows an open session. `path` is the opened path if it differs from the log's (a saved session).
     pub fn show(&mut self, log: Box<dyn PlayingLog>, path: Option<&Path>) {
         self.desktop.remember_log(path.unwrap_or(&log.recording().log_path));
         self.state.recent_logs = self.desktop.recent_logs();
@@ -187,7 +185,7 @@ impl App {
         self.reported_warnings = 0;
     }
 
-    /// The session, `None` before a log is open.
+    /// The session; `None` before a log is open.
     pub fn log(&self) -> Option<&dyn PlayingLog> {
         self.log.as_deref()
     }
@@ -265,7 +263,7 @@ impl App {
             log.wake_with(Box::new(move || context.request_repaint()));
             self.wakes = true;
         }
-        // Log time follows the wall clock: slow drawing skips frames, not time.
+        // Log time follows the wall clock: slow rendering skips frames, not time.
         let (stable_s, now_s) = ui.input(|input| (f64::from(input.stable_dt), input.time));
         let elapsed_s = self.played_s.map_or(stable_s, |before_s| now_s - before_s);
         if elapsed_s < MAX_FRAME_TIME_S {
@@ -308,7 +306,7 @@ impl App {
         if commanded {
             ui.ctx().request_repaint();
         } else if playback.playing {
-            // egui subtracts the time that it expects a frame to take.
+            // egui subtracts the expected duration of a frame.
             let frame = Duration::from_secs_f32(ui.input(|input| input.predicted_dt.clamp(0.0, 1.0)));
             let wait = until_next_step(&recording, log.cursor_ns(), playback.speed);
             ui.ctx().request_repaint_after(wait + frame);
@@ -319,7 +317,6 @@ impl App {
         self.report_warnings(&recording);
     }
 
-    /// Shows a log that has been opened.
     fn take_opened(&mut self) {
         let Some(opening) = &self.opening else { return };
         match opening.result.try_recv() {
@@ -347,7 +344,6 @@ impl App {
         }
     }
 
-    /// Opens the first of the dropped files.
     fn take_dropped(&mut self, ui: &Ui) {
         let dropped: Vec<PathBuf> =
             ui.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());

@@ -1,4 +1,4 @@
-//! The interface of a session that the window needs.
+//! Interface of a session that the window needs.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -6,19 +6,17 @@ use std::sync::Arc;
 use crate::gui::{ImageSource, Playback};
 use crate::session::{Command, FrameImage, Recording, Wake};
 
-/// A log during playback: the interface of a session that the window needs.
+/// A log during playback.
 pub trait PlayingLog: Send {
-    /// The results so far; a cheap copy.
+    /// Results so far; cheap to clone.
     fn recording(&self) -> Arc<Recording>;
-    /// A counter that grows with every change of the results.
+    /// A counter that increases with every change of the results.
     fn generation(&self) -> u64;
-    /// Sets what asks for a frame when steps at the cursor have been recomputed.
+    /// Sets the callback that requests a frame when steps at the cursor have been recomputed.
     fn wake_with(&mut self, wake: Wake);
     /// Position of the cursor, in nanoseconds since the log began.
     fn cursor_ns(&self) -> i64;
-    /// The state of playback.
     fn playback(&self) -> Playback;
-    /// Executes a command.
     fn apply(&mut self, command: Command);
     /// Moves the cursor by `elapsed_s` seconds of the wall clock.
     fn advance(&mut self, elapsed_s: f64);
@@ -30,14 +28,14 @@ pub trait PlayingLog: Send {
     fn take_notices(&mut self) -> Vec<String>;
     /// The session as text, with the layout of the panels; `None` for a log without a session.
     fn saved(&self, layout: Option<serde_json::Value>) -> Option<String>;
-    /// The panel layout of the saved session.
+    /// Panel layout of the saved session.
     fn layout(&self) -> Option<&serde_json::Value>;
 }
 
-/// Opens a log. The message of an error has its cause and remedy.
+/// Opens a log. An error message states cause and remedy.
 pub type OpenLog = Arc<dyn Fn(&Path) -> Result<Box<dyn PlayingLog>, String> + Send + Sync>;
 
-/// Moves a cursor before the first frame to that frame, so that a newly opened log shows something. Returns whether
+/// Moves a cursor before the first frame to that frame, so that a newly opened log shows something. Returns true if
 /// there is a frame yet.
 pub(super) fn go_to_first_frame(log: &mut dyn PlayingLog) -> bool {
     let recording = log.recording();

@@ -1,14 +1,14 @@
-//! When playback needs its next picture.
+//! Time of the next frame during playback.
 
 use std::time::Duration;
 
 use crate::geometry::seconds_from_ns;
 use crate::session::{Recording, RunRecord};
 
-/// Longest time between two pictures of playback, in which the cursor moves on between two steps.
+/// Longest time in seconds between two frames of playback; between two steps only the cursor moves.
 const LONGEST_PAUSE_S: f64 = 0.05;
 
-/// Time until playback reaches the next step of any run: until then only the cursor moves.
+/// Time until playback reaches the next step of any run; until then only the cursor moves.
 pub(super) fn until_next_step(recording: &Recording, cursor_ns: i64, speed: f64) -> Duration {
     let next = |run: &RunRecord| {
         let place = run.index_at(cursor_ns).map_or(0, |place| place + 1);
@@ -32,7 +32,7 @@ mod tests {
         let off = |wait: Duration, expected: Duration| wait.abs_diff(expected) < Duration::from_micros(1);
         assert!(off(until_next_step(recording, stamp_ns, 2.0), period / 2));
         assert!(off(until_next_step(recording, stamp_ns + FRAME_PERIOD_NS / 4, 2.0), period * 3 / 8));
-        // In slow motion the cursor moves on between two steps, and behind the last one it waits for more.
+        // In slow motion the cursor moves between two steps, and after the last one it waits for more.
         let longest = Duration::from_secs_f64(LONGEST_PAUSE_S);
         assert_eq!(until_next_step(recording, stamp_ns, 0.1), longest);
         assert_eq!(until_next_step(recording, recording.last_stamp_ns(), 1.0), longest);

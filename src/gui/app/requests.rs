@@ -31,7 +31,7 @@ impl App {
         }
     }
 
-    /// Writes the session to its file; returns whether it is written.
+    /// Writes the session to its file; returns true on success.
     pub(super) fn save_session(&mut self) -> bool {
         let layout = self.state.layout_value();
         let Some(log) = &self.log else { return false };

@@ -14,16 +14,15 @@ use crate::gui::desktop::Desktop;
 use crate::gui::scene::SceneBackend;
 use crate::gui::theme::ThemeName;
 
-/// Packages that a server without a desktop needs for the window (Debian and Ubuntu).
+/// Packages for the window on a server without a desktop (Debian and Ubuntu).
 pub const WINDOW_PACKAGES: &str = "mesa-vulkan-drivers libx11-6 libxcursor1 libxi6 libxkbcommon-x11-0";
 
-/// The icon of the window, in its title bar and in the task bar.
+/// Icon of the window in its title bar and in the task bar.
 const ICON_PNG: &[u8] = include_bytes!("../../../assets/icon/dcvins-128.png");
 
-/// The reason why the window cannot be opened.
+/// Reason why the window cannot be opened.
 #[derive(Debug, Error)]
 pub enum WindowError {
-    /// No display.
     #[error(
         "no display: neither WAYLAND_DISPLAY nor DISPLAY is set\n\
          start it in a desktop session or through 'ssh -X'; 'dcvins screenshot' renders panels without a display"
@@ -34,26 +33,22 @@ pub enum WindowError {
     Refused {
         /// The error of the operating system.
         problem: String,
-        /// The remedy.
         remedy: String,
     },
 }
 
-/// The initial state of the window.
 pub struct WindowOptions {
     /// A session that is already open.
     pub log: Option<Box<dyn PlayingLog>>,
-    /// A log to open when the window is shown.
+    /// Log to open when the window is shown.
     pub log_path: Option<PathBuf>,
     /// Opens the logs that the user selects.
     pub open_log: OpenLog,
-    /// Opens the studies among them.
+    /// Opens paths that are studies.
     pub open_study: OpenStudy,
-    /// Access to files and memory of the machine.
     pub desktop: Arc<dyn Desktop>,
-    /// The initial theme.
     pub theme: ThemeName,
-    /// Whether the tour begins at once.
+    /// True if the tour starts immediately.
     pub tour: bool,
 }
 
@@ -66,7 +61,7 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
     let kept = KeptWindow::from_text(&options.desktop.kept_window().unwrap_or_default());
     let viewport = ViewportBuilder::default()
         .with_title("dcvins")
-        // The name of the desktop entry, `assets/linux/dcvins.desktop`.
+        // Name of the desktop entry, `assets/linux/dcvins.desktop`.
         .with_app_id("dcvins")
         .with_icon(icon())
         .with_drag_and_drop(true);
@@ -96,7 +91,7 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
             }),
         )
     };
-    // The loader of the keyboard library panics when the library is missing; it is reported as an error.
+    // The loader of the keyboard library panics if the library is missing; the panic is reported as an error.
     match without_loader_panics(start) {
         Ok(Ok(())) => Ok(()),
         Ok(Err(error)) => Err(display_error(error.to_string())),
@@ -108,8 +103,8 @@ fn icon() -> IconData {
     eframe::icon_data::from_png_bytes(ICON_PNG).expect("the icon is a PNG, as a test checks")
 }
 
-/// Selects the renderer: a graphics card draws everything; with a CPU adapter, drawing on the CPU here is several times
-/// faster.
+/// Selects the renderer: the graphics card, or with a CPU adapter this program's own painter, which is several times
+/// faster there.
 fn arrange_drawing(state: Option<&eframe::egui_wgpu::RenderState>, context: &egui::Context) {
     match state {
         Some(state) if state.adapter.get_info().device_type != wgpu::DeviceType::Cpu => {
@@ -125,7 +120,7 @@ fn arrange_drawing(state: Option<&eframe::egui_wgpu::RenderState>, context: &egu
 fn display_error(problem: String) -> WindowError {
     let remedy = if cfg!(target_os = "linux") {
         format!(
-            "on a machine without a desktop install what the window needs: apt-get install {WINDOW_PACKAGES}\n\
+            "on a machine without a desktop install the packages of the window: apt-get install {WINDOW_PACKAGES}\n\
              'dcvins screenshot' renders panels without a display"
         )
     } else {

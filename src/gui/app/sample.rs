@@ -1,4 +1,4 @@
-//! The sample flight that is being simulated on this machine.
+//! Simulation of the sample flight on this machine.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -9,13 +9,13 @@ use egui::{ProgressBar, RichText, Ui};
 use crate::gui::desktop::{Desktop, SampleProgress};
 use crate::gui::theme::Theme;
 
-/// A simulation on its way.
+/// A running simulation.
 struct Simulation {
     news: Receiver<SampleProgress>,
     images: Option<(usize, usize)>,
 }
 
-/// State of the sample flight: the simulation while it runs, and its problem if it failed.
+/// State of the sample flight: the running simulation, or the error of the last one.
 #[derive(Default)]
 pub(super) struct SampleFlight {
     simulation: Option<Simulation>,
@@ -23,7 +23,6 @@ pub(super) struct SampleFlight {
 }
 
 impl SampleFlight {
-    /// Starts the simulation.
     pub(super) fn start(&mut self, desktop: &Arc<dyn Desktop>) {
         match desktop.make_sample() {
             Ok(news) => (self.simulation, self.problem) = (Some(Simulation { news, images: None }), None),
@@ -31,12 +30,11 @@ impl SampleFlight {
         }
     }
 
-    /// Whether the simulation runs.
     pub(super) fn is_running(&self) -> bool {
         self.simulation.is_some()
     }
 
-    /// Reads the news and returns the finished log.
+    /// Reads the progress and returns the finished log.
     pub(super) fn receive(&mut self) -> Option<PathBuf> {
         let simulation = self.simulation.as_mut()?;
         let result = loop {
@@ -51,7 +49,7 @@ impl SampleFlight {
         result.map_err(|problem| self.problem = Some(problem)).ok()
     }
 
-    /// Draws the progress with a button that cancels, or the problem of the last simulation.
+    /// Draws the progress with a button to cancel, or the error of the last simulation.
     pub(super) fn ui(&mut self, ui: &mut Ui, theme: &Theme) {
         if let Some(simulation) = &self.simulation {
             let (done, total) = simulation.images.unwrap_or((0, 1));

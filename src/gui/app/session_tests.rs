@@ -1,4 +1,4 @@
-//! The application of the window with a session that processes a sample log.
+//! Tests of the application with a session that processes a sample log.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::gui::desktop::Desktop;
 use crate::gui::theme::ThemeName;
 use crate::session::{RunRecord, Session, SessionPlan, SessionRequest};
 
-/// The window on the first seconds of the sample log, processed by one run.
+/// A window with the first seconds of the sample log, processed by one run.
 fn window_over_garden(spec: &str, duration_s: f64) -> Harness<'static, App> {
     let log_path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
     let specs = vec![spec.parse().unwrap()];
@@ -35,7 +35,7 @@ fn all_finished(harness: &Harness<'static, App>) -> bool {
     harness.state().log().unwrap().recording().runs.iter().all(|run| run.finished)
 }
 
-/// Informed rank of a step, `None` during initialization.
+/// Informed rank of a step; `None` during initialization.
 fn informed(run: &RunRecord, step: usize) -> Option<usize> {
     run.steps[step].rank.as_ref().map(|rank| rank.rank_informed)
 }
@@ -74,7 +74,6 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     let rank = step.rank.as_ref().unwrap();
     assert_eq!((rank.parameters.len(), rank.rank_structural, rank.deficit_parameterization), (24, 18, 6));
 
-    // The fork by keyboard and label.
     harness.key_press(Key::F);
     harness.run_steps(3);
     assert!(harness.query_by_label_contains("Fork classical at ").is_some());
@@ -100,7 +99,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     let forked = fork.steps[at].rank.as_ref().unwrap();
     assert_eq!((forked.parameters.len(), forked.rank_structural, forked.deficit_parameterization), (18, 18, 0));
 
-    // Both lanes by their names beside the timeline, and the fork's origin.
+    // Both lanes have names next to the timeline, and the fork shows its origin.
     harness.run_steps(4);
     let timeline = harness.get_by_label("Timeline").rect();
     let lanes: Vec<String> = painted_texts(&harness)
@@ -126,7 +125,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     let time = format!("{divergence_label}: {:.3} s", step.report.stamp_ns as f64 * 1e-9);
     assert!(harness.query_by_label(&time).is_some(), "{time}");
 
-    // The rank panel beside it shows the fork.
+    // The rank panel next to it shows the fork.
     harness.get_by_label(&format!("Show run {} in all panels", fork.spec.label)).click();
     harness.run_steps(4);
     assert_eq!(harness.state().selection.run, 1);

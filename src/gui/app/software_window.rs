@@ -1,6 +1,6 @@
-//! Paints the window on the CPU where the graphics adapter computes on the CPU anyway.
+//! Paints the window on the CPU if the graphics adapter is a CPU adapter.
 //!
-//! A software Vulkan driver takes several times as long for egui's meshes as [`Painter`]. The window's meshes are
+//! egui's meshes take several times as long in a software Vulkan driver as in [`Painter`]. The meshes of the window are
 //! therefore painted here, and the adapter draws one textured rectangle.
 
 use egui::epaint::{ClippedShape, ImageDelta, Mesh};
@@ -9,7 +9,7 @@ use egui::{Color32, Context, FullOutput, Plugin, Pos2, Rect, Shape, TextureId, T
 use crate::gui::rendering::chunks::Tessellation;
 use crate::gui::rendering::painter::Painter;
 
-/// The texture with the content of the window; egui counts its own textures up from 0.
+/// Texture with the content of the window; egui numbers its textures from 0 upwards.
 const WINDOW_TEXTURE: TextureId = TextureId::Managed(u64::MAX);
 
 /// Replaces the meshes of a frame by one texture.

@@ -1,4 +1,4 @@
-//! A study in the window: its view, and the runs that are opened from it.
+//! A study in the window: its view, and the runs opened from it.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,22 +11,20 @@ use crate::gui::theme::MAX_RUNS;
 use crate::gui::window::NoticeLevel;
 use crate::study::view::{Study, comparable_rows};
 
-/// A study on the disk: its tables, and its runs as sessions.
+/// A study on disk: its tables, and its runs as sessions.
 pub trait StudySource: Send + Sync {
-    /// The tables.
     fn study(&self) -> Arc<Study>;
-    /// A session over the log of the first row, with the runs of all rows; its cursor goes to the worst frame of the first
-    /// row as soon as that is computed. The message of an error has its cause and remedy.
+    /// Opens a session on the log of the first row with the runs of all rows. Its cursor goes to the worst frame of the
+    /// first row as soon as that is computed. An error message states cause and remedy.
     ///
     /// # Errors
-    /// When the log or the rig cannot be read any more.
+    /// When the log or the rig can no longer be read.
     fn open_runs(&self, rows: &[usize]) -> Result<Box<dyn PlayingLog>, String>;
 }
 
 /// Opens a study; `None` for a path that is no study.
 pub type OpenStudy = Arc<dyn Fn(&Path) -> Option<Result<Arc<dyn StudySource>, String>> + Send + Sync>;
 
-/// The study of the window.
 pub(super) struct ShownStudy {
     source: Arc<dyn StudySource>,
     pub(super) state: StudyState,
@@ -34,7 +32,7 @@ pub(super) struct ShownStudy {
 }
 
 impl ShownStudy {
-    /// Name of its folder.
+    /// Name of the study's folder.
     pub(super) fn name(&self) -> String {
         let name = self.path.file_name().unwrap_or(self.path.as_os_str());
         name.to_string_lossy().into_owned()
@@ -42,7 +40,7 @@ impl ShownStudy {
 }
 
 impl App {
-    /// The same window, which opens studies as well.
+    /// Adds the ability to open studies.
     #[must_use]
     pub fn with_studies(mut self, open_study: OpenStudy) -> Self {
         self.open_study = Some(open_study);
@@ -66,7 +64,7 @@ impl App {
         }
     }
 
-    /// Whether a study is open, behind the session or in front.
+    /// True if a study is open, with or without a session in front of it.
     pub fn has_study(&self) -> bool {
         self.study.is_some()
     }
@@ -92,7 +90,8 @@ impl App {
         }
     }
 
-    /// Starts to open a run with those beside it, on its own thread; a second click while one opens has no effect.
+    /// Starts to open a run with the comparable runs on another thread; while one is being opened, further clicks have
+    /// no effect.
     fn open_run(&mut self, row: usize) {
         let Some(study) = self.study.as_ref().filter(|_| self.opening.is_none()) else { return };
         let table = study.state.study();

@@ -1,4 +1,4 @@
-//! A study in the window: opened like a log, its runs in front of it, and the way back.
+//! Tests of a study in the window: opening it like a log, opening its runs, and returning to it.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -34,7 +34,7 @@ impl StudySource for SampleStudy {
     }
 }
 
-/// The window after a study has been opened by its path.
+/// A window in which a study has been opened by its path.
 fn with_study() -> (Harness<'static, App>, Arc<SampleStudy>) {
     let source = Arc::new(SampleStudy { study: Arc::new(synthetic_study(1)), opened: Mutex::default() });
     let open: OpenLog = Arc::new(|path: &Path| Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>));

@@ -1,4 +1,4 @@
-//! The application of the window with a log that needs no files and no threads.
+//! Tests of the application with a log that needs no files and no threads.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -15,7 +15,7 @@ use crate::gui::theme::ThemeName;
 use crate::gui::{ImageSource as _, Playback};
 use crate::session::{Command, FrameImage, Recording, Wake};
 
-/// A log that has been computed already.
+/// A log with finished results.
 pub(super) struct SampleLog {
     recording: Arc<Recording>,
     cursor_ns: i64,
@@ -23,7 +23,7 @@ pub(super) struct SampleLog {
 }
 
 impl SampleLog {
-    /// The cursor is before the first frame, as in a log whose images begin after its first message.
+    /// Places the cursor before the first frame, as in a log whose images start after its first message.
     pub(super) fn new(path: &Path) -> Self {
         static SAMPLE: OnceLock<Recording> = OnceLock::new();
         let sample = SAMPLE.get_or_init(|| sample_recording_of(70, &["auto", "classical"]));
@@ -98,7 +98,7 @@ pub(super) struct TestDesktop {
     pub(super) sessions: Mutex<Vec<String>>,
     settings: Mutex<Option<String>>,
     pub(super) window: Mutex<Option<String>>,
-    /// The answer of the desktop's file dialog, where it has one.
+    /// Result of the desktop's file dialog; `None` without such a dialog.
     picked: Mutex<Option<Receiver<Option<PathBuf>>>>,
 }
 
@@ -211,7 +211,7 @@ pub(super) fn app() -> (Harness<'static, App>, Arc<TestDesktop>) {
     (harness, desktop)
 }
 
-/// Runs frames until the condition is true; logs are opened on their own thread.
+/// Runs frames until the condition is true; logs are opened on another thread.
 pub(super) fn run_until(harness: &mut Harness<'static, App>, holds: impl Fn(&Harness<'static, App>) -> bool) {
     for _ in 0..2000 {
         harness.run_steps(1);
@@ -274,7 +274,7 @@ fn a_dropped_log_is_opened_and_a_wrong_file_reported() {
     run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/x/b.mcap")));
 }
 
-/// A window with a log and with the desktop's file dialog open; the sender gives its answer.
+/// A window with a log and an open file dialog of the desktop; the sender gives the result of the dialog.
 fn with_file_dialog() -> (Harness<'static, App>, Sender<Option<PathBuf>>) {
     let (mut harness, desktop) = app();
     harness.get_by_label("Open yard.mcap").click();

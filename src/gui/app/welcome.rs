@@ -14,27 +14,23 @@ use crate::gui::theme::Theme;
 /// Maximum width of the content in points.
 const WIDTH: f32 = 760.0;
 
-/// What the user has chosen.
+/// Choice of the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Choice {
-    /// Open a log or a session.
     Open(PathBuf),
     /// Open a log and take the tour over it.
     Tour(PathBuf),
-    /// Read the manual.
     Manual,
-    /// Read the tutorial.
     Tutorial,
 }
 
-/// State of the welcome view.
 pub(super) struct Welcome {
     desktop: Arc<dyn Desktop>,
     path_field: PathField,
     samples: Vec<PathBuf>,
     recent: Vec<PathBuf>,
     flight: SampleFlight,
-    /// Whether the tour begins when the sample flight is simulated.
+    /// True if the tour starts when the sample flight is simulated.
     tour: bool,
 }
 
@@ -46,12 +42,12 @@ impl Welcome {
         Self { desktop, path_field, samples, recent, flight: SampleFlight::default(), tour: false }
     }
 
-    /// Stops a simulation, because another log is shown.
+    /// Stops a simulation; used when another log is shown.
     pub(super) fn stop(&mut self) {
         self.flight = SampleFlight::default();
     }
 
-    /// The sample log to open, simulated first where there is none.
+    /// Path of the sample log; without one, starts its simulation.
     pub(super) fn sample(&mut self, tour: bool) -> Option<Choice> {
         self.tour = tour;
         if let Some(path) = self.samples.first() {
@@ -104,14 +100,14 @@ impl Welcome {
         chosen
     }
 
-    /// The tour, the sample flight and the documents.
+    /// Draws buttons for the tour, the sample flight and the documents.
     fn first_steps_ui(&mut self, ui: &mut Ui, theme: &Theme) -> Option<Choice> {
         let mut chosen = None;
         let running = self.flight.is_running();
         ui.horizontal_wrapped(|ui| {
             let big = |text: &str| Button::new(RichText::new(text).size(14.0)).min_size(vec2(178.0, 30.0));
             let tour = big("Take the tour").fill(theme.accent.gamma_multiply(0.35));
-            let hover = "Six steps over the sample flight, up to: which parameter is unobservable, since when, why, and \
+            let hover = "Six steps over the sample flight: which parameter is unobservable, since when, why, and \
                          which motion fixes it";
             if ui.add_enabled(!running, tour).on_hover_text(hover).clicked() {
                 chosen = self.sample(true);
@@ -122,7 +118,11 @@ impl Welcome {
             if ui.add(big("Manual")).on_hover_text("Shift+F1").clicked() {
                 chosen = Some(Choice::Manual);
             }
-            if ui.add(big("Tutorial")).on_hover_text("The sample flight in the window and on the command line").clicked() {
+            if ui
+                .add(big("Tutorial"))
+                .on_hover_text("The sample flight in the window and on the command line")
+                .clicked()
+            {
                 chosen = Some(Choice::Tutorial);
             }
         });
@@ -166,7 +166,7 @@ impl App {
         }
     }
 
-    /// Begins the tour: over the log that is open or being opened, else over the sample flight.
+    /// Starts the tour on the log that is open or being opened, else on the sample flight.
     pub fn start_tour(&mut self) {
         if self.log.is_some() {
             self.state.start_tour();
@@ -182,7 +182,7 @@ fn chosen_sample(path: PathBuf, tour: bool) -> Choice {
     if tour { Choice::Tour(path) } else { Choice::Open(path) }
 }
 
-/// The area for dropping a log; it is highlighted while a file is dragged over the window.
+/// Draws the drop area for a log; it is highlighted while a file is dragged over the window.
 fn drop_target_ui(ui: &mut Ui, theme: &Theme) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 92.0), Sense::hover());
     let file_over_window = ui.input(|input| !input.raw.hovered_files.is_empty());
@@ -190,8 +190,8 @@ fn drop_target_ui(ui: &mut Ui, theme: &Theme) {
     ui.painter().rect(rect, 6.0, theme.plot_background, Stroke::new(1.5, color), StrokeKind::Inside);
     let lines = [
         ("Drop a flight log (.mcap, .mcap.zstd) or a saved session (.session.json) here", 14.0, theme.text_strong),
-        ("Rig: NAME.rig.yaml beside NAME.mcap, or attached to the log", 12.0, theme.text_weak),
-        ("ROS bags and EuRoC folders first become a log: dcvins convert SOURCE -o LOG.mcap", 12.0, theme.text_weak),
+        ("Rig: NAME.rig.yaml next to NAME.mcap, or attached to the log", 12.0, theme.text_weak),
+        ("Convert ROS bags and EuRoC folders to a log first: dcvins convert SOURCE -o LOG.mcap", 12.0, theme.text_weak),
     ];
     let spoken = lines.map(|(text, ..)| text).join(". ");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &spoken));

@@ -1,4 +1,4 @@
-//! The hits of all breakpoints, one hit per row.
+//! Hits of all breakpoints; one hit per row.
 
 use super::BreakpointsPanel;
 use crate::gui::PanelContext;

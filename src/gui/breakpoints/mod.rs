@@ -1,4 +1,4 @@
-//! The breakpoints: conditions on the steps, their hit counts, and buttons to go to the next hit.
+//! Breakpoints panel: conditions on the steps, their hit counts, and buttons to go to the next hit.
 
 mod csv;
 
@@ -9,7 +9,6 @@ use super::units::counted;
 use crate::session::Command;
 use crate::session::breakpoints::{Breakpoint, Condition, quantity_help};
 
-/// State of the panel.
 #[derive(Debug, Default)]
 pub struct BreakpointsPanel {
     typed: String,
@@ -67,7 +66,7 @@ impl BreakpointsPanel {
         if let Err(problem) = parsed
             && !self.typed.trim().is_empty()
         {
-            // The text again with a caret under the error.
+            // The text again, with a caret under the error.
             let pointed = format!("{}\n{}^", problem.text, " ".repeat(problem.column - 1));
             ui.label(RichText::new(pointed).monospace().color(ctx.theme.text_weak));
             let text = format!("Column {}: {}", problem.column, problem.message);

@@ -1,4 +1,4 @@
-//! The comparison of all runs as a long table, one value per row.
+//! Comparison of all runs as a long table; one value per row.
 
 use super::{ComparisonPanel, label_of};
 use crate::gui::PanelContext;

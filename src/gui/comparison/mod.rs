@@ -1,4 +1,4 @@
-//! The comparison panel: one run against the ground truth, or up to four runs at one cursor, as tables, as differences over
+//! Comparison panel: one run against the ground truth, or up to four runs at one cursor, as tables, as differences over
 //! time, and as images and scenes side by side.
 
 mod csv;
@@ -32,7 +32,6 @@ const MIN_WIDTH_FOR_BOTH_TABLES: f32 = 860.0;
 /// Height from which scenes are shown below the images.
 const MIN_HEIGHT_FOR_SCENES: f32 = 760.0;
 
-/// A view of the comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum View {
     All,
@@ -59,7 +58,7 @@ impl View {
 pub struct ComparisonPanel {
     /// Index of the reference run.
     pub reference: usize,
-    /// The chosen view, `None` before a choice.
+    /// Chosen view; `None` until the user chooses.
     view: Option<View>,
     scores: Scores,
     comparisons: Vec<Comparison>,
@@ -67,12 +66,12 @@ pub struct ComparisonPanel {
     images: Images,
     scenes: Scenes,
     single: Single,
-    /// The dialog that was asked for in the last frame; the window takes it.
+    /// Dialog requested in the last frame; the window takes it.
     pub asked: Option<Dialog>,
 }
 
 impl ComparisonPanel {
-    /// A panel with the same view and no texture of a window.
+    /// A panel with the same view, without textures of a window.
     pub(in crate::gui) fn view_copy(&self) -> Self {
         let (images, scenes) = (self.images.view_copy(), self.scenes.view_copy());
         Self { reference: self.reference, view: self.view, images, scenes, ..Self::default() }
@@ -102,7 +101,8 @@ impl ComparisonPanel {
         }
     }
 
-    /// Comparisons of all runs and then all trajectories with the reference; the reference's own is empty.
+    /// Comparisons of all runs, then of all trajectories, with the reference run; that of the reference itself is
+    /// empty.
     pub(in crate::gui) fn comparisons(&mut self, ctx: &PanelContext<'_>) -> &[Comparison] {
         self.read(ctx);
         &self.comparisons
@@ -124,7 +124,7 @@ impl ComparisonPanel {
         self.scores.read(ctx.recording);
     }
 
-    /// The selectors of reference and view; in a figure the reference.
+    /// Selectors of reference and view; in a figure only the reference.
     fn controls_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) -> View {
         let mut view = self.view.unwrap_or(View::All);
         ui.horizontal_wrapped(|ui| {
@@ -180,7 +180,7 @@ impl ComparisonPanel {
         self.over_time.ui(ui, ctx, self.reference, &self.comparisons);
     }
 
-    /// Tables on the left; differences and images on the right.
+    /// Draws tables on the left; differences and images on the right.
     fn all_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         const GAP: f32 = 10.0;
         let all = ui.available_rect_before_wrap();
@@ -203,13 +203,13 @@ impl ComparisonPanel {
         }
     }
 
-    /// The accuracy of all runs.
+    /// Accuracy of all runs.
     pub(in crate::gui) fn scores(&self) -> &Scores {
         &self.scores
     }
 }
 
-/// Label of a column of the panel: of a run, then of a trajectory.
+/// Label of a column of the panel; the runs come first, then the trajectories.
 fn label_of(recording: &Recording, index: usize) -> &str {
     let lane = |index: usize| recording.trajectories.get(index).map_or("", |lane| lane.label.as_str());
     match recording.runs.get(index) {
@@ -218,7 +218,7 @@ fn label_of(recording: &Recording, index: usize) -> &str {
     }
 }
 
-/// Style of a column of the panel: of a run, then of a trajectory.
+/// Style of a column of the panel; the runs come first, then the trajectories.
 fn style_of(recording: &Recording, theme: &Theme, index: usize) -> RunStyle {
     let runs = recording.runs.len();
     if index < runs { theme.run(index) } else { theme.trajectory(index - runs) }

@@ -1,4 +1,4 @@
-//! The tables: accuracy of all runs, and their first divergences from the reference.
+//! Tables of the accuracy of all runs and of their first divergences from the reference.
 
 use egui::{Button, Grid, RichText, Ui, WidgetInfo, vec2};
 
@@ -28,10 +28,10 @@ pub(super) fn difference_text(quantity: Quantity, apart: f64) -> String {
     format!("{number}{space}{unit}")
 }
 
-/// What a trajectory beside the runs has.
+/// Tooltip of a trajectory of another program.
 pub(in crate::gui) const POSES_ONLY: &str = "A trajectory has poses only: scene, timeline and comparison show it, panels of calibration, features and residuals do not";
 
-/// Stands below the heading of the accuracy where the truth is the trajectory of an offline calibration.
+/// Note below the heading of the accuracy if the reference trajectory is that of an offline calibration.
 pub(super) const AGAINST_BATCH: &str = "Against the batch reference, not ground truth";
 
 /// Accuracy of all runs and trajectories; the best value of a row is marked.
@@ -87,7 +87,7 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
     }
 }
 
-/// The first divergences of each run, with buttons that move the cursor there.
+/// Table of the first divergences of each run, with buttons that move the cursor there.
 pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference: usize, comparisons: &[Comparison]) {
     let theme = *ctx.theme;
     let Some(base) = ctx.recording.runs.get(reference) else { return };
@@ -95,7 +95,7 @@ pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference:
         if number == reference {
             continue;
         }
-        // The stamps of a comparison with a trajectory are those of the reference.
+        // A comparison with a trajectory has the stamps of the reference.
         let run = ctx.recording.runs.get(number).unwrap_or(base);
         let (own, other) = (label_of(ctx.recording, number), &base.spec.label);
         ui.horizontal_wrapped(|ui| {
@@ -131,7 +131,7 @@ pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference:
 
 fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, comparison: &Comparison) {
     let theme = *ctx.theme;
-    let grid = Grid::new(("partings", number)).striped(true).min_row_height(ROW_HEIGHT);
+    let grid = Grid::new(("divergences", number)).striped(true).min_row_height(ROW_HEIGHT);
     grid.spacing(vec2(12.0, 2.0)).show(ui, |ui| {
         for term in [
             divergence::QUANTITY,
@@ -169,7 +169,7 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
     });
 }
 
-/// A stamp as a button that moves the cursor there, in a figure as text; a dash without one.
+/// A stamp as a button that moves the cursor there, in a figure as text; a dash if there is no stamp.
 fn time_button(ui: &mut Ui, ctx: &mut PanelContext<'_>, stamp_ns: Option<i64>, name: &str) {
     let Some(stamp_ns) = stamp_ns else {
         ui.label(RichText::new("–").color(ctx.theme.text_weak));

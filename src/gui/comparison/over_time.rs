@@ -12,7 +12,6 @@ use crate::session::{Comparison, Quantity};
 /// Range of the row height in points.
 const HEIGHTS: std::ops::RangeInclusive<f32> = MIN_HEIGHT..=120.0;
 
-/// The plotted quantities.
 const DRAWN: [Quantity; 8] = [
     Quantity::Position,
     Quantity::Attitude,
@@ -31,7 +30,7 @@ pub(super) struct OverTime {
 }
 
 impl OverTime {
-    /// Draws a row for every quantity that some run has.
+    /// Draws a row for every quantity that at least one run has.
     pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, reference: usize, comparisons: &[Comparison]) {
         let known = |quantity: Quantity| {
             comparisons.iter().enumerate().any(|(run, comparison)| {

@@ -10,59 +10,55 @@ use crate::gui::plot::{
 };
 use crate::gui::theme::{self, CURVE_WIDTH, RunStyle};
 
-/// Width of names and values on the left.
+/// Width of names and values on the left, in points.
 const NAMES: f32 = 158.0;
-/// Dashes of a bound.
 const BOUND_DASHES: &[f32] = &[4.0, 3.0];
 
-/// Minimum height of a row in points; a list of rows that are so low may scroll.
+/// Minimum height of a row in points; a list of rows of this height may scroll.
 pub(super) const MIN_HEIGHT: f32 = 46.0;
 
-/// A row.
 pub(super) struct Row<'a> {
     pub(super) name: &'a str,
     /// Shown unit, empty for counts.
     pub(super) unit: &'a str,
     /// Shown value per stored value.
     pub(super) factor: f64,
-    /// Value of the dotted line, as stored.
+    /// Stored value of the dotted line.
     pub(super) threshold: Option<f64>,
-    /// The axis reaches at least this value, so that rounding errors are not magnified.
+    /// Smallest upper limit of the axis, so that rounding errors are not magnified.
     pub(super) min_high: f64,
-    /// A bound of the values over time, with the stamps of the first line.
+    /// Bound of the values over time, at the stamps of the first line.
     pub(super) bound: Option<Bound<'a>>,
-    /// Whether values are constant until the next one.
+    /// True if values are constant until the next one.
     pub(super) steps: bool,
     /// Unique in the panel.
     pub(super) id: usize,
-    /// Name for screen readers.
     pub(super) label: &'a str,
-    /// Tooltip.
     pub(super) hover: &'a str,
 }
 
-/// What the values of a row should stay below, by frame.
+/// Bound of the values of a row, by frame.
 pub(super) struct Bound<'a> {
     pub(super) values: &'a [f64],
     pub(super) curve: &'a mut Curve,
-    /// The bound at the cursor.
+    /// Bound at the cursor.
     pub(super) text: Option<String>,
 }
 
 /// The values of one run in a row.
 pub(super) struct Line<'a> {
-    /// Index of the run, or behind the runs of the trajectory, for colour and dashes.
+    /// Index of the column for colour and dashes: of the run, or after the runs that of the trajectory.
     pub(super) run: usize,
     pub(super) epoch: u64,
     pub(super) stamps_ns: &'a [i64],
     pub(super) values: &'a [f64],
-    /// The value at the cursor.
+    /// Value at the cursor.
     pub(super) text: Option<String>,
     /// Stamp of a triangle on the upper edge.
     pub(super) mark_ns: Option<i64>,
 }
 
-/// Draws a row; `curves` are the caches of the lines.
+/// Draws a row; `curves` are the cached curves of the lines.
 pub(super) fn row_ui(
     ui: &mut Ui,
     ctx: &mut PanelContext<'_>,

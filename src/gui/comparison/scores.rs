@@ -1,11 +1,11 @@
-//! The accuracy of all runs as table rows with a column per run.
+//! Accuracy of all runs as table rows with a column per run.
 
 use crate::estimator::Phase;
 use crate::geometry::seconds_from_ns;
 use crate::gui::units::{fixed, significant};
 use crate::session::{ChainDistance, RELATIVE_LENGTHS_M, Recording, RunRecord, TrajectoryAccuracy, TrajectoryLane};
 
-/// Number of new steps after which a run's accuracy is computed again.
+/// Number of new steps after which a run's accuracy is recomputed.
 const UPDATE_PERIOD_STEPS: usize = 20;
 
 /// The values of one run over all its steps so far.
@@ -17,7 +17,7 @@ struct RunScore {
     accuracy: Option<TrajectoryAccuracy>,
     chain: Option<ChainDistance>,
     initialized_s: Option<f64>,
-    /// `None` of a trajectory, as what follows.
+    /// `None` for a trajectory of another program, like the following fields.
     estimated: Option<usize>,
     restarts: Option<usize>,
     columns: Option<usize>,
@@ -30,25 +30,22 @@ pub(crate) struct Scores {
     runs: Vec<RunScore>,
 }
 
-/// A row of the table.
 #[derive(Debug)]
 pub(crate) struct ScoreRow {
-    /// Name of the value.
     pub(crate) name: String,
-    /// Definition of the value.
     pub(super) meaning: &'static str,
     /// Shown unit, empty for counts.
     pub(crate) unit: &'static str,
     /// Values by run and then by trajectory, in the shown unit.
     pub(crate) values: Vec<Option<f64>>,
-    /// Whether smaller is better; `None` where the value is no measure of quality.
+    /// True if smaller is better; `None` for a value that is no measure of quality.
     pub(super) less_is_better: Option<bool>,
-    /// Decimals, `None` for three significant digits.
+    /// Decimals; `None` for three significant digits.
     pub(super) decimals: Option<usize>,
 }
 
 impl ScoreRow {
-    /// The shown text of a value.
+    /// Shown text of a value.
     pub(crate) fn text(&self, run: usize) -> String {
         let value = self.values.get(run).copied().flatten();
         value.map_or_else(
@@ -71,7 +68,6 @@ impl ScoreRow {
 }
 
 impl Scores {
-    /// Updates the values.
     pub(super) fn read(&mut self, recording: &Recording) {
         self.runs.resize_with(recording.runs.len() + recording.trajectories.len(), RunScore::default);
         let (of_runs, of_trajectories) = self.runs.split_at_mut(recording.runs.len());
@@ -89,7 +85,6 @@ impl Scores {
         }
     }
 
-    /// The rows of the table.
     pub(crate) fn rows(&self) -> Vec<ScoreRow> {
         let row = |name: &str, unit: &'static str, less, decimals, of: &dyn Fn(&RunScore) -> Option<f64>| ScoreRow {
             name: name.to_owned(),

@@ -6,7 +6,7 @@ use crate::gui::image_panel::ImagePanel;
 use crate::gui::scene::ScenePanel;
 use crate::gui::{PanelContext, Selection};
 
-/// Minimum width of a run's cell; below it the cells form two rows.
+/// Minimum width of a run's cell in points; below it the cells form two rows.
 const MIN_CELL_WIDTH: f32 = 250.0;
 const GAP: f32 = 6.0;
 
@@ -64,9 +64,9 @@ impl Scenes {
     }
 }
 
-/// Draws each run in its own cell, as the shown run.
+/// Draws each run in a cell, as if it were the shown run.
 ///
-/// A selection in one cell applies to all: features only to runs on the same camera.
+/// A selection in one cell applies to all cells, a selected feature only to runs on the same camera.
 fn each_run(ui: &mut Ui, ctx: &mut PanelContext<'_>, mut draw: impl FnMut(&mut Ui, &mut PanelContext<'_>, usize)) {
     let all = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(all);
@@ -100,7 +100,7 @@ fn each_run(ui: &mut Ui, ctx: &mut PanelContext<'_>, mut draw: impl FnMut(&mut U
     }
 }
 
-/// The cells: one row where they are wide enough, else two.
+/// Rectangles of the cells: one row if they are wide enough, else two.
 fn cells(all: Rect, count: usize) -> Vec<Rect> {
     let columns = if count > 2 && all.width() < MIN_CELL_WIDTH * count as f32 { 2 } else { count.max(1) };
     let rows = count.div_ceil(columns);

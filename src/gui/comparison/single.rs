@@ -1,4 +1,4 @@
-//! The panel with one run: its errors over time, and the runs that it can be compared with.
+//! The panel with one run: its errors over time, and suggested runs for a comparison.
 
 use egui::{Button, Label, Rect, RichText, ScrollArea, Ui, UiBuilder, WidgetInfo, vec2};
 
@@ -17,12 +17,12 @@ use crate::gui::window::Dialog;
 use crate::sensors::{CameraMount, Rig};
 use crate::session::{Command, RunRecord, RunSpec, StepRecord};
 
-/// Panel width from which the errors over time stand beside the numbers.
+/// Panel width in points from which the errors over time are shown to the right of the numbers.
 const MIN_WIDTH_FOR_BOTH: f32 = 700.0;
 /// Range of the row height in points.
 const HEIGHTS: std::ops::RangeInclusive<f32> = MIN_HEIGHT..=120.0;
 
-/// A value over time: name, shown unit, factor from the stored unit, meaning.
+/// Values over time: name, shown unit, factor from the stored unit, definition.
 const ROWS: [(&str, &str, f64, &str); 8] = [
     (
         "position error",
@@ -45,36 +45,36 @@ const ROWS: [(&str, &str, f64, &str); 8] = [
 ];
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// A run that answers a question beside the first one: specification as on the command line, and the question.
+/// Suggested runs for a comparison: specification as on the command line, and purpose.
 const OFFERS: [(&str, &str); 5] = [
-    ("classical", "which directions are redundant in the classical parameterization"),
-    ("auto:encoder=off", "how much the encoder readings contribute"),
-    ("auto:calibrate=off", "what the online calibration gains over the rig's values"),
-    ("static", "how the rigid camera of the rig does without the gimbal"),
-    ("auto:first-estimates=off", "how much spurious information first-estimate Jacobians avoid"),
+    ("classical", "redundant directions of the classical parameterization"),
+    ("auto:encoder=off", "contribution of the encoder readings"),
+    ("auto:calibrate=off", "gain of the online calibration over the rig's values"),
+    ("static", "accuracy of the rig's rigid camera, without the gimbal"),
+    ("auto:first-estimates=off", "spurious information that first-estimate Jacobians avoid"),
 ];
 
-/// What a comparison shows.
+/// Preview of a comparison.
 const PREVIEW: &str = "Two to four runs share log, tracks and cursor. Shown are the accuracy of each with the best of each row \
     marked, the first difference and the first notable divergence of 14 quantities, differences over time, images and \
     scenes side by side, and lost directions with common rows.";
 
-/// The values of the run over time, computed again when it has new steps or another alignment.
+/// Values of the run over time; recomputed when the run has new steps or another alignment.
 #[derive(Debug, Default)]
 pub(super) struct Single {
     of: Option<(u64, usize, Option<RigidTransform>)>,
-    /// Changes when rows were removed.
+    /// Changes when rows are removed.
     epoch: u64,
     stamps_ns: Vec<i64>,
     columns: [Vec<f64>; ROWS.len()],
     curves: [Curve; ROWS.len()],
-    /// 3σ of the rows that have one, by frame.
+    /// 3σ by frame, of the rows that have one.
     bounds: [Vec<f64>; ROWS.len()],
     bound_curves: [Curve; ROWS.len()],
 }
 
 impl Single {
-    /// Draws offers, numbers and errors over time. Returns the dialog that was asked for.
+    /// Draws suggestions, numbers and errors over time. Returns the requested dialog.
     pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scores) -> Option<Dialog> {
         const GAP: f32 = 12.0;
         let run = ctx.recording.runs.first()?;
@@ -196,7 +196,7 @@ impl Single {
     }
 }
 
-/// 3σ of a step in the order of [`ROWS`], `None` where a row has none.
+/// 3σ of a step in the order of [`ROWS`]; `None` where a row has none.
 fn bounds_of(step: &StepRecord) -> [Option<f64>; ROWS.len()] {
     let pose = step.report.newest().zip(step.report.newest_pose_covariance);
     let position_m = pose.map(|(_, covariance)| 3.0 * covariance.position_sigma_m());
@@ -208,7 +208,7 @@ fn is_known(column: &[f64]) -> bool {
     column.iter().any(|value| value.is_finite())
 }
 
-/// The values of a step in the order of [`ROWS`], `None` where it does not have one.
+/// Values of a step in the order of [`ROWS`]; `None` where the step has none.
 fn values_of(
     step: &StepRecord,
     alignment: Option<&RigidTransform>,
@@ -247,7 +247,7 @@ fn encoder_difference_rad(report: &StepReport) -> Option<f64> {
     differences.reduce(f64::max)
 }
 
-/// The runs that can be added with a click, and the dialogs for others.
+/// Lists runs that a click adds, and the dialogs for others.
 fn offers_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord) -> Option<Dialog> {
     let theme = *ctx.theme;
     let mut asked = None;
@@ -266,7 +266,7 @@ fn offers_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord) -> Option
     ui.horizontal(|ui| {
         for (text, dialog, hover) in [
             ("Add another run…", Dialog::AddRun, "Choose parameterization and options (A)"),
-            ("Fork at the cursor…", Dialog::Fork, "Continue from this frame with changes, in a lane of its own (F)"),
+            ("Fork at the cursor…", Dialog::Fork, "Continue from this frame with changes, as a new run (F)"),
         ] {
             if ui.button(text).on_hover_text(hover).clicked() {
                 asked = Some(dialog);
@@ -277,7 +277,7 @@ fn offers_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord) -> Option
     asked
 }
 
-/// An offer as a specification, unless the log lacks what it needs or it is the run itself.
+/// Specification of a suggested run; `None` if the log lacks its inputs or if it equals `run`.
 fn offered(text: &str, rig: &Rig, run: &RunRecord) -> Option<RunSpec> {
     let spec: RunSpec = text.parse().ok()?;
     let has_encoders = rig.gimbal.as_ref().is_some_and(|gimbal| gimbal.encoder_sigma_rad.is_some());
@@ -308,7 +308,7 @@ mod tests {
         let error_m = (aligned.translation_m - step.ground_truth.unwrap().translation_m).norm();
         assert_eq!(values[0], Some(error_m));
         assert!(values[3].unwrap() > 0.0 && values[6] == Some(step.report.reprojection_rms_after_px));
-        // The tilt is a part of the attitude error, and within its 3σ.
+        // The tilt is part of the attitude error, and below the 3σ of the tilt.
         let bounds = bounds_of(step);
         assert!(values[2].unwrap() <= values[1].unwrap() && values[2] < bounds[2], "{values:?} {bounds:?}");
         assert!(bounds[0].unwrap() > 0.0 && bounds[1].is_none());

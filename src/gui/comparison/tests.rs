@@ -1,4 +1,4 @@
-//! The comparison panel, tested by its labels.
+//! Tests of the comparison panel by its labels.
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
@@ -74,7 +74,7 @@ fn numbers_show_accuracy_and_lead_to_the_divergence() {
     harness.get_by_label(&label).click();
     harness.run_steps(2);
     assert_eq!(harness.state().commands, [Command::Seek { stamp_ns: first_ns }]);
-    // With the reference exchanged they diverge at the same frame.
+    // With the other run as reference they diverge at the same frame.
     harness.state_mut().panel.reference = 1;
     harness.run_steps(2);
     assert!(harness.query_by_label("auto vs. classical").is_some());
@@ -162,7 +162,7 @@ fn sides_of_the_solve_and_selection_are_shared_by_all_images() {
     assert_eq!(harness.state().panel.comparisons[1].at(Quantity::Tracks, at), Some(0.0));
 }
 
-/// A trajectory of another program: the first run's in another world, 5 cm too high or too low in turns.
+/// A trajectory of another program: that of the first run in another world, alternately 5 cm too high and too low.
 fn with_trajectory(recording: &mut Recording) {
     use nalgebra::{UnitQuaternion, Vector3};
 

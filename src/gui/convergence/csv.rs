@@ -1,4 +1,4 @@
-//! The calibration over time, one step per row.
+//! Calibration over time; one step per row.
 
 use super::ConvergencePanel;
 use crate::gimbal::ParameterId;

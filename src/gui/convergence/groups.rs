@@ -1,4 +1,4 @@
-//! The choice of the group that the convergence panel shows, and the headings of groups.
+//! Selector of the group that the convergence panel shows, and the headings of groups.
 
 use egui::{Align2, Rect, Role, Ui, WidgetInfo, pos2};
 
@@ -14,7 +14,7 @@ pub(super) enum View {
     All,
     /// One group fills the panel.
     Group(ParameterGroup),
-    /// What the flight determines, as a table.
+    /// Table of the parameters that the flight determines.
     Table,
 }
 
@@ -24,7 +24,7 @@ pub(super) fn groups_of(parameters: &[ParameterId]) -> Vec<(ParameterGroup, usiz
     chunks.filter_map(|chunk| Some((chunk.first()?.group(), chunk.len()))).collect()
 }
 
-/// A row of labels to choose from.
+/// Draws a row of labels, one of which is selected.
 pub(super) fn choice_ui(ui: &mut Ui, view: &mut View, groups: &[(ParameterGroup, usize)]) {
     ui.horizontal(|ui| {
         let all: usize = groups.iter().map(|(_, count)| count).sum();
@@ -34,7 +34,7 @@ pub(super) fn choice_ui(ui: &mut Ui, view: &mut View, groups: &[(ParameterGroup,
             ui.selectable_value(view, View::Group(*group), label).on_hover_text("This group fills the panel");
         }
         ui.separator();
-        ui.selectable_value(view, View::Table, "Table").on_hover_text("Which of them the flight determines");
+        ui.selectable_value(view, View::Table, "Table").on_hover_text("Parameters that the flight determines");
     });
 }
 
@@ -43,7 +43,7 @@ fn capitalized(name: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// The heading of a group, which folds it.
+/// Draws the heading of a group; a click folds the group.
 pub(super) fn heading_ui(
     ui: &Ui,
     ctx: &PanelContext<'_>,

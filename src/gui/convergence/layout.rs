@@ -5,29 +5,29 @@ use egui::{Rect, pos2, vec2};
 use super::names::{CalibrationPart, part_of};
 use crate::gimbal::{ParameterGroup, ParameterId};
 
-/// Minimum height of a legible plot in points, its title included.
+/// Minimum height of a legible plot in points, including its title.
 const MIN_CELL_HEIGHT: f32 = 52.0;
 /// Minimum width of a legible plot in points.
 const MIN_CELL_WIDTH: f32 = 118.0;
 /// Gap between plots in points.
 const GAP: f32 = 5.0;
-/// Width of the headings beside the rows.
+/// Width of the headings at the left of the rows, in points.
 pub(crate) const HEADING_WIDTH: f32 = 46.0;
-/// Height of the headings above groups.
+/// Height of the headings above groups, in points.
 const GROUP_HEIGHT: f32 = 17.0;
 
 /// Rectangles of the plots.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Layout {
-    /// One cell per parameter that is shown, in order.
+    /// One cell per shown parameter, in order.
     pub(crate) cells: Vec<Rect>,
-    /// The heading of each group, in the layout by groups.
+    /// Heading of each group in the layout by groups.
     pub(crate) groups: Vec<(ParameterGroup, Rect)>,
-    /// Rows by part of the calibration, with the rectangle of the heading; empty in the flowing layout.
+    /// Heading of each row, by part of the calibration; empty in the flowing layout.
     pub(crate) headings: Vec<(CalibrationPart, Rect)>,
-    /// The largest free rectangle of the layout by rows.
+    /// Largest free rectangle of the layout by rows.
     pub(crate) legend: Option<Rect>,
-    /// Total height, more than available if it has to be scrolled.
+    /// Total height in points; larger than the available height if the panel has to scroll.
     pub(crate) height: f32,
 }
 
@@ -48,7 +48,7 @@ fn by_part(parameters: &[ParameterId], available: Rect) -> Option<Layout> {
     let columns = rows.iter().map(|(_, count)| *count).max()?;
     let width = (available.width() - HEADING_WIDTH - GAP * columns as f32) / columns as f32;
     let height = (available.height() - GAP * (rows.len() as f32 - 1.0)) / rows.len() as f32;
-    // The layout by rows leaves free cells; it is used only if plots stay legible and few cells are empty.
+    // The layout by rows leaves cells free; it is used only if plots stay legible and few cells are empty.
     let empty = rows.len() * columns - parameters.len();
     if rows.len() < 2
         || width < MIN_CELL_WIDTH * 1.15
@@ -119,13 +119,13 @@ fn flowing(count: usize, available: Rect) -> Layout {
     Layout { cells, groups: Vec::new(), headings: Vec::new(), legend: None, height: bottom - available.top() }
 }
 
-/// Lays out groups below each other, each with a heading and cells on one common grid; a folded group, of no cells, is its
-/// heading only.
+/// Lays out groups below each other, each with a heading and cells on one common grid; a folded group has no cells,
+/// only its heading.
 pub(crate) fn by_group(groups: &[(ParameterGroup, usize)], available: Rect) -> Layout {
     let largest = groups.iter().map(|(_, count)| *count).max().unwrap_or(0).max(1);
     let max_columns = (((available.width() + GAP) / (MIN_CELL_WIDTH + GAP)) as usize).clamp(1, largest);
     let rows_of = |columns: usize| groups.iter().map(|(_, count)| count.div_ceil(columns)).sum::<usize>();
-    // As few columns as give the smallest number of rows: the plots are as wide as possible.
+    // The fewest columns that give the smallest number of rows, so that the plots are as wide as possible.
     let fewest = rows_of(max_columns);
     let columns = (1..=max_columns).find(|columns| rows_of(*columns) == fewest).unwrap_or(max_columns);
     let width = (available.width() - GAP * (columns as f32 - 1.0)) / columns as f32;

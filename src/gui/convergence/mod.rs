@@ -30,7 +30,7 @@ const LEGEND_ROW_HEIGHT: f32 = 18.0;
 struct ParameterCurves {
     value: Curve,
     band: BandCurve,
-    /// Ranges in which it is weak, unobservable, or not estimated yet.
+    /// Ranges in which the parameter is weak, unobservable, or not estimated yet.
     states: [StateCurve; paint::MARKED.len()],
 }
 
@@ -38,11 +38,11 @@ struct ParameterCurves {
 #[derive(Debug, Default)]
 pub struct ConvergencePanel {
     histories: Vec<CalibrationHistory>,
-    /// The other runs in the parameterization of the shown one.
+    /// The other runs in the parameterization of the shown run.
     converted: Vec<ConvertedHistory>,
-    /// By run and parameter.
+    /// Curves by run and parameter.
     curves: BTreeMap<(usize, ParameterId), ParameterCurves>,
-    /// What is shown of a calibration with more than one group.
+    /// View of a calibration with more than one group.
     view: View,
     folded: Vec<ParameterGroup>,
 }
@@ -66,7 +66,7 @@ impl ConvergencePanel {
             empty_ui(ui, "No steps yet");
             return;
         }
-        // Only the parameters of the parameterization at the cursor: after a switch the old ones are no longer
+        // Only the parameters of the parameterization at the cursor; after a switch the previous ones are no longer
         // estimated.
         let row = history.row_at(ctx.cursor_ns).unwrap_or(0);
         let mut parameters: Vec<ParameterId> = history

@@ -10,7 +10,6 @@ use crate::observability::{ParameterState, parameter_states};
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
-/// One parameter over time.
 #[derive(Debug, Default)]
 pub(crate) struct ParameterHistory {
     /// Value by step; NaN where the parameterization has no such parameter.
@@ -21,7 +20,6 @@ pub(crate) struct ParameterHistory {
     pub(crate) upper: Vec<f64>,
     /// Standard deviation by step.
     pub(crate) sigmas: Vec<f64>,
-    /// Observability by step.
     pub(crate) states: Vec<ParameterState>,
 }
 
@@ -29,13 +27,12 @@ pub(crate) struct ParameterHistory {
 #[derive(Debug, Default)]
 pub(crate) struct CalibrationHistory {
     follower: Follower,
-    /// Stamps of the steps.
     pub(crate) stamps_ns: Vec<i64>,
     /// The parameters, in the order of their first appearance.
     pub(crate) parameters: Vec<(ParameterId, ParameterHistory)>,
-    /// Changes when steps were removed.
+    /// Changes when steps are removed.
     pub(crate) epoch: u64,
-    /// Values of the last step, with which angles are unwrapped.
+    /// Values of the last step, the reference for unwrapping angles.
     last: ParameterValues,
 }
 
@@ -86,7 +83,6 @@ impl CalibrationHistory {
         self.last = values;
     }
 
-    /// The history of one parameter.
     pub(crate) fn parameter(&self, parameter: ParameterId) -> Option<&ParameterHistory> {
         self.parameters.iter().find(|(known, _)| *known == parameter).map(|(_, history)| history)
     }
@@ -102,20 +98,19 @@ impl CalibrationHistory {
 pub(crate) struct ConvertedHistory {
     follower: Follower,
     target: Option<(Parameterization, NearestForm)>,
-    /// Stamps of the steps.
     pub(crate) stamps_ns: Vec<i64>,
     /// Values of the steps by parameter.
     pub(crate) values: BTreeMap<ParameterId, Vec<f64>>,
-    /// Changes when steps were removed; differs from every epoch of a [`CalibrationHistory`].
+    /// Changes when steps are removed; differs from every epoch of a [`CalibrationHistory`].
     pub(crate) epoch: u64,
     last: ParameterValues,
 }
 
 impl ConvertedHistory {
-    /// Reads the steps that are new since the last call, or all steps when the parameterization has changed.
+    /// Reads the steps that are new since the last call, or all steps if the parameterization has changed.
     ///
-    /// Steps before the estimator tracks are skipped: their calibration is the rig's. Of several equivalent values of
-    /// the classical parameterization it takes those nearest to the rig's, as a classical run does.
+    /// Steps before tracking are skipped: their calibration is the rig's. Of several equivalent values of the classical
+    /// parameterization it takes those nearest to the rig's, as a classical run does.
     pub(crate) fn read(&mut self, run: &RunRecord, rig: &Rig, target: Parameterization) {
         const APART: u64 = 1 << 63;
         if self.target.as_ref().is_none_or(|(known, _)| *known != target) {
@@ -158,9 +153,9 @@ impl ConvertedHistory {
 }
 
 impl ParameterHistory {
-    /// An angle plus the multiple of 2π with which it is nearest to the last value: the values of a history are continuous and
-    /// may leave (−π, π]. Other quantities stay as they are.
-    pub(super) fn on_same_turn(&self, parameter: ParameterId, value: f64) -> f64 {
+    /// An angle plus the multiple of 2π that brings it nearest to the last value: the values of a history are
+    /// continuous and may leave (−π, π]. Other quantities are returned unchanged.
+    pub(super) fn unwrap_near(&self, parameter: ParameterId, value: f64) -> f64 {
         let last = self.values.iter().rev().find(|known| known.is_finite());
         last.map_or(value, |last| last + parameter.principal_value(value - last))
     }
@@ -218,15 +213,15 @@ mod tests {
         assert!(converted.values.contains_key(&id("IB.rz")));
     }
 
-    /// A chain that is given beyond ±180° while the true one is on this side.
+    /// The estimate of the angle is beyond −180°, its ground truth just below 180°.
     #[test]
     fn the_ground_truth_is_shown_on_the_turn_of_the_values() {
         let history = ParameterHistory { values: vec![-3.145, -3.15, f64::NAN], ..ParameterHistory::default() };
-        let shown = history.on_same_turn(id("I.rx"), 3.13);
+        let shown = history.unwrap_near(id("I.rx"), 3.13);
         assert!((shown - (3.13 - std::f64::consts::TAU)).abs() < 1e-12, "{shown}");
         let length = ParameterHistory { values: vec![-3.15], ..ParameterHistory::default() };
-        assert!((length.on_same_turn(id("I.tx"), 3.13) - 3.13).abs() < 1e-12);
-        assert_eq!(ParameterHistory::default().on_same_turn(id("I.rx"), 3.13), 3.13);
+        assert!((length.unwrap_near(id("I.tx"), 3.13) - 3.13).abs() < 1e-12);
+        assert_eq!(ParameterHistory::default().unwrap_near(id("I.rx"), 3.13), 3.13);
     }
 
     #[test]

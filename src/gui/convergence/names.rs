@@ -3,7 +3,7 @@
 use crate::gimbal::{ParameterGroup, ParameterId, ParameterPart, Quantity};
 use crate::sensors::Rig;
 
-/// The part of the calibration that a parameter belongs to, in the order of [`ParameterGroup::ALL`].
+/// Part of the calibration to which a parameter belongs, in the order of [`ParameterGroup::ALL`].
 ///
 /// [`ParameterGroup::ALL`]: crate::gimbal::ParameterGroup::ALL
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,15 +18,12 @@ pub(crate) enum CalibrationPart {
     Rigid,
     /// The intrinsics of a camera by its number.
     Camera(u8),
-    /// The intrinsics of the gyroscope.
     Gyroscope,
-    /// The intrinsics of the accelerometer.
     Accelerometer,
     /// Time offsets and readout times.
     Clocks,
 }
 
-/// The part of the calibration that a parameter belongs to.
 pub(crate) fn part_of(parameter: ParameterId) -> CalibrationPart {
     match (parameter.group(), parameter.part) {
         (ParameterGroup::Clocks, _) => CalibrationPart::Clocks,
@@ -59,7 +56,7 @@ fn joint_name(number: usize, rig: &Rig) -> Option<&str> {
     joints.get(number.checked_sub(1)?).map(|joint| joint.name.as_str())
 }
 
-/// The meaning of a parameter in words.
+/// Meaning of a parameter in words.
 pub(crate) fn meaning_of(parameter: ParameterId, rig: &Rig) -> String {
     let part = part_of(parameter);
     let kind = match parameter.quantity {

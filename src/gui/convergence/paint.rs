@@ -1,4 +1,5 @@
-//! Painting of one small plot: value with ±3σ band, ground truth, and where the parameter is not informed.
+//! Painting of one small plot: value with ±3σ band, ground truth, and the ranges in which the parameter is not
+//! informed.
 
 use std::collections::BTreeMap;
 
@@ -21,20 +22,19 @@ use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::gui::units::{Shown, fixed};
 use crate::observability::ParameterState;
 
-/// Height of the state strip at the bottom of a plot.
+/// Height of the state strip at the bottom of a plot, in points.
 const STRIP_HEIGHT: f32 = 3.0;
-/// Width beside the error that the values of the axis need.
+/// Width reserved for the values of the axis next to the error, in points.
 const TICK_WIDTH: f32 = 46.0;
-/// Width of a sample in the legend.
+/// Width of a sample in the legend, in points.
 const SAMPLE_WIDTH: f32 = 26.0;
-/// Height of the line with name and value.
+/// Height of the line with name and value, in points.
 const TITLE_HEIGHT: f32 = 15.0;
 
 /// States that are marked in the plots.
 pub(super) const MARKED: [ParameterState; 3] =
     [ParameterState::Weak, ParameterState::Unobservable, ParameterState::Waiting];
 
-/// The heading of a row.
 pub(super) fn heading(ui: &Ui, ctx: &PanelContext<'_>, part: CalibrationPart, rect: Rect) {
     let painter = ui.painter();
     let theme = ctx.theme;
@@ -43,7 +43,7 @@ pub(super) fn heading(ui: &Ui, ctx: &PanelContext<'_>, part: CalibrationPart, re
     painter.text(place, Align2::LEFT_TOP, heading_of(part, &ctx.recording.rig), theme::label_font(), theme.text_weak);
 }
 
-/// The legend of lines and marks, where the layout has room for it.
+/// Draws the legend of lines and marks in a free rectangle of the layout.
 pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
     const LINE: f32 = 15.0;
     let painter = ui.painter_at(rect);
@@ -60,7 +60,7 @@ pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
     });
 }
 
-/// The same legend in one row, for figures.
+/// Draws the same legend in one row, for figures.
 pub(super) fn legend_row(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
     const HEIGHT: f32 = 11.0;
     let painter = ui.painter_at(rect);
@@ -76,7 +76,7 @@ pub(super) fn legend_row(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
 /// Draws the sample of an entry of the legend into a rectangle.
 type PaintSample<'a> = &'a dyn Fn(&egui::Painter, Rect);
 
-/// Passes every entry of the legend, its text and the drawing of its sample, to a function.
+/// Calls a function with every entry of the legend: its text and the function that draws its sample.
 fn legend_entries(ctx: &PanelContext<'_>, add_entry: &mut dyn FnMut(&str, PaintSample<'_>)) {
     let theme = ctx.theme;
     for (number, run) in ctx.recording.runs.iter().enumerate() {
@@ -105,17 +105,16 @@ fn legend_entries(ctx: &PanelContext<'_>, add_entry: &mut dyn FnMut(&str, PaintS
     }
 }
 
-/// The data of the plots.
+/// Inputs of the plots.
 pub(super) struct PlotData<'a> {
-    /// The calibration of each run in its own parameterization.
+    /// Calibration of each run in its own parameterization.
     pub(super) histories: &'a [CalibrationHistory],
-    /// The runs in another parameterization than the shown one, converted to it.
+    /// Runs in a parameterization other than the shown one, converted to it.
     pub(super) converted: &'a [ConvertedHistory],
     /// Ground-truth values in the shown run's parameterization.
     pub(super) ground_truth: &'a ParameterValues,
     /// Index of the shown run.
     pub(super) shown: usize,
-    /// The effect of the wheel.
     pub(super) wheel: Wheel,
 }
 
@@ -131,7 +130,7 @@ impl<'a> PlotData<'a> {
         Some((history.epoch, &history.stamps_ns, &history.parameter(parameter)?.values))
     }
 
-    /// Values of the other runs at the cursor, and whether they are inside the plot.
+    /// Values of the other runs at the cursor, with a note for those outside the plot.
     fn others_lines(
         &self,
         ctx: &PanelContext<'_>,
@@ -185,7 +184,7 @@ pub(super) fn cell_ui(
         }
     }
     let curve_of = |run: usize| curves.get(&(run, id));
-    let ground_truth = data.ground_truth.get(&id).map(|truth| parameter.on_same_turn(id, *truth));
+    let ground_truth = data.ground_truth.get(&id).map(|truth| parameter.unwrap_near(id, *truth));
     let extent_of = |run: usize| curve_of(run)?.value.extent;
     let others = overlaid.iter().filter(|run| **run != shown_run).filter_map(|run| extent_of(*run));
     let (low, high) = value_range(extent_of(shown_run), ground_truth, others, parameter);
@@ -272,13 +271,13 @@ pub(super) fn cell_ui(
     });
 }
 
-/// The signed error against the ground truth.
+/// Signed error against the ground truth.
 fn signed(shown: Shown, error: f64, sigma: f64) -> String {
     let value = shown.value(error, sigma);
     if value.starts_with('-') { value } else { format!("+{value}") }
 }
 
-/// The signed error against the ground truth, also in standard deviations.
+/// Signed error against the ground truth, with its multiple of σ.
 fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
     let times = error.abs() / sigma;
     let text = signed(shown, error, sigma);
@@ -308,7 +307,7 @@ fn state_color(theme: &theme::Theme, state: ParameterState) -> Color32 {
     }
 }
 
-/// Name on the left, value and σ on the right as far as they fit.
+/// Draws the name on the left, value and σ on the right as far as they fit.
 #[expect(clippy::too_many_arguments, reason = "one line of text has that many inputs")]
 fn title(
     painter: &egui::Painter,
@@ -337,13 +336,13 @@ fn title(
     }
 }
 
-/// The value without its unit, which follows the σ.
+/// The value without its unit, which follows after the σ.
 fn fixed_value(shown: Shown, value: f64, sigma: f64) -> String {
     let text = shown.value(value, sigma);
     text.strip_suffix(shown.unit).map_or_else(|| fixed(value, 2), str::to_owned)
 }
 
-/// Text with a background, legible over curves.
+/// Draws a text with a background, legible over curves.
 fn boxed_text(painter: &egui::Painter, theme: &theme::Theme, place: Pos2, align: Align2, text: &str, color: Color32) {
     let galley = painter.layout_no_wrap(text.to_owned(), theme::label_font(), color);
     let rect = align.anchor_size(place, galley.size());

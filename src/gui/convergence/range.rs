@@ -6,10 +6,10 @@ use super::model::ParameterHistory;
 use crate::gui::plot::{Curve, PlotArea};
 use crate::gui::theme::RunStyle;
 
-/// Other runs extend the range on either side by at most this ratio of the shown run's own range.
+/// Largest extension of the range on either side by other runs, as a ratio of the shown run's range.
 const WIDENING: f64 = 0.5;
 
-/// Smallest and largest value, `None` without values.
+/// Smallest and largest value; `None` without values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Extent(Option<(f64, f64)>);
 
@@ -19,11 +19,11 @@ impl Extent {
     }
 }
 
-/// The value range of the plot.
+/// Value range of the plot.
 ///
 /// It contains the shown run's curve (`own`), the ground truth, and the band around the last value; the wide bands of
-/// the first steps would flatten everything else. A run that was converted from another parameterization can lie far
-/// away: the others extend the range a little at most.
+/// the first steps would flatten everything else. A run that was converted from another parameterization can be far
+/// away, so the other runs extend the range only slightly.
 pub(super) fn value_range(
     own: Option<(f64, f64)>,
     ground_truth: Option<f64>,
@@ -42,7 +42,7 @@ pub(super) fn value_range(
     let own = Extent::of(own.into_iter().chain(ground_truth).chain(last));
     let (mut low, mut high) = own.0.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
     let span = high - low;
-    // A constant value has no range of its own: then the others decide.
+    // A constant value gives no range; then the others determine it.
     let room = if span > 0.0 { WIDENING * span } else { f64::INFINITY };
     let (lowest, highest) = (low - room, high + room);
     if let Extent(Some((others_low, others_high))) = Extent::of(others) {
@@ -77,7 +77,7 @@ fn outside(area: &PlotArea, curve: &Curve) -> [Vec<Rangef>; 2] {
 
 /// Marks where a curve lies outside the plot: a line along that edge with an arrowhead, `level` lines from it.
 pub(super) fn paint_outside(painter: &Painter, area: &PlotArea, curve: &Curve, style: RunStyle, level: usize) {
-    /// Distance between the lines of two runs, and half the width of an arrowhead.
+    /// Distance between the lines of two runs, and half the width of an arrowhead, in points.
     const PITCH: f32 = 2.5;
     const HALF: f32 = 3.5;
     let inset = 1.5 + level as f32 * PITCH;
@@ -117,7 +117,7 @@ mod tests {
         assert!(lowest > -1.0 && highest < 2.5, "{lowest} {highest}");
         // The ground truth is always visible.
         assert!(range(&[], Some(-9.0)).0 < -9.0);
-        // A fixed value has no range of its own.
+        // A fixed value gives no range.
         let constant = history(&[2.0, 2.0], f64::NAN);
         let (low, high) = value_range(Some((2.0, 2.0)), None, [(1.0, 3.0)].into_iter(), &constant);
         assert!(low < 1.0 && high > 3.0);

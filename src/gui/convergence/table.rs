@@ -1,4 +1,4 @@
-//! Which parameters the flight determines up to the cursor, as a table.
+//! Table of the parameters that the flight determines up to the cursor.
 
 use egui::{Color32, Grid, Label, RichText, ScrollArea, Ui, vec2};
 
@@ -13,7 +13,7 @@ use crate::session::RunRecord;
 
 const HEADS: [(&str, &str); 8] = [
     ("Parameter", "Click: select it in all panels"),
-    ("Group", "The sensor or mechanism that it describes"),
+    ("Group", "Sensor or mechanism of the parameter"),
     ("Value", "Estimate at the cursor"),
     ("σ", "Posterior standard deviation"),
     ("Prior σ", "Standard deviation before the flight"),
@@ -21,7 +21,7 @@ const HEADS: [(&str, &str); 8] = [
     ("Verdict", "Known: σ below 0.3 of the prior; not from this flight: σ of 0.9 of the prior or more"),
     (
         "Reason",
-        "Null or weak direction of the last window that it belongs to, with the other parameters in it, or its largest \
+        "Null or weak direction of the last window that contains the parameter, with the others in it, or its largest \
          posterior correlation",
     ),
 ];
@@ -78,7 +78,7 @@ fn row_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, theme: &Theme, row: &Paramete
     ui.add(Label::new(RichText::new(reason).color(theme.text)).extend());
 }
 
-/// Symbol and colour of a verdict: never the colour alone.
+/// Symbol and colour of a verdict; the symbol is unique without the colour.
 fn mark_of(estimability: Estimability, theme: &Theme) -> (&'static str, Color32) {
     match estimability {
         Estimability::Known => ("✔", theme.ok),

@@ -14,7 +14,7 @@ const MIN_COLUMN_WIDTH: f32 = 70.0;
 /// Sizes of headings by level in points.
 const HEADING_SIZES: [f32; 3] = [20.0, 16.5, 14.0];
 
-/// Draws a block and returns the link that was clicked.
+/// Draws a block and returns the clicked link.
 pub(super) fn block_ui(ui: &mut Ui, theme: &Theme, block: &Block) -> Option<String> {
     match block {
         Block::Heading { level, spans, .. } => {
@@ -46,7 +46,7 @@ pub(super) fn block_ui(ui: &mut Ui, theme: &Theme, block: &Block) -> Option<Stri
     }
 }
 
-/// Draws a paragraph and returns the link that was clicked.
+/// Draws a paragraph and returns the clicked link.
 pub(super) fn spans_ui(ui: &mut Ui, theme: &Theme, spans: &[Span], heading: Option<f32>) -> Option<String> {
     let mut clicked = None;
     ui.horizontal_wrapped(|ui| {
@@ -128,7 +128,7 @@ fn width_of(ui: &Ui, cell: &[Span]) -> f32 {
     cell.iter().map(|span| width(span).ceil()).sum::<f32>() + 1.0
 }
 
-/// Widths that fit into `room`: narrow columns keep their width, the others share what is left.
+/// Column widths that fit into the width `room`: narrow columns keep their width, the others share the rest.
 fn fitted(natural: &[f32], room: f32) -> Vec<f32> {
     let (mut wide, mut left) = (natural.len(), room);
     let mut limit = f32::INFINITY;

@@ -4,7 +4,6 @@ use std::sync::OnceLock;
 
 use super::markdown::{Block, parse};
 
-/// One embedded document.
 #[derive(Debug)]
 struct Document {
     /// Path in the repository.
@@ -12,7 +11,7 @@ struct Document {
     text: &'static str,
 }
 
-/// The manual comes first.
+/// The manual is first.
 const DOCUMENTS: [Document; 11] = [
     Document { path: "docs/manual.md", text: include_str!("../../../docs/manual.md") },
     Document { path: "docs/tutorial.md", text: include_str!("../../../docs/tutorial.md") },
@@ -27,35 +26,31 @@ const DOCUMENTS: [Document; 11] = [
     Document { path: "assets/README.md", text: include_str!("../../../assets/README.md") },
 ];
 
-/// An embedded document by its place in the list; the default is the manual.
+/// Index of an embedded document in the list; the default is the manual.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct DocumentId(usize);
 
-/// The target of a link.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Target {
-    /// A section of an embedded document; without an anchor its beginning.
+    /// A section of an embedded document; without an anchor its start.
     Section(DocumentId, Option<String>),
-    /// A page of the web.
     Web(String),
 }
 
 impl DocumentId {
-    /// The tutorial.
     pub(super) const TUTORIAL: Self = Self(1);
 
-    /// All embedded documents.
     pub(super) fn all() -> impl Iterator<Item = Self> {
         (0..DOCUMENTS.len()).map(Self)
     }
 
-    /// Its blocks, parsed once.
+    /// Blocks of the document, parsed once.
     pub(super) fn blocks(self) -> &'static [Block] {
         static PARSED: OnceLock<Vec<Vec<Block>>> = OnceLock::new();
         &PARSED.get_or_init(|| DOCUMENTS.iter().map(|document| parse(document.text)).collect())[self.0]
     }
 
-    /// Its first heading.
+    /// First heading of the document.
     pub(super) fn title(self) -> String {
         let heading = self.blocks().iter().find_map(|block| match block {
             Block::Heading { spans, .. } => Some(spans),
@@ -64,13 +59,13 @@ impl DocumentId {
         heading.map_or_else(String::new, |spans| spans.iter().map(|span| span.text.as_str()).collect())
     }
 
-    /// Whether it has a heading with this anchor.
+    /// True if the document has a heading with this anchor.
     #[cfg(test)]
     pub(super) fn has_anchor(self, wanted: &str) -> bool {
         self.blocks().iter().any(|block| matches!(block, Block::Heading { anchor, .. } if anchor == wanted))
     }
 
-    /// The target of a link in this document; `None` if it leads to no embedded document.
+    /// Target of a link in this document; `None` if it leads to no embedded document.
     pub(super) fn follow(self, link: &str) -> Option<Target> {
         if link.starts_with("https://") || link.starts_with("http://") {
             return Some(Target::Web(link.to_owned()));

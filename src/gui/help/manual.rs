@@ -1,4 +1,4 @@
-//! The documents in a window of their own.
+//! The documents in a separate window.
 
 use egui::{Align, Button, ComboBox, Key, Modifiers, RichText, ScrollArea, Ui, WidgetInfo, vec2};
 
@@ -7,37 +7,35 @@ use super::documents::{DocumentId, Target};
 use super::markdown::{Block, Span};
 use crate::gui::theme::Theme;
 
-/// Frames in which the section is brought into view: the first ones lay out the window and the scroll area.
+/// Frames in which the section is scrolled into view: the first ones lay out the window and the scroll area.
 const FRAMES_TO_SECTION: u8 = 3;
 
-/// A section that is shown.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 struct Place {
     document: DocumentId,
-    /// `None` for the beginning of the document.
+    /// `None` for the start of the document.
     anchor: Option<String>,
 }
 
-/// State of the manual: whether it is open, the section, and the sections before.
+/// State of the manual: open or closed, the section, and the previously shown sections.
 #[derive(Debug, Default)]
 pub(crate) struct Manual {
     open: bool,
     place: Place,
     earlier: Vec<Place>,
-    /// Frames in which the section is still to be brought into view.
+    /// Remaining frames in which the section is scrolled into view.
     frames_to_section: u8,
-    /// A web address that cannot be opened from here.
+    /// Web address that cannot be opened from here.
     web: Option<String>,
 }
 
 impl Manual {
-    /// Opens a section of the manual; without an anchor its beginning.
+    /// Opens a section of the manual; without an anchor its start.
     pub(crate) fn show(&mut self, anchor: Option<&str>) {
         let place = Place { document: DocumentId::default(), anchor: anchor.map(str::to_owned) };
         self.go(place);
     }
 
-    /// Opens the tutorial.
     pub(crate) fn show_tutorial(&mut self) {
         self.go(Place { document: DocumentId::TUTORIAL, anchor: None });
     }
@@ -55,12 +53,11 @@ impl Manual {
         }
     }
 
-    /// Whether it is open.
     pub(crate) fn is_open(&self) -> bool {
         self.open
     }
 
-    /// Closes it; the section stays for the next time.
+    /// Closes the manual; the section is kept.
     pub(crate) fn close(&mut self) {
         self.open = false;
     }
@@ -97,7 +94,7 @@ impl Manual {
         }
     }
 
-    /// The buttons above the document.
+    /// Draws the buttons above the document.
     fn bar_ui(&mut self, ui: &mut Ui, theme: &Theme) {
         ui.horizontal(|ui| {
             let back = ui.add_enabled(!self.earlier.is_empty(), Button::new("◀ Back"));
@@ -149,7 +146,7 @@ impl Manual {
                     drawn.response.scroll_to_me_animation(Some(Align::TOP), animation);
                 }
             }
-            // The last section can be brought to the top too.
+            // Lets the last section scroll to the top, too.
             ui.add_space(0.7 * ui.clip_rect().height());
         });
         if let Some(link) = clicked {
@@ -158,7 +155,7 @@ impl Manual {
     }
 }
 
-/// Pages by which the Page keys scroll.
+/// Number of pages by which the Page keys scroll in this frame.
 fn page_of(ui: &Ui) -> f32 {
     if ui.ctx().egui_wants_keyboard_input() {
         return 0.0;

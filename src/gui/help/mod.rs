@@ -1,4 +1,4 @@
-//! Help: what each panel shows, the manual in the window, and what each shown quantity is.
+//! Help: the content of each panel, the manual in the window, and the definition of each shown quantity.
 
 mod blocks_ui;
 mod documents;
@@ -21,13 +21,12 @@ const WIDTH: f32 = 360.0;
 /// Side of the button in points.
 const BUTTON: f32 = 18.0;
 
-/// State of the help: the panel that the popup is about, and the manual.
+/// State of the help: the panel of the popup, and the manual.
 #[derive(Debug, Default)]
 pub(crate) struct Help {
     panel: Option<PanelName>,
-    /// The panel that a key asks about; its button takes the focus.
+    /// Panel for which a key requested the popup; its button takes the focus.
     asked: Option<PanelName>,
-    /// The manual.
     pub(crate) manual: Manual,
 }
 
@@ -51,8 +50,8 @@ impl Help {
         self.asked = Some(panel);
     }
 
-    /// Draws the popup below the upper right corner of its panel, and the manual. `places` are the panels on the
-    /// screen.
+    /// Draws the popup below the upper right corner of its panel, and the manual. `places` are the rectangles of the
+    /// visible panels.
     pub(crate) fn ui(&mut self, ui: &Ui, theme: &Theme, places: &[(PanelName, Rect)]) {
         let by_key = self.asked.is_some();
         if let Some(panel) = self.asked.take() {
@@ -65,7 +64,7 @@ impl Help {
         self.manual.ui(ui, theme);
     }
 
-    /// Draws the manual where no log is open, and reads its keys.
+    /// Draws the manual if no log is open, and handles its keys.
     pub(crate) fn welcome_ui(&mut self, ui: &Ui, theme: &Theme) {
         let (opens, closes) = ui.input_mut(|input| {
             let opens = input.consume_key(Modifiers::SHIFT, Key::F1) || input.consume_key(Modifiers::NONE, Key::F1);
@@ -110,7 +109,7 @@ impl Help {
     }
 }
 
-/// The button that opens the popup about a panel.
+/// Draws the button that opens the popup about a panel.
 pub(crate) fn button_ui(ui: &mut Ui, theme: &Theme, panel: PanelName) -> bool {
     let sign = RichText::new("?").color(theme.text_weak);
     let button = ui.add(Button::new(sign).small().min_size(vec2(BUTTON, 16.0)));

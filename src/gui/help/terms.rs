@@ -1,22 +1,20 @@
-//! The shown quantities with their explanations: what it is, its unit, and where it comes from.
+//! Shown quantities with their definition, unit and source.
 
-/// A shown quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Term {
-    /// Its name in the window.
+    /// Name in the window.
     pub(crate) name: &'static str,
-    /// What it is, its unit, and where it comes from.
+    /// Definition, unit and source.
     pub(crate) meaning: &'static str,
 }
 
-/// Constants of the terms, and a list of all.
+/// Declares the terms as constants, and a list of all.
 macro_rules! terms {
     ($($constant:ident: $name:literal => $meaning:literal;)*) => {
         $(
             #[doc = concat!("The quantity `", $name, "`.")]
             pub(crate) const $constant: Term = Term { name: $name, meaning: $meaning };
         )*
-        /// All terms of this list.
         #[cfg(test)]
         pub(super) const ALL: &[Term] = &[$($constant),*];
     };
@@ -64,7 +62,7 @@ pub(crate) mod feature {
         FLOW: "flow, px" => "Distance between the feature's pixels in the previous image and in this one.";
         ANCHOR: "anchor frame" => "Number of the image whose first observation anchors the landmark's inverse depth.";
         DEPTH: "depth, m" => "Depth along the optical axis of the anchor camera, m: the reciprocal of the estimated inverse depth.";
-        STATE: "state" => "Whether the solve used the feature, and whether it was rejected as an outlier afterwards.";
+        STATE: "state" => "Used in the solve, not used, or rejected as an outlier after the solve.";
         LANDMARK: "landmark position, m" => "Position of the landmark in the world of the run, m, from anchor pose, extrinsics and inverse depth.";
     }
 }
@@ -196,12 +194,12 @@ pub(crate) mod factors {
         IMU: "IMU" => "Preintegrated IMU samples between two frames, whitened by the noise densities of the rig.";
         ENCODER: "encoder" => "Joint angles minus encoder readings over the encoder σ of the rig.";
         CALIBRATION_PRIOR: "calibration prior" => "Calibration minus the value of the rig over the prior σ of the rig.";
-        MARGINALIZATION_PRIOR: "marginalization prior" => "What the frames that left the window say about those in it.";
+        MARGINALIZATION_PRIOR: "marginalization prior" => "Information of the frames that left the window about the frames in it.";
         ZERO_VELOCITY: "zero velocity" => "Zero-velocity update (ZUPT) of a stationary vehicle.";
     }
 }
 
-/// The status bar, the caption of the image, the scene's table, and what other panels show once.
+/// The status bar, the caption of the image, the scene's table, and terms that other panels show once.
 pub(crate) mod window {
     use super::Term;
 
@@ -216,16 +214,16 @@ pub(crate) mod window {
         CHAIN_FRAMES: "chain frames" => "Frames of the chain: I IMU, B base, J2, J3 … after each joint, E end effector, C camera. Axes x red, y green, z blue; dashed: ground truth.";
         CHAIN_ERROR: "extrinsics error" => "Distance and angle between imu_from_camera of the estimate and of the ground truth at the joint angles of the cursor.";
         SCENE_LEGEND: "scene legend" => "Distance between the estimated position at the cursor and the ground truth, m, after alignment in yaw and position. Landmarks are coloured by their height.";
-        INITIALIZATION: "initialization" => "What the last attempt of the initialization waits for; the measured value and its threshold are in the inspector.";
+        INITIALIZATION: "initialization" => "Unmet condition of the last initialization attempt; measured value and threshold are in the inspector.";
         MECHANISM: "mechanism" => "Chain of joints from the rig, or a standard one.";
         MOTION: "motion" => "Motion of vehicle and joints in the synthetic window.";
-        JOINT_ANGLES: "joint angles" => "Whether joint angles are known, measured by encoders of this σ in degrees, or unknowns.";
-        POSES: "poses" => "Whether the poses are known, or follow from IMU samples with the noise of the rig.";
+        JOINT_ANGLES: "joint angles" => "Joint angles: known, measured by encoders of this σ in degrees, or unknown.";
+        POSES: "poses" => "Poses: known, or estimated from IMU samples with the noise of the rig.";
         VERDICT: "verdict" => "Structural rank: directions that the measurements of the window constrain in principle. Informed rank: those with at least the information of a prior of 10° or 3 cm.";
         LEAST_OBSERVABLE: "least observable" => "Direction with the smallest singular value, by the parameters with the largest weights.";
         RANK_DEFICIT: "rank deficit" => "Unobservable directions by cause: parameterization, stationary joints, free joint angles, motion of the vehicle.";
         SINGULARITY_MARGIN: "singularity margin" => "Distance of the chain from a singularity of its parameterization: 1 far, 0 singular. The second value is that of the other minimal parameterization.";
-        SPURIOUS: "spurious information" => "What priors claim about directions that no measurement observes, as a singular value (1: σ of 10° or 3 cm).";
+        SPURIOUS: "spurious information" => "Information of the priors on directions that no measurement constrains, as a singular value (1: σ of 10° or 3 cm).";
         RANKS_OVER_TIME: "ranks over time" => "Informed rank of each run by step, and faint the structural rank (rank.csv).";
         ASSUMPTIONS: "assumptions" => "Synthetic window of the experiment: motion, knowledge of joint angles and poses, number of frames and landmarks. No log is used.";
         JACOBIAN_NORM: "block norm" => "Frobenius norm of a block of the whitened Jacobian: change of the residuals in σ per 10°, 3 cm, 0.1 m/s, 1 °/s, 0.1 m/s² or 10 % of the inverse depth.";

@@ -1,11 +1,10 @@
-//! The observations in the image at the cursor, one feature per row.
+//! Observations in the image at the cursor; one feature per row.
 
 use super::ImagePanel;
 use crate::gui::PanelContext;
 use crate::gui::csv_table::{CsvTable, Table, number};
 
 impl CsvTable for ImagePanel {
-    /// The features of the image at the cursor.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let Some(run) = ctx.selected_run() else { return String::new() };
         let mut table = Table::new([

@@ -16,6 +16,7 @@ use self::model::ImageModel;
 pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
 use super::accessible::describe;
+use super::convergence::empty_ui;
 use super::copied_value::offer;
 use super::help::terms::window;
 use super::pan_zoom::PanZoom;
@@ -28,12 +29,12 @@ use crate::session::FrameImage;
 const MAX_ZOOM: f32 = 16.0;
 /// Width in points of the row with all options.
 const OPTIONS_WIDTH: f32 = 395.0;
-/// Width in points of the option of a mask.
+/// Width in points of the mask option.
 const MASK_WIDTH: f32 = 60.0;
-/// The whole legend in words, for images too narrow for it.
+/// The legend as text, for images that are too narrow for the painted one.
 const LEGEND: &str = "Colour: age of the track in frames\nRing: used in the solve\nDot: tracked only\nCross: rejected\n\
     Line: residual (prediction − measurement), magnified";
-/// Period at which an image that is being decoded is asked for again.
+/// Period at which an image that is being decoded is requested again.
 const DECODING_PERIOD: Duration = Duration::from_millis(15);
 /// Height of legend and caption in points.
 const LINE_HEIGHT: f32 = 18.0;
@@ -44,13 +45,10 @@ pub struct ImagePanel {
     pub side: SolveSide,
     /// Magnification of the residuals.
     pub magnification: f32,
-    /// Draw residuals.
     pub residuals: bool,
-    /// Draw the track trails.
     pub trails: bool,
-    /// Write every feature's id.
     pub ids: bool,
-    /// Tint what the mask of the camera covers.
+    /// Tint the pixels that the mask of the camera covers.
     pub mask: bool,
     view: PanZoom,
     texture: Option<CachedTexture>,
@@ -73,13 +71,13 @@ impl Default for ImagePanel {
 
 struct CachedTexture {
     image: Arc<GrayImage>,
-    /// Whether the mask is tinted in it.
+    /// True if the mask is tinted in the texture.
     masked: bool,
     handle: TextureHandle,
 }
 
 impl ImagePanel {
-    /// A panel with the same view and no texture of a window.
+    /// A panel with the same view, without textures of a window.
     pub(in crate::gui) fn view_copy(&self) -> Self {
         let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *self;
         Self { side, magnification, residuals, trails, ids, mask, view, texture: None }
@@ -92,7 +90,7 @@ impl ImagePanel {
         *self = Self { side, magnification, residuals, trails, ids, mask, view, texture };
     }
 
-    /// Whether it has the view of another panel.
+    /// True if it has the view of another panel.
     pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
         let look = |panel: &Self| {
             let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *panel;
@@ -104,12 +102,12 @@ impl ImagePanel {
     /// Draws options, image, overlay and legend.
     pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
         let Some(run) = context.recording.runs.get(context.selection.run) else {
-            message_ui(ui, "No runs");
+            empty_ui(ui, "No runs");
             return;
         };
         self.controls_ui(ui, context, &run.spec.label);
         let Some(model) = ImageModel::at(run, context.cursor_ns) else {
-            message_ui(ui, "No image at or before the cursor");
+            empty_ui(ui, "No image at or before the cursor");
             return;
         };
         let size = ui.available_size() - vec2(0.0, 2.0 * LINE_HEIGHT + 2.0 * ui.spacing().item_spacing.y);
@@ -159,7 +157,7 @@ impl ImagePanel {
         });
     }
 
-    /// The options of the overlay: in a row where there is room, else in a menu.
+    /// Draws the options of the overlay: in a row where they fit, else in a menu.
     fn options_ui(&mut self, ui: &mut Ui, has_mask: bool) {
         ui.checkbox(&mut self.residuals, "Residuals")
             .on_hover_text("Reprojection residuals, prediction − measurement, px, magnified");
@@ -228,7 +226,7 @@ impl ImagePanel {
         self.pick_ui(ui, &painter, &place, response, context, model);
     }
 
-    /// Tooltip, click, and the selected feature.
+    /// Handles tooltip, click, and the selected feature.
     fn pick_ui(
         &self,
         ui: &Ui,
@@ -308,8 +306,4 @@ fn mask_of<'a>(context: &PanelContext<'a>) -> Option<&'a ImageMask> {
 fn fitted_size(area: Rect, size_px: [usize; 2]) -> Vec2 {
     let image = vec2(size_px[0].max(1) as f32, size_px[1].max(1) as f32);
     image * (area.width() / image.x).min(area.height() / image.y)
-}
-
-fn message_ui(ui: &mut Ui, text: &str) {
-    ui.centered_and_justified(|ui| ui.weak(text));
 }

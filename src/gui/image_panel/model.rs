@@ -1,4 +1,4 @@
-//! The content of the image panel for one step, collected from report and tracks.
+//! Content of the image panel for one step, collected from report and tracks.
 
 use nalgebra::Vector2;
 
@@ -7,40 +7,37 @@ use crate::frontend::{FeatureId, FrontEndStatistics};
 use crate::geometry::seconds_from_ns;
 use crate::session::RunRecord;
 
-/// Between two parts of the caption.
+/// Separator between two parts of the caption.
 const SEPARATOR: &str = " · ";
 
 /// Length of a track trail in images.
 const TRAIL_FRAMES: usize = 4;
 
-/// The state of the solve in which residuals are taken.
+/// State of the solve for which residuals are shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SolveSide {
-    /// Before the solve.
     Before,
-    /// After the solve.
     #[default]
     After,
 }
 
-/// One feature in the image.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FeatureMark {
     pub(super) id: FeatureId,
-    /// Number of earlier images with an observation of it.
+    /// Number of earlier images with an observation of this feature.
     pub(super) age: u32,
     /// Measured position in pixels.
     pub(super) measured_px: Vector2<f64>,
     /// Measured positions in earlier images, newest first.
     pub(super) trail_px: Vec<Vector2<f64>>,
-    /// Its result of the solve, `None` for a feature that was not solved.
+    /// Result of the solve; `None` for a feature that was not in the solve.
     pub(super) solved: Option<SolvedMark>,
 }
 
-/// The result of the solve for a feature.
+/// Result of the solve for a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SolvedMark {
-    /// Predicted minus measured position in this image, `None` in the image that anchors the feature.
+    /// Predicted minus measured position in this image; `None` in the image that anchors the feature.
     pub(super) residual_before_px: Option<Vector2<f64>>,
     pub(super) residual_after_px: Option<Vector2<f64>>,
     pub(super) chi2: f64,
@@ -59,7 +56,6 @@ impl SolvedMark {
     }
 }
 
-/// The overlay of one image.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ImageModel {
     pub(super) frame_index: usize,
@@ -78,7 +74,7 @@ pub(super) struct ImageModel {
 }
 
 impl ImageModel {
-    /// The overlay of the last step at or before the cursor, `None` before the first.
+    /// Overlay of the last step at or before the cursor; `None` before the first.
     pub(super) fn at(run: &RunRecord, cursor_ns: i64) -> Option<Self> {
         let after = run.steps.partition_point(|step| step.report.stamp_ns <= cursor_ns);
         let earlier = run.steps.get(..after)?;
@@ -157,12 +153,12 @@ impl ImageModel {
         parts
     }
 
-    /// The caption with all its parts.
+    /// The caption with all parts.
     pub(super) fn caption(&self) -> String {
         self.caption_parts().join(SEPARATOR)
     }
 
-    /// The caption with as many of the most important parts as `fits` accepts, at least the first.
+    /// The caption with as many of the most important parts as `fits` accepts; at least the first.
     pub(super) fn fitting_caption(&self, fits: impl Fn(&str) -> bool) -> String {
         let parts = self.caption_parts();
         let captions = (1..=parts.len()).rev().map(|count| parts[..count].join(SEPARATOR));
@@ -170,7 +166,7 @@ impl ImageModel {
     }
 }
 
-/// The tooltip of a feature: `17 · age 42 · …`, one value per line.
+/// Tooltip of a feature: `17 · age 42 · …`, one value per line.
 pub(super) fn description(mark: &FeatureMark) -> String {
     let mut lines = vec![
         format!("feature {}", mark.id.0),

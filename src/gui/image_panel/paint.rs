@@ -9,13 +9,13 @@ use crate::sensors::ImageMask;
 
 /// Period of the hatch over masked pixels, in image pixels.
 const HATCH_PX: usize = 12;
-/// Age in frames with the last colour of the map.
+/// Age in frames of the last colour of the map.
 const MAX_AGE: f64 = 100.0;
 /// Ages in the legend.
 const LEGEND_AGES: [u32; 4] = [0, 10, 40, 100];
-/// Radius of the keypoint marker of a solved feature in points, where the image is large enough.
+/// Maximum radius of the keypoint marker of a solved feature, in points.
 const MARKER_RADIUS: f32 = 4.0;
-/// Radius of the keypoint marker in image pixels, so that markers do not hide a small image.
+/// Maximum radius of the keypoint marker in image pixels, so that markers do not hide a small image.
 const MARKER_RADIUS_PX: f32 = 7.0;
 /// Radius in points of a feature that is only tracked.
 const DOT_RADIUS: f32 = 2.0;
@@ -24,7 +24,7 @@ const HALO: Color32 = Color32::from_black_alpha(150);
 /// Glow below dark marks, for dark regions of the image.
 const GLOW: Color32 = Color32::from_rgba_premultiplied(190, 190, 190, 190);
 
-/// The rectangle of the image on the screen.
+/// Rectangle of the image on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ImagePlacement {
     /// Rectangle of the whole image, which may be larger than the visible region.
@@ -79,13 +79,13 @@ pub(super) fn tint(image: &mut ColorImage, mask: &ImageMask) {
     }
 }
 
-/// The colour below a mark.
+/// Colour below a mark.
 fn halo_of(color: Color32) -> Color32 {
     let [red, green, blue, _] = color.to_array().map(u32::from);
     if 2 * red + 5 * green + blue < 900 { GLOW } else { HALO }
 }
 
-/// The theme of the overlay: the image is its background in every theme, so its colours are the same.
+/// Theme of the overlay: the same in every theme, because the image is its background.
 fn ink() -> Theme {
     Theme::of(ThemeName::Dark)
 }
@@ -94,7 +94,7 @@ fn residual_color() -> Color32 {
     ink().runs[1]
 }
 
-/// One feature: trail, keypoint marker, residual, cross, id.
+/// Draws one feature: trail, keypoint marker, residual, cross, id.
 pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureMark, options: &MarkOptions) {
     let at = place.position(&mark.measured_px);
     let (color, marker_radius) = (age_color(mark.age), place.marker_radius());
@@ -127,8 +127,7 @@ pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureM
     }
 }
 
-/// The predicted position of a feature for the chain moved along a direction: a cross, and a line from the prediction
-/// before.
+/// Draws the predicted position of a feature for the moved chain: a cross, and a line from the unmoved prediction.
 pub(super) fn moved_prediction(painter: &Painter, place: &ImagePlacement, now: &Vector2<f64>, moved: &Vector2<f64>) {
     let (from, to) = (place.position(now), place.position(moved));
     let reach = place.marker_radius() + 2.0;
@@ -143,7 +142,7 @@ fn upright_cross(painter: &Painter, at: Pos2, reach: f32, stroke: Stroke) {
     painter.line_segment([at - vec2(0.0, reach), at + vec2(0.0, reach)], stroke);
 }
 
-/// A line from the measurement to the (magnified) prediction, with a diamond at its end.
+/// Draws a line from the measurement to the (magnified) prediction, with a diamond at its end.
 fn residual_arrow(painter: &Painter, from: Pos2, tip: Pos2) {
     let color = residual_color();
     painter.line_segment([from, tip], Stroke::new(3.0, HALO));
@@ -153,7 +152,7 @@ fn residual_arrow(painter: &Painter, from: Pos2, tip: Pos2) {
     painter.add(Shape::convex_polygon(diamond.to_vec(), color, Stroke::NONE));
 }
 
-/// The mark of a rejected feature.
+/// Draws the mark of a rejected feature.
 fn cross(painter: &Painter, at: Pos2, radius: f32) {
     let arm = radius * std::f32::consts::FRAC_1_SQRT_2;
     for stroke in [Stroke::new(4.0, HALO), Stroke::new(2.0, ink().error)] {
@@ -162,14 +161,14 @@ fn cross(painter: &Painter, at: Pos2, radius: f32) {
     }
 }
 
-/// A circle around the selected feature.
+/// Draws a circle around the selected feature.
 pub(super) fn selection(painter: &Painter, place: &ImagePlacement, at: Pos2) {
     let radius = place.marker_radius() + 5.0;
     painter.circle_stroke(at, radius, Stroke::new(4.0, HALO));
     painter.circle_stroke(at, radius, Stroke::new(2.0, ink().cursor));
 }
 
-/// A text on the image with a dark background.
+/// Draws a text on the image with a dark background; returns its rectangle.
 pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) -> Rect {
     let galley = painter.layout_no_wrap(text.to_owned(), theme::label_font(), ink().text_strong);
     let rect = align.anchor_size(at, galley.size());
@@ -178,9 +177,9 @@ pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) -> R
     rect
 }
 
-/// The legend of the marks in one line; entries that do not fit are omitted from the right.
+/// Draws the legend of the marks in one line; entries that do not fit are omitted from the right.
 ///
-/// `moved`: predictions with a moved chain are drawn.
+/// `moved`: predictions of a moved chain are drawn.
 pub(super) fn legend(painter: &Painter, rect: Rect, theme: &Theme, options: &MarkOptions, moved: bool) {
     let painter = painter.with_clip_rect(rect);
     let mut pen = LegendPen { painter: &painter, theme, at: rect.left_center(), end: rect.right() };
@@ -221,7 +220,6 @@ fn residual_arrow_plain(painter: &Painter, from: Pos2, tip: Pos2, theme: &Theme)
     painter.add(Shape::convex_polygon(diamond.to_vec(), color, Stroke::NONE));
 }
 
-/// Writes the legend from left to right.
 struct LegendPen<'a> {
     painter: &'a Painter,
     theme: &'a Theme,

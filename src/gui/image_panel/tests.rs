@@ -15,7 +15,7 @@ use crate::gui::{ImageSource, Selection};
 use crate::sensors::{CameraMask, GrayImage, ImageMask};
 use crate::session::{FrameImage, Recording, StepRecord};
 
-/// A recording of 80 frames; the estimator tracks in the last one.
+/// A recording of 80 frames with tracking in the last one.
 fn recording() -> Recording {
     sample_recording_of(80, &["auto"])
 }
@@ -120,7 +120,7 @@ fn a_click_selects_the_feature_under_it() {
         (ImagePanel::default(), Selection::default()),
     );
     harness.run();
-    // The image fills width or height of its area; a feature is searched by trying positions.
+    // The image fills width or height of its area; the position of a feature is found by trying positions.
     let area = harness.ctx.globally_used_rect();
     // The tooltip is also the accessible description of the image.
     let tooltip = |node: &AccessKitNode<'_>| node.description().is_some_and(|text| text.contains("residual after"));

@@ -1,4 +1,4 @@
-//! The state at the cursor, one quantity per row.
+//! State at the cursor; one quantity per row.
 
 use super::InspectorPanel;
 use crate::geometry::seconds_from_ns;

@@ -1,4 +1,4 @@
-//! Links through the step's Jacobian: residuals, their features, and the parameters that they depend on.
+//! Links by the step's Jacobian: residuals, their features, and the parameters on which they depend.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::session::{RunRecord, StepRecord};
 /// Number of links shown for a feature or parameter.
 const SHOWN: usize = 6;
 
-/// The Jacobian of the step that was requested last.
+/// Jacobian of the step that was requested last.
 #[derive(Debug, Default)]
 pub(super) struct Links {
     of: Option<(Arc<StepRecord>, Option<StepJacobian>)>,
@@ -32,7 +32,7 @@ impl Links {
         self.of.as_ref()?.1.as_ref()
     }
 
-    /// The features whose residuals depend most on a parameter; a click selects one.
+    /// Lists the features whose residuals depend most on a parameter; a click selects one.
     pub(super) fn of_parameter_ui(
         &mut self,
         ui: &mut Ui,
@@ -62,7 +62,7 @@ impl Links {
         }
     }
 
-    /// The parameters on which a feature's residuals depend most; a click selects one.
+    /// Lists the parameters on which a feature's residuals depend most; a click selects one.
     pub(super) fn of_feature_ui(
         &mut self,
         ui: &mut Ui,
@@ -90,7 +90,7 @@ impl Links {
     }
 }
 
-/// Links with the norms of their blocks; returns the clicked one.
+/// Draws links with the norms of their blocks; returns the clicked one.
 fn links_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -118,7 +118,7 @@ fn links_ui(
     clicked
 }
 
-/// The residuals of a feature with their derivatives with respect to a parameter.
+/// Draws the residuals of a feature with their derivatives with respect to a parameter.
 pub(super) fn block_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,

@@ -1,4 +1,4 @@
-//! The inspector: the values of the selection and of the step at the cursor.
+//! Inspector panel: values of the selection and of the step at the cursor.
 
 mod csv;
 mod feature;
@@ -17,10 +17,9 @@ use super::help::terms::Term;
 use super::theme::Theme;
 use crate::session::{RunRecord, StepRecord};
 
-/// State of the inspector.
 #[derive(Debug, Default)]
 pub struct InspectorPanel {
-    /// Whether stage times are shown. They differ between runs; screenshots must not.
+    /// Show stage times. They differ between executions, so screenshots omit them.
     pub show_times: bool,
     links: Links,
 }
@@ -75,9 +74,9 @@ impl InspectorPanel {
     }
 }
 
-/// A section under its title, which opens and closes it in the window.
+/// Draws a section with a title; in the window a click on the title opens or closes it.
 fn section_ui(ui: &mut Ui, theme: &Theme, figure: bool, title: &str, contents: impl FnOnce(&mut Ui)) {
-    // The first word identifies the section: it stays open or closed when another parameter or frame is shown.
+    // The id uses only the first word, so that a section stays open or closed when another parameter or frame is shown.
     let salt = title.split(' ').next().unwrap_or(title);
     let title = RichText::new(title).strong().color(theme.text_strong);
     if figure {
@@ -88,7 +87,7 @@ fn section_ui(ui: &mut Ui, theme: &Theme, figure: bool, title: &str, contents: i
     CollapsingHeader::new(title).id_salt(salt).default_open(true).show_unindented(ui, contents);
 }
 
-/// A row: the quantity and its values.
+/// A quantity and its values.
 type Row = (Term, Vec<String>);
 
 /// Aligned rows of a name and its values; hovering either explains the quantity.
@@ -110,7 +109,7 @@ fn table_ui(ui: &mut Ui, theme: &Theme, salt: &str, columns: &[Term], rows: impl
     headed_table_ui(ui, theme, salt, &headings, rows);
 }
 
-/// The same with headings that differ from the names of the quantities.
+/// Like [`table_ui`], with headings that differ from the names of the quantities.
 fn headed_table_ui(
     ui: &mut Ui,
     theme: &Theme,

@@ -12,7 +12,6 @@ use crate::gui::theme::Theme;
 use crate::gui::units::{fixed, seconds, significant};
 use crate::session::{RunRecord, StepRecord};
 
-/// State of the newest frame.
 pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord) {
     let report = &step.report;
     let delay_ms = (step.log_time_ns - report.stamp_ns) as f64 * 1e-6;
@@ -71,7 +70,7 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
     }
 }
 
-/// The events of the step with the values that caused them.
+/// Lists the events of the step with the values that caused them.
 pub(super) fn events_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     if report.events.is_empty() && report.warnings.is_empty() {
         ui.label(RichText::new("No events in this step").color(theme.text_weak));
@@ -99,7 +98,6 @@ pub(super) fn events_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     }
 }
 
-/// The iterations of the solver.
 pub(super) fn iterations_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     if report.iterations.is_empty() {
         ui.label(RichText::new("No solve in this step").color(theme.text_weak));
@@ -126,7 +124,7 @@ pub(super) fn iterations_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     table_ui(ui, theme, "iterations", &columns, lines);
 }
 
-/// Stage times in milliseconds.
+/// Table of the stage times in milliseconds.
 pub(super) fn times_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     let stages = &report.times;
     let row = |term: Term, value: f64| -> Row { (term, vec![format!("{} ms", fixed(value, 1))]) };

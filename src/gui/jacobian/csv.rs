@@ -1,4 +1,4 @@
-//! The norms of the Jacobian's blocks, one factor per row.
+//! Norms of the Jacobian's blocks; one factor per row.
 
 use super::JacobianPanel;
 use super::{cameras, column_name, name_of};

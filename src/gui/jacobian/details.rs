@@ -1,4 +1,4 @@
-//! The values of a block and of its residuals.
+//! Values of a block and of its residuals.
 
 use egui::{Label, RichText, ScrollArea, Ui, vec2};
 
@@ -25,7 +25,7 @@ pub(super) fn headline(model: &JacobianModel, row: usize, column: usize) -> Stri
     format!("{name}: {} {} ({size})", significant(f64::from(norm)), unit_text(block, model.joint_count))
 }
 
-/// The values of the selected row, column or block.
+/// Draws the values of the selected row, column or block.
 pub(super) fn ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -124,7 +124,7 @@ fn block_ui(
     }
 }
 
-/// A row for each observation: its residual, and the derivatives of the pixel position with respect to the unknown.
+/// Table with a row per observation: its residual, and the derivatives of the pixel with respect to the unknown.
 fn observations_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -162,7 +162,8 @@ fn observations_ui(
     numbers_ui(ui, ctx, &heads, lines);
 }
 
-/// A row for each encoder: its reading, its residual, and the derivatives of the residual with respect to the unknown.
+/// Table with a row per encoder: its reading, its residual, and the derivatives of the residual with respect to the
+/// unknown.
 fn readings_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -200,7 +201,7 @@ fn readings_ui(
     );
 }
 
-/// The scalar columns of a block: the label of each, and its shown units per stored unit.
+/// Scalar columns of a block: label, and shown units per stored unit.
 fn scalar_columns(block: &ColumnBlock, joint_count: usize) -> Vec<(String, f64)> {
     let shown = |name: &str, dimension: Dimension| {
         let shown = Shown::of(dimension);

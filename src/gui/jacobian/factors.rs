@@ -1,4 +1,4 @@
-//! The rows of the factors other than reprojection. A record has only the norms of their blocks, so the session
+//! Rows of the factors other than reprojection. A record contains only the norms of their blocks, so the session
 //! recomputes the rows of a selected factor.
 
 use egui::{RichText, Ui};
@@ -12,7 +12,7 @@ use crate::gui::help::terms::jacobian as terms;
 use crate::gui::units::{Shown, fixed, significant};
 use crate::session::{Command, RunRecord};
 
-/// Maximum number of rows shown; a marginalization prior has over a hundred, the largest come first.
+/// Maximum number of rows shown, the largest first; a marginalization prior has more than a hundred.
 const MAX_ROWS: usize = 40;
 
 /// Requests the rows of the selected factor of step `number` if the record does not have them.
@@ -25,7 +25,7 @@ pub(super) fn request(ctx: &mut PanelContext<'_>, run: &RunRecord, number: Optio
     }
 }
 
-/// A row for each residual of the block's factor: the residual, and its derivatives with respect to the unknowns.
+/// Table with a row per residual of the block's factor: the residual, and its derivatives with respect to the unknowns.
 pub(super) fn block_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -79,8 +79,7 @@ pub(super) fn block_ui(
     numbers_ui(ui, ctx, &heads, lines);
 }
 
-/// The scalar columns of a block: the label of the derivative with respect to each, and its shown units per stored
-/// unit.
+/// Scalar columns of a block: label of the derivative, and shown units per stored unit.
 fn scalar_columns(block: &ColumnBlock, joint_count: usize) -> Vec<(String, f64)> {
     let shown = |name: &str, dimension: Dimension| {
         let shown = Shown::of(dimension);

@@ -32,10 +32,11 @@ const MAX_ZOOM: f32 = 40.0;
 const ROW_NAMES: f32 = 104.0;
 /// Height of the legend below the matrix in points.
 const LEGEND: f32 = 18.0;
-/// Panel height from which the values of the selected block are shown, and their ratio of it.
+/// Panel height in points from which the values of the selected block are shown, and the fraction of the height that
+/// they take.
 const MIN_HEIGHT_WITH_DETAILS: f32 = 300.0;
 const DETAILS_RATIO: f32 = 0.3;
-/// Height of the line about a row or a column in points.
+/// Height in points of the line about a row or a column.
 const DETAILS_LINE: f32 = 34.0;
 
 /// State of the Jacobian panel: the visible region and the selected block.
@@ -44,9 +45,9 @@ pub struct JacobianPanel {
     model: Option<JacobianModel>,
     mesh: paint::CachedMesh,
     view: PanZoom,
-    /// The selected row, when it is not a feature (features are selected in all panels).
+    /// Selected row if it is not a feature (features are selected in all panels).
     row: Option<JacobianFactor>,
-    /// The selected column, when it is not a parameter.
+    /// Selected column if it is not a parameter.
     column: Option<ColumnId>,
 }
 
@@ -61,7 +62,7 @@ impl JacobianPanel {
         if !self.model.as_ref().is_some_and(|model| Arc::ptr_eq(&model.step, step)) {
             self.model = JacobianModel::of_step(&ctx.recording.rig, &ctx.names(), run, step);
         }
-        // Taken out for drawing, so that the rest of the panel can change.
+        // Taken out for drawing, so that the rest of the panel can be mutated.
         let Some(model) = self.model.take() else {
             let why = if step.summary_only { "Recomputing this step…" } else { "No linearization in this step" };
             empty_ui(ui, why);
@@ -121,7 +122,7 @@ impl JacobianPanel {
         }
     }
 
-    /// The block that is selected here or follows from the common selection: a row, a column, or both.
+    /// Block that is selected in this panel or by the common selection: a row, a column, or both.
     fn selected_block(&self, ctx: &PanelContext<'_>, model: &JacobianModel) -> Option<(Option<usize>, Option<usize>)> {
         let wanted = self.row.or_else(|| ctx.selection.feature.map(JacobianFactor::Feature));
         let row = wanted.and_then(|wanted| model.jacobian.rows.iter().position(|row| row.factor == wanted));
@@ -130,7 +131,7 @@ impl JacobianPanel {
         (row.is_some() || column.is_some()).then_some((row, column))
     }
 
-    /// A click selects features and parameters in all panels, other rows and columns here.
+    /// Applies a click: features and parameters are selected in all panels, other rows and columns only here.
     fn select(&mut self, ctx: &mut PanelContext<'_>, model: &JacobianModel, block: Option<(usize, usize)>) {
         (self.row, self.column) = (None, None);
         (ctx.selection.feature, ctx.selection.parameter) = (None, None);
@@ -146,7 +147,7 @@ impl JacobianPanel {
     }
 }
 
-/// The row and column at a screen position.
+/// Row and column at a screen position.
 fn block_at(model: &JacobianModel, place: Rect, pointer: Pos2) -> Option<(usize, usize)> {
     let fraction = (pointer - place.min) / place.size();
     Some((model.rows.at(fraction.y)?, model.columns.at(fraction.x)?))

@@ -13,14 +13,14 @@ use crate::session::{RunRecord, StepRecord};
 /// Maximum number of decades of the colour map.
 const MAX_DECADES: f64 = 6.0;
 
-/// Label of the calibration columns when they are of one group.
+/// Label of the calibration columns if they are of one group.
 pub(super) const ONE_GROUP: &str = "calibration";
 
 /// A row or a column of blocks, or a group of them.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Strip {
     pub(super) name: String,
-    /// Begin and end as fractions of the axis.
+    /// Start and end as fractions of the axis.
     pub(super) begin: f32,
     pub(super) end: f32,
 }
@@ -32,10 +32,10 @@ pub(super) struct Axis {
     pub(super) groups: Vec<Strip>,
 }
 
-/// The matrix of one step.
+/// The block matrix of one step.
 #[derive(Clone, Debug)]
 pub(super) struct JacobianModel {
-    /// The step. It is kept so that its address stays unique.
+    /// Kept so that its address stays unique.
     pub(super) step: Arc<StepRecord>,
     pub(super) jacobian: StepJacobian,
     pub(super) rows: Axis,
@@ -46,7 +46,7 @@ pub(super) struct JacobianModel {
     pub(super) joint_count: usize,
 }
 
-/// The cameras of a run in the order of its features, the main camera first.
+/// Cameras of a run in the order of its features, the main camera first.
 pub(in crate::gui) fn cameras<'a>(rig: &'a Rig, run: &RunRecord, step: &StepRecord) -> Vec<&'a CameraModel> {
     let rigid = step.report.calibration.rigid_cameras.iter().map(|(key, _)| key);
     let keys = std::iter::once(&run.camera_key).chain(rigid);
@@ -61,7 +61,7 @@ impl JacobianModel {
         format!("{rows} and {columns} of blocks, norms from 1e{:.0} to 1e{:.0}", self.decades.0, self.decades.1)
     }
 
-    /// The matrix of a step, `None` if it has none.
+    /// The matrix of a step; `None` if it has no linearization.
     pub(super) fn of_step(rig: &Rig, names: &ParameterNames, run: &RunRecord, step: &Arc<StepRecord>) -> Option<Self> {
         let jacobian = step.report.jacobian(&cameras(rig, run, step))?;
         let norms = jacobian.rows.iter().flat_map(|row| &row.norms).map(|(_, norm)| f64::from(*norm).log10());
@@ -88,7 +88,7 @@ impl JacobianModel {
         ((f64::from(norm).log10() - low) / (high - low)).clamp(0.0, 1.0)
     }
 
-    /// The norm of a block, 0 for an empty one.
+    /// Norm of a block, 0 for an empty one.
     pub(super) fn norm(&self, row: usize, column: usize) -> f32 {
         let row = self.jacobian.rows.get(row).map_or(&[][..], |row| &row.norms);
         row.iter().find(|(known, _)| usize::from(*known) == column).map_or(0.0, |(_, norm)| *norm)
@@ -101,7 +101,7 @@ impl Axis {
         self.strips.iter().position(|strip| strip.begin <= fraction && fraction < strip.end)
     }
 
-    /// Lays out rows or columns, given name, group and weight of each: group after group, within a group in sequence.
+    /// Lays out rows or columns, given the name, group and weight of each: group after group, within a group in order.
     fn lay_out(strips: impl Iterator<Item = (String, usize, f32)>, group_names: &[String]) -> Self {
         let strips: Vec<_> = strips.collect();
         let total: f32 = strips.iter().map(|(_, _, weight)| weight).sum();
@@ -125,7 +125,6 @@ impl Axis {
     }
 }
 
-/// Name of a row of blocks.
 pub(in crate::gui) fn name_of(factor: &JacobianFactor) -> String {
     match factor {
         JacobianFactor::Feature(id) => format!("feature {}", id.0),
@@ -137,9 +136,9 @@ pub(in crate::gui) fn name_of(factor: &JacobianFactor) -> String {
     }
 }
 
-/// Features at the top, the other factors below; each group has a minimum height.
+/// Lays out features at the top, the other factors below; each group has a minimum height.
 fn rows_of(jacobian: &StepJacobian) -> Axis {
-    /// Ratios of the height for visual, IMU and encoder rows and priors.
+    /// Fractions of the height for visual, IMU and encoder rows and priors.
     const HEIGHT_RATIOS: [f32; 4] = [0.62, 0.15, 0.13, 0.1];
     let group_of = |factor: &JacobianFactor| match factor {
         JacobianFactor::Feature(_) => 0,
@@ -164,8 +163,8 @@ fn rows_of(jacobian: &StepJacobian) -> Axis {
     Axis::lay_out(strips, &names)
 }
 
-/// Calibration columns are wide, so that they can be read one by one; states of the frames are narrow. The calibration is
-/// split by the group of its parameters where it has several.
+/// Lays out the columns: wide for the calibration, so that they can be read one by one, narrow for the states of the
+/// frames. The calibration is split by the group of its parameters if it has several.
 pub(super) fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> Axis {
     let mut groups = ParameterGroup::ALL.map(|group| group.name().to_owned()).to_vec();
     groups.extend(["joints", "poses", "velocities, biases", "depth"].map(str::to_owned));
@@ -190,7 +189,6 @@ pub(super) fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> Axi
     Axis::lay_out(strips, &groups)
 }
 
-/// Name of a column of blocks.
 pub(in crate::gui) fn column_name(id: ColumnId, names: &ParameterNames) -> String {
     match id {
         ColumnId::Calibration(parameter) => names.name(parameter),
@@ -201,7 +199,8 @@ pub(in crate::gui) fn column_name(id: ColumnId, names: &ParameterNames) -> Strin
     }
 }
 
-/// Names and shown units of the columns of a block of joints: angles, then with a rolling shutter rates and accelerations.
+/// Names and shown units of the columns of a block of joints: angles, then with a rolling shutter rates and
+/// accelerations.
 pub(super) fn joint_columns(columns: usize, joint_count: usize) -> Vec<(String, &'static str)> {
     let joints = joint_count.clamp(1, columns.max(1));
     let derivatives = [("", "°"), ("'", "(°/s)"), ("''", "(°/s²)")];
@@ -212,12 +211,12 @@ pub(super) fn joint_columns(columns: usize, joint_count: usize) -> Vec<(String, 
     (0..columns).map(of).collect()
 }
 
-/// A unit per shown unit, `px/mm`; per one where a number has no unit.
+/// Text of one per shown unit, `px/mm`; per one if the quantity has no unit.
 pub(super) fn per(unit: &str, shown: Shown) -> String {
     format!("{unit}/{}", if shown.unit.is_empty() { "1" } else { shown.unit.trim() })
 }
 
-/// The unit of a column in which the norms are given.
+/// Unit of a column in which the norms are given.
 pub(super) fn unit_text(block: &ColumnBlock, joint_count: usize) -> &'static str {
     match block.id {
         ColumnId::Calibration(parameter) => match (parameter.group(), parameter.dimension()) {

@@ -1,11 +1,11 @@
-//! The table of values of a block.
+//! Table of the values of a block.
 
 use egui::{Grid, RichText, Ui, vec2};
 
 use crate::gui::PanelContext;
 use crate::gui::help::terms::Term;
 
-/// A table of numbers with column headings; hovering a cell explains its column.
+/// Draws a table of numbers with column headings; hovering a cell explains its column.
 pub(super) fn numbers_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,

@@ -14,7 +14,7 @@ use crate::session::StepRecord;
 /// Minimum width in points of a row or column with a name.
 const MIN_NAMED_WIDTH: f32 = 11.0;
 
-/// The blocks as triangles, cached while step, rectangle and colours stay the same.
+/// Blocks as triangles, cached while step, rectangle and colours stay the same.
 #[derive(Debug, Default)]
 pub(super) struct CachedMesh {
     of: Option<(Arc<StepRecord>, Rect, Rect, ThemeName)>,
@@ -22,7 +22,7 @@ pub(super) struct CachedMesh {
 }
 
 impl CachedMesh {
-    /// Paints all blocks that are not zero.
+    /// Paints all non-zero blocks.
     pub(super) fn paint(&mut self, ui: &Ui, theme: &Theme, area: Rect, place: Rect, model: &JacobianModel) {
         let painter = ui.painter_at(area);
         paint_ground(&painter, theme, area);
@@ -61,9 +61,9 @@ fn mesh_of(theme: &Theme, area: Rect, place: Rect, model: &JacobianModel) -> Mes
     mesh
 }
 
-/// Height of the column names in points: that of the names of a chain, and more for longer names of sensors.
+/// Height of the column names in points; larger than that of a chain if the names of sensors are longer.
 pub(super) fn column_names_height(ui: &Ui, model: &JacobianModel) -> f32 {
-    /// Height with the columns of a chain, and that of the names of groups.
+    /// Height with the columns of a chain, and height of the names of groups, in points.
     const OF_CHAIN: f32 = 68.0;
     const GROUP: f32 = 20.0;
     if model.columns.groups.first().is_none_or(|group| group.name == ONE_GROUP) {
@@ -76,12 +76,12 @@ pub(super) fn column_names_height(ui: &Ui, model: &JacobianModel) -> f32 {
     OF_CHAIN.max(GROUP + model.columns.strips.iter().map(width).fold(0.0, f32::max))
 }
 
-/// Name of a column under that of its group: frames are labelled by their number.
+/// Name of a column under the name of its group; frames are labelled by their number.
 fn short_name(strip: &Strip) -> &str {
     strip.name.rsplit(' ').next().unwrap_or(&strip.name)
 }
 
-/// The names on both axes, and the selection.
+/// Draws the names on both axes, and the selection.
 pub(super) fn axes(
     ui: &Ui,
     theme: &Theme,
@@ -174,7 +174,7 @@ fn column_names(painter: &Painter, theme: &Theme, top: Rect, place: Rect, column
     }
 }
 
-/// Lines from the block under the pointer to both axes.
+/// Draws lines from the block under the pointer to both axes.
 pub(super) fn hover(ui: &Ui, theme: &Theme, area: Rect, place: Rect, model: &JacobianModel, block: (usize, usize)) {
     let rect = rect_of(model, place, block.0, block.1);
     let painter = ui.painter_at(area);
@@ -184,7 +184,7 @@ pub(super) fn hover(ui: &Ui, theme: &Theme, area: Rect, place: Rect, model: &Jac
     painter.rect_stroke(rect, 0.0, Stroke::new(1.5, theme.cursor), StrokeKind::Outside);
 }
 
-/// The colour map with powers of ten.
+/// Draws the colour map with powers of ten.
 pub(super) fn legend(ui: &Ui, theme: &Theme, rect: Rect, model: &JacobianModel) {
     const WIDTH: f32 = 150.0;
     const STEPS: u16 = 30;

@@ -83,7 +83,7 @@ fn axes_are_whole_and_in_order() {
 #[test]
 fn columns_are_in_groups_and_joints_have_rates() {
     let mut jacobian = model().jacobian;
-    // A clock between the columns of the chain, as that of the main camera before a rigid one.
+    // A time offset between the columns of the chain, as that of the main camera before a rigid one.
     let place = 4;
     for (column, name) in [(place, "readout"), (place + 1, "gyroscope.sx"), (place + 2, "fx")] {
         jacobian.columns[column].id = ColumnId::Calibration(parameter(name));
@@ -118,7 +118,7 @@ fn a_click_selects_feature_and_parameter_and_shows_their_values() {
     assert_eq!((selection.feature, selection.parameter), (Some(id), Some(parameter("L2.alpha"))));
     assert!(harness.query_by_label_contains(&format!("feature {} × roll.alpha: ", id.0)).is_some());
     assert!(harness.query_by_label("∂u, px/°").is_some());
-    // A parameter selected in another panel is shown alone, with the rows of the largest norms.
+    // A parameter selected in another panel is shown as a column, with the rows of the largest norms.
     harness.state_mut().1 = Selection { parameter: Some(parameter("L1.alpha")), ..Selection::default() };
     harness.run_steps(2);
     assert!(harness.query_by_label_contains("yaw.alpha: non-zero in ").is_some());

@@ -9,7 +9,7 @@ use crate::gui::PanelContext;
 use crate::gui::help::terms::window;
 use crate::observability::laboratory::{LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
 
-/// Parameterizations that can be compared.
+/// Parameterizations to choose from.
 const PARAMETERIZATIONS: [Parameterization; 6] = Parameterization::ALL;
 
 /// Knowledge of the joint angles.
@@ -28,10 +28,9 @@ enum Poses {
     InertialBiasKnown,
 }
 
-/// The current choices.
 #[derive(Clone, Debug)]
 pub(super) struct Choices {
-    /// A mechanism's name, `None` for the rig's.
+    /// Name of a mechanism; `None` for the rig's.
     mechanism: Option<&'static str>,
     motion: LaboratoryMotion,
     parameterizations: [bool; PARAMETERIZATIONS.len()],
@@ -61,7 +60,6 @@ impl Default for Choices {
 }
 
 impl Choices {
-    /// Draws the choices.
     pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) {
         ui.horizontal_wrapped(|ui| {
             self.mechanism_ui(ui, ctx);
@@ -74,7 +72,7 @@ impl Choices {
                 ui.checkbox(chosen, parameterization.name());
             }
             ui.checkbox(&mut self.joint_offsets, "Joint offsets")
-                .on_hover_text("Whether the joint offsets are estimated, as calibration columns");
+                .on_hover_text("Estimate the joint offsets as calibration columns");
         });
         let names = self.mechanism(ctx).map(|mechanism| mechanism.joints).unwrap_or_default();
         self.frozen.resize(names.len(), false);
@@ -88,7 +86,7 @@ impl Choices {
         }
     }
 
-    /// The choices that the results do not state, as text.
+    /// Writes the choices that the results do not state.
     pub(super) fn summary_ui(&self, ui: &mut Ui, ctx: &PanelContext<'_>) {
         let rig = format!("rig {}", ctx.recording.rig.name);
         let mechanism = self.mechanism.map_or(rig, str::to_owned);

@@ -1,4 +1,4 @@
-//! The spectra of the compared parameterizations: one row per singular value or weight of a direction.
+//! Spectra of the compared parameterizations; one row per singular value or weight of a direction.
 
 use super::LaboratoryPanel;
 use crate::gui::PanelContext;

@@ -1,4 +1,4 @@
-//! The laboratory panel: which parameters a mechanism, its parameterizations and a motion make observable, without a
+//! Laboratory panel: observability of the parameters for a mechanism, its parameterizations and a motion, without a
 //! log.
 //!
 //! The experiments are those of `dcvins degeneracy`.
@@ -22,7 +22,7 @@ use crate::observability::laboratory::{LaboratoryReport, LaboratoryResult};
 /// State of the laboratory panel: choices and results.
 #[derive(Default)]
 pub struct LaboratoryPanel {
-    /// Whether experiments run on their own thread, as in the window; screenshots wait for them.
+    /// True if experiments run on another thread, as in the window; screenshots wait for them.
     pub in_background: bool,
     choices: Choices,
     worker: Worker,
@@ -89,7 +89,7 @@ impl LaboratoryPanel {
     }
 }
 
-/// The assumptions of the experiment in one sentence.
+/// Assumptions of the experiment in one sentence.
 fn assumptions(report: &LaboratoryReport) -> String {
     let frozen = if report.frozen_joints.is_empty() {
         String::new()

@@ -41,10 +41,10 @@ fn choose(harness: &mut Harness<'static, LaboratoryPanel>, list: &str, entry: &s
 #[test]
 fn experiments_have_the_results_of_the_command() {
     let mut harness = bench(false);
-    // The rig's mechanism with aggressive motion: only the parameterization loses rank.
+    // The rig's mechanism with aggressive motion: rank is lost only by the parameterization.
     assert!(harness.query_by_label("18 of 24").is_some());
     assert_eq!(harness.query_all_by_label("18 of 18").count(), 2);
-    // Another mechanism and motion, with the results of the command.
+    // Another mechanism and motion, with the results of the command line.
     choose(&mut harness, "Mechanism", "yaw-roll-pitch-ideal");
     choose(&mut harness, "Motion", "hover");
     let mechanism = Mechanism::named("yaw-roll-pitch-ideal").unwrap();

@@ -1,14 +1,13 @@
-//! Computes experiments, on their own thread or while the caller waits.
+//! Computes experiments on another thread or while the caller waits.
 //!
-//! An experiment consists of a mechanism, motions and joint readings alone: it has no log, no run and no step, so that
-//! it belongs neither to the session nor to its record, and the panel owns the thread.
+//! An experiment consists only of a mechanism, motions and joint readings, without log, run or step. It therefore
+//! belongs neither to the session nor to its record, and the panel owns the thread.
 
 use std::sync::mpsc::{Receiver, channel};
 use std::thread::Builder;
 
 use crate::observability::laboratory::{LaboratoryForm, LaboratoryResult, LaboratorySetup};
 
-/// A setup and the parameterizations to compare.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Experiment {
     pub(super) setup: LaboratorySetup,
@@ -48,7 +47,7 @@ impl Worker {
             let given = experiment.clone();
             let work = move || {
                 given.setup.run_each(&given.parameterizations, |result| {
-                    // The receiver is gone when another experiment was requested meanwhile.
+                    // The receiver has been dropped if another experiment was requested meanwhile.
                     sender.send(result).is_ok()
                 });
             };
@@ -60,17 +59,16 @@ impl Worker {
         self.results = experiment.setup.run_all(&experiment.parameterizations);
     }
 
-    /// Whether results are missing.
+    /// True if results are missing.
     pub(super) fn is_busy(&self) -> bool {
         self.coming.is_some()
     }
 
-    /// The results so far, and the number of parameterizations.
+    /// Results so far, and the number of parameterizations.
     pub(super) fn results(&self) -> (&[LaboratoryResult], usize) {
         (&self.results, self.asked.as_ref().map_or(0, |experiment| experiment.parameterizations.len()))
     }
 
-    /// The setup of the current experiment.
     pub(super) fn setup(&self) -> Option<&LaboratorySetup> {
         self.asked.as_ref().map(|experiment| &experiment.setup)
     }

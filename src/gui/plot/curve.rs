@@ -4,7 +4,7 @@ use egui::{Rangef, vec2};
 
 use super::{PlotArea, visible_segments};
 
-/// The inputs of a reduced curve; equal keys have equal curves.
+/// Inputs of a reduced curve; equal keys have equal curves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct CurveKey {
     epoch: u64,
@@ -89,7 +89,6 @@ impl StateCurve {
         }
     }
 
-    /// The ranges in screen coordinates.
     pub(crate) fn on_screen(&self, area: &PlotArea) -> impl Iterator<Item = Rangef> {
         let left = area.rect.left();
         self.segments.iter().map(move |segment| Rangef::new(left + segment.min, left + segment.max))
@@ -167,7 +166,7 @@ fn reduce(area: &PlotArea, stamps_ns: &[i64], values: &[f64]) -> Vec<Vec<(f32, f
     segments
 }
 
-/// One pixel column: rows and values of its extremes.
+/// Rows and values of the extremes of one pixel column.
 struct Column {
     x: f32,
     first: (usize, f64),
@@ -241,7 +240,7 @@ mod tests {
 
     #[test]
     fn a_band_keeps_both_edges_of_a_column_together() {
-        // Each edge has its extremes at its own rows, and in one place both are missing.
+        // Each edge has its extremes at different rows, and in one place both are missing.
         let stamps: Vec<i64> = (0..10_000).collect();
         let lower: Vec<f64> = stamps.iter().map(|row| -1.0 - f64::from((row * 7 % 13) as i32)).collect();
         let mut upper: Vec<f64> = stamps.iter().map(|row| 1.0 + f64::from((row * 5 % 11) as i32)).collect();
@@ -254,7 +253,6 @@ mod tests {
             assert!(segment.iter().all(|(_, low, high)| (*low, *high) == (-13.0, 11.0)), "the whole reach of a column");
         }
         assert!(band.segments.iter().map(Vec::len).sum::<usize>() <= 102);
-        // A few rows stay as they are.
         band.update(&area(100.0), 1, &[0, 5000], &[1.0, 2.0], &[3.0, 4.0]);
         assert_eq!(band.segments, [[(0.0, 1.0, 3.0), (50.0, 2.0, 4.0)]]);
     }

@@ -18,7 +18,6 @@ pub(crate) use ticks::{decimals_of_step, ticks};
 
 use super::theme::{self, RunStyle, Theme};
 
-/// Rectangle and ranges of a plot over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PlotArea {
     /// Screen rectangle in points.
@@ -34,8 +33,8 @@ pub(crate) struct PlotArea {
 }
 
 impl PlotArea {
-    /// Distance to the right of the left edge in points, limited to one width outside: dashes along a very long line
-    /// would take all memory.
+    /// Distance to the right of the left edge in points, limited to one plot width outside: dashes along a very long
+    /// line would exhaust the memory.
     pub(crate) fn offset_of(&self, stamp_ns: i64) -> f32 {
         let span_ns = self.end_ns.saturating_sub(self.begin_ns).max(1);
         let fraction = stamp_ns.saturating_sub(self.begin_ns) as f64 / span_ns as f64;
@@ -69,23 +68,23 @@ impl PlotArea {
     }
 }
 
-/// Whether the content of a list is higher than its panel.
+/// True if the content of a list is higher than its panel.
 pub(crate) fn overflows<R>(list: &ScrollAreaOutput<R>) -> bool {
     list.content_size.y > list.inner_rect.height() + 1.0
 }
 
-/// Background and border of a plot.
+/// Paints background and border of a plot.
 pub(crate) fn paint_ground(painter: &Painter, theme: &Theme, rect: Rect) {
     painter.rect_filled(rect, 0.0, theme.plot_background);
 }
 
-/// Horizontal grid lines with their values inside the left edge; `factor` converts stored values to shown ones.
+/// Draws horizontal grid lines with their values inside the left edge; `factor` converts stored values to shown ones.
 pub(crate) fn paint_value_grid(painter: &Painter, theme: &Theme, area: &PlotArea, factor: f64, max_count: usize) {
     let (marks, step) = ticks(area.low * factor, area.high * factor, max_count);
     for shown in marks {
         let y = area.y(shown / factor).round() + 0.5;
         painter.hline(area.rect.x_range(), y, Stroke::new(theme::HAIRLINE_WIDTH, theme.grid));
-        // Labels that would leave the plot are omitted.
+        // Labels that would extend beyond the plot are omitted.
         if y - 12.0 > area.rect.top() && y < area.rect.bottom() + 1.0 {
             let text = super::units::fixed(shown, decimals_of_step(step));
             let at = pos2(area.rect.left() + 2.0, y);
@@ -94,7 +93,7 @@ pub(crate) fn paint_value_grid(painter: &Painter, theme: &Theme, area: &PlotArea
     }
 }
 
-/// The cursor as a vertical line.
+/// Draws the cursor as a vertical line.
 pub(crate) fn paint_cursor(painter: &Painter, theme: &Theme, area: &PlotArea, cursor_ns: i64) {
     let x = area.x(cursor_ns);
     if area.rect.x_range().expand(0.5).contains(x) {
@@ -102,7 +101,7 @@ pub(crate) fn paint_cursor(painter: &Painter, theme: &Theme, area: &PlotArea, cu
     }
 }
 
-/// A curve with a run's colour and dashes.
+/// Draws a curve with a run's colour and dashes.
 pub(crate) fn paint_curve(painter: &Painter, area: &PlotArea, curve: &Curve, style: RunStyle, width: f32) {
     for segment in &curve.segments {
         let points: Vec<Pos2> =
@@ -111,7 +110,7 @@ pub(crate) fn paint_curve(painter: &Painter, area: &PlotArea, curve: &Curve, sty
     }
 }
 
-/// A curve whose value is constant until the next row, for counts and states.
+/// Draws a curve whose value is constant until the next row, for counts and states.
 pub(crate) fn paint_steps(painter: &Painter, area: &PlotArea, curve: &Curve, style: RunStyle, width: f32) {
     for segment in &curve.segments {
         let places = segment.iter().map(|(offset, value)| pos2(area.rect.left() + offset, area.y(*value)));
@@ -140,7 +139,7 @@ fn staircase(places: impl Iterator<Item = Pos2>) -> Vec<Pos2> {
     corners
 }
 
-/// An open line with dashes; a single point becomes a dot.
+/// Draws an open line with dashes; a single point becomes a dot.
 pub(crate) fn paint_line(painter: &Painter, points: &[Pos2], style: RunStyle, width: f32) {
     let stroke = Stroke::new(width, style.color);
     match points {
@@ -159,7 +158,7 @@ pub(crate) fn paint_line(painter: &Painter, points: &[Pos2], style: RunStyle, wi
     }
 }
 
-/// The area of a band.
+/// Fills the area of a band.
 pub(crate) fn paint_band(painter: &Painter, area: &PlotArea, band: &BandCurve, fill: Color32) {
     for segment in &band.segments {
         let mut mesh = Mesh::default();
@@ -177,7 +176,7 @@ pub(crate) fn paint_band(painter: &Painter, area: &PlotArea, band: &BandCurve, f
     }
 }
 
-/// Diagonal hatching of a rectangle of a plot.
+/// Draws diagonal hatching in a rectangle of a plot.
 pub(crate) fn paint_hatch(painter: &Painter, rect: Rect, color: Color32) {
     const SPACING: f32 = 6.0;
     if rect.width() < 0.5 || rect.height() < 0.5 {
@@ -195,7 +194,7 @@ pub(crate) fn paint_hatch(painter: &Painter, rect: Rect, color: Color32) {
     painter.extend(lines);
 }
 
-/// Time ranges of the rows for which `holds` is true: from the stamp of the first row to that of the row behind the
+/// Time ranges of the rows for which `holds` is true: from the stamp of the first row to that of the row after the
 /// last.
 fn segments_where(stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<(i64, i64)> {
     let mut segments = Vec::new();
@@ -264,7 +263,7 @@ mod tests {
         let apart = visible_segments(&area, &stamps, |row| row < 600 || row >= 6000 && row < 12_000);
         assert_eq!(apart.len(), 2);
         assert!((apart[0].max - 5.0).abs() < 0.02 && (apart[1].min - 50.0).abs() < 0.02, "{apart:?}");
-        // Beyond the edges there is nothing.
+        // There is nothing beyond the edges.
         let later = PlotArea { begin_ns: 20_000, end_ns: 30_000, ..area };
         assert!(visible_segments(&later, &stamps, |_| true).is_empty());
     }

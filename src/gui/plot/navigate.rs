@@ -18,7 +18,7 @@ pub(crate) fn visible_range(ctx: &PanelContext<'_>) -> (i64, i64) {
     ctx.selection.visible_ns.filter(|(begin, end)| begin < end).unwrap_or(whole)
 }
 
-/// The effect of the pointer's primary button on a plot.
+/// Effect of the pointer's primary button on a plot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Clicks {
     /// A click and a drag move the cursor: the timeline.
@@ -29,33 +29,28 @@ pub(crate) enum Clicks {
     Select,
 }
 
-/// The effect of the wheel on a plot.
+/// Effect of the wheel on a plot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wheel {
-    /// It zooms.
     Zooms,
-    /// It scrolls the list around the plot; with Ctrl it zooms.
+    /// Scrolls the list around the plot; with Ctrl it zooms.
     Scrolls,
 }
 
 impl Wheel {
-    /// The wheel scrolls a list that is higher than its panel, and zooms where there is nothing to scroll.
+    /// Scrolling in a list that is higher than its panel, else zooming.
     pub(crate) fn in_list(overflows: bool) -> Self {
         if overflows { Self::Scrolls } else { Self::Zooms }
     }
 }
 
-/// A plot as the pointer and a screen reader meet it.
+/// Interface of a plot to the pointer and to a screen reader.
 pub(crate) struct Interaction<'a> {
-    /// Its id in the window.
     pub(crate) id: Id,
-    /// Its name.
     pub(crate) name: &'a str,
-    /// What it shows at the cursor, as text.
+    /// Shown content at the cursor, as text.
     pub(crate) value: &'a str,
-    /// The effect of the primary button.
     pub(crate) clicks: Clicks,
-    /// The effect of the wheel.
     pub(crate) wheel: Wheel,
 }
 
@@ -121,7 +116,7 @@ fn move_cursor(ui: &Ui, ctx: &mut PanelContext<'_>, area: &PlotArea, clicks: Cli
     }
 }
 
-/// The wheel and gestures of a frame.
+/// Wheel and gestures of a frame.
 struct Scroll {
     /// Factor of the magnification.
     zoom: f64,
@@ -143,13 +138,13 @@ impl Scroll {
     }
 }
 
-/// The range that is dragged with the secondary button, and whether the button has just been released.
+/// Range dragged with the secondary button; the bool is true if the button has just been released.
 fn dragged_range(ui: &Ui, rect: Rect, response: &Response) -> Option<(Rangef, bool)> {
     let complete = response.drag_stopped_by(PointerButton::Secondary);
     if !complete && !response.dragged_by(PointerButton::Secondary) {
         return None;
     }
-    // The origin of the press is gone when the button is released.
+    // The origin of the press is no longer available when the button is released.
     let stored = response.id.with("range");
     let origin = ui.input(|input| input.pointer.press_origin()).map(|origin| origin.x);
     let begin = match origin {
@@ -189,7 +184,7 @@ pub(crate) fn zoom_about_cursor(ctx: &mut PanelContext<'_>, closer: bool) {
     zoom(ctx, (begin_ns, end_ns), fixed_ns, if closer { ZOOM_STEP } else { 1.0 / ZOOM_STEP });
 }
 
-/// Zooms a time range by a factor about a stamp, which stays where it is.
+/// Zooms a time range by a factor about a fixed stamp.
 fn zoom(ctx: &mut PanelContext<'_>, (begin_ns, end_ns): (i64, i64), fixed_ns: i64, factor: f64) {
     let scaled = |stamp_ns: i64| fixed_ns + ((stamp_ns - fixed_ns) as f64 / factor).round() as i64;
     show(ctx, scaled(begin_ns), scaled(end_ns));

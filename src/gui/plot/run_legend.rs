@@ -1,4 +1,4 @@
-//! The runs with colour and dashes, for figures: in the window the bar at the top has them.
+//! Legend of the runs with colour and dashes, for figures; in the window the top bar shows it.
 
 use egui::{Align2, Color32, Ui, pos2, vec2};
 

@@ -1,4 +1,4 @@
-//! How long the least observable direction has been unobservable, and the suggested excitation.
+//! Duration of the least observable direction, and the suggested excitation.
 
 use std::sync::Arc;
 
@@ -16,39 +16,36 @@ use crate::session::{LostSince, RunRecord, StepRecord};
 /// Number of alternatives to the best motion.
 const OTHERS_SHOWN: usize = 3;
 
-/// The advice where no motion helps.
+/// Text shown if no motion helps.
 const NO_MOTION: &str = "No candidate motion constrains this calibration further";
 
-/// Seconds without a move of the cursor before advice is computed in the background.
+/// Seconds without cursor movement before advice is computed in the background.
 const CURSOR_IDLE_S: f64 = 0.15;
 /// Minimum period in seconds of the computation while the cursor moves.
 const MIN_PERIOD_S: f64 = 1.0;
 
-/// The results for one step.
 #[derive(Debug)]
 struct StepAdvice {
-    /// Since when the least observable direction has been unobservable: `weak since 5.55 s`.
+    /// Start of the present loss of observability: `weak since 5.55 s`.
     since: Option<String>,
-    /// The suggested excitation.
     advice: Option<Advice>,
 }
 
-/// The results for one step; they are computed again for another step.
+/// Results for one step; recomputed for another step.
 #[derive(Debug, Default)]
 pub(super) struct AdviceUi {
-    /// Id of the run.
     run: Option<u64>,
     results: StepWork<StepAdvice>,
-    /// The step at the cursor, and when the cursor reached it, in seconds of the window's clock.
+    /// Step at the cursor, and the time when the cursor reached it, in seconds of the window's clock.
     seen: Option<(Arc<StepRecord>, f64)>,
     /// Start of the last computation, in seconds of the window's clock.
     requested_s: f64,
 }
 
 impl AdviceUi {
-    /// Computes since when the least observable direction has been unobservable, and the suggested excitation.
+    /// Computes the duration of the least observable direction and the suggested excitation.
     ///
-    /// Both are computed while the caller waits, or in the background: then for the step at which the cursor rests, and
+    /// Both are computed while the caller waits, or in the background: then for the step at which the cursor stops, and
     /// once per second while it moves. The results of an earlier step stay until then.
     pub(super) fn update(
         &mut self,
@@ -77,13 +74,13 @@ impl AdviceUi {
         }
     }
 
-    /// Since when the least observable direction of the step has been unobservable, once it is computed.
+    /// Start of the loss of observability of the step's least observable direction; `None` until it is computed.
     pub(super) fn since(&self, step: &Arc<StepRecord>) -> Option<&str> {
         let (of, results) = self.results.last()?;
         results.filter(|_| Arc::ptr_eq(of, step))?.since.as_deref()
     }
 
-    /// Draws the suggested excitation, with the stamp of its step where that is not the cursor's.
+    /// Draws the suggested excitation, with the stamp of its step if that is not the cursor's.
     pub(super) fn ui(&self, ui: &mut Ui, ctx: &PanelContext<'_>, step: &Arc<StepRecord>) {
         let Some((of, results)) = self.results.last() else {
             ui.label(RichText::new("Linearizing candidate motions…").color(ctx.theme.text_weak));
@@ -114,7 +111,7 @@ impl AdviceUi {
         });
     }
 
-    /// The suggested excitation for a step of a run, once it is computed.
+    /// Suggested excitation for a step of a run; `None` until it is computed.
     pub(super) fn sentence(&self, run: u64, step: &StepRecord) -> Option<String> {
         if self.run != Some(run) || !self.results.has_result(step) {
             return None;
@@ -124,7 +121,7 @@ impl AdviceUi {
         Some(sentence.unwrap_or_else(|| NO_MOTION.to_owned()))
     }
 
-    /// Whether a computation in the background is due.
+    /// True if a computation in the background is due.
     fn is_due(&self, now_s: f64) -> bool {
         let rests = self.seen.as_ref().is_some_and(|(_, since_s)| now_s - since_s >= CURSOR_IDLE_S);
         let first = self.results.last().is_none();
@@ -150,7 +147,7 @@ impl AdviceUi {
     }
 }
 
-/// The suggested excitation; `time` is the stamp it was computed for, where that is not the cursor's.
+/// Draws the suggested excitation; `time` is the stamp for which it was computed if that is not the cursor's.
 fn advice_ui(ui: &mut Ui, ctx: &PanelContext<'_>, advice: Option<&Advice>, time: &str) {
     let Some(advice) = advice else {
         ui.label(RichText::new(NO_MOTION).color(ctx.theme.text_weak));
@@ -171,7 +168,7 @@ fn advice_ui(ui: &mut Ui, ctx: &PanelContext<'_>, advice: Option<&Advice>, time:
     ));
 }
 
-/// The motion for a sensor's parameter that is least observable, and the suggested excitation of the chain.
+/// Draws the motion for the least observable sensor parameter, and the suggested excitation of the chain.
 fn sensor_advice_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,

@@ -14,11 +14,8 @@ use crate::observability::{CalibrationDirection, RankReport};
 
 /// One report with its title.
 pub(in crate::gui) struct RankColumn<'a> {
-    /// Title of the column.
     pub(in crate::gui) title: String,
-    /// Colour of the title.
     pub(in crate::gui) color: Color32,
-    /// The rank report.
     pub(in crate::gui) rank: &'a RankReport,
 }
 
@@ -26,14 +23,13 @@ pub(in crate::gui) struct RankColumn<'a> {
 const NAMES: f32 = 128.0;
 /// Gap between two reports in points.
 const GAP: f32 = 10.0;
-/// Maximum width of a direction's column.
+/// Maximum width of a direction's column in points.
 const MAX_COLUMN_WIDTH: f32 = 46.0;
-/// Minimum width of a column with signed numbers.
+/// Minimum width of a column with signed numbers in points.
 const MIN_COLUMN_WIDTH: f32 = 36.0;
 const MIN_ROW_HEIGHT: f32 = 13.0;
 const MAX_ROW_HEIGHT: f32 = 20.0;
 
-/// Draws the reports side by side.
 pub(in crate::gui) fn columns_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_>]) {
     if columns.is_empty() {
         return;

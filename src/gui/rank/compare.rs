@@ -26,7 +26,6 @@ fn ranked<'a>(ctx: &PanelContext<'a>) -> impl Iterator<Item = (usize, &'a RunRec
     })
 }
 
-/// Draws all runs.
 pub(in crate::gui) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
     let theme = *ctx.theme;
     let ranked: Vec<_> = ranked(ctx).collect();
@@ -47,7 +46,7 @@ pub(in crate::gui) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
     });
 }
 
-/// The singularity margin of a minimal run, and the other end block if no run uses it.
+/// Shows the singularity margin of a minimal run, and offers the other end block if no run uses it.
 pub(super) fn singularity_ui(
     ui: &mut Ui,
     ctx: &mut PanelContext<'_>,

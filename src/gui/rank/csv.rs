@@ -1,4 +1,4 @@
-//! The singular values and directions at the cursor, one singular value per row.
+//! Singular values and directions at the cursor; one singular value per row.
 
 use super::RankPanel;
 use crate::gui::PanelContext;

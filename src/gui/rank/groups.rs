@@ -1,4 +1,4 @@
-//! Groups of the rows of a heat map: names beside them and lines between them.
+//! Groups of the rows of a heat map: names at their left and lines between them.
 
 use egui::epaint::TextShape;
 use egui::{Painter, Rangef, Stroke, pos2};
@@ -9,18 +9,18 @@ use crate::gui::theme::{Theme, label_font};
 /// Width of the names of groups in points.
 const STRIP_WIDTH: f32 = 15.0;
 
-/// Width in points that the names of groups need beside the rows: none when all parameters are of one group.
+/// Width in points of the group names; 0 if all parameters are of one group.
 pub(super) fn strip_width(parameters: &[ParameterId]) -> f32 {
     let several = parameters.windows(2).any(|pair| pair[0].group() != pair[1].group());
     if several { STRIP_WIDTH } else { 0.0 }
 }
 
-/// Paints the name of each group upwards at the left end of its rows, where it fits, and lines between groups; `rows`
-/// follow each other downwards.
+/// Paints the name of each group upwards at the left end of its rows if it fits, and lines between groups; `rows` are
+/// in order from top to bottom.
 pub(super) fn paint_groups(painter: &Painter, theme: &Theme, rows: &[(ParameterGroup, Rangef)], across: Rangef) {
     for (number, chunk) in rows.chunk_by(|(a, _), (b, _)| a == b).enumerate() {
         let [(group, first), .., (_, last)] = chunk else {
-            // A single row is as high as a name is wide only by chance: the line says enough.
+            // A name rarely fits into a single row; only the line is drawn.
             separator(painter, theme, number, chunk.first().map_or(0.0, |(_, row)| row.min), across);
             continue;
         };

@@ -13,25 +13,25 @@ use crate::gui::units::{counted, fixed, significant};
 use crate::observability::{CalibrationDirection, RankReport, parameters_of};
 
 const HEADER_HEIGHT: f32 = 28.0;
-/// Height of the header of narrow columns, whose numbers are vertical.
+/// Height in points of the header of narrow columns, whose numbers are vertical.
 const UPRIGHT_HEADER_HEIGHT: f32 = 46.0;
 const MAX_ROW_HEIGHT: f32 = 22.0;
 const MIN_ROW_HEIGHT: f32 = 12.0;
 /// Row height in points from which rows without weights are shown too.
 const COMFORTABLE_ROW_HEIGHT: f32 = 16.0;
-/// Height of the line about rows and columns that are not shown.
+/// Height in points of the line about rows and columns that are not shown.
 const NOTE_HEIGHT: f32 = 16.0;
-/// Number of rows that are shown in a panel of any height.
+/// Number of rows shown whatever the height of the panel.
 const MIN_ROWS: usize = 3;
-/// Minimum width of a column with signed numbers.
+/// Minimum width of a column with signed numbers in points.
 const NUMBER_WIDTH: f32 = 37.0;
-/// Minimum width of a column whose singular value fits beside its neighbours'.
+/// Minimum width in points of a column whose singular value fits between its neighbours.
 const HEAD_WIDTH: f32 = 44.0;
 const MAX_COLUMN_WIDTH: f32 = 84.0;
 const MIN_COLUMN_WIDTH: f32 = 15.0;
 /// Smaller weights have no text in their cell.
 const MIN_SHOWN_WEIGHT: f64 = 0.05;
-/// Range of the width of the names.
+/// Range of the width of the names in points.
 const NAME_WIDTHS: std::ops::RangeInclusive<f32> = 40.0..=130.0;
 
 /// Draws the heat map in the first of the `heights`, in points, if all parameters fit into it, else in the second with
@@ -91,18 +91,17 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, hei
     }
 }
 
-/// The shown rows.
 struct Rows {
     /// Indices of the parameters, in chain order.
     rows: Vec<usize>,
     row_height: f32,
-    /// Largest |weight| of the parameters that are not shown, `None` if all are.
+    /// Largest |weight| of the parameters that are not shown; `None` if all are.
     omitted: Option<f64>,
 }
 
 impl Rows {
-    /// All rows where they fit into the first of the `heights` with room to spare; else those with weights that are
-    /// shown, at least in the second; else those with the largest weights that fit into the second.
+    /// All rows if they fit comfortably into the first of the `heights`; else those with shown weights, if they fit at
+    /// least into the second; else those with the largest weights that fit into the second.
     fn of(rank: &RankReport, directions: &[CalibrationDirection], heights: [f32; 2]) -> Self {
         let height_of =
             |height: f32, count: usize| (height / count.max(1) as f32).clamp(MIN_ROW_HEIGHT, MAX_ROW_HEIGHT);
@@ -133,7 +132,7 @@ fn weight_of(direction: &CalibrationDirection, row: usize) -> f64 {
 }
 
 /// At most `count` of `all` rows: the row with the largest weight in each direction, then the row with the second
-/// largest, and so on while weights are shown.
+/// largest, and so on, as long as the weights are shown.
 fn largest_rows(all: usize, directions: &[CalibrationDirection], count: usize) -> Vec<usize> {
     let by_weight: Vec<Vec<usize>> = directions
         .iter()
@@ -154,7 +153,7 @@ fn largest_rows(all: usize, directions: &[CalibrationDirection], count: usize) -
     rows
 }
 
-/// Number and singular value of a direction.
+/// Paints the number and the singular value of a direction.
 fn header(
     ui: &Ui,
     ctx: &PanelContext<'_>,
@@ -248,7 +247,7 @@ mod tests {
         let directions = [direction(&[0.9, -0.4, 0.0, 0.1, 0.01]), direction(&[0.0, 0.3, -0.2, 0.8, 0.02])];
         assert_eq!(largest_rows(5, &directions, 2), [0, 3]);
         assert_eq!(largest_rows(5, &directions, 3), [0, 3, 1]);
-        // The last row has no weight that is shown.
+        // The weights of the last row are below the shown minimum.
         assert_eq!(largest_rows(5, &directions, 5), [0, 3, 1, 2]);
     }
 }

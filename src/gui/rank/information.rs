@@ -13,9 +13,9 @@ use crate::gui::units::fixed;
 use crate::observability::{InformationRate, information_rate};
 use crate::session::{RunRecord, StepRecord};
 
-/// Interval before the cursor over which the gain is summed.
+/// Interval before the cursor over which the gain is summed, in nanoseconds.
 const RATE_INTERVAL_NS: i64 = 1_000_000_000;
-/// Smaller contributions, in bits per second, are not shown.
+/// Smallest shown contribution in bits per second.
 const MIN_SHOWN: f64 = 0.005;
 
 /// The cached sums of one step.
@@ -52,7 +52,7 @@ fn rate_before(run: &RunRecord, step: &StepRecord) -> Option<InformationRate> {
     information_rate(run.steps[begin..end].iter().filter_map(|step| step.gain()))
 }
 
-/// The longest headline that fits, else the shortest: a wider one would widen all content below.
+/// The longest headline that fits, else the shortest; a wider one would widen all content below.
 fn fitting<'a>(ui: &Ui, headlines: &'a [String; 3]) -> &'a str {
     let font = TextStyle::Button.resolve(ui.style());
     let room = ui.available_width() - ui.spacing().indent - 2.0 * ui.spacing().button_padding.x;
@@ -60,7 +60,7 @@ fn fitting<'a>(ui: &Ui, headlines: &'a [String; 3]) -> &'a str {
     headlines.iter().find(|text| width(text) <= room).unwrap_or(&headlines[2])
 }
 
-/// Headlines: complete, without the parameter of the largest gain, and the sum alone.
+/// Three headlines: complete, without the parameter of the largest gain, and the sum alone.
 fn headlines(rate: &InformationRate, names: &ParameterNames, joints: &[String]) -> [String; 3] {
     let main_motion = rate
         .leading(None)
@@ -126,7 +126,7 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joi
 /// A number whose background shows its sign and magnitude.
 fn number_ui(ui: &mut Ui, theme: &Theme, number: f64, ratio: f64) {
     let text = if number.abs() < MIN_SHOWN { "·".to_owned() } else { fixed(number, 2) };
-    // Right-aligned, so that signs and decimal points are aligned.
+    // Right-aligned, which aligns signs and decimal points.
     let mut text = RichText::new(format!("{text:>5}")).font(number_font()).color(theme.text_strong);
     if ratio.abs() >= 0.05 {
         let ground = theme.diverging(ratio);

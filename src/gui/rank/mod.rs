@@ -1,4 +1,4 @@
-//! The rank panel: observability of the calibration as a verdict, as a spectrum and by parameter name.
+//! Rank panel: observability of the calibration as a verdict, as a spectrum and by parameter name.
 
 mod advice;
 pub(super) mod columns;
@@ -46,13 +46,13 @@ const RUN_WIDTH: f32 = 480.0;
 /// Size of the headline of the verdict in points.
 const HEADLINE: f32 = 13.0;
 
-/// Width in points from which the details are beside the heat map instead of below it.
+/// Width in points from which the details are to the right of the heat map instead of below it.
 const MIN_WIDTH_WITH_DETAILS_BESIDE: f32 = 760.0;
 
-/// Height in points that the details below the heat map get before its rows grow.
+/// Height in points reserved for the details below the heat map before its rows grow.
 const DETAILS_HEIGHT: f32 = 210.0;
 
-/// The same in a figure, which cannot be scrolled: singular values and ranks over time with their headings.
+/// The same in a figure, which cannot be scrolled: singular values and ranks over time with their headings, in points.
 const FIGURE_DETAILS_HEIGHT: f32 = 320.0;
 
 /// Height of the ranks over time in points.
@@ -61,25 +61,24 @@ const OVER_TIME_HEIGHT: f32 = 62.0;
 /// Height in points below the heat map in which its slider and the first heading stay visible.
 const HEAD_OF_DETAILS: f32 = 26.0;
 
-/// State of the rank panel.
 #[derive(Debug, Default)]
 pub struct RankPanel {
     tables: RunTables,
-    /// By run: informed and structural rank.
+    /// Informed and structural rank by run.
     curves: Vec<[Curve; 2]>,
-    /// Whether advice is computed on its own thread, as in the window; screenshots wait for it.
+    /// True if advice is computed on another thread, as in the window; screenshots wait for it.
     pub in_background: bool,
     advice: AdviceUi,
     information: InformationUi,
     slider: SliderUi,
     /// Show all runs side by side, in a panel too small for both views.
     all_runs: bool,
-    /// Whether the content is higher than the panel, so that the wheel scrolls.
+    /// True if the content is higher than the panel, so that the wheel scrolls.
     overflows: bool,
 }
 
 impl RankPanel {
-    /// The suggested excitation for a step of a run, once the panel has computed it.
+    /// Suggested excitation for a step of a run; `None` until the panel has computed it.
     pub(in crate::gui) fn suggested_excitation(&self, run: u64, step: &StepRecord) -> Option<String> {
         self.advice.sentence(run, step)
     }
@@ -125,7 +124,7 @@ impl RankPanel {
         self.run_ui(ui, ctx, run, step, ui.available_height());
     }
 
-    /// One run: the answers and the heat map above the fold, details below or beside them.
+    /// Draws one run: summary and heat map visible without scrolling, details below or to the right.
     fn run_ui(
         &mut self,
         ui: &mut Ui,
@@ -165,8 +164,8 @@ impl RankPanel {
         });
     }
 
-    /// Verdict, least observable direction and since when, suggested excitation, heat map. Returns whether the step has
-    /// a rank.
+    /// Draws verdict, least observable direction with its start, suggested excitation and heat map. Returns true if the
+    /// step has a rank.
     ///
     /// The heat map leaves the first of the `details` heights above `bottom` free if all its rows fit, else the second.
     fn answers_ui(
@@ -192,7 +191,7 @@ impl RankPanel {
         true
     }
 
-    /// What the answers follow from, in sections that are open where there is room.
+    /// Draws the details behind the summary in sections; a section is initially open if it fits.
     fn details_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>) {
         let Some(rank) = &step.rank else { return };
         let (theme, names, presentation) = (*ctx.theme, ctx.names(), ctx.presentation);
@@ -216,7 +215,7 @@ impl RankPanel {
 
     /// Structural and informed rank of all runs over time.
     fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        /// Height of the caption.
+        /// Height of the caption in points.
         const CAPTION: f32 = 14.0;
         let theme = *ctx.theme;
         let tables = self.tables.read(&ctx.recording.runs, rank_row);
@@ -252,7 +251,7 @@ impl RankPanel {
     }
 }
 
-/// Both ranks in words.
+/// Structural and informed rank in words.
 fn ranks_text(rank: &RankReport) -> String {
     let count = rank.parameters.len();
     format!("structural rank {} of {count}, informed rank {} of {count}", rank.rank_structural, rank.rank_informed)
@@ -271,7 +270,7 @@ fn halves(rect: egui::Rect, fraction: f32) -> [egui::Rect; 2] {
     [left.with_max_x(left.right() - GAP), right]
 }
 
-/// The verdict: a symbol, one line, the reasons, and the least observable direction.
+/// Draws the verdict: a symbol, one line, the reasons, and the least observable direction.
 fn verdict_ui(ui: &mut Ui, theme: &Theme, verdict: &Verdict, since: Option<&str>) {
     let (mark, color) = mark_of(verdict.level, theme);
     ui.horizontal(|ui| {
@@ -293,7 +292,7 @@ fn verdict_ui(ui: &mut Ui, theme: &Theme, verdict: &Verdict, since: Option<&str>
     }
 }
 
-/// A name and what it is, wrapped.
+/// Draws a name and its text, wrapped.
 fn fact_ui(ui: &mut Ui, theme: &Theme, name: &str, text: &str, color: egui::Color32) -> egui::Response {
     let font = TextStyle::Body.resolve(ui.style());
     let mut job = LayoutJob::default();
@@ -302,9 +301,9 @@ fn fact_ui(ui: &mut Ui, theme: &Theme, name: &str, text: &str, color: egui::Colo
     ui.add(egui::Label::new(job).wrap())
 }
 
-/// A section with a heading, open at first where `height` points are left above the fold.
+/// Draws a section with a heading; it is initially open if `height` points are visible without scrolling.
 ///
-/// A figure has the sections that fit, and no headings to click.
+/// A figure shows only the sections that fit, and its headings cannot be clicked.
 fn section_ui(
     ui: &mut Ui,
     theme: &Theme,
@@ -327,7 +326,7 @@ fn section_ui(
     header.show_unindented(ui, contents);
 }
 
-/// The null directions that are known in closed form.
+/// Draws the null directions that are known in closed form.
 fn structure_ui(ui: &mut Ui, ctx: &PanelContext<'_>, names: &ParameterNames, rank: &RankReport) {
     if rank.known.is_empty() {
         return;
@@ -351,7 +350,7 @@ fn structure_ui(ui: &mut Ui, ctx: &PanelContext<'_>, names: &ParameterNames, ran
     });
 }
 
-/// Symbol and colour of a level: never the colour alone.
+/// Symbol and colour of a level; the symbol is unique without the colour.
 fn mark_of(level: Level, theme: &Theme) -> (&'static str, egui::Color32) {
     match level {
         Level::Good => ("✔", theme.ok),

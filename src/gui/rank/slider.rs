@@ -1,5 +1,5 @@
-//! A slider that moves the chain along a null or weak direction: the scene shows the moved chain, the image the change
-//! of the reprojections.
+//! Slider that moves the chain along a null or weak direction: the scene shows the moved chain, the image the change of
+//! the reprojections.
 
 use egui::{ComboBox, Label, RichText, Role, Slider, Ui, WidgetInfo};
 
@@ -15,15 +15,14 @@ use crate::session::StepRecord;
 const MAX_DISPLACEMENT: f64 = 2.0;
 /// Period of the animation in seconds.
 const PERIOD_S: f64 = 4.0;
-/// Changes of the reprojections up to here count as zero, in pixels.
+/// Largest change of the reprojections in pixels that counts as zero.
 const ZERO_CHANGE_PX: f64 = 0.1;
-/// Minimum width of the slider and maximum width of the choice of the direction, in points.
+/// Minimum width of the slider and maximum width of the direction selector, in points.
 const MIN_SLIDER_WIDTH: f32 = 70.0;
 const MAX_CHOICE_WIDTH: f32 = 300.0;
 /// Number of parameters whose changes are listed.
 const CHANGES_SHOWN: usize = 4;
 
-/// State of the slider.
 #[derive(Debug, Default)]
 pub(super) struct SliderUi {
     playing: bool,
@@ -123,12 +122,12 @@ fn directions_first(rank: &RankReport) -> Option<SlideDirection> {
     SlideDirection::of_step(rank).into_iter().next()
 }
 
-/// Whether it is not one of the step's own directions.
+/// True if the direction is not one of the step's.
 fn is_other(direction: &SlideDirection, rank: &RankReport) -> bool {
     !SlideDirection::of_step(rank).contains(direction)
 }
 
-/// The changes of reprojections and parameters.
+/// Draws the changes of reprojections and parameters.
 fn outcome_ui(ui: &mut Ui, ctx: &PanelContext<'_>, slide: &ChainSlide, parameters: &[ParameterId]) {
     let names = ctx.names();
     let stays = slide.largest_px <= ZERO_CHANGE_PX;

@@ -1,4 +1,4 @@
-//! The singular values on a logarithmic axis with both thresholds.
+//! Singular values on a logarithmic axis with both thresholds.
 
 use egui::{Align2, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
@@ -57,7 +57,7 @@ pub(super) fn paint(
         };
         let bar = Rect::from_min_max(pos2(x - width / 2.0, axis.y(*value)), pos2(x + width / 2.0, plot.bottom()));
         if *value <= rank.structural_threshold {
-            // A zero has no position on the axis: an open box at the bottom represents it.
+            // A zero has no position on the axis; an open box at the bottom represents it.
             let zero = Rect::from_min_max(pos2(bar.left(), plot.bottom() - 5.0), bar.max);
             painter.rect_stroke(zero, 0.0, Stroke::new(1.0, color), StrokeKind::Inside);
         } else {
@@ -109,7 +109,7 @@ struct LogAxis {
 }
 
 impl LogAxis {
-    /// The axis that contains the spectra of all reports.
+    /// Axis that contains the spectra of all reports.
     fn of(reports: &[&RankReport], plot: Rect) -> Option<Self> {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for rank in reports.iter().filter(|rank| !rank.singular_values.is_empty()) {

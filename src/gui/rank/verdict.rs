@@ -1,4 +1,4 @@
-//! The rank of a step in words.
+//! Rank of a step in words.
 
 use crate::estimator::{EventKind, Phase};
 use crate::gimbal::{ParameterNames, SWITCH_MARGIN};
@@ -6,51 +6,43 @@ use crate::gui::help::terms::{Term, window};
 use crate::observability::{KnownDirection, RankReport, parameters_of};
 use crate::session::StepRecord;
 
-/// Severity of the verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Level {
-    /// All directions are informed.
     Good,
     /// Some directions are weak.
     Weak,
     /// Some directions are unobservable.
     Lost,
-    /// No verdict yet.
     None,
 }
 
-/// The summary of a step's rank report.
+/// Summary of a step's rank report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Verdict {
-    /// Severity.
     pub(crate) level: Level,
-    /// One line.
     pub(crate) headline: String,
-    /// Where the rank is lost, or what the initialization waits for.
+    /// Causes of the lost rank, or the condition of the initialization that is not met.
     pub(crate) reasons: Vec<Reason>,
     /// The least observable direction by parameter name.
     pub(crate) direction: Option<Reason>,
-    /// Further findings.
     pub(crate) notes: Vec<Reason>,
 }
 
 impl Verdict {
-    /// A verdict on a step without a rank.
+    /// Verdict on a step without a rank.
     fn none(headline: &str, reasons: Vec<Reason>) -> Self {
         Self { level: Level::None, headline: headline.to_owned(), reasons, direction: None, notes: Vec::new() }
     }
 }
 
-/// One reason of a verdict.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Reason {
-    /// What it is about.
+    /// Quantity of the reason.
     pub(crate) term: Term,
-    /// One line.
     pub(crate) text: String,
 }
 
-/// The observability of the calibration in a step.
+/// Verdict on the observability of the calibration in a step.
 pub(crate) fn verdict(step: &StepRecord, names: &ParameterNames) -> Verdict {
     match &step.rank {
         Some(rank) if rank.parameters.is_empty() => Verdict::none("Calibration fixed in this run", Vec::new()),

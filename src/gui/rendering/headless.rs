@@ -23,11 +23,10 @@ pub struct HeadlessOptions {
     pub size_px: [u32; 2],
     /// Pixels per point: 1 on an ordinary screen, 2 for print.
     pub pixels_per_point: f32,
-    /// Colours.
     pub theme: ThemeName,
 }
 
-/// The output of egui for one frame.
+/// Output of egui for one frame.
 pub struct Frame {
     /// Meshes, in points.
     pub chunks: Vec<Arc<Chunk>>,
@@ -37,7 +36,6 @@ pub struct Frame {
 
 /// Paints frames into pixels.
 pub trait FramePainter {
-    /// The reason why a frame cannot be painted.
     type Error;
 
     /// Stores new and changed textures; called for every frame before it is painted.
@@ -78,18 +76,17 @@ impl FramePainter for Painter {
     }
 }
 
-/// An egui context without a window; it uses egui's own fonts, never the system's.
+/// An egui context without a window; it uses egui's embedded fonts, never those of the system.
 pub struct Headless {
     context: egui::Context,
     options: HeadlessOptions,
     tessellation: Tessellation,
-    /// Time between frames and elapsed time in seconds.
+    /// Time between frames, and elapsed time, in seconds.
     frame_time_s: f64,
     time_s: f64,
 }
 
 impl Headless {
-    /// A new context with the theme of the options.
     pub fn new(options: HeadlessOptions) -> Self {
         let context = egui::Context::default();
         Theme::of(options.theme).apply(&context);
@@ -177,8 +174,8 @@ pub fn draw(options: HeadlessOptions, ui: impl FnMut(&mut Ui)) -> RgbaImage {
 
 /// A user interface as an SVG drawing.
 ///
-/// `title` is the title of the drawing; `prefix` begins the ids of its elements, so that one page can hold several
-/// drawings.
+/// `title` is the title of the drawing; `prefix` is the prefix of the ids of its elements, so that one page can hold
+/// several drawings.
 pub fn svg_of(options: HeadlessOptions, prefix: &str, title: &str, ui: impl FnMut(&mut Ui)) -> String {
     Headless::new(options).drawing(prefix, title, ui)
 }

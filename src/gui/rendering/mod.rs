@@ -1,4 +1,4 @@
-//! Painting of egui's frames without a window into pixels or SVG: on the CPU with the same bytes on every machine, or
+//! Painting of egui's frames without a window into pixels or SVG: on the CPU with identical bytes on every machine, or
 //! on a graphics adapter.
 
 pub mod chunks;

@@ -1,5 +1,5 @@
-//! Paints frames with wgpu, as the window does, but into a texture that is read back: for comparing graphics drivers
-//! with the CPU painter, and for large screenshots of scenes.
+//! Paints frames with wgpu like the window, but into a texture that is read back: for comparing graphics drivers with
+//! the CPU painter, and for large screenshots of scenes.
 //!
 //! The bytes of such a screenshot depend on the driver; those of the CPU painter do not.
 
@@ -15,19 +15,19 @@ use super::chunks::Chunk;
 use super::headless::{FramePainter, Headless, HeadlessOptions};
 use crate::gui::scene::SceneBackend;
 
-/// Format of the target: eight bits per channel in gamma space, where egui blends.
+/// Format of the target: eight bits per channel in gamma space, in which egui blends.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const BYTES_PER_PIXEL: u32 = 4;
 /// Timeout for one frame of the driver.
 const DRIVER_HANGS_AFTER: Duration = Duration::from_mins(1);
 
-/// The reason why a screenshot cannot be painted.
+/// Reason why a screenshot cannot be painted.
 #[derive(Debug, Error)]
 pub enum OffscreenError {
     /// No driver, or no usable one.
     #[error("no graphics adapter: {problem}; use --renderer cpu")]
     NoAdapter {
-        /// The backends that were tried.
+        /// Backends that were tried.
         problem: String,
     },
     /// The screenshot is larger than the adapter's largest texture.
@@ -42,15 +42,12 @@ pub enum OffscreenError {
         height: u32,
         /// Largest side of a texture in pixels.
         largest: u32,
-        /// Name of the adapter.
         adapter: String,
     },
-    /// The driver did not return the pixels.
     #[error("the graphics adapter {adapter} returned no image: {problem}; use --renderer cpu")]
     NotDelivered {
-        /// Name of the adapter.
         adapter: String,
-        /// The error of the driver.
+        /// Error of the driver.
         problem: String,
     },
 }
@@ -103,7 +100,7 @@ impl Offscreen {
         Ok(Self { device, queue, renderer, largest_side_px, adapter: format!("{} ({:?})", info.name, info.backend) })
     }
 
-    /// The adapter's name and its graphics interface.
+    /// Name of the adapter and its graphics interface.
     pub fn adapter(&self) -> &str {
         &self.adapter
     }

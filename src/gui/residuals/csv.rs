@@ -1,4 +1,4 @@
-//! The residuals over time, one step of one run per row.
+//! Residuals over time; one row per step of a run.
 
 use super::{ResidualsPanel, rms_px};
 use crate::estimator::FactorKind;

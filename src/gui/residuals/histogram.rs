@@ -1,11 +1,9 @@
-//! Histogram of residuals.
-
 use crate::estimator::StepReport;
 
 /// Histogram of one step's reprojection residuals, both image axes together.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ResidualHistogram {
-    /// Half the range in pixels: bins run from minus this to plus this.
+    /// Half the range in pixels: bins run from −`reach_px` to +`reach_px`.
     pub(crate) reach_px: f64,
     /// Counts before the solve.
     pub(crate) before: Vec<usize>,
@@ -31,7 +29,6 @@ pub(crate) struct ResidualHistogram {
 const BINS: usize = 41;
 
 impl ResidualHistogram {
-    /// The histogram of a step.
     pub(crate) fn of(report: &StepReport) -> Self {
         let observations = || report.features.iter().flat_map(|feature| feature.observations.iter());
         let after: Vec<_> =

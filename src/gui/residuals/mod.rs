@@ -1,4 +1,4 @@
-//! The residuals panel: the fit of the window as a histogram, over time, and by kind of factor.
+//! Residuals panel: fit of the window as a histogram, over time, and by kind of factor.
 
 mod csv;
 mod histogram;
@@ -31,9 +31,9 @@ use crate::session::StepRecord;
 pub struct ResidualsPanel {
     tables: RunTables,
     curves: Vec<Curve>,
-    /// The step of the histogram, and the histogram.
+    /// Step and its histogram.
     counted: Option<(Arc<StepRecord>, ResidualHistogram)>,
-    /// Whether the content is higher than the panel, so that the wheel scrolls.
+    /// True if the content is higher than the panel, so that the wheel scrolls.
     overflows: bool,
 }
 
@@ -78,7 +78,7 @@ impl ResidualsPanel {
         self.over_time_ui(ui, ctx, over_time);
     }
 
-    /// Reprojection RMS after the solve over time, for all runs.
+    /// Plot of the reprojection RMS after the solve over time, for all runs.
     fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, height: f32) {
         let theme = *ctx.theme;
         let top = ui.cursor().top();
@@ -115,7 +115,7 @@ impl ResidualsPanel {
     }
 }
 
-/// The step's reprojection RMS after the solve in pixels, NaN without a solve.
+/// Reprojection RMS of the step after the solve in pixels; NaN without a solve.
 pub(crate) fn rms_px(report: &StepReport) -> f64 {
     if report.window.is_empty() { f64::NAN } else { report.reprojection_rms_after_px }
 }
@@ -226,7 +226,7 @@ fn histogram_ui(ui: &mut Ui, theme: &Theme, histogram: &ResidualHistogram, heigh
     response.on_hover_text("Components u and v of the reprojection residuals in the window, px");
 }
 
-/// χ² by kind of factor: before, after, and per residual, which is expected to be about 1.
+/// Table of χ² by kind of factor: before, after, and per residual, which is expected to be about 1.
 fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
     if residuals.is_empty() {
         ui.label(RichText::new("No solve in this step").color(theme.text_weak));
@@ -254,7 +254,7 @@ fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
     });
 }
 
-/// The explanation of a kind of factor.
+/// Definition of a kind of factor.
 const fn term_of(factor: FactorKind) -> Term {
     match factor {
         FactorKind::Visual => factors::VISUAL,
@@ -266,7 +266,7 @@ const fn term_of(factor: FactorKind) -> Term {
     }
 }
 
-/// χ² per residual with a bar around 1.
+/// Draws χ² per residual with a bar around 1.
 fn ratio_ui(ui: &mut Ui, theme: &Theme, ratio: f64) {
     let (color, meaning) = if !ratio.is_finite() {
         (theme.text_weak, "")

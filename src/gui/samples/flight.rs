@@ -1,7 +1,7 @@
 //! A short synthetic flight with a three-axis gimbal, processed by the real estimator once per test process.
 //!
 //! Two seconds of hover, then an aggressive flight around a house; feature tracks are projections of landmarks with
-//! noise, some of which drift off.
+//! noise, and some of the tracks drift.
 
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
@@ -19,11 +19,9 @@ use crate::simulation::{IntrinsicsError, SyntheticFlight, SyntheticMount, Synthe
 
 /// Period of the images in nanoseconds (20 Hz).
 pub(crate) const FRAME_PERIOD_NS: i64 = 50_000_000;
-/// Number of frames of the flight.
 pub(crate) const SAMPLE_FRAMES: usize = 120;
 /// Delay of the images in the log, in nanoseconds.
 const LOG_DELAY_NS: i64 = 19_000_000;
-/// The runs on the flight.
 const RUNS: [&str; 2] = ["auto", "classical"];
 
 static SAMPLE: LazyLock<Recording> = LazyLock::new(|| {
@@ -41,7 +39,7 @@ pub(crate) fn sample_recording() -> Recording {
     SAMPLE.clone()
 }
 
-/// The first frames of [`sample_recording`] with some of its runs, each with an id of its own.
+/// The first frames of [`sample_recording`] with some of its runs, each with a new id.
 pub(crate) fn sample_recording_of(frame_count: usize, runs: &[&str]) -> Recording {
     let part_of = |name: &&str| {
         let whole = SAMPLE.runs.iter().find(|run| run.spec.label == **name).expect("a run of the sample");
@@ -79,7 +77,7 @@ pub(crate) fn rigid_recording() -> Recording {
     RIGID.clone()
 }
 
-/// A run that also estimates the shutter and the intrinsics of camera and IMU, which the rig has wrong.
+/// A run that also estimates the shutter and the intrinsics of camera and IMU, whose values in the rig are wrong.
 pub(crate) fn sensor_recording() -> Recording {
     static SENSORS: LazyLock<Recording> = LazyLock::new(|| {
         let flight = flight_of(&SyntheticOptions {
@@ -96,7 +94,7 @@ pub(crate) fn sensor_recording() -> Recording {
     SENSORS.clone()
 }
 
-/// A flight whose first frame has stamp 0, so that frame `k` has `k` periods.
+/// A flight whose first frame has stamp 0, so that frame `k` has stamp `k` · [`FRAME_PERIOD_NS`].
 fn flight_of(options: &SyntheticOptions) -> SyntheticFlight {
     let mut flight = synthetic_tracks(options);
     let first_ns = flight.frames[0].stamp_ns;
@@ -129,7 +127,7 @@ fn recording_of(flight: &SyntheticFlight, runs: &[&str]) -> Recording {
     }
 }
 
-/// The estimator on all frames of a flight, each with its rank.
+/// Results of the estimator on all frames of a flight, each step with its rank.
 fn run_on(flight: &SyntheticFlight, name: &str) -> RunRecord {
     let rig = &flight.given_rig;
     let mut estimator = Estimator::new(configuration(rig, name));

@@ -14,7 +14,6 @@ const FIELD_PX: usize = 40;
 /// The image of `cam0` at any frame.
 pub(crate) struct SampleImages;
 
-/// Images for the recordings of this module.
 pub(crate) fn sample_images() -> SampleImages {
     SampleImages
 }

@@ -1,4 +1,4 @@
-//! The viewpoint of the scene and its projection onto the screen.
+//! Viewpoint of the scene and its projection onto the screen.
 //!
 //! No sine or cosine is computed unless the user rotates the view, so that screenshots do not depend on the system's
 //! math library.
@@ -11,9 +11,9 @@ const WORLD_HALF_TANGENT: f64 = 0.40;
 const CLOSE_UP_HALF_TANGENT: f64 = 0.08;
 /// Ratio of the near distance to the distance of the target.
 const NEAR_RATIO: f64 = 0.02;
-/// Largest sine of the elevation, less than 1 so that "up" stays defined.
+/// Largest sine of the elevation; less than 1, so that the up direction stays defined.
 const MAX_ELEVATION_SINE: f64 = 0.999;
-/// Ratio of the viewport that framed points may fill.
+/// Fraction of the viewport that framed points may fill.
 const FRAME_RATIO: f64 = 0.86;
 
 /// A camera that looks at a target, with the z axis up.
@@ -36,12 +36,12 @@ pub(super) struct Viewport {
 }
 
 impl Viewport {
-    /// For the world, with the region for framing.
+    /// Viewport of the world, with the region for framing.
     pub(super) fn world(size_px: [u32; 2], frame_px: [f64; 4]) -> Self {
         Self { size_px, frame_px, half_tangent: WORLD_HALF_TANGENT }
     }
 
-    /// For a small object, over the whole size.
+    /// Viewport of a small object, framed in the whole size.
     pub(super) fn close_up(size_px: [u32; 2]) -> Self {
         let frame_px = [0.0, 0.0, f64::from(size_px[0]), f64::from(size_px[1])];
         Self { size_px, frame_px, half_tangent: CLOSE_UP_HALF_TANGENT }
@@ -63,7 +63,7 @@ impl Viewport {
     }
 }
 
-/// A camera and its viewport, ready for projection.
+/// A camera and its viewport, prepared for projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct View {
     pub(super) camera: OrbitCamera,
@@ -100,7 +100,7 @@ impl View {
         Self { camera, viewport, right, up, near_m: (camera.distance_m * NEAR_RATIO).max(1e-6) }
     }
 
-    /// A point in the view: right, up and forward, in metres.
+    /// Coordinates of a point in the view: right, up and forward, in metres.
     pub(super) fn in_view(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
         let offset = point_m - self.camera.target_m;
         let away = self.camera.distance_m - self.camera.towards.dot(&offset);
@@ -153,10 +153,9 @@ pub(super) fn frame(points_m: &[Vector3<f64>], towards: Vector3<f64>, viewport: 
     let smallest_m = ((high - low).norm() * 0.05).max(1e-3);
     let reach = viewport.half_size_px().map(|half| FRAME_RATIO * half / viewport.focal_px());
     let middle = (low + high) * 0.5;
-    // A point at `across` and `nearer` (towards the camera) is inside when
-    // across − shift
-    // ≤ reach · (distance − nearer). For each side that bounds the shift from above or below; the smallest distance is
-    // where both bounds are equal.
+    // A point at `across` and `nearer` (towards the camera) is inside when across − shift ≤ reach · (distance −
+    // nearer). On each side this bounds the shift from above or below; the smallest distance is the one with equal
+    // bounds.
     let solve = |axis: &Vector3<f64>, reach: f64| {
         let (highest, lowest) = finite().fold((f64::NEG_INFINITY, f64::INFINITY), |(highest, lowest), point| {
             let offset = point - middle;
@@ -180,7 +179,7 @@ pub(super) struct Orbit {
 }
 
 impl Orbit {
-    /// Without changes by the user, from a direction that is not zero.
+    /// View from a non-zero direction without changes by the user.
     pub(super) fn from_direction(direction: Vector3<f64>) -> Self {
         Self { towards: direction.normalize(), zoom: 1.0, shift_m: Vector3::zeros() }
     }
@@ -214,7 +213,6 @@ impl Orbit {
     }
 }
 
-/// Length of a vector in the plane.
 #[expect(clippy::imprecise_flops, reason = "a square root rounds alike everywhere, which `hypot` does not promise")]
 pub(super) fn length(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()

@@ -41,12 +41,12 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// An empty canvas; the name distinguishes canvases of one panel.
+    /// Creates an empty canvas; `name` distinguishes the canvases of one panel.
     pub(super) fn new(name: &'static str) -> Self {
         Self { name, drawing: None, texture: None }
     }
 
-    /// Draws everything except the labels; `rect` has whole pixels.
+    /// Draws everything except the labels; the edges of `rect` are on whole pixels.
     pub(super) fn show(&mut self, ui: &Ui, rect: Rect, drawing: Drawing) -> Arc<Drawing> {
         let drawing = match self.drawing.take() {
             Some(last) if *last == drawing => last,

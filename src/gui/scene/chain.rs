@@ -19,8 +19,8 @@ pub(super) struct ChainPose {
     pub(super) names: Vec<String>,
     /// Poses `imu_from_frame` of the frames.
     pub(super) imu_from_frame: Vec<RigidTransform>,
-    /// For each link the corner between its translation along the joint's axis and its translation along the link, in
-    /// the IMU frame in metres.
+    /// Per link the corner between its translation along the joint's axis and its translation along the link, in metres
+    /// in the IMU frame.
     corners_m: Vec<Vector3<f64>>,
 }
 
@@ -51,8 +51,8 @@ impl ChainPose {
         Self { names, imu_from_frame, corners_m }
     }
 
-    /// The direction from which the frames have the largest distances on the screen; the same for all joint angles, so
-    /// that the view does not rotate with the joints.
+    /// Direction from which the frames have the largest distances on the screen. It is the same for all joint angles,
+    /// so that the view does not rotate with the joints.
     pub(super) fn best_direction(chain: &ClassicalChain) -> Vector3<f64> {
         const ROUND: [[f64; 2]; 16] = {
             const QUARTER: [[f64; 2]; 4] = [[5.0, 0.0], [4.6, 1.9], [3.5, 3.5], [1.9, 4.6]];
@@ -87,7 +87,6 @@ impl ChainPose {
         best.1
     }
 
-    /// Pose `imu_from_camera`.
     pub(super) fn imu_from_camera(&self) -> RigidTransform {
         self.imu_from_frame.last().copied().unwrap_or_default()
     }
@@ -120,7 +119,7 @@ pub(super) struct ChainModel {
     pub(super) estimate: ChainPose,
     /// The ground-truth chain at the same joint angles, or the estimate when `estimate` is moved away from it.
     pub(super) ground_truth: Option<ChainPose>,
-    /// Whether `estimate` is moved along a direction, and `ground_truth` is the chain before that.
+    /// True if `estimate` is moved along a direction; `ground_truth` is then the chain before the move.
     pub(super) moved: bool,
     pub(super) rows: Vec<LinkRow>,
     /// Distance in metres and angle in radians between the camera poses in the IMU frame of `estimate` and
@@ -128,7 +127,6 @@ pub(super) struct ChainModel {
     pub(super) camera_error: Option<(f64, f64)>,
 }
 
-/// The values of one link.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct LinkRow {
     pub(super) joint: String,
@@ -177,7 +175,7 @@ impl ChainModel {
 
     /// Points that a view of the chain must contain; they do not depend on a move along a direction.
     pub(super) fn framing_points_m(&self) -> Vec<Vector3<f64>> {
-        /// Ratio of the framed extent to the chain's, so that a moved chain fits.
+        /// Ratio of the framed extent to the extent of the chain; leaves space for a moved chain.
         const ROOM: f64 = 1.35;
         let reference = self.ground_truth.as_ref().filter(|_| self.moved);
         let Some(reference) = reference else { return self.estimate.framing_points_m() };
@@ -186,7 +184,7 @@ impl ChainModel {
         points.into_iter().map(|point| middle + (point - middle) * ROOM).collect()
     }
 
-    /// The close-up in the IMU frame.
+    /// Scene of the close-up in the IMU frame.
     pub(super) fn scene(&self, theme: &Theme) -> SceneModel {
         let mut scene = SceneModel::default();
         let length_m = self.axis_length_m();
@@ -218,7 +216,6 @@ impl ChainModel {
         scene
     }
 
-    /// A small camera frustum.
     fn camera_symbol(&self, theme: &Theme, scene: &mut SceneModel) {
         let pose = self.estimate.imu_from_camera();
         let depth_m = 1.1 * self.axis_length_m();
@@ -231,8 +228,8 @@ impl ChainModel {
         }
     }
 
-    /// The rods: grey from the IMU to the base and from the effector to the camera; for each link its `d` in the colour
-    /// of z and its `a` in the colour of x.
+    /// Draws the rods: grey from the IMU to the base and from the effector to the camera; for each link its `d` in the
+    /// colour of z and its `a` in the colour of x.
     fn links(&self, theme: &Theme, scene: &mut SceneModel) {
         const ROD: f32 = 3.0;
         let axes = axis_colors(theme);

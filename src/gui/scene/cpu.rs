@@ -1,4 +1,5 @@
-//! Draws a scene on the CPU: four samples per pixel at the positions that graphics cards use, each with its depth.
+//! Draws a scene on the CPU with four samples per pixel, at the sample positions of graphics cards; each sample has a
+//! depth.
 
 use egui::{Color32, ColorImage};
 use rayon::prelude::*;
@@ -55,7 +56,7 @@ fn sort_into_bands<T>(shapes: &[T], bands: usize, reach_px: impl Fn(&T) -> (f32,
     let mut sorted = vec![Vec::new(); bands];
     for shape in shapes {
         let (top, bottom) = reach_px(shape);
-        // NaN becomes 0 and infinity the last band; such shapes are skipped there.
+        // NaN becomes 0 and infinity the last band; both are skipped when drawn.
         let band_of = |row: f32| (row.max(0.0) as usize) / BAND_ROWS;
         let (first, end) = (band_of(top), band_of(bottom).saturating_add(1).min(bands));
         if bottom >= 0.0 && first < end {
@@ -83,7 +84,7 @@ struct SamplePlane {
 }
 
 impl Band {
-    /// Clears it for other rows.
+    /// Clears the band for other rows.
     fn begin(&mut self, width: usize, rows: usize, first_row: usize, background: u32) {
         self.clip = Clip { left: 0, top: first_row as i32, right: width as i32, bottom: (first_row + rows) as i32 };
         self.width = width;
@@ -95,7 +96,6 @@ impl Band {
         }
     }
 
-    /// Whether a range of rows does not touch the band.
     fn misses(&self, top_px: f32, bottom_px: f32) -> bool {
         bottom_px < self.clip.top as f32 || top_px > self.clip.bottom as f32
     }
@@ -115,7 +115,7 @@ impl Band {
     fn polygon(&mut self, triangles: &[[[i32; 2]; 3]], depth: &Plane, color: impl Fn(f64, f64, f64) -> u32) {
         let clip = self.clip;
         for (plane, [sample_x, sample_y]) in self.planes.iter_mut().zip(SAMPLES) {
-            // A sample is covered when the pixel's centre is, after a displacement by their difference.
+            // A sample is covered if the pixel's centre is, displaced by their difference.
             let (dx, dy) = (SUBPIXELS / 2 - sample_x, SUBPIXELS / 2 - sample_y);
             let (off_x, off_y) = (-f64::from(dx) / f64::from(SUBPIXELS), -f64::from(dy) / f64::from(SUBPIXELS));
             for triangle in triangles {
@@ -145,7 +145,7 @@ impl Band {
             return self.disc(&Disc { centre: segment.from, radius_px: half, color: segment.color });
         }
         let (ux, uy) = ((x1 - x0) / length, (y1 - y0) / length);
-        // Extended a little at both ends, so that bends have no notch.
+        // Extended slightly at both ends, so that bends have no notch.
         let (ex, ey) = (0.5 * half * ux, 0.5 * half * uy);
         let (nx, ny) = (-uy * half, ux * half);
         let quad = [

@@ -1,4 +1,4 @@
-//! The trajectories of the scene, one step of one run, or one pose of a trajectory, per row.
+//! Trajectories of the scene; one row per step of a run or pose of a trajectory.
 
 use super::ScenePanel;
 use crate::geometry::seconds_from_ns;
@@ -6,7 +6,8 @@ use crate::gui::PanelContext;
 use crate::gui::csv_table::{CsvTable, Table, number, seconds};
 
 impl CsvTable for ScenePanel {
-    /// Positions of all runs and trajectories up to the cursor, aligned with the ground truth as in the scene, and the ground truth.
+    /// Positions of all runs and trajectories up to the cursor, aligned with the ground truth as in the scene, and the
+    /// ground truth.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let mut table = Table::new(["t_s", "run", "x_m", "y_m", "z_m", "truth_x_m", "truth_y_m", "truth_z_m"]);
         for run in &ctx.recording.runs {

@@ -1,7 +1,6 @@
-//! Draws a scene with wgpu: into its own colour and depth targets with four samples per pixel, then copied into egui's
-//! pass.
+//! Draws a scene with wgpu into colour and depth targets with four samples per pixel, then copies it into egui's pass.
 //!
-//! egui's pass has no depth buffer, so the scene has its own, and is drawn again only when it has changed.
+//! egui's pass has no depth buffer. The scene is drawn again only when it has changed.
 
 use std::sync::Arc;
 
@@ -27,7 +26,7 @@ pub(super) struct SceneCallback {
 }
 
 impl SceneCallback {
-    /// `canvas` identifies the view, so that each keeps its targets.
+    /// `canvas` identifies the view; each view keeps its targets.
     pub(super) fn new(canvas: egui::Id, drawing: Arc<Drawing>, target_format: wgpu::TextureFormat) -> Self {
         Self { canvas, drawing, target_format }
     }
@@ -55,7 +54,6 @@ impl CallbackTrait for SceneCallback {
     }
 }
 
-/// Uniforms of the shaders.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 struct Uniforms {

@@ -10,16 +10,15 @@ use super::camera::{ScreenPoint, View, length};
 use super::model::{ImageQuad, Line, SceneModel};
 use crate::sensors::GrayImage;
 
-/// Factor by which lines are nearer than the surfaces on which they are drawn.
+/// Factor by which lines are drawn nearer than the surfaces on which they lie.
 const LINE_LIFT: f64 = 1.004;
 /// Distance outside the viewport in pixels up to which lines are kept.
 const MARGIN_PX: f64 = 64.0;
 
-/// A straight line segment.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(super) struct Segment {
-    /// x, y in pixels, depth.
+    /// x, y in pixels, and depth.
     pub(super) from: [f32; 3],
     pub(super) to: [f32; 3],
     pub(super) half_width_px: f32,
@@ -82,7 +81,6 @@ pub(super) struct Drawing {
     pub(super) labels: Vec<ScreenLabel>,
 }
 
-/// Projects a scene.
 pub(super) fn lay_out(model: &SceneModel, view: &View, pixels_per_point: f32, background: Color32) -> Drawing {
     let mut drawing = Drawing {
         size_px: view.viewport.size_px,
@@ -164,7 +162,7 @@ fn lay_out_line(line: &Line, view: &View, pixels_per_point: f32, drawing: &mut D
     }
 }
 
-/// Calls `emit(begin, end)` for every dash of a line, measured from the begin of the line.
+/// Calls `emit(start, end)` for every dash of a line, measured from the start of the line.
 fn each_dash(dashes: &[f64], travelled_px: f64, length_px: f64, mut emit: impl FnMut(f64, f64)) {
     let period: f64 = dashes.iter().sum();
     if !(period > 1e-3 && length_px.is_finite() && travelled_px.is_finite()) {

@@ -35,10 +35,9 @@ use crate::camera::CameraModel;
 use crate::sensors::Rig;
 use crate::session::RunRecord;
 
-/// The centre of the view of the world.
+/// Content on which the view of the world is centred.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Follow {
-    /// All trajectories.
     #[default]
     Trajectory,
     /// The vehicle at the cursor.
@@ -51,7 +50,7 @@ const VEHICLE_DISTANCE_RATIO: f64 = 0.3;
 const ROTATION_PER_POINT_RAD: f64 = 0.008;
 /// Width of the table of the chain's links in points.
 const TABLE_WIDTH: f32 = 256.0;
-/// Width of the legend that explains itself to a pointer, in points.
+/// Width in points of the legend that shows a tooltip.
 const LEGEND_WIDTH: f32 = 220.0;
 /// Height of the axes and the scale below the legend in points.
 const GIZMO_ROOM: f32 = 105.0;
@@ -60,15 +59,12 @@ const CLOSE_UP_FROM: Vec2 = vec2(440.0, 230.0);
 
 /// State of the scene panel: options and viewpoints.
 pub struct ScenePanel {
-    /// The centre of the view.
     pub follow: Follow,
-    /// Show landmarks.
     pub landmarks: bool,
-    /// Show the window's keyframes.
+    /// Show camera frusta of the keyframes in the window.
     pub keyframes: bool,
     /// Show the newest image in the camera's frustum.
     pub image: bool,
-    /// Show the close-up of the gimbal's chain.
     pub chain: bool,
     /// Show three standard deviations of the position around the trajectory of the selected run.
     pub tube: bool,
@@ -103,7 +99,7 @@ fn default_world_orbit() -> Orbit {
 }
 
 impl ScenePanel {
-    /// A panel with the same view and no texture of a window.
+    /// A panel with the same view, without textures of a window.
     pub(in crate::gui) fn view_copy(&self) -> Self {
         let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, .. } = *self;
         Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, ..Self::default() }
@@ -117,7 +113,7 @@ impl ScenePanel {
         (self.chain, self.tube) = (chain, tube);
     }
 
-    /// Whether it has options and viewpoint of another panel.
+    /// True if options and viewpoint equal those of another panel.
     pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
         let look = |panel: &Self| {
             let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, .. } = *panel;
@@ -187,7 +183,8 @@ impl ScenePanel {
         let lanes: Vec<LaneView<'_>> =
             lanes.map(|(number, lane)| LaneView::new(number, lane, first, context.cursor_ns)).collect();
         let points = framing_points_m(&views, &lanes);
-        // The legend in the upper left corner: a line per run and trajectory, one for the ground truth, one for the landmarks.
+        // Lines of the legend in the upper left corner: one per run and trajectory, one for the ground truth, one for
+        // the landmarks.
         let key = overlay::LINE_HEIGHT * (views.len() + lanes.len() + 2) as f32;
         let viewport = world_viewport(area, close_up, key.min(0.22 * area.height()), scale);
         let mut framing = frame(&points, self.world.towards, &viewport);
@@ -239,7 +236,7 @@ impl ScenePanel {
         let legend = Rect::from_min_size(area.min, vec2(LEGEND_WIDTH.min(area.width()), key));
         explain(ui, legend, "scene legend", window::SCENE_LEGEND);
         overlay::scale_bar(&painter, area, scale, theme, &view, &format!(", grid {spacing_m} m"));
-        // In a low panel the legend covers the place of the axes.
+        // In a low panel the legend covers the space of the axes.
         if area.height() > key + GIZMO_ROOM {
             overlay::gizmo(&painter, area.left_bottom() + vec2(34.0, -62.0), theme, &view);
         }
@@ -293,7 +290,7 @@ impl ScenePanel {
     }
 }
 
-/// Explains what is painted in a rectangle to a pointer over it.
+/// Adds a tooltip with the definition of `term` to a painted rectangle.
 fn explain(ui: &Ui, rect: Rect, name: &str, term: Term) {
     ui.interact(rect, ui.scope_id().with(name), Sense::hover()).on_hover_text(term.meaning);
 }
@@ -371,7 +368,7 @@ fn size_px(rect: Rect, pixels_per_point: f32) -> [u32; 2] {
     [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32)
 }
 
-/// The whole area; framing uses the region to the left of the close-up and below the legend.
+/// Viewport of the whole area; framing uses the region to the left of the close-up and below the legend.
 fn world_viewport(area: Rect, close_up: Option<Rect>, key_height: f32, pixels_per_point: f32) -> Viewport {
     let size_px = size_px(area, pixels_per_point);
     let right = close_up.map_or_else(|| area.right(), |rect| rect.left());
@@ -384,16 +381,17 @@ fn world_viewport(area: Rect, close_up: Option<Rect>, key_height: f32, pixels_pe
     Viewport::world(size_px, frame_px.map(f64::from))
 }
 
-/// The rectangle of the close-up in the lower right corner.
+/// Rectangle of the close-up in the lower right corner.
 fn close_up_rect(area: Rect, pixels_per_point: f32) -> Rect {
     const INSET: f32 = 6.0;
-    // The table of links has a minimum width, but the flight keeps half of the panel.
+    // The table of links has a minimum width, but at least half of the panel remains for the flight.
     let min_width = (0.5 * area.width()).min(TABLE_WIDTH);
     let size = vec2((0.42 * area.width()).clamp(min_width, 420.0), (0.8 * area.height()).clamp(180.0, 420.0));
     on_pixels(Rect::from_min_max(area.max - size - Vec2::splat(INSET), area.max - Vec2::splat(INSET)), pixels_per_point)
 }
 
-/// Dragging rotates, with Shift or another button it shifts, the wheel zooms, a double click resets the view.
+/// Navigation by pointer: dragging rotates, with Shift or another button it shifts, the wheel zooms, a double click
+/// resets the view.
 fn navigate(ui: &Ui, response: &Response, orbit: &mut Orbit, home: Orbit, view: &View) {
     if response.double_clicked() {
         *orbit = home;

@@ -1,4 +1,4 @@
-//! The content of a scene, common to all backends, in metres in one frame.
+//! Content of a scene in metres in one frame, common to all backends.
 
 use std::sync::Arc;
 
@@ -8,7 +8,6 @@ use nalgebra::Vector3;
 use crate::geometry::RigidTransform;
 use crate::sensors::GrayImage;
 
-/// A line through several points.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Line {
     pub(super) points_m: Vec<Vector3<f64>>,
@@ -28,7 +27,6 @@ pub(super) struct Dot {
     pub(super) radius: f32,
 }
 
-/// A triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Face {
     pub(super) corners_m: [Vector3<f64>; 3],
@@ -42,7 +40,7 @@ pub(super) struct ImageQuad {
     pub(super) image: Arc<GrayImage>,
 }
 
-/// A text beside a point.
+/// A text next to a point.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Label {
     pub(super) position_m: Vector3<f64>,
@@ -50,7 +48,6 @@ pub(super) struct Label {
     pub(super) color: Color32,
 }
 
-/// All objects of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct SceneModel {
     pub(super) lines: Vec<Line>,

@@ -24,7 +24,7 @@ const SIDES: [(Align2, Vec2); 8] = [
     (Align2::RIGHT_CENTER, vec2(-16.0, 0.0)),
 ];
 
-/// Writes labels without overlaps and inside `rect`; a label without room is omitted.
+/// Writes labels without overlaps and inside `rect`; a label that does not fit is omitted.
 pub(super) fn labels(painter: &Painter, rect: Rect, pixels_per_point: f32, labels: &[ScreenLabel], ground: Color32) {
     let mut taken: Vec<Rect> = Vec::new();
     for label in labels {
@@ -54,7 +54,7 @@ pub(super) struct LegendLine {
     pub(super) text: String,
 }
 
-/// The legend of the lines in the upper left corner, and below it the colour map of the landmarks.
+/// Draws the legend of the lines in the upper left corner, and below it the colour map of the landmarks.
 pub(super) fn legend(
     painter: &Painter,
     rect: Rect,
@@ -97,7 +97,7 @@ fn length_text(length_m: f64) -> String {
     if length_m < 0.0995 { format!("{:.0} mm", length_m * 1e3) } else { format!("{length_m} m") }
 }
 
-/// A bar of a round length at the depth of the view's target, in the lower left corner.
+/// Draws a bar of a round length, valid at the depth of the view's target, in the lower left corner.
 pub(super) fn scale_bar(painter: &Painter, rect: Rect, pixels_per_point: f32, theme: &Theme, view: &View, note: &str) {
     const WANTED_PX: f64 = 90.0;
     let metres_per_point = view.metres_per_px() * f64::from(pixels_per_point);
@@ -113,7 +113,7 @@ pub(super) fn scale_bar(painter: &Painter, rect: Rect, pixels_per_point: f32, th
     plated(painter, left + vec2(4.0, -6.0 - galley.size().y), galley, theme.text, theme.plot_background);
 }
 
-/// The directions of x, y, z as small axes in a corner.
+/// Draws the directions of x, y, z as small axes in a corner.
 pub(super) fn gizmo(painter: &Painter, centre: Pos2, theme: &Theme, view: &View) {
     const REACH: f32 = 20.0;
     let camera = view.camera;
@@ -126,7 +126,6 @@ pub(super) fn gizmo(painter: &Painter, centre: Pos2, theme: &Theme, view: &View)
             (in_view.z, reach, axis_colors(theme)[axis], name)
         })
         .into();
-    // The farthest axis first.
     arms.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (_, reach, color, name) in arms {
         painter.line_segment([centre, centre + reach], Stroke::new(2.0, color));
@@ -144,14 +143,14 @@ pub(super) fn chain_table_height(chain: &ChainModel) -> f32 {
     (rows + footer) as f32 * LINE_HEIGHT + 6.0
 }
 
-/// The error of the camera's extrinsics, or by how much the camera is moved.
+/// Error of the camera's extrinsics, or the displacement of a moved camera.
 pub(super) fn camera_error_text(chain: &ChainModel) -> Option<String> {
     let (distance_m, angle_rad) = chain.camera_error?;
     let what = if chain.moved { "camera moved by" } else { "extrinsics error:" };
     Some(format!("{what} {:.1} mm, {:.2}°", distance_m * 1e3, angle_rad.to_degrees()))
 }
 
-/// The values of the links in degrees and millimetres.
+/// Table of the link values in degrees and millimetres.
 pub(super) fn chain_table(painter: &Painter, rect: Rect, theme: &Theme, chain: &ChainModel) {
     let font = theme::number_font();
     let mut y = rect.top() + 2.0;

@@ -14,7 +14,7 @@ pub(super) struct PipelineMaker<'a> {
 }
 
 impl PipelineMaker<'_> {
-    /// A pipeline that draws into the scene's own targets with a depth test.
+    /// A pipeline that draws into the targets of the scene with a depth test.
     pub(super) fn scene(
         &self,
         [vertex, fragment]: [&str; 2],

@@ -85,7 +85,6 @@ fn framing_contains_every_point_and_fills_the_view() {
         let filled = ((right - left) / 500.0).max((bottom - top) / 430.0);
         assert!(filled > 0.75, "only {filled} of the view is used from {direction:?}");
     }
-    // No point, equal points, NaN.
     for points in [vec![], vec![Vector3::zeros(); 3], vec![Vector3::new(f64::NAN, 0.0, 0.0)]] {
         let camera = frame(&points, Vector3::z(), &viewport);
         assert!(camera.distance_m > 0.0 && camera.distance_m.is_finite());

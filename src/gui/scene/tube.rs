@@ -1,25 +1,24 @@
-//! The outline of the space around a trajectory that its covariances leave: three standard deviations to each side.
+//! Outline of the 3σ tube of the position covariances around a trajectory.
 
 use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Factor of the standard deviation.
 const SIGMAS: f64 = 3.0;
 /// Largest number of cross-sections of a path without interruption.
 const MAX_RINGS: f64 = 180.0;
 /// Points of a cross-section.
 const RING_POINTS: usize = 20;
-/// Shortest distance of two cross-sections in metres; longer ones are a power of two of it.
+/// Shortest distance of two cross-sections in metres; longer distances are this times a power of two.
 const MIN_SPACING_M: f64 = 0.02;
 /// Lines along the trajectory.
 const SIDES: usize = 4;
 
 /// Cross-sections at equal distances along the path, perpendicular to it, and lines along it on four sides.
 ///
-/// `place` and `covariance` return the position in metres and its covariance in m² of a step; steps without a place
-/// interrupt the tube. A cross-section is the ellipse of 3σ of the position across the path. The distance of two
-/// cross-sections doubles as the path gets longer: in between they stay where they are.
+/// `place` and `covariance` return the position in metres and its covariance in m² of a step; steps without a position
+/// interrupt the tube. A cross-section is the 3σ ellipse of the position across the path. The distance of two
+/// cross-sections doubles as the path gets longer; between two doublings the cross-sections do not move.
 pub(super) fn outline(
     steps: usize,
     place: impl Fn(usize) -> Option<Vector3<f64>>,
@@ -66,7 +65,7 @@ fn rings<'a>(
     rings
 }
 
-/// The ellipse of 3σ across a direction, from the right-hand side on.
+/// The 3σ ellipse across a direction, starting at the right-hand side.
 fn ring(place: &Vector3<f64>, covariance: &Matrix3<f64>, direction: &Vector3<f64>) -> Vec<Vector3<f64>> {
     // A vertical path has no right-hand side.
     let across = direction.cross(&Vector3::z());
@@ -96,7 +95,7 @@ mod tests {
         let place = |step: usize| (step != 20).then(|| Vector3::new(0.5 * step as f64, 0.0, 0.0));
         let lines = outline(40, place, |_| covariance);
         let rings: Vec<_> = lines.iter().filter(|line| (line[0] - line[line.len() - 1]).norm() < 1e-12).collect();
-        // The first place of each of the two parts has no direction.
+        // The first position of each of the two parts has no direction.
         assert_eq!((rings.len(), lines.len() - rings.len()), (37, 2 * SIDES));
         let inverse = covariance.fixed_view::<2, 2>(1, 1).try_inverse().unwrap();
         for ring in rings {

@@ -1,4 +1,4 @@
-//! The scene in the world: ground, trajectories, landmarks, cameras and the vehicle.
+//! Scene in the world frame: ground, trajectories, landmarks, cameras and the vehicle.
 
 use std::sync::Arc;
 
@@ -24,7 +24,6 @@ const MAX_LANDMARK_STEPS: usize = 128;
 /// Maximum number of drawn landmarks.
 const MAX_LANDMARKS: usize = 20_000;
 
-/// Options of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct WorldOptions {
     pub(super) landmarks: bool,
@@ -33,15 +32,15 @@ pub(super) struct WorldOptions {
     pub(super) tube: bool,
 }
 
-/// Columns of a run's table: estimated position, ground-truth position, then the upper triangle of the covariance of the
-/// estimated position; NaN where unknown.
+/// Columns of a run's table: estimated position, ground-truth position, then the upper triangle of the covariance of
+/// the estimated position; NaN where unknown.
 const PLACES: usize = 12;
 const ESTIMATE: usize = 0;
 const GROUND_TRUTH: usize = 3;
 const COVARIANCE: usize = 6;
 
-/// Estimated and ground-truth positions of each run with their covariances, read step by step, so that a long recording is not read again for
-/// every frame.
+/// Estimated and ground-truth positions of each run with their covariances, read step by step, so that a long recording
+/// is not read again for every frame.
 #[derive(Debug, Default)]
 pub(super) struct Trajectories {
     tables: RunTables,
@@ -93,7 +92,6 @@ impl<'a> RunView<'a> {
         Self { shown: self.places.stamps_ns.len(), ..*self }
     }
 
-    /// The step at the cursor.
     fn step(&self) -> Option<&'a Arc<crate::session::StepRecord>> {
         self.run.step(self.shown.checked_sub(1)?)
     }
@@ -118,12 +116,11 @@ impl<'a> RunView<'a> {
         Some((self.aligned * self.newest()?.world_from_imu).translation_m)
     }
 
-    /// Whether the run has ground truth up to the cursor.
     pub(super) fn has_ground_truth(&self) -> bool {
         self.places.columns[GROUND_TRUTH][..self.shown].iter().any(|x| x.is_finite())
     }
 
-    /// Aligned positions in metres, interrupted where the run did not track.
+    /// Aligned positions in metres, interrupted where the run was not tracking.
     fn trajectory_m(&self) -> Vec<Vec<Vector3<f64>>> {
         broken_line(self.shown, |step| self.aligned.transform(&self.place(ESTIMATE, step)))
     }
@@ -132,7 +129,7 @@ impl<'a> RunView<'a> {
         broken_line(self.shown, |step| self.place(GROUND_TRUTH, step))
     }
 
-    /// The tube of three standard deviations around the estimated positions.
+    /// The 3σ tube around the estimated positions.
     fn tube_m(&self) -> Vec<Vec<Vector3<f64>>> {
         let rotation = self.aligned.rotation.to_rotation_matrix();
         let covariance_m2 = |step: usize| {
@@ -155,7 +152,7 @@ impl<'a> RunView<'a> {
     }
 }
 
-/// A trajectory beside the runs up to the cursor, in the world of the scene.
+/// A trajectory of another program up to the cursor, in the world of the scene.
 pub(super) struct LaneView<'a> {
     pub(super) number: usize,
     pub(super) lane: &'a TrajectoryLane,
@@ -165,7 +162,7 @@ pub(super) struct LaneView<'a> {
 }
 
 impl<'a> LaneView<'a> {
-    /// `run` is the first one of the recording, whose world is that of the scene where there is no ground truth.
+    /// `run` is the first run of the recording; without ground truth its world is that of the scene.
     pub(super) fn new(number: usize, lane: &'a TrajectoryLane, run: Option<&RunRecord>, cursor_ns: i64) -> Self {
         let shown = lane.track.samples().partition_point(|sample| sample.stamp_ns <= cursor_ns);
         Self { number, lane, shown, world_from_own: lane.world_from_own(run) }
@@ -224,13 +221,13 @@ pub(super) fn ground_height_m(points: &[Vector3<f64>]) -> f64 {
     points.iter().map(|point| point.z).fold(0.0, f64::min)
 }
 
-/// Builds the world. Objects without a size of their own scale with `view_distance_m`.
+/// Builds the scene of the world. Objects without a physical size scale with `view_distance_m`.
 pub(super) struct WorldBuilder<'a> {
     pub(super) theme: &'a Theme,
     pub(super) options: WorldOptions,
     pub(super) view_distance_m: f64,
     pub(super) scene: SceneModel,
-    /// Heights with the first and the last colour of the landmarks.
+    /// Heights in metres of the first and the last colour of the landmarks.
     pub(super) height_range_m: Option<(f64, f64)>,
 }
 
@@ -239,7 +236,7 @@ impl<'a> WorldBuilder<'a> {
         Self { theme, options, view_distance_m, scene: SceneModel::default(), height_range_m: None }
     }
 
-    /// A square grid under the flight; returns its spacing in metres.
+    /// Draws a square grid under the flight; returns its spacing in metres.
     pub(super) fn ground(&mut self, points_m: &[Vector3<f64>]) -> f64 {
         let Some((low, high)) = bounds(points_m) else { return 1.0 };
         let extent_m = (high.x - low.x).max(high.y - low.y);
@@ -262,7 +259,7 @@ impl<'a> WorldBuilder<'a> {
         spacing_m
     }
 
-    /// The ground-truth trajectory up to the cursor.
+    /// Draws the ground-truth trajectory up to the cursor.
     pub(super) fn ground_truth(&mut self, view: &RunView<'_>) {
         let style = self.theme.ground_truth_style();
         for line in view.ground_truth_m() {
@@ -270,7 +267,7 @@ impl<'a> WorldBuilder<'a> {
         }
     }
 
-    /// The positions of the antenna up to the cursor, where these are the ground truth.
+    /// Draws the antenna positions up to the cursor, where these are the ground truth.
     pub(super) fn true_positions(&mut self, truth: &PositionTruth, cursor_ns: i64) {
         let shown = truth.samples.partition_point(|sample| sample.stamp_ns <= cursor_ns);
         let style = self.theme.ground_truth_style();
@@ -279,7 +276,7 @@ impl<'a> WorldBuilder<'a> {
         }
     }
 
-    /// A run's trajectory and its newest camera.
+    /// Draws a run's trajectory and its newest camera.
     pub(super) fn run(&mut self, view: &RunView<'_>, camera: Option<&CameraModel>, image: Option<Arc<GrayImage>>) {
         let style = self.theme.run(view.number);
         for line in view.trajectory_m() {
@@ -297,7 +294,7 @@ impl<'a> WorldBuilder<'a> {
         }
     }
 
-    /// A trajectory beside the runs with its newest pose.
+    /// Draws a trajectory of another program with its newest pose.
     pub(super) fn lane(&mut self, view: &LaneView<'_>) {
         let style = self.theme.trajectory(view.number);
         for line in view.lines_m(view.shown) {
@@ -310,7 +307,7 @@ impl<'a> WorldBuilder<'a> {
         self.scene.axes(&world_from_imu, 0.03 * self.view_distance_m, axis_colors(self.theme), 1.5);
     }
 
-    /// Details of the selected run: window, landmarks, height above the ground.
+    /// Draws details of the selected run: window, landmarks, height above the ground.
     pub(super) fn details(&mut self, view: &RunView<'_>, camera: Option<&CameraModel>, ground_height_m: f64) {
         let Some(step) = view.step() else { return };
         if self.options.landmarks {
@@ -347,7 +344,7 @@ impl<'a> WorldBuilder<'a> {
         self.scene.dots.push(Dot { position_m, color, radius });
     }
 
-    /// Landmarks of the step at the cursor, and paler those of earlier steps; viridis over their height.
+    /// Draws the landmarks of the step at the cursor, and paler those of earlier steps; viridis over their height.
     fn landmarks(&mut self, view: &RunView<'_>) {
         let steps = &view.run.steps[..view.shown];
         let Some(now) = view.step() else { return };
@@ -383,7 +380,7 @@ impl<'a> WorldBuilder<'a> {
         }
     }
 
-    /// A camera's frustum, with the image at its far end.
+    /// Draws a camera's frustum, with the image at its far end.
     fn frustum(
         &mut self,
         world_from_camera: &RigidTransform,
@@ -423,7 +420,7 @@ fn frustum_corners(camera: &CameraModel) -> [Vector3<f64>; 4] {
     let [fx, fy, cx, cy] = camera.intrinsics_px;
     [(-0.5, -0.5), (width, -0.5), (width, height), (-0.5, height)].map(|(u, v)| {
         let bearing = camera.unproject(&Vector2::new(u, v)).filter(|bearing| bearing.z > 0.1);
-        // Wide lenses also see behind the image plane; there the corner of the pinhole model is used.
+        // Wide lenses have corners behind the image plane; there the corner of the pinhole model is used.
         bearing.map_or_else(|| Vector3::new((u - cx) / fx, (v - cy) / fy, 1.0), |bearing| bearing / bearing.z)
     })
 }

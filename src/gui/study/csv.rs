@@ -1,4 +1,4 @@
-//! The values of the panels of a study as comma-separated values.
+//! Values of the panels of a study as comma-separated values.
 
 use super::StudyPanel;
 use super::model::StudyModel;
@@ -7,7 +7,7 @@ use super::strips::Strip;
 use crate::gui::csv_table::{Table, number};
 use crate::study::view::{Study, parameter_errors};
 
-/// The values of a panel with a head line: runs in the stored units with all columns, plots in the shown ones.
+/// Values of a panel with a header line: runs in the stored units with all columns, plots in the shown units.
 pub(super) fn table(panel: StudyPanel, study: &Study, model: &mut StudyModel) -> String {
     model.update(study);
     match panel {

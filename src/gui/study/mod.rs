@@ -1,7 +1,7 @@
-//! The view of a study: many runs in a table, as distributions, paired differences, success rates, parallel coordinates
-//! and errors against σ.
+//! View of a study: many runs in a table, as distributions, paired differences, success rates, parallel coordinates and
+//! errors against σ.
 //!
-//! Like the panels of a session these read plain data and push requests; the application executes them.
+//! Like the panels of a session it reads plain data and pushes requests; the application executes them.
 
 mod csv;
 mod model;
@@ -30,7 +30,6 @@ use super::theme::{PANEL_MARGIN, Theme};
 use super::units::counted;
 use crate::study::view::{GroupSummary, Metric, ParameterErrors, Study, parameter_errors, summarize_groups};
 
-/// A panel of the study view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum StudyPanel {
     /// One line per run.
@@ -48,7 +47,6 @@ pub enum StudyPanel {
 }
 
 impl StudyPanel {
-    /// All panels.
     pub const ALL: [Self; 6] =
         [Self::Runs, Self::Distributions, Self::Differences, Self::Success, Self::Parallel, Self::Parameters];
 
@@ -64,12 +62,12 @@ impl StudyPanel {
         }
     }
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub const fn as_str(self) -> &'static str {
         self.names().0
     }
 
-    /// Its title in the window.
+    /// Title in the window.
     pub const fn title(self) -> &'static str {
         self.names().1
     }
@@ -78,11 +76,10 @@ impl StudyPanel {
 /// A request of the study view to the application.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum StudyRequest {
-    /// Open the run of this row in the debugger, with the runs of the same log beside it.
+    /// Open the run of this row in the debugger, together with the comparable runs of the same log.
     OpenRun(usize),
-    /// Put a text into the clipboard; the second text says what it is.
+    /// Put a text into the clipboard; the second text is its description.
     Copy(String, String),
-    /// Close the study.
     Close,
 }
 
@@ -92,15 +89,15 @@ pub(crate) struct StudyContext<'a> {
     pub(crate) model: &'a mut StudyModel,
     pub(crate) theme: &'a Theme,
     pub(crate) presentation: Presentation,
-    /// The run under the pointer in any panel, in the last frame.
+    /// Run under the pointer in any panel, in the last frame.
     pub(crate) pointed: Option<usize>,
-    /// The run under the pointer in this frame.
+    /// Run under the pointer in this frame.
     pub(crate) now_pointed: &'a mut Option<usize>,
     pub(crate) requests: &'a mut Vec<StudyRequest>,
 }
 
 impl StudyContext<'_> {
-    /// Marks the run under the pointer in all panels, with its name and what a click does beside the pointer.
+    /// Marks the run under the pointer in all panels, and shows its name and the effect of a click next to the pointer.
     pub(crate) fn point_at(&mut self, ui: &Ui, response: &egui::Response, row: usize, value: &str) {
         *self.now_pointed = Some(row);
         let title = self.study.title_of(row);
@@ -123,7 +120,6 @@ impl StudyContext<'_> {
     }
 }
 
-/// State of the study view.
 pub struct StudyState {
     study: Arc<Study>,
     model: StudyModel,
@@ -134,16 +130,16 @@ pub struct StudyState {
     parallel: ParallelPanel,
     parameters: ParametersPanel,
     pointed: Option<usize>,
-    /// The panel that fills the window.
+    /// Panel that fills the window.
     maximized: Option<StudyPanel>,
-    /// The panel behind which of the two lower right ones.
+    /// Front panel of the two lower right ones.
     lower_right: StudyPanel,
     /// Requests to the application, which takes them after each frame.
     pub requests: Vec<StudyRequest>,
 }
 
 impl StudyState {
-    /// The view of a study with filter, groups and metric.
+    /// Creates the view of a study with filter, groups and metric.
     ///
     /// # Errors
     /// When the options name a column that the study does not have, or a condition cannot be parsed.
@@ -165,12 +161,11 @@ impl StudyState {
         })
     }
 
-    /// The study.
     pub fn study(&self) -> &Arc<Study> {
         &self.study
     }
 
-    /// Draws one panel into the available room of `ui`.
+    /// Draws one panel into the available space of `ui`.
     fn panel_ui(
         &mut self,
         panel: StudyPanel,
@@ -198,7 +193,7 @@ impl StudyState {
         }
     }
 
-    /// The groups in numbers.
+    /// Summary values of the groups.
     pub fn group_summaries(&mut self) -> Vec<GroupSummary> {
         self.model.update(&self.study);
         let (model, study) = (&self.model, &self.study);
@@ -207,13 +202,12 @@ impl StudyState {
         summarize_groups(study, arranged, model.group(), reference, model.metric(), success)
     }
 
-    /// The calibration parameters of the shown runs.
+    /// Errors of the calibration parameters of the shown runs.
     pub fn parameter_errors(&mut self) -> Vec<ParameterErrors> {
         self.model.update(&self.study);
         parameter_errors(&self.study, &self.study.run_of_parameter_rows(), &self.model.arranged.rows)
     }
 
-    /// Number of shown runs.
     pub fn shown_runs(&mut self) -> usize {
         self.model.update(&self.study);
         self.model.arranged.rows.len()
@@ -224,12 +218,12 @@ impl StudyState {
         self.model.options()
     }
 
-    /// Title of the metric with its unit, empty in a study without numbers.
+    /// Title of the metric with its unit; empty in a study without numbers.
     pub fn metric_title(&self) -> String {
         self.model.metric().map(Metric::title).unwrap_or_default()
     }
 
-    /// The values of a panel as comma-separated values, in the stored units.
+    /// Values of a panel as comma-separated values, in the stored units.
     pub fn csv_table(&mut self, panel: StudyPanel) -> String {
         self.model.update(&self.study);
         csv::table(panel, &self.study, &mut self.model)
@@ -251,7 +245,6 @@ pub fn study_panel_ui(
     state.pointed = pointed;
 }
 
-/// Draws the whole view of a study.
 pub fn study_ui(ui: &mut Ui, state: &mut StudyState, theme: &Theme) {
     let bar = Frame::new().fill(theme.surface).inner_margin(egui::Margin::symmetric(8, 4));
     Panel::top("study bar").frame(bar).show(ui, |ui| {
@@ -272,7 +265,7 @@ pub fn study_ui(ui: &mut Ui, state: &mut StudyState, theme: &Theme) {
     }
 }
 
-/// Room of every visible panel.
+/// Rectangle of every visible panel.
 fn places(room: Rect, maximized: Option<StudyPanel>, lower_right: StudyPanel) -> Vec<(StudyPanel, Rect)> {
     use StudyPanel::{Differences, Distributions, Runs, Success};
     if let Some(panel) = maximized {
@@ -292,7 +285,7 @@ fn places(room: Rect, maximized: Option<StudyPanel>, lower_right: StudyPanel) ->
     ]
 }
 
-/// A panel with its title and buttons.
+/// Draws a panel with its title and buttons.
 fn framed_ui(
     ui: &mut Ui,
     state: &mut StudyState,

@@ -1,11 +1,11 @@
-//! What all panels of a study share: filter, order, groups, metric, and the rows that follow from them.
+//! State common to all panels of a study: filter, order, groups, metric, and the resulting rows.
 
 use crate::study::view::{Arranged, Metric, RowFilter, SortKey, Study, arrange, columns, group_columns, metrics};
 
-/// Filter, groups and metric of a study view, as they are given on the command line.
+/// Filter, groups and metric of a study view, as on the command line.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct StudyOptions {
-    /// Condition on the rows, empty for all.
+    /// Condition on the rows; empty for all.
     pub filter: String,
     /// Column of groups; `None` for the first one that varies.
     pub group: Option<String>,
@@ -17,12 +17,12 @@ pub struct StudyOptions {
     pub success: Option<String>,
 }
 
-/// A condition as it is typed and as it was last valid.
+/// A condition as typed, and the last valid one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Condition {
     pub(crate) text: String,
     pub(crate) filter: RowFilter,
-    /// What is wrong with the text.
+    /// Error in the text.
     pub(crate) problem: Option<String>,
 }
 
@@ -32,7 +32,8 @@ impl Condition {
         Ok(Self { text: text.to_owned(), filter, problem: None })
     }
 
-    /// Parses the text again; an invalid text leaves the last valid condition in effect. Returns whether that changed.
+    /// Parses the text again; an invalid text leaves the last valid condition in effect. Returns true if the condition
+    /// in effect changed.
     pub(crate) fn parse(&mut self, study: &Study) -> bool {
         match RowFilter::parse(&self.text, &study.runs) {
             Ok(filter) => {
@@ -49,7 +50,7 @@ impl Condition {
     }
 }
 
-/// The state that all panels share.
+/// State common to all panels.
 #[derive(Clone, Debug)]
 pub(crate) struct StudyModel {
     pub(crate) filter: Condition,
@@ -58,18 +59,18 @@ pub(crate) struct StudyModel {
     group: Option<String>,
     reference: Option<String>,
     metric: usize,
-    /// Columns of numbers with values.
+    /// Columns with numeric values.
     pub(crate) metrics: Vec<Metric>,
     /// Columns by which rows can be grouped.
     pub(crate) group_columns: Vec<String>,
-    /// The rows as they are shown.
+    /// Rows in the shown order.
     pub(crate) arranged: Arranged,
-    /// Grows with every change of rows or groups.
+    /// Increases with every change of rows or groups.
     pub(crate) generation: u64,
     stale: bool,
 }
 
-/// The condition of a success unless another one is given.
+/// Default condition of a success.
 const SUCCESS: &str = "status = ok";
 
 impl StudyModel {
@@ -123,7 +124,7 @@ impl StudyModel {
         }
     }
 
-    /// Everything that can be chosen, as it is in effect.
+    /// All options in effect.
     pub(crate) fn options(&self) -> StudyOptions {
         StudyOptions {
             filter: self.filter.text.clone(),
@@ -134,12 +135,12 @@ impl StudyModel {
         }
     }
 
-    /// Marks the rows as out of date.
+    /// Marks the rows as outdated.
     pub(crate) fn touch(&mut self) {
         self.stale = true;
     }
 
-    /// The column of groups.
+    /// Column of groups.
     pub(crate) fn group(&self) -> Option<&str> {
         self.group.as_deref()
     }
@@ -151,7 +152,7 @@ impl StudyModel {
         }
     }
 
-    /// The metric of all plots, `None` in a study without numbers.
+    /// Metric of all plots; `None` in a study without numbers.
     pub(crate) fn metric(&self) -> Option<&Metric> {
         self.metrics.get(self.metric)
     }
@@ -163,7 +164,7 @@ impl StudyModel {
         }
     }
 
-    /// The reference group of differences: the chosen one, or the first.
+    /// Reference group of differences: the chosen one, or the first.
     pub(crate) fn reference(&self) -> Option<&str> {
         let chosen = self.reference.as_ref().filter(|name| self.arranged.groups.iter().any(|of| of.name == **name));
         chosen.map(String::as_str).or_else(|| self.arranged.groups.first().map(|group| group.name.as_str()))
@@ -176,7 +177,7 @@ impl StudyModel {
         }
     }
 
-    /// A click on the head of a column: ascending, descending, unsorted. With `add` the other keys stay.
+    /// Applies a click on the heading of a column: ascending, descending, unsorted. With `add` the other keys stay.
     pub(crate) fn sort_by(&mut self, column: &str, add: bool) {
         let at = self.sort.iter().position(|key| key.column == column);
         let next = match at.map(|at| self.sort[at].descending) {
@@ -194,7 +195,6 @@ impl StudyModel {
         self.touch();
     }
 
-    /// The success condition changed.
     pub(crate) fn success_changed(&mut self) {
         self.generation += 1;
     }
@@ -205,7 +205,7 @@ fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> 
     format!("unknown {what} '{name}': expected one of {}", known.join(", "))
 }
 
-/// The name of a group for people.
+/// Shown name of a group.
 pub(crate) fn shown_group(name: &str, column: Option<&str>) -> String {
     match (name.is_empty(), column) {
         (true, None) => "all runs".to_owned(),

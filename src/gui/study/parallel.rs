@@ -15,16 +15,16 @@ use crate::study::view::{AxisScale, ParallelAxis, Study, default_axes, parallel_
 
 /// Distance in points within which the pointer hits a line.
 const REACH: f32 = 5.0;
-/// Room above the axes for titles and upper ends.
+/// Space in points above the axes for titles and upper ends.
 const ABOVE: f32 = 34.0;
-/// Room below them.
+/// Space in points below the axes.
 const BELOW: f32 = 18.0;
-/// Colours of the metric.
+/// Number of colours of the metric.
 const SHADES: usize = 12;
-/// Most axes.
+/// Maximum number of axes.
 const MAX_AXES: usize = 12;
 
-/// The inputs of the drawn lines; equal keys have equal lines.
+/// Inputs of the drawn lines; equal keys have equal lines.
 #[derive(Clone, Debug, PartialEq)]
 struct Key {
     generation: u64,
@@ -56,7 +56,7 @@ impl ParallelPanel {
         let columns: Vec<String> = self
             .columns
             .iter()
-            // The axis of the metric is always there, as the last one.
+            // The axis of the metric is always the last one.
             .filter(|column| metric.as_ref().is_none_or(|metric| metric.column != **column))
             .cloned()
             .chain(metric.as_ref().map(|metric| metric.column.clone()))
@@ -82,7 +82,7 @@ impl ParallelPanel {
         self.pointer_ui(ui, ctx, rect, plot, &painter);
     }
 
-    /// The menu of the axes.
+    /// Draws the menu of the axes.
     fn chooser_ui(&mut self, ui: &mut Ui, ctx: &StudyContext<'_>) {
         let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
         ui.horizontal(|ui| {
@@ -105,13 +105,13 @@ impl ParallelPanel {
         });
     }
 
-    /// Line, title and marks of an axis.
+    /// Draws line, title and ticks of an axis.
     fn axis_ui(&self, painter: &egui::Painter, theme: &Theme, plot: Rect, number: usize) {
         let (axis, count) = (&self.axes[number], self.axes.len());
         let x = axis_x(plot, number, count);
         painter.vline(x, plot.y_range(), Stroke::new(1.5, theme.text_weak));
         let room = plot.width() / count.max(2).saturating_sub(1) as f32 - 6.0;
-        // The outer titles begin and end at the edges of the plot.
+        // The outer titles are aligned to the edges of the plot.
         let (align, from) = match number {
             0 => (Align2::LEFT_BOTTOM, plot.left() - 12.0),
             _ if number + 1 == count => (Align2::RIGHT_BOTTOM, plot.right() + 34.0),
@@ -177,7 +177,7 @@ impl ParallelPanel {
         }
     }
 
-    /// Where a line crosses the axes.
+    /// Intersections of a line with the axes.
     fn points_of(&self, place: usize, plot: Rect) -> impl Iterator<Item = Option<Pos2>> {
         let count = self.axes.len();
         self.axes.iter().enumerate().map(move |(number, axis)| {
@@ -186,7 +186,7 @@ impl ParallelPanel {
         })
     }
 
-    /// Place of the line nearest to the pointer among the shown rows.
+    /// Index of the line nearest to the pointer among the shown rows.
     fn line_at(&self, pointer: Pos2, plot: Rect) -> Option<usize> {
         let gaps = self.axes.len().checked_sub(1).filter(|gaps| *gaps > 0)?;
         let fraction = ((pointer.x - plot.left()) / plot.width()).clamp(0.0, 1.0) * gaps as f32;
@@ -216,7 +216,7 @@ fn y_of(plot: Rect, position: f64) -> f32 {
     plot.bottom() - position as f32 * plot.height()
 }
 
-/// The lines of all rows as one mesh. Lines between the same two pixels are drawn once, and darker the more they are, so
+/// Lines of all rows as one mesh. Lines between the same two pixels are drawn once, the darker the more they are, so
 /// that the mesh does not grow with the number of rows.
 fn lines(theme: &Theme, axes: &[ParallelAxis], plot: Rect, rows: usize) -> Mesh {
     let mut mesh = Mesh::default();
@@ -245,7 +245,7 @@ fn lines(theme: &Theme, axes: &[ParallelAxis], plot: Rect, rows: usize) -> Mesh 
     mesh
 }
 
-/// Viridis without the end that has too little contrast with the background.
+/// Viridis without the end of low contrast with the background.
 fn shade_color(theme: &Theme, fraction: f64) -> Color32 {
     if theme.is_dark() { viridis(0.3 + 0.7 * fraction) } else { viridis(0.8 * fraction) }
 }

@@ -9,10 +9,10 @@ use crate::gui::theme::{ThemeName, label_font, number_font};
 use crate::gui::units::{fixed, significant};
 use crate::study::view::{ParameterErrors, SigmaVerdict, Study, ValueAxis, parameter_errors};
 
-/// Heads of the table with their meanings.
+/// Headings of the table with their definitions.
 const HEADS: [(&str, &str); 7] = [
     ("Parameter", "Click: show its runs on the right"),
-    ("error / σ", "Root mean square of error over σ; 1 when σ is honest, above 1 when it is too small"),
+    ("error / σ", "Root mean square of error over σ; 1 when σ is consistent, above 1 when it is too small"),
     ("mean", "Mean of error over σ; 0 without a bias"),
     ("≤ 1σ", "Runs whose error is within 1 σ; 68 % when consistent"),
     ("≤ 3σ", "Runs whose error is within 3 σ; 99.7 % when consistent"),
@@ -20,9 +20,9 @@ const HEADS: [(&str, &str); 7] = [
     ("median σ", "Median of the standard deviations at the end"),
 ];
 
-/// Room beside the scatter plot for marks and titles.
+/// Space in points to the left of the scatter plot for ticks and titles.
 const LEFT: f32 = 50.0;
-/// Room below it.
+/// Space in points below the scatter plot.
 const BELOW: f32 = 32.0;
 /// Height of a line of text in points.
 const LABEL_HEIGHT: f32 = 14.0;
@@ -35,10 +35,9 @@ struct Key {
     theme: ThemeName,
 }
 
-/// State of the panel.
 #[derive(Debug, Default)]
 pub(super) struct ParametersPanel {
-    /// Row of the run of each row of the table of parameters.
+    /// Row of the study for each row of the table of parameters.
     run_of: Vec<Option<usize>>,
     generation: Option<u64>,
     errors: Vec<ParameterErrors>,
@@ -112,7 +111,7 @@ impl ParametersPanel {
         });
     }
 
-    /// Size of the error over σ of every run, both logarithmic, with lines at 1 σ and 3 σ.
+    /// Scatter plot of |error| over σ of every run, both logarithmic, with lines at 1 σ and 3 σ.
     fn scatter_ui(&mut self, ui: &Ui, ctx: &mut StudyContext<'_>, chosen: usize, rect: Rect) {
         let theme = *ctx.theme;
         let of = &self.errors[chosen];
@@ -180,13 +179,13 @@ impl ParametersPanel {
     }
 }
 
-/// The parameter whose error is largest against its σ: the one to look at first.
+/// Index of the parameter with the largest error relative to σ; it is shown first.
 fn least_consistent(errors: &[ParameterErrors]) -> usize {
     let worst = errors.iter().enumerate().max_by(|(_, a), (_, b)| a.ratio_rms.total_cmp(&b.ratio_rms));
     worst.map_or(0, |(place, _)| place)
 }
 
-/// Axes of σ and of the size of the error. Errors far below all σ are shown at the lower edge.
+/// Axes of σ and |error|. Errors far below all σ are shown at the lower edge.
 fn axes(of: &ParameterErrors) -> [ValueAxis; 2] {
     let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
     let most = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::MIN_POSITIVE, f64::max);
@@ -198,7 +197,7 @@ fn axes(of: &ParameterErrors) -> [ValueAxis; 2] {
     [ValueAxis::logarithmic(low, high), ValueAxis::logarithmic(lowest, highest)]
 }
 
-/// The line on which the error is a multiple of σ, from the left to the right edge of the plot.
+/// Line on which the error is a multiple of σ, from the left to the right edge of the plot.
 fn factor_line(factor: f64, [x_axis, y_axis]: [ValueAxis; 2], plot: Rect) -> [egui::Pos2; 2] {
     let (low, high) = (y_axis.low.ln(), y_axis.high.ln());
     [(x_axis.low, plot.left()), (x_axis.high, plot.right())].map(|(sigma, x)| {

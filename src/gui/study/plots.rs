@@ -1,4 +1,4 @@
-//! The plots with a strip per group: distributions, paired differences and success rates.
+//! Plots with a strip per group: distributions, paired differences and success rates.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use super::strips::{Strip, StripsFrame, StripsPlot};
 use crate::gui::units::{counted, fixed, significant};
 use crate::study::view::{Metric, Spread, Study, SuccessRate, ValueAxis, columns, paired_differences, success_rate};
 
-/// Strips that are computed again when rows, groups or metric change.
+/// Strips that are recomputed when rows, groups or metric change.
 #[derive(Debug, Default)]
 struct Cached {
     generation: u64,
@@ -19,7 +19,7 @@ struct Cached {
 }
 
 impl Cached {
-    /// The strips and their axis, up to date.
+    /// Strips and their axis, updated if necessary.
     fn read(
         &mut self,
         model: &StudyModel,
@@ -39,7 +39,7 @@ fn values(strips: &[Strip]) -> impl Iterator<Item = f64> {
     strips.iter().flat_map(|strip| strip.points.iter().map(|(_, value)| *value))
 }
 
-/// A unit behind a number, with a space before all but degrees and percent signs.
+/// A unit after a number, with a space before all but degrees and percent signs.
 pub(super) fn spaced(unit: &str) -> String {
     match unit {
         "" | "°" => unit.to_owned(),
@@ -51,12 +51,11 @@ fn hint_ui(ui: &mut Ui, ctx: &StudyContext<'_>, text: &str) {
     ui.add(Label::new(RichText::new(text).color(ctx.theme.text_weak)).wrap());
 }
 
-/// "by run", nothing without groups.
+/// "by run"; empty without groups.
 fn by_group(model: &StudyModel) -> String {
     model.group().map(|group| format!(" by {group}")).unwrap_or_default()
 }
 
-/// A metric by group.
 #[derive(Debug, Default)]
 pub(super) struct DistributionPanel {
     cached: Cached,
@@ -84,7 +83,7 @@ impl DistributionPanel {
 
 #[cfg(test)]
 impl DistributionPanel {
-    /// The points on the screen with their rows.
+    /// Screen positions of the points with their rows.
     pub(super) fn places(&self) -> Vec<(egui::Pos2, usize)> {
         self.plot.places()
     }
@@ -155,7 +154,7 @@ impl PairedPanel {
     }
 }
 
-/// The differences of every group but the reference.
+/// Differences of every group except the reference.
 pub(super) fn differences(study: &Study, model: &StudyModel, metric: &Metric, reference: &str) -> Vec<Strip> {
     let Some(column) = model.group() else { return Vec::new() };
     let groups = &model.arranged.groups;
@@ -196,13 +195,11 @@ pub(super) fn differences(study: &Study, model: &StudyModel, metric: &Metric, re
     compared.into_iter().map(strip).collect()
 }
 
-/// A number with its sign.
 fn signed(value: f64) -> String {
     let text = significant(value);
     if value > 0.0 { format!("+{text}") } else { text }
 }
 
-/// Success rates by group.
 #[derive(Debug, Default)]
 pub(super) struct SuccessPanel {
     cached: Cached,
@@ -227,7 +224,6 @@ impl SuccessPanel {
     }
 }
 
-/// The success rates of the groups.
 pub(super) fn success_rates(study: &Study, model: &StudyModel) -> Vec<Strip> {
     let strip = |(number, group): (usize, &crate::study::view::RowGroup)| {
         let succeeded = |row: &&usize| model.success.filter.passes(&study.runs, **row);

@@ -1,20 +1,20 @@
-//! Many points as one mesh, and the one under the pointer.
+//! Many points as one mesh, and a search for the point under the pointer.
 
 use std::sync::Arc;
 
 use egui::epaint::Mesh;
 use egui::{Color32, Painter, Pos2, Rect, Shape, Stroke, Vec2};
 
-/// Half of the side of a point in points.
+/// Half of the side of a point, in points of the screen.
 const HALF: f32 = 1.5;
 /// Distance in points within which the pointer hits a point.
 const REACH: f32 = 6.0;
 
-/// Points with the rows that they stand for.
+/// Points with the rows that they represent.
 #[derive(Debug, Default)]
 pub(super) struct Points {
     mesh: Arc<Mesh>,
-    /// Ascending by x.
+    /// Sorted by ascending x.
     places: Vec<(Pos2, usize)>,
 }
 
@@ -37,7 +37,7 @@ impl Points {
         }
     }
 
-    /// The row of the point nearest to the pointer, with its distance, if it is near enough.
+    /// Row of the point nearest to the pointer, with its distance; `None` if none is within [`REACH`].
     pub(super) fn at(&self, pointer: Pos2) -> Option<(usize, f32)> {
         let from = self.places.partition_point(|(place, _)| place.x < pointer.x - REACH);
         let near = self.places[from..].iter().take_while(|(place, _)| place.x <= pointer.x + REACH);

@@ -1,4 +1,4 @@
-//! The table of runs: sorted by clicks on its heads, grouped, and drawn only where it is visible.
+//! Table of runs: sorted by clicks on its headings, grouped, and drawn only where it is visible.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -18,11 +18,11 @@ use crate::study::{Cell, ColumnType, ColumnValues, StudyColumn};
 
 /// Height of a line in points.
 const LINE: f32 = 18.0;
-/// Least and largest width of a column in points.
+/// Minimum and maximum width of a column in points.
 const WIDTHS: [f32; 2] = [44.0, 230.0];
-/// Rows from which the width of a column is measured.
+/// Number of rows from which the width of a column is measured.
 const MEASURED: usize = 300;
-/// Columns that are shown at first, where they vary or have different results.
+/// Initially shown columns, if they vary or have different results.
 const FIRST: [&str; 18] = [
     columns::RUN,
     columns::LOG,
@@ -44,25 +44,23 @@ const FIRST: [&str; 18] = [
     columns::MESSAGE,
 ];
 
-/// A line of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Line {
-    /// The head of a group, by its place.
+    /// Heading of a group, by its index.
     Group(usize),
     /// A row of the study.
     Run(usize),
 }
 
-/// State of the table.
 #[derive(Debug)]
 pub(super) struct RunsTablePanel {
     /// Names of the shown columns in the order of the study.
     shown: BTreeSet<String>,
-    /// Groups by name whose rows are hidden.
+    /// Names of groups whose rows are hidden.
     closed: BTreeSet<String>,
     generation: Option<u64>,
     lines: Vec<Line>,
-    /// Shown columns as place in the study, title and width; empty until they are measured.
+    /// Shown columns: index in the study, title and width; empty until they are measured.
     columns: Vec<ShownColumn>,
     /// Quantiles of the metric by group.
     spreads: Vec<Option<Spread>>,
@@ -112,7 +110,7 @@ impl RunsTablePanel {
         });
     }
 
-    /// Number of runs, the columns and the groups.
+    /// Draws number of runs, and menus for the columns and the groups.
     fn bar_ui(&mut self, ui: &mut Ui, ctx: &StudyContext<'_>) {
         let (shown, all) = (ctx.model.arranged.rows.len(), ctx.study.runs.rows());
         let text = if shown == all { counted(all, "run") } else { format!("{shown} of {}", counted(all, "run")) };
@@ -146,12 +144,12 @@ impl RunsTablePanel {
                     self.generation = None;
                 }
             }
-            let hint = "head: sort (Shift: also by it); run: open it at its worst frame";
+            let hint = "header: sort (Shift: add key); run: open it at its worst frame";
             ui.add(Label::new(RichText::new(format!("{text} · {hint}")).small().color(ctx.theme.text_weak)).truncate());
         });
     }
 
-    /// The lines of the table: heads of groups and rows.
+    /// Arranges the lines of the table: headings of groups and rows.
     fn arrange(&mut self, study: &Study, model: &StudyModel) {
         self.lines.clear();
         let grouped = model.group().is_some();
@@ -170,7 +168,7 @@ impl RunsTablePanel {
         self.spreads = model.arranged.groups.iter().map(|group| spread(&group.rows)).collect();
     }
 
-    /// Widths of the shown columns, from their titles and their first rows.
+    /// Measures the widths of the shown columns from their titles and first rows.
     fn measure(&mut self, ui: &Ui, study: &Study) {
         let width = |text: String, number: bool| {
             let font = if number { number_font() } else { label_font() };
@@ -192,7 +190,7 @@ impl RunsTablePanel {
         self.columns = shown.into_iter().map(|place| column(place, &columns[place])).collect();
     }
 
-    /// The heads, which sort.
+    /// Draws the headings; a click sorts.
     fn heads_ui(&self, ui: &mut Ui, ctx: &mut StudyContext<'_>, width: f32) {
         let theme = *ctx.theme;
         let (_, rect) = ui.allocate_space(vec2(width, LINE + 2.0));
@@ -258,7 +256,7 @@ impl RunsTablePanel {
         }
     }
 
-    /// The head of a group; returns whether it is clicked.
+    /// Draws the heading of a group; returns true if it is clicked.
     fn group_ui(&self, ui: &Ui, ctx: &StudyContext<'_>, group: usize, place: Rect) -> bool {
         let theme = ctx.theme;
         let Some(of) = ctx.model.arranged.groups.get(group) else { return false };
@@ -332,7 +330,7 @@ impl RunsTablePanel {
     }
 }
 
-/// A cell as it is shown: numbers with three digits in the shown unit.
+/// Shown text of a cell: numbers with three digits in the shown unit.
 fn text_of(values: &ColumnValues, row: usize, factor: f64) -> String {
     match values.cell(row) {
         Cell::Number(number) => significant(number * factor),
@@ -343,7 +341,7 @@ fn text_of(values: &ColumnValues, row: usize, factor: f64) -> String {
     }
 }
 
-/// A status other than success is marked by its colour; its text says the same.
+/// Colour of a cell: marks a status other than success, in addition to the text.
 fn cell_color(theme: &Theme, column: &StudyColumn, text: &str) -> egui::Color32 {
     if column.name == columns::STATUS && text != columns::STATUS_OK {
         theme.error

@@ -9,21 +9,20 @@ use crate::gui::theme::{Theme, label_font, number_font};
 use crate::gui::units::significant;
 use crate::study::view::{Spread, ValueAxis};
 
-/// Least and largest height of a strip in points.
+/// Minimum and maximum height of a strip in points.
 const STRIP: [f32; 2] = [26.0, 120.0];
-/// Height of the axis with its marks and title.
+/// Height in points of the axis with its ticks and title.
 const AXIS: f32 = 30.0;
-/// Width of a column of points.
+/// Width in points of a column of data points.
 const BIN: f32 = 3.0;
 
 /// The values of one group.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Strip {
-    /// Name of the group.
     pub(super) name: String,
-    /// Lines of text at its right side.
+    /// Lines of text at the right of the strip.
     pub(super) notes: Vec<String>,
-    /// Explanation of the notes.
+    /// Tooltip of the notes.
     pub(super) hover: String,
     /// Rows with their values.
     pub(super) points: Vec<(usize, f64)>,
@@ -31,11 +30,11 @@ pub(super) struct Strip {
     pub(super) spread: Option<Spread>,
     /// Lower end, middle and upper end of an interval.
     pub(super) interval: Option<[f64; 3]>,
-    /// Index of its colour.
+    /// Colour index.
     pub(super) color: usize,
 }
 
-/// The inputs of a drawn plot; equal keys have equal points.
+/// Inputs of a drawn plot; equal keys have equal points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Key {
     generation: u64,
@@ -51,7 +50,7 @@ pub(super) struct StripsPlot {
     points: Vec<Points>,
 }
 
-/// What a plot shows beside its strips.
+/// Parts of a plot other than its strips.
 pub(super) struct StripsFrame<'a> {
     /// Name for screen readers.
     pub(super) name: &'a str,
@@ -60,7 +59,7 @@ pub(super) struct StripsFrame<'a> {
     /// Unit of values in tooltips, with its leading space.
     pub(super) unit: &'a str,
     pub(super) axis: ValueAxis,
-    /// Whether zero is marked.
+    /// True if zero is marked.
     pub(super) zero: bool,
 }
 
@@ -178,8 +177,8 @@ impl StripsPlot {
     }
 }
 
-/// Points of a strip: each at its value, beside each other where several share a column of pixels. They are nearer
-/// together in a full column, so that all fit in.
+/// Points of a strip at their values; points in the same column of pixels are spread vertically, closer together in a
+/// full column, so that all fit.
 pub(super) fn swarm(points: &[(usize, f64)], place: Rect, axis: &ValueAxis) -> Vec<(Pos2, usize)> {
     let place = place.shrink2(vec2(0.0, 4.0));
     let mut order: Vec<(usize, f64)> = points.to_vec();
@@ -199,7 +198,7 @@ pub(super) fn swarm(points: &[(usize, f64)], place: Rect, axis: &ValueAxis) -> V
     placed
 }
 
-/// The interval of a strip as a bar with a dot, with a light outline so that it stays visible over points.
+/// Paints the interval of a strip as a bar with a dot, with a light outline so that it stays visible over points.
 fn interval_ui(painter: &Painter, theme: &Theme, strip: &Strip, place: Rect, x: impl Fn(f64) -> f32) {
     let Some([low, middle, high]) = strip.interval else { return };
     let color = if strip.points.is_empty() { theme.run(strip.color).color } else { theme.text_strong };
@@ -214,7 +213,7 @@ fn interval_ui(painter: &Painter, theme: &Theme, strip: &Strip, place: Rect, x: 
     painter.circle(pos2(x(middle), y), 4.5, color, Stroke::new(1.5, theme.plot_background));
 }
 
-/// Name and notes of a strip beside it.
+/// Draws name and notes of a strip at its left and right.
 fn texts_ui(ui: &Ui, theme: &Theme, strip: &Strip, place: Rect, [left, right]: [f32; 2], width: f32) {
     let clip = ui.clip_rect();
     let name_place = Rect::from_x_y_ranges(left..=place.left() - 4.0, place.y_range());
@@ -238,7 +237,7 @@ fn texts_ui(ui: &Ui, theme: &Theme, strip: &Strip, place: Rect, [left, right]: [
     }
 }
 
-/// Marks with their values, and the title.
+/// Draws ticks with their values, and the title.
 pub(super) fn axis_ui(painter: &Painter, theme: &Theme, place: Rect, frame: &StripsFrame<'_>) {
     let mut free = f32::NEG_INFINITY;
     for mark in frame.axis.marks((place.width() / 60.0) as usize) {

@@ -1,4 +1,4 @@
-//! The view of a synthetic study: found by label, clicked, and drawn in every theme.
+//! Tests of the view of a synthetic study: found by label, clicked, and drawn in every theme.
 
 use std::sync::Arc;
 
@@ -107,7 +107,7 @@ fn a_point_under_the_pointer_opens_its_run() {
     let theme = Theme::of(options.theme);
     let mut state = state(2, &StudyOptions::default());
     let mut headless = Headless::new(options);
-    // A press that lasts a second is no click.
+    // A press that lasts a second is not a click.
     headless.set_frame_time_s(0.05);
     let mut frame = |events: Vec<Event>, state: &mut StudyState| {
         drop(headless.frame(events, |ui| {

@@ -10,7 +10,7 @@ use crate::gui::theme::Theme;
 use crate::gui::units::counted;
 use crate::study::view::Study;
 
-/// Draws the bar and applies what is chosen.
+/// Draws the bar and applies the choices.
 pub(super) fn ui(
     ui: &mut Ui,
     study: &Arc<Study>,
@@ -51,7 +51,7 @@ pub(super) fn ui(
     }
 }
 
-/// A labelled input line; returns whether another condition is in effect now.
+/// Draws a labelled input line; returns true if the condition in effect changed.
 fn condition_ui(
     ui: &mut Ui,
     name: &str,

@@ -15,7 +15,6 @@ pub use self::color::{mix, viridis};
 pub(crate) use self::style::dialog_frame;
 pub use self::style::{label_font, number_font};
 
-/// A theme by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ThemeName {
@@ -29,7 +28,7 @@ pub enum ThemeName {
 }
 
 impl ThemeName {
-    /// Its name on the command line.
+    /// Name on the command line.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Dark => "dark",
@@ -39,11 +38,9 @@ impl ThemeName {
     }
 }
 
-/// There is no theme of that name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown theme '{name}': expected dark, light or print")]
 pub struct UnknownTheme {
-    /// The name as written.
     pub name: String,
 }
 
@@ -60,10 +57,9 @@ impl FromStr for ThemeName {
     }
 }
 
-/// Colour and dashes of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunStyle {
-    /// Its Okabe–Ito colour.
+    /// Okabe–Ito colour.
     pub color: Color32,
     /// Lengths of dash, gap, dash, gap, … in points; empty for a solid line.
     pub dashes: &'static [f32],
@@ -75,7 +71,7 @@ const RUN_DASHES: [&[f32]; 4] = [&[], &[11.0, 4.0], &[8.0, 3.0, 2.0, 3.0], &[4.0
 /// Dash and gap of the ground truth.
 const GROUND_TRUTH_DASHES: &[f32] = &[5.0, 4.0];
 
-/// Dashes and gaps of trajectories beside the runs: each has dots.
+/// Dashes and gaps of trajectories of other programs: each has dots.
 const TRAJECTORY_DASHES: [&[f32]; 4] =
     [&[1.5, 3.0], &[1.5, 3.0, 7.0, 3.0], &[1.5, 3.0, 1.5, 3.0, 7.0, 3.0], &[1.5, 7.0]];
 
@@ -86,25 +82,22 @@ pub const MAX_RUNS: usize = RUN_DASHES.len();
 pub const CORNER_RADIUS: u8 = 3;
 /// Space around the content of a panel in points.
 pub const PANEL_MARGIN: i8 = 6;
-/// Size of the smallest text in points; a text of a plot is not smaller, whatever its room.
+/// Size of the smallest text in points; texts of plots are not smaller, even in a small plot.
 pub const SMALLEST_TEXT: f32 = 11.0;
 /// Height of one line of a table or list in points.
 pub const ROW_HEIGHT: f32 = 16.0;
 /// Height of a lane of the timeline in points.
 pub const LANE_HEIGHT: f32 = 18.0;
-/// Width of the lane names beside the timeline in points.
+/// Width of the lane names in points.
 pub const LANE_LABEL_WIDTH: f32 = 118.0;
 /// Width of a curve in points.
 pub const CURVE_WIDTH: f32 = 1.5;
 /// Width of a thin line such as a grid in points.
 pub const HAIRLINE_WIDTH: f32 = 1.0;
 
-/// Every colour of a theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Theme {
-    /// Name of the theme.
     pub name: ThemeName,
-    /// Background of the window.
     pub background: Color32,
     /// Background of panels.
     pub surface: Color32,
@@ -118,7 +111,6 @@ pub struct Theme {
     pub grid: Color32,
     /// Hatching of ranges without information.
     pub hatch: Color32,
-    /// Ordinary text.
     pub text: Color32,
     /// Headings and values.
     pub text_strong: Color32,
@@ -136,15 +128,13 @@ pub struct Theme {
     pub axis_z: Color32,
     /// Ground truth, always dashed.
     pub ground_truth: Color32,
-    /// Values in order.
+    /// Values within their limits.
     pub ok: Color32,
-    /// Warnings.
     pub warn: Color32,
-    /// Errors.
     pub error: Color32,
     /// Runs 0 to 3 (Okabe–Ito).
     pub runs: [Color32; MAX_RUNS],
-    /// Trajectories 0 to 3 beside the runs.
+    /// Colours of the trajectories 0 to 3 of other programs.
     pub trajectories: [Color32; TRAJECTORY_DASHES.len()],
     /// Colours of −1, 0 and +1 in the diverging map.
     diverging: [Color32; 3],
@@ -157,7 +147,6 @@ impl Default for Theme {
 }
 
 impl Theme {
-    /// The theme with a name.
     pub fn of(name: ThemeName) -> Self {
         match name {
             ThemeName::Dark => Self {
@@ -228,7 +217,6 @@ impl Theme {
         }
     }
 
-    /// Whether the background is dark.
     pub fn is_dark(&self) -> bool {
         self.name == ThemeName::Dark
     }
@@ -238,25 +226,24 @@ impl Theme {
         RunStyle { color: self.runs[index % MAX_RUNS], dashes: RUN_DASHES[index % MAX_RUNS] }
     }
 
-    /// Style of trajectory `index` beside the runs; indices past the last repeat.
+    /// Style of trajectory `index` of another program; indices past the last repeat.
     pub fn trajectory(&self, index: usize) -> RunStyle {
         let index = index % TRAJECTORY_DASHES.len();
         RunStyle { color: self.trajectories[index], dashes: TRAJECTORY_DASHES[index] }
     }
 
-    /// Style of the ground truth.
     pub fn ground_truth_style(&self) -> RunStyle {
         RunStyle { color: self.ground_truth, dashes: GROUND_TRUTH_DASHES }
     }
 
-    /// The diverging colour of a signed weight in −1 to 1: blue, background, orange; NaN is the background.
+    /// Diverging colour of a signed weight in −1 to 1: blue, background, orange; NaN gives the background.
     pub fn diverging(&self, weight: f64) -> Color32 {
         let weight = if weight.is_nan() { 0.0 } else { weight.clamp(-1.0, 1.0) as f32 };
         let [negative, zero, positive] = self.diverging;
         mix(zero, if weight < 0.0 { negative } else { positive }, weight.abs())
     }
 
-    /// Viridis over heights, without the end that has too little contrast with this theme's background.
+    /// Viridis over heights, without the end of low contrast with this theme's background.
     pub fn height_color(&self, fraction: f64) -> Color32 {
         let (low, high) = if self.is_dark() { (0.3, 1.0) } else { (0.0, 0.75) };
         viridis(low + (high - low) * fraction.clamp(0.0, 1.0))

@@ -1,4 +1,4 @@
-//! A theme as the style of egui: visuals, fonts, spacing, frames.
+//! Conversion of a theme to egui's style: visuals, fonts, spacing, frames.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ impl Theme {
         let base = if self.is_dark() { egui::Theme::Dark } else { egui::Theme::Light };
         let style = std::sync::Arc::new(self.style(base));
         ctx.set_fonts(fonts());
-        // The user chooses the theme, not the desktop: both of egui's slots hold it.
+        // The theme is the user's choice, not the desktop's: both of egui's slots get it.
         ctx.set_style_of(egui::Theme::Dark, style.clone());
         ctx.set_style_of(egui::Theme::Light, style);
         ctx.set_theme(base);
@@ -69,7 +69,7 @@ impl Theme {
     }
 }
 
-/// The fonts of egui; the proportional family falls back to the monospace font, which alone has arrows.
+/// The fonts of egui; the proportional family falls back to the monospace font, the only one with arrows.
 fn fonts() -> FontDefinitions {
     let mut fonts = FontDefinitions::default();
     let monospace = fonts.families.get(&FontFamily::Monospace).and_then(|names| names.first()).cloned();
@@ -100,7 +100,7 @@ pub fn label_font() -> FontId {
     FontId::new(SMALLEST_TEXT, FontFamily::Proportional)
 }
 
-/// The frame of dialogs, notices and menus.
+/// Frame of dialogs, notices and menus.
 pub(crate) fn dialog_frame(theme: &Theme) -> Frame {
     Frame::new()
         .fill(theme.surface)

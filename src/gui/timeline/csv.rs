@@ -1,4 +1,4 @@
-//! The lanes of the timeline, one step or one event per row.
+//! Lanes of the timeline; one row per step or event.
 
 use super::TimelinePanel;
 use crate::gui::PanelContext;
@@ -7,8 +7,7 @@ use crate::gui::events::name_of;
 use crate::gui::residuals::rms_px;
 
 impl CsvTable for TimelinePanel {
-    /// The lanes: a row for every step of every run, followed by one for each of its notable events and of the log's
-    /// warnings.
+    /// A row for every step of every run, followed by one for each of its notable events and of the log's warnings.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         const VALUES: [&str; 7] =
             ["phase", "keyframe", "features", "reprojection_rms_px", "rank_informed", "rank_structural", "rejected"];

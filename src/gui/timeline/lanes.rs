@@ -18,31 +18,26 @@ const MAX_BAR_HEIGHT: f32 = 24.0;
 /// Minimum height of a lane with a scale in points.
 const MIN_HEIGHT_WITH_SCALE: f32 = 28.0;
 
-/// A lane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Lane {
     /// Phases and keyframes of a run.
     Run(usize),
-    /// The time of a trajectory beside the runs.
+    /// Time range of a trajectory of another program.
     Trajectory(usize),
-    /// Hits of breakpoints.
     Breakpoints,
     /// Infrequent events of all runs.
     Events,
-    /// Informed rank.
     Rank,
     /// Number of tracked features.
     Features,
-    /// Reprojection RMS.
     Reprojection,
-    /// Rejected outliers.
     Outliers,
     /// Warnings about the log (gaps etc.) and of steps.
     Warnings,
 }
 
 impl Lane {
-    /// The name beside the lane.
+    /// Name next to the lane.
     pub(crate) fn name(self, ctx: &PanelContext<'_>) -> String {
         match self {
             Self::Run(run) => ctx.recording.runs.get(run).map_or_else(String::new, |run| run.spec.label.clone()),
@@ -59,7 +54,7 @@ impl Lane {
         }
     }
 
-    /// What the lane shows, with its unit and its file column.
+    /// Tooltip of the lane: content, unit and file column.
     pub(super) const fn meaning(self) -> &'static str {
         match self {
             Self::Run(_) => "Phases of the run: hatched while initializing, filled while tracking; ticks: keyframes",
@@ -91,7 +86,7 @@ impl Lane {
         }
     }
 
-    /// The column of the runs' tables that it plots.
+    /// Plotted column of the runs' tables; `None` for lanes without a curve.
     pub(crate) fn column(self) -> Option<usize> {
         match self {
             Self::Rank => Some(INFORMED),
@@ -104,7 +99,7 @@ impl Lane {
     }
 }
 
-/// The phases of a run as a bar, with keyframes as ticks; steps that are not computed yet stay empty.
+/// Draws the phases of a run as a bar, with keyframes as ticks; steps that are not computed yet stay empty.
 pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &RunLanes, style: RunStyle) {
     let bar = area.rect.shrink2(vec2(0.0, (0.5 * (area.rect.height() - MAX_BAR_HEIGHT)).max(4.0)));
     for segment in visible_segments(area, &lanes.stamps_ns, |row| !lanes.tracking[row]) {
@@ -129,7 +124,7 @@ pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &Run
     });
 }
 
-/// The time of a trajectory as a bar, interrupted where its poses are too far apart to be interpolated.
+/// Draws the time of a trajectory as a bar, interrupted where its poses are too far apart to be interpolated.
 pub(super) fn trajectory(painter: &Painter, area: &PlotArea, track: &PoseTrack, style: RunStyle) {
     let bar = area.rect.shrink2(vec2(0.0, (0.5 * (area.rect.height() - MAX_BAR_HEIGHT)).max(4.0)));
     let stamps_ns: Vec<i64> = track.samples().iter().map(|sample| sample.stamp_ns).collect();
@@ -158,13 +153,13 @@ struct Covered {
 }
 
 impl Covered {
-    /// Whether a position is new; `kind` separates symbols that must all be visible.
+    /// True for a new position; `kind` separates symbols that must all be visible.
     fn is_new(&mut self, place: Pos2, kind: u8) -> bool {
         self.places.insert((place.x.round() as i32, place.y.round() as i32, kind))
     }
 }
 
-/// Infrequent events as symbols.
+/// Draws infrequent events as symbols.
 pub(super) fn events(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[RunLanes]) {
     let mut covered = Covered::default();
     for (number, lanes) in runs.iter().enumerate() {
@@ -181,7 +176,7 @@ pub(super) fn events(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[
     }
 }
 
-/// A value of all runs as curves; integers as step curves.
+/// Draws a value of all runs as curves; integers as step curves.
 pub(super) fn plotted_values(
     painter: &Painter,
     theme: &Theme,
@@ -215,7 +210,7 @@ pub(super) fn plotted_values(
     }
 }
 
-/// Hits of breakpoints: filled for enabled ones, in the colour of the run and in its section of the lane.
+/// Draws hits of breakpoints: filled for enabled ones, in the colour of the run and in its section of the lane.
 pub(super) fn breakpoints(painter: &Painter, theme: &Theme, area: &PlotArea, ctx: &PanelContext<'_>) {
     let runs = &ctx.recording.runs;
     for (number, run) in runs.iter().enumerate() {
@@ -235,7 +230,7 @@ pub(super) fn breakpoints(painter: &Painter, theme: &Theme, area: &PlotArea, ctx
     }
 }
 
-/// Rejected outliers: a line whose height is their number.
+/// Draws rejected outliers as lines; the height is their number.
 pub(super) fn outliers(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[RunLanes]) {
     let max_value = runs.iter().flat_map(|lanes| &lanes.rejected).map(|(_, count)| *count).max().unwrap_or(1);
     for (run, lanes) in runs.iter().enumerate() {
@@ -265,7 +260,7 @@ fn highest_by_column(area: &PlotArea, counts: &[(i64, usize)]) -> Vec<(f32, usiz
     columns
 }
 
-/// Warnings about the log and of the steps.
+/// Draws warnings about the log and of the steps.
 pub(super) fn warnings(painter: &Painter, theme: &Theme, area: &PlotArea, log_ns: &[i64], runs: &[RunLanes]) {
     let step_ns = runs.iter().flat_map(|lanes| &lanes.warnings).map(|(stamp_ns, _)| *stamp_ns);
     let mut covered = Covered::default();
@@ -283,7 +278,7 @@ pub(super) fn warnings(painter: &Painter, theme: &Theme, area: &PlotArea, log_ns
     }
 }
 
-/// The name of a lane with its value at the cursor.
+/// Draws the name of a lane with its value at the cursor.
 pub(super) fn label(painter: &Painter, theme: &Theme, rect: Rect, name: &str, value: Option<String>, color: Color32) {
     let clipped = painter.with_clip_rect(rect.intersect(painter.clip_rect()));
     let mut right = rect.right() - 4.0;

@@ -1,4 +1,4 @@
-//! The timeline: lanes over the whole log, and the cursor that all panels follow.
+//! The timeline: lanes over the whole log, and the cursor of all panels.
 
 mod csv;
 mod lanes;
@@ -25,20 +25,19 @@ use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::session::Command;
 
 const RULER_HEIGHT: f32 = 18.0;
-/// Maximum width of the names beside the lanes in points.
+/// Maximum width of the lane names in points.
 const MAX_LABEL_WIDTH: f32 = 220.0;
 /// Maximum height of a lane in points.
 const MAX_LANE_HEIGHT: f32 = 90.0;
 
-/// State of the timeline.
 #[derive(Debug, Default)]
 pub struct TimelinePanel {
-    /// The measured speed of the cursor.
+    /// Measured speed of the cursor.
     pub pace: Pace,
     runs: Vec<RunLanes>,
     /// Curves of the plotted lanes: rank, features, reprojection.
     curves: [Vec<Curve>; 3],
-    /// Begin of a range that is being selected with Shift.
+    /// Start of a range that is being selected with Shift.
     range_begin_ns: Option<i64>,
 }
 
@@ -61,7 +60,7 @@ impl TimelinePanel {
         if plot.width() < 8.0 || plot.height() < RULER_HEIGHT {
             return;
         }
-        // The lanes take all available room, so that the panel around them keeps its height.
+        // The lanes fill the available space, so that the panel around them keeps its height.
         ui.advance_cursor_after_rect(rect);
         let (begin_ns, end_ns) = visible_range(ctx);
         let area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0 };
@@ -102,9 +101,8 @@ impl TimelinePanel {
         self.hover(ui, ctx, &area, response);
     }
 
-    /// Width of the names beside the lanes, so that those of the runs fit.
+    /// Width in points of the lane names, large enough for those of the runs.
     fn label_width(&self, ui: &Ui, ctx: &PanelContext<'_>) -> f32 {
-        /// Space around a name.
         const MARGIN: f32 = 10.0;
         let width = |lane: Lane| lanes::name_width(ui, ctx, lane) + MARGIN;
         let trajectories = (0..ctx.recording.trajectories.len()).map(Lane::Trajectory);
@@ -223,7 +221,7 @@ impl TimelinePanel {
     }
 }
 
-/// The timeline as a slider of a screen reader: its value is the cursor in seconds, a step is a frame.
+/// Exposes the timeline to a screen reader as a slider: its value is the cursor in seconds, its step one frame.
 fn step_by_assistance(ui: &Ui, ctx: &mut PanelContext<'_>, response: &Response) {
     use egui::accesskit::{Action, ActionData};
 
@@ -250,7 +248,6 @@ fn step_by_assistance(ui: &Ui, ctx: &mut PanelContext<'_>, response: &Response) 
     });
 }
 
-/// The loop range.
 fn paint_range(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotArea) {
     if let Some((begin_ns, end_ns)) = ctx.playback.loop_range_ns {
         let rect = Rect::from_x_y_ranges(area.x(begin_ns)..=area.x(end_ns), area.rect.y_range());
@@ -283,7 +280,7 @@ fn paint_ruler(painter: &egui::Painter, theme: &Theme, area: &PlotArea) {
     }
 }
 
-/// The origins of forks: the steps shared with the parent are dimmed, and a line connects both lanes.
+/// Draws the origins of forks: the steps shared with the parent are dimmed, and a line connects both lanes.
 fn paint_forks(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotArea, lane_y: impl Fn(usize) -> f32) {
     let runs = &ctx.recording.runs;
     for (number, run) in runs.iter().enumerate() {
@@ -317,7 +314,7 @@ fn paint_cursor(painter: &egui::Painter, theme: &Theme, area: &PlotArea, cursor_
     if !area.rect.x_range().expand(1.0).contains(x) {
         return;
     }
-    // The head of the cursor is below the seconds, so that they stay legible.
+    // The head of the cursor is below the seconds and does not cover them.
     let foot = area.rect.top() + RULER_HEIGHT;
     painter.vline(x, foot - 1.0..=area.rect.bottom(), Stroke::new(1.5, theme.cursor));
     let head = vec![pos2(x - 5.0, foot - 6.0), pos2(x + 5.0, foot - 6.0), pos2(x, foot)];

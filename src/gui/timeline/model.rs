@@ -8,9 +8,7 @@ use crate::session::RunRecord;
 /// An event with its position in the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TimedEvent {
-    /// Stamp, in nanoseconds since the log began.
     pub(crate) stamp_ns: i64,
-    /// Kind of the event.
     pub(crate) kind: EventKind,
     /// Index of the step in the run.
     pub(crate) step: usize,
@@ -23,28 +21,24 @@ pub(crate) const FEATURES: usize = 0;
 pub(crate) const RMS: usize = 1;
 pub(crate) const INFORMED: usize = 2;
 pub(crate) const STRUCTURAL: usize = 3;
-/// Number of columns.
 pub(crate) const COLUMNS: usize = 4;
 
 /// The lanes of one run.
 #[derive(Debug, Default)]
 pub(crate) struct RunLanes {
     follower: Follower,
-    /// Stamps of the steps.
     pub(crate) stamps_ns: Vec<i64>,
-    /// Values of the steps by column, NaN where unknown.
+    /// Values of the steps by column; NaN where unknown.
     pub(crate) columns: [Vec<f64>; COLUMNS],
-    /// Whether each step was in the tracking phase.
+    /// True for each step in the tracking phase.
     pub(crate) tracking: Vec<bool>,
-    /// Stamps of keyframes.
     pub(crate) keyframes_ns: Vec<i64>,
-    /// Infrequent events.
     pub(crate) events: Vec<TimedEvent>,
     /// Steps with rejected outliers: stamp and number of rejected features.
     pub(crate) rejected: Vec<(i64, usize)>,
     /// Steps with warnings: stamp and index.
     pub(crate) warnings: Vec<(i64, usize)>,
-    /// Changes when steps were removed.
+    /// Changes when steps are removed.
     pub(crate) epoch: u64,
 }
 

@@ -14,7 +14,6 @@ pub struct Pace {
     frames: VecDeque<(f64, i64)>,
 }
 
-/// A measured speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
     /// Log seconds per second.

@@ -14,7 +14,7 @@ pub(super) const HEIGHT: f32 = 26.0;
 /// Selectable speeds in log seconds per second.
 pub(crate) const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 10.0];
 
-/// Draws the buttons, the time, and the progress of the estimation; in a figure only the time.
+/// Draws the buttons, the time, and the progress of the estimation; a figure has only the time.
 pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, pace: Option<Reading>) {
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT - 4.0);
@@ -114,7 +114,7 @@ fn time_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     }
 }
 
-/// The shown state of the solver, and the result of its last iteration.
+/// Shows the displayed solver iteration and the result of the last iteration.
 fn solver_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord) {
     let theme = ctx.theme;
     ui.add_space(8.0);
@@ -134,10 +134,10 @@ fn solver_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord) {
     }
 }
 
-/// The frame rate, and a warning when the cursor is slower than the set speed. Slow drawing skips frames first, so then
-/// it waits for the estimator.
+/// Shows the frame rate, and a warning when the cursor is slower than the set speed. The cursor is then limited by the
+/// estimator: slow drawing only skips frames.
 fn pace_ui(ui: &mut Ui, ctx: &PanelContext<'_>, pace: Reading) {
-    /// Below this ratio of the set speed the cursor counts as slow.
+    /// Ratio of the set speed below which the cursor counts as slow.
     const LATE_RATIO: f64 = 0.9;
     let theme = ctx.theme;
     let text = format!("{} fps", fixed(pace.fps, 0));
@@ -167,7 +167,7 @@ fn progress_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
             (number, [long, format!("{label} {percent} %"), format!("{percent} %")])
         })
         .collect();
-    // The longest form in which the lines of all runs fit.
+    // The longest variant in which the lines of all runs fit.
     let font = TextStyle::Body.resolve(ui.style());
     let width = |text: &String| ui.painter().layout_no_wrap(text.clone(), font.clone(), theme.text).size().x + 8.0;
     let fits = |form: usize| lines.iter().map(|(_, texts)| width(&texts[form])).sum::<f32>() <= ui.available_width();

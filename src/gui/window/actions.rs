@@ -1,4 +1,4 @@
-//! The actions of keys, buttons and the command palette in one table.
+//! Table of the actions of keys, buttons and the command palette.
 
 use egui::{Event, Key, KeyboardShortcut, Modifiers, Popup, Ui};
 
@@ -11,10 +11,8 @@ use crate::gui::theme::ThemeName;
 use crate::gui::timeline::toggled_loop;
 use crate::session::{Command, PlaybackSpeed};
 
-/// An action of the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Action {
-    /// Play or pause.
     TogglePlay,
     /// Move the cursor by this number of frames.
     Step(i64),
@@ -42,17 +40,12 @@ pub(crate) enum Action {
     Dismiss,
     /// Show the next run in the panels that show one.
     NextRun,
-    /// Open a dialog.
     Dialog(Dialog),
-    /// Explain the focused panel.
     Explain,
-    /// Open the manual.
     Manual,
-    /// Begin the tour.
+    /// Start the tour.
     Tour,
-    /// List all shortcuts.
     Shortcuts,
-    /// List the warnings.
     Warnings,
     /// Write the session to a file.
     Save,
@@ -64,11 +57,10 @@ pub(crate) enum Action {
     CopyTable(PanelName),
     /// Undo the last change of settings or layout.
     Undo,
-    /// Redo it.
+    /// Redo the change that was undone last.
     Redo,
     /// Close the log and go back to the welcome view.
     CloseLog,
-    /// Quit the program.
     Quit,
     /// Arrange the panels as in a preset.
     Layout(Preset),
@@ -78,31 +70,25 @@ pub(crate) enum Action {
     NextPanel(bool),
     /// Toggle between dark and light theme.
     Theme,
-    /// Set a theme.
     SetTheme(ThemeName),
     /// Move the cursor to a stamp, in nanoseconds since the log began.
     GoTo(i64),
-    /// Select a feature.
     Feature(FeatureId),
     /// Show a run in the panels that show one.
     Run(usize),
     /// Remove the last run.
     RemoveRun(usize),
-    /// Show a panel and focus it.
     Show(PanelName),
-    /// Hide a panel.
     Hide(PanelName),
     /// Set the speed of playback in log seconds per second.
     Speed(f64),
 }
 
-/// One row of the table.
 pub(crate) struct Entry {
-    /// The action.
     pub(crate) action: Action,
-    /// Its name in the window.
+    /// Name in the window.
     pub(crate) name: &'static str,
-    /// Its keys as shown to the user.
+    /// Keys as shown to the user.
     pub(crate) keys: &'static str,
     shortcuts: &'static [(Modifiers, Key)],
 }
@@ -121,11 +107,11 @@ const SHIFT: Modifiers = Modifiers::SHIFT;
 const CTRL: Modifiers = Modifiers::COMMAND;
 const CTRL_SHIFT: Modifiers = CTRL.plus(SHIFT);
 
-/// All actions. Those with more modifiers come first, because a shortcut also matches with further modifiers.
+/// All actions. Those with more modifiers are first, because a shortcut also matches with additional modifiers.
 pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Redo, "Redo the change of settings or layout", "Ctrl+Shift+Z", &[(CTRL_SHIFT, Key::Z)]),
     entry(Action::Undo, "Undo the last change of settings or layout", "Ctrl+Z", &[(CTRL, Key::Z)]),
-    // The desktop's own key for copying arrives as an event.
+    // The platform's copy key arrives as an event.
     entry(Action::Copy, "Copy the value under the pointer, or the focused panel's table", "Ctrl+C", &[]),
     entry(Action::CloseLog, "Close the log", "Ctrl+W", &[(CTRL, Key::W)]),
     entry(Action::Quit, "Quit", "Ctrl+Q", &[(CTRL, Key::Q)]),
@@ -173,11 +159,11 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Dismiss, "Clear the selection", "Escape", &[(NONE, Key::Escape)]),
 ];
 
-/// Keys of the saved layouts in order, with Ctrl.
+/// Keys of the saved layouts in order, pressed with Ctrl.
 const LAYOUT_KEYS: [Key; 9] =
     [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
 
-/// The keys of an action for display.
+/// Keys of an action for display.
 pub(crate) fn keys_of(action: Action) -> &'static str {
     TABLE.iter().find(|entry| entry.action == action).map_or("", |entry| entry.keys)
 }
@@ -202,7 +188,7 @@ pub(crate) fn pressed(ui: &Ui) -> Vec<Action> {
         }
         for entry in TABLE {
             for (modifiers, key) in entry.shortcuts {
-                // Space and the arrows belong to a focused widget, other keys to the window.
+                // A focused widget gets Space and the arrows, the window the other keys.
                 let widget_key = matches!(key, Key::Space | Key::ArrowLeft | Key::ArrowRight | Key::Home | Key::End);
                 // Escape closes an open menu first.
                 let menu_key = menu_open && *key == Key::Escape;

@@ -1,4 +1,4 @@
-//! Copying values and tables to the clipboard: by key, and by the menu of the secondary button.
+//! Copying values and tables to the clipboard: by key, and by the context menu.
 
 use egui::epaint::TextShape;
 use egui::{Id, LayerId, Popup, PopupAnchor, PopupCloseBehavior, Pos2, Shape, Ui};
@@ -8,26 +8,25 @@ use crate::gui::PanelContext;
 use crate::gui::copied_value::offered;
 use crate::gui::units::counted;
 
-/// Letters of a copied value that its notice shows.
+/// Number of letters of a copied value that its notice shows.
 const SHOWN_LETTERS: usize = 60;
 
-/// The menu of a panel.
 #[derive(Debug)]
 pub(super) struct PanelMenu {
     panel: PanelName,
     at: Pos2,
-    /// The value under the pointer when the menu was opened.
+    /// Value under the pointer when the menu was opened.
     value: Option<String>,
 }
 
-/// The value under the pointer: the one that a panel offers, or the text that is painted there.
+/// Value under the pointer: the one that a panel offers, or the text that is painted there.
 pub(super) fn value_under_pointer(ui: &Ui) -> Option<String> {
     let pointer = ui.input(|input| input.pointer.hover_pos())?;
     let free = ui.ctx().layer_id_at(pointer) == Some(ui.layer_id());
     free.then(|| offered(ui.ctx()).or_else(|| text_at(ui, ui.layer_id(), pointer))).flatten()
 }
 
-/// The text that is painted at a position of a layer.
+/// Text painted at a position of a layer.
 fn text_at(ui: &Ui, layer: LayerId, position: Pos2) -> Option<String> {
     fn text_in(shape: &Shape, position: Pos2) -> Option<&TextShape> {
         match shape {
@@ -44,7 +43,7 @@ fn text_at(ui: &Ui, layer: LayerId, position: Pos2) -> Option<String> {
     })
 }
 
-/// Copies the value under the pointer, or else the table of the panel with the focus.
+/// Copies the value under the pointer; without one, the table of the panel with the focus.
 pub(super) fn copy(value: Option<String>, state: &mut WindowState, ctx: &PanelContext<'_>) {
     match value {
         Some(value) => copy_value(value, state),
@@ -80,7 +79,7 @@ fn menu_id() -> Id {
     Id::unique("panel menu")
 }
 
-/// Opens the menu of the panel that is clicked with the secondary button, and draws it.
+/// Draws the context menu of a panel, and opens it on a click with the secondary button.
 pub(super) fn menu_ui(ui: &Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
     let clicked = ui.input(|input| input.pointer.secondary_clicked().then(|| input.pointer.interact_pos()).flatten());
     let clicked = clicked.filter(|at| ui.ctx().layer_id_at(*at) == Some(ui.layer_id()));

@@ -1,4 +1,4 @@
-//! Panels as figures hold nothing that a person could operate.
+//! Tests: panels as figures contain nothing that a user can operate.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::observability::{SlideDirection, SlidePosition};
 use crate::session::Recording;
 use crate::session::breakpoints::Breakpoints;
 
-/// Roles of what a click, a drag or a key changes.
+/// Accessibility roles of widgets that a click, a drag or a key changes.
 const OPERABLE: [Role; 12] = [
     Role::Button,
     Role::CheckBox,
@@ -90,7 +90,7 @@ fn figures_have_no_buttons_sliders_or_selectors() {
                 let found = operable(&recording, panel, Presentation::Figure, size);
                 assert!(found.is_empty(), "{} with {} runs at {size:?}: {found:?}", panel.as_str(), runs.len());
             }
-            // The same panels in the window, so that the list of roles is known to find controls.
+            // The same panels in the window, to verify that the list of roles finds controls.
             if WITH_CONTROLS.contains(&panel) {
                 let found = operable(&recording, panel, Presentation::Interactive, [1400.0, 900.0]);
                 assert!(!found.is_empty(), "{} has no controls", panel.as_str());

@@ -1,4 +1,5 @@
-//! What a small screen shows: whole texts of a legible size, and the answers of the rank panel without scrolling.
+//! Tests of a small screen: it shows whole texts of a legible size, and the summary of the rank panel without
+//! scrolling.
 
 use egui::{Key, Rect, Shape};
 use egui_kittest::Harness;
@@ -9,10 +10,9 @@ use super::{PanelName, Preset};
 use crate::gui::theme::SMALLEST_TEXT;
 use crate::session::Recording;
 
-/// The size of a small laptop's screen in points.
+/// Screen of a small laptop in points.
 const SMALL: [f32; 2] = [1366.0, 768.0];
 
-/// A painted text.
 #[derive(Debug)]
 struct Painted {
     text: String,
@@ -45,7 +45,7 @@ fn painted(harness: &Harness<'static, Bench>) -> Vec<Painted> {
     texts
 }
 
-/// Asserts that texts are whole and legible. Names of places in the scene move with the view and are exempt.
+/// Asserts that texts are whole and legible. Names of positions in the scene move with the view and are exempt.
 fn check_texts(harness: &Harness<'static, Bench>, what: &str) {
     let scene = harness.state().window.places.iter().find(|(panel, _)| *panel == PanelName::Scene);
     let scene = scene.map_or(Rect::NOTHING, |(_, rect)| *rect);
@@ -55,7 +55,7 @@ fn check_texts(harness: &Harness<'static, Bench>, what: &str) {
         assert!(painted.smallest >= SMALLEST_TEXT, "{what}: small text {painted:?}");
         let (rect, clip) = (painted.rect, painted.clip.expand(1.0));
         let cut = rect.left() < clip.left() || rect.right() > clip.right();
-        // The choice of the direction has a tooltip with the whole text.
+        // The selector of the direction has a tooltip with the whole text.
         let choice = painted.text.starts_with("weak ") || painted.text.starts_with("null ");
         assert!(choice || !painted.elided, "{what}: shortened text {painted:?}");
         assert!(!cut || scene.contains(rect.center()), "{what}: text that is cut off {painted:?}");

@@ -1,24 +1,24 @@
-//! The keyboard focus: a ring around the widget that has it, and names of the lines between panels.
+//! The keyboard focus: a ring around the focused widget, and names of the separators between panels.
 
 use egui::accesskit::{Orientation, Role};
 use egui::{Event, Id, Key, LayerId, Order, Stroke, StrokeKind, Ui, WidgetRect};
 
 use crate::gui::theme::{CORNER_RADIUS, Theme};
 
-/// Maximum width of a line between panels and its minimum length in points.
+/// Maximum width of a separator between panels and its minimum length, in points.
 const LINE_WIDTH: f32 = 14.0;
 const MIN_LINE_LENGTH: f32 = 40.0;
 
-/// Whether the user navigates by keyboard.
+/// State of keyboard navigation.
 #[derive(Debug, Default)]
 pub(super) struct FocusRing {
     by_key: bool,
-    /// Whether the focus moves backwards.
+    /// True if the focus moves backwards.
     backward: bool,
 }
 
 impl FocusRing {
-    /// Draws the ring; none while the pointer moves the focus.
+    /// Draws the ring; no ring while the pointer moves the focus.
     pub(super) fn ui(&mut self, ui: &Ui, theme: &Theme) {
         self.read_keys(ui);
         let widgets = focusable(ui);
@@ -28,7 +28,7 @@ impl FocusRing {
         let Some(focused) = ui.memory(egui::Memory::focused).filter(|_| self.by_key) else { return };
         let focused = self.passed_over(ui, &widgets, focused);
         let Some(response) = ui.ctx().read_response(focused) else { return };
-        // Above everything, so that adjacent widgets do not cover the ring.
+        // Drawn above everything, so that adjacent widgets do not cover the ring.
         let layer = LayerId::new(Order::Tooltip, Id::unique("focus ring"));
         let painter = ui.ctx().layer_painter(layer).with_clip_rect(ui.ctx().content_rect());
         let rect = response.rect.intersect(response.interact_rect.expand(2.0)).expand(1.0);
@@ -54,7 +54,7 @@ impl FocusRing {
         });
     }
 
-    /// Moves the focus on from a line between panels: no key moves the line. Returns the widget with the focus.
+    /// Moves the focus on from a separator between panels, which no key moves. Returns the widget with the focus.
     fn passed_over(&self, ui: &Ui, widgets: &[WidgetRect], focused: Id) -> Id {
         let Some(at) = widgets.iter().position(|widget| widget.id == focused) else { return focused };
         if !is_line(&widgets[at]) {
@@ -70,7 +70,7 @@ impl FocusRing {
     }
 }
 
-/// The widgets in the layer of `ui` that can have the focus, in the order of the Tab key.
+/// Focusable widgets in the layer of `ui`, in the order of the Tab key.
 fn focusable(ui: &Ui) -> Vec<WidgetRect> {
     ui.ctx().viewport(|viewport| {
         let widgets = viewport.this_pass.widgets.layers().filter(|(layer, _)| **layer == ui.layer_id());
@@ -79,13 +79,13 @@ fn focusable(ui: &Ui) -> Vec<WidgetRect> {
     })
 }
 
-/// Whether a widget is a line between panels, or a scroll bar: the pointer drags it, no key does.
+/// True for a separator between panels and for a scroll bar: they are dragged with the pointer, not moved by keys.
 fn is_line(widget: &WidgetRect) -> bool {
     let size = widget.rect.size();
     widget.sense.senses_drag() && size.min_elem() < LINE_WIDTH && size.max_elem() >= MIN_LINE_LENGTH
 }
 
-/// Names a line between panels, which the libraries leave without a name.
+/// Names a separator between panels; the libraries do not.
 fn name_line(ui: &Ui, line: &WidgetRect) {
     let upright = line.rect.height() > line.rect.width();
     ui.ctx().accesskit_node_builder(line.id, |node| {

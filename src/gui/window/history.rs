@@ -11,27 +11,25 @@ const MAX_CHANGES: usize = 100;
 /// Settings and layout at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Arrangement {
-    /// The settings.
     pub(super) settings: Settings,
-    /// The layout of the panels.
     pub(super) layout: Layout,
 }
 
-/// The changes of settings and layout, oldest first.
+/// Changes of settings and layout, oldest first.
 #[derive(Debug, Default)]
 pub(super) struct History {
     before: VecDeque<Arrangement>,
     undone: Vec<Arrangement>,
-    /// The state to which `before` leads and from which `undone` goes on.
+    /// State after the last change in `before` and before the first one in `undone`.
     current: Option<Arrangement>,
-    /// The state after a change that is not yet recorded.
+    /// State after a change that is not yet recorded.
     pending: Option<Arrangement>,
 }
 
 impl History {
-    /// Records a change since the last call; returns whether another frame has to follow for that.
+    /// Records a change since the last call; returns true if another frame is needed for that.
     ///
-    /// A change is recorded when it is complete: no button of the pointer is down (`settled`), and two calls see the
+    /// A change is recorded when it is complete: no button of the pointer is down (`settled`), and two calls get the
     /// same state, because the tree of panels is simplified in the frame after a drop. Another open tab alone is no
     /// change.
     pub(super) fn follow(&mut self, settings: &Settings, layout: &Layout, settled: bool) -> bool {
@@ -56,7 +54,7 @@ impl History {
         false
     }
 
-    /// Records the change that is pending.
+    /// Records the pending change.
     fn record(&mut self) {
         let Some(now) = self.pending.take() else { return };
         self.before.extend(self.current.replace(now));
@@ -66,17 +64,15 @@ impl History {
         }
     }
 
-    /// Whether there is a change to undo.
     pub(super) fn can_undo(&self) -> bool {
         !self.before.is_empty()
     }
 
-    /// Whether there is a change to redo.
     pub(super) fn can_redo(&self) -> bool {
         !self.undone.is_empty()
     }
 
-    /// Goes back by one change and returns the state before it.
+    /// Undoes one change and returns the state before it.
     pub(super) fn undo(&mut self) -> Option<Arrangement> {
         self.record();
         let before = self.before.pop_back()?;
@@ -84,7 +80,7 @@ impl History {
         Some(before)
     }
 
-    /// Goes forward by one change that was undone and returns the state after it.
+    /// Redoes one change and returns the state after it.
     pub(super) fn redo(&mut self) -> Option<Arrangement> {
         self.record();
         let after = self.undone.pop()?;
@@ -100,7 +96,7 @@ mod tests {
     use super::*;
     use crate::gui::theme::ThemeName;
 
-    /// Two frames after a change.
+    /// Runs the two frames that complete a change.
     fn complete(history: &mut History, settings: &Settings, layout: &Layout) {
         history.follow(settings, layout, true);
         assert!(!history.follow(settings, layout, true));
@@ -114,7 +110,6 @@ mod tests {
         assert!(!history.can_undo() && history.undo().is_none());
         layout.arrange(Preset::Scene);
         complete(&mut history, &settings, &layout);
-        // A slider that is being dragged is one change.
         for scale in [1.1, 1.2, 1.3] {
             settings.scale = scale;
             history.follow(&settings, &layout, false);
@@ -132,7 +127,7 @@ mod tests {
         assert_eq!(shown(history.undo()), None);
         assert_eq!(shown(history.redo()), Some((Some(Preset::Scene), 1.0, true)));
         assert_eq!(shown(history.redo()), Some((Some(Preset::Scene), 1.3, true)));
-        // A new change takes the place of those that were undone.
+        // A new change replaces those that were undone.
         let Some(Arrangement { mut settings, layout }) = history.current.clone() else { panic!() };
         settings.theme = ThemeName::Print;
         complete(&mut history, &settings, &layout);

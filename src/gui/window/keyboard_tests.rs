@@ -1,4 +1,4 @@
-//! The window by keyboard alone, and its accessible names.
+//! Tests of the window by keyboard alone, and of its accessible names.
 
 use egui::accesskit::Action;
 use egui::{Key, Modifiers, Role};
@@ -82,7 +82,7 @@ fn the_palette_has_every_action_with_its_keys_and_moves_by_key() {
 #[test]
 fn keys_typed_at_once_go_to_the_palette_and_not_to_the_shortcuts() {
     let mut harness = bench();
-    // On a slow machine the key that opens the palette and the next one are in one frame.
+    // On a slow machine the key that opens the palette and the next one arrive in one frame.
     harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
     harness.event(egui::Event::Text("4".to_owned()));
     harness.key_press(Key::Num4);
@@ -120,20 +120,20 @@ fn panels_get_the_focus_by_key_in_the_order_on_the_screen() {
     harness.key_press_modifiers(Modifiers::SHIFT, Key::F6);
     harness.run_steps(2);
     assert_eq!(harness.state().window.focus, seen.iter().rev().nth(1).copied());
-    // A saved layout by key, and the notice without one.
+    // A saved layout by key, and the notice if there is none.
     harness.key_press_modifiers(Modifiers::COMMAND, Key::Num3);
     harness.run_steps(3);
     assert!(harness.query_by_label_contains("No saved layout has this number").is_some());
 }
 
-/// Every node that can be clicked or focused has a name, in every preset and with every dialog open.
+/// Every clickable or focusable node has a name, in every preset and with every dialog open.
 #[test]
 fn everything_that_can_be_used_has_a_name() {
     let mut harness = bench();
     let check = |harness: &Harness<'static, Bench>, place: &str| {
         let usable = By::new().predicate(|node| {
             let acts = |action| node.data().supports_action(action);
-            // Scroll bars report their position and belong to the content that they scroll.
+            // Scroll bars report their position and are part of the content that they scroll.
             let container =
                 matches!(node.role(), Role::GenericContainer | Role::Window | Role::ScrollView | Role::ScrollBar);
             (acts(Action::Click) || acts(Action::Focus)) && !container
@@ -206,14 +206,13 @@ fn tab_reaches_everything_and_shows_where_it_is() {
         }
     }
     assert!(wanted.is_empty(), "not reached by Tab: {wanted:?}");
-    // Enter presses the focused widget.
     harness.get_by_label("Go to end").focus();
     harness.run_steps(1);
     let pushed = commands_of(&mut harness, |harness| harness.key_press(Key::Enter));
     assert_eq!(pushed, [Command::GoToEnd]);
 }
 
-/// What is painted says to a screen reader what it shows.
+/// Painted elements describe their content to a screen reader.
 #[test]
 fn painted_elements_have_a_role_and_say_their_content() {
     // High enough that every section of the rank panel is open.
@@ -222,7 +221,7 @@ fn painted_elements_have_a_role_and_say_their_content() {
         let mut nodes = harness.query_all(By::new().label_contains(name).predicate(move |node| node.role() == role));
         let node = nodes.next().unwrap_or_else(|| panic!("{role:?} {name}")).accesskit_node();
         assert_eq!(node.value(), node.description(), "{name}");
-        node.description().unwrap_or_else(|| panic!("{name} says nothing"))
+        node.description().unwrap_or_else(|| panic!("{name} has no description"))
     };
     let frame = harness.state().recording.runs[0].step_at(3 * SECOND_NS).unwrap().report.frame_index;
     let timeline = content(&harness, "Timeline", Role::Slider);
@@ -230,7 +229,7 @@ fn painted_elements_have_a_role_and_say_their_content() {
     assert!(content(&harness, "Image of auto", Role::Image).contains("frame"));
     assert!(content(&harness, "View of the scene", Role::Image).starts_with("auto"));
     assert!(content(&harness, "View of the gimbal's chain", Role::Image).contains("extrinsics error"));
-    // In a low panel the section of the spectrum is closed at first.
+    // In a low panel the section of the spectrum is initially closed.
     if harness.query_all_by_label("Singular values").all(|node| node.accesskit_node().role() != Role::Image) {
         harness.get_by_label("Singular values").click();
         harness.run_steps(4);
@@ -264,7 +263,7 @@ fn painted_elements_have_a_role_and_say_their_content() {
     assert_eq!(pushed, [Command::StepFrames(1)]);
 }
 
-/// The focus goes from the bar at the top through the panels, each with its tabs, to the timeline and the status bar.
+/// The focus moves from the top bar through the panels, each with its tabs, to the timeline and the status bar.
 #[test]
 fn tab_goes_in_reading_order_and_not_to_lines() {
     let mut harness = bench();

@@ -1,4 +1,4 @@
-//! The runs, and the trajectories beside them, with their colours, dashes and accuracy.
+//! Legend of the runs and of the trajectories of other programs, with colours, dashes and accuracy.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::gui::units::fixed;
 use crate::session::accuracy::ErrorStatistics;
 use crate::session::{Command, RunRecord, StepRecord, TrajectoryLane};
 
-/// The accuracy of one run, and the number of steps it was computed from.
+/// Accuracy of one run, and the number of steps from which it was computed.
 #[derive(Debug, Default)]
 struct RunAccuracy {
     count: usize,
@@ -69,7 +69,7 @@ impl RunLegend {
 }
 
 impl RunAccuracy {
-    /// The absolute trajectory error as a text.
+    /// Absolute trajectory error as text.
     fn text(&self) -> Option<String> {
         self.statistics.as_ref().map(ate_text)
     }
@@ -91,12 +91,11 @@ fn ate_text(errors: &ErrorStatistics) -> String {
     format!("ATE {} m", fixed(errors.rmse, 3))
 }
 
-/// The absolute trajectory error of a trajectory as a text.
+/// Absolute trajectory error of a trajectory as text.
 fn text_of_lane(lane: &TrajectoryLane) -> Option<String> {
     lane.evaluation.accuracy.as_ref().map(|accuracy| ate_text(&accuracy.absolute_m))
 }
 
-/// The laid out texts of an entry.
 struct Entry {
     label: Arc<Galley>,
     accuracy: Option<Arc<Galley>>,
@@ -104,7 +103,7 @@ struct Entry {
 }
 
 impl Entry {
-    /// Width of the sample of the line on the left, and the margin on the right.
+    /// Width of the sample of the line at the left, and the margin at the right, in points.
     const LINE: f32 = 34.0;
     const MARGIN: f32 = 6.0;
 
@@ -183,7 +182,7 @@ fn entry_ui(
     });
 }
 
-/// A trajectory beside the runs: it cannot be selected, as it has no calibration and no features.
+/// Draws the entry of a trajectory of another program; it cannot be selected, as it has no calibration and no features.
 fn lane_ui(ui: &mut Ui, ctx: &PanelContext<'_>, number: usize, lane: &TrajectoryLane, accuracy: bool, max_width: f32) {
     let theme = *ctx.theme;
     let text = text_of_lane(lane);

@@ -1,4 +1,4 @@
-//! The menus of the bar at the top: the actions of the table with their keys, and what changes with the session.
+//! Menus of the top bar: the actions of the table with their keys, and entries that depend on the session.
 
 use std::path::Path;
 
@@ -15,7 +15,6 @@ use crate::gui::timeline::SPEEDS;
 /// Maximum number of recent files in the menu.
 const MAX_RECENT: usize = 10;
 
-/// A menu of the bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Menu {
     File,
@@ -26,10 +25,9 @@ pub(super) enum Menu {
 }
 
 impl Menu {
-    /// All menus from left to right; the menu of the panels stands after the view.
+    /// All menus from left to right; the menu of the panels follows after the view.
     pub(super) const ALL: [Self; 5] = [Self::File, Self::View, Self::Run, Self::Playback, Self::Help];
 
-    /// Its title.
     pub(super) const fn title(self) -> &'static str {
         match self {
             Self::File => "File",
@@ -40,7 +38,7 @@ impl Menu {
         }
     }
 
-    /// The actions in groups, from above.
+    /// Actions of the menu in groups, from top to bottom.
     const fn actions(self) -> &'static [&'static [Action]] {
         match self {
             Self::File => &[
@@ -80,7 +78,7 @@ impl Menu {
         }
     }
 
-    /// The entries of the table in groups. An action without a place in any menu is in the menu of the view.
+    /// Entries of the table in groups. The view menu also contains the actions that are in no menu.
     pub(super) fn groups(self) -> Vec<Vec<&'static Entry>> {
         let mut groups: Vec<Vec<&Entry>> = self
             .actions()
@@ -101,7 +99,7 @@ impl Menu {
     }
 }
 
-/// Draws the buttons of all menus, and the menu that is open.
+/// Draws the buttons of all menus, and the open menu.
 pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
     for menu in Menu::ALL {
         MenuButton::from_button(Button::new(menu.title()).frame_when_inactive(false)).ui(ui, |ui| {
@@ -125,7 +123,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>, a
     }
 }
 
-/// One action with its keys.
+/// Draws one action with its keys.
 fn entry_ui(ui: &mut Ui, state: &WindowState, ctx: &PanelContext<'_>, entry: &Entry, actions: &mut Vec<Action>) {
     if matches!(entry.action, Action::SavedLayout(_)) {
         return;
@@ -144,7 +142,7 @@ fn item_ui(ui: &mut Ui, name: &str, keys: &str, enabled: bool, on: bool) -> bool
     response.clicked()
 }
 
-/// What belongs to the first group of a menu and depends on the session.
+/// Draws the entries of the first group of a menu that depend on the session.
 fn first_group_ui(ui: &mut Ui, menu: Menu, state: &mut WindowState, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
     match menu {
         Menu::File => {
@@ -192,7 +190,7 @@ fn first_group_ui(ui: &mut Ui, menu: Menu, state: &mut WindowState, ctx: &PanelC
     }
 }
 
-/// A recent file by its name; the folder is in the tooltip.
+/// Draws a recent file by name, with its folder in the tooltip; returns true if it is clicked.
 fn recent_ui(ui: &mut Ui, path: &Path) -> bool {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     let response = ui.button(&name);
@@ -200,7 +198,7 @@ fn recent_ui(ui: &mut Ui, path: &Path) -> bool {
     response.on_hover_text(path.display().to_string()).clicked()
 }
 
-/// What belongs to the last group of a menu and depends on the session.
+/// Draws the entries of the last group of a menu that depend on the session.
 fn last_group_ui(ui: &mut Ui, menu: Menu, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
     if menu == Menu::View {
         for theme in [ThemeName::Light, ThemeName::Dark, ThemeName::Print] {
@@ -211,7 +209,7 @@ fn last_group_ui(ui: &mut Ui, menu: Menu, ctx: &PanelContext<'_>, actions: &mut 
     }
 }
 
-/// The menu of the panels stays open while panels are chosen.
+/// Menu of the panels; it stays open while panels are chosen.
 fn panels_ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
     let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     let button = Button::new("Panels").frame_when_inactive(false);

@@ -1,4 +1,4 @@
-//! The content of the window: bars, panels, timeline, dialogs.
+//! Content of the window: bars, panels, timeline, dialogs.
 //!
 //! The real window and headless screenshots both draw [`window_ui`].
 
@@ -58,58 +58,50 @@ use super::slide;
 use super::theme::Theme;
 use super::timeline::TimelinePanel;
 
-/// A request of the window to the application, beyond the commands of a session.
+/// Request of the window to the application, in addition to the commands of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum WindowRequest {
-    /// Open a log.
     OpenLog(PathBuf),
     /// Store the saved layouts, given as text.
     KeepLayouts(String),
-    /// Write the session to a file.
     SaveSession,
     /// Close the log and go back to the welcome view.
     CloseLog,
-    /// Quit the program.
     Quit,
-    /// Leave the session after the question about unsaved work, with or without saving it.
+    /// Leave the session after the question about unsaved work.
     Leave {
-        /// Whether the session is saved before.
+        /// True if the session is saved first.
         save: bool,
     },
-    /// Write a panel to files.
     WritePanel(Box<PanelExport>),
 }
 
 /// State of the window without the session.
 #[derive(Default)]
 pub struct WindowState {
-    /// The panels.
     pub panels: Panels,
     /// The runs with their accuracy.
     pub legend: RunLegend,
-    /// Messages for the user.
     pub notices: Notices,
-    /// The modal dialogs.
     pub dialogs: Dialogs,
-    /// Whether the list of shortcuts is open.
+    /// True if the list of shortcuts is open.
     pub shortcuts_open: bool,
-    /// Memory of the process in bytes if known; screenshots omit it, because it differs between runs of the program.
+    /// Memory of the process in bytes, if known. It differs between executions, so screenshots omit it.
     pub memory_bytes: Option<u64>,
-    /// Whether step times are shown; screenshots omit them for the same reason.
+    /// Show step times; screenshots omit them for the same reason.
     pub show_times: bool,
     /// Requests to the application, which takes them after each frame.
     pub requests: Vec<WindowRequest>,
-    /// The user's saved layouts.
     pub saved_layouts: SavedLayouts,
-    /// The user's settings, applied by the application.
+    /// User settings, applied by the application.
     pub settings: Settings,
-    /// Progress of the estimation, `None` when all steps are computed.
+    /// Progress of the estimation; `None` when all steps are computed.
     pub progress: Option<Progress>,
-    /// The log that is being opened while another one is shown.
+    /// Log that is being opened while another one is shown.
     pub opening: Option<PathBuf>,
     /// Name of the study from which the session was opened.
     pub study: Option<String>,
-    /// "What is this?" and the manual.
+    /// State of "What is this?" and the manual.
     pub(crate) help: Help,
     /// Recently opened logs and sessions, newest first, for the menu.
     pub recent_logs: Vec<PathBuf>,
@@ -117,36 +109,34 @@ pub struct WindowState {
     ring: FocusRing,
     layout: Layout,
     history: History,
-    /// The layout when its last change was noticed.
+    /// Layout at its last detected change.
     noticed: Option<Layout>,
-    /// The value under the pointer.
+    /// Value under the pointer.
     pointed: Option<String>,
-    /// Text for the clipboard.
     copied: Option<String>,
-    /// The open menu of a panel.
     menu: Option<PanelMenu>,
-    /// The panel that was clicked last.
+    /// Panel that was clicked last.
     focus: Option<PanelName>,
-    /// Height of timeline and status bar in the last frame.
+    /// Height of timeline and status bar in the last frame, in points.
     below_height: Option<f32>,
-    /// The rectangles of the panels on the screen, in the order of drawing.
+    /// Rectangles of the visible panels, in the order of drawing.
     places: Vec<(PanelName, Rect)>,
 }
 
 impl WindowState {
-    /// Closes all dialogs and lists, for a session that ends.
+    /// Closes all dialogs and lists when a session ends.
     pub(in crate::gui) fn close_everything(&mut self) {
         self.close_dialogs();
         self.tour.end();
         (self.progress, self.opening) = (None, None);
     }
 
-    /// Begins the tour at its first stop.
+    /// Starts the tour at its first stop.
     pub(in crate::gui) fn start_tour(&mut self) {
         self.tour.start();
     }
 
-    /// Draws the ring around the widget with the keyboard focus, in a view without a session.
+    /// Draws the ring around the widget with the keyboard focus in a view without a session.
     pub(in crate::gui) fn focus_ring_ui(&mut self, ui: &Ui, theme: &Theme) {
         self.ring.ui(ui, theme);
     }
@@ -158,13 +148,13 @@ impl WindowState {
         self.help.manual.close();
     }
 
-    /// Restores settings and layout as before the last change.
+    /// Restores settings and layout to the state before the last change.
     fn undo(&mut self) {
         let before = self.history.undo();
         self.restore(before, "Nothing to undo");
     }
 
-    /// Restores settings and layout as before the last undo.
+    /// Restores settings and layout to the state before the last undo.
     fn redo(&mut self) {
         let undone = self.history.redo();
         self.restore(undone, "Nothing to redo");
@@ -177,7 +167,7 @@ impl WindowState {
         }
     }
 
-    /// The focused panel, to which commands about one panel apply, and its size in points.
+    /// Focused panel, to which commands about one panel apply, and its size in points.
     fn focused(&self) -> (PanelName, Vec2) {
         let panel = self.focus.unwrap_or(PanelName::Image);
         let place = self.places.iter().find(|(known, _)| *known == panel);
@@ -193,7 +183,7 @@ impl WindowState {
         self.focus = shown.get(next).map(|(panel, _)| *panel).or(self.focus);
     }
 
-    /// Opens "What is this?" about the focused panel where it is on the screen, else about the first one.
+    /// Opens "What is this?" for the focused panel if it is visible, else for the first one.
     fn explain_focused(&mut self) {
         let shown = |wanted: PanelName| self.places.iter().any(|(panel, _)| *panel == wanted);
         let focused = self.focus.filter(|panel| shown(*panel));
@@ -211,7 +201,7 @@ impl WindowState {
         self.focus = place.map_or(self.focus, |(panel, _)| Some(*panel));
     }
 
-    /// The layout of the panels for a saved session.
+    /// Layout of the panels for a saved session.
     pub fn layout_value(&self) -> Option<serde_json::Value> {
         saved_layouts::layout_value(&self.layout)
     }
@@ -221,7 +211,7 @@ impl WindowState {
         saved_layouts::take_layout(&mut self.layout, value);
     }
 
-    /// Whether the layout has changed since the last call.
+    /// True if the layout has changed since the last call.
     pub(in crate::gui) fn take_layout_changed(&mut self) -> bool {
         let changed = self.noticed.as_ref().is_some_and(|noticed| *noticed != self.layout);
         if changed || self.noticed.is_none() {
@@ -230,12 +220,12 @@ impl WindowState {
         changed
     }
 
-    /// The layout of the panels for the next start.
+    /// Layout of the panels for the next start.
     pub(in crate::gui) fn last_layout_value(&self) -> Option<serde_json::Value> {
         saved_layouts::last_layout_value(&self.layout)
     }
 
-    /// Arranges the panels for the start: as at the end of the last use, or as the settings say.
+    /// Arranges the panels for the start: as at the end of the last use, or as in the settings.
     pub(in crate::gui) fn arrange_for_start(&mut self, last: Option<&serde_json::Value>) {
         let name = self.settings.layout.clone();
         match last.filter(|_| name == settings::LAST_LAYOUT) {
@@ -280,7 +270,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     Panel::top("top bar").exact_size(30.0).frame(bar).show(ui, |ui| top_bar::ui(ui, state, ctx, &mut actions));
     notices::banner_ui(ui, ctx);
 
-    // The panels are drawn before the timeline below them: the Tab key follows the order of drawing.
+    // The panels are drawn before the timeline below them, because the Tab key follows the order of drawing.
     let wanted = TimelinePanel::height_for(ctx.recording.runs.len() + ctx.recording.trajectories.len());
     let wanted = wanted.min(0.25 * (ui.available_height() - STATUS_HEIGHT));
     let below = state.below_height.unwrap_or(wanted + STATUS_HEIGHT);
@@ -294,7 +284,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
         asked = state.layout.ui(ui, &mut state.panels, ctx, state.focus, &mut state.places);
     });
 
-    // The status bar takes its room first, because it is the lowest.
+    // The status bar is laid out first, because it is the lowest.
     let status = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(8, 2));
     let status = Panel::bottom("status bar").exact_size(STATUS_HEIGHT).frame(status);
     let status = status.show(ui, |ui| ui.max_rect());

@@ -1,4 +1,4 @@
-//! Messages for the user: toasts, a banner for runs that stopped, a list of all warnings.
+//! Messages for the user: toasts, a banner for stopped runs, a list of all warnings.
 
 use egui::{Align2, Area, Button, Frame, Id, Margin, Order, Panel, RichText, ScrollArea, Ui, vec2};
 
@@ -11,7 +11,6 @@ use crate::session::Command;
 /// Severity of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoticeLevel {
-    /// Information.
     Info,
     /// A problem that does not stop the operation.
     Warning,
@@ -33,7 +32,7 @@ struct Toast {
 #[derive(Debug, Default)]
 pub struct Notices {
     toasts: Vec<Toast>,
-    /// Whether the list of warnings is open.
+    /// True if the list of warnings is open.
     pub list_open: bool,
 }
 
@@ -117,7 +116,7 @@ impl Notices {
     }
 }
 
-/// A banner for each run that stopped with an error.
+/// Draws a banner for each run that stopped with an error.
 pub(super) fn banner_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     let theme = ctx.theme;
     for (number, run) in ctx.recording.runs.iter().enumerate() {

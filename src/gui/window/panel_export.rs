@@ -18,12 +18,12 @@ const MAX_SIDE_PX: f32 = 8192.0;
 /// Minimum size in points of the screenshot of a panel with a list.
 const MIN_LIST_SIZE: Vec2 = Vec2::new(460.0, 640.0);
 
-/// Draws the panel again without the window around it.
+/// Draws the panel again without the rest of the window.
 pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelExport {
     let (panel, size) = state.focused();
     let mut copy = WindowState { panels: state.panels.views(), show_times: state.show_times, ..WindowState::default() };
     copy.panels.inspector.show_times = state.show_times;
-    // A scrolling list in a low panel is written completely, up to a limit.
+    // A scrolling list in a low panel is exported completely, up to a limit.
     let min_size = match panel {
         PanelName::Rank | PanelName::Inspector | PanelName::Breakpoints => MIN_LIST_SIZE,
         _ => Vec2::ZERO,
@@ -55,7 +55,7 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
     PanelExport { name, screenshot, drawing, table: copy.panels.csv_table(panel, ctx) }
 }
 
-/// The values of a panel, comma separated.
+/// Values of a panel, comma separated.
 pub fn panel_table(panel: PanelName, state: &mut WindowState, ctx: &mut PanelContext<'_>) -> String {
     slide::update(ctx);
     state.panels.csv_table(panel, ctx)
@@ -68,5 +68,5 @@ pub fn alone_ui(panel: PanelName, ui: &mut Ui, state: &mut WindowState, ctx: &mu
     CentralPanel::no_frame().frame(frame).show(ui, |ui| state.panels.ui(panel, ui, ctx));
 }
 
-/// Size in points of a panel that is not on the screen.
+/// Size in points of an exported panel that is not visible.
 pub(super) const HIDDEN_PANEL_SIZE: Vec2 = Vec2::new(960.0, 540.0);

@@ -1,4 +1,4 @@
-//! The panels by name, and their state.
+//! Panels by name, and their state.
 
 use egui::Ui;
 use serde::{Deserialize, Serialize};
@@ -20,9 +20,7 @@ use crate::gui::timeline::TimelinePanel;
 /// A panel by its name on the command line, in file names and in saved layouts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
 pub enum PanelName {
-    /// The camera's image.
     Image,
-    /// The 3D scene.
     Scene,
     /// Calibration over time.
     Convergence,
@@ -45,7 +43,6 @@ pub enum PanelName {
 }
 
 impl PanelName {
-    /// All panels.
     pub const ALL: [Self; 11] = [
         Self::Image,
         Self::Scene,
@@ -82,51 +79,39 @@ impl PanelName {
         }
     }
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub const fn as_str(self) -> &'static str {
         self.names().0
     }
 
-    /// Anchor of the section of the manual about it.
+    /// Anchor of the panel's section in the manual.
     pub(crate) const fn section(self) -> &'static str {
         self.as_str()
     }
 
-    /// Its title in the window.
+    /// Title in the window.
     pub const fn title(self) -> &'static str {
         self.names().1
     }
 }
 
-/// The state of all panels.
 #[derive(Default)]
 pub struct Panels {
-    /// State of the camera's image.
     pub image: ImagePanel,
-    /// State of the 3D scene.
     pub scene: ScenePanel,
-    /// State of the calibration over time.
     pub convergence: ConvergencePanel,
-    /// State of rank and null directions.
     pub rank: RankPanel,
-    /// State of the linearization by blocks.
     pub jacobian: JacobianPanel,
-    /// State of the residuals.
     pub residuals: ResidualsPanel,
-    /// State of the inspector.
     pub inspector: InspectorPanel,
-    /// State of the laboratory.
     pub laboratory: LaboratoryPanel,
-    /// State of the comparison of runs.
     pub comparison: ComparisonPanel,
-    /// State of the breakpoints.
     pub breakpoints: BreakpointsPanel,
-    /// State of the timeline.
     pub timeline: TimelinePanel,
 }
 
 impl Panels {
-    /// Panels with the same view and no texture of a window.
+    /// Panels with the same view, without textures of a window.
     pub(super) fn views(&self) -> Self {
         Self {
             image: self.image.view_copy(),
@@ -137,7 +122,7 @@ impl Panels {
         }
     }
 
-    /// Draws a panel into the available room of `ui`.
+    /// Draws a panel into the available space of `ui`.
     pub(super) fn ui(&mut self, panel: PanelName, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         match panel {
             PanelName::Image => self.image.ui(ui, ctx),
@@ -154,7 +139,7 @@ impl Panels {
         }
     }
 
-    /// The values of a panel as a CSV table, empty without a run.
+    /// Values of a panel as a CSV table; empty without a run.
     pub(super) fn csv_table(&mut self, panel: PanelName, ctx: &PanelContext<'_>) -> String {
         if ctx.selected_run().is_none() {
             return String::new();

@@ -1,4 +1,4 @@
-//! The window by pointer: zooming, panning, dragging tabs, copying.
+//! Tests of the window by pointer: zooming, panning, dragging tabs, copying.
 
 use egui::{
     Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, OutputCommand, PointerButton, Pos2, Role, TouchPhase,
@@ -60,7 +60,7 @@ fn visible_s(harness: &Harness<'static, Bench>) -> Option<(f64, f64)> {
 /// The plot of the first parameter, which does not scroll in the overview, and the timeline.
 const PLOTS: [&str; 2] = ["I.rx", "Timeline"];
 
-/// A place in a plot, by fractions of its size.
+/// Position in a plot by fractions of its size.
 fn place_in(harness: &Harness<'static, Bench>, plot: &str, x: f32, y: f32) -> Pos2 {
     let rect = harness.query_all_by_label_contains(plot).next().unwrap().rect();
     rect.min + vec2(x, y) * rect.size()
@@ -73,21 +73,20 @@ fn plots_and_timeline_zoom_and_pan_alike() {
         harness.state_mut().selection.visible_ns = None;
         harness.run_steps(2);
         let at = |harness: &Harness<'static, Bench>, x: f32| place_in(harness, plot, x, 0.6);
-        // The whole log of 4 s is shown; a quarter of it is left of the pointer.
+        // The whole log of 4 s is shown; a quarter of it is to the left of the pointer.
         let pointer = at(&harness, 0.25);
         scroll(&mut harness, pointer, vec2(0.0, 120.0), Modifiers::NONE);
         let (begin_s, end_s) = visible_s(&harness).unwrap_or_else(|| panic!("{plot} zooms"));
         let fraction = (1.0 - begin_s) / (end_s - begin_s);
         assert!(end_s - begin_s < 3.0 && (fraction - 0.25).abs() < 0.02, "{plot}: {begin_s} to {end_s}");
-        // Horizontal scrolling pans: to the left shows what is later.
+        // Horizontal scrolling to the left shows later times.
         scroll(&mut harness, pointer, vec2(-60.0, 0.0), Modifiers::NONE);
         let (later_s, later_end_s) = visible_s(&harness).unwrap();
         assert!(later_s > begin_s && (later_end_s - later_s - (end_s - begin_s)).abs() < 1e-6, "{plot}");
-        // Pinching is Ctrl and the wheel.
         scroll(&mut harness, pointer, vec2(0.0, -40.0), Modifiers::COMMAND);
         let (wide_s, wide_end_s) = visible_s(&harness).unwrap();
         assert!(wide_end_s - wide_s > later_end_s - later_s, "{plot}");
-        // In one frame, because a test's frame takes a quarter of a second.
+        // In one frame: a frame of the test takes a quarter of a second.
         let double = [true, false, true, false].map(|pressed| press(pointer, PointerButton::Primary, pressed));
         harness.input_mut().events.extend(double);
         harness.run_steps(3);
@@ -98,7 +97,7 @@ fn plots_and_timeline_zoom_and_pan_alike() {
         drag(&mut harness, PointerButton::Secondary, from, to);
         let (begin_s, end_s) = visible_s(&harness).unwrap_or_else(|| panic!("{plot} zooms to a range"));
         assert!((begin_s - 1.0).abs() < 0.05 && (end_s - 3.0).abs() < 0.05, "{plot}: {begin_s} to {end_s}");
-        // The timeline's own drag moves the cursor, so there the middle button pans.
+        // On the timeline a drag moves the cursor, so the middle button pans there.
         let button = if plot == "Timeline" { PointerButton::Middle } else { PointerButton::Primary };
         drag(&mut harness, button, from, to);
         let (panned_s, panned_end_s) = visible_s(&harness).unwrap();
@@ -158,7 +157,8 @@ fn tabs_and_their_bars_are_dragged_and_put_back_by_undo() {
     harness.key_press(Key::Num1);
     harness.run_steps(3);
 
-    // The bar behind the tabs of convergence and others moves all of them to the right edge of the inspector.
+    // Dragging the empty part of a tab bar moves all its tabs; here those of the convergence to the right edge of the
+    // inspector.
     let (convergence, inspector) =
         (place_of(&harness, PanelName::Convergence), place_of(&harness, PanelName::Inspector));
     let bar = pos2(convergence.right() - 60.0, convergence.top() - 10.0);
@@ -198,7 +198,7 @@ fn settings_and_layout_are_undone_and_redone_by_key() {
     assert!(preset(&harness) == Some(Preset::Calibration) && harness.state().window.settings.theme != theme);
 }
 
-/// The text that a frame copies.
+/// Text that a frame copies.
 fn copied(harness: &mut Harness<'static, Bench>, act: impl FnOnce(&mut Harness<'static, Bench>)) -> Option<String> {
     act(harness);
     let mut text = None;
@@ -230,14 +230,13 @@ fn the_value_under_the_pointer_or_the_table_is_copied() {
     harness.run_steps(2);
     let value = copied(&mut harness, |harness| harness.event(Event::Copy)).unwrap();
     assert!(value.contains("tructural rank 18 of 18"), "{value}");
-    // Where there is no value, the table of the focused panel.
+    // Without a value, the table of the focused panel is copied.
     harness.state_mut().window.focus = Some(PanelName::Rank);
     harness.event(Event::PointerGone);
     harness.run_steps(2);
     let table = copied(&mut harness, |harness| harness.event(Event::Copy)).unwrap();
     assert_eq!(table.lines().count(), 19, "{table}");
     assert!(harness.query_by_label("Copied the table of Rank: 18 rows (CSV)").is_some());
-    // The menu of the secondary button.
     click(&mut harness, cell, PointerButton::Secondary);
     assert!(harness.query_by_label("Copy value").is_some());
     let table = copied(&mut harness, |harness| harness.get_by_label("Copy table (CSV)").click()).unwrap();

@@ -5,21 +5,19 @@ use crate::session::Recording;
 /// Seconds of computation before a remaining time is shown.
 const MIN_MEASURED_S: f64 = 1.5;
 
-/// Measures the progress of the estimation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ProgressMeter {
-    /// Wall clock in seconds at the first reading, and the ratio computed then.
+    /// Wall clock in seconds and fraction at the first reading.
     start: Option<(f64, f64)>,
-    /// The ratio at the last reading.
+    /// Fraction at the last reading.
     last: f64,
 }
 
-/// Progress of the estimation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// Number of unfinished runs.
     pub runs: usize,
-    /// Ratio of the log that has been processed, 0 to 1.
+    /// Processed fraction of the log, 0 to 1.
     pub fraction: f64,
     /// Remaining seconds at the present speed.
     pub left_s: Option<f64>,
@@ -35,7 +33,7 @@ impl ProgressMeter {
             return None;
         }
         let fraction = fractions.iter().sum::<f64>() / fractions.len() as f64;
-        // A new run reduces the ratio: the measurement restarts.
+        // A new run reduces the fraction; the measurement restarts.
         if fraction < self.last {
             self.start = None;
         }

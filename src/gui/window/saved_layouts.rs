@@ -12,7 +12,7 @@ use crate::gui::theme::Theme;
 /// Maximum number of saved layouts.
 const MAX_LAYOUTS: usize = 12;
 
-/// The layouts by name, and the name that is being typed.
+/// Layouts by name, and the name that is being typed.
 #[derive(Debug, Default)]
 pub struct SavedLayouts {
     layouts: BTreeMap<String, Tree<PanelName>>,
@@ -27,12 +27,11 @@ impl SavedLayouts {
         Self { layouts, typed: String::new() }
     }
 
-    /// The names in order.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.layouts.keys().map(String::as_str)
     }
 
-    /// Applies the layout with an index in the order of the names; returns whether it exists.
+    /// Applies the layout with an index in the order of the names; returns true if it exists.
     pub(super) fn take(&self, number: usize, layout: &mut Layout) -> bool {
         let tree = self.layouts.values().nth(number);
         if let Some(tree) = tree {
@@ -46,7 +45,7 @@ impl SavedLayouts {
         serde_json::to_string(&self.layouts).unwrap_or_default()
     }
 
-    /// Lists the layouts with buttons to apply and delete them, and saves the current one. Returns whether the list
+    /// Lists the layouts with buttons to apply and delete them, and saves the current one. Returns true if the list
     /// changed.
     pub(super) fn ui(&mut self, ui: &mut Ui, theme: &Theme, layout: &mut Layout) -> bool {
         let mut forgotten = None;
@@ -92,7 +91,7 @@ pub(super) fn layout_value(layout: &Layout) -> Option<serde_json::Value> {
     serde_json::to_value(layout.tree()).ok()
 }
 
-/// Applies the layout of a saved session if this program has its panels.
+/// Applies the layout of a saved session if this program has all its panels.
 pub(super) fn take_layout(layout: &mut Layout, value: &serde_json::Value) {
     if let Some(tree) = tree_of(value.clone()) {
         layout.take(tree);
@@ -105,7 +104,7 @@ pub(super) fn last_layout_value(layout: &Layout) -> Option<serde_json::Value> {
     Some(serde_json::json!({ "preset": preset, "panels": layout_value(layout)? }))
 }
 
-/// Applies the value of [`last_layout_value`] if this program has its panels.
+/// Applies the value of [`last_layout_value`] if this program has all its panels.
 pub(super) fn take_last_layout(layout: &mut Layout, value: &serde_json::Value) {
     if let Some(panels) = value.get("panels") {
         take_layout(layout, panels);
@@ -136,7 +135,8 @@ mod tests {
         let back = SavedLayouts::from_text(&saved.to_text());
         assert!(back.layouts["mine"] == *layout.tree());
         assert!(SavedLayouts::from_text("no json").layouts.is_empty());
-        // An older layout has fewer panels, which can be added; a later one may have unknown ones.
+        // An older layout has fewer panels; the missing ones can be added. A layout of a later version may have unknown
+        // ones.
         let mut older = layout.tree().clone();
         let rank = older.tiles.find_pane(&PanelName::Rank).unwrap();
         older.remove_recursively(rank);

@@ -1,25 +1,23 @@
-//! The user's settings, stored for the next start.
+//! User settings, stored for the next start.
 
 use serde::{Deserialize, Serialize};
 
 use crate::gui::theme::ThemeName;
 use crate::session::DEFAULT_MEMORY_BUDGET_BYTES;
 
-/// Range of the scale.
+/// Range of the scale factor.
 pub const SCALES: std::ops::RangeInclusive<f32> = 0.5..=3.0;
 /// Range of the memory budget of a recording in MiB.
 pub(super) const MEMORY_MIB: std::ops::RangeInclusive<usize> = 64..=65_536;
 
-/// The initial layout that is the one at the end of the last use.
+/// Name of the initial layout that restores the layout at the end of the last use.
 pub(super) const LAST_LAYOUT: &str = "Last used";
 
-/// The user's settings, stored for the next start.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(default)]
 pub struct Settings {
-    /// Theme of the window.
     pub theme: ThemeName,
-    /// Scale factor of the whole window, 1 is the scale of the screen.
+    /// Scale factor of the whole window; 1 is the scale of the screen.
     pub scale: f32,
     /// Memory budget of a recording in MiB.
     pub memory_mib: usize,
@@ -46,7 +44,7 @@ impl Settings {
     pub fn from_text(text: &str, theme: ThemeName) -> Self {
         let standard = Self { theme, ..Self::default() };
         let mut value: serde_json::Value = serde_json::from_str(text).unwrap_or_default();
-        // One invalid entry must not discard the others.
+        // One invalid entry does not discard the others.
         let Some(entries) = value.as_object_mut() else { return standard };
         let Ok(serde_json::Value::Object(known)) = serde_json::to_value(&standard) else { return standard };
         for (name, usual) in &known {
@@ -65,7 +63,7 @@ impl Settings {
         serde_json::to_string_pretty(self).unwrap_or_default()
     }
 
-    /// With every number limited to its range.
+    /// Limits every number to its range.
     fn within_ranges(mut self) -> Self {
         let clamp = |value: f32| value.clamp(*SCALES.start(), *SCALES.end());
         self.scale = if self.scale.is_finite() { clamp(self.scale) } else { 1.0 };

@@ -1,4 +1,4 @@
-//! The list of shortcuts: the actions of the table by menu, and what has no action.
+//! List of shortcuts: the actions of the table by menu, and keys and gestures without an action.
 
 use egui::{Align, Align2, Label, Layout, RichText, ScrollArea, Ui, vec2};
 
@@ -88,7 +88,7 @@ fn columns(sections: Vec<Section>, count: usize) -> Vec<Vec<Section>> {
     columns
 }
 
-/// Draws the list while it is open, in as many columns as fit; it scrolls where the window is too low.
+/// Draws the list while it is open, in as many columns as fit; it scrolls if the window is too low.
 pub(super) fn ui(ui: &Ui, theme: &Theme, open: &mut bool) {
     let room = ui.ctx().content_rect().size() - vec2(MARGIN, MARGIN + 40.0);
     let count = (((room.x + GAP) / (COLUMN_WIDTH + GAP)) as usize).clamp(1, 3);

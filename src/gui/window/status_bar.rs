@@ -1,4 +1,4 @@
-//! The bar at the bottom: step time, real-time factor, memory, clock, warnings.
+//! Status bar: step time, real-time factor, memory, clock, warnings.
 
 use std::path::Path;
 
@@ -81,16 +81,15 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
     });
 }
 
-/// A value of the bar.
 struct Field {
-    /// Its rank: those with a higher one are left out first where the window is narrow.
+    /// Priority: fields with a higher number are omitted first in a narrow window.
     rank: u8,
     name: &'static str,
     value: String,
     hover: String,
 }
 
-/// The fields that fit into a width.
+/// Draws the fields that fit into the width `room`, in points.
 fn fields_ui(ui: &mut Ui, theme: &Theme, mut fields: Vec<Field>, room: f32) {
     const GAP: f32 = 10.0;
     let small = TextStyle::Small.resolve(ui.style());
@@ -111,7 +110,6 @@ fn fields_ui(ui: &mut Ui, theme: &Theme, mut fields: Vec<Field>, room: f32) {
     }
 }
 
-/// The progress of the estimation.
 fn progress_ui(ui: &mut Ui, progress: &Progress) {
     let left = progress.left_s.map_or_else(String::new, |left_s| format!(", {} s left", fixed(left_s.ceil(), 0)));
     let text = format!("{}: {} %{left}", counted(progress.runs, "run"), fixed(100.0 * progress.fraction, 0));
@@ -123,7 +121,7 @@ fn progress_ui(ui: &mut Ui, progress: &Progress) {
     response.on_hover_text("Estimation progress: processed log time of all runs, remaining wall-clock time");
 }
 
-/// Another log is being opened.
+/// Shows that another log is being opened.
 fn opening_ui(ui: &mut Ui, path: &Path) {
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let text = RichText::new(format!("opening {name}…")).small();
@@ -131,7 +129,7 @@ fn opening_ui(ui: &mut Ui, path: &Path) {
     ui.add(egui::Spinner::new().size(12.0));
 }
 
-/// Memory of the recording relative to its budget, and the effect on its steps.
+/// Memory of the recording relative to its budget, and the number of steps that are only summaries.
 fn recorded(recording: &Recording) -> (String, String) {
     let steps: usize = recording.runs.iter().map(|run| run.steps.len()).sum();
     let summarized: usize = recording.runs.iter().map(|run| run.memory.summaries).sum();

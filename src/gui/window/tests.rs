@@ -1,4 +1,4 @@
-//! The window, tested by its labels.
+//! Tests of the window by its labels.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::session::{Command, ForkChanges, ForkOrigin, PlaybackSpeed, Recording,
 
 pub(super) const SECOND_NS: i64 = 1_000_000_000;
 
-/// A window with the sample, and the commands that it pushed.
+/// A window with the sample, and the pushed commands.
 pub(super) struct Bench {
     pub(super) recording: Recording,
     pub(super) cursor_ns: i64,
@@ -28,7 +28,7 @@ pub(super) struct Bench {
 }
 
 impl Bench {
-    /// The commands since they were taken last.
+    /// Commands pushed since they were last taken.
     pub(super) fn commands_mut(&mut self) -> &mut Vec<Command> {
         &mut self.commands
     }
@@ -403,7 +403,7 @@ fn the_chain_slides_from_the_rank_panel() {
     harness.run_steps(2);
     assert_eq!(amount(&harness), before);
     let names = harness.state().recording.rig.parameter_names();
-    // Along a known unobservable direction the reprojections stay; along a single parameter they move.
+    // Along a known unobservable direction the reprojections do not change; along a single parameter they do.
     harness.state_mut().selection.run = 1;
     for (position, said) in [("base-d=1", "Reprojections unchanged"), ("roll.alpha=1", "Reprojections changed")] {
         harness.state_mut().selection.slide = position.parse::<SlideRequest>().unwrap().position(&names);

@@ -10,7 +10,6 @@ use crate::gui::PanelContext;
 use crate::gui::help;
 use crate::gui::theme::{PANEL_MARGIN, Theme};
 
-/// A predefined layout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Preset {
     /// Image and scene above convergence, rank and inspector on the right.
@@ -30,7 +29,6 @@ impl Preset {
     /// All presets in the order of their keys 1 to 5.
     pub const ALL: [Self; 5] = [Self::Overview, Self::Calibration, Self::FrontEnd, Self::Scene, Self::Comparison];
 
-    /// Its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Overview => "Overview",
@@ -46,7 +44,7 @@ impl Preset {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Layout {
     tree: Tree<PanelName>,
-    /// The preset that was chosen last, `None` for a saved layout.
+    /// Preset that was chosen last; `None` for a saved layout.
     pub(crate) preset: Option<Preset>,
 }
 
@@ -57,7 +55,7 @@ impl Default for Layout {
 }
 
 impl Layout {
-    /// Arranges the panels as in a preset, all visible.
+    /// Arranges the panels as in a preset, with all panels visible.
     pub(crate) fn arrange(&mut self, preset: Preset) {
         self.tree = tree_of(preset);
         self.preset = Some(preset);
@@ -74,7 +72,7 @@ impl Layout {
         &self.tree
     }
 
-    /// Whether another layout has the same panels in the same places, with other tabs in front.
+    /// True if another layout has the same panels in the same places, with other tabs in front.
     pub(crate) fn differs_by_open_tabs_only(&self, other: &Self) -> bool {
         let without_open_tabs = |layout: &Self| {
             let mut tree = layout.tree.clone();
@@ -88,12 +86,10 @@ impl Layout {
         self != other && self.preset == other.preset && without_open_tabs(self) == without_open_tabs(other)
     }
 
-    /// Whether a panel is shown.
     pub(crate) fn is_visible(&self, pane: PanelName) -> bool {
         self.tree.tiles.find_pane(&pane).is_some_and(|tile| self.tree.is_visible(tile))
     }
 
-    /// Shows or hides a panel.
     pub(crate) fn set_visible(&mut self, pane: PanelName, visible: bool) {
         if visible && self.tree.tiles.find_pane(&pane).is_none() {
             // A saved layout may be older than the panel.
@@ -177,19 +173,18 @@ fn tabs(tiles: &mut Tiles<PanelName>, panes: &[PanelName]) -> TileId {
     tiles.insert_tab_tile(children)
 }
 
-/// Two tiles side by side or one above the other; the first takes `fraction` of the room.
+/// Two tiles side by side or one above the other; the first takes `fraction` of the space.
 fn split(tiles: &mut Tiles<PanelName>, direction: LinearDir, children: [TileId; 2], fraction: f32) -> TileId {
     tiles.insert_container(Container::Linear(Linear::new_binary(direction, children, fraction)))
 }
 
-/// The ids of the tree that is drawn.
+/// Ids of the drawn tree.
 #[derive(Clone, Copy)]
 struct TreeIds {
     id: Id,
     root: Option<TileId>,
 }
 
-/// The panels while they are drawn.
 struct Shown<'a, 'b> {
     panels: &'a mut Panels,
     ctx: &'a mut PanelContext<'b>,
@@ -219,7 +214,7 @@ impl Behavior<PanelName> for Shown<'_, '_> {
         pane.title().into()
     }
 
-    /// A "?" about the panel in front.
+    /// Draws a "?" for the panel in front.
     fn top_bar_right_ui(
         &mut self,
         tiles: &Tiles<PanelName>,
@@ -238,7 +233,7 @@ impl Behavior<PanelName> for Shown<'_, '_> {
         matches!(tiles.get(tile), Some(Tile::Pane(_)))
     }
 
-    /// The bar behind the tabs drags all of them. It is no stop of the Tab key, as the one of the library would be.
+    /// Lets the empty part of a tab bar drag all its tabs. Unlike the library's, it is skipped by the Tab key.
     fn tab_bar_trailing_ui(&mut self, _tiles: &Tiles<PanelName>, ui: &mut Ui, tile: TileId, _tabs: &Tabs) {
         let room = ui.available_rect_before_wrap().intersect(ui.clip_rect());
         if self.tree.root == Some(tile) || !room.is_positive() {
@@ -250,7 +245,7 @@ impl Behavior<PanelName> for Shown<'_, '_> {
         }
     }
 
-    /// A dragged group has the names of its panels.
+    /// Title of a dragged group: the names of its panels.
     fn tab_title_for_tile(&mut self, tiles: &Tiles<PanelName>, tile: TileId) -> WidgetText {
         let names: Vec<&str> = match tiles.get(tile) {
             Some(Tile::Pane(panel)) => vec![panel.title()],
@@ -276,7 +271,7 @@ impl Behavior<PanelName> for Shown<'_, '_> {
         matches!(tiles.get(tile), Some(Tile::Pane(_)))
     }
 
-    /// A closed panel is hidden, so that the menu can show it again.
+    /// Hides a closed panel, so that the menu can show it again.
     fn on_tab_close(&mut self, tiles: &mut Tiles<PanelName>, tile: TileId) -> bool {
         tiles.set_visible(tile, false);
         false

@@ -1,4 +1,4 @@
-//! The bar at the top: menus, log, runs, layouts.
+//! Top bar: menus, log, runs, layouts.
 
 use egui::containers::menu::MenuBar;
 use egui::style::StyleModifier;
@@ -11,7 +11,7 @@ use crate::gui::PanelContext;
 use crate::gui::theme::MAX_RUNS;
 use crate::session::Recording;
 
-/// The buttons beside the menus, where there is room: text and action.
+/// Buttons to the right of the menus, shown if they fit: text and action.
 const BUTTONS: [(&str, Action); 2] =
     [("Add run…", Action::Dialog(Dialog::AddRun)), ("Fork…", Action::Dialog(Dialog::Fork))];
 
@@ -63,41 +63,39 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     });
 }
 
-/// The file name of the log.
 pub(crate) fn log_name(recording: &Recording) -> String {
     recording.log_path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
-/// Widths in points of what stands in the bar beside the menus.
+/// Widths in points of the elements to the right of the menus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Widths {
     log: f32,
     rig: f32,
     buttons: f32,
-    /// All runs with and without their accuracy.
+    /// Width of all runs with and without their accuracy.
     runs: [f32; 2],
     layout_names: f32,
     layout_numbers: f32,
-    /// Gap between two groups.
     gap: f32,
 }
 
-/// What is shown in the room of the bar.
+/// Elements shown in the available width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Shown {
-    /// Maximum width of the name of the log.
+    /// Maximum width of the name of the log in points.
     log: f32,
     rig: bool,
     buttons: bool,
     accuracy: bool,
     layout_names: bool,
-    /// Width of all runs.
+    /// Width of all runs in points.
     runs: f32,
 }
 
 impl Widths {
-    /// What fits: the rig goes first, then the names of the layouts, the buttons and the accuracies; the name of the log
-    /// and those of the runs are shortened last.
+    /// Elements that fit into `room` points. The rig is omitted first, then the names of the layouts, the buttons and
+    /// the accuracies; the name of the log and those of the runs are shortened last.
     fn shown(self, room: f32) -> Shown {
         let mut shown =
             Shown { log: self.log, rig: true, buttons: true, accuracy: true, layout_names: true, runs: self.runs[0] };
@@ -152,7 +150,7 @@ fn action_button(ui: &mut Ui, text: &str, action: Action, enabled: bool, actions
     }
 }
 
-/// The button that closes the session and goes back to its study.
+/// Draws the button that closes the session and returns to its study.
 fn study_button(ui: &mut Ui, study: &str, actions: &mut Vec<Action>) {
     let response = ui.add(Button::new("◀ Study"));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Back to the study"));
@@ -161,7 +159,7 @@ fn study_button(ui: &mut Ui, study: &str, actions: &mut Vec<Action>) {
     }
 }
 
-/// The button of a layout, with its name or with its number.
+/// Draws the button of a layout, with its name or with its number.
 fn layout_button(
     ui: &mut Ui,
     state: &WindowState,

@@ -1,24 +1,22 @@
-//! The warnings of the log and its runs, one line for those that repeat.
+//! Warnings of the log and its runs, with one line for repeated ones.
 
 use crate::gui::units::{counted, seconds};
 use crate::session::Recording;
 
-/// Warnings of one source that differ in their numbers only.
+/// Warnings of one source that differ only in their numbers.
 #[derive(Debug)]
 pub(super) struct WarningLine<'a> {
-    /// Label of the run, `None` for the log.
+    /// Label of the run; `None` for the log.
     run: Option<&'a str>,
-    /// The first message.
     message: &'a str,
-    /// Stamp of the first warning.
     pub(super) first_ns: i64,
     last_ns: i64,
-    /// Number of warnings of the log, or of steps of the run that warn.
+    /// Number of warnings of the log, or of steps of the run with the warning.
     count: usize,
 }
 
 impl WarningLine<'_> {
-    /// The message with its run, the count and the time span.
+    /// Message with its run, the count and the time span.
     pub(super) fn text(&self) -> String {
         let Self { run, message, first_ns, last_ns, count } = self;
         let run = run.map_or_else(String::new, |run| format!("{run}: "));
@@ -30,7 +28,7 @@ impl WarningLine<'_> {
     }
 }
 
-/// The lines of all warnings, those of the log first, each source in the order of the first stamps.
+/// Lines of all warnings, those of the log first, each source in the order of the first stamps.
 pub(super) fn warning_lines(recording: &Recording) -> Vec<WarningLine<'_>> {
     let of_log = recording.warnings.iter().map(|warning| WarningLine {
         run: None,
@@ -63,7 +61,7 @@ pub(super) fn warning_lines(recording: &Recording) -> Vec<WarningLine<'_>> {
     lines
 }
 
-/// Whether two messages are equal but for their numbers.
+/// True if two messages are equal except for their numbers.
 fn is_repeated(message: &str, other: &str) -> bool {
     let of_number = |byte: &u8| byte.is_ascii_digit() || b".+-".contains(byte);
     message.bytes().filter(|byte| !of_number(byte)).eq(other.bytes().filter(|byte| !of_number(byte)))

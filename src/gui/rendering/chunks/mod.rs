@@ -1,8 +1,8 @@
-//! Tessellation in chunks of shapes; chunks that did not change are kept from frame to frame.
+//! Tessellation in chunks of shapes; unchanged chunks are reused in the next frame.
 //!
-//! Most of a window is the same as in the frame before: labels, frames, and plots over the whole flight. A chunk is a run
-//! of shapes with one clip rectangle. Where chunks end depends on the shapes alone, so that a shape more or less in a
-//! panel changes one or two chunks and not all that follow.
+//! Most of a window does not change between frames: labels, frames, and plots over the whole flight. A chunk is a run
+//! of shapes with one clip rectangle. The ends of the chunks depend on the shapes alone, so that an added or removed
+//! shape in a panel changes one or two chunks and not all that follow.
 
 mod shape_hash;
 #[cfg(test)]
@@ -16,29 +16,28 @@ use egui::{Context, Galley};
 
 use self::shape_hash::ShapeHasher;
 
-/// A chunk ends after so many shapes at the latest.
+/// Maximum number of shapes of a chunk.
 const MOST_SHAPES: usize = 64;
 /// A chunk ends after a shape whose hash has none of these bits: after eight shapes on average.
 const ENDING_BITS: u64 = 7;
-/// A shape with more points or vertices is a chunk of its own.
+/// A shape with more points or vertices is a separate chunk.
 const MANY_POINTS: usize = 64;
 
 /// Consecutive shapes, tessellated.
 pub struct Chunk {
-    /// Meshes, in points, and what the graphics adapter paints by itself.
+    /// Meshes in points, and primitives that the graphics adapter paints itself.
     pub primitives: Vec<ClippedPrimitive>,
-    /// The texts of the shapes. Texts are compared by address, which nothing else can have while they are kept.
+    /// Texts of the shapes. Texts are compared by address, which is unique while they are kept.
     _texts: Vec<Arc<Galley>>,
 }
 
 impl Chunk {
-    /// A chunk of meshes.
     pub fn new(primitives: Vec<ClippedPrimitive>) -> Self {
         Self { primitives, _texts: Vec::new() }
     }
 }
 
-/// What the tessellation of a shape depends on besides the shape.
+/// Inputs of the tessellation in addition to the shape.
 #[derive(PartialEq)]
 struct Setting {
     pixels_per_point: f32,
@@ -49,7 +48,7 @@ struct Setting {
 /// Tessellates frames of one context.
 #[derive(Default)]
 pub struct Tessellation {
-    /// The chunks of the last frame by hash.
+    /// Chunks of the last frame by hash.
     chunks: HashMap<u64, Arc<Chunk>>,
     setting: Option<Setting>,
 }
@@ -57,7 +56,7 @@ pub struct Tessellation {
 impl Tessellation {
     /// Tessellates the shapes of a frame, in the order of painting.
     ///
-    /// All meshes together paint the same as those of [`Context::tessellate`].
+    /// Together the meshes give the same image as those of [`Context::tessellate`].
     pub fn chunks(&mut self, context: &Context, shapes: Vec<ClippedShape>, pixels_per_point: f32) -> Vec<Arc<Chunk>> {
         let setting = Setting {
             pixels_per_point,
@@ -107,7 +106,7 @@ impl Tessellation {
     }
 }
 
-/// Whether a shape is a chunk of its own.
+/// True if a shape is a separate chunk.
 fn is_alone(shape: &ClippedShape) -> bool {
     shape_hash::points_of(&shape.shape) > MANY_POINTS
 }

@@ -1,4 +1,4 @@
-//! Hashes of shapes: shapes with the same hash are tessellated alike.
+//! Hashes of shapes; shapes with equal hashes have equal tessellations.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use egui::{Color32, Galley, Pos2, Rect, Shape, Stroke, StrokeKind, TextureId};
 
 use crate::gui::rendering::mixing::mixed;
 
-/// The number of points that the tessellation of a shape starts from, 1 for all shapes of fixed size.
+/// Number of points from which the tessellation of a shape starts, 1 for all shapes of fixed size.
 pub(super) fn points_of(shape: &Shape) -> usize {
     match shape {
         Shape::Vec(shapes) => shapes.iter().map(points_of).sum(),
@@ -30,26 +30,24 @@ pub(super) fn points_of(shape: &Shape) -> usize {
     }
 }
 
-/// The bits of two numbers.
+/// Concatenated bits of two numbers.
 #[inline]
 fn joined(first: f32, second: f32) -> u64 {
     u64::from(first.to_bits()) << 32 | u64::from(second.to_bits())
 }
 
-/// Hashes consecutive shapes.
 #[derive(Default)]
 pub(super) struct ShapeHasher {
     /// Hash of the shapes so far.
     all: u64,
-    /// Hash of the last shape without the addresses of its texts, which differ from process to process.
+    /// Hash of the last shape without the addresses of its texts, which differ between processes.
     last: u64,
-    /// Whether a shape contains code, which cannot be compared.
+    /// True if a shape contains code, which cannot be compared.
     has_code: bool,
     texts: Vec<Arc<Galley>>,
 }
 
 impl ShapeHasher {
-    /// Adds a shape.
     pub(super) fn add(&mut self, clipped: &ClippedShape) {
         let ClippedShape { clip_rect, shape, transform_after_tessellation } = clipped;
         self.last = 0;
@@ -60,17 +58,17 @@ impl ShapeHasher {
         self.all = mixed(self.all, self.last);
     }
 
-    /// Hash of the last shape, the same in every process: texts count by their places and colors only.
+    /// Hash of the last shape, equal in every process: of texts it contains only positions and colours.
     pub(super) fn last(&self) -> u64 {
         self.last
     }
 
-    /// Hash of all shapes, `None` if one cannot be compared with others.
+    /// Hash of all shapes; `None` if one of them cannot be compared.
     pub(super) fn hash(&self) -> Option<u64> {
         (!self.has_code).then_some(self.all)
     }
 
-    /// The texts of the shapes, which are hashed by their addresses.
+    /// Texts of the shapes, which are hashed by their addresses.
     pub(super) fn into_texts(self) -> Vec<Arc<Galley>> {
         self.texts
     }
@@ -85,7 +83,7 @@ impl ShapeHasher {
         }
     }
 
-    /// Adds words in four independent chains, of which the processor computes several at a time.
+    /// Adds words in four independent chains, which the processor computes in parallel.
     fn words<T>(&mut self, items: &[T], word_of: impl Fn(&T) -> u64) {
         self.word(items.len() as u64);
         let mut chains = [self.last; 4];

@@ -9,8 +9,8 @@ use egui::{Color32, Context, FontId, Pos2, RawInput, Rect, Shape, Stroke, Stroke
 use super::shape_hash::ShapeHasher;
 use super::{Chunk, Tessellation};
 
-/// The shapes of a window with texts, lines and a path of a thousand points; `cursor` moves a line that is painted last
-/// but one.
+/// Shapes of a window with texts, lines and a path of a thousand points; `cursor` moves a line that is painted second
+/// to last.
 fn shapes(context: &Context, cursor: f32, words: &[&str]) -> Vec<ClippedShape> {
     let screen_rect = Some(Rect::from_min_max(Pos2::ZERO, pos2(400.0, 1500.0)));
     let mut output = context.run_ui(RawInput { screen_rect, ..RawInput::default() }, |ui| {
@@ -95,7 +95,7 @@ fn another_scale_tessellates_everything_anew() {
 
 #[test]
 fn chunks_end_at_the_same_shapes_in_every_context() {
-    // Every context lays its texts out anew, at other addresses.
+    // Every context lays out its texts again, at other addresses.
     let contexts: Vec<_> = (0..20).map(|_| Context::default()).collect();
     let sizes = contexts.iter().map(|context| {
         let chunks = Tessellation::default().chunks(context, shapes(context, 10.0, &[]), 1.0);
@@ -106,7 +106,7 @@ fn chunks_end_at_the_same_shapes_in_every_context() {
     assert!(sizes[0].len() > 5, "triangles per chunk: {:?}", sizes[0]);
 }
 
-/// The hash of a shape, `None` if it cannot be compared.
+/// Hash of a shape; `None` if it cannot be compared.
 fn hash_of(shape: &Shape) -> Option<u64> {
     let mut hasher = ShapeHasher::default();
     hasher.add(&ClippedShape::new(Rect::EVERYTHING, shape.clone()));
@@ -129,7 +129,7 @@ fn every_field_of_a_shape_counts() {
         angle: 0.0,
     };
     let context = Context::default();
-    // Fonts are there after a first frame.
+    // Fonts are available after a first frame.
     shapes(&context, 0.0, &[]);
     let galley =
         |text: &str| context.fonts_mut(|fonts| fonts.layout_no_wrap(text.to_owned(), FontId::default(), Color32::RED));

@@ -1,9 +1,8 @@
 //! Arithmetic on packed premultiplied pixels: red in the lowest byte, alpha in the highest.
 
-/// Two of the four channels, with room for carries.
+/// Two of the four channels, with space for carries.
 const LANES: u32 = 0x00ff_00ff;
 
-/// Packs red, green, blue, alpha.
 pub(in crate::gui) const fn pack(rgba: [u8; 4]) -> u32 {
     u32::from_le_bytes(rgba)
 }
@@ -13,7 +12,7 @@ pub(in crate::gui) const fn unpack(pixel: u32) -> [u8; 4] {
     pixel.to_le_bytes()
 }
 
-/// The four channels of a pixel, each with room for carries.
+/// The four channels of a pixel, each with space for carries.
 const CHANNELS: u64 = 0x00ff_00ff_00ff_00ff;
 
 /// Spreads a pixel over four channels: red, blue, green, alpha from the lowest.

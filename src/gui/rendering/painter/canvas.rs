@@ -1,4 +1,4 @@
-//! The image in tiles that are painted again only when their content changes.
+//! The image in tiles, which are repainted only when their content changes.
 
 use std::sync::Arc;
 
@@ -12,42 +12,39 @@ use super::raster::Target;
 use super::texture::TextureStore;
 use super::triangle::Clip;
 
-/// Size of a tile in pixels: small enough that a moving cursor changes few tiles, and that a tile fits the cache.
+/// Size of a tile in pixels: small enough that a moving cursor changes few tiles and that a tile fits into the cache.
 pub(super) const TILE_PX: [usize; 2] = [64, 32];
 
-/// Number of tiles in a row of an image of this width.
+/// Number of tiles in a row of an image of width `width_px`.
 pub(super) fn tiles_in_row(width_px: usize) -> usize {
     width_px.div_ceil(TILE_PX[0])
 }
 
-/// A tile of the image.
 #[derive(Default)]
 struct Tile {
-    /// Chunks that may touch it, in the order of painting: number of the chunk and of its share.
+    /// Parts of chunks that may touch the tile, in the order of painting: number of the chunk and of its part (share).
     shares: Vec<[u32; 2]>,
-    /// Hashes of the shares of the last image, `None` before the first one.
+    /// Hashes of the shares of the last image; `None` before the first one.
     hashes: Option<Vec<u64>>,
     /// Pixels by row, each row as wide as the tile.
     pixels: Vec<u32>,
-    /// The pixels below the first share that changed in the last update. What moves, as a cursor over plots, is mostly the
-    /// same share again, and all that lies below it needs not be painted again.
+    /// Pixels below the first share that changed in the last update. A moving element, such as a cursor over plots, is
+    /// mostly the same share again; all content below it need not be repainted.
     below: Vec<u32>,
     /// Number of shares in `below`.
     below_count: usize,
-    /// Whether it was painted in the last update.
+    /// True if the tile was painted in the last update.
     changed: bool,
 }
 
 /// A rectangle of the image in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelRect {
-    /// Column and row of its upper left pixel.
+    /// Column and row of the upper left pixel.
     pub at: [usize; 2],
-    /// Width and height.
     pub size: [usize; 2],
 }
 
-/// The last image.
 #[derive(Default)]
 pub(super) struct Canvas {
     size_px: [usize; 2],
@@ -56,7 +53,6 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// Number of tiles in a row.
     fn columns(&self) -> usize {
         tiles_in_row(self.size_px[0])
     }
@@ -72,7 +68,7 @@ impl Canvas {
         PixelRect { at, size: [0, 1].map(|axis| TILE_PX[axis].min(self.size_px[axis] - at[axis])) }
     }
 
-    /// Updates the image; the result is the same as painting all of it again.
+    /// Updates the image; the result equals that of painting it completely.
     pub(super) fn update(
         &mut self,
         chunks: &[Arc<PreparedChunk>],
@@ -112,12 +108,11 @@ impl Canvas {
         rects
     }
 
-    /// Width and height.
     pub(super) fn size_px(&self) -> [usize; 2] {
         self.size_px
     }
 
-    /// A rectangle of whole tiles as colours.
+    /// A rectangle of whole tiles, as colours.
     pub(super) fn part(&self, rect: PixelRect) -> ColorImage {
         let [left, top] = rect.at;
         let [first, end] = [left / TILE_PX[0], (left + rect.size[0]).div_ceil(TILE_PX[0])];
@@ -136,7 +131,6 @@ impl Canvas {
         ColorImage::new(rect.size, pixels)
     }
 
-    /// The whole image.
     pub(super) fn image(&self) -> RgbaImage {
         let [width, height] = self.size_px;
         let mut bytes = vec![0; width * height * 4];

@@ -1,10 +1,9 @@
 //! A CPU rasterizer for egui's meshes, so that screenshots need no driver and have the same bytes on every machine.
 //!
 //! It follows egui's shader: colours are premultiplied and blended in gamma space, textures are filtered between texel
-//! centres, and clip rectangles are rounded to whole pixels.
-//! Vertices are snapped to 1/256 pixel and edges follow the top-left rule in integers, so that triangles with a common
-//! edge leave no gap and paint no pixel twice.
-//! Paint callbacks are not drawn: on the CPU the scene is a texture.
+//! centres, and clip rectangles are rounded to whole pixels. Vertices are snapped to 1/256 pixel and edges follow the
+//! top-left rule in integers, so that triangles with a common edge leave no gap and paint no pixel twice. Paint
+//! callbacks are not drawn: on the CPU the scene is a texture.
 
 pub(in crate::gui) mod blend;
 mod canvas;
@@ -28,20 +27,19 @@ use self::prepared::PreparedChunk;
 use self::texture::TextureStore;
 use super::chunks::Chunk;
 
-/// Paints egui's meshes. It keeps their textures, the chunks of the last image, and the last image, of which only changed
-/// tiles are painted again.
+/// Paints egui's meshes. It keeps their textures, the chunks of the last image, and the last image, of which only
+/// changed tiles are repainted.
 #[derive(Default)]
 pub struct Painter {
     textures: TextureStore,
     canvas: Canvas,
     /// Size and scale for which the chunks are prepared.
     format: ([u32; 2], f32),
-    /// The chunks of the last image by address, which they keep.
+    /// Chunks of the last image by address; they are kept, so that the addresses stay unique.
     prepared: HashMap<usize, Arc<PreparedChunk>>,
 }
 
 impl Painter {
-    /// A painter without textures.
     pub fn new() -> Self {
         Self::default()
     }
@@ -60,7 +58,7 @@ impl Painter {
     /// Paints chunks, whose positions are in points, over an opaque background.
     ///
     /// Primitives with an unknown texture are skipped, as are triangles with positions that are not finite. Tiles that
-    /// did not change since the last image are not painted again.
+    /// did not change since the last image are not repainted.
     pub fn paint(
         &mut self,
         chunks: &[Arc<Chunk>],
@@ -72,7 +70,7 @@ impl Painter {
         self.canvas.image()
     }
 
-    /// Paints as [`Painter::paint`] does without copying the image.
+    /// Like [`Painter::paint`], without copying the image.
     pub fn update(&mut self, chunks: &[Arc<Chunk>], size_px: [u32; 2], pixels_per_point: f32, background: Color32) {
         if self.format != (size_px, pixels_per_point) {
             self.format = (size_px, pixels_per_point);
@@ -102,7 +100,7 @@ impl Painter {
     }
 }
 
-/// The address of a chunk, which no other one has while it is kept.
+/// Address of a chunk, unique while the chunk is kept.
 fn address(chunk: &Arc<Chunk>) -> usize {
     Arc::as_ptr(chunk).addr()
 }

@@ -19,25 +19,24 @@ struct Piece {
     triangle: u32,
 }
 
-/// The part of a chunk in one tile.
+/// Part of a chunk in one tile.
 pub(super) struct Share {
-    /// Number of the tile.
     pub(super) tile: u32,
-    /// Hash of its triangles: shares with the same hash have the same pixels.
+    /// Hash of the triangles: shares with equal hashes have equal pixels.
     pub(super) hash: u64,
     pieces: Range<u32>,
 }
 
-/// What a mesh shows of a texture.
+/// Region of a texture that a mesh shows.
 struct TextureView {
     texture: TextureId,
     /// Smallest and largest vertical texture coordinate.
     vs: [f32; 2],
-    /// When the chunk was prepared, `None` without that texture.
+    /// State when the chunk was prepared; `None` without that texture.
     seen: Option<Seen>,
 }
 
-/// The look of a texture.
+/// State of a texture.
 struct Seen {
     /// Version of the last change of the texture.
     newest: u64,
@@ -51,7 +50,7 @@ impl TextureView {
         let vs = textured.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], vertex| {
             [low.min(vertex.uv.y), high.max(vertex.uv.y)]
         });
-        // An untextured mesh shows the corner texel alone, which is in every state.
+        // An untextured mesh uses only the corner texel, which is part of every state.
         let vs = if vs[0] <= vs[1] { vs } else { [0.0; 2] };
         let texture = textures.get(mesh.texture_id);
         let seen = texture.map(|texture| Seen { newest: texture.newest(), rows: texture.state(vs) });
@@ -70,7 +69,7 @@ impl TextureView {
 /// A chunk with its triangles by tile, for one size of the image.
 pub(super) struct PreparedChunk {
     chunk: Arc<Chunk>,
-    /// The vertices of each mesh, `None` for what is not painted.
+    /// Vertices of each mesh; `None` for a mesh that is not painted.
     snapped: Vec<Option<Snapped>>,
     views: Vec<TextureView>,
     /// Ordered by tile.
@@ -105,7 +104,7 @@ impl PreparedChunk {
             }
             snapped.push(vertices);
         }
-        // A stable sort, which keeps the order of painting within a tile.
+        // A stable sort keeps the order of painting within a tile.
         placed.sort_by_key(|(tile, _, _)| *tile);
         let mut shares = Vec::new();
         let mut start = 0;
@@ -119,7 +118,7 @@ impl PreparedChunk {
         Self { chunk: Arc::clone(chunk), snapped, views, shares, pieces }
     }
 
-    /// Whether the textures still look as they did.
+    /// True if the textures have not changed.
     pub(super) fn is_current(&self, textures: &TextureStore) -> bool {
         self.views.iter().all(|view| view.is_current(textures))
     }

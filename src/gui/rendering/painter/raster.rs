@@ -12,7 +12,7 @@ use super::triangle::{Clip, Gradient, Place, SUBPIXELS, first_centre, pack_fixed
 /// Largest coordinate in subpixels (32 768 pixels), so that products fit into 64 bits.
 const MAX_COORDINATE: f32 = (1 << 23) as f32;
 
-/// A rectangle of the image that one worker paints.
+/// Rectangle of the image that one worker paints.
 pub(super) struct Target<'a> {
     /// Pixels by row, each row as wide as `clip`.
     pub(super) pixels: &'a mut [u32],
@@ -35,9 +35,9 @@ impl Target<'_> {
 
 /// The vertices of a mesh in subpixels.
 pub(super) struct Snapped {
-    /// The clip rectangle inside the image.
+    /// Clip rectangle inside the image.
     clip: Clip,
-    /// Position of each vertex, `None` if it is not finite.
+    /// Position of each vertex; `None` if it is not finite.
     points: Vec<Option<[i32; 2]>>,
 }
 
@@ -61,10 +61,10 @@ impl Snapped {
     }
 }
 
-/// A number rounded to the nearest integer, halves away from zero.
+/// The nearest integer, halves away from zero.
 #[inline]
 fn rounded(number: f32) -> i32 {
-    // The sum is exact where the half decides.
+    // In `f64` the sum is exact, so that halves are rounded correctly.
     let number = f64::from(number);
     (number + 0.5_f64.copysign(number)) as i32
 }
@@ -78,25 +78,23 @@ pub(super) struct PreparedMesh<'a> {
 }
 
 impl PreparedMesh<'_> {
-    /// Number of triangles.
     pub(super) fn triangles(&self) -> usize {
         self.mesh.indices.len() / 3
     }
 
-    /// Vertex indices of a triangle.
     #[inline]
     fn corners(&self, triangle: usize) -> [usize; 3] {
         [0, 1, 2].map(|corner| self.mesh.indices[3 * triangle + corner] as usize)
     }
 
-    /// Positions of the corners of a triangle, `None` if one is not finite.
+    /// Positions of the corners of a triangle; `None` if one is not finite.
     #[inline]
     fn points(&self, triangle: usize) -> Option<[[i32; 2]; 3]> {
         let [a, b, c] = self.corners(triangle).map(|corner| self.snapped.points.get(corner).copied().flatten());
         Some([a?, b?, c?])
     }
 
-    /// Pixels that a triangle may touch, `None` if it is outside the clip rectangle.
+    /// Pixels that a triangle may touch; `None` if it is outside the clip rectangle.
     fn reach(&self, triangle: usize) -> Option<Clip> {
         let points = self.points(triangle)?;
         let [across, down] = [0, 1].map(|axis| points.map(|point| point[axis]));
@@ -134,7 +132,7 @@ impl PreparedMesh<'_> {
             let texels = if uvs[0] == uvs[1] && uvs[1] == uvs[2] {
                 u64::from(self.texel_at(uvs[0]))
             } else {
-                // Bit above every texel value, which has 32 bits.
+                // A bit above every texel value, which has 32 bits.
                 self.texture.version(uvs.map(|uv| uv.y)) | 1 << 63
             };
             emit(triangle, reach, mixed(mixed(mixed(a, b), c), mixed(clip, texels)));
@@ -219,7 +217,7 @@ impl PreparedMesh<'_> {
         self.texture.sample(coordinate(uv.x, self.texture.width), coordinate(uv.y, self.texture.height))
     }
 
-    /// A span of one colour times the texture, from a texture position on.
+    /// Paints a span of one colour times the texture, starting at a texture position.
     fn texture_span(&self, [mut u, mut v]: [i64; 2], [step_u, step_v]: [i64; 2], color: u32, pixels: &mut [u32]) {
         const ONE: i64 = 1 << TEXEL_BITS;
         const HALF: i64 = ONE / 2;
@@ -252,7 +250,7 @@ impl PreparedMesh<'_> {
         (u, v) = (u - HALF, v - HALF);
         let (upper, lower) = (texture.row(v >> TEXEL_BITS), texture.row((v >> TEXEL_BITS) + 1));
         let down = weight(v);
-        // One texel per pixel, as for glyphs: positions are so near to texel centres that every weight is 0 or 1.
+        // One texel per pixel, as for glyphs: positions are so close to texel centres that every weight is 0 or 1.
         let nearest = (u + HALF) >> TEXEL_BITS;
         let off = (u - (nearest << TEXEL_BITS)).abs() + (step_u - ONE).abs().saturating_mul(pixels.len() as i64);
         if off < ONE / 512 && (down == 0 || down == 256) {
@@ -296,7 +294,6 @@ fn fill(pixels: &mut [u32], color: u32) {
     }
 }
 
-/// Hash of a vertex.
 fn hash_of(vertex: &Vertex, point: Option<[i32; 2]>) -> u64 {
     let [x, y] = point.unwrap_or([i32::MIN; 2]);
     let pair = |a: u32, b: u32| u64::from(a) << 32 | u64::from(b);

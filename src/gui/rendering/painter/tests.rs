@@ -281,7 +281,7 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
     assert_eq!(alone, many);
 }
 
-/// The part of the image in which the test of updates paints.
+/// Part of the image in which the test of updates paints.
 fn middle() -> Rect {
     Rect::from_min_max(pos2(5.0, 5.0), pos2(235.0, 170.0))
 }
@@ -323,8 +323,8 @@ fn an_updated_image_equals_one_painted_again() {
     const SIZE: [u32; 2] = [241, 187];
     let texels = |shade: u8| ColorImage::new([3, 40], vec![Color32::from_rgb(shade, 90, 10); 120]);
     let mut kept = painter_with(Some((texels(30), TextureOptions::LINEAR)));
-    // Most chunks are the same from image to image. Every image has another cursor, some have lines of another colour
-    // below it, and twice the texture changes.
+    // Most chunks do not change between images. Every image has another cursor, some have lines of another colour below
+    // it, and the texture changes twice.
     let [orange, blue] = [[250, 120, 30], [20, 60, 250]]
         .map(|[red, green, blue]| lines(Color32::from_rgba_unmultiplied(red, green, blue, 180)));
     let image = textured();
@@ -360,7 +360,7 @@ fn an_updated_image_equals_one_painted_again() {
         fresh.set_textures(&delta);
         delta.clear();
         assert!(image == fresh.paint(&chunks(moved), SIZE, 1.0, GROUND), "image {moved}");
-        // The reported rectangles are all that differs.
+        // The reported rectangles contain all differences.
         for (rect, part) in kept.changes() {
             for (index, color) in part.pixels.iter().enumerate() {
                 let (column, row) = (rect.at[0] + index % rect.size[0], rect.at[1] + index / rect.size[0]);

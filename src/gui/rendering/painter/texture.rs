@@ -11,7 +11,6 @@ use super::blend;
 /// Fractional bits of a texel coordinate.
 pub(super) const TEXEL_BITS: u32 = 32;
 
-/// All textures by id.
 #[derive(Default)]
 pub(super) struct TextureStore {
     textures: BTreeMap<TextureId, Texture>,
@@ -69,7 +68,7 @@ impl TextureStore {
     }
 }
 
-/// A common property of all texels.
+/// Common property of all texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TexelKind {
     /// Four equal channels: coverage, as in the font atlas.
@@ -97,7 +96,6 @@ impl TexelKind {
     }
 }
 
-/// One texture.
 pub(super) struct Texture {
     pub(super) width: usize,
     pub(super) height: usize,
@@ -138,7 +136,7 @@ impl Texture {
     }
 
     /// Version of the rows that a triangle with these texture coordinates can show; it differs after every change of
-    /// them.
+    /// these rows.
     pub(super) fn version(&self, vs: [f32; 3]) -> u64 {
         let (low, high) = (vs[0].min(vs[1]).min(vs[2]), vs[0].max(vs[1]).max(vs[2]));
         let all = self.versions.len();
@@ -153,17 +151,16 @@ impl Texture {
         self.versions.get(blocks).unwrap_or(&self.versions).iter().copied().max().unwrap_or(0)
     }
 
-    /// Version of the last change.
     pub(super) fn newest(&self) -> u64 {
         self.newest
     }
 
-    /// What the rows of these texture coordinates, and the corner texel, look like; it differs after every change of them.
+    /// State of the rows of these texture coordinates and of the corner texel; it differs after every change of them.
     pub(super) fn state(&self, vs: [f32; 2]) -> (u64, u32) {
         (self.version([vs[0], vs[1], vs[1]]), self.corner())
     }
 
-    /// The corner texel, which egui uses for untextured meshes.
+    /// Corner texel, which egui uses for untextured meshes.
     pub(super) fn corner(&self) -> u32 {
         self.texels.first().copied().unwrap_or(u32::MAX)
     }

@@ -18,7 +18,7 @@ pub(in crate::gui) struct Clip {
 }
 
 impl Clip {
-    /// A clip rectangle, rounded as egui's own renderer rounds its scissor rectangle.
+    /// A clip rectangle with the rounding of the scissor rectangle in egui's renderer.
     pub(super) fn new(rect: Rect, pixels_per_point: f32, size_px: [u32; 2]) -> Self {
         let pixel = |coordinate: f32, size: u32| ((coordinate * pixels_per_point).round() as i32).clamp(0, size as i32);
         Self {
@@ -34,12 +34,12 @@ impl Clip {
     }
 }
 
-/// The first pixel whose centre is at or behind a subpixel coordinate.
+/// The first pixel whose centre is at or after a subpixel coordinate.
 pub(super) fn first_centre(subpixels: i32) -> i32 {
     (subpixels + SUBPIXELS / 2 - 1) >> SUBPIXELS.trailing_zeros()
 }
 
-/// Calls `emit(row, left, right)` for each row of a triangle with at least one pixel centre inside, top-left rule.
+/// Calls `emit(row, left, right)` for each row of a triangle with at least one pixel centre inside (top-left rule).
 #[inline]
 pub(in crate::gui) fn spans(mut points: [[i32; 2]; 3], clip: Clip, mut emit: impl FnMut(i32, i32, i32)) {
     points.sort_unstable_by_key(|point| point[1]);
@@ -80,7 +80,7 @@ fn cross(a: [i32; 2], b: [i32; 2], c: [i32; 2]) -> i64 {
     ux * vy - uy * vx
 }
 
-/// An edge traversed by rows in integers: `pixel` is the first whose centre is at or to the right of the edge.
+/// An edge traversed by rows in integers: `pixel` is the first pixel whose centre is at or to the right of the edge.
 struct Edge {
     pixel: i64,
     remainder: i64,
@@ -95,7 +95,7 @@ impl Edge {
         let [dx, dy] = [i64::from(to[0] - from[0]), i64::from(to[1] - from[1])];
         let divisor = scale * dy;
         let down = i64::from(row) * scale + scale / 2 - i64::from(from[1]);
-        // Rounded up: the divisor minus one is added before the division.
+        // Rounded up by adding the divisor minus one before the division.
         let numerator = (i64::from(from[0]) - scale / 2) * dy + down * dx + divisor - 1;
         Self {
             pixel: numerator.div_euclid(divisor),
@@ -135,7 +135,7 @@ impl Slopes {
         (area != 0).then(|| Self { corner: a, second: from_a(b), third: from_a(c), scale })
     }
 
-    /// The plane through values at the corners.
+    /// Plane through values at the corners.
     #[inline]
     fn plane(&self, values: [f64; 3]) -> Plane {
         let (db, dc) = (values[1] - values[0], values[2] - values[0]);
@@ -146,7 +146,7 @@ impl Slopes {
     }
 }
 
-/// A value that is linear over the image, in pixels.
+/// A value that is linear over the image, per pixel.
 #[derive(Clone, Copy)]
 pub(in crate::gui) struct Plane {
     at_corner: f64,
@@ -155,12 +155,12 @@ pub(in crate::gui) struct Plane {
 }
 
 impl Plane {
-    /// From its value at the image's corner and its slopes.
+    /// Plane given by its value at the image's corner and its slopes.
     pub(in crate::gui) fn new(at_corner: f64, per_column: f64, per_row: f64) -> Self {
         Self { at_corner, per_column, per_row }
     }
 
-    /// Through values at three corners; `None` for a triangle without area.
+    /// Plane through values at three corners; `None` for a triangle without area.
     pub(in crate::gui) fn through(points: [[i32; 2]; 3], values: [f64; 3]) -> Option<Self> {
         Slopes::of(points).map(|slopes| slopes.plane(values))
     }
@@ -182,7 +182,7 @@ pub(super) struct Gradient {
     at_corner: [f64; 4],
     per_column: [f64; 4],
     per_row: [f64; 4],
-    /// The increment per pixel, in fixed point.
+    /// Increment per pixel, in fixed point.
     pub(super) step: [i32; 4],
 }
 

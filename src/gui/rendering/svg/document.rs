@@ -10,10 +10,10 @@ use super::{mesh, text};
 /// Number of lines that approximate a curve.
 const LINES_PER_CURVE: usize = 24;
 
-/// The drawing of shapes over an opaque background.
+/// SVG drawing of shapes over an opaque background.
 ///
-/// `size` is in points and `size_px` the size in a viewer; `prefix` begins the ids of the elements, so that one page
-/// can hold several drawings; `title` is its title.
+/// `size` is in points and `size_px` the size in a viewer; `prefix` is the prefix of the ids of the elements, so that
+/// one page can hold several drawings; `title` is its title.
 pub(in crate::gui) fn document(
     shapes: &[ClippedShape],
     textures: &Textures,
@@ -69,7 +69,7 @@ struct Writer<'a> {
     prefix: &'a str,
     body: String,
     clips: Vec<Rect>,
-    /// Straight lines of one stroke that are still to be written, as one path.
+    /// Pending straight lines of one stroke, which are written as one path.
     lines: Option<(Stroke, String)>,
 }
 
@@ -128,8 +128,8 @@ impl Writer<'_> {
                 }
                 return;
             }
-            // Consecutive lines of one stroke, such as dashes and grids, become one path. Translucent ones would add up
-            // one by one.
+            // Consecutive lines of one stroke, such as dashes and grids, become one path; separate translucent lines
+            // would add up where they overlap.
             Shape::LineSegment { points, stroke } => return self.line(points, *stroke),
             _ => self.finish_lines(),
         }
@@ -201,7 +201,7 @@ impl Writer<'_> {
             self.body.push_str(&self.textures.element(brush.fill_texture_id, shape.rect, brush.uv));
         }
         let fill = if shape.brush.is_some() { Color32::TRANSPARENT } else { shape.fill };
-        // SVG strokes the middle of the outline.
+        // SVG strokes are centred on the outline.
         let half = 0.5 * shape.stroke.width;
         let outline = match shape.stroke_kind {
             _ if shape.stroke.is_empty() => shape.rect,
@@ -232,7 +232,7 @@ fn places() -> impl Iterator<Item = f32> {
     (0..=LINES_PER_CURVE).map(|place| place as f32 / LINES_PER_CURVE as f32)
 }
 
-/// The colour of a path. Colours that vary along a path are not supported; the program does not use them.
+/// Colour of a path. Colours that vary along a path are not supported; the program does not use them.
 fn solid(color: &ColorMode) -> Color32 {
     match color {
         ColorMode::Solid(color) => *color,

@@ -38,7 +38,7 @@ pub(super) fn paint(name: &str, color: Color32) -> String {
     text
 }
 
-/// A stroke with its width, nothing when it is empty.
+/// A stroke with its width; empty for an empty stroke.
 pub(super) fn stroke(stroke: Stroke) -> String {
     if stroke.is_empty() {
         return String::new();

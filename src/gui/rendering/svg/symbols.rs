@@ -1,6 +1,6 @@
-//! Outlines of symbols that the text fonts of a reader need not have.
+//! Outlines of symbols that the reader's text fonts may lack.
 
-/// The outline of a symbol as SVG path data in a square of 16 × 16 with y down; `None` for every other character.
+/// Outline of a symbol as SVG path data in a square of 16 × 16 with y down; `None` for every other character.
 pub(super) fn outline(symbol: char) -> Option<&'static str> {
     Some(match symbol {
         '✔' => "M1.5 8.5L3.5 6.5L6.3 9.3L12.7 2.9L14.5 4.7L6.3 13Z",

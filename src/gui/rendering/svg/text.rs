@@ -7,7 +7,6 @@ use egui::{Color32, FontFamily, Rect, pos2, vec2};
 use super::element::{attribute, escape, number, paint, put, stroke};
 use super::symbols::outline;
 
-/// One text with all its rows.
 pub(super) fn text(svg: &mut String, shape: &TextShape) {
     let is_rotated = shape.angle != 0.0;
     if is_rotated {
@@ -80,7 +79,7 @@ fn write_run(svg: &mut String, shape: &TextShape, row: egui::Vec2, run: &[&Glyph
     }
 }
 
-/// A symbol as an outline of the height of capital letters, in the middle of its advance width.
+/// Writes a symbol as an outline of the height of capital letters, centred in its advance width.
 fn symbol(svg: &mut String, glyph: &Glyph, offset: egui::Vec2, color: Color32, font_size: f32) {
     const SIZE_RATIO: f32 = 0.75;
     let Some(path) = outline(glyph.chr) else { return };
@@ -97,7 +96,7 @@ fn symbol(svg: &mut String, glyph: &Glyph, offset: egui::Vec2, color: Color32, f
     );
 }
 
-/// Letters of one colour and font, with their laid-out width.
+/// Writes letters of one colour and font with their laid-out width.
 fn write_letters(
     svg: &mut String,
     run: &[&Glyph],

@@ -26,7 +26,6 @@ pub(in crate::gui) struct Textures {
 }
 
 impl Textures {
-    /// Stores new and changed textures.
     pub(in crate::gui) fn set(&mut self, delta: &TexturesDelta) {
         for (id, changes) in delta.set.iter().filter(|(id, _)| **id != TextureId::default()) {
             let texture = self.images.entry(*id).or_default();
@@ -41,7 +40,7 @@ impl Textures {
         self.images.retain(|id, _| !delta.free.contains(id));
     }
 
-    /// The region `uv` of a texture in a rectangle; empty for an unknown texture.
+    /// SVG element with the region `uv` of a texture in a rectangle; empty for an unknown texture.
     pub(super) fn element(&self, id: TextureId, rect: Rect, uv: Rect) -> String {
         let Some(texture) = self.images.get(&id).filter(|texture| !texture.rgba.is_empty()) else {
             return String::new();

@@ -17,7 +17,6 @@ const CHOICES: [(&str, &str); 7] = [
     ("cluster", "gimbal camera and static camera in one window"),
 ];
 
-/// State of the dialog.
 #[derive(Debug)]
 pub(super) struct AddRunDialog {
     choice: usize,
@@ -47,7 +46,7 @@ impl Default for AddRunDialog {
 }
 
 impl AddRunDialog {
-    /// The specification of the run, as on the command line.
+    /// Specification of the run, as on the command line.
     fn written(&self) -> String {
         let mut options = Vec::new();
         if !self.encoder {
@@ -75,7 +74,7 @@ impl AddRunDialog {
         if options.is_empty() { name.to_owned() } else { format!("{name}:{}", options.join(",")) }
     }
 
-    /// Draws the dialog and pushes the command that adds the run. Returns whether it stays open.
+    /// Draws the dialog and pushes the command that adds the run. Returns true if it stays open.
     pub(super) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) -> bool {
         let theme = *ctx.theme;
         let title = "Add a run on the same log and tracks";
@@ -132,7 +131,7 @@ impl AddRunDialog {
             ui.end_row();
             let name = ui.label("Passes over the log");
             ui.add(egui::DragValue::new(&mut self.passes).range(RunSpec::PASSES)).labelled_by(name.id).on_hover_text(
-                "Each pass starts with the calibration and the biases that the one before found; the last one is shown",
+                "Each pass starts with the calibration and the biases of the previous pass; the last pass is shown",
             );
             ui.end_row();
             let name = ui.label("Name");

@@ -8,13 +8,12 @@ use crate::gui::PanelContext;
 use crate::gui::units::seconds;
 use crate::session::{Command, FORK_PARAMETERIZATIONS, ForkChanges, RunSpec};
 
-/// First entry of the list: no other parameterization.
+/// First entry of the list: the parent's parameterization.
 const AS_BEFORE: &str = "unchanged";
 
-/// State of the dialog.
 #[derive(Debug)]
 pub(super) struct ForkDialog {
-    /// Index in the list, 0 for the parent's parameterization.
+    /// Index in the list; 0 for the parent's parameterization.
     choice: usize,
     estimated: String,
     frozen: String,
@@ -49,7 +48,7 @@ impl Default for ForkDialog {
 }
 
 impl ForkDialog {
-    /// The changes as text.
+    /// Changes as text.
     fn written(&self) -> String {
         let mut parts = Vec::new();
         if let Some(choice) = self.choice.checked_sub(1).and_then(|index| FORK_PARAMETERIZATIONS.get(index)) {
@@ -67,7 +66,7 @@ impl ForkDialog {
             }
         }
         for value in self.values.split([',', ' ']).filter(|value| !value.is_empty()) {
-            // Users may write an equals sign there.
+            // An equals sign is accepted, too.
             parts.push(format!("set={}", value.replacen('=', ":", 1)));
         }
         if !self.encoder {
@@ -83,7 +82,7 @@ impl ForkDialog {
         parts.join(",")
     }
 
-    /// The fork's label, `None` for an automatic one; an error if it is no valid folder name.
+    /// Label of the fork; `None` for an automatic one; an error if it is no valid folder name.
     fn label(&self) -> Result<Option<String>, String> {
         let name = self.name.trim();
         if name.is_empty() {
@@ -93,7 +92,7 @@ impl ForkDialog {
         spec.map(|spec| Some(spec.label)).map_err(|error| error.to_string())
     }
 
-    /// Draws the dialog and pushes the command that forks the run. Returns whether it stays open.
+    /// Draws the dialog and pushes the command that forks the run. Returns true if it stays open.
     pub(super) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) -> bool {
         let theme = *ctx.theme;
         let run = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));

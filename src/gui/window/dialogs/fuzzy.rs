@@ -7,9 +7,9 @@ pub(super) fn score(typed: &str, text: &str) -> Option<i32> {
     typed.to_lowercase().split_whitespace().map(|word| word_score(word, &text)).sum()
 }
 
-/// Best of: at the begin of a word, within a word, as letters in order.
+/// The best match of: at the start of a word, within a word, as letters in order.
 fn word_score(word: &str, text: &str) -> Option<i32> {
-    /// Largest penalty for the distance of a match from the begin.
+    /// Largest penalty for the distance of a match from the start.
     const MAX_PENALTY: usize = 20;
     let begins = |at: usize| !text[..at].chars().next_back().is_some_and(char::is_alphanumeric);
     let places = text.match_indices(word).map(|(at, _)| at);
@@ -18,9 +18,9 @@ fn word_score(word: &str, text: &str) -> Option<i32> {
     whole.or_else(|| scattered(word, text))
 }
 
-/// Letters in order with others between: begins of words increase the result, gaps reduce it.
+/// Match of letters in order with others in between; starts of words increase the result, gaps reduce it.
 fn scattered(word: &str, text: &str) -> Option<i32> {
-    /// Maximum number of letters between the first and the last one that are not typed.
+    /// Maximum number of skipped letters between the first and the last match.
     const MAX_GAP: i32 = 16;
     let mut wanted = word.chars().peekable();
     let (mut begins, mut holes, mut begun, mut before) = (0, 0, false, ' ');

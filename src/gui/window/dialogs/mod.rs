@@ -23,7 +23,6 @@ use super::{WindowRequest, WindowState};
 use crate::gui::PanelContext;
 use crate::gui::desktop::Desktop;
 
-/// A dialog by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dialog {
     /// Opens a log or a saved session.
@@ -32,15 +31,13 @@ pub enum Dialog {
     AddRun,
     /// Forks the selected run at the cursor.
     Fork,
-    /// The command palette.
     Palette,
-    /// The settings.
     Settings,
-    /// The question before unsaved work is left.
+    /// Question asked before unsaved work is discarded.
     Unsaved,
 }
 
-/// The state of all dialogs, open or not.
+/// State of all dialogs, open or not.
 #[derive(Default)]
 pub struct Dialogs {
     open: Option<Dialog>,
@@ -48,17 +45,17 @@ pub struct Dialogs {
     add_run: AddRunDialog,
     fork: ForkDialog,
     palette: CommandPalette,
-    /// The work that is not saved, as text.
+    /// Unsaved work as text.
     unsaved: String,
 }
 
 impl Dialogs {
-    /// Gives the dialog for logs access to the machine, for completing paths.
+    /// Gives the dialogs access to the machine, for completing paths.
     pub fn set_desktop(&mut self, desktop: Arc<dyn Desktop>) {
         self.open_log = OpenLogDialog::new(desktop);
     }
 
-    /// Opens a dialog and closes the one that is open; the palette opens with an empty input.
+    /// Opens a dialog and closes the open one; the palette opens with an empty input.
     pub fn show(&mut self, dialog: Dialog) {
         match dialog {
             Dialog::OpenLog => self.open_log.show_picker(),
@@ -68,24 +65,24 @@ impl Dialogs {
         self.open = Some(dialog);
     }
 
-    /// Asks whether to save the session before it is left; `lost` counts what is not saved.
+    /// Asks whether to save the session before leaving it; `lost` is the unsaved work as text.
     pub fn ask_to_save(&mut self, lost: String) {
         self.unsaved = lost;
         self.open = Some(Dialog::Unsaved);
     }
 
-    /// Whether a dialog is open.
+    /// True if a dialog is open.
     pub fn is_open(&self) -> bool {
         self.open.is_some()
     }
 
-    /// Closes the dialog that is open.
+    /// Closes the open dialog.
     pub fn close(&mut self) {
         self.open = None;
     }
 }
 
-/// Draws the dialog that is open.
+/// Draws the open dialog.
 pub(super) fn ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
     let WindowState { dialogs, requests, saved_layouts, settings, layout, history, .. } = state;
     let picked = dialogs.open_log.picked(ui);

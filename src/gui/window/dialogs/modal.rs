@@ -1,22 +1,21 @@
-//! The common parts of all dialogs: backdrop, frame, title, and closing.
+//! Common parts of all dialogs: backdrop, frame, title, and closing.
 
 use egui::{Button, Id, Key, RichText, Ui};
 
 use crate::gui::theme::{Theme, dialog_frame};
 
-/// A modal dialog.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Modal<'a> {
-    /// Its id in the window.
+    /// Id in the window.
     pub(super) name: &'static str,
-    /// The title, none if it is empty.
+    /// Title; not shown if it is empty.
     pub(super) title: &'a str,
     /// Width of the content in points.
     pub(super) width: f32,
 }
 
 impl Modal<'_> {
-    /// Draws the dialog. Returns the result of `contents`, and whether the dialog stays open.
+    /// Draws the dialog. Returns the result of `contents`, and true if the dialog stays open.
     ///
     /// Escape, a click outside and `ui.close()` in the contents close it.
     pub(super) fn ui<T>(self, ui: &Ui, theme: &Theme, contents: impl FnOnce(&mut Ui) -> T) -> (T, bool) {
@@ -33,8 +32,8 @@ impl Modal<'_> {
     }
 }
 
-/// The buttons at the bottom: the one that accepts, also by Enter, and the one that cancels. Both close the dialog;
-/// returns whether it was accepted.
+/// Draws the buttons at the bottom: one accepts, also by Enter, the other cancels. Both close the dialog; returns true
+/// if it was accepted.
 pub(super) fn accept_or_cancel_ui(ui: &mut Ui, label: &str, ready: bool) -> bool {
     let enter = ui.input(|input| input.key_pressed(Key::Enter));
     let clicked = ui.horizontal(|ui| {

@@ -1,4 +1,4 @@
-//! The dialog that opens a log or a saved session: a path field, and the desktop's own file dialog where there is one.
+//! Dialog that opens a log or a saved session: a path field, and the desktop's file dialog where it exists.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -17,7 +17,6 @@ const POLL_PERIOD: Duration = Duration::from_millis(100);
 /// A file dialog that ends without a choice within this many seconds was not shown.
 const MIN_CANCEL_S: f64 = 0.5;
 
-/// State of the dialog.
 #[derive(Default)]
 pub(super) struct OpenLogDialog {
     desktop: Option<Arc<dyn Desktop>>,
@@ -25,10 +24,10 @@ pub(super) struct OpenLogDialog {
     picker: Option<FilePicker>,
 }
 
-/// The desktop's file dialog while it is open.
+/// Open file dialog of the desktop.
 struct FilePicker {
     answer: Receiver<Option<PathBuf>>,
-    /// Time of the first frame in which it was polled.
+    /// Time in seconds of the first frame in which it was polled.
     since_s: Option<f64>,
 }
 
@@ -52,8 +51,8 @@ impl OpenLogDialog {
         }
     }
 
-    /// The result of the desktop's file dialog, once; `None` also if it could not be shown and the path field has to be
-    /// used.
+    /// Result of the desktop's file dialog, returned once; `None` also if the dialog could not be shown and the path
+    /// field has to be used.
     pub(super) fn picked(&mut self, ui: &Ui) -> Option<Picked> {
         let picker = self.picker.as_mut()?;
         let now_s = ui.input(|input| input.time);
@@ -74,7 +73,7 @@ impl OpenLogDialog {
         }
     }
 
-    /// Draws the dialog. Returns the chosen path, and whether the dialog stays open.
+    /// Draws the dialog. Returns the chosen path, and true if the dialog stays open.
     pub(super) fn ui(&mut self, ui: &Ui, theme: &Theme) -> (Option<PathBuf>, bool) {
         let modal =
             Modal { name: "open log", title: "Open flight log (.mcap) or session (.session.json)", width: 560.0 };

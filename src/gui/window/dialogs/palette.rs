@@ -1,4 +1,4 @@
-//! The command palette: search over all actions of the window.
+//! Command palette: search over all actions of the window.
 
 use egui::{Align, Key, Layout as UiLayout, Modifiers, RichText, ScrollArea, TextEdit, Ui, WidgetInfo};
 
@@ -14,7 +14,6 @@ const LIST_HEIGHT: f32 = 360.0;
 /// Number of rows that Page up and Page down move.
 const PAGE_ROWS: usize = 10;
 
-/// State of the command palette.
 #[derive(Debug, Default)]
 pub(super) struct CommandPalette {
     typed: String,
@@ -22,8 +21,8 @@ pub(super) struct CommandPalette {
 }
 
 impl CommandPalette {
-    /// Draws the palette. A chosen action is pushed to `actions`, another choice is executed at once. Returns whether
-    /// it stays open.
+    /// Draws the palette. A chosen action is pushed to `actions`, another choice is executed immediately. Returns true
+    /// if it stays open.
     pub(super) fn ui(
         &mut self,
         ui: &Ui,
@@ -38,7 +37,7 @@ impl CommandPalette {
         let (choice, stays_open) = modal.ui(ui, &theme, |ui| {
             let moved = moves(ui);
             let hint = "Command, time (12.5), frame, feature or parameter";
-            // It gets the focus before it is drawn, so that no typed letter is lost.
+            // The input gets the focus before it is drawn, so that no typed letter is lost.
             let id = ui.unique_id().with("command");
             ui.memory_mut(|memory| memory.request_focus(id));
             let edit = TextEdit::singleline(&mut self.typed).id(id).hint_text(hint).desired_width(f32::INFINITY);
@@ -71,7 +70,7 @@ impl CommandPalette {
     }
 }
 
-/// A move of the selection by a key.
+/// Movement of the selection by a key.
 #[derive(Clone, Copy, Debug)]
 enum Move {
     By(isize),
@@ -90,7 +89,7 @@ fn moves(ui: &Ui) -> Option<Move> {
     ui.input_mut(|input| keys.into_iter().find(|(key, _)| input.consume_key(Modifiers::NONE, *key)).map(|(_, it)| it))
 }
 
-/// The items with the selected one marked and in view; returns the clicked one.
+/// Draws the items and scrolls to the selected one; returns the clicked one.
 fn list_ui(ui: &mut Ui, ctx: &PanelContext<'_>, items: &[Item], chosen: usize, bring: bool) -> Option<usize> {
     let mut clicked = None;
     ScrollArea::vertical().max_height(LIST_HEIGHT).auto_shrink([false, true]).show(ui, |ui| {

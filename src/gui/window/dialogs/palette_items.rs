@@ -1,4 +1,4 @@
-//! The items of the command palette: all actions, and the content of the recording at the cursor.
+//! Items of the command palette: all actions, and the content of the recording at the cursor.
 
 use super::{Dialog, fuzzy};
 use crate::frontend::FeatureId;
@@ -17,7 +17,6 @@ use crate::session::RunRecord;
 /// The effect of an item.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Choice {
-    /// An action of the window.
     Action(Action),
     /// Selection of a parameter.
     Parameter(ParameterId),
@@ -26,11 +25,9 @@ pub(super) enum Choice {
 /// A row of the palette.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Item {
-    /// Its name.
     pub(super) name: String,
-    /// Its keys, empty without keys.
+    /// Keys; empty without keys.
     pub(super) keys: &'static str,
-    /// Its effect.
     pub(super) choice: Choice,
 }
 
@@ -38,7 +35,7 @@ fn item(name: impl Into<String>, action: Action) -> Item {
     Item { name: name.into(), keys: keys_of(action), choice: Choice::Action(action) }
 }
 
-/// Items that match the typed text, best first; all actions in their own order for an empty text.
+/// Items that match the typed text, best first; for an empty text all actions in the order of the table.
 pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &Layout) -> Vec<Item> {
     let places = places(typed, ctx);
     let mut items = commands(ctx, layouts, layout);
@@ -54,7 +51,7 @@ pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts,
 
 fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &Layout) -> Vec<Item> {
     let listed = TABLE.iter().filter(|entry| {
-        // Their effects are listed below, or are in effect already.
+        // Their effects are listed below, or are already in effect.
         !matches!(entry.action, Action::Dialog(Dialog::Palette) | Action::Dismiss | Action::SavedLayout(_))
     });
     let mut items: Vec<Item> = listed.map(|entry| item(entry.name, entry.action)).collect();
@@ -95,7 +92,7 @@ fn shown<'a>(ctx: &PanelContext<'a>) -> Option<&'a RunRecord> {
     ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)))
 }
 
-/// The parameters of the shown run at the cursor.
+/// Parameters of the shown run at the cursor.
 fn parameters(ctx: &PanelContext<'_>) -> Vec<Item> {
     let step = shown(ctx).and_then(|run| run.step_at(ctx.cursor_ns).or_else(|| run.steps.first()));
     let names = ctx.names();
@@ -113,7 +110,7 @@ fn parameters(ctx: &PanelContext<'_>) -> Vec<Item> {
 fn places(typed: &str, ctx: &PanelContext<'_>) -> Vec<Item> {
     let text = typed.trim().to_lowercase();
     let text = text.strip_prefix("go to").map_or(text.as_str(), str::trim_start);
-    // `frame 12`, `time 3`, `feature 40`; `12.5 s` begins with the number itself.
+    // `frame 12`, `time 3`, `feature 40`; `12.5 s` starts with the number.
     let word = text.split_whitespace().next().filter(|word| word.chars().all(char::is_alphabetic)).unwrap_or_default();
     let number = text[word.len()..].trim_start();
     let is = |kind: &str| kind.starts_with(word);

@@ -1,4 +1,4 @@
-//! The dialog for the settings.
+//! Settings dialog.
 
 use egui::{ComboBox, DragValue, Grid, Key, Modifiers, RichText, Ui, vec2};
 
@@ -10,7 +10,7 @@ use crate::gui::window::history::History;
 use crate::gui::window::settings::{LAST_LAYOUT, MEMORY_MIB, SCALES, Settings};
 use crate::gui::window::tiles::Preset;
 
-/// Draws the dialog; changes have effect at once. Returns whether it stays open.
+/// Draws the dialog; changes have effect immediately. Returns true if it stays open.
 pub(super) fn ui<'a>(
     ui: &Ui,
     theme: &Theme,

@@ -1,4 +1,4 @@
-//! The question before unsaved work is left.
+//! Question asked before unsaved work is discarded.
 
 use egui::{Button, Key, RichText, Ui};
 
@@ -7,19 +7,19 @@ use crate::gui::PanelContext;
 use crate::gui::window::WindowRequest;
 use crate::gui::window::top_bar::log_name;
 
-/// Draws the question; `lost` counts what is not saved. Returns whether it stays open.
+/// Draws the question; `lost` is the unsaved work as text. Returns true if it stays open.
 pub(super) fn ui(ui: &Ui, ctx: &PanelContext<'_>, lost: &str, requests: &mut Vec<WindowRequest>) -> bool {
     let modal = Modal { name: "unsaved", title: "Save the session?", width: 430.0 };
     let contents = modal.ui(ui, ctx.theme, |ui| {
         ui.add_space(4.0);
         ui.label(format!("Not saved in {}: {lost}", log_name(ctx.recording)));
-        let hint = "A saved session opens like a log; its results are computed anew, to the same bits";
+        let hint = "A saved session opens like a log; its results are recomputed bit for bit";
         ui.label(RichText::new(hint).color(ctx.theme.text_weak));
         ui.add_space(6.0);
         let enter = ui.input(|input| input.key_pressed(Key::Enter));
         ui.horizontal(|ui| {
             let save = ui.add(Button::new("Save"));
-            // The safe answer has the focus, so that Enter saves and Tab goes on to the others.
+            // The safe answer has the focus: Enter saves, Tab moves to the others.
             if ui.memory(|memory| memory.focused().is_none()) {
                 save.request_focus();
             }

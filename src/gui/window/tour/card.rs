@@ -1,4 +1,4 @@
-//! The card of a stop: it lies beside its panel and points at it.
+//! Card of a stop: it is placed next to its panel and points at it.
 
 use egui::{Area, Button, Id, Label, Order, Pos2, Rect, RichText, Shape, Stroke, StrokeKind, Ui, Vec2, pos2, vec2};
 
@@ -7,7 +7,7 @@ use crate::gui::theme::{Theme, dialog_frame};
 
 /// Width of the text in points.
 const WIDTH: f32 = 370.0;
-/// Gap between card and panel, in which the pointer lies, in points.
+/// Gap in points between card and panel, in which the pointer is drawn.
 const GAP: f32 = 14.0;
 /// Distance of the card from the edges of the window in points.
 const MARGIN: f32 = 6.0;
@@ -15,15 +15,15 @@ const MARGIN: f32 = 6.0;
 /// A button of the card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pressed {
-    /// The next stop; after the last one the end.
+    /// Go to the next stop; at the last one, end the tour.
     Next,
-    /// The stop before.
+    /// Go to the previous stop.
     Back,
-    /// The end of the tour.
+    /// End the tour.
     End,
 }
 
-/// Draws the card of stop `index` of `count` and marks its panel; returns the button that was pressed.
+/// Draws the card of stop `index` of `count` and marks its panel; returns the pressed button.
 pub(super) fn card_ui(
     ui: &Ui,
     theme: &Theme,
@@ -79,7 +79,7 @@ pub(super) fn card_ui(
     pressed
 }
 
-/// The place beside a panel that is inside the window: left, right, above or below, else in the panel's lower right
+/// Rectangle of the card inside the window: left, right, above or below the panel, else in the panel's lower right
 /// corner.
 fn beside(panel: Rect, room: Rect, size: Vec2) -> Rect {
     let middle = panel.center() - 0.5 * size;
@@ -102,7 +102,7 @@ fn corner(room: Rect, size: Vec2) -> Rect {
     Rect::from_min_size(room.max - size, size)
 }
 
-/// A triangle from the card to the panel beside it; none for a card inside of its panel.
+/// Triangle from the card to its panel; `None` for a card inside its panel.
 fn pointer(card: Rect, panel: Rect) -> Option<[Pos2; 3]> {
     const HALF: f32 = 9.0;
     let (x, y) = (card.center().x.clamp(panel.left() + HALF, panel.right() - HALF), card.center().y);

@@ -1,7 +1,7 @@
-//! The tour: six stops over the recording at hand, from the log to the suggested excitation.
+//! The tour: six stops over the open recording, from the log to the suggested excitation.
 //!
-//! Each stop drives the window (layout, cursor, shown run) and points at one panel; its texts take their numbers from
-//! the recording.
+//! Each stop sets layout, cursor and shown run, and points at one panel; its texts take their numbers from the
+//! recording.
 
 mod card;
 mod story;
@@ -19,10 +19,9 @@ use crate::gui::PanelContext;
 use crate::gui::theme::MAX_RUNS;
 use crate::session::Command;
 
-/// Frames before the card is drawn: the layout of a stop is on the screen from the second one on.
+/// Frames before the card is drawn: the layout of a stop is shown from the second one on.
 const FRAMES_TO_LAYOUT: u8 = 2;
 
-/// A stop of the tour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stop {
     Log,
@@ -36,7 +35,7 @@ enum Stop {
 impl Stop {
     const ALL: [Self; 6] = [Self::Log, Self::Image, Self::Convergence, Self::Which, Self::Why, Self::Remedy];
 
-    /// The layout, and the panel that the card points at.
+    /// Layout of the stop, and the panel at which the card points.
     const fn place(self) -> (Preset, PanelName) {
         match self {
             Self::Log => (Preset::Overview, PanelName::Timeline),
@@ -47,35 +46,33 @@ impl Stop {
     }
 }
 
-/// State of the tour; it begins and ends only when asked.
+/// State of the tour; it starts and ends only on request.
 #[derive(Debug, Default)]
 pub(crate) struct Tour {
-    /// Index of the stop, `None` while there is no tour.
+    /// Index of the stop; `None` without a tour.
     stop: Option<usize>,
     /// Frames since the panels have been laid out for the stop; 0 before.
     frames: u8,
-    /// Whether cursor, run and selection have been set, which may have to wait for the estimator.
+    /// True if cursor, run and selection have been set; setting them may have to wait for the estimator.
     arranged: bool,
-    /// Id of the run that the tour is about, and its instant.
+    /// Run and stamp of the tour.
     story: Option<Story>,
-    /// Whether the run `classical` has been added.
+    /// True if the run `classical` has been added.
     added: bool,
-    /// Whether that run is to be shown as soon as it has a step.
+    /// True if that run is to be shown as soon as it has a step.
     awaited: bool,
 }
 
 impl Tour {
-    /// Begins at the first stop.
+    /// Starts at the first stop.
     pub(crate) fn start(&mut self) {
         *self = Self { stop: Some(0), ..Self::default() };
     }
 
-    /// Ends the tour.
     pub(crate) fn end(&mut self) {
         *self = Self::default();
     }
 
-    /// Whether it runs.
     pub(crate) fn is_running(&self) -> bool {
         self.stop.is_some()
     }
@@ -95,7 +92,8 @@ impl Tour {
     }
 }
 
-/// Reads the keys of the tour before the window reads its own: Enter for the next stop, Backspace for the one before.
+/// Reads the keys of the tour before the window reads its keys: Enter for the next stop, Backspace for the previous
+/// one.
 pub(super) fn keys(ui: &Ui, state: &mut WindowState) {
     let busy = state.dialogs.is_open() || ui.egui_wants_keyboard_input() || Popup::is_any_open(ui.ctx());
     if !state.tour.is_running() || busy || ui.memory(|memory| memory.focused().is_some()) {
@@ -114,7 +112,7 @@ pub(super) fn keys(ui: &Ui, state: &mut WindowState) {
 pub(super) fn ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
     let mut tour = std::mem::take(&mut state.tour);
     tour.ui(ui, state, ctx);
-    // Nothing that the tour does starts another one.
+    // No action of the tour starts another tour, so nothing is overwritten.
     state.tour = tour;
 }
 
@@ -151,7 +149,7 @@ impl Tour {
         }
     }
 
-    /// Chooses the run of the tour, and its instant as soon as that is computed.
+    /// Chooses the run of the tour, and its stamp as soon as that step is computed.
     fn read_story(&mut self, ctx: &PanelContext<'_>) {
         let runs = &ctx.recording.runs;
         let known = self.story.filter(|story| runs.iter().any(|run| run.id == story.run));
@@ -162,7 +160,7 @@ impl Tour {
         }
     }
 
-    /// Sets cursor, shown run and selection of a stop; returns whether everything that it needs is computed.
+    /// Sets cursor, shown run and selection of a stop; returns true if all its inputs are computed.
     fn arrange(&mut self, stop: Stop, story: Story, ctx: &mut PanelContext<'_>) -> bool {
         let runs = &ctx.recording.runs;
         let number_of = |id: u64| runs.iter().position(|run| run.id == id);

@@ -1,4 +1,4 @@
-//! The run and the instant that the tour is about.
+//! Run and stamp on which the tour is based.
 
 use std::sync::Arc;
 
@@ -6,40 +6,36 @@ use crate::geometry::ns_from_seconds;
 use crate::gimbal::Parameterization;
 use crate::session::{RunRecord, StepRecord};
 
-/// The run that shows a redundant parameterization.
+/// Run with a redundant parameterization.
 pub(super) const CLASSICAL: &str = "classical";
 
-/// Time after the first rank that the tour looks at, in seconds.
+/// Duration of the examined interval after the first rank, in seconds.
 const SPAN_S: f64 = 6.0;
-/// Time for which a direction has been lost at the instant of the tour, in seconds.
+/// Time in seconds between the loss of a direction and the stamp of the tour.
 const LOST_S: f64 = 0.5;
 
-/// The run and the instant of the tour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Story {
-    /// Id of the run.
     pub(super) run: u64,
-    /// Stamp of the step in nanoseconds since the log began, `None` until it is computed.
+    /// Stamp of the step in nanoseconds since the log began; `None` until it is computed.
     pub(super) instant_ns: Option<i64>,
 }
 
 impl Story {
-    /// The story of a run.
     pub(super) fn new(run: &RunRecord) -> Self {
         Self { run: run.id, instant_ns: None }
     }
 
-    /// The run.
     pub(super) fn run(self, runs: &[RunRecord]) -> Option<&RunRecord> {
         runs.iter().find(|run| run.id == self.run)
     }
 
-    /// The step of the instant.
+    /// The step at the stamp.
     pub(super) fn step(self, runs: &[RunRecord]) -> Option<&Arc<StepRecord>> {
         self.run(runs)?.step_at(self.instant_ns?)
     }
 
-    /// Finds the instant as soon as the run is far enough.
+    /// Finds the stamp as soon as the run has computed enough steps.
     pub(super) fn read(&mut self, runs: &[RunRecord]) {
         if self.instant_ns.is_none() {
             self.instant_ns = self.run(runs).and_then(instant_ns);
@@ -47,8 +43,8 @@ impl Story {
     }
 }
 
-/// The step shortly after the informed rank has fallen from its maximum, within the first seconds of tracking; the last
-/// step of a run without a rank. `None` while the run is not far enough.
+/// Stamp of the step shortly after the informed rank has fallen from its maximum, within the first seconds of tracking;
+/// of the last step of a run without a rank. `None` while too few steps are computed.
 fn instant_ns(run: &RunRecord) -> Option<i64> {
     let over = run.finished || run.error.is_some();
     let last_ns = run.steps.last()?.report.stamp_ns;
@@ -69,7 +65,7 @@ fn instant_ns(run: &RunRecord) -> Option<i64> {
     ranked.iter().find(|(stamp_ns, _)| *stamp_ns >= wanted_ns).or_else(|| ranked.last()).map(|(stamp_ns, _)| *stamp_ns)
 }
 
-/// The index of a run with the classical parameterization that has a step.
+/// Index of a run with the classical parameterization that has a step.
 pub(super) fn classical(runs: &[RunRecord]) -> Option<usize> {
     runs.iter().position(|run| {
         run.steps.first().is_some_and(|step| step.report.calibration.parameterization == Parameterization::Classical)

@@ -1,4 +1,4 @@
-//! The tour, tested by its keys and labels.
+//! Tests of the tour by its keys and labels.
 
 use egui::Key;
 use egui_kittest::Harness;
@@ -17,7 +17,7 @@ fn recording(runs: &[&str]) -> Recording {
     sample_recording_of(SAMPLE_FRAMES, runs)
 }
 
-/// Presses a key, and moves the cursor where the tour asks for it.
+/// Presses a key, and moves the cursor if the tour requests it.
 fn press(harness: &mut Harness<'static, Bench>, key: Key) -> Vec<Command> {
     let pushed = commands_of(harness, |harness| harness.key_press(key));
     for command in &pushed {

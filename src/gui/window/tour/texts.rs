@@ -1,4 +1,4 @@
-//! The texts of the stops, with the numbers of the recording at hand.
+//! Texts of the stops, with the numbers of the open recording.
 
 use super::Stop;
 use super::story::{self, Story};
@@ -11,22 +11,21 @@ use crate::gui::units::{Shown, counted, fixed};
 use crate::observability::{RankReport, parameters_of};
 use crate::session::{LostSince, RunRecord, StepRecord};
 
-/// What a card says.
+/// Content of a card.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct CardText {
-    /// The question of the stop.
+    /// Question of the stop.
     pub(super) title: &'static str,
-    /// Its paragraphs.
     pub(super) lines: Vec<String>,
-    /// What is still being computed.
+    /// Result that is still being computed.
     pub(super) waiting: Option<String>,
 }
 
-/// The text of a stop; `excitation` is what the rank panel suggests at the instant of the tour.
+/// Text of a stop; `excitation` is the suggestion of the rank panel at the stamp of the tour.
 pub(super) fn of(stop: Stop, story: Story, ctx: &PanelContext<'_>, excitation: Option<&str>) -> CardText {
     let title = match stop {
         Stop::Log => "What is in the log?",
-        Stop::Image => "What does one step see?",
+        Stop::Image => "What does one step contain?",
         Stop::Convergence => "Which parameters does the log calibrate?",
         Stop::Which => "Which parameter is degenerate, and since when?",
         Stop::Why => "Why?",
@@ -51,7 +50,7 @@ pub(super) fn of(stop: Stop, story: Story, ctx: &PanelContext<'_>, excitation: O
     CardText { title, lines, waiting }
 }
 
-/// How far a run is.
+/// Progress of a run as text.
 fn progress(ctx: &PanelContext<'_>, run: &RunRecord) -> String {
     let done_s = run.steps.last().map_or(0.0, |last| seconds_from_ns(last.report.stamp_ns));
     let end_s = seconds_from_ns(ctx.recording.duration_ns);
@@ -116,7 +115,7 @@ fn reductions(step: &StepRecord) -> Vec<(usize, f64)> {
     ratios
 }
 
-/// The parameter whose σ is reduced least at an instant.
+/// The parameter with the smallest reduction of σ at a stamp.
 pub(super) fn least_reduced(run: &RunRecord, instant_ns: i64) -> Option<ParameterId> {
     let step = run.step_at(instant_ns)?;
     let (index, _) = reductions(step).pop()?;
@@ -149,7 +148,7 @@ fn convergence_lines(step: &StepRecord, names: &ParameterNames) -> Vec<String> {
     ]
 }
 
-/// The parameter with the largest weight in that direction.
+/// The parameter with the largest weight in the least observable direction.
 pub(super) fn leading(run: &RunRecord, instant_ns: i64) -> Option<ParameterId> {
     let rank = run.step_at(instant_ns)?.rank.as_ref()?;
     let weights = &rank.least_observable_direction()?.weights;
@@ -157,7 +156,7 @@ pub(super) fn leading(run: &RunRecord, instant_ns: i64) -> Option<ParameterId> {
     rank.parameters.get(largest).copied()
 }
 
-/// `weak since 5.55 s`.
+/// Start of the loss, such as `weak since 5.55 s`.
 fn lost_since(run: &RunRecord, step: &StepRecord) -> Option<String> {
     let before = run.steps.partition_point(|other| other.report.stamp_ns < step.report.stamp_ns);
     LostSince::of(&run.steps[..before], step).map(|lost| lost.to_string())
@@ -225,10 +224,12 @@ fn why_lines(ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord) -> (Vec
     (lines, None)
 }
 
-/// Why the direction of the tour is lost.
+/// Cause of the loss of the tour's direction, as text.
 fn cause_line(run: &RunRecord, step: &StepRecord, rank: &RankReport) -> String {
     let label = &run.spec.label;
-    let Some(direction) = rank.least_observable_direction() else { return format!("Run {label} loses no direction.") };
+    let Some(direction) = rank.least_observable_direction() else {
+        return format!("Run {label}: every direction is informed.");
+    };
     let window = &step.report.window;
     let span_ns = window.first().zip(window.last()).map_or(0, |(first, last)| last.stamp_ns - first.stamp_ns);
     if direction.structural {
@@ -272,7 +273,7 @@ fn remedy_lines(
     };
     lines.push(
         "From here: F forks the run with parameters fixed or another parameterization, 5 compares runs, and \
-         \"dcvins report\" writes it all down. Shift+F1 opens the manual, with the tutorial."
+         \"dcvins report\" writes these results to a report. Shift+F1 opens the manual, with the tutorial."
             .to_owned(),
     );
     (lines, waiting)
