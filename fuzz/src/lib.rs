@@ -1,8 +1,7 @@
 //! Functions that fuzz the readers of external data, each called by the fuzz target of the same name.
 //!
 //! Each takes the bytes of one input, passes them to the reader as a file or as text, and drops the result: an input is
-//! a
-//! finding if the reader panics, aborts, runs for seconds, or takes more memory than the fuzzer allows.
+//! a finding if the reader panics, aborts, runs for seconds, or takes more memory than the fuzzer allows.
 //! `src/bin/seeds.rs` writes valid inputs to start from.
 
 use std::fs;
@@ -97,8 +96,7 @@ fn read_log(path: &Path) {
 }
 
 /// Fuzzes a video: the first byte selects H.264 or H.265, followed by its messages (Annex B), each after its length in
-/// two
-/// bytes.
+/// two bytes.
 pub fn video(bytes: &[u8]) {
     let Some((codec, mut rest)) = bytes.split_first() else { return };
     let format = if codec % 2 == 0 { "h264" } else { "h265" };

@@ -29,8 +29,7 @@ impl CameraModel {
     }
 
     /// Returns the pixel, its derivative with respect to the point (2 × 3, px/m) and to `[fx, fy, cx, cy, k1, k2]` (2 ×
-    /// 6,
-    /// px per unit of each), with zero columns for coefficients that the model does not have.
+    /// 6, px per unit of each), with zero columns for coefficients that the model does not have.
     pub fn project_with_intrinsics_jacobian(
         &self,
         point_in_camera: &Vector3<f64>,

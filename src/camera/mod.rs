@@ -115,8 +115,7 @@ impl CameraModel {
     }
 
     /// Projects a point of the camera frame to a pixel; `None` if the point is not visible (behind the camera, or
-    /// outside
-    /// the model's domain).
+    /// outside the model's domain).
     ///
     /// The pixel may lie outside the image; see [`CameraModel::contains`].
     pub fn project(&self, point_in_camera: &Vector3<f64>) -> Option<Vector2<f64>> {

@@ -1,6 +1,5 @@
 //! Merges messages with some of the joints to samples of all joints: several drivers can publish on one topic, one
-//! joint
-//! each.
+//! joint each.
 
 use std::collections::VecDeque;
 
@@ -35,8 +34,7 @@ impl JointMerge {
     }
 
     /// Adds the next reading; stamps must not decrease. Returns `false` for a joint's second reading of one stamp,
-    /// which is
-    /// ignored.
+    /// which is ignored.
     pub(crate) fn push(&mut self, reading: &JointReading) -> bool {
         self.newest_ns = reading.stamp_ns;
         let mut taken = true;

@@ -1,8 +1,7 @@
 //! Limits on the memory and disk space that reading an external file may take.
 //!
 //! Sizes and counts in a file are not trusted: they are compared with the size of the file, with the machine's memory
-//! and
-//! with the limits below before anything is allocated. Each limit can be set by name (`--limit record-bytes=2G`).
+//! and with the limits below before anything is allocated. Each limit can be set by name (`--limit record-bytes=2G`).
 
 use std::fs;
 use std::str::FromStr;

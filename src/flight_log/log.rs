@@ -64,8 +64,7 @@ impl FlightLog {
     /// (or truncated) is scanned once.
     ///
     /// The log starts (time zero) at the smallest header stamp among the first messages of all topics that are read,
-    /// except
-    /// stamps more than a minute before the first IMU message, which are of another clock.
+    /// except stamps more than a minute before the first IMU message, which are of another clock.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         Self::open_with(path, &LogLimits::default())
     }
@@ -205,8 +204,7 @@ impl FlightLog {
     }
 
     /// Calls `visit` for every readable message of a topic in the order of log times, with its log time since the start
-    /// of
-    /// the log, until it returns `false`.
+    /// of the log, until it returns `false`.
     pub(super) fn for_each_message(&self, topic: &str, mut visit: impl FnMut(i64, &[u8]) -> bool) {
         let mut cache = BlockCache::new(2);
         let mut topic = self.topic_index(topic);

@@ -127,8 +127,7 @@ impl MessageKind {
     }
 
     /// True if the messages are attitudes of a gimbal or of the vehicle. Robots record such messages for many purposes,
-    /// with
-    /// stamps of other times (static transforms) and clocks (PX4), so that they do not define the start of a log.
+    /// with stamps of other times (static transforms) and clocks (PX4), so that they do not define the start of a log.
     pub fn is_attitude(self) -> bool {
         matches!(self, Self::QuaternionStamped | Self::Vector3Stamped | Self::Transforms | Self::MavrosGimbalAttitude)
             || self.counts_since_boot()

@@ -1,6 +1,5 @@
 //! Flight logs: MCAP in and out as typed events in time order, the rigs that describe their sensors, and the logs of
-//! other
-//! recorders.
+//! other recorders.
 //!
 //! Time is nanoseconds since the first message of the log (header stamps; the log time is kept too).
 

@@ -2,12 +2,10 @@
 //!
 //! If anything fails before the rename (an error, a full disk, an interrupt, a killed process), the final name has the
 //! old file, or none; afterwards it has the new one. If several processes write one file, each writes a complete one,
-//! and
-//! the last rename wins.
+//! and the last rename wins.
 //!
 //! A temporary file is named `.NAME.dcvins-XXXXXX.tmp` and is locked as long as its process lives. A leftover of a
-//! killed
-//! process has a free lock, and the next process that writes the same file removes it.
+//! killed process has a free lock, and the next process that writes the same file removes it.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};

@@ -158,8 +158,7 @@ struct Mosaic<'a> {
 
 impl Mosaic<'_> {
     /// Gray values from bilinear interpolation of the three colors. At the border the image is mirrored at its
-    /// outermost
-    /// samples, which keeps the pattern.
+    /// outermost samples, which keeps the pattern.
     fn gray(&self, narrow: impl Fn(u16) -> u8) -> Vec<u8> {
         let mirrored =
             |at: usize, size: usize| [at.checked_sub(1).unwrap_or(1), if at + 1 < size { at + 1 } else { size - 2 }];

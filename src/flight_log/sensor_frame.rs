@@ -16,8 +16,7 @@ pub struct LogWarning {
 #[derive(Clone, Debug)]
 pub struct SensorFrame {
     /// Number of the image in its camera's stream, from 0, over the entire log. Skipped images keep their number, so
-    /// that
-    /// it depends neither on the start of a replay nor on earlier damage.
+    /// that it depends neither on the start of a replay nor on earlier damage.
     pub index: usize,
     /// Header stamp of the image since the start of the log, in camera time.
     pub stamp_ns: i64,

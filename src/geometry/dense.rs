@@ -66,10 +66,8 @@ pub fn to_faer(matrix: &DMatrix<f64>) -> Mat<f64> {
 }
 
 /// Multiplies `rest` (m × n) in place by `Qᵀ` of `spanning` (m × k) `= Q·R·Pᵀ` and returns the rank r of `spanning`:
-/// the
-/// first r rows of the product are the part of `rest` within the column space of `spanning`, the other m − r rows the
-/// part
-/// orthogonal to it.
+/// the first r rows of the product are the part of `rest` within the column space of `spanning`, the other m − r rows
+/// the part orthogonal to it.
 ///
 /// Column-pivoted Householder QR, also correct for dependent columns: a pivot counts when it exceeds `tolerance`, so
 /// the columns of `spanning` should have norms around 1. Both matrices must be finite.

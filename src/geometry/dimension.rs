@@ -35,8 +35,7 @@ impl Dimension {
     /// Scale of the observability analysis, in the unit: 10°, 3 cm, 20 ms, 10 px, one tenth.
     ///
     /// Columns of a Jacobian are multiplied by the scale of their parameter, so that columns of different dimensions
-    /// are
-    /// comparable. The scale is about the uncertainty of a calibration before the first flight.
+    /// are comparable. The scale is about the uncertainty of a calibration before the first flight.
     pub const fn scale(self) -> f64 {
         match self {
             Self::Angle => 10.0 * std::f64::consts::PI / 180.0,

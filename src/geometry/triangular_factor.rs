@@ -17,8 +17,7 @@ pub(crate) const PORTION: usize = 128;
 /// Upper triangular factor `R` (n × n) of rows `A`: `RᵀR = AᵀA`.
 ///
 /// A row costs nothing in the columns before its first entry, and little in columns in which neither its portion nor
-/// the
-/// rows of `R` above have entries: merge rows that begin at the same column together.
+/// the rows of `R` above have entries: merge rows that begin at the same column together.
 #[derive(Clone, Debug)]
 pub(crate) struct TriangularFactor {
     columns: usize,
@@ -365,8 +364,7 @@ fn finish<const N: usize>(
 
 /// Reflects an upper triangular matrix so that a column that depends on those before it takes up no row. Returns the
 /// independent columns among the first `columns`: one leading row begins in each of them, and the other rows are zero
-/// in
-/// all of these columns.
+/// in all of these columns.
 ///
 /// A column depends on those before it when no more than `tolerance` of its norm is independent of them.
 pub(crate) fn skip_dependent_columns(

@@ -131,8 +131,7 @@ fn rotated_back(angle_rad: f64, v: &Vector3<f64>) -> Vector3<f64> {
 }
 
 /// Converts a minimal chain to the classical parameterization: the base keeps its rotations, and the transform after
-/// the
-/// last link (with the swapped end block: after its translation along y) becomes `effector_from_camera`.
+/// the last link (with the swapped end block: after its translation along y) becomes `effector_from_camera`.
 pub(super) fn classical_of_minimal(chain: &MinimalChain, parameterization: Parameterization) -> ClassicalChain {
     let mut base = Frame::identity();
     let order = if parameterization.base_yx() { [Axis::Y, Axis::X] } else { [Axis::X, Axis::Y] };
@@ -219,8 +218,7 @@ fn split_inner(block: &Frame) -> (DhLink, f64, f64) {
 
 impl Chain {
     /// Returns the canonical one of all chains of the same mechanism: middle angles of base and end within ±π/2, twists
-    /// of
-    /// the middle links within 0 to π, offsets and other rotations within ±π. Parameterizations that are not minimal
+    /// of the middle links within 0 to π, offsets and other rotations within ±π. Parameterizations that are not minimal
     /// return unchanged.
     ///
     /// Unique away from singularities and from parallel neighbouring axes.

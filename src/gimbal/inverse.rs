@@ -86,10 +86,8 @@ impl InverseChain {
     ///
     /// Two solutions may exist, on either side of a singularity. If only one is within the limits, and the chain is not
     /// near the singularity, it does not depend on `previous`. Otherwise the solution nearest to `previous` is
-    /// returned; near
-    /// the singularity it is also pulled to `previous` in the directions that the orientation does not constrain.
-    /// Without a
-    /// previous solution, the middle of the limits is used instead.
+    /// returned; near the singularity it is also pulled to `previous` in the directions that the orientation does not
+    /// constrain. Without a previous solution, the middle of the limits is used instead.
     pub fn solve(&self, imu_from_camera: &UnitQuaternion<f64>, previous: Option<&[f64]>) -> InverseSolution {
         let solutions = self.solutions(imu_from_camera);
         let middle: Vec<f64> = self.ranges.iter().map(|(middle, _)| *middle).collect();
@@ -131,9 +129,8 @@ impl InverseChain {
     }
 
     /// Initial angles of both solutions of three joints: with `R = Rz(ψ₁)·M(ψ₂)·Rz(ψ₃)`, `M = Rx(α₁)·Rz(ψ₂)·Rx(α₂)`,
-    /// the
-    /// lower right corner of `R` is `cos α₁·cos α₂ − sin α₁·sin α₂·cos ψ₂`; its last column and row then give ψ₁ and
-    /// ψ₃.
+    /// the lower right corner of `R` is `cos α₁·cos α₂ − sin α₁·sin α₂·cos ψ₂`; its last column and row then give ψ₁
+    /// and ψ₃.
     fn closed_form(&self, wanted: &UnitQuaternion<f64>) -> Vec<Vec<f64>> {
         let about_x = |angle_rad: f64| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), angle_rad);
         let about_z = |angle_rad: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad);
@@ -184,8 +181,7 @@ impl InverseChain {
     }
 
     /// Minimizes the squared rotation error, plus with `held` the weighted squared distance from given angles (rad),
-    /// within
-    /// the limits.
+    /// within the limits.
     fn refined(&self, start: &[f64], wanted: &UnitQuaternion<f64>, held: Option<(&[f64], f64)>) -> InverseSolution {
         let joints = self.links.len();
         let (held_rad, weight) = held.unwrap_or((start, 0.0));

@@ -3,8 +3,7 @@ use nalgebra::{DMatrix, Vector3};
 use super::ClassicalChain;
 
 /// Returns the redundant directions of the classical parameterization: steps that leave the camera pose unchanged at
-/// all
-/// joint angles, in closed form (Eqs. 11–17).
+/// all joint angles, in closed form (Eqs. 11–17).
 ///
 /// (12 + 4N) × 6, one direction per column, in radians and metres and in the order of the classical columns.
 /// At the base: a rotation about and a translation along the first axis. At the end: each parameter of the last

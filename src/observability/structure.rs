@@ -4,11 +4,11 @@
 //! The paper claims six degenerate columns of the classical chain (§4.5): `d`, `a`, `α` and `θ` of the last link and
 //! `d` and `θ` of the first one. It proves that of `d` (Eqs. 11–17) and fixes the others by the forms of Eqs. 19 and
 //! 20. Errors of the print do not affect the claim (docs/mathematics.md, section 2): Eq. 12 has a minus before the
-//! lever-arm block where a plus belongs (left convention; the proof uses other columns only), and Eq. 18 has `−cos β`
-//! in the lower right corner of a rotation, while Eq. 19 needs `+cos β`. Exchanging the rotations of α and β to avoid
-//! the singularity of Eq. 19 works only when `y` is moved together with β (docs/mathematics.md, section 4):
-//! [`crate::gimbal::Parameterization::MinimalSwapped`]. The paper perturbs rotations on the left; the directions here
-//! use the right convention, as the rest of the program.
+//!     lever-arm block where a plus belongs (left convention; the proof uses other columns only), and Eq. 18 has `−cos
+//!     β` in the lower right corner of a rotation, while Eq. 19 needs `+cos β`. Exchanging the rotations of α and β to
+//!     avoid the singularity of Eq. 19 works only when `y` is moved together with β (docs/mathematics.md, section 4):
+//!     [`crate::gimbal::Parameterization::MinimalSwapped`]. The paper perturbs rotations on the left; the directions
+//!     here use the right convention, as the rest of the program.
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 

@@ -26,8 +26,7 @@ pub struct AttitudeSource {
     /// forward.
     pub first_joint_offset_rad: f64,
     /// Chain that converts the attitude to joint angles; `None` for the rig's chain. A calibrated rig keeps the chain
-    /// from
-    /// before the calibration: the calibrated chain would give other joint angles, and so undo the calibration.
+    /// from before the calibration: the calibrated chain would give other joint angles, and so undo the calibration.
     pub chain: Option<Box<ClassicalChain>>,
 }
 

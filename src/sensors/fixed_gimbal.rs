@@ -14,8 +14,7 @@ impl Rig {
     }
 
     /// Returns the rig with its gimbal fixed at encoder angles in radians, one per joint: its cameras are static and
-    /// there is
-    /// no gimbal. `None` if the number of angles is not that of the joints.
+    /// there is no gimbal. `None` if the number of angles is not that of the joints.
     pub fn at_joint_angles(&self, angles_rad: &[f64]) -> Option<Self> {
         let mut rig = self.clone();
         let Some(gimbal) = rig.gimbal.take() else { return angles_rad.is_empty().then_some(rig) };
@@ -32,8 +31,7 @@ impl Rig {
 
     /// Returns the rig with static cameras and IMU in Kalibr's IMU frame, in which the accelerometer's matrix is lower
     /// triangular, and `kalibr_from_imu`. If the matrix is lower triangular already (as for a calibrated IMU), that is
-    /// the
-    /// identity and all values keep their bits. Cameras on a gimbal are unchanged.
+    /// the identity and all values keep their bits. Cameras on a gimbal are unchanged.
     pub fn in_kalibr_imu_frame(&self) -> (Self, UnitQuaternion<f64>) {
         let (kalibr_from_imu, intrinsics) = self.imu.intrinsics.in_lower_triangular_frame();
         let mut rig = self.clone();

@@ -104,8 +104,7 @@ impl ImuIntrinsics {
     }
 
     /// Remaining correction of `self` for samples that `first` has corrected: `self = left.after(first)`. `None` if a
-    /// matrix
-    /// of `first` is singular.
+    /// matrix of `first` is singular.
     pub fn left_after(&self, first: &Self) -> Option<Self> {
         Some(Self {
             gyroscope_correction: self.gyroscope_correction * first.gyroscope_correction.try_inverse()?,
@@ -114,9 +113,8 @@ impl ImuIntrinsics {
     }
 
     /// Returns the correction in the IMU frame of `given`, since [`Self::parameters`] may rotate it: the correction
-    /// that
-    /// remains after `given` then has an upper triangular matrix of the accelerometer. `None` if a matrix of `given` is
-    /// singular.
+    /// that remains after `given` then has an upper triangular matrix of the accelerometer. `None` if a matrix of
+    /// `given` is singular.
     pub fn in_frame_of(&self, given: &Self) -> Option<Self> {
         let left = self.left_after(given)?;
         let (own_from_given, _) = rotation_and_upper(&left.accelerometer_correction);
@@ -128,10 +126,8 @@ impl ImuIntrinsics {
     }
 
     /// Returns the correction in the frame in which the accelerometer's matrix is lower triangular, which is Kalibr's
-    /// IMU
-    /// frame, after the rotation `triangle_from_imu`; the identity, and the same bits, if it is lower triangular
-    /// already. The
-    /// matrix must have a positive determinant.
+    /// IMU frame, after the rotation `triangle_from_imu`; the identity, and the same bits, if it is lower triangular
+    /// already. The matrix must have a positive determinant.
     pub fn in_lower_triangular_frame(&self) -> (UnitQuaternion<f64>, Self) {
         let c = &self.accelerometer_correction;
         let is_lower = [(0, 1), (0, 2), (1, 2)].iter().all(|entry| c[*entry] == 0.0);

@@ -16,8 +16,7 @@ pub struct JointAngles {
     /// Standard deviation of each angle in radians: below the rig's value for one reading if several were averaged.
     pub sigmas_rad: Vec<f64>,
     /// Part of each standard deviation in radians that is common to consecutive images, so that no average reduces it
-    /// (zero
-    /// for white noise).
+    /// (zero for white noise).
     pub lasting_sigmas_rad: Vec<f64>,
     /// Angular rate of each joint in rad/s from the readings around the stamp; zero if they do not constrain it.
     pub rates_rad_per_s: Vec<f64>,

@@ -81,8 +81,7 @@ impl PoseTrack {
     }
 
     /// Pose at a stamp, interpolated between the poses before and after it; `None` before the first, after the last,
-    /// and
-    /// if the nearest of the two is further than [`NEAREST_POSE_NS`] away.
+    /// and if the nearest of the two is further than [`NEAREST_POSE_NS`] away.
     pub fn at(&self, stamp_ns: i64) -> Option<RigidTransform> {
         let after = self.0.partition_point(|sample| sample.stamp_ns <= stamp_ns);
         let from = self.0.get(after.checked_sub(1)?)?;

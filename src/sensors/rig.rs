@@ -151,8 +151,7 @@ pub struct GimbalRig {
 
 impl GimbalRig {
     /// Inverse of the chain that converts attitudes to joint angles; `None` unless the rig has an attitude source and
-    /// one to
-    /// three joints.
+    /// one to three joints.
     pub fn inverse_chain(&self) -> Option<InverseChain> {
         let source = self.attitude.as_ref()?;
         let limits: Vec<(f64, f64)> = self.joints.iter().map(|joint| joint.limits_rad).collect();
@@ -238,8 +237,7 @@ impl Rig {
         match (&self.gimbal, &camera.mount) {
             (Some(gimbal), CameraMount::Gimbal) => gimbal.prior,
             // The rigid camera of a gimbal rig is assumed to be calibrated as well as the gimbal, but never worse than
-            // the
-            // usual rigid camera.
+            // the usual rigid camera.
             (Some(gimbal), CameraMount::Static { .. }) => ChainPrior {
                 translation_bound_m: gimbal.prior.translation_bound_m.min(ChainPrior::RIGID_CAMERA.translation_bound_m),
                 rotation_bound_rad: gimbal.prior.rotation_bound_rad.min(ChainPrior::RIGID_CAMERA.rotation_bound_rad),

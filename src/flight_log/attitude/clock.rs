@@ -20,8 +20,7 @@ pub(crate) enum StampClock {
 
 impl StampClock {
     /// Selects the clock of a topic. Stamps of PX4 count from its start unless its bridge has converted them; they are
-    /// used if
-    /// the first one lies within the times of the log. An error if neither stamps nor log times do.
+    /// used if the first one lies within the times of the log. An error if neither stamps nor log times do.
     pub(crate) fn of(log: &FlightLog, topic: &str, kind: MessageKind) -> Result<Self, LogError> {
         if !kind.counts_since_boot() {
             return Ok(Self::Stamps);

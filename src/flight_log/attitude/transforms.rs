@@ -36,8 +36,7 @@ type Tree = BTreeMap<String, (String, Option<UnitQuaternion<f64>>)>;
 
 impl TransformPath {
     /// Finds the path between two frames of a log: static transforms of `/tf_static` (or the topic with `_static`),
-    /// others of
-    /// `topic`.
+    /// others of `topic`.
     pub(crate) fn find(log: &FlightLog, topic: &str, parent: &str, child: &str) -> Result<Self, LogError> {
         let (parent, child) = (bare_name(parent), bare_name(child));
         let mut tree = Tree::new();

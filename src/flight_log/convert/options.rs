@@ -11,8 +11,7 @@ pub struct ConvertOptions {
     /// Autopilot's log of the flight in a video.
     pub autopilot: Option<AutopilotLog>,
     /// Relation of the video's clock to the autopilot's log; if not given, by the recorded times of both, else both
-    /// start
-    /// together.
+    /// start together.
     pub video_clock: Option<VideoClock>,
 }
 

@@ -10,8 +10,7 @@ use super::super::text::{nearest_name, printable, shortened};
 use crate::geometry::RigidTransform;
 
 /// Largest distance of a rotation block from orthonormal (largest entry of `RᵀR − I`); Kalibr writes 1e-16,
-/// hand-written
-/// files are rounded.
+/// hand-written files are rounded.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// Longest name of a topic, frame or joint in a rig.

@@ -35,8 +35,7 @@ impl Rig {
     }
 
     /// Returns the rig of [`Self::for_log`], with the paths of the keys in its file that other programs write and that
-    /// are
-    /// not used.
+    /// are not used.
     pub fn for_log_with_unused_keys(log: &FlightLog, explicit: Option<&Path>) -> Result<(Self, Vec<String>), LogError> {
         let beside = log.path().with_extension("rig.yaml");
         find(log, explicit, &beside, ".rig.yaml")?

@@ -10,8 +10,7 @@ use crate::sensors::{AssumedField, CameraMount, CameraRig, GimbalRig, ImuIntrins
 
 impl Rig {
     /// Returns the rig as a YAML file, with its chain in the classical parameterization. Numbers read back exactly;
-    /// rotation
-    /// matrices read back to within rounding.
+    /// rotation matrices read back to within rounding.
     pub fn to_yaml(&self) -> String {
         let mut out = String::from("# T_a_b maps points from b to a; metres, radians, seconds.\n");
         line(&mut out, 0, "rig_version", "1");

@@ -20,15 +20,13 @@ const STRETCH_NS: i64 = 1_000_000_000;
 /// Reading of the vehicle's attitude starts this much earlier than that of the gimbal's.
 const VEHICLE_MARGIN_NS: i64 = 1_200_000_000;
 /// Times before the wanted start at which reading is tried, to find a sample that does not depend on earlier ones;
-/// after
-/// these it starts at the beginning of the log.
+/// after these it starts at the beginning of the log.
 const EARLIER_NS: [i64; 4] = [0, 4_000_000_000, 16_000_000_000, 64_000_000_000];
 
 /// Samples of all joints in time order, computed by inverting the rig's chain.
 ///
 /// A sample depends on the one before it near a singularity, and where the limits admit two solutions. Reading starts
-/// with
-/// a sample that depends on none, or with the log, so that the samples do not depend on the start of reading.
+/// with a sample that depends on none, or with the log, so that the samples do not depend on the start of reading.
 pub(super) struct AttitudeJoints {
     gimbal: GimbalReadings,
     vehicle: Option<Lookup<UnitQuaternion<f64>>>,

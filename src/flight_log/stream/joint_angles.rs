@@ -13,14 +13,12 @@ const NEAREST_NS: i64 = 100_000_000;
 /// The same for attitudes, which some gimbals record 5 times per second.
 const NEAREST_ATTITUDE_NS: i64 = 150_000_000;
 /// Standard deviation, half way between two attitudes, of a joint's deviation from a constant rate, relative to its
-/// rotation
-/// between them. A joint that rotates only during one half of the time deviates four times as much.
+/// rotation between them. A joint that rotates only during one half of the time deviates four times as much.
 const DEVIATION_OF_ROTATION: f64 = 1.0 / 16.0;
 /// Largest half length of a batch; over longer times a stabilized joint does not follow a parabola.
 const MAX_HALF_BATCH_NS: i64 = 25_000_000;
 /// The rate is fitted to this many times the batch on either side, neighbouring batches included: its noise falls with
-/// the
-/// length to the power of −3/2, and noise on a rate biases an estimated time offset towards zero.
+/// the length to the power of −3/2, and noise on a rate biases an estimated time offset towards zero.
 const RATE_BATCHES: i64 = 2;
 /// Minimum number of readings of a batch; two cannot be averaged.
 const MIN_BATCH: usize = 3;
@@ -89,8 +87,7 @@ impl EncoderAverage {
     }
 
     /// Sets that the readings are attitudes: they are interpolated over larger gaps, with an uncertainty that grows
-    /// with the
-    /// gap and with the rotation in it, and the rate over the gap is used.
+    /// with the gap and with the rotation in it, and the rate over the gap is used.
     pub(super) fn of_attitude(self) -> Self {
         Self { of_attitude: true, ..self }
     }
@@ -215,8 +212,7 @@ impl MeasuredNoise {
 }
 
 /// Length of the blocks within which the white noise is measured. They start at multiples of it since the start of the
-/// log,
-/// so that the result does not depend on the start of a replay.
+/// log, so that the result does not depend on the start of a replay.
 const BLOCK_NS: i64 = 50_000_000;
 /// Number of blocks that are pooled; a replay reads this many blocks before its start.
 const BLOCKS: i64 = 40;

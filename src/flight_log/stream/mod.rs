@@ -41,8 +41,8 @@ pub struct FrameStream {
 
 impl FrameStream {
     /// Starts with the camera's first frame at or after `start_s` (seconds since the start of the log) and ends
-    /// `duration_s`
-    /// later, or with the log. Fails if the rig does not match the log; a missing ground truth is a warning.
+    /// `duration_s` later, or with the log. Fails if the rig does not match the log; a missing ground truth is a
+    /// warning.
     pub fn new(
         log: Arc<FlightLog>,
         rig: &Rig,
@@ -54,8 +54,7 @@ impl FrameStream {
     }
 
     /// [`Self::new`] with the IMU samples of `after_s` seconds after each stamp, during which the rows of a rolling
-    /// shutter
-    /// are exposed.
+    /// shutter are exposed.
     pub fn with_motion_after(
         log: Arc<FlightLog>,
         rig: &Rig,

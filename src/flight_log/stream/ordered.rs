@@ -116,8 +116,8 @@ pub(super) struct OrderedSamples<T> {
 
 impl<T> OrderedSamples<T> {
     /// Reads the messages of a topic with log times at or after `from_ns` since the start of the log. If `numbered`,
-    /// the
-    /// numbers passed to the decoder count from the log's start, which requires reading the index of everything before.
+    /// the numbers passed to the decoder count from the log's start, which requires reading the index of everything
+    /// before.
     pub(super) fn new(log: &FlightLog, topic: &str, from_ns: i64, numbered: bool, decode: Decoder<T>) -> Self {
         let mut messages = log.topic_index(topic);
         let log_time_ns = u64::try_from(log.epoch_ns().saturating_add(from_ns)).unwrap_or(0);

@@ -28,10 +28,8 @@ pub fn is_batch_reference(path: &Path) -> bool {
 /// Reads the poses of a trajectory file in the order of their stamps; of several with one stamp the first is kept.
 ///
 /// Lines with commas are a table of EuRoC: stamps in nanoseconds, the quaternion's w first, further columns ignored.
-/// Others
-/// are TUM: stamps in seconds, the quaternion's w last. Lines without a quaternion, or with one of zeros, are
-/// positions.
-/// Lines that begin with `#` are comments.
+/// Others are TUM: stamps in seconds, the quaternion's w last. Lines without a quaternion, or with one of zeros, are
+/// positions. Lines that begin with `#` are comments.
 ///
 /// # Errors
 /// When the file cannot be read, a line is no pose, or there is none.

@@ -127,8 +127,7 @@ impl VideoDecoder {
     }
 
     /// Decodes the frame of a message (Annex B) into 8-bit gray values. If a resolution is expected, other resolutions
-    /// are an
-    /// error.
+    /// are an error.
     pub(crate) fn decode(
         &mut self,
         access_unit: &[u8],

@@ -23,8 +23,7 @@ use super::messages::{MessageKind, VideoPacket, read_video_packet};
 const BLOCKS: usize = 2;
 
 /// Number of the message from which a frame has to be decoded: the last keyframe at or before it, or the one before
-/// that
-/// for a frame that depends on frames before its keyframe; 0 without one.
+/// that for a frame that depends on frames before its keyframe; 0 without one.
 pub(super) fn keyframe_before(log: &FlightLog, messages: &mut TopicIndex, kind: MessageKind, number: usize) -> usize {
     let mut cache = BlockCache::new(BLOCKS);
     let mut holds = |number: usize, property: fn(&VideoPacket<'_>) -> bool| {

@@ -1,6 +1,5 @@
 //! Messages for display in viewers (Foxglove, Rerun, RViz): paths, transform trees, point clouds, image annotations,
-//! log
-//! lines, and rows of named numbers.
+//! log lines, and rows of named numbers.
 
 use nalgebra::{Vector2, Vector3};
 

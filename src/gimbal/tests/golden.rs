@@ -223,8 +223,7 @@ impl Reprojection {
     }
 
     /// Predicts the feature that is anchored in frame i with `(x/z, y/z, 1)` and its inverse depth, observed in frame
-    /// j; each
-    /// frame is given by its `world_from_imu` and its joint angles.
+    /// j; each frame is given by its `world_from_imu` and its joint angles.
     pub(crate) fn new(
         chain: &Chain,
         camera: &CameraModel,

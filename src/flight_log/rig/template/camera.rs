@@ -47,8 +47,7 @@ const fn photo(name: &'static str, deg: f64, aspect: [f64; 2]) -> PublishedCamer
 
 impl PublishedCamera {
     /// All cameras. Sources: `GoPro`'s support pages "Field of View (FOV) Information" of each model (stabilization
-    /// off), and
-    /// the specifications of DJI's aircraft.
+    /// off), and the specifications of DJI's aircraft.
     pub const ALL: [Self; 29] = [
         video("gopro-hero3-wide", 118.2, Some(122.6), true),
         video("gopro-hero3-medium", 94.4, Some(94.4), true),
@@ -87,8 +86,7 @@ impl PublishedCamera {
     }
 
     /// Horizontal field of view in degrees for images of an aspect ratio (width by height), true for a fisheye lens,
-    /// and the
-    /// assumptions.
+    /// and the assumptions.
     fn horizontal(self, aspect: f64) -> (f64, bool, String) {
         match self.lens {
             PublishedLens::Video { wide_deg, tall_deg, fisheye } => {
@@ -149,8 +147,7 @@ impl FromStr for CameraChoice {
 }
 
 /// Model of a lens with this horizontal field of view, without distortion or equidistant, and its principal point in
-/// the
-/// middle.
+/// the middle.
 fn lens(horizontal_deg: f64, fisheye: bool, resolution_px: [usize; 2]) -> CameraModel {
     let [width, height] = resolution_px.map(|side| side as f64);
     let half_rad = 0.5 * horizontal_deg.to_radians();

@@ -105,8 +105,7 @@ impl std::fmt::Display for MechanismAxes {
 
 impl MechanismAxes {
     /// Chain whose axes meet at right angles at `position_m` (forward, left and up of the IMU), with the camera at the
-    /// same
-    /// position; it looks forward, level, at angles zero.
+    /// same position; it looks forward, level, at angles zero.
     pub(super) fn chain(&self, positive: BodyAxes, imu: BodyAxes, position_m: Vector3<f64>) -> ClassicalChain {
         let imu_from_vehicle = imu.flu_from_axes().inverse();
         let position_in_imu_m = imu_from_vehicle * position_m;

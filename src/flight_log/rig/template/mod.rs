@@ -21,8 +21,7 @@ use crate::sensors::{
 };
 
 /// Standard deviations of intrinsics from a field of view: of the focal length as a ratio (manufacturers round, crop
-/// and
-/// stabilize), of the principal point as a ratio of the width, and of distortion coefficients.
+/// and stabilize), of the principal point as a ratio of the width, and of distortion coefficients.
 const ASSUMED_FOCAL_RATIO: f64 = 0.1;
 const ASSUMED_CENTRE_RATIO: f64 = 0.02;
 const ASSUMED_DISTORTION: f64 = 0.1;
@@ -36,8 +35,7 @@ const CHAIN_PRIOR: ChainPrior =
 const GRAVITY_M_PER_S2: f64 = 9.81;
 
 /// Noise of an autopilot's MEMS IMU in flight: about five times the densities in data sheets of the ICM-20689,
-/// ICM-42688
-/// and BMI088 (gyroscope 0.005 to 0.014 °/s/√Hz, accelerometer 70 to 190 µg/√Hz), as estimators need it.
+/// ICM-42688 and BMI088 (gyroscope 0.005 to 0.014 °/s/√Hz, accelerometer 70 to 190 µg/√Hz), as estimators need it.
 pub const TYPICAL_IMU_NOISE: ImuNoise = ImuNoise {
     accelerometer_noise_density: 0.01,
     accelerometer_random_walk: 0.002,

@@ -60,8 +60,7 @@ impl RigTemplate {
     ///
     /// # Errors
     /// When the log has no images or no IMU, or several of them of which none is chosen, or when the size of the images
-    /// is
-    /// not known.
+    /// is not known.
     pub fn new(choices: &RigChoices, log: Option<&FlightLog>) -> Result<Self, TemplateError> {
         let imu = imu(choices, log)?;
         let camera = camera(choices, log)?;
