@@ -16,7 +16,6 @@ use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{Layout, POSE, VELOCITY_BIAS};
 use crate::estimator::state::track::TrackObservation;
 use crate::frontend::FeatureId;
-use crate::gimbal::ParameterId;
 use crate::optimization::{BlockTerm, CameraPose, Landmark};
 
 /// Jacobian of a step in blocks.
@@ -48,7 +47,8 @@ impl StepReport {
             let Some(written) = writer.feature(index, feature) else { continue };
             rows.push(writer.row_of(feature, &written));
         }
-        rows.extend(writer.other_rows());
+        let numbers: Vec<FrameId> = self.window.iter().map(|frame| FrameId(frame.frame_index)).collect();
+        rows.extend(writer.source.rows(&numbers));
         Some(StepJacobian { columns: writer.columns, rows })
     }
 
@@ -76,7 +76,6 @@ struct Writer<'a> {
     source: &'a JacobianSource,
     layout: Layout,
     columns: Vec<ColumnBlock>,
-    states: Vec<FrameState>,
     cameras: Vec<WindowCamera<'a>>,
     /// Landmark positions in the world, in metres.
     places_m: BTreeMap<FeatureId, Vector3<f64>>,
@@ -119,7 +118,7 @@ impl<'a> Writer<'a> {
             })
             .collect();
         let places_m = report.landmarks.iter().map(|landmark| (landmark.id, landmark.position_m)).collect();
-        Some(Self { report, source, layout, columns, states, cameras, places_m })
+        Some(Self { report, source, layout, columns, cameras, places_m })
     }
 
     /// Rows of a feature; `None` when its camera or an anchor observation is missing.
@@ -163,44 +162,6 @@ impl<'a> Writer<'a> {
         let position_m = self.places_m.get(&feature.id)?;
         let point = anchor.rotation.tr_mul(&(position_m - anchor.position_m));
         Some(Landmark { bearing: point.normalize(), inverse_distance: point.norm().recip() })
-    }
-
-    /// Rows of factors without a feature.
-    fn other_rows(&self) -> Vec<JacobianRow> {
-        let numbers: Vec<FrameId> = self.report.window.iter().map(|frame| FrameId(frame.frame_index)).collect();
-        let mut rows: Vec<JacobianRow> = self.source.rows(&numbers).collect();
-        let is_imu = |row: &JacobianRow| matches!(row.factor, JacobianFactor::Imu { .. });
-        let place = rows.iter().position(|row| !is_imu(row)).unwrap_or(rows.len());
-        // Readings depend on the joint angles of their frame and on the time offset, each with its inverse standard
-        // deviation.
-        let encoders = self.report.window.iter().enumerate().filter_map(|(slot, frame)| {
-            let sigmas = frame.encoder_sigmas_rad.as_ref().filter(|sigmas| !sigmas.is_empty())?;
-            let id = ColumnId::Joints(numbers[slot]);
-            let column = self.columns.iter().position(|block| block.id == id)?;
-            let scale = id.scale(0);
-            let sigmas = || sigmas.iter().take(self.layout.joints).enumerate();
-            let squared: f64 = sigmas().map(|(_, sigma)| (scale / sigma).powi(2)).sum();
-            let factor = JacobianFactor::Encoder(numbers[slot]);
-            let mut norms = vec![(column as u16, squared.sqrt() as f32)];
-            if let Some((clock, block)) = self.encoder_clock() {
-                let scale = block.id.scale(0);
-                let rate = |joint: usize| self.states[slot].joint_rate_rad_per_s(joint);
-                let squared: f64 = sigmas().map(|(joint, sigma)| (scale * rate(joint) / sigma).powi(2)).sum();
-                if squared > 0.0 {
-                    norms.insert(0, (clock as u16, squared.sqrt() as f32));
-                }
-            }
-            Some(JacobianRow { factor, height: sigmas().count(), norms })
-        });
-        let encoders: Vec<JacobianRow> = encoders.collect();
-        rows.splice(place..place, encoders);
-        rows
-    }
-
-    /// Index and block of the encoder time offset's column, `None` if it is not estimated.
-    fn encoder_clock(&self) -> Option<(usize, &ColumnBlock)> {
-        let id = ColumnId::Calibration(ParameterId::ENCODER_TIMESHIFT);
-        self.columns.iter().enumerate().find(|(_, block)| block.id == id)
     }
 
     /// Writes the rows of an observation by a camera with `N` blocks per frame; `None` if the observation has no rows.

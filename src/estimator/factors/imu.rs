@@ -2,10 +2,88 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::factor::{Block, Factor, Point, Rows, Sink};
+use super::kind::FactorLabel;
+use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::imu_errors::ImuErrors;
+use crate::estimator::state::layout::POSE;
 use crate::estimator::state::navigation::{Matrix15, NavigationState, Vector15};
 use crate::estimator::state::preintegration::Preintegration;
 use crate::geometry::so3;
+
+/// IMU factor between two frames of a window (IMU term of Eq. 8): 15 rows `[φ, p, v, b_g, b_a]`.
+#[derive(Clone, Debug)]
+pub(crate) struct ImuFactor<'a> {
+    /// Slot of the later frame.
+    pub(crate) slot: usize,
+    pub(crate) motion: &'a Preintegration,
+    /// Square-root information of `motion` (15 × 15).
+    pub(crate) information: &'a Matrix15,
+    /// Gravity in the world frame, in m/s².
+    pub(crate) gravity_in_world: &'a Vector3<f64>,
+    /// States of the earlier and of the later frame.
+    pub(crate) current: [&'a NavigationState; 2],
+    /// The same at the linearization point.
+    pub(crate) linearized: [&'a NavigationState; 2],
+    /// First columns of `[φ, p]` of both frames.
+    pub(crate) poses: [usize; 2],
+    /// First columns of `[v, b_g, b_a]` of both frames.
+    pub(crate) velocity_biases: [usize; 2],
+    /// Intrinsics of the IMU with their first column, `None` if they are not estimated.
+    pub(crate) intrinsics: Option<(&'a ImuErrors, usize)>,
+}
+
+impl<'a> ImuFactor<'a> {
+    /// Factor that ends at `slot`, `None` without IMU samples.
+    pub(crate) fn of(point: &Point<'a>, slot: usize) -> Option<Self> {
+        let (frame, layout, calibration) = (&point.frames[slot], &point.layout, &point.at.calibration);
+        let first = layout.calibration().start + calibration.imu_columns().start;
+        let states = |states: &'a [FrameState]| [&states[slot - 1].navigation, &states[slot].navigation];
+        Some(Self {
+            slot,
+            motion: &frame.motion,
+            information: frame.motion_information.as_ref()?,
+            gravity_in_world: point.gravity_in_world,
+            current: states(&point.at.frames),
+            linearized: states(point.linearized),
+            poses: [slot - 1, slot].map(|slot| layout.pose(slot).start),
+            velocity_biases: [slot - 1, slot].map(|slot| layout.velocity_bias(slot).start),
+            intrinsics: calibration.imu_errors().map(|errors| (errors, first)),
+        })
+    }
+}
+
+impl Factor for ImuFactor<'_> {
+    fn label(&self) -> FactorLabel {
+        FactorLabel::Imu(self.slot as u8)
+    }
+
+    fn rows<S: Sink>(&self, sink: &mut S) {
+        let errors = self.intrinsics.map(|(errors, _)| errors);
+        let [from, to] = self.current;
+        let residual = self.information * residual_with(self.motion, from, to, self.gravity_in_world, errors);
+        let mut rows = Rows { residual: residual.as_slice(), blocks: &[], products: None };
+        if !S::DERIVATIVES {
+            return sink.add(self.label(), &rows);
+        }
+        let [from, to] = self.linearized;
+        let (by_from, by_to, by_intrinsics) = jacobians_with(self.motion, from, to, self.gravity_in_world, errors);
+        let [by_from, by_to] = [by_from, by_to].map(|by_state| sparse_product(self.information, &by_state));
+        let mut blocks = Vec::with_capacity(5);
+        for (index, by_state) in [&by_from, &by_to].into_iter().enumerate() {
+            let (by_pose, by_velocity_bias) = by_state.as_slice().split_at(ROWS * POSE);
+            blocks.push(Block { start: self.poses[index], entries: by_pose });
+            blocks.push(Block { start: self.velocity_biases[index], entries: by_velocity_bias });
+        }
+        let by_intrinsics = sparse_product(self.information, &by_intrinsics);
+        blocks.extend(self.intrinsics.map(|(_, start)| Block { start, entries: by_intrinsics.as_slice() }));
+        rows.blocks = &blocks;
+        sink.add(self.label(), &rows);
+    }
+}
+
+/// Number of rows.
+const ROWS: usize = 15;
 
 /// Residual `[φ, p, v, b_g, b_a]` (15 × 1) of two states given the IMU samples between them (IMU term of Eq. 8),
 /// not whitened.
@@ -114,4 +192,19 @@ pub(crate) fn jacobians_with(
         by_intrinsics.fixed_rows_mut::<6>(3).copy_from(&-increment.fixed_rows::<6>(3));
     }
     (by_from, by_to, by_intrinsics)
+}
+
+/// `left · right` for a mostly zero right matrix.
+fn sparse_product(left: &Matrix15, right: &Matrix15) -> Matrix15 {
+    let mut product = Matrix15::zeros();
+    for (target, factors) in product.data.0.iter_mut().zip(&right.data.0) {
+        for (column, factor) in left.data.0.iter().zip(factors) {
+            if *factor != 0.0 {
+                for (entry, source) in target.iter_mut().zip(column) {
+                    *entry += source * factor;
+                }
+            }
+        }
+    }
+    product
 }

@@ -1,5 +1,8 @@
 //! Joint rates and joint accelerations of a frame.
 
+use super::encoder::diagonal;
+use super::factor::{Block, Factor, Point, Rows, Sink};
+use super::kind::FactorLabel;
 use crate::sensors::JointAngles;
 
 /// Standard deviation of the change of a joint angle since the previous frame, without an encoder.
@@ -27,4 +30,50 @@ pub(crate) fn measured_joint_motion(encoder: Option<&JointAngles>, place: usize,
         (value.is_finite() && sigma.is_finite()).then(|| (value, sigma.hypot(MIN_MOTION_SIGMAS[derivative.min(1)])))
     });
     measured.filter(|(_, sigma)| *sigma < unknown).unwrap_or((0.0, unknown))
+}
+
+/// Joint rates and joint accelerations of a frame: one row each, relative to the value that the encoders measure, or
+/// relative to zero with the motion of a gimbal as standard deviation.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JointMotionFactor<'a> {
+    slot: usize,
+    encoder: Option<&'a JointAngles>,
+    /// Joint rates in rad/s, then joint accelerations in rad/s².
+    motion: &'a [f64],
+    /// Column of the first joint rate.
+    start: usize,
+}
+
+impl<'a> JointMotionFactor<'a> {
+    /// Factor of the frame at `slot`, `None` if joint rates are not estimated.
+    pub(crate) fn of(point: &Point<'a>, slot: usize) -> Option<Self> {
+        let motion = point.at.frames[slot].joint_motion.as_slice();
+        (!motion.is_empty()).then(|| Self {
+            slot,
+            encoder: point.frames[slot].encoder.as_ref(),
+            motion,
+            start: point.layout.joint_motion(slot).start,
+        })
+    }
+}
+
+impl Factor for JointMotionFactor<'_> {
+    /// Label of the frame's encoder readings, which measure the joint motion.
+    fn label(&self) -> FactorLabel {
+        FactorLabel::Encoder(self.slot as u8)
+    }
+
+    fn rows<S: Sink>(&self, sink: &mut S) {
+        let joints = self.motion.len() / 2;
+        let terms: Vec<(f64, f64)> = (0..self.motion.len())
+            .map(|place| {
+                let (measured, sigma) = measured_joint_motion(self.encoder, place, joints);
+                ((self.motion[place] - measured) / sigma, 1.0 / sigma)
+            })
+            .collect();
+        let residual: Vec<f64> = terms.iter().map(|(residual, _)| *residual).collect();
+        let entries = diagonal(terms.iter().map(|(_, slope)| *slope));
+        let blocks = [Block { start: self.start, entries: &entries }];
+        sink.add(self.label(), &Rows { residual: &residual, blocks: &blocks, products: None });
+    }
 }

@@ -1,4 +1,4 @@
-//! Kinds of factors.
+//! Kinds of factors, and the label of each factor of a window.
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FactorKind {
@@ -46,6 +46,31 @@ impl FactorKind {
             Self::MarginalizationPrior => "marginalization_prior",
             Self::ZeroVelocity => "standstill",
             _ => self.name(),
+        }
+    }
+}
+
+/// Factor of a window without landmarks; its frame by slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FactorLabel {
+    /// IMU samples that end at this slot.
+    Imu(u8),
+    /// Encoder readings of the frame at this slot, with its joint rates and joint accelerations.
+    Encoder(u8),
+    ZeroVelocity,
+    CalibrationPrior,
+    /// Marginalization prior and prior at the start.
+    MarginalizationPrior,
+}
+
+impl FactorLabel {
+    pub(crate) const fn kind(self) -> FactorKind {
+        match self {
+            Self::Imu(_) => FactorKind::Imu,
+            Self::Encoder(_) => FactorKind::Encoder,
+            Self::ZeroVelocity => FactorKind::ZeroVelocity,
+            Self::CalibrationPrior => FactorKind::CalibrationPrior,
+            Self::MarginalizationPrior => FactorKind::MarginalizationPrior,
         }
     }
 }

@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::factor::{Block, Factor, Point, Products, Rows, Sink};
+use super::kind::FactorLabel;
 use crate::estimator::state::layout::{Layout, POSE};
 use crate::optimization::dense;
 
@@ -140,25 +142,6 @@ impl Prior {
         &self.residual + &self.jacobian * self.gather(layout, first_estimate_offset)
     }
 
-    /// Adds `JᵀJ` (lower triangle at least) and `Jᵀ(r + J δ)` to the normal equations.
-    pub(crate) fn add_to(
-        &self,
-        layout: &Layout,
-        first_estimate_offset: &DVector<f64>,
-        hessian: &mut DMatrix<f64>,
-        gradient: &mut DVector<f64>,
-    ) {
-        let local = &self.gradient + &self.hessian * self.gather(layout, first_estimate_offset);
-        let indices: Vec<usize> = self.columns.iter().map(|column| column.index(layout)).collect();
-        for (column, global_column) in indices.iter().enumerate() {
-            gradient[*global_column] += local[column];
-            let mut target = hessian.column_mut(*global_column);
-            for (entry, global_row) in self.hessian.column(column).iter().zip(&indices) {
-                target[*global_row] += entry;
-            }
-        }
-    }
-
     /// Whitened rows `[columns of the layout | residual]`, residuals at `first_estimate_offset` from `x₀`.
     pub(crate) fn rows(&self, layout: &Layout, first_estimate_offset: &DVector<f64>) -> DMatrix<f64> {
         let mut rows = DMatrix::zeros(self.len(), layout.total() + 1);
@@ -204,5 +187,43 @@ impl Prior {
             self.columns.len(),
             self.columns.iter().map(|column| first_estimate_offset[column.index(layout)]),
         )
+    }
+}
+
+/// [`Prior`] on the window.
+#[derive(Clone, Debug)]
+pub(crate) struct MarginalPriorFactor<'a> {
+    prior: &'a Prior,
+    layout: Layout,
+    /// `x ⊟ x₀` in the columns of the prior.
+    offset: DVector<f64>,
+}
+
+impl<'a> MarginalPriorFactor<'a> {
+    /// Factor of the window; `first_estimate_offset` is `x ⊟ x₀` in the window's layout.
+    pub(crate) fn of(prior: &'a Prior, point: &Point<'_>, first_estimate_offset: &DVector<f64>) -> Self {
+        Self { prior, layout: point.layout, offset: prior.gather(&point.layout, first_estimate_offset) }
+    }
+}
+
+impl Factor for MarginalPriorFactor<'_> {
+    fn label(&self) -> FactorLabel {
+        FactorLabel::MarginalizationPrior
+    }
+
+    fn rows<S: Sink>(&self, sink: &mut S) {
+        let prior = self.prior;
+        let residual = &prior.residual + &prior.jacobian * &self.offset;
+        let mut rows = Rows { residual: residual.as_slice(), blocks: &[], products: None };
+        if !S::DERIVATIVES {
+            return sink.add(self.label(), &rows);
+        }
+        let columns = prior.columns.iter().zip(prior.jacobian.as_slice().chunks_exact(prior.len()));
+        let blocks: Vec<Block<'_>> =
+            columns.map(|(column, entries)| Block { start: column.index(&self.layout), entries }).collect();
+        let gradient = &prior.gradient + &prior.hessian * &self.offset;
+        rows.blocks = &blocks;
+        rows.products = Some(Products { hessian: &prior.hessian, gradient: &gradient });
+        sink.add(self.label(), &rows);
     }
 }

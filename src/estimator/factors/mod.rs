@@ -1,11 +1,18 @@
-//! Factors of the window (Eqs. 8–10): whitened residuals with their Jacobians.
+//! Factors of the window (Eqs. 8–10): whitened residuals with their Jacobians, one file per factor.
 //!
-//! A factor takes states and measurements and returns whitened residuals and derivatives; it does not depend on
-//! the window.
+//! A factor takes states and measurements and passes its rows to a sink: costs, normal equations, or labelled rows.
+//! It does not depend on the window. A further sensor is a file here and a line in
+//! [`Problem::measurements`](super::problem::problem::Problem::measurements).
 
+pub(crate) mod calibration_prior;
+pub(crate) mod costs;
+pub(crate) mod dense_equations;
+pub(crate) mod encoder;
+pub(crate) mod factor;
 pub mod imu;
 pub(crate) mod joint_motion;
-mod kind;
+pub(crate) mod kind;
+pub(crate) mod labelled_rows;
 pub(crate) mod marginal_prior;
 pub(crate) mod packed_prior;
 pub(crate) mod projected_rows;

@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
+use super::factor::{Block, Factor, Point, Rows, Sink};
+use super::kind::FactorLabel;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::POSE;
 use crate::estimator::state::navigation::ImuBias;
@@ -55,5 +57,33 @@ impl StartPrior {
                 / self.accelerometer_bias_sigma[axis];
         }
         (jacobian, residual)
+    }
+}
+
+/// [`StartPrior`] on the oldest frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StartPriorFactor<'a> {
+    prior: &'a StartPrior,
+    state: &'a FrameState,
+    /// First column of the frame.
+    start: usize,
+}
+
+impl<'a> StartPriorFactor<'a> {
+    /// Factor of the window, `None` without a frame.
+    pub(crate) fn of(prior: &'a StartPrior, point: &Point<'a>) -> Option<Self> {
+        Some(Self { prior, state: point.at.frames.first()?, start: point.layout.frame(0).start })
+    }
+}
+
+impl Factor for StartPriorFactor<'_> {
+    fn label(&self) -> FactorLabel {
+        FactorLabel::MarginalizationPrior
+    }
+
+    fn rows<S: Sink>(&self, sink: &mut S) {
+        let (jacobian, residual) = self.prior.rows(self.state);
+        let blocks = [Block { start: self.start, entries: jacobian.as_slice() }];
+        sink.add(self.label(), &Rows { residual: residual.as_slice(), blocks: &blocks, products: None });
     }
 }

@@ -3,58 +3,70 @@
 //! It is soft: position equal to that of the previous frame and zero velocity, up to the motion that the images
 //! cannot resolve at the distance of the scene.
 
-use crate::estimator::state::frame_state::FrameState;
-use crate::estimator::state::layout::Layout;
+use nalgebra::Vector3;
 
-/// Zero-velocity update of a frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Stationary {
-    /// Start of the stationary phase.
-    pub(crate) since_ns: i64,
-    /// Standard deviation of the position relative to the previous frame, per axis: the resolution of the images.
-    pub(crate) position_sigma_m: f64,
-    /// Standard deviation of the velocity, per axis.
-    pub(crate) velocity_sigma_m_per_s: f64,
+use super::factor::{Block, Factor, Point, Rows, Sink};
+use super::kind::FactorLabel;
+use crate::estimator::state::frame::Stationary;
+
+/// Zero-velocity update of a frame in the world frame: three rows `v / σ_v`, and three rows `(p_j − p_i) / σ_p` relative
+/// to the frame before it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ZeroVelocityFactor {
+    sigmas: Stationary,
+    velocity_m_per_s: Vector3<f64>,
+    /// First column of the velocity.
+    velocity: usize,
+    /// Translation since the previous frame, `None` if the vehicle moved in between.
+    translation: Option<Translation>,
 }
 
-/// One whitened scalar residual of the zero-velocity update: an unknown, or its difference from that of the
-/// previous frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ZeroVelocityTerm {
-    /// Column whose derivative is `slope`.
-    pub(crate) column: usize,
-    /// Column whose derivative is `-slope`, `None` without one.
-    pub(crate) against: Option<usize>,
-    /// Residual over its standard deviation.
-    pub(crate) residual: f64,
-    pub(crate) slope: f64,
+/// Translation between two frames.
+#[derive(Clone, Copy, Debug)]
+struct Translation {
+    moved_m: Vector3<f64>,
+    /// First columns of the positions of the earlier and of the later frame.
+    positions: [usize; 2],
 }
 
-impl Stationary {
-    /// `v / σ_v` of the frame at `slot`, world frame, one term per axis.
-    pub(crate) fn velocity_terms(&self, layout: Layout, slot: usize, state: &FrameState) -> [ZeroVelocityTerm; 3] {
-        let slope = 1.0 / self.velocity_sigma_m_per_s;
-        let velocity = state.navigation.velocity_m_per_s;
-        let column = layout.velocity_bias(slot).start;
-        [0, 1, 2].map(|axis| ZeroVelocityTerm {
-            column: column + axis,
-            against: None,
-            residual: velocity[axis] * slope,
-            slope,
+impl ZeroVelocityFactor {
+    /// Factor of the frame at `slot`, `None` unless the vehicle is stationary there.
+    pub(crate) fn of(point: &Point<'_>, slot: usize) -> Option<Self> {
+        let sigmas = point.frames[slot].stationary?;
+        let (states, layout) = (&point.at.frames, &point.layout);
+        let position = |slot: usize| states[slot].navigation.world_from_imu.translation_m;
+        let before = slot.checked_sub(1).filter(|before| point.frames[*before].stamp_ns >= sigmas.since_ns);
+        Some(Self {
+            sigmas,
+            velocity_m_per_s: states[slot].navigation.velocity_m_per_s,
+            velocity: layout.velocity_bias(slot).start,
+            translation: before.map(|before| Translation {
+                moved_m: position(slot) - position(before),
+                positions: [before, slot].map(|slot| layout.pose(slot).start + 3),
+            }),
         })
     }
+}
 
-    /// `(p_j − p_i) / σ_p` of the frame `j` at `slot` and the previous frame `i`, world frame, one term per axis.
-    pub(crate) fn position_terms(&self, layout: Layout, slot: usize, states: &[FrameState]) -> [ZeroVelocityTerm; 3] {
-        let slope = 1.0 / self.position_sigma_m;
-        let position = |slot: usize| states[slot].navigation.world_from_imu.translation_m;
-        let moved = position(slot) - position(slot - 1);
-        let column = |slot: usize, axis: usize| layout.pose(slot).start + 3 + axis;
-        [0, 1, 2].map(|axis| ZeroVelocityTerm {
-            column: column(slot, axis),
-            against: Some(column(slot - 1, axis)),
-            residual: moved[axis] * slope,
-            slope,
-        })
+impl Factor for ZeroVelocityFactor {
+    fn label(&self) -> FactorLabel {
+        FactorLabel::ZeroVelocity
+    }
+
+    fn rows<S: Sink>(&self, sink: &mut S) {
+        let slope = 1.0 / self.sigmas.velocity_sigma_m_per_s;
+        for axis in 0..3 {
+            let residual = [self.velocity_m_per_s[axis] * slope];
+            let blocks = [Block { start: self.velocity + axis, entries: &[slope] }];
+            sink.add(self.label(), &Rows { residual: &residual, blocks: &blocks, products: None });
+        }
+        let Some(Translation { moved_m, positions: [before, here] }) = self.translation else { return };
+        let slope = 1.0 / self.sigmas.position_sigma_m;
+        for axis in 0..3 {
+            let residual = [moved_m[axis] * slope];
+            let blocks =
+                [Block { start: before + axis, entries: &[-slope] }, Block { start: here + axis, entries: &[slope] }];
+            sink.add(self.label(), &Rows { residual: &residual, blocks: &blocks, products: None });
+        }
     }
 }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::frame::{Frame, layout};
 use super::linearization::Linearization;
 use super::problem::{CameraFactors, Problem};
 use crate::camera::CameraModel;
@@ -15,6 +14,7 @@ use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::camera_pose;
 use crate::estimator::state::columns::{ColumnBlock, ColumnGroup, FrameId};
 use crate::estimator::state::estimate::Estimate;
+use crate::estimator::state::frame::{Frame, layout};
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::given_chain::GivenSigmas;
 use crate::estimator::state::navigation::NavigationState;

@@ -12,6 +12,7 @@ use nalgebra::DMatrix;
 
 use super::motion_parts::motion_parts;
 use super::problem::Problem;
+use crate::estimator::factors::encoder::{EncoderFactor, EncoderResidual};
 use crate::estimator::factors::projected_rows::ProjectedRows;
 use crate::estimator::state::allocation::allocated_bytes;
 use crate::estimator::state::camera_pose::CameraMaps;
@@ -165,7 +166,7 @@ impl Problem<'_> {
         let newest = layout.frames - 1;
         let frames = self.linearization_frames(estimate);
         let answer = |slots: usize| {
-            let (mut hessian, _) = self.other_equations(estimate, &frames, slots);
+            let mut hessian = self.other_equations(estimate, &frames, slots).hessian;
             for (camera, information) in cameras.iter().enumerate() {
                 let poses = if slots == layout.frames { &information.with } else { &information.without };
                 let block = |row: usize, column: usize| poses.fixed_view::<6, 6>(6 * row, 6 * column).into_owned();
@@ -252,13 +253,14 @@ impl Problem<'_> {
         without: &DMatrix<f64>,
         motion_terms: &mut DMatrix<f64>,
     ) {
-        let Some(clock) = self.encoder_clock_column(estimate) else { return };
+        let point = self.point(estimate, &estimate.frames);
+        let Some(clock) = EncoderFactor::clock(&point) else { return };
         let newest = self.layout.frames - 1;
         for slot in 0..self.layout.frames {
             let joints = self.layout.joints(slot).start;
-            for (joint, _, slope) in self.encoder_residuals(slot, estimate) {
-                let by_clock = slope * estimate.frames[slot].joint_rate_rad_per_s(joint);
-                let row = |answer: &DMatrix<f64>| answer.row(joints + joint) * slope + answer.row(clock) * by_clock;
+            let Some(encoder) = EncoderFactor::of(&point, slot) else { continue };
+            for (joint, EncoderResidual { by_angle, by_clock, .. }) in encoder.residuals().enumerate() {
+                let row = |answer: &DMatrix<f64>| answer.row(joints + joint) * by_angle + answer.row(clock) * by_clock;
                 let force = if slot == newest { row(with) } else { row(with) - row(without) };
                 for column in 0..force.len() {
                     motion_terms[(6 + joint, column)] += by_clock * with[(clock, column)] * force[column];

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::information_gain::CameraInformation;
 use super::problem::Problem;
-use super::rows::stack_columns;
+use crate::estimator::factors::kind::{FactorKind, FactorLabel};
+use crate::estimator::factors::labelled_rows::{LabelledPart, LabelledRows, stack};
 use crate::estimator::factors::projected_rows::NewestRows;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::camera_pose::CameraMaps;
@@ -103,16 +104,17 @@ impl Problem<'_> {
                 seen.push(CameraInformation::new(&projected, maps));
             }
         }
-        let imu: Vec<DMatrix<f64>> = (1..layout.frames).map(|slot| self.imu_rows_at(slot, estimate, &frames)).collect();
-        norms.extend(
-            self.imu_columns(&estimate.calibration)
-                .map(|column| imu.iter().map(|rows| rows.column(column).norm_squared()).sum::<f64>().sqrt()),
-        );
-        measured.extend(imu);
-        measured.extend((0..layout.frames).map(|slot| self.encoder_rows(slot, estimate)));
-        let stationary: Vec<_> = self.zero_velocity_terms(&estimate.frames).collect();
-        measured.push(self.zero_velocity_rows(&stationary));
-        let priors = [self.calibration_prior_rows(estimate), self.prior_rows(estimate)];
+        let point = self.point(estimate, &frames);
+        let mut measurements = LabelledRows::new(layout.total());
+        self.measurements(&point, layout.frames, &mut measurements);
+        let imu = || measurements.parts.iter().filter(|part| part.label.kind() == FactorKind::Imu);
+        let squared = |column: usize| imu().map(|part| part.rows.column(column).norm_squared()).sum::<f64>();
+        let imu_columns = estimate.calibration.imu_columns();
+        norms.extend(imu_columns.map(|column| squared(layout.calibration().start + column).sqrt()));
+        let mut priors = LabelledRows::new(layout.total());
+        self.priors(&point, &mut priors);
+        let of_rig = |part: &&LabelledPart| part.label == FactorLabel::CalibrationPrior;
+        let rig_prior_rows = priors.parts.iter().filter(of_rig).map(|part| part.rows.nrows()).sum();
         let frozen = estimate.calibration.frozen_columns();
         let is_fixed = |column: usize| frozen.contains(&column);
         let first = layout.calibration().start;
@@ -128,9 +130,9 @@ impl Problem<'_> {
         Linearization {
             columns: column_blocks(&layout, &of(false), numbers),
             fixed_parameters: of(true),
-            jacobian: stack_columns(&measured, order.iter().copied()),
-            prior_jacobian: stack_columns(&priors, order.iter().copied()),
-            rig_prior_rows: priors[0].nrows(),
+            jacobian: stack(measured.iter().chain(measurements.matrices()), order.iter().copied()),
+            prior_jacobian: stack(priors.matrices(), order.iter().copied()),
+            rig_prior_rows,
             calibration_column_norms: DVector::from_vec(norms),
             chain: calibration.of(MAIN).chain().clone(),
         }

@@ -2,25 +2,31 @@
 
 use nalgebra::DMatrix;
 
-use super::frame::Frame;
 use super::problem::Problem;
-use super::rows::stack;
+use crate::estimator::factors::kind::FactorLabel;
+use crate::estimator::factors::labelled_rows::{LabelledRows, stack};
 use crate::estimator::factors::marginal_prior::Prior;
 use crate::estimator::state::estimate::Estimate;
+use crate::estimator::state::frame::Frame;
 
 /// Prior after marginalization of the oldest frame and of the landmarks of the problem's tracks (those that
 /// leave the window with it).
 ///
 /// Its residuals refer to the first estimates: frames of the old prior keep theirs, others use the current estimate.
 pub(crate) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior> {
-    let mut parts = vec![problem.prior_rows(estimate), problem.encoder_rows(0, estimate)];
-    parts.extend(problem.velocity_terms(0, &estimate.frames[0]).map(|terms| problem.zero_velocity_rows(&terms)));
-    if problem.frames.len() > 1 {
-        parts.push(problem.imu_rows(1, estimate));
-        parts.extend(problem.position_terms(1, &estimate.frames).map(|terms| problem.zero_velocity_rows(&terms)));
-    }
-    parts.push(problem.visual_rows(estimate));
-    eliminated(problem, estimate, &parts, 0)
+    let frames = problem.linearization_frames(estimate);
+    let point = problem.point(estimate, &frames);
+    let (total, layout) = (problem.layout.total(), &problem.layout);
+    // The rig's prior stays in the window.
+    let mut priors = LabelledRows::of(total, |label| label != FactorLabel::CalibrationPrior);
+    problem.priors(&point, &mut priors);
+    let mut measured = LabelledRows::new(total);
+    problem.measurements(&point, layout.frames.min(2), &mut measured);
+    measured.parts.retain(|part| part.touches(&layout.frame(0)));
+    measured.parts.sort_by_key(|part| part.touches(&layout.frame(1)));
+    let visual = problem.visual_rows(estimate);
+    let parts = priors.parts.iter().chain(&measured.parts).map(|part| &part.rows).chain([&visual]);
+    eliminated(problem, estimate, parts, 0)
 }
 
 /// Prior without the frame at `slot`, including its encoder readings; its visual observations are
@@ -30,14 +36,24 @@ pub(crate) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -
     if !prior.holds_frame(slot) {
         return Some(prior.clone());
     }
+    let frames = problem.linearization_frames(estimate);
+    let label = FactorLabel::Encoder(slot as u8);
+    let mut readings = LabelledRows::of(problem.layout.total(), |wanted| wanted == label);
+    problem.measurements(&problem.point(estimate, &frames), slot + 1, &mut readings);
     let carried = prior.rows(&problem.layout, &problem.first_estimate_offset(estimate));
-    eliminated(problem, estimate, &[carried, problem.encoder_rows(slot, estimate)], slot)
+    let parts = [&carried].into_iter().chain(readings.parts.iter().map(|part| &part.rows));
+    eliminated(problem, estimate, parts, slot)
 }
 
 /// Converts rows with residuals at the current estimate to a prior at the first estimates.
-fn eliminated(problem: &Problem<'_>, estimate: &Estimate, parts: &[DMatrix<f64>], slot: usize) -> Option<Prior> {
+fn eliminated<'a>(
+    problem: &Problem<'_>,
+    estimate: &Estimate,
+    parts: impl Iterator<Item = &'a DMatrix<f64>> + Clone,
+    slot: usize,
+) -> Option<Prior> {
     let total = problem.layout.total();
-    let mut rows = stack(parts, total + 1);
+    let mut rows = stack(parts, 0..total + 1);
     let shift = rows.columns(0, total) * problem.first_estimate_offset(estimate);
     let mut residual = rows.column_mut(total);
     residual -= shift;

@@ -2,7 +2,6 @@
 //!
 //! Nothing here decides which frames and features are in the window.
 
-pub(crate) mod frame;
 pub(crate) mod hypothetical;
 pub(crate) mod information_gain;
 pub(crate) mod linearization;
@@ -10,5 +9,5 @@ pub(crate) mod marginalization;
 pub(crate) mod motion_parts;
 #[expect(clippy::module_inception, reason = "the type that the folder is about")]
 pub(crate) mod problem;
-pub(crate) mod rows;
 pub(crate) mod solver;
+mod visual_rows;

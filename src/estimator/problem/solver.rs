@@ -4,7 +4,8 @@ use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector, Matrix6};
 
-use super::problem::{Costs, NormalEquations, Problem};
+use super::problem::{NormalEquations, Problem};
+use crate::estimator::factors::costs::Costs;
 use crate::estimator::factors::reprojection::ReducedVisualEquations;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::layout::Layout;

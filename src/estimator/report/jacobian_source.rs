@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Quaternion, UnitQuaternion, Vector3};
 
-use crate::estimator::factors::FactorKind;
+use crate::estimator::factors::kind::{FactorKind, FactorLabel};
 use crate::estimator::state::allocation::allocated_bytes;
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::columns::FrameId;
@@ -72,37 +72,12 @@ pub(crate) struct ClockColumns {
     pub(crate) shifts_s: [f64; 2],
 }
 
-/// Rows of a factor other than features and encoders.
+/// Rows of a factor without a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PackedRow {
-    pub(crate) kind: PackedKind,
+    pub(crate) label: FactorLabel,
     pub(crate) height: u16,
     pub(crate) count: u16,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum PackedKind {
-    /// Preintegrated IMU samples that end at this slot.
-    Imu(u8),
-    ZeroVelocity,
-    CalibrationPrior,
-    MarginalizationPrior,
-}
-
-impl PackedKind {
-    /// Factor of the rows; `numbers` are the frames by slot.
-    pub(crate) fn factor(self, numbers: &[FrameId]) -> Option<JacobianFactor> {
-        Some(match self {
-            Self::Imu(slot) => {
-                let slot = usize::from(slot);
-                let from = numbers.get(slot.checked_sub(1)?)?;
-                JacobianFactor::Imu { from: *from, to: *numbers.get(slot)? }
-            }
-            Self::ZeroVelocity => JacobianFactor::ZeroVelocity,
-            Self::CalibrationPrior => JacobianFactor::CalibrationPrior,
-            Self::MarginalizationPrior => JacobianFactor::MarginalizationPrior,
-        })
-    }
 }
 
 /// Rows of a factor without a feature.
@@ -134,6 +109,18 @@ pub enum JacobianFactor {
 }
 
 impl JacobianFactor {
+    /// Factor without a feature; `numbers` are the frames by slot.
+    pub(crate) fn of(label: FactorLabel, numbers: &[FrameId]) -> Option<Self> {
+        let number = |slot: u8| numbers.get(usize::from(slot)).copied();
+        Some(match label {
+            FactorLabel::Imu(slot) => Self::Imu { from: number(slot.checked_sub(1)?)?, to: number(slot)? },
+            FactorLabel::Encoder(slot) => Self::Encoder(number(slot)?),
+            FactorLabel::ZeroVelocity => Self::ZeroVelocity,
+            FactorLabel::CalibrationPrior => Self::CalibrationPrior,
+            FactorLabel::MarginalizationPrior => Self::MarginalizationPrior,
+        })
+    }
+
     pub const fn kind(self) -> FactorKind {
         match self {
             Self::Feature(_) => FactorKind::Visual,
@@ -220,7 +207,7 @@ impl JacobianSource {
         self.rows.iter().filter_map(move |row| {
             let range = begin..begin + usize::from(row.count);
             begin = range.end;
-            let factor = row.kind.factor(numbers)?;
+            let factor = JacobianFactor::of(row.label, numbers)?;
             let norms = self.columns[range.clone()].iter().copied().zip(self.norms[range].iter().copied());
             Some(JacobianRow { factor, height: usize::from(row.height), norms: norms.collect() })
         })

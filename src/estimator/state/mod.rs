@@ -10,6 +10,7 @@ pub(crate) mod camera_view;
 pub(crate) mod columns;
 pub(crate) mod earlier_pass;
 pub(crate) mod estimate;
+pub(crate) mod frame;
 pub(crate) mod frame_state;
 pub(crate) mod given_chain;
 pub(crate) mod imu_calibration;

@@ -1,16 +1,18 @@
 //! Windows and estimators from synthetic flights.
 
-use nalgebra::{DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::Noise;
 use crate::estimator::config::{CameraSensorPrior, EstimatorConfig, EstimatorOptions, RigidCamera};
 use crate::estimator::estimator::PhaseState;
+use crate::estimator::factors::kind::FactorLabel;
+use crate::estimator::factors::labelled_rows::{LabelledRows, stack};
 use crate::estimator::factors::start_prior::StartPrior;
-use crate::estimator::problem::frame::{Frame, layout};
 use crate::estimator::problem::problem::Problem;
 use crate::estimator::report::StepReport;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::estimate::Estimate;
+use crate::estimator::state::frame::{Frame, layout};
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
@@ -259,4 +261,15 @@ pub(super) fn disturb(test: &mut TestWindow, scale: f64) {
         frame.state = frame.state.stepped(frame.first_estimate.as_ref(), &delta.as_slice()[layout.frame(slot)]);
     }
     test.window.calibration = test.window.calibration.stepped(&delta.as_slice()[layout.calibration()]);
+}
+
+/// Rows `[columns of the layout | residual]` of the wanted factors, reprojections excepted.
+pub(super) fn rows(problem: &Problem<'_>, estimate: &Estimate, wanted: impl Fn(FactorLabel) -> bool) -> DMatrix<f64> {
+    let total = problem.layout.total();
+    let linearized = problem.linearization_frames(estimate);
+    let point = problem.point(estimate, &linearized);
+    let mut rows = LabelledRows::of(total, wanted);
+    problem.measurements(&point, problem.layout.frames, &mut rows);
+    problem.priors(&point, &mut rows);
+    stack(rows.matrices(), 0..total + 1)
 }

@@ -4,6 +4,7 @@ mod clocks;
 mod cluster;
 mod consistency;
 
+mod factors;
 mod fixture;
 mod flight;
 mod gain;

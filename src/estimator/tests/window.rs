@@ -5,8 +5,9 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use super::fixture;
 use super::fixture::TestWindow;
 use crate::estimator::config::EstimatorOptions;
+use crate::estimator::factors::kind::{FactorKind, FactorLabel};
+use crate::estimator::factors::labelled_rows::stack;
 use crate::estimator::problem::marginalization;
-use crate::estimator::problem::rows::stack;
 use crate::estimator::problem::solver::{self, SolverLimits};
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::estimate::Estimate;
@@ -22,7 +23,7 @@ fn quadratic() -> EstimatorOptions {
 
 /// Windows of a gimbal in each parameterization, a rigid camera, both cameras with and without time offsets, a
 /// rolling shutter of 20 ms, and intrinsics.
-fn windows() -> Vec<(&'static str, TestWindow)> {
+pub(super) fn windows() -> Vec<(&'static str, TestWindow)> {
     let gimbal = |parameterization| fixture::window(parameterization, true, quadratic());
     vec![
         ("minimal", gimbal(Parameterization::Minimal)),
@@ -137,15 +138,17 @@ fn marginalizing_the_oldest_agrees_with_the_full_batch() {
 
         // The oldest frame and all tracks marginalized first, then the other factors with the resulting prior.
         let mut prior = marginalization::oldest(&problem, &estimate).unwrap();
-        let mut rest = vec![problem.calibration_prior_rows(&estimate)];
-        rest.extend((2..layout.frames).map(|slot| problem.imu_rows(slot, &estimate)));
-        rest.extend((1..layout.frames).map(|slot| problem.encoder_rows(slot, &estimate)));
-        let rest = stack(&rest, layout.total() + 1);
+        let rest = fixture::rows(&problem, &estimate, |label| match label {
+            FactorLabel::CalibrationPrior => true,
+            FactorLabel::Imu(slot) => slot >= 2,
+            FactorLabel::Encoder(slot) => slot >= 1,
+            FactorLabel::ZeroVelocity | FactorLabel::MarginalizationPrior => false,
+        });
         prior.renumber(0);
         let later = crate::estimator::state::layout::Layout { frames: layout.frames - 1, ..layout };
         let kept: Vec<usize> = (layout.frame(1).start..=layout.total()).collect();
         let zero = DVector::zeros(later.total());
-        let rows = stack(&[rest.select_columns(&kept), prior.rows(&later, &zero)], later.total() + 1);
+        let rows = stack([rest.select_columns(&kept), prior.rows(&later, &zero)].iter(), 0..later.total() + 1);
         let upper = dense::triangularize(&rows);
         let count = later.total();
         let solution =
@@ -168,7 +171,8 @@ fn dropping_a_frame_from_the_prior_keeps_the_information_on_the_others() {
     assert!(prior.holds_frame(gone));
     let zero = DVector::zeros(layout.total());
     let carried = prior.rows(&layout, &zero);
-    let rows = stack(&[carried.clone(), problem.encoder_rows(gone, &estimate)], layout.total() + 1);
+    let readings = fixture::rows(&problem, &estimate, |label| label == FactorLabel::Encoder(gone as u8));
+    let rows = stack([&carried, &readings].into_iter(), 0..layout.total() + 1);
     let information = |rows: &DMatrix<f64>, columns: &[usize]| {
         let part = rows.select_columns(columns);
         part.tr_mul(&part)
@@ -244,10 +248,12 @@ fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
     let problem = estimator.problem(&active);
     let estimate = estimator.estimate(&active);
     let total = problem.layout.total();
-    let mut parts =
-        vec![problem.visual_rows(&estimate), problem.prior.unwrap().rows(&problem.layout, &DVector::zeros(total))];
-    parts.extend((1..problem.layout.frames).map(|slot| problem.imu_rows(slot, &estimate)));
-    let rows = stack(&parts, total + 1);
+    let parts = [
+        problem.visual_rows(&estimate),
+        problem.prior.unwrap().rows(&problem.layout, &DVector::zeros(total)),
+        fixture::rows(&problem, &estimate, |label| matches!(label, FactorLabel::Imu(_))),
+    ];
+    let rows = stack(parts.iter(), 0..total + 1);
     let first = estimate.calibration.at_first_estimate();
     let directions = crate::gimbal::redundant_directions(&first.of(MAIN).chain().to_classical());
     assert_eq!(directions.ncols(), 6);
@@ -268,7 +274,11 @@ fn solving_converges_to_the_ground_truth_from_disturbed_values() {
         let residuals = 2 * tracks.map(|track| track.observations.len()).sum::<usize>();
         // The pixel noise of the tracks is 0.3 px (standard deviation).
         let expected = residuals as f64 * (0.3 / estimator.setup.config.options.pixel_sigma_px).powi(2);
-        assert!(solution.costs_after.visual < 1.5 * expected, "{name}: {:?} of {expected}", solution.costs_after);
+        assert!(
+            solution.costs_after.of(FactorKind::Visual) < 1.5 * expected,
+            "{name}: {:?} of {expected}",
+            solution.costs_after
+        );
         assert!(solution.costs_after.total() < 0.01 * solution.costs_before.total(), "{name}");
     }
 }

@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 use super::setup::Setup;
 use super::window_state::WindowState;
-use crate::estimator::problem::frame;
+use crate::estimator::state::frame;
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::ParameterId;

@@ -3,8 +3,8 @@
 use super::features::FeatureMap;
 use super::window_state::WindowState;
 use crate::estimator::config::EstimatorOptions;
-use crate::estimator::problem::frame::Frame;
 use crate::estimator::report::{Event, EventKind, FailureCause};
+use crate::estimator::state::frame::Frame;
 use crate::estimator::state::navigation::NavigationState;
 use crate::geometry::seconds_from_ns;
 

@@ -3,7 +3,7 @@
 use std::ops::{Deref, DerefMut};
 
 use crate::estimator::config::EstimatorOptions;
-use crate::estimator::problem::frame::Frame;
+use crate::estimator::state::frame::Frame;
 use crate::estimator::state::imu_errors::ImuErrors;
 
 /// Change of a scale error, a misalignment or the rotation in radians above which an interval is integrated again:

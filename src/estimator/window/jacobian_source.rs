@@ -1,14 +1,14 @@
 //! Data of a solved window from which the report reproduces the Jacobian of the step.
 
-use nalgebra::DMatrix;
+use nalgebra::DMatrixView;
 
 use super::setup::Setup;
 use super::solve::SolvedWindow;
 use super::window_state::WindowState;
+use crate::estimator::factors::labelled_rows::{LabelledRows, stack};
 use crate::estimator::problem::linearization::{column_blocks, column_order};
-use crate::estimator::problem::rows::stack_columns;
-use crate::estimator::report::jacobian_source::{ClockColumns, ExactSource, PackedKind, PackedRow};
-use crate::estimator::report::{FactorRows, JacobianSource};
+use crate::estimator::report::jacobian_source::{ClockColumns, ExactSource, PackedRow};
+use crate::estimator::report::{FactorRows, JacobianFactor, JacobianSource};
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::columns::{ColumnBlock, FrameId, scales_of};
 use crate::estimator::state::frame_state::FrameState;
@@ -29,27 +29,19 @@ impl WindowState {
         let mut packed = Vec::new();
         let mut norms: Vec<(u16, f32)> = Vec::new();
         let mut kept = Vec::new();
-        let mut push = |kind: PackedKind, rows: &DMatrix<f64>| {
-            if rows.nrows() > 0 {
-                let jacobian = stack_columns(std::slice::from_ref(rows), order.iter().copied());
-                let own = norms_of(&jacobian, &columns, &scales);
-                if let Some(factor) = kind.factor(&numbers).filter(|_| setup.config.options.keep_factor_rows) {
-                    let last = jacobian.ncols();
-                    let mut rows_with_residual = jacobian.resize_horizontally(last + 1, 0.0);
-                    rows_with_residual.set_column(last, &rows.column(layout.total()));
-                    kept.push(FactorRows { factor, rows: rows_with_residual });
-                }
-                packed.push(PackedRow { kind, height: rows.nrows() as u16, count: own.len() as u16 });
-                norms.extend(own);
-            }
-        };
-        for slot in 1..layout.frames {
-            push(PackedKind::Imu(slot as u8), &problem.imu_rows_at(slot, estimate, &frames));
+        let total = layout.total();
+        let mut rows = LabelledRows::new(total);
+        let point = problem.point(estimate, &frames);
+        problem.measurements(&point, layout.frames, &mut rows);
+        problem.priors(&point, &mut rows);
+        for (label, rows) in rows.by_factor() {
+            let rows = stack([&rows].into_iter(), order.iter().copied().chain([total]).collect::<Vec<_>>());
+            let of_factor = norms_of(&rows.columns(0, total), &columns, &scales);
+            packed.push(PackedRow { label, height: rows.nrows() as u16, count: of_factor.len() as u16 });
+            norms.extend(of_factor);
+            let factor = JacobianFactor::of(label, &numbers).filter(|_| setup.config.options.keep_factor_rows);
+            kept.extend(factor.map(|factor| FactorRows { factor, rows }));
         }
-        let stationary: Vec<_> = problem.zero_velocity_terms(&estimate.frames).collect();
-        push(PackedKind::ZeroVelocity, &problem.zero_velocity_rows(&stationary));
-        push(PackedKind::CalibrationPrior, &problem.calibration_prior_rows(estimate));
-        push(PackedKind::MarginalizationPrior, &problem.prior_rows(estimate));
         let packed_frame = |state: &FrameState| {
             let pose = state.navigation.world_from_imu;
             let numbers = pose.rotation.coords.iter().chain(pose.translation_m.iter()).chain(&state.joints_rad);
@@ -100,7 +92,7 @@ impl WindowState {
 }
 
 /// Indices and norms of the nonzero column blocks of some rows.
-fn norms_of(jacobian: &DMatrix<f64>, columns: &[ColumnBlock], scales: &[f64]) -> Vec<(u16, f32)> {
+fn norms_of(jacobian: &DMatrixView<'_, f64>, columns: &[ColumnBlock], scales: &[f64]) -> Vec<(u16, f32)> {
     let mut norms: Vec<(u16, f32)> = Vec::new();
     for (number, block) in columns.iter().enumerate() {
         let range = block.start..block.start + block.len;

@@ -6,9 +6,7 @@ use super::setup::Setup;
 use super::solve::{SolvedWindow, TrackResiduals};
 use super::window_state::WindowState;
 use crate::estimator::factors::FactorKind;
-use crate::estimator::factors::marginal_prior::Prior;
-use crate::estimator::factors::start_prior::StartPrior;
-use crate::estimator::problem::problem::Costs;
+use crate::estimator::problem::solver::Solution;
 use crate::estimator::report::{
     CalibrationEstimate, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport, Phase,
     PoseCovariance, ResidualSummary, StageTimes, StepReport,
@@ -70,7 +68,7 @@ impl WindowState {
         report.counts = FeatureCounts::of(&report.features);
         report.effective_pixel_sigma_px = effective_sigma(report.pixel_sigma_px, &report.features);
         report.landmarks = self.landmark_reports(setup, solved);
-        report.residuals = self.residual_summaries(setup, solved);
+        report.residuals = residual_summaries(&solved.solution);
         report.reprojection_rms_before_px =
             root_mean_square(solved.checks.iter().map(|checks| &checks.residuals_before));
         let residuals_after = || solved.checks.iter().map(|checks| &checks.residuals_after);
@@ -170,36 +168,19 @@ impl WindowState {
         landmarks.shrink_to_fit();
         landmarks
     }
+}
 
-    fn residual_summaries(&self, setup: &Setup, solved: &SolvedWindow) -> Vec<ResidualSummary> {
-        let problem = self.problem(setup, &solved.cameras);
-        let joints = problem.layout.joints;
-        let tracks = solved.cameras.iter().flat_map(|of_camera| &of_camera.tracks);
-        let observations: usize = tracks.map(|track| track.observations.len()).sum();
-        let read = self.frames.iter().filter(|frame| frame.encoder.is_some()).count();
-        let stationary = problem.zero_velocity_terms(&solved.solution.estimate.frames).count();
-        let intervals = self.frames.iter().skip(1).filter(|frame| frame.motion_information.is_some()).count();
-        let prior_rows =
-            self.prior.as_ref().map_or(0, Prior::len) + if self.start.is_some() { StartPrior::LEN } else { 0 };
-        let (before, after) = (&solved.solution.costs_before, &solved.solution.costs_after);
-        let summary = |factor: FactorKind, count: usize, part: fn(&Costs) -> f64| ResidualSummary {
-            factor,
-            count,
-            chi2_before: part(before),
-            chi2_after: part(after),
-        };
-        let mut summaries = vec![
-            summary(FactorKind::Visual, 2 * observations, |costs| costs.visual),
-            summary(FactorKind::Imu, 15 * intervals, |costs| costs.imu),
-            summary(FactorKind::Encoder, (joints + problem.layout.joint_motion) * read, |costs| costs.encoder),
-            summary(FactorKind::CalibrationPrior, problem.layout.calibration, |costs| costs.calibration),
-            summary(FactorKind::MarginalizationPrior, prior_rows, |costs| costs.prior),
-        ];
-        if stationary > 0 {
-            summaries.push(summary(FactorKind::ZeroVelocity, stationary, |costs| costs.zero_velocity));
-        }
-        summaries
-    }
+/// Residuals by kind of factor, those of zero-velocity updates only where there are some.
+fn residual_summaries(solution: &Solution) -> Vec<ResidualSummary> {
+    let (before, after) = (&solution.costs_before, &solution.costs_after);
+    let shown = |kind: &FactorKind| *kind != FactorKind::ZeroVelocity || after.count(*kind) > 0;
+    let summary = |factor: FactorKind| ResidualSummary {
+        factor,
+        count: after.count(factor),
+        chi2_before: before.of(factor),
+        chi2_after: after.of(factor),
+    };
+    FactorKind::ALL.into_iter().filter(shown).map(summary).collect()
 }
 
 /// Standard deviation of a pixel with the same average information as the observations, robust weights included.

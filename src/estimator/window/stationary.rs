@@ -9,9 +9,9 @@ use std::collections::VecDeque;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::estimator::factors::zero_velocity::Stationary;
 use crate::estimator::initialization::bearing::fit_rotation;
 use crate::estimator::report::{Event, EventKind};
+use crate::estimator::state::frame::Stationary;
 use crate::estimator::state::navigation::ImuBias;
 use crate::estimator::step_input::StepInput;
 use crate::frontend::{FeatureId, TrackedFeature};

@@ -7,11 +7,11 @@ use super::setup::Setup;
 use crate::estimator::factors::marginal_prior::Prior;
 use crate::estimator::factors::reprojection::VisualModel;
 use crate::estimator::factors::start_prior::StartPrior;
-use crate::estimator::problem::frame;
 use crate::estimator::problem::problem::{CameraFactors, Problem};
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::camera_view::CameraView;
 use crate::estimator::state::estimate::Estimate;
+use crate::estimator::state::frame;
 use crate::gimbal::Parameterization;
 use crate::optimization::Landmark;
 

@@ -3,9 +3,9 @@
 use super::packed_features::PackedFeatures;
 use crate::estimator::factors::packed_prior::PackedPrior;
 use crate::estimator::factors::start_prior::StartPrior;
-use crate::estimator::factors::zero_velocity::Stationary;
-use crate::estimator::problem::frame::Frame;
 use crate::estimator::state::calibrations::Calibrations;
+use crate::estimator::state::frame::Frame;
+use crate::estimator::state::frame::Stationary;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::imu_errors::ImuErrors;
 use crate::estimator::state::navigation::ImuBias;

@@ -1,11 +1,21 @@
 //! A frame of the window with its measurements.
 
-use crate::estimator::factors::zero_velocity::Stationary;
-use crate::estimator::state::frame_state::FrameState;
-use crate::estimator::state::layout::Layout;
-use crate::estimator::state::navigation::Matrix15;
-use crate::estimator::state::preintegration::Preintegration;
+use super::frame_state::FrameState;
+use super::layout::Layout;
+use super::navigation::Matrix15;
+use super::preintegration::Preintegration;
 use crate::sensors::JointAngles;
+
+/// Zero-velocity update of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stationary {
+    /// Start of the stationary phase.
+    pub(crate) since_ns: i64,
+    /// Standard deviation of the position relative to the previous frame, per axis: the resolution of the images.
+    pub(crate) position_sigma_m: f64,
+    /// Standard deviation of the velocity, per axis.
+    pub(crate) velocity_sigma_m_per_s: f64,
+}
 
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {

@@ -1,0 +1,56 @@
+//! Costs by kind of factor.
+
+use nalgebra::DVectorView;
+
+use super::factor::{Rows, Sink};
+use super::kind::{FactorKind, FactorLabel};
+
+/// Twice the cost and number of scalar residuals by kind of factor: the cost is robust for reprojections, χ² for the
+/// other factors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Costs {
+    squared: [f64; FactorKind::ALL.len()],
+    counts: [usize; FactorKind::ALL.len()],
+}
+
+/// Order of the sum of all kinds.
+const SUM_ORDER: [FactorKind; FactorKind::ALL.len()] = [
+    FactorKind::Visual,
+    FactorKind::Imu,
+    FactorKind::Encoder,
+    FactorKind::ZeroVelocity,
+    FactorKind::CalibrationPrior,
+    FactorKind::MarginalizationPrior,
+];
+
+impl Costs {
+    /// Adds twice the cost and the number of scalar residuals of some factors.
+    pub(crate) fn add_to(&mut self, kind: FactorKind, squared: f64, count: usize) {
+        self.squared[kind as usize] += squared;
+        self.counts[kind as usize] += count;
+    }
+
+    /// Twice the cost of a kind of factor.
+    pub(crate) fn of(&self, kind: FactorKind) -> f64 {
+        self.squared[kind as usize]
+    }
+
+    /// Number of scalar residuals of a kind of factor.
+    pub(crate) fn count(&self, kind: FactorKind) -> usize {
+        self.counts[kind as usize]
+    }
+
+    /// Objective of the solver: half the sum.
+    pub(crate) fn total(&self) -> f64 {
+        0.5 * SUM_ORDER.iter().map(|kind| self.of(*kind)).sum::<f64>()
+    }
+}
+
+impl Sink for Costs {
+    const DERIVATIVES: bool = false;
+
+    fn add(&mut self, label: FactorLabel, rows: &Rows<'_>) {
+        let residual = DVectorView::from_slice(rows.residual, rows.residual.len());
+        self.add_to(label.kind(), residual.norm_squared(), rows.residual.len());
+    }
+}

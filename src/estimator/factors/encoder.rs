@@ -1,0 +1,95 @@
+//! Encoder readings of a frame.
+
+use super::factor::{Block, Factor, Point, Rows, Sink};
+use super::kind::FactorLabel;
+use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::state::frame_state::FrameState;
+use crate::geometry::wrap_angle;
+use crate::sensors::JointAngles;
+
+/// Encoder readings of a frame: one row `(θ + θ̇·shift − reading) / σ` per joint.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EncoderFactor<'a> {
+    slot: usize,
+    reading: &'a JointAngles,
+    state: &'a FrameState,
+    /// Time offset of the encoders relative to the rig, in seconds.
+    shift_s: f64,
+    /// Column of the first joint angle.
+    joints: usize,
+    /// Column of the encoders' time offset, `None` if it is not estimated.
+    clock: Option<usize>,
+}
+
+/// Whitened residual of one joint angle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EncoderResidual {
+    pub(crate) residual: f64,
+    /// Derivative by the joint angle, in 1/rad.
+    pub(crate) by_angle: f64,
+    /// Derivative by the time offset, in 1/s.
+    pub(crate) by_clock: f64,
+}
+
+impl<'a> EncoderFactor<'a> {
+    /// Factor of the frame at `slot`, `None` without joints or readings.
+    pub(crate) fn of(point: &Point<'a>, slot: usize) -> Option<Self> {
+        let (calibration, state) = (&point.at.calibration, &point.at.frames[slot]);
+        let reading = point.frames[slot].encoder.as_ref().filter(|_| !state.joints_rad.is_empty())?;
+        Some(Self {
+            slot,
+            reading,
+            state,
+            shift_s: calibration.of(MAIN).encoder_shift_s(),
+            joints: point.layout.joints(slot).start,
+            clock: Self::clock(point),
+        })
+    }
+
+    /// Column of the encoders' time offset, `None` if it is not estimated.
+    pub(crate) fn clock(point: &Point<'_>) -> Option<usize> {
+        let calibration = &point.at.calibration;
+        let column = calibration.of(MAIN).encoder_shift_column()?;
+        Some(point.layout.calibration().start + calibration.columns(MAIN).start + column)
+    }
+
+    /// Residuals by joint.
+    pub(crate) fn residuals(&self) -> impl Iterator<Item = EncoderResidual> + '_ {
+        let readings = self.reading.angles_rad.iter().zip(&self.reading.sigmas_rad);
+        self.state.joints_rad.iter().zip(readings).enumerate().map(|(joint, (angle, (reading, sigma)))| {
+            let rate = self.state.joint_rate_rad_per_s(joint);
+            let by_angle = 1.0 / sigma;
+            EncoderResidual {
+                residual: wrap_angle(angle + rate * self.shift_s - reading) / sigma,
+                by_angle,
+                by_clock: by_angle * rate,
+            }
+        })
+    }
+}
+
+impl Factor for EncoderFactor<'_> {
+    fn label(&self) -> FactorLabel {
+        FactorLabel::Encoder(self.slot as u8)
+    }
+
+    fn rows<S: Sink>(&self, sink: &mut S) {
+        let terms: Vec<EncoderResidual> = self.residuals().collect();
+        let residual: Vec<f64> = terms.iter().map(|term| term.residual).collect();
+        let by_angles = diagonal(terms.iter().map(|term| term.by_angle));
+        let by_clock: Vec<f64> = terms.iter().map(|term| term.by_clock).collect();
+        let mut blocks = vec![Block { start: self.joints, entries: &by_angles }];
+        blocks.extend(self.clock.map(|start| Block { start, entries: &by_clock }));
+        sink.add(self.label(), &Rows { residual: &residual, blocks: &blocks, products: None });
+    }
+}
+
+/// Entries of a diagonal matrix, column by column.
+pub(super) fn diagonal(entries: impl ExactSizeIterator<Item = f64>) -> Vec<f64> {
+    let count = entries.len();
+    let mut matrix = vec![0.0; count * count];
+    for (index, entry) in entries.enumerate() {
+        matrix[index * (count + 1)] = entry;
+    }
+    matrix
+}

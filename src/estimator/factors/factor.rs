@@ -1,0 +1,84 @@
+//! A factor, its whitened rows, and the sinks that take them.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::kind::FactorLabel;
+use crate::estimator::state::estimate::Estimate;
+use crate::estimator::state::frame::Frame;
+use crate::estimator::state::frame_state::FrameState;
+use crate::estimator::state::layout::Layout;
+
+/// A factor of the least-squares problem: whitened residuals with their derivatives by columns of the layout.
+///
+/// Reprojection factors are separate ([`super::reprojection`]): their landmarks are eliminated before.
+pub(crate) trait Factor {
+    fn label(&self) -> FactorLabel;
+
+    /// Passes the rows to a sink: residuals at the current estimate, derivatives at the linearization point.
+    fn rows<S: Sink>(&self, sink: &mut S);
+}
+
+/// Use of the rows of factors: their cost, their normal equations, or the rows themselves.
+pub(crate) trait Sink {
+    /// False if derivatives are not used; factors then omit them.
+    const DERIVATIVES: bool;
+
+    /// True if rows of this factor are to be added.
+    fn wants(&self, _label: FactorLabel) -> bool {
+        true
+    }
+
+    fn add(&mut self, label: FactorLabel, rows: &Rows<'_>);
+
+    /// Adds the rows of a factor, if there is one and they are wanted.
+    fn take(&mut self, factor: Option<impl Factor>)
+    where
+        Self: Sized,
+    {
+        if let Some(factor) = factor.filter(|factor| self.wants(factor.label())) {
+            factor.rows(self);
+        }
+    }
+}
+
+/// Whitened rows of a factor.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rows<'a> {
+    /// Residual over its standard deviation (m × 1).
+    pub(crate) residual: &'a [f64],
+    /// Derivatives by columns of the layout; empty if the sink does not use derivatives.
+    pub(crate) blocks: &'a [Block<'a>],
+    /// Normal equations of these rows, `None` if they are to be computed from the blocks.
+    pub(crate) products: Option<Products<'a>>,
+}
+
+/// Derivative by consecutive columns of the layout.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Block<'a> {
+    /// First column of the layout.
+    pub(crate) start: usize,
+    /// Entries (m × n), column by column.
+    pub(crate) entries: &'a [f64],
+}
+
+/// Normal equations of a factor by the columns of its blocks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Products<'a> {
+    /// `JᵀJ`.
+    pub(crate) hessian: &'a DMatrix<f64>,
+    /// `Jᵀr`.
+    pub(crate) gradient: &'a DVector<f64>,
+}
+
+/// States and measurements from which the factors of a window are made.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Point<'a> {
+    pub(crate) layout: Layout,
+    pub(crate) frames: &'a [Frame],
+    /// Gravity in the world frame, in m/s².
+    pub(crate) gravity_in_world: &'a Vector3<f64>,
+    /// Estimate at which residuals are evaluated.
+    pub(crate) at: &'a Estimate,
+    /// States at which derivatives are evaluated, by slot.
+    pub(crate) linearized: &'a [FrameState],
+}

@@ -1,0 +1,58 @@
+//! Reprojection factors as whitened rows `[columns of the layout | residual]`, for marginalization and reports.
+
+use nalgebra::DMatrix;
+
+use super::problem::Problem;
+use crate::estimator::factors::labelled_rows::stack;
+use crate::estimator::factors::projected_rows::{NewestRows, ProjectedRows};
+use crate::estimator::state::camera_pose::CameraMaps;
+use crate::estimator::state::camera_view::CameraView;
+use crate::estimator::state::estimate::Estimate;
+
+impl Problem<'_> {
+    /// Rows of the reprojection factors after elimination of the landmarks; at most `6·frames` rows per camera.
+    pub(crate) fn visual_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
+        let frames = self.linearization_frames(estimate);
+        let calibration = self.linearization_calibration(&estimate.calibration);
+        let seeing = (0..self.cameras.len()).filter(|camera| !self.cameras[*camera].tracks.is_empty());
+        let rows: Vec<DMatrix<f64>> = seeing
+            .map(|camera| {
+                let maps = CameraMaps::new(&frames, calibration.of(camera));
+                let linearized = self.view(camera, &frames, &calibration);
+                let projected = self.projected_rows(camera, estimate, &linearized, NewestRows::Among);
+                self.carried_rows(camera, &projected, &maps)
+            })
+            .collect();
+        stack(rows.iter(), 0..self.layout.total() + 1)
+    }
+
+    /// Rows of the reprojection factors of one camera by its blocks, landmarks eliminated; derivatives at `linearized`.
+    pub(crate) fn projected_rows(
+        &self,
+        camera: usize,
+        estimate: &Estimate,
+        linearized: &CameraView<'_>,
+        apart: NewestRows,
+    ) -> ProjectedRows {
+        let factors = &self.cameras[camera];
+        let current = self.view(camera, &estimate.frames, &estimate.calibration);
+        let landmarks = &estimate.landmarks[camera];
+        ProjectedRows::new(&factors.visual, &current, linearized, factors.tracks, landmarks, apart)
+    }
+
+    /// Converts rows by the blocks of a camera to rows by the unknowns.
+    pub(crate) fn carried_rows(&self, camera: usize, projected: &ProjectedRows, maps: &CameraMaps) -> DMatrix<f64> {
+        let by_camera = &projected.rows;
+        let total = self.layout.total();
+        let height = by_camera.nrows();
+        let calibration = &self.cameras[camera].columns;
+        let mut rows = DMatrix::zeros(height, total + 1);
+        for block in 0..maps.blocks() {
+            let columns = by_camera.view((0, 6 * block), (height, 6));
+            rows.columns_range_mut(maps.columns(&self.layout, block)).gemm(1.0, &columns, &maps.own[block], 1.0);
+            rows.columns_range_mut(calibration.clone()).gemm(1.0, &columns, &maps.calibration[block], 1.0);
+        }
+        rows.set_column(total, &by_camera.view((0, 6 * maps.blocks()), (height, 1)).column(0));
+        rows
+    }
+}
