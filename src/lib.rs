@@ -33,9 +33,10 @@
 //!
 //! Equations and parameterizations: docs/mathematics.md, sections 2 and 3; rank rule: docs/mathematics.md, section 8.
 //!
-//! Documents: `docs/tutorial.md` and `docs/manual.md` (the window), `docs/recordings.md` (from a recording
-//! to a run), `docs/commands.md`, `docs/formats.md` (logs, rigs, written files), `docs/accuracy.md`, `docs/architecture.md`, `docs/coming_from.md` (Kalibr,
-//! VINS-Fusion, OpenVINS), `docs/packages.md`.
+//! Documents: `docs/tutorial.md` and `docs/manual.md` (the window), `docs/recordings.md` (from a recording to a run),
+//! `docs/commands.md`, `docs/formats.md` (logs, rigs, written files), `docs/accuracy.md` and `docs/experiments/`
+//! (results), `docs/architecture.md`, `docs/libraries.md`, `docs/coming_from.md` (Kalibr, VINS-Fusion, OpenVINS),
+//! `docs/packages.md`.
 //!
 //! # The estimator as a library
 //!

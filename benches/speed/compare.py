@@ -44,7 +44,7 @@ def main():
     ratios = {spec: [] for spec in TARGETS}
     for _ in range(repetitions):
         for spec in TARGETS:
-            # The speed of a shared machine changes from minute to minute: each run is divided by a unit of its own.
+            # The speed of a shared machine changes from minute to minute: each run is divided by a separate measurement of the unit.
             unit, run = unit_ms(log), run_ms(dcvins, log, spec)
             units.append(unit)
             runs[spec].append(run)

@@ -2,7 +2,7 @@
 
 `unit.py LOG` prints milliseconds per image, the mean over the images of all cameras. The front end is that of VINS-Fusion with its options: calcOpticalFlowPyrLK
 with windows of 21x21 pixels and a maximum level of 3, back again from the found positions with a maximum level of 1, and
-goodFeaturesToTrack for the missing corners beside those that are tracked. Reading the log is not counted.
+goodFeaturesToTrack for the missing corners in addition to the tracked ones. Reading the log is not counted.
 """
 
 import sys

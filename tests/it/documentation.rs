@@ -12,15 +12,15 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// All Rust files below a folder, ordered by path.
-fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
+/// All files below a folder with this extension, ordered by path.
+fn files_below(folder: &Path, wanted: &str, found: &mut Vec<PathBuf>) {
     let entries = fs::read_dir(folder).expect("the folder can be listed");
     let mut entries: Vec<PathBuf> = entries.map(|entry| entry.expect("the entry can be read").path()).collect();
     entries.sort();
     for path in entries {
         if path.is_dir() {
-            rust_files(&path, found);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files_below(&path, wanted, found);
+        } else if path.extension().is_some_and(|extension| extension == wanted) {
             found.push(path);
         }
     }
@@ -57,7 +57,7 @@ fn cited_sections_of_the_mathematics_exist() {
     assert_eq!(headings, (1..=11).collect::<Vec<u32>>(), "sections are numbered from 1");
     let mut files = Vec::new();
     for folder in ["src", "tests", "benches"] {
-        rust_files(&root().join(folder), &mut files);
+        files_below(&root().join(folder), "rs", &mut files);
     }
     let mut cited = 0;
     for path in files.iter().filter(|path| !path.ends_with("tests/it/documentation.rs")) {
@@ -87,11 +87,8 @@ fn citations_are_read() {
 
 /// All documents for readers.
 fn documents() -> Vec<PathBuf> {
-    let folder = fs::read_dir(root().join("docs")).expect("the folder can be listed");
-    let mut paths: Vec<PathBuf> = folder.map(|entry| entry.expect("the entry can be read").path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == "md"));
-    paths.extend(["README.md", "assets/README.md", "sample_logs/README.md"].map(|name| root().join(name)));
-    paths.sort();
+    let mut paths = Vec::from(["README.md", "assets/README.md", "sample_logs/README.md"].map(|name| root().join(name)));
+    files_below(&root().join("docs"), "md", &mut paths);
     paths
 }
 

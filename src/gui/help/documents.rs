@@ -11,19 +11,39 @@ struct Document {
     text: &'static str,
 }
 
+macro_rules! document {
+    ($path:literal) => {
+        Document { path: $path, text: include_str!(concat!("../../../", $path)) }
+    };
+}
+
 /// The manual is first.
-const DOCUMENTS: [Document; 11] = [
-    Document { path: "docs/manual.md", text: include_str!("../../../docs/manual.md") },
-    Document { path: "docs/tutorial.md", text: include_str!("../../../docs/tutorial.md") },
-    Document { path: "docs/recordings.md", text: include_str!("../../../docs/recordings.md") },
-    Document { path: "docs/commands.md", text: include_str!("../../../docs/commands.md") },
-    Document { path: "docs/formats.md", text: include_str!("../../../docs/formats.md") },
-    Document { path: "docs/coming_from.md", text: include_str!("../../../docs/coming_from.md") },
-    Document { path: "docs/mathematics.md", text: include_str!("../../../docs/mathematics.md") },
-    Document { path: "docs/accuracy.md", text: include_str!("../../../docs/accuracy.md") },
-    Document { path: "docs/packages.md", text: include_str!("../../../docs/packages.md") },
-    Document { path: "docs/architecture.md", text: include_str!("../../../docs/architecture.md") },
-    Document { path: "assets/README.md", text: include_str!("../../../assets/README.md") },
+const DOCUMENTS: [Document; 25] = [
+    document!("docs/manual.md"),
+    document!("docs/tutorial.md"),
+    document!("docs/recordings.md"),
+    document!("docs/commands.md"),
+    document!("docs/formats.md"),
+    document!("docs/coming_from.md"),
+    document!("docs/mathematics.md"),
+    document!("docs/accuracy.md"),
+    document!("docs/packages.md"),
+    document!("docs/architecture.md"),
+    document!("assets/README.md"),
+    document!("docs/libraries.md"),
+    document!("docs/experiments/README.md"),
+    document!("docs/experiments/images_and_front_end.md"),
+    document!("docs/experiments/encoders_and_joint_angles.md"),
+    document!("docs/experiments/robustness.md"),
+    document!("docs/experiments/second_pass_and_first_seconds.md"),
+    document!("docs/experiments/solver_and_first_window.md"),
+    document!("docs/experiments/shutters_and_intrinsics.md"),
+    document!("docs/experiments/imu_noise.md"),
+    document!("docs/experiments/rigs_and_recordings.md"),
+    document!("docs/experiments/batch_reference.md"),
+    document!("docs/experiments/speed_and_memory.md"),
+    document!("docs/experiments/regression_guard.md"),
+    document!("docs/experiments/tried_and_not_used.md"),
 ];
 
 /// Index of an embedded document in the list; the default is the manual.

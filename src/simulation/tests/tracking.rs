@@ -1,6 +1,6 @@
 //! Tracks of the front end on simulated images, compared with the visible surfaces.
 
-#![expect(clippy::print_stdout, reason = "docs/accuracy.md states the errors that are printed with --nocapture")]
+#![expect(clippy::print_stdout, reason = "docs/experiments/images_and_front_end.md has the printed errors")]
 
 use std::collections::BTreeMap;
 
