@@ -10,15 +10,14 @@ use super::frame_sets::FrameSet;
 use super::pairs::{ViewPair, ViewRows, add_pairs};
 use super::state::{Camera, Columns, Estimate, ViewId, ViewMap};
 use super::visual::{self, PixelModel, ReducedVisualEquations, Track, VisualEquations};
-use crate::estimator::preintegration::Vector15;
-use crate::estimator::{NavigationState, imu_factor};
-use crate::geometry::{RigidTransform, so3, wrap_angle};
+use crate::estimator::factors::costs::Costs;
+use crate::estimator::factors::encoder::EncoderFactor;
+use crate::estimator::factors::factor::{Block, Factor, NavigationColumns, Rows, Sink};
+use crate::estimator::factors::imu::ImuFactor;
+use crate::estimator::factors::kind::FactorLabel;
+use crate::estimator::factors::start_prior::{StartPrior, StartPriorFactor};
+use crate::geometry::{RigidTransform, so3};
 use crate::optimization::CameraPose;
-
-/// Standard deviation of the first position in metres; only fixes the gauge.
-const GAUGE_SIGMA_M: f64 = 1e-3;
-/// Standard deviation of the first heading in radians; only fixes the gauge.
-const GAUGE_SIGMA_RAD: f64 = 1e-4;
 
 #[derive(Clone, Debug)]
 pub(super) struct Priors {
@@ -28,10 +27,8 @@ pub(super) struct Priors {
     /// Standard deviations of the extrinsics per axis, in metres and radians.
     pub(super) extrinsics_sigmas: (f64, f64),
     pub(super) time_shift_sigma_s: f64,
-    /// Standard deviations of the first biases about zero, in rad/s and m/s².
-    pub(super) bias_sigmas: (f64, f64),
-    /// State of the first frame set, which fixes the gauge.
-    pub(super) first: NavigationState,
+    /// Prior on the first frame set, which fixes the gauge, and on its biases.
+    pub(super) start: StartPrior,
 }
 
 #[derive(Clone, Debug)]
@@ -44,28 +41,19 @@ pub(super) struct Bundle<'a> {
     pub(super) tracks: &'a [Track],
 }
 
-/// Residual and derivatives of one encoder reading.
-struct EncoderEquation {
-    /// Column of the joint angle in the band.
-    column: usize,
-    information: f64,
-    /// `q − reading` in radians; the reading is corrected by the gimbal camera's time offset.
-    residual: f64,
-    /// Rate of change of the reading, in rad/s.
-    rate: f64,
+/// Priors on the border: one row per column.
+struct BorderPrior<'a> {
+    priors: &'a Priors,
+    columns: Columns,
+    estimate: &'a Estimate,
 }
 
 /// Normal equations; those of the visual factors are kept over the view poses.
 pub(super) struct BundleEquations {
     visual: VisualEquations,
     maps: BTreeMap<ViewId, ViewMap>,
-    /// IMU rows of each pair of neighbouring frame sets: first column, whitened Jacobian, residual.
-    imu: Vec<(usize, DMatrix<f64>, Vector15)>,
-    encoders: Vec<EncoderEquation>,
-    /// Jacobian and residual of the priors on the first frame set.
-    first: (DMatrix<f64>, DVector<f64>),
-    border_hessian: DMatrix<f64>,
-    border_gradient: DVector<f64>,
+    /// Rows of all other factors; columns of the band, then of the border.
+    others: StoredRows,
 }
 
 impl Bundle<'_> {
@@ -89,97 +77,68 @@ impl Bundle<'_> {
 
     /// Twice the cost: sum of the robust squared whitened residuals.
     pub(super) fn cost(&self, estimate: &Estimate) -> f64 {
-        let mut cost = self.pixels.cost(&self.poses(estimate), self.tracks, &estimate.landmarks);
+        let mut costs = Costs::default();
+        self.factors(estimate, &mut costs);
+        self.pixels.cost(&self.poses(estimate), self.tracks, &estimate.landmarks) + 2.0 * costs.total()
+    }
+
+    /// Passes all factors but the reprojections to a sink; columns are those of the band, then of the border.
+    fn factors(&self, estimate: &Estimate, sink: &mut impl Sink) {
         for frame_set in 1..self.frame_sets.len() {
-            if let Some(residual) = self.imu_residual(frame_set, estimate) {
-                cost += residual.norm_squared();
-            }
+            sink.take(self.imu_factor(frame_set, estimate));
         }
-        for (_, information, residual) in self.encoder_terms(estimate) {
-            cost += residual * residual * information;
+        for frame_set in 0..self.frame_sets.len() {
+            sink.take(self.encoder_factor(frame_set, estimate));
         }
-        cost += self.first_rows(estimate).1.norm_squared();
-        cost + self.border_rows(estimate).1.norm_squared()
+        let state = &estimate.navigation[0];
+        sink.take(Some(StartPriorFactor { prior: &self.priors.start, state, columns: self.navigation_columns(0) }));
+        sink.take(Some(self.border_prior(estimate)));
     }
 
-    fn imu_residual(&self, frame_set: usize, estimate: &Estimate) -> Option<Vector15> {
+    /// IMU factor that ends at a frame set, `None` without samples.
+    fn imu_factor<'s>(&'s self, frame_set: usize, estimate: &'s Estimate) -> Option<ImuFactor<'s>> {
         let (motion, information) = self.frame_sets[frame_set].motion.as_ref()?;
-        let (from, to) = (&estimate.navigation[frame_set - 1], &estimate.navigation[frame_set]);
-        Some(information * imu_factor::residual(motion, from, to, &self.gravity_in_world))
+        let states = [&estimate.navigation[frame_set - 1], &estimate.navigation[frame_set]];
+        Some(ImuFactor {
+            slot: frame_set,
+            motion,
+            information,
+            gravity_in_world: &self.gravity_in_world,
+            current: states,
+            linearized: states,
+            columns: [frame_set - 1, frame_set].map(|frame_set| self.navigation_columns(frame_set)),
+            intrinsics: None,
+        })
     }
 
-    /// `((frame_set, joint), 1/σ², q − reading)` of every encoder reading, corrected by the gimbal camera's
-    /// time offset.
-    fn encoder_terms<'s>(&'s self, estimate: &'s Estimate) -> impl Iterator<Item = ((usize, usize), f64, f64)> + 's {
-        let shift_s = estimate.shifts_s[1];
-        self.frame_sets
-            .iter()
-            .enumerate()
-            .filter_map(|(index, frame_set)| Some((index, frame_set.gimbal.as_ref()?)))
-            .flat_map(move |(index, gimbal)| {
-                let angles = &estimate.joints_rad[index];
-                let encoder = &gimbal.encoder;
-                let readings = encoder.angles_rad.iter().zip(&encoder.sigmas_rad).zip(&gimbal.reading_rate_rad_per_s);
-                angles.iter().zip(readings).enumerate().map(move |(joint, (angle, ((reading, sigma), rate)))| {
-                    ((index, joint), 1.0 / (sigma * sigma), wrap_angle(angle - reading - rate * shift_s))
-                })
-            })
+    /// Encoder factor of a frame set: the reading at the gimbal camera's image moves with the camera's time offset.
+    fn encoder_factor<'s>(&'s self, frame_set: usize, estimate: &'s Estimate) -> Option<EncoderFactor<'s>> {
+        let gimbal = self.frame_sets[frame_set].gimbal.as_ref()?;
+        Some(EncoderFactor {
+            slot: frame_set,
+            reading: &gimbal.encoder,
+            angles_rad: &estimate.joints_rad[frame_set],
+            rates_rad_per_s: gimbal.reading_rate_rad_per_s.iter().map(|rate| -rate).collect(),
+            shift_s: estimate.shifts_s[1],
+            joints: frame_set * self.columns.block() + Columns::joint(0),
+            clock: Some(self.columns.band() + self.columns.gimbal_shift()),
+        })
     }
 
-    /// Rows of the priors on the first frame set (Jacobian rows × 15, residual): position and heading of the gauge,
-    /// biases.
-    fn first_rows(&self, estimate: &Estimate) -> (DMatrix<f64>, DVector<f64>) {
-        let (state, first) = (&estimate.navigation[0], &self.priors.first);
-        let (gyroscope, accelerometer) = self.priors.bias_sigmas;
-        let mut rows = DMatrix::zeros(10, 15);
-        let mut residual = DVector::zeros(10);
-        let rotation_error = so3::log(&(first.world_from_imu.rotation.inverse() * state.world_from_imu.rotation));
-        // Vertical in the IMU frame of the first frame set.
-        let vertical: Vector3<f64> = first.world_from_imu.rotation.inverse() * Vector3::z();
-        let heading = vertical.transpose() * so3::right_jacobian_inverse(&rotation_error);
-        rows.fixed_view_mut::<1, 3>(0, 0).copy_from(&(heading / GAUGE_SIGMA_RAD));
-        residual[0] = vertical.dot(&rotation_error) / GAUGE_SIGMA_RAD;
-        let shift = state.world_from_imu.translation_m - first.world_from_imu.translation_m;
-        for axis in 0..3 {
-            rows[(1 + axis, 3 + axis)] = 1.0 / GAUGE_SIGMA_M;
-            residual[1 + axis] = shift[axis] / GAUGE_SIGMA_M;
-            rows[(4 + axis, 9 + axis)] = 1.0 / gyroscope;
-            residual[4 + axis] = state.bias.gyroscope_rad_per_s[axis] / gyroscope;
-            rows[(7 + axis, 12 + axis)] = 1.0 / accelerometer;
-            residual[7 + axis] = state.bias.accelerometer_m_per_s2[axis] / accelerometer;
-        }
-        (rows, residual)
+    fn border_prior<'s>(&'s self, estimate: &'s Estimate) -> BorderPrior<'s> {
+        BorderPrior { priors: self.priors, columns: self.columns, estimate }
     }
 
-    /// Rows of the priors on the border (Jacobian rows × borders, whitened residual).
-    fn border_rows(&self, estimate: &Estimate) -> (DMatrix<f64>, DVector<f64>) {
-        let columns = &self.columns;
-        let count = columns.borders();
-        let (mut rows, mut residual) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        let (translation_m, rotation_rad) = self.priors.extrinsics_sigmas;
-        let change = estimate.extrinsics.minus(&self.priors.extrinsics);
-        let rotation_error: Vector3<f64> = change.fixed_rows::<3>(0).into_owned();
-        rows.fixed_view_mut::<3, 3>(0, 0).copy_from(&(so3::right_jacobian_inverse(&rotation_error) / rotation_rad));
-        residual.fixed_rows_mut::<3>(0).copy_from(&(rotation_error / rotation_rad));
-        for axis in 3..6 {
-            rows[(axis, axis)] = 1.0 / translation_m;
-            residual[axis] = change[axis] / translation_m;
-        }
-        for (column, shift_s) in
-            [(Columns::STATIC_SHIFT, estimate.shifts_s[0]), (columns.gimbal_shift(), estimate.shifts_s[1])]
-        {
-            rows[(column, column)] = 1.0 / self.priors.time_shift_sigma_s;
-            residual[column] = shift_s / self.priors.time_shift_sigma_s;
-        }
-        let chain = Columns::CHAIN..columns.gimbal_shift();
-        rows.view_range_mut(chain.clone(), chain.clone()).copy_from(self.priors.chain.jacobian());
-        residual.rows_range_mut(chain).copy_from(&self.priors.chain.residual(&estimate.chain));
-        (rows, residual)
+    /// Columns of a navigation state in the band.
+    fn navigation_columns(&self, frame_set: usize) -> NavigationColumns {
+        let start = frame_set * self.columns.block();
+        let column = |entry: usize| start + self.columns.navigation(entry);
+        NavigationColumns { pose: column(0), velocity: column(6), biases: column(9) }
     }
 
     /// Information matrix of the priors on the border (borders × borders).
     pub(super) fn border_prior_information(&self, estimate: &Estimate) -> DMatrix<f64> {
-        let (rows, _) = self.border_rows(estimate);
+        let (rows, _) = self.border_prior(estimate).jacobian_and_residual();
         rows.tr_mul(&rows)
     }
 
@@ -188,40 +147,13 @@ impl Bundle<'_> {
         let map =
             |view: ViewId| (view, estimate.view_map(view, &self.columns, self.frame_sets, &self.gravity_in_world));
         let maps: BTreeMap<ViewId, ViewMap> = poses.keys().map(|view| map(*view)).collect();
-        let (border_rows, border_residual) = self.border_rows(estimate);
-        let mut equations = BundleEquations {
+        let mut others = StoredRows::default();
+        self.factors(estimate, &mut others);
+        BundleEquations {
             visual: visual::equations(&self.pixels, &poses, self.tracks, &estimate.landmarks),
             maps,
-            imu: Vec::with_capacity(self.frame_sets.len()),
-            encoders: Vec::new(),
-            first: self.first_rows(estimate),
-            border_hessian: border_rows.tr_mul(&border_rows),
-            border_gradient: border_rows.tr_mul(&border_residual),
-        };
-        for frame_set in 1..self.frame_sets.len() {
-            let Some(residual) = self.imu_residual(frame_set, estimate) else { continue };
-            let Some((motion, information)) = &self.frame_sets[frame_set].motion else { continue };
-            let (from, to) = (&estimate.navigation[frame_set - 1], &estimate.navigation[frame_set]);
-            let (by_from, by_to) = imu_factor::jacobians(motion, from, to, &self.gravity_in_world);
-            let mut rows = DMatrix::zeros(15, 30);
-            rows.fixed_columns_mut::<15>(0).copy_from(&(information * by_from));
-            rows.fixed_columns_mut::<15>(15).copy_from(&(information * by_to));
-            equations.imu.push((frame_set, rows, residual));
+            others,
         }
-        for ((frame_set, joint), information, residual) in self.encoder_terms(estimate) {
-            equations.encoders.push(EncoderEquation {
-                column: frame_set * self.columns.block() + Columns::joint(joint),
-                information,
-                residual,
-                rate: self.frame_sets[frame_set].gimbal.as_ref().map_or(0.0, |g| g.reading_rate_rad_per_s[joint]),
-            });
-        }
-        equations
-    }
-
-    /// Column in the band of an entry of a navigation state.
-    fn navigation_column(&self, frame_set: usize, entry: usize) -> usize {
-        frame_set * self.columns.block() + self.columns.navigation(entry)
     }
 
     /// Largest number of frame sets between two observations of one landmark, at least one for the IMU factors.
@@ -245,34 +177,24 @@ impl Bundle<'_> {
         let mut matrix =
             ArrowMatrix::zeros(columns.band(), (self.reach() + 1) * columns.block() - 1, columns.borders(), memory);
         let mut band = vec![0.0; columns.band()];
-        let mut border = -&equations.border_gradient;
-        *matrix.corner_mut() += &equations.border_hessian;
-        for (frame_set, rows, residual) in &equations.imu {
-            let column = |entry: usize| self.navigation_column(frame_set - 1 + entry / 15, entry % 15);
-            let hessian = rows.tr_mul(rows);
-            let gradient = rows.tr_mul(residual);
-            for a in 0..30 {
-                band[column(a)] -= gradient[a];
-                for b in 0..30 {
-                    matrix.add(column(a), column(b), hessian[(a, b)]);
+        let mut border = DVector::zeros(columns.borders());
+        for rows in &equations.others.rows {
+            let hessian = rows.jacobian.tr_mul(&rows.jacobian);
+            let gradient = rows.jacobian.tr_mul(&rows.residual);
+            for (a, row) in rows.columns.iter().enumerate() {
+                match row.checked_sub(columns.band()) {
+                    None => band[*row] -= gradient[a],
+                    Some(row) => border[row] -= gradient[a],
                 }
-            }
-        }
-        let shift = columns.gimbal_shift();
-        for encoder in &equations.encoders {
-            let EncoderEquation { column, information, residual, rate } = *encoder;
-            matrix.add(column, column, information);
-            matrix.add_border(shift, column, -rate * information);
-            matrix.corner_mut()[(shift, shift)] += rate * rate * information;
-            band[column] -= information * residual;
-            border[shift] += rate * information * residual;
-        }
-        let (rows, residual) = &equations.first;
-        let (hessian, gradient) = (rows.tr_mul(rows), rows.tr_mul(residual));
-        for a in 0..15 {
-            band[self.navigation_column(0, a)] -= gradient[a];
-            for b in 0..15 {
-                matrix.add(self.navigation_column(0, a), self.navigation_column(0, b), hessian[(a, b)]);
+                for (b, column) in rows.columns.iter().enumerate() {
+                    let entry = hessian[(a, b)];
+                    match (row.checked_sub(columns.band()), column.checked_sub(columns.band())) {
+                        (None, None) => matrix.add(*row, *column, entry),
+                        (Some(row), None) => matrix.add_border(row, *column, entry),
+                        (Some(row), Some(column)) => matrix.corner_mut()[(row, column)] += entry,
+                        (None, Some(_)) => {}
+                    }
+                }
             }
         }
         for (view, gradient) in reduced.poses.gradients() {
@@ -309,6 +231,71 @@ impl Bundle<'_> {
             (*view, Vector6::from_column_slice(moved.as_slice()))
         };
         equations.maps.iter().map(step).collect()
+    }
+}
+
+impl BorderPrior<'_> {
+    /// Whitened Jacobian (borders × borders) and residual.
+    fn jacobian_and_residual(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let Self { priors, columns, estimate } = self;
+        let count = columns.borders();
+        let (mut rows, mut residual) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let (translation_m, rotation_rad) = priors.extrinsics_sigmas;
+        let change = estimate.extrinsics.minus(&priors.extrinsics);
+        let rotation_error: Vector3<f64> = change.fixed_rows::<3>(0).into_owned();
+        rows.fixed_view_mut::<3, 3>(0, 0).copy_from(&(so3::right_jacobian_inverse(&rotation_error) / rotation_rad));
+        residual.fixed_rows_mut::<3>(0).copy_from(&(rotation_error / rotation_rad));
+        for axis in 3..6 {
+            rows[(axis, axis)] = 1.0 / translation_m;
+            residual[axis] = change[axis] / translation_m;
+        }
+        for (column, shift_s) in
+            [(Columns::STATIC_SHIFT, estimate.shifts_s[0]), (columns.gimbal_shift(), estimate.shifts_s[1])]
+        {
+            rows[(column, column)] = 1.0 / priors.time_shift_sigma_s;
+            residual[column] = shift_s / priors.time_shift_sigma_s;
+        }
+        let chain = Columns::CHAIN..columns.gimbal_shift();
+        rows.view_range_mut(chain.clone(), chain.clone()).copy_from(priors.chain.jacobian());
+        residual.rows_range_mut(chain).copy_from(&priors.chain.residual(&estimate.chain));
+        (rows, residual)
+    }
+}
+
+impl Factor for BorderPrior<'_> {
+    fn label(&self) -> FactorLabel {
+        FactorLabel::CalibrationPrior
+    }
+
+    fn rows<S: Sink>(&self, sink: &mut S) {
+        let (jacobian, residual) = self.jacobian_and_residual();
+        let blocks = [Block { start: self.columns.band(), entries: jacobian.as_slice() }];
+        sink.add(self.label(), &Rows { residual: residual.as_slice(), blocks: &blocks, products: None });
+    }
+}
+
+/// Rows of factors, kept for several assemblies.
+#[derive(Default)]
+struct StoredRows {
+    rows: Vec<StoredFactor>,
+}
+
+struct StoredFactor {
+    /// Column of the bundle for each column of the Jacobian.
+    columns: Vec<usize>,
+    jacobian: DMatrix<f64>,
+    residual: DVector<f64>,
+}
+
+impl Sink for StoredRows {
+    const DERIVATIVES: bool = true;
+
+    fn add(&mut self, _label: FactorLabel, rows: &Rows<'_>) {
+        let height = rows.residual.len();
+        let columns: Vec<usize> = rows.columns().collect();
+        let entries = rows.blocks.iter().flat_map(|block| block.entries.iter().copied());
+        let jacobian = DMatrix::from_iterator(height, columns.len(), entries);
+        self.rows.push(StoredFactor { columns, jacobian, residual: DVector::from_column_slice(rows.residual) });
     }
 }
 

@@ -18,8 +18,9 @@ use super::state::{Camera, Columns, Estimate};
 use super::statistics::Statistics;
 use super::trajectory::InitialTrajectory;
 use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
-use crate::estimator::{ColumnBlock, ColumnId, Linearization, NavigationState, gravity_in_world, imu_factor};
-use crate::geometry::seconds_from_ns;
+use crate::estimator::factors::start_prior::StartPrior;
+use crate::estimator::{ColumnBlock, ColumnId, ImuBias, Linearization, NavigationState, gravity_in_world, imu_factor};
+use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::gimbal::Chain;
 use crate::observability::{RankReport, analyse};
 use crate::sensors::JointAngles;
@@ -254,8 +255,12 @@ fn priors(input: &CalibrationInput, options: &CalibrationOptions, navigation: &[
         extrinsics: input.static_camera.imu_from_camera,
         extrinsics_sigmas: input.static_camera.prior.sigmas(),
         time_shift_sigma_s: options.time_shift_sigma_s,
-        bias_sigmas: options.bias_sigmas,
-        first: navigation.first().copied().unwrap_or_default(),
+        start: StartPrior {
+            reference: navigation.first().map_or_else(RigidTransform::identity, |first| first.world_from_imu),
+            bias: ImuBias::default(),
+            gyroscope_bias_sigma: Vector3::repeat(options.bias_sigmas.0),
+            accelerometer_bias_sigma: Vector3::repeat(options.bias_sigmas.1),
+        },
     }
 }
 
@@ -332,7 +337,7 @@ fn imu_residual_report(
     for index in 1..frame_sets.len() {
         let Some((motion, _)) = &frame_sets[index].motion else { continue };
         let residual =
-            imu_factor::residual(motion, &estimate.navigation[index - 1], &estimate.navigation[index], &gravity);
+            imu_factor::residual(motion, &estimate.navigation[index - 1], &estimate.navigation[index], &gravity, None);
         gyroscope.push(residual.fixed_rows::<3>(0).norm() / motion.duration_s());
         accelerometer.push(residual.fixed_rows::<3>(6).norm() / motion.duration_s());
     }

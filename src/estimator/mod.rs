@@ -6,7 +6,7 @@ mod config;
 #[expect(clippy::module_inception, reason = "the type that the folder is about")]
 mod estimator;
 mod explain;
-mod factors;
+pub(crate) mod factors;
 pub mod initialization;
 mod interventions;
 mod packed;

@@ -51,7 +51,8 @@ impl DenseEquations {
     /// Adds given products.
     fn add_products(&mut self, rows: &Rows<'_>, products: Products<'_>) {
         let columns = &mut self.scratch.columns;
-        columns_of(rows, columns);
+        columns.clear();
+        columns.extend(rows.columns());
         for (local, column) in columns.iter().enumerate() {
             self.gradient[*column] += products.gradient[local];
             let mut target = self.hessian.column_mut(*column);
@@ -64,7 +65,8 @@ impl DenseEquations {
     /// Adds rows with several blocks.
     fn add_blocks(&mut self, rows: &Rows<'_>) {
         let scratch = &mut self.scratch;
-        columns_of(rows, &mut scratch.columns);
+        scratch.columns.clear();
+        scratch.columns.extend(rows.columns());
         match scratch.columns.len() {
             // A constant width lets the compiler unroll the loops.
             IMU_COLUMNS => scratch.multiply(rows, IMU_COLUMNS),
@@ -106,13 +108,6 @@ impl Scratch {
             }
         }
     }
-}
-
-/// Columns of the layout, block by block.
-fn columns_of(rows: &Rows<'_>, columns: &mut Vec<usize>) {
-    let height = rows.residual.len();
-    columns.clear();
-    columns.extend(rows.blocks.iter().flat_map(|block| block.start..block.start + block.entries.len() / height));
 }
 
 impl Sink for DenseEquations {

@@ -3,22 +3,25 @@
 use super::factor::{Block, Factor, Point, Rows, Sink};
 use super::kind::FactorLabel;
 use crate::estimator::state::calibrations::MAIN;
-use crate::estimator::state::frame_state::FrameState;
 use crate::geometry::wrap_angle;
 use crate::sensors::JointAngles;
 
 /// Encoder readings of a frame: one row `(θ + θ̇·shift − reading) / σ` per joint.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct EncoderFactor<'a> {
-    slot: usize,
-    reading: &'a JointAngles,
-    state: &'a FrameState,
+    /// Slot of the frame.
+    pub(crate) slot: usize,
+    pub(crate) reading: &'a JointAngles,
+    /// Joint angles θ, in radians.
+    pub(crate) angles_rad: &'a [f64],
+    /// Rate θ̇ of each joint at the reading, in rad/s.
+    pub(crate) rates_rad_per_s: Vec<f64>,
     /// Time offset of the encoders relative to the rig, in seconds.
-    shift_s: f64,
+    pub(crate) shift_s: f64,
     /// Column of the first joint angle.
-    joints: usize,
+    pub(crate) joints: usize,
     /// Column of the encoders' time offset, `None` if it is not estimated.
-    clock: Option<usize>,
+    pub(crate) clock: Option<usize>,
 }
 
 /// Whitened residual of one joint angle.
@@ -39,7 +42,8 @@ impl<'a> EncoderFactor<'a> {
         Some(Self {
             slot,
             reading,
-            state,
+            angles_rad: &state.joints_rad,
+            rates_rad_per_s: (0..state.joints_rad.len()).map(|joint| state.joint_rate_rad_per_s(joint)).collect(),
             shift_s: calibration.of(MAIN).encoder_shift_s(),
             joints: point.layout.joints(slot).start,
             clock: Self::clock(point),
@@ -56,8 +60,8 @@ impl<'a> EncoderFactor<'a> {
     /// Residuals by joint.
     pub(crate) fn residuals(&self) -> impl Iterator<Item = EncoderResidual> + '_ {
         let readings = self.reading.angles_rad.iter().zip(&self.reading.sigmas_rad);
-        self.state.joints_rad.iter().zip(readings).enumerate().map(|(joint, (angle, (reading, sigma)))| {
-            let rate = self.state.joint_rate_rad_per_s(joint);
+        let joints = self.angles_rad.iter().zip(&self.rates_rad_per_s);
+        joints.zip(readings).map(|((angle, rate), (reading, sigma))| {
             let by_angle = 1.0 / sigma;
             EncoderResidual {
                 residual: wrap_angle(angle + rate * self.shift_s - reading) / sigma,
@@ -70,7 +74,7 @@ impl<'a> EncoderFactor<'a> {
 
 impl Factor for EncoderFactor<'_> {
     fn label(&self) -> FactorLabel {
-        FactorLabel::Encoder(self.slot as u8)
+        FactorLabel::Encoder(self.slot as u16)
     }
 
     fn rows<S: Sink>(&self, sink: &mut S) {

@@ -52,6 +52,14 @@ pub(crate) struct Rows<'a> {
     pub(crate) products: Option<Products<'a>>,
 }
 
+impl Rows<'_> {
+    /// Columns of the layout, block by block.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = usize> + '_ {
+        let height = self.residual.len();
+        self.blocks.iter().flat_map(move |block| block.start..block.start + block.entries.len() / height)
+    }
+}
+
 /// Derivative by consecutive columns of the layout.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Block<'a> {
@@ -81,4 +89,32 @@ pub(crate) struct Point<'a> {
     pub(crate) at: &'a Estimate,
     /// States at which derivatives are evaluated, by slot.
     pub(crate) linearized: &'a [FrameState],
+}
+
+/// First columns of a navigation state `[φ, p | v | b_g, b_a]`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NavigationColumns {
+    pub(crate) pose: usize,
+    pub(crate) velocity: usize,
+    pub(crate) biases: usize,
+}
+
+impl NavigationColumns {
+    /// Columns of the frame at `slot`.
+    pub(crate) fn of(layout: &Layout, slot: usize) -> Self {
+        let velocity = layout.velocity_bias(slot).start;
+        Self { pose: layout.pose(slot).start, velocity, biases: velocity + 3 }
+    }
+
+    /// Blocks of a derivative by the state (m × 15, column by column).
+    pub(crate) fn blocks<'a>(&self, entries: &'a [f64]) -> [Block<'a>; 3] {
+        let height = entries.len() / 15;
+        let (by_pose, others) = entries.split_at(6 * height);
+        let (by_velocity, by_biases) = others.split_at(3 * height);
+        [
+            Block { start: self.pose, entries: by_pose },
+            Block { start: self.velocity, entries: by_velocity },
+            Block { start: self.biases, entries: by_biases },
+        ]
+    }
 }

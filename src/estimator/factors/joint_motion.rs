@@ -60,7 +60,7 @@ impl<'a> JointMotionFactor<'a> {
 impl Factor for JointMotionFactor<'_> {
     /// Label of the frame's encoder readings, which measure the joint motion.
     fn label(&self) -> FactorLabel {
-        FactorLabel::Encoder(self.slot as u8)
+        FactorLabel::Encoder(self.slot as u16)
     }
 
     fn rows<S: Sink>(&self, sink: &mut S) {

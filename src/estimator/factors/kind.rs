@@ -54,9 +54,9 @@ impl FactorKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FactorLabel {
     /// IMU samples that end at this slot.
-    Imu(u8),
+    Imu(u16),
     /// Encoder readings of the frame at this slot, with its joint rates and joint accelerations.
-    Encoder(u8),
+    Encoder(u16),
     ZeroVelocity,
     CalibrationPrior,
     /// Marginalization prior and prior at the start.

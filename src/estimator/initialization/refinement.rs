@@ -9,7 +9,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, SMatrix, SVector, UnitQuate
 
 use super::alignment::{Alignment, VectorPrior};
 use super::visual_problem::{TrackedLandmark, moved, visual_cost, visual_equations};
-use crate::estimator::state::navigation::ImuBias;
+use crate::estimator::factors::imu::{self, MotionJacobians};
+use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
 use crate::geometry::{RigidTransform, so3, tangent_basis};
 use crate::optimization::damped::{DampedOptions, DampedProblem, StopReason, minimize};
@@ -154,6 +155,11 @@ impl RefinedState {
         self.poses.iter().zip(self.imu_from_camera(given)).map(|(pose, mount)| *pose * mount).collect()
     }
 
+    /// State of a view; the biases are common to all views.
+    fn navigation(&self, view: usize) -> NavigationState {
+        NavigationState { world_from_imu: self.poses[view], velocity_m_per_s: self.velocities[view], bias: self.bias }
+    }
+
     fn gravity_basis(&self) -> Matrix3x2<f64> {
         let norm = self.gravity.norm();
         tangent_basis(&(self.gravity / norm)) * norm
@@ -181,29 +187,6 @@ impl RefinedState {
         }
         next
     }
-}
-
-/// Whitened IMU residual `[φ, p, v]` (9 × 1) of one interval.
-fn imu_residual(
-    state: &RefinedState,
-    view: usize,
-    increment: &Preintegration,
-) -> (Vector9, Vector3<f64>, Vector3<f64>) {
-    let (from, to) = (&state.poses[view], &state.poses[view + 1]);
-    let t = increment.duration_s();
-    let motion = increment.corrected(&state.bias);
-    let rotation_error = so3::log(&(motion.rotation.inverse() * from.rotation.inverse() * to.rotation));
-    let shift = from.rotation.inverse_transform_vector(
-        &(to.translation_m - from.translation_m - state.velocities[view] * t - state.gravity * (0.5 * t * t)),
-    );
-    let gain = from
-        .rotation
-        .inverse_transform_vector(&(state.velocities[view + 1] - state.velocities[view] - state.gravity * t));
-    let mut residual = Vector9::zeros();
-    residual.fixed_rows_mut::<3>(0).copy_from(&rotation_error);
-    residual.fixed_rows_mut::<3>(3).copy_from(&(shift - motion.position_m));
-    residual.fixed_rows_mut::<3>(6).copy_from(&(gain - motion.velocity_m_per_s));
-    (residual, shift, gain)
 }
 
 /// All factors linearized at a state.
@@ -322,8 +305,15 @@ impl<'a> Refinement<'a> {
             .increments
             .iter()
             .enumerate()
-            .map(|(view, increment)| (self.whitening[view] * imu_residual(state, view, increment).0).norm_squared())
+            .map(|(view, increment)| self.imu_residual(state, view, increment).norm_squared())
             .sum()
+    }
+
+    /// Whitened IMU residual `[φ, p, v]` (9 × 1) of the interval after a view.
+    fn imu_residual(&self, state: &RefinedState, view: usize, increment: &Preintegration) -> Vector9 {
+        let (motion, duration_s) = (increment.corrected(&state.bias), increment.duration_s());
+        let (from, to) = (state.navigation(view), state.navigation(view + 1));
+        self.whitening[view] * imu::motion_residual(&motion, duration_s, &from, &to, &state.gravity)
     }
 
     fn prior_cost(&self, state: &RefinedState) -> f64 {
@@ -452,50 +442,31 @@ impl<'a> Refinement<'a> {
         normal: &mut DMatrix<f64>,
         gradient: &mut DVector<f64>,
     ) {
-        let (residual, shift, gain) = imu_residual(state, view, increment);
+        let residual = self.imu_residual(state, view, increment);
         let whitening = &self.whitening[view];
-        let t = increment.duration_s();
-        let from = state.poses[view].rotation_matrix();
-        let to = state.poses[view + 1].rotation_matrix();
-        let back = from.transpose();
-        let rotation_error: Vector3<f64> = residual.fixed_rows::<3>(0).into_owned();
-        let by_rotation_error = so3::right_jacobian_inverse(&rotation_error);
-        let by_bias = increment.bias_jacobian();
-        let change: Vector3<f64> = by_bias.fixed_rows::<3>(0) * increment.bias_change(&state.bias);
-        let rotation_by_gyroscope_bias: Matrix3<f64> = -by_rotation_error
-            * so3::exp(&rotation_error).inverse().to_rotation_matrix().into_inner()
-            * so3::right_jacobian(&change)
-            * by_bias.fixed_view::<3, 3>(0, 0);
-        let column = |top: Option<Matrix3<f64>>, middle: Option<Matrix3<f64>>, bottom: Option<Matrix3<f64>>| {
-            let mut block = SMatrix::<f64, 9, 3>::zeros();
-            for (row, part) in [(0, top), (3, middle), (6, bottom)] {
-                if let Some(part) = part {
-                    block.fixed_view_mut::<3, 3>(row, 0).copy_from(&part);
-                }
-            }
-            whitening * block
-        };
+        let shift = increment.shift(&state.bias, None);
+        let (from, to) = (state.navigation(view), state.navigation(view + 1));
+        let (motion, duration_s) = (increment.shifted(&shift), increment.duration_s());
+        let mut jacobians = MotionJacobians::new(&motion, duration_s, &from, &to, &state.gravity);
+        jacobians.rotation_by_motion *= so3::right_jacobian(&shift.fixed_rows::<3>(0).into_owned());
+        let by_bias = whitening * jacobians.by_parameters(increment.bias_jacobian());
+        let [by_from, by_to] = [jacobians.by_from, jacobians.by_to].map(|by_state| whitening * by_state);
         let (pose_i, pose_j) = (self.layout.pose(view), self.layout.pose(view + 1));
         let (velocity_i, velocity_j) = (self.layout.velocity(view), self.layout.velocity(view + 1));
-        let part = |row: usize, col: usize| -> Matrix3<f64> { -by_bias.fixed_view::<3, 3>(row, col).into_owned() };
-        let blocks = [
-            (
-                pose_i,
-                column(Some(-by_rotation_error * to.transpose() * from), Some(so3::hat(&shift)), Some(so3::hat(&gain))),
-            ),
-            (pose_i + 3, column(None, Some(-back), None)),
-            (pose_j, column(Some(by_rotation_error), None, None)),
-            (pose_j + 3, column(None, Some(back), None)),
-            (velocity_i, column(None, Some(-back * t), Some(-back))),
-            (velocity_j, column(None, None, Some(back))),
-            (Layout::GYROSCOPE, column(Some(rotation_by_gyroscope_bias), Some(part(3, 0)), Some(part(6, 0)))),
-            (Layout::ACCELEROMETER, column(None, Some(part(3, 3)), Some(part(6, 3)))),
+        let blocks: [(usize, SMatrix<f64, 9, 3>); 8] = [
+            (pose_i, by_from.fixed_columns::<3>(0).into_owned()),
+            (pose_i + 3, by_from.fixed_columns::<3>(3).into_owned()),
+            (pose_j, by_to.fixed_columns::<3>(0).into_owned()),
+            (pose_j + 3, by_to.fixed_columns::<3>(3).into_owned()),
+            (velocity_i, by_from.fixed_columns::<3>(6).into_owned()),
+            (velocity_j, by_to.fixed_columns::<3>(6).into_owned()),
+            (Layout::GYROSCOPE, by_bias.fixed_columns::<3>(0).into_owned()),
+            (Layout::ACCELEROMETER, by_bias.fixed_columns::<3>(3).into_owned()),
         ];
-        let gravity_block = whitening * gravity_columns(state, &back, t);
-        let whitened = whitening * residual;
+        let gravity_block = whitening * jacobians.by_gravity * state.gravity_basis();
         for (column_a, block_a) in &blocks {
             let mut target = gradient.fixed_rows_mut::<3>(*column_a);
-            target += block_a.tr_mul(&whitened);
+            target += block_a.tr_mul(&residual);
             for (column_b, block_b) in &blocks {
                 let mut target = normal.fixed_view_mut::<3, 3>(*column_a, *column_b);
                 target += block_a.tr_mul(block_b);
@@ -507,7 +478,7 @@ impl<'a> Refinement<'a> {
             target += cross.transpose();
         }
         let mut target = gradient.fixed_rows_mut::<2>(Layout::GRAVITY);
-        target += gravity_block.tr_mul(&whitened);
+        target += gravity_block.tr_mul(&residual);
         let mut target = normal.fixed_view_mut::<2, 2>(Layout::GRAVITY, Layout::GRAVITY);
         target += gravity_block.tr_mul(&gravity_block);
     }
@@ -541,15 +512,6 @@ impl<'a> Refinement<'a> {
             }
         }
     }
-}
-
-/// Derivative of an IMU residual by the two gravity columns (9 × 2), not whitened.
-fn gravity_columns(state: &RefinedState, back: &Matrix3<f64>, t: f64) -> SMatrix<f64, 9, 2> {
-    let rotated_basis = back * state.gravity_basis();
-    let mut block = SMatrix::<f64, 9, 2>::zeros();
-    block.fixed_view_mut::<3, 2>(3, 0).copy_from(&(rotated_basis * (-0.5 * t * t)));
-    block.fixed_view_mut::<3, 2>(6, 0).copy_from(&(rotated_basis * -t));
-    block
 }
 
 impl DampedProblem for &Refinement<'_> {

@@ -37,7 +37,7 @@ pub(crate) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -
         return Some(prior.clone());
     }
     let frames = problem.linearization_frames(estimate);
-    let label = FactorLabel::Encoder(slot as u8);
+    let label = FactorLabel::Encoder(slot as u16);
     let mut readings = LabelledRows::of(problem.layout.total(), |wanted| wanted == label);
     problem.measurements(&problem.point(estimate, &frames), slot + 1, &mut readings);
     let carried = prior.rows(&problem.layout, &problem.first_estimate_offset(estimate));

@@ -111,7 +111,7 @@ pub enum JacobianFactor {
 impl JacobianFactor {
     /// Factor without a feature; `numbers` are the frames by slot.
     pub(crate) fn of(label: FactorLabel, numbers: &[FrameId]) -> Option<Self> {
-        let number = |slot: u8| numbers.get(usize::from(slot)).copied();
+        let number = |slot: u16| numbers.get(usize::from(slot)).copied();
         Some(match label {
             FactorLabel::Imu(slot) => Self::Imu { from: number(slot.checked_sub(1)?)?, to: number(slot)? },
             FactorLabel::Encoder(slot) => Self::Encoder(number(slot)?),

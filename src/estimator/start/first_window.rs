@@ -111,7 +111,7 @@ impl<'a> FirstWindow<'a> {
             accelerometer_sigma_m_per_s2: Vector3::repeat(options.accelerometer_bias_sigma),
         });
         let start = StartPrior {
-            reference: frames.oldest().state.clone(),
+            reference: frames.oldest().state.navigation.world_from_imu,
             bias: bias.mean,
             accelerometer_bias_sigma: bias.accelerometer_sigma_m_per_s2,
             gyroscope_bias_sigma: bias.gyroscope_sigma_rad_per_s,
@@ -140,7 +140,7 @@ impl<'a> FirstWindow<'a> {
         }
         let window = &mut self.window.state;
         if let Some(start) = &mut window.start {
-            start.reference = window.frames.oldest().state.clone();
+            start.reference = window.frames.oldest().state.navigation.world_from_imu;
         }
         let (kind, how) = match self.solution.origin {
             InitializationOrigin::FromMotion => (EventKind::InitializedFromMotion, "motion"),

@@ -171,7 +171,7 @@ fn dropping_a_frame_from_the_prior_keeps_the_information_on_the_others() {
     assert!(prior.holds_frame(gone));
     let zero = DVector::zeros(layout.total());
     let carried = prior.rows(&layout, &zero);
-    let readings = fixture::rows(&problem, &estimate, |label| label == FactorLabel::Encoder(gone as u8));
+    let readings = fixture::rows(&problem, &estimate, |label| label == FactorLabel::Encoder(gone as u16));
     let rows = stack([&carried, &readings].into_iter(), 0..layout.total() + 1);
     let information = |rows: &DMatrix<f64>, columns: &[usize]| {
         let part = rows.select_columns(columns);

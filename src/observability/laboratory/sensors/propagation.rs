@@ -31,7 +31,7 @@ pub(super) struct Change {
     pub(super) rotation_by: SMatrix<f64, 3, IMU_COLUMNS>,
     pub(super) velocity_by: SMatrix<f64, 3, IMU_COLUMNS>,
     pub(super) position_by: SMatrix<f64, 3, IMU_COLUMNS>,
-    /// Covariance (9 × 9) of rotation, velocity and position due to white noise.
+    /// Covariance (9 × 9) of rotation, position and velocity due to white noise.
     pub(super) covariance: SMatrix<f64, 9, 9>,
 }
 
@@ -111,9 +111,9 @@ impl Change {
     fn covariance_rate(&self, spin: &Matrix3<f64>, force: &Matrix3<f64>, noise: &ImuNoise) -> SMatrix<f64, 9, 9> {
         let mut by_error = SMatrix::<f64, 9, 9>::zeros();
         by_error.fixed_view_mut::<3, 3>(0, 0).copy_from(&-spin);
-        by_error.fixed_view_mut::<3, 3>(3, 0).copy_from(&-(self.rotation * force));
-        by_error.fixed_view_mut::<3, 3>(6, 3).copy_from(&Matrix3::identity());
-        let densities = [noise.gyroscope_noise_density, noise.accelerometer_noise_density, 0.0];
+        by_error.fixed_view_mut::<3, 3>(3, 6).copy_from(&Matrix3::identity());
+        by_error.fixed_view_mut::<3, 3>(6, 0).copy_from(&-(self.rotation * force));
+        let densities = [noise.gyroscope_noise_density, 0.0, noise.accelerometer_noise_density];
         let white = SVector::<f64, 9>::from_fn(|row, _| densities[row / 3] * densities[row / 3]);
         let spread = by_error * self.covariance;
         spread + spread.transpose() + SMatrix::from_diagonal(&white)

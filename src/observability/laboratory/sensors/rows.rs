@@ -1,13 +1,14 @@
 //! Whitened residuals of a window with sensor columns, and their Jacobian.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 use super::propagation::{Change, IMU_COLUMNS};
 use super::state::State;
 use super::values::{ACCELEROMETER, GYROSCOPE, INTRINSICS};
 use super::window::{Observation, Prediction, SensorWindow};
-use crate::estimator::{ColumnBlock, ColumnId, FrameId, JointKnowledge, Linearization, PoseKnowledge};
-use crate::geometry::{dense, so3};
+use crate::estimator::imu_factor::{self, MotionJacobians};
+use crate::estimator::{ColumnBlock, ColumnId, FrameId, JointKnowledge, Linearization, MotionIncrement, PoseKnowledge};
+use crate::geometry::dense;
 use crate::gimbal::ParameterId;
 use crate::observability::laboratory::PIXEL_SIGMA_PX;
 use crate::sensors::ImuNoise;
@@ -162,46 +163,16 @@ impl SensorWindow<'_> {
         let measured = |time_s: f64| self.measured(time_s);
         let change = Change::integrate(&measured, (start_s, duration_s), &state.sensors, &before.bias, None);
         let gravity = self.flight.gravity_in_world;
-        let to_before = before.world_from_imu.rotation_matrix().transpose();
-        let rotation =
-            change.rotation().inverse() * (before.world_from_imu.rotation.inverse() * after.world_from_imu.rotation);
-        let velocity = to_before * (after.velocity_m_per_s - before.velocity_m_per_s - gravity * duration_s);
-        let moved = after.world_from_imu.translation_m
-            - before.world_from_imu.translation_m
-            - before.velocity_m_per_s * duration_s
-            - gravity * (0.5 * duration_s * duration_s);
-        let position = to_before * moved;
-
-        let mut residual = SVector::<f64, 9>::zeros();
-        residual.fixed_rows_mut::<3>(0).copy_from(&so3::log(&rotation));
-        residual.fixed_rows_mut::<3>(3).copy_from(&(velocity - change.velocity));
-        residual.fixed_rows_mut::<3>(6).copy_from(&(position - change.position));
-        // By pose and velocity of both frames, and by the IMU.
-        let mut by_before = SMatrix::<f64, 9, 9>::zeros();
-        let mut by_after = SMatrix::<f64, 9, 9>::zeros();
-        let mut by_imu = SMatrix::<f64, 9, IMU_COLUMNS>::zeros();
-        let by_log = so3::right_jacobian_inverse(&so3::log(&rotation));
-        let before_from_after = to_before * after.world_from_imu.rotation_matrix();
-        by_before.fixed_view_mut::<3, 3>(0, 0).copy_from(&-(by_log * before_from_after.transpose()));
-        by_after.fixed_view_mut::<3, 3>(0, 0).copy_from(&by_log);
-        let rotation_matrix = rotation.to_rotation_matrix();
-        by_imu
-            .fixed_view_mut::<3, IMU_COLUMNS>(0, 0)
-            .copy_from(&-(by_log * rotation_matrix.matrix().transpose() * change.rotation_by));
-        by_before.fixed_view_mut::<3, 3>(3, 0).copy_from(&so3::hat(&velocity));
-        by_before.fixed_view_mut::<3, 3>(3, 6).copy_from(&-to_before);
-        by_after.fixed_view_mut::<3, 3>(3, 6).copy_from(&to_before);
-        by_imu.fixed_view_mut::<3, IMU_COLUMNS>(3, 0).copy_from(&-change.velocity_by);
-        by_before.fixed_view_mut::<3, 3>(6, 0).copy_from(&so3::hat(&position));
-        by_before.fixed_view_mut::<3, 3>(6, 3).copy_from(&-to_before);
-        by_before.fixed_view_mut::<3, 3>(6, 6).copy_from(&-(to_before * duration_s));
-        by_after.fixed_view_mut::<3, 3>(6, 3).copy_from(&to_before);
-        by_imu.fixed_view_mut::<3, IMU_COLUMNS>(6, 0).copy_from(&-change.position_by);
+        let motion = change.increment();
+        let residual = imu_factor::motion_residual(&motion, duration_s, before, after, &gravity);
+        let jacobians = MotionJacobians::new(&motion, duration_s, before, after, &gravity);
+        let by_imu = jacobians.by_parameters(&change.by_imu());
 
         let whitening = self.weights[frame - 1];
         let mut rows = Rows::zeros(9, columns.count(), 0);
         rows.residual.copy_from(&(whitening * residual));
-        let (by_before, by_after, by_imu) = (whitening * by_before, whitening * by_after, whitening * by_imu);
+        let by_imu = whitening * by_imu;
+        let (by_before, by_after) = (whitening * jacobians.by_from, whitening * jacobians.by_to);
         for (frame, derivative) in [(frame - 1, by_before), (frame, by_after)] {
             rows.jacobian.columns_mut(columns.pose_at(frame), 6).copy_from(&derivative.fixed_columns::<6>(0));
             let at = columns.velocity_bias_at(frame);
@@ -324,5 +295,18 @@ impl Change {
     pub(super) fn rotation(&self) -> nalgebra::UnitQuaternion<f64> {
         let matrix: Matrix3<f64> = self.rotation;
         nalgebra::UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(matrix))
+    }
+
+    fn increment(&self) -> MotionIncrement {
+        MotionIncrement { rotation: self.rotation(), position_m: self.position, velocity_m_per_s: self.velocity }
+    }
+
+    /// Derivative of [`Self::increment`] `[φ, p, v]` by biases and intrinsics of the IMU.
+    fn by_imu(&self) -> SMatrix<f64, 9, IMU_COLUMNS> {
+        let mut by_imu = SMatrix::<f64, 9, IMU_COLUMNS>::zeros();
+        by_imu.fixed_rows_mut::<3>(0).copy_from(&self.rotation_by);
+        by_imu.fixed_rows_mut::<3>(3).copy_from(&self.position_by);
+        by_imu.fixed_rows_mut::<3>(6).copy_from(&self.velocity_by);
+        by_imu
     }
 }
