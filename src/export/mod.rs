@@ -3,7 +3,6 @@
 mod calibration_files;
 mod calibration_report;
 mod covariance;
-mod csv_table;
 #[cfg(feature = "gui")]
 mod desktop;
 mod error;

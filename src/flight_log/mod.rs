@@ -7,6 +7,7 @@ pub(crate) mod attitude;
 mod cdr;
 pub(crate) mod container;
 pub mod convert;
+pub mod csv_writer;
 mod error;
 mod file;
 mod geodesy;

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::error::StudyFileError;
-use super::parquet_table::{csv_text, read_parquet, stage_parquet};
+use super::parquet_table::{read_parquet, stage_parquet};
 use crate::flight_log::output::{self, OutputSet};
 use crate::study::{
     KeyedJob, SimulatedFlight, StudyJob, StudyOutput, StudyPlan, StudyTable, frames_table, parameters_table, runs_table,
@@ -248,7 +248,7 @@ impl StudyFolder {
         for (name, table) in [(RUNS, &tables.runs), (PARAMETERS, &tables.parameters)] {
             let [parquet, csv] = ["parquet", "csv"].map(|kind| self.root.join(format!("{name}.{kind}")));
             outputs.add(stage_parquet(table, &parquet)?);
-            outputs.write(&csv, csv_text(table).as_bytes()).map_err(StudyFileError::write(&csv))?;
+            outputs.write(&csv, table.csv(0..table.rows()).as_bytes()).map_err(StudyFileError::write(&csv))?;
             paths.extend([parquet, csv]);
         }
         if plan.output.frames {

@@ -15,5 +15,5 @@ pub use execute::JobError;
 pub use flights::{FlightError, RenderedFlight};
 pub use folder::{StudyFolder, StudyTables};
 pub use inputs::{find_logs, program_identity, read_plan};
-pub use parquet_table::{csv_text, read_parquet, write_parquet, write_text};
+pub use parquet_table::{read_parquet, write_parquet, write_text};
 pub use rows::{JobCosts, JobStatus};
