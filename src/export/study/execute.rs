@@ -11,16 +11,15 @@ use super::rows::{JobCosts, JobStatus, add_frames, failed_rows, run_rows, trajec
 use crate::calibration::CalibrationOptions;
 use crate::export::ExportError;
 use crate::export::calibration_files::write_calibration;
-use crate::export::calibration_report::{CalibrationReport, report_calibration};
+use crate::export::calibration_report::report_calibration;
 use crate::export::masks;
 use crate::export::run_files::{RunFileOptions, write_run};
-use crate::export::summary::summarize;
 use crate::flight_log::output::OutputSet;
 use crate::flight_log::{FlightLog, LogError};
 use crate::sensors::Rig;
 use crate::session::{
-    self, CalibrationRequest, CalibrationRunError, Recording, SessionError, SessionPlan, SessionRequest, Stopwatch,
-    TrajectorySource, TrajectorySpec,
+    self, CalibrationRequest, CalibrationRun, CalibrationRunError, Recording, SessionError, SessionPlan,
+    SessionRequest, Stopwatch, TrajectorySource, TrajectorySpec, summarize,
 };
 use crate::study::{JobLog, JobSubject, KeyedJob, PerturbationStart, StudyJob, StudyOutput, TableError};
 
@@ -245,7 +244,7 @@ impl StudyFolder {
 
     /// Calibrates offline from the log of a job, writes the files of `dcvins calibrate` into its folder, and makes the
     /// result its rig.
-    fn calibrate(&self, key: &str, job: &StudyJob, files: &mut JobFiles) -> Result<CalibrationReport, JobError> {
+    fn calibrate(&self, key: &str, job: &StudyJob, files: &mut JobFiles) -> Result<CalibrationRun, JobError> {
         let (start_s, duration_s) = span(job);
         let request = CalibrationRequest {
             log_path: files.log.clone(),
@@ -259,7 +258,7 @@ impl StudyFolder {
         let (report, folder) = (report_calibration(&run), self.job(key));
         write_calibration(&run, &report, &folder, false)?;
         files.rig = Some(folder.join("rig.yaml"));
-        Ok(report)
+        Ok(run)
     }
 
     /// Writes the rig of a job with its errors, and the masks beside it.

@@ -2,10 +2,8 @@
 
 use super::folder::StudyTables;
 use crate::estimator::{EventKind, FailureCause};
-use crate::export::calibration_report::CalibrationReport;
-use crate::export::summary::{Accuracy, RunSummary, TrajectorySummary};
 use crate::geometry::{median, seconds_from_ns, so3};
-use crate::session::{Recording, RunRecord, TrajectoryLane};
+use crate::session::{CalibrationRun, Recording, RunRecord, RunSummary, TrajectoryAccuracy, TrajectoryLane};
 use crate::study::{Cell, JobLog, StudyJob, TableError, relative_error_columns};
 
 /// How a job ended.
@@ -144,7 +142,7 @@ pub(super) fn run_rows(
     recording: &Recording,
     run: &RunRecord,
     summary: &RunSummary,
-    offline: Option<&CalibrationReport>,
+    offline: Option<&CalibrationRun>,
 ) -> Result<StudyTables, TableError> {
     let mut tables = StudyTables::default();
     let initialized = summary.frames.initialized_at_s.is_some();
@@ -183,21 +181,21 @@ pub(super) fn trajectory_rows(
     lane: &TrajectoryLane,
 ) -> Result<StudyTables, TableError> {
     let mut tables = StudyTables::default();
-    let summary = TrajectorySummary::of(lane);
-    let mut cells = inputs(key, job, JobStatus::Ok, summary.accuracy_missing.as_deref().unwrap_or_default(), costs);
-    cells.extend([("estimated", summary.poses.into()), ("length_m", summary.length_m.into())]);
-    cells.extend(summary.accuracy.as_ref().map(absolute_errors).unwrap_or_default());
+    let accuracy = lane.evaluation.accuracy.as_ref();
+    let mut cells = inputs(key, job, JobStatus::Ok, lane.accuracy_missing.as_deref().unwrap_or_default(), costs);
+    cells.extend([("estimated", lane.track.samples().len().into()), ("length_m", lane.length_m.into())]);
+    cells.extend(accuracy.map(absolute_errors).unwrap_or_default());
     let errors = (0..lane.evaluation.pairs.len()).filter_map(|pair| Some((pair, lane.evaluation.error_m(pair)?)));
     if let Some((pair, worst_m)) = errors.max_by(|a, b| a.1.total_cmp(&b.1)) {
         let worst_s = lane.evaluation.pairs[pair].0.stamp_s;
         cells.extend([("worst_frame_s", worst_s.into()), ("worst_frame_m", worst_m.into())]);
     }
-    push_run(&mut tables, cells, summary.accuracy.as_ref())?;
+    push_run(&mut tables, cells, accuracy)?;
     Ok(tables)
 }
 
 /// Adds the row of a run or of a trajectory, with its relative errors.
-fn push_run(tables: &mut StudyTables, cells: Cells, accuracy: Option<&Accuracy>) -> Result<(), TableError> {
+fn push_run(tables: &mut StudyTables, cells: Cells, accuracy: Option<&TrajectoryAccuracy>) -> Result<(), TableError> {
     let relative = relative_errors(accuracy);
     let relative = relative.iter().map(|(name, value)| (name.as_str(), Cell::from(*value)));
     tables.runs.push(cells.into_iter().chain(relative))
@@ -241,7 +239,7 @@ fn lost_s(run: &RunRecord) -> Option<f64> {
 }
 
 /// Absolute errors of a trajectory.
-fn absolute_errors(accuracy: &Accuracy) -> Cells {
+fn absolute_errors(accuracy: &TrajectoryAccuracy) -> Cells {
     vec![
         ("ate_rmse_m", accuracy.ate_rmse_m.into()),
         ("ate_mean_m", accuracy.ate_mean_m.into()),
@@ -265,7 +263,7 @@ fn accuracy(run: &RunRecord, summary: &RunSummary) -> Cells {
 }
 
 /// Relative errors by column.
-fn relative_errors(accuracy: Option<&Accuracy>) -> Vec<(String, f64)> {
+fn relative_errors(accuracy: Option<&TrajectoryAccuracy>) -> Vec<(String, f64)> {
     let errors = accuracy.into_iter().flat_map(|accuracy| &accuracy.rpe);
     let columns = errors.flat_map(|over| {
         let values = [over.translation_rmse_m, over.rotation_rmse_deg.to_radians()];
@@ -337,13 +335,14 @@ fn calibration(summary: &RunSummary) -> Cells {
 }
 
 /// Residuals of the offline calibration, and the error of its first stage.
-fn offline_calibration(report: &CalibrationReport) -> Cells {
-    let mut cells: Cells = vec![("offline_static_alone_px", report.camera_imu_reprojection.error_px.mean.into())];
-    for (column, camera) in ["offline_static_px", "offline_gimbal_px"].into_iter().zip(&report.reprojection) {
-        cells.push((column, camera.error_px.mean.into()));
+fn offline_calibration(run: &CalibrationRun) -> Cells {
+    let outcome = &run.outcome;
+    let mut cells: Cells = vec![("offline_static_alone_px", outcome.static_pixels.residuals_px.mean.into())];
+    for (column, camera) in ["offline_static_px", "offline_gimbal_px"].into_iter().zip(&outcome.pixels) {
+        cells.push((column, camera.residuals_px.mean.into()));
     }
-    if let Some(truth) = &report.ground_truth {
-        let error = &truth.static_camera_imu;
+    if let Some(errors) = run.errors() {
+        let error = &errors.static_camera_imu;
         cells.push(("offline_static_alone_error_m", error.translation_mean_m.into()));
         cells.push(("offline_static_alone_error_rad", error.rotation_mean_rad.into()));
     }
