@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::run::RunRecord;
 use super::step::StepRecord;
 use crate::calibration::ChainDistance;
-use crate::geometry::seconds_from_ns;
+use crate::geometry::{seconds_from_ns, so3};
 use crate::gimbal::ClassicalChain;
 use crate::session::accuracy::{
     Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, path_length_m, relative_errors,
@@ -164,6 +164,15 @@ impl RunRecord {
         let last = self.antenna.pairs.partition_point(|pair| pair.stamp_ns <= stamp_ns).checked_sub(1)?;
         let pair = self.antenna.pairs.get(last).filter(|pair| stamp_ns - pair.stamp_ns <= MAX_POSITION_AGE_NS)?;
         antenna_errors_m(std::slice::from_ref(pair), alignment).first().copied()
+    }
+
+    /// Position error in metres and angle in radians of the pose of a step after the alignment of the whole run; `None`
+    /// without a pose or ground truth.
+    pub fn aligned_error(&self, step: &StepRecord) -> Option<[f64; 2]> {
+        let (alignment, truth) = (self.alignment?, step.ground_truth?);
+        let aligned = alignment * step.report.newest()?.world_from_imu;
+        let turn = so3::log(&(truth.rotation.inverse() * aligned.rotation));
+        Some([(aligned.translation_m - truth.translation_m).norm(), turn.norm()])
     }
 
     fn pose_error_m(&self, step: &StepRecord) -> Option<f64> {
