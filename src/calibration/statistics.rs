@@ -1,6 +1,8 @@
+use serde::Serialize;
+
 use crate::geometry::median;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Statistics {
     pub count: usize,
     pub mean: f64,

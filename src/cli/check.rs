@@ -17,7 +17,6 @@ use crate::cli::terminal::{Progress, notify, print_report};
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct CheckArguments {
-    /// The log.
     pub log: PathBuf,
     /// Rig file; default: next to the log or attached to it.
     #[arg(long, value_name = "FILE")]

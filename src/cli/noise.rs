@@ -20,7 +20,6 @@ use crate::cli::value_parsers::seconds;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct NoiseArguments {
-    /// The log.
     pub log: PathBuf,
     /// Folder for noise.json, the lines of the rig (imu0.yaml) and, from stationary stretches, allan.csv, allan.png,
     /// allan.svg.

@@ -28,7 +28,7 @@ pub enum ExportError {
     /// Two trajectories cannot be compared.
     #[error("{problem}")]
     NotComparable {
-        /// The problem and its remedy.
+        /// Problem and remedy.
         problem: String,
     },
 }

@@ -3,11 +3,9 @@
 mod calibration_files;
 mod calibration_report;
 mod covariance;
-mod csv_table;
 #[cfg(feature = "gui")]
 mod desktop;
 mod error;
-mod estimability;
 mod evaluation;
 mod existing;
 mod file_hash;
@@ -25,12 +23,10 @@ mod sample_flight;
 #[cfg(feature = "gui")]
 mod screenshot;
 mod session_file;
-mod structure;
 pub mod study;
 #[cfg(feature = "gui")]
 mod study_screenshot;
 mod study_source;
-mod summary;
 mod tables;
 pub mod trajectory;
 mod video_alignment;
@@ -40,7 +36,6 @@ pub use calibration_report::{CalibrationReport, report_calibration};
 #[cfg(feature = "gui")]
 pub use desktop::Machine;
 pub use error::ExportError;
-pub use estimability::EstimabilitySummary;
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 pub use existing::{
     check_calibration_folder, check_converted_log, check_report_folder, check_run_folders, check_screenshot,
@@ -66,12 +61,7 @@ pub use screenshot::{
     png_bytes, write_csv, write_png, write_screenshot, write_svg,
 };
 pub use session_file::{is_session, read_session};
-pub use structure::KnownLossSummary;
 #[cfg(feature = "gui")]
 pub use study_screenshot::{STUDY_PANEL_NAMES, draw_study_panel, draw_study_panel_svg, study_panel_csv};
 pub use study_source::{OpenedStudy, StudySourceError, is_study};
-pub use summary::{
-    Accuracy, AntennaSummary, CalibrationSummary, RunSummary, StageSummary, TimingSummary, TrajectorySummary, log_name,
-    summarize,
-};
 pub use video_alignment::{VideoAlignment, VideoAlignmentError, align_video, write_alignment_plot};

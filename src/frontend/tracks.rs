@@ -51,7 +51,7 @@ pub struct FrontEndStatistics {
 /// All features of one image, ordered by id.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackedFrame {
-    /// Header stamp of the image since the log began.
+    /// Header stamp of the image since the start of the log.
     pub stamp_ns: i64,
     /// Ordered by id.
     pub features: Vec<TrackedFeature>,

@@ -44,7 +44,6 @@ pub struct ParameterEstimability {
     pub value: f64,
     /// Posterior standard deviation, NaN before the first solve.
     pub sigma: f64,
-    /// Prior standard deviation.
     pub prior_sigma: f64,
     pub estimability: Estimability,
     /// Reason that the parameter is not known: the null or weak direction of the last window or the correlation that it

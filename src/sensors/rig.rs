@@ -180,7 +180,6 @@ pub struct AssumedField {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     pub name: String,
-    /// Magnitude of gravity in m/s².
     pub gravity_m_per_s2: f64,
     pub imu: ImuRig,
     /// Cameras in the order of their keys.

@@ -45,7 +45,6 @@ pub struct SyntheticOptions {
     pub motion: SyntheticMotion,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Length in seconds.
     pub duration_s: f64,
     pub frame_rate_hz: f64,
     /// Noise of a feature's pixel, per axis.

@@ -20,7 +20,6 @@ const KEY_RULES: u32 = 1;
 pub struct RecordedLog {
     /// Name in the tables.
     pub name: String,
-    /// Path of the log.
     pub path: PathBuf,
     /// SHA-256 of its content, in hexadecimal.
     pub sha256: String,
@@ -137,7 +136,6 @@ impl fmt::Display for JobSubject {
 /// One run specification, or one trajectory of another program, on one log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StudyJob {
-    /// Name of the study.
     pub study: String,
     pub log: JobLog,
     pub disturbance: String,

@@ -230,12 +230,7 @@ pub enum PerturbationError {
     },
     /// A camera would have impossible intrinsics.
     #[error("perturbation '{perturbation}' gives {camera} impossible intrinsics: {source}")]
-    Camera {
-        perturbation: String,
-        /// Key of the camera.
-        camera: String,
-        source: CameraError,
-    },
+    Camera { perturbation: String, camera: String, source: CameraError },
     /// The perturbation starts from the ground truth, which is unknown.
     #[error("perturbation '{perturbation}' starts from the truth, but the log has no ground-truth rig")]
     NoGroundTruth { perturbation: String },

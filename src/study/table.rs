@@ -8,6 +8,8 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::flight_log::csv_writer::CsvWriter;
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ColumnType {
     /// 64-bit floating point.
@@ -353,7 +355,16 @@ impl StudyTable {
         self.columns.iter().map(move |column| column.values.cell(row))
     }
 
-    /// Appends a row of named cells; other columns get an empty cell.
+    /// Rows of these numbers as comma-separated values under the names of the columns.
+    pub fn csv(&self, rows: impl IntoIterator<Item = usize>) -> String {
+        let mut csv = CsvWriter::new(self.columns.iter().map(|column| column.name.as_str()));
+        for row in rows {
+            csv.row(self.row(row).map(|cell| cell.to_string()));
+        }
+        csv.into_text()
+    }
+
+    /// Appends a row of named cells; columns that are not named get an empty cell.
     ///
     /// # Errors
     /// For an unknown column, or a value of another type than its column; the table is then unchanged.

@@ -6,8 +6,8 @@ use std::process::{Command, Output};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
-use dcvins::export::study::{JobCosts, JobStatus, write_text};
-use dcvins::study::{self, JobLog, KeyedJob, SlurmOptions};
+use dcvins::export::study::write_text;
+use dcvins::study::{self, JobCosts, JobLog, JobStatus, KeyedJob, SlurmOptions};
 
 use super::pool::{PoolOutcome, last_lines};
 use super::{Sweep, SweepArguments};

@@ -9,7 +9,6 @@ use crate::sensors::JointAngles;
 /// Encoder readings of a frame: one row `(θ + θ̇·shift − reading) / σ` per joint.
 #[derive(Clone, Debug)]
 pub(crate) struct EncoderFactor<'a> {
-    /// Slot of the frame.
     pub(crate) slot: usize,
     pub(crate) reading: &'a JointAngles,
     /// Joint angles θ, in radians.

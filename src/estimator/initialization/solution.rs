@@ -49,7 +49,7 @@ pub struct InitializedLandmark {
     pub id: FeatureId,
     /// `frame_index` of the first observing view.
     pub anchor_frame_index: usize,
-    /// Position in the world, in metres.
+    /// In the world frame.
     pub position_m: Vector3<f64>,
     /// Inverse depth along the anchor's optical axis, in 1/m.
     pub inverse_depth_per_m: f64,

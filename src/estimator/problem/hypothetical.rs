@@ -81,7 +81,6 @@ pub struct HypotheticalWindow {
     pub landmarks: Vec<HypotheticalLandmark>,
     pub poses: PoseKnowledge,
     pub joints: JointKnowledge,
-    /// Standard deviation of a pixel.
     pub pixel_sigma_px: f64,
     pub landmark_model: LandmarkModel,
     /// Gravity in the world, in m/s².

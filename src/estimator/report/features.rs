@@ -47,6 +47,6 @@ impl FeatureCounts {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LandmarkReport {
     pub id: FeatureId,
-    /// Position in the world, in metres.
+    /// In the world frame.
     pub position_m: Vector3<f64>,
 }

@@ -20,7 +20,7 @@ pub enum AngleOrigin {
     /// Measured in a log.
     Measured {
         log: String,
-        /// Seconds since the log began.
+        /// In seconds since the log began.
         time_s: f64,
     },
 }

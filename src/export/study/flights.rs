@@ -22,7 +22,6 @@ const NOTES: &str = "rendered.json";
 pub struct RenderedFlight {
     /// SHA-256 of the log.
     pub sha256: String,
-    /// Length in seconds.
     pub duration_s: f64,
     /// Wall time of the rendering in seconds.
     pub rendered_in_s: f64,

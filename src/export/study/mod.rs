@@ -6,14 +6,12 @@ mod flights;
 mod folder;
 mod inputs;
 mod parquet_table;
-mod rows;
 #[cfg(test)]
 mod tests;
 
 pub use error::StudyFileError;
 pub use execute::JobError;
 pub use flights::{FlightError, RenderedFlight};
-pub use folder::{StudyFolder, StudyTables};
+pub use folder::StudyFolder;
 pub use inputs::{find_logs, program_identity, read_plan};
-pub use parquet_table::{csv_text, read_parquet, write_parquet, write_text};
-pub use rows::{JobCosts, JobStatus};
+pub use parquet_table::{read_parquet, write_parquet, write_text};

@@ -37,7 +37,6 @@ pub enum ConvertError {
         line: usize,
         /// Value of the line and the expected one.
         problem: String,
-        /// Path of the table.
         path: PathBuf,
     },
     #[error("no message can be used ({}): {}", if topics.is_empty() { "it has no topics" } else { topics }, path.display())]

@@ -2,8 +2,9 @@
 
 use super::JacobianPanel;
 use super::{cameras, column_name, name_of};
+use crate::flight_log::csv_writer::CsvWriter;
 use crate::gui::PanelContext;
-use crate::gui::csv_table::{CsvTable, Table};
+use crate::gui::csv_table::CsvTable;
 
 impl CsvTable for JacobianPanel {
     /// Norms of the Jacobian's blocks as in the panel; zeros are empty.
@@ -14,7 +15,7 @@ impl CsvTable for JacobianPanel {
         let Some(jacobian) = step.report.jacobian(&cameras) else { return String::new() };
         let names = ctx.names();
         let heads = ["residuals", "rows"].map(str::to_owned).into_iter();
-        let mut table = Table::new(heads.chain(jacobian.columns.iter().map(|block| column_name(block.id, &names))));
+        let mut table = CsvWriter::new(heads.chain(jacobian.columns.iter().map(|block| column_name(block.id, &names))));
         for row in &jacobian.rows {
             let norm = |column: usize| row.norms.iter().find(|(known, _)| usize::from(*known) == column);
             let cells =

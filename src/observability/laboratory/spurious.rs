@@ -35,7 +35,6 @@ pub(super) fn title() -> String {
 /// Spurious information along the null directions of one parameterization.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SpuriousRow {
-    /// Name of the parameterization.
     pub form: String,
     /// True if the joint angles are known.
     pub encoder: bool,

@@ -45,7 +45,7 @@ const WINDOW_RANGE: std::ops::RangeInclusive<usize> = 4..=30;
 const DEFAULT_WINDOW: usize = 10;
 
 impl ParameterizationChoice {
-    /// The name on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         NAMES.iter().find(|(_, choice)| *choice == self).map_or("auto", |(name, _)| name)
     }

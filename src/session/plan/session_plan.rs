@@ -47,7 +47,7 @@ pub enum SessionError {
     Trajectory {
         /// The file or topic.
         source_name: String,
-        /// The problem and its remedy.
+        /// Problem and remedy.
         problem: String,
     },
     /// The start is after the end of the log.

@@ -78,7 +78,7 @@ fn no_overlap(log: &FlightLog, poses: &[RecordedPose], (begin_ns, end_ns): (i64,
 /// Antenna positions as ground truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadedPositions {
-    /// The file or the topic.
+    /// The file or topic.
     pub source: String,
     /// Positions within the time of the log, in the order of their stamps.
     pub samples: Vec<PositionSample>,

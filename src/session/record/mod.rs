@@ -2,6 +2,8 @@
 
 mod antenna_record;
 mod comparison;
+mod estimability;
+mod known_losses;
 mod lost_since;
 mod pass_progress;
 mod pose_consistency;
@@ -10,6 +12,7 @@ mod recording;
 mod rig_values;
 mod run;
 mod run_accuracy;
+mod run_summary;
 mod solver_trace;
 mod step;
 mod summary;
@@ -18,13 +21,16 @@ mod warnings;
 
 pub use antenna_record::PositionTruth;
 pub use comparison::{Comparison, Divergence, Quantity};
+pub use estimability::{EstimabilitySummary, estimability_summary};
+pub use known_losses::KnownLossSummary;
 pub use lost_since::LostSince;
 pub use pass_progress::PassProgress;
 pub use pose_consistency::PoseConsistency;
 pub use pose_errors::PoseError;
 pub use recording::Recording;
 pub use run::{ForkOrigin, RunMemory, RunRecord};
-pub use run_accuracy::{ChainDistance, RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};
+pub use run_accuracy::{RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};
+pub use run_summary::{ParameterSummary, RunSummary, StageSummary, summarize};
 pub use solver_trace::{SolverPosition, SolverTrace};
 pub(in crate::session) use step::tracks_bytes;
 pub use step::{StepFactorRows, StepRecord};

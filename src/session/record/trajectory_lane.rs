@@ -3,6 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use nalgebra::UnitQuaternion;
+use serde::{Serialize, Serializer};
 
 use super::antenna_record::PositionTruth;
 use super::run::{NEXT_ID, RunRecord};
@@ -12,11 +13,13 @@ use crate::sensors::{PoseSample, PoseTrack};
 use crate::session::accuracy::{Alignment, StampedPose, align, path_length_m};
 
 /// A trajectory evaluated against ground truth.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TrajectoryEvaluation {
     /// Estimated and ground-truth poses with equal stamps, in seconds since the log began.
+    #[serde(skip)]
     pub pairs: Vec<(StampedPose, StampedPose)>,
     /// `true_from_estimate`, a rotation about the vertical and a translation; `None` with too few pairs.
+    #[serde(skip)]
     pub alignment: Option<RigidTransform>,
     /// Errors after this alignment.
     pub accuracy: Option<TrajectoryAccuracy>,
@@ -43,23 +46,31 @@ pub fn evaluate_trajectory(estimate: &[PoseSample], ground_truth: &PoseTrack) ->
     TrajectoryEvaluation { alignment, accuracy: TrajectoryAccuracy::of(&pairs), pairs }
 }
 
-/// A trajectory of another program. It has only poses: no calibration, no features, no residuals.
-#[derive(Clone, Debug)]
+/// A trajectory beside the runs, as in `summary.json`. It has poses only: no calibration, no features, no residuals.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrajectoryLane {
     pub label: String,
     /// The file or topic from which it was read.
     pub source: String,
     /// Poses `world_from_imu` in the trajectory's own world, in time order.
+    #[serde(rename = "poses", serialize_with = "pose_count")]
     pub track: PoseTrack,
-    /// Errors against the ground truth.
-    pub evaluation: TrajectoryEvaluation,
-    /// Reason why there is no accuracy.
-    pub accuracy_missing: Option<String>,
     /// Path length in metres: of the ground truth at the trajectory's stamps if there is ground truth, else of the
     /// trajectory.
     pub length_m: f64,
+    /// Errors against the ground truth.
+    #[serde(flatten)]
+    pub evaluation: TrajectoryEvaluation,
+    /// Reason why there is no accuracy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy_missing: Option<String>,
     /// Unique among runs and trajectories of the process.
+    #[serde(skip)]
     pub id: u64,
+}
+
+fn pose_count<S: Serializer>(track: &PoseTrack, serializer: S) -> Result<S::Ok, S::Error> {
+    track.samples().len().serialize(serializer)
 }
 
 impl TrajectoryLane {
@@ -99,7 +110,7 @@ impl TrajectoryLane {
             path_length_m(evaluation.pairs.iter().map(|(_, actual)| &actual.pose.translation_m))
         };
         let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
-        Self { label, source, track, evaluation, accuracy_missing, length_m, id }
+        Self { label, source, track, length_m, evaluation, accuracy_missing, id }
     }
 
     /// Transform from the trajectory's world to that of the scene: the alignment with the ground truth; without one,
@@ -171,12 +182,12 @@ mod tests {
             PoseTrack::new(samples.collect())
         };
         let lane = TrajectoryLane::new("vins".into(), "vins.tum".into(), moved(0.0), Some(&actual));
-        assert!(lane.evaluation.accuracy.as_ref().unwrap().absolute_m.max < 1e-9);
+        assert!(lane.evaluation.accuracy.as_ref().unwrap().ate_max_m < 1e-9);
         assert!((lane.world_from_own(None) * other_world).minus(&RigidTransform::identity()).norm() < 1e-9);
         assert!((lane.length_m - lane.evaluation.accuracy.unwrap().length_m).abs() < 1e-12);
 
         let lane = TrajectoryLane::new("vins".into(), "vins.tum".into(), moved(0.02), Some(&actual));
-        let rmse_m = lane.evaluation.accuracy.as_ref().unwrap().absolute_m.rmse;
+        let rmse_m = lane.evaluation.accuracy.as_ref().unwrap().ate_rmse_m;
         assert!((rmse_m - 0.02).abs() < 1e-6, "{rmse_m}");
         assert!((lane.error_m(7_020_000_000).unwrap() - 0.02).abs() < 1e-4);
         assert!(lane.error_m(-1).is_none() && lane.error_m(30_000_000_000).is_none());

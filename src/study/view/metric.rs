@@ -1,6 +1,7 @@
 //! Numeric columns in the units that are shown, and axes over their values.
 
 use super::study::columns;
+use crate::study::columns::run_column;
 use crate::study::{ColumnType, StudyColumn, StudyTable};
 
 /// A numeric column with the unit that is shown.
@@ -21,8 +22,7 @@ impl Metric {
         if column.values.column_type() == ColumnType::Text {
             return None;
         }
-        // Errors of the extrinsics are shown in millimetres, those of trajectories in metres.
-        let fine = column.name.starts_with("chain_error");
+        let fine = run_column(&column.name).is_some_and(|column| column.fine);
         let (factor, unit) = Self::shown_unit(&column.unit, fine);
         Some(Self { column: column.name.clone(), factor, unit, description: column.description.clone() })
     }

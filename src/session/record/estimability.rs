@@ -2,10 +2,11 @@
 
 use serde::Serialize;
 
+use super::recording::Recording;
+use super::run::RunRecord;
 use crate::geometry::Dimension;
 use crate::gimbal::{ParameterGroup, ParameterId, Quantity};
 use crate::observability::{Estimability, ParameterEstimability, estimability};
-use crate::session::{Recording, RunRecord};
 
 /// A calibration parameter and its estimability from the flight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -29,8 +30,8 @@ pub struct EstimabilitySummary {
     pub estimability: Estimability,
 }
 
-/// Verdicts at the end of a run, in groups.
-pub(super) fn estimability_summary(recording: &Recording, run: &RunRecord) -> Vec<EstimabilitySummary> {
+/// The verdicts at the end of a run, in groups.
+pub fn estimability_summary(recording: &Recording, run: &RunRecord) -> Vec<EstimabilitySummary> {
     let Some(last) = run.steps.last() else { return Vec::new() };
     let rank = run.steps.iter().rev().find_map(|step| step.rank.as_ref());
     let names = recording.rig.parameter_names();
