@@ -9,7 +9,8 @@ use crate::calibration::frame_sets::{FrameSet, frame_sets};
 use crate::calibration::state::{Camera, Columns, Estimate, ViewId};
 use crate::calibration::visual::{PixelModel, Track};
 use crate::calibration::{CalibrationOptions, observations};
-use crate::estimator::gravity_in_world;
+use crate::estimator::factors::start_prior::StartPrior;
+use crate::estimator::{ImuBias, gravity_in_world};
 use crate::geometry::RigidTransform;
 use crate::optimization::{CameraPose, RobustLoss};
 use crate::simulation::{SyntheticMotion, SyntheticOptions};
@@ -46,8 +47,12 @@ fn example() -> Example {
         extrinsics: flight.input.static_camera.imu_from_camera,
         extrinsics_sigmas: (0.003, 0.005),
         time_shift_sigma_s: 0.01,
-        bias_sigmas: (0.05, 0.5),
-        first: navigation[0],
+        start: StartPrior {
+            reference: navigation[0].world_from_imu,
+            bias: ImuBias::default(),
+            gyroscope_bias_sigma: Vector3::repeat(0.05),
+            accelerometer_bias_sigma: Vector3::repeat(0.5),
+        },
     };
     let joint = |frame_set: &FrameSet| {
         frame_set

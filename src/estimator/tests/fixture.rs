@@ -212,7 +212,7 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
     }
     let frames = frames.expect("six frames");
     let start = StartPrior {
-        reference: frames.oldest().state.clone(),
+        reference: frames.oldest().state.navigation.world_from_imu,
         bias: ImuBias::default(),
         accelerometer_bias_sigma: Vector3::repeat(0.5),
         gyroscope_bias_sigma: Vector3::repeat(0.02),
