@@ -10,24 +10,15 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::appearance::Appearance;
+use super::appearance::{Appearance, CENTRE, LANES, Rows, SIDE, WINDOW};
 use super::pyramid::cut_out;
 use super::resample::{BORDER, Patch};
 use crate::sensors::GrayImage;
 
-/// Side of the window in pixels.
-pub(super) const WINDOW: usize = 21;
-pub(super) const CENTRE: usize = WINDOW / 2;
-/// Pixels around the window that its gradient needs.
-pub(super) const MARGIN: usize = 2;
-/// Side of the window with these.
-pub(super) const SIDE: usize = WINDOW + 2 * MARGIN;
 /// From the image's first column or row to the middle of the first window that can be resampled, in pixels.
 const NEAR_BORDER: f64 = (CENTRE + BORDER[0]) as f64;
 /// From the middle of the last window that can be resampled to the image's last column or row, in pixels.
 const FAR_BORDER: f64 = (CENTRE + BORDER[1]) as f64;
-/// Columns rounded up to whole vector registers; the surplus ones weigh nothing.
-pub(super) const LANES: usize = 24;
 
 /// Options of the refinement against reference patches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,9 +52,6 @@ pub(super) struct ReferencePatch {
     /// Maps offsets in the reference to offsets in the newest image.
     warp: Matrix2<f64>,
 }
-
-/// Grey levels of a window, row by row.
-pub(super) type Rows = [[f32; LANES]; WINDOW];
 
 impl ReferencePatch {
     /// The window about a feature that moves by about `motion_px` to the image in which it is matched.

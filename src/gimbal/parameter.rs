@@ -2,8 +2,6 @@
 
 use crate::geometry::{Dimension, principal_angle};
 
-use super::Singularity;
-
 /// A scalar parameter of the static calibration: one column of its Jacobian.
 ///
 /// Cameras are numbered as the estimator has them: 0 is the main camera, whose chain may have joints, the rigid cameras
@@ -433,6 +431,17 @@ impl ParameterNames {
         };
         part.has(quantity).then_some(ParameterId { part, quantity })
     }
+}
+
+/// Place of a singularity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Singularity {
+    /// In the base block of a minimal parameterization.
+    Base,
+    /// In the end block of a minimal parameterization.
+    End,
+    /// Where the joint axes at both ends of this link, counted from 0, are parallel.
+    ParallelAxes(u8),
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Singularity margins of the minimal parameterizations, and the choice among them.
 
-use super::chain::Form;
 use super::conversion::end_block;
+use super::form::Form;
 use super::frame::Frame;
-use super::{Chain, ClassicalChain, Parameterization};
+use super::{Chain, ClassicalChain, Parameterization, Singularity};
 
 /// A minimal parameterization is replaced when its margin at base or end falls below this.
 pub const SWITCH_MARGIN: f64 = 0.3;
@@ -23,17 +23,6 @@ pub fn auto_parameterization(classical: &ClassicalChain) -> Parameterization {
     let margin_printed = end[(0, 1)].hypot(end[(1, 1)]);
     let margin_swapped = end[(0, 0)].hypot(end[(1, 0)]);
     Parameterization::minimal(margin_yx > margin_xy + TIE, margin_swapped > margin_printed + TIE)
-}
-
-/// Place of a singularity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Singularity {
-    /// In the base block of a minimal parameterization.
-    Base,
-    /// In the end block of a minimal parameterization.
-    End,
-    /// Where the joint axes at both ends of this link, counted from 0, are parallel.
-    ParallelAxes(u8),
 }
 
 impl Chain {

@@ -1,7 +1,7 @@
 //! What goes wrong on a flight, on purpose.
 
+use super::error::SimulationError;
 use super::interval::during;
-use super::options::SimulationError;
 use super::vibration::Vibration;
 
 /// What may go wrong on a flight; by default nothing.

@@ -1,11 +1,9 @@
 use std::path::PathBuf;
 
-use thiserror::Error;
-
 use super::disturbances::Disturbances;
 use super::equipment::Lens;
+use super::error::SimulationError;
 use super::experiment::Experiment;
-use crate::flight_log::LogError;
 use crate::sensors::ChainPrior;
 
 /// Flight and sensors of a simulation; [`SimulationOptions::new`] gives an experiment of the paper.
@@ -110,46 +108,4 @@ pub struct SimulationProgress {
     pub images_done: usize,
     /// Images in all.
     pub images_total: usize,
-}
-
-/// Why a simulation ended without its files.
-#[derive(Debug, Error)]
-pub enum SimulationError {
-    /// A disturbance that cannot be read.
-    #[error("disturbance '{text}': {expected}")]
-    BadDisturbance {
-        /// As it was written.
-        text: String,
-        /// What was expected.
-        expected: String,
-    },
-    /// An option out of its range.
-    #[error("{option} is {value}: expected {low} to {high}")]
-    BadOption {
-        /// Which.
-        option: &'static str,
-        /// What it holds.
-        value: f64,
-        /// Least value.
-        low: f64,
-        /// Largest value.
-        high: f64,
-    },
-    /// An image could not be compressed.
-    #[error("cannot compress an image as JPEG: {problem}")]
-    Image {
-        /// The encoder's answer.
-        problem: String,
-    },
-    /// The caller has stopped it.
-    #[error("interrupted after {images_done} of {images_total} images; nothing is written")]
-    Interrupted {
-        /// Images so far.
-        images_done: usize,
-        /// Images of the whole log.
-        images_total: usize,
-    },
-    /// A file could not be written.
-    #[error(transparent)]
-    Log(#[from] LogError),
 }
