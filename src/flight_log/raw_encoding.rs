@@ -1,6 +1,6 @@
 //! Pixel encodings of raw images (`sensor_msgs/msg/Image`) and their grey levels.
 
-use super::image_decoding::BitDepth;
+use super::bit_depth::BitDepth;
 use super::messages::ImageMessage;
 
 /// How the pixels of a raw image are stored, by the names of ROS (`sensor_msgs/image_encodings.hpp`).

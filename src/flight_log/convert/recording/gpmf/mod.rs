@@ -11,7 +11,7 @@ use super::mp4::Payload;
 use super::recorded::{Recorded, finite, nanoseconds};
 use crate::flight_log::geodesy::Geodetic;
 use clock::{Mark, sample_times_ns};
-use items::{Item, items};
+use items::{Item, Properties, items};
 use karma::Karma;
 
 /// Name of the format in the report.
@@ -44,18 +44,6 @@ struct State {
     axes: Option<String>,
     /// Letter of the field of view (`VFOV`).
     field_of_view: Option<String>,
-}
-
-/// What the items of a stream say of its samples.
-#[derive(Debug, Default)]
-struct Properties {
-    scales: Vec<f64>,
-    letters: String,
-    name: String,
-    axes: String,
-    /// UTC (`GPSU`), and kind of the fix (`GPSF`).
-    utc_ns: Option<i64>,
-    fix: Option<f64>,
 }
 
 /// The telemetry of a video, by nanoseconds since its start.

@@ -10,7 +10,7 @@ use super::super::super::file::LogFile;
 use super::super::super::limits::LogLimits;
 use super::super::super::video::VideoCodec;
 use super::super::ConvertError;
-use super::recorded::Samples;
+use super::recorded::{Samples, rate_hz};
 use annex_b::UnitFormat;
 use boxes::{child, children, descendant, file_boxes, u32_at, u64_at};
 use track::{Sample, Track};
@@ -225,7 +225,7 @@ impl Video {
         let times: Samples<()> = self.pictures.iter().map(|picture| (picture.decoded_ns, ())).collect();
         let [width, height] = self.resolution_px;
         let order = if self.has_reordered_pictures { "; with B-frames, in the order of decoding" } else { "" };
-        format!("{}, {width}×{height}, {:.2} fps{order}", self.codec.name(), super::topics::rate_hz(&times))
+        format!("{}, {width}×{height}, {:.2} fps{order}", self.codec.name(), rate_hz(&times))
     }
 
     /// First and last time of its pictures in nanoseconds since its start.
