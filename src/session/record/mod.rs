@@ -3,7 +3,6 @@
 mod antenna_record;
 mod comparison;
 mod lost_since;
-mod pass_progress;
 mod pose_consistency;
 mod pose_errors;
 mod recording;
@@ -13,22 +12,25 @@ mod run_accuracy;
 mod solver_trace;
 mod step;
 mod summary;
+mod trajectory_accuracy;
+mod trajectory_evaluation;
 mod trajectory_lane;
 mod warnings;
 
 pub use antenna_record::PositionTruth;
 pub use comparison::{Comparison, Divergence, Quantity};
 pub use lost_since::LostSince;
-pub use pass_progress::PassProgress;
 pub use pose_consistency::PoseConsistency;
 pub use pose_errors::PoseError;
 pub use recording::Recording;
-pub use run::{ForkOrigin, RunMemory, RunRecord};
-pub use run_accuracy::{ChainDistance, RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};
+pub use run::{ForkOrigin, PassProgress, RunMemory, RunRecord};
+pub use run_accuracy::ChainDistance;
 pub use solver_trace::{SolverPosition, SolverTrace};
 pub(in crate::session) use step::tracks_bytes;
 pub use step::{StepFactorRows, StepRecord};
-pub use trajectory_lane::{TrajectoryEvaluation, TrajectoryLane, evaluate_trajectory};
+pub use trajectory_accuracy::{RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};
+pub use trajectory_evaluation::{TrajectoryEvaluation, evaluate_trajectory};
+pub use trajectory_lane::TrajectoryLane;
 pub use warnings::RunWarning;
 #[cfg(test)]
 pub(in crate::session) use warnings::warnings_of;
