@@ -62,13 +62,13 @@ pub use results::write_results;
 pub use run_files::{RunFileOptions, write_run};
 #[cfg(feature = "gui")]
 pub use screenshot::{
-    PANEL_NAMES, Renderer, ScreenshotError, ScreenshotOptions, draw_panel, draw_panel_svg, panel_csv, panel_names,
-    png_bytes, write_csv, write_png, write_screenshot, write_svg,
+    PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotError, ScreenshotOptions, draw_panel, draw_panel_svg,
+    panel_csv, panel_names, png_bytes, write_csv, write_png, write_screenshot, write_svg,
 };
 pub use session_file::{is_session, read_session};
 pub use structure::KnownLossSummary;
 #[cfg(feature = "gui")]
-pub use study_screenshot::{STUDY_PANEL_NAMES, draw_study_panel, draw_study_panel_svg, study_panel_csv};
+pub use study_screenshot::{draw_study_panel, draw_study_panel_svg, study_panel_csv};
 pub use study_source::{OpenedStudy, StudySourceError, is_study};
 pub use summary::{
     Accuracy, AntennaSummary, CalibrationSummary, RunSummary, StageSummary, TimingSummary, TrajectorySummary, log_name,

@@ -13,9 +13,10 @@ use super::error::ExportError;
 use crate::flight_log::output;
 use crate::gui::rendering::offscreen::{Offscreen, OffscreenError};
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
+use crate::gui::study::StudyPanel;
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::window::{PanelName, Preset, WindowState, alone_ui, panel_table, window_ui};
-use crate::gui::{ImageSource, PanelContext, Playback, Presentation, Selection};
+use crate::gui::window::{Preset, WindowState, alone_ui, panel_table, window_ui};
+use crate::gui::{ImageSource, PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
 
@@ -28,6 +29,20 @@ pub const PANEL_NAMES: [&str; PanelName::ALL.len() + 1] = {
     let mut index = 0;
     while index < PanelName::ALL.len() {
         names[index + 1] = PanelName::ALL[index].as_str();
+        index += 1;
+    }
+    names
+};
+
+/// The name of the whole view.
+pub(super) const WHOLE_VIEW: &str = "all";
+
+/// Names of the panels of a study; `all` is the whole view.
+pub const STUDY_PANEL_NAMES: [&str; StudyPanel::ALL.len() + 1] = {
+    let mut names = [WHOLE_VIEW; StudyPanel::ALL.len() + 1];
+    let mut index = 0;
+    while index < StudyPanel::ALL.len() {
+        names[index + 1] = StudyPanel::ALL[index].as_str();
         index += 1;
     }
     names
@@ -95,7 +110,7 @@ pub enum ScreenshotError {
         name: String,
     },
     /// There is no panel of that name in the view of a study.
-    #[error("unknown panel '{name}' of a study: expected one of {}", super::STUDY_PANEL_NAMES.join(", "))]
+    #[error("unknown panel '{name}' of a study: expected one of {}", STUDY_PANEL_NAMES.join(", "))]
     UnknownStudyPanel {
         /// The name as written.
         name: String,

@@ -2,14 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::PanelContext;
 use crate::geometry::seconds_from_ns;
-
-/// A panel whose values can be written as a CSV table.
-pub trait CsvTable {
-    /// The table with its header line, in seconds, radians, metres and pixels; empty where there are no values.
-    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String;
-}
 
 /// A CSV table that is built row by row.
 pub(super) struct Table {

@@ -6,7 +6,7 @@ use super::rendering::headless::{HeadlessOptions, draw};
 use super::samples::{rigid_recording, sample_images, sample_recording, sample_recording_of};
 use super::tests::{keep_screenshot, with_context};
 use super::theme::{Theme, ThemeName};
-use super::{PanelContext, Selection};
+use super::{Panel as _, PanelContext, Selection};
 use crate::gimbal::tests::parameter;
 use crate::session::Recording;
 

@@ -5,6 +5,9 @@ use std::time::Duration;
 use crate::geometry::seconds_from_ns;
 use crate::session::{Recording, RunRecord};
 
+/// Period at which the window checks for new steps.
+pub(super) const POLL_PERIOD: Duration = Duration::from_millis(60);
+
 /// Longest time between two pictures of playback, in which the cursor moves on between two steps.
 const LONGEST_PAUSE_S: f64 = 0.05;
 

@@ -1,45 +1,16 @@
 //! A study in the window: its view, and the runs that are opened from it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use egui::Ui;
 
-use super::{App, Opened, PlayingLog};
+use super::shown_study::{OpenStudy, ShownStudy, StudySource};
+use super::{App, Opened};
 use crate::gui::study::{StudyOptions, StudyRequest, StudyState, study_ui};
 use crate::gui::theme::MAX_RUNS;
 use crate::gui::window::NoticeLevel;
-use crate::study::view::{Study, rows_beside};
-
-/// A study on the disk: its tables, and its runs as sessions.
-pub trait StudySource: Send + Sync {
-    /// The tables.
-    fn study(&self) -> Arc<Study>;
-    /// A session over the log of the first row, with the runs of all rows; its cursor goes to the worst frame of the first
-    /// row as soon as that is computed. The message of an error has its cause and remedy.
-    ///
-    /// # Errors
-    /// When the log or the rig cannot be read any more.
-    fn open_runs(&self, rows: &[usize]) -> Result<Box<dyn PlayingLog>, String>;
-}
-
-/// Opens a study; `None` for a path that is no study.
-pub type OpenStudy = Arc<dyn Fn(&Path) -> Option<Result<Arc<dyn StudySource>, String>> + Send + Sync>;
-
-/// The study of the window.
-pub(super) struct ShownStudy {
-    source: Arc<dyn StudySource>,
-    pub(super) state: StudyState,
-    path: PathBuf,
-}
-
-impl ShownStudy {
-    /// Name of its folder.
-    pub(super) fn name(&self) -> String {
-        let name = self.path.file_name().unwrap_or(self.path.as_os_str());
-        name.to_string_lossy().into_owned()
-    }
-}
+use crate::study::view::rows_beside;
 
 impl App {
     /// The same window, which opens studies as well.

@@ -1,8 +1,8 @@
 //! The hits of all breakpoints, one hit per row.
 
 use super::BreakpointsPanel;
-use crate::gui::PanelContext;
-use crate::gui::csv_table::{CsvTable, Table, seconds};
+use crate::gui::csv_table::{Table, seconds};
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for BreakpointsPanel {
     /// Every hit of every breakpoint, by breakpoint and run.

@@ -1,8 +1,9 @@
 //! The comparison of all runs as a long table, one value per row.
 
-use super::{ComparisonPanel, label_of};
-use crate::gui::PanelContext;
-use crate::gui::csv_table::{CsvTable, Table, number, seconds};
+use super::ComparisonPanel;
+use super::columns::label_of;
+use crate::gui::csv_table::{Table, number, seconds};
+use crate::gui::{CsvTable, PanelContext};
 use crate::session::Quantity;
 
 impl CsvTable for ComparisonPanel {

@@ -2,9 +2,9 @@
 
 use super::ConvergencePanel;
 use crate::gimbal::ParameterId;
-use crate::gui::PanelContext;
 use crate::gui::chain_values::true_values;
-use crate::gui::csv_table::{CsvTable, Table, number, seconds};
+use crate::gui::csv_table::{Table, number, seconds};
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for ConvergencePanel {
     /// The calibration of the shown run over the whole recording, with the ground truth in the parameterization at the

@@ -1,8 +1,8 @@
 //! The observations in the image at the cursor, one feature per row.
 
 use super::ImagePanel;
-use crate::gui::PanelContext;
-use crate::gui::csv_table::{CsvTable, Table, number};
+use crate::gui::csv_table::{Table, number};
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for ImagePanel {
     /// The features of the image at the cursor.

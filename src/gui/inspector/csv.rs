@@ -2,8 +2,8 @@
 
 use super::InspectorPanel;
 use crate::geometry::seconds_from_ns;
-use crate::gui::PanelContext;
-use crate::gui::csv_table::{CsvTable, Table, number};
+use crate::gui::csv_table::{Table, number};
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for InspectorPanel {
     /// The state of the newest frame at the cursor.

@@ -2,8 +2,8 @@
 
 use super::JacobianPanel;
 use super::{cameras, column_name, name_of};
-use crate::gui::PanelContext;
-use crate::gui::csv_table::{CsvTable, Table};
+use crate::gui::csv_table::Table;
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for JacobianPanel {
     /// Norms of the Jacobian's blocks as in the panel; zeros are empty.

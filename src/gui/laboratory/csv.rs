@@ -1,8 +1,8 @@
 //! The spectra of the compared parameterizations: one row per singular value or weight of a direction.
 
 use super::LaboratoryPanel;
-use crate::gui::PanelContext;
-use crate::gui::csv_table::{CsvTable, Table, number};
+use crate::gui::csv_table::{Table, number};
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for LaboratoryPanel {
     /// Singular values and directions of each parameterization.

@@ -1,8 +1,8 @@
 //! The singular values and directions at the cursor, one singular value per row.
 
 use super::RankPanel;
-use crate::gui::PanelContext;
-use crate::gui::csv_table::{CsvTable, Table, number};
+use crate::gui::csv_table::{Table, number};
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for RankPanel {
     /// Singular values of the step at the cursor, and each null or weak direction as weights by parameter name.

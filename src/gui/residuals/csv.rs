@@ -2,8 +2,8 @@
 
 use super::{ResidualsPanel, rms_px};
 use crate::estimator::FactorKind;
-use crate::gui::PanelContext;
-use crate::gui::csv_table::{CsvTable, Table, number, seconds};
+use crate::gui::csv_table::{Table, number, seconds};
+use crate::gui::{CsvTable, PanelContext};
 use crate::session::StepRecord;
 
 impl CsvTable for ResidualsPanel {

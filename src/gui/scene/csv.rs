@@ -2,8 +2,8 @@
 
 use super::ScenePanel;
 use crate::geometry::seconds_from_ns;
-use crate::gui::PanelContext;
-use crate::gui::csv_table::{CsvTable, Table, number, seconds};
+use crate::gui::csv_table::{Table, number, seconds};
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for ScenePanel {
     /// Positions of all runs and trajectories up to the cursor, aligned with the ground truth as in the scene, and the ground truth.

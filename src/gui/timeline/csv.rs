@@ -1,10 +1,10 @@
 //! The lanes of the timeline, one step or one event per row.
 
 use super::TimelinePanel;
-use crate::gui::PanelContext;
-use crate::gui::csv_table::{CsvTable, Table, number, seconds};
+use crate::gui::csv_table::{Table, number, seconds};
 use crate::gui::events::name_of;
 use crate::gui::residuals::rms_px;
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for TimelinePanel {
     /// The lanes: a row for every step of every run, followed by one for each of its notable events and of the log's

@@ -3,22 +3,14 @@
 use egui::epaint::TextShape;
 use egui::{Id, LayerId, Popup, PopupAnchor, PopupCloseBehavior, Pos2, Shape, Ui};
 
-use super::{NoticeLevel, PanelName, WindowState};
-use crate::gui::PanelContext;
+use super::notices::NoticeLevel;
+use super::state::{PanelMenu, WindowState};
 use crate::gui::copied_value::offered;
 use crate::gui::units::counted;
+use crate::gui::{PanelContext, PanelName};
 
 /// Letters of a copied value that its notice shows.
 const SHOWN_LETTERS: usize = 60;
-
-/// The menu of a panel.
-#[derive(Debug)]
-pub(super) struct PanelMenu {
-    panel: PanelName,
-    at: Pos2,
-    /// The value under the pointer when the menu was opened.
-    value: Option<String>,
-}
 
 /// The value under the pointer: the one that a panel offers, or the text that is painted there.
 pub(super) fn value_under_pointer(ui: &Ui) -> Option<String> {

@@ -6,11 +6,11 @@ use egui::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
-use super::{PanelName, WindowState, alone_ui};
+use super::{WindowState, alone_ui};
 use crate::gimbal::tests::parameter;
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::{PanelContext, Playback, Presentation, Selection};
+use crate::gui::{PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::{SlideDirection, SlidePosition};
 use crate::session::Recording;
 use crate::session::breakpoints::Breakpoints;

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::Settings;
+use super::settings::Settings;
 use super::tiles::Layout;
 
 /// Maximum number of changes that can be undone.
@@ -95,9 +95,9 @@ impl History {
 
 #[cfg(test)]
 mod tests {
-    use super::super::PanelName;
     use super::super::tiles::Preset;
     use super::*;
+    use crate::gui::PanelName;
     use crate::gui::theme::ThemeName;
 
     /// Two frames after a change.

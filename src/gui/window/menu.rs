@@ -6,11 +6,12 @@ use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Button, PopupCloseBehavior, Ui, WidgetInfo};
 
 use super::actions::{Action, Entry, TABLE};
+use super::request::WindowRequest;
+use super::state::WindowState;
 use super::tiles::Preset;
-use super::{Dialog, PanelName, WindowRequest, WindowState};
-use crate::gui::PanelContext;
 use crate::gui::theme::{MAX_RUNS, ThemeName};
 use crate::gui::timeline::SPEEDS;
+use crate::gui::{Dialog, PanelContext, PanelName};
 
 /// Maximum number of recent files in the menu.
 const MAX_RECENT: usize = 10;

@@ -2,13 +2,12 @@
 
 use egui::{CentralPanel, Frame, Ui, Vec2};
 
-use super::{PanelName, WindowState};
+use super::state::WindowState;
 use crate::geometry::seconds_from_ns;
 use crate::gui::desktop::PanelExport;
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
-use crate::gui::slide;
 use crate::gui::theme::PANEL_MARGIN;
-use crate::gui::{PanelContext, Playback, Presentation};
+use crate::gui::{PanelContext, PanelName, Playback, Presentation};
 
 /// Pixels per point of the screenshot: twice an ordinary screen, so that it can be printed.
 const PIXELS_PER_POINT: f32 = 2.0;
@@ -57,16 +56,13 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
 
 /// The values of a panel, comma separated.
 pub fn panel_table(panel: PanelName, state: &mut WindowState, ctx: &mut PanelContext<'_>) -> String {
-    slide::update(ctx);
+    ctx.move_chain();
     state.panels.csv_table(panel, ctx)
 }
 
 /// Draws one panel into all of `ui`.
 pub fn alone_ui(panel: PanelName, ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
     let frame = Frame::new().fill(ctx.theme.surface).inner_margin(PANEL_MARGIN);
-    slide::update(ctx);
-    CentralPanel::no_frame().frame(frame).show(ui, |ui| state.panels.ui(panel, ui, ctx));
+    ctx.move_chain();
+    CentralPanel::no_frame().frame(frame).show(ui, |ui| state.panels.get(panel).ui(ui, ctx));
 }
-
-/// Size in points of a panel that is not on the screen.
-pub(super) const HIDDEN_PANEL_SIZE: Vec2 = Vec2::new(960.0, 540.0);

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use egui::{Button, RichText, TextEdit, Ui};
 use egui_tiles::Tree;
 
-use super::PanelName;
 use super::tiles::{Layout, Preset};
+use crate::gui::PanelName;
 use crate::gui::theme::Theme;
 
 /// Maximum number of saved layouts.

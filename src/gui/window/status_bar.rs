@@ -4,8 +4,9 @@ use std::path::Path;
 
 use egui::{Align, Button, FontId, Label, Layout as UiLayout, ProgressBar, RichText, TextStyle, Ui};
 
+use super::progress::Progress;
+use super::state::WindowState;
 use super::warning_lines::warning_lines;
-use super::{Progress, WindowState};
 use crate::gui::PanelContext;
 use crate::gui::theme::{self, Theme};
 use crate::gui::units::{bytes, counted, fixed};

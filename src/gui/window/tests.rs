@@ -6,11 +6,11 @@ use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
-use super::{PanelName, Preset, WindowState, window_ui};
+use super::{Preset, WindowState, window_ui};
 use crate::gimbal::tests::parameter;
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::{PanelContext, Playback, Presentation, Selection};
+use crate::gui::{PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::SlideRequest;
 use crate::session::breakpoints::Breakpoints;
 use crate::session::{Command, ForkChanges, ForkOrigin, PlaybackSpeed, Recording, RunWarning};

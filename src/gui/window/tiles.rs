@@ -5,10 +5,10 @@ use egui_tiles::{
     Behavior, Container, Linear, LinearDir, SimplificationOptions, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
 };
 
-use super::{PanelName, Panels};
-use crate::gui::PanelContext;
+use super::panels::Panels;
 use crate::gui::help;
 use crate::gui::theme::{PANEL_MARGIN, Theme};
+use crate::gui::{PanelContext, PanelName};
 
 /// A predefined layout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -207,7 +207,7 @@ impl Behavior<PanelName> for Shown<'_, '_> {
         self.places.push((*pane, place));
         egui::Frame::new().fill(theme.surface).inner_margin(PANEL_MARGIN).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            self.panels.ui(*pane, ui, self.ctx);
+            self.panels.get(*pane).ui(ui, self.ctx);
         });
         if self.focus == Some(*pane) {
             ui.painter().hline(place.x_range(), place.top() + 1.0, Stroke::new(2.0, theme.accent));

@@ -5,11 +5,11 @@ use egui::style::StyleModifier;
 use egui::{Align, Button, Label, Layout as UiLayout, RichText, TextStyle, Ui, vec2};
 
 use super::actions::{Action, TABLE};
+use super::menu;
+use super::state::WindowState;
 use super::tiles::Preset;
-use super::{Dialog, WindowState, menu};
-use crate::gui::PanelContext;
 use crate::gui::theme::MAX_RUNS;
-use crate::session::Recording;
+use crate::gui::{Dialog, PanelContext};
 
 /// The buttons beside the menus, where there is room: text and action.
 const BUTTONS: [(&str, Action); 2] =
@@ -26,7 +26,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
         if let Some(study) = &state.study {
             study_button(ui, study, actions);
         }
-        let log = log_name(ctx.recording);
+        let log = ctx.recording.log_name();
         let rig = format!("rig: {}", ctx.recording.rig.name);
         let widths = Widths {
             log: text_width(ui, &log),
@@ -61,11 +61,6 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
             }
         });
     });
-}
-
-/// The file name of the log.
-pub(crate) fn log_name(recording: &Recording) -> String {
-    recording.log_path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
 /// Widths in points of what stands in the bar beside the menus.

@@ -8,82 +8,17 @@ mod open_log;
 mod palette;
 mod palette_items;
 mod settings;
+mod state;
 mod unsaved;
-
-use std::sync::Arc;
 
 use egui::Ui;
 
-use self::add_run::AddRunDialog;
-use self::fork::ForkDialog;
-use self::open_log::{OpenLogDialog, Picked};
-use self::palette::CommandPalette;
+use self::open_log::Picked;
+pub use self::state::Dialogs;
 use super::actions::Action;
-use super::{WindowRequest, WindowState};
-use crate::gui::PanelContext;
-use crate::gui::desktop::Desktop;
-
-/// A dialog by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Dialog {
-    /// Opens a log or a saved session.
-    OpenLog,
-    /// Adds a run on the same log.
-    AddRun,
-    /// Forks the selected run at the cursor.
-    Fork,
-    /// The command palette.
-    Palette,
-    /// The settings.
-    Settings,
-    /// The question before unsaved work is left.
-    Unsaved,
-}
-
-/// The state of all dialogs, open or not.
-#[derive(Default)]
-pub struct Dialogs {
-    open: Option<Dialog>,
-    open_log: OpenLogDialog,
-    add_run: AddRunDialog,
-    fork: ForkDialog,
-    palette: CommandPalette,
-    /// The work that is not saved, as text.
-    unsaved: String,
-}
-
-impl Dialogs {
-    /// Gives the dialog for logs access to the machine, for completing paths.
-    pub fn set_desktop(&mut self, desktop: Arc<dyn Desktop>) {
-        self.open_log = OpenLogDialog::new(desktop);
-    }
-
-    /// Opens a dialog and closes the one that is open; the palette opens with an empty input.
-    pub fn show(&mut self, dialog: Dialog) {
-        match dialog {
-            Dialog::OpenLog => self.open_log.show_picker(),
-            Dialog::Palette => self.palette = CommandPalette::default(),
-            _ => {}
-        }
-        self.open = Some(dialog);
-    }
-
-    /// Asks whether to save the session before it is left; `lost` counts what is not saved.
-    pub fn ask_to_save(&mut self, lost: String) {
-        self.unsaved = lost;
-        self.open = Some(Dialog::Unsaved);
-    }
-
-    /// Whether a dialog is open.
-    pub fn is_open(&self) -> bool {
-        self.open.is_some()
-    }
-
-    /// Closes the dialog that is open.
-    pub fn close(&mut self) {
-        self.open = None;
-    }
-}
+use super::request::WindowRequest;
+use super::state::WindowState;
+use crate::gui::{Dialog, PanelContext};
 
 /// Draws the dialog that is open.
 pub(super) fn ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {

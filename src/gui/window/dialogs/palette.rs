@@ -5,8 +5,8 @@ use egui::{Align, Key, Layout as UiLayout, Modifiers, RichText, ScrollArea, Text
 use super::modal::Modal;
 use super::palette_items::{Choice, Item, found};
 use crate::gui::PanelContext;
-use crate::gui::window::SavedLayouts;
 use crate::gui::window::actions::Action;
+use crate::gui::window::saved_layouts::SavedLayouts;
 use crate::gui::window::tiles::Layout;
 
 /// Height of the list in points.

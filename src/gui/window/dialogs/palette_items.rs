@@ -1,17 +1,17 @@
 //! The items of the command palette: all actions, and the content of the recording at the cursor.
 
-use super::{Dialog, fuzzy};
+use super::fuzzy;
 use crate::frontend::FeatureId;
 use crate::geometry::ns_from_seconds;
 use crate::gimbal::ParameterId;
-use crate::gui::PanelContext;
 use crate::gui::convergence::names::meaning_of;
 use crate::gui::theme::ThemeName;
 use crate::gui::timeline::SPEEDS;
 use crate::gui::units::seconds;
 use crate::gui::window::actions::{Action, TABLE, keys_of};
+use crate::gui::window::saved_layouts::SavedLayouts;
 use crate::gui::window::tiles::Layout;
-use crate::gui::window::{PanelName, SavedLayouts};
+use crate::gui::{Dialog, PanelContext, PanelName};
 use crate::session::RunRecord;
 
 /// The effect of an item.
