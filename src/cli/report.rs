@@ -157,7 +157,7 @@ fn figures_of(
     plan: &SessionPlan,
     computation: &mut Computation,
 ) -> Result<Vec<ReportFigure>> {
-    report_figures::draw(arguments, plan, computation)
+    report_figures::draw(&arguments.at, plan, computation)
 }
 
 /// Without the window no figures can be drawn.

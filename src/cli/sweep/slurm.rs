@@ -9,8 +9,9 @@ use anyhow::{Context as _, Result, bail};
 use dcvins::export::study::{JobCosts, JobStatus, write_text};
 use dcvins::study::{self, JobLog, KeyedJob, SlurmOptions};
 
+use super::arguments::SweepArguments;
+use super::opened::Sweep;
 use super::pool::{PoolOutcome, last_lines};
-use super::{Sweep, SweepArguments};
 use crate::cli::exit::JOBS_FAILED;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{Progress, notify};

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::ReportOptions;
 use super::inputs::InputFile;
+use super::options::ReportOptions;
 use super::rank_intervals::{RankInterval, rank_intervals};
 use super::verdict::{RunVerdict, Statement, log_statement};
 use crate::export::estimability::{EstimabilitySummary, estimability_summary};

@@ -4,8 +4,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use super::options::{ReportDrawing, ReportFigure};
 use super::verdict::Mark;
-use super::{ReportDrawing, ReportFigure};
 
 /// Tables with at most so many rows are not split between printed pages.
 const MAX_UNBROKEN_ROWS: usize = 14;
@@ -109,16 +109,6 @@ pub(super) fn unbroken(text: &str) -> String {
     words
 }
 
-/// A number with so many decimals and a true minus sign; a negative zero is 0.
-pub(super) fn number(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(digits) if digits.chars().all(|digit| digit == '0' || digit == '.') => digits.to_owned(),
-        Some(digits) => format!("−{digits}"),
-        None => text,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -147,12 +137,5 @@ mod tests {
     fn units_stay_with_their_numbers() {
         assert_eq!(unbroken("over 5 m 47.3 mm, 2 more"), "over 5\u{a0}m 47.3\u{a0}mm, 2 more");
         assert_eq!(unbroken("for 4 s; 4 seconds; 0.05 % of"), "for 4\u{a0}s; 4 seconds; 0.05\u{a0}% of");
-    }
-
-    #[test]
-    fn numbers_have_a_minus_sign_and_no_negative_zero() {
-        assert_eq!(number(-1.25, 1), "−1.2");
-        assert_eq!(number(-0.001, 2), "0.00");
-        assert_eq!(number(3.0, 0), "3");
     }
 }

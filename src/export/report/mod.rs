@@ -5,6 +5,8 @@
 mod content;
 mod html;
 mod inputs;
+mod numbers;
+mod options;
 mod page;
 mod rank_intervals;
 mod study;
@@ -16,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 use content::ReportContent;
 use inputs::InputFile;
-use rank_intervals::RankInterval;
+pub use options::{ReportDrawing, ReportFigure, ReportOptions};
 use serde_json::Value;
 pub use study::{StudyReport, check_study_report, write_study_report};
 
@@ -25,46 +27,10 @@ use super::existing::{RUN_FILES, check_run_folder, read_index};
 use super::result_cache::CachedFile;
 use super::run_files::{RunFileOptions, remove_unwritten, stage_run};
 use crate::flight_log::output::OutputSet;
-use crate::log_check::CheckReport;
 use crate::session::Recording;
 
 /// The files of each run, without measured times.
 const RUN_OPTIONS: RunFileOptions = RunFileOptions { timing: false, mcap: false, euroc_trajectory: false };
-
-/// A figure of a report.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ReportFigure {
-    /// Heading above it; consecutive figures with the same heading share it.
-    pub heading: String,
-    /// What is shown, of which run and at which time; the page adds the number of the figure.
-    pub title: String,
-    /// How to read it: colours, dashes, units.
-    pub reading: String,
-    /// Its drawing.
-    pub drawing: ReportDrawing,
-}
-
-/// The drawing of a figure.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum ReportDrawing {
-    /// A PNG file, for images and the 3D scene.
-    Png(Vec<u8>),
-    /// An SVG, for plots; the prefix of its element ids is unique in the report.
-    Svg(String),
-}
-
-/// Contents of a report in addition to the recording.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ReportOptions {
-    /// The command line.
-    pub command: String,
-    /// Input files, listed with their hashes.
-    pub inputs: Vec<PathBuf>,
-    /// Figures in the order of the page.
-    pub figures: Vec<ReportFigure>,
-    /// Findings of `check` about the log and its rig.
-    pub check: Option<CheckReport>,
-}
 
 /// Writes `report.html`, `report.json` and a folder for each run as `run --no-timing` does; returns the paths of all files,
 /// that of the HTML last.

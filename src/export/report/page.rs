@@ -2,11 +2,13 @@
 
 use maud::{Markup, html};
 
-use super::ReportFigure;
 use super::content::{ReportContent, RunContent};
-use super::html::{document, figure, icon, list, number, unbroken};
+use super::html::{document, figure, icon, list, unbroken};
+use super::numbers::number;
+use super::options::ReportFigure;
+use super::rank_intervals::RankInterval;
+use super::tables;
 use super::verdict::Statement;
-use super::{RankInterval, tables};
 
 /// The whole page.
 pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String {

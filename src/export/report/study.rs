@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use maud::{Markup, html};
 use serde::Serialize;
 
-use super::ReportFigure;
-use super::html::{document, figure, number, table};
+use super::html::{document, figure, table};
+use super::numbers::number;
+use super::options::ReportFigure;
 use crate::export::error::ExportError;
 use crate::export::existing::read_index;
 use crate::flight_log::output::{self, OutputSet};

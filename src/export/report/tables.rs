@@ -3,19 +3,15 @@
 use maud::{Markup, html};
 
 use super::content::{ReportContent, RunContent};
-use super::html::{list, number, table};
+use super::html::{list, table};
+use super::numbers::{MS_PER_S, number, shown_unit};
 use super::verdict::ParameterVerdict;
 use crate::export::estimability::EstimabilitySummary;
 use crate::export::summary::{ParameterSummary, TrajectorySummary};
-use crate::geometry::Dimension;
 use crate::log_check::{CheckReport, Severity};
 
-/// Millimetres per metre.
-const MM_PER_M: f64 = 1e3;
 /// Number of columns of the calibration table before the prior: name, unit, values and σ.
 const VALUE_COLUMNS: usize = 5;
-/// Milliseconds per second.
-const MS_PER_S: f64 = 1e3;
 
 /// Frame counts of each run.
 pub(super) fn frames(content: &ReportContent) -> Markup {
@@ -150,17 +146,6 @@ pub(super) fn estimability(run: &RunContent) -> Markup {
     table(&caption, &header, &rows)
 }
 
-/// The shown unit of a dimension, shown units per stored unit, and decimals in tables.
-pub(super) fn shown_unit(dimension: Dimension) -> (&'static str, f64, usize) {
-    match dimension {
-        Dimension::Angle => ("°", 1f64.to_degrees(), 3),
-        Dimension::Length => ("mm", MM_PER_M, 2),
-        Dimension::Time => ("ms", MS_PER_S, 3),
-        Dimension::Pixel => ("px", 1.0, 3),
-        Dimension::Ratio => ("", 1.0, 6),
-    }
-}
-
 fn calibration_row(parameter: &ParameterSummary, with_ground_truth: bool) -> Vec<String> {
     let (unit, scale, decimals) = shown_unit(parameter.dimension);
     let shown = |value: f64| number(value * scale, decimals);
@@ -242,6 +227,7 @@ pub(super) fn inputs(content: &ReportContent) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Dimension;
 
     #[test]
     fn every_unit_is_shown_as_people_read_it() {

@@ -4,8 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde::Serialize;
 
-use super::html::number;
-use super::tables::shown_unit;
+use super::numbers::{number, shown_unit};
 use crate::export::summary::{Accuracy, ChainError, RunSummary};
 use crate::geometry::{Dimension, seconds_from_ns};
 use crate::log_check::{CheckReport, Severity};

@@ -77,10 +77,12 @@ pub enum StudyFileError {
         path: PathBuf,
     },
     /// The folder holds something else than a study.
-    #[error("the folder holds '{found}' and no {}; give another folder, or an empty one: {path}", super::folder::INDEX)]
+    #[error("the folder holds '{found}' and no {index}; give another folder, or an empty one: {path}")]
     NoStudy {
         /// What is in it.
         found: String,
+        /// Name of the file by which a study is recognized.
+        index: &'static str,
         /// The folder.
         path: PathBuf,
     },

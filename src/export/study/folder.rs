@@ -77,7 +77,7 @@ impl StudyFolder {
         let foreign = names.find(|name| !output::is_temporary(name));
         if let Some(found) = foreign.filter(|_| !root.join(INDEX).is_file()) {
             let found = found.to_string_lossy().into_owned();
-            return Err(StudyFileError::NoStudy { found, path: root.to_owned() });
+            return Err(StudyFileError::NoStudy { found, index: INDEX, path: root.to_owned() });
         }
         for folder in [root.to_owned(), root.join("jobs"), root.join("flights")] {
             fs::create_dir_all(&folder).map_err(StudyFileError::write(&folder))?;
