@@ -22,14 +22,18 @@
 //! | `study` | the runs that a plan asks for, the tables of their results and the comparison of two of them | files, processes, screens |
 //! | `gui` | panels, 3D scene, theme: reads reports, sends commands | the inside of the estimator |
 //! | `export` | the same tables and panels without a window | windows |
+//! | `interop` | a rig as the configuration of another estimator | runs |
+//! | `report` | HTML reports of logs and of studies | how their figures are drawn |
+//! | `sweep` | the jobs of a study executed, and the files of their results | how jobs are distributed |
+//! | `desktop` | what the window asks of the machine: recent files, settings, written panels | sessions |
 //!
 //! Two places differ from the way of the data, each for a reason: `simulation` stands below `frontend`, whose track types
 //! it writes for flights without images; `calibration` stands below `observability`, by which it says what its flight
 //! could not constrain.
 //!
 //! Four absences hold the shape: nothing above `gui` names egui or wgpu; [`frontend`], [`estimator`] and [`calibration`]
-//! do not know `flight_log`; [`frontend`] does not know the estimator; only `flight_log`, `export` and the command line
-//! touch the file system, and only `gui` asks the wall clock for anything but the stage timings of a report.
+//! do not know `flight_log`; [`frontend`] does not know the estimator; only `flight_log`, `export` and what
+//! follows it touch the file system, and only `gui` asks the wall clock for anything but the stage timings of a report.
 //!
 //! Equations and parameterizations: docs/mathematics.md, sections 2 and 3; rank rule: docs/mathematics.md, section 8.
 //!
@@ -79,6 +83,8 @@
 
 pub mod calibration;
 pub mod camera;
+#[cfg(feature = "gui")]
+pub mod desktop;
 pub mod estimator;
 #[cfg(feature = "logs")]
 pub mod export;
@@ -90,12 +96,18 @@ pub mod gimbal;
 #[cfg(feature = "gui")]
 pub mod gui;
 #[cfg(feature = "logs")]
+pub mod interop;
+#[cfg(feature = "logs")]
 pub mod log_check;
 pub mod observability;
 pub mod optimization;
+#[cfg(feature = "logs")]
+pub mod report;
 pub mod sensors;
 #[cfg(feature = "logs")]
 pub mod session;
 pub mod simulation;
 #[cfg(feature = "logs")]
 pub mod study;
+#[cfg(feature = "logs")]
+pub mod sweep;

@@ -1,6 +1,6 @@
 //! What is remembered of a log, and what it takes to go back in it.
 
-use dcvins::export::Machine;
+use dcvins::desktop::Machine;
 use dcvins::geometry::SplitMix64;
 use dcvins::gui::desktop::Desktop as _;
 use dcvins::session::{Command, Session, Stopwatch};

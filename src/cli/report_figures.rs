@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use anyhow::Result;
-use dcvins::export::{ReportDrawing, ReportFigure, ScreenshotOptions, draw_panel, draw_panel_svg, png_bytes};
+use dcvins::export::{ScreenshotOptions, draw_panel, draw_panel_svg, png_bytes};
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
 use dcvins::gui::theme::ThemeName;
+use dcvins::report::{ReportDrawing, ReportFigure};
 use dcvins::session::{Computation, Recording, SessionPlan};
 
 use super::terminal::Progress;

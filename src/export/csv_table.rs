@@ -5,23 +5,23 @@
 const IN_MEMORY: &str = "every row has as many cells as the header";
 
 /// A table of comma-separated values in memory; cells are quoted where necessary.
-pub(super) struct CsvTable(csv::Writer<Vec<u8>>);
+pub(crate) struct CsvTable(csv::Writer<Vec<u8>>);
 
 impl CsvTable {
     /// An empty table with the names of its columns.
-    pub(super) fn new<S: AsRef<[u8]>>(header: impl IntoIterator<Item = S>) -> Self {
+    pub(crate) fn new<S: AsRef<[u8]>>(header: impl IntoIterator<Item = S>) -> Self {
         let mut table = Self(csv::Writer::from_writer(Vec::new()));
         table.push(header);
         table
     }
 
     /// Appends a row with one cell per column.
-    pub(super) fn push<S: AsRef<[u8]>>(&mut self, row: impl IntoIterator<Item = S>) {
+    pub(crate) fn push<S: AsRef<[u8]>>(&mut self, row: impl IntoIterator<Item = S>) {
         self.0.write_record(row).expect(IN_MEMORY);
     }
 
     /// The text of the table, with a line break after every row.
-    pub(super) fn into_text(self) -> String {
+    pub(crate) fn into_text(self) -> String {
         let bytes = self.0.into_inner().map_err(|error| error.to_string()).expect(IN_MEMORY);
         String::from_utf8(bytes).expect("cells are UTF-8")
     }

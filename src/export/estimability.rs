@@ -35,7 +35,7 @@ pub struct EstimabilitySummary {
 }
 
 /// The verdicts at the end of a run, in groups.
-pub(super) fn estimability_summary(recording: &Recording, run: &RunRecord) -> Vec<EstimabilitySummary> {
+pub(crate) fn estimability_summary(recording: &Recording, run: &RunRecord) -> Vec<EstimabilitySummary> {
     let Some(last) = run.steps.last() else { return Vec::new() };
     let rank = run.steps.iter().rev().find_map(|step| step.rank.as_ref());
     let names = recording.rig.parameter_names();

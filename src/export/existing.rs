@@ -19,7 +19,7 @@ use crate::flight_log::output;
 use crate::flight_log::{FlightLog, shortened};
 
 /// Names of all files that a run can write.
-pub(super) const RUN_FILES: [&str; 10] = [
+pub(crate) const RUN_FILES: [&str; 10] = [
     "summary.json",
     "trajectory.tum",
     "covariance.csv",
@@ -194,7 +194,7 @@ pub fn other_runs(folder: &Path, labels: &[&str]) -> Vec<String> {
 }
 
 /// A folder of a run must hold nothing, or a run on this log and nothing else.
-pub(super) fn check_run_folder(folder: &Path, log: &str) -> Result<(), ExportError> {
+pub(crate) fn check_run_folder(folder: &Path, log: &str) -> Result<(), ExportError> {
     let existing = |problem: String| ExportError::Existing { problem, path: folder.to_owned() };
     for entry in fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok) {
         let name = entry.file_name();
@@ -230,7 +230,7 @@ fn log_of(index: &Path) -> Option<String> {
 }
 
 /// A JSON file of results.
-pub(super) fn read_index(index: &Path) -> Option<Value> {
+pub(crate) fn read_index(index: &Path) -> Option<Value> {
     let file = fs::File::open(index).ok()?;
     let mut text = String::new();
     file.take(LARGEST_INDEX_BYTES).read_to_string(&mut text).ok()?;

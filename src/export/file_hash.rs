@@ -13,7 +13,7 @@ const BLOCK_BYTES: usize = 1 << 20;
 ///
 /// # Errors
 /// When it cannot be read.
-pub(super) fn add_file(hash: &mut Sha256, path: &Path) -> io::Result<u64> {
+pub(crate) fn add_file(hash: &mut Sha256, path: &Path) -> io::Result<u64> {
     let mut file = File::open(path)?;
     let mut block = vec![0; BLOCK_BYTES];
     let mut bytes = 0;

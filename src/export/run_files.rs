@@ -54,7 +54,7 @@ pub fn write_run(
 }
 
 /// Prepares the files of one run without giving them their names.
-pub(super) fn stage_run(
+pub(crate) fn stage_run(
     recording: &Recording,
     run: &RunRecord,
     folder: &Path,
@@ -97,7 +97,7 @@ pub(super) fn stage_run(
 }
 
 /// Removes the files that an earlier run with other options left in the folder of a run.
-pub(super) fn remove_unwritten(folder: &Path, options: RunFileOptions) -> Result<(), ExportError> {
+pub(crate) fn remove_unwritten(folder: &Path, options: RunFileOptions) -> Result<(), ExportError> {
     for (name, written) in [(EUROC_TRAJECTORY, options.euroc_trajectory), (RESULTS, options.mcap)] {
         let path = folder.join(name);
         if !written && path.is_file() {

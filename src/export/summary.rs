@@ -290,7 +290,7 @@ pub struct TrajectorySummary {
 
 impl TrajectorySummary {
     /// The summary of a trajectory beside the runs.
-    pub(super) fn of(lane: &TrajectoryLane) -> Self {
+    pub(crate) fn of(lane: &TrajectoryLane) -> Self {
         Self {
             label: lane.label.clone(),
             source: lane.source.clone(),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::imports::{Imports, is_test_file};
 
 /// Folders from the first to the last; each may use those before it. The table in `src/lib.rs` says what each promises.
-const ORDER: [&str; 18] = [
+const ORDER: [&str; 22] = [
     "geometry",
     "camera",
     "gimbal",
@@ -23,6 +23,10 @@ const ORDER: [&str; 18] = [
     "study",
     "gui",
     "export",
+    "interop",
+    "report",
+    "sweep",
+    "desktop",
     "cli",
     "main",
 ];
@@ -37,7 +41,7 @@ const UNKNOWN_TO: [(&str, &[&str]); 5] = [
 ];
 
 /// The only folders that may open, read or write files.
-const FILE_SYSTEM: [&str; 3] = ["flight_log", "export", "cli"];
+const FILE_SYSTEM: [&str; 7] = ["flight_log", "export", "interop", "report", "sweep", "desktop", "cli"];
 
 /// The only folders that may name the crates of the window; `export` draws its panels.
 const WINDOW: [&str; 3] = ["gui", "export", "cli"];

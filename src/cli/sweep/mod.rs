@@ -11,9 +11,8 @@ mod tolerance;
 use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, bail};
-use dcvins::export;
-use dcvins::export::study::{read_parquet, write_parquet};
 use dcvins::study::{self, StudyTable};
+use dcvins::sweep::{read_parquet, write_parquet, write_text};
 use serde::Serialize;
 
 use crate::cli::exit::Outcome;
@@ -155,7 +154,7 @@ fn finish(
     }
     if let Some(comparison) = &report.comparison {
         match &arguments.summary {
-            Some(path) => export::study::write_text(path, &comparison.to_string())?,
+            Some(path) => write_text(path, &comparison.to_string())?,
             None if !arguments.json => print(&format!("\n{comparison}"))?,
             None => {}
         }

@@ -1,8 +1,8 @@
 //! The plan of a sweep with its folder and its jobs.
 
 use anyhow::Result;
-use dcvins::export::study::{StudyFolder, find_logs, program_identity, read_plan};
 use dcvins::study::{self, KeyedJob, StudyPlan};
+use dcvins::sweep::{StudyFolder, find_logs, program_identity, read_plan};
 
 use super::arguments::SweepArguments;
 use crate::cli::terminal::Progress;

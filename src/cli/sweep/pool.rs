@@ -7,9 +7,9 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result};
-use dcvins::export::study::{JobCosts, JobStatus, StudyFolder};
 use dcvins::session::Stopwatch;
 use dcvins::study::{JobLog, KeyedJob, SimulatedFlight, StudyPlan};
+use dcvins::sweep::{JobCosts, JobStatus, StudyFolder};
 
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::Progress;

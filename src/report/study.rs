@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::html::{document, figure, table};
 use super::numbers::number;
 use super::options::ReportFigure;
-use crate::export::error::ExportError;
+use crate::export::ExportError;
 use crate::export::existing::read_index;
 use crate::flight_log::output::{self, OutputSet};
 use crate::study::view::{GroupSummary, ParameterErrors};

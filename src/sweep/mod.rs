@@ -1,4 +1,4 @@
-//! Files of studies: plans, logs, simulated flights, jobs and tables.
+//! The runs of a study: reading its plan and logs, simulating its flights, executing its jobs, and the files of their results.
 
 mod error;
 mod execute;
@@ -7,6 +7,7 @@ mod folder;
 mod inputs;
 mod parquet_table;
 mod rows;
+mod study_source;
 #[cfg(test)]
 mod tests;
 
@@ -17,3 +18,4 @@ pub use folder::{StudyFolder, StudyTables};
 pub use inputs::{find_logs, program_identity, read_plan};
 pub use parquet_table::{csv_text, read_parquet, write_parquet, write_text};
 pub use rows::{JobCosts, JobStatus};
+pub use study_source::{OpenedStudy, StudySourceError, is_study};

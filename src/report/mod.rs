@@ -22,10 +22,9 @@ pub use options::{ReportDrawing, ReportFigure, ReportOptions};
 use serde_json::Value;
 pub use study::{StudyReport, check_study_report, write_study_report};
 
-use super::error::ExportError;
-use super::existing::{RUN_FILES, check_run_folder, read_index};
-use super::result_cache::CachedFile;
-use super::run_files::{RunFileOptions, remove_unwritten, stage_run};
+use crate::export::existing::{RUN_FILES, check_run_folder, read_index};
+use crate::export::run_files::{remove_unwritten, stage_run};
+use crate::export::{CachedFile, ExportError, RunFileOptions};
 use crate::flight_log::output::OutputSet;
 use crate::session::Recording;
 

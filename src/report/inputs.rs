@@ -3,7 +3,7 @@ use std::path::Path;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
-use crate::export::error::ExportError;
+use crate::export::ExportError;
 use crate::export::file_hash;
 use crate::study::hex;
 

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::study::{StudyFileError, read_parquet};
+use super::error::StudyFileError;
+use super::parquet_table::read_parquet;
 use crate::study::view::{Study, columns};
 use crate::study::{Cell, ColumnType, ColumnValues, StudyColumn, StudyTable, parameters_table, runs_table};
 

@@ -10,7 +10,7 @@ use super::verdict::Mark;
 /// Tables with at most so many rows are not split between printed pages.
 const MAX_UNBROKEN_ROWS: usize = 14;
 /// Style sheet for screens and for paper, where rows of tables and figures are not split between pages.
-const STYLE: &str = include_str!("../../../assets/report/style.css");
+const STYLE: &str = include_str!("../../assets/report/style.css");
 
 /// A whole page.
 pub(super) fn document(title: &str, body: &Markup) -> String {
@@ -87,10 +87,10 @@ pub(super) fn figure(number: usize, figure: &ReportFigure) -> Markup {
 /// The icon of a mark, drawn in the page so that it needs no symbol font.
 pub(super) fn icon(mark: Mark) -> Markup {
     let svg = match mark {
-        Mark::Good => include_str!("../../../assets/report/icons/good.svg"),
-        Mark::Note => include_str!("../../../assets/report/icons/note.svg"),
-        Mark::Warning => include_str!("../../../assets/report/icons/warning.svg"),
-        Mark::Error => include_str!("../../../assets/report/icons/error.svg"),
+        Mark::Good => include_str!("../../assets/report/icons/good.svg"),
+        Mark::Note => include_str!("../../assets/report/icons/note.svg"),
+        Mark::Warning => include_str!("../../assets/report/icons/warning.svg"),
+        Mark::Error => include_str!("../../assets/report/icons/error.svg"),
     };
     PreEscaped(svg.trim_end().to_owned())
 }

@@ -18,8 +18,7 @@ mod vins_fusion;
 
 use std::path::{Path, PathBuf};
 
-use super::error::ExportError;
-use super::masks;
+use crate::export::{ExportError, masks};
 use crate::flight_log::output::{self, OutputSet};
 use crate::sensors::Rig;
 

@@ -19,7 +19,7 @@ pub struct RecentFiles {
 
 /// Folder of the program's state: `$XDG_STATE_HOME/dcvins` or `~/.local/state/dcvins` on Linux, the user's local
 /// application data elsewhere; `None` for a user without a home folder.
-pub(super) fn state_folder() -> Option<PathBuf> {
+pub(crate) fn state_folder() -> Option<PathBuf> {
     let folders = ProjectDirs::from("", "", "dcvins")?;
     Some(folders.state_dir().unwrap_or_else(|| folders.data_local_dir()).to_path_buf())
 }

@@ -6,11 +6,9 @@ use std::sync::mpsc::{Receiver, channel};
 
 use directories::UserDirs;
 
-use super::error::ExportError;
 use super::recent_files::{RecentFiles, state_folder};
 use super::sample_flight;
-use super::screenshot::{write_csv, write_png, write_svg};
-use super::session_file::is_session;
+use crate::export::{ExportError, is_session, write_csv, write_png, write_svg};
 use crate::flight_log::output;
 use crate::gui::desktop::{Desktop, PanelExport, PathEntry, SampleProgress};
 
