@@ -15,7 +15,7 @@ use crate::gui::rendering::offscreen::{Offscreen, OffscreenError};
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
 use crate::gui::study::StudyPanel;
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::window::{Preset, WindowState, alone_ui, panel_table, window_ui};
+use crate::gui::window::{MainWindow, Preset, alone_ui, panel_table, window_ui};
 use crate::gui::{ImageSource, PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
@@ -203,7 +203,7 @@ pub fn panel_csv(
     let (selection, commands, playback, theme) = (&mut selection, &mut Vec::new(), &playback, &theme);
     let presentation = options.presentation;
     let ctx = &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, presentation, commands };
-    Ok(panel_table(panel, &mut WindowState::default(), ctx))
+    Ok(panel_table(panel, &mut MainWindow::default(), ctx))
 }
 
 /// Passes the panel's user interface to a function that draws it.
@@ -221,7 +221,7 @@ fn with_panel<T>(
     }
     check(options)?;
     let theme = Theme::of(options.theme);
-    let mut state = WindowState::default();
+    let mut state = MainWindow::default();
     state.arrange(options.layout);
     let mut selection = Selection { run: options.run, slide: options.slide, ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };

@@ -8,7 +8,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::cdr::{CdrError, CdrReader};
 use super::protobuf::{ProtobufReader, ProtobufValue};
-use super::video::VideoCodec;
+use super::video::codec::VideoCodec;
 use crate::geometry::RigidTransform;
 
 /// A message type that is read.

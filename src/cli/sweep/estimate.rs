@@ -25,7 +25,7 @@ struct ListedJob {
 
 /// What the jobs will take.
 #[derive(Debug, Serialize)]
-struct Estimate {
+struct SweepEstimate {
     /// Jobs that are not done.
     jobs: usize,
     /// Flights that are not rendered.
@@ -44,7 +44,7 @@ struct Estimate {
 #[derive(Debug, Serialize)]
 struct DryRun {
     jobs: Vec<ListedJob>,
-    estimate: Estimate,
+    estimate: SweepEstimate,
 }
 
 /// What the jobs that are done have taken.
@@ -147,7 +147,7 @@ fn log_s(sweep: &Sweep, job: &KeyedJob) -> f64 {
 }
 
 /// Time by the seconds of log where they are known, else by the number of jobs.
-fn estimate(sweep: &Sweep, limits: &PoolLimits, measured: &Measured) -> Estimate {
+fn estimate(sweep: &Sweep, limits: &PoolLimits, measured: &Measured) -> SweepEstimate {
     let left: Vec<&KeyedJob> = sweep.jobs.iter().filter(|job| !sweep.folder.is_done(&job.key, &sweep.plan)).collect();
     let mut flights = BTreeMap::new();
     for job in &left {
@@ -171,7 +171,7 @@ fn estimate(sweep: &Sweep, limits: &PoolLimits, measured: &Measured) -> Estimate
         flights.values().map(|duration_s| duration_s.map_or(render_mean_s, |seconds| seconds * render_per_s)).sum();
     let by_memory = limits.memory_bytes.checked_div(measured.memory_bytes).unwrap_or(u64::MAX);
     let at_once = limits.jobs.min(usize::try_from(by_memory).unwrap_or(usize::MAX)).clamp(1, left.len().max(1));
-    Estimate {
+    SweepEstimate {
         jobs: left.len(),
         flights: flights.len(),
         at_once,

@@ -4,7 +4,7 @@
 //! that is damaged or missing, pictures are refused up to the next keyframe, because they would be wrong.
 
 mod bits;
-mod codec;
+pub(super) mod codec;
 mod decoder;
 mod frame_numbers;
 mod picture_stream;

@@ -40,7 +40,7 @@ use self::welcome::{Choice, Welcome};
 use crate::gui::desktop::Desktop;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::units::counted;
-use crate::gui::window::{NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, WindowState, window_ui};
+use crate::gui::window::{MainWindow, NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, window_ui};
 use crate::gui::{PanelContext, Presentation, Selection};
 use crate::session::{Command, PlaybackSpeed, Recording};
 
@@ -87,7 +87,7 @@ pub struct App {
     welcome: Welcome,
     /// The log over which the tour begins when it is open.
     tour_of: Option<PathBuf>,
-    state: WindowState,
+    state: MainWindow,
     selection: Selection,
     theme: Theme,
     /// The settings in effect, `None` before the first frame.
@@ -102,7 +102,7 @@ pub struct App {
 impl App {
     /// A window without a log; `theme` is used until the user chooses another one.
     pub fn new(open_log: OpenLog, desktop: Arc<dyn Desktop>, theme: ThemeName) -> Self {
-        let mut state = WindowState::default();
+        let mut state = MainWindow::default();
         state.show_times = true;
         state.panels.laboratory.in_background = true;
         state.panels.rank.in_background = true;

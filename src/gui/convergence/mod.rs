@@ -131,7 +131,7 @@ impl ConvergencePanel {
         ui: &Ui,
         ctx: &PanelContext<'_>,
         groups: &[(ParameterGroup, usize)],
-        layout: &layout::Layout,
+        layout: &layout::PlotGrid,
     ) {
         for (group, (_, rect)) in groups.iter().zip(&layout.groups) {
             groups::heading_ui(ui, ctx, &mut self.folded, *group, *rect);
@@ -164,7 +164,7 @@ impl ConvergencePanel {
         (shown, wheel): (usize, Wheel),
         parameters: &[ParameterId],
         ground_truth: &ParameterValues,
-        layout: &layout::Layout,
+        layout: &layout::PlotGrid,
     ) {
         for (part, rect) in &layout.headings {
             paint::heading(ui, ctx, *part, *rect);

@@ -4,7 +4,7 @@ use egui::epaint::TextShape;
 use egui::{Id, LayerId, Popup, PopupAnchor, PopupCloseBehavior, Pos2, Shape, Ui};
 
 use super::notices::NoticeLevel;
-use super::state::{PanelMenu, WindowState};
+use super::state::{MainWindow, PanelMenu};
 use crate::gui::copied_value::offered;
 use crate::gui::units::counted;
 use crate::gui::{PanelContext, PanelName};
@@ -37,14 +37,14 @@ fn text_at(ui: &Ui, layer: LayerId, position: Pos2) -> Option<String> {
 }
 
 /// Copies the value under the pointer, or else the table of the panel with the focus.
-pub(super) fn copy(value: Option<String>, state: &mut WindowState, ctx: &PanelContext<'_>) {
+pub(super) fn copy(value: Option<String>, state: &mut MainWindow, ctx: &PanelContext<'_>) {
     match value {
         Some(value) => copy_value(value, state),
         None => copy_table(state.focused().0, state, ctx),
     }
 }
 
-fn copy_value(value: String, state: &mut WindowState) {
+fn copy_value(value: String, state: &mut MainWindow) {
     let mut shown: String =
         value.chars().take(SHOWN_LETTERS).map(|letter| if letter == '\n' { ' ' } else { letter }).collect();
     if value.chars().count() > SHOWN_LETTERS {
@@ -55,7 +55,7 @@ fn copy_value(value: String, state: &mut WindowState) {
 }
 
 /// Copies the values of a panel as comma-separated values.
-pub(super) fn copy_table(panel: PanelName, state: &mut WindowState, ctx: &PanelContext<'_>) {
+pub(super) fn copy_table(panel: PanelName, state: &mut MainWindow, ctx: &PanelContext<'_>) {
     let table = state.panels.csv_table(panel, ctx);
     let rows = table.lines().count().saturating_sub(1);
     if rows == 0 {
@@ -73,7 +73,7 @@ fn menu_id() -> Id {
 }
 
 /// Opens the menu of the panel that is clicked with the secondary button, and draws it.
-pub(super) fn menu_ui(ui: &Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
+pub(super) fn menu_ui(ui: &Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
     let clicked = ui.input(|input| input.pointer.secondary_clicked().then(|| input.pointer.interact_pos()).flatten());
     let clicked = clicked.filter(|at| ui.ctx().layer_id_at(*at) == Some(ui.layer_id()));
     let panel = clicked.and_then(|at| state.places.iter().find(|(_, place)| place.contains(at)).map(|it| (it.0, at)));

@@ -7,7 +7,7 @@ use egui::{Button, PopupCloseBehavior, Ui, WidgetInfo};
 
 use super::actions::{Action, Entry, TABLE};
 use super::request::WindowRequest;
-use super::state::WindowState;
+use super::state::MainWindow;
 use super::tiles::Preset;
 use crate::gui::theme::{MAX_RUNS, ThemeName};
 use crate::gui::timeline::SPEEDS;
@@ -103,7 +103,7 @@ impl Menu {
 }
 
 /// Draws the buttons of all menus, and the menu that is open.
-pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
     for menu in Menu::ALL {
         MenuButton::from_button(Button::new(menu.title()).frame_when_inactive(false)).ui(ui, |ui| {
             ui.set_min_width(230.0);
@@ -127,7 +127,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>, a
 }
 
 /// One action with its keys.
-fn entry_ui(ui: &mut Ui, state: &WindowState, ctx: &PanelContext<'_>, entry: &Entry, actions: &mut Vec<Action>) {
+fn entry_ui(ui: &mut Ui, state: &MainWindow, ctx: &PanelContext<'_>, entry: &Entry, actions: &mut Vec<Action>) {
     if matches!(entry.action, Action::SavedLayout(_)) {
         return;
     }
@@ -146,7 +146,7 @@ fn item_ui(ui: &mut Ui, name: &str, keys: &str, enabled: bool, on: bool) -> bool
 }
 
 /// What belongs to the first group of a menu and depends on the session.
-fn first_group_ui(ui: &mut Ui, menu: Menu, state: &mut WindowState, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
+fn first_group_ui(ui: &mut Ui, menu: Menu, state: &mut MainWindow, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
     match menu {
         Menu::File => {
             ui.add_enabled_ui(!state.recent_logs.is_empty(), |ui| {
@@ -213,7 +213,7 @@ fn last_group_ui(ui: &mut Ui, menu: Menu, ctx: &PanelContext<'_>, actions: &mut 
 }
 
 /// The menu of the panels stays open while panels are chosen.
-fn panels_ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
+fn panels_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
     let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     let button = Button::new("Panels").frame_when_inactive(false);
     MenuButton::from_button(button).config(config).ui(ui, |ui| {

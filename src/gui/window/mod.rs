@@ -38,7 +38,7 @@ mod warning_lines;
 use egui::{CentralPanel, Frame, Margin, Rect, Ui, UiBuilder, vec2};
 
 use self::actions::Action;
-pub use self::dialogs::Dialogs;
+pub use self::dialogs::state::Dialogs;
 pub use self::legend::RunLegend;
 pub use self::notices::{NoticeLevel, Notices};
 pub use self::panel_export::{alone_ui, panel_table};
@@ -48,7 +48,7 @@ pub use self::progress::{Progress, ProgressMeter};
 pub use self::request::WindowRequest;
 pub use self::saved_layouts::SavedLayouts;
 pub use self::settings::{SCALES, Settings};
-pub use self::state::WindowState;
+pub use self::state::MainWindow;
 pub use self::tiles::Preset;
 use super::help;
 use super::timeline::TimelinePanel;
@@ -58,7 +58,7 @@ use super::{Panel as _, PanelContext, PanelName};
 const STATUS_HEIGHT: f32 = 22.0;
 
 /// Draws the window for a session.
-pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
+pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
     let theme = *ctx.theme;
     ctx.move_chain();
     tour::keys(ui, state);

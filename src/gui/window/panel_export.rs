@@ -2,7 +2,7 @@
 
 use egui::{CentralPanel, Frame, Ui, Vec2};
 
-use super::state::WindowState;
+use super::state::MainWindow;
 use crate::geometry::seconds_from_ns;
 use crate::gui::desktop::PanelExport;
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
@@ -18,9 +18,9 @@ const MAX_SIDE_PX: f32 = 8192.0;
 const MIN_LIST_SIZE: Vec2 = Vec2::new(460.0, 640.0);
 
 /// Draws the panel again without the window around it.
-pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelExport {
+pub(super) fn export(state: &MainWindow, ctx: &mut PanelContext<'_>) -> PanelExport {
     let (panel, size) = state.focused();
-    let mut copy = WindowState { panels: state.panels.views(), show_times: state.show_times, ..WindowState::default() };
+    let mut copy = MainWindow { panels: state.panels.views(), show_times: state.show_times, ..MainWindow::default() };
     copy.panels.inspector.show_times = state.show_times;
     // A scrolling list in a low panel is written completely, up to a limit.
     let min_size = match panel {
@@ -55,13 +55,13 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
 }
 
 /// The values of a panel, comma separated.
-pub fn panel_table(panel: PanelName, state: &mut WindowState, ctx: &mut PanelContext<'_>) -> String {
+pub fn panel_table(panel: PanelName, state: &mut MainWindow, ctx: &mut PanelContext<'_>) -> String {
     ctx.move_chain();
     state.panels.csv_table(panel, ctx)
 }
 
 /// Draws one panel into all of `ui`.
-pub fn alone_ui(panel: PanelName, ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
+pub fn alone_ui(panel: PanelName, ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
     let frame = Frame::new().fill(ctx.theme.surface).inner_margin(PANEL_MARGIN);
     ctx.move_chain();
     CentralPanel::no_frame().frame(frame).show(ui, |ui| state.panels.get(panel).ui(ui, ctx));

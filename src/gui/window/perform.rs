@@ -3,7 +3,7 @@
 use super::actions::Action;
 use super::notices::NoticeLevel;
 use super::request::WindowRequest;
-use super::state::WindowState;
+use super::state::MainWindow;
 use super::{copying, panel_export};
 use crate::gui::plot::zoom_about_cursor;
 use crate::gui::theme::ThemeName;
@@ -12,7 +12,7 @@ use crate::gui::{PanelContext, PanelName};
 use crate::session::{Command, PlaybackSpeed};
 
 /// Executes an action.
-pub(super) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
+pub(super) fn perform(action: Action, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
     match action {
         Action::TogglePlay => ctx.commands.push(Command::TogglePlay),
         Action::Step(frames) => ctx.commands.push(Command::StepFrames(frames)),

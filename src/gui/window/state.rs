@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use egui::{Pos2, Rect, Ui, Vec2};
 
-use super::dialogs::Dialogs;
+use super::dialogs::state::Dialogs;
 use super::focus_ring::FocusRing;
 use super::history::{Arrangement, History};
 use super::legend::RunLegend;
@@ -14,8 +14,8 @@ use super::progress::Progress;
 use super::request::WindowRequest;
 use super::saved_layouts::{self, SavedLayouts};
 use super::settings::{self, Settings};
-use super::tiles::{Layout, Preset};
-use super::tour::Tour;
+use super::tiles::{PanelLayout, Preset};
+use super::tour::state::Tour;
 use crate::gui::PanelName;
 use crate::gui::help::Help;
 use crate::gui::theme::Theme;
@@ -34,7 +34,7 @@ pub(super) struct PanelMenu {
 
 /// State of the window without the session.
 #[derive(Default)]
-pub struct WindowState {
+pub struct MainWindow {
     /// The panels.
     pub panels: Panels,
     /// The runs with their accuracy.
@@ -67,10 +67,10 @@ pub struct WindowState {
     pub recent_logs: Vec<PathBuf>,
     pub(super) tour: Tour,
     pub(super) ring: FocusRing,
-    pub(super) layout: Layout,
+    pub(super) layout: PanelLayout,
     pub(super) history: History,
     /// The layout when its last change was noticed.
-    pub(super) noticed: Option<Layout>,
+    pub(super) noticed: Option<PanelLayout>,
     /// The value under the pointer.
     pub(super) pointed: Option<String>,
     /// Text for the clipboard.
@@ -85,7 +85,7 @@ pub struct WindowState {
     pub(super) places: Vec<(PanelName, Rect)>,
 }
 
-impl WindowState {
+impl MainWindow {
     /// Closes all dialogs and lists, for a session that ends.
     pub(in crate::gui) fn close_everything(&mut self) {
         self.close_dialogs();

@@ -44,19 +44,19 @@ impl Preset {
 
 /// The layout of the movable panels.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Layout {
+pub(crate) struct PanelLayout {
     tree: Tree<PanelName>,
     /// The preset that was chosen last, `None` for a saved layout.
     pub(crate) preset: Option<Preset>,
 }
 
-impl Default for Layout {
+impl Default for PanelLayout {
     fn default() -> Self {
         Self { tree: tree_of(Preset::default()), preset: Some(Preset::default()) }
     }
 }
 
-impl Layout {
+impl PanelLayout {
     /// Arranges the panels as in a preset, all visible.
     pub(crate) fn arrange(&mut self, preset: Preset) {
         self.tree = tree_of(preset);

@@ -6,7 +6,7 @@ use egui::{Align, Button, Label, Layout as UiLayout, RichText, TextStyle, Ui, ve
 
 use super::actions::{Action, TABLE};
 use super::menu;
-use super::state::WindowState;
+use super::state::MainWindow;
 use super::tiles::Preset;
 use crate::gui::theme::MAX_RUNS;
 use crate::gui::{Dialog, PanelContext};
@@ -18,7 +18,7 @@ const BUTTONS: [(&str, Action); 2] =
 /// Minimum width in points of the entries of all runs.
 const MIN_RUNS_WIDTH: f32 = 60.0;
 
-pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
     MenuBar::new().style(StyleModifier::default()).ui(ui, |ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         menu::ui(ui, state, ctx, actions);
@@ -159,7 +159,7 @@ fn study_button(ui: &mut Ui, study: &str, actions: &mut Vec<Action>) {
 /// The button of a layout, with its name or with its number.
 fn layout_button(
     ui: &mut Ui,
-    state: &WindowState,
+    state: &MainWindow,
     preset: Preset,
     number: usize,
     named: bool,

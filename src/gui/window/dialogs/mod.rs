@@ -8,21 +8,20 @@ mod open_log;
 mod palette;
 mod palette_items;
 mod settings;
-mod state;
+pub(super) mod state;
 mod unsaved;
 
 use egui::Ui;
 
 use self::open_log::Picked;
-pub use self::state::Dialogs;
 use super::actions::Action;
 use super::request::WindowRequest;
-use super::state::WindowState;
+use super::state::MainWindow;
 use crate::gui::{Dialog, PanelContext};
 
 /// Draws the dialog that is open.
-pub(super) fn ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
-    let WindowState { dialogs, requests, saved_layouts, settings, layout, history, .. } = state;
+pub(super) fn ui(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
+    let MainWindow { dialogs, requests, saved_layouts, settings, layout, history, .. } = state;
     let picked = dialogs.open_log.picked(ui);
     if picked.is_some() && dialogs.open == Some(Dialog::OpenLog) {
         dialogs.open = None;

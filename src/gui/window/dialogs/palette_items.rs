@@ -10,7 +10,7 @@ use crate::gui::timeline::SPEEDS;
 use crate::gui::units::seconds;
 use crate::gui::window::actions::{Action, TABLE, keys_of};
 use crate::gui::window::saved_layouts::SavedLayouts;
-use crate::gui::window::tiles::Layout;
+use crate::gui::window::tiles::PanelLayout;
 use crate::gui::{Dialog, PanelContext, PanelName};
 use crate::session::RunRecord;
 
@@ -39,7 +39,7 @@ fn item(name: impl Into<String>, action: Action) -> Item {
 }
 
 /// Items that match the typed text, best first; all actions in their own order for an empty text.
-pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &Layout) -> Vec<Item> {
+pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &PanelLayout) -> Vec<Item> {
     let places = places(typed, ctx);
     let mut items = commands(ctx, layouts, layout);
     if !typed.trim().is_empty() {
@@ -52,7 +52,7 @@ pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts,
     places.into_iter().chain(scored.into_iter().map(|(_, item)| item)).collect()
 }
 
-fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &Layout) -> Vec<Item> {
+fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &PanelLayout) -> Vec<Item> {
     let listed = TABLE.iter().filter(|entry| {
         // Their effects are listed below, or are in effect already.
         !matches!(entry.action, Action::Dialog(Dialog::Palette) | Action::Dismiss | Action::SavedLayout(_))

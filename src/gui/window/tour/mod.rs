@@ -4,7 +4,7 @@
 //! the recording.
 
 mod card;
-mod state;
+pub(super) mod state;
 mod stop;
 mod story;
 #[cfg(test)]
@@ -14,16 +14,16 @@ mod texts;
 use egui::{Key, Modifiers, Popup, Ui};
 
 use self::card::{Pressed, card_ui};
-pub(crate) use self::state::Tour;
+use self::state::Tour;
 use self::stop::Stop;
-use super::state::WindowState;
+use super::state::MainWindow;
 use crate::gui::{PanelContext, PanelName};
 
 /// Frames before the card is drawn: the layout of a stop is on the screen from the second one on.
 const FRAMES_TO_LAYOUT: u8 = 2;
 
 /// Reads the keys of the tour before the window reads its own: Enter for the next stop, Backspace for the one before.
-pub(super) fn keys(ui: &Ui, state: &mut WindowState) {
+pub(super) fn keys(ui: &Ui, state: &mut MainWindow) {
     let busy = state.dialogs.is_open() || ui.egui_wants_keyboard_input() || Popup::is_any_open(ui.ctx());
     if !state.tour.is_running() || busy || ui.memory(|memory| memory.focused().is_some()) {
         return;
@@ -38,14 +38,14 @@ pub(super) fn keys(ui: &Ui, state: &mut WindowState) {
 }
 
 /// Arranges the window for the stop and draws its card.
-pub(super) fn ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
+pub(super) fn ui(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
     let mut tour = std::mem::take(&mut state.tour);
     stop_ui(&mut tour, ui, state, ctx);
     // Nothing that the tour does starts another one.
     state.tour = tour;
 }
 
-fn stop_ui(tour: &mut Tour, ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
+fn stop_ui(tour: &mut Tour, ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
     let Some(index) = tour.stop else { return };
     let stop = Stop::ALL[index];
     tour.read_story(ctx);
@@ -78,7 +78,7 @@ fn stop_ui(tour: &mut Tour, ui: &Ui, state: &mut WindowState, ctx: &mut PanelCon
 }
 
 /// Arranges the panels for a stop and focuses its panel.
-fn lay_out(stop: Stop, state: &mut WindowState) {
+fn lay_out(stop: Stop, state: &mut MainWindow) {
     let (preset, panel) = stop.place();
     if state.layout.preset != Some(preset) {
         state.layout.arrange(preset);

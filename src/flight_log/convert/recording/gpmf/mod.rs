@@ -33,7 +33,7 @@ struct Sensor {
 
 /// What has been read so far.
 #[derive(Debug)]
-struct State {
+struct ReadPayloads {
     camera: Recorded,
     karma: Karma,
     gyroscope: Sensor,
@@ -59,7 +59,7 @@ pub(super) struct Telemetry {
 
 /// Reads the telemetry of a video.
 pub(super) fn read(payloads: &[Payload]) -> Telemetry {
-    let mut state = State {
+    let mut state = ReadPayloads {
         camera: Recorded::new(FORMAT, "/camera"),
         karma: Karma::default(),
         gyroscope: Sensor::default(),
@@ -75,7 +75,8 @@ pub(super) fn read(payloads: &[Payload]) -> Telemetry {
             state.problem.get_or_insert(problem);
         }
     }
-    let State { mut camera, karma, gyroscope, accelerometer, damaged_payloads, problem, axes, field_of_view } = state;
+    let ReadPayloads { mut camera, karma, gyroscope, accelerometer, damaged_payloads, problem, axes, field_of_view } =
+        state;
     if let Some(problem) = problem {
         camera.notes.push(format!(
             "{damaged_payloads} of {} payloads of telemetry are damaged, of which what lies before the damage is read: {problem}",
@@ -100,7 +101,7 @@ pub(super) fn read(payloads: &[Payload]) -> Telemetry {
     Telemetry { camera, drone: karma.finish(), field_of_view }
 }
 
-fn read_payload(payload: &Payload, state: &mut State) -> Result<(), String> {
+fn read_payload(payload: &Payload, state: &mut ReadPayloads) -> Result<(), String> {
     for device in items(&payload.bytes) {
         let device = device?;
         if &device.key != b"DEVC" {
@@ -118,7 +119,7 @@ fn read_payload(payload: &Payload, state: &mut State) -> Result<(), String> {
     Ok(())
 }
 
-fn read_stream(stream: &Item<'_>, payload: &Payload, state: &mut State) -> Result<(), String> {
+fn read_stream(stream: &Item<'_>, payload: &Payload, state: &mut ReadPayloads) -> Result<(), String> {
     let mut properties = Properties::default();
     for item in items(stream.data) {
         let item = item?;
@@ -145,7 +146,7 @@ fn read_stream(stream: &Item<'_>, payload: &Payload, state: &mut State) -> Resul
 }
 
 /// Takes samples of the camera's gyroscope in rad/s or accelerometer in m/s².
-fn take_inertial(item: &Item<'_>, properties: &Properties, payload: &Payload, state: &mut State) {
+fn take_inertial(item: &Item<'_>, properties: &Properties, payload: &Payload, state: &mut ReadPayloads) {
     let axes = if properties.axes.is_empty() { axes_of_name(&properties.name) } else { Some(properties.axes.clone()) };
     let axes = axes.unwrap_or_else(|| DEFAULT_AXES.to_owned());
     let sensor = if &item.key == b"GYRO" { &mut state.gyroscope } else { &mut state.accelerometer };

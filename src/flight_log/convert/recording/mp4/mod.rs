@@ -13,7 +13,7 @@ use super::super::ConvertError;
 use super::recorded::{Samples, rate_hz};
 use annex_b::UnitFormat;
 use boxes::{child, children, descendant, file_boxes, u32_at, u64_at};
-use track::{Sample, Track};
+use track::{MovieTrack, Sample};
 
 /// Seconds from 1904, from which MP4 counts, to the epoch.
 const EPOCH_1904_S: u64 = 2_082_844_800;
@@ -102,7 +102,7 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     let firmware = descendant(&table, &[b"udta", b"FIRM"]).map(|text| String::from_utf8_lossy(text).into_owned());
     let max_samples = limits.messages(file.len() as u64);
     let traks = children(&table).filter(|(kind, _)| kind == b"trak");
-    let tracks: Vec<Track<'_>> =
+    let tracks: Vec<MovieTrack<'_>> =
         traks.filter_map(|(_, trak)| track::read(trak, movie_timescale.unwrap_or(1), max_samples)).collect();
     let telemetry = telemetry(&tracks, &file, &mut notes);
     let (track, format, resolution_px) = video_track(&tracks).map_err(unreadable)?;
@@ -123,7 +123,7 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
 }
 
 /// The first video track that can be read, how its units are stored, and its resolution.
-fn video_track<'a>(tracks: &'a [Track<'a>]) -> Result<(&'a Track<'a>, UnitFormat, [usize; 2]), String> {
+fn video_track<'a>(tracks: &'a [MovieTrack<'a>]) -> Result<(&'a MovieTrack<'a>, UnitFormat, [usize; 2]), String> {
     let mut others = Vec::new();
     for track in tracks.iter().filter(|track| &track.handler == b"vide") {
         let (kind, description) = track.description;
@@ -152,7 +152,7 @@ fn video_track<'a>(tracks: &'a [Track<'a>]) -> Result<(&'a Track<'a>, UnitFormat
 }
 
 /// The pictures that lie in the file, and whether they are shown in another order than decoded.
-fn pictures(track: &Track<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (Vec<Picture>, bool) {
+fn pictures(track: &MovieTrack<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (Vec<Picture>, bool) {
     // Pictures that wait for others are written when the last of those that they wait for is decoded.
     let delay_ns = track.samples.iter().map(|sample| sample.presented_ns.saturating_sub(sample.decoded_ns)).max();
     let delay_ns = delay_ns.unwrap_or(0);
@@ -187,7 +187,7 @@ fn place(sample: &Sample, file_bytes: usize) -> Option<(usize, usize)> {
 }
 
 /// The payloads of `GoPro`'s telemetry.
-fn telemetry(tracks: &[Track<'_>], file: &LogFile, notes: &mut Vec<String>) -> Vec<Payload> {
+fn telemetry(tracks: &[MovieTrack<'_>], file: &LogFile, notes: &mut Vec<String>) -> Vec<Payload> {
     let Some(track) = tracks.iter().find(|track| &track.description.0 == b"gpmd") else { return Vec::new() };
     let mut payloads = Vec::new();
     let mut lost = track.undescribed;

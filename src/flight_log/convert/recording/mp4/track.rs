@@ -16,7 +16,7 @@ pub(super) struct Sample {
 
 /// A track.
 #[derive(Clone, Debug)]
-pub(super) struct Track<'a> {
+pub(super) struct MovieTrack<'a> {
     /// `vide`, `soun`, `meta`.
     pub(super) handler: [u8; 4],
     /// Type and content of its first sample description.
@@ -31,7 +31,7 @@ pub(super) struct Track<'a> {
 }
 
 /// Reads a `trak` box; `None` when a table is missing. `max_samples` bounds what the tables may announce.
-pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Option<Track<'_>> {
+pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Option<MovieTrack<'_>> {
     let media = child(trak, b"mdia")?;
     let handler: [u8; 4] = child(media, b"hdlr")?.get(8..12)?.try_into().ok()?;
     let header = child(media, b"mdhd")?;
@@ -68,7 +68,7 @@ pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Optio
     }
     let undescribed = places.announced.saturating_sub(samples.len() as u64);
     let is_upright = child(trak, b"tkhd").is_none_or(is_upright);
-    Some(Track { handler, description, samples, undescribed, is_upright, edits })
+    Some(MovieTrack { handler, description, samples, undescribed, is_upright, edits })
 }
 
 /// Places of samples in the file.

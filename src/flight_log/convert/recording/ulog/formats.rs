@@ -26,9 +26,9 @@ struct Field {
 
 /// Where the numbers of a message lie.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Layout(BTreeMap<String, Field>);
+pub(super) struct MessageLayout(BTreeMap<String, Field>);
 
-impl Layout {
+impl MessageLayout {
     /// The numbers of a field of so many, `None` where the message has no such field or ends before it.
     pub(super) fn numbers<const N: usize>(&self, message: &[u8], name: &str) -> Option<[f64; N]> {
         let field = self.0.get(name).filter(|field| field.count == N)?;
@@ -90,9 +90,9 @@ impl Formats {
     }
 
     /// Where the numbers of a format lie; `None` for a format that is not declared, or whose size cannot be told.
-    pub(super) fn layout(&self, name: &str) -> Option<Layout> {
+    pub(super) fn layout(&self, name: &str) -> Option<MessageLayout> {
         let mut sizes = BTreeMap::new();
-        let mut layout = Layout::default();
+        let mut layout = MessageLayout::default();
         let mut offset: usize = 0;
         for field in self.0.get(name)? {
             if let Some(scalar) = scalar(&field.type_name) {
