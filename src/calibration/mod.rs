@@ -44,8 +44,8 @@ pub use imu_noise::{FittedDensity, FlightNoise, ImuNoiseError, NoiseDensity, fit
 pub use input::{CalibrationInput, GimbalCamera, StaticCamera, TrackedView};
 pub use options::CalibrationOptions;
 pub use outcome::{
-    CalibratedParameter, CalibrationOutcome, ExtrinsicsReport, ImuResidualReport, PixelReport, PoseLoopReport,
-    chain_distance, transform_distance,
+    CalibratedParameter, CalibrationOutcome, ChainDistance, ExtrinsicsReport, ImuResidualReport, PixelReport,
+    PoseLoopReport, transform_distance,
 };
 pub use statistics::Statistics;
 pub use trajectory::InitialTrajectory;

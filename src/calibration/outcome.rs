@@ -1,5 +1,7 @@
 //! Result of a calibration as plain numbers.
 
+use serde::Serialize;
+
 use super::batch::BatchPose;
 use super::statistics::Statistics;
 use crate::geometry::{RigidTransform, so3};
@@ -22,15 +24,17 @@ pub struct CalibratedParameter {
 }
 
 /// Reprojection residuals of one camera.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PixelReport {
     /// Key of the camera.
     pub camera: String,
     /// Number of landmarks with an observation by this camera.
     pub landmarks: usize,
     /// Lengths of the residuals in pixels.
+    #[serde(rename = "error_px")]
     pub residuals_px: Statistics,
     /// Standard deviation of a pixel coordinate, estimated from the median residual.
+    #[serde(skip)]
     pub sigma_px: f64,
 }
 
@@ -44,7 +48,7 @@ pub struct ImuResidualReport {
 }
 
 /// Chain calibrated by the pose loops alone.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PoseLoopReport {
     /// Number of reconstructions of the gimbal camera.
     pub segments: usize,
@@ -53,15 +57,20 @@ pub struct PoseLoopReport {
     /// Number of pairs with a robust weight of at least one half.
     pub fitting: usize,
     /// Lengths of the position gaps of the loops, in metres.
+    #[serde(rename = "gap_m")]
     pub gaps_m: Statistics,
     /// Standard deviation of a measured position per coordinate, estimated from the median gap, in metres.
+    #[serde(skip)]
     pub position_sigma_m: f64,
     /// Calibrated chain.
+    #[serde(skip)]
     pub chain: ClassicalChain,
     /// Standard deviations of the chain's parameters for independent errors of the measured poses; common errors of
     /// the poses of one reconstruction are not included.
+    #[serde(skip)]
     pub sigmas: Vec<f64>,
     /// Number of solver iterations.
+    #[serde(skip)]
     pub iterations: usize,
 }
 
@@ -119,19 +128,44 @@ pub struct CalibrationOutcome {
     pub warnings: Vec<String>,
 }
 
-/// Distance of a chain from a reference over joint angles: translation in metres, rotation in radians.
-///
-/// `None` without joint angles.
-pub fn chain_distance(
-    chain: &ClassicalChain,
-    reference: &ClassicalChain,
-    angles_rad: &[Vec<f64>],
-) -> Option<(Statistics, Statistics)> {
-    let (translations, rotations): (Vec<f64>, Vec<f64>) = angles_rad
-        .iter()
-        .map(|angles| transform_distance(&chain.imu_from_camera(angles), &reference.imu_from_camera(angles)))
-        .unzip();
-    Some((Statistics::of(&translations)?, Statistics::of(&rotations)?))
+/// Distance of `imu_from_camera` from a reference over joint angles.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ChainDistance {
+    /// Mean distance of the camera positions in metres.
+    pub translation_mean_m: f64,
+    /// Standard deviation of the distance.
+    pub translation_std_m: f64,
+    /// Mean angle between the camera attitudes in radians.
+    pub rotation_mean_rad: f64,
+    /// Standard deviation of the angle.
+    pub rotation_std_rad: f64,
+}
+
+impl ChainDistance {
+    /// Distance of a chain from a reference, `None` without joint angles.
+    pub fn over<'a>(
+        chain: &ClassicalChain,
+        reference: &ClassicalChain,
+        angles_rad: impl IntoIterator<Item = &'a Vec<f64>>,
+    ) -> Option<Self> {
+        let (translations, rotations): (Vec<f64>, Vec<f64>) = angles_rad
+            .into_iter()
+            .map(|angles| transform_distance(&chain.imu_from_camera(angles), &reference.imu_from_camera(angles)))
+            .unzip();
+        let (translation, rotation) = (Statistics::of(&translations)?, Statistics::of(&rotations)?);
+        Some(Self {
+            translation_mean_m: translation.mean,
+            translation_std_m: translation.std,
+            rotation_mean_rad: rotation.mean,
+            rotation_std_rad: rotation.std,
+        })
+    }
+
+    /// Distance of extrinsics that no joint moves.
+    pub fn of_extrinsics(imu_from_camera: &RigidTransform, reference: &RigidTransform) -> Self {
+        let (translation_mean_m, rotation_mean_rad) = transform_distance(imu_from_camera, reference);
+        Self { translation_mean_m, translation_std_m: 0.0, rotation_mean_rad, rotation_std_rad: 0.0 }
+    }
 }
 
 /// Distance between two transforms: translation in metres, rotation angle in radians.

@@ -1,7 +1,9 @@
+use serde::Serialize;
+
 use crate::geometry::median;
 
 /// Statistics of a series of lengths.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Statistics {
     /// How many.
     pub count: usize,

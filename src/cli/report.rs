@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 use dcvins::export;
+use dcvins::flight_log::log_name;
 use dcvins::log_check::{self, CheckReport};
 use dcvins::report::{ReportFigure, ReportOptions, write_known_report, write_report};
 use dcvins::session::{Computation, SessionPlan, image_rotations};
@@ -64,7 +65,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     let interrupt = Interrupt::watch()?;
     let cached = arguments.cache.result_of(&own_command_line(), &arguments.log, &arguments.estimation, &plan);
     if let Some(files) = cached.as_ref().and_then(CachedResult::load) {
-        write_known_report(&files, &arguments.output, &labels, &export::log_name(&arguments.log))?;
+        write_known_report(&files, &arguments.output, &labels, &log_name(&arguments.log))?;
         print(&format!("{}\n", page_of(arguments).display()))?;
         return Ok(Outcome::Success);
     }

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use dcvins::export::{self, RunFileOptions, RunSummary};
+use dcvins::export::{self, RunFileOptions};
+use dcvins::flight_log::log_name;
 use dcvins::geometry::seconds_from_ns;
 use dcvins::session::breakpoints::Condition;
-use dcvins::session::{BreakpointHit, Recording, RunRecord, SessionPlan};
+use dcvins::session::{BreakpointHit, Recording, RunRecord, RunSummary, SessionPlan};
 
 use crate::cli::compute::{compute, compute_until};
 use crate::cli::estimation_arguments::EstimationArguments;
@@ -116,7 +117,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Outcome> {
         return Ok(Outcome::Interrupted);
     }
     if no_steps {
-        let log = export::log_name(&arguments.log);
+        let log = log_name(&arguments.log);
         bail!("no image of '{log}' could be used; reasons: 'dcvins check {}'", arguments.log.display());
     }
     if hit.is_some() {

@@ -2,37 +2,18 @@
 
 use std::path::Path;
 
-use dcvins::export::{self, Accuracy, AntennaSummary, RunSummary, TrajectorySummary};
 use dcvins::observability::{Estimability, MIN_SPURIOUS_GAIN};
+use dcvins::session::{EstimabilitySummary, KnownLossSummary, RunSummary, StageSummary, TrajectoryLane};
 
 /// The text of a trajectory beside the runs for the terminal.
-pub(crate) fn describe_trajectory(lane: &TrajectorySummary) -> String {
-    let accuracy = match (&lane.accuracy, &lane.accuracy_missing) {
-        (Some(accuracy), _) => accuracy_text(accuracy, lane.length_m),
+pub(crate) fn describe_trajectory(lane: &TrajectoryLane) -> String {
+    let accuracy = match (&lane.evaluation.accuracy, &lane.accuracy_missing) {
+        (Some(accuracy), _) => accuracy.to_string(),
         (None, Some(reason)) => format!("not available: {reason}"),
         (None, None) => "not available".to_owned(),
     };
-    format!("trajectory {} ({}, {} poses)\n  accuracy     {accuracy}\n", lane.label, lane.source, lane.poses)
-}
-
-/// Errors of a trajectory in one line.
-fn accuracy_text(accuracy: &Accuracy, length_m: f64) -> String {
-    let antenna = accuracy.antenna.as_ref().map_or_else(String::new, |antenna| format!(", {}", antenna_text(antenna)));
-    format!(
-        "ATE {:.3} m RMSE, {:.3} m max (alignment {}), {:.2} % of {length_m:.1} m{antenna}",
-        accuracy.ate_rmse_m, accuracy.ate_max_m, accuracy.alignment, accuracy.ate_percent_of_length,
-    )
-}
-
-/// The lever arm of the antenna whose positions are the ground truth.
-fn antenna_text(antenna: &AntennaSummary) -> String {
-    let [x, y, z] = antenna.lever_arm_m;
-    match antenna.lever_arm_sigma_m {
-        None => format!("of the antenna at ({x:.3}, {y:.3}, {z:.3}) m"),
-        Some([sx, sy, sz]) => {
-            format!("of the antenna, estimated at ({x:.3} ± {sx:.3}, {y:.3} ± {sy:.3}, {z:.3} ± {sz:.3}) m")
-        }
-    }
+    let poses = lane.track.samples().len();
+    format!("trajectory {} ({}, {poses} poses)\n  accuracy     {accuracy}\n", lane.label, lane.source)
 }
 
 /// The text of a run's summary for the terminal.
@@ -47,7 +28,7 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
         frames.estimated, frames.total, frames.keyframes, frames.restarts
     ));
     if let Some(accuracy) = &summary.accuracy {
-        lines.push(format!("  accuracy     {}\n", accuracy_text(accuracy, summary.length_m)));
+        lines.push(format!("  accuracy     {accuracy}\n"));
     } else if let Some(reason) = &summary.accuracy_missing {
         lines.push(format!("  accuracy     not available: {reason}\n"));
     }
@@ -77,7 +58,7 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
             rank.deficit.absorbed,
             rank.deficit.motion
         ));
-        let null_throughout = |known: &export::KnownLossSummary| known.agreeing == known.steps;
+        let null_throughout = |known: &KnownLossSummary| known.agreeing == known.steps;
         if !rank.known.is_empty() {
             let agreeing = rank.known.iter().filter(|known| null_throughout(known)).count();
             lines.push(format!(
@@ -91,7 +72,7 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
         }));
     }
     if let (Some(timing), Some(factor)) = (&summary.timing_ms, summary.real_time_factor) {
-        let stage = |stage: &export::StageSummary| format!("{:.1}/{:.1}", stage.p50, stage.p95);
+        let stage = |stage: &StageSummary| format!("{:.1}/{:.1}", stage.p50, stage.p95);
         lines.push(format!(
             "  ms p50/p95   front end {}, optimize {}, linearize {}, report {}, marginalize {}, observability {}, step {}; {factor:.1} × real time\n",
             stage(&timing.frontend),
@@ -111,7 +92,7 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
 }
 
 /// The parameters by verdict, those of a group together.
-fn estimability_lines(parameters: &[export::EstimabilitySummary]) -> Vec<String> {
+fn estimability_lines(parameters: &[EstimabilitySummary]) -> Vec<String> {
     let verdicts = [Estimability::Known, Estimability::Weak, Estimability::NotFromThisFlight, Estimability::Fixed];
     let line = |verdict: Estimability| {
         let of = parameters.iter().filter(|parameter| parameter.estimability == verdict);
@@ -123,7 +104,7 @@ fn estimability_lines(parameters: &[export::EstimabilitySummary]) -> Vec<String>
 }
 
 /// Spurious information of the priors along the unobservable directions.
-fn spurious_information(known: &[export::KnownLossSummary]) -> String {
+fn spurious_information(known: &[KnownLossSummary]) -> String {
     let claimed = known.iter().map(|known| known.largest_spurious_gain).filter(|gain| *gain > MIN_SPURIOUS_GAIN);
     match (claimed.clone().count(), claimed.fold(0.0, f64::max)) {
         (0, _) => "no spurious information".to_owned(),

@@ -8,9 +8,9 @@ use clap::error::ErrorKind;
 use clap::{Args, ValueEnum};
 use dcvins::export::{
     PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_screenshot, draw_panel, draw_panel_svg,
-    is_session, log_name, panel_csv, png_bytes, read_session, write_screenshot,
+    is_session, panel_csv, png_bytes, read_session, write_screenshot,
 };
-use dcvins::flight_log::ImageReader;
+use dcvins::flight_log::{ImageReader, log_name};
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
 use dcvins::gui::app::PlayingLog;
 use dcvins::gui::theme::ThemeName;

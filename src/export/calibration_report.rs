@@ -5,36 +5,12 @@ use std::fmt;
 use nalgebra::Matrix4;
 use serde::Serialize;
 
-use super::summary::{difference, log_name};
-use crate::calibration::{
-    CalibrationOutcome, ExtrinsicsReport, PixelReport, Statistics, chain_distance, transform_distance,
-};
+use crate::calibration::{CalibrationOutcome, ExtrinsicsReport, PixelReport, PoseLoopReport, Statistics};
+use crate::flight_log::log_name;
 use crate::geometry::{Dimension, RigidTransform, seconds_from_ns, so3};
-use crate::gimbal::{Chain, ClassicalChain, Quantity};
-use crate::sensors::{CameraMount, Rig};
-use crate::session::CalibrationRun;
-
-/// Statistics of a series of lengths, in the unit of the field's name.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct StatisticsReport {
-    /// Number of values.
-    pub count: usize,
-    /// Arithmetic mean.
-    pub mean: f64,
-    /// Middle of the sorted values.
-    pub median: f64,
-    /// Standard deviation about the mean.
-    pub std: f64,
-    /// Root mean square.
-    pub rms: f64,
-}
-
-impl From<Statistics> for StatisticsReport {
-    fn from(statistics: Statistics) -> Self {
-        let Statistics { count, mean, median, std, rms } = statistics;
-        Self { count, mean, median, std, rms }
-    }
-}
+use crate::gimbal::{Chain, Quantity};
+use crate::sensors::Rig;
+use crate::session::{CalibrationErrors, CalibrationRun};
 
 /// One parameter before and after the calibration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -59,66 +35,6 @@ pub struct ParameterReport {
     /// Calibrated minus ground-truth value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
-}
-
-/// Reprojection errors of one camera.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ReprojectionReport {
-    /// Key of the camera.
-    pub camera: String,
-    /// Number of landmarks that it observed.
-    pub landmarks: usize,
-    /// Lengths of the reprojection errors in pixels, one per observation.
-    pub error_px: StatisticsReport,
-}
-
-impl From<&PixelReport> for ReprojectionReport {
-    fn from(pixels: &PixelReport) -> Self {
-        Self { camera: pixels.camera.clone(), landmarks: pixels.landmarks, error_px: pixels.residuals_px.into() }
-    }
-}
-
-/// Error of a calibration against ground truth, over the joint angles of the log.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct DistanceReport {
-    /// Mean distance of the camera positions in metres.
-    pub translation_mean_m: f64,
-    /// Standard deviation of the distance.
-    pub translation_std_m: f64,
-    /// Mean angle between the camera attitudes in radians.
-    pub rotation_mean_rad: f64,
-    /// Standard deviation of the angle.
-    pub rotation_std_rad: f64,
-}
-
-/// Errors against ground truth by stage of the calibration.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct GroundTruthReport {
-    /// `imu_from_camera` of the static camera in the given rig.
-    pub static_initial: DistanceReport,
-    /// After the camera–IMU calibration of the static camera alone.
-    pub static_camera_imu: DistanceReport,
-    /// After the bundle adjustment of both cameras.
-    pub static_final: DistanceReport,
-    /// The chain in the given rig.
-    pub chain_initial: DistanceReport,
-    /// After the pose loops.
-    pub chain_pose_loop: DistanceReport,
-    /// After the bundle adjustment of both cameras.
-    pub chain_final: DistanceReport,
-}
-
-/// Pairs of camera poses and their loop closures.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LoopReport {
-    /// Number of reconstructions of the gimbal camera.
-    pub segments: usize,
-    /// Number of pairs of camera poses.
-    pub pairs: usize,
-    /// Number of pairs whose robust weight is at least one half.
-    pub fitting: usize,
-    /// Lengths of the loop-closure errors in metres.
-    pub gap_m: StatisticsReport,
 }
 
 /// Ranks of the chain's calibration over the whole log.
@@ -147,15 +63,15 @@ pub struct CalibrationReport {
     /// Name of the parameterization of the estimated chain.
     pub parameterization: String,
     /// Reprojection errors of the static camera's calibration alone.
-    pub camera_imu_reprojection: ReprojectionReport,
+    pub camera_imu_reprojection: PixelReport,
     /// Reprojection errors of the bundle adjustment, static camera first.
-    pub reprojection: Vec<ReprojectionReport>,
+    pub reprojection: [PixelReport; 2],
     /// Difference of mean angular rates between frames and the gyroscope's, in rad/s.
-    pub gyroscope_error_rad_per_s: StatisticsReport,
+    pub gyroscope_error_rad_per_s: Statistics,
     /// Difference of mean accelerations between frames and the accelerometer's, in m/s².
-    pub accelerometer_error_m_per_s2: StatisticsReport,
+    pub accelerometer_error_m_per_s2: Statistics,
     /// Result of the pose loops.
-    pub pose_loops: LoopReport,
+    pub pose_loops: PoseLoopReport,
     /// Every calibrated parameter: static camera, time offsets, chain.
     pub parameters: Vec<ParameterReport>,
     /// `T_cam_imu` of the static camera, by rows.
@@ -166,7 +82,7 @@ pub struct CalibrationReport {
     pub rank: Option<CalibrationRank>,
     /// Errors against ground truth, where it is known.
     #[serde(rename = "truth")]
-    pub ground_truth: Option<GroundTruthReport>,
+    pub ground_truth: Option<CalibrationErrors>,
     /// Warnings about the log.
     pub warnings: Vec<String>,
 }
@@ -184,16 +100,11 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
         stretch_s: [seconds_from_ns(outcome.stretch_ns.0), seconds_from_ns(outcome.stretch_ns.1)],
         frame_sets: outcome.frame_sets,
         parameterization: outcome.parameterization.to_string(),
-        camera_imu_reprojection: (&outcome.static_pixels).into(),
-        reprojection: outcome.pixels.iter().map(Into::into).collect(),
-        gyroscope_error_rad_per_s: outcome.imu.gyroscope_rad_per_s.into(),
-        accelerometer_error_m_per_s2: outcome.imu.accelerometer_m_per_s2.into(),
-        pose_loops: LoopReport {
-            segments: outcome.pose_loop.segments,
-            pairs: outcome.pose_loop.pairs,
-            fitting: outcome.pose_loop.fitting,
-            gap_m: outcome.pose_loop.gaps_m.into(),
-        },
+        camera_imu_reprojection: outcome.static_pixels.clone(),
+        reprojection: outcome.pixels.clone(),
+        gyroscope_error_rad_per_s: outcome.imu.gyroscope_rad_per_s,
+        accelerometer_error_m_per_s2: outcome.imu.accelerometer_m_per_s2,
+        pose_loops: outcome.pose_loop.clone(),
         parameters: parameters(run),
         static_t_cam_imu: rows(&outcome.extrinsics.imu_from_camera.inverse()),
         gimbal_t_imu_cam_at_zero: rows(&outcome.chain.imu_from_camera(&zero)),
@@ -203,7 +114,7 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
             rank_informed: rank.rank_informed,
             verdict: rank.verdict(&run.given_rig.parameter_names()),
         }),
-        ground_truth: run.ground_truth_rig.as_ref().and_then(|ground_truth| ground_truth_report(run, ground_truth)),
+        ground_truth: run.errors(),
         warnings,
     }
 }
@@ -211,43 +122,6 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
 fn rows(transform: &RigidTransform) -> [[f64; 4]; 4] {
     let matrix: Matrix4<f64> = transform.to_matrix();
     std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
-}
-
-fn ground_truth_extrinsics(ground_truth: &Rig, key: &str) -> Option<RigidTransform> {
-    ground_truth.cameras.iter().find(|camera| camera.key == key).and_then(|camera| match &camera.mount {
-        CameraMount::Static { imu_from_camera } => Some(*imu_from_camera),
-        CameraMount::Gimbal => None,
-    })
-}
-
-fn ground_truth_report(run: &CalibrationRun, ground_truth: &Rig) -> Option<GroundTruthReport> {
-    let outcome = &run.outcome;
-    let extrinsics = ground_truth_extrinsics(ground_truth, &run.static_camera)?;
-    let chain = &ground_truth.gimbal.as_ref()?.chain;
-    if chain.joint_count() != outcome.chain.joint_count() {
-        return None;
-    }
-    let of_extrinsics = |found: &RigidTransform| {
-        let (translation_mean_m, rotation_mean_rad) = transform_distance(found, &extrinsics);
-        DistanceReport { translation_mean_m, translation_std_m: 0.0, rotation_mean_rad, rotation_std_rad: 0.0 }
-    };
-    let of_chain = |found: &ClassicalChain| {
-        let (translation, rotation) = chain_distance(found, chain, &outcome.visited_rad)?;
-        Some(DistanceReport {
-            translation_mean_m: translation.mean,
-            translation_std_m: translation.std,
-            rotation_mean_rad: rotation.mean,
-            rotation_std_rad: rotation.std,
-        })
-    };
-    Some(GroundTruthReport {
-        static_initial: of_extrinsics(&outcome.extrinsics.initial),
-        static_camera_imu: of_extrinsics(&outcome.static_camera_imu.imu_from_camera),
-        static_final: of_extrinsics(&outcome.extrinsics.imu_from_camera),
-        chain_initial: of_chain(&outcome.given_chain)?,
-        chain_pose_loop: of_chain(&outcome.pose_loop.chain)?,
-        chain_final: of_chain(&outcome.chain)?,
-    })
 }
 
 /// Static camera, time offsets, then the chain.
@@ -265,7 +139,7 @@ fn extrinsics_parameters(run: &CalibrationRun, extrinsics: &ExtrinsicsReport) ->
         let (rotation_vector, shift) = (so3::log(&transform.rotation), transform.translation_m);
         [rotation_vector.x, rotation_vector.y, rotation_vector.z, shift.x, shift.y, shift.z]
     };
-    let ground_truth = run.ground_truth_rig.as_ref().and_then(|rig| ground_truth_extrinsics(rig, &run.static_camera));
+    let ground_truth = run.true_extrinsics();
     let (initial, last) = (values(&extrinsics.initial), values(&extrinsics.imu_from_camera));
     let ground_truth_values = ground_truth.as_ref().map(values);
     let error = ground_truth.map(|ground_truth| extrinsics.imu_from_camera.minus(&ground_truth));
@@ -322,7 +196,7 @@ fn chain_parameters(run: &CalibrationRun, outcome: &CalibrationOutcome) -> Vec<P
                 sigma: parameter.sigma,
                 prior_sigma: Some(parameter.prior_sigma),
                 ground_truth: ground_truth.map(|ground_truth| parameter.parameter.principal_value(ground_truth)),
-                error: ground_truth.map(|ground_truth| difference(dimension, parameter.value, ground_truth)),
+                error: ground_truth.map(|ground_truth| dimension.difference(parameter.value, ground_truth)),
             }
         })
         .collect()
@@ -335,7 +209,7 @@ impl fmt::Display for CalibrationReport {
             "Offline calibration of {}, {:.2} to {:.2} s, {} synchronized frame sets, parameterization {}",
             self.log, self.stretch_s[0], self.stretch_s[1], self.frame_sets, self.parameterization
         )?;
-        let line = |f: &mut fmt::Formatter<'_>, name: &str, unit: &str, s: &StatisticsReport| {
+        let line = |f: &mut fmt::Formatter<'_>, name: &str, unit: &str, s: &Statistics| {
             writeln!(
                 f,
                 "  {:<38} mean {:.4}, median {:.4}, std {:.4}, rms {:.4} ({})",
@@ -349,7 +223,7 @@ impl fmt::Display for CalibrationReport {
         };
         writeln!(f, "\nCamera-IMU calibration of the static camera")?;
         let alone = &self.camera_imu_reprojection;
-        line(f, &format!("Reprojection error ({})", alone.camera), "px", &alone.error_px)?;
+        line(f, &format!("Reprojection error ({})", alone.camera), "px", &alone.residuals_px)?;
         writeln!(f, "\nPose loops")?;
         let loops = &self.pose_loops;
         writeln!(
@@ -357,10 +231,10 @@ impl fmt::Display for CalibrationReport {
             "  {} pose pairs of static and gimbal camera in {} segments, {} inliers",
             loops.pairs, loops.segments, loops.fitting
         )?;
-        line(f, "Loop closure error", "m", &loops.gap_m)?;
+        line(f, "Loop closure error", "m", &loops.gaps_m)?;
         writeln!(f, "\nBundle adjustment of both cameras")?;
         for camera in &self.reprojection {
-            line(f, &format!("Reprojection error ({})", camera.camera), "px", &camera.error_px)?;
+            line(f, &format!("Reprojection error ({})", camera.camera), "px", &camera.residuals_px)?;
         }
         line(f, "Gyroscope error", "rad/s", &self.gyroscope_error_rad_per_s)?;
         line(f, "Accelerometer error", "m/s²", &self.accelerometer_error_m_per_s2)?;

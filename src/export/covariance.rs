@@ -2,8 +2,8 @@
 
 use nalgebra::Matrix6;
 
-use super::csv_table::{CsvTable, number_cell};
-use super::tables::{optional_cell, seconds_text};
+use super::tables::optional_cell;
+use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::session::{CalibrationRun, RunRecord};
 
 /// The covariances of the poses of a run, with ground truth also the squared errors over the covariances.
@@ -40,12 +40,12 @@ fn table(poses: impl Iterator<Item = (i64, Matrix6<f64>, Option<f64>)>, with_nee
     let mut header = vec!["t_s".to_owned()];
     header.extend(upper().map(name));
     header.extend(with_nees.then(|| "nees".to_owned()));
-    let mut table = CsvTable::new(header);
+    let mut table = CsvWriter::new(header);
     for (stamp_ns, covariance, nees) in poses {
-        let mut row = vec![seconds_text(stamp_ns)];
+        let mut row = vec![seconds_cell(stamp_ns)];
         row.extend(upper().map(|place| number_cell(covariance[place])));
         row.extend(with_nees.then(|| optional_cell(nees.as_ref())));
-        table.push(row);
+        table.row(row);
     }
     table.into_text()
 }

@@ -29,35 +29,11 @@ impl Default for EvaluationOptions {
     }
 }
 
-/// Statistics as written to JSON.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Statistics {
-    /// Root mean square.
-    pub rmse: f64,
-    /// Arithmetic mean.
-    pub mean: f64,
-    /// Median.
-    pub median: f64,
-    /// Standard deviation.
-    pub std: f64,
-    /// Smallest error.
-    pub min: f64,
-    /// Largest error.
-    pub max: f64,
-}
-
-impl From<ErrorStatistics> for Statistics {
-    fn from(statistics: ErrorStatistics) -> Self {
-        let ErrorStatistics { count: _, rmse, mean, median, std, min, max } = statistics;
-        Self { rmse, mean, median, std, min, max }
-    }
-}
-
 /// Result of a comparison of two trajectories.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EvaluationReport {
-    /// `none`, `yaw+position`, `se3` or `sim3`.
-    pub alignment: &'static str,
+    /// Alignment of the estimate with the reference.
+    pub alignment: Alignment,
     /// Number of associated poses.
     pub pairs: usize,
     /// Number of poses of the estimate.
@@ -69,23 +45,13 @@ pub struct EvaluationReport {
     /// Scale factor of the alignment.
     pub scale: f64,
     /// Absolute position error in metres.
-    pub ate_m: Statistics,
+    pub ate_m: ErrorStatistics,
     /// Translation part of the relative error in metres.
-    pub rpe_translation_m: Statistics,
+    pub rpe_translation_m: ErrorStatistics,
     /// Rotation part of the relative error in degrees.
-    pub rpe_rotation_deg: Statistics,
+    pub rpe_rotation_deg: ErrorStatistics,
     /// Number of sub-trajectories of the relative error.
     pub rpe_pairs: usize,
-}
-
-/// The name of an alignment in files.
-pub(super) fn alignment_name(alignment: Alignment) -> &'static str {
-    match alignment {
-        Alignment::None => "none",
-        Alignment::YawPosition => "yaw+position",
-        Alignment::Rigid => "se3",
-        Alignment::Similarity => "sim3",
-    }
 }
 
 /// Compares two trajectory files.
@@ -113,7 +79,7 @@ pub fn evaluate(
         not_comparable(format!(
             "{} associated poses do not determine the alignment '{}'; try --align none",
             pairs.len(),
-            alignment_name(options.alignment)
+            options.alignment.name()
         ))
     })?;
     let (translations, rotations) = relative_errors(&pairs, &transform, options.delta);
@@ -123,15 +89,15 @@ pub fn evaluate(
     let rpe_translation = ErrorStatistics::of(&translations).ok_or_else(too_short)?;
     let rpe_rotation = ErrorStatistics::of(&rotations_deg).ok_or_else(too_short)?;
     Ok(EvaluationReport {
-        alignment: alignment_name(options.alignment),
+        alignment: options.alignment,
         pairs: pairs.len(),
         estimate_poses: estimate_poses.len(),
         reference_poses: reference_poses.len(),
         reference_length_m: path_length_m(pairs.iter().map(|(_, reference)| &reference.pose.translation_m)),
         scale: transform.scale,
-        ate_m: ate.into(),
-        rpe_translation_m: rpe_translation.into(),
-        rpe_rotation_deg: rpe_rotation.into(),
+        ate_m: ate,
+        rpe_translation_m: rpe_translation,
+        rpe_rotation_deg: rpe_rotation,
         rpe_pairs: translations.len(),
     })
 }
@@ -145,8 +111,8 @@ impl fmt::Display for EvaluationReport {
             self.estimate_poses,
             self.reference_poses,
             self.reference_length_m,
-            self.alignment,
-            if self.alignment == "sim3" { format!(", scale {:.6}", self.scale) } else { String::new() }
+            self.alignment.name(),
+            if self.alignment == Alignment::Similarity { format!(", scale {:.6}", self.scale) } else { String::new() }
         )?;
         writeln!(
             formatter,
@@ -159,7 +125,7 @@ impl fmt::Display for EvaluationReport {
             ("RPE rotation (°)", &self.rpe_rotation_deg),
         ];
         for (name, row) in rows {
-            let Statistics { rmse, mean, median, std, min, max } = row;
+            let ErrorStatistics { count: _, rmse, mean, median, std, min, max } = row;
             writeln!(formatter, "{name:<24}{rmse:>12.6}{mean:>12.6}{median:>12.6}{std:>12.6}{min:>12.6}{max:>12.6}")?;
         }
         Ok(())

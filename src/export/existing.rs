@@ -14,9 +14,8 @@ use serde_json::Value;
 use super::calibration_files::TRAJECTORY_FILES;
 use super::error::ExportError;
 use super::masks::is_mask_name;
-use super::summary::log_name;
 use crate::flight_log::output;
-use crate::flight_log::{FlightLog, shortened};
+use crate::flight_log::{FlightLog, log_name, shortened};
 
 /// Names of all files that a run can write.
 pub(crate) const RUN_FILES: [&str; 10] = [

@@ -3,9 +3,7 @@
 pub(crate) mod calibration_files;
 pub(crate) mod calibration_report;
 mod covariance;
-pub(crate) mod csv_table;
 mod error;
-pub(crate) mod estimability;
 mod evaluation;
 pub(crate) mod existing;
 pub(crate) mod file_hash;
@@ -18,10 +16,8 @@ pub(crate) mod run_files;
 #[cfg(feature = "gui")]
 pub(crate) mod screenshot;
 mod session_file;
-mod structure;
 #[cfg(feature = "gui")]
 mod study_screenshot;
-pub(crate) mod summary;
 mod tables;
 pub mod trajectory;
 mod video_alignment;
@@ -29,7 +25,6 @@ mod video_alignment;
 pub use calibration_files::write_calibration;
 pub use calibration_report::{CalibrationReport, report_calibration};
 pub use error::ExportError;
-pub use estimability::EstimabilitySummary;
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 pub use existing::{
     check_calibration_folder, check_converted_log, check_report_folder, check_run_folders, check_screenshot,
@@ -47,11 +42,6 @@ pub use screenshot::{
     panel_csv, panel_names, png_bytes, write_csv, write_png, write_screenshot, write_svg,
 };
 pub use session_file::{is_session, read_session};
-pub use structure::KnownLossSummary;
 #[cfg(feature = "gui")]
 pub use study_screenshot::{draw_study_panel, draw_study_panel_svg, study_panel_csv};
-pub use summary::{
-    Accuracy, AntennaSummary, CalibrationSummary, RunSummary, StageSummary, TimingSummary, TrajectorySummary, log_name,
-    summarize,
-};
 pub use video_alignment::{VideoAlignment, VideoAlignmentError, align_video, write_alignment_plot};

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::csv_table::{CsvTable, number_cell};
 use super::error::ExportError;
 use super::flight_noise::FlightNoiseReport;
+use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::flight_log::output::OutputSet;
 use crate::log_check::AllanReport;
 
@@ -21,7 +21,7 @@ const SVG: &str = "allan.svg";
 /// The points of all axes, one row each.
 fn table(report: &AllanReport) -> String {
     let mut table =
-        CsvTable::new(["sensor", "axis", "tau_s", "deviation", "sigma", "low", "high", "fitted", "vibration"]);
+        CsvWriter::new(["sensor", "axis", "tau_s", "deviation", "sigma", "low", "high", "fitted", "vibration"]);
     for sensor in &report.sensors {
         for axis in &sensor.axes {
             for point in &axis.points {
@@ -30,7 +30,7 @@ fn table(report: &AllanReport) -> String {
                 row.extend(numbers.map(number_cell));
                 row.push(point.model.map_or_else(String::new, number_cell));
                 row.push(u8::from(point.vibration).to_string());
-                table.push(row);
+                table.row(row);
             }
         }
     }

@@ -7,11 +7,10 @@ use super::covariance::covariance_csv;
 use super::error::ExportError;
 use super::masks;
 use super::results::stage_results;
-use super::summary::{RunSummary, summarize, to_json};
 use super::tables::{calibration_csv, frames_csv, information_csv, rank_csv};
 use super::trajectory::{euroc_of_run, tum_of_run};
 use crate::flight_log::output::OutputSet;
-use crate::session::{Recording, RunRecord};
+use crate::session::{Recording, RunRecord, RunSummary, summarize};
 
 /// The trajectory as a table like EuRoC's.
 const EUROC_TRAJECTORY: &str = "trajectory.euroc.csv";
@@ -64,13 +63,13 @@ pub(crate) fn stage_run(
     let folder = folder.join(&run.spec.label);
     fs::create_dir_all(&folder).map_err(ExportError::write(&folder))?;
     let summary = summarize(recording, run, options.timing);
-    let json = to_json(&summary)
+    let json = serde_json::to_string_pretty(&summary)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("summary.json") })?;
     let mut rig = run.calibrated_rig(&recording.rig);
     let masks = masks::beside(&mut rig)?;
     // The summary says of which log the files are, and comes first.
     let mut files = vec![
-        ("summary.json", json),
+        ("summary.json", format!("{json}\n")),
         ("trajectory.tum", tum_of_run(run, recording.epoch_ns)),
         ("covariance.csv", covariance_csv(run)),
         ("calibration.csv", calibration_csv(run, &recording.rig)),

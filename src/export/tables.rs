@@ -1,16 +1,10 @@
 //! The CSV tables of a run, one row per frame.
 
-use super::csv_table::{CsvTable, number_cell};
 use crate::estimator::{Event, Motion};
-use crate::geometry::seconds_from_ns;
+use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gimbal::{ParameterId, ParameterNames, Singularity};
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
-
-/// Seconds since the log began with nanosecond resolution.
-pub(super) fn seconds_text(stamp_ns: i64) -> String {
-    format!("{:.9}", seconds_from_ns(stamp_ns))
-}
 
 /// `calibration.csv`: each parameter and its σ, then the joint angles. A switch of the parameterization changes the
 /// parameters: the columns are those of all parameterizations of the run, empty while another one is in use.
@@ -32,10 +26,10 @@ pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
         header.extend([format!("{name}_{unit}"), format!("{name}_sigma_{unit}")]);
     }
     header.extend(joints.iter().map(|joint| format!("{joint}_rad")));
-    let mut table = CsvTable::new(header);
+    let mut table = CsvWriter::new(header);
     for step in run.steps.iter().filter(|step| step.report.newest().is_some()) {
         let calibration = &step.report.calibration;
-        let mut row = vec![seconds_text(step.report.stamp_ns)];
+        let mut row = vec![seconds_cell(step.report.stamp_ns)];
         for parameter in &columns {
             let index = calibration.parameters.iter().position(|known| known == parameter);
             let series = [&calibration.values, &calibration.sigmas];
@@ -43,7 +37,7 @@ pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
         }
         let angles = step.report.newest().map_or(&[][..], |newest| &newest.joint_angles_rad);
         row.extend((0..joints.len()).map(|index| optional_cell(angles.get(index))));
-        table.push(row);
+        table.row(row);
     }
     table.into_text()
 }
@@ -92,9 +86,9 @@ pub(super) fn rank_csv(run: &RunRecord, names: &ParameterNames) -> String {
     header.extend(margins.iter().map(|it| format!("margin_{}", names.singularity(*it).replace([' ', ','], "_"))));
     header.extend((1..=columns).map(|index| format!("singular_value_{index}")));
     header.extend((1..=columns).map(|index| format!("singular_value_with_priors_{index}")));
-    let mut table = CsvTable::new(header);
+    let mut table = CsvWriter::new(header);
     for (step, rank) in ranked {
-        let mut row = vec![seconds_text(step.report.stamp_ns)];
+        let mut row = vec![seconds_cell(step.report.stamp_ns)];
         let counts = [
             rank.parameters.len(),
             rank.rank_structural,
@@ -116,7 +110,7 @@ pub(super) fn rank_csv(run: &RunRecord, names: &ParameterNames) -> String {
         for series in [&rank.singular_values, &rank.singular_values_with_priors] {
             row.extend((0..columns).map(|index| optional_cell(series.get(index))));
         }
-        table.push(row);
+        table.row(row);
     }
     table.into_text()
 }
@@ -130,11 +124,11 @@ pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
     let mut header = ["t_s", "keyframe", "interval_s", "parameter", "bits_per_s"].map(str::to_owned).to_vec();
     header.extend(Motion::all(count).map(|motion| motion.name(&joints).replace(' ', "_")));
     header.push("earlier".to_owned());
-    let mut table = CsvTable::new(header);
+    let mut table = CsvWriter::new(header);
     for (step, (rank, gain)) in informed().filter(|(_, (rank, gain))| rank.parameters.len() == gain.columns()) {
         for (column, parameter) in rank.parameters.iter().enumerate() {
             let mut row = vec![
-                seconds_text(step.report.stamp_ns),
+                seconds_cell(step.report.stamp_ns),
                 u8::from(step.report.keyframe).to_string(),
                 number_cell(gain.interval_s),
                 names.name(*parameter),
@@ -143,7 +137,7 @@ pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
             let parts: Vec<f64> = gain.by_motion_per_s(column).collect();
             row.extend((0..6 + count).map(|motion| optional_cell(parts.get(motion))));
             row.push(number_cell(gain.earlier_per_s(column)));
-            table.push(row);
+            table.row(row);
         }
     }
     table.into_text()
@@ -152,7 +146,7 @@ pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
 /// `frames.csv`: counts, residuals, iterations, stage times and events. Without `timing` the time cells are empty, so
 /// that two runs give the same bytes.
 pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
-    let mut table = CsvTable::new([
+    let mut table = CsvWriter::new([
         "t_s",
         "frame",
         "log_time_s",
@@ -180,9 +174,9 @@ pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
         let report = &step.report;
         let statistics = &step.tracks.statistics;
         let mut row = vec![
-            seconds_text(report.stamp_ns),
+            seconds_cell(report.stamp_ns),
             report.frame_index.to_string(),
-            seconds_text(step.log_time_ns),
+            seconds_cell(step.log_time_ns),
             report.phase.name().to_owned(),
             statistics.tracked.to_string(),
             statistics.detected.to_string(),
@@ -207,7 +201,7 @@ pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
         row.extend(stages_ms.map(|time_ms| if timing { format!("{time_ms:.3}") } else { String::new() }));
         row.push(report.events.iter().map(event_text).collect::<Vec<_>>().join("; "));
         row.push(report.warnings.join("; "));
-        table.push(row);
+        table.row(row);
     }
     table.into_text()
 }

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use nalgebra::Vector4;
 
-use super::csv_table::CsvTable;
 use super::error::ExportError;
+use crate::flight_log::csv_writer::CsvWriter;
 use crate::flight_log::{BATCH_REFERENCE, LogError, RecordedPose, read_trajectory_file};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::session::accuracy::StampedPose;
@@ -52,7 +52,7 @@ fn tum(poses: impl Iterator<Item = (i64, RigidTransform)>, epoch_ns: i64) -> Str
 /// The trajectory of a run as a table like EuRoC's `state_groundtruth_estimate0`: stamp in nanoseconds, position,
 /// orientation (w first) and velocity of the IMU in the estimator's world, gyroscope and accelerometer bias.
 pub fn euroc_of_run(run: &RunRecord, epoch_ns: i64) -> String {
-    let mut table = CsvTable::new([
+    let mut table = CsvWriter::new([
         "#timestamp [ns]",
         "p_RS_R_x [m]",
         "p_RS_R_y [m]",
@@ -78,7 +78,7 @@ pub fn euroc_of_run(run: &RunRecord, epoch_ns: i64) -> String {
         let numbers = newest.world_from_imu.translation_m.iter().chain(&orientation).chain(&newest.velocity_m_per_s);
         let numbers = numbers.chain(&newest.gyroscope_bias_rad_per_s).chain(&newest.accelerometer_bias_m_per_s2);
         let cells = numbers.map(|number| format!("{number:.9}"));
-        table.push(std::iter::once(stamp_ns.to_string()).chain(cells));
+        table.row(std::iter::once(stamp_ns.to_string()).chain(cells));
     }
     table.into_text()
 }

@@ -8,6 +8,7 @@ pub(crate) mod bit_depth;
 mod cdr;
 pub(crate) mod container;
 pub mod convert;
+pub mod csv_writer;
 mod error;
 mod file;
 mod geodesy;
@@ -41,7 +42,7 @@ pub use messages::MessageKind;
 pub use rig::template as rig_template;
 pub use sensor_frame::{LogWarning, SensorFrame};
 pub use stream::FrameStream;
-pub use text::{edit_distance, nearest_name, printable, printable_lines, shortened};
+pub use text::{edit_distance, log_name, nearest_name, printable, printable_lines, shortened};
 pub use trajectory::{BATCH_REFERENCE, RecordedPose, is_batch_reference, read_trajectory_file};
 pub use writer::{
     CircleAnnotation, LinesAnnotation, LogCompression, LogLevel, LogWriter, LogWriterOptions, MessageTimes,

@@ -2,6 +2,12 @@
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
+use std::path::Path;
+
+/// File name of a log without its folder.
+pub fn log_name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
 
 /// Whether a character can change how a terminal shows the text around it: control characters (C0, DEL, C1), line and
 /// paragraph separators, marks that reorder text (bidirectional overrides, embeddings and isolates).

@@ -1,5 +1,7 @@
 use serde::Serialize;
 
+use super::principal_angle;
+
 /// Physical dimension of a parameter; written to files as the symbol of its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub enum Dimension {
@@ -29,6 +31,14 @@ impl Dimension {
             Self::Time => "s",
             Self::Pixel => "px",
             Self::Ratio => "",
+        }
+    }
+
+    /// Difference of two values in the unit; of angles, in (−π, π].
+    pub fn difference(self, value: f64, reference: f64) -> f64 {
+        match self {
+            Self::Angle => principal_angle(value - reference),
+            _ => value - reference,
         }
     }
 

@@ -8,7 +8,6 @@ mod chain_values;
 pub mod comparison;
 pub mod convergence;
 mod copied_value;
-pub mod csv_table;
 pub mod desktop;
 mod events;
 mod follow;

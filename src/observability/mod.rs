@@ -34,7 +34,7 @@ pub use factor::PackedFactor;
 pub use information::{InformationRate, ParameterRate, information_rate};
 pub use parameter_state::{ParameterState, parameter_states};
 pub use persistence::steps_lost;
-pub use report::{CalibrationDirection, RankReport};
+pub use report::{CalibrationDirection, Deficit, RankReport};
 pub use slide::{ChainSlide, chain_of_step, slide};
 pub use slide_direction::{InvalidSlide, SlideDirection, SlidePosition, SlideRequest};
 pub use structure::{KnownDirection, KnownLoss, MIN_SPURIOUS_GAIN, known_losses};

@@ -1,3 +1,5 @@
+use serde::Serialize;
+
 use super::{KnownDirection, PackedFactor};
 use crate::estimator::allocated_bytes;
 use crate::gimbal::{ParameterGroup, ParameterId, ParameterNames, Quantity, Singularity};
@@ -43,6 +45,19 @@ pub struct RankReport {
     pub posterior: PackedFactor,
 }
 
+/// Number of unobservable columns by cause.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Deficit {
+    /// Redundant in the parameterization, or at its singularity (G).
+    pub parameterization: usize,
+    /// Joints that did not move (F).
+    pub joints: usize,
+    /// Absorbed by free joint angles (E).
+    pub absorbed: usize,
+    /// Motion of the vehicle and scene (M).
+    pub motion: usize,
+}
+
 /// A right singular direction of the calibration block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationDirection {
@@ -55,6 +70,16 @@ pub struct CalibrationDirection {
 }
 
 impl RankReport {
+    /// The deficit by cause.
+    pub fn deficit(&self) -> Deficit {
+        Deficit {
+            parameterization: self.deficit_parameterization,
+            joints: self.deficit_joints,
+            absorbed: self.deficit_absorbed,
+            motion: self.deficit_motion,
+        }
+    }
+
     /// Summary in one line: `structural rank 18 of 24; 6 redundant in the parameterization; informed rank 15; least observable yaw.d`.
     pub fn verdict(&self, names: &ParameterNames) -> String {
         let causes = [

@@ -8,11 +8,10 @@ use super::inputs::InputFile;
 use super::options::ReportOptions;
 use super::rank_intervals::{RankInterval, rank_intervals};
 use super::verdict::{RunVerdict, Statement, log_statement};
-use crate::export::estimability::{EstimabilitySummary, estimability_summary};
-use crate::export::summary::{RunSummary, log_name};
+use crate::flight_log::log_name;
 use crate::geometry::seconds_from_ns;
 use crate::log_check::CheckReport;
-use crate::session::{Recording, RunRecord};
+use crate::session::{EstimabilitySummary, Recording, RunRecord, RunSummary, estimability_summary};
 
 /// A notable event of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -6,9 +6,8 @@ use super::content::{ReportContent, RunContent};
 use super::html::{list, table};
 use super::numbers::{MS_PER_S, number, shown_unit};
 use super::verdict::ParameterVerdict;
-use crate::export::estimability::EstimabilitySummary;
-use crate::export::summary::{ParameterSummary, TrajectorySummary};
 use crate::log_check::{CheckReport, Severity};
+use crate::session::{EstimabilitySummary, ParameterSummary, TrajectoryLane};
 
 /// Number of columns of the calibration table before the prior: name, unit, values and σ.
 const VALUE_COLUMNS: usize = 5;
@@ -46,7 +45,8 @@ pub(super) fn accuracy(content: &ReportContent) -> Markup {
     // Every summary has the trajectories.
     let trajectories = content.runs.first().map_or(&[][..], |run| &run.summary.trajectories);
     let of_runs = content.runs.iter().map(|run| (&run.label, &run.summary.accuracy, &run.summary.accuracy_missing));
-    let of_trajectories = trajectories.iter().map(|lane| (&lane.label, &lane.accuracy, &lane.accuracy_missing));
+    let of_trajectories =
+        trajectories.iter().map(|lane| (&lane.label, &lane.evaluation.accuracy, &lane.accuracy_missing));
     let all: Vec<_> = of_runs.chain(of_trajectories).collect();
     for relative in all.iter().filter_map(|&(_, accuracy, _)| accuracy.as_ref()).flat_map(|found| &found.rpe) {
         if !lengths_m.contains(&relative.delta_m) {
@@ -88,10 +88,11 @@ pub(super) fn accuracy(content: &ReportContent) -> Markup {
 /// The trajectories of other programs, `None` without one.
 pub(super) fn trajectories(content: &ReportContent) -> Option<Markup> {
     let lanes = &content.runs.first()?.summary.trajectories;
-    let row = |lane: &TrajectorySummary| {
-        vec![lane.label.clone(), lane.source.clone(), lane.poses.to_string(), number(lane.length_m, 1)]
+    let row = |lane: &TrajectoryLane| {
+        let poses = lane.track.samples().len().to_string();
+        vec![lane.label.clone(), lane.source.clone(), poses, number(lane.length_m, 1)]
     };
-    let rows: Vec<Vec<String>> = lanes.iter().map(row).collect();
+    let rows: Vec<Vec<String>> = lanes.iter().map(|lane| row(lane)).collect();
     let caption = "Trajectories of other programs: poses only, without calibration, features and residuals";
     (!rows.is_empty()).then(|| table(caption, &["trajectory", "file or topic", "poses", "path length, m"], &rows))
 }

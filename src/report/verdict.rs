@@ -5,12 +5,12 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use serde::Serialize;
 
 use super::numbers::{number, shown_unit};
-use crate::export::summary::{Accuracy, ChainError, RunSummary};
+use crate::calibration::ChainDistance;
 use crate::geometry::{Dimension, seconds_from_ns};
 use crate::log_check::{CheckReport, Severity};
 use crate::observability::laboratory::{Situation, advise};
 use crate::observability::{ParameterState, RankReport, parameter_states, parameters_of};
-use crate::session::{LostSince, PoseError, Recording, RunRecord, StepRecord};
+use crate::session::{LostSince, PoseError, Recording, RunRecord, RunSummary, StepRecord};
 
 /// A parameter counts as informed when its posterior σ is at most this ratio of its prior σ: the measurements then
 /// contribute at least as much information as the prior.
@@ -111,14 +111,6 @@ fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Sta
     });
     match (&summary.accuracy, uncertainty) {
         (Some(found), uncertainty) => {
-            let Accuracy { ate_rmse_m, ate_max_m, ate_percent_of_length: percent, .. } = found;
-            let text = format!(
-                "Position error {} RMSE, at most {} (ATE, aligned by yaw and position): {} % of the path of {} m.",
-                length(*ate_rmse_m),
-                length(*ate_max_m),
-                number(*percent, 2),
-                number(summary.length_m, 1)
-            );
             let relative = found.rpe.iter().map(|over| {
                 format!(
                     "over {} m {}, {}°",
@@ -137,8 +129,8 @@ fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Sta
                 details.push(format!("Relative pose error (RPE, RMSE): {}.", relative.join("; ")));
             }
             details.extend(uncertainty.map(|text| format!("Uncertainty of the estimator: {text}.")));
-            let mark = if *percent <= MAX_ATE_PERCENT { Mark::Good } else { Mark::Warning };
-            statement("Accuracy", mark, text, details)
+            let mark = if found.ate_percent_of_length <= MAX_ATE_PERCENT { Mark::Good } else { Mark::Warning };
+            statement("Accuracy", mark, format!("{found}."), details)
         }
         (None, Some(uncertainty)) => {
             let missing = summary.accuracy_missing.clone().unwrap_or_default();
@@ -363,7 +355,7 @@ fn length(value_m: f64) -> String {
     if value_m < 0.1 { format!("{} mm", number(1e3 * value_m, 1)) } else { format!("{} m", number(value_m, 2)) }
 }
 
-fn chain_error(error: &ChainError) -> String {
+fn chain_error(error: &ChainDistance) -> String {
     format!("{} mm, {}°", number(error.translation_mean_m * 1e3, 1), number(error.rotation_mean_rad.to_degrees(), 2))
 }
 

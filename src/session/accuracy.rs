@@ -1,6 +1,7 @@
 //! Absolute and relative trajectory error, as evo computes them.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use serde::{Serialize, Serializer};
 
 use crate::geometry::{RigidTransform, so3};
 
@@ -26,10 +27,29 @@ pub enum Alignment {
     Similarity,
 }
 
+impl Alignment {
+    /// Name in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::YawPosition => "yaw+position",
+            Self::Rigid => "se3",
+            Self::Similarity => "sim3",
+        }
+    }
+}
+
+impl Serialize for Alignment {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
 /// Statistics of a series of errors, named as in evo.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ErrorStatistics {
     /// Number of errors.
+    #[serde(skip)]
     pub count: usize,
     /// Root mean square.
     pub rmse: f64,

@@ -1,6 +1,9 @@
 //! Trajectory errors against positions of an antenna: ground truth without attitudes, beside the IMU by a lever arm.
 
+use std::fmt;
+
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
+use serde::{Serialize, Serializer};
 use thiserror::Error;
 
 use super::accuracy::{Alignment, AlignmentSums, ErrorStatistics, path_length_m};
@@ -30,14 +33,39 @@ pub struct AntennaPair {
 }
 
 /// What maps an estimated trajectory onto the positions of an antenna.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct AntennaAlignment {
     /// `true_from_estimate`, a rotation about the vertical and a translation.
+    #[serde(skip)]
     pub true_from_estimate: RigidTransform,
     /// Position of the antenna in the IMU frame, in metres.
+    #[serde(serialize_with = "coordinates")]
     pub lever_arm_m: Vector3<f64>,
     /// Standard deviation of each of its coordinates, where it was estimated.
+    #[serde(serialize_with = "optional_coordinates")]
     pub lever_arm_sigma_m: Option<Vector3<f64>>,
+}
+
+fn coordinates<S: Serializer>(vector: &Vector3<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+    vector.as_slice().serialize(serializer)
+}
+
+#[expect(clippy::ref_option, reason = "signature of serialize_with")]
+fn optional_coordinates<S: Serializer>(vector: &Option<Vector3<f64>>, serializer: S) -> Result<S::Ok, S::Error> {
+    vector.as_ref().map(Vector3::as_slice).serialize(serializer)
+}
+
+/// `the antenna at (0.120, -0.050, 0.310) m`: position in the IMU frame, with σ where it was estimated.
+impl fmt::Display for AntennaAlignment {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z]: [f64; 3] = self.lever_arm_m.into();
+        match self.lever_arm_sigma_m.map(<[f64; 3]>::from) {
+            None => write!(formatter, "the antenna at ({x:.3}, {y:.3}, {z:.3}) m"),
+            Some([sx, sy, sz]) => {
+                write!(formatter, "the antenna, estimated at ({x:.3} ± {sx:.3}, {y:.3} ± {sy:.3}, {z:.3} ± {sz:.3}) m")
+            }
+        }
+    }
 }
 
 /// Why a trajectory cannot be aligned with the positions of an antenna.

@@ -26,8 +26,9 @@ mod record;
 pub(crate) mod tests;
 
 pub use engine::{
-    BreakpointHit, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation, FlightNoiseError, SnapshotUse,
-    Stopwatch, calibrate, camera_rotations, compute, compute_until, fit_flight_noise, image_rotations,
+    BreakpointHit, CalibrationErrors, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation,
+    FlightNoiseError, SnapshotUse, Stopwatch, calibrate, camera_rotations, compute, compute_until, fit_flight_noise,
+    image_rotations,
 };
 pub use plan::{
     DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, ForkChanges, ForkError, LoadedPositions,
@@ -39,8 +40,9 @@ pub use playback::{
     SavedSessionError, Session, Wake,
 };
 pub use record::{
-    ChainDistance, Comparison, Divergence, ForkOrigin, LostSince, PassProgress, PoseConsistency, PoseError,
-    PositionTruth, Quantity, RELATIVE_LENGTHS_M, Recording, RelativeAccuracy, RunMemory, RunRecord, RunWarning,
-    SolverPosition, SolverTrace, StepFactorRows, StepRecord, TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane,
-    evaluate_trajectory,
+    Comparison, Divergence, EstimabilitySummary, ForkOrigin, KnownLossSummary, LostSince, ParameterSummary,
+    PassProgress, PoseConsistency, PoseError, PositionTruth, Quantity, RELATIVE_LENGTHS_M, Recording, RelativeAccuracy,
+    RunMemory, RunRecord, RunSummary, RunWarning, SolverPosition, SolverTrace, StageSummary, StepFactorRows,
+    StepRecord, TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane, estimability_summary, evaluate_trajectory,
+    summarize,
 };

@@ -10,8 +10,8 @@ use std::fmt;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::columns::{PAIRING_COLUMNS, run_column};
 use super::pairing::{RunPair, pair_runs};
-use super::schema::PAIRING_COLUMNS;
 use super::statistics::MeanInterval;
 use super::table::StudyTable;
 
@@ -33,15 +33,9 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// The direction of a column.
+    /// The direction of a column of the table of runs; of an unknown one, larger is worse.
     fn of(column: &str) -> Self {
-        match column {
-            "pose_nees" | "parameter_error_sigma" => Self::Either,
-            "estimated" | "keyframes" | "length_m" | "rank_structural" | "rank_informed" | "real_time_factor" => {
-                Self::Smaller
-            }
-            _ => Self::Larger,
-        }
+        run_column(column).map_or(Self::Larger, |column| column.worse)
     }
 }
 

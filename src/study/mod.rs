@@ -8,17 +8,18 @@
 //! - `job`: the jobs of a plan and their keys.
 //! - `baseline`, `comparison`, `pairing`, `statistics`: a study against a baseline, paired and with intervals.
 //! - `summary_table`: statistics of groups of runs as Markdown.
-//! - `table`, `schema`: columns with units and descriptions, and those of the tables of a study.
+//! - `table`: columns of values with units and descriptions.
+//! - `columns/`: the columns of the tables of a study, each with name, unit, meaning and value in one definition.
 //! - `view/`: what the study view shows: filters, groups, distributions, differences.
 
 mod baseline;
+mod columns;
 mod comparison;
 mod job;
 mod pairing;
 mod perturbation;
 mod plan;
 mod recipe;
-mod schema;
 mod statistics;
 mod summary_table;
 mod table;
@@ -27,6 +28,9 @@ mod tests;
 pub mod view;
 
 pub use baseline::baseline_table;
+pub use columns::{
+    JobCosts, JobResult, JobStatus, PAIRING_COLUMNS, RunResult, StudyTables, frames_table, parameters_table, runs_table,
+};
 pub use comparison::{
     ComparisonError, Direction, MetricComparison, SUCCESS, StudyComparison, Verdict, WorstPair, compare,
 };
@@ -40,7 +44,6 @@ pub use plan::{
     DisturbanceSet, Exclusion, JobLimits, LOG_PLACE, LogSource, PlanError, SlurmOptions, StudyOutput, StudyPlan,
 };
 pub use recipe::{EncoderNoise, FlightRecipe};
-pub use schema::{PAIRING_COLUMNS, frames_table, parameters_table, relative_error_columns, runs_table};
 pub use statistics::MeanInterval;
 pub use summary_table::{ReferenceValue, Statistic, SummaryColumn, SummaryTable};
 pub use table::{Cell, ColumnType, ColumnValues, StudyColumn, StudyTable, TableError};

@@ -7,7 +7,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::schema::PAIRING_COLUMNS;
+use super::columns::PAIRING_COLUMNS;
 use super::table::{Cell, StudyTable};
 use crate::session::RunSpec;
 

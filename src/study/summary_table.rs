@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::schema::{PAIRING_COLUMNS, runs_table};
+use super::columns::{PAIRING_COLUMNS, runs_table};
 use super::table::ColumnType::{Integer, Number};
 use super::table::StudyTable;
 use crate::geometry::median;

@@ -8,6 +8,8 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::flight_log::csv_writer::CsvWriter;
+
 /// Type of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ColumnType {
@@ -376,6 +378,15 @@ impl StudyTable {
     /// The cells of a row in the order of the columns.
     pub fn row(&self, row: usize) -> impl Iterator<Item = Cell> + '_ {
         self.columns.iter().map(move |column| column.values.cell(row))
+    }
+
+    /// Rows of these numbers as comma-separated values under the names of the columns.
+    pub fn csv(&self, rows: impl IntoIterator<Item = usize>) -> String {
+        let mut csv = CsvWriter::new(self.columns.iter().map(|column| column.name.as_str()));
+        for row in rows {
+            csv.row(self.row(row).map(|cell| cell.to_string()));
+        }
+        csv.into_text()
     }
 
     /// Appends a row of named cells; columns that are not named get an empty cell.

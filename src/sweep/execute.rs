@@ -5,24 +5,25 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::error::StudyFileError;
-use super::folder::{StudyFolder, StudyTables};
+use super::folder::StudyFolder;
 use super::inputs::rig_sha256;
-use super::rows::{JobCosts, JobStatus, add_frames, failed_rows, run_rows, trajectory_rows};
 use crate::calibration::CalibrationOptions;
 use crate::export::ExportError;
 use crate::export::calibration_files::write_calibration;
-use crate::export::calibration_report::{CalibrationReport, report_calibration};
+use crate::export::calibration_report::report_calibration;
 use crate::export::masks;
 use crate::export::run_files::{RunFileOptions, write_run};
-use crate::export::summary::summarize;
 use crate::flight_log::output::OutputSet;
 use crate::flight_log::{FlightLog, LogError};
 use crate::sensors::Rig;
 use crate::session::{
-    self, CalibrationRequest, CalibrationRunError, Recording, SessionError, SessionPlan, SessionRequest, Stopwatch,
-    TrajectorySource, TrajectorySpec,
+    self, CalibrationRequest, CalibrationRun, CalibrationRunError, Recording, SessionError, SessionPlan,
+    SessionRequest, Stopwatch, TrajectorySource, TrajectorySpec, summarize,
 };
-use crate::study::{JobLog, JobSubject, KeyedJob, PerturbationStart, StudyJob, StudyOutput, TableError};
+use crate::study::{
+    JobCosts, JobLog, JobResult, JobStatus, JobSubject, KeyedJob, PerturbationStart, RunResult, StudyJob, StudyOutput,
+    StudyTables,
+};
 
 /// Frames between two samples of the consistency of poses: about as long as a window, so that samples share few
 /// measurements.
@@ -48,9 +49,6 @@ pub enum JobError {
     /// The log cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The rows do not fit into the tables.
-    #[error(transparent)]
-    Table(#[from] TableError),
     /// The estimator has stopped early.
     #[error("{0}")]
     Estimator(String),
@@ -147,15 +145,30 @@ impl StudyFolder {
             peak_memory_bytes: peak_memory_bytes(),
             ..self.costs(&job, &files, program, attempts)
         };
-        let mut tables = run_rows(key, &job, &costs, &recording, run, &summary, offline.as_ref())?;
-        if output.frames {
-            add_frames(&mut tables, key, run)?;
-        }
+        let consistency = run.pose_consistency();
+        let initialized = summary.frames.initialized_at_s.is_some();
+        let status = if initialized { JobStatus::Ok } else { JobStatus::NotInitialized };
+        let result = JobResult {
+            key,
+            job: &job,
+            status,
+            message: summary.accuracy_missing.as_deref().filter(|_| !initialized).unwrap_or_default(),
+            costs: &costs,
+            run: Some(RunResult {
+                recording: &recording,
+                record: run,
+                summary: &summary,
+                consistency: &consistency,
+                offline: offline.as_ref(),
+            }),
+            trajectory: None,
+        };
+        let tables = StudyTables::of(&result, output.frames);
         if output.files {
             write_run(&recording, run, &self.job(key), RunFileOptions::default())?;
         }
         self.write_rows(key, &tables, output)?;
-        Ok(if summary.frames.initialized_at_s.is_some() { JobStatus::Ok } else { JobStatus::NotInitialized })
+        Ok(status)
     }
 
     /// Evaluates a trajectory of another program against the ground truth of its log and writes its row.
@@ -189,8 +202,17 @@ impl StudyFolder {
             peak_memory_bytes: peak_memory_bytes(),
             ..self.costs(job, &files, program, attempts)
         };
-        let tables = trajectory_rows(key, job, &costs, &recording.trajectories[0])?;
-        self.write_rows(key, &tables, output)?;
+        let lane = &recording.trajectories[0];
+        let result = JobResult {
+            key,
+            job,
+            status: JobStatus::Ok,
+            message: lane.accuracy_missing.as_deref().unwrap_or_default(),
+            costs: &costs,
+            run: None,
+            trajectory: Some(lane),
+        };
+        self.write_rows(key, &StudyTables::of(&result, output.frames), output)?;
         Ok(JobStatus::Ok)
     }
 
@@ -239,13 +261,13 @@ impl StudyFolder {
             wall_s: costs.wall_s,
             ..self.costs(job, &self.files_of(job), &costs.program, costs.attempts)
         };
-        let tables: StudyTables = failed_rows(key, job, status, message, &costs)?;
-        Ok(self.write_rows(key, &tables, output)?)
+        let result = JobResult { key, job, status, message, costs: &costs, run: None, trajectory: None };
+        Ok(self.write_rows(key, &StudyTables::of(&result, output.frames), output)?)
     }
 
     /// Calibrates offline from the log of a job, writes the files of `dcvins calibrate` into its folder, and makes the
     /// result its rig.
-    fn calibrate(&self, key: &str, job: &StudyJob, files: &mut JobFiles) -> Result<CalibrationReport, JobError> {
+    fn calibrate(&self, key: &str, job: &StudyJob, files: &mut JobFiles) -> Result<CalibrationRun, JobError> {
         let (start_s, duration_s) = span(job);
         let request = CalibrationRequest {
             log_path: files.log.clone(),
@@ -259,7 +281,7 @@ impl StudyFolder {
         let (report, folder) = (report_calibration(&run), self.job(key));
         write_calibration(&run, &report, &folder, false)?;
         files.rig = Some(folder.join("rig.yaml"));
-        Ok(report)
+        Ok(run)
     }
 
     /// Writes the rig of a job with its errors, and the masks beside it.

@@ -16,11 +16,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::error::StudyFileError;
-use super::parquet_table::{csv_text, read_parquet, stage_parquet};
+use super::parquet_table::{read_parquet, stage_parquet};
 use crate::flight_log::output::{self, OutputSet};
-use crate::study::{
-    KeyedJob, SimulatedFlight, StudyJob, StudyOutput, StudyPlan, StudyTable, frames_table, parameters_table, runs_table,
-};
+use crate::study::{KeyedJob, SimulatedFlight, StudyJob, StudyOutput, StudyPlan, StudyTable, StudyTables};
 
 /// The file by which a folder of a study is recognized.
 pub(super) const INDEX: &str = "study.json";
@@ -41,23 +39,6 @@ struct StudyIndex {
     name: String,
     /// Absolute path of the plan.
     plan: PathBuf,
-}
-
-/// The tables of a study.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StudyTables {
-    /// One row per run.
-    pub runs: StudyTable,
-    /// One row per run and calibration parameter.
-    pub parameters: StudyTable,
-    /// One row per run and frame; empty unless the plan asks for it.
-    pub frames: StudyTable,
-}
-
-impl Default for StudyTables {
-    fn default() -> Self {
-        Self { runs: runs_table(), parameters: parameters_table(), frames: frames_table() }
-    }
 }
 
 /// The folder of a study.
@@ -248,7 +229,7 @@ impl StudyFolder {
         for (name, table) in [(RUNS, &tables.runs), (PARAMETERS, &tables.parameters)] {
             let [parquet, csv] = ["parquet", "csv"].map(|kind| self.root.join(format!("{name}.{kind}")));
             outputs.add(stage_parquet(table, &parquet)?);
-            outputs.write(&csv, csv_text(table).as_bytes()).map_err(StudyFileError::write(&csv))?;
+            outputs.write(&csv, table.csv(0..table.rows()).as_bytes()).map_err(StudyFileError::write(&csv))?;
             paths.extend([parquet, csv]);
         }
         if plan.output.frames {

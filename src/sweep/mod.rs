@@ -6,7 +6,6 @@ mod flights;
 mod folder;
 mod inputs;
 mod parquet_table;
-mod rows;
 mod study_source;
 #[cfg(test)]
 mod tests;
@@ -14,8 +13,7 @@ mod tests;
 pub use error::StudyFileError;
 pub use execute::JobError;
 pub use flights::{FlightError, RenderedFlight};
-pub use folder::{StudyFolder, StudyTables};
+pub use folder::StudyFolder;
 pub use inputs::{find_logs, program_identity, read_plan};
-pub use parquet_table::{csv_text, read_parquet, write_parquet, write_text};
-pub use rows::{JobCosts, JobStatus};
+pub use parquet_table::{read_parquet, write_parquet, write_text};
 pub use study_source::{OpenedStudy, StudySourceError, is_study};

@@ -19,9 +19,8 @@ use parquet::schema::types::Type;
 use serde::{Deserialize, Serialize};
 
 use super::error::StudyFileError;
-use crate::export::csv_table::CsvTable;
 use crate::flight_log::output::{self, OutputFile, StagedFile};
-use crate::study::{Cell, ColumnType, ColumnValues, StudyColumn, StudyTable};
+use crate::study::{ColumnType, ColumnValues, StudyColumn, StudyTable};
 
 /// Key of the metadata with units and descriptions.
 const COLUMNS_KEY: &str = "dcvins.columns";
@@ -228,15 +227,6 @@ fn read_cells<T: DataType, V>(
         left -= records;
     }
     Ok(())
-}
-
-/// The text of a table as comma-separated values, with the names of the columns in the first row.
-pub fn csv_text(table: &StudyTable) -> String {
-    let mut csv = CsvTable::new(table.columns().iter().map(|column| column.name.as_str()));
-    for row in 0..table.rows() {
-        csv.push(table.row(row).map(|cell: Cell| cell.to_string()));
-    }
-    csv.into_text()
 }
 
 /// Writes a text, in place of an older file.

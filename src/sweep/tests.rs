@@ -58,7 +58,7 @@ fn a_damaged_table_is_an_error() {
 
 #[test]
 fn csv_has_all_digits_and_quotes() {
-    let text = csv_text(&table(2));
+    let text = table(2).csv(0..2);
     assert_eq!(
         text,
         "log,seed,ate_rmse_m,ok\n\"flight «0», \"\"a\"\"\n\",-2,0.1,\n\"flight «1», \"\"a\"\"\n\",,,true\n"

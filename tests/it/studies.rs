@@ -24,7 +24,7 @@ fn write_study(folder: &Path, parquet: bool) {
         if parquet {
             write_parquet(&table, &folder.join(format!("{name}.parquet"))).expect("the table is written");
         } else {
-            fs::write(folder.join(format!("{name}.csv")), csv_text(&table)).expect("the table is written");
+            fs::write(folder.join(format!("{name}.csv")), table.csv(0..table.rows())).expect("the table is written");
         }
     }
 }

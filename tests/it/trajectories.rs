@@ -56,7 +56,7 @@ fn a_trajectory_is_evaluated_like_a_run() {
     let run = ["run", &log, "--duration", "6", "--out", &results, "--trajectory", &file, "--trajectory", topic];
     let (code, text) = dcvins(&run);
     assert_eq!(code, 0, "{text}");
-    assert!(text.contains("trajectory Other (") && text.contains("ATE 0.050 m RMSE"), "{text}");
+    assert!(text.contains("trajectory Other (") && text.contains("ATE 50.0 mm RMSE"), "{text}");
     let summary = std::fs::read_to_string(folder.path().join("results/auto/summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&summary).unwrap();
     let lanes = summary["trajectories"].as_array().unwrap();

@@ -2,7 +2,7 @@
 
 use nalgebra::{DVector, UnitQuaternion, Vector3, Vector6};
 
-use crate::calibration::chain_distance;
+use crate::calibration::ChainDistance;
 use crate::calibration::chain_prior::ChainTerm;
 use crate::calibration::pose_loop::{LoopNoise, LoopState, PairedSegment, PoseLoops, PosePair, SegmentFrame};
 use crate::geometry::{RigidTransform, SplitMix64, so3, wrap_angle};
@@ -152,16 +152,11 @@ fn exact_poses_recover_the_chain_up_to_encoder_noise() {
         let example = example(seed, 1e-4, (0.0, 0.0), false);
         let term = ChainTerm::new(&example.given, &prior());
         let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
-        let (before, _) = chain_distance(&example.given, &example.ground_truth, &example.visited).unwrap();
-        let (shift, rotation_error) =
-            chain_distance(&solution.chain.to_classical(), &example.ground_truth, &example.visited).unwrap();
-        assert!(before.mean > 0.01, "seed {seed} begins {} m off", before.mean);
-        assert!(
-            shift.mean < 5e-4 && rotation_error.mean < 1e-3,
-            "seed {seed}: {} m, {} rad",
-            shift.mean,
-            rotation_error.mean
-        );
+        let before = ChainDistance::over(&example.given, &example.ground_truth, &example.visited).unwrap();
+        let after =
+            ChainDistance::over(&solution.chain.to_classical(), &example.ground_truth, &example.visited).unwrap();
+        assert!(before.translation_mean_m > 0.01, "seed {seed}: {before:?}");
+        assert!(after.translation_mean_m < 5e-4 && after.rotation_mean_rad < 1e-3, "seed {seed}: {after:?}");
     }
 }
 
@@ -196,7 +191,6 @@ fn stationary_joints_leave_unobservable_directions_at_the_prior() {
         (0..covariance.nrows()).map(|k| covariance[(k, k)] / term.prior_sigmas[k].powi(2)).sum::<f64>()
     };
     assert!(total(&solution.covariance) > 5.0 * total(&moved.covariance));
-    let (shift, rotation_error) =
-        chain_distance(&solution.chain.to_classical(), &example.ground_truth, &example.visited).unwrap();
-    assert!(shift.mean < 0.01 && rotation_error.mean < 0.02, "{} m, {} rad", shift.mean, rotation_error.mean);
+    let error = ChainDistance::over(&solution.chain.to_classical(), &example.ground_truth, &example.visited).unwrap();
+    assert!(error.translation_mean_m < 0.01 && error.rotation_mean_rad < 0.02, "{error:?}");
 }

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result};
 use dcvins::session::Stopwatch;
-use dcvins::study::{JobLog, KeyedJob, SimulatedFlight, StudyPlan};
-use dcvins::sweep::{JobCosts, JobStatus, StudyFolder};
+use dcvins::study::{JobCosts, JobLog, JobStatus, KeyedJob, SimulatedFlight, StudyPlan};
+use dcvins::sweep::StudyFolder;
 
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::Progress;

@@ -6,8 +6,8 @@ use std::process::{Command, Output};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
-use dcvins::study::{self, JobLog, KeyedJob, SlurmOptions};
-use dcvins::sweep::{JobCosts, JobStatus, write_text};
+use dcvins::study::{self, JobCosts, JobLog, JobStatus, KeyedJob, SlurmOptions};
+use dcvins::sweep::write_text;
 
 use super::arguments::SweepArguments;
 use super::opened::Sweep;

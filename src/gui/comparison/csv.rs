@@ -2,7 +2,7 @@
 
 use super::ComparisonPanel;
 use super::columns::label_of;
-use crate::gui::csv_table::{Table, number, seconds};
+use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gui::{CsvTable, PanelContext};
 use crate::session::Quantity;
 
@@ -10,12 +10,12 @@ impl CsvTable for ComparisonPanel {
     /// Accuracy of all runs, their first divergences from the reference, and the differences of every common frame.
     /// Differences are in stored units (radians, metres), accuracy in the units of the panel.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
-        let mut table = Table::new(["kind", "run", "reference", "quantity", "unit", "t_s", "value"]);
+        let mut table = CsvWriter::new(["kind", "run", "reference", "quantity", "unit", "t_s", "value"]);
         let label = |index: usize| label_of(ctx.recording, index).to_owned();
         let comparisons = self.comparisons(ctx).to_vec();
         for row in self.scores().rows() {
             for (run, value) in row.values.iter().enumerate() {
-                let value = number(value.unwrap_or(f64::NAN));
+                let value = number_cell(value.unwrap_or(f64::NAN));
                 let unit = row.unit.to_owned();
                 table.row([
                     "accuracy".to_owned(),
@@ -37,8 +37,8 @@ impl CsvTable for ComparisonPanel {
                     reference.clone(),
                     quantity.name().to_owned(),
                     quantity.unit().to_owned(),
-                    seconds(stamp_ns),
-                    number(value),
+                    seconds_cell(stamp_ns),
+                    number_cell(value),
                 ]);
             };
             for (quantity, divergence) in Quantity::ALL.into_iter().zip(&comparison.divergences) {

@@ -1,9 +1,10 @@
 //! The accuracy of all runs as table rows with a column per run.
 
+use crate::calibration::ChainDistance;
 use crate::estimator::Phase;
 use crate::geometry::seconds_from_ns;
 use crate::gui::units::{fixed, significant};
-use crate::session::{ChainDistance, RELATIVE_LENGTHS_M, Recording, RunRecord, TrajectoryAccuracy, TrajectoryLane};
+use crate::session::{RELATIVE_LENGTHS_M, Recording, RunRecord, TrajectoryAccuracy, TrajectoryLane};
 
 /// Number of new steps after which a run's accuracy is computed again.
 const UPDATE_PERIOD_STEPS: usize = 20;
@@ -101,7 +102,6 @@ impl Scores {
         };
         let with = |meaning: &'static str, row: ScoreRow| ScoreRow { meaning, ..row };
         let less = Some(true);
-        let absolute = |score: &RunScore| score.accuracy.as_ref().map(|accuracy| accuracy.absolute_m);
         let ate = |row| {
             with(
                 "Absolute trajectory error: distance to the ground truth after alignment in yaw and position, over the estimated frames",
@@ -109,13 +109,13 @@ impl Scores {
             )
         };
         let mut rows = vec![
-            ate(row("ATE RMS", "m", less, None, &|score| Some(absolute(score)?.rmse))),
-            ate(row("ATE mean", "m", less, None, &|score| Some(absolute(score)?.mean))),
-            ate(row("ATE median", "m", less, None, &|score| Some(absolute(score)?.median))),
-            ate(row("ATE max", "m", less, None, &|score| Some(absolute(score)?.max))),
+            ate(row("ATE RMS", "m", less, None, &|score| Some(score.accuracy.as_ref()?.ate_rmse_m))),
+            ate(row("ATE mean", "m", less, None, &|score| Some(score.accuracy.as_ref()?.ate_mean_m))),
+            ate(row("ATE median", "m", less, None, &|score| Some(score.accuracy.as_ref()?.ate_median_m))),
+            ate(row("ATE max", "m", less, None, &|score| Some(score.accuracy.as_ref()?.ate_max_m))),
             ate(row("ATE RMS / path length", "%", less, Some(2), &|score| {
                 let accuracy = score.accuracy.as_ref().filter(|accuracy| accuracy.length_m > 0.0)?;
-                Some(100.0 * accuracy.absolute_m.rmse / accuracy.length_m)
+                Some(accuracy.ate_percent_of_length)
             })),
         ];
         let rpe =
@@ -124,20 +124,19 @@ impl Scores {
             with("Error of imu_from_camera against the ground-truth rig, mean over the visited joint angles", row)
         };
         for delta_m in RELATIVE_LENGTHS_M {
-            let over = |score: &RunScore| {
-                score.accuracy.as_ref()?.relative.iter().find(|over| over.delta_m == delta_m).copied()
-            };
+            let over =
+                |score: &RunScore| score.accuracy.as_ref()?.rpe.iter().find(|over| over.delta_m == delta_m).copied();
             let name = format!("RPE {delta_m:.0} m RMS");
-            rows.push(rpe(row(&name, "m", less, None, &|score| Some(over(score)?.translation_m.rmse))));
-            rows.push(rpe(row(&name, "°", less, None, &|score| Some(over(score)?.rotation_rad.rmse.to_degrees()))));
+            rows.push(rpe(row(&name, "m", less, None, &|score| Some(over(score)?.translation_rmse_m))));
+            rows.push(rpe(row(&name, "°", less, None, &|score| Some(over(score)?.rotation_rmse_deg))));
         }
         let chain = |score: &RunScore| score.chain;
         rows.extend([
             extrinsics(row("extrinsics error, mean", "mm", less, Some(2), &|score| {
-                Some(1e3 * chain(score)?.translation_m.mean)
+                Some(1e3 * chain(score)?.translation_mean_m)
             })),
             extrinsics(row("extrinsics error, mean", "°", less, Some(3), &|score| {
-                Some(chain(score)?.rotation_rad.mean.to_degrees())
+                Some(chain(score)?.rotation_mean_rad.to_degrees())
             })),
             with(
                 "Length of the ground-truth path over the estimated frames",

@@ -1,9 +1,9 @@
 //! The calibration over time, one step per row.
 
 use super::ConvergencePanel;
+use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gimbal::ParameterId;
 use crate::gui::chain_values::true_values;
-use crate::gui::csv_table::{Table, number, seconds};
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for ConvergencePanel {
@@ -26,16 +26,16 @@ impl CsvTable for ConvergencePanel {
             let (name, unit) = (names.name(*parameter), parameter.dimension().unit());
             columns.extend(["", "_sigma", "_truth"].map(|part| format!("{name}{part}_{unit}")));
         }
-        let mut table = Table::new(columns);
+        let mut table = CsvWriter::new(columns);
         for step in run.steps.iter().filter(|step| step.report.newest().is_some()) {
             let calibration = &step.report.calibration;
             let cells = parameters.iter().flat_map(|parameter| {
                 let index = calibration.parameters.iter().position(|known| known == parameter);
                 let entry = |values: &[f64]| index.and_then(|index| values.get(index)).copied().unwrap_or(f64::NAN);
                 let ground_truth = ground_truth.get(parameter).copied().unwrap_or(f64::NAN);
-                [entry(&calibration.values), entry(&calibration.sigmas), ground_truth].map(number)
+                [entry(&calibration.values), entry(&calibration.sigmas), ground_truth].map(number_cell)
             });
-            table.row(std::iter::once(seconds(step.report.stamp_ns)).chain(cells));
+            table.row(std::iter::once(seconds_cell(step.report.stamp_ns)).chain(cells));
         }
         table.into_text()
     }

@@ -1,14 +1,14 @@
 //! The observations in the image at the cursor, one feature per row.
 
 use super::ImagePanel;
-use crate::gui::csv_table::{Table, number};
+use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for ImagePanel {
     /// The features of the image at the cursor.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let Some(run) = ctx.selected_run() else { return String::new() };
-        let mut table = Table::new([
+        let mut table = CsvWriter::new([
             "id",
             "age_frames",
             "u_px",
@@ -29,22 +29,22 @@ impl CsvTable for ImagePanel {
                 .and_then(|solved| solved.observations.iter().find(|seen| seen.frame_index == step.report.frame_index));
             let vector = |residual: Option<nalgebra::Vector2<f64>>| {
                 let [u, v] = residual.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
-                [number(u), number(v)]
+                [number_cell(u), number_cell(v)]
             };
             let [before_u, before_v] = vector(here.and_then(|seen| seen.residual_before_px));
             let [after_u, after_v] = vector(here.and_then(|seen| seen.residual_after_px));
             table.row([
                 feature.id.0.to_string(),
                 feature.age.to_string(),
-                number(feature.uv_px.x),
-                number(feature.uv_px.y),
+                number_cell(feature.uv_px.x),
+                number_cell(feature.uv_px.y),
                 before_u,
                 before_v,
                 after_u,
                 after_v,
-                number(here.map_or(f64::NAN, |seen| seen.chi2)),
-                number(here.map_or(f64::NAN, |seen| seen.robust_weight)),
-                number(solved.map_or(f64::NAN, |solved| 1.0 / solved.inverse_depth_per_m)),
+                number_cell(here.map_or(f64::NAN, |seen| seen.chi2)),
+                number_cell(here.map_or(f64::NAN, |seen| seen.robust_weight)),
+                number_cell(solved.map_or(f64::NAN, |solved| 1.0 / solved.inverse_depth_per_m)),
                 solved.map_or_else(String::new, |solved| solved.rejected.to_string()),
             ]);
         }

@@ -1,18 +1,18 @@
 //! The state at the cursor, one quantity per row.
 
 use super::InspectorPanel;
+use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::geometry::seconds_from_ns;
-use crate::gui::csv_table::{Table, number};
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for InspectorPanel {
     /// The state of the newest frame at the cursor.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let Some(run) = ctx.selected_run() else { return String::new() };
-        let mut table = Table::new(["quantity", "unit", "value"]);
+        let mut table = CsvWriter::new(["quantity", "unit", "value"]);
         let Some(step) = run.step_at(ctx.cursor_ns) else { return table.into_text() };
         let mut push_row = |quantity: &str, unit: &str, value: f64| {
-            table.row([quantity.to_owned(), unit.to_owned(), number(value)]);
+            table.row([quantity.to_owned(), unit.to_owned(), number_cell(value)]);
         };
         push_row("time", "s", seconds_from_ns(step.report.stamp_ns));
         push_row("frame", "", step.report.frame_index as f64);

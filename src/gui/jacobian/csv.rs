@@ -2,7 +2,7 @@
 
 use super::JacobianPanel;
 use super::{cameras, column_name, name_of};
-use crate::gui::csv_table::Table;
+use crate::flight_log::csv_writer::CsvWriter;
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for JacobianPanel {
@@ -14,7 +14,7 @@ impl CsvTable for JacobianPanel {
         let Some(jacobian) = step.report.jacobian(&cameras) else { return String::new() };
         let names = ctx.names();
         let heads = ["residuals", "rows"].map(str::to_owned).into_iter();
-        let mut table = Table::new(heads.chain(jacobian.columns.iter().map(|block| column_name(block.id, &names))));
+        let mut table = CsvWriter::new(heads.chain(jacobian.columns.iter().map(|block| column_name(block.id, &names))));
         for row in &jacobian.rows {
             let norm = |column: usize| row.norms.iter().find(|(known, _)| usize::from(*known) == column);
             let cells =

@@ -1,18 +1,18 @@
 //! The spectra of the compared parameterizations: one row per singular value or weight of a direction.
 
 use super::LaboratoryPanel;
-use crate::gui::csv_table::{Table, number};
+use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for LaboratoryPanel {
     /// Singular values and directions of each parameterization.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
-        let mut table = Table::new(["form", "kind", "number", "singular_value", "parameter", "weight"]);
+        let mut table = CsvWriter::new(["form", "kind", "number", "singular_value", "parameter", "weight"]);
         let names = ctx.names();
         for (parameterization, rank) in self.ranks(ctx) {
             for (index, value) in rank.singular_values.iter().enumerate() {
                 let place = (index + 1).to_string();
-                let cells = [parameterization.clone(), "singular value".to_owned(), place, number(*value)];
+                let cells = [parameterization.clone(), "singular value".to_owned(), place, number_cell(*value)];
                 table.row(cells.into_iter().chain([String::new(), String::new()]));
             }
             for (index, direction) in rank.directions.iter().enumerate() {
@@ -23,9 +23,9 @@ impl CsvTable for LaboratoryPanel {
                         parameterization.clone(),
                         kind.to_owned(),
                         (index + 1).to_string(),
-                        number(direction.singular_value),
+                        number_cell(direction.singular_value),
                         names.name(*parameter),
-                        number(*weight),
+                        number_cell(*weight),
                     ]);
                 }
             }

@@ -1,7 +1,7 @@
 //! The singular values and directions at the cursor, one singular value per row.
 
 use super::RankPanel;
-use crate::gui::csv_table::{Table, number};
+use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for RankPanel {
@@ -12,7 +12,7 @@ impl CsvTable for RankPanel {
         let names = ctx.names();
         let heads = ["number", "singular_value", "singular_value_with_priors", "kind"].map(str::to_owned);
         let mut table =
-            Table::new(heads.into_iter().chain(rank.parameters.iter().map(|parameter| names.name(*parameter))));
+            CsvWriter::new(heads.into_iter().chain(rank.parameters.iter().map(|parameter| names.name(*parameter))));
         for (index, value) in rank.singular_values.iter().enumerate() {
             // Directions start with the least observable one, singular values with the largest.
             let direction = rank.directions.get(rank.singular_values.len() - 1 - index);
@@ -20,9 +20,9 @@ impl CsvTable for RankPanel {
             let with_priors = rank.singular_values_with_priors.get(index).copied().unwrap_or(f64::NAN);
             let weights = (0..rank.parameters.len()).map(|column| {
                 let weight = direction.and_then(|direction| direction.weights.get(column));
-                number(weight.copied().unwrap_or(f64::NAN))
+                number_cell(weight.copied().unwrap_or(f64::NAN))
             });
-            let heads = [(index + 1).to_string(), number(*value), number(with_priors), kind.to_owned()];
+            let heads = [(index + 1).to_string(), number_cell(*value), number_cell(with_priors), kind.to_owned()];
             table.row(heads.into_iter().chain(weights));
         }
         table.into_text()

@@ -2,7 +2,7 @@
 
 use super::{ResidualsPanel, rms_px};
 use crate::estimator::FactorKind;
-use crate::gui::csv_table::{Table, number, seconds};
+use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gui::{CsvTable, PanelContext};
 use crate::session::StepRecord;
 
@@ -21,20 +21,20 @@ impl CsvTable for ResidualsPanel {
             let factor = factor.key();
             columns.extend(["count", "chi2_before", "chi2_after"].map(|part| format!("{factor}_{part}")));
         }
-        let mut table = Table::new(columns);
+        let mut table = CsvWriter::new(columns);
         for run in &ctx.recording.runs {
             for step in run.steps.iter().filter(solved) {
                 let report = &step.report;
                 let heads = [
-                    seconds(report.stamp_ns),
+                    seconds_cell(report.stamp_ns),
                     run.spec.label.clone(),
-                    number(report.reprojection_rms_before_px),
-                    number(rms_px(report)),
+                    number_cell(report.reprojection_rms_before_px),
+                    number_cell(rms_px(report)),
                 ];
                 let cells = factors.iter().flat_map(|factor| {
                     let summary = report.residuals.iter().find(|summary| summary.factor == *factor);
                     summary.map_or_else(Default::default, |summary| {
-                        [summary.count.to_string(), number(summary.chi2_before), number(summary.chi2_after)]
+                        [summary.count.to_string(), number_cell(summary.chi2_before), number_cell(summary.chi2_after)]
                     })
                 });
                 table.row(heads.into_iter().chain(cells));

@@ -1,14 +1,14 @@
 //! The trajectories of the scene, one step of one run, or one pose of a trajectory, per row.
 
 use super::ScenePanel;
+use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::geometry::seconds_from_ns;
-use crate::gui::csv_table::{Table, number, seconds};
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for ScenePanel {
     /// Positions of all runs and trajectories up to the cursor, aligned with the ground truth as in the scene, and the ground truth.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
-        let mut table = Table::new(["t_s", "run", "x_m", "y_m", "z_m", "truth_x_m", "truth_y_m", "truth_z_m"]);
+        let mut table = CsvWriter::new(["t_s", "run", "x_m", "y_m", "z_m", "truth_x_m", "truth_y_m", "truth_z_m"]);
         for run in &ctx.recording.runs {
             let aligned = run.alignment.unwrap_or_default();
             for step in run.steps.iter().take_while(|step| step.report.stamp_ns <= ctx.cursor_ns) {
@@ -16,8 +16,8 @@ impl CsvTable for ScenePanel {
                 let ground_truth = step.ground_truth.map(|pose| pose.translation_m);
                 let places = [estimate, ground_truth];
                 let coordinates =
-                    places.iter().flat_map(|at| at.map_or([f64::NAN; 3], |at| [at.x, at.y, at.z]).map(number));
-                table.row([seconds(step.report.stamp_ns), run.spec.label.clone()].into_iter().chain(coordinates));
+                    places.iter().flat_map(|at| at.map_or([f64::NAN; 3], |at| [at.x, at.y, at.z]).map(number_cell));
+                table.row([seconds_cell(step.report.stamp_ns), run.spec.label.clone()].into_iter().chain(coordinates));
             }
         }
         for lane in &ctx.recording.trajectories {
@@ -32,8 +32,8 @@ impl CsvTable for ScenePanel {
                     actual.map(|(_, actual)| actual.pose.translation_m),
                 ];
                 let coordinates =
-                    places.iter().flat_map(|at| at.map_or([f64::NAN; 3], |at| [at.x, at.y, at.z]).map(number));
-                table.row([seconds(sample.stamp_ns), lane.label.clone()].into_iter().chain(coordinates));
+                    places.iter().flat_map(|at| at.map_or([f64::NAN; 3], |at| [at.x, at.y, at.z]).map(number_cell));
+                table.row([seconds_cell(sample.stamp_ns), lane.label.clone()].into_iter().chain(coordinates));
             }
         }
         table.into_text()

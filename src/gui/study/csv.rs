@@ -4,14 +4,14 @@ use super::context::StudyPanel;
 use super::model::StudyModel;
 use super::plots::{differences, distributions, success_rates};
 use super::strips::Strip;
-use crate::gui::csv_table::{Table, number};
+use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::study::view::{Study, parameter_errors};
 
 /// The values of a panel with a head line: runs in the stored units with all columns, plots in the shown ones.
 pub(super) fn table(panel: StudyPanel, study: &Study, model: &mut StudyModel) -> String {
     model.update(study);
     match panel {
-        StudyPanel::Runs | StudyPanel::Parallel => runs(study, model),
+        StudyPanel::Runs | StudyPanel::Parallel => study.runs.csv(model.arranged.rows.iter().copied()),
         StudyPanel::Distributions => {
             let Some(metric) = model.metric() else { return String::new() };
             points(study, &metric.title(), &distributions(study, model, metric))
@@ -26,41 +26,33 @@ pub(super) fn table(panel: StudyPanel, study: &Study, model: &mut StudyModel) ->
     }
 }
 
-fn runs(study: &Study, model: &StudyModel) -> String {
-    let mut table = Table::new(study.runs.columns().iter().map(|column| column.name.clone()));
-    for row in &model.arranged.rows {
-        table.row(study.runs.row(*row).map(|cell| cell.to_string()));
-    }
-    table.into_text()
-}
-
 fn points(study: &Study, title: &str, strips: &[Strip]) -> String {
-    let mut table = Table::new(["group", "key", "run", title]);
+    let mut table = CsvWriter::new(["group", "key", "run", title]);
     for strip in strips {
         for (row, value) in &strip.points {
             let key = study.runs.text(*row, crate::study::view::columns::KEY).unwrap_or_default().to_owned();
-            table.row([strip.name.clone(), key, study.title_of(*row), number(*value)]);
+            table.row([strip.name.clone(), key, study.title_of(*row), number_cell(*value)]);
         }
     }
     table.into_text()
 }
 
 fn success(study: &Study, model: &StudyModel) -> String {
-    let mut table = Table::new(["group", "rate_percent", "low_percent", "high_percent", "runs"]);
+    let mut table = CsvWriter::new(["group", "rate_percent", "low_percent", "high_percent", "runs"]);
     for (strip, group) in success_rates(study, model).into_iter().zip(&model.arranged.groups) {
         let [low, rate, high] = strip.interval.unwrap_or([f64::NAN; 3]);
-        table.row([strip.name, number(rate), number(low), number(high), group.rows.len().to_string()]);
+        table.row([strip.name, number_cell(rate), number_cell(low), number_cell(high), group.rows.len().to_string()]);
     }
     table.into_text()
 }
 
 fn parameters(study: &Study, model: &StudyModel) -> String {
     let head = ["parameter", "unit", "runs", "error_over_sigma_rms", "error_over_sigma_mean", "within_1_sigma"];
-    let mut table = Table::new(head.into_iter().chain(["within_3_sigma", "error_rms", "sigma_median"]));
+    let mut table = CsvWriter::new(head.into_iter().chain(["within_3_sigma", "error_rms", "sigma_median"]));
     for of in parameter_errors(study, &study.run_of_parameter_rows(), &model.arranged.rows) {
         let numbers = [of.ratio_rms, of.ratio_mean, of.within_1, of.within_3, of.error_rms, of.sigma_median];
         let texts = [of.name.clone(), of.unit.to_owned(), of.points.len().to_string()];
-        table.row(texts.into_iter().chain(numbers.map(number)));
+        table.row(texts.into_iter().chain(numbers.map(number_cell)));
     }
     table.into_text()
 }

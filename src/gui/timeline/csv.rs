@@ -1,7 +1,7 @@
 //! The lanes of the timeline, one step or one event per row.
 
 use super::TimelinePanel;
-use crate::gui::csv_table::{Table, number, seconds};
+use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gui::events::name_of;
 use crate::gui::residuals::rms_px;
 use crate::gui::{CsvTable, PanelContext};
@@ -29,7 +29,7 @@ impl CsvTable for TimelinePanel {
                     report.phase.name().to_owned(),
                     report.keyframe.to_string(),
                     step.tracks.features.len().to_string(),
-                    number(rms_px(report)),
+                    number_cell(rms_px(report)),
                     rank.map_or_else(String::new, |rank| rank.rank_informed.to_string()),
                     rank.map_or_else(String::new, |rank| rank.rank_structural.to_string()),
                     report.counts.rejected.to_string(),
@@ -38,7 +38,7 @@ impl CsvTable for TimelinePanel {
                 let cells = std::iter::once(label.clone()).chain(values).chain(nothing);
                 rows.push((report.stamp_ns, cells.collect()));
                 for event in report.events.iter().filter(|event| event.kind.is_notable()) {
-                    let significant = |value: Option<f64>| number(value.unwrap_or(f64::NAN));
+                    let significant = |value: Option<f64>| number_cell(value.unwrap_or(f64::NAN));
                     let cells = [
                         name_of(event.kind).to_owned(),
                         significant(event.value),
@@ -51,9 +51,9 @@ impl CsvTable for TimelinePanel {
         }
         rows.sort_by_key(|(stamp_ns, _)| *stamp_ns);
         let heads: Vec<&str> = ["t_s", "run"].into_iter().chain(VALUES).chain(EVENT).collect();
-        let mut table = Table::new(heads);
+        let mut table = CsvWriter::new(heads);
         for (stamp_ns, cells) in rows {
-            table.row(std::iter::once(seconds(stamp_ns)).chain(cells));
+            table.row(std::iter::once(seconds_cell(stamp_ns)).chain(cells));
         }
         table.into_text()
     }

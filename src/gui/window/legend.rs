@@ -71,7 +71,7 @@ impl RunLegend {
 impl RunAccuracy {
     /// The absolute trajectory error as a text.
     fn text(&self) -> Option<String> {
-        self.statistics.as_ref().map(ate_text)
+        self.statistics.as_ref().map(|statistics| ate_text(statistics.rmse))
     }
 
     fn update(&mut self, run: &RunRecord) {
@@ -87,13 +87,13 @@ impl RunAccuracy {
     }
 }
 
-fn ate_text(errors: &ErrorStatistics) -> String {
-    format!("ATE {} m", fixed(errors.rmse, 3))
+fn ate_text(rmse_m: f64) -> String {
+    format!("ATE {} m", fixed(rmse_m, 3))
 }
 
 /// The absolute trajectory error of a trajectory as a text.
 fn text_of_lane(lane: &TrajectoryLane) -> Option<String> {
-    lane.evaluation.accuracy.as_ref().map(|accuracy| ate_text(&accuracy.absolute_m))
+    lane.evaluation.accuracy.as_ref().map(|accuracy| ate_text(accuracy.ate_rmse_m))
 }
 
 /// The laid out texts of an entry.

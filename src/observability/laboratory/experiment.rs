@@ -1,7 +1,6 @@
 //! One experiment: a mechanism in a motion, its window linearized and analysed in several forms.
 
 use nalgebra::Vector3;
-use serde::Serialize;
 
 use super::mechanism::Mechanism;
 use super::motion::{Flight, LaboratoryMotion};
@@ -264,30 +263,7 @@ pub struct LaboratoryResult {
     pub rank: RankReport,
 }
 
-/// Number of unobservable columns by cause.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Deficit {
-    /// Redundant in the parameterization, or at its singularity (G).
-    pub parameterization: usize,
-    /// Joints that did not move (F).
-    pub joints: usize,
-    /// Absorbed by free joint angles (E).
-    pub absorbed: usize,
-    /// Motion of the vehicle and scene (M).
-    pub motion: usize,
-}
-
 impl LaboratoryResult {
-    /// The deficit by cause.
-    pub fn deficit(&self) -> Deficit {
-        Deficit {
-            parameterization: self.rank.deficit_parameterization,
-            joints: self.rank.deficit_joints,
-            absorbed: self.rank.deficit_absorbed,
-            motion: self.rank.deficit_motion,
-        }
-    }
-
     /// Parameters with a weight in null directions, in column order.
     pub fn null_parameters(&self) -> Vec<ParameterId> {
         let null: Vec<_> = self.rank.directions.iter().filter(|direction| direction.structural).collect();

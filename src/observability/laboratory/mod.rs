@@ -22,7 +22,7 @@ mod tests;
 pub use advice::{ADVICE_DURATION_S, Advice, CandidateReport, WeakDirection, advise};
 pub use excitation::{Excitation, ParameterExcitation, excitation};
 pub use experiment::{
-    Deficit, FRAME_PERIOD_S, LABORATORY_IMU, LaboratoryForm, LaboratoryResult, LaboratorySetup, PIXEL_SIGMA_PX,
+    FRAME_PERIOD_S, LABORATORY_IMU, LaboratoryForm, LaboratoryResult, LaboratorySetup, PIXEL_SIGMA_PX,
 };
 pub use mechanism::{LaboratoryJoint, Mechanism, UnknownMechanism};
 pub use motion::{LaboratoryMotion, UnknownMotion};

@@ -4,10 +4,10 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::{Deficit, FRAME_PERIOD_S, LaboratoryResult, LaboratorySetup, PIXEL_SIGMA_PX};
+use super::{FRAME_PERIOD_S, LaboratoryResult, LaboratorySetup, PIXEL_SIGMA_PX};
 use crate::estimator::{JointKnowledge, PoseKnowledge};
 use crate::gimbal::ParameterNames;
-use crate::observability::CalibrationDirection;
+use crate::observability::{CalibrationDirection, Deficit};
 
 /// Results of an experiment in several parameterizations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -160,7 +160,7 @@ impl FormReport {
             names: columns,
             rank_structural: rank.rank_structural,
             rank_informed: rank.rank_informed,
-            deficit: result.deficit(),
+            deficit: result.rank.deficit(),
             singular_values: rank.singular_values.clone(),
             structural_threshold: rank.structural_threshold,
             informed_threshold: rank.informed_threshold,

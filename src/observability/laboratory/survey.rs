@@ -8,8 +8,9 @@ use serde::Serialize;
 use super::experiments::{Experiment, MIN_FRAMES, SECTIONS};
 use super::sensors::{SensorSurveySection, survey_sensors};
 use super::spurious::{self, SpuriousRow};
-use super::{Deficit, LaboratoryForm, LaboratoryResult};
+use super::{LaboratoryForm, LaboratoryResult};
 use crate::gimbal::{ParameterNames, Parameterization};
+use crate::observability::Deficit;
 
 /// Number of frames with which a window reaches its largest rank.
 const MAX_FRAMES: usize = 16;
@@ -122,7 +123,7 @@ impl SurveyRow {
             mechanism: experiment.mechanism.to_owned(),
             motion: experiment.motion.name().to_owned(),
             entries,
-            deficit: first.map(LaboratoryResult::deficit),
+            deficit: first.map(|result| result.rank.deficit()),
             known: first.map_or(0, |result| result.rank.known.len()),
             known_agreeing: first.map_or(0, |result| result.rank.known_agreeing()),
             null_of_minimal: minimal

@@ -7,6 +7,7 @@
 
 mod altered_measurements;
 mod calibrate;
+mod calibration_errors;
 mod computation;
 mod compute;
 mod configuration;
@@ -25,6 +26,7 @@ mod threads;
 mod tracker;
 
 pub use calibrate::{CalibrationRequest, CalibrationRun, CalibrationRunError, calibrate};
+pub use calibration_errors::CalibrationErrors;
 pub use computation::Computation;
 pub use compute::{BreakpointHit, compute, compute_until};
 #[cfg(test)]

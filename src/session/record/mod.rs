@@ -2,6 +2,8 @@
 
 mod antenna_record;
 mod comparison;
+mod estimability;
+mod known_losses;
 mod lost_since;
 mod pose_consistency;
 mod pose_errors;
@@ -9,6 +11,7 @@ mod recording;
 mod rig_values;
 mod run;
 mod run_accuracy;
+mod run_summary;
 mod solver_trace;
 mod step;
 mod summary;
@@ -19,12 +22,14 @@ mod warnings;
 
 pub use antenna_record::PositionTruth;
 pub use comparison::{Comparison, Divergence, Quantity};
+pub use estimability::{EstimabilitySummary, estimability_summary};
+pub use known_losses::KnownLossSummary;
 pub use lost_since::LostSince;
 pub use pose_consistency::PoseConsistency;
 pub use pose_errors::PoseError;
 pub use recording::Recording;
 pub use run::{ForkOrigin, PassProgress, RunMemory, RunRecord};
-pub use run_accuracy::ChainDistance;
+pub use run_summary::{ParameterSummary, RunSummary, StageSummary, summarize};
 pub use solver_trace::{SolverPosition, SolverTrace};
 pub(in crate::session) use step::tracks_bytes;
 pub use step::{StepFactorRows, StepRecord};

@@ -3,21 +3,13 @@
 use super::run::RunRecord;
 use super::step::StepRecord;
 use super::trajectory_accuracy::{MAX_POSITION_AGE_NS, TrajectoryAccuracy};
+use crate::calibration::ChainDistance;
 use crate::geometry::{seconds_from_ns, so3};
 use crate::gimbal::ClassicalChain;
-use crate::session::accuracy::{ErrorStatistics, StampedPose, path_length_m};
+use crate::session::accuracy::{StampedPose, path_length_m};
 use crate::session::antenna::{align_antenna, antenna_errors_m};
 
 const NO_GROUND_TRUTH: &str = "no ground truth for the estimated frames in the log";
-
-/// Error of a chain against a reference chain over the joint angles of a run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ChainDistance {
-    /// Errors of the camera position in metres.
-    pub translation_m: ErrorStatistics,
-    /// Errors of the camera attitude in radians.
-    pub rotation_rad: ErrorStatistics,
-}
 
 impl RunRecord {
     /// Errors of the trajectory: of the poses of the IMU, or of the positions of the antenna where these are the ground
@@ -59,6 +51,15 @@ impl RunRecord {
         antenna_errors_m(std::slice::from_ref(pair), alignment).first().copied()
     }
 
+    /// Position error in metres and angle in radians of the pose of a step after the alignment of the whole run; `None`
+    /// without a pose or ground truth.
+    pub fn aligned_error(&self, step: &StepRecord) -> Option<[f64; 2]> {
+        let (alignment, truth) = (self.alignment?, step.ground_truth?);
+        let aligned = alignment * step.report.newest()?.world_from_imu;
+        let turn = so3::log(&(truth.rotation.inverse() * aligned.rotation));
+        Some([(aligned.translation_m - truth.translation_m).norm(), turn.norm()])
+    }
+
     fn pose_error_m(&self, step: &StepRecord) -> Option<f64> {
         let estimate = self.alignment?.transform(&step.report.newest()?.world_from_imu.translation_m);
         Some((estimate - step.ground_truth?.translation_m).norm())
@@ -89,20 +90,9 @@ impl RunRecord {
             .collect()
     }
 
-    /// Error of a chain against a reference over the joint angles of the run's frames, `None` before the first pose.
+    /// Distance of a chain from a reference over the joint angles of the run's frames, `None` before the first pose.
     pub fn chain_distance(&self, chain: &ClassicalChain, reference: &ClassicalChain) -> Option<ChainDistance> {
         let newest = self.steps.iter().filter_map(|step| step.report.newest());
-        let (translations, rotations): (Vec<f64>, Vec<f64>) = newest
-            .map(|newest| {
-                let estimate = chain.imu_from_camera(&newest.joint_angles_rad);
-                let reference = reference.imu_from_camera(&newest.joint_angles_rad);
-                let reference_from_estimate = reference.rotation.inverse() * estimate.rotation;
-                ((estimate.translation_m - reference.translation_m).norm(), so3::log(&reference_from_estimate).norm())
-            })
-            .unzip();
-        Some(ChainDistance {
-            translation_m: ErrorStatistics::of(&translations)?,
-            rotation_rad: ErrorStatistics::of(&rotations)?,
-        })
+        ChainDistance::over(chain, reference, newest.map(|newest| &newest.joint_angles_rad))
     }
 }

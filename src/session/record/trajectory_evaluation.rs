@@ -1,16 +1,20 @@
 //! A trajectory evaluated against ground truth.
 
+use serde::Serialize;
+
 use super::trajectory_accuracy::TrajectoryAccuracy;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{PoseSample, PoseTrack};
 use crate::session::accuracy::{Alignment, StampedPose, align};
 
 /// Pairs of poses, their alignment and its errors.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TrajectoryEvaluation {
     /// Estimated and ground-truth poses with one stamp, in seconds since the log began.
+    #[serde(skip)]
     pub pairs: Vec<(StampedPose, StampedPose)>,
     /// `true_from_estimate`, a rotation about the vertical and a translation; `None` with too few pairs.
+    #[serde(skip)]
     pub alignment: Option<RigidTransform>,
     /// Errors after this alignment.
     pub accuracy: Option<TrajectoryAccuracy>,

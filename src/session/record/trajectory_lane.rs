@@ -3,6 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use nalgebra::UnitQuaternion;
+use serde::{Serialize, Serializer};
 
 use super::antenna_record::PositionTruth;
 use super::run::{NEXT_ID, RunRecord};
@@ -12,23 +13,31 @@ use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::PoseTrack;
 use crate::session::accuracy::path_length_m;
 
-/// A trajectory beside the runs. It has poses only: no calibration, no features, no residuals.
-#[derive(Clone, Debug)]
+/// A trajectory beside the runs, as in `summary.json`. It has poses only: no calibration, no features, no residuals.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrajectoryLane {
     /// Its name.
     pub label: String,
     /// The file or the topic that it was read from.
     pub source: String,
     /// Poses `world_from_imu` in the trajectory's own world, in time order.
+    #[serde(rename = "poses", serialize_with = "pose_count")]
     pub track: PoseTrack,
-    /// Its errors against the ground truth.
-    pub evaluation: TrajectoryEvaluation,
-    /// Why it has no accuracy.
-    pub accuracy_missing: Option<String>,
     /// Path length in metres: of the ground truth at its stamps where there is one, else its own.
     pub length_m: f64,
+    /// Its errors against the ground truth.
+    #[serde(flatten)]
+    pub evaluation: TrajectoryEvaluation,
+    /// Why it has no accuracy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy_missing: Option<String>,
     /// Unique among runs and trajectories of the process.
+    #[serde(skip)]
     pub id: u64,
+}
+
+fn pose_count<S: Serializer>(track: &PoseTrack, serializer: S) -> Result<S::Ok, S::Error> {
+    track.samples().len().serialize(serializer)
 }
 
 impl TrajectoryLane {
@@ -68,7 +77,7 @@ impl TrajectoryLane {
             path_length_m(evaluation.pairs.iter().map(|(_, actual)| &actual.pose.translation_m))
         };
         let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
-        Self { label, source, track, evaluation, accuracy_missing, length_m, id }
+        Self { label, source, track, length_m, evaluation, accuracy_missing, id }
     }
 
     /// What maps its world to that of the scene: the alignment with the ground truth; without one, what puts it onto a run
@@ -142,12 +151,12 @@ mod tests {
             PoseTrack::new(samples.collect())
         };
         let lane = TrajectoryLane::new("vins".into(), "vins.tum".into(), moved(0.0), Some(&actual));
-        assert!(lane.evaluation.accuracy.as_ref().unwrap().absolute_m.max < 1e-9);
+        assert!(lane.evaluation.accuracy.as_ref().unwrap().ate_max_m < 1e-9);
         assert!((lane.world_from_own(None) * other_world).minus(&RigidTransform::identity()).norm() < 1e-9);
         assert!((lane.length_m - lane.evaluation.accuracy.unwrap().length_m).abs() < 1e-12);
 
         let lane = TrajectoryLane::new("vins".into(), "vins.tum".into(), moved(0.02), Some(&actual));
-        let rmse_m = lane.evaluation.accuracy.as_ref().unwrap().absolute_m.rmse;
+        let rmse_m = lane.evaluation.accuracy.as_ref().unwrap().ate_rmse_m;
         assert!((rmse_m - 0.02).abs() < 1e-6, "{rmse_m}");
         assert!((lane.error_m(7_020_000_000).unwrap() - 0.02).abs() < 1e-4);
         assert!(lane.error_m(-1).is_none() && lane.error_m(30_000_000_000).is_none());

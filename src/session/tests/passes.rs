@@ -54,7 +54,7 @@ fn a_second_pass_starts_upright_and_follows_the_truth_more_closely() {
         for (place, spec) in ["auto", "auto:passes=2"].into_iter().enumerate() {
             let (run, _) = recorded_in_passes(&flight, spec);
             tilts[place] += first_tilt_rad(&run);
-            errors[place] += run.accuracy().expect("there is ground truth").absolute_m.rmse.ln();
+            errors[place] += run.accuracy().expect("there is ground truth").ate_rmse_m.ln();
             if place == 1 {
                 nees += PoseError::mean_nees(&run.pose_errors()).unwrap();
             }

@@ -95,12 +95,24 @@ fn rows_are_grouped_by_the_text_of_a_cell() {
 }
 
 #[test]
-fn the_documents_list_every_column() {
+fn the_documents_list_exactly_the_columns() {
     let document = include_str!("../../../docs/formats.md");
-    let tables = [crate::study::runs_table(), crate::study::parameters_table(), crate::study::frames_table()];
-    for column in tables.iter().flat_map(StudyTable::columns) {
-        let StudyColumn { name, unit, description, values } = column;
-        let row = format!("| `{name}` | {} | {unit} | {description} |", values.column_type().name());
-        assert!(document.contains(&row), "docs/formats.md lacks: {row}");
+    for table in [crate::study::runs_table(), crate::study::parameters_table(), crate::study::frames_table()] {
+        let row = |StudyColumn { name, unit, description, values }: &StudyColumn| {
+            format!("| `{name}` | {} | {unit} | {description} |\n", values.column_type().name())
+        };
+        let rows: String = table.columns().iter().map(row).collect();
+        let expected = format!("| column | type | unit | content |\n| --- | --- | --- | --- |\n{rows}\n");
+        assert!(document.contains(&expected), "docs/formats.md lacks the table:\n{expected}");
+    }
+}
+
+#[test]
+fn every_path_length_of_relative_errors_has_its_columns() {
+    let runs = crate::study::runs_table();
+    for length_m in crate::session::RELATIVE_LENGTHS_M {
+        for name in [format!("rpe_{length_m}m_translation_m"), format!("rpe_{length_m}m_rotation_rad")] {
+            assert!(runs.place(&name).is_some(), "no column {name}");
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Columns of numbers in the units that people read, and axes of their values.
 
 use super::study::columns;
+use crate::study::columns::run_column;
 use crate::study::{ColumnType, StudyColumn, StudyTable};
 
 /// A column of numbers with its shown unit.
@@ -22,8 +23,7 @@ impl Metric {
         if column.values.column_type() == ColumnType::Text {
             return None;
         }
-        // Errors of the extrinsics are millimetres, those of trajectories metres.
-        let fine = column.name.starts_with("chain_error");
+        let fine = run_column(&column.name).is_some_and(|column| column.fine);
         let (factor, unit) = Self::shown_unit(&column.unit, fine);
         Some(Self { column: column.name.clone(), factor, unit, description: column.description.clone() })
     }

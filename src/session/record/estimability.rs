@@ -2,10 +2,11 @@
 
 use serde::Serialize;
 
+use super::recording::Recording;
+use super::run::RunRecord;
 use crate::geometry::Dimension;
 use crate::gimbal::{ParameterGroup, ParameterId, Quantity};
 use crate::observability::{Estimability, ParameterEstimability, estimability};
-use crate::session::{Recording, RunRecord};
 
 /// A calibration parameter with what the flight tells of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -35,7 +36,7 @@ pub struct EstimabilitySummary {
 }
 
 /// The verdicts at the end of a run, in groups.
-pub(crate) fn estimability_summary(recording: &Recording, run: &RunRecord) -> Vec<EstimabilitySummary> {
+pub fn estimability_summary(recording: &Recording, run: &RunRecord) -> Vec<EstimabilitySummary> {
     let Some(last) = run.steps.last() else { return Vec::new() };
     let rank = run.steps.iter().rev().find_map(|step| step.rank.as_ref());
     let names = recording.rig.parameter_names();

@@ -1,19 +1,24 @@
 //! `summary.json`: the result of one run.
 
-use std::path::Path;
+use std::sync::Arc;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::estimability::{EstimabilitySummary, sensor_estimability};
-use super::evaluation::alignment_name;
-use super::structure::{KnownLossSummary, known_losses};
+use super::known_losses::{KnownLossSummary, known_losses};
+use super::recording::Recording;
+use super::run::RunRecord;
+use super::trajectory_accuracy::TrajectoryAccuracy;
+use super::trajectory_lane::TrajectoryLane;
+use super::warnings::RunWarning;
+use crate::calibration::ChainDistance;
 use crate::estimator::{EventKind, Phase, StageTimes};
-use crate::geometry::{Dimension, principal_angle, seconds_from_ns};
+use crate::flight_log::log_name;
+use crate::geometry::{Dimension, seconds_from_ns};
 use crate::gimbal::{ClassicalChain, ParameterId};
-use crate::observability::{ParameterRate, information_rate};
+use crate::observability::{Deficit, ParameterRate, information_rate};
 use crate::sensors::Rig;
-use crate::session::accuracy::{Alignment, path_length_m};
-use crate::session::{Recording, RunRecord, RunWarning, TrajectoryAccuracy, TrajectoryLane};
+use crate::session::accuracy::path_length_m;
 
 /// Frame counts of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -28,52 +33,6 @@ pub struct FrameCounts {
     pub initialized_at_s: Option<f64>,
     /// Number of restarts after a failure.
     pub restarts: usize,
-}
-
-/// Relative error over one path length.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct RelativeError {
-    /// Path length of a sub-trajectory in metres.
-    pub delta_m: f64,
-    /// Number of sub-trajectories.
-    pub pairs: usize,
-    /// Root mean square of the translation error.
-    pub translation_rmse_m: f64,
-    /// Root mean square of the rotation error.
-    pub rotation_rmse_deg: f64,
-}
-
-/// Trajectory errors against ground truth.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Accuracy {
-    /// Alignment of the estimate with the ground truth.
-    pub alignment: &'static str,
-    /// Root mean square of the absolute position error.
-    pub ate_rmse_m: f64,
-    /// Mean of the absolute position error.
-    pub ate_mean_m: f64,
-    /// Its standard deviation.
-    pub ate_std_m: f64,
-    /// Median of the absolute position error.
-    pub ate_median_m: f64,
-    /// Largest absolute position error.
-    pub ate_max_m: f64,
-    /// Root mean square of the absolute position error in percent of the path length.
-    pub ate_percent_of_length: f64,
-    /// Relative errors by path length; none where the ground truth is positions.
-    pub rpe: Vec<RelativeError>,
-    /// The antenna whose positions are the ground truth.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub antenna: Option<AntennaSummary>,
-}
-
-/// The lever arm of an antenna.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct AntennaSummary {
-    /// Position in the IMU frame in metres.
-    pub lever_arm_m: [f64; 3],
-    /// Standard deviations, where it was estimated.
-    pub lever_arm_sigma_m: Option<[f64; 3]>,
 }
 
 /// One calibration parameter, initial and final.
@@ -99,19 +58,6 @@ pub struct ParameterSummary {
     pub error: Option<f64>,
 }
 
-/// Error of `imu_from_camera` against ground truth over the joint angles of the run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ChainError {
-    /// Mean distance in metres.
-    pub translation_mean_m: f64,
-    /// Standard deviation of the distance.
-    pub translation_std_m: f64,
-    /// Mean angle in radians.
-    pub rotation_mean_rad: f64,
-    /// Standard deviation of the angle.
-    pub rotation_std_rad: f64,
-}
-
 /// The calibration of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CalibrationSummary {
@@ -124,10 +70,10 @@ pub struct CalibrationSummary {
     /// What the flight determines of them, for a run that estimates more than chain and time offsets.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub estimability: Vec<EstimabilitySummary>,
-    /// Final error of the whole chain against ground truth.
-    pub chain_error: Option<ChainError>,
-    /// Initial error of the whole chain, with the values of the rig.
-    pub chain_error_initial: Option<ChainError>,
+    /// Final distance of the whole chain from the ground truth over the joint angles of the run.
+    pub chain_error: Option<ChainDistance>,
+    /// The same with the values of the rig.
+    pub chain_error_initial: Option<ChainDistance>,
 }
 
 impl CalibrationSummary {
@@ -140,19 +86,6 @@ impl CalibrationSummary {
         let squares: Vec<f64> = ratios.collect();
         (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
     }
-}
-
-/// Rank deficit by cause.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct DeficitSummary {
-    /// Redundant parameters of the parameterization.
-    pub parameterization: usize,
-    /// Joints that did not move.
-    pub joints: usize,
-    /// Absorbed by free joint angles.
-    pub absorbed: usize,
-    /// Insufficient motion of the vehicle.
-    pub motion: usize,
 }
 
 /// Weight of one parameter in a direction.
@@ -174,7 +107,7 @@ pub struct RankSummary {
     /// Informed rank.
     pub rank_informed: usize,
     /// Rank deficit by cause.
-    pub deficit: DeficitSummary,
+    pub deficit: Deficit,
     /// Structural null directions, each by its parameters with a weight above 0.01.
     pub null_directions: Vec<Vec<DirectionWeight>>,
     /// Null directions of the parameterization that are known in closed form, compared with every step.
@@ -251,7 +184,7 @@ pub struct RunSummary {
     /// Path length over the estimated frames in metres, of the ground truth where there is one, else of the estimate.
     pub length_m: f64,
     /// Errors against ground truth, if there is one and the run was initialized.
-    pub accuracy: Option<Accuracy>,
+    pub accuracy: Option<TrajectoryAccuracy>,
     /// The reason why there is no accuracy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy_missing: Option<String>,
@@ -266,40 +199,12 @@ pub struct RunSummary {
     /// Warnings about the log and of the run.
     pub warnings: Vec<String>,
     /// Trajectories of other programs beside the runs, evaluated like them.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub trajectories: Vec<TrajectorySummary>,
+    #[serde(serialize_with = "lanes", skip_serializing_if = "Vec::is_empty")]
+    pub trajectories: Vec<Arc<TrajectoryLane>>,
 }
 
-/// A trajectory of another program.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TrajectorySummary {
-    /// Its name.
-    pub label: String,
-    /// The file or the topic that it was read from.
-    pub source: String,
-    /// Number of its poses within the time of the session.
-    pub poses: usize,
-    /// Path length in metres, of the ground truth at its stamps where there is one, else its own.
-    pub length_m: f64,
-    /// Errors against ground truth.
-    pub accuracy: Option<Accuracy>,
-    /// The reason why there is no accuracy.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub accuracy_missing: Option<String>,
-}
-
-impl TrajectorySummary {
-    /// The summary of a trajectory beside the runs.
-    pub(crate) fn of(lane: &TrajectoryLane) -> Self {
-        Self {
-            label: lane.label.clone(),
-            source: lane.source.clone(),
-            poses: lane.track.samples().len(),
-            length_m: lane.length_m,
-            accuracy: lane.evaluation.accuracy.as_ref().map(accuracy_summary),
-            accuracy_missing: lane.accuracy_missing.clone(),
-        }
-    }
+fn lanes<S: Serializer>(lanes: &[Arc<TrajectoryLane>], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(lanes.iter().map(Arc::as_ref))
 }
 
 /// The summary of one run of a recording.
@@ -309,7 +214,7 @@ pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSum
     let own_length_m = || path_length_m(positions.iter().map(|frame| &frame.world_from_imu.translation_m));
     let length_m = run.true_length_m().unwrap_or_else(own_length_m);
     let (accuracy, accuracy_missing) = match run.accuracy() {
-        Ok(accuracy) => (Some(accuracy_summary(&accuracy)), None),
+        Ok(accuracy) => (Some(accuracy), None),
         Err(_) if estimated.is_empty() => (None, Some(never_initialized(run))),
         Err(reason) => (None, Some(reason)),
     };
@@ -332,7 +237,7 @@ pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSum
         timing_ms: if timing { timing_summary(run) } else { None },
         real_time_factor: if timing { real_time_factor(run) } else { None },
         warnings: warnings(recording, run),
-        trajectories: recording.trajectories.iter().map(|lane| TrajectorySummary::of(lane)).collect(),
+        trajectories: recording.trajectories.clone(),
     }
 }
 
@@ -358,30 +263,6 @@ fn never_initialized(run: &RunRecord) -> String {
         || "the run never initialized: no image reached the estimator".to_owned(),
         |reasons| format!("the run never initialized; last attempt: {reasons}"),
     )
-}
-
-fn accuracy_summary(accuracy: &TrajectoryAccuracy) -> Accuracy {
-    let TrajectoryAccuracy { length_m, absolute_m: errors, relative, antenna } = accuracy;
-    let rpe = relative.iter().map(|over| RelativeError {
-        delta_m: over.delta_m,
-        pairs: over.translation_m.count,
-        translation_rmse_m: over.translation_m.rmse,
-        rotation_rmse_deg: over.rotation_rad.rmse.to_degrees(),
-    });
-    Accuracy {
-        alignment: alignment_name(Alignment::YawPosition),
-        ate_rmse_m: errors.rmse,
-        ate_mean_m: errors.mean,
-        ate_std_m: errors.std,
-        ate_median_m: errors.median,
-        ate_max_m: errors.max,
-        ate_percent_of_length: if *length_m > 0.0 { 100.0 * errors.rmse / length_m } else { 0.0 },
-        rpe: rpe.collect(),
-        antenna: antenna.as_ref().map(|antenna| AntennaSummary {
-            lever_arm_m: antenna.lever_arm_m.into(),
-            lever_arm_sigma_m: antenna.lever_arm_sigma_m.map(Into::into),
-        }),
-    }
 }
 
 fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
@@ -420,12 +301,12 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
                 last: value,
                 sigma: last.sigmas.get(index).copied().filter(|sigma| sigma.is_finite()),
                 ground_truth,
-                error: ground_truth.map(|ground_truth| difference(dimension, value, ground_truth)),
+                error: ground_truth.map(|ground_truth| dimension.difference(value, ground_truth)),
             }
         })
         .collect();
     let chain_error =
-        |chain: &ClassicalChain| ground_truth.as_ref().and_then(|ground_truth| chain_error(run, chain, ground_truth));
+        |chain: &ClassicalChain| ground_truth.as_ref().and_then(|reference| run.chain_distance(chain, reference));
     CalibrationSummary {
         parameterization: last.parameterization.to_string(),
         columns: last.parameters.len(),
@@ -434,24 +315,6 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
         chain_error: chain_error(&last.classical),
         chain_error_initial: given.as_ref().and_then(chain_error),
     }
-}
-
-/// Difference of two values of a parameter; of angles, in (−π, π].
-pub(super) fn difference(dimension: Dimension, value: f64, reference: f64) -> f64 {
-    match dimension {
-        Dimension::Angle => principal_angle(value - reference),
-        _ => value - reference,
-    }
-}
-
-fn chain_error(run: &RunRecord, chain: &ClassicalChain, ground_truth: &ClassicalChain) -> Option<ChainError> {
-    let distance = run.chain_distance(chain, ground_truth)?;
-    Some(ChainError {
-        translation_mean_m: distance.translation_m.mean,
-        translation_std_m: distance.translation_m.std,
-        rotation_mean_rad: distance.rotation_rad.mean,
-        rotation_std_rad: distance.rotation_rad.std,
-    })
 }
 
 fn rank(recording: &Recording, run: &RunRecord) -> Option<RankSummary> {
@@ -473,12 +336,7 @@ fn rank(recording: &Recording, run: &RunRecord) -> Option<RankSummary> {
         columns: rank.parameters.len(),
         rank_structural: rank.rank_structural,
         rank_informed: rank.rank_informed,
-        deficit: DeficitSummary {
-            parameterization: rank.deficit_parameterization,
-            joints: rank.deficit_joints,
-            absorbed: rank.deficit_absorbed,
-            motion: rank.deficit_motion,
-        },
+        deficit: rank.deficit(),
         null_directions,
         known: known_losses(run, &names),
         information: information(recording, run),
@@ -546,14 +404,4 @@ fn warnings(recording: &Recording, run: &RunRecord) -> Vec<String> {
     }
     texts.extend(run.error.iter().cloned());
     texts
-}
-
-/// The text of `summary.json`.
-pub(super) fn to_json(summary: &RunSummary) -> Result<String, serde_json::Error> {
-    serde_json::to_string_pretty(summary).map(|text| format!("{text}\n"))
-}
-
-/// File name of a log without its folder, for messages.
-pub fn log_name(path: &Path) -> String {
-    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
+use super::run::RunRecord;
 use crate::gimbal::ParameterNames;
 use crate::observability::KnownLoss;
-use crate::session::RunRecord;
 
 /// A null direction known in closed form, compared with the measured response in every step of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
