@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use dcvins::sweep::write_parquet;
 use dcvins::sweep::{OpenedStudy, is_study};
-use dcvins::sweep::{csv_text, write_parquet};
 
 use crate::study_sample;
 
