@@ -22,14 +22,18 @@
 //! | `study` | the runs defined by a plan, the tables of their results and the comparison of two studies | files, processes, screens |
 //! | `gui` | panels, 3D scene, theme: reads reports, sends commands | the internals of the estimator |
 //! | `export` | the same tables and panels without a window | windows |
+//! | `interop` | a rig as the configuration of another estimator | runs |
+//! | `report` | HTML reports of logs and of studies | how their figures are drawn |
+//! | `sweep` | the jobs of a study executed, and the files of their results | how jobs are distributed |
+//! | `desktop` | what the window asks of the machine: recent files, settings, written panels | sessions |
 //!
 //! Two folders differ from the order of the data flow: `simulation` comes after `frontend`, because flights without images
 //! use its track types; `calibration` comes after `observability`, with which it reports the unobservable parameters of
 //! its flight.
 //!
-//! Four rules: nothing above `gui` uses egui or wgpu; [`frontend`], [`estimator`] and [`calibration`] do not depend on
-//! `flight_log`; [`frontend`] does not depend on the estimator; only `flight_log`, `export` and the command line access
-//! the file system, and only `gui` reads the wall clock for anything but the stage timings of a report.
+//! Four absences hold the shape: nothing above `gui` names egui or wgpu; [`frontend`], [`estimator`] and [`calibration`]
+//! do not know `flight_log`; [`frontend`] does not know the estimator; only `flight_log`, `export` and what
+//! follows it touch the file system, and only `gui` asks the wall clock for anything but the stage timings of a report.
 //!
 //! Equations and parameterizations: docs/mathematics.md, sections 2 and 3; rank rule: docs/mathematics.md, section 8.
 //!
@@ -81,6 +85,8 @@
 
 pub mod calibration;
 pub mod camera;
+#[cfg(feature = "gui")]
+pub mod desktop;
 pub mod estimator;
 #[cfg(feature = "logs")]
 pub mod export;
@@ -92,12 +98,18 @@ pub mod gimbal;
 #[cfg(feature = "gui")]
 pub mod gui;
 #[cfg(feature = "logs")]
+pub mod interop;
+#[cfg(feature = "logs")]
 pub mod log_check;
 pub mod observability;
 pub mod optimization;
+#[cfg(feature = "logs")]
+pub mod report;
 pub mod sensors;
 #[cfg(feature = "logs")]
 pub mod session;
 pub mod simulation;
 #[cfg(feature = "logs")]
 pub mod study;
+#[cfg(feature = "logs")]
+pub mod sweep;

@@ -6,7 +6,7 @@ use dcvins::flight_log::ImageReader;
 use dcvins::gui::rendering::headless::{Frame, Headless, HeadlessOptions};
 use dcvins::gui::rendering::painter::Painter;
 use dcvins::gui::theme::{Theme, ThemeName};
-use dcvins::gui::window::{Preset, WindowState, window_ui};
+use dcvins::gui::window::{MainWindow, Preset, window_ui};
 use dcvins::gui::{PanelContext, Playback, Presentation, Selection};
 use dcvins::sensors::GrayImage;
 use dcvins::session::{Recording, SessionPlan};
@@ -32,7 +32,7 @@ pub(crate) struct Player {
     images: ImageReader,
     headless: Headless,
     painter: Painter,
-    state: WindowState,
+    state: MainWindow,
     selection: Selection,
 }
 
@@ -40,7 +40,7 @@ impl Player {
     pub(crate) fn new(plan: &SessionPlan) -> Self {
         let mut headless = Headless::new(OPTIONS);
         headless.set_frame_time_s(FRAME_TIME_S);
-        let mut state = WindowState::default();
+        let mut state = MainWindow::default();
         state.panels.rank.in_background = true;
         Self {
             images: ImageReader::new(Arc::clone(&plan.log), &plan.rig),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dcvins::export::Machine;
+use dcvins::desktop::Machine;
 use dcvins::gui::desktop::Desktop as _;
 use dcvins::session::{Computation, Recording, RunRecord, StepRecord};
 

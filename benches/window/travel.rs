@@ -1,6 +1,6 @@
 //! Memory of the recording of a log, and the time to seek backwards in it.
 
-use dcvins::export::Machine;
+use dcvins::desktop::Machine;
 use dcvins::geometry::SplitMix64;
 use dcvins::gui::desktop::Desktop as _;
 use dcvins::session::{Command, Session, Stopwatch};

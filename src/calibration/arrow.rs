@@ -1,7 +1,7 @@
 //! Symmetric positive definite systems with a band and a border: states in time order, then the unknowns common
 //! to all states.
 
-#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+#![expect(clippy::inline_always, reason = "code that is not inlined is not compiled for the registers of its caller")]
 
 use std::ops::Range;
 

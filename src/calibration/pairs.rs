@@ -4,7 +4,7 @@
 //! Every entry is the sum that matrix products of the complete Jacobians would give, without their zero columns.
 //! Entries are added in the order of the pairs for any number of threads.
 
-#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+#![expect(clippy::inline_always, reason = "code that is not inlined is not compiled for the registers of its caller")]
 
 use std::ops::Range;
 

@@ -5,6 +5,7 @@
 //! [`Distortion`] moves it there, and focal lengths and principal point convert it to pixels.
 
 mod distortion;
+mod error;
 mod intrinsics;
 mod kalibr;
 mod projection;
@@ -13,11 +14,11 @@ mod rational;
 mod tests;
 
 pub use distortion::Distortion;
+pub use error::CameraError;
 pub use projection::Projection;
 pub use rational::RationalLens;
 
 use nalgebra::{Matrix2x3, Vector2, Vector3};
-use thiserror::Error;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraModel {
@@ -27,43 +28,6 @@ pub struct CameraModel {
     pub intrinsics_px: [f64; 4],
     /// Width and height in pixels.
     pub resolution_px: [usize; 2],
-}
-
-/// Invalid description of a camera.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub enum CameraError {
-    #[error("unknown camera_model '{name}': expected one of pinhole, omni, eucm, ds")]
-    UnknownModel { name: String },
-    #[error(
-        "unknown distortion_model '{name}': expected one of none, radtan, plumb_bob, rational_polynomial, equidistant, fov"
-    )]
-    UnknownDistortion { name: String },
-    /// Distortion that is not defined for the projection.
-    #[error("camera_model '{model}' does not support distortion_model '{distortion}': expected {expected}")]
-    Combination {
-        model: &'static str,
-        distortion: &'static str,
-        /// Distortions of this projection.
-        expected: &'static str,
-    },
-    #[error("{field} of '{model}' holds {found} numbers, expected {expected}: {meaning}")]
-    Count {
-        /// `intrinsics` or `distortion_coeffs`.
-        field: &'static str,
-        model: &'static str,
-        found: usize,
-        expected: usize,
-        /// Names of the numbers, in order.
-        meaning: &'static str,
-    },
-    /// Number out of its range.
-    #[error("{field} is {value}, expected {expected}")]
-    Value {
-        field: &'static str,
-        value: f64,
-        /// Valid range.
-        expected: &'static str,
-    },
 }
 
 impl CameraModel {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use dcvins::export::{FixedJointAngles, OtherEstimator, configure, write_configuration};
 use dcvins::flight_log::FlightLog;
+use dcvins::interop::{FixedJointAngles, OtherEstimator, configure, write_configuration};
 use dcvins::sensors::Rig;
 use serde::Serialize;
 

@@ -4,10 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
-use dcvins::export::{self, ReportFigure, ReportOptions, write_known_report, write_report};
+use dcvins::export;
 use dcvins::flight_log::log_name;
 use dcvins::log_check::{self, CheckReport};
+use dcvins::report::{ReportFigure, ReportOptions, write_known_report, write_report};
 use dcvins::session::{Computation, SessionPlan, image_rotations};
+#[cfg(feature = "gui")]
+use dcvins::sweep::{OpenedStudy, is_study};
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
@@ -50,7 +53,7 @@ pub(crate) struct ReportArguments {
 
 pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     #[cfg(feature = "gui")]
-    if export::is_study(&arguments.log) {
+    if is_study(&arguments.log) {
         return of_study(arguments);
     }
     #[cfg(feature = "gui")]
@@ -124,7 +127,7 @@ fn of_study(arguments: &ReportArguments) -> Result<Outcome> {
     if !arguments.at.is_empty() || !arguments.estimation.runs.is_empty() {
         anyhow::bail!("{} is a study: leave --at and --run out", arguments.log.display());
     }
-    let study = export::OpenedStudy::read(&arguments.log)?;
+    let study = OpenedStudy::read(&arguments.log)?;
     let view = arguments.study.options();
     study_report(&study, &view, &arguments.output, own_command_line(), arguments.force)?;
     Ok(Outcome::Success)
@@ -154,7 +157,7 @@ fn figures_of(
     plan: &SessionPlan,
     computation: &mut Computation,
 ) -> Result<Vec<ReportFigure>> {
-    report_figures::draw(arguments, plan, computation)
+    report_figures::draw(&arguments.at, plan, computation)
 }
 
 /// Figures cannot be drawn in a build without the window.

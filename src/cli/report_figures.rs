@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use anyhow::Result;
-use dcvins::export::{ReportDrawing, ReportFigure, ScreenshotOptions, draw_panel, draw_panel_svg, png_bytes};
+use dcvins::export::{ScreenshotOptions, draw_panel, draw_panel_svg, png_bytes};
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
 use dcvins::gui::theme::ThemeName;
+use dcvins::report::{ReportDrawing, ReportFigure};
 use dcvins::session::{Computation, Recording, SessionPlan};
 
-use super::report::ReportArguments;
 use super::terminal::Progress;
 
 /// Width of every figure in points. Printed 170 mm wide, text of 11 points is then 2.6 mm high.
@@ -43,15 +43,11 @@ impl Wanted {
     }
 }
 
-/// Figures of a report: of the whole log, then of each stamp (of the end if there is none).
-pub(crate) fn draw(
-    arguments: &ReportArguments,
-    plan: &SessionPlan,
-    computation: &mut Computation,
-) -> Result<Vec<ReportFigure>> {
+/// The figures of a report: of the whole log, then of each stamp (without one, of the end).
+pub(crate) fn draw(at_s: &[f64], plan: &SessionPlan, computation: &mut Computation) -> Result<Vec<ReportFigure>> {
     let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
     let end_ns = computation.recording().last_stamp_ns();
-    let stamps_ns: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(end_ns)).collect();
+    let stamps_ns: Vec<i64> = at_s.iter().map(|at_s| ns_from_seconds(*at_s).min(end_ns)).collect();
     let stamps_ns = if stamps_ns.is_empty() { vec![end_ns] } else { stamps_ns };
     let whole = whole_log(computation.recording(), end_ns);
     let mut groups = vec![("Over the whole log".to_owned(), end_ns, whole)];

@@ -7,8 +7,8 @@ use anyhow::{Context as _, Result, bail};
 use clap::error::ErrorKind;
 use clap::{Args, ValueEnum};
 use dcvins::export::{
-    OpenedStudy, PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_screenshot, draw_panel,
-    draw_panel_svg, is_session, is_study, panel_csv, png_bytes, read_session, write_screenshot,
+    PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_screenshot, draw_panel, draw_panel_svg,
+    is_session, panel_csv, png_bytes, read_session, write_screenshot,
 };
 use dcvins::flight_log::{ImageReader, log_name};
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
@@ -17,6 +17,7 @@ use dcvins::gui::theme::ThemeName;
 use dcvins::gui::window::Preset;
 use dcvins::gui::{ImageSource, Playback, Presentation};
 use dcvins::session::{Computation, Session, SessionPlan};
+use dcvins::sweep::{OpenedStudy, is_study};
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;

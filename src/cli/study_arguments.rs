@@ -6,10 +6,11 @@ use std::sync::Arc;
 use anyhow::{Result, bail};
 use clap::Args;
 use dcvins::export::{
-    OpenedStudy, STUDY_PANEL_NAMES, ScreenshotOptions, draw_study_panel, draw_study_panel_svg, study_panel_csv,
-    write_csv, write_png, write_svg,
+    STUDY_PANEL_NAMES, ScreenshotOptions, draw_study_panel, draw_study_panel_svg, study_panel_csv, write_csv,
+    write_png, write_svg,
 };
 use dcvins::gui::study::StudyOptions;
+use dcvins::sweep::OpenedStudy;
 
 /// Filter, groups and metric of a study.
 #[derive(Args, Clone, Debug, Default)]

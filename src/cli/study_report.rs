@@ -4,12 +4,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Result, anyhow};
-use dcvins::export::{
-    OpenedStudy, ReportDrawing, ReportFigure, ScreenshotOptions, StudyReport, check_study_report, draw_study_panel,
-    draw_study_panel_svg, png_bytes, study_panel_csv, write_study_report,
-};
+use dcvins::export::{ScreenshotOptions, draw_study_panel, draw_study_panel_svg, png_bytes, study_panel_csv};
 use dcvins::gui::study::{StudyOptions, StudyState};
 use dcvins::gui::theme::ThemeName;
+use dcvins::report::{ReportDrawing, ReportFigure, StudyReport, check_study_report, write_study_report};
+use dcvins::sweep::OpenedStudy;
 
 use crate::cli::terminal::{Progress, print};
 

@@ -36,15 +36,16 @@ mod window {
     use std::sync::Arc;
 
     use anyhow::Result;
+    use dcvins::desktop::Machine;
     use dcvins::export::{
-        self, Machine, OpenedStudy, PANEL_NAMES, RunFileOptions, ScreenshotOptions, draw_panel, is_session, is_study,
-        read_session, write_png,
+        self, PANEL_NAMES, RunFileOptions, ScreenshotOptions, draw_panel, is_session, read_session, write_png,
     };
     use dcvins::flight_log::ImageReader;
     use dcvins::gui::app::run_window::{WindowError, WindowOptions, run_window};
     use dcvins::gui::app::{PlayingLog, StudySource};
     use dcvins::gui::theme::ThemeName;
     use dcvins::session::{Session, SessionPlan};
+    use dcvins::sweep::{OpenedStudy, is_study};
     use parking_lot::Mutex;
 
     use super::ViewArguments;

@@ -35,12 +35,12 @@ pub enum ExportError {
 
 impl ExportError {
     /// For `map_err` behind [`OutputSet::commit`](crate::flight_log::output::OutputSet::commit).
-    pub(super) fn commit((path, source): (PathBuf, io::Error)) -> Self {
+    pub(crate) fn commit((path, source): (PathBuf, io::Error)) -> Self {
         Self::Write { source, path }
     }
 
     /// For `map_err` of a write.
-    pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
+    pub(crate) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::Write { source, path: path.to_owned() }
     }
 }

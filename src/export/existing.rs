@@ -16,8 +16,8 @@ use super::masks::is_mask_name;
 use crate::flight_log::output;
 use crate::flight_log::{FlightLog, log_name, shortened};
 
-/// Names of all files of a run.
-pub(super) const RUN_FILES: [&str; 10] = [
+/// Names of all files that a run can write.
+pub(crate) const RUN_FILES: [&str; 10] = [
     "summary.json",
     "trajectory.tum",
     "covariance.csv",
@@ -192,8 +192,8 @@ pub fn other_runs(folder: &Path, labels: &[&str]) -> Vec<String> {
     names
 }
 
-/// Checks that the folder of a run is empty or contains only a run on this log.
-pub(super) fn check_run_folder(folder: &Path, log: &str) -> Result<(), ExportError> {
+/// A folder of a run must hold nothing, or a run on this log and nothing else.
+pub(crate) fn check_run_folder(folder: &Path, log: &str) -> Result<(), ExportError> {
     let existing = |problem: String| ExportError::Existing { problem, path: folder.to_owned() };
     for entry in fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok) {
         let name = entry.file_name();
@@ -228,8 +228,8 @@ fn log_of(index: &Path) -> Option<String> {
     value.get("log").and_then(Value::as_str).map(str::to_owned)
 }
 
-/// Parses an index file of results.
-pub(super) fn read_index(index: &Path) -> Option<Value> {
+/// A JSON file of results.
+pub(crate) fn read_index(index: &Path) -> Option<Value> {
     let file = fs::File::open(index).ok()?;
     let mut text = String::new();
     file.take(LARGEST_INDEX_BYTES).read_to_string(&mut text).ok()?;

@@ -12,8 +12,8 @@ const BLOCK_BYTES: usize = 1 << 20;
 /// Adds the content of a file block by block; returns its number of bytes.
 ///
 /// # Errors
-/// If the file cannot be read.
-pub(super) fn add_file(hash: &mut Sha256, path: &Path) -> io::Result<u64> {
+/// When it cannot be read.
+pub(crate) fn add_file(hash: &mut Sha256, path: &Path) -> io::Result<u64> {
     let mut file = File::open(path)?;
     let mut block = vec![0; BLOCK_BYTES];
     let mut bytes = 0;

@@ -21,8 +21,8 @@ pub(super) fn is_mask_name(name: &str) -> bool {
         .is_some_and(|number| number.parse::<u32>().is_ok())
 }
 
-/// Sets the names of a rig's masks to their files next to the rig in a new folder, and returns names and contents.
-pub(super) fn beside(rig: &mut Rig) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
+/// Names the masks of a rig as they lie beside it in a new folder, and returns them with their content.
+pub(crate) fn beside(rig: &mut Rig) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
     let mut files = Vec::new();
     for camera in &mut rig.cameras {
         if let Some(mask) = &mut camera.mask {
@@ -34,7 +34,7 @@ pub(super) fn beside(rig: &mut Rig) -> Result<Vec<(String, Vec<u8>)>, ExportErro
 }
 
 /// A mask as an 8-bit PNG, white where it is masked.
-pub(super) fn png(mask: &ImageMask) -> Result<Vec<u8>, ExportError> {
+pub(crate) fn png(mask: &ImageMask) -> Result<Vec<u8>, ExportError> {
     let image = mask.to_image();
     let failed = |source: image::ImageError| ExportError::Write {
         source: std::io::Error::other(source.to_string()),

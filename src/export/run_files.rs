@@ -52,8 +52,8 @@ pub fn write_run(
     Ok((folder, summary))
 }
 
-/// Prepares the files of one run under temporary names.
-pub(super) fn stage_run(
+/// Prepares the files of one run without giving them their names.
+pub(crate) fn stage_run(
     recording: &Recording,
     run: &RunRecord,
     folder: &Path,
@@ -95,8 +95,8 @@ pub(super) fn stage_run(
     Ok((folder, summary))
 }
 
-/// Removes files that an earlier run with other options left in the folder of a run.
-pub(super) fn remove_unwritten(folder: &Path, options: RunFileOptions) -> Result<(), ExportError> {
+/// Removes the files that an earlier run with other options left in the folder of a run.
+pub(crate) fn remove_unwritten(folder: &Path, options: RunFileOptions) -> Result<(), ExportError> {
     for (name, written) in [(EUROC_TRAJECTORY, options.euroc_trajectory), (RESULTS, options.mcap)] {
         let path = folder.join(name);
         if !written && path.is_file() {

@@ -13,9 +13,10 @@ use super::error::ExportError;
 use crate::flight_log::output;
 use crate::gui::rendering::offscreen::{Offscreen, OffscreenError};
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
+use crate::gui::study::StudyPanel;
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::window::{PanelName, Preset, WindowState, alone_ui, panel_table, window_ui};
-use crate::gui::{ImageSource, PanelContext, Playback, Presentation, Selection};
+use crate::gui::window::{MainWindow, Preset, alone_ui, panel_table, window_ui};
+use crate::gui::{ImageSource, PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
 
@@ -28,6 +29,20 @@ pub const PANEL_NAMES: [&str; PanelName::ALL.len() + 1] = {
     let mut index = 0;
     while index < PanelName::ALL.len() {
         names[index + 1] = PanelName::ALL[index].as_str();
+        index += 1;
+    }
+    names
+};
+
+/// The name of the whole view.
+pub(super) const WHOLE_VIEW: &str = "all";
+
+/// Names of the panels of a study; `all` is the whole view.
+pub const STUDY_PANEL_NAMES: [&str; StudyPanel::ALL.len() + 1] = {
+    let mut names = [WHOLE_VIEW; StudyPanel::ALL.len() + 1];
+    let mut index = 0;
+    while index < StudyPanel::ALL.len() {
+        names[index + 1] = StudyPanel::ALL[index].as_str();
         index += 1;
     }
     names
@@ -88,10 +103,16 @@ impl Default for ScreenshotOptions {
 pub enum ScreenshotError {
     /// There is no panel with this name.
     #[error("unknown panel '{name}': expected one of {}", PANEL_NAMES.join(", "))]
-    UnknownPanel { name: String },
-    /// The view of a study has no panel with this name.
-    #[error("unknown panel '{name}' of a study: expected one of {}", super::STUDY_PANEL_NAMES.join(", "))]
-    UnknownStudyPanel { name: String },
+    UnknownPanel {
+        /// The name as written.
+        name: String,
+    },
+    /// There is no panel of that name in the view of a study.
+    #[error("unknown panel '{name}' of a study: expected one of {}", STUDY_PANEL_NAMES.join(", "))]
+    UnknownStudyPanel {
+        /// The name as written.
+        name: String,
+    },
     /// Filter, groups or metric of a study are invalid.
     #[error("{problem}")]
     StudyOptions {
@@ -167,7 +188,7 @@ pub fn panel_csv(
     let (selection, commands, playback, theme) = (&mut selection, &mut Vec::new(), &playback, &theme);
     let presentation = options.presentation;
     let ctx = &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, presentation, commands };
-    Ok(panel_table(panel, &mut WindowState::default(), ctx))
+    Ok(panel_table(panel, &mut MainWindow::default(), ctx))
 }
 
 /// Passes the panel's user interface to a function that draws it.
@@ -185,7 +206,7 @@ fn with_panel<T>(
     }
     check(options)?;
     let theme = Theme::of(options.theme);
-    let mut state = WindowState::default();
+    let mut state = MainWindow::default();
     state.arrange(options.layout);
     let mut selection = Selection { run: options.run, slide: options.slide, ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };

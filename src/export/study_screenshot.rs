@@ -5,26 +5,12 @@ use std::sync::Arc;
 use egui::Ui;
 use image::RgbaImage;
 
-use super::screenshot::{Renderer, ScreenshotError, ScreenshotOptions, check};
+use super::screenshot::{Renderer, ScreenshotError, ScreenshotOptions, WHOLE_VIEW, check};
 use crate::gui::rendering::offscreen::Offscreen;
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
 use crate::gui::study::{StudyOptions, StudyPanel, StudyState, study_panel_ui, study_ui};
 use crate::gui::theme::Theme;
 use crate::study::view::Study;
-
-/// Name of the whole view.
-const WHOLE_VIEW: &str = "all";
-
-/// Names of the panels of a study; `all` is the whole view.
-pub const STUDY_PANEL_NAMES: [&str; StudyPanel::ALL.len() + 1] = {
-    let mut names = [WHOLE_VIEW; StudyPanel::ALL.len() + 1];
-    let mut index = 0;
-    while index < StudyPanel::ALL.len() {
-        names[index + 1] = StudyPanel::ALL[index].as_str();
-        index += 1;
-    }
-    names
-};
 
 fn panel_of(name: &str) -> Result<Option<StudyPanel>, ScreenshotError> {
     let panel = StudyPanel::ALL.into_iter().find(|known| known.as_str() == name);

@@ -5,102 +5,47 @@ use std::io::Cursor;
 use image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader as CodecReader, Limits};
 
 use super::FlightLog;
+use super::bit_depth::BitDepth;
+use super::image_problem::{ImageProblem, check_resolution, unreadable};
 use super::limits::{LogLimits, can_hold_image};
 use super::messages::{ImageMessage, MessageKind, read_compressed_image, read_image, read_video_packet};
 use super::raw_encoding::{RawEncoding, luma};
 use super::video::VideoDecoder;
 use crate::sensors::GrayImage;
 
-/// Larger images are rejected: no camera has them, so the header is damaged.
-const LARGEST_SIDE_PX: usize = 65_535;
 /// Memory limit of the decoders per pixel: 16 bits of red, green, blue and alpha.
 const DECODER_BYTES_PER_PIXEL: u64 = 8;
 /// First bytes of a PNG file.
 const PNG: [u8; 4] = [0x89, b'P', b'N', b'G'];
 
-/// Number of bits that a camera uses of a 16-bit gray value: its sensor has 8, 10, 12, 14 or 16.
-///
-/// A 12-bit sensor leaves the upper four bits at zero, so that the upper eight bits have 16 values only. Therefore the
-/// eight bits below the highest used bit are taken. The brightest pixel of the topic's first image determines that bit:
-/// the same for all images of a log, wherever reading starts. Brighter pixels of later images saturate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct BitDepth(u32);
-
-impl Default for BitDepth {
-    fn default() -> Self {
-        Self(16)
-    }
+/// Bits in use by the images of a topic, from its first image that can be decoded; 16 without one.
+pub(crate) fn bit_depth_of_topic(log: &FlightLog, topic: &str, kind: MessageKind) -> BitDepth {
+    let limits = log.file().limits();
+    log.find_message(topic, |message| bit_depth_of_message(kind, message, limits)).unwrap_or_default()
 }
 
-impl BitDepth {
-    /// Bit depth of the first image of a topic that can be decoded; 16 without one.
-    pub(crate) fn of_topic(log: &FlightLog, topic: &str, kind: MessageKind) -> Self {
-        let limits = log.file().limits();
-        log.find_message(topic, |message| Self::of(kind, message, limits)).unwrap_or_default()
+/// Bits in use by one image message; `None` when it cannot be decoded or is black. Images of 8 bits have the default.
+pub(crate) fn bit_depth_of_message(kind: MessageKind, message: &[u8], limits: &LogLimits) -> Option<BitDepth> {
+    if kind.is_video() {
+        return Some(BitDepth::default());
     }
-
-    /// Bit depth of one image message; `None` if it cannot be decoded or is black. Images of 8 bits have the default.
-    pub(crate) fn of(kind: MessageKind, message: &[u8], limits: &LogLimits) -> Option<Self> {
-        if kind.is_video() {
-            return Some(Self::default());
+    let brightest = if kind == MessageKind::Image {
+        let raw = read_image(message).ok()?;
+        match RawEncoding::from_name(raw.encoding) {
+            Some(encoding) if encoding.is_wide() => encoding.brightest(&raw)?,
+            _ => return Some(BitDepth::default()),
         }
-        let brightest = if kind == MessageKind::Image {
-            let raw = read_image(message).ok()?;
-            match RawEncoding::from_name(raw.encoding) {
-                Some(encoding) if encoding.is_wide() => encoding.brightest(&raw)?,
-                _ => return Some(Self::default()),
-            }
-        } else {
-            let (_, data) = read_compressed_image(message).ok()?;
-            if !data.starts_with(&PNG) {
-                return Some(Self::default());
-            }
-            match decode_within(data, ImageFormat::Png, limits, None).ok()? {
-                DynamicImage::ImageLuma16(gray) => gray.into_raw().into_iter().max()?,
-                _ => return Some(Self::default()),
-            }
-        };
-        Self::of_brightest(brightest)
-    }
-
-    /// Bit depth for the brightest pixel of an image; `None` if it is black.
-    pub(super) fn of_brightest(brightest: u16) -> Option<Self> {
-        let used = u16::BITS - brightest.leading_zeros();
-        (used > 0).then(|| Self(used.next_multiple_of(2).max(8)))
-    }
-
-    /// Number of bits, 8 to 16.
-    pub(crate) fn bits(self) -> u32 {
-        self.0
-    }
-
-    /// Converts a 16-bit gray value to 8 bits.
-    pub(super) fn narrowed(self, value: u16) -> u8 {
-        u8::try_from(value >> (self.0 - 8)).unwrap_or(u8::MAX)
-    }
-}
-
-/// Reason why an image message cannot be decoded.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum ImageProblem {
-    /// The resolution differs from the expected one; the image was not decoded.
-    OtherResolution([usize; 2]),
-    /// Description of the problem.
-    Unreadable(String),
-}
-
-impl std::fmt::Display for ImageProblem {
-    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::OtherResolution([width, height]) => write!(out, "an image of {width}×{height} pixels"),
-            Self::Unreadable(problem) => out.write_str(problem),
+    } else {
+        let (_, data) = read_compressed_image(message).ok()?;
+        if !data.starts_with(&PNG) {
+            return Some(BitDepth::default());
         }
-    }
-}
-
-#[expect(clippy::needless_pass_by_value, reason = "for map_err")]
-pub(super) fn unreadable(problem: impl ToString) -> ImageProblem {
-    ImageProblem::Unreadable(problem.to_string())
+        match decode_within(data, ImageFormat::Png, limits, None).ok()? {
+            DynamicImage::ImageLuma16(gray) => gray.into_raw().into_iter().max()?,
+            _ => return Some(BitDepth::default()),
+        }
+    };
+    BitDepth::of_brightest(brightest)
 }
 
 /// Decodes a raw or compressed image message, or a keyframe of a video, into 8-bit gray values. If a resolution is
@@ -123,22 +68,6 @@ pub(crate) fn decode_image(
     }
     let (format, data) = read_compressed_image(message).map_err(unreadable)?;
     gray_from_compressed(format, data, depth, limits, expected_px)
-}
-
-/// Checks the resolution in an image's header.
-pub(super) fn check_resolution(
-    claimed_px: [usize; 2],
-    limits: &LogLimits,
-    expected_px: Option<[usize; 2]>,
-) -> Result<(), ImageProblem> {
-    let [width, height] = claimed_px;
-    if width == 0 || height == 0 || width > LARGEST_SIDE_PX || height > LARGEST_SIDE_PX {
-        return Err(unreadable(format!("image of {width}×{height} pixels")));
-    }
-    if expected_px.is_some_and(|expected_px| expected_px != claimed_px) {
-        return Err(ImageProblem::OtherResolution(claimed_px));
-    }
-    limits.check_image(claimed_px).map_err(unreadable)
 }
 
 /// Remedy for an unsupported encoding.

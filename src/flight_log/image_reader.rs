@@ -2,8 +2,9 @@ use std::sync::Arc;
 
 use parking_lot::Mutex;
 
+use super::bit_depth::BitDepth;
 use super::container::{BlockCache, TopicIndex};
-use super::image_decoding::{BitDepth, decode_image};
+use super::image_decoding::{bit_depth_of_topic, decode_image};
 use super::log::relative_ns;
 use super::messages::{MessageKind, read_video_packet, stamp_ns};
 use super::video::{PictureStream, keyframe_before};
@@ -61,7 +62,7 @@ impl ImageReader {
                 let info = log.topic(&camera.topic)?;
                 let kind = info.kind.filter(|kind| kind.is_image())?;
                 let (key, topic) = (camera.key.clone(), camera.topic.clone());
-                let depth = BitDepth::of_topic(&log, &topic, kind);
+                let depth = bit_depth_of_topic(&log, &topic, kind);
                 Some(CameraImages { key, topic, kind, depth, count: info.count as usize })
             })
             .collect();

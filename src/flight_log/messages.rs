@@ -8,7 +8,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::cdr::{CdrError, CdrReader};
 use super::protobuf::{ProtobufReader, ProtobufValue};
-use super::video::VideoCodec;
+use super::video::codec::VideoCodec;
 use crate::geometry::RigidTransform;
 
 /// Supported message type.
@@ -159,6 +159,12 @@ pub(in crate::flight_log) fn read_header<'a>(reader: &mut CdrReader<'a>) -> Resu
     Ok(Header { stamp_ns: seconds * 1_000_000_000 + nanoseconds, frame_id })
 }
 
+/// Microseconds as nanoseconds.
+fn read_px4_stamp(reader: &mut CdrReader<'_>) -> Result<i64, CdrError> {
+    let microseconds = i64::try_from(reader.read_u64()?).unwrap_or(i64::MAX);
+    Ok(microseconds.saturating_mul(1000))
+}
+
 /// Header stamp of any message that starts with a header, in nanoseconds since the epoch.
 pub(crate) fn stamp_ns(kind: MessageKind, message: &[u8]) -> Result<i64, CdrError> {
     if kind == MessageKind::CompressedVideoProtobuf {
@@ -166,7 +172,7 @@ pub(crate) fn stamp_ns(kind: MessageKind, message: &[u8]) -> Result<i64, CdrErro
     }
     let mut reader = CdrReader::new(message)?;
     if kind.counts_since_boot() {
-        return attitudes::read_px4_stamp(&mut reader);
+        return read_px4_stamp(&mut reader);
     }
     if kind == MessageKind::Transforms && reader.read_u32()? == 0 {
         return Err(CdrError { what: "no transform".into(), offset: 4 });

@@ -4,6 +4,7 @@
 //! Time is nanoseconds since the first message of the log (header stamps; the log time is kept too).
 
 pub(crate) mod attitude;
+pub(crate) mod bit_depth;
 mod cdr;
 pub(crate) mod container;
 pub mod convert;
@@ -12,6 +13,7 @@ mod error;
 mod file;
 mod geodesy;
 pub(crate) mod image_decoding;
+mod image_problem;
 mod image_reader;
 pub(crate) mod imu_merge;
 pub(crate) mod joint_merge;

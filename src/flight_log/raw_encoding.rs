@@ -1,6 +1,6 @@
 //! Pixel encodings of raw images (`sensor_msgs/msg/Image`) and their gray values.
 
-use super::image_decoding::BitDepth;
+use super::bit_depth::BitDepth;
 use super::messages::ImageMessage;
 
 /// Storage of a raw image's pixels, by the names of ROS (`sensor_msgs/image_encodings.hpp`).

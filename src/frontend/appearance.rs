@@ -6,7 +6,18 @@ use nalgebra::{Matrix6, Vector6};
 use pulp::{Arch, NullaryFnOnce};
 
 use super::lucas_kanade::REGISTER;
-use super::reference::{CENTRE, LANES, MARGIN, Rows, SIDE, WINDOW};
+
+/// Side of the window in pixels.
+pub(super) const WINDOW: usize = 21;
+pub(super) const CENTRE: usize = WINDOW / 2;
+/// Pixels around the window for its gradient.
+pub(super) const MARGIN: usize = 2;
+/// Side of the window with this margin.
+pub(super) const SIDE: usize = WINDOW + 2 * MARGIN;
+/// Columns of the window, padded to whole vector registers; the padding has zero weight.
+pub(super) const LANES: usize = 24;
+/// Grey levels of a window, row by row.
+pub(super) type Rows = [[f32; LANES]; WINDOW];
 
 /// Minimum variance of a window, in squared grey levels.
 const MIN_VARIANCE: f32 = 4.0;

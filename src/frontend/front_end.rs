@@ -54,7 +54,7 @@ pub enum FrontEndError {
 
 /// A tracked feature in the previous image.
 #[derive(Clone, Debug)]
-struct Track {
+struct PreviousFeature {
     id: FeatureId,
     age: u32,
     uv_px: Vector2<f64>,
@@ -92,7 +92,7 @@ pub struct FrontEnd {
     options: FrontEndOptions,
     previous: Pyramid,
     now: Pyramid,
-    tracks: Vec<Track>,
+    tracks: Vec<PreviousFeature>,
     next_id: u64,
     coarse: CoarseAligner,
     detector: CornerDetector,
@@ -181,7 +181,7 @@ impl FrontEnd {
         statistics.detected = features.len() - steps.len();
         let references = steps.into_iter().map(|step| step.reference).chain(std::iter::repeat(None));
         self.tracks.clear();
-        self.tracks.extend(features.iter().zip(references).map(|(feature, reference)| Track {
+        self.tracks.extend(features.iter().zip(references).map(|(feature, reference)| PreviousFeature {
             id: feature.id,
             age: feature.age,
             uv_px: feature.uv_px,
@@ -237,7 +237,7 @@ impl FrontEnd {
         results.into_iter().flatten().collect()
     }
 
-    fn track(&self, track: &Track, guess_px: &Vector2<f64>, buffers: &mut Buffers) -> Option<Step> {
+    fn track(&self, track: &PreviousFeature, guess_px: &Vector2<f64>, buffers: &mut Buffers) -> Option<Step> {
         let options = &self.options.lucas_kanade;
         let Buffers { motion, search } = buffers;
         let near_px = lucas_kanade::approach(&self.previous, &self.now, &track.uv_px, guess_px, options, motion)?;
@@ -267,8 +267,13 @@ impl FrontEnd {
         })
     }
 
-    /// Pixel of a feature under a pure camera rotation; its previous pixel if the rotated one is out of view.
-    fn rotated(&self, track: &Track, rotation: &UnitQuaternion<f64>, rows: Option<&RowRotations>) -> Vector2<f64> {
+    /// Pixel of a feature under a rotation of the camera alone; its previous pixel when that is out of view.
+    fn rotated(
+        &self,
+        track: &PreviousFeature,
+        rotation: &UnitQuaternion<f64>,
+        rows: Option<&RowRotations>,
+    ) -> Vector2<f64> {
         let rotated_px = match rows {
             None => self.camera.project(&(rotation * track.bearing)),
             Some(rows) => {

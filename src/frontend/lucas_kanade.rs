@@ -7,22 +7,17 @@ use std::ops::Range;
 use nalgebra::Vector2;
 use pulp::{Arch, NullaryFnOnce};
 
-use super::products::sums_of_products;
+use super::products::{STRIDE, WINDOW, Weights, sums_of_products};
 use super::pyramid::{Pyramid, cut_out};
 use crate::geometry::planar_length;
 use crate::sensors::GrayImage;
 
-/// Side of the tracked square in pixels, on every level.
-const WINDOW: usize = 21;
 /// Columns of the window, padded to whole vector registers; the padding has zero weight.
 const LANES: usize = 24;
 /// Columns in a vector register.
 pub(super) const REGISTER: usize = 8;
 /// Distance of the centre from the first column or row of the window.
 const CENTRE: f32 = (WINDOW / 2) as f32;
-/// Elements from one row to the next, of the weights and of the region of the second image: with one stride for both, a sum
-/// over the window is a single loop.
-pub(super) const STRIDE: usize = 32;
 /// Rows of the region of the second image, so that the window can move within it.
 const SEARCH_HEIGHT: usize = 34;
 /// Largest first column and row of a window for which the neighbouring windows at one and two pixels also fit.
@@ -33,7 +28,6 @@ const LARGEST_WEIGHT: f32 = 16383.0;
 
 /// Region of the second image, row by row, grey levels less 128.
 type Search = [[i16; STRIDE]; SEARCH_HEIGHT];
-pub(super) type Weights = [i16; STRIDE * WINDOW];
 
 /// Options of the tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]

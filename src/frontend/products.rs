@@ -1,6 +1,11 @@
 //! Sums of products over a window at its position and at the neighbours to the right, below and diagonally.
 
-use super::lucas_kanade::{STRIDE, Weights};
+/// Side of the tracked square in pixels, on every level.
+pub(super) const WINDOW: usize = 21;
+/// Elements from one row to the next, of the weights and of the region of the second image: with one stride for both, a sum
+/// over the window is a single loop.
+pub(super) const STRIDE: usize = 32;
+pub(super) type Weights = [i16; STRIDE * WINDOW];
 
 /// Pixels from the first one of a window to the last one of its neighbours.
 pub(super) type Pixels = [i16; STRIDE * WINDOW_ROWS + STRIDE + 1];

@@ -10,24 +10,15 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::appearance::Appearance;
+use super::appearance::{Appearance, CENTRE, LANES, Rows, SIDE, WINDOW};
 use super::pyramid::cut_out;
 use super::resample::{BORDER, Patch};
 use crate::sensors::GrayImage;
 
-/// Side of the window in pixels.
-pub(super) const WINDOW: usize = 21;
-pub(super) const CENTRE: usize = WINDOW / 2;
-/// Pixels around the window for its gradient.
-pub(super) const MARGIN: usize = 2;
-/// Side of the window with this margin.
-pub(super) const SIDE: usize = WINDOW + 2 * MARGIN;
 /// Distance from the image's first column or row to the centre of the first window that can be resampled, in pixels.
 const NEAR_BORDER: f64 = (CENTRE + BORDER[0]) as f64;
 /// Distance from the centre of the last window that can be resampled to the image's last column or row, in pixels.
 const FAR_BORDER: f64 = (CENTRE + BORDER[1]) as f64;
-/// Columns of the window, padded to whole vector registers; the padding has zero weight.
-pub(super) const LANES: usize = 24;
 
 /// Options of the refinement against reference patches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,9 +51,6 @@ pub(super) struct ReferencePatch {
     /// Map from offsets in the reference to offsets in the newest image.
     warp: Matrix2<f64>,
 }
-
-/// Grey levels of a window, row by row.
-pub(super) type Rows = [[f32; LANES]; WINDOW];
 
 impl ReferencePatch {
     /// Window around a feature that moves by about `motion_px` to the image in which it is matched.

@@ -5,7 +5,7 @@
 use nalgebra::{Matrix2, Vector2};
 use pulp::{Arch, NullaryFnOnce};
 
-use super::reference::{CENTRE, LANES, Rows, WINDOW};
+use super::appearance::{CENTRE, LANES, Rows, WINDOW};
 use crate::sensors::GrayImage;
 
 /// Row stride of a patch, and its number of rows: enough for a window of twice the area at any rotation.

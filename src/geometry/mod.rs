@@ -4,34 +4,20 @@
 //! `t ← t + δt` (a vector in the outer frame).
 //! The paper's Eqs. 12–14 print the left form; `φ_left = R·φ_right`.
 
-mod angle;
-mod chi_square;
 pub mod dense;
 mod dimension;
-mod median;
-mod planar;
 mod rigid_transform;
+mod scalars;
 pub mod so3;
 mod split_mix;
-mod tangent;
 #[cfg(test)]
 mod tests;
 pub(crate) mod triangular_factor;
 
-pub use angle::{principal_angle, wrap_angle};
-pub use chi_square::mean_square_quantile;
 pub use dimension::Dimension;
-pub use median::median;
-pub(crate) use planar::planar_length;
 pub use rigid_transform::RigidTransform;
+pub(crate) use scalars::planar_length;
+pub use scalars::{
+    mean_square_quantile, median, ns_from_seconds, principal_angle, seconds_from_ns, tangent_basis, wrap_angle,
+};
 pub use split_mix::SplitMix64;
-pub use tangent::tangent_basis;
-
-pub fn seconds_from_ns(time_ns: i64) -> f64 {
-    time_ns as f64 * 1e-9
-}
-
-/// Rounded to the nearest nanosecond.
-pub fn ns_from_seconds(time_s: f64) -> i64 {
-    (time_s * 1e9).round() as i64
-}

@@ -1,34 +1,10 @@
+use std::f64::consts::PI;
+
 use nalgebra::{DVector, Vector6};
 
-use crate::geometry::{RigidTransform, so3};
-
+use super::form::Form;
 use super::{ClassicalChain, DhLink, ParameterId, ParameterPart, Parameterization, Quantity, conversion};
-
-/// Values of a chain with at least one joint in a minimal parameterization.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct MinimalChain {
-    /// Base rotations `rx ry`, or `ry rx` in the `yx` order, in radians.
-    pub(super) base_angles_rad: [f64; 2],
-    /// Base translation `tx ty` after those rotations, in metres.
-    pub(super) base_shift_m: [f64; 2],
-    /// All links; `alpha` of the last one belongs to the end block.
-    pub(super) links: Vec<DhLink>,
-    /// Rotation β about y in the end block.
-    pub(super) beta_rad: f64,
-    /// Translation along y in the end block.
-    pub(super) y_m: f64,
-}
-
-/// Values of a chain, one variant for each set of columns.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Form {
-    Classical(ClassicalChain),
-    Minimal(MinimalChain),
-    /// `X0 … XN`.
-    Poe(Vec<RigidTransform>),
-    /// Chain without joints: a single rigid transform in every parameterization but the classical one.
-    Rigid(RigidTransform),
-}
+use crate::geometry::{RigidTransform, so3, wrap_angle};
 
 /// Gimbal chain in one parameterization: its static calibration as named columns.
 ///
@@ -223,6 +199,38 @@ impl Chain {
             Form::Rigid(transform) => block(&mut values, transform),
         }
         DVector::from_vec(values)
+    }
+
+    /// Returns the canonical one of all chains of the same mechanism: middle angles of base and end within ±π/2, twists
+    /// of the middle links within 0 to π, offsets and other rotations within ±π. Parameterizations that are not minimal
+    /// return unchanged.
+    ///
+    /// Unique away from singularities and from parallel neighbouring axes.
+    #[must_use]
+    pub fn canonical(&self) -> Self {
+        if !matches!(self.form, Form::Minimal(_)) {
+            return self.clone();
+        }
+        let mut canonical = Self::from_classical(&self.to_classical(), self.parameterization);
+        canonical.offsets_hidden = self.offsets_hidden;
+        if let Form::Minimal(chain) = &mut canonical.form {
+            for index in 0..chain.links.len() - 1 {
+                let link = &mut chain.links[index];
+                link.alpha_rad = wrap_angle(link.alpha_rad);
+                if link.alpha_rad < 0.0 {
+                    // DH(θ, d, a, α) = DH(θ + π, d, −a, −α)·Rz(−π)
+                    link.theta_offset_rad += PI;
+                    link.a_m = -link.a_m;
+                    link.alpha_rad = -link.alpha_rad;
+                    chain.links[index + 1].theta_offset_rad -= PI;
+                }
+            }
+            for link in &mut chain.links {
+                link.theta_offset_rad = wrap_angle(link.theta_offset_rad);
+                link.alpha_rad = wrap_angle(link.alpha_rad);
+            }
+        }
+        canonical
     }
 
     fn push_link(&self, values: &mut Vec<f64>, link: &DhLink) {

@@ -1,15 +1,13 @@
 //! Conversions between the classical and the other parameterizations, in closed forms that exist for every
 //! chain (docs/mathematics.md, section 5).
 
-use std::f64::consts::PI;
-
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-use crate::geometry::{RigidTransform, wrap_angle};
+use crate::geometry::RigidTransform;
 
-use super::chain::{Form, MinimalChain};
+use super::form::MinimalChain;
 use super::frame::{Axis, Frame};
-use super::{Chain, ClassicalChain, DhLink, Parameterization};
+use super::{ClassicalChain, DhLink, Parameterization};
 
 /// A decomposition is singular when the cosine (or sine) of its middle angle is below this.
 const SINGULAR_COSINE: f64 = 1e-12;
@@ -214,38 +212,4 @@ fn split_inner(block: &Frame) -> (DhLink, f64, f64) {
     let joint_translation_m = if parallel { 0.0 } else { -shift.y / twist_sine };
     let d_m = shift.z - joint_translation_m * r[(2, 2)];
     (DhLink { theta_offset_rad, d_m, a_m: shift.x, alpha_rad }, joint_rotation_rad, joint_translation_m)
-}
-
-impl Chain {
-    /// Returns the canonical one of all chains of the same mechanism: middle angles of base and end within ±π/2, twists
-    /// of the middle links within 0 to π, offsets and other rotations within ±π. Parameterizations that are not minimal
-    /// return unchanged.
-    ///
-    /// Unique away from singularities and from parallel neighbouring axes.
-    #[must_use]
-    pub fn canonical(&self) -> Self {
-        if !matches!(self.form, Form::Minimal(_)) {
-            return self.clone();
-        }
-        let mut canonical = Self::from_classical(&self.to_classical(), self.parameterization);
-        canonical.offsets_hidden = self.offsets_hidden;
-        if let Form::Minimal(chain) = &mut canonical.form {
-            for index in 0..chain.links.len() - 1 {
-                let link = &mut chain.links[index];
-                link.alpha_rad = wrap_angle(link.alpha_rad);
-                if link.alpha_rad < 0.0 {
-                    // DH(θ, d, a, α) = DH(θ + π, d, −a, −α)·Rz(−π)
-                    link.theta_offset_rad += PI;
-                    link.a_m = -link.a_m;
-                    link.alpha_rad = -link.alpha_rad;
-                    chain.links[index + 1].theta_offset_rad -= PI;
-                }
-            }
-            for link in &mut chain.links {
-                link.theta_offset_rad = wrap_angle(link.theta_offset_rad);
-                link.alpha_rad = wrap_angle(link.alpha_rad);
-            }
-        }
-        canonical
-    }
 }

@@ -8,7 +8,7 @@ use nalgebra::{Matrix6xX, Vector3};
 
 use crate::geometry::RigidTransform;
 
-use super::chain::Form;
+use super::form::Form;
 use super::frame::{Axis, Frame};
 use super::{Chain, DhLink};
 

@@ -4,7 +4,8 @@ use nalgebra::{DVector, UnitQuaternion, Vector3};
 
 use crate::geometry::{RigidTransform, so3};
 
-use super::chain::{Form, take_block};
+use super::chain::take_block;
+use super::form::Form;
 use super::{Chain, DhLink};
 
 impl Chain {

@@ -10,6 +10,7 @@ mod chain;
 mod classical;
 mod conversion;
 mod covariance;
+mod form;
 mod frame;
 mod inverse;
 mod linearize;
@@ -29,7 +30,7 @@ pub use covariance::{generic_joint_angles, stacked_jacobian, transport, transpor
 pub use inverse::{InverseChain, InverseSolution};
 pub use linearize::ChainLinearization;
 pub use nearest::NearestForm;
-pub use parameter::{ParameterGroup, ParameterId, ParameterNames, ParameterPart, Quantity};
+pub use parameter::{ParameterGroup, ParameterId, ParameterNames, ParameterPart, Quantity, Singularity};
 pub use parameterization::{Parameterization, UnknownParameterization};
 pub use redundancy::redundant_directions;
-pub use singularity::{SWITCH_MARGIN, Singularity, auto_parameterization};
+pub use singularity::{SWITCH_MARGIN, auto_parameterization};

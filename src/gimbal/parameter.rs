@@ -2,9 +2,7 @@
 
 use crate::geometry::{Dimension, principal_angle};
 
-use super::Singularity;
-
-/// Scalar parameter of the static calibration: one column of its Jacobian.
+/// A scalar parameter of the static calibration: one column of its Jacobian.
 ///
 /// Cameras are numbered as in the estimator: 0 is the main camera, whose chain may have joints; further rigid cameras
 /// follow from 1.
@@ -423,6 +421,17 @@ impl ParameterNames {
         };
         part.has(quantity).then_some(ParameterId { part, quantity })
     }
+}
+
+/// Location of a singularity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Singularity {
+    /// Base block of a minimal parameterization.
+    Base,
+    /// End block of a minimal parameterization.
+    End,
+    /// Link, counted from 0, with parallel joint axes at both ends.
+    ParallelAxes(u8),
 }
 
 #[cfg(test)]

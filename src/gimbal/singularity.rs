@@ -1,9 +1,9 @@
 //! Singularity margins of the minimal parameterizations, and the choice between these parameterizations.
 
-use super::chain::Form;
 use super::conversion::end_block;
+use super::form::Form;
 use super::frame::Frame;
-use super::{Chain, ClassicalChain, Parameterization};
+use super::{Chain, ClassicalChain, Parameterization, Singularity};
 
 /// A minimal parameterization is replaced when its margin at base or end falls below this.
 pub const SWITCH_MARGIN: f64 = 0.3;
@@ -23,17 +23,6 @@ pub fn auto_parameterization(classical: &ClassicalChain) -> Parameterization {
     let margin_printed = end[(0, 1)].hypot(end[(1, 1)]);
     let margin_swapped = end[(0, 0)].hypot(end[(1, 0)]);
     Parameterization::minimal(margin_yx > margin_xy + TIE, margin_swapped > margin_printed + TIE)
-}
-
-/// Location of a singularity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Singularity {
-    /// Base block of a minimal parameterization.
-    Base,
-    /// End block of a minimal parameterization.
-    End,
-    /// Link, counted from 0, with parallel joint axes at both ends.
-    ParallelAxes(u8),
 }
 
 impl Chain {

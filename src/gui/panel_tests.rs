@@ -6,7 +6,7 @@ use super::rendering::headless::{HeadlessOptions, draw};
 use super::samples::{rigid_recording, sample_images, sample_recording, sample_recording_of};
 use super::tests::{keep_screenshot, with_context};
 use super::theme::{Theme, ThemeName};
-use super::{PanelContext, Selection};
+use super::{Panel as _, PanelContext, Selection};
 use crate::gimbal::tests::parameter;
 use crate::session::Recording;
 
@@ -129,11 +129,11 @@ fn residuals_are_drawn_in_every_case() {
 
 #[test]
 fn the_window_is_drawn_in_every_case() {
-    use super::window::{Preset, WindowState, window_ui};
-    check("window", [1920, 1080], |state: &mut WindowState, ui, ctx| window_ui(ui, state, ctx));
-    check("window-small", [1366, 768], |state: &mut WindowState, ui, ctx| window_ui(ui, state, ctx));
+    use super::window::{MainWindow, Preset, window_ui};
+    check("window", [1920, 1080], |state: &mut MainWindow, ui, ctx| window_ui(ui, state, ctx));
+    check("window-small", [1366, 768], |state: &mut MainWindow, ui, ctx| window_ui(ui, state, ctx));
     for preset in [Preset::Calibration, Preset::FrontEnd, Preset::Scene] {
-        let mut state = WindowState::default();
+        let mut state = MainWindow::default();
         state.arrange(preset);
         let (recording, selection) = (sample_recording(), Selection::default());
         let name = format!("window-{preset:?}");

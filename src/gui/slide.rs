@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use super::PanelContext;
 use crate::observability::{ChainSlide, SlidePosition, chain_of_step, slide};
-use crate::session::{RunRecord, StepRecord};
+use crate::session::{Recording, RunRecord, StepRecord};
 
 /// The last result and its inputs.
 #[derive(Clone, Debug, Default)]
@@ -20,32 +19,35 @@ impl PartialEq for MovedChain {
     }
 }
 
-/// Computes the moved chain if position, run or step has changed.
-pub(crate) fn update(ctx: &mut PanelContext<'_>) {
-    let run = ctx.recording.runs.get(ctx.selection.run);
-    let step = run.and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?)));
-    let (Some(position), Some((run, step))) = (&ctx.selection.slide, step) else {
-        ctx.selection.moved = MovedChain::default();
-        return;
-    };
-    let answered = ctx.selection.moved.answered.as_ref();
-    if answered.is_some_and(|(known, of)| known == position && Arc::ptr_eq(of, step)) {
-        return;
+impl MovedChain {
+    /// Computes the moved chain of a run's step when position, run or step has changed.
+    pub(super) fn update(
+        &mut self,
+        recording: &Recording,
+        step: Option<(&RunRecord, &Arc<StepRecord>)>,
+        position: Option<&SlidePosition>,
+    ) {
+        let (Some(position), Some((run, step))) = (position, step) else {
+            *self = Self::default();
+            return;
+        };
+        if self.answered.as_ref().is_some_and(|(known, of)| known == position && Arc::ptr_eq(of, step)) {
+            return;
+        }
+        let slide = moved(recording, run, step, position);
+        *self = Self { answered: Some((*position, Arc::clone(step))), slide: slide.map(Arc::new) };
     }
-    let slide = moved(ctx, run, step, position);
-    let answered = Some((*position, Arc::clone(step)));
-    ctx.selection.moved = MovedChain { answered, slide: slide.map(Arc::new) };
+
+    /// The moved chain if it belongs to the step with this stamp.
+    pub(super) fn at(&self, stamp_ns: i64) -> Option<&Arc<ChainSlide>> {
+        self.slide.as_ref().filter(|slide| slide.stamp_ns == stamp_ns)
+    }
 }
 
-fn moved(ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord, position: &SlidePosition) -> Option<ChainSlide> {
+fn moved(recording: &Recording, run: &RunRecord, step: &StepRecord, position: &SlidePosition) -> Option<ChainSlide> {
     let rank = step.rank.as_ref()?;
     let chain = chain_of_step(&step.report, rank)?;
     let weights = position.direction.weights(rank, &chain)?;
-    let camera = ctx.recording.rig.camera(&run.camera_key).ok()?;
+    let camera = recording.rig.camera(&run.camera_key).ok()?;
     slide(&step.report, &camera.model, &chain, &weights, position.amount)
-}
-
-/// Moved chain if it belongs to the step at the cursor.
-pub(crate) fn of<'a>(ctx: &'a PanelContext<'_>, stamp_ns: i64) -> Option<&'a Arc<ChainSlide>> {
-    ctx.selection.moved.slide.as_ref().filter(|slide| slide.stamp_ns == stamp_ns)
 }

@@ -2,9 +2,6 @@
 
 use nalgebra::UnitQuaternion;
 
-use super::statistics::median;
-use super::survey::Survey;
-use super::{Area, Findings, Severity};
 use crate::flight_log::attitude::{
     MAX_VEHICLE_GAP_NS, StampClock, TransformMerge, TransformPath, gimbal_kinds, rotation_at, topic_field,
     vehicle_topic,
@@ -13,7 +10,7 @@ use crate::flight_log::joint_merge::JointReading;
 use crate::flight_log::log::relative_ns;
 use crate::flight_log::messages::{self, MessageKind};
 use crate::flight_log::{FlightLog, LogError};
-use crate::geometry::{ns_from_seconds, seconds_from_ns};
+use crate::geometry::ns_from_seconds;
 use crate::sensors::{AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig};
 
 /// Attitudes farther apart are not interpolated.
@@ -207,63 +204,5 @@ impl AttitudeSurvey {
             }
         });
         solved.collect()
-    }
-}
-
-/// Tolerated rotation that the joints cannot reach: before calibration the chain may have an error of degrees.
-const UNREACHABLE_RAD: f64 = 0.035;
-
-/// Checks that the attitude is readable, that the joints can reach it, and that it determines their angles.
-pub(super) fn check_attitude(survey: &Survey, findings: &mut Findings) {
-    if let Some(problem) = &survey.attitude_problem {
-        let title = "the gimbal's attitude cannot be read";
-        let remedy = "correct gimbal.source; its topics and types are in the table of topics";
-        findings.add(Severity::Error, Area::Encoders, title, problem.clone(), remedy);
-    }
-    let Some(attitude) = &survey.attitude else { return };
-    for warning in &attitude.warnings {
-        let title = "the stamps of an attitude are of an unknown clock";
-        findings.add(Severity::Warning, Area::Time, title, warning.clone(), "record with synchronized clocks");
-    }
-    let all = attitude.values.len();
-    let solved = &survey.solved;
-    if solved.len() < all {
-        let evidence =
-            format!("{} of {all} attitudes are too far in time from an attitude of the vehicle", all - solved.len());
-        let remedy = format!(
-            "record the vehicle's attitude at 10 Hz or more; gaps above {:.1} s are not interpolated",
-            seconds_from_ns(MAX_VEHICLE_GAP_NS)
-        );
-        findings.add(Severity::Warning, Area::Encoders, "attitudes of the gimbal are not used", evidence, remedy);
-    }
-    if solved.is_empty() {
-        return;
-    }
-    let unreachable: Vec<f64> = solved.iter().map(|solved| solved.unreachable_rad).collect();
-    let worst = solved.iter().max_by(|a, b| a.unreachable_rad.total_cmp(&b.unreachable_rad));
-    let (worst_rad, worst_ns) = worst.map_or((0.0, 0), |worst| (worst.unreachable_rad, worst.reading.stamp_ns));
-    let evidence = format!(
-        "the nearest attitude of the joints within their limits differs by {:.2}° in the median, by at most {:.1}° at {:.1} s",
-        median(&unreachable).to_degrees(),
-        worst_rad.to_degrees(),
-        seconds_from_ns(worst_ns)
-    );
-    let beyond = unreachable.iter().filter(|angle| **angle > UNREACHABLE_RAD).count();
-    if beyond * 100 > solved.len() {
-        let severity = if beyond * 2 > solved.len() { Severity::Error } else { Severity::Warning };
-        let title = "the joints cannot reach the recorded attitude";
-        let remedy = "check frame, axes, order and unit of gimbal.source, then links and limits";
-        findings.add(severity, Area::Encoders, title, evidence, remedy);
-    } else {
-        findings.good(Area::Encoders, "the joints can reach the recorded attitude", evidence);
-    }
-    let undecided = solved.iter().filter(|solved| !solved.decided).count();
-    if undecided * 2 > solved.len() {
-        let title = "the limits of the joints admit two solutions";
-        let evidence =
-            format!("for {undecided} of {} attitudes; the one nearest to the previous is taken", solved.len());
-        let remedy =
-            "narrow the limits of gimbal.links to the mechanism's: a seek then need not read the log from its start";
-        findings.add(Severity::Note, Area::Encoders, title, evidence, remedy);
     }
 }

@@ -1,9 +1,12 @@
-use super::attitude;
-use super::statistics::percentile;
+use super::statistics::{median, percentile};
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
+use crate::flight_log::attitude::MAX_VEHICLE_GAP_NS;
 use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::sensors::{GimbalRig, Joint, Rig};
+
+/// Tolerated rotation that the joints cannot reach: before calibration the chain may have an error of degrees.
+const UNREACHABLE_RAD: f64 = 0.035;
 
 /// Range of motion over the log below which the parameters of a joint are unobservable.
 const MIN_RANGE_RAD: f64 = 0.05;
@@ -22,7 +25,7 @@ pub(super) fn check_joints(survey: &Survey, rig: &Rig, findings: &mut Findings) 
         let remedy = "joint angles are then estimated in every frame and need more observations to converge";
         return findings.add(Severity::Note, Area::Encoders, title, evidence, remedy);
     }
-    attitude::check_attitude(survey, findings);
+    check_attitude(survey, findings);
     if survey.joints.is_empty() {
         return;
     }
@@ -144,5 +147,60 @@ fn compare_sigma(name: &str, measured: f64, given: f64, findings: &mut Findings)
         findings.add(Severity::Note, Area::Encoders, title, evidence, remedy);
     } else {
         findings.good(Area::Encoders, format!("encoder noise of '{name}' agrees with the rig"), evidence);
+    }
+}
+
+/// Whether the attitude could be read, whether the joints can make it, and whether it determines their angles.
+fn check_attitude(survey: &Survey, findings: &mut Findings) {
+    if let Some(problem) = &survey.attitude_problem {
+        let title = "the gimbal's attitude cannot be read";
+        let remedy = "correct gimbal.source; its topics and types are in the table of topics";
+        findings.add(Severity::Error, Area::Encoders, title, problem.clone(), remedy);
+    }
+    let Some(attitude) = &survey.attitude else { return };
+    for warning in &attitude.warnings {
+        let title = "the stamps of an attitude are of an unknown clock";
+        findings.add(Severity::Warning, Area::Time, title, warning.clone(), "record with synchronized clocks");
+    }
+    let all = attitude.values.len();
+    let solved = &survey.solved;
+    if solved.len() < all {
+        let evidence =
+            format!("{} of {all} attitudes are too far in time from an attitude of the vehicle", all - solved.len());
+        let remedy = format!(
+            "record the vehicle's attitude at 10 Hz or more; gaps above {:.1} s are not interpolated",
+            seconds_from_ns(MAX_VEHICLE_GAP_NS)
+        );
+        findings.add(Severity::Warning, Area::Encoders, "attitudes of the gimbal are not used", evidence, remedy);
+    }
+    if solved.is_empty() {
+        return;
+    }
+    let unreachable: Vec<f64> = solved.iter().map(|solved| solved.unreachable_rad).collect();
+    let worst = solved.iter().max_by(|a, b| a.unreachable_rad.total_cmp(&b.unreachable_rad));
+    let (worst_rad, worst_ns) = worst.map_or((0.0, 0), |worst| (worst.unreachable_rad, worst.reading.stamp_ns));
+    let evidence = format!(
+        "the nearest attitude of the joints within their limits differs by {:.2}° in the median, by at most {:.1}° at {:.1} s",
+        median(&unreachable).to_degrees(),
+        worst_rad.to_degrees(),
+        seconds_from_ns(worst_ns)
+    );
+    let beyond = unreachable.iter().filter(|angle| **angle > UNREACHABLE_RAD).count();
+    if beyond * 100 > solved.len() {
+        let severity = if beyond * 2 > solved.len() { Severity::Error } else { Severity::Warning };
+        let title = "the joints cannot reach the recorded attitude";
+        let remedy = "check frame, axes, order and unit of gimbal.source, then links and limits";
+        findings.add(severity, Area::Encoders, title, evidence, remedy);
+    } else {
+        findings.good(Area::Encoders, "the joints can reach the recorded attitude", evidence);
+    }
+    let undecided = solved.iter().filter(|solved| !solved.decided).count();
+    if undecided * 2 > solved.len() {
+        let title = "the limits of the joints admit two solutions";
+        let evidence =
+            format!("for {undecided} of {} attitudes; the one nearest to the previous is taken", solved.len());
+        let remedy =
+            "narrow the limits of gimbal.links to the mechanism's: a seek then need not read the log from its start";
+        findings.add(Severity::Note, Area::Encoders, title, evidence, remedy);
     }
 }

@@ -3,6 +3,7 @@
 
 mod attitude;
 mod clock_alignment;
+mod gradient_sums;
 mod hand_eye;
 mod image_measure;
 mod images;
@@ -14,6 +15,7 @@ mod noise;
 mod pictures;
 mod readout;
 mod render;
+mod report;
 mod rig_sanity;
 mod rotation;
 mod source_fit;
@@ -33,122 +35,15 @@ pub use self::noise::{
     AllanPoint, AllanReport, AxisNoise, GivenNoise, NoiseTerm, NoiseTerms, SensorNoise, measure_noise,
 };
 
-use nalgebra::UnitQuaternion;
-use serde::Serialize;
+pub use self::report::{Area, CheckReport, Finding, ImageRotation, ProposedMask, Severity, TopicReport};
 
+use self::report::Findings;
 use self::survey::Survey;
 use crate::flight_log::attitude::{VEHICLE_KINDS, gimbal_kinds, topic_field};
 use crate::flight_log::log::WarningKind;
 use crate::flight_log::{FlightLog, LogError, MessageKind, TopicInfo};
-use crate::frontend::readout::RowTrack;
 use crate::geometry::seconds_from_ns;
-use crate::sensors::{ImageMask, Rig};
-
-/// Severity of a finding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Severity {
-    Good,
-    Note,
-    /// Degrades results or delays initialization.
-    Warning,
-    /// Makes results invalid until it is corrected.
-    Error,
-}
-
-/// Subject of a finding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Area {
-    /// The file and its topics.
-    Log,
-    /// Time bases, rates, gaps and order of stamps.
-    Time,
-    /// Units, gravity, biases, noise and saturation of the IMU.
-    #[serde(rename = "inertial")]
-    Imu,
-    /// Stationary and hovering periods, fast rotation.
-    Motion,
-    /// Joint angles and their limits.
-    Encoders,
-    /// Size, blur, exposure and texture.
-    Images,
-    /// Camera models and lenses.
-    Intrinsics,
-    /// Poses of the cameras relative to the IMU.
-    Extrinsics,
-}
-
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Finding {
-    pub severity: Severity,
-    pub area: Area,
-    /// In one sentence.
-    pub title: String,
-    /// Measured values with units.
-    pub evidence: String,
-    /// Instruction; empty if nothing needs to be done.
-    pub remedy: String,
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TopicReport {
-    pub topic: String,
-    /// Message type, such as `sensor_msgs/msg/Imu`.
-    pub schema: String,
-    /// `imu0`, `cam0`, `gimbal`, `ground truth`, `not in the rig`, or `ignored`.
-    pub role: String,
-    pub count: u64,
-    /// Mean rate over its log times, in Hz.
-    pub rate_hz: f64,
-    /// First header stamp since the log began, in seconds; log time for an ignored topic.
-    pub first_s: f64,
-    /// Last header stamp, as for `first_s`.
-    pub last_s: f64,
-    /// Median of log time minus header stamp in seconds, `None` for an ignored topic.
-    pub latency_s: Option<f64>,
-}
-
-/// Rotation between two images of one camera, measured from the images alone.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImageRotation {
-    pub camera_key: String,
-    /// Header stamp of the first image since the log began.
-    pub from_ns: i64,
-    /// Header stamp of the second image.
-    pub to_ns: i64,
-    /// Rotates vectors from the camera frame of the first image to that of the second.
-    pub second_from_first: UnitQuaternion<f64>,
-    /// Features of both images, for the readout; may be empty.
-    pub tracks: Vec<RowTrack>,
-}
-
-/// Result of [`check`].
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CheckReport {
-    pub log: String,
-    /// Name of the rig, `None` without a readable one.
-    pub rig: Option<String>,
-    /// Absolute header stamp of the log's start, in nanoseconds.
-    pub epoch_ns: i64,
-    /// Length of the log, in seconds.
-    pub duration_s: f64,
-    /// All topics, ordered by name.
-    pub topics: Vec<TopicReport>,
-    /// Most severe first, then by area.
-    pub findings: Vec<Finding>,
-    /// Masks for cameras with the vehicle in view.
-    #[serde(skip)]
-    pub proposed_masks: Vec<ProposedMask>,
-}
-
-/// Mask of the static pixels in the images of a camera.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ProposedMask {
-    pub camera_key: String,
-    /// The proposed pixels, without those of the rig's mask.
-    pub mask: ImageMask,
-}
+use crate::sensors::Rig;
 
 /// Checks an entire log against its rig.
 ///
@@ -197,37 +92,6 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         topics: topic_reports(log, &survey, rig.ok()),
         findings,
         proposed_masks,
-    }
-}
-
-impl CheckReport {
-    /// Highest severity of the findings.
-    pub fn worst(&self) -> Severity {
-        self.findings.iter().map(|finding| finding.severity).max().unwrap_or(Severity::Good)
-    }
-}
-
-/// Findings in the order of the checks.
-#[derive(Debug, Default)]
-struct Findings {
-    list: Vec<Finding>,
-}
-
-impl Findings {
-    fn add(
-        &mut self,
-        severity: Severity,
-        area: Area,
-        title: impl Into<String>,
-        evidence: impl Into<String>,
-        remedy: impl Into<String>,
-    ) {
-        let (title, evidence, remedy) = (title.into(), evidence.into(), remedy.into());
-        self.list.push(Finding { severity, area, title, evidence, remedy });
-    }
-
-    fn good(&mut self, area: Area, title: impl Into<String>, evidence: impl Into<String>) {
-        self.add(Severity::Good, area, title, evidence, "");
     }
 }
 

@@ -3,11 +3,12 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::attitude::{AttitudeSurvey, SolvedAttitude};
+use super::gradient_sums::GradientSums;
 use super::image_measure::{ImageMeasure, measure};
 use super::statistics::median;
-use super::still_pixels::GradientSums;
+use crate::flight_log::bit_depth::BitDepth;
 use crate::flight_log::container::DecodedBlock;
-use crate::flight_log::image_decoding::{BitDepth, decode_image};
+use crate::flight_log::image_decoding::{bit_depth_of_message, decode_image};
 use crate::flight_log::imu_merge::ImuMerge;
 use crate::flight_log::joint_merge::{JointMerge, JointReading};
 use crate::flight_log::log::relative_ns;
@@ -304,7 +305,8 @@ impl Survey {
             }
         }
         if sampled && let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic && kind.is_image()) {
-            let known = self.depths.get(&camera.key).copied().or_else(|| BitDepth::of(kind, data, log.file().limits()));
+            let known =
+                self.depths.get(&camera.key).copied().or_else(|| bit_depth_of_message(kind, data, log.file().limits()));
             if let Some(depth) = known {
                 self.depths.insert(camera.key.clone(), depth);
             }

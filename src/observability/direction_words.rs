@@ -1,7 +1,7 @@
 //! Directions of the calibration as text.
 
 use super::CalibrationDirection;
-use crate::gimbal::{ParameterGroup, ParameterId, ParameterNames, Quantity};
+use crate::gimbal::{ParameterId, ParameterNames};
 
 /// The parameters with the largest weights in a direction, `L1.d - I.tx`, at most `max_count`.
 pub fn parameters_of(
@@ -43,28 +43,11 @@ pub fn parameters_of_weights(
     text
 }
 
-/// Parameter with the second largest weight in a direction, if it or the leading one belongs to the shutter, the
-/// intrinsics of a camera or those of the IMU: a joint change of both hardly changes the measurements.
-pub(super) fn trades_with(parameters: &[ParameterId], direction: &CalibrationDirection) -> Option<ParameterId> {
-    const SMALLEST_RATIO: f64 = 0.3;
-    let leading = direction.leading(parameters)?;
-    let weight_of = |wanted: ParameterId| {
-        parameters.iter().zip(&direction.weights).find(|(it, _)| **it == wanted).map_or(0.0, |(_, weight)| weight.abs())
-    };
-    let others = parameters.iter().copied().filter(|parameter| *parameter != leading);
-    let partner = others.max_by(|a, b| weight_of(*a).total_cmp(&weight_of(*b)))?;
-    let of_sensor = |parameter: ParameterId| {
-        matches!(parameter.group(), ParameterGroup::Camera | ParameterGroup::Imu)
-            || parameter.quantity == Quantity::Readout
-    };
-    let takes_part = weight_of(partner) >= SMALLEST_RATIO * weight_of(leading);
-    (takes_part && (of_sensor(leading) || of_sensor(partner))).then_some(partner)
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::report::trades_with;
     use super::*;
-    use crate::gimbal::ParameterPart;
+    use crate::gimbal::{ParameterPart, Quantity};
 
     #[test]
     fn directions_are_named_by_their_largest_weights() {

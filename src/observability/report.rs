@@ -1,9 +1,8 @@
 use serde::Serialize;
 
-use super::direction_words::trades_with;
 use super::{KnownDirection, PackedFactor};
 use crate::estimator::allocated_bytes;
-use crate::gimbal::{ParameterId, ParameterNames, Singularity};
+use crate::gimbal::{ParameterGroup, ParameterId, ParameterNames, Quantity, Singularity};
 
 /// Ranks of the calibration block at one step, by the rule of docs/mathematics.md, section 8.
 #[derive(Clone, Debug, PartialEq)]
@@ -157,4 +156,22 @@ impl CalibrationDirection {
 
 fn of_vec<T>(vec: &Vec<T>) -> usize {
     allocated_bytes(vec.capacity() * size_of::<T>())
+}
+
+/// Parameter with the second largest weight in a direction, if it or the leading one belongs to the shutter, the
+/// intrinsics of a camera or those of the IMU: a joint change of both hardly changes the measurements.
+pub(super) fn trades_with(parameters: &[ParameterId], direction: &CalibrationDirection) -> Option<ParameterId> {
+    const SMALLEST_RATIO: f64 = 0.3;
+    let leading = direction.leading(parameters)?;
+    let weight_of = |wanted: ParameterId| {
+        parameters.iter().zip(&direction.weights).find(|(it, _)| **it == wanted).map_or(0.0, |(_, weight)| weight.abs())
+    };
+    let others = parameters.iter().copied().filter(|parameter| *parameter != leading);
+    let partner = others.max_by(|a, b| weight_of(*a).total_cmp(&weight_of(*b)))?;
+    let of_sensor = |parameter: ParameterId| {
+        matches!(parameter.group(), ParameterGroup::Camera | ParameterGroup::Imu)
+            || parameter.quantity == Quantity::Readout
+    };
+    let takes_part = weight_of(partner) >= SMALLEST_RATIO * weight_of(leading);
+    (takes_part && (of_sensor(leading) || of_sensor(partner))).then_some(partner)
 }

@@ -153,7 +153,7 @@ struct Window<'a> {
 }
 
 /// A feature with its bearing and depth in the anchor's camera, and its observing frames.
-struct Track {
+struct AnchoredFeature {
     anchor: usize,
     /// `(x/z, y/z, 1)`.
     ray: Vector3<f64>,
@@ -162,13 +162,13 @@ struct Track {
 }
 
 impl Window<'_> {
-    fn track(&self, feature: &FeatureReport) -> Option<Track> {
+    fn track(&self, feature: &FeatureReport) -> Option<AnchoredFeature> {
         let slot_of = |index: usize| self.report.window.iter().position(|frame| frame.frame_index == index);
         let anchor = slot_of(feature.anchor_frame_index)?;
         let bearing = self.camera.unproject(&feature.observations.iter().next()?.measured_px)?;
         let seen = feature.observations.iter().skip(1);
         let observers: Vec<usize> = seen.filter_map(|seen| slot_of(seen.frame_index)).collect();
-        (bearing.z > 0.0 && !observers.is_empty()).then(|| Track {
+        (bearing.z > 0.0 && !observers.is_empty()).then(|| AnchoredFeature {
             anchor,
             ray: bearing / bearing.z,
             inverse_depth_per_m: feature.inverse_depth_per_m.max(FARTHEST_PER_M),
@@ -177,7 +177,7 @@ impl Window<'_> {
     }
 }
 
-impl Track {
+impl AnchoredFeature {
     /// Predicted pixels, one per observing frame.
     fn pixels(
         &self,

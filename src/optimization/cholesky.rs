@@ -1,6 +1,6 @@
 //! Cholesky factorization of a symmetric matrix that skips zeros.
 
-#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+#![expect(clippy::inline_always, reason = "code that is not inlined is not compiled for the registers of its caller")]
 
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};

@@ -1,7 +1,7 @@
 //! Elimination of a landmark by QR: the rows of its observations are projected orthogonally onto the complement of the
 //! landmark's columns. No normal equations are formed, so exactly unobservable directions stay exactly unobservable.
 
-#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+#![expect(clippy::inline_always, reason = "code that is not inlined is not compiled for the registers of its caller")]
 
 use std::ops::Range;
 

@@ -11,7 +11,7 @@
 //!
 //! `H_ll` is block-diagonal, 3 × 3 per landmark.
 
-#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+#![expect(clippy::inline_always, reason = "code that is not inlined is not compiled for the registers of its caller")]
 
 mod sparse;
 

@@ -1,7 +1,7 @@
 //! Simulated sensor faults and calibration errors.
 
+use super::error::SimulationError;
 use super::interval::during;
-use super::options::SimulationError;
 use super::vibration::Vibration;
 
 /// Simulated sensor faults and calibration errors; none by default.

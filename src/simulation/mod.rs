@@ -9,6 +9,8 @@
 #[cfg(feature = "logs")]
 mod disturbances;
 mod equipment;
+#[cfg(feature = "logs")]
+mod error;
 mod exercise;
 mod experiment;
 mod gimbal;
@@ -35,12 +37,14 @@ mod world;
 #[cfg(feature = "logs")]
 pub use disturbances::Disturbances;
 pub use equipment::{IntrinsicsError, Lens};
+#[cfg(feature = "logs")]
+pub use error::SimulationError;
 pub use exercise::{Exercise, JOINT_PERIOD_S, JointSwing, ROCK_M, ROCK_PERIOD_S, SWING_M, VehicleSwing, YAW_SWING_RAD};
 pub use experiment::{Environment, Experiment};
 pub use gimbal::JointMotion;
 pub use imu::ImuBias;
 #[cfg(feature = "logs")]
-pub use options::{SimulationError, SimulationOptions, SimulationProgress, SimulationSummary};
+pub use options::{SimulationOptions, SimulationProgress, SimulationSummary};
 #[cfg(feature = "logs")]
 pub use simulate::{simulate, simulate_interruptible};
 pub use synthetic::{

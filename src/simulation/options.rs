@@ -1,11 +1,9 @@
 use std::path::PathBuf;
 
-use thiserror::Error;
-
 use super::disturbances::Disturbances;
 use super::equipment::Lens;
+use super::error::SimulationError;
 use super::experiment::Experiment;
-use crate::flight_log::LogError;
 use crate::sensors::ChainPrior;
 
 /// Flight and sensors of a simulation; [`SimulationOptions::new`] gives an experiment of the paper.
@@ -98,27 +96,4 @@ pub struct SimulationSummary {
 pub struct SimulationProgress {
     pub images_done: usize,
     pub images_total: usize,
-}
-
-/// Reason that a simulation ended without its files.
-#[derive(Debug, Error)]
-pub enum SimulationError {
-    /// A disturbance that cannot be parsed.
-    #[error("disturbance '{text}': {expected}")]
-    BadDisturbance { text: String, expected: String },
-    /// An option out of its range.
-    #[error("{option} is {value}: expected {low} to {high}")]
-    BadOption { option: &'static str, value: f64, low: f64, high: f64 },
-    /// An image could not be compressed.
-    #[error("cannot compress an image as JPEG: {problem}")]
-    Image {
-        /// Message of the encoder.
-        problem: String,
-    },
-    /// Stopped by the caller.
-    #[error("interrupted after {images_done} of {images_total} images; nothing is written")]
-    Interrupted { images_done: usize, images_total: usize },
-    /// A file could not be written.
-    #[error(transparent)]
-    Log(#[from] LogError),
 }

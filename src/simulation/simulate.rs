@@ -11,9 +11,10 @@ use rayon::prelude::*;
 
 use super::disturbances::{BLANK_GREY, EXPOSURE_DRIFT, VIGNETTING};
 use super::equipment::{Equipment, IntrinsicsError};
+use super::error::SimulationError;
 use super::experiment::Experiment;
 use super::interval::during;
-use super::options::{SimulationError, SimulationOptions, SimulationProgress, SimulationSummary};
+use super::options::{SimulationOptions, SimulationProgress, SimulationSummary};
 use super::random::RandomStream;
 use super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};

@@ -282,8 +282,8 @@ fn trajectory(options: &SyntheticOptions) -> Trajectory {
     )
 }
 
-/// Feature with its state between frames.
-struct Track {
+/// A feature on its way through the frames.
+struct SyntheticTrack {
     id: FeatureId,
     age: u32,
     landmark_m: Vector3<f64>,
@@ -301,7 +301,7 @@ struct Tracker {
     pixel_sigma_px: f64,
     outlier_ratio: f64,
     features: usize,
-    tracks: Vec<Track>,
+    tracks: Vec<SyntheticTrack>,
     landmarks: BTreeMap<FeatureId, Vector3<f64>>,
     next_id: u64,
     before: Option<RigidTransform>,
@@ -421,7 +421,7 @@ impl Tracker {
             let slips = self.random.chance(self.outlier_ratio);
             let life = 2.0 - LIFE_FRAMES * (1.0 - self.random.unit()).ln();
             self.landmarks.insert(id, landmark_m);
-            self.tracks.push(Track {
+            self.tracks.push(SyntheticTrack {
                 id,
                 age: 0,
                 landmark_m,

@@ -1,6 +1,6 @@
 //! Studies: the runs that a plan defines, and the tables of their results.
 //!
-//! Everything here is plain data and computation on it; files are read and written by `export/study/`, processes are
+//! Everything here is plain data and computation on it; files are read and written by `sweep/`, processes are
 //! started by the command line.
 //!
 //! - `plan/`: the TOML text of a plan as typed values; every error names line and key.

@@ -2,6 +2,7 @@
 //! those of the program.
 
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -215,7 +216,7 @@ fn named_paths(text: &str) -> Vec<(String, Vec<String>)> {
         let (before, quoted) = (pair[0], pair[1]);
         if [".rs", ".md", "/"].iter().any(|end| quoted.ends_with(end)) {
             named.push((quoted.to_owned(), Vec::new()));
-            separator = quoted.ends_with(".rs").then_some(": ");
+            separator = (Path::new(quoted).extension() == Some(OsStr::new("rs"))).then_some(": ");
         } else if let Some((_, names)) = named.last_mut().filter(|_| separator == Some(before)) {
             names.push(quoted.to_owned());
             separator = Some(", ");

@@ -1,11 +1,12 @@
-//! One-way order of the folders of `src/`, read from their imports.
+//! The one-way order of the folders of `src/` and of the files in them, read from their imports.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Folders from the first to the last; each may use those before it. The table in `src/lib.rs` lists the contract of
-/// each.
-const ORDER: [&str; 18] = [
+use super::imports::{Imports, is_test_file};
+
+/// Folders from the first to the last; each may use those before it. The table in `src/lib.rs` says what each promises.
+const ORDER: [&str; 22] = [
     "geometry",
     "camera",
     "gimbal",
@@ -22,6 +23,10 @@ const ORDER: [&str; 18] = [
     "study",
     "gui",
     "export",
+    "interop",
+    "report",
+    "sweep",
+    "desktop",
     "cli",
     "main",
 ];
@@ -36,10 +41,13 @@ const UNKNOWN_TO: [(&str, &[&str]); 5] = [
 ];
 
 /// The only folders that may open, read or write files.
-const FILE_SYSTEM: [&str; 3] = ["flight_log", "export", "cli"];
+const FILE_SYSTEM: [&str; 7] = ["flight_log", "export", "interop", "report", "sweep", "desktop", "cli"];
 
 /// The only folders that may name the crates of the window; `export` draws its panels.
 const WINDOW: [&str; 3] = ["gui", "export", "cli"];
+
+/// Folders whose files may still import each other in a circle, until they are untied.
+const CIRCLES_ALLOWED: [&str; 2] = ["estimator/", "observability/laboratory/"];
 
 /// One source file: the folder it belongs to and its text without comments.
 struct Source {
@@ -62,10 +70,7 @@ fn sources() -> Vec<Source> {
             } else if path.extension().is_some_and(|extension| extension == "rs") {
                 let inside = path.strip_prefix(&root).expect("the file is below the root");
                 let first = inside.components().next().expect("the path has a name").as_os_str().to_string_lossy();
-                let test = inside.iter().any(|part| {
-                    let part = part.to_string_lossy();
-                    part.starts_with("tests") || part.ends_with("_tests.rs")
-                });
+                let test = is_test_file(&inside.to_string_lossy().replace('\\', "/"));
                 let text = code_of(&fs::read_to_string(&path).expect("the source is UTF-8"));
                 sources.push(Source { folder: first.trim_end_matches(".rs").to_owned(), text, test, path });
             }
@@ -180,4 +185,33 @@ fn only_some_folders_name_the_window_and_the_file_system() {
         only_in(&FILE_SYSTEM, &["std::fs", "fs::read", "fs::write", "File::open", "File::create"]);
     }
     fail_on(&violations);
+}
+
+#[test]
+fn circles_are_found_through_groups_parents_and_reexports() {
+    let file = |name: &str, text: &str| (name.to_owned(), text.to_owned());
+    let circles = |texts: &[(String, String)]| Imports::of(texts.to_vec()).circles(&[]);
+    let parent = file("a/mod.rs", "mod b;\nmod c;\npub use c::C;");
+    let tied = [
+        file("lib.rs", "mod a;"),
+        parent.clone(),
+        file("a/b.rs", "use super::C;\npub struct B;\nfn text() -> &'static str { \"crate::a::c::C\" }"),
+        file("a/c.rs", "use std::{fmt, fs};\nuse crate::a::{b::{self, D as E}};\npub struct C(b::B);"),
+    ];
+    assert_eq!(circles(&tied), [["a/b.rs -> a/c.rs: C", "a/c.rs -> a/b.rs: B, D"]]);
+
+    let untied = [
+        file("lib.rs", "mod a;"),
+        parent,
+        file("a/b.rs", "pub struct B;\n#[cfg(test)]\nmod tests {\n    use super::super::c::C;\n}"),
+        file("a/c.rs", "use super::b::B;\npub struct C(B);\nmod inner {\n    use super::C;\n}"),
+    ];
+    assert_eq!(circles(&untied), Vec::<Vec<String>>::new());
+}
+
+#[test]
+fn no_files_import_each_other_in_a_circle() {
+    let circles = Imports::read().circles(&CIRCLES_ALLOWED);
+    let lines: Vec<String> = circles.iter().map(|circle| circle.join("\n")).collect();
+    assert!(lines.is_empty(), "{} circles:\n{}", lines.len(), lines.join("\n\n"));
 }

@@ -8,6 +8,7 @@ mod dependencies;
 mod documentation;
 mod evaluate;
 mod hostile_logs;
+mod imports;
 mod layering;
 mod masks;
 mod other_estimators;

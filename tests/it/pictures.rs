@@ -19,8 +19,8 @@ use dcvins::gui::rendering::headless::{self, Headless, HeadlessOptions};
 use dcvins::gui::rendering::painter::Painter;
 use dcvins::gui::study::{StudyOptions, StudyPanel};
 use dcvins::gui::theme::{Theme, ThemeName};
-use dcvins::gui::window::{Dialog, PanelName, Preset, WindowState, window_ui};
-use dcvins::gui::{PanelContext, Playback, Presentation, Selection};
+use dcvins::gui::window::{MainWindow, Preset, window_ui};
+use dcvins::gui::{Dialog, PanelContext, PanelName, Playback, Presentation, Selection};
 use dcvins::session::breakpoints::Breakpoints;
 use dcvins::session::{self, Recording, SessionPlan, SessionRequest};
 use dcvins::study::view::Study;
@@ -115,7 +115,7 @@ impl Subject {
             Self::Panel(name) => panel(name.as_str(), ScreenshotOptions::default()),
             Self::Layout(layout) => panel("all", ScreenshotOptions { layout, ..Default::default() }),
             Self::Dialog(_) | Self::Shortcuts => {
-                let (mut state, mut selection) = (WindowState::default(), Selection::default());
+                let (mut state, mut selection) = (MainWindow::default(), Selection::default());
                 match self {
                     Self::Dialog(dialog) => state.dialogs.show(dialog),
                     _ => state.shortcuts_open = true,

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-use dcvins::export::study::read_parquet;
 use dcvins::study::StudyTable;
+use dcvins::sweep::read_parquet;
 
 use crate::sample_folder;
 

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use dcvins::export::study::write_parquet;
-use dcvins::export::{OpenedStudy, is_study};
+use dcvins::sweep::write_parquet;
+use dcvins::sweep::{OpenedStudy, is_study};
 
 use crate::study_sample;
 

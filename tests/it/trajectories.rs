@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use dcvins::export::OpenedStudy;
-use dcvins::export::study::read_parquet;
 use dcvins::flight_log::FlightLog;
 use dcvins::gui::app::StudySource;
 use dcvins::study::view::comparable_rows;
+use dcvins::sweep::OpenedStudy;
+use dcvins::sweep::read_parquet;
 use serde_json::Value;
 
 use crate::sample_folder;

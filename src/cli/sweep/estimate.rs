@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use dcvins::study::{JobLog, KeyedJob};
 use serde::Serialize;
 
-use super::Sweep;
+use super::opened::Sweep;
 use super::pool::{Pool, PoolLimits, duration_text};
 use crate::cli::exit::Outcome;
 use crate::cli::interrupt::Interrupt;
@@ -24,7 +24,7 @@ struct ListedJob {
 
 /// Expected cost of the jobs.
 #[derive(Debug, Serialize)]
-struct Estimate {
+struct SweepEstimate {
     /// Number of jobs that are not done.
     jobs: usize,
     /// Number of flights that are not rendered.
@@ -42,7 +42,7 @@ struct Estimate {
 #[derive(Debug, Serialize)]
 struct DryRun {
     jobs: Vec<ListedJob>,
-    estimate: Estimate,
+    estimate: SweepEstimate,
 }
 
 /// Measured cost of the jobs that are done.
@@ -144,8 +144,8 @@ fn log_s(sweep: &Sweep, job: &KeyedJob) -> f64 {
     job.job.log.duration_s().or_else(of_flight).unwrap_or(0.0)
 }
 
-/// Estimates the time from the seconds of log if they are known, else from the number of jobs.
-fn estimate(sweep: &Sweep, limits: &PoolLimits, measured: &Measured) -> Estimate {
+/// Time by the seconds of log where they are known, else by the number of jobs.
+fn estimate(sweep: &Sweep, limits: &PoolLimits, measured: &Measured) -> SweepEstimate {
     let left: Vec<&KeyedJob> = sweep.jobs.iter().filter(|job| !sweep.folder.is_done(&job.key, &sweep.plan)).collect();
     let mut flights = BTreeMap::new();
     for job in &left {
@@ -169,7 +169,7 @@ fn estimate(sweep: &Sweep, limits: &PoolLimits, measured: &Measured) -> Estimate
         flights.values().map(|duration_s| duration_s.map_or(render_mean_s, |seconds| seconds * render_per_s)).sum();
     let by_memory = limits.memory_bytes.checked_div(measured.memory_bytes).unwrap_or(u64::MAX);
     let at_once = limits.jobs.min(usize::try_from(by_memory).unwrap_or(usize::MAX)).clamp(1, left.len().max(1));
-    Estimate {
+    SweepEstimate {
         jobs: left.len(),
         flights: flights.len(),
         at_once,

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
-use dcvins::export::study::StudyFolder;
 use dcvins::study::{SimulatedFlight, StudyOutput};
+use dcvins::sweep::StudyFolder;
 
 use crate::cli::exit::{INTERRUPTED, Outcome};
 

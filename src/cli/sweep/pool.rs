@@ -7,9 +7,9 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result};
-use dcvins::export::study::StudyFolder;
 use dcvins::session::Stopwatch;
 use dcvins::study::{JobCosts, JobLog, JobStatus, KeyedJob, SimulatedFlight, StudyPlan};
+use dcvins::sweep::StudyFolder;
 
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::Progress;

@@ -6,11 +6,12 @@ use std::process::{Command, Output};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
-use dcvins::export::study::write_text;
 use dcvins::study::{self, JobCosts, JobLog, JobStatus, KeyedJob, SlurmOptions};
+use dcvins::sweep::write_text;
 
+use super::arguments::SweepArguments;
+use super::opened::Sweep;
 use super::pool::{PoolOutcome, last_lines};
-use super::{Sweep, SweepArguments};
 use crate::cli::exit::JOBS_FAILED;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{Progress, notify};

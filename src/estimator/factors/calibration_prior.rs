@@ -16,7 +16,7 @@ impl<'a> CalibrationPriorFactor<'a> {
     /// Factor of the window, `None` if the calibration is fixed.
     pub(crate) fn of(point: &Point<'a>) -> Option<Self> {
         let start = point.layout.calibration().start;
-        (point.layout.calibration > 0).then(|| Self { calibration: &point.at.calibration, start })
+        (point.layout.calibration > 0).then_some(Self { calibration: &point.at.calibration, start })
     }
 }
 

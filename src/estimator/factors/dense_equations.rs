@@ -84,6 +84,7 @@ impl DenseEquations {
 
 impl Scratch {
     /// Computes the products of the blocks; sums run over the rows in their order.
+    #[expect(clippy::inline_always, reason = "the caller passes a constant width for the largest factor")]
     #[inline(always)]
     fn multiply(&mut self, rows: &Rows<'_>, width: usize) {
         let height = rows.residual.len();

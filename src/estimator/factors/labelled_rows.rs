@@ -47,7 +47,7 @@ impl<W: Fn(FactorLabel) -> bool> LabelledRows<W> {
     }
 
     /// Rows of each part.
-    pub(crate) fn matrices(&self) -> impl Iterator<Item = &DMatrix<f64>> + Clone {
+    pub(crate) fn matrices(&self) -> impl Iterator<Item = &DMatrix<f64>> {
         self.parts.iter().map(|part| &part.rows)
     }
 
@@ -55,7 +55,7 @@ impl<W: Fn(FactorLabel) -> bool> LabelledRows<W> {
     pub(crate) fn by_factor(&self) -> impl Iterator<Item = (FactorLabel, DMatrix<f64>)> + '_ {
         self.parts
             .chunk_by(|one, next| one.label == next.label)
-            .map(|parts| (parts[0].label, stack(parts.iter().map(|part| &part.rows), 0..self.columns + 1)))
+            .map(|parts| (parts[0].label, stack(parts.iter().map(|part| &part.rows), 0..=self.columns)))
     }
 }
 
@@ -83,15 +83,16 @@ impl<W: Fn(FactorLabel) -> bool> Sink for LabelledRows<W> {
 
 /// Stacks the given columns of matrices.
 pub(crate) fn stack<'a>(
-    parts: impl Iterator<Item = &'a DMatrix<f64>> + Clone,
-    columns: impl IntoIterator<Item = usize, IntoIter: ExactSizeIterator>,
+    parts: impl IntoIterator<Item = &'a DMatrix<f64>>,
+    columns: impl IntoIterator<Item = usize>,
 ) -> DMatrix<f64> {
-    let columns = columns.into_iter();
-    let height = parts.clone().map(DMatrix::nrows).sum();
+    let (parts, columns): (Vec<&DMatrix<f64>>, Vec<usize>) =
+        (parts.into_iter().collect(), columns.into_iter().collect());
+    let height = parts.iter().map(|part| part.nrows()).sum();
     let mut stacked = DMatrix::zeros(height, columns.len());
-    for (target, source) in columns.enumerate() {
+    for (target, source) in columns.into_iter().enumerate() {
         let mut start = 0;
-        for part in parts.clone() {
+        for part in &parts {
             stacked.view_mut((start, target), (part.nrows(), 1)).copy_from(&part.column(source));
             start += part.nrows();
         }

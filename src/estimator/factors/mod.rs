@@ -2,7 +2,7 @@
 //!
 //! A factor takes states and measurements and passes its rows to a sink: costs, normal equations, or labelled rows.
 //! It does not depend on the window. A further sensor is a file here and a line in
-//! [`Problem::measurements`](super::problem::problem::Problem::measurements).
+//! `measurements.rs`; a further kind of factor is also a variant of [`FactorKind`] and `FactorLabel`.
 
 pub(crate) mod calibration_prior;
 pub(crate) mod costs;
@@ -14,6 +14,7 @@ pub(crate) mod joint_motion;
 pub(crate) mod kind;
 pub(crate) mod labelled_rows;
 pub(crate) mod marginal_prior;
+pub(crate) mod measurements;
 pub(crate) mod packed_prior;
 pub(crate) mod projected_rows;
 pub(crate) mod reprojection;

@@ -6,6 +6,7 @@ use super::information_gain::CameraInformation;
 use super::problem::Problem;
 use crate::estimator::factors::kind::{FactorKind, FactorLabel};
 use crate::estimator::factors::labelled_rows::{LabelledPart, LabelledRows, stack};
+use crate::estimator::factors::measurements::measurements;
 use crate::estimator::factors::projected_rows::NewestRows;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::camera_pose::CameraMaps;
@@ -105,9 +106,9 @@ impl Problem<'_> {
             }
         }
         let point = self.point(estimate, &frames);
-        let mut measurements = LabelledRows::new(layout.total());
-        self.measurements(&point, layout.frames, &mut measurements);
-        let imu = || measurements.parts.iter().filter(|part| part.label.kind() == FactorKind::Imu);
+        let mut measured_rows = LabelledRows::new(layout.total());
+        measurements(&point, layout.frames, &mut measured_rows);
+        let imu = || measured_rows.parts.iter().filter(|part| part.label.kind() == FactorKind::Imu);
         let squared = |column: usize| imu().map(|part| part.rows.column(column).norm_squared()).sum::<f64>();
         let imu_columns = estimate.calibration.imu_columns();
         norms.extend(imu_columns.map(|column| squared(layout.calibration().start + column).sqrt()));
@@ -130,7 +131,7 @@ impl Problem<'_> {
         Linearization {
             columns: column_blocks(&layout, &of(false), numbers),
             fixed_parameters: of(true),
-            jacobian: stack(measured.iter().chain(measurements.matrices()), order.iter().copied()),
+            jacobian: stack(measured.iter().chain(measured_rows.matrices()), order.iter().copied()),
             prior_jacobian: stack(priors.matrices(), order.iter().copied()),
             rig_prior_rows,
             calibration_column_norms: DVector::from_vec(norms),

@@ -6,6 +6,7 @@ use super::problem::Problem;
 use crate::estimator::factors::kind::FactorLabel;
 use crate::estimator::factors::labelled_rows::{LabelledRows, stack};
 use crate::estimator::factors::marginal_prior::Prior;
+use crate::estimator::factors::measurements::measurements;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame::Frame;
 
@@ -21,7 +22,7 @@ pub(crate) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior
     let mut priors = LabelledRows::of(total, |label| label != FactorLabel::CalibrationPrior);
     problem.priors(&point, &mut priors);
     let mut measured = LabelledRows::new(total);
-    problem.measurements(&point, layout.frames.min(2), &mut measured);
+    measurements(&point, layout.frames.min(2), &mut measured);
     measured.parts.retain(|part| part.touches(&layout.frame(0)));
     measured.parts.sort_by_key(|part| part.touches(&layout.frame(1)));
     let visual = problem.visual_rows(estimate);
@@ -39,7 +40,7 @@ pub(crate) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -
     let frames = problem.linearization_frames(estimate);
     let label = FactorLabel::Encoder(slot as u16);
     let mut readings = LabelledRows::of(problem.layout.total(), |wanted| wanted == label);
-    problem.measurements(&problem.point(estimate, &frames), slot + 1, &mut readings);
+    measurements(&problem.point(estimate, &frames), slot + 1, &mut readings);
     let carried = prior.rows(&problem.layout, &problem.first_estimate_offset(estimate));
     let parts = [&carried].into_iter().chain(readings.parts.iter().map(|part| &part.rows));
     eliminated(problem, estimate, parts, slot)
@@ -49,11 +50,11 @@ pub(crate) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -
 fn eliminated<'a>(
     problem: &Problem<'_>,
     estimate: &Estimate,
-    parts: impl Iterator<Item = &'a DMatrix<f64>> + Clone,
+    parts: impl Iterator<Item = &'a DMatrix<f64>>,
     slot: usize,
 ) -> Option<Prior> {
     let total = problem.layout.total();
-    let mut rows = stack(parts, 0..total + 1);
+    let mut rows = stack(parts, 0..=total);
     let shift = rows.columns(0, total) * problem.first_estimate_offset(estimate);
     let mut residual = rows.column_mut(total);
     residual -= shift;

@@ -7,15 +7,12 @@ use nalgebra::{DMatrix, DVector, Vector3, Vector6};
 use crate::estimator::factors::calibration_prior::CalibrationPriorFactor;
 use crate::estimator::factors::costs::Costs;
 use crate::estimator::factors::dense_equations::DenseEquations;
-use crate::estimator::factors::encoder::EncoderFactor;
 use crate::estimator::factors::factor::{Point, Sink};
-use crate::estimator::factors::imu::ImuFactor;
-use crate::estimator::factors::joint_motion::JointMotionFactor;
 use crate::estimator::factors::kind::FactorKind;
 use crate::estimator::factors::marginal_prior::{MarginalPriorFactor, Prior};
+use crate::estimator::factors::measurements::measurements;
 use crate::estimator::factors::reprojection::{self, ReducedVisualEquations, VisualEquations, VisualModel};
 use crate::estimator::factors::start_prior::{StartPrior, StartPriorFactor};
-use crate::estimator::factors::zero_velocity::ZeroVelocityFactor;
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::camera_pose::CameraMaps;
 use crate::estimator::state::camera_view::CameraView;
@@ -94,20 +91,6 @@ impl Problem<'_> {
         }
     }
 
-    /// Passes the measurements of the frames before `slots` to a sink, without reprojections.
-    pub(crate) fn measurements(&self, point: &Point<'_>, slots: usize, sink: &mut impl Sink) {
-        for slot in 1..slots {
-            sink.take(ImuFactor::of(point, slot));
-        }
-        for slot in 0..slots {
-            sink.take(EncoderFactor::of(point, slot));
-            sink.take(JointMotionFactor::of(point, slot));
-        }
-        for slot in 0..slots {
-            sink.take(ZeroVelocityFactor::of(point, slot));
-        }
-    }
-
     /// Passes the priors to a sink.
     pub(crate) fn priors(&self, point: &Point<'_>, sink: &mut impl Sink) {
         sink.take(CalibrationPriorFactor::of(point));
@@ -127,7 +110,7 @@ impl Problem<'_> {
             costs.add_to(FactorKind::Visual, squared, 2 * observations);
         }
         let point = self.point(estimate, &estimate.frames);
-        self.measurements(&point, self.frames.len(), &mut costs);
+        measurements(&point, self.frames.len(), &mut costs);
         self.priors(&point, &mut costs);
         costs
     }
@@ -185,7 +168,7 @@ impl Problem<'_> {
     ) -> DenseEquations {
         let mut equations = DenseEquations::zeros(self.layout.total());
         let point = self.point(estimate, linearized);
-        self.measurements(&point, slots, &mut equations);
+        measurements(&point, slots, &mut equations);
         self.priors(&point, &mut equations);
         equations
     }

@@ -23,7 +23,7 @@ impl Problem<'_> {
                 self.carried_rows(camera, &projected, &maps)
             })
             .collect();
-        stack(rows.iter(), 0..self.layout.total() + 1)
+        stack(&rows, 0..=self.layout.total())
     }
 
     /// Rows of the reprojection factors of one camera by its blocks, landmarks eliminated; derivatives at `linearized`.

@@ -7,6 +7,7 @@ use crate::estimator::config::{CameraSensorPrior, EstimatorConfig, EstimatorOpti
 use crate::estimator::estimator::PhaseState;
 use crate::estimator::factors::kind::FactorLabel;
 use crate::estimator::factors::labelled_rows::{LabelledRows, stack};
+use crate::estimator::factors::measurements::measurements;
 use crate::estimator::factors::start_prior::StartPrior;
 use crate::estimator::problem::problem::Problem;
 use crate::estimator::report::StepReport;
@@ -269,7 +270,7 @@ pub(super) fn rows(problem: &Problem<'_>, estimate: &Estimate, wanted: impl Fn(F
     let linearized = problem.linearization_frames(estimate);
     let point = problem.point(estimate, &linearized);
     let mut rows = LabelledRows::of(total, wanted);
-    problem.measurements(&point, problem.layout.frames, &mut rows);
+    measurements(&point, problem.layout.frames, &mut rows);
     problem.priors(&point, &mut rows);
-    stack(rows.matrices(), 0..total + 1)
+    stack(rows.matrices(), 0..=total)
 }

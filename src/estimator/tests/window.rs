@@ -148,7 +148,7 @@ fn marginalizing_the_oldest_agrees_with_the_full_batch() {
         let later = crate::estimator::state::layout::Layout { frames: layout.frames - 1, ..layout };
         let kept: Vec<usize> = (layout.frame(1).start..=layout.total()).collect();
         let zero = DVector::zeros(later.total());
-        let rows = stack([rest.select_columns(&kept), prior.rows(&later, &zero)].iter(), 0..later.total() + 1);
+        let rows = stack(&[rest.select_columns(&kept), prior.rows(&later, &zero)], 0..=later.total());
         let upper = dense::triangularize(&rows);
         let count = later.total();
         let solution =
@@ -172,7 +172,7 @@ fn dropping_a_frame_from_the_prior_keeps_the_information_on_the_others() {
     let zero = DVector::zeros(layout.total());
     let carried = prior.rows(&layout, &zero);
     let readings = fixture::rows(&problem, &estimate, |label| label == FactorLabel::Encoder(gone as u16));
-    let rows = stack([&carried, &readings].into_iter(), 0..layout.total() + 1);
+    let rows = stack([&carried, &readings], 0..=layout.total());
     let information = |rows: &DMatrix<f64>, columns: &[usize]| {
         let part = rows.select_columns(columns);
         part.tr_mul(&part)
@@ -253,7 +253,7 @@ fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
         problem.prior.unwrap().rows(&problem.layout, &DVector::zeros(total)),
         fixture::rows(&problem, &estimate, |label| matches!(label, FactorLabel::Imu(_))),
     ];
-    let rows = stack(parts.iter(), 0..total + 1);
+    let rows = stack(&parts, 0..=total);
     let first = estimate.calibration.at_first_estimate();
     let directions = crate::gimbal::redundant_directions(&first.of(MAIN).chain().to_classical());
     assert_eq!(directions.ncols(), 6);

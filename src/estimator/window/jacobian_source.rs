@@ -6,6 +6,7 @@ use super::setup::Setup;
 use super::solve::SolvedWindow;
 use super::window_state::WindowState;
 use crate::estimator::factors::labelled_rows::{LabelledRows, stack};
+use crate::estimator::factors::measurements::measurements;
 use crate::estimator::problem::linearization::{column_blocks, column_order};
 use crate::estimator::report::jacobian_source::{ClockColumns, ExactSource, PackedRow};
 use crate::estimator::report::{FactorRows, JacobianFactor, JacobianSource};
@@ -32,10 +33,10 @@ impl WindowState {
         let total = layout.total();
         let mut rows = LabelledRows::new(total);
         let point = problem.point(estimate, &frames);
-        problem.measurements(&point, layout.frames, &mut rows);
+        measurements(&point, layout.frames, &mut rows);
         problem.priors(&point, &mut rows);
         for (label, rows) in rows.by_factor() {
-            let rows = stack([&rows].into_iter(), order.iter().copied().chain([total]).collect::<Vec<_>>());
+            let rows = stack([&rows], order.iter().copied().chain([total]));
             let of_factor = norms_of(&rows.columns(0, total), &columns, &scales);
             packed.push(PackedRow { label, height: rows.nrows() as u16, count: of_factor.len() as u16 });
             norms.extend(of_factor);

@@ -5,6 +5,7 @@
 //! are those of the images, so that playback is synchronous with the log; stamps are the estimator's.
 
 mod annotations;
+mod names;
 mod series;
 
 use std::path::Path;
@@ -15,6 +16,7 @@ use crate::frontend::FeatureId;
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
 use crate::session::{Recording, RunRecord, StepRecord};
+use names::Names;
 use series::Series;
 
 /// World frame common to all runs: that of the ground truth if there is one.
@@ -23,30 +25,6 @@ const WORLD: &str = "world";
 const PATH_PERIOD_NS: i64 = 1_000_000_000;
 /// Maximum number of poses of a path message; longer paths are thinned.
 const PATH_POSES: usize = 300;
-
-/// Names of the topics and frames of one run.
-struct Names {
-    /// The label; characters that ROS does not allow in a topic are replaced.
-    label: String,
-}
-
-impl Names {
-    fn new(label: &str) -> Self {
-        let allowed = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '_' };
-        let label: String = label.chars().map(allowed).collect();
-        // The name of a topic must not begin with a digit.
-        let digit = label.starts_with(|first: char| first.is_ascii_digit());
-        Self { label: if digit || label.is_empty() { format!("run_{label}") } else { label } }
-    }
-
-    fn topic(&self, name: &str) -> String {
-        format!("/{}/{name}", self.label)
-    }
-
-    fn frame(&self, name: &str) -> String {
-        format!("{}/{name}", self.label)
-    }
-}
 
 /// Writes one run of a recording.
 ///

@@ -1,6 +1,6 @@
 //! Named numbers over time: calibration with σ, joint angles, rank, frame statistics.
 
-use super::Names;
+use super::names::Names;
 use crate::flight_log::{LogError, LogWriter, MessageTimes};
 use crate::gimbal::ParameterId;
 use crate::sensors::Rig;

@@ -7,8 +7,9 @@ use nalgebra::Matrix4;
 use serde_json::Value;
 
 use super::super::LogError;
+use super::ConvertError;
 use super::sink::Sink;
-use super::{ConvertError, read_description};
+use super::source_file::read_description;
 use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ImuIntrinsics, ImuNoise, ImuRig, Rig};

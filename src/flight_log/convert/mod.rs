@@ -16,19 +16,19 @@ mod ros1_message;
 mod ros1_record;
 mod ros2_bag;
 mod sink;
+mod source_file;
 mod sqlite;
 
 use std::fs;
 use std::io::Read as _;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 pub use error::ConvertError;
 pub use options::{AutopilotLog, AutopilotLogKind, ConvertOptions, VideoClock};
 pub use report::{ConversionReport, ConvertedTopic};
 
 use super::file::{LogFile, ZSTD_MAGIC, kind_of, unpacked_name};
-use super::limits::DESCRIPTION_BYTES;
 use super::log::lfs_pointer;
 use super::{FlightLog, LogError, LogLimits, LogWriter, LogWriterOptions};
 use crate::geometry::seconds_from_ns;
@@ -216,23 +216,6 @@ fn write(
     };
     let report = sink.finish(kind.name(), source)?;
     Ok((report, rig))
-}
-
-/// Reads a small text file; an error for a larger one.
-fn read_description(path: &Path, action: &'static str) -> Result<String, ConvertError> {
-    let metadata = fs::metadata(path).map_err(ConvertError::io(action, path))?;
-    if !metadata.is_file() || metadata.len() > DESCRIPTION_BYTES {
-        let problem = format!("{} bytes in place of a text file of at most {DESCRIPTION_BYTES}", metadata.len());
-        return Err(ConvertError::unreadable(problem, path));
-    }
-    fs::read_to_string(path).map_err(ConvertError::io(action, path))
-}
-
-/// Appends a suffix: `a/log.mcap` and `.zstd` give `a/log.mcap.zstd`.
-fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(suffix);
-    PathBuf::from(name)
 }
 
 /// Number of bytes at the start that identify the kind of a source.

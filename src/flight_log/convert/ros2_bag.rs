@@ -11,8 +11,9 @@ use tempfile::NamedTempFile;
 use super::super::file::{LogFile, unpacked_name};
 use super::super::limits::LogLimits;
 use super::sink::Sink;
+use super::source_file::{read_description, with_suffix};
 use super::sqlite::BagDatabase;
-use super::{ConvertError, mcap_segment, read_description, sqlite};
+use super::{ConvertError, mcap_segment, sqlite};
 
 /// Number of bytes that are copied at a time.
 const COPIED_BYTES: usize = 1 << 20;
@@ -98,7 +99,7 @@ fn find(folder: &Path, name: &str) -> PathBuf {
     let in_folder = if inside { folder.join(name) } else { beside.clone() };
     let mut candidates = [&in_folder, &beside]
         .into_iter()
-        .flat_map(|path| [path.clone(), super::with_suffix(path, ".zstd"), unpacked_name(path)]);
+        .flat_map(|path| [path.clone(), with_suffix(path, ".zstd"), unpacked_name(path)]);
     candidates.find(|path| path.is_file()).unwrap_or_else(|| beside.clone())
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::super::cdr::{CdrError, CdrReader};
-use super::{MessageKind, read_header};
+use super::{MessageKind, read_header, read_px4_stamp};
 use crate::sensors::AttitudeValue;
 
 /// Largest number of transforms in a message; robots publish some dozens.
@@ -15,12 +15,6 @@ pub(crate) struct StampedRotation<T> {
     /// Nanoseconds since the epoch, or since PX4 started.
     pub(crate) stamp_ns: i64,
     pub(crate) content: Option<T>,
-}
-
-/// Reads microseconds as nanoseconds.
-pub(super) fn read_px4_stamp(reader: &mut CdrReader<'_>) -> Result<i64, CdrError> {
-    let microseconds = i64::try_from(reader.read_u64()?).unwrap_or(i64::MAX);
-    Ok(microseconds.saturating_mul(1000))
 }
 
 /// Rotation of a quaternion, `None` if its norm differs from 1 by more than rounding (32-bit numbers).

@@ -2,7 +2,7 @@
 
 use super::super::LogError;
 use super::fields::Field;
-use super::read::read_link;
+use super::link::read_link;
 use crate::gimbal::{ClassicalChain, InverseChain};
 use crate::sensors::{AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, BodyAxes, EulerAngles, NamedAxes};
 

@@ -2,9 +2,10 @@ use std::path::{Path, PathBuf};
 
 use super::super::messages::{self, CameraInfoMessage, MessageKind};
 use super::super::{FlightLog, LogError};
+use super::camera_facts::{CameraFacts, NoFacts};
 use super::document::Document;
 use super::mask::{Attached, InFolder};
-use super::read::{self, CameraFacts, NoFacts};
+use super::read;
 use super::{kalibr, keys};
 use crate::camera::CameraModel;
 use crate::sensors::Rig;

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::super::LogError;
+use super::camera_facts::CameraFacts;
 use super::fields::Field;
-use super::read::{self, CameraFacts};
+use super::read;
 use crate::sensors::{CameraMount, Rig};
 
 /// Usual names of Kalibr's IMU file.

@@ -8,8 +8,8 @@ use image::ImageFormat;
 
 use super::super::image_decoding::decode_within;
 use super::super::{FlightLog, LogError, LogLimits};
+use super::camera_facts::CameraFacts;
 use super::fields::Field;
-use super::read::CameraFacts;
 use crate::camera::CameraModel;
 use crate::sensors::{CameraMask, GrayImage, ImageMask};
 

@@ -1,11 +1,13 @@
 //! Rig files: this program's schema and Kalibr's, read and written.
 
 pub(crate) mod attitude;
+mod camera_facts;
 mod document;
 mod fields;
 mod find;
 mod kalibr;
 mod keys;
+mod link;
 mod mask;
 mod read;
 mod save;
@@ -15,4 +17,4 @@ pub mod template;
 mod tests;
 mod write;
 
-pub(crate) use read::CameraFacts;
+pub(crate) use camera_facts::CameraFacts;

@@ -3,11 +3,13 @@ use nalgebra::Vector3;
 use super::super::LogError;
 use super::super::text::shortened;
 use super::attitude;
+use super::camera_facts::CameraFacts;
 use super::fields::Field;
+use super::link::read_link;
 use super::mask;
 use super::sensor;
 use crate::camera::{CameraError, CameraModel};
-use crate::gimbal::{ClassicalChain, DhLink, InverseChain};
+use crate::gimbal::{ClassicalChain, InverseChain};
 use crate::sensors::{
     AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, LeverArm, MAX_LEVER_ARM_M,
     Rig,
@@ -24,8 +26,6 @@ const MAX_ASSUMED: usize = 256;
 /// Gravity for Kalibr's files, which do not contain it, in m/s².
 pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.81;
 
-/// A joint offset or twist beyond a full revolution is an angle in degrees.
-const MAX_OFFSET_RAD: f64 = std::f64::consts::TAU;
 /// A joint limit beyond two revolutions is an angle in degrees.
 const MAX_LIMIT_RAD: f64 = 2.0 * std::f64::consts::TAU;
 /// An encoder with a larger standard deviation measures nothing; values of 0.5 to 1 are usually degrees.
@@ -33,31 +33,6 @@ const MAX_SIGMA_RAD: f64 = 0.5;
 
 /// A larger time offset means that a clock was never set.
 const MAX_TIMESHIFT_S: f64 = 10.0;
-
-/// Values of a log that replace missing values of a rig, by image topic.
-pub(crate) trait CameraFacts {
-    /// Camera model from `CameraInfo`, or the reason why there is none.
-    fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String>;
-    /// Mean rate of the images.
-    fn rate_hz(&self, image_topic: &str) -> Option<f64>;
-    /// Content of a file of the rig, next to it or attached with it, or the reason why there is none.
-    fn file_beside_rig(&self, _name: &str) -> Result<Vec<u8>, String> {
-        Err("there is no folder to take it from".into())
-    }
-}
-
-/// Facts without a log.
-pub(super) struct NoFacts;
-
-impl CameraFacts for NoFacts {
-    fn camera_model(&self, _image_topic: &str) -> Result<CameraModel, String> {
-        Err("there is no log to take them from".into())
-    }
-
-    fn rate_hz(&self, _image_topic: &str) -> Option<f64> {
-        None
-    }
-}
 
 /// Reads a rig in the schema of this program.
 pub(super) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraFacts) -> Result<Rig, LogError> {
@@ -254,21 +229,6 @@ fn name_the_field(camera: &Field<'_>, error: &CameraError) -> LogError {
             camera.field(place).error(format!("{field} is {value}, expected {expected}"))
         }
     }
-}
-
-/// Reads the numbers of a link.
-pub(super) fn read_link(link: &Field<'_>) -> Result<DhLink, LogError> {
-    let angle = |key: &str| {
-        let angle_rad = link.field(key).number("an angle in rad")?;
-        link.field(key).in_radians(angle_rad, MAX_OFFSET_RAD)
-    };
-    let length = |key: &str| link.field(key).number("a length in m");
-    Ok(DhLink {
-        theta_offset_rad: angle("theta_offset")?,
-        d_m: length("d")?,
-        a_m: length("a")?,
-        alpha_rad: angle("alpha")?,
-    })
 }
 
 fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {

@@ -1,7 +1,9 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::super::image_decoding::{BitDepth, ImageProblem, decode_image};
+use super::super::bit_depth::BitDepth;
+use super::super::image_decoding::{bit_depth_of_topic, decode_image};
+use super::super::image_problem::ImageProblem;
 use super::super::log::relative_ns;
 use super::super::messages::{self, MessageKind};
 use super::super::video::PictureStream;
@@ -111,7 +113,7 @@ impl FrameSource {
             count,
             topic: camera.topic.clone(),
             kind,
-            depth: BitDepth::of_topic(log, &camera.topic, kind),
+            depth: bit_depth_of_topic(log, &camera.topic, kind),
             key: camera_key.to_owned(),
             resolution_px: camera.model.resolution_px,
             shift_ns,

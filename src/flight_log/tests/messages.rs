@@ -1,6 +1,8 @@
+use super::super::bit_depth::BitDepth;
 use super::super::cdr::{CdrReader, CdrWriter};
 use super::super::image_decoding;
-use super::super::image_decoding::{BitDepth, ImageProblem};
+use super::super::image_decoding::bit_depth_of_message;
+use super::super::image_problem::ImageProblem;
 use super::super::limits::LogLimits;
 use super::super::messages::{self, MessageKind};
 use super::*;
@@ -96,7 +98,7 @@ fn wide_grey_values_keep_the_bits_that_are_in_use() {
         let data: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         encode::image(0, "camera", [2, 2], "mono16", &data)
     };
-    let depth_of = |values: [u16; 4]| BitDepth::of(MessageKind::Image, &message(values), &LogLimits::default());
+    let depth_of = |values: [u16; 4]| bit_depth_of_message(MessageKind::Image, &message(values), &LogLimits::default());
     let check = |values: [u16; 4], bits: u32, expected: [u8; 4]| {
         let depth = depth_of(values).unwrap();
         assert_eq!(depth.bits(), bits, "{values:?}");
@@ -115,7 +117,7 @@ fn wide_grey_values_keep_the_bits_that_are_in_use() {
     let later = decode_image(MessageKind::Image, &message([4, 1023, 1024, 4000]), first).unwrap();
     assert_eq!(later.pixels, [1, 255, 255, 255]);
     let narrow = encode::image(0, "camera", [2, 2], "mono8", &[1, 2, 3, 4]);
-    assert_eq!(BitDepth::of(MessageKind::Image, &narrow, &LogLimits::default()).unwrap().bits(), 16);
+    assert_eq!(bit_depth_of_message(MessageKind::Image, &narrow, &LogLimits::default()).unwrap().bits(), 16);
 }
 
 #[test]

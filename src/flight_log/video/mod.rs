@@ -4,6 +4,7 @@
 //! damaged or missing message, frames are rejected up to the next keyframe, because they would be wrong.
 
 mod bits;
+pub(super) mod codec;
 mod decoder;
 mod frame_numbers;
 mod picture_stream;
@@ -11,7 +12,8 @@ mod stretches;
 #[cfg(test)]
 pub(super) mod tests;
 
-pub(crate) use decoder::{VideoCodec, VideoDecoder};
+pub(crate) use codec::VideoCodec;
+pub(crate) use decoder::VideoDecoder;
 pub(crate) use picture_stream::PictureStream;
 pub(crate) use stretches::{MissingPictures, missing_pictures};
 

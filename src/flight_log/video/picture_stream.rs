@@ -1,4 +1,4 @@
-use super::super::image_decoding::{ImageProblem, unreadable};
+use super::super::image_problem::{ImageProblem, unreadable};
 use super::super::limits::LogLimits;
 use super::super::messages::VideoPacket;
 use super::VideoDecoder;

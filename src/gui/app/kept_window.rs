@@ -1,19 +1,16 @@
 //! Size and position of the window and the layout of its panels, restored at the next start.
 
-use egui::{Ui, ViewportBuilder, ViewportCommand, ViewportInfo, pos2, vec2};
+use egui::{ViewportBuilder, ViewportInfo, pos2};
 use serde::{Deserialize, Serialize};
-
-use super::App;
-use crate::gui::window::NoticeLevel;
 
 /// Size of the window at the first start, in logical pixels.
 const FIRST_SIZE: [f32; 2] = [1600.0, 900.0];
 /// Minimum size in logical pixels.
 const MIN_SIZE: [f32; 2] = [640.0, 400.0];
-/// Number of frames after which the window is shown with its decoration.
-const SHOWN_FRAMES: u32 = 4;
+/// Number of frames after which a window is shown with its frame.
+pub(super) const SHOWN_FRAMES: u32 = 4;
 /// Seconds after which a change is stored.
-const STORED_AFTER_S: f64 = 1.0;
+pub(super) const STORED_AFTER_S: f64 = 1.0;
 
 /// State of the window at the end of the last use.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -35,7 +32,7 @@ impl KeptWindow {
         kept
     }
 
-    fn to_text(&self) -> String {
+    pub(super) fn to_text(&self) -> String {
         serde_json::to_string(self).unwrap_or_default()
     }
 }
@@ -65,9 +62,9 @@ impl WindowPlace {
         size && self.position.iter().flatten().all(finite)
     }
 
-    /// Reads the position of a window of `size_points` at the program's scale. A minimized or full-screen window keeps
-    /// the last position.
-    fn read(&mut self, viewport: &ViewportInfo, size_points: egui::Vec2, scale: f32) {
+    /// Reads the place of a window of `size_points` at the program's scale. Minimized and full screens keep the last
+    /// place.
+    pub(super) fn read(&mut self, viewport: &ViewportInfo, size_points: egui::Vec2, scale: f32) {
         let is = |state: Option<bool>| state.unwrap_or(false);
         if is(viewport.minimized) || is(viewport.fullscreen) {
             return;
@@ -138,12 +135,12 @@ pub(super) fn move_inside_screen(window: &winit::window::Window) {
 /// Current window state, and the time since which it differs from the stored one.
 #[derive(Debug, Default)]
 pub(super) struct WindowKeeper {
-    kept: KeptWindow,
-    changed_s: Option<f64>,
-    /// True if the window is to be maximized when it is shown.
-    maximizes: bool,
-    /// Number of frames in which the window was shown before it was placed.
-    shown: u32,
+    pub(super) kept: KeptWindow,
+    pub(super) changed_s: Option<f64>,
+    /// Whether the window is to be maximized when it is shown.
+    pub(super) maximizes: bool,
+    /// Number of frames in which the window was shown, until it has its place.
+    pub(super) shown: u32,
 }
 
 impl WindowKeeper {
@@ -153,54 +150,10 @@ impl WindowKeeper {
     }
 }
 
-impl App {
-    /// Places the window after it is shown: before that, X11 ignores a request to maximize, and the size of the frame
-    /// is not known.
-    pub(super) fn place_window(&mut self, ui: &Ui, window: &winit::window::Window) {
-        if self.keeper.shown > SHOWN_FRAMES {
-            return;
-        }
-        self.keeper.shown += 1;
-        if self.keeper.shown <= SHOWN_FRAMES {
-            ui.request_repaint();
-        } else if self.keeper.maximizes {
-            ui.send_viewport_cmd(ViewportCommand::Maximized(true));
-        } else {
-            move_inside_screen(window);
-        }
-    }
-
-    /// Reads size, place and layout, and stores them some time after a change.
-    pub(super) fn keep_window(&mut self, ui: &Ui) {
-        let scale = ui.zoom_factor();
-        let size = ui.viewport_rect().size();
-        let (mut place, now_s) = (self.keeper.kept.place, ui.input(|input| input.time));
-        ui.input(|input| place.read(input.viewport(), vec2(size.x, size.y), scale));
-        if place != self.keeper.kept.place || self.state.take_layout_changed() {
-            self.keeper.kept.place = place;
-            self.keeper.changed_s.get_or_insert(now_s);
-        }
-        match self.keeper.changed_s {
-            Some(changed_s) if now_s - changed_s >= STORED_AFTER_S => self.store_window(),
-            Some(_) => ui.request_repaint_after(std::time::Duration::from_secs_f64(STORED_AFTER_S)),
-            None => {}
-        }
-    }
-
-    /// Stores size, place and layout if they have changed.
-    pub(super) fn store_window(&mut self) {
-        if self.keeper.changed_s.take().is_none() {
-            return;
-        }
-        self.keeper.kept.layout = self.state.last_layout_value();
-        if let Err(problem) = self.desktop.keep_window(&self.keeper.kept.to_text()) {
-            self.state.notices.show_message(NoticeLevel::Error, problem);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use egui::vec2;
+
     use super::*;
 
     #[test]

@@ -1,64 +1,13 @@
-//! Leaving a session (quitting, closing the log, opening another one), and the unsaved work that would be lost.
+//! Leaving a session: quitting, closing the log or opening another one.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use egui::{Ui, ViewportCommand};
-use serde_json::Value;
 
+use super::App;
+use super::departure::{Departure, Leaving, Work};
 use super::welcome::Welcome;
-use super::{App, PlayingLog};
 use crate::gui::Selection;
-use crate::gui::units::counted;
-
-/// Destination when leaving the open session.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Leaving {
-    Quit,
-    /// Close the log and go back to the welcome view.
-    CloseLog,
-    Open(PathBuf),
-}
-
-/// Keys of a saved session whose entries are stored nowhere else, each with the noun for one entry.
-const WORK: [(&str, &str); 3] = [("forks", "fork"), ("breakpoints", "breakpoint"), ("markers_ns", "marker")];
-
-/// Forks, breakpoints and markers of a session in saved form. Runs, layout and cursor are not included: they are easily
-/// restored when the log is opened.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Work([Vec<Value>; 3]);
-
-impl Work {
-    /// Current work of a session.
-    pub(super) fn of(log: &dyn PlayingLog) -> Self {
-        log.saved(None).map(|text| Self::of_text(&text)).unwrap_or_default()
-    }
-
-    fn of_text(text: &str) -> Self {
-        let value: Value = serde_json::from_str(text).unwrap_or_default();
-        Self(WORK.map(|(key, _)| value.get(key).and_then(Value::as_array).cloned().unwrap_or_default()))
-    }
-
-    /// Entries that are not in the work `saved`, as text: "1 fork, 2 markers"; `None` if there are none.
-    fn missing_in(&self, saved: &Self) -> Option<String> {
-        let counts = self.0.iter().zip(&saved.0).zip(WORK).filter_map(|((now, saved), (_, word))| {
-            let count = now.iter().filter(|entry| !saved.contains(entry)).count();
-            (count > 0).then(|| counted(count, word))
-        });
-        let text = counts.collect::<Vec<_>>().join(", ");
-        (!text.is_empty()).then_some(text)
-    }
-}
-
-#[derive(Debug, Default)]
-pub(super) struct Departure {
-    /// Work stored in the log or in the session's file.
-    pub(super) saved: Work,
-    /// Destination after the answer of the dialog.
-    asked: Option<Leaving>,
-    /// True if the window may close without a question.
-    pub(super) quits: bool,
-}
 
 impl App {
     /// Leaves the session; asks first if work would be lost.
@@ -118,26 +67,5 @@ impl App {
         self.selection = Selection::default();
         self.departure = Departure::default();
         self.state.close_everything();
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_new_entries_would_be_lost() {
-        let work = |forks: &str, breakpoints: &str, markers: &str| {
-            Work::of_text(&format!(
-                "{{\"forks\": [{forks}], \"breakpoints\": [{breakpoints}], \"markers_ns\": [{markers}], \"cursor_ns\": 7}}"
-            ))
-        };
-        let saved = work("", "{\"condition\": \"frame == 3\"}", "5, 9");
-        assert_eq!(saved.missing_in(&saved), None);
-        assert_eq!(work("", "", "5").missing_in(&saved), None, "what was removed is still in the file");
-        let more = work("{\"name\": \"a\"}", "{\"condition\": \"frame == 3\"}", "5, 6, 7, 9");
-        assert_eq!(more.missing_in(&saved).as_deref(), Some("1 fork, 2 markers"));
-        assert_eq!(more.missing_in(&Work::default()).as_deref(), Some("1 fork, 1 breakpoint, 4 markers"));
-        assert_eq!(Work::of_text("no session").missing_in(&Work::default()), None);
     }
 }

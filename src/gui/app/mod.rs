@@ -1,5 +1,6 @@
 //! The application of the window: it owns the session, passes time and commands to it, and draws its results.
 
+mod departure;
 mod kept_window;
 mod leaving;
 #[cfg(test)]
@@ -12,6 +13,7 @@ mod sample;
 mod session_log;
 #[cfg(test)]
 mod session_tests;
+mod shown_study;
 mod software_window;
 mod study;
 #[cfg(test)]
@@ -25,28 +27,26 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::Duration;
 
-use egui::{Ui, ViewportCommand};
+use egui::{CentralPanel, Frame, Ui, ViewportCommand, vec2};
 
-use self::kept_window::{KeptWindow, WindowKeeper};
-use self::leaving::{Departure, Leaving, Work};
+use self::departure::{Departure, Leaving, Work};
+use self::kept_window::{KeptWindow, SHOWN_FRAMES, STORED_AFTER_S, WindowKeeper, move_inside_screen};
 use self::playing_log::{Images, go_to_first_frame};
 pub use self::playing_log::{OpenLog, PlayingLog};
-use self::repaint::until_next_step;
-use self::study::ShownStudy;
-pub use self::study::{OpenStudy, StudySource};
-use self::welcome::Welcome;
+use self::repaint::{POLL_PERIOD, until_next_step};
+use self::shown_study::ShownStudy;
+pub use self::shown_study::{OpenStudy, StudySource};
+use self::welcome::{Choice, Welcome};
 use crate::gui::desktop::Desktop;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::units::counted;
-use crate::gui::window::{NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, WindowState, window_ui};
+use crate::gui::window::{MainWindow, NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, window_ui};
 use crate::gui::{PanelContext, Presentation, Selection};
 use crate::session::{Command, PlaybackSpeed, Recording};
 
 /// Longest pause between two frames in seconds after which the cursor catches up; after a longer one the window was
 /// hidden or the machine suspended.
 const MAX_FRAME_TIME_S: f64 = 2.0;
-/// Period at which the window checks for new steps.
-const POLL_PERIOD: Duration = Duration::from_millis(60);
 /// Period in seconds at which the memory of the process is read.
 const MEMORY_PERIOD_S: f64 = 1.0;
 
@@ -85,7 +85,7 @@ pub struct App {
     welcome: Welcome,
     /// Log on which the tour starts when it is open.
     tour_of: Option<PathBuf>,
-    state: WindowState,
+    state: MainWindow,
     selection: Selection,
     theme: Theme,
     /// Settings in effect; `None` before the first frame.
@@ -100,7 +100,7 @@ pub struct App {
 impl App {
     /// Creates a window without a log; `theme` is used until the user chooses another one.
     pub fn new(open_log: OpenLog, desktop: Arc<dyn Desktop>, theme: ThemeName) -> Self {
-        let mut state = WindowState::default();
+        let mut state = MainWindow::default();
         state.show_times = true;
         state.panels.laboratory.in_background = true;
         state.panels.rank.in_background = true;
@@ -366,15 +366,92 @@ impl App {
 
     /// Sets the title of the window to the name of the log.
     fn update_title(&mut self, ui: &Ui) {
-        let of_log = self.log.as_ref().map(|log| {
-            let path = log.recording().log_path.clone();
-            path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
-        });
+        let of_log = self.log.as_ref().map(|log| log.recording().log_name());
         let name = of_log.or_else(|| self.study.as_ref().map(ShownStudy::name));
         let title = name.map_or_else(|| "dcvins".to_owned(), |name| format!("{name} – dcvins"));
         if title != self.title {
             ui.ctx().send_viewport_cmd(ViewportCommand::Title(title.clone()));
             self.title = title;
+        }
+    }
+
+    /// Draws the view, the manual over it and the notices, and executes the choice.
+    fn welcome_ui(&mut self, ui: &mut Ui) {
+        let opening = self.opening.as_ref().map(|opening| opening.path.as_path());
+        let frame = Frame::new().fill(self.theme.surface).inner_margin(20);
+        let chosen = CentralPanel::no_frame().frame(frame).show(ui, |ui| self.welcome.ui(ui, &self.theme, opening));
+        self.state.help.welcome_ui(ui, &self.theme);
+        self.state.focus_ring_ui(ui, &self.theme);
+        self.state.notices.toasts_ui(ui, &self.theme);
+        if let Some(choice) = chosen.inner {
+            self.take_choice(choice);
+        }
+    }
+
+    fn take_choice(&mut self, choice: Choice) {
+        match choice {
+            Choice::Open(path) => self.open(path),
+            Choice::Tour(path) => {
+                self.tour_of = Some(path.clone());
+                self.open(path);
+            }
+            Choice::Manual => self.state.help.manual.show(None),
+            Choice::Tutorial => self.state.help.manual.show_tutorial(),
+        }
+    }
+
+    /// Starts the tour on the log that is open or being opened, else on the sample flight.
+    pub fn start_tour(&mut self) {
+        if self.log.is_some() {
+            self.state.start_tour();
+        } else if let Some(opening) = &self.opening {
+            self.tour_of = Some(opening.path.clone());
+        } else if let Some(choice) = self.welcome.sample(true) {
+            self.take_choice(choice);
+        }
+    }
+
+    /// Gives the window its place once it is shown: before, X11 ignores the wish to be maximized, and the size of the
+    /// frame is not known.
+    fn place_window(&mut self, ui: &Ui, window: &winit::window::Window) {
+        if self.keeper.shown > SHOWN_FRAMES {
+            return;
+        }
+        self.keeper.shown += 1;
+        if self.keeper.shown <= SHOWN_FRAMES {
+            ui.request_repaint();
+        } else if self.keeper.maximizes {
+            ui.send_viewport_cmd(ViewportCommand::Maximized(true));
+        } else {
+            move_inside_screen(window);
+        }
+    }
+
+    /// Reads size, place and layout, and stores them some time after a change.
+    fn keep_window(&mut self, ui: &Ui) {
+        let scale = ui.zoom_factor();
+        let size = ui.viewport_rect().size();
+        let (mut place, now_s) = (self.keeper.kept.place, ui.input(|input| input.time));
+        ui.input(|input| place.read(input.viewport(), vec2(size.x, size.y), scale));
+        if place != self.keeper.kept.place || self.state.take_layout_changed() {
+            self.keeper.kept.place = place;
+            self.keeper.changed_s.get_or_insert(now_s);
+        }
+        match self.keeper.changed_s {
+            Some(changed_s) if now_s - changed_s >= STORED_AFTER_S => self.store_window(),
+            Some(_) => ui.request_repaint_after(std::time::Duration::from_secs_f64(STORED_AFTER_S)),
+            None => {}
+        }
+    }
+
+    /// Stores size, place and layout if they have changed.
+    fn store_window(&mut self) {
+        if self.keeper.changed_s.take().is_none() {
+            return;
+        }
+        self.keeper.kept.layout = self.state.last_layout_value();
+        if let Err(problem) = self.desktop.keep_window(&self.keeper.kept.to_text()) {
+            self.state.notices.show_message(NoticeLevel::Error, problem);
         }
     }
 }

@@ -5,6 +5,9 @@ use std::time::Duration;
 use crate::geometry::seconds_from_ns;
 use crate::session::{Recording, RunRecord};
 
+/// Period at which the window checks for new steps.
+pub(super) const POLL_PERIOD: Duration = Duration::from_millis(60);
+
 /// Longest time in seconds between two frames of playback; between two steps only the cursor moves.
 const LONGEST_PAUSE_S: f64 = 0.05;
 

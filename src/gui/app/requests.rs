@@ -3,7 +3,7 @@
 use egui::Ui;
 
 use super::App;
-use super::leaving::{Leaving, Work};
+use super::departure::{Leaving, Work};
 use crate::gui::desktop::PanelExport;
 use crate::gui::window::{NoticeLevel, WindowRequest};
 

@@ -1,43 +1,16 @@
 //! A study in the window: its view, and the runs opened from it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use egui::Ui;
 
-use super::{App, Opened, PlayingLog};
+use super::shown_study::{OpenStudy, ShownStudy, StudySource};
+use super::{App, Opened};
 use crate::gui::study::{StudyOptions, StudyRequest, StudyState, study_ui};
 use crate::gui::theme::MAX_RUNS;
 use crate::gui::window::NoticeLevel;
-use crate::study::view::{Study, comparable_rows};
-
-/// A study on disk: its tables, and its runs as sessions.
-pub trait StudySource: Send + Sync {
-    fn study(&self) -> Arc<Study>;
-    /// Opens a session on the log of the first row with the runs of all rows. Its cursor goes to the worst frame of the
-    /// first row as soon as that is computed. An error message states cause and remedy.
-    ///
-    /// # Errors
-    /// When the log or the rig can no longer be read.
-    fn open_runs(&self, rows: &[usize]) -> Result<Box<dyn PlayingLog>, String>;
-}
-
-/// Opens a study; `None` for a path that is no study.
-pub type OpenStudy = Arc<dyn Fn(&Path) -> Option<Result<Arc<dyn StudySource>, String>> + Send + Sync>;
-
-pub(super) struct ShownStudy {
-    source: Arc<dyn StudySource>,
-    pub(super) state: StudyState,
-    path: PathBuf,
-}
-
-impl ShownStudy {
-    /// Name of the study's folder.
-    pub(super) fn name(&self) -> String {
-        let name = self.path.file_name().unwrap_or(self.path.as_os_str());
-        name.to_string_lossy().into_owned()
-    }
-}
+use crate::study::view::comparable_rows;
 
 impl App {
     /// Adds the ability to open studies.

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use egui::{Align, Button, CentralPanel, Frame, Layout, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, vec2};
+use egui::{Align, Button, Layout, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, vec2};
 
-use super::App;
+use super::repaint::POLL_PERIOD;
 use super::sample::SampleFlight;
 use crate::gui::desktop::Desktop;
 use crate::gui::path_field::PathField;
@@ -61,7 +61,7 @@ impl Welcome {
     pub(super) fn ui(&mut self, ui: &mut Ui, theme: &Theme, opening: Option<&Path>) -> Option<Choice> {
         let mut chosen = self.flight.receive().map(|path| chosen_sample(path, self.tour));
         if self.flight.is_running() {
-            ui.ctx().request_repaint_after(super::POLL_PERIOD);
+            ui.ctx().request_repaint_after(POLL_PERIOD);
         }
         ui.with_layout(Layout::top_down(Align::Center), |ui| {
             ui.add_space((0.04 * ui.available_height()).clamp(4.0, 60.0));
@@ -137,44 +137,6 @@ impl Welcome {
             ui.add(egui::Label::new(RichText::new(text).color(theme.text_weak)).wrap());
         }
         chosen
-    }
-}
-
-impl App {
-    /// Draws the view, the manual over it and the notices, and executes the choice.
-    pub(super) fn welcome_ui(&mut self, ui: &mut Ui) {
-        let opening = self.opening.as_ref().map(|opening| opening.path.as_path());
-        let frame = Frame::new().fill(self.theme.surface).inner_margin(20);
-        let chosen = CentralPanel::no_frame().frame(frame).show(ui, |ui| self.welcome.ui(ui, &self.theme, opening));
-        self.state.help.welcome_ui(ui, &self.theme);
-        self.state.focus_ring_ui(ui, &self.theme);
-        self.state.notices.toasts_ui(ui, &self.theme);
-        if let Some(choice) = chosen.inner {
-            self.take_choice(choice);
-        }
-    }
-
-    fn take_choice(&mut self, choice: Choice) {
-        match choice {
-            Choice::Open(path) => self.open(path),
-            Choice::Tour(path) => {
-                self.tour_of = Some(path.clone());
-                self.open(path);
-            }
-            Choice::Manual => self.state.help.manual.show(None),
-            Choice::Tutorial => self.state.help.manual.show_tutorial(),
-        }
-    }
-
-    /// Starts the tour on the log that is open or being opened, else on the sample flight.
-    pub fn start_tour(&mut self) {
-        if self.log.is_some() {
-            self.state.start_tour();
-        } else if let Some(opening) = &self.opening {
-            self.tour_of = Some(opening.path.clone());
-        } else if let Some(choice) = self.welcome.sample(true) {
-            self.take_choice(choice);
-        }
     }
 }
 

@@ -2,8 +2,7 @@
 
 use super::BreakpointsPanel;
 use crate::flight_log::csv_writer::{CsvWriter, seconds_cell};
-use crate::gui::PanelContext;
-use crate::gui::csv_table::CsvTable;
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for BreakpointsPanel {
     /// Every hit of every breakpoint, by breakpoint and run.

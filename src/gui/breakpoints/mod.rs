@@ -4,8 +4,8 @@ mod csv;
 
 use egui::{Button, CollapsingHeader, Grid, Key, RichText, ScrollArea, TextEdit, Ui, WidgetInfo};
 
-use super::PanelContext;
 use super::units::counted;
+use super::{Panel, PanelContext};
 use crate::session::Command;
 use crate::session::breakpoints::{Breakpoint, Condition, quantity_help};
 
@@ -16,9 +16,8 @@ pub struct BreakpointsPanel {
     changing: Option<usize>,
 }
 
-impl BreakpointsPanel {
-    /// Draws editor, list and buttons.
-    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+impl Panel for BreakpointsPanel {
+    fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let figure = ctx.presentation.is_figure();
         if !figure {
             buttons_ui(ui, ctx);
@@ -40,7 +39,9 @@ impl BreakpointsPanel {
             }
         });
     }
+}
 
+impl BreakpointsPanel {
     /// The input line for a condition with its syntax error.
     fn editor_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let parsed: Result<Condition, _> = self.typed.parse();

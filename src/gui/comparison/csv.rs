@@ -1,9 +1,9 @@
 //! Comparison of all runs as a long table; one value per row.
 
-use super::{ComparisonPanel, label_of};
+use super::ComparisonPanel;
+use super::columns::label_of;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
-use crate::gui::PanelContext;
-use crate::gui::csv_table::CsvTable;
+use crate::gui::{CsvTable, PanelContext};
 use crate::session::Quantity;
 
 impl CsvTable for ComparisonPanel {

@@ -1,6 +1,7 @@
 //! Comparison panel: one run against the ground truth, or up to four runs at one cursor, as tables, as differences over
 //! time, and as images and scenes side by side.
 
+mod columns;
 mod csv;
 mod numbers;
 mod over_time;
@@ -18,12 +19,10 @@ use self::over_time::OverTime;
 use self::scores::Scores;
 use self::side_by_side::{Images, Scenes};
 use self::single::Single;
-use super::PanelContext;
 use super::convergence::empty_ui;
 use super::rank;
-use super::window::Dialog;
-use crate::gui::theme::{RunStyle, Theme};
-use crate::session::{Comparison, Recording};
+use super::{Dialog, Panel, PanelContext};
+use crate::session::Comparison;
 
 /// Panel size from which all views are shown at once.
 const MIN_SIZE_FOR_ALL: Vec2 = vec2(960.0, 430.0);
@@ -70,15 +69,8 @@ pub struct ComparisonPanel {
     pub asked: Option<Dialog>,
 }
 
-impl ComparisonPanel {
-    /// A panel with the same view, without textures of a window.
-    pub(in crate::gui) fn view_copy(&self) -> Self {
-        let (images, scenes) = (self.images.view_copy(), self.scenes.view_copy());
-        Self { reference: self.reference, view: self.view, images, scenes, ..Self::default() }
-    }
-
-    /// Draws the controls and the chosen view.
-    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+impl Panel for ComparisonPanel {
+    fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let runs = &ctx.recording.runs;
         if runs.is_empty() {
             empty_ui(ui, "No runs");
@@ -101,6 +93,13 @@ impl ComparisonPanel {
         }
     }
 
+    fn view_copy(&self) -> Self {
+        let (images, scenes) = (self.images.view_copy(), self.scenes.view_copy());
+        Self { reference: self.reference, view: self.view, images, scenes, ..Self::default() }
+    }
+}
+
+impl ComparisonPanel {
     /// Comparisons of all runs, then of all trajectories, with the reference run; that of the reference itself is
     /// empty.
     pub(in crate::gui) fn comparisons(&mut self, ctx: &PanelContext<'_>) -> &[Comparison] {
@@ -207,19 +206,4 @@ impl ComparisonPanel {
     pub(in crate::gui) fn scores(&self) -> &Scores {
         &self.scores
     }
-}
-
-/// Label of a column of the panel; the runs come first, then the trajectories.
-fn label_of(recording: &Recording, index: usize) -> &str {
-    let lane = |index: usize| recording.trajectories.get(index).map_or("", |lane| lane.label.as_str());
-    match recording.runs.get(index) {
-        Some(run) => &run.spec.label,
-        None => lane(index - recording.runs.len()),
-    }
-}
-
-/// Style of a column of the panel; the runs come first, then the trajectories.
-fn style_of(recording: &Recording, theme: &Theme, index: usize) -> RunStyle {
-    let runs = recording.runs.len();
-    if index < runs { theme.run(index) } else { theme.trajectory(index - runs) }
 }

@@ -2,8 +2,8 @@
 
 use egui::{Button, Grid, RichText, Ui, WidgetInfo, vec2};
 
+use super::columns::{label_of, style_of};
 use super::scores::Scores;
-use super::{label_of, style_of};
 use crate::gui::PanelContext;
 use crate::gui::help::terms::divergence;
 use crate::gui::theme::ROW_HEIGHT;

@@ -2,7 +2,7 @@
 
 use egui::{ScrollArea, Ui};
 
-use super::label_of;
+use super::columns::label_of;
 use super::numbers::{difference_text, shown};
 use super::row::{Line, MIN_HEIGHT, Row, row_ui};
 use crate::gui::PanelContext;

@@ -2,7 +2,7 @@
 
 use egui::{Align2, Rect, Shape, Stroke, Ui, pos2, vec2};
 
-use super::style_of;
+use super::columns::style_of;
 use crate::gui::PanelContext;
 use crate::gui::plot::{
     Clicks, Curve, Interaction, PlotArea, Wheel, navigate, paint_cursor, paint_curve, paint_ground, paint_steps,

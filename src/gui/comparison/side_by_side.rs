@@ -4,7 +4,7 @@ use egui::{Rect, RichText, Ui, UiBuilder, pos2, vec2};
 
 use crate::gui::image_panel::ImagePanel;
 use crate::gui::scene::ScenePanel;
-use crate::gui::{PanelContext, Selection};
+use crate::gui::{Panel as _, PanelContext, Selection};
 
 /// Minimum width of a run's cell in points; below it the cells form two rows.
 const MIN_CELL_WIDTH: f32 = 250.0;

@@ -10,10 +10,9 @@ use super::scores::Scores;
 use crate::estimator::StepReport;
 use crate::geometry::{RigidTransform, so3, wrap_angle};
 use crate::gimbal::ClassicalChain;
-use crate::gui::PanelContext;
 use crate::gui::plot::Curve;
 use crate::gui::units::{fixed, significant};
-use crate::gui::window::Dialog;
+use crate::gui::{Dialog, PanelContext};
 use crate::sensors::{CameraMount, Rig};
 use crate::session::{Command, RunRecord, RunSpec, StepRecord};
 

@@ -8,8 +8,7 @@ use super::numbers::AGAINST_BATCH;
 use super::scores::ScoreRow;
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::window::Dialog;
-use crate::gui::{PanelContext, Playback, Presentation, Selection};
+use crate::gui::{Dialog, Panel as _, PanelContext, Playback, Presentation, Selection};
 use crate::session::{Command, Quantity, Recording};
 
 struct Bench {

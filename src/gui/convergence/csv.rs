@@ -3,9 +3,8 @@
 use super::ConvergencePanel;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gimbal::ParameterId;
-use crate::gui::PanelContext;
 use crate::gui::chain_values::true_values;
-use crate::gui::csv_table::CsvTable;
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for ConvergencePanel {
     /// The calibration of the shown run over the whole recording, with the ground truth in the parameterization at the

@@ -18,7 +18,7 @@ const GROUP_HEIGHT: f32 = 17.0;
 
 /// Rectangles of the plots.
 #[derive(Debug, PartialEq)]
-pub(crate) struct Layout {
+pub(crate) struct PlotGrid {
     /// One cell per shown parameter, in order.
     pub(crate) cells: Vec<Rect>,
     /// Heading of each group in the layout by groups.
@@ -32,11 +32,11 @@ pub(crate) struct Layout {
 }
 
 /// Lays out one cell per parameter (sorted along the chain): one row per part of the chain if that fits, else flowing.
-pub(crate) fn lay_out(parameters: &[ParameterId], available: Rect) -> Layout {
+pub(crate) fn lay_out(parameters: &[ParameterId], available: Rect) -> PlotGrid {
     by_part(parameters, available).unwrap_or_else(|| flowing(parameters.len(), available))
 }
 
-fn by_part(parameters: &[ParameterId], available: Rect) -> Option<Layout> {
+fn by_part(parameters: &[ParameterId], available: Rect) -> Option<PlotGrid> {
     let mut rows: Vec<(CalibrationPart, usize)> = Vec::new();
     for parameter in parameters {
         let part = part_of(*parameter);
@@ -64,7 +64,7 @@ fn by_part(parameters: &[ParameterId], available: Rect) -> Option<Layout> {
         Rect::from_min_size(pos2(available.right() - size.x - GAP, top), size)
     });
     let mut layout =
-        Layout { cells: Vec::new(), groups: Vec::new(), headings: Vec::new(), legend, height: available.height() };
+        PlotGrid { cells: Vec::new(), groups: Vec::new(), headings: Vec::new(), legend, height: available.height() };
     for (row, (part, count)) in rows.into_iter().enumerate() {
         let top = available.top() + row as f32 * (height + GAP);
         let heading = Rect::from_min_size(pos2(available.left(), top), vec2(HEADING_WIDTH, height));
@@ -91,7 +91,7 @@ fn free_corner(counts: &[usize], columns: usize) -> Option<(usize, usize, usize)
     best
 }
 
-fn flowing(count: usize, available: Rect) -> Layout {
+fn flowing(count: usize, available: Rect) -> PlotGrid {
     const WANTED_ASPECT: f32 = 2.0;
     let max_columns = (((available.width() + GAP) / (MIN_CELL_WIDTH + GAP)) as usize).clamp(1, count.max(1));
     let size = |columns: usize| {
@@ -116,12 +116,12 @@ fn flowing(count: usize, available: Rect) -> Layout {
         })
         .collect();
     let bottom = cells.last().map_or_else(|| available.top(), |cell| cell.bottom());
-    Layout { cells, groups: Vec::new(), headings: Vec::new(), legend: None, height: bottom - available.top() }
+    PlotGrid { cells, groups: Vec::new(), headings: Vec::new(), legend: None, height: bottom - available.top() }
 }
 
-/// Lays out groups below each other, each with a heading and cells on one common grid; a folded group has no cells,
-/// only its heading.
-pub(crate) fn by_group(groups: &[(ParameterGroup, usize)], available: Rect) -> Layout {
+/// Lays out groups below each other, each with a heading and cells on one common grid; a folded group, of no cells, is its
+/// heading only.
+pub(crate) fn by_group(groups: &[(ParameterGroup, usize)], available: Rect) -> PlotGrid {
     let largest = groups.iter().map(|(_, count)| *count).max().unwrap_or(0).max(1);
     let max_columns = (((available.width() + GAP) / (MIN_CELL_WIDTH + GAP)) as usize).clamp(1, largest);
     let rows_of = |columns: usize| groups.iter().map(|(_, count)| count.div_ceil(columns)).sum::<usize>();
@@ -131,7 +131,7 @@ pub(crate) fn by_group(groups: &[(ParameterGroup, usize)], available: Rect) -> L
     let width = (available.width() - GAP * (columns as f32 - 1.0)) / columns as f32;
     let room = available.height() - groups.len() as f32 * GROUP_HEIGHT;
     let height = (room / fewest.max(1) as f32 - GAP).max(MIN_CELL_HEIGHT);
-    let mut layout = Layout {
+    let mut layout = PlotGrid {
         cells: Vec::new(),
         groups: Vec::new(),
         headings: Vec::new(),
@@ -165,7 +165,7 @@ mod tests {
         counts.iter().flat_map(|(part, count)| of(*part, *count)).collect()
     }
 
-    fn check(names: &[ParameterId], width: f32, height: f32) -> Layout {
+    fn check(names: &[ParameterId], width: f32, height: f32) -> PlotGrid {
         let available = Rect::from_min_size(pos2(20.0, 30.0), vec2(width, height));
         let layout = lay_out(names, available);
         assert_eq!(layout.cells.len(), names.len());

@@ -17,22 +17,14 @@ use egui::{Rect, RichText, ScrollArea, Ui, vec2};
 
 use self::groups::{View, groups_of};
 use self::model::{CalibrationHistory, ConvertedHistory};
-use super::PanelContext;
+use self::paint::ParameterCurves;
 use super::chain_values::{ParameterValues, true_values};
-use super::plot::{BandCurve, Curve, StateCurve, Wheel};
+use super::plot::Wheel;
+use super::{Panel, PanelContext};
 use crate::gimbal::{ParameterGroup, ParameterId};
 
 /// Height in points of the legend above the plots of a figure.
 const LEGEND_ROW_HEIGHT: f32 = 18.0;
-
-/// The cached curves of one parameter of one run.
-#[derive(Debug, Default)]
-struct ParameterCurves {
-    value: Curve,
-    band: BandCurve,
-    /// Ranges in which the parameter is weak, unobservable, or not estimated yet.
-    states: [StateCurve; paint::MARKED.len()],
-}
 
 /// State of the convergence panel: the calibration of each run over time, and its curves.
 #[derive(Debug, Default)]
@@ -47,9 +39,8 @@ pub struct ConvergencePanel {
     folded: Vec<ParameterGroup>,
 }
 
-impl ConvergencePanel {
-    /// Draws one plot per parameter of the shown run.
-    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+impl Panel for ConvergencePanel {
+    fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         self.histories.resize_with(ctx.recording.runs.len(), CalibrationHistory::default);
         for (history, run) in self.histories.iter_mut().zip(&ctx.recording.runs) {
             history.read(run);
@@ -132,13 +123,15 @@ impl ConvergencePanel {
             self.cells_ui(ui, ctx, (shown, Wheel::Zooms), &parameters, &ground_truth, &layout);
         }
     }
+}
 
+impl ConvergencePanel {
     fn headings_ui(
         &mut self,
         ui: &Ui,
         ctx: &PanelContext<'_>,
         groups: &[(ParameterGroup, usize)],
-        layout: &layout::Layout,
+        layout: &layout::PlotGrid,
     ) {
         for (group, (_, rect)) in groups.iter().zip(&layout.groups) {
             groups::heading_ui(ui, ctx, &mut self.folded, *group, *rect);
@@ -171,7 +164,7 @@ impl ConvergencePanel {
         (shown, wheel): (usize, Wheel),
         parameters: &[ParameterId],
         ground_truth: &ParameterValues,
-        layout: &layout::Layout,
+        layout: &layout::PlotGrid,
     ) {
         for (part, rect) in &layout.headings {
             paint::heading(ui, ctx, *part, *rect);

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 
 use egui::{Align2, Color32, Pos2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 
-use super::ParameterCurves;
 use super::model::{CalibrationHistory, ConvertedHistory};
 use super::names::{CalibrationPart, heading_of, meaning_of};
 use super::range::{paint_outside, value_range};
@@ -15,8 +14,8 @@ use crate::gui::chain_values::ParameterValues;
 use crate::gui::copied_value::offer;
 use crate::gui::help::terms::window;
 use crate::gui::plot::{
-    Clicks, Interaction, PlotArea, Wheel, navigate, paint_band, paint_cursor, paint_curve, paint_ground, paint_hatch,
-    paint_line, paint_value_grid, visible_range,
+    BandCurve, Clicks, Curve, Interaction, PlotArea, StateCurve, Wheel, navigate, paint_band, paint_cursor,
+    paint_curve, paint_ground, paint_hatch, paint_line, paint_value_grid, visible_range,
 };
 use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::gui::units::{Shown, fixed};
@@ -348,4 +347,13 @@ fn boxed_text(painter: &egui::Painter, theme: &theme::Theme, place: Pos2, align:
     let rect = align.anchor_size(place, galley.size());
     painter.rect_filled(rect.expand2(vec2(2.0, 0.0)), 2.0, theme.plot_background.gamma_multiply(0.85));
     painter.galley(rect.min, galley, color);
+}
+
+/// The cached curves of one parameter of one run.
+#[derive(Debug, Default)]
+pub(super) struct ParameterCurves {
+    pub(super) value: Curve,
+    pub(super) band: BandCurve,
+    /// Ranges in which it is weak, unobservable, or not estimated yet.
+    pub(super) states: [StateCurve; MARKED.len()],
 }

@@ -2,11 +2,11 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
 use super::ConvergencePanel;
-use crate::gui::Selection;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
 use crate::gui::samples::{sample_images, sensor_recording};
 use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::{Panel as _, Selection};
 
 type Shown = (ConvergencePanel, Selection);
 

@@ -13,8 +13,8 @@ use egui::{
 use self::blocks_ui::spans_ui;
 pub(crate) use self::manual::Manual;
 use self::manual::first_paragraph;
+use super::PanelName;
 use super::theme::Theme;
-use super::window::PanelName;
 
 /// Width of the popup in points.
 const WIDTH: f32 = 360.0;

@@ -2,8 +2,7 @@
 
 use super::ImagePanel;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell};
-use crate::gui::PanelContext;
-use crate::gui::csv_table::CsvTable;
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for ImagePanel {
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {

@@ -21,7 +21,7 @@ use super::copied_value::offer;
 use super::help::terms::window;
 use super::pan_zoom::PanZoom;
 use super::units::significant;
-use super::{PanelContext, slide};
+use super::{Panel, PanelContext};
 use crate::sensors::{GrayImage, ImageMask};
 use crate::session::FrameImage;
 
@@ -76,31 +76,8 @@ struct CachedTexture {
     handle: TextureHandle,
 }
 
-impl ImagePanel {
-    /// A panel with the same view, without textures of a window.
-    pub(in crate::gui) fn view_copy(&self) -> Self {
-        let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *self;
-        Self { side, magnification, residuals, trails, ids, mask, view, texture: None }
-    }
-
-    /// Copies the view of another panel.
-    pub(in crate::gui) fn follow(&mut self, other: &Self) {
-        let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *other;
-        let texture = self.texture.take();
-        *self = Self { side, magnification, residuals, trails, ids, mask, view, texture };
-    }
-
-    /// True if it has the view of another panel.
-    pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
-        let look = |panel: &Self| {
-            let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *panel;
-            (side, magnification, residuals, trails, ids, mask, view)
-        };
-        look(self) == look(other)
-    }
-
-    /// Draws options, image, overlay and legend.
-    pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
+impl Panel for ImagePanel {
+    fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
         let Some(run) = context.recording.runs.get(context.selection.run) else {
             empty_ui(ui, "No runs");
             return;
@@ -119,13 +96,36 @@ impl ImagePanel {
         self.image_ui(ui, area, &response, context, &model, image);
         let (legend, line) = ui.allocate_exact_size(vec2(ui.available_width(), LINE_HEIGHT), Sense::hover());
         line.on_hover_text(LEGEND);
-        let moved = slide::of(context, model.stamp_ns).is_some();
+        let moved = context.moved_chain(model.stamp_ns).is_some();
         paint::legend(ui.painter(), legend, context.theme, &self.mark_options(), moved);
         let (room, font) = (ui.available_width(), egui::TextStyle::Body.resolve(ui.style()));
         let width =
             |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), context.theme.text).size().x;
         let line = ui.add(egui::Label::new(model.fitting_caption(|text| width(text) <= room)).truncate());
         line.on_hover_text(format!("{}\n{}", model.caption(), window::CAPTION.meaning));
+    }
+
+    fn view_copy(&self) -> Self {
+        let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *self;
+        Self { side, magnification, residuals, trails, ids, mask, view, texture: None }
+    }
+}
+
+impl ImagePanel {
+    /// Copies the view of another panel.
+    pub(in crate::gui) fn follow(&mut self, other: &Self) {
+        let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *other;
+        let texture = self.texture.take();
+        *self = Self { side, magnification, residuals, trails, ids, mask, view, texture };
+    }
+
+    /// True if it has the view of another panel.
+    pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
+        let look = |panel: &Self| {
+            let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *panel;
+            (side, magnification, residuals, trails, ids, mask, view)
+        };
+        look(self) == look(other)
     }
 
     fn mark_options(&self) -> MarkOptions {
@@ -216,7 +216,7 @@ impl ImagePanel {
         for mark in &model.marks {
             paint::feature(&painter, &place, mark, &options);
         }
-        if let Some(slide) = slide::of(context, model.stamp_ns) {
+        if let Some(slide) = context.moved_chain(model.stamp_ns) {
             for (_, [now, moved]) in &slide.predictions_px {
                 paint::moved_prediction(&painter, &place, now, moved);
             }

@@ -11,7 +11,7 @@ use crate::gui::rendering::headless::{HeadlessOptions, draw};
 use crate::gui::samples::{FRAME_PERIOD_NS, first_tracked_frame, sample_images, sample_recording_of};
 use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::{ImageSource, Selection};
+use crate::gui::{ImageSource, Panel as _, Selection};
 use crate::sensors::{CameraMask, GrayImage, ImageMask};
 use crate::session::{FrameImage, Recording, StepRecord};
 

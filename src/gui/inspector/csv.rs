@@ -3,8 +3,7 @@
 use super::InspectorPanel;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::geometry::seconds_from_ns;
-use crate::gui::PanelContext;
-use crate::gui::csv_table::CsvTable;
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for InspectorPanel {
     /// The state of the newest frame at the cursor.

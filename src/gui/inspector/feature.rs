@@ -2,7 +2,7 @@
 
 use egui::{RichText, Ui};
 
-use super::{rows_ui, table_ui};
+use super::rows::{rows_ui, table_ui};
 use crate::frontend::FeatureId;
 use crate::gui::PanelContext;
 use crate::gui::help::terms::{feature, observations};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::{RichText, Ui};
 
-use super::headed_table_ui;
+use super::rows::headed_table_ui;
 use crate::estimator::{JacobianFactor, StepJacobian};
 use crate::frontend::FeatureId;
 use crate::gimbal::ParameterId;

@@ -4,17 +4,17 @@ mod csv;
 mod feature;
 mod links;
 mod parameter;
+mod rows;
 mod step;
 
 use std::sync::Arc;
 
-use egui::{CollapsingHeader, Grid, RichText, ScrollArea, Ui, vec2};
+use egui::{CollapsingHeader, RichText, ScrollArea, Ui, vec2};
 
 use self::links::Links;
-use super::PanelContext;
 use super::convergence::empty_ui;
-use super::help::terms::Term;
 use super::theme::Theme;
+use super::{Panel, PanelContext};
 use crate::session::{RunRecord, StepRecord};
 
 #[derive(Debug, Default)]
@@ -24,9 +24,8 @@ pub struct InspectorPanel {
     links: Links,
 }
 
-impl InspectorPanel {
-    /// Draws one section per selected item, then the sections of the step.
-    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+impl Panel for InspectorPanel {
+    fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let recording = ctx.recording;
         let run = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
         let Some((run, step)) = recording.runs.get(run).and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?))) else {
@@ -38,7 +37,9 @@ impl InspectorPanel {
             self.sections_ui(ui, ctx, run, step);
         });
     }
+}
 
+impl InspectorPanel {
     fn sections_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>) {
         let figure = ctx.presentation.is_figure();
         if !figure && (ctx.selection.parameter.is_some() || ctx.selection.feature.is_some()) {
@@ -85,48 +86,4 @@ fn section_ui(ui: &mut Ui, theme: &Theme, figure: bool, title: &str, contents: i
         return;
     }
     CollapsingHeader::new(title).id_salt(salt).default_open(true).show_unindented(ui, contents);
-}
-
-/// A quantity and its values.
-type Row = (Term, Vec<String>);
-
-/// Aligned rows of a name and its values; hovering either explains the quantity.
-fn rows_ui(ui: &mut Ui, theme: &Theme, salt: &str, rows: &[Row]) {
-    Grid::new(salt).spacing(vec2(8.0, 1.0)).min_row_height(15.0).show(ui, |ui| {
-        for (term, values) in rows {
-            ui.label(RichText::new(term.name).color(theme.text_weak)).on_hover_text(term.meaning);
-            for value in values {
-                ui.label(RichText::new(value).monospace().color(theme.text_strong)).on_hover_text(term.meaning);
-            }
-            ui.end_row();
-        }
-    });
-}
-
-/// A table with column headings; hovering a cell explains its column.
-fn table_ui(ui: &mut Ui, theme: &Theme, salt: &str, columns: &[Term], rows: impl Iterator<Item = Vec<String>>) {
-    let headings: Vec<(String, Term)> = columns.iter().map(|term| (term.name.to_owned(), *term)).collect();
-    headed_table_ui(ui, theme, salt, &headings, rows);
-}
-
-/// Like [`table_ui`], with headings that differ from the names of the quantities.
-fn headed_table_ui(
-    ui: &mut Ui,
-    theme: &Theme,
-    salt: &str,
-    headings: &[(String, Term)],
-    rows: impl Iterator<Item = Vec<String>>,
-) {
-    Grid::new(salt).striped(true).spacing(vec2(9.0, 1.0)).min_row_height(15.0).show(ui, |ui| {
-        for (heading, term) in headings {
-            ui.label(RichText::new(heading).small().color(theme.text_weak)).on_hover_text(term.meaning);
-        }
-        ui.end_row();
-        for row in rows {
-            for (cell, (_, term)) in row.into_iter().zip(headings) {
-                ui.label(RichText::new(cell).monospace().color(theme.text_strong)).on_hover_text(term.meaning);
-            }
-            ui.end_row();
-        }
-    });
 }

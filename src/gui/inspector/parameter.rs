@@ -2,7 +2,7 @@
 
 use egui::{RichText, Ui};
 
-use super::rows_ui;
+use super::rows::rows_ui;
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::chain_values::true_values;

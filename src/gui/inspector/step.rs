@@ -2,7 +2,7 @@
 
 use egui::{RichText, Sense, Ui, vec2};
 
-use super::{Row, rows_ui, table_ui};
+use super::rows::{Row, rows_ui, table_ui};
 use crate::estimator::StepReport;
 use crate::geometry::{principal_angle, so3};
 use crate::gui::PanelContext;

@@ -3,8 +3,7 @@
 use super::JacobianPanel;
 use super::{cameras, column_name, name_of};
 use crate::flight_log::csv_writer::CsvWriter;
-use crate::gui::PanelContext;
-use crate::gui::csv_table::CsvTable;
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for JacobianPanel {
     /// Norms of the Jacobian's blocks as in the panel; zeros are empty.

@@ -13,16 +13,16 @@ mod tests;
 
 use std::sync::Arc;
 
-use egui::{Pos2, Rect, Role, Sense, Ui, Vec2, WidgetInfo, pos2, vec2};
+use egui::{Pos2, Rect, Role, Sense, Ui, Vec2, WidgetInfo, vec2};
 
 use self::model::JacobianModel;
 pub(super) use self::model::{cameras, column_name, name_of};
-use super::PanelContext;
 use super::accessible::describe;
 use super::convergence::empty_ui;
 use super::copied_value::offer;
 use super::help::terms::window;
 use super::pan_zoom::PanZoom;
+use super::{Panel, PanelContext};
 use crate::estimator::{ColumnId, JacobianFactor};
 use crate::session::{RunRecord, StepRecord};
 
@@ -51,9 +51,8 @@ pub struct JacobianPanel {
     column: Option<ColumnId>,
 }
 
-impl JacobianPanel {
-    /// Draws the matrix, its axes, the legend and the values of the selected block.
-    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+impl Panel for JacobianPanel {
+    fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
         let Some((run, step)) = run.and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?))) else {
             empty_ui(ui, "No step at the cursor");
@@ -71,7 +70,9 @@ impl JacobianPanel {
         self.model_ui(ui, ctx, run, step, &model);
         self.model = Some(model);
     }
+}
 
+impl JacobianPanel {
     fn model_ui(
         &mut self,
         ui: &mut Ui,
@@ -151,11 +152,4 @@ impl JacobianPanel {
 fn block_at(model: &JacobianModel, place: Rect, pointer: Pos2) -> Option<(usize, usize)> {
     let fraction = (pointer - place.min) / place.size();
     Some((model.rows.at(fraction.y)?, model.columns.at(fraction.x)?))
-}
-
-/// The screen rectangle of a block.
-fn rect_of(model: &JacobianModel, place: Rect, row: usize, column: usize) -> Rect {
-    let (row, column) = (&model.rows.strips[row], &model.columns.strips[column]);
-    let at = |x: f32, y: f32| pos2(place.left() + x * place.width(), place.top() + y * place.height());
-    Rect::from_min_max(at(column.begin, row.begin), at(column.end, row.end))
 }

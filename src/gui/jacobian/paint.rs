@@ -6,7 +6,6 @@ use egui::epaint::{Mesh, TextShape};
 use egui::{Align2, Color32, Painter, Rect, Shape, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::model::{Axis, JacobianModel, ONE_GROUP, Strip};
-use super::rect_of;
 use crate::gui::plot::paint_ground;
 use crate::gui::theme::{Theme, ThemeName, label_font};
 use crate::session::StepRecord;
@@ -204,4 +203,11 @@ pub(super) fn legend(ui: &Ui, theme: &Theme, rect: Rect, model: &JacobianModel) 
     }
     at.x = bar.right() + 5.0;
     text(at, format!("1e{high:.0} σ per 10°, 3 cm, 0.1 m/s, 1 °/s, 0.1 m/s², 10 % of the inverse depth"));
+}
+
+/// The screen rectangle of a block.
+pub(super) fn rect_of(model: &JacobianModel, place: Rect, row: usize, column: usize) -> Rect {
+    let (row, column) = (&model.rows.strips[row], &model.columns.strips[column]);
+    let at = |x: f32, y: f32| pos2(place.left() + x * place.width(), place.top() + y * place.height());
+    Rect::from_min_max(at(column.begin, row.begin), at(column.end, row.end))
 }

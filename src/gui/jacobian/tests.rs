@@ -5,14 +5,15 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
 use super::model::JacobianModel;
-use super::{JacobianPanel, PanZoom, rect_of};
+use super::paint::rect_of;
+use super::{JacobianPanel, PanZoom};
 use crate::estimator::{ColumnBlock, ColumnGroup, ColumnId, JacobianFactor};
 use crate::gimbal::tests::parameter;
-use crate::gui::Selection;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
 use crate::gui::samples::{SAMPLE_FRAMES, first_tracked_frame, sample_images, sample_recording_of};
 use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::{Panel as _, Selection};
 use crate::session::Recording;
 
 type Shown = (JacobianPanel, Selection);

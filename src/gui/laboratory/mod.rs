@@ -13,9 +13,9 @@ use egui::{Label, RichText, ScrollArea, Ui};
 
 use self::choices::Choices;
 use self::worker::Worker;
-use super::PanelContext;
 use super::help::terms::window;
 use super::rank::columns::{RankColumn, columns_ui};
+use super::{Panel, PanelContext};
 use crate::observability::RankReport;
 use crate::observability::laboratory::{LaboratoryReport, LaboratoryResult};
 
@@ -28,22 +28,8 @@ pub struct LaboratoryPanel {
     worker: Worker,
 }
 
-impl LaboratoryPanel {
-    /// A panel with the same choices, for a screenshot.
-    pub(in crate::gui) fn view_copy(&self) -> Self {
-        Self { in_background: false, choices: self.choices.clone(), worker: Worker::default() }
-    }
-
-    /// The chosen parameterizations with their rank reports; waits for missing results.
-    pub(in crate::gui) fn ranks(&mut self, ctx: &PanelContext<'_>) -> Vec<(String, RankReport)> {
-        if let Ok(experiment) = self.choices.experiment(ctx) {
-            self.worker.request(&experiment, self.in_background);
-        }
-        self.worker.results().0.iter().map(|result| (result.form.name(), result.rank.clone())).collect()
-    }
-
-    /// Draws choices and results.
-    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+impl Panel for LaboratoryPanel {
+    fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 3.0;
             if ctx.presentation.is_figure() {
@@ -86,6 +72,20 @@ impl LaboratoryPanel {
                 .collect();
             columns_ui(ui, ctx, &columns);
         });
+    }
+
+    fn view_copy(&self) -> Self {
+        Self { in_background: false, choices: self.choices.clone(), worker: Worker::default() }
+    }
+}
+
+impl LaboratoryPanel {
+    /// The chosen parameterizations with their rank reports; waits for missing results.
+    pub(in crate::gui) fn ranks(&mut self, ctx: &PanelContext<'_>) -> Vec<(String, RankReport)> {
+        if let Ok(experiment) = self.choices.experiment(ctx) {
+            self.worker.request(&experiment, self.in_background);
+        }
+        self.worker.results().0.iter().map(|result| (result.form.name(), result.rank.clone())).collect()
     }
 }
 

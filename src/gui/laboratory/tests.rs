@@ -4,11 +4,11 @@ use egui_kittest::kittest::Queryable as _;
 
 use super::LaboratoryPanel;
 use crate::gimbal::Parameterization;
-use crate::gui::Selection;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::{Panel as _, Selection};
 use crate::observability::laboratory::{LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
 use crate::session::Recording;
 

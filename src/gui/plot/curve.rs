@@ -2,7 +2,7 @@
 
 use egui::{Rangef, vec2};
 
-use super::{PlotArea, visible_segments};
+use super::area::{PlotArea, visible_segments};
 
 /// Inputs of a reduced curve; equal keys have equal curves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

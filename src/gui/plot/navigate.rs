@@ -2,7 +2,7 @@
 
 use egui::{Id, PointerButton, Rangef, Rect, Response, Role, Sense, Stroke, Ui, WidgetInfo};
 
-use super::PlotArea;
+use super::area::PlotArea;
 use crate::gui::PanelContext;
 use crate::gui::accessible::describe;
 use crate::session::Command;

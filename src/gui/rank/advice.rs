@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::{RichText, Ui};
 
-use super::{fact_ui, section_ui};
+use super::sections::{fact_ui, section_ui};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;

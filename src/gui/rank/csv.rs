@@ -2,8 +2,7 @@
 
 use super::RankPanel;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell};
-use crate::gui::PanelContext;
-use crate::gui::csv_table::CsvTable;
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for RankPanel {
     /// Singular values of the step at the cursor, and each null or weak direction as weights by parameter name.

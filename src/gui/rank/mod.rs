@@ -7,6 +7,7 @@ mod csv;
 mod groups;
 mod heat_map;
 mod information;
+mod sections;
 mod slider;
 mod spectrum;
 pub(crate) mod verdict;
@@ -15,12 +16,13 @@ pub(super) use self::compare::ui as all_runs_ui;
 
 use std::sync::Arc;
 
-use egui::text::{LayoutJob, TextFormat};
-use egui::{RichText, ScrollArea, TextStyle, Ui, UiBuilder, vec2};
+use egui::{RichText, ScrollArea, Ui, UiBuilder, vec2};
 
 use self::advice::AdviceUi;
 use self::information::InformationUi;
+use self::sections::{fact_ui, section_ui};
 use self::slider::SliderUi;
+use self::spectrum::ranks_text;
 use self::verdict::{Level, Verdict};
 use super::convergence::empty_ui;
 use super::follow::RunTables;
@@ -30,7 +32,7 @@ use super::plot::{
     run_legend_ui, visible_range,
 };
 use super::theme::{CURVE_WIDTH, RunStyle, Theme};
-use super::{PanelContext, Presentation};
+use super::{Panel, PanelContext};
 use crate::gimbal::ParameterNames;
 use crate::observability::RankReport;
 use crate::session::{RunRecord, StepRecord};
@@ -77,14 +79,8 @@ pub struct RankPanel {
     overflows: bool,
 }
 
-impl RankPanel {
-    /// Suggested excitation for a step of a run; `None` until the panel has computed it.
-    pub(in crate::gui) fn suggested_excitation(&self, run: u64, step: &StepRecord) -> Option<String> {
-        self.advice.sentence(run, step)
-    }
-
-    /// Draws the shown run, or all runs side by side.
-    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+impl Panel for RankPanel {
+    fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let recording = ctx.recording;
         let Some(run) = recording.runs.get(ctx.selection.run.min(recording.runs.len().saturating_sub(1))) else {
             empty_ui(ui, "No runs");
@@ -122,6 +118,13 @@ impl RankPanel {
             }
         }
         self.run_ui(ui, ctx, run, step, ui.available_height());
+    }
+}
+
+impl RankPanel {
+    /// Suggested excitation for a step of a run; `None` until the panel has computed it.
+    pub(in crate::gui) fn suggested_excitation(&self, run: u64, step: &StepRecord) -> Option<String> {
+        self.advice.sentence(run, step)
     }
 
     /// Draws one run: summary and heat map visible without scrolling, details below or to the right.
@@ -251,12 +254,6 @@ impl RankPanel {
     }
 }
 
-/// Structural and informed rank in words.
-fn ranks_text(rank: &RankReport) -> String {
-    let count = rank.parameters.len();
-    format!("structural rank {} of {count}, informed rank {} of {count}", rank.rank_structural, rank.rank_informed)
-}
-
 fn rank_row(step: &StepRecord) -> [f64; 3] {
     step.rank.as_ref().filter(|rank| !rank.parameters.is_empty()).map_or([f64::NAN, f64::NAN, 0.0], |rank| {
         [rank.rank_structural as f64, rank.rank_informed as f64, rank.parameters.len() as f64]
@@ -290,40 +287,6 @@ fn verdict_ui(ui: &mut Ui, theme: &Theme, verdict: &Verdict, since: Option<&str>
         let line = fact_ui(ui, theme, &format!("{kind}: "), &format!("{names}{since}"), theme.text_strong);
         line.on_hover_text(direction.term.meaning);
     }
-}
-
-/// Draws a name and its text, wrapped.
-fn fact_ui(ui: &mut Ui, theme: &Theme, name: &str, text: &str, color: egui::Color32) -> egui::Response {
-    let font = TextStyle::Body.resolve(ui.style());
-    let mut job = LayoutJob::default();
-    job.append(name, 0.0, TextFormat::simple(font.clone(), theme.text_weak));
-    job.append(text, 0.0, TextFormat::simple(font, color));
-    ui.add(egui::Label::new(job).wrap())
-}
-
-/// Draws a section with a heading; it is initially open if `height` points are visible without scrolling.
-///
-/// A figure shows only the sections that fit, and its headings cannot be clicked.
-fn section_ui(
-    ui: &mut Ui,
-    theme: &Theme,
-    presentation: Presentation,
-    title: &str,
-    height: f32,
-    contents: impl FnOnce(&mut Ui),
-) {
-    const HEADING: f32 = 24.0;
-    let room = ui.clip_rect().bottom() - ui.cursor().top();
-    let heading = RichText::new(title).color(theme.text);
-    if presentation.is_figure() {
-        if room >= height + HEADING {
-            ui.label(heading);
-            contents(ui);
-        }
-        return;
-    }
-    let header = egui::CollapsingHeader::new(heading).id_salt(title).default_open(room >= height + HEADING);
-    header.show_unindented(ui, contents);
 }
 
 /// Draws the null directions that are known in closed form.

@@ -4,8 +4,8 @@
 use egui::{ComboBox, Label, RichText, Role, Slider, Ui, WidgetInfo};
 
 use crate::gimbal::ParameterId;
+use crate::gui::PanelContext;
 use crate::gui::units::{Shown, fixed, significant};
-use crate::gui::{PanelContext, slide};
 use crate::observability::{
     ChainSlide, RankReport, SlideDirection, SlidePosition, chain_of_step, parameters_of_weights,
 };
@@ -59,7 +59,7 @@ impl SliderUi {
         let mut direction = position.as_ref().map_or(first, |position| position.direction);
         let mut amount = position.map_or(0.0, |position| position.amount);
         if ctx.presentation.is_figure() {
-            if let Some(slide) = slide::of(ctx, step.report.stamp_ns) {
+            if let Some(slide) = ctx.moved_chain(step.report.stamp_ns) {
                 let text = format!("Chain moved along {} by {}", label(&direction), signed(amount));
                 ui.add(Label::new(RichText::new(text).color(ctx.theme.text)).wrap());
                 outcome_ui(ui, ctx, slide, &parameters);
@@ -112,7 +112,7 @@ impl SliderUi {
         let untouched = ctx.selection.slide.is_none() && amount == 0.0 && !self.playing;
         let unchosen = directions_first(rank).as_ref() == Some(&direction);
         ctx.selection.slide = (!(untouched && unchosen)).then_some(SlidePosition { direction, amount });
-        if let Some(slide) = slide::of(ctx, step.report.stamp_ns) {
+        if let Some(slide) = ctx.moved_chain(step.report.stamp_ns) {
             outcome_ui(ui, ctx, slide, &parameters);
         }
     }

@@ -72,7 +72,7 @@ pub(super) fn paint(
 
     let response = ui.interact(rect, ui.unique_id().with(("spectrum", number)), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Singular values"));
-    describe(&response, &super::ranks_text(rank));
+    describe(&response, &ranks_text(rank));
     if let Some(pointer) = response.hover_pos() {
         let index = ((pointer.x - plot.left()) / pitch) as usize;
         if let Some(value) = rank.singular_values.get(index).filter(|_| plot.x_range().contains(pointer.x)) {
@@ -129,4 +129,10 @@ impl LogAxis {
     fn y(&self, value: f64) -> f32 {
         if value > 0.0 { self.y_of_power(value.log10()) } else { self.plot.bottom() }
     }
+}
+
+/// Both ranks in words.
+pub(super) fn ranks_text(rank: &RankReport) -> String {
+    let count = rank.parameters.len();
+    format!("structural rank {} of {count}, informed rank {} of {count}", rank.rank_structural, rank.rank_informed)
 }

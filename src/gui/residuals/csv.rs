@@ -3,8 +3,7 @@
 use super::{ResidualsPanel, rms_px};
 use crate::estimator::FactorKind;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
-use crate::gui::PanelContext;
-use crate::gui::csv_table::CsvTable;
+use crate::gui::{CsvTable, PanelContext};
 use crate::session::StepRecord;
 
 impl CsvTable for ResidualsPanel {

@@ -11,7 +11,6 @@ use egui::{
     pos2, vec2,
 };
 
-use super::PanelContext;
 use super::accessible::describe;
 use super::convergence::empty_ui;
 use super::follow::RunTables;
@@ -22,6 +21,7 @@ use super::plot::{
 };
 use super::theme::{CURVE_WIDTH, ROW_HEIGHT, Theme, label_font, number_font};
 use super::units::{fixed, significant};
+use super::{Panel, PanelContext};
 use crate::estimator::{FactorKind, ResidualSummary, StepReport};
 use crate::gui::residuals::histogram::ResidualHistogram;
 use crate::session::StepRecord;
@@ -37,9 +37,8 @@ pub struct ResidualsPanel {
     overflows: bool,
 }
 
-impl ResidualsPanel {
-    /// Draws histogram, plot over time and table of factors.
-    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+impl Panel for ResidualsPanel {
+    fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let recording = ctx.recording;
         let run = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
         let Some(step) = recording.runs.get(run).and_then(|run| run.step_at(ctx.cursor_ns)) else {
@@ -66,7 +65,9 @@ impl ResidualsPanel {
         });
         self.overflows = overflows(&shown);
     }
+}
 
+impl ResidualsPanel {
     fn left_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, report: &StepReport, height: f32) {
         let theme = *ctx.theme;
         let Some((_, histogram)) = &self.counted else { return };

@@ -3,8 +3,7 @@
 use super::ScenePanel;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::geometry::seconds_from_ns;
-use crate::gui::PanelContext;
-use crate::gui::csv_table::CsvTable;
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for ScenePanel {
     /// Positions of all runs and trajectories up to the cursor, aligned with the ground truth as in the scene, and the

@@ -30,7 +30,7 @@ use self::overlay::LegendLine;
 use self::world::{LaneView, RunView, Trajectories, WorldBuilder, WorldOptions, framing_points_m, ground_height_m};
 use super::accessible::describe;
 use super::help::terms::{Term, window};
-use super::{PanelContext, slide};
+use super::{Panel, PanelContext};
 use crate::camera::CameraModel;
 use crate::sensors::Rig;
 use crate::session::RunRecord;
@@ -98,13 +98,31 @@ fn default_world_orbit() -> Orbit {
     Orbit::from_direction(Vector3::new(-0.45, -0.75, 0.55))
 }
 
-impl ScenePanel {
-    /// A panel with the same view, without textures of a window.
-    pub(in crate::gui) fn view_copy(&self) -> Self {
+impl Panel for ScenePanel {
+    fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
+        if !context.presentation.is_figure() {
+            self.controls_ui(ui);
+        }
+        let (area, response) =
+            ui.allocate_exact_size(ui.available_size().max(Vec2::splat(16.0)), Sense::click_and_drag());
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "View of the scene"));
+        let area = on_pixels(area, ui.pixels_per_point());
+        let has_room = area.width() >= CLOSE_UP_FROM.x && area.height() >= CLOSE_UP_FROM.y;
+        let chain = (self.chain && has_room).then(|| chain_model(context)).flatten();
+        let close_up = chain.as_ref().map(|_| close_up_rect(area, ui.pixels_per_point()));
+        self.world_ui(ui, area, close_up, &response, context);
+        if let (Some(chain), Some(rect)) = (chain, close_up) {
+            self.close_up_ui(ui, rect, &chain, context);
+        }
+    }
+
+    fn view_copy(&self) -> Self {
         let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, .. } = *self;
         Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, ..Self::default() }
     }
+}
 
+impl ScenePanel {
     /// Copies options and viewpoint of another panel.
     pub(in crate::gui) fn follow(&mut self, other: &Self) {
         let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, .. } = *other;
@@ -120,24 +138,6 @@ impl ScenePanel {
             (follow, landmarks, keyframes, image, chain, tube, world, close_up)
         };
         look(self) == look(other)
-    }
-
-    /// Draws world, close-up and legend.
-    pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
-        if !context.presentation.is_figure() {
-            self.controls_ui(ui);
-        }
-        let (area, response) =
-            ui.allocate_exact_size(ui.available_size().max(Vec2::splat(16.0)), Sense::click_and_drag());
-        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "View of the scene"));
-        let area = on_pixels(area, ui.pixels_per_point());
-        let has_room = area.width() >= CLOSE_UP_FROM.x && area.height() >= CLOSE_UP_FROM.y;
-        let chain = (self.chain && has_room).then(|| chain_model(context)).flatten();
-        let close_up = chain.as_ref().map(|_| close_up_rect(area, ui.pixels_per_point()));
-        self.world_ui(ui, area, close_up, &response, context);
-        if let (Some(chain), Some(rect)) = (chain, close_up) {
-            self.close_up_ui(ui, rect, &chain, context);
-        }
     }
 
     fn controls_ui(&mut self, ui: &mut Ui) {
@@ -338,7 +338,7 @@ fn chain_model(context: &PanelContext<'_>) -> Option<ChainModel> {
     let estimate = &step.report.calibration.classical;
     let joint_names = context.recording.rig.joint_names();
     let angles_rad = step.report.newest().map_or(&[][..], |frame| &frame.joint_angles_rad);
-    if let Some(slide) = slide::of(context, step.report.stamp_ns) {
+    if let Some(slide) = context.moved_chain(step.report.stamp_ns) {
         let model = ChainModel::at(angles_rad, &slide.chain, Some(estimate), &joint_names);
         return Some(ChainModel { moved: true, camera_error: Some(slide.camera_moves), ..model });
     }

@@ -10,11 +10,11 @@ use super::chain::{ChainModel, ChainPose};
 use super::layout::{Drawing, lay_out};
 use super::model::{Dot, Face, ImageQuad, Line, SceneModel};
 use super::{Follow, ScenePanel, cpu};
-use crate::gui::Selection;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
 use crate::gui::samples::{sample_images, sample_recording, sample_recording_of};
 use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::{Panel as _, Selection};
 use crate::sensors::GrayImage;
 use crate::session::Recording;
 

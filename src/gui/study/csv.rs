@@ -1,6 +1,6 @@
 //! Values of the panels of a study as comma-separated values.
 
-use super::StudyPanel;
+use super::context::StudyPanel;
 use super::model::StudyModel;
 use super::plots::{differences, distributions, success_rates};
 use super::strips::Strip;

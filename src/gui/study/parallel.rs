@@ -7,7 +7,7 @@ use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::epaint::{Mesh, Vertex, WHITE_UV};
 use egui::{Align2, Color32, PopupCloseBehavior, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2};
 
-use super::StudyContext;
+use super::context::StudyContext;
 use crate::gui::accessible::describe;
 use crate::gui::theme::{Theme, ThemeName, label_font, number_font, viridis};
 use crate::gui::units::significant;

@@ -2,7 +2,7 @@
 
 use egui::{Align2, Rect, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
-use super::StudyContext;
+use super::context::StudyContext;
 use super::points::Points;
 use crate::gui::accessible::describe;
 use crate::gui::theme::{ThemeName, label_font, number_font};

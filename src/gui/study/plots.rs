@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use egui::{Label, RichText, Ui};
 
-use super::StudyContext;
+use super::context::StudyContext;
 use super::model::{StudyModel, shown_group};
 use super::strips::{Strip, StripsFrame, StripsPlot};
 use crate::gui::units::{counted, fixed, significant};

@@ -8,7 +8,7 @@ use egui::{
     Align2, Label, PopupCloseBehavior, Rect, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetInfo, pos2, vec2,
 };
 
-use super::StudyContext;
+use super::context::StudyContext;
 use super::model::{StudyModel, shown_group};
 use super::plots::spaced;
 use crate::gui::theme::{Theme, label_font, number_font};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::{Align, Button, ComboBox, Label, Layout, RichText, TextEdit, Ui, WidgetInfo};
 
-use super::StudyRequest;
+use super::context::StudyRequest;
 use super::model::{Condition, StudyModel, shown_group};
 use crate::gui::theme::Theme;
 use crate::gui::units::counted;

@@ -2,10 +2,9 @@
 
 use super::TimelinePanel;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
-use crate::gui::PanelContext;
-use crate::gui::csv_table::CsvTable;
 use crate::gui::events::name_of;
 use crate::gui::residuals::rms_px;
+use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for TimelinePanel {
     /// A row for every step of every run, followed by one for each of its notable events and of the log's warnings.

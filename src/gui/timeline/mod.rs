@@ -13,7 +13,6 @@ use egui::{Align2, PointerButton, Rect, Response, Role, Sense, Stroke, Ui, Widge
 
 use self::lanes::Lane;
 use self::model::RunLanes;
-use super::PanelContext;
 use super::copied_value::offer;
 use super::events::name_of;
 use super::plot::{
@@ -21,6 +20,7 @@ use super::plot::{
 };
 use super::theme::{LANE_HEIGHT, LANE_LABEL_WIDTH, Theme, number_font};
 use super::units::{fixed, seconds};
+use super::{Panel, PanelContext};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::session::Command;
 
@@ -41,14 +41,8 @@ pub struct TimelinePanel {
     range_begin_ns: Option<i64>,
 }
 
-impl TimelinePanel {
-    /// Height in points of the transport and of all lanes for this number of runs and trajectories.
-    pub fn height_for(lanes: usize) -> f32 {
-        transport::HEIGHT + RULER_HEIGHT + LANE_HEIGHT * (lanes + 7) as f32 + 10.0
-    }
-
-    /// Draws transport, lanes and cursor.
-    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+impl Panel for TimelinePanel {
+    fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         self.runs.resize_with(ctx.recording.runs.len(), RunLanes::default);
         for (lanes, run) in self.runs.iter_mut().zip(&ctx.recording.runs) {
             lanes.read(run);
@@ -99,6 +93,13 @@ impl TimelinePanel {
         step_by_assistance(ui, ctx, &response);
         self.select_range(ui, ctx, &area, &response);
         self.hover(ui, ctx, &area, response);
+    }
+}
+
+impl TimelinePanel {
+    /// Height in points of the transport and of all lanes for this number of runs and trajectories.
+    pub fn height_for(lanes: usize) -> f32 {
+        transport::HEIGHT + RULER_HEIGHT + LANE_HEIGHT * (lanes + 7) as f32 + 10.0
     }
 
     /// Width in points of the lane names, large enough for those of the runs.

@@ -3,13 +3,9 @@
 use egui::{Event, Key, KeyboardShortcut, Modifiers, Popup, Ui};
 
 use super::tiles::Preset;
-use super::{Dialog, NoticeLevel, PanelName, WindowRequest, WindowState, copying};
 use crate::frontend::FeatureId;
-use crate::gui::PanelContext;
-use crate::gui::plot::zoom_about_cursor;
 use crate::gui::theme::ThemeName;
-use crate::gui::timeline::toggled_loop;
-use crate::session::{Command, PlaybackSpeed};
+use crate::gui::{Dialog, PanelName};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Action {
@@ -204,77 +200,6 @@ pub(crate) fn pressed(ui: &Ui) -> Vec<Action> {
         }
     });
     actions
-}
-
-/// Executes an action: commands for the session, state for the window.
-pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
-    match action {
-        Action::TogglePlay => ctx.commands.push(Command::TogglePlay),
-        Action::Step(frames) => ctx.commands.push(Command::StepFrames(frames)),
-        Action::Iteration(forward) => ctx.commands.push(Command::StepIteration { forward }),
-        Action::Event(forward) => ctx.commands.push(Command::JumpToEvent { forward }),
-        Action::Start => ctx.commands.push(Command::GoToStart),
-        Action::End => ctx.commands.push(Command::GoToEnd),
-        Action::Loop => ctx.commands.push(toggled_loop(ctx)),
-        Action::Breakpoint => ctx.commands.push(Command::ToggleBreakpointHere),
-        Action::Hit(forward) => ctx.commands.push(Command::RunToBreakpoint { forward }),
-        Action::Marker => ctx.commands.push(Command::ToggleMarker),
-        Action::WholeLog => ctx.selection.visible_ns = None,
-        Action::Dismiss if state.help.manual.is_open() => state.help.manual.close(),
-        Action::Dismiss if state.tour.is_running() => state.tour.end(),
-        Action::Tour => state.tour.start(),
-        Action::Dismiss => {
-            (ctx.selection.feature, ctx.selection.parameter, ctx.selection.slide) = (None, None, None);
-            state.close_dialogs();
-        }
-        Action::ZoomTime(closer) => zoom_about_cursor(ctx, closer),
-        Action::NextRun => {
-            ctx.selection.run = (ctx.selection.run + 1) % ctx.recording.runs.len().max(1);
-        }
-        Action::Dialog(dialog) => state.dialogs.show(dialog),
-        Action::Explain => state.explain_focused(),
-        Action::Manual => state.help.manual.show(None),
-        Action::Shortcuts => state.shortcuts_open = !state.shortcuts_open,
-        Action::Warnings => state.notices.list_open = !state.notices.list_open,
-        Action::Export => {
-            let export = super::panel_export::export(state, ctx);
-            state.requests.push(WindowRequest::WritePanel(Box::new(export)));
-        }
-        Action::Copy => {
-            let value = state.pointed.take();
-            copying::copy(value, state, ctx);
-        }
-        Action::CopyTable(panel) => copying::copy_table(panel, state, ctx),
-        Action::Undo => state.undo(),
-        Action::Redo => state.redo(),
-        Action::CloseLog => state.requests.push(WindowRequest::CloseLog),
-        Action::Quit => state.requests.push(WindowRequest::Quit),
-        Action::Save => state.requests.push(WindowRequest::SaveSession),
-        Action::Layout(preset) => state.layout.arrange(preset),
-        Action::SavedLayout(number) => {
-            if !state.saved_layouts.take(number, &mut state.layout) {
-                let text = "No saved layout has this number: save one in the Panels menu";
-                state.notices.show_message(NoticeLevel::Info, text);
-            }
-        }
-        Action::NextPanel(forward) => state.focus_neighbour(forward),
-        Action::Theme => {
-            state.settings.theme = if ctx.theme.is_dark() { ThemeName::Light } else { ThemeName::Dark };
-        }
-        Action::SetTheme(theme) => state.settings.theme = theme,
-        Action::GoTo(stamp_ns) => ctx.commands.push(Command::Seek { stamp_ns }),
-        Action::Feature(feature) => ctx.selection.feature = Some(feature),
-        Action::Run(run) => ctx.selection.run = run,
-        Action::RemoveRun(run) => ctx.commands.push(Command::RemoveRun(run)),
-        Action::Show(panel) => {
-            if panel != PanelName::Timeline {
-                state.layout.set_visible(panel, true);
-            }
-            state.focus = Some(panel);
-        }
-        Action::Hide(panel) => state.layout.set_visible(panel, false),
-        Action::Speed(speed) => ctx.commands.push(Command::SetSpeed(PlaybackSpeed(speed))),
-    }
 }
 
 #[cfg(test)]

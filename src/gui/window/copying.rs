@@ -3,21 +3,14 @@
 use egui::epaint::TextShape;
 use egui::{Id, LayerId, Popup, PopupAnchor, PopupCloseBehavior, Pos2, Shape, Ui};
 
-use super::{NoticeLevel, PanelName, WindowState};
-use crate::gui::PanelContext;
+use super::notices::NoticeLevel;
+use super::state::{MainWindow, PanelMenu};
 use crate::gui::copied_value::offered;
 use crate::gui::units::counted;
+use crate::gui::{PanelContext, PanelName};
 
 /// Number of letters of a copied value that its notice shows.
 const SHOWN_LETTERS: usize = 60;
-
-#[derive(Debug)]
-pub(super) struct PanelMenu {
-    panel: PanelName,
-    at: Pos2,
-    /// Value under the pointer when the menu was opened.
-    value: Option<String>,
-}
 
 /// Value under the pointer: the one that a panel offers, or the text that is painted there.
 pub(super) fn value_under_pointer(ui: &Ui) -> Option<String> {
@@ -43,15 +36,15 @@ fn text_at(ui: &Ui, layer: LayerId, position: Pos2) -> Option<String> {
     })
 }
 
-/// Copies the value under the pointer; without one, the table of the panel with the focus.
-pub(super) fn copy(value: Option<String>, state: &mut WindowState, ctx: &PanelContext<'_>) {
+/// Copies the value under the pointer, or else the table of the panel with the focus.
+pub(super) fn copy(value: Option<String>, state: &mut MainWindow, ctx: &PanelContext<'_>) {
     match value {
         Some(value) => copy_value(value, state),
         None => copy_table(state.focused().0, state, ctx),
     }
 }
 
-fn copy_value(value: String, state: &mut WindowState) {
+fn copy_value(value: String, state: &mut MainWindow) {
     let mut shown: String =
         value.chars().take(SHOWN_LETTERS).map(|letter| if letter == '\n' { ' ' } else { letter }).collect();
     if value.chars().count() > SHOWN_LETTERS {
@@ -62,7 +55,7 @@ fn copy_value(value: String, state: &mut WindowState) {
 }
 
 /// Copies the values of a panel as comma-separated values.
-pub(super) fn copy_table(panel: PanelName, state: &mut WindowState, ctx: &PanelContext<'_>) {
+pub(super) fn copy_table(panel: PanelName, state: &mut MainWindow, ctx: &PanelContext<'_>) {
     let table = state.panels.csv_table(panel, ctx);
     let rows = table.lines().count().saturating_sub(1);
     if rows == 0 {
@@ -79,8 +72,8 @@ fn menu_id() -> Id {
     Id::unique("panel menu")
 }
 
-/// Draws the context menu of a panel, and opens it on a click with the secondary button.
-pub(super) fn menu_ui(ui: &Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
+/// Opens the menu of the panel that is clicked with the secondary button, and draws it.
+pub(super) fn menu_ui(ui: &Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
     let clicked = ui.input(|input| input.pointer.secondary_clicked().then(|| input.pointer.interact_pos()).flatten());
     let clicked = clicked.filter(|at| ui.ctx().layer_id_at(*at) == Some(ui.layer_id()));
     let panel = clicked.and_then(|at| state.places.iter().find(|(_, place)| place.contains(at)).map(|it| (it.0, at)));

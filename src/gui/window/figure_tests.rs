@@ -6,11 +6,11 @@ use egui::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
-use super::{PanelName, WindowState, alone_ui};
+use super::{MainWindow, alone_ui};
 use crate::gimbal::tests::parameter;
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::{PanelContext, Playback, Presentation, Selection};
+use crate::gui::{PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::{SlideDirection, SlidePosition};
 use crate::session::Recording;
 use crate::session::breakpoints::Breakpoints;
@@ -55,7 +55,7 @@ fn operable(recording: &Recording, panel: PanelName, presentation: Presentation,
         slide: Some(SlidePosition { direction: SlideDirection::Measured(0), amount: 0.5 }),
         ..Selection::default()
     };
-    let ui = |ui: &mut egui::Ui, (window, selection): &mut (WindowState, Selection)| {
+    let ui = |ui: &mut egui::Ui, (window, selection): &mut (MainWindow, Selection)| {
         let theme = Theme::of(ThemeName::Print);
         let mut context = PanelContext {
             recording,
@@ -73,7 +73,7 @@ fn operable(recording: &Recording, panel: PanelName, presentation: Presentation,
         .with_size(size)
         .with_max_steps(20)
         .with_context_setup(|ctx| Theme::of(ThemeName::Print).apply(ctx))
-        .build_ui_state(ui, (WindowState::default(), selection));
+        .build_ui_state(ui, (MainWindow::default(), selection));
     harness.run_steps(3);
     let nodes = harness.query_all(By::new().predicate(|node| OPERABLE.contains(&node.role())));
     nodes

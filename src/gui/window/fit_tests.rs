@@ -5,8 +5,9 @@ use egui::{Key, Rect, Shape};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
+use super::Preset;
 use super::tests::{Bench, bench_of, sample};
-use super::{PanelName, Preset};
+use crate::gui::PanelName;
 use crate::gui::theme::SMALLEST_TEXT;
 use crate::session::Recording;
 

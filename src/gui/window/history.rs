@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-use super::Settings;
-use super::tiles::Layout;
+use super::settings::Settings;
+use super::tiles::PanelLayout;
 
 /// Maximum number of changes that can be undone.
 const MAX_CHANGES: usize = 100;
@@ -12,7 +12,8 @@ const MAX_CHANGES: usize = 100;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Arrangement {
     pub(super) settings: Settings,
-    pub(super) layout: Layout,
+    /// The layout of the panels.
+    pub(super) layout: PanelLayout,
 }
 
 /// Changes of settings and layout, oldest first.
@@ -32,7 +33,7 @@ impl History {
     /// A change is recorded when it is complete: no button of the pointer is down (`settled`), and two calls get the
     /// same state, because the tree of panels is simplified in the frame after a drop. Another open tab alone is no
     /// change.
-    pub(super) fn follow(&mut self, settings: &Settings, layout: &Layout, settled: bool) -> bool {
+    pub(super) fn follow(&mut self, settings: &Settings, layout: &PanelLayout, settled: bool) -> bool {
         let now = || Arrangement { settings: settings.clone(), layout: layout.clone() };
         let Some(current) = &mut self.current else {
             self.current = Some(now());
@@ -91,20 +92,20 @@ impl History {
 
 #[cfg(test)]
 mod tests {
-    use super::super::PanelName;
     use super::super::tiles::Preset;
     use super::*;
+    use crate::gui::PanelName;
     use crate::gui::theme::ThemeName;
 
-    /// Runs the two frames that complete a change.
-    fn complete(history: &mut History, settings: &Settings, layout: &Layout) {
+    /// Two frames after a change.
+    fn complete(history: &mut History, settings: &Settings, layout: &PanelLayout) {
         history.follow(settings, layout, true);
         assert!(!history.follow(settings, layout, true));
     }
 
     #[test]
     fn changes_are_undone_and_redone_in_order() {
-        let (mut settings, mut layout) = (Settings::default(), Layout::default());
+        let (mut settings, mut layout) = (Settings::default(), PanelLayout::default());
         let mut history = History::default();
         complete(&mut history, &settings, &layout);
         assert!(!history.can_undo() && history.undo().is_none());
@@ -137,7 +138,7 @@ mod tests {
 
     #[test]
     fn an_open_tab_is_no_change_and_the_number_of_changes_is_limited() {
-        let (mut settings, mut layout) = (Settings::default(), Layout::default());
+        let (mut settings, mut layout) = (Settings::default(), PanelLayout::default());
         let mut history = History::default();
         complete(&mut history, &settings, &layout);
         layout.set_visible(PanelName::Residuals, true);

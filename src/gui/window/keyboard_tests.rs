@@ -5,11 +5,12 @@ use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
+use super::Preset;
 use super::tests::{Bench, SECOND_NS, bench, bench_of, commands_of, sample};
-use super::{Dialog, PanelName, Preset};
 use crate::frontend::FeatureId;
 use crate::gimbal::tests::parameter;
 use crate::gui::theme::ThemeName;
+use crate::gui::{Dialog, PanelName};
 use crate::session::Command;
 
 /// Opens the palette, types, and presses Enter.

@@ -6,11 +6,12 @@ use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Button, PopupCloseBehavior, Ui, WidgetInfo};
 
 use super::actions::{Action, Entry, TABLE};
+use super::request::WindowRequest;
+use super::state::MainWindow;
 use super::tiles::Preset;
-use super::{Dialog, PanelName, WindowRequest, WindowState};
-use crate::gui::PanelContext;
 use crate::gui::theme::{MAX_RUNS, ThemeName};
 use crate::gui::timeline::SPEEDS;
+use crate::gui::{Dialog, PanelContext, PanelName};
 
 /// Maximum number of recent files in the menu.
 const MAX_RECENT: usize = 10;
@@ -99,8 +100,8 @@ impl Menu {
     }
 }
 
-/// Draws the buttons of all menus, and the open menu.
-pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
+/// Draws the buttons of all menus, and the menu that is open.
+pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
     for menu in Menu::ALL {
         MenuButton::from_button(Button::new(menu.title()).frame_when_inactive(false)).ui(ui, |ui| {
             ui.set_min_width(230.0);
@@ -123,8 +124,8 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>, a
     }
 }
 
-/// Draws one action with its keys.
-fn entry_ui(ui: &mut Ui, state: &WindowState, ctx: &PanelContext<'_>, entry: &Entry, actions: &mut Vec<Action>) {
+/// One action with its keys.
+fn entry_ui(ui: &mut Ui, state: &MainWindow, ctx: &PanelContext<'_>, entry: &Entry, actions: &mut Vec<Action>) {
     if matches!(entry.action, Action::SavedLayout(_)) {
         return;
     }
@@ -142,8 +143,8 @@ fn item_ui(ui: &mut Ui, name: &str, keys: &str, enabled: bool, on: bool) -> bool
     response.clicked()
 }
 
-/// Draws the entries of the first group of a menu that depend on the session.
-fn first_group_ui(ui: &mut Ui, menu: Menu, state: &mut WindowState, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
+/// What belongs to the first group of a menu and depends on the session.
+fn first_group_ui(ui: &mut Ui, menu: Menu, state: &mut MainWindow, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
     match menu {
         Menu::File => {
             ui.add_enabled_ui(!state.recent_logs.is_empty(), |ui| {
@@ -209,8 +210,8 @@ fn last_group_ui(ui: &mut Ui, menu: Menu, ctx: &PanelContext<'_>, actions: &mut 
     }
 }
 
-/// Menu of the panels; it stays open while panels are chosen.
-fn panels_ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
+/// The menu of the panels stays open while panels are chosen.
+fn panels_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
     let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     let button = Button::new("Panels").frame_when_inactive(false);
     MenuButton::from_button(button).config(config).ui(ui, |ui| {

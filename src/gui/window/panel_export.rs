@@ -2,13 +2,12 @@
 
 use egui::{CentralPanel, Frame, Ui, Vec2};
 
-use super::{PanelName, WindowState};
+use super::state::MainWindow;
 use crate::geometry::seconds_from_ns;
 use crate::gui::desktop::PanelExport;
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
-use crate::gui::slide;
 use crate::gui::theme::PANEL_MARGIN;
-use crate::gui::{PanelContext, Playback, Presentation};
+use crate::gui::{PanelContext, PanelName, Playback, Presentation};
 
 /// Pixels per point of the screenshot: twice an ordinary screen, so that it can be printed.
 const PIXELS_PER_POINT: f32 = 2.0;
@@ -18,10 +17,10 @@ const MAX_SIDE_PX: f32 = 8192.0;
 /// Minimum size in points of the screenshot of a panel with a list.
 const MIN_LIST_SIZE: Vec2 = Vec2::new(460.0, 640.0);
 
-/// Draws the panel again without the rest of the window.
-pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelExport {
+/// Draws the panel again without the window around it.
+pub(super) fn export(state: &MainWindow, ctx: &mut PanelContext<'_>) -> PanelExport {
     let (panel, size) = state.focused();
-    let mut copy = WindowState { panels: state.panels.views(), show_times: state.show_times, ..WindowState::default() };
+    let mut copy = MainWindow { panels: state.panels.views(), show_times: state.show_times, ..MainWindow::default() };
     copy.panels.inspector.show_times = state.show_times;
     // A scrolling list in a low panel is exported completely, up to a limit.
     let min_size = match panel {
@@ -55,18 +54,15 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
     PanelExport { name, screenshot, drawing, table: copy.panels.csv_table(panel, ctx) }
 }
 
-/// Values of a panel, comma separated.
-pub fn panel_table(panel: PanelName, state: &mut WindowState, ctx: &mut PanelContext<'_>) -> String {
-    slide::update(ctx);
+/// The values of a panel, comma separated.
+pub fn panel_table(panel: PanelName, state: &mut MainWindow, ctx: &mut PanelContext<'_>) -> String {
+    ctx.move_chain();
     state.panels.csv_table(panel, ctx)
 }
 
 /// Draws one panel into all of `ui`.
-pub fn alone_ui(panel: PanelName, ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
+pub fn alone_ui(panel: PanelName, ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
     let frame = Frame::new().fill(ctx.theme.surface).inner_margin(PANEL_MARGIN);
-    slide::update(ctx);
-    CentralPanel::no_frame().frame(frame).show(ui, |ui| state.panels.ui(panel, ui, ctx));
+    ctx.move_chain();
+    CentralPanel::no_frame().frame(frame).show(ui, |ui| state.panels.get(panel).ui(ui, ctx));
 }
-
-/// Size in points of an exported panel that is not visible.
-pub(super) const HIDDEN_PANEL_SIZE: Vec2 = Vec2::new(960.0, 540.0);

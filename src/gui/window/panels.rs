@@ -1,13 +1,8 @@
-//! Panels by name, and their state.
+//! State of all panels.
 
-use egui::Ui;
-use serde::{Deserialize, Serialize};
-
-use crate::gui::PanelContext;
 use crate::gui::breakpoints::BreakpointsPanel;
 use crate::gui::comparison::ComparisonPanel;
 use crate::gui::convergence::ConvergencePanel;
-use crate::gui::csv_table::CsvTable;
 use crate::gui::image_panel::ImagePanel;
 use crate::gui::inspector::InspectorPanel;
 use crate::gui::jacobian::JacobianPanel;
@@ -16,84 +11,7 @@ use crate::gui::rank::RankPanel;
 use crate::gui::residuals::ResidualsPanel;
 use crate::gui::scene::ScenePanel;
 use crate::gui::timeline::TimelinePanel;
-
-/// A panel by its name on the command line, in file names and in saved layouts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
-pub enum PanelName {
-    Image,
-    Scene,
-    /// Calibration over time.
-    Convergence,
-    /// Rank and null directions.
-    Rank,
-    /// The linearization by blocks.
-    Jacobian,
-    /// Residuals as a histogram, over time and by factor.
-    Residuals,
-    /// Values of the selection.
-    Inspector,
-    /// Observability of a mechanism and a motion without a log.
-    Laboratory,
-    /// Comparison of all runs.
-    Comparison,
-    /// Breakpoints and their hits.
-    Breakpoints,
-    /// The timeline at the bottom of the window.
-    Timeline,
-}
-
-impl PanelName {
-    pub const ALL: [Self; 11] = [
-        Self::Image,
-        Self::Scene,
-        Self::Convergence,
-        Self::Rank,
-        Self::Jacobian,
-        Self::Residuals,
-        Self::Inspector,
-        Self::Laboratory,
-        Self::Comparison,
-        Self::Breakpoints,
-        Self::Timeline,
-    ];
-
-    /// The panels that can be moved and hidden: all but the timeline.
-    pub fn movable() -> impl Iterator<Item = Self> {
-        Self::ALL.into_iter().filter(|panel| *panel != Self::Timeline)
-    }
-
-    /// Name on the command line, and title.
-    const fn names(self) -> (&'static str, &'static str) {
-        match self {
-            Self::Image => ("image", "Image"),
-            Self::Scene => ("scene", "Scene"),
-            Self::Convergence => ("convergence", "Convergence"),
-            Self::Rank => ("rank", "Rank"),
-            Self::Jacobian => ("jacobian", "Jacobian"),
-            Self::Residuals => ("residuals", "Residuals"),
-            Self::Inspector => ("inspector", "Inspector"),
-            Self::Laboratory => ("laboratory", "Laboratory"),
-            Self::Comparison => ("comparison", "Comparison"),
-            Self::Breakpoints => ("breakpoints", "Breakpoints"),
-            Self::Timeline => ("timeline", "Timeline"),
-        }
-    }
-
-    /// Name on the command line.
-    pub const fn as_str(self) -> &'static str {
-        self.names().0
-    }
-
-    /// Anchor of the panel's section in the manual.
-    pub(crate) const fn section(self) -> &'static str {
-        self.as_str()
-    }
-
-    /// Title in the window.
-    pub const fn title(self) -> &'static str {
-        self.names().1
-    }
-}
+use crate::gui::{Panel, PanelContext, PanelName};
 
 #[derive(Default)]
 pub struct Panels {
@@ -116,35 +34,21 @@ impl Panels {
         Self {
             image: self.image.view_copy(),
             scene: self.scene.view_copy(),
+            convergence: self.convergence.view_copy(),
+            rank: self.rank.view_copy(),
+            jacobian: self.jacobian.view_copy(),
+            residuals: self.residuals.view_copy(),
+            inspector: self.inspector.view_copy(),
             laboratory: self.laboratory.view_copy(),
             comparison: self.comparison.view_copy(),
-            ..Self::default()
+            breakpoints: self.breakpoints.view_copy(),
+            timeline: self.timeline.view_copy(),
         }
     }
 
-    /// Draws a panel into the available space of `ui`.
-    pub(super) fn ui(&mut self, panel: PanelName, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+    /// A panel by name.
+    pub(super) fn get(&mut self, panel: PanelName) -> &mut dyn Panel {
         match panel {
-            PanelName::Image => self.image.ui(ui, ctx),
-            PanelName::Scene => self.scene.ui(ui, ctx),
-            PanelName::Convergence => self.convergence.ui(ui, ctx),
-            PanelName::Rank => self.rank.ui(ui, ctx),
-            PanelName::Jacobian => self.jacobian.ui(ui, ctx),
-            PanelName::Residuals => self.residuals.ui(ui, ctx),
-            PanelName::Inspector => self.inspector.ui(ui, ctx),
-            PanelName::Laboratory => self.laboratory.ui(ui, ctx),
-            PanelName::Comparison => self.comparison.ui(ui, ctx),
-            PanelName::Breakpoints => self.breakpoints.ui(ui, ctx),
-            PanelName::Timeline => self.timeline.ui(ui, ctx),
-        }
-    }
-
-    /// Values of a panel as a CSV table; empty without a run.
-    pub(super) fn csv_table(&mut self, panel: PanelName, ctx: &PanelContext<'_>) -> String {
-        if ctx.selected_run().is_none() {
-            return String::new();
-        }
-        let source: &mut dyn CsvTable = match panel {
             PanelName::Image => &mut self.image,
             PanelName::Scene => &mut self.scene,
             PanelName::Convergence => &mut self.convergence,
@@ -156,7 +60,11 @@ impl Panels {
             PanelName::Comparison => &mut self.comparison,
             PanelName::Breakpoints => &mut self.breakpoints,
             PanelName::Timeline => &mut self.timeline,
-        };
-        source.csv_table(ctx)
+        }
+    }
+
+    /// Values of a panel as a CSV table; empty without a run.
+    pub(super) fn csv_table(&mut self, panel: PanelName, ctx: &PanelContext<'_>) -> String {
+        if ctx.selected_run().is_none() { String::new() } else { self.get(panel).csv_table(ctx) }
     }
 }

@@ -7,8 +7,9 @@ use egui::{Vec2, pos2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
+use super::Preset;
 use super::tests::{Bench, SECOND_NS, bench};
-use super::{PanelName, Preset};
+use crate::gui::PanelName;
 use crate::session::Command;
 
 fn press(pos: Pos2, button: PointerButton, pressed: bool) -> Event {

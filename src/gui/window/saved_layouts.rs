@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use egui::{Button, RichText, TextEdit, Ui};
 use egui_tiles::Tree;
 
-use super::PanelName;
-use super::tiles::{Layout, Preset};
+use super::tiles::{PanelLayout, Preset};
+use crate::gui::PanelName;
 use crate::gui::theme::Theme;
 
 /// Maximum number of saved layouts.
@@ -31,8 +31,8 @@ impl SavedLayouts {
         self.layouts.keys().map(String::as_str)
     }
 
-    /// Applies the layout with an index in the order of the names; returns true if it exists.
-    pub(super) fn take(&self, number: usize, layout: &mut Layout) -> bool {
+    /// Applies the layout with an index in the order of the names; returns whether it exists.
+    pub(super) fn take(&self, number: usize, layout: &mut PanelLayout) -> bool {
         let tree = self.layouts.values().nth(number);
         if let Some(tree) = tree {
             layout.take(tree.clone());
@@ -47,7 +47,7 @@ impl SavedLayouts {
 
     /// Lists the layouts with buttons to apply and delete them, and saves the current one. Returns true if the list
     /// changed.
-    pub(super) fn ui(&mut self, ui: &mut Ui, theme: &Theme, layout: &mut Layout) -> bool {
+    pub(super) fn ui(&mut self, ui: &mut Ui, theme: &Theme, layout: &mut PanelLayout) -> bool {
         let mut forgotten = None;
         for (name, tree) in &self.layouts {
             ui.horizontal(|ui| {
@@ -87,25 +87,25 @@ impl SavedLayouts {
 }
 
 /// The current layout for a saved session.
-pub(super) fn layout_value(layout: &Layout) -> Option<serde_json::Value> {
+pub(super) fn layout_value(layout: &PanelLayout) -> Option<serde_json::Value> {
     serde_json::to_value(layout.tree()).ok()
 }
 
-/// Applies the layout of a saved session if this program has all its panels.
-pub(super) fn take_layout(layout: &mut Layout, value: &serde_json::Value) {
+/// Applies the layout of a saved session if this program has its panels.
+pub(super) fn take_layout(layout: &mut PanelLayout, value: &serde_json::Value) {
     if let Some(tree) = tree_of(value.clone()) {
         layout.take(tree);
     }
 }
 
 /// The current layout for the next start, with the name of its preset.
-pub(super) fn last_layout_value(layout: &Layout) -> Option<serde_json::Value> {
+pub(super) fn last_layout_value(layout: &PanelLayout) -> Option<serde_json::Value> {
     let preset = layout.preset.map(Preset::name);
     Some(serde_json::json!({ "preset": preset, "panels": layout_value(layout)? }))
 }
 
-/// Applies the value of [`last_layout_value`] if this program has all its panels.
-pub(super) fn take_last_layout(layout: &mut Layout, value: &serde_json::Value) {
+/// Applies the value of [`last_layout_value`] if this program has its panels.
+pub(super) fn take_last_layout(layout: &mut PanelLayout, value: &serde_json::Value) {
     if let Some(panels) = value.get("panels") {
         take_layout(layout, panels);
         let name = value.get("preset").and_then(serde_json::Value::as_str);
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn layouts_survive_writing_and_unknown_ones_are_skipped() {
-        let mut layout = Layout::default();
+        let mut layout = PanelLayout::default();
         layout.arrange(Preset::Scene);
         layout.set_visible(PanelName::Rank, false);
         let mut saved = SavedLayouts::default();
@@ -152,11 +152,11 @@ mod tests {
 
     #[test]
     fn the_last_layout_is_restored_with_the_name_of_its_preset() {
-        let mut layout = Layout::default();
+        let mut layout = PanelLayout::default();
         layout.arrange(Preset::FrontEnd);
         layout.set_visible(PanelName::Scene, false);
         let value = last_layout_value(&layout).unwrap();
-        let mut next = Layout::default();
+        let mut next = PanelLayout::default();
         take_last_layout(&mut next, &value);
         assert!(next == layout && next.preset == Some(Preset::FrontEnd));
         take_last_layout(&mut next, &serde_json::json!({ "preset": "Overview", "panels": 7 }));

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use egui::{Align, Button, FontId, Label, Layout as UiLayout, ProgressBar, RichText, TextStyle, Ui};
 
+use super::progress::Progress;
+use super::state::MainWindow;
 use super::warning_lines::warning_lines;
-use super::{Progress, WindowState};
 use crate::gui::PanelContext;
 use crate::gui::theme::{self, Theme};
 use crate::gui::units::{bytes, counted, fixed};
@@ -19,7 +20,7 @@ const OPENING_WIDTH: f32 = 200.0;
 /// Number of steps over which the real-time factor is averaged.
 const STEPS_OF_MEAN: usize = 100;
 
-pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
+pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
     let theme = *ctx.theme;
     let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
     ui.horizontal_centered(|ui| {

@@ -6,11 +6,11 @@ use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
-use super::{PanelName, Preset, WindowState, window_ui};
+use super::{MainWindow, Preset, window_ui};
 use crate::gimbal::tests::parameter;
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::{PanelContext, Playback, Presentation, Selection};
+use crate::gui::{PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::SlideRequest;
 use crate::session::breakpoints::Breakpoints;
 use crate::session::{Command, ForkChanges, ForkOrigin, PlaybackSpeed, Recording, RunWarning};
@@ -23,7 +23,7 @@ pub(super) struct Bench {
     pub(super) cursor_ns: i64,
     playback: Playback,
     pub(super) selection: Selection,
-    pub(super) window: WindowState,
+    pub(super) window: MainWindow,
     commands: Vec<Command>,
 }
 
@@ -66,7 +66,7 @@ pub(super) fn bench_of(recording: Recording, size: [f32; 2]) -> Harness<'static,
         cursor_ns: 3 * SECOND_NS,
         playback: Playback::default(),
         selection: Selection::default(),
-        window: WindowState::default(),
+        window: MainWindow::default(),
         commands: Vec::new(),
     };
     let mut harness = Harness::builder()

@@ -5,10 +5,10 @@ use egui_tiles::{
     Behavior, Container, Linear, LinearDir, SimplificationOptions, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
 };
 
-use super::{PanelName, Panels};
-use crate::gui::PanelContext;
+use super::panels::Panels;
 use crate::gui::help;
 use crate::gui::theme::{PANEL_MARGIN, Theme};
+use crate::gui::{PanelContext, PanelName};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Preset {
@@ -42,19 +42,19 @@ impl Preset {
 
 /// The layout of the movable panels.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Layout {
+pub(crate) struct PanelLayout {
     tree: Tree<PanelName>,
     /// Preset that was chosen last; `None` for a saved layout.
     pub(crate) preset: Option<Preset>,
 }
 
-impl Default for Layout {
+impl Default for PanelLayout {
     fn default() -> Self {
         Self { tree: tree_of(Preset::default()), preset: Some(Preset::default()) }
     }
 }
 
-impl Layout {
+impl PanelLayout {
     /// Arranges the panels as in a preset, with all panels visible.
     pub(crate) fn arrange(&mut self, preset: Preset) {
         self.tree = tree_of(preset);
@@ -202,7 +202,7 @@ impl Behavior<PanelName> for Shown<'_, '_> {
         self.places.push((*pane, place));
         egui::Frame::new().fill(theme.surface).inner_margin(PANEL_MARGIN).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            self.panels.ui(*pane, ui, self.ctx);
+            self.panels.get(*pane).ui(ui, self.ctx);
         });
         if self.focus == Some(*pane) {
             ui.painter().hline(place.x_range(), place.top() + 1.0, Stroke::new(2.0, theme.accent));

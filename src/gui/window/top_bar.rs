@@ -5,11 +5,11 @@ use egui::style::StyleModifier;
 use egui::{Align, Button, Label, Layout as UiLayout, RichText, TextStyle, Ui, vec2};
 
 use super::actions::{Action, TABLE};
+use super::menu;
+use super::state::MainWindow;
 use super::tiles::Preset;
-use super::{Dialog, WindowState, menu};
-use crate::gui::PanelContext;
 use crate::gui::theme::MAX_RUNS;
-use crate::session::Recording;
+use crate::gui::{Dialog, PanelContext};
 
 /// Buttons to the right of the menus, shown if they fit: text and action.
 const BUTTONS: [(&str, Action); 2] =
@@ -18,7 +18,7 @@ const BUTTONS: [(&str, Action); 2] =
 /// Minimum width in points of the entries of all runs.
 const MIN_RUNS_WIDTH: f32 = 60.0;
 
-pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
+pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
     MenuBar::new().style(StyleModifier::default()).ui(ui, |ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         menu::ui(ui, state, ctx, actions);
@@ -26,7 +26,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
         if let Some(study) = &state.study {
             study_button(ui, study, actions);
         }
-        let log = log_name(ctx.recording);
+        let log = ctx.recording.log_name();
         let rig = format!("rig: {}", ctx.recording.rig.name);
         let widths = Widths {
             log: text_width(ui, &log),
@@ -61,10 +61,6 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
             }
         });
     });
-}
-
-pub(crate) fn log_name(recording: &Recording) -> String {
-    recording.log_path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
 /// Widths in points of the elements to the right of the menus.
@@ -162,7 +158,7 @@ fn study_button(ui: &mut Ui, study: &str, actions: &mut Vec<Action>) {
 /// Draws the button of a layout, with its name or with its number.
 fn layout_button(
     ui: &mut Ui,
-    state: &WindowState,
+    state: &MainWindow,
     preset: Preset,
     number: usize,
     named: bool,

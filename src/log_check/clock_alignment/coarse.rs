@@ -1,6 +1,6 @@
 //! Correlation of angular speeds over all offsets of the search.
 
-use super::{DISTINCT_S, MIN_ROTATIONS, Measured, OrientationSeries};
+use super::series::{DISTINCT_S, MIN_ROTATIONS, Measured, OrientationSeries};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 
 /// Step of the search and of the sampled speeds, in seconds.

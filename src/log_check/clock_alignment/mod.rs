@@ -8,21 +8,21 @@
 mod coarse;
 mod references;
 mod refinement;
+mod series;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::{UnitQuaternion, Vector3};
-use serde::Serialize;
+use nalgebra::Vector3;
 
 pub use self::references::{AlignmentReference, align_camera};
+pub use self::refinement::ClockAlignment;
 use self::refinement::Refined;
+pub use self::series::OrientationSeries;
+use self::series::{DISTINCT_S, MIN_ROTATIONS, Measured};
 use super::ImageRotation;
 use super::statistics::median;
-use crate::flight_log::attitude::rotation_at;
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 
-/// Minimum number of image rotations.
-const MIN_ROTATIONS: usize = 40;
 /// Minimum median rotation between two images; below it the noise of the images dominates.
 const MIN_ROTATION_RAD: f64 = 0.001;
 /// Minimum ratio of the squared rotations that the reference explains.
@@ -34,133 +34,6 @@ const MIN_DISTINCTION: f64 = 1.5;
 const NOISY_LENGTHS_S: [f64; 2] = [0.3, 0.6];
 /// An image rotation is an outlier if it differs from its neighbours by this many times the median.
 const OUTLIER_RATIO: f64 = 8.0;
-/// Offsets closer than this count as one, in seconds.
-const DISTINCT_S: f64 = 0.25;
-
-/// Rotation between two images.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Measured {
-    /// Stamp of the first image.
-    from_ns: i64,
-    to_ns: i64,
-    /// Rotation vector of `second_from_first`, in radians.
-    rotation: Vector3<f64>,
-    /// Derivative of the rotation by a shift of both times, in rad/s, from the rotations of images around both; zero
-    /// for single pairs.
-    by_shift: Vector3<f64>,
-}
-
-impl Measured {
-    fn interval_s(&self) -> f64 {
-        seconds_from_ns(self.to_ns - self.from_ns)
-    }
-
-    fn middle_s(&self) -> f64 {
-        0.5 * (seconds_from_ns(self.from_ns) + seconds_from_ns(self.to_ns))
-    }
-}
-
-/// Orientations on one clock, up to a constant rotation on either side: `fixed_from_body` at increasing stamps.
-///
-/// From a gyroscope they are its integral; from a gimbal, its attitudes relative to the earth.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct OrientationSeries {
-    samples: Vec<(i64, UnitQuaternion<f64>)>,
-    /// True if the noise between samples exceeds that of the images, as for measured joint angles.
-    is_noisy: bool,
-}
-
-impl OrientationSeries {
-    /// Series of orientations with stamps in nanoseconds; samples whose stamp does not increase are omitted.
-    pub fn from_orientations(orientations: impl IntoIterator<Item = (i64, UnitQuaternion<f64>)>) -> Self {
-        let mut samples: Vec<(i64, UnitQuaternion<f64>)> = Vec::new();
-        for (stamp_ns, orientation) in orientations {
-            if samples.last().is_none_or(|(last, _)| *last < stamp_ns) {
-                samples.push((stamp_ns, orientation));
-            }
-        }
-        Self { samples, is_noisy: false }
-    }
-
-    /// Marks the series as noisy: only rotations over longer times are precise.
-    #[must_use]
-    pub fn with_noise(self) -> Self {
-        Self { is_noisy: true, ..self }
-    }
-
-    /// Integral of angular velocities in rad/s with stamps in nanoseconds.
-    pub fn from_angular_velocities(rates: impl IntoIterator<Item = (i64, Vector3<f64>)>) -> Self {
-        let mut orientation = UnitQuaternion::identity();
-        let mut previous: Option<(i64, Vector3<f64>)> = None;
-        let integrated = rates.into_iter().filter_map(move |(stamp_ns, rate)| {
-            if let Some((before_ns, before)) = previous {
-                if stamp_ns <= before_ns {
-                    return None;
-                }
-                orientation *= so3::exp(&((before + rate) * (0.5 * seconds_from_ns(stamp_ns - before_ns))));
-            }
-            previous = Some((stamp_ns, rate));
-            Some((stamp_ns, orientation))
-        });
-        Self { samples: integrated.collect(), is_noisy: false }
-    }
-
-    /// First and last stamp; `None` without samples.
-    fn range_ns(&self) -> Option<(i64, i64)> {
-        Some((self.samples.first()?.0, self.samples.last()?.0))
-    }
-
-    /// Interpolated orientation; `None` outside the series.
-    fn at(&self, stamp_ns: i64) -> Option<UnitQuaternion<f64>> {
-        rotation_at(&self.samples, stamp_ns, i64::MAX)
-    }
-
-    /// Rotation vector of `second_from_first` between two times, in radians.
-    fn rotation(&self, from_ns: i64, to_ns: i64) -> Option<Vector3<f64>> {
-        Some(so3::log(&(self.at(to_ns)?.inverse() * self.at(from_ns)?)))
-    }
-}
-
-/// Times of the camera on the clock of the reference: `t_reference = t_camera + offset + drift · (t_camera − middle)`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ClockAlignment {
-    /// Offset at the middle, in seconds.
-    pub offset_s: f64,
-    pub offset_sigma_s: f64,
-    /// Drift of the reference's clock against the camera's, 10⁻⁶.
-    pub drift_ppm: f64,
-    pub drift_sigma_ppm: f64,
-    /// Middle of the image rotations on the camera's clock, in seconds.
-    pub middle_s: f64,
-    /// Ratio of the squared rotations of the images that the reference explains, at most 1.
-    pub explained: f64,
-    /// Next offset and the ratio that it explains, if there is one.
-    pub next: Option<(f64, f64)>,
-    /// Rotation from the reference's body frame to the camera frame, as a rotation vector in radians.
-    pub camera_from_body_rad: [f64; 3],
-    /// Ratio of the rotations of the images to those of the reference; below 1 if the focal length is too long.
-    pub scale: f64,
-    /// Number of image rotations that overlap with the reference.
-    pub rotations: usize,
-    /// Median rotation between two images, in degrees.
-    pub rotation_deg: f64,
-    /// Median residual of a rotation, in degrees.
-    pub residual_deg: f64,
-    /// Correlation of the angular speeds by offset in seconds.
-    #[serde(skip)]
-    pub correlation: Vec<(f64, f64)>,
-    /// Angular speeds in rad/s of images and reference, by time on the reference's clock in seconds.
-    #[serde(skip)]
-    pub speeds: Vec<(f64, f64, f64)>,
-}
-
-impl ClockAlignment {
-    /// Time in nanoseconds to add to a stamp of the camera.
-    pub fn shift_ns(&self, camera_ns: i64) -> i64 {
-        let since_middle_s = seconds_from_ns(camera_ns) - self.middle_s;
-        ns_from_seconds(self.offset_s + self.drift_ppm * 1e-6 * since_middle_s)
-    }
-}
 
 /// Reason that two clocks cannot be aligned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

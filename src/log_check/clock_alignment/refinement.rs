@@ -1,11 +1,12 @@
 //! Offset, drift, rotation and scale by robust least squares on rotation vectors.
 
 use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector3, Vector6};
+use serde::Serialize;
 
 use super::super::hand_eye::best_rotation;
 use super::super::statistics::median;
-use super::{ClockAlignment, MIN_ROTATIONS, Measured, OrientationSeries};
-use crate::geometry::{ns_from_seconds, so3};
+use super::series::{MIN_ROTATIONS, Measured, OrientationSeries};
+use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 
 /// Prior standard deviation of the drift between two quartz clocks.
 const DRIFT_SIGMA: f64 = 1e-4;
@@ -234,4 +235,45 @@ impl Refined {
 fn constant_rotation(rows: &[Row]) -> Option<UnitQuaternion<f64>> {
     let pairs: Vec<_> = rows.iter().map(|row| (row.predicted, row.measured)).collect();
     best_rotation(&pairs).filter(|_| rows.len() >= MIN_ROTATIONS).map(|(rotation, _)| rotation)
+}
+
+/// Times of the camera on the clock of the reference: `t_reference = t_camera + offset + drift · (t_camera − middle)`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ClockAlignment {
+    /// Offset at the middle, in seconds.
+    pub offset_s: f64,
+    pub offset_sigma_s: f64,
+    /// Drift of the reference's clock against the camera's, 10⁻⁶.
+    pub drift_ppm: f64,
+    pub drift_sigma_ppm: f64,
+    /// Middle of the image rotations on the camera's clock, in seconds.
+    pub middle_s: f64,
+    /// Ratio of the squared rotations of the images that the reference explains, at most 1.
+    pub explained: f64,
+    /// Next offset and the ratio that it explains, if there is one.
+    pub next: Option<(f64, f64)>,
+    /// Rotation from the reference's body frame to the camera frame, as a rotation vector in radians.
+    pub camera_from_body_rad: [f64; 3],
+    /// Ratio of the rotations of the images to those of the reference; below 1 if the focal length is too long.
+    pub scale: f64,
+    /// Number of image rotations that overlap with the reference.
+    pub rotations: usize,
+    /// Median rotation between two images, in degrees.
+    pub rotation_deg: f64,
+    /// Median residual of a rotation, in degrees.
+    pub residual_deg: f64,
+    /// Correlation of the angular speeds by offset in seconds.
+    #[serde(skip)]
+    pub correlation: Vec<(f64, f64)>,
+    /// Angular speeds in rad/s of images and reference, by time on the reference's clock in seconds.
+    #[serde(skip)]
+    pub speeds: Vec<(f64, f64, f64)>,
+}
+
+impl ClockAlignment {
+    /// Time in nanoseconds to add to a stamp of the camera.
+    pub fn shift_ns(&self, camera_ns: i64) -> i64 {
+        let since_middle_s = seconds_from_ns(camera_ns) - self.middle_s;
+        ns_from_seconds(self.offset_s + self.drift_ppm * 1e-6 * since_middle_s)
+    }
 }

@@ -20,7 +20,7 @@ pub struct Hit {
 
 /// The steps of one run that a breakpoint has been evaluated over, and its hits.
 #[derive(Clone, Debug, Default, PartialEq)]
-struct Track {
+struct RunHits {
     read: usize,
     was_true: bool,
     /// Stamp and index of each step in which the condition became true.
@@ -35,7 +35,7 @@ pub struct Breakpoint {
     /// True if the cursor stops at its hits.
     pub enabled: bool,
     /// By [`RunRecord::id`].
-    tracks: BTreeMap<u64, Track>,
+    tracks: BTreeMap<u64, RunHits>,
 }
 
 impl Breakpoint {

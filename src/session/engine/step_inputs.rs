@@ -95,12 +95,12 @@ impl StepMeasurements for OwnedStepInput {
 /// Inputs of a run's steps so far, shared with its forks.
 #[derive(Debug, Default)]
 pub(in crate::session) struct StepInputs {
-    state: Mutex<State>,
+    state: Mutex<InputQueue>,
     grown: Condvar,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct InputQueue {
     steps: Vec<Arc<OwnedStepInput>>,
     ended: bool,
 }

@@ -1,5 +1,6 @@
 //! The definition of a session: the log with its rig, its runs, and the changes of a fork. Plain data.
 
+mod error;
 mod fork_changes;
 mod fork_text;
 mod run_spec;
@@ -8,10 +9,11 @@ mod trajectories;
 mod trajectory_spec;
 mod tuning;
 
+pub use error::SessionError;
 pub use fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError};
-pub use run_spec::{ParameterizationChoice, RunSpec, RunSpecError};
+pub use run_spec::{MAX_RUNS, ParameterizationChoice, RunSpec, RunSpecError};
 pub(in crate::session) use run_spec::{distinct_label, distinct_labels};
-pub use session_plan::{DEFAULT_MEMORY_BUDGET_BYTES, MAX_RUNS, SessionError, SessionPlan, SessionRequest};
+pub use session_plan::{DEFAULT_MEMORY_BUDGET_BYTES, SessionPlan, SessionRequest};
 pub(in crate::session) use session_plan::{RunCameras, cameras_of_run, check_start};
 pub use trajectories::{LoadedPositions, LoadedTrajectory};
 pub use trajectory_spec::{MAX_TRAJECTORIES, TrajectorySource, TrajectorySpec, TrajectorySpecError};

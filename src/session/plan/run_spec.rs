@@ -7,6 +7,9 @@ use super::tuning::{EstimatorTuning, read_count};
 use crate::estimator::SensorColumns;
 use crate::sensors::Rig;
 
+/// Maximum number of runs of a session.
+pub const MAX_RUNS: usize = 4;
+
 /// The parameterization in which a run estimates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterizationChoice {

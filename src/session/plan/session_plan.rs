@@ -5,64 +5,16 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use thiserror::Error;
-
 use super::distinct_labels;
-use super::run_spec::{ParameterizationChoice, RunSpec};
+use super::error::SessionError;
+use super::run_spec::{MAX_RUNS, ParameterizationChoice, RunSpec};
 use super::trajectories::{self, LoadedPositions, LoadedTrajectory, LoadedTruth};
-use super::trajectory_spec::{MAX_TRAJECTORIES, TrajectorySource, TrajectorySpec};
+use super::trajectory_spec::{TrajectorySource, TrajectorySpec};
 use crate::estimator::rigid_columns;
-use crate::flight_log::{FlightLog, LogError, LogLimits, is_batch_reference};
+use crate::flight_log::{FlightLog, LogLimits, is_batch_reference};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::{CameraMount, CameraRig, LeverArm, PoseTrack, Rig};
-
-/// Maximum number of runs of a session.
-pub const MAX_RUNS: usize = 4;
-
-/// Reason why a session cannot start.
-#[derive(Debug, Error)]
-pub enum SessionError {
-    /// The log, its rig or its ground truth cannot be read.
-    #[error(transparent)]
-    Log(#[from] LogError),
-    /// The rig has no camera for the run.
-    #[error("run '{run}' needs {wanted}, but the rig '{rig}' has only {present}")]
-    NoCamera {
-        run: String,
-        /// Description of the required camera.
-        wanted: String,
-        rig: String,
-        /// Keys and kinds of the rig's cameras.
-        present: String,
-    },
-    /// More than [`MAX_RUNS`] runs.
-    #[error("{count} runs requested, at most {MAX_RUNS} are possible")]
-    TooManyRuns { count: usize },
-    /// More than [`MAX_TRAJECTORIES`] trajectories.
-    #[error("{count} trajectories requested, at most {MAX_TRAJECTORIES} are possible")]
-    TooManyTrajectories { count: usize },
-    /// A trajectory cannot be used with the log.
-    #[error("cannot use the trajectory '{source_name}': {problem}")]
-    Trajectory {
-        /// The file or topic.
-        source_name: String,
-        /// Problem and remedy.
-        problem: String,
-    },
-    /// The start is after the end of the log.
-    #[error("--start {start_s} s is after the end of the log ({end_s:.3} s): {}", path.display())]
-    StartBeyondEnd {
-        /// Requested start in seconds.
-        start_s: f64,
-        /// Length of the log in seconds.
-        end_s: f64,
-        path: PathBuf,
-    },
-    /// A thread could not be started.
-    #[error("cannot start a thread: {source}")]
-    Thread { source: std::io::Error },
-}
 
 /// The arguments of a session, as on the command line.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -55,12 +55,12 @@ struct Worker {
 
 #[derive(Debug, Default)]
 struct Shared {
-    state: Mutex<State>,
+    state: Mutex<ImageQueue>,
     changed: Condvar,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct ImageQueue {
     /// Last requested image of each camera that is not delivered yet, the oldest request first.
     wanted: Vec<Key>,
     /// Delivered images, ready or missing, the most recently used last.
@@ -108,7 +108,7 @@ impl Worker {
         if state.delivered(&key).is_none() {
             state.want(key.clone());
             self.shared.changed.notify_all();
-            let decoding = |state: &mut State| state.wanted.contains(&key);
+            let decoding = |state: &mut ImageQueue| state.wanted.contains(&key);
             match time {
                 Some(time) => {
                     self.shared.changed.wait_while_for(&mut state, decoding, time);
@@ -156,7 +156,7 @@ impl Shared {
     }
 }
 
-impl State {
+impl ImageQueue {
     /// Delivered image, `None` if there is none.
     fn delivered(&mut self, key: &Key) -> Option<FrameImage> {
         let found = self.delivered.iter().position(|(delivered, _)| delivered == key)?;
@@ -211,9 +211,9 @@ mod tests {
 
     #[test]
     fn a_newer_request_replaces_an_older_one() {
-        let state = |wanted: &[(&str, usize)]| State {
+        let state = |wanted: &[(&str, usize)]| ImageQueue {
             wanted: wanted.iter().map(|(camera, index)| ((*camera).to_owned(), *index)).collect(),
-            ..State::default()
+            ..ImageQueue::default()
         };
         let mut waiting = state(&[("cam0", 3), ("cam1", 9)]);
         waiting.want(("cam0".to_owned(), 4));

@@ -12,7 +12,7 @@ use crate::session::engine::{Computation, EngineMessage, RecomputeRequest, Recom
 use crate::session::plan::SessionError;
 use crate::session::record::Recording;
 
-struct State {
+struct SharedState {
     computation: Mutex<Computation>,
     generation: AtomicU64,
     /// Called when a step at the cursor has been recomputed.
@@ -22,7 +22,7 @@ struct State {
 /// Function that requests a new frame from a window, callable from any thread.
 pub type Wake = Box<dyn Fn() + Send>;
 
-impl State {
+impl SharedState {
     fn change(&self, change: impl FnOnce(&mut Computation)) {
         change(&mut self.computation.lock());
         self.generation.fetch_add(1, Ordering::Release);
@@ -31,7 +31,7 @@ impl State {
 
 /// A computation behind a mutex that is locked only for a change or a copy.
 pub(super) struct SharedComputation {
-    state: Arc<State>,
+    state: Arc<SharedState>,
     collector: Option<JoinHandle<()>>,
 }
 
@@ -44,7 +44,7 @@ impl fmt::Debug for SharedComputation {
 impl SharedComputation {
     pub(super) fn new(computation: Computation) -> Self {
         let state =
-            State { computation: Mutex::new(computation), generation: AtomicU64::new(1), wake: Mutex::default() };
+            SharedState { computation: Mutex::new(computation), generation: AtomicU64::new(1), wake: Mutex::default() };
         Self { state: Arc::new(state), collector: None }
     }
 

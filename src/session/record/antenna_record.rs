@@ -2,8 +2,8 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::run_accuracy::TrajectoryAccuracy;
-use super::trajectory_lane::TrajectoryEvaluation;
+use super::trajectory_accuracy::TrajectoryAccuracy;
+use super::trajectory_evaluation::TrajectoryEvaluation;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{LeverArm, NEAREST_POSE_NS, PoseSample, PoseTrack, PositionSample};
 use crate::session::accuracy::{Alignment, AlignmentSums, StampedPose};

@@ -38,6 +38,11 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// File name of the log.
+    pub fn log_name(&self) -> String {
+        self.log_path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+    }
+
     /// The runs of a plan before their first step.
     pub fn new(plan: &SessionPlan) -> Self {
         let position_truth = plan.position_truth.as_ref().map(|loaded| {

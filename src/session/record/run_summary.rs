@@ -8,7 +8,7 @@ use super::estimability::{EstimabilitySummary, sensor_estimability};
 use super::known_losses::{KnownLossSummary, known_losses};
 use super::recording::Recording;
 use super::run::RunRecord;
-use super::run_accuracy::TrajectoryAccuracy;
+use super::trajectory_accuracy::TrajectoryAccuracy;
 use super::trajectory_lane::TrajectoryLane;
 use super::warnings::RunWarning;
 use crate::calibration::ChainDistance;

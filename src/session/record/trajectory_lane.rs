@@ -7,44 +7,11 @@ use serde::{Serialize, Serializer};
 
 use super::antenna_record::PositionTruth;
 use super::run::{NEXT_ID, RunRecord};
-use super::run_accuracy::{MAX_POSITION_AGE_NS, TrajectoryAccuracy};
+use super::trajectory_accuracy::MAX_POSITION_AGE_NS;
+use super::trajectory_evaluation::{TrajectoryEvaluation, evaluate_trajectory};
 use crate::geometry::{RigidTransform, seconds_from_ns};
-use crate::sensors::{PoseSample, PoseTrack};
-use crate::session::accuracy::{Alignment, StampedPose, align, path_length_m};
-
-/// A trajectory evaluated against ground truth.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct TrajectoryEvaluation {
-    /// Estimated and ground-truth poses with equal stamps, in seconds since the log began.
-    #[serde(skip)]
-    pub pairs: Vec<(StampedPose, StampedPose)>,
-    /// `true_from_estimate`, a rotation about the vertical and a translation; `None` with too few pairs.
-    #[serde(skip)]
-    pub alignment: Option<RigidTransform>,
-    /// Errors after this alignment.
-    pub accuracy: Option<TrajectoryAccuracy>,
-}
-
-impl TrajectoryEvaluation {
-    /// Distance between the aligned pose and the ground truth of a pair in metres, `None` without an alignment.
-    pub fn error_m(&self, pair: usize) -> Option<f64> {
-        let (estimate, actual) = self.pairs.get(pair)?;
-        Some((self.alignment?.transform(&estimate.pose.translation_m) - actual.pose.translation_m).norm())
-    }
-}
-
-/// Evaluates a trajectory against ground truth as a run is evaluated: ground truth interpolated at the stamps of the
-/// trajectory, aligned by yaw and position.
-pub fn evaluate_trajectory(estimate: &[PoseSample], ground_truth: &PoseTrack) -> TrajectoryEvaluation {
-    let pair = |sample: &PoseSample| {
-        let stamp_s = seconds_from_ns(sample.stamp_ns);
-        let actual = ground_truth.at(sample.stamp_ns)?;
-        Some((StampedPose { stamp_s, pose: sample.world_from_imu }, StampedPose { stamp_s, pose: actual }))
-    };
-    let pairs: Vec<_> = estimate.iter().filter_map(pair).collect();
-    let alignment = align(&pairs, Alignment::YawPosition).map(|transform| transform.rigid);
-    TrajectoryEvaluation { alignment, accuracy: TrajectoryAccuracy::of(&pairs), pairs }
-}
+use crate::sensors::PoseTrack;
+use crate::session::accuracy::path_length_m;
 
 /// A trajectory beside the runs, as in `summary.json`. It has poses only: no calibration, no features, no residuals.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -153,6 +120,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use crate::sensors::PoseSample;
 
     /// A climbing turn of 20 s at 20 Hz.
     fn flight() -> Vec<PoseSample> {

@@ -10,6 +10,7 @@ mod shade;
 mod shadow;
 mod view;
 
+pub(crate) use raster::Workspace;
 pub(crate) use sensor::{Sensor, SensorOptions};
 pub(crate) use shade::Renderer;
-pub(crate) use view::{View, Workspace};
+pub(crate) use view::View;

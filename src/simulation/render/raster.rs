@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::view::{Grid, Workspace};
+use super::view::Grid;
 use crate::geometry::RigidTransform;
 use crate::simulation::world::{Affine, Bounds, World};
 
@@ -88,6 +88,21 @@ pub(super) struct Shape {
     right: f64,
     /// Edges crossed by the previously drawn row.
     crossed: Option<[usize; 2]>,
+}
+
+/// Buffers of a thread, reused between images.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Workspace {
+    /// For a band of the sample grid.
+    pub(super) inverse_depth: Vec<f32>,
+    pub(super) face: Vec<u32>,
+    pub(super) prepared: Vec<Prepared>,
+    pub(super) shapes: Vec<Shape>,
+    pub(super) outline_points: Vec<[f64; 2]>,
+    /// Face of each pixel of a row, or `MIXED`.
+    pub(super) seen: Vec<u32>,
+    /// Not 0 for the pixels of a row that show several faces.
+    pub(super) differs: Vec<u32>,
 }
 
 impl Workspace {
@@ -253,5 +268,25 @@ fn ceil_to_usize(value: f64) -> usize {
 impl Grid {
     fn place(&self, point: &Vector3<f64>) -> [f64; 2] {
         [(point.x / point.z - self.origin[0]) / self.step[0], (point.y / point.z - self.origin[1]) / self.step[1]]
+    }
+}
+
+#[cfg(test)]
+impl Workspace {
+    /// Depth of the face at the first sample of every pixel, from a pose.
+    pub(crate) fn depths_m(
+        &mut self,
+        view: &super::view::View,
+        world: &crate::simulation::world::World,
+        world_from_camera: &crate::geometry::RigidTransform,
+    ) -> Vec<f64> {
+        self.prepare(world, &Eye::new(world_from_camera), &view.grid, &(0..view.grid.rows));
+        self.draw(&view.grid, 0..view.grid.rows);
+        let place = |pixel: usize| {
+            let (row, column) = (pixel / view.width, pixel % view.width);
+            let regular = row * super::view::SAMPLES * view.grid.columns + column;
+            view.places.as_ref().map_or(regular, |places| places[pixel][0] as usize)
+        };
+        (0..view.pixels()).map(|pixel| 1.0 / f64::from(self.inverse_depth[place(pixel)])).collect()
     }
 }

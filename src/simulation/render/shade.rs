@@ -2,9 +2,9 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::raster::{Eye, Prepared, SKY};
+use super::raster::{Eye, Prepared, SKY, Workspace};
 use super::shadow::ShadowMap;
-use super::view::{OFFSETS_PX, PixelRay, Rays, SAMPLES, View, Workspace};
+use super::view::{OFFSETS_PX, PixelRay, Rays, SAMPLES, View};
 use crate::geometry::RigidTransform;
 use crate::simulation::world::{Footprints, World};
 

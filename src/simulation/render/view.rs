@@ -72,21 +72,6 @@ impl From<PixelRay> for Rays<1> {
     }
 }
 
-/// Buffers of a thread, reused between images.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Workspace {
-    /// For a band of the sample grid.
-    pub(super) inverse_depth: Vec<f32>,
-    pub(super) face: Vec<u32>,
-    pub(super) prepared: Vec<super::raster::Prepared>,
-    pub(super) shapes: Vec<super::raster::Shape>,
-    pub(super) outline_points: Vec<[f64; 2]>,
-    /// Face of each pixel of a row, or `MIXED`.
-    pub(super) seen: Vec<u32>,
-    /// Not 0 for the pixels of a row that show several faces.
-    pub(super) differs: Vec<u32>,
-}
-
 impl View {
     pub(crate) fn new(model: &CameraModel) -> Self {
         let [width, height] = model.resolution_px;
@@ -215,26 +200,6 @@ impl View {
 impl View {
     pub(crate) fn width(&self) -> usize {
         self.width
-    }
-}
-
-#[cfg(test)]
-impl Workspace {
-    /// Depth of the face at the first sample of every pixel, from a pose.
-    pub(crate) fn depths_m(
-        &mut self,
-        view: &View,
-        world: &crate::simulation::world::World,
-        world_from_camera: &crate::geometry::RigidTransform,
-    ) -> Vec<f64> {
-        self.prepare(world, &super::raster::Eye::new(world_from_camera), &view.grid, &(0..view.grid.rows));
-        self.draw(&view.grid, 0..view.grid.rows);
-        let place = |pixel: usize| {
-            let (row, column) = (pixel / view.width, pixel % view.width);
-            let regular = row * SAMPLES * view.grid.columns + column;
-            view.places.as_ref().map_or(regular, |places| places[pixel][0] as usize)
-        };
-        (0..view.pixels()).map(|pixel| 1.0 / f64::from(self.inverse_depth[place(pixel)])).collect()
     }
 }
 

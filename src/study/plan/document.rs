@@ -6,6 +6,9 @@ use thiserror::Error;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+/// Range of seeds: integers that every program that reads the tables can represent.
+pub(super) const SEEDS: std::ops::RangeInclusive<u64> = 0..=i64::MAX as u64;
+
 /// Reason why a plan cannot be used.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("line {line}: {problem}")]

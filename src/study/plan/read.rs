@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::document::{PlanError, Section, parse};
+use super::document::{PlanError, SEEDS, Section, parse};
+use super::study_plan::{DisturbanceSet, JobLimits, LOG_PLACE, LogSource, SlurmOptions, StudyOutput, StudyPlan};
 use super::tables;
-use super::{DisturbanceSet, JobLimits, LOG_PLACE, LogSource, SlurmOptions, StudyOutput, StudyPlan};
 use crate::session::{RunSpec, TrajectorySpec, TrajectorySpecError};
 use crate::simulation::Disturbances;
 use crate::study::perturbation::{
@@ -27,50 +27,56 @@ const PLAN_KEYS: [&str; 13] = [
     "tolerance",
     "tables",
 ];
-/// Range of seeds: integers that every program that reads the tables can represent.
-pub(super) const SEEDS: std::ops::RangeInclusive<u64> = 0..=i64::MAX as u64;
 /// Range of times in a plan, in seconds.
 const SECONDS: std::ops::RangeInclusive<f64> = 0.0..=1e6;
 
-pub(super) fn plan(text: &str) -> Result<StudyPlan, PlanError> {
-    let document = parse(text)?;
-    let root = Section::root(text, &document);
-    root.allow(&PLAN_KEYS)?;
-    let plan = StudyPlan {
-        name: root.text("name")?.unwrap_or_default(),
-        logs: root.sections("logs")?.iter().map(log).collect::<Result<_, _>>()?,
-        flights: root.sections("flights")?.iter().map(flight).collect::<Result<_, _>>()?,
-        specs: specs(&root)?,
-        perturbations: perturbations(&root)?,
-        disturbances: disturbances(&root)?,
-        seeds: seeds(&root)?,
-        limits: root.section("limits")?.as_ref().map_or_else(|| Ok(JobLimits::default()), limits)?,
-        output: root.section("output")?.as_ref().map_or_else(|| Ok(StudyOutput::default()), output)?,
-        slurm: root.section("slurm")?.as_ref().map_or_else(|| Ok(SlurmOptions::default()), slurm)?,
-        exclusions: tables::exclusions(&root)?,
-        tables: tables::tables(&root)?,
-        tolerances: root.section("tolerance")?.as_ref().map_or_else(|| Ok(BTreeMap::new()), tolerances)?,
-    };
-    if plan.logs.is_empty() && plan.flights.is_empty() {
-        return Err(root.error("has no logs: expected [[logs]] with a path, or [[flights]] with an experiment"));
-    }
-    if plan.flights.is_empty() && plan.disturbances.iter().any(|set| !set.disturb.is_empty()) {
-        return Err(
-            root.error_at("disturbances", "disturb simulated flights, and there are none: expected [[flights]]")
-        );
-    }
-    distinct(&root, "flights", plan.flights.iter().map(|flight| flight.name.as_str()))?;
-    distinct(&root, "perturbations", plan.perturbations.iter().map(|level| level.name.as_str()))?;
-    distinct(&root, "disturbances", plan.disturbances.iter().map(|level| level.name.as_str()))?;
-    distinct(&root, "specs", plan.specs.iter().map(|spec| spec.label.as_str()))?;
-    for trajectory in plan.logs.iter().flat_map(|log| &log.trajectories) {
-        if plan.specs.iter().any(|spec| spec.label == trajectory.label) {
-            let problem = format!("a trajectory and a run are named '{}', expected different names", trajectory.label);
-            return Err(root.error_at("specs", &problem));
+impl StudyPlan {
+    /// Parses a plan.
+    ///
+    /// # Errors
+    /// For invalid TOML, an unknown key, a value of the wrong type or out of its range, and for a plan without logs or
+    /// with two levels of the same name.
+    pub fn from_toml(text: &str) -> Result<Self, PlanError> {
+        let document = parse(text)?;
+        let root = Section::root(text, &document);
+        root.allow(&PLAN_KEYS)?;
+        let plan = Self {
+            name: root.text("name")?.unwrap_or_default(),
+            logs: root.sections("logs")?.iter().map(log).collect::<Result<_, _>>()?,
+            flights: root.sections("flights")?.iter().map(flight).collect::<Result<_, _>>()?,
+            specs: specs(&root)?,
+            perturbations: perturbations(&root)?,
+            disturbances: disturbances(&root)?,
+            seeds: seeds(&root)?,
+            limits: root.section("limits")?.as_ref().map_or_else(|| Ok(JobLimits::default()), limits)?,
+            output: root.section("output")?.as_ref().map_or_else(|| Ok(StudyOutput::default()), output)?,
+            slurm: root.section("slurm")?.as_ref().map_or_else(|| Ok(SlurmOptions::default()), slurm)?,
+            exclusions: tables::exclusions(&root)?,
+            tables: tables::tables(&root)?,
+            tolerances: root.section("tolerance")?.as_ref().map_or_else(|| Ok(BTreeMap::new()), tolerances)?,
+        };
+        if plan.logs.is_empty() && plan.flights.is_empty() {
+            return Err(root.error("has no logs: expected [[logs]] with a path, or [[flights]] with an experiment"));
         }
+        if plan.flights.is_empty() && plan.disturbances.iter().any(|set| !set.disturb.is_empty()) {
+            return Err(
+                root.error_at("disturbances", "disturb simulated flights, and there are none: expected [[flights]]")
+            );
+        }
+        distinct(&root, "flights", plan.flights.iter().map(|flight| flight.name.as_str()))?;
+        distinct(&root, "perturbations", plan.perturbations.iter().map(|level| level.name.as_str()))?;
+        distinct(&root, "disturbances", plan.disturbances.iter().map(|level| level.name.as_str()))?;
+        distinct(&root, "specs", plan.specs.iter().map(|spec| spec.label.as_str()))?;
+        for trajectory in plan.logs.iter().flat_map(|log| &log.trajectories) {
+            if plan.specs.iter().any(|spec| spec.label == trajectory.label) {
+                let problem =
+                    format!("a trajectory and a run are named '{}', expected different names", trajectory.label);
+                return Err(root.error_at("specs", &problem));
+            }
+        }
+        tables::check_exclusions(&root, &plan)?;
+        Ok(plan)
     }
-    tables::check_exclusions(&root, &plan)?;
-    Ok(plan)
 }
 
 /// Returns an error if two levels have the same name.

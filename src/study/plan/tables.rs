@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::document::{PlanError, Section};
-use super::read::SEEDS;
-use super::{Exclusion, StudyPlan};
+use super::document::{PlanError, SEEDS, Section};
+use super::study_plan::{Exclusion, StudyPlan};
 use crate::study::summary_table::{ReferenceValue, Statistic, SummaryColumn, SummaryTable, is_run_column};
 
 /// Range of the factor of a column.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::flight_log::geodesy::Geodetic;
+use crate::geometry::seconds_from_ns;
 
 /// Standard gravity (ISO 80000-3), the unit of accelerations in g.
 pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.80665;
@@ -234,4 +235,11 @@ pub(super) fn rotation([w, x, y, z]: [f64; 4]) -> Option<UnitQuaternion<f64>> {
 pub(super) fn from_euler(angles_rad: [f64; 3]) -> Option<UnitQuaternion<f64>> {
     let [roll_rad, pitch_rad, yaw_rad] = finite(angles_rad)?.into();
     Some(UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad))
+}
+
+/// Measurements per second, 0 for less than two.
+pub(super) fn rate_hz<T>(samples: &Samples<T>) -> f64 {
+    let (Some((first_ns, _)), Some((last_ns, _))) = (samples.first(), samples.last()) else { return 0.0 };
+    let duration_s = seconds_from_ns(last_ns.saturating_sub(*first_ns));
+    if duration_s > 0.0 { (samples.len() - 1) as f64 / duration_s } else { 0.0 }
 }

@@ -7,8 +7,8 @@ use super::super::ConvertError;
 use super::super::sink::Sink;
 use super::attitude::{AttitudeTrack, earth_from_heading, enu_from_ned};
 use super::mp4::Video;
-use super::recorded::{Candidates, GimbalAttitude, GimbalFrame, NamedSamples, Recorded, RecordedImu, Samples};
-use crate::geometry::{RigidTransform, seconds_from_ns};
+use super::recorded::{Candidates, GimbalAttitude, GimbalFrame, NamedSamples, Recorded, RecordedImu, Samples, rate_hz};
+use crate::geometry::RigidTransform;
 
 const IMU_TYPE: &str = "sensor_msgs/msg/Imu";
 const ROTATION_TYPE: &str = "geometry_msgs/msg/QuaternionStamped";
@@ -99,13 +99,6 @@ fn in_order<T>(samples: Samples<T>, format: &str, record: &str, sink: &mut Sink<
         sink.leave(record, format, left, "its time goes back or jumps ahead");
     }
     kept
-}
-
-/// Measurements per second, 0 for less than two.
-pub(super) fn rate_hz<T>(samples: &Samples<T>) -> f64 {
-    let (Some((first_ns, _)), Some((last_ns, _))) = (samples.first(), samples.last()) else { return 0.0 };
-    let duration_s = seconds_from_ns(last_ns.saturating_sub(*first_ns));
-    if duration_s > 0.0 { (samples.len() - 1) as f64 / duration_s } else { 0.0 }
 }
 
 fn imu_rate_hz(imu: &RecordedImu) -> f64 {

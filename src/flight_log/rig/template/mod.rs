@@ -1,6 +1,7 @@
 //! Rig for a recording without one: known facts, usual values for the rest, and a list of those (`assumed`).
 
 mod camera;
+mod error;
 mod mechanism;
 #[cfg(test)]
 mod tests;
@@ -8,11 +9,11 @@ mod text;
 mod topics;
 
 pub use camera::{CameraChoice, PublishedCamera};
+pub use error::TemplateError;
 pub use mechanism::{GimbalAxis, MechanismAxes};
 pub use topics::RigChoices;
 
 use nalgebra::Vector3;
-use thiserror::Error;
 
 use crate::camera::CameraModel;
 use crate::sensors::{
@@ -42,60 +43,6 @@ pub const TYPICAL_IMU_NOISE: ImuNoise = ImuNoise {
     gyroscope_noise_density: 1e-3,
     gyroscope_random_walk: 4e-5,
 };
-
-/// Reason why a rig cannot be written.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-pub enum TemplateError {
-    #[error(
-        "unknown camera '{given}': expected fov:DEG, info, info:TOPIC or a name such as '{nearest}' (--list prints all)"
-    )]
-    UnknownCamera {
-        given: String,
-        /// Name with the smallest edit distance.
-        nearest: &'static str,
-    },
-    /// Invalid field of view.
-    #[error(
-        "'{given}' is not a field of view: expected fov:DEG with degrees across the image from 1 to 220, as in fov:84"
-    )]
-    FieldOfView { given: String },
-    #[error(
-        "unknown mechanism '{given}': expected yaw, roll and pitch in the order from the vehicle to the camera, as in \
-         yaw-roll-pitch, no axis twice in a row, or rigid"
-    )]
-    UnknownMechanism { given: String },
-    /// The log has no such topic.
-    #[error("the log has no {what}: {remedy}")]
-    NoTopic {
-        /// Kind of topic.
-        what: String,
-        remedy: String,
-    },
-    /// The log has several such topics.
-    #[error("the log has several {what}: name one with {option}, of {}", available.join(", "))]
-    SeveralTopics {
-        /// Kind of topic.
-        what: String,
-        /// Option to select a topic.
-        option: &'static str,
-        available: Vec<String>,
-    },
-    #[error("no camera model in the log: {reason}; give one with --camera fov:DEG")]
-    NoCameraInfo { reason: String },
-    #[error("the size of the images is unknown: {reason}; give it with --size WxH")]
-    NoSize { reason: String },
-    /// The description of an attitude topic is incomplete or invalid.
-    #[error("--attitude: {problem}")]
-    Attitude { problem: String },
-    #[error("the joints of {topic} ({}) do not match the mechanism {mechanism}: name them in its order with --joints", found.join(", "))]
-    Joints {
-        topic: String,
-        /// Names of the log's joints.
-        found: Vec<String>,
-        /// Axes of the mechanism.
-        mechanism: String,
-    },
-}
 
 /// Value with its source.
 #[derive(Clone, Debug, PartialEq, Eq)]

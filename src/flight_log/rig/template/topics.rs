@@ -4,15 +4,16 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
+use super::super::camera_facts::CameraFacts as _;
 use super::super::fields::Field;
-use super::super::read::CameraFacts as _;
 use super::camera::{of_field_of_view, of_published};
 use super::{
     AngleTemplate, AttitudeTemplate, CameraChoice, CameraTemplate, GimbalAxis, GimbalTemplate, ImuTemplate,
     MechanismAxes, RigTemplate, Sourced, TYPICAL_IMU_NOISE, TemplateError,
 };
 use crate::camera::CameraModel;
-use crate::flight_log::image_decoding::{BitDepth, decode_image};
+use crate::flight_log::bit_depth::BitDepth;
+use crate::flight_log::image_decoding::decode_image;
 use crate::flight_log::messages::{self, MessageKind};
 use crate::flight_log::{FlightLog, LogError, TopicInfo};
 use crate::sensors::{BodyAxes, ImuNoise};

@@ -7,18 +7,10 @@ use image::RgbaImage;
 use rayon::prelude::*;
 
 use super::blend;
-use super::prepared::PreparedChunk;
+use super::prepared::{PreparedChunk, TILE_PX, tiles_in_row};
 use super::raster::Target;
 use super::texture::TextureStore;
 use super::triangle::Clip;
-
-/// Size of a tile in pixels: small enough that a moving cursor changes few tiles and that a tile fits into the cache.
-pub(super) const TILE_PX: [usize; 2] = [64, 32];
-
-/// Number of tiles in a row of an image of width `width_px`.
-pub(super) fn tiles_in_row(width_px: usize) -> usize {
-    width_px.div_ceil(TILE_PX[0])
-}
 
 #[derive(Default)]
 struct Tile {

@@ -6,11 +6,13 @@ use std::sync::Arc;
 use egui::TextureId;
 use egui::epaint::{Mesh, Primitive, WHITE_UV};
 
-use super::canvas::{TILE_PX, tiles_in_row};
 use super::raster::{PreparedMesh, Snapped, Target};
 use super::texture::TextureStore;
 use crate::gui::rendering::chunks::Chunk;
 use crate::gui::rendering::mixing::mixed;
+
+/// Size of a tile in pixels: small enough that a moving cursor changes few tiles and that a tile fits into the cache.
+pub(super) const TILE_PX: [usize; 2] = [64, 32];
 
 /// Indices of a mesh and of a triangle in it.
 #[derive(Clone, Copy)]
@@ -144,4 +146,9 @@ impl PreparedChunk {
             }
         }
     }
+}
+
+/// Number of tiles in a row of an image of width `width_px`.
+pub(super) fn tiles_in_row(width_px: usize) -> usize {
+    width_px.div_ceil(TILE_PX[0])
 }

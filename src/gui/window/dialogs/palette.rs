@@ -1,13 +1,13 @@
 //! Command palette: search over all actions of the window.
 
-use egui::{Align, Key, Layout as UiLayout, Modifiers, RichText, ScrollArea, TextEdit, Ui, WidgetInfo};
+use egui::{Align, Key, Layout, Modifiers, RichText, ScrollArea, TextEdit, Ui, WidgetInfo};
 
 use super::modal::Modal;
 use super::palette_items::{Choice, Item, found};
 use crate::gui::PanelContext;
-use crate::gui::window::SavedLayouts;
 use crate::gui::window::actions::Action;
-use crate::gui::window::tiles::Layout;
+use crate::gui::window::saved_layouts::SavedLayouts;
+use crate::gui::window::tiles::PanelLayout;
 
 /// Height of the list in points.
 const LIST_HEIGHT: f32 = 360.0;
@@ -28,7 +28,7 @@ impl CommandPalette {
         ui: &Ui,
         ctx: &mut PanelContext<'_>,
         layouts: &SavedLayouts,
-        layout: &Layout,
+        layout: &PanelLayout,
         actions: &mut Vec<Action>,
     ) -> bool {
         let theme = *ctx.theme;
@@ -102,7 +102,7 @@ fn list_ui(ui: &mut Ui, ctx: &PanelContext<'_>, items: &[Item], chosen: usize, b
                 if bring && number == chosen {
                     row.scroll_to_me(None);
                 }
-                ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     ui.label(RichText::new(item.keys).small().color(ctx.theme.text_weak));
                 });
             });

@@ -1,17 +1,17 @@
 //! Items of the command palette: all actions, and the content of the recording at the cursor.
 
-use super::{Dialog, fuzzy};
+use super::fuzzy;
 use crate::frontend::FeatureId;
 use crate::geometry::ns_from_seconds;
 use crate::gimbal::ParameterId;
-use crate::gui::PanelContext;
 use crate::gui::convergence::names::meaning_of;
 use crate::gui::theme::ThemeName;
 use crate::gui::timeline::SPEEDS;
 use crate::gui::units::seconds;
 use crate::gui::window::actions::{Action, TABLE, keys_of};
-use crate::gui::window::tiles::Layout;
-use crate::gui::window::{PanelName, SavedLayouts};
+use crate::gui::window::saved_layouts::SavedLayouts;
+use crate::gui::window::tiles::PanelLayout;
+use crate::gui::{Dialog, PanelContext, PanelName};
 use crate::session::RunRecord;
 
 /// The effect of an item.
@@ -35,8 +35,8 @@ fn item(name: impl Into<String>, action: Action) -> Item {
     Item { name: name.into(), keys: keys_of(action), choice: Choice::Action(action) }
 }
 
-/// Items that match the typed text, best first; for an empty text all actions in the order of the table.
-pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &Layout) -> Vec<Item> {
+/// Items that match the typed text, best first; all actions in their own order for an empty text.
+pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &PanelLayout) -> Vec<Item> {
     let places = places(typed, ctx);
     let mut items = commands(ctx, layouts, layout);
     if !typed.trim().is_empty() {
@@ -49,7 +49,7 @@ pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts,
     places.into_iter().chain(scored.into_iter().map(|(_, item)| item)).collect()
 }
 
-fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &Layout) -> Vec<Item> {
+fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &PanelLayout) -> Vec<Item> {
     let listed = TABLE.iter().filter(|entry| {
         // Their effects are listed below, or are already in effect.
         !matches!(entry.action, Action::Dialog(Dialog::Palette) | Action::Dismiss | Action::SavedLayout(_))

@@ -5,9 +5,9 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
 use super::story::{Story, classical};
+use crate::gui::PanelName;
 use crate::gui::rank::verdict::verdict;
 use crate::gui::samples::{SAMPLE_FRAMES, sample_recording_of};
-use crate::gui::window::PanelName;
 use crate::gui::window::tests::{Bench, bench_of, commands_of};
 use crate::session::{Command, Recording};
 

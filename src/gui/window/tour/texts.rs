@@ -1,6 +1,6 @@
 //! Texts of the stops, with the numbers of the open recording.
 
-use super::Stop;
+use super::stop::Stop;
 use super::story::{self, Story};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::{ParameterId, ParameterNames};
@@ -64,7 +64,7 @@ fn log_lines(ctx: &PanelContext<'_>, run: &RunRecord) -> Vec<String> {
         0 => String::new(),
         count => format!(", a gimbal with {} ({})", counted(count, "joint"), joints.join(", ")),
     };
-    let log = super::super::top_bar::log_name(recording);
+    let log = recording.log_name();
     let length = fixed(seconds_from_ns(recording.duration_ns), 1);
     let contents = format!(
         "{log}: {length} s, {}{gimbal}. Each run estimates the trajectory and calibrates the chain from IMU to camera.",

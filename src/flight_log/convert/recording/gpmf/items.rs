@@ -101,6 +101,18 @@ impl Item<'_> {
     }
 }
 
+/// What the items of a stream say of its samples.
+#[derive(Debug, Default)]
+pub(super) struct Properties {
+    pub(super) scales: Vec<f64>,
+    pub(super) letters: String,
+    pub(super) name: String,
+    pub(super) axes: String,
+    /// UTC (`GPSU`), and kind of the fix (`GPSF`).
+    pub(super) utc_ns: Option<i64>,
+    pub(super) fix: Option<f64>,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

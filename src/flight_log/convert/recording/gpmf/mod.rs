@@ -11,7 +11,7 @@ use super::mp4::Payload;
 use super::recorded::{Recorded, finite, nanoseconds};
 use crate::flight_log::geodesy::Geodetic;
 use clock::{Mark, sample_times_ns};
-use items::{Item, items};
+use items::{Item, Properties, items};
 use karma::Karma;
 
 /// Name of the format in the report.
@@ -33,7 +33,7 @@ struct Sensor {
 
 /// Telemetry read so far.
 #[derive(Debug)]
-struct State {
+struct ReadPayloads {
     camera: Recorded,
     karma: Karma,
     gyroscope: Sensor,
@@ -44,18 +44,6 @@ struct State {
     axes: Option<String>,
     /// Letter of the field of view (`VFOV`).
     field_of_view: Option<String>,
-}
-
-/// Description of a stream's samples by its items.
-#[derive(Debug, Default)]
-struct Properties {
-    scales: Vec<f64>,
-    letters: String,
-    name: String,
-    axes: String,
-    /// UTC (`GPSU`), and kind of the fix (`GPSF`).
-    utc_ns: Option<i64>,
-    fix: Option<f64>,
 }
 
 /// Telemetry of a video, in nanoseconds since its start.
@@ -70,7 +58,7 @@ pub(super) struct Telemetry {
 }
 
 pub(super) fn read(payloads: &[Payload]) -> Telemetry {
-    let mut state = State {
+    let mut state = ReadPayloads {
         camera: Recorded::new(FORMAT, "/camera"),
         karma: Karma::default(),
         gyroscope: Sensor::default(),
@@ -86,7 +74,8 @@ pub(super) fn read(payloads: &[Payload]) -> Telemetry {
             state.problem.get_or_insert(problem);
         }
     }
-    let State { mut camera, karma, gyroscope, accelerometer, damaged_payloads, problem, axes, field_of_view } = state;
+    let ReadPayloads { mut camera, karma, gyroscope, accelerometer, damaged_payloads, problem, axes, field_of_view } =
+        state;
     if let Some(problem) = problem {
         camera.notes.push(format!(
             "{damaged_payloads} of {} payloads of telemetry are damaged and read up to the damage only: {problem}",
@@ -111,7 +100,7 @@ pub(super) fn read(payloads: &[Payload]) -> Telemetry {
     Telemetry { camera, drone: karma.finish(), field_of_view }
 }
 
-fn read_payload(payload: &Payload, state: &mut State) -> Result<(), String> {
+fn read_payload(payload: &Payload, state: &mut ReadPayloads) -> Result<(), String> {
     for device in items(&payload.bytes) {
         let device = device?;
         if &device.key != b"DEVC" {
@@ -129,7 +118,7 @@ fn read_payload(payload: &Payload, state: &mut State) -> Result<(), String> {
     Ok(())
 }
 
-fn read_stream(stream: &Item<'_>, payload: &Payload, state: &mut State) -> Result<(), String> {
+fn read_stream(stream: &Item<'_>, payload: &Payload, state: &mut ReadPayloads) -> Result<(), String> {
     let mut properties = Properties::default();
     for item in items(stream.data) {
         let item = item?;
@@ -155,8 +144,8 @@ fn read_stream(stream: &Item<'_>, payload: &Payload, state: &mut State) -> Resul
     Ok(())
 }
 
-/// Stores samples of the camera's gyroscope in rad/s or accelerometer in m/s².
-fn take_inertial(item: &Item<'_>, properties: &Properties, payload: &Payload, state: &mut State) {
+/// Takes samples of the camera's gyroscope in rad/s or accelerometer in m/s².
+fn take_inertial(item: &Item<'_>, properties: &Properties, payload: &Payload, state: &mut ReadPayloads) {
     let axes = if properties.axes.is_empty() { axes_of_name(&properties.name) } else { Some(properties.axes.clone()) };
     let axes = axes.unwrap_or_else(|| DEFAULT_AXES.to_owned());
     let sensor = if &item.key == b"GYRO" { &mut state.gyroscope } else { &mut state.accelerometer };

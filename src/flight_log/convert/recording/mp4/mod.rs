@@ -10,10 +10,10 @@ use super::super::super::file::LogFile;
 use super::super::super::limits::LogLimits;
 use super::super::super::video::VideoCodec;
 use super::super::ConvertError;
-use super::recorded::Samples;
+use super::recorded::{Samples, rate_hz};
 use annex_b::UnitFormat;
 use boxes::{child, children, descendant, file_boxes, u32_at, u64_at};
-use track::{Sample, Track};
+use track::{MovieTrack, Sample};
 
 /// Seconds from 1904, the origin of MP4 times, to the epoch.
 const EPOCH_1904_S: u64 = 2_082_844_800;
@@ -102,7 +102,7 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     let firmware = descendant(&table, &[b"udta", b"FIRM"]).map(|text| String::from_utf8_lossy(text).into_owned());
     let max_samples = limits.messages(file.len() as u64);
     let traks = children(&table).filter(|(kind, _)| kind == b"trak");
-    let tracks: Vec<Track<'_>> =
+    let tracks: Vec<MovieTrack<'_>> =
         traks.filter_map(|(_, trak)| track::read(trak, movie_timescale.unwrap_or(1), max_samples)).collect();
     let telemetry = telemetry(&tracks, &file, &mut notes);
     let (track, format, resolution_px) = video_track(&tracks).map_err(unreadable)?;
@@ -122,8 +122,8 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     Ok(Movie { video, telemetry, created_ns, firmware, notes })
 }
 
-/// First video track of a supported type, with the format of its units and its resolution.
-fn video_track<'a>(tracks: &'a [Track<'a>]) -> Result<(&'a Track<'a>, UnitFormat, [usize; 2]), String> {
+/// The first video track that can be read, how its units are stored, and its resolution.
+fn video_track<'a>(tracks: &'a [MovieTrack<'a>]) -> Result<(&'a MovieTrack<'a>, UnitFormat, [usize; 2]), String> {
     let mut others = Vec::new();
     for track in tracks.iter().filter(|track| &track.handler == b"vide") {
         let (kind, description) = track.description;
@@ -151,8 +151,8 @@ fn video_track<'a>(tracks: &'a [Track<'a>]) -> Result<(&'a Track<'a>, UnitFormat
     })
 }
 
-/// Frames that lie in the file, and true if their display order differs from the decoding order.
-fn pictures(track: &Track<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (Vec<Picture>, bool) {
+/// The pictures that lie in the file, and whether they are shown in another order than decoded.
+fn pictures(track: &MovieTrack<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (Vec<Picture>, bool) {
     // Frames that depend on later ones are written when the last of these is decoded.
     let delay_ns = track.samples.iter().map(|sample| sample.presented_ns.saturating_sub(sample.decoded_ns)).max();
     let delay_ns = delay_ns.unwrap_or(0);
@@ -184,8 +184,8 @@ fn place(sample: &Sample, file_bytes: usize) -> Option<(usize, usize)> {
     (length > 0 && start.checked_add(length)? <= file_bytes).then_some((start, length))
 }
 
-/// Payloads of `GoPro` telemetry.
-fn telemetry(tracks: &[Track<'_>], file: &LogFile, notes: &mut Vec<String>) -> Vec<Payload> {
+/// The payloads of `GoPro`'s telemetry.
+fn telemetry(tracks: &[MovieTrack<'_>], file: &LogFile, notes: &mut Vec<String>) -> Vec<Payload> {
     let Some(track) = tracks.iter().find(|track| &track.description.0 == b"gpmd") else { return Vec::new() };
     let mut payloads = Vec::new();
     let mut lost = track.undescribed;
@@ -223,7 +223,7 @@ impl Video {
         let times: Samples<()> = self.pictures.iter().map(|picture| (picture.decoded_ns, ())).collect();
         let [width, height] = self.resolution_px;
         let order = if self.has_reordered_pictures { "; with B-frames, in the order of decoding" } else { "" };
-        format!("{}, {width}×{height}, {:.2} fps{order}", self.codec.name(), super::topics::rate_hz(&times))
+        format!("{}, {width}×{height}, {:.2} fps{order}", self.codec.name(), rate_hz(&times))
     }
 
     /// First and last time of the frames in nanoseconds since the start of the video.

@@ -15,7 +15,7 @@ pub(super) struct Sample {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Track<'a> {
+pub(super) struct MovieTrack<'a> {
     /// Such as `vide`, `soun`, `meta`.
     pub(super) handler: [u8; 4],
     /// Type and content of the first sample description.
@@ -29,8 +29,8 @@ pub(super) struct Track<'a> {
     pub(super) edits: usize,
 }
 
-/// Reads a `trak` box; `None` if a table is missing. `max_samples` bounds the number of samples in the tables.
-pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Option<Track<'_>> {
+/// Reads a `trak` box; `None` when a table is missing. `max_samples` bounds what the tables may announce.
+pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Option<MovieTrack<'_>> {
     let media = child(trak, b"mdia")?;
     let handler: [u8; 4] = child(media, b"hdlr")?.get(8..12)?.try_into().ok()?;
     let header = child(media, b"mdhd")?;
@@ -67,7 +67,7 @@ pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Optio
     }
     let undescribed = places.announced.saturating_sub(samples.len() as u64);
     let is_upright = child(trak, b"tkhd").is_none_or(is_upright);
-    Some(Track { handler, description, samples, undescribed, is_upright, edits })
+    Some(MovieTrack { handler, description, samples, undescribed, is_upright, edits })
 }
 
 /// Positions of samples in the file.

@@ -84,7 +84,7 @@ struct Session {
 }
 
 #[derive(Debug)]
-struct State {
+struct ReadMessages {
     /// Measurements with times since the epoch.
     recorded: Recorded,
     sessions: BTreeMap<u8, Session>,
@@ -102,7 +102,8 @@ fn empty() -> Recorded {
 pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
     let file = LogFile::open(path, sink.limits())?;
     let mut frames = Frames::new(&file, checksum_byte);
-    let mut state = State { recorded: empty(), sessions: BTreeMap::new(), system: None, autopilot: None, restarts: 0 };
+    let mut state =
+        ReadMessages { recorded: empty(), sessions: BTreeMap::new(), system: None, autopilot: None, restarts: 0 };
     let mut at = 0;
     while let Some(frame) = frames.next(at).map_err(|problem| ConvertError::unreadable(problem, path))? {
         at = frame.end;
@@ -110,7 +111,7 @@ pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, Convert
         sink.advance(at, file.len())?;
     }
     let damage = frames.damage;
-    let State { mut recorded, sessions, autopilot, restarts, .. } = state;
+    let ReadMessages { mut recorded, sessions, autopilot, restarts, .. } = state;
     for session in sessions.into_values() {
         recorded.append(session.finish());
     }
@@ -143,7 +144,7 @@ impl Session {
     }
 }
 
-impl State {
+impl ReadMessages {
     fn take(&mut self, frame: &Frame) {
         let Some((name, _)) = described(frame.message) else {
             return self.recorded.leave(&format!("message {}", frame.message), "not read");

@@ -26,9 +26,9 @@ struct Field {
 
 /// Offsets and types of a message's numbers.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Layout(BTreeMap<String, Field>);
+pub(super) struct MessageLayout(BTreeMap<String, Field>);
 
-impl Layout {
+impl MessageLayout {
     /// Values of a field with `N` numbers, `None` if the message has no such field or ends before it.
     pub(super) fn numbers<const N: usize>(&self, message: &[u8], name: &str) -> Option<[f64; N]> {
         let field = self.0.get(name).filter(|field| field.count == N)?;
@@ -89,10 +89,10 @@ impl Formats {
         Ok(())
     }
 
-    /// Layout of a format; `None` for an undeclared format or one of unknown size.
-    pub(super) fn layout(&self, name: &str) -> Option<Layout> {
+    /// Where the numbers of a format lie; `None` for a format that is not declared, or whose size cannot be told.
+    pub(super) fn layout(&self, name: &str) -> Option<MessageLayout> {
         let mut sizes = BTreeMap::new();
-        let mut layout = Layout::default();
+        let mut layout = MessageLayout::default();
         let mut offset: usize = 0;
         for field in self.0.get(name)? {
             if let Some(scalar) = scalar(&field.type_name) {

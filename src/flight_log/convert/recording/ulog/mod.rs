@@ -13,7 +13,7 @@ use super::damage::Damage;
 use super::mavlink_gimbal::gimbal_attitude;
 use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, finite, from_euler, nanoseconds, rotation};
 use crate::flight_log::geodesy::Geodetic;
-use formats::{Formats, Layout};
+use formats::{Formats, MessageLayout};
 pub(super) use messages::MAGIC;
 use messages::{HEADER_BYTES, Messages};
 
@@ -29,10 +29,10 @@ struct Subscription {
 
 /// Declarations of a log up to the present position.
 #[derive(Debug, Default)]
-struct State {
+struct Declarations {
     formats: Formats,
     subscriptions: BTreeMap<u16, Subscription>,
-    layouts: BTreeMap<String, Layout>,
+    layouts: BTreeMap<String, MessageLayout>,
     /// Ends of the parts of the log: up to the first, then from each to the next.
     parts: Vec<usize>,
     dropouts: u64,
@@ -46,7 +46,7 @@ struct State {
 pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
     let file = LogFile::open(path, sink.limits())?;
     let mut recorded = Recorded::new("PX4 ULog", "");
-    let mut state = State::default();
+    let mut state = Declarations::default();
     let mut messages = Messages::new(&file);
     let mut at = HEADER_BYTES;
     let mut part = 0;
@@ -67,7 +67,7 @@ pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, Convert
     Ok(recorded)
 }
 
-fn report(state: &State, damage: &Damage, recorded: &mut Recorded) {
+fn report(state: &Declarations, damage: &Damage, recorded: &mut Recorded) {
     recorded.notes.extend(damage.notes("are no messages", |bytes| {
         format!("the log ends within a message (power lost, or the copy is incomplete): {bytes} bytes are lost")
     }));
@@ -86,7 +86,7 @@ fn report(state: &State, damage: &Damage, recorded: &mut Recorded) {
     }
 }
 
-fn take(kind: u8, content: &[u8], state: &mut State, recorded: &mut Recorded) {
+fn take(kind: u8, content: &[u8], state: &mut Declarations, recorded: &mut Recorded) {
     match (kind, content) {
         (b'F', text) => {
             let declared = std::str::from_utf8(text)
@@ -160,7 +160,7 @@ fn is_read(name: &str) -> bool {
 /// Data message.
 struct Record<'a> {
     subscription: &'a Subscription,
-    layout: &'a Layout,
+    layout: &'a MessageLayout,
     message: &'a [u8],
 }
 

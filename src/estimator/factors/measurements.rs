@@ -1,0 +1,21 @@
+//! The list of measurements of a window, reprojections excepted.
+
+use super::encoder::EncoderFactor;
+use super::factor::{Point, Sink};
+use super::imu::ImuFactor;
+use super::joint_motion::JointMotionFactor;
+use super::zero_velocity::ZeroVelocityFactor;
+
+/// Passes the measurements of the frames before `slots` to a sink.
+pub(crate) fn measurements(point: &Point<'_>, slots: usize, sink: &mut impl Sink) {
+    for slot in 1..slots {
+        sink.take(ImuFactor::of(point, slot));
+    }
+    for slot in 0..slots {
+        sink.take(EncoderFactor::of(point, slot));
+        sink.take(JointMotionFactor::of(point, slot));
+    }
+    for slot in 0..slots {
+        sink.take(ZeroVelocityFactor::of(point, slot));
+    }
+}

@@ -1,0 +1,28 @@
+//! What a rig file leaves to its log.
+
+use crate::camera::CameraModel;
+
+/// Values of a log that replace missing values of a rig, by image topic.
+pub(crate) trait CameraFacts {
+    /// Camera model from `CameraInfo`, or the reason why there is none.
+    fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String>;
+    /// Mean rate of the images.
+    fn rate_hz(&self, image_topic: &str) -> Option<f64>;
+    /// Content of a file of the rig, next to it or attached with it, or the reason why there is none.
+    fn file_beside_rig(&self, _name: &str) -> Result<Vec<u8>, String> {
+        Err("there is no folder to take it from".into())
+    }
+}
+
+/// Facts without a log.
+pub(super) struct NoFacts;
+
+impl CameraFacts for NoFacts {
+    fn camera_model(&self, _image_topic: &str) -> Result<CameraModel, String> {
+        Err("there is no log to take them from".into())
+    }
+
+    fn rate_hz(&self, _image_topic: &str) -> Option<f64> {
+        None
+    }
+}

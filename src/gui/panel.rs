@@ -1,0 +1,244 @@
+//! The panels of the window by name, what each of them does, and what it gets and gives in a frame.
+
+use std::sync::Arc;
+
+use egui::{Role, Sense, Ui};
+use serde::{Deserialize, Serialize};
+
+use super::slide::MovedChain;
+use super::theme::Theme;
+use crate::frontend::FeatureId;
+use crate::gimbal::{ParameterId, ParameterNames};
+use crate::observability::{ChainSlide, SlidePosition};
+use crate::session::breakpoints::Breakpoints;
+use crate::session::{Command, FrameImage, Recording, RunRecord, SolverPosition};
+
+/// One of the panels: it draws itself, and gives its values.
+pub trait Panel: CsvTable {
+    /// Draws the panel into the available room of `ui`.
+    fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>);
+
+    /// Panel with the same view and no texture of a window, for a figure; the default where there is no view to choose.
+    #[must_use]
+    fn view_copy(&self) -> Self
+    where
+        Self: Sized + Default,
+    {
+        Self::default()
+    }
+}
+
+/// Source of camera images, by camera key and index in the stream.
+pub trait ImageSource {
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage;
+}
+
+/// The selection, common to all panels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Selection {
+    pub feature: Option<FeatureId>,
+    pub parameter: Option<ParameterId>,
+    /// Index of the run in panels that show one run.
+    pub run: usize,
+    /// Time range of all plots, in nanoseconds since the log began; `None` for the whole log.
+    pub visible_ns: Option<(i64, i64)>,
+    /// Direction and distance by which the selected run's chain is moved.
+    pub slide: Option<SlidePosition>,
+    /// The moved chain at the cursor.
+    pub(crate) moved: MovedChain,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Playback {
+    /// True if the cursor moves.
+    pub playing: bool,
+    /// Speed in log seconds per second.
+    pub speed: f64,
+    /// The loop range, in nanoseconds since the log began.
+    pub loop_range_ns: Option<(i64, i64)>,
+    /// Stamps of the markers in ascending order.
+    pub markers_ns: Vec<i64>,
+    /// The solver iteration at which the step is shown, `None` for the converged step.
+    pub solver: Option<SolverPosition>,
+    /// True if steps at the cursor are being recomputed.
+    pub recomputing: bool,
+    /// Breakpoints with their hits so far.
+    pub breakpoints: Arc<Breakpoints>,
+    /// True while the cursor runs to a hit that the estimators have not reached yet.
+    pub running_to_breakpoint: bool,
+}
+
+impl Default for Playback {
+    fn default() -> Self {
+        Self {
+            playing: false,
+            speed: 1.0,
+            loop_range_ns: None,
+            markers_ns: Vec::new(),
+            solver: None,
+            recomputing: false,
+            breakpoints: Arc::default(),
+            running_to_breakpoint: false,
+        }
+    }
+}
+
+/// Presentation of a panel: in the window, or as a figure of a report or of an exported file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Presentation {
+    /// With toolbars, buttons and selectors.
+    #[default]
+    Interactive,
+    /// Values, plots and legends only.
+    Figure,
+}
+
+impl Presentation {
+    /// True if buttons, selectors and hints are omitted.
+    pub fn is_figure(self) -> bool {
+        self == Self::Figure
+    }
+
+    /// Sense and accessibility role of a painted element that a click selects. In the window it is a button; in a
+    /// figure it has the given role and does not react.
+    pub(crate) fn clickable(self, role_in_figure: Role) -> (Sense, Role) {
+        if self.is_figure() { (Sense::hover(), role_in_figure) } else { (Sense::click(), Role::Button) }
+    }
+}
+
+/// The inputs and outputs of a panel in one frame.
+pub struct PanelContext<'a> {
+    pub recording: &'a Recording,
+    /// Position of the cursor in nanoseconds since the log began; panels show the last step at or before it.
+    pub cursor_ns: i64,
+    pub playback: &'a Playback,
+    pub images: &'a mut dyn ImageSource,
+    /// The common selection, which a panel may change.
+    pub selection: &'a mut Selection,
+    pub theme: &'a Theme,
+    pub presentation: Presentation,
+    /// Commands of the panel, applied after this frame.
+    pub commands: &'a mut Vec<Command>,
+}
+
+impl<'a> PanelContext<'a> {
+    /// The selected run, `None` before the first run has started.
+    pub fn selected_run(&self) -> Option<&'a RunRecord> {
+        self.recording.runs.get(self.selection.run)
+    }
+
+    /// Names of calibration parameters and joints.
+    pub(crate) fn names(&self) -> ParameterNames {
+        self.recording.rig.parameter_names()
+    }
+
+    /// Computes the moved chain of the selected run when position, run or step has changed.
+    pub(crate) fn move_chain(&mut self) {
+        let run = self.recording.runs.get(self.selection.run);
+        let step = run.and_then(|run| Some((run, run.step_at(self.cursor_ns)?)));
+        let Selection { slide, moved, .. } = &mut *self.selection;
+        moved.update(self.recording, step, slide.as_ref());
+    }
+
+    /// The moved chain if it belongs to the step at the cursor.
+    pub(crate) fn moved_chain(&self, stamp_ns: i64) -> Option<&Arc<ChainSlide>> {
+        self.selection.moved.at(stamp_ns)
+    }
+}
+
+/// A panel by its name on the command line, in file names and in saved layouts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
+pub enum PanelName {
+    Image,
+    Scene,
+    /// Calibration over time.
+    Convergence,
+    /// Rank and null directions.
+    Rank,
+    /// The linearization by blocks.
+    Jacobian,
+    /// Residuals as a histogram, over time and by factor.
+    Residuals,
+    /// Values of the selection.
+    Inspector,
+    /// Observability of a mechanism and a motion without a log.
+    Laboratory,
+    /// Comparison of all runs.
+    Comparison,
+    /// Breakpoints and their hits.
+    Breakpoints,
+    /// The timeline at the bottom of the window.
+    Timeline,
+}
+
+impl PanelName {
+    pub const ALL: [Self; 11] = [
+        Self::Image,
+        Self::Scene,
+        Self::Convergence,
+        Self::Rank,
+        Self::Jacobian,
+        Self::Residuals,
+        Self::Inspector,
+        Self::Laboratory,
+        Self::Comparison,
+        Self::Breakpoints,
+        Self::Timeline,
+    ];
+
+    /// The panels that can be moved and hidden: all but the timeline.
+    pub fn movable() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|panel| *panel != Self::Timeline)
+    }
+
+    /// Name on the command line, and title.
+    const fn names(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Image => ("image", "Image"),
+            Self::Scene => ("scene", "Scene"),
+            Self::Convergence => ("convergence", "Convergence"),
+            Self::Rank => ("rank", "Rank"),
+            Self::Jacobian => ("jacobian", "Jacobian"),
+            Self::Residuals => ("residuals", "Residuals"),
+            Self::Inspector => ("inspector", "Inspector"),
+            Self::Laboratory => ("laboratory", "Laboratory"),
+            Self::Comparison => ("comparison", "Comparison"),
+            Self::Breakpoints => ("breakpoints", "Breakpoints"),
+            Self::Timeline => ("timeline", "Timeline"),
+        }
+    }
+
+    /// Name on the command line.
+    pub const fn as_str(self) -> &'static str {
+        self.names().0
+    }
+
+    /// Anchor of the panel's section in the manual.
+    pub(crate) const fn section(self) -> &'static str {
+        self.as_str()
+    }
+
+    /// Title in the window.
+    pub const fn title(self) -> &'static str {
+        self.names().1
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dialog {
+    /// Opens a log or a saved session.
+    OpenLog,
+    /// Adds a run on the same log.
+    AddRun,
+    /// Forks the selected run at the cursor.
+    Fork,
+    Palette,
+    Settings,
+    /// Question asked before unsaved work is discarded.
+    Unsaved,
+}
+
+pub trait CsvTable {
+    /// The table with its header line, in seconds, radians, metres and pixels; empty where there are no values.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String;
+}

@@ -1,0 +1,55 @@
+//! State of all dialogs.
+
+use std::sync::Arc;
+
+use super::add_run::AddRunDialog;
+use super::fork::ForkDialog;
+use super::open_log::OpenLogDialog;
+use super::palette::CommandPalette;
+use crate::gui::Dialog;
+use crate::gui::desktop::Desktop;
+
+/// State of all dialogs, open or not.
+#[derive(Default)]
+pub struct Dialogs {
+    pub(super) open: Option<Dialog>,
+    pub(super) open_log: OpenLogDialog,
+    pub(super) add_run: AddRunDialog,
+    pub(super) fork: ForkDialog,
+    pub(super) palette: CommandPalette,
+    /// The work that is not saved, as text.
+    pub(super) unsaved: String,
+}
+
+impl Dialogs {
+    /// Gives the dialogs access to the machine, for completing paths.
+    pub fn set_desktop(&mut self, desktop: Arc<dyn Desktop>) {
+        self.open_log = OpenLogDialog::new(desktop);
+    }
+
+    /// Opens a dialog and closes the open one; the palette opens with an empty input.
+    pub fn show(&mut self, dialog: Dialog) {
+        match dialog {
+            Dialog::OpenLog => self.open_log.show_picker(),
+            Dialog::Palette => self.palette = CommandPalette::default(),
+            _ => {}
+        }
+        self.open = Some(dialog);
+    }
+
+    /// Asks whether to save the session before leaving it; `lost` is the unsaved work as text.
+    pub fn ask_to_save(&mut self, lost: String) {
+        self.unsaved = lost;
+        self.open = Some(Dialog::Unsaved);
+    }
+
+    /// True if a dialog is open.
+    pub fn is_open(&self) -> bool {
+        self.open.is_some()
+    }
+
+    /// Closes the open dialog.
+    pub fn close(&mut self) {
+        self.open = None;
+    }
+}

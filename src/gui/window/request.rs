@@ -1,0 +1,23 @@
+//! Requests of the window to the application.
+
+use std::path::PathBuf;
+
+use crate::gui::desktop::PanelExport;
+
+/// Request of the window to the application, in addition to the commands of a session.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum WindowRequest {
+    OpenLog(PathBuf),
+    /// Store the saved layouts, given as text.
+    KeepLayouts(String),
+    SaveSession,
+    /// Close the log and go back to the welcome view.
+    CloseLog,
+    Quit,
+    /// Leave the session after the question about unsaved work.
+    Leave {
+        /// True if the session is saved first.
+        save: bool,
+    },
+    WritePanel(Box<PanelExport>),
+}

@@ -1,0 +1,159 @@
+//! The content of a report as data: `report.json`, and the input of the HTML page.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::inputs::InputFile;
+use super::options::ReportOptions;
+use super::rank_intervals::{RankInterval, rank_intervals};
+use super::verdict::{RunVerdict, Statement, log_statement};
+use crate::flight_log::log_name;
+use crate::geometry::seconds_from_ns;
+use crate::log_check::CheckReport;
+use crate::session::{EstimabilitySummary, Recording, RunRecord, RunSummary, estimability_summary};
+
+/// A notable event of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct ReportEvent {
+    /// Stamp of its first frame, in seconds since the log began.
+    pub(super) time_s: f64,
+    pub(super) kind: String,
+    /// Reason in one sentence.
+    pub(super) message: String,
+    /// Number of consecutive frames with the event.
+    pub(super) times: usize,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct RunContent {
+    pub(super) label: String,
+    /// The verdict at the top of the page.
+    pub(super) verdict: RunVerdict,
+    /// The summary, as in `summary.json`.
+    pub(super) summary: RunSummary,
+    /// Estimability of the calibration parameters, in groups.
+    pub(super) estimability: Vec<EstimabilitySummary>,
+    /// Intervals of constant rank.
+    #[serde(rename = "rank_story")]
+    pub(super) rank_intervals: Vec<RankInterval>,
+    /// Notable events.
+    pub(super) events: Vec<ReportEvent>,
+    /// Counts of the frequent kinds of events.
+    pub(super) frequent_events: BTreeMap<String, usize>,
+}
+
+/// The content of the whole report.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct ReportContent {
+    /// Program and version.
+    pub(super) program: &'static str,
+    /// Command line of the report.
+    pub(super) command: String,
+    pub(super) log: String,
+    pub(super) rig: String,
+    /// Length of the log in seconds.
+    pub(super) duration_s: f64,
+    /// Input files with their hashes.
+    pub(super) inputs: Vec<InputFile>,
+    /// The verdict on the log and the rig.
+    pub(super) log_verdict: Statement,
+    /// Runs in the order of the command line.
+    pub(super) runs: Vec<RunContent>,
+    /// Findings about the log and its rig, as printed by `check --json`.
+    pub(super) check: Option<CheckReport>,
+    /// Warnings about the log.
+    pub(super) log_warnings: Vec<String>,
+}
+
+impl ReportContent {
+    /// Collects the content of a recording; `summaries` are those of its runs, in order.
+    pub(super) fn new(
+        recording: &Recording,
+        summaries: Vec<RunSummary>,
+        inputs: Vec<InputFile>,
+        options: &ReportOptions,
+    ) -> Self {
+        let runs = recording.runs.iter().zip(summaries).map(|(run, summary)| {
+            let (events, frequent_events) = events(run);
+            RunContent {
+                label: run.spec.label.clone(),
+                verdict: RunVerdict::new(recording, run, &summary),
+                summary,
+                estimability: estimability_summary(recording, run),
+                rank_intervals: rank_intervals(run, &recording.rig),
+                events,
+                frequent_events,
+            }
+        });
+        let warnings = recording.warnings.iter();
+        let log_warnings: Vec<String> = warnings
+            .map(|warning| format!("{:.3} s: {}", seconds_from_ns(warning.stamp_ns), warning.message))
+            .collect();
+        Self {
+            program: concat!("dcvins ", env!("CARGO_PKG_VERSION")),
+            command: options.command.clone(),
+            log: log_name(&recording.log_path),
+            rig: recording.rig.name.clone(),
+            duration_s: seconds_from_ns(recording.duration_ns),
+            inputs,
+            log_verdict: log_statement(options.check.as_ref(), &log_warnings),
+            runs: runs.collect(),
+            check: options.check.clone(),
+            log_warnings,
+        }
+    }
+}
+
+/// Notable events, equal ones of consecutive frames merged, and the counts of the others by kind.
+fn events(run: &RunRecord) -> (Vec<ReportEvent>, BTreeMap<String, usize>) {
+    let mut notable: Vec<ReportEvent> = Vec::new();
+    let mut frequent = BTreeMap::new();
+    // By kind: index of its last frame, and its index in `notable`.
+    let mut latest: BTreeMap<String, (usize, usize)> = BTreeMap::new();
+    for (number, step) in run.steps.iter().enumerate() {
+        for event in &step.report.events {
+            let kind = words(&format!("{:?}", event.kind));
+            if !event.kind.is_notable() {
+                *frequent.entry(kind).or_default() += 1;
+                continue;
+            }
+            let before = latest.get(&kind).filter(|(frame, _)| frame + 1 >= number).map(|(_, place)| *place);
+            let place = before.unwrap_or(notable.len());
+            match notable.get_mut(place) {
+                Some(known) => known.times += 1,
+                None => notable.push(ReportEvent {
+                    time_s: seconds_from_ns(step.report.stamp_ns),
+                    kind: kind.clone(),
+                    message: event.message.clone(),
+                    times: 1,
+                }),
+            }
+            latest.insert(kind, (number, place));
+        }
+    }
+    (notable, frequent)
+}
+
+/// Converts `InitializedFromMotion` to `initialized from motion`.
+fn words(name: &str) -> String {
+    let mut words = String::new();
+    for letter in name.chars() {
+        if letter.is_ascii_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.push(letter.to_ascii_lowercase());
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::words;
+
+    #[test]
+    fn kinds_of_events_are_written_as_words() {
+        assert_eq!(words("InitializedFromMotion"), "initialized from motion");
+        assert_eq!(words("Failure"), "failure");
+    }
+}

@@ -1,0 +1,176 @@
+//! The HTML page of a report, from its content and figures.
+
+use maud::{Markup, html};
+
+use super::content::{ReportContent, RunContent};
+use super::html::{document, figure, icon, list, unbroken};
+use super::numbers::number;
+use super::options::ReportFigure;
+use super::rank_intervals::RankInterval;
+use super::tables;
+use super::verdict::Statement;
+
+pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String {
+    let title = format!("Flight report: {}", content.log);
+    let body = html! {
+        h1 { (title) }
+        p.lead { (lead(content)) }
+        (contents(content))
+        (verdict_section(content))
+        (grouped(figures))
+        h2 #accuracy { "Accuracy" }
+        (tables::accuracy(content))
+        (tables::frames(content))
+        @if let Some(trajectories) = tables::trajectories(content) {
+            (trajectories)
+        }
+        @for (index, run) in content.runs.iter().enumerate() {
+            (run_section(index, run))
+        }
+        @if has_log_section(content) {
+            h2 #log { "Log and rig" }
+        }
+        @if let Some(check) = &content.check {
+            (tables::findings(check))
+            (tables::topics(check))
+        }
+        @if !content.log_warnings.is_empty() {
+            h3 { "Warnings of the log reader" }
+            (list(&content.log_warnings))
+        }
+        h2 #origin { "Reproduction" }
+        p { "Command" }
+        pre { (content.command) }
+        (tables::inputs(content))
+        p {
+            "Version: " (content.program) ". The same files, command and version give the same bytes. Files next to \
+             this page: report.json and, for each run, trajectory.tum, covariance.csv, calibration.csv, rank.csv, information.csv, \
+             frames.csv, rig.yaml and summary.json."
+        }
+    };
+    format!("{}\n", document(&title, &body))
+}
+
+fn has_log_section(content: &ReportContent) -> bool {
+    content.check.is_some() || !content.log_warnings.is_empty()
+}
+
+/// The log, the rig and the runs in one sentence.
+fn lead(content: &ReportContent) -> String {
+    let runs: Vec<String> = content.runs.iter().map(|run| format!("{} ({})", run.label, run.summary.camera)).collect();
+    let noun = if runs.len() == 1 { "run" } else { "runs" };
+    format!(
+        "Log of {} s, rig {}, {noun} {}. {}.",
+        number(content.duration_s, 1),
+        content.rig,
+        runs.join(", "),
+        content.program
+    )
+}
+
+/// The verdicts, before any figure: one table for each run and one for the log.
+fn verdict_section(content: &ReportContent) -> Markup {
+    html! {
+        h2 #verdict { "Verdict" }
+        @for run in &content.runs {
+            @if content.runs.len() > 1 {
+                h3 { "Run " (run.label) }
+            }
+            (statements(&run.verdict.statements))
+        }
+        @if content.runs.len() > 1 {
+            h3 { "Log" }
+        }
+        (statements(std::slice::from_ref(&content.log_verdict)))
+    }
+}
+
+fn statements(statements: &[Statement]) -> Markup {
+    html! {
+        dl.verdict {
+            @for statement in statements {
+                div {
+                    dt { (icon(statement.mark)) " " (statement.topic) }
+                    dd {
+                        p { (unbroken(&statement.text)) }
+                        (list(&statement.details.iter().map(|line| unbroken(line)).collect::<Vec<_>>()))
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn contents(content: &ReportContent) -> Markup {
+    html! {
+        nav {
+            ul {
+                li { a href="#verdict" { "Verdict" } }
+                " " li { a href="#accuracy" { "Accuracy" } }
+                @for (index, run) in content.runs.iter().enumerate() {
+                    " " li { a href={ "#run-" (index) } { (run.label) } }
+                }
+                @if has_log_section(content) {
+                    " " li { a href="#log" { "Log and rig" } }
+                }
+                " " li { a href="#origin" { "Reproduction" } }
+            }
+        }
+    }
+}
+
+/// The figures with their headings, numbered over all groups.
+fn grouped(figures: &[ReportFigure]) -> Markup {
+    let numbered: Vec<(usize, &ReportFigure)> = (1..).zip(figures).collect();
+    html! {
+        @for group in numbered.chunk_by(|(_, a), (_, b)| a.heading == b.heading) {
+            @if let Some((_, first)) = group.first() {
+                h2 { (first.heading) }
+            }
+            @for (number, shown) in group {
+                (figure(*number, shown))
+            }
+        }
+    }
+}
+
+fn run_section(index: usize, run: &RunContent) -> Markup {
+    let calibration = &run.summary.calibration;
+    let frequent: Vec<String> = run.frequent_events.iter().map(|(kind, count)| format!("{kind} {count}")).collect();
+    html! {
+        h2 id={ "run-" (index) } { "Run " (run.label) }
+        @if !calibration.parameters.is_empty() {
+            (tables::calibration(run))
+            (tables::estimability(run))
+        }
+        (rank_section(run))
+        h3 { "Events and warnings" }
+        @if !run.events.is_empty() {
+            (tables::events(run))
+        }
+        @if !frequent.is_empty() {
+            p { "Number of other events: " (frequent.join(", ")) "." }
+        }
+        (list(&run.summary.warnings))
+    }
+}
+
+fn rank_section(run: &RunContent) -> Markup {
+    let sentences: Vec<String> = run.rank_intervals.iter().map(RankInterval::sentence).collect();
+    let known = run.summary.rank.iter().flat_map(|rank| &rank.known);
+    let known: Vec<String> = known
+        .map(|known| format!("{} (confirmed in {} of {} steps)", known.reason, known.agreeing, known.steps))
+        .collect();
+    html! {
+        h3 { "Rank over time" }
+        @if sentences.is_empty() {
+            p { "No rank analysis: no step of the run was linearized." }
+        } @else {
+            (list(&sentences))
+            @if !known.is_empty() {
+                p { "Null directions of the parameterization in closed form, and the steps whose Jacobian confirms them:" }
+                (list(&known))
+            }
+        }
+    }
+}

@@ -1,0 +1,434 @@
+//! The verdict at the top of a report, before any figure.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use serde::Serialize;
+
+use super::numbers::{number, shown_unit};
+use crate::calibration::ChainDistance;
+use crate::geometry::{Dimension, seconds_from_ns};
+use crate::log_check::{CheckReport, Severity};
+use crate::observability::laboratory::{Situation, advise};
+use crate::observability::{ParameterState, RankReport, parameter_states, parameters_of};
+use crate::session::{LostSince, PoseError, Recording, RunRecord, RunSummary, StepRecord};
+
+/// A parameter is informed if its posterior σ is at most this ratio of its prior σ: the measurements then contribute at
+/// least as much information as the prior.
+const INFORMED_RATIO: f64 = FRAC_1_SQRT_2;
+/// Largest trajectory error, in percent of the path length, with a good mark.
+const MAX_ATE_PERCENT: f64 = 1.0;
+/// Number of parameters by which a direction is named.
+const NAMED: usize = 4;
+
+/// Severity of a statement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Mark {
+    /// No problem.
+    Good,
+    Note,
+    /// The use of the result is limited.
+    Warning,
+    /// The result is missing or invalid.
+    Error,
+}
+
+/// One statement of the verdict.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub(super) struct Statement {
+    /// Subject in one word.
+    pub(super) topic: &'static str,
+    pub(super) mark: Mark,
+    /// The statement in one sentence.
+    pub(super) text: String,
+    /// Underlying values and reasons, one sentence each.
+    pub(super) details: Vec<String>,
+}
+
+/// Comparison of a calibration parameter with its prior.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct ParameterVerdict {
+    pub(super) name: String,
+    /// Serialized as its unit.
+    #[serde(rename = "unit")]
+    pub(super) dimension: Dimension,
+    /// Posterior standard deviation.
+    pub(super) sigma: Option<f64>,
+    /// Prior standard deviation.
+    pub(super) prior_sigma: Option<f64>,
+    /// True if the posterior σ is at most 0.71 of the prior σ.
+    pub(super) informed: bool,
+    /// `weak` or `unobservable` in the last window, empty otherwise.
+    pub(super) state: &'static str,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct RunVerdict {
+    /// Statements in the order of the page.
+    pub(super) statements: Vec<Statement>,
+    /// Calibration parameters in column order.
+    pub(super) parameters: Vec<ParameterVerdict>,
+}
+
+impl RunVerdict {
+    pub(super) fn new(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Self {
+        let parameters = parameters(recording, run);
+        let mut statements = vec![accuracy(recording, run, summary)];
+        statements.push(calibration(&parameters, summary));
+        statements.extend(observability(recording, run));
+        statements.push(estimation(run, summary));
+        Self { statements, parameters }
+    }
+}
+
+fn statement(topic: &'static str, mark: Mark, text: String, details: Vec<String>) -> Statement {
+    Statement { topic, mark, text, details }
+}
+
+/// Errors against the ground truth, or the covariance of the last pose if there is none.
+fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Statement {
+    let nees = PoseError::mean_nees(&run.pose_errors());
+    let last = run.steps.iter().rev().find_map(|step| Some((step, step.report.newest_pose_covariance?)));
+    let uncertainty = last.map(|(last, covariance)| {
+        let text = format!(
+            "at {} s position ±{}, attitude ±{}° (1σ, relative to the first estimated frame)",
+            number(seconds_from_ns(last.report.stamp_ns), 2),
+            length(covariance.position_sigma_m()),
+            number(covariance.attitude_sigma_rad().to_degrees(), 2)
+        );
+        match nees {
+            Some(nees) => format!(
+                "{text}; squared error over covariance {} on average (NEES, 6 when consistent)",
+                number(nees, 1)
+            ),
+            None => text,
+        }
+    });
+    match (&summary.accuracy, uncertainty) {
+        (Some(found), uncertainty) => {
+            let relative = found.rpe.iter().map(|over| {
+                format!(
+                    "over {} m {}, {}°",
+                    over.delta_m,
+                    length(over.translation_rmse_m),
+                    number(over.rotation_rmse_deg, 2)
+                )
+            });
+            let relative: Vec<String> = relative.collect();
+            let mut details = Vec::new();
+            if recording.truth_is_batch {
+                let of = "The errors are distances to the batch reference (dcvins calibrate --trajectory), which uses the same measurements and is not an independent ground truth.";
+                details.push(of.to_owned());
+            }
+            if !relative.is_empty() {
+                details.push(format!("Relative pose error (RPE, RMSE): {}.", relative.join("; ")));
+            }
+            details.extend(uncertainty.map(|text| format!("Uncertainty of the estimator: {text}.")));
+            let mark = if found.ate_percent_of_length <= MAX_ATE_PERCENT { Mark::Good } else { Mark::Warning };
+            statement("Accuracy", mark, format!("{found}."), details)
+        }
+        (None, Some(uncertainty)) => {
+            let missing = summary.accuracy_missing.clone().unwrap_or_default();
+            let text = format!("No error against ground truth; uncertainty of the estimator {uncertainty}.");
+            statement("Accuracy", Mark::Note, text, vec![capitalized(&missing)])
+        }
+        (None, None) => {
+            let missing = summary.accuracy_missing.clone().unwrap_or_else(|| "no estimated pose".to_owned());
+            statement("Accuracy", Mark::Error, capitalized(&missing), Vec::new())
+        }
+    }
+}
+
+/// Posterior against prior σ of every parameter at the end of the run.
+fn parameters(recording: &Recording, run: &RunRecord) -> Vec<ParameterVerdict> {
+    let Some(last) = run.steps.last() else { return Vec::new() };
+    let calibration = &last.report.calibration;
+    let names = recording.rig.parameter_names();
+    let rank = run.steps.iter().rev().find_map(|step| step.rank.as_ref());
+    let states = parameter_states(rank).unwrap_or_default();
+    let finite = |sigmas: &[f64], index: usize| sigmas.get(index).copied().filter(|sigma| sigma.is_finite());
+    let verdict = |(index, parameter): (usize, &crate::gimbal::ParameterId)| {
+        let (sigma, prior_sigma) = (finite(&calibration.sigmas, index), finite(&calibration.prior_sigmas, index));
+        let informed = match (sigma, prior_sigma) {
+            (Some(sigma), Some(prior)) => sigma <= INFORMED_RATIO * prior,
+            (Some(_), None) => true,
+            (None, _) => false,
+        };
+        let state = match states.get(parameter) {
+            Some(state @ (ParameterState::Weak | ParameterState::Unobservable | ParameterState::Fixed)) => state.tag(),
+            _ => "",
+        };
+        ParameterVerdict {
+            name: names.name(*parameter),
+            dimension: parameter.dimension(),
+            sigma,
+            prior_sigma,
+            informed,
+            state,
+        }
+    };
+    calibration.parameters.iter().enumerate().map(verdict).collect()
+}
+
+fn calibration(parameters: &[ParameterVerdict], summary: &RunSummary) -> Statement {
+    let (informed, others): (Vec<_>, Vec<_>) = parameters.iter().partition(|parameter| parameter.informed);
+    let estimated = summary.frames.estimated > 0;
+    if parameters.is_empty() || !estimated {
+        let text = if estimated { "Calibration fixed at the values of the rig." } else { "Not calibrated." };
+        return statement("Calibration", Mark::Note, text.to_owned(), Vec::new());
+    }
+    let rule = "at most 0.71 of the prior σ, from all windows together";
+    let count = parameters.len();
+    let (mark, text) = match (informed.len(), others.len()) {
+        (_, 0) => (Mark::Good, format!("Calibrated: all {count} parameters reached an informed σ ({rule}).")),
+        (0, _) => {
+            (Mark::Warning, format!("Not calibrated: none of {count} parameters reached an informed σ ({rule})."))
+        }
+        (known, _) => {
+            (Mark::Warning, format!("Partly calibrated: {known} of {count} parameters reached an informed σ ({rule})."))
+        }
+    };
+    let listed = |parameters: &[&ParameterVerdict]| {
+        parameters.iter().map(|parameter| parameter.text()).collect::<Vec<_>>().join(", ")
+    };
+    let mut details = Vec::new();
+    if !informed.is_empty() {
+        details.push(format!("Informed: {}.", listed(&informed)));
+    }
+    // Grouped by their observability in the last window.
+    let mut states: Vec<&str> = others.iter().map(|parameter| parameter.state).collect();
+    states.sort_unstable();
+    states.dedup();
+    for state in states {
+        let of_state: Vec<&ParameterVerdict> =
+            others.iter().copied().filter(|parameter| parameter.state == state).collect();
+        let state = if state.is_empty() { String::new() } else { format!(", {state} in the last window") };
+        details.push(format!("Not informed{state}: {}.", listed(&of_state)));
+    }
+    let errors = (&summary.calibration.chain_error_initial, &summary.calibration.chain_error);
+    if let (Some(first), Some(last)) = errors {
+        details.push(format!(
+            "Extrinsics error of the camera, mean over the joint angles of the run: {} with the rig's values, {} with \
+             the final calibration.",
+            chain_error(first),
+            chain_error(last)
+        ));
+    }
+    statement("Calibration", mark, text, details)
+}
+
+impl ParameterVerdict {
+    /// For example `yaw.alpha ±0.12°`.
+    fn text(&self) -> String {
+        let sigma = self.sigma.map_or_else(String::new, |sigma| format!(" ±{}", sigma_text(self.dimension, sigma)));
+        format!("{}{sigma}", self.name)
+    }
+}
+
+/// Ranks at the end of the run: the least observable direction, since when, the cause, and suggested excitation.
+fn observability(recording: &Recording, run: &RunRecord) -> Option<Statement> {
+    let place = run.steps.iter().rposition(|step| step.rank.is_some())?;
+    let (earlier, step) = (&run.steps[..place], run.steps.get(place)?);
+    let rank = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty())?;
+    let names = recording.rig.parameter_names();
+    let columns = rank.parameters.len();
+    let text = format!(
+        "At {} s structural rank {} of {columns}, informed rank {}.",
+        number(seconds_from_ns(step.report.stamp_ns), 2),
+        rank.rank_structural,
+        rank.rank_informed
+    );
+    let mut details = Vec::new();
+    if let Some(direction) = rank.least_observable_direction() {
+        let since = LostSince::of(earlier, step).map_or_else(String::new, |lost| format!(", {lost}"));
+        let along = parameters_of(&names, &rank.parameters, direction, NAMED);
+        details.push(format!("Least observable direction: {along}{since}."));
+    }
+    details.extend(why(rank, step));
+    let best = run.steps.iter().filter_map(|step| Some((step.rank.as_ref()?.rank_informed, step.report.stamp_ns)));
+    if let Some((most, stamp_ns)) = best.max_by_key(|(informed, stamp_ns)| (*informed, std::cmp::Reverse(*stamp_ns)))
+        && most > rank.rank_informed
+    {
+        let at_s = number(seconds_from_ns(stamp_ns), 2);
+        details.push(format!("Largest informed rank of the run: {most} at {at_s} s."));
+    }
+    if let Some((parameter, motion)) = rank.sensor_excitation() {
+        details.push(format!("Suggested excitation for {}: {motion}.", names.name(parameter)));
+    }
+    if rank.rank_informed < columns
+        && let Some(advice) =
+            Situation::of_step(&step.report, rank, &recording.rig, &run.camera_key).as_ref().and_then(advise)
+        && let Some(sentence) = advice.sentence()
+    {
+        details.push(format!("Suggested excitation: {}.", in_words(&sentence)));
+    }
+    let mark =
+        if rank.rank_structural == columns && rank.rank_informed == columns { Mark::Good } else { Mark::Warning };
+    Some(statement("Observability", mark, text, details))
+}
+
+/// Causes of null and of weak directions.
+fn why(rank: &RankReport, step: &StepRecord) -> Vec<String> {
+    let causes = [
+        (rank.deficit_parameterization, "redundant in the parameterization"),
+        (rank.deficit_joints, "lost to stationary joints"),
+        (rank.deficit_absorbed, "absorbed by free joint angles"),
+        (rank.deficit_motion, "lost to the vehicle's motion"),
+    ];
+    let named = causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}"));
+    let named: Vec<String> = named.collect();
+    let mut reasons = Vec::new();
+    if !named.is_empty() {
+        reasons.push(format!("Unobservable directions: {}.", named.join(", ")));
+    }
+    let weak = rank.rank_structural.saturating_sub(rank.rank_informed);
+    if let (Some(first), Some(last), true) = (step.report.window.first(), step.report.window.last(), weak > 0) {
+        let window_s = seconds_from_ns(last.stamp_ns - first.stamp_ns);
+        reasons.push(format!(
+            "{} because the motion in the window ({} frames, {} s) constrains {} less than a prior of 10° or 3 cm.",
+            if weak == 1 { "1 direction is weak" } else { "Directions are weak" },
+            step.report.window.len(),
+            number(window_s, 1),
+            if weak == 1 { "it".to_owned() } else { format!("{weak} of them") }
+        ));
+    }
+    reasons
+}
+
+/// Frames, restarts and warnings of the run.
+fn estimation(run: &RunRecord, summary: &RunSummary) -> Statement {
+    let frames = &summary.frames;
+    let initialized = frames
+        .initialized_at_s
+        .map_or_else(|| "never initialized".to_owned(), |at_s| format!("initialized at {} s", number(at_s, 2)));
+    let text = format!(
+        "{} of {} images have an estimated pose; {initialized}; {}; {}.",
+        frames.estimated,
+        frames.total,
+        count(frames.restarts, "restart"),
+        count(run.warnings.len(), "warning")
+    );
+    let mark = match (frames.estimated, frames.restarts, run.warnings.len(), &run.error) {
+        (0, ..) | (_, _, _, Some(_)) => Mark::Error,
+        (_, 0, 0, None) => Mark::Good,
+        (_, 0, _, None) => Mark::Note,
+        _ => Mark::Warning,
+    };
+    statement("Estimation", mark, text, run.error.iter().cloned().collect())
+}
+
+/// Problems of the log and the rig found by `check`, and those of the reader.
+pub(super) fn log_statement(check: Option<&CheckReport>, reader_warnings: &[String]) -> Statement {
+    let of = |severity: Severity| {
+        let findings = check.into_iter().flat_map(|check| &check.findings);
+        findings.filter(move |finding| finding.severity == severity).collect::<Vec<_>>()
+    };
+    let (errors, warnings) = (of(Severity::Error), of(Severity::Warning));
+    let others = warnings.len() + reader_warnings.len();
+    let mark = match (errors.len(), others) {
+        (0, 0) => Mark::Good,
+        (0, _) => Mark::Warning,
+        _ => Mark::Error,
+    };
+    let text = match (errors.len(), others) {
+        (0, 0) => "No problems found in the log and the rig.".to_owned(),
+        (found, others) => {
+            let counts = format!("{} and {}", count(found, "error"), count(others, "warning"));
+            format!("{} about the log and the rig.", capitalized(&counts))
+        }
+    };
+    let line = |finding: &&crate::log_check::Finding| {
+        let remedy = if finding.remedy.is_empty() { String::new() } else { format!(" Remedy: {}", finding.remedy) };
+        format!("{}: {}.{remedy}", capitalized(&finding.title), finding.evidence)
+    };
+    let details = errors.iter().chain(&warnings).map(line).chain(reader_warnings.iter().cloned()).collect();
+    statement("Log and rig", mark, text, details)
+}
+
+/// A length in millimetres below a decimetre, else in metres.
+fn length(value_m: f64) -> String {
+    if value_m < 0.1 { format!("{} mm", number(1e3 * value_m, 1)) } else { format!("{} m", number(value_m, 2)) }
+}
+
+fn chain_error(error: &ChainDistance) -> String {
+    format!("{} mm, {}°", number(error.translation_mean_m * 1e3, 1), number(error.rotation_mean_rad.to_degrees(), 2))
+}
+
+/// A standard deviation with two digits and its unit.
+fn sigma_text(dimension: Dimension, sigma: f64) -> String {
+    let (unit, scale, _) = shown_unit(dimension);
+    let shown = sigma * scale;
+    let decimals = if shown > 0.0 { (1.0 - shown.log10().floor()).clamp(0.0, 6.0) as usize } else { 0 };
+    let space = if unit.is_empty() || unit == "°" { "" } else { " " };
+    format!("{}{space}{unit}", number(shown, decimals))
+}
+
+fn count(number: usize, noun: &str) -> String {
+    match number {
+        0 => format!("no {noun}s"),
+        1 => format!("1 {noun}"),
+        _ => format!("{number} {noun}s"),
+    }
+}
+
+fn capitalized(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// `σ(yaw.d) 1.68 → 1.26 mm` without the arrow, which some fonts lack.
+fn in_words(sentence: &str) -> String {
+    let mut parts = sentence.splitn(2, " → ");
+    match (parts.next(), parts.next()) {
+        (Some(motion), Some(effect)) => format!("{motion} changes {}", effect.replace(" → ", " to ")),
+        _ => sentence.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parameter(name: &str, sigma: f64, prior_sigma: f64) -> ParameterVerdict {
+        ParameterVerdict {
+            name: name.to_owned(),
+            dimension: Dimension::Length,
+            sigma: Some(sigma),
+            prior_sigma: Some(prior_sigma),
+            informed: sigma <= INFORMED_RATIO * prior_sigma,
+            state: "weak",
+        }
+    }
+
+    #[test]
+    fn parameters_are_named_with_their_sigma() {
+        assert_eq!(parameter("yaw.d", 0.00123, 0.003).text(), "yaw.d ±1.2 mm");
+        assert_eq!(parameter("yaw.d", 0.0025, 0.003).text(), "yaw.d ±2.5 mm");
+        assert!(parameter("yaw.d", 0.002, 0.003).informed && !parameter("yaw.d", 0.0025, 0.003).informed);
+        assert_eq!(sigma_text(Dimension::Angle, 0.002), "0.11°");
+        assert_eq!(sigma_text(Dimension::Length, 0.0), "0 mm");
+    }
+
+    #[test]
+    fn advice_is_a_sentence_without_arrows() {
+        let text = in_words("roll gimbal ±15°, hover for 4 s → σ(L3.d, with L3.a) 1.68 → 1.26 mm");
+        assert_eq!(text, "roll gimbal ±15°, hover for 4 s changes σ(L3.d, with L3.a) 1.68 to 1.26 mm");
+    }
+
+    #[test]
+    fn a_log_without_findings_is_in_order_and_warnings_are_counted() {
+        let good = log_statement(None, &[]);
+        assert_eq!((good.mark, good.details.len()), (Mark::Good, 0));
+        let warned = log_statement(None, &["1.000 s: gap".to_owned()]);
+        assert_eq!(
+            (warned.mark, warned.text.as_str()),
+            (Mark::Warning, "No errors and 1 warning about the log and the rig.")
+        );
+    }
+
+    #[test]
+    fn lengths_have_sensible_digits() {
+        assert_eq!(length(0.00824), "8.2 mm");
+        assert_eq!(length(0.2449), "0.24 m");
+    }
+}

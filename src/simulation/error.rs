@@ -1,0 +1,47 @@
+//! Errors of a simulation.
+
+use thiserror::Error;
+
+use crate::flight_log::LogError;
+
+/// Reason that a simulation ended without its files.
+#[derive(Debug, Error)]
+pub enum SimulationError {
+    /// A disturbance that cannot be read.
+    #[error("disturbance '{text}': {expected}")]
+    BadDisturbance {
+        /// As it was written.
+        text: String,
+        /// What was expected.
+        expected: String,
+    },
+    /// An option out of its range.
+    #[error("{option} is {value}: expected {low} to {high}")]
+    BadOption {
+        /// Which.
+        option: &'static str,
+        /// What it holds.
+        value: f64,
+        /// Least value.
+        low: f64,
+        /// Largest value.
+        high: f64,
+    },
+    /// An image could not be compressed.
+    #[error("cannot compress an image as JPEG: {problem}")]
+    Image {
+        /// Message of the encoder.
+        problem: String,
+    },
+    /// The caller stopped the conversion.
+    #[error("interrupted after {images_done} of {images_total} images; nothing is written")]
+    Interrupted {
+        /// Images so far.
+        images_done: usize,
+        /// Images of the whole log.
+        images_total: usize,
+    },
+    /// A file could not be written.
+    #[error(transparent)]
+    Log(#[from] LogError),
+}
