@@ -8,6 +8,7 @@ use dcvins::export;
 use dcvins::flight_log::FlightLog;
 use dcvins::flight_log::rig_template::{CameraChoice, MechanismAxes, PublishedCamera, RigChoices, RigTemplate};
 use dcvins::sensors::BodyAxes;
+use dcvins::text::Entry;
 
 use crate::cli::exit::{self, Outcome};
 use crate::cli::limit_arguments::LimitArguments;
@@ -130,7 +131,7 @@ fn attitude(text: &str) -> Result<Attitude, String> {
     let mut parts = text.split(',');
     let topic = parts.next().unwrap_or_default().to_owned();
     let entry = |part: &str| {
-        let (key, value) = part.split_once('=')?;
+        let Entry { key, value } = Entry::parse(part)?;
         let plain =
             !value.is_empty() && value.chars().all(|letter| letter.is_ascii_alphanumeric() || "/_-= ".contains(letter));
         (plain && KEYS.contains(&key)).then(|| (key.to_owned(), value.to_owned()))

@@ -4,6 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{BodyAxes, NamedAxes};
 use crate::gimbal::ClassicalChain;
+use crate::text::Entry;
 
 /// Where the attitude of a gimbal is recorded and what it means (`gimbal.source` of a rig); its topic is the gimbal's.
 #[derive(Clone, Debug, PartialEq)]
@@ -248,7 +249,7 @@ impl EulerAngles {
     pub fn parse_order(text: &str) -> Option<Vec<EulerRotation>> {
         let mut order: Vec<EulerRotation> = Vec::new();
         for word in text.split_whitespace() {
-            let (rotation, field) = word.split_once('=')?;
+            let Entry { key: rotation, value: field } = Entry::parse(word)?;
             let axis = Self::ROTATIONS.iter().position(|name| *name == rotation)?;
             let (negative, field) = field.strip_prefix('-').map_or((false, field), |field| (true, field));
             let field = Self::FIELDS.iter().position(|name| *name == field)?;

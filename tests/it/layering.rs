@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Folders from the first to the last; each may use those before it. The table in `src/lib.rs` says what each promises.
-const ORDER: [&str; 18] = [
+const ORDER: [&str; 19] = [
+    "text",
     "geometry",
     "camera",
     "gimbal",
