@@ -14,6 +14,7 @@ use crate::observability::{ParameterRate, information_rate};
 use crate::sensors::Rig;
 use crate::session::accuracy::{Alignment, path_length_m};
 use crate::session::{Recording, RunRecord, RunWarning, TrajectoryAccuracy, TrajectoryLane};
+use crate::text::Named as _;
 
 /// Frame counts of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]

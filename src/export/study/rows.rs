@@ -7,6 +7,7 @@ use crate::export::summary::{Accuracy, RunSummary, TrajectorySummary};
 use crate::geometry::{median, seconds_from_ns, so3};
 use crate::session::{Recording, RunRecord, TrajectoryLane};
 use crate::study::{Cell, JobLog, StudyJob, TableError, relative_error_columns};
+use crate::text::Named as _;
 
 /// How a job ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -2,6 +2,7 @@
 
 mod fork_changes;
 mod fork_text;
+mod run_options;
 mod run_spec;
 mod session_plan;
 mod trajectories;
