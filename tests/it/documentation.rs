@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use dcvins::session::{ForkChanges, ParameterizationChoice, RunSpec};
+use dcvins::simulation::Disturbances;
 use dcvins::text::Named;
 
 const DOCUMENT: &str = "docs/mathematics.md";
@@ -221,6 +222,8 @@ fn tables_of_keys_are_those_of_the_definitions() {
     has_table("docs/commands.md", "| name | parameterization of the gimbal chain |", &names.collect::<Vec<_>>());
     let rows: Vec<String> = RunSpec::KEYS.iter().map(|key| key.document_row(&run)).collect();
     has_table("docs/commands.md", "| key | meaning |", &rows);
+    let rows: Vec<String> = Disturbances::KEYS.iter().map(|key| key.document_row(&Disturbances::default())).collect();
+    has_table("docs/commands.md", "| disturbance | effect |", &rows);
     let parameterization = "| `classical`, `minimal`, … | another parameterization of the same chain |".to_owned();
     let keys = ForkChanges::KEYS.iter().map(|key| key.document_row(&ForkChanges::default()));
     let rows: Vec<String> = std::iter::once(parameterization).chain(keys).collect();
