@@ -8,7 +8,7 @@ use dcvins::export;
 use dcvins::flight_log::FlightLog;
 use dcvins::flight_log::rig_template::{CameraChoice, MechanismAxes, PublishedCamera, RigChoices, RigTemplate};
 use dcvins::sensors::BodyAxes;
-use dcvins::text::Entry;
+use dcvins::text::{Entry, Named as _};
 
 use crate::cli::exit::{self, Outcome};
 use crate::cli::limit_arguments::LimitArguments;
@@ -99,7 +99,7 @@ fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(text: &str) -> Result<T,
 }
 
 fn body_axes(text: &str) -> Result<BodyAxes, String> {
-    let axes = BodyAxes::ALL.into_iter().find(|axes| axes.name().eq_ignore_ascii_case(text));
+    let axes = BodyAxes::all().find(|axes| axes.name().eq_ignore_ascii_case(text));
     axes.ok_or_else(|| "expected flu (forward, left, up) or frd (forward, right, down)".to_owned())
 }
 

@@ -6,6 +6,8 @@ use thiserror::Error;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::text::Named;
+
 /// The reason why a plan cannot be used.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("line {line}: {problem}")]
@@ -129,6 +131,13 @@ impl<'a> Section<'a> {
     /// A text that must be there.
     pub(super) fn required_text(&self, name: &str) -> Result<String, PlanError> {
         self.text(name)?.ok_or_else(|| self.error(&format!("lacks the key '{name}'")))
+    }
+
+    /// Value of an enum by its name.
+    pub(super) fn named<N: Named>(&self, name: &str) -> Result<Option<N>, PlanError> {
+        let Some(text) = self.text(name)? else { return Ok(None) };
+        let unknown = || self.error_at(name, &format!("is '{text}', expected {}", N::alternatives()));
+        N::from_name(&text).map(Some).ok_or_else(unknown)
     }
 
     /// A number within a range; integers are numbers as well.
