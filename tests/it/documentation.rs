@@ -6,6 +6,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use dcvins::session::{ForkChanges, ParameterizationChoice, RunSpec};
+use dcvins::simulation::Disturbances;
+use dcvins::text::Named;
+
 const DOCUMENT: &str = "docs/mathematics.md";
 
 fn root() -> &'static Path {
@@ -196,4 +200,32 @@ fn commands_and_options_are_those_of_the_program() {
     known.extend(["--release", "--test", "--ignored"].map(str::to_owned));
     let unknown: Vec<String> = options(&documented).into_iter().filter(|option| !known.contains(option)).collect();
     assert!(unknown.is_empty(), "docs/commands.md names options that no command has: {unknown:?}");
+}
+
+/// Checks that a document holds a table with exactly these rows.
+fn has_table(document: &str, head: &str, rows: &[String]) {
+    let text = fs::read_to_string(root().join(document)).unwrap();
+    let table = text.split_once(&format!("\n{head}\n| --- | --- |\n")).map(|(_, rest)| rest);
+    let table = table.unwrap_or_else(|| panic!("{document} has no table '{head}'"));
+    let documented: Vec<&str> = table.lines().take_while(|line| line.starts_with('|')).collect();
+    let rows_text = rows.join("\n");
+    assert_eq!(documented, rows, "{document} differs from the definitions, whose rows are:\n{rows_text}");
+}
+
+#[test]
+fn tables_of_keys_are_those_of_the_definitions() {
+    let run = RunSpec::default();
+    let names = ParameterizationChoice::all().map(|choice| {
+        let default = if choice == run.parameterization { " (default)" } else { "" };
+        format!("| `{}`{default} | {} |", choice.name(), choice.meaning())
+    });
+    has_table("docs/commands.md", "| name | parameterization of the gimbal chain |", &names.collect::<Vec<_>>());
+    let rows: Vec<String> = RunSpec::KEYS.iter().map(|key| key.document_row(&run)).collect();
+    has_table("docs/commands.md", "| key | meaning |", &rows);
+    let rows: Vec<String> = Disturbances::KEYS.iter().map(|key| key.document_row(&Disturbances::default())).collect();
+    has_table("docs/commands.md", "| disturbance | effect |", &rows);
+    let parameterization = "| `classical`, `minimal`, … | another parameterization of the same chain |".to_owned();
+    let keys = ForkChanges::KEYS.iter().map(|key| key.document_row(&ForkChanges::default()));
+    let rows: Vec<String> = std::iter::once(parameterization).chain(keys).collect();
+    has_table("docs/manual.md", "| change | meaning |", &rows);
 }
