@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dcvins::sensors::LeverArm;
-use dcvins::session::{RunSpec, SessionRequest, TrajectorySource, TrajectorySpec};
+use dcvins::session::{ParameterizationChoice, RunSpec, SessionRequest, TrajectorySource, TrajectorySpec};
+use dcvins::text::{Named as _, key_list};
 
 use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::value_parsers::seconds;
@@ -12,11 +13,7 @@ use crate::cli::value_parsers::seconds;
 /// Runs, rig, ground truth and time range, shared by the sub-commands that run the estimator.
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct EstimationArguments {
-    /// A run over the log: NAME[:key=value,…], NAME one of auto, minimal, minimal-swapped, classical, poe, static,
-    /// cluster; keys encoder=on|off, calibrate=on|off, timeshift=on|off, readout=on|off, intrinsics=on|off,
-    /// imu-intrinsics=on|off, first-estimates=on|off, window=N, passes=N, pixel-noise=F, imu-noise=F,
-    /// encoder-noise=F, loss=none|huber-K|cauchy-K, iterations=N, camera=KEY, name=LABEL. Up to four.
-    #[arg(long = "run", value_name = "SPEC")]
+    #[arg(long = "run", value_name = "SPEC", help = run_help())]
     pub runs: Vec<RunSpec>,
     /// A trajectory of another program, aligned and evaluated like the runs: FILE[:LABEL] in TUM's or EuRoC's format
     /// with header stamps of the log, or topic:NAME[:LABEL] for a topic of odometry, stamped poses or transforms. Up to
@@ -44,6 +41,11 @@ pub(crate) struct EstimationArguments {
     pub duration: Option<f64>,
     #[command(flatten)]
     pub limits: LimitArguments,
+}
+
+fn run_help() -> String {
+    let (names, keys) = (ParameterizationChoice::names(), key_list(RunSpec::KEYS));
+    format!("A run over the log: NAME[:key=value,…], NAME one of {names}; keys {keys}. Up to four")
 }
 
 fn truth_trajectory(text: &str) -> Result<TrajectorySource, String> {

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use dcvins::flight_log::FlightLog;
 use dcvins::interop::{FixedJointAngles, OtherEstimator, configure, write_configuration};
 use dcvins::sensors::Rig;
+use dcvins::text::{Entry, FINITE};
 use serde::Serialize;
 
 use crate::cli::limit_arguments::LimitArguments;
@@ -77,11 +78,9 @@ impl From<ProgramArgument> for OtherEstimator {
 }
 
 fn joint_angle(text: &str) -> Result<(String, f64), String> {
-    let parts = text.split_once('=');
-    let angle_deg = parts.and_then(|(_, angle)| angle.trim().parse::<f64>().ok()).filter(|angle| angle.is_finite());
-    let name = parts.map(|(name, _)| name.trim()).filter(|name| !name.is_empty());
-    name.zip(angle_deg)
-        .map(|(name, angle_deg)| (name.to_owned(), angle_deg))
+    let entry = Entry::parse(text).map(Entry::trimmed).filter(|entry| !entry.key.is_empty());
+    entry
+        .and_then(|entry| Some((entry.key.to_owned(), entry.number(&FINITE)?)))
         .ok_or_else(|| "expected a joint and its angle in degrees, as in pitch=-30".to_owned())
 }
 

@@ -8,6 +8,7 @@ use dcvins::export;
 use dcvins::flight_log::FlightLog;
 use dcvins::flight_log::rig_template::{CameraChoice, MechanismAxes, PublishedCamera, RigChoices, RigTemplate};
 use dcvins::sensors::BodyAxes;
+use dcvins::text::{Entry, Named as _};
 
 use crate::cli::exit::{self, Outcome};
 use crate::cli::limit_arguments::LimitArguments;
@@ -95,7 +96,7 @@ fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(text: &str) -> Result<T,
 }
 
 fn body_axes(text: &str) -> Result<BodyAxes, String> {
-    let axes = BodyAxes::ALL.into_iter().find(|axes| axes.name().eq_ignore_ascii_case(text));
+    let axes = BodyAxes::all().find(|axes| axes.name().eq_ignore_ascii_case(text));
     axes.ok_or_else(|| "expected flu (forward, left, up) or frd (forward, right, down)".to_owned())
 }
 
@@ -127,7 +128,7 @@ fn attitude(text: &str) -> Result<Attitude, String> {
     let mut parts = text.split(',');
     let topic = parts.next().unwrap_or_default().to_owned();
     let entry = |part: &str| {
-        let (key, value) = part.split_once('=')?;
+        let Entry { key, value } = Entry::parse(part)?;
         let plain =
             !value.is_empty() && value.chars().all(|letter| letter.is_ascii_alphanumeric() || "/_-= ".contains(letter));
         (plain && KEYS.contains(&key)).then(|| (key.to_owned(), value.to_owned()))

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use dcvins::export;
-use dcvins::simulation::{self, Experiment, SimulationError, SimulationOptions};
+use dcvins::simulation::{self, Disturbances, Experiment, SimulationError, SimulationOptions};
+use dcvins::text::key_list;
 
 use crate::cli::exit::Outcome;
 use crate::cli::interrupt::Interrupt;
@@ -42,12 +43,7 @@ pub(crate) struct SimulateArguments {
     /// unmodified rigs is replaced.
     #[arg(long)]
     pub force: bool,
-    /// A disturbance, in seconds and SI units; may be given several times: camera-offset=S, joint-lag=S,
-    /// joint-start=S, image-gap=START,LENGTH, exposure=S, image-noise=GREY, jpeg=QUALITY, vignetting=RATIO,
-    /// exposure-drift=RATIO, gyroscope-range=RAD/S, accelerometer-range=M/S²,
-    /// light=START,FACTOR, blank=START,LENGTH, slew=START,LENGTH, spin=START,LENGTH,RAD/S, hold-joint=NUMBER,START,LENGTH,
-    /// hover=START,LENGTH, stabilize=START,LENGTH, vibration=HZ,RAD/S,M/S².
-    #[arg(long, value_name = "KEY=VALUE[,VALUE…]")]
+    #[arg(long, value_name = "KEY=VALUE[,VALUE…]", help = disturb_help())]
     pub disturb: Vec<String>,
 }
 
@@ -70,6 +66,11 @@ pub(crate) enum EncoderArgument {
     None,
     /// White noise of this standard deviation, in degrees.
     Sigma(f64),
+}
+
+fn disturb_help() -> String {
+    let keys = key_list(Disturbances::KEYS);
+    format!("A disturbance, in seconds and SI units; may be given several times: {keys}")
 }
 
 fn image_size(text: &str) -> Result<[usize; 2], String> {

@@ -9,6 +9,8 @@ use std::sync::OnceLock;
 
 use thiserror::Error;
 
+use crate::text::{Entry, Named};
+
 /// Decompressed size that is allowed for every record: larger chunks are rare, smaller ones compress at any ratio.
 const RECORD_FLOOR_BYTES: u64 = 32 << 20;
 /// Largest compression ratio of a record above that size. Sensor data compress to a tenth; a record that
@@ -63,22 +65,18 @@ pub enum LimitKind {
     ImagePixels,
 }
 
+impl Named for LimitKind {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::RecordBytes, "record-bytes"),
+        (Self::UnpackedBytes, "unpacked-bytes"),
+        (Self::Messages, "messages"),
+        (Self::Topics, "topics"),
+        (Self::NameBytes, "name-bytes"),
+        (Self::ImagePixels, "image-pixels"),
+    ];
+}
+
 impl LimitKind {
-    pub const ALL: [Self; 6] =
-        [Self::RecordBytes, Self::UnpackedBytes, Self::Messages, Self::Topics, Self::NameBytes, Self::ImagePixels];
-
-    /// Name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::RecordBytes => "record-bytes",
-            Self::UnpackedBytes => "unpacked-bytes",
-            Self::Messages => "messages",
-            Self::Topics => "topics",
-            Self::NameBytes => "name-bytes",
-            Self::ImagePixels => "image-pixels",
-        }
-    }
-
     /// Unit of the limited number.
     fn unit(self) -> &'static str {
         match self {
@@ -112,10 +110,10 @@ impl FromStr for LimitSetting {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let names = || LimitKind::ALL.map(LimitKind::name).join(", ");
-        let (name, number) =
-            text.split_once('=').ok_or_else(|| format!("expected NAME=NUMBER, NAME one of {}", names()))?;
-        let kind = LimitKind::ALL.into_iter().find(|kind| kind.name() == name);
+        let names = LimitKind::names;
+        let entry = Entry::parse(text).ok_or_else(|| format!("expected NAME=NUMBER, NAME one of {}", names()))?;
+        let Entry { key: name, value: number } = entry;
+        let kind = LimitKind::from_name(name);
         let kind = kind.ok_or_else(|| format!("unknown limit '{name}', expected one of {}", names()))?;
         let (digits, factor) = match number.char_indices().next_back() {
             Some((at, 'k' | 'K')) => (&number[..at], 1 << 10),
@@ -226,7 +224,7 @@ mod tests {
         let setting = |kind, value| Ok(LimitSetting { kind, value });
         assert_eq!(parse("record-bytes=2G"), setting(LimitKind::RecordBytes, 2 << 30));
         assert_eq!(parse("image-pixels=500000"), setting(LimitKind::ImagePixels, 500_000));
-        for kind in LimitKind::ALL {
+        for kind in LimitKind::all() {
             assert_eq!(parse(&format!("{}=3k", kind.name())), setting(kind, 3072));
         }
         assert!(parse("pixels=3").unwrap_err().contains("unknown limit 'pixels', expected one of record-bytes"));

@@ -8,6 +8,7 @@ use thiserror::Error;
 use super::structure::known_losses;
 use super::{KnownLoss, RankReport};
 use crate::gimbal::{Chain, ParameterId, ParameterNames};
+use crate::text::{Entry, FINITE};
 
 /// Direction in which a chain is moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,9 +53,9 @@ impl FromStr for SlideRequest {
 
     fn from_str(text: &str) -> Result<Self, InvalidSlide> {
         let invalid = || InvalidSlide { given: text.to_owned() };
-        let (direction, amount) = text.split_once('=').ok_or_else(invalid)?;
-        let amount: f64 = amount.trim().parse().ok().filter(|amount: &f64| amount.is_finite()).ok_or_else(invalid)?;
-        let direction = direction.trim();
+        let entry = Entry::parse(text).ok_or_else(invalid)?.trimmed();
+        let amount = entry.number(&FINITE).ok_or_else(invalid)?;
+        let direction = entry.key;
         let valid = !direction.is_empty() && direction.parse::<usize>() != Ok(0);
         valid.then(|| Self { direction: direction.to_owned(), amount }).ok_or_else(invalid)
     }

@@ -26,7 +26,6 @@ pub enum ReportDrawing {
 /// Contents of a report in addition to the recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReportOptions {
-    /// The command line.
     pub command: String,
     /// Input files, listed with their hashes.
     pub inputs: Vec<PathBuf>,

@@ -4,6 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{BodyAxes, NamedAxes};
 use crate::gimbal::ClassicalChain;
+use crate::text::{Entry, Named};
 
 /// Message type, frame and axes of a recorded gimbal attitude (`gimbal.source` of a rig); its topic is the gimbal's.
 #[derive(Clone, Debug, PartialEq)]
@@ -161,19 +162,13 @@ pub enum AttitudeFrame {
     Flags,
 }
 
+/// Names in a rig.
+impl Named for AttitudeFrame {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::Body, "body"), (Self::Vehicle, "vehicle"), (Self::Earth, "earth"), (Self::Flags, "flags")];
+}
+
 impl AttitudeFrame {
-    pub const ALL: [Self; 4] = [Self::Body, Self::Vehicle, Self::Earth, Self::Flags];
-
-    /// Value of `frame` in a rig's source.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Body => "body",
-            Self::Vehicle => "vehicle",
-            Self::Earth => "earth",
-            Self::Flags => "flags",
-        }
-    }
-
     /// Frame by the flags of a `GIMBAL_DEVICE_ATTITUDE_STATUS`: the flag of the yaw's frame; without one, the yaw lock.
     pub fn of_flags(flags: u16) -> Self {
         const YAW_LOCK: u16 = 16;
@@ -195,17 +190,12 @@ pub enum AngleUnit {
     Degrees,
 }
 
+/// Names in a rig.
+impl Named for AngleUnit {
+    const NAMES: &'static [(Self, &'static str)] = &[(Self::Radians, "rad"), (Self::Degrees, "deg")];
+}
+
 impl AngleUnit {
-    pub const ALL: [Self; 2] = [Self::Radians, Self::Degrees];
-
-    /// Value of `unit` in a rig's source.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Radians => "rad",
-            Self::Degrees => "deg",
-        }
-    }
-
     fn radians(self, angle: f64) -> f64 {
         match self {
             Self::Radians => angle,
@@ -244,7 +234,7 @@ impl EulerAngles {
     pub fn parse_order(text: &str) -> Option<Vec<EulerRotation>> {
         let mut order: Vec<EulerRotation> = Vec::new();
         for word in text.split_whitespace() {
-            let (rotation, field) = word.split_once('=')?;
+            let Entry { key: rotation, value: field } = Entry::parse(word)?;
             let axis = Self::ROTATIONS.iter().position(|name| *name == rotation)?;
             let (negative, field) = field.strip_prefix('-').map_or((false, field), |field| (true, field));
             let field = Self::FIELDS.iter().position(|name| *name == field)?;

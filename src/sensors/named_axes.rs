@@ -5,6 +5,8 @@ use std::str::FromStr;
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
+use crate::text::Named;
+
 /// Axes of a body, x forward.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BodyAxes {
@@ -14,17 +16,12 @@ pub enum BodyAxes {
     Flu,
 }
 
+/// Names in a rig.
+impl Named for BodyAxes {
+    const NAMES: &'static [(Self, &'static str)] = &[(Self::Frd, "frd"), (Self::Flu, "flu")];
+}
+
 impl BodyAxes {
-    pub const ALL: [Self; 2] = [Self::Frd, Self::Flu];
-
-    /// Name in a rig.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Frd => "frd",
-            Self::Flu => "flu",
-        }
-    }
-
     /// Rotates vectors from these axes to forward, left, up.
     pub fn flu_from_axes(self) -> UnitQuaternion<f64> {
         NamedAxes::from(self).flu_from_axes()

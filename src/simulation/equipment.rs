@@ -12,6 +12,7 @@ use crate::sensors::{
     CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuIntrinsicsParameters, ImuRig, Rig,
     ScaleMisalignment,
 };
+use crate::text::Named;
 
 /// Gravity in the simulated worlds, in m/s².
 pub(crate) const GRAVITY_M_PER_S2: f64 = 9.81;
@@ -27,6 +28,10 @@ pub enum Lens {
     Pinhole,
     /// Mild barrel distortion, radial–tangential.
     Radtan,
+}
+
+impl Named for Lens {
+    const NAMES: &'static [(Self, &'static str)] = &[(Self::Pinhole, "pinhole"), (Self::Radtan, "radtan")];
 }
 
 /// Camera model at this image size; `which` is 0 for the gimbal camera, 1 for the static one.

@@ -6,6 +6,7 @@ use super::gimbal::LookAround;
 use super::random::RandomStream;
 use super::route::{Cruise, Flight, Pace, Path, Shuttle};
 use crate::sensors::ChainPrior;
+use crate::text::Named;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Experiment {
@@ -32,24 +33,13 @@ pub(crate) const TOWN_PITCH_M: f64 = 30.0;
 /// Number of roads per direction of the town.
 pub(crate) const TOWN_ROADS: usize = 4;
 
+/// Names as in the paper and on the command line.
+impl Named for Experiment {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::T1, "T1"), (Self::T2, "T2"), (Self::T3, "T3"), (Self::T4, "T4")];
+}
+
 impl Experiment {
-    pub const ALL: [Self; 4] = [Self::T1, Self::T2, Self::T3, Self::T4];
-
-    /// Name as in the paper and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::T1 => "T1",
-            Self::T2 => "T2",
-            Self::T3 => "T3",
-            Self::T4 => "T4",
-        }
-    }
-
-    /// Experiment of this name, ignoring case.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|experiment| experiment.name().eq_ignore_ascii_case(name))
-    }
-
     pub fn environment(self) -> Environment {
         match self {
             Self::T1 | Self::T2 => Environment::House,

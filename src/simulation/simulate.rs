@@ -25,6 +25,7 @@ use crate::flight_log::output::OutputSet;
 use crate::flight_log::{LogError, LogWriter, LogWriterOptions, MessageTimes, Odometry};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 use crate::sensors::{CameraRig, ImuSample, JointSample};
+use crate::text::Named as _;
 
 /// Start of simulated logs: 15 June 2025, 15:06:40 UTC.
 const EPOCH_NS: i64 = 1_750_000_000_000_000_000;
@@ -111,7 +112,7 @@ pub fn simulate_interruptible(
 /// Flight with its measurements.
 fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
     let experiment = options.experiment;
-    let variant = 100 * Experiment::ALL.iter().position(|other| *other == experiment).unwrap_or(0) as u64;
+    let variant = 100 * Experiment::all().position(|other| other == experiment).unwrap_or(0) as u64;
     let random = |stream: u64| RandomStream::new(options.seed, stream + variant);
     let planned_s = (experiment.length_m() / PLANNED_M_PER_S).max(options.duration_s.unwrap_or(0.0));
     let flight = experiment.flight(4.0 * planned_s, &mut random(stream::ROUTE));

@@ -9,6 +9,7 @@ use super::random::RandomStream;
 use super::route::Wave;
 use super::trajectory::Trajectory;
 use crate::geometry::seconds_from_ns;
+use crate::text::Numbers;
 
 /// Number of rotors, each with its own speed.
 const ROTORS: usize = 4;
@@ -28,7 +29,7 @@ const AIRBORNE_M_PER_S: f64 = 0.2;
 /// are aliased.
 const FILTER_RATE_RATIO: f64 = 0.4;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Vibration {
     /// Frequency of the rotors while hovering, in Hz. Their thrust follows the flight and grows with the square of the
     /// speed; until the vehicle first moves they idle at 60 % of it.
@@ -37,6 +38,18 @@ pub struct Vibration {
     pub rate_rad_per_s: f64,
     /// Amplitude of the specific force, likewise, in m/s².
     pub force_m_per_s2: f64,
+}
+
+impl Numbers for Vibration {
+    fn set(&mut self, numbers: &[f64]) -> bool {
+        let [rotor_hz, rate_rad_per_s, force_m_per_s2] = *numbers else { return false };
+        *self = Self { rotor_hz, rate_rad_per_s, force_m_per_s2 };
+        true
+    }
+
+    fn get(&self) -> Vec<f64> {
+        vec![self.rotor_hz, self.rate_rad_per_s, self.force_m_per_s2]
+    }
 }
 
 /// One harmonic of one rotor: direction and phase in each sensor.

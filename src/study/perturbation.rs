@@ -2,7 +2,6 @@
 
 use std::fmt;
 use std::ops::RangeInclusive;
-use std::str::FromStr;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -13,79 +12,73 @@ use crate::camera::CameraError;
 use crate::geometry::{Dimension, SplitMix64, so3};
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, GimbalRig, Rig};
+use crate::text::Named;
 
 /// A quantity of a rig that a study can perturb.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
 pub enum RigQuantity {
     /// The independent translations of the gimbal chain.
-    #[serde(rename = "gimbal.translation")]
     GimbalTranslation,
     /// The independent angles of the gimbal chain.
-    #[serde(rename = "gimbal.rotation")]
     GimbalRotation,
     /// The offsets of the joint angles.
-    #[serde(rename = "gimbal.theta_offset")]
     GimbalThetaOffset,
     /// The time offset of the joint angles.
-    #[serde(rename = "gimbal.timeshift")]
     GimbalTimeshift,
     /// The standard deviation of the encoders stated in the rig.
-    #[serde(rename = "gimbal.encoder_sigma")]
     EncoderSigma,
     /// The positions of rigid cameras.
-    #[serde(rename = "static.translation")]
     StaticTranslation,
     /// The orientations of rigid cameras.
-    #[serde(rename = "static.rotation")]
     StaticRotation,
     /// The focal lengths; fx and fy of a camera change by the same factor.
-    #[serde(rename = "camera.focal")]
     Focal,
     /// The principal points.
-    #[serde(rename = "camera.centre")]
     Centre,
     /// The first two coefficients of the distortion.
-    #[serde(rename = "camera.distortion")]
     Distortion,
     /// The time offsets of the cameras.
-    #[serde(rename = "camera.timeshift")]
     CameraTimeshift,
     /// The readout times of the cameras.
-    #[serde(rename = "camera.readout")]
     Readout,
     /// The four noise densities of the IMU stated in the rig, all by one factor.
-    #[serde(rename = "imu.noise")]
     ImuNoise,
 }
 
-/// Quantities with their names in plans.
-const QUANTITIES: [(RigQuantity, &str); 13] = [
-    (RigQuantity::GimbalTranslation, "gimbal.translation"),
-    (RigQuantity::GimbalRotation, "gimbal.rotation"),
-    (RigQuantity::GimbalThetaOffset, "gimbal.theta_offset"),
-    (RigQuantity::GimbalTimeshift, "gimbal.timeshift"),
-    (RigQuantity::EncoderSigma, "gimbal.encoder_sigma"),
-    (RigQuantity::StaticTranslation, "static.translation"),
-    (RigQuantity::StaticRotation, "static.rotation"),
-    (RigQuantity::Focal, "camera.focal"),
-    (RigQuantity::Centre, "camera.centre"),
-    (RigQuantity::Distortion, "camera.distortion"),
-    (RigQuantity::CameraTimeshift, "camera.timeshift"),
-    (RigQuantity::Readout, "camera.readout"),
-    (RigQuantity::ImuNoise, "imu.noise"),
-];
+impl Named for RigQuantity {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::GimbalTranslation, "gimbal.translation"),
+        (Self::GimbalRotation, "gimbal.rotation"),
+        (Self::GimbalThetaOffset, "gimbal.theta_offset"),
+        (Self::GimbalTimeshift, "gimbal.timeshift"),
+        (Self::EncoderSigma, "gimbal.encoder_sigma"),
+        (Self::StaticTranslation, "static.translation"),
+        (Self::StaticRotation, "static.rotation"),
+        (Self::Focal, "camera.focal"),
+        (Self::Centre, "camera.centre"),
+        (Self::Distortion, "camera.distortion"),
+        (Self::CameraTimeshift, "camera.timeshift"),
+        (Self::Readout, "camera.readout"),
+        (Self::ImuNoise, "imu.noise"),
+    ];
+}
+
+impl From<RigQuantity> for String {
+    fn from(quantity: RigQuantity) -> Self {
+        quantity.name().to_owned()
+    }
+}
+
+impl TryFrom<String> for RigQuantity {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Self, String> {
+        Self::from_name(&name).ok_or_else(|| format!("no quantity '{name}'"))
+    }
+}
 
 impl RigQuantity {
-    /// Name in plans.
-    pub fn name(self) -> &'static str {
-        QUANTITIES.iter().find(|(quantity, _)| *quantity == self).map_or("", |(_, name)| name)
-    }
-
-    /// All quantities.
-    pub fn all() -> impl Iterator<Item = Self> {
-        QUANTITIES.into_iter().map(|(quantity, _)| quantity)
-    }
-
     /// Dimension of a magnitude; a ratio is relative to the rig's value.
     pub fn dimension(self) -> MagnitudeDimension {
         MagnitudeDimension(match self {
@@ -107,17 +100,6 @@ impl RigQuantity {
             Dimension::Ratio if matches!(self, Self::Focal | Self::Distortion) => -0.5..=0.5,
             Dimension::Ratio => -0.99..=1000.0,
         }
-    }
-}
-
-impl FromStr for RigQuantity {
-    /// Expected names.
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let names = || QUANTITIES.map(|(_, name)| name).join(", ");
-        let found = QUANTITIES.iter().find(|(_, name)| *name == text).map(|(quantity, _)| *quantity);
-        found.ok_or_else(|| format!("one of {}", names()))
     }
 }
 
@@ -181,6 +163,11 @@ pub enum Distribution {
     Constant,
 }
 
+impl Named for Distribution {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::Uniform, "uniform"), (Self::Normal, "normal"), (Self::Constant, "constant")];
+}
+
 /// One error of a perturbation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RigChange {
@@ -203,6 +190,11 @@ pub enum PerturbationStart {
     Truth,
     /// The rig that the offline calibration estimates from the log itself.
     Calibrated,
+}
+
+impl Named for PerturbationStart {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::Rig, "rig"), (Self::Truth, "truth"), (Self::Calibrated, "calibrated")];
 }
 
 /// A named set of errors, one level of the factor "perturbation" of a study.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sensors::ChainPrior;
 use crate::simulation::{Experiment, Lens, SimulationError, SimulationOptions};
+use crate::text::Named as _;
 
 /// Noise of the simulated encoders.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,25 +50,21 @@ impl FlightRecipe {
     /// Checks names and ranges; the error contains the key and the problem.
     pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
         if self.experiment().is_none() {
-            return Err(("experiment", format!("is '{}', expected T1, T2, T3 or T4", self.experiment)));
+            return Err(("experiment", format!("is '{}', expected {}", self.experiment, Experiment::alternatives())));
         }
         if self.lens().is_none() {
-            return Err(("lens", format!("is '{}', expected pinhole or radtan", self.lens)));
+            return Err(("lens", format!("is '{}', expected {}", self.lens, Lens::alternatives())));
         }
         let options = self.options(1, &[]).map_err(|error| ("disturb", error.to_string()))?;
         options.check().map_err(|error| ("disturb", error.to_string()))
     }
 
     fn experiment(&self) -> Option<Experiment> {
-        Experiment::ALL.into_iter().find(|experiment| experiment.name() == self.experiment)
+        Experiment::from_name(&self.experiment)
     }
 
     fn lens(&self) -> Option<Lens> {
-        match self.lens.as_str() {
-            "pinhole" => Some(Lens::Pinhole),
-            "radtan" => Some(Lens::Radtan),
-            _ => None,
-        }
+        Lens::from_name(&self.lens)
     }
 
     /// Options of the simulation with a seed and additional disturbances.

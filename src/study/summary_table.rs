@@ -6,6 +6,7 @@ use super::columns::{PAIRING_COLUMNS, runs_table};
 use super::table::ColumnType::{Integer, Number};
 use super::table::StudyTable;
 use crate::geometry::median;
+use crate::text::Named;
 
 /// Statistic that reduces the values of a group to one cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -21,14 +22,9 @@ pub enum Statistic {
     Ratio,
 }
 
-/// Statistics with their names in plans.
-const STATISTICS: [(Statistic, &str); 4] =
-    [(Statistic::Median, "median"), (Statistic::Mean, "mean"), (Statistic::Sum, "sum"), (Statistic::Ratio, "ratio")];
-
-impl Statistic {
-    pub(super) fn of_name(name: &str) -> Option<Self> {
-        STATISTICS.iter().find(|(_, known)| *known == name).map(|(statistic, _)| *statistic)
-    }
+impl Named for Statistic {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::Median, "median"), (Self::Mean, "mean"), (Self::Sum, "sum"), (Self::Ratio, "ratio")];
 }
 
 /// A column of a table.

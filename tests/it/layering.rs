@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use super::imports::{Imports, is_test_file};
 
 /// Folders from the first to the last; each may use those before it. The table in `src/lib.rs` says what each promises.
-const ORDER: [&str; 22] = [
+const ORDER: [&str; 23] = [
+    "text",
     "geometry",
     "camera",
     "gimbal",

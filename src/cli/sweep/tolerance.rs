@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use dcvins::study::StudyPlan;
+use dcvins::text::Entry;
 
 /// Metrics that are compared if neither the plan nor the command line names one.
 const STANDARD: [(&str, f64); 1] = [("ate_rmse_m", 0.1)];
@@ -19,10 +20,9 @@ impl FromStr for Tolerance {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text.split_once('=').and_then(|(metric, ratio)| Some((metric, ratio.parse::<f64>().ok()?)));
-        let valid = parts.filter(|(metric, ratio)| !metric.is_empty() && ratio.is_finite() && *ratio >= 0.0);
-        valid
-            .map(|(metric, ratio)| Self { metric: metric.to_owned(), ratio })
+        let entry = Entry::parse(text).filter(|entry| !entry.key.is_empty());
+        entry
+            .and_then(|entry| Some(Self { metric: entry.key.to_owned(), ratio: entry.number(&(0.0..=f64::MAX))? }))
             .ok_or_else(|| "expected COLUMN=RATIO with a ratio from 0 up, as in ate_rmse_m=0.1".to_owned())
     }
 }

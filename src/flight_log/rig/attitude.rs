@@ -5,6 +5,7 @@ use super::fields::Field;
 use super::link::read_link;
 use crate::gimbal::{ClassicalChain, InverseChain};
 use crate::sensors::{AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, BodyAxes, EulerAngles, NamedAxes};
+use crate::text::Named;
 
 const TYPES: &str = "quaternion, pose, euler, tf, mavros or px4";
 const FRAMES: &str = "body, vehicle (levelled, x towards the heading) or earth";
@@ -13,7 +14,6 @@ const BODY_AXES: &str = "frd (forward, right, down; earth: NED) or flu (forward,
 const NAMED_AXES: &str = "three letters of f b l r u d, right-handed, such as flu, frd or rdf";
 const ORDER: &str = "rotations in their order from the frame to the gimbal with the fields that hold them, such as yaw=z roll=x pitch=y, a field with the \
      sign of its angle (pitch=-y)";
-const UNITS: &str = "rad or deg";
 const VEHICLE: &str = "the topic of the vehicle's attitude (QuaternionStamped, PoseStamped, Odometry, TransformStamped, Imu or px4's \
                        VehicleAttitude)";
 
@@ -27,14 +27,13 @@ pub(super) fn read(source: &Field<'_>) -> Result<(String, AttitudeSource), LogEr
         None if by_flags => AttitudeFrame::Flags,
         _ => {
             let expected = if by_flags { FRAMES_BY_FLAGS } else { FRAMES };
-            let frames = AttitudeFrame::ALL.into_iter().filter(|frame| by_flags || *frame != AttitudeFrame::Flags);
-            one_of(&source.field("frame"), expected, frames, AttitudeFrame::name)?
+            one_of(&source.field("frame"), expected, |frame| by_flags || *frame != AttitudeFrame::Flags)?
         }
     };
     let axes = match source.field("axes").optional() {
         // These messages are defined in FRD.
         None if by_flags => BodyAxes::Frd,
-        _ => one_of(&source.field("axes"), BODY_AXES, BodyAxes::ALL, BodyAxes::name)?,
+        _ => one_of(&source.field("axes"), BODY_AXES, |_| true)?,
     };
     let vehicle = source.field("vehicle").optional();
     let vehicle_topic = vehicle.map(|topic| topic.text(VEHICLE).map(str::to_owned)).transpose()?;
@@ -43,8 +42,7 @@ pub(super) fn read(source: &Field<'_>) -> Result<(String, AttitudeSource), LogEr
         return Err(source.field("vehicle").unexpected(&expected));
     }
     let vehicle_axes = source.field("vehicle_axes").optional();
-    let vehicle_axes =
-        vehicle_axes.map(|field| one_of(&field, BODY_AXES, BodyAxes::ALL, BodyAxes::name)).transpose()?;
+    let vehicle_axes = vehicle_axes.map(|field| one_of(&field, BODY_AXES, |_| true)).transpose()?;
     let gimbal_axes = source.field("gimbal_axes").optional().map(|field| named_axes(&field)).transpose()?;
     let imu_axes = source.field("imu_axes").optional().map(|field| named_axes(&field)).transpose()?;
     let imu_axes = imu_axes.unwrap_or(NamedAxes::FLU);
@@ -88,7 +86,7 @@ fn read_message(source: &Field<'_>) -> Result<AttitudeMessage, LogError> {
         "euler" => {
             let order = source.field("order");
             let order = EulerAngles::parse_order(order.text(ORDER)?).ok_or_else(|| order.unexpected(ORDER))?;
-            let unit = one_of(&source.field("unit"), UNITS, AngleUnit::ALL, AngleUnit::name)?;
+            let unit = one_of(&source.field("unit"), &AngleUnit::alternatives(), |_| true)?;
             AttitudeMessage::Euler(EulerAngles { order, unit })
         }
         "tf" => {
@@ -110,15 +108,9 @@ fn named_axes(field: &Field<'_>) -> Result<NamedAxes, LogError> {
     field.text(NAMED_AXES)?.parse().map_err(|()| field.unexpected(NAMED_AXES))
 }
 
-/// Value with the given name.
-fn one_of<T: Copy>(
-    field: &Field<'_>,
-    expected: &str,
-    values: impl IntoIterator<Item = T>,
-    name: fn(T) -> &'static str,
-) -> Result<T, LogError> {
-    let text = field.text(expected)?;
-    values.into_iter().find(|value| name(*value) == text).ok_or_else(|| field.unexpected(expected))
+/// The value of a name.
+fn one_of<N: Named>(field: &Field<'_>, expected: &str, allowed: impl Fn(&N) -> bool) -> Result<N, LogError> {
+    N::from_name(field.text(expected)?).filter(allowed).ok_or_else(|| field.unexpected(expected))
 }
 
 /// Keys and values of a source in the order of a rig, without its chain; texts without quotes.

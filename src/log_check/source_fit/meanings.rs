@@ -2,6 +2,7 @@
 
 use crate::flight_log::rig::attitude::entries;
 use crate::sensors::{AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, BodyAxes, GimbalRig, NamedAxes};
+use crate::text::Named as _;
 
 /// Interpretations that differ from `source` in one property, grouped by property.
 pub(super) fn changes(source: &AttitudeSource, has_vehicle: bool) -> Vec<Vec<AttitudeSource>> {
@@ -11,14 +12,14 @@ pub(super) fn changes(source: &AttitudeSource, has_vehicle: bool) -> Vec<Vec<Att
         other
     };
     let flagged = matches!(source.message, AttitudeMessage::Mavros | AttitudeMessage::Px4);
-    let frames = AttitudeFrame::ALL.into_iter().filter(|frame| match frame {
+    let frames = AttitudeFrame::all().filter(|frame| match frame {
         AttitudeFrame::Body => true,
         AttitudeFrame::Vehicle | AttitudeFrame::Earth => has_vehicle,
         AttitudeFrame::Flags => has_vehicle && flagged,
     });
     let mut all = vec![
         frames.map(|frame| with(&|other| other.frame = frame)).collect::<Vec<_>>(),
-        BodyAxes::ALL.into_iter().map(|axes| with(&|other| other.axes = axes)).collect(),
+        BodyAxes::all().map(|axes| with(&|other| other.axes = axes)).collect(),
         [None, Some(NamedAxes::RDF)].into_iter().map(|axes| with(&|other| other.gimbal_axes = axes)).collect(),
         [NamedAxes::FLU, NamedAxes::FRD, NamedAxes::RDF]
             .into_iter()
@@ -27,7 +28,7 @@ pub(super) fn changes(source: &AttitudeSource, has_vehicle: bool) -> Vec<Vec<Att
     ];
     if has_vehicle {
         let given = source.vehicle_axes.unwrap_or(source.axes);
-        let axes = BodyAxes::ALL.into_iter().filter(|axes| *axes != given);
+        let axes = BodyAxes::all().filter(|axes| *axes != given);
         all.push(axes.map(|axes| with(&|other| other.vehicle_axes = Some(axes))).collect());
     }
     if let AttitudeMessage::Euler(angles) = &source.message {
@@ -51,7 +52,7 @@ pub(super) fn changes(source: &AttitudeSource, has_vehicle: bool) -> Vec<Vec<Att
             }
             other
         });
-        let units = AngleUnit::ALL.into_iter().map(|unit| {
+        let units = AngleUnit::all().map(|unit| {
             let mut other = angles.clone();
             other.unit = unit;
             other

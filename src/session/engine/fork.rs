@@ -56,7 +56,7 @@ pub(in crate::session) fn apply_fork(
     engine.alter(AlteredMeasurements {
         dropped: changes.dropped.clone(),
         disabled_cameras,
-        encoder_off: changes.encoder_off,
+        encoder_off: !changes.encoder,
         joint_noise_rad: changes.joint_noise_rad,
         encoder_noise: changes.encoder_noise,
     });

@@ -6,10 +6,12 @@ use thiserror::Error;
 
 use super::run_spec::{ParameterizationChoice, RunSpec};
 use crate::estimator::{InterventionError, SensorColumns};
+use crate::text::Named as _;
 
 /// The changes of a fork against its parent run.
 ///
-/// Syntax: `classical,estimate=readout,freeze=yaw.alpha+yaw.d,set=pitch.a:30mm,drop=12+15,joint-noise=0.5deg,imu-noise=2`.
+/// Syntax: `classical,estimate=readout,freeze=yaw.alpha+yaw.d,set=pitch.a:30mm,drop=12+15,joint-noise=0.5deg,imu-noise=2`;
+/// the keys are [`ForkChanges::KEYS`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForkChanges {
     /// Another parameterization of the same chain.
@@ -24,8 +26,8 @@ pub struct ForkChanges {
     pub dropped: BTreeSet<u64>,
     /// Keys of cameras that are no longer used, for a run with two (`without=`).
     pub without: BTreeSet<String>,
-    /// True if encoder readings are no longer used (`encoder=off`).
-    pub encoder_off: bool,
+    /// Whether encoder readings are still used (`encoder=off` clears it).
+    pub encoder: bool,
     /// Standard deviation of noise added to every joint angle, in radians; the estimator's σ stays as it is.
     pub joint_noise_rad: f64,
     /// Scale factor of the IMU noise densities.
@@ -45,7 +47,7 @@ impl Default for ForkChanges {
             values: Vec::new(),
             dropped: BTreeSet::new(),
             without: BTreeSet::new(),
-            encoder_off: false,
+            encoder: true,
             joint_noise_rad: 0.0,
             imu_noise: 1.0,
             pixel_noise: 1.0,
@@ -107,7 +109,7 @@ impl ForkChanges {
     pub(in crate::session) fn spec(&self, parent: &RunSpec, time_s: f64) -> RunSpec {
         let parameterization = self.parameterization.unwrap_or(parent.parameterization);
         let name = self.parameterization.map_or(&*parent.label, |choice| choice.name());
-        let encoder = parent.encoder && !self.encoder_off;
+        let encoder = parent.encoder && self.encoder;
         let mut spec = RunSpec { label: format!("{name}-{time_s:.2}s"), parameterization, encoder, ..parent.clone() };
         self.estimated.iter().for_each(|columns| *spec.estimates_mut(*columns) = true);
         spec

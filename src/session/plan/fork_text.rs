@@ -4,8 +4,86 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError, OTHER_CAMERA};
+use super::run_options::{encoder_noise, imu_noise, pixel_noise};
 use super::run_spec::ParameterizationChoice;
 use crate::estimator::SensorColumns;
+use crate::text::{Entry, Field, Key, Named as _, items, read_entry, written_items};
+
+/// Reason why a fork cannot use encoder readings that its parent does not use.
+const NO_JOINT_OFFSETS: &str = "off: a calibration that was initialized without encoder readings has no joint offsets; add a run \
+                                with encoder=on instead";
+
+impl ForkChanges {
+    /// The changes beside the parameterization, in the order of the canonical text.
+    pub const KEYS: &'static [Key<Self>] = &[
+        Key::<Self>::new(
+            "estimate",
+            "GROUP+…",
+            "sensor parameters estimated from here on: `timeshift`, `readout`, `intrinsics`, `imu-intrinsics`",
+            Field::Other(read_estimated, |changes| joined(changes.estimated.iter().map(|columns| columns.key()))),
+        )
+        .labelled("", "Estimate sensors", ""),
+        Key::<Self>::new(
+            "freeze",
+            "PARAMETER+…",
+            "parameters fixed at their values, as in `freeze=yaw.alpha+yaw.d`",
+            Field::Other(
+                |changes, entry| {
+                    changes.frozen.extend(several(entry).map(str::to_owned));
+                    Ok(())
+                },
+                |changes| joined(&changes.frozen),
+            ),
+        )
+        .labelled("", "Freeze parameters", ""),
+        Key::<Self>::new(
+            "set",
+            "PARAMETER:VALUE",
+            "another value (`deg`, `mrad`, `rad`, `mm`, `m`), as in `set=pitch.a:30mm`",
+            Field::Other(read_values, |changes| {
+                changes.values.iter().map(|(name, value)| format!("{name}:{value}")).collect()
+            }),
+        )
+        .labelled("", "Set parameters", ""),
+        Key::<Self>::new(
+            "drop",
+            "FEATURE+…",
+            "features that are not used any more, as in `drop=12+15`",
+            Field::Other(read_dropped, |changes| joined(changes.dropped.iter().map(u64::to_string))),
+        )
+        .labelled("", "Drop features", ""),
+        Key::<Self>::new(
+            "without",
+            "CAMERA",
+            "one camera of a `cluster` is not used any more, as in `without=cam1`",
+            Field::Other(
+                |changes, entry| {
+                    changes.without.extend(several(entry).map(str::to_owned));
+                    Ok(())
+                },
+                |changes| joined(&changes.without),
+            ),
+        )
+        .labelled("", "Exclude camera", ""),
+        Key::<Self>::new(
+            "encoder",
+            "off",
+            "encoder readings are not used any more",
+            Field::Switch(|changes| &mut changes.encoder),
+        )
+        .labelled("Use from the cursor on", "Encoder readings", ""),
+        Key::<Self>::new(
+            "joint-noise",
+            "ANGLE",
+            "standard deviation of noise added to the joint angles, as in `joint-noise=0.5deg`",
+            Field::Other(read_joint_noise, |changes| vec![changes.joint_noise_rad.to_string()]),
+        )
+        .labelled("", "Added joint noise, σ", ""),
+        imu_noise::<Self>(|changes| &mut changes.imu_noise).labelled("", "Assumed IMU noise", ""),
+        pixel_noise::<Self>(|changes| &mut changes.pixel_noise).labelled("", "Assumed pixel noise", ""),
+        encoder_noise::<Self>(|changes| &mut changes.encoder_noise).labelled("", "Assumed encoder noise", ""),
+    ];
+}
 
 impl FromStr for ForkChanges {
     type Err = ForkError;
@@ -13,82 +91,81 @@ impl FromStr for ForkChanges {
     fn from_str(text: &str) -> Result<Self, ForkError> {
         let mut changes = Self::default();
         let bad = |problem: String| ForkError::BadChange { text: text.to_owned(), problem };
-        for item in text.split(',').map(str::trim).filter(|item| !item.is_empty()) {
-            let Some((key, value)) = item.split_once('=') else {
-                let choice = FORK_PARAMETERIZATIONS.into_iter().find(|choice| choice.name() == item);
-                let known = FORK_PARAMETERIZATIONS.map(ParameterizationChoice::name).join(", ");
-                let expected = || {
-                    if ParameterizationChoice::all().any(|(name, _)| name == item) {
-                        bad(format!("'{item}' uses other cameras: {OTHER_CAMERA}; add a run {item} instead"))
-                    } else {
-                        bad(format!("unknown parameterization '{item}', expected one of {known}"))
-                    }
-                };
-                changes.parameterization = Some(choice.ok_or_else(expected)?);
-                continue;
-            };
-            let quantity = |text: &str| {
-                number(text).ok_or_else(|| {
-                    bad(format!("{key} is '{text}', expected a number with an optional unit (deg, mrad, rad, mm, m)"))
-                })
-            };
-            let factor = |text: &str| {
-                let expected = || bad(format!("{key} is '{text}', expected a factor from 0.001 to 1000"));
-                number(text).filter(|factor| (1e-3..=1e3).contains(factor)).ok_or_else(expected)
-            };
-            let several = || value.split('+').map(str::trim).filter(|name| !name.is_empty());
-            match key.trim() {
-                "estimate" => {
-                    for name in several() {
-                        let columns = SensorColumns::ALL.into_iter().find(|columns| columns.key() == name);
-                        let known = SensorColumns::ALL.map(SensorColumns::key).join(", ");
-                        let expected = || bad(format!("estimate is '{name}', expected one of {known}"));
-                        changes.estimated.insert(columns.ok_or_else(expected)?);
-                    }
+        for item in items(text).map(str::trim).filter(|item| !item.is_empty()) {
+            match Entry::parse(item).map(Entry::trimmed) {
+                None => changes.parameterization = Some(parameterization(item).map_err(bad)?),
+                Some(Entry { key: "camera", value }) => {
+                    return Err(bad(format!("{OTHER_CAMERA}; a run with camera={value} can be added instead")));
                 }
-                "freeze" => changes.frozen.extend(several().map(str::to_owned)),
-                "set" => {
-                    for one in several_values(value) {
-                        let (name, value) = one.split_once(':').ok_or_else(|| {
-                            bad(format!("'{one}' has no value; expected set=PARAMETER:VALUE, as in set=yaw.alpha:1deg"))
-                        })?;
-                        changes.values.push((name.trim().to_owned(), quantity(value)?));
-                    }
+                Some(entry) if entry.key == "encoder" && entry.value != "off" => {
+                    return Err(bad(entry.problem(NO_JOINT_OFFSETS)));
                 }
-                "drop" => {
-                    for id in several() {
-                        let expected = || bad(format!("'{id}' is not a feature id"));
-                        changes.dropped.insert(id.parse().ok().ok_or_else(expected)?);
-                    }
-                }
-                "without" => changes.without.extend(several().map(str::to_owned)),
-                "camera" => return Err(bad(format!("{OTHER_CAMERA}; a run with camera={value} can be added instead"))),
-                "encoder" => {
-                    if value.trim() != "off" {
-                        return Err(bad(format!(
-                            "encoder is '{value}', expected off: a calibration that was initialized without encoder readings has \
-                             no joint offsets; add a run with encoder=on instead"
-                        )));
-                    }
-                    changes.encoder_off = true;
-                }
-                "joint-noise" => {
-                    changes.joint_noise_rad = quantity(value)?;
-                    if changes.joint_noise_rad < 0.0 {
-                        return Err(bad(format!("joint-noise is '{value}', expected 0 or more")));
-                    }
-                }
-                "imu-noise" => changes.imu_noise = factor(value)?,
-                "pixel-noise" => changes.pixel_noise = factor(value)?,
-                "encoder-noise" => changes.encoder_noise = factor(value)?,
-                _ => {
-                    let known = "estimate, freeze, set, drop, without, encoder, joint-noise, imu-noise, pixel-noise, encoder-noise";
-                    return Err(bad(format!("unknown key '{key}', expected one of {known}")));
-                }
+                Some(entry) => read_entry(Self::KEYS, &mut changes, &entry).map_err(bad)?,
             }
         }
         Ok(changes)
     }
+}
+
+impl fmt::Display for ForkChanges {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut items: Vec<String> = self.parameterization.iter().map(|choice| choice.name().to_owned()).collect();
+        items.extend(written_items(Self::KEYS, self, &Self::default()));
+        formatter.write_str(&items.join(","))
+    }
+}
+
+fn parameterization(name: &str) -> Result<ParameterizationChoice, String> {
+    let choice = ParameterizationChoice::from_name(name);
+    choice.filter(|choice| FORK_PARAMETERIZATIONS.contains(choice)).ok_or_else(|| {
+        if choice.is_some() {
+            return format!("'{name}' uses other cameras: {OTHER_CAMERA}; run {name} beside it instead");
+        }
+        let known = FORK_PARAMETERIZATIONS.map(ParameterizationChoice::name).join(", ");
+        format!("unknown parameterization '{name}', expected one of {known}")
+    })
+}
+
+/// Texts between plus signs as one canonical text; none of no texts.
+fn joined(texts: impl IntoIterator<Item = impl AsRef<str>>) -> Vec<String> {
+    let texts: Vec<String> = texts.into_iter().map(|text| text.as_ref().to_owned()).collect();
+    if texts.is_empty() { texts } else { vec![texts.join("+")] }
+}
+
+/// Names between plus signs.
+fn several<'a>(entry: &Entry<'a>) -> impl Iterator<Item = &'a str> {
+    entry.value.split('+').map(str::trim).filter(|name| !name.is_empty())
+}
+
+fn read_estimated(changes: &mut ForkChanges, entry: &Entry<'_>) -> Result<(), String> {
+    for name in several(entry) {
+        let columns = SensorColumns::ALL.into_iter().find(|columns| columns.key() == name);
+        let known = SensorColumns::ALL.map(SensorColumns::key).join(", ");
+        let expected = || format!("estimate is '{name}', expected one of {known}");
+        changes.estimated.insert(columns.ok_or_else(expected)?);
+    }
+    Ok(())
+}
+
+fn read_values(changes: &mut ForkChanges, entry: &Entry<'_>) -> Result<(), String> {
+    for one in several_values(entry.value) {
+        let no_value = || format!("'{one}' has no value; expected set=PARAMETER:VALUE, as in set=yaw.alpha:1deg");
+        let (name, value) = one.split_once(':').ok_or_else(no_value)?;
+        changes.values.push((name.trim().to_owned(), quantity(&Entry { key: entry.key, value })?));
+    }
+    Ok(())
+}
+
+fn read_dropped(changes: &mut ForkChanges, entry: &Entry<'_>) -> Result<(), String> {
+    for id in several(entry) {
+        changes.dropped.insert(id.parse().map_err(|_not_a_number| format!("'{id}' is not a feature id"))?);
+    }
+    Ok(())
+}
+
+fn read_joint_noise(changes: &mut ForkChanges, entry: &Entry<'_>) -> Result<(), String> {
+    changes.joint_noise_rad = quantity(entry)?;
+    if changes.joint_noise_rad < 0.0 { Err(entry.problem("0 or more")) } else { Ok(()) }
 }
 
 /// The items of `yaw.a:1e+3+yaw.d:2`; a plus sign after an exponent belongs to the number.
@@ -107,51 +184,14 @@ fn several_values(text: &str) -> Vec<String> {
     items
 }
 
-/// A number with an optional unit (`deg`, `mrad`, `rad`, `mm`, `m`), in radians or metres.
-fn number(text: &str) -> Option<f64> {
-    let text = text.trim();
+/// Value with an optional unit (`deg`, `mrad`, `rad`, `mm`, `m`), in radians or metres.
+fn quantity(entry: &Entry<'_>) -> Result<f64, String> {
+    let text = entry.value.trim();
     let units = [("deg", std::f64::consts::PI / 180.0), ("mrad", 1e-3), ("rad", 1.0), ("mm", 1e-3), ("m", 1.0)];
     let unit = units.iter().find_map(|(unit, factor)| Some((text.strip_suffix(unit)?, *factor)));
     let (digits, factor) = unit.unwrap_or((text, 1.0));
-    digits.trim().parse::<f64>().ok().map(|value| value * factor).filter(|value| value.is_finite())
-}
-
-impl fmt::Display for ForkChanges {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let standard = Self::default();
-        let mut items: Vec<String> = self.parameterization.iter().map(|choice| choice.name().to_owned()).collect();
-        if !self.estimated.is_empty() {
-            let keys: Vec<&str> = self.estimated.iter().map(|columns| columns.key()).collect();
-            items.push(format!("estimate={}", keys.join("+")));
-        }
-        if !self.frozen.is_empty() {
-            items.push(format!("freeze={}", self.frozen.join("+")));
-        }
-        items.extend(self.values.iter().map(|(name, value)| format!("set={name}:{value}")));
-        if !self.dropped.is_empty() {
-            let dropped: Vec<String> = self.dropped.iter().map(u64::to_string).collect();
-            items.push(format!("drop={}", dropped.join("+")));
-        }
-        if !self.without.is_empty() {
-            items.push(format!("without={}", self.without.iter().cloned().collect::<Vec<_>>().join("+")));
-        }
-        if self.encoder_off {
-            items.push("encoder=off".to_owned());
-        }
-        let values = [
-            ("joint-noise", self.joint_noise_rad, standard.joint_noise_rad),
-            ("imu-noise", self.imu_noise, standard.imu_noise),
-            ("pixel-noise", self.pixel_noise, standard.pixel_noise),
-            ("encoder-noise", self.encoder_noise, standard.encoder_noise),
-        ];
-        items.extend(
-            values
-                .iter()
-                .filter(|(_, value, default)| value != default)
-                .map(|(key, value, _)| format!("{key}={value}")),
-        );
-        formatter.write_str(&items.join(","))
-    }
+    let value = digits.trim().parse::<f64>().ok().map(|value| value * factor).filter(|value| value.is_finite());
+    value.ok_or_else(|| entry.problem("a number with an optional unit (deg, mrad, rad, mm, m)"))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 mod error;
 mod fork_changes;
 mod fork_text;
+mod run_options;
 mod run_spec;
 mod session_plan;
 mod trajectories;

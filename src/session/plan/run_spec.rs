@@ -3,9 +3,10 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::tuning::{EstimatorTuning, read_count};
+use super::tuning::EstimatorTuning;
 use crate::estimator::SensorColumns;
 use crate::sensors::Rig;
+use crate::text::{Named, items, read_item, written_items};
 
 /// Maximum number of runs of a session.
 pub const MAX_RUNS: usize = 4;
@@ -29,28 +30,54 @@ pub enum ParameterizationChoice {
     Cluster,
 }
 
-/// Names on the command line, in the order of the help text.
-const NAMES: [(&str, ParameterizationChoice); 7] = [
-    ("auto", ParameterizationChoice::Auto),
-    ("minimal", ParameterizationChoice::Minimal),
-    ("minimal-swapped", ParameterizationChoice::MinimalSwapped),
-    ("classical", ParameterizationChoice::Classical),
-    ("poe", ParameterizationChoice::Poe),
-    ("static", ParameterizationChoice::Static),
-    ("cluster", ParameterizationChoice::Cluster),
-];
-
-/// Range of the window size: two keyframes give too little parallax, and with more than thirty the dense solve takes
-/// much longer than real time.
-const WINDOW_RANGE: std::ops::RangeInclusive<usize> = 4..=30;
-
-/// Default number of keyframes in the window, as in the paper.
-const DEFAULT_WINDOW: usize = 10;
+impl Named for ParameterizationChoice {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Auto, "auto"),
+        (Self::Minimal, "minimal"),
+        (Self::MinimalSwapped, "minimal-swapped"),
+        (Self::Classical, "classical"),
+        (Self::Poe, "poe"),
+        (Self::Static, "static"),
+        (Self::Cluster, "cluster"),
+    ];
+}
 
 impl ParameterizationChoice {
-    /// Name on the command line.
-    pub fn name(self) -> &'static str {
-        NAMES.iter().find(|(_, choice)| *choice == self).map_or("auto", |(name, _)| name)
+    /// Summary for the window.
+    pub const fn summary(self) -> &'static str {
+        self.texts().0
+    }
+
+    /// Description for the documents, as Markdown.
+    pub const fn meaning(self) -> &'static str {
+        self.texts().1
+    }
+
+    const fn texts(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Auto => (
+                "minimal, switched away from singularities",
+                "minimal, with the base and end blocks that have the larger singularity margin; switches with hysteresis",
+            ),
+            Self::Minimal => ("minimal, as in the paper", "Eqs. 18 to 20 of the paper, corrected"),
+            Self::MinimalSwapped => (
+                "minimal, end block swapped",
+                "minimal with the blocks of the last link swapped, for mechanisms at the singularity of Eq. 19",
+            ),
+            Self::Classical => (
+                "base, links, end effector; redundant directions",
+                "Eqs. 5 and 6: 12 + 4N parameters, six of them redundant",
+            ),
+            Self::Poe => (
+                "product of exponentials, without singularities",
+                "product of exponentials, without singularities; the reference",
+            ),
+            Self::Static => ("static camera of the rig, rigid extrinsics", "the first rigid camera of the rig"),
+            Self::Cluster => (
+                "gimbal camera and static camera in one window",
+                "the gimbal camera as in `auto` and the first rigid camera, in one window",
+            ),
+        }
     }
 
     /// True if runs switch to the other end block near a singularity. A rig may require that for every minimal run.
@@ -63,43 +90,28 @@ impl ParameterizationChoice {
             Self::Classical | Self::Poe | Self::Static => false,
         }
     }
-
-    /// All parameterizations with their names, in the order of the help text.
-    pub fn all() -> impl Iterator<Item = (&'static str, Self)> {
-        NAMES.into_iter()
-    }
 }
 
 /// One `--run NAME[:key=value,…]`.
+///
+/// Meaning and range of each option: its row of [`RunSpec::KEYS`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunSpec {
-    /// Name in the window and of the result folder: `name=…`, or the specification as written.
+    /// Name in the window and of the folder: `name=…`, or the specification as written.
     pub label: String,
-    /// The parameterization in which the calibration is estimated.
+    /// Parameterization in which the calibration is estimated.
     pub parameterization: ParameterizationChoice,
-    /// True if encoder readings are used (`encoder=off` clears it).
     pub encoder: bool,
-    /// True if the calibration is estimated (`calibrate=off` clears it).
     pub calibrate: bool,
-    /// True if the time offsets of cameras and encoders are estimated (`timeshift=on` sets it).
     pub timeshift: bool,
-    /// True if the readout times of rolling shutters are estimated (`readout=on` sets it).
     pub readout: bool,
-    /// True if the intrinsics of the cameras are estimated (`intrinsics=on` sets it).
     pub intrinsics: bool,
-    /// True if the intrinsics of the IMU are estimated (`imu-intrinsics=on` sets it).
     pub imu_intrinsics: bool,
-    /// True if Jacobians are evaluated at first estimates, FEJ (`first-estimates=off` clears it). Without FEJ the prior
-    /// gains spurious information.
     pub first_estimates: bool,
-    /// Number of keyframes in the window (`window=10`).
     pub window: usize,
-    /// Number of passes over the log (`passes=2`): each starts from the calibration and biases estimated by the
-    /// previous one.
-    /// The last one is recorded.
     pub passes: usize,
-    /// Key of the main camera (`camera=cam1`). `None` means the gimballed camera, or the first rigid one for `static`
-    /// and for rigs without a gimbal. A `cluster` also uses the first rigid camera.
+    /// Key of the main camera. `None` means the gimballed camera, or the first rigid one for `static` and for rigs without
+    /// a gimbal. A `cluster` also uses the first rigid camera.
     pub camera_key: Option<String>,
     pub tuning: EstimatorTuning,
 }
@@ -116,7 +128,8 @@ impl Default for RunSpec {
             intrinsics: false,
             imu_intrinsics: false,
             first_estimates: true,
-            window: DEFAULT_WINDOW,
+            // As in the paper.
+            window: 10,
             passes: 1,
             camera_key: None,
             tuning: EstimatorTuning::default(),
@@ -128,8 +141,11 @@ impl Default for RunSpec {
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum RunSpecError {
     /// Unknown parameterization.
-    #[error("unknown run '{name}': expected one of auto, minimal, minimal-swapped, classical, poe, static, cluster")]
-    UnknownName { name: String },
+    #[error("unknown run '{name}': expected one of {}", ParameterizationChoice::names())]
+    UnknownName {
+        /// The name as written.
+        name: String,
+    },
     /// Unknown key, or invalid value.
     #[error("run '{spec}': {problem}")]
     BadOption {
@@ -141,9 +157,6 @@ pub enum RunSpecError {
 }
 
 impl RunSpec {
-    /// Range of the number of passes: more than three passes change little.
-    pub const PASSES: std::ops::RangeInclusive<usize> = 1..=3;
-
     /// True if these columns are estimated in addition to the chain's.
     pub fn estimates(&self, columns: SensorColumns) -> bool {
         match columns {
@@ -154,30 +167,15 @@ impl RunSpec {
         }
     }
 
+    /// Whether the fixed calibration excludes a key: sensor columns require `calibrate=on`.
+    pub fn excludes(&self, key: &str) -> bool {
+        !self.calibrate && SensorColumns::ALL.into_iter().any(|columns| columns.key() == key)
+    }
+
     /// Text of all settings that affect the results, without the name. Keys with default values are omitted and the
     /// others have a fixed order, so that equivalent specifications have the same text.
     pub fn settings(&self) -> String {
-        let standard = Self::default();
-        let mut options = Vec::new();
-        if !self.encoder {
-            options.push("encoder=off".to_owned());
-        }
-        if !self.calibrate {
-            options.push("calibrate=off".to_owned());
-        }
-        let estimated = SensorColumns::ALL.into_iter().filter(|columns| self.estimates(*columns));
-        options.extend(estimated.map(|columns| format!("{}=on", columns.key())));
-        if !self.first_estimates {
-            options.push("first-estimates=off".to_owned());
-        }
-        if self.window != standard.window {
-            options.push(format!("window={}", self.window));
-        }
-        if self.passes != standard.passes {
-            options.push(format!("passes={}", self.passes));
-        }
-        options.extend(self.tuning.options());
-        options.extend(self.camera_key.iter().map(|key| format!("camera={key}")));
+        let options = written_items(Self::KEYS, self, &Self::default());
         let name = self.parameterization.name();
         if options.is_empty() { name.to_owned() } else { format!("{name}:{}", options.join(",")) }
     }
@@ -198,47 +196,13 @@ impl FromStr for RunSpec {
 
     fn from_str(spec: &str) -> Result<Self, RunSpecError> {
         let (name, options) = spec.split_once(':').map_or((spec, ""), |(name, options)| (name, options));
-        let parameterization = NAMES
-            .iter()
-            .find(|(known, _)| *known == name)
-            .map(|(_, choice)| *choice)
-            .ok_or_else(|| RunSpecError::UnknownName { name: name.to_owned() })?;
+        let unknown = || RunSpecError::UnknownName { name: name.to_owned() };
+        let parameterization = ParameterizationChoice::from_name(name).ok_or_else(unknown)?;
         let bad = |problem: String| RunSpecError::BadOption { spec: spec.to_owned(), problem };
         let mut run = Self { label: folder_name(spec), parameterization, ..Self::default() };
-        for option in options.split(',').filter(|option| !option.is_empty()) {
-            let (key, value) = option
-                .split_once('=')
-                .ok_or_else(|| bad(format!("option '{option}' has no value; expected key=value, as in encoder=off")))?;
-            if let Some(columns) = SensorColumns::ALL.into_iter().find(|columns| columns.key() == key) {
-                *run.estimates_mut(columns) = on_or_off(value).map_err(|problem| bad(format!("{key}: {problem}")))?;
-                continue;
-            }
-            match key {
-                "encoder" => run.encoder = on_or_off(value).map_err(|problem| bad(format!("encoder: {problem}")))?,
-                "calibrate" => {
-                    run.calibrate = on_or_off(value).map_err(|problem| bad(format!("calibrate: {problem}")))?;
-                }
-                "first-estimates" => {
-                    run.first_estimates =
-                        on_or_off(value).map_err(|problem| bad(format!("first-estimates: {problem}")))?;
-                }
-                "window" => run.window = read_count(key, value, &WINDOW_RANGE).map_err(bad)?,
-                "passes" => run.passes = read_count(key, value, &Self::PASSES).map_err(bad)?,
-                tuned if EstimatorTuning::KEYS.contains(&tuned) => run.tuning.set(tuned, value).map_err(bad)?,
-                "camera" => run.camera_key = Some(value.to_owned()),
-                "name" if folder_name(value) == value && !value.is_empty() => run.label = value.to_owned(),
-                "name" => {
-                    return Err(bad(format!("name is '{value}', expected letters, digits, '-', '_' and '.' only")));
-                }
-                _ => {
-                    let known = "encoder, calibrate, timeshift, readout, intrinsics, imu-intrinsics, first-estimates, window, passes, camera, name";
-                    let tuning = EstimatorTuning::KEYS.join(", ");
-                    return Err(bad(format!("unknown key '{key}', expected one of {known}, {tuning}")));
-                }
-            }
-        }
-        let estimated = SensorColumns::ALL.into_iter().find(|columns| run.estimates(*columns) && !run.calibrate);
-        if let Some(columns) = estimated {
+        items(options).try_for_each(|item| read_item(Self::KEYS, &mut run, item)).map_err(bad)?;
+        let estimated = |columns: &SensorColumns| run.estimates(*columns) && run.excludes(columns.key());
+        if let Some(columns) = SensorColumns::ALL.into_iter().find(estimated) {
             return Err(bad(format!("{}=on requires calibrate=on", columns.key())));
         }
         Ok(run)
@@ -259,20 +223,12 @@ impl fmt::Display for RunSpec {
 }
 
 /// The text with every character that is unsafe in folder names replaced by `-`; never empty, `.` or `..`.
-fn folder_name(text: &str) -> String {
+pub(super) fn folder_name(text: &str) -> String {
     let clean: String = text
         .chars()
         .map(|letter| if letter.is_ascii_alphanumeric() || "-_.".contains(letter) { letter } else { '-' })
         .collect();
     if clean.trim_matches('.').is_empty() { "run".to_owned() } else { clean }
-}
-
-fn on_or_off(value: &str) -> Result<bool, String> {
-    match value {
-        "on" => Ok(true),
-        "off" => Ok(false),
-        _ => Err(format!("it is '{value}', expected on or off")),
-    }
 }
 
 /// Makes the labels of several runs unique by appending numbers.

@@ -19,6 +19,7 @@ use crate::gimbal::{ClassicalChain, ParameterId};
 use crate::observability::{Deficit, ParameterRate, information_rate};
 use crate::sensors::Rig;
 use crate::session::accuracy::path_length_m;
+use crate::text::Named as _;
 
 /// Frame counts of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -10,6 +10,7 @@ use super::super::spline::Spline;
 use super::super::trajectory::{Trajectory, VehicleLimits};
 use super::super::vibration::{Vibration, shake};
 use crate::geometry::so3;
+use crate::text::Named as _;
 
 pub(super) fn experiment_trajectory(experiment: Experiment, seed: u64, duration_s: f64) -> Trajectory {
     let flight = experiment.flight(4.0 * duration_s, &mut RandomStream::new(seed, stream::ROUTE));
@@ -95,7 +96,7 @@ fn spline_derivatives_meet_central_differences() {
 #[test]
 fn every_experiment_lasts_its_length_and_keeps_the_limits() {
     let limits = VehicleLimits::default();
-    for experiment in Experiment::ALL {
+    for experiment in Experiment::all() {
         let trajectory = experiment_trajectory(experiment, 3, 200.0);
         let end_s = trajectory.time_of_length(experiment.length_m());
         assert!((trajectory.length_m(end_s) - experiment.length_m()).abs() < 0.3, "{experiment:?}");

@@ -8,6 +8,7 @@ use super::super::world::{self, World};
 use super::flight::experiment_trajectory;
 use crate::geometry::{RigidTransform, so3};
 use crate::sensors::GrayImage;
+use crate::text::Named as _;
 
 /// Image from a position along a heading, 8° down.
 fn radiance(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> GrayImage {
@@ -169,7 +170,7 @@ fn rows_rendered_apart_are_those_of_the_whole_image() {
 
 #[test]
 fn flights_keep_clear_of_everything_built() {
-    for experiment in Experiment::ALL {
+    for experiment in Experiment::all() {
         let world = world::build(experiment.environment(), 1);
         for seed in 1..4 {
             let trajectory = experiment_trajectory(experiment, seed, 160.0);

@@ -5,6 +5,7 @@ use super::job_result::JobResult;
 use crate::estimator::FailureCause;
 use crate::study::JobLog;
 use crate::study::comparison::Direction;
+use crate::text::Named as _;
 
 /// The column of a name.
 pub(in crate::study) fn run_column(name: &str) -> Option<&'static Column<JobResult<'static>>> {

@@ -8,6 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 /// Range of seeds: integers that every program that reads the tables can represent.
 pub(super) const SEEDS: std::ops::RangeInclusive<u64> = 0..=i64::MAX as u64;
+use crate::text::Named;
 
 /// Reason why a plan cannot be used.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -127,6 +128,13 @@ impl<'a> Section<'a> {
     /// The text of a mandatory key.
     pub(super) fn required_text(&self, name: &str) -> Result<String, PlanError> {
         self.text(name)?.ok_or_else(|| self.error(&format!("lacks the key '{name}'")))
+    }
+
+    /// Value of an enum by its name.
+    pub(super) fn named<N: Named>(&self, name: &str) -> Result<Option<N>, PlanError> {
+        let Some(text) = self.text(name)? else { return Ok(None) };
+        let unknown = || self.error_at(name, &format!("is '{text}', expected {}", N::alternatives()));
+        N::from_name(&text).map(Some).ok_or_else(unknown)
     }
 
     /// A number within a range; integers are accepted as well.

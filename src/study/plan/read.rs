@@ -7,10 +7,9 @@ use super::study_plan::{DisturbanceSet, JobLimits, LOG_PLACE, LogSource, SlurmOp
 use super::tables;
 use crate::session::{RunSpec, TrajectorySpec, TrajectorySpecError};
 use crate::simulation::Disturbances;
-use crate::study::perturbation::{
-    Distribution, MagnitudeError, PerturbationStart, RigChange, RigPerturbation, RigQuantity,
-};
+use crate::study::perturbation::{Distribution, MagnitudeError, RigChange, RigPerturbation, RigQuantity};
 use crate::study::recipe::{EncoderNoise, FlightRecipe};
+use crate::text::Named as _;
 
 const PLAN_KEYS: [&str; 13] = [
     "name",
@@ -223,15 +222,7 @@ fn perturbations(root: &Section<'_>) -> Result<Vec<RigPerturbation>, PlanError> 
 
 fn perturbation(section: &Section<'_>) -> Result<RigPerturbation, PlanError> {
     section.allow(&["name", "start", "prior", "changes"])?;
-    let start = match section.text("start")?.as_deref() {
-        None | Some("rig") => PerturbationStart::Rig,
-        Some("truth") => PerturbationStart::Truth,
-        Some("calibrated") => PerturbationStart::Calibrated,
-        Some(other) => {
-            let problem = format!("is '{other}', expected \"rig\", \"truth\" or \"calibrated\"");
-            return Err(section.error_at("start", &problem));
-        }
-    };
+    let start = section.named("start")?.unwrap_or_default();
     let match_prior = match section.text("prior")?.as_deref() {
         None | Some("rig") => false,
         Some("changes") => true,
@@ -246,18 +237,12 @@ fn perturbation(section: &Section<'_>) -> Result<RigPerturbation, PlanError> {
 fn change(section: &Section<'_>) -> Result<RigChange, PlanError> {
     section.allow(&["quantity", "distribution", "magnitude"])?;
     let quantity = section.required_text("quantity")?;
-    let quantity: RigQuantity = quantity
-        .parse()
-        .map_err(|expected: String| section.error_at("quantity", &format!("is '{quantity}', expected {expected}")))?;
-    let distribution = match section.text("distribution")?.as_deref() {
-        None | Some("uniform") => Distribution::Uniform,
-        Some("normal") => Distribution::Normal,
-        Some("constant") => Distribution::Constant,
-        Some(other) => {
-            let problem = format!("is '{other}', expected uniform, normal or constant");
-            return Err(section.error_at("distribution", &problem));
-        }
+    let unknown = || {
+        let names = RigQuantity::names();
+        section.error_at("quantity", &format!("is '{quantity}', expected one of {names}"))
     };
+    let quantity = RigQuantity::from_name(&quantity).ok_or_else(unknown)?;
+    let distribution = section.named("distribution")?.unwrap_or(Distribution::Uniform);
     let expected = MagnitudeError { dimension: quantity.dimension() }.to_string();
     let in_range = |value: f64| quantity.range().contains(&value).then_some(value);
     let magnitude = section.number_or(

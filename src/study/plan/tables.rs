@@ -119,16 +119,10 @@ fn column(section: &Section<'_>) -> Result<SummaryColumn, PlanError> {
         let problem = format!("is '{column}', expected a column of numbers of the table of runs");
         return Err(section.error_at("column", &problem));
     }
-    let statistic = match section.text("statistic")? {
-        None => Statistic::default(),
-        Some(name) => Statistic::of_name(&name).ok_or_else(|| {
-            section.error_at("statistic", &format!("is '{name}', expected median, mean, sum or ratio"))
-        })?,
-    };
     Ok(SummaryColumn {
         title: section.text("title")?.unwrap_or_else(|| column.clone()),
         column,
-        statistic,
+        statistic: section.named("statistic")?.unwrap_or_default(),
         factor: section.number("factor", FACTORS)?.unwrap_or(1.0),
         digits: section.integer("digits", 0..=MOST_DIGITS)?.map_or(DIGITS, |digits| digits as usize),
     })

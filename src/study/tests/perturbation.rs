@@ -2,6 +2,7 @@ use crate::geometry::so3;
 use crate::sensors::{CameraMount, Rig};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 use crate::study::{Distribution, PerturbationStart, RigChange, RigPerturbation, RigQuantity};
+use crate::text::Named as _;
 
 fn rig() -> Rig {
     let options = SyntheticOptions { duration_s: 1.0, ..SyntheticOptions::default() };

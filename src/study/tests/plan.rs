@@ -164,7 +164,10 @@ fn errors_name_line_key_and_what_is_allowed() {
     check(&flight("encoder_sigma_deg = \"no\""), "expected degrees, a number above 0 and up to 90, or \"none\"");
     check(&flight("size_px = [640]"), "'flights[1].size_px' expected width and height");
     check(&flight("size_px = [640, 8]"), "'flights[1].size_px[2]' is 8, expected an integer from 32 to 4096");
-    check(&flight("disturb = [\"fog=1\"]"), "'flights[1].disturb[1]' is 'fog=1': disturbance 'fog=1': expected one of");
+    check(
+        &flight("disturb = [\"fog=1\"]"),
+        "'flights[1].disturb[1]' is 'fog=1': disturbance 'fog=1': unknown key 'fog', expected one of",
+    );
     check(&flight("lens = \"fisheye\""), "expected pinhole or radtan");
     check(&flight("static_camera = 1"), "'flights[1].static_camera' is 1, expected true or false");
     check(&changes("quantity = \"gimbal.d\", magnitude = 1"), "expected one of gimbal.translation");

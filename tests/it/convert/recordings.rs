@@ -11,6 +11,7 @@ use dcvins::flight_log::convert::{
     AutopilotLog, AutopilotLogKind, ConversionReport, ConvertError, ConvertOptions, VideoClock, convert_with,
 };
 use dcvins::sensors::Rig;
+use dcvins::text::Named as _;
 
 use super::recorders::{
     GIMBAL_DEG, PERIOD_US, POSITION_M, START_US, START_UTC_S, Track, VEHICLE_DEG, dataflash, force, movie, quaternion,

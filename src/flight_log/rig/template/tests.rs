@@ -5,6 +5,7 @@ use nalgebra::{Vector2, Vector3};
 use super::*;
 use crate::camera::{CameraModel, Distortion};
 use crate::sensors::{BodyAxes, Rig};
+use crate::text::Named as _;
 
 const SIZE_PX: [usize; 2] = [640, 480];
 

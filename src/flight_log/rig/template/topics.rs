@@ -17,6 +17,7 @@ use crate::flight_log::image_decoding::decode_image;
 use crate::flight_log::messages::{self, MessageKind};
 use crate::flight_log::{FlightLog, LogError, TopicInfo};
 use crate::sensors::{BodyAxes, ImuNoise};
+use crate::text::Named as _;
 
 /// Number of IMU messages over which gravity is averaged.
 const GRAVITY_SAMPLES: usize = 2000;

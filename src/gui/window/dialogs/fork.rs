@@ -1,5 +1,7 @@
 //! The dialog that forks a run at the cursor with changes.
 
+use std::collections::BTreeMap;
+
 use egui::{ComboBox, DragValue, Grid, RichText, TextEdit, Ui, vec2};
 
 use super::modal::{Modal, accept_or_cancel_ui};
@@ -7,44 +9,24 @@ use crate::estimator::SensorColumns;
 use crate::gui::PanelContext;
 use crate::gui::units::seconds;
 use crate::session::{Command, FORK_PARAMETERIZATIONS, ForkChanges, RunSpec};
+use crate::text::{Field, Key, Label, Named as _, written_items};
 
 /// First entry of the list: the parent's parameterization.
 const AS_BEFORE: &str = "unchanged";
 
-#[derive(Debug)]
+/// Key of the noise that is typed in degrees here and stored in radians.
+const JOINT_NOISE: &str = "joint-noise";
+
+#[derive(Debug, Default)]
 pub(super) struct ForkDialog {
     /// Index in the list; 0 for the parent's parameterization.
     choice: usize,
-    estimated: String,
-    frozen: String,
-    values: String,
-    dropped: String,
-    without: String,
-    encoder: bool,
+    /// Switches and factors.
+    changes: ForkChanges,
+    /// Values of the other keys, as typed.
+    texts: BTreeMap<&'static str, String>,
     joint_noise_deg: f64,
-    imu_noise: f64,
-    pixel_noise: f64,
-    encoder_noise: f64,
     name: String,
-}
-
-impl Default for ForkDialog {
-    fn default() -> Self {
-        Self {
-            choice: 0,
-            estimated: String::new(),
-            frozen: String::new(),
-            values: String::new(),
-            dropped: String::new(),
-            without: String::new(),
-            encoder: true,
-            joint_noise_deg: 0.0,
-            imu_noise: 1.0,
-            pixel_noise: 1.0,
-            encoder_noise: 1.0,
-            name: String::new(),
-        }
-    }
 }
 
 impl ForkDialog {
@@ -54,31 +36,19 @@ impl ForkDialog {
         if let Some(choice) = self.choice.checked_sub(1).and_then(|index| FORK_PARAMETERIZATIONS.get(index)) {
             parts.push(choice.name().to_owned());
         }
-        let list = |text: &str| text.split([',', ' ', '+']).filter(|it| !it.is_empty()).collect::<Vec<_>>().join("+");
-        for (key, text) in [
-            ("estimate", &self.estimated),
-            ("freeze", &self.frozen),
-            ("drop", &self.dropped),
-            ("without", &self.without),
-        ] {
-            if !text.trim().is_empty() {
-                parts.push(format!("{key}={}", list(text)));
+        for (key, text) in &self.texts {
+            let words = text.split([',', ' ']).filter(|word| !word.is_empty());
+            if *key == "set" {
+                // Users may write an equals sign there.
+                parts.extend(words.map(|value| format!("set={}", value.replacen('=', ":", 1))));
+            } else if !text.trim().is_empty() {
+                parts.push(format!("{key}={}", words.collect::<Vec<_>>().join("+")));
             }
         }
-        for value in self.values.split([',', ' ']).filter(|value| !value.is_empty()) {
-            // An equals sign is accepted, too.
-            parts.push(format!("set={}", value.replacen('=', ":", 1)));
-        }
-        if !self.encoder {
-            parts.push("encoder=off".to_owned());
-        }
         if self.joint_noise_deg != 0.0 {
-            parts.push(format!("joint-noise={}deg", self.joint_noise_deg));
+            parts.push(format!("{JOINT_NOISE}={}deg", self.joint_noise_deg));
         }
-        let factors =
-            [("imu-noise", self.imu_noise), ("pixel-noise", self.pixel_noise), ("encoder-noise", self.encoder_noise)];
-        parts
-            .extend(factors.iter().filter(|(_, factor)| *factor != 1.0).map(|(key, factor)| format!("{key}={factor}")));
+        parts.extend(written_items(ForkChanges::KEYS, &self.changes, &ForkChanges::default()));
         parts.join(",")
     }
 
@@ -137,39 +107,49 @@ impl ForkDialog {
             let parameter = selected.0.map_or_else(|| "yaw.alpha".to_owned(), |parameter| ctx.names().name(parameter));
             let feature = selected.1.map_or_else(|| "12 15".to_owned(), |id| id.0.to_string());
             let sensors = SensorColumns::ALL.map(SensorColumns::key).join(" ");
-            let value = format!("{parameter}=1deg");
             let camera = second_camera(ctx).unwrap_or_else(|| "cluster runs only: one of the two cameras".to_owned());
-            for (label, text, hint) in [
-                ("Estimate sensors", &mut self.estimated, &sensors),
-                ("Freeze parameters", &mut self.frozen, &parameter),
-                ("Set parameters", &mut self.values, &value),
-                ("Drop features", &mut self.dropped, &feature),
-                ("Exclude camera", &mut self.without, &camera),
-                ("Name", &mut self.name, &"automatic".to_owned()),
-            ] {
+            let text_ui = |ui: &mut Ui, label: &str, text: &mut String, hint: &str| {
                 let name = ui.label(label);
                 ui.add(TextEdit::singleline(text).hint_text(hint).desired_width(260.0)).labelled_by(name.id);
                 ui.end_row();
+            };
+            let is_text = |key: &Key<ForkChanges>| matches!(key.field, Field::Other(..)) && key.name != JOINT_NOISE;
+            for (key, label) in labelled().filter(|(key, _)| is_text(key)) {
+                let hint = match key.name {
+                    "estimate" => sensors.clone(),
+                    "set" => format!("{parameter}=1deg"),
+                    "drop" => feature.clone(),
+                    "without" => camera.clone(),
+                    _ => parameter.clone(),
+                };
+                text_ui(ui, label.text, self.texts.entry(key.name).or_default(), &hint);
             }
-            ui.label("Use from the cursor on");
-            ui.checkbox(&mut self.encoder, "Encoder readings");
-            ui.end_row();
-            let name = ui.label("Added joint noise, σ");
-            ui.add(DragValue::new(&mut self.joint_noise_deg).range(0.0..=45.0).speed(0.05).suffix("°"))
-                .labelled_by(name.id);
-            ui.end_row();
-            for (label, factor) in [
-                ("Assumed IMU noise", &mut self.imu_noise),
-                ("Assumed pixel noise", &mut self.pixel_noise),
-                ("Assumed encoder noise", &mut self.encoder_noise),
-            ] {
-                let name = ui.label(label);
-                let drag = DragValue::new(factor).range(0.001..=1000.0).speed(0.02).prefix("× ");
-                ui.add(drag).labelled_by(name.id);
+            text_ui(ui, "Name", &mut self.name, "automatic");
+            for (key, label) in labelled().filter(|(key, _)| !is_text(key)) {
+                let mut drag_ui = |value: DragValue<'_>| {
+                    let name = ui.label(label.text);
+                    ui.add(value).labelled_by(name.id);
+                };
+                match &key.field {
+                    Field::Switch(on) => {
+                        ui.label(label.group);
+                        ui.checkbox(on(&mut self.changes), label.text);
+                    }
+                    Field::Factor(factor, range) => {
+                        let factor = DragValue::new(factor(&mut self.changes));
+                        drag_ui(factor.range(range.clone()).speed(0.02).prefix("× "));
+                    }
+                    _ => drag_ui(DragValue::new(&mut self.joint_noise_deg).range(0.0..=45.0).speed(0.05).suffix("°")),
+                }
                 ui.end_row();
             }
         });
     }
+}
+
+/// The keys that have a label.
+fn labelled() -> impl Iterator<Item = (&'static Key<ForkChanges>, &'static Label)> {
+    ForkChanges::KEYS.iter().filter_map(|key| Some((key, key.label.as_ref()?)))
 }
 
 /// The second camera of the shown run.
@@ -185,15 +165,18 @@ mod tests {
 
     #[test]
     fn what_is_filled_in_is_understood() {
+        let texts = [
+            ("freeze", "yaw.alpha, yaw.d"),
+            ("set", "pitch.a=30mm roll.a:1deg"),
+            ("drop", "12 15"),
+            ("without", "cam1"),
+            ("estimate", " "),
+        ];
         let dialog = ForkDialog {
             choice: 4,
-            frozen: "yaw.alpha, yaw.d".to_owned(),
-            values: "pitch.a=30mm roll.a:1deg".to_owned(),
-            dropped: "12 15".to_owned(),
-            without: "cam1".to_owned(),
-            encoder: false,
+            changes: ForkChanges { encoder: false, imu_noise: 2.0, ..ForkChanges::default() },
+            texts: texts.map(|(key, text)| (key, text.to_owned())).into(),
             joint_noise_deg: 0.5,
-            imu_noise: 2.0,
             ..ForkDialog::default()
         };
         let changes: ForkChanges = dialog.written().parse().unwrap();

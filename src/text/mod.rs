@@ -1,0 +1,9 @@
+//! Texts that people write and read: `KEY=VALUE` entries, tables of keys, names of enums.
+
+mod entry;
+mod keys;
+mod named;
+
+pub use entry::{Entry, FINITE, items, numbers};
+pub use keys::{Field, Key, Label, Numbers, key_list, read_entry, read_item, written_items};
+pub use named::Named;
