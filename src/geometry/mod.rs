@@ -1,4 +1,5 @@
-//! Rotations, rigid transforms and the perturbation rule; tangent plane of a direction, median, quantiles of χ².
+//! Rotations, rigid transforms and the perturbation rule; tangent plane of a direction, mean and spread of
+//! vectors, median, quantiles of χ².
 //!
 //! The rule is written here once: a perturbation is `[φ; δt]`, rotation first, with `R ← R·Exp(φ)` (right, local) and
 //! `t ← t + δt` (a vector in the outer frame).
@@ -17,6 +18,7 @@ mod tangent;
 #[cfg(test)]
 mod tests;
 pub(crate) mod triangular_factor;
+mod vector_statistics;
 
 pub use angle::{principal_angle, wrap_angle};
 pub use chi_square::mean_square_quantile;
@@ -26,6 +28,7 @@ pub(crate) use planar::planar_length;
 pub use rigid_transform::RigidTransform;
 pub use split_mix::SplitMix64;
 pub use tangent::tangent_basis;
+pub use vector_statistics::{mean, standard_deviation};
 
 pub fn seconds_from_ns(time_ns: i64) -> f64 {
     time_ns as f64 * 1e-9

@@ -18,6 +18,7 @@ mod rig_sanity;
 mod rotation;
 mod source_fit;
 mod spectrum;
+mod stationary;
 mod statistics;
 mod still_pixels;
 mod survey;
