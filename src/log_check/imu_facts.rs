@@ -7,7 +7,7 @@ use super::statistics::median;
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
 use crate::geometry::{mean, seconds_from_ns};
-use crate::sensors::{ImuSample, Rig};
+use crate::sensors::{AngularRates, ImuSample, Rig};
 
 /// Norm of the specific force below which it counts as unset in the message.
 const NO_FORCE_M_PER_S2: f64 = 0.01;
@@ -20,6 +20,8 @@ const STATIONARY_MOTION: [f64; 2] = [0.012, 0.06];
 pub(super) struct ImuFacts {
     /// Finite samples, ordered by stamp.
     pub(super) samples: Vec<ImuSample>,
+    /// Angular rates of the samples without bias.
+    pub(super) gyroscope: AngularRates,
     /// Mean angular rate while stationary, in the IMU frame; `None` if the vehicle is never stationary.
     pub(super) gyroscope_bias_rad_per_s: Option<Vector3<f64>>,
     /// Time and mean specific force (IMU frame, m/s²) of a stationary window; without one, the middle and the mean of
@@ -69,7 +71,10 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
     let stationary_up =
         stationary.get(stationary.len() / 2).map(|window| (middle_ns(window.range_ns), window.mean_force));
     let up = stationary_up.unwrap_or_else(|| (samples[samples.len() / 2].stamp_ns, mean(&forces())));
-    ImuFacts { samples, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up) }
+    let bias = gyroscope_bias.unwrap_or_default();
+    let unbiased = rates.iter().map(|(stamp_ns, rate)| (seconds_from_ns(*stamp_ns), rate - bias));
+    let gyroscope = AngularRates::new(unbiased).bridging_gaps();
+    ImuFacts { samples, gyroscope, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up) }
 }
 
 /// Windows of a log from its angular rates and specific forces, both ordered by stamp.

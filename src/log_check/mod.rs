@@ -27,7 +27,7 @@ mod tests;
 mod timing;
 
 pub use self::clock_alignment::{
-    AlignmentError, AlignmentReference, ClockAlignment, OrientationSeries, align_camera, align_clocks,
+    AlignmentError, AlignmentReference, ClockAlignment, RotationReference, align_camera, align_clocks,
 };
 
 pub use self::noise::{

@@ -20,6 +20,7 @@ use super::ImageRotation;
 use super::statistics::median;
 use crate::flight_log::attitude::rotation_at;
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
+use crate::sensors::AngularRates;
 
 /// Minimum number of image rotations.
 const MIN_ROTATIONS: usize = 40;
@@ -60,18 +61,17 @@ impl Measured {
     }
 }
 
-/// Orientations on one clock, up to a constant rotation on either side: `fixed_from_body` at increasing stamps.
-///
-/// From a gyroscope they are its integral; from a gimbal, its attitudes relative to the earth.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct OrientationSeries {
-    samples: Vec<(i64, UnitQuaternion<f64>)>,
-    /// True if the noise between samples exceeds that of the images, as for measured joint angles.
-    is_noisy: bool,
+/// Rotations on the clock with which the camera's is compared.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RotationReference {
+    Gyroscope(AngularRates),
+    /// Orientations `fixed_from_body` at increasing stamps, up to a constant rotation on either side, as from a gimbal's
+    /// joints. Their noise exceeds that of the images: only rotations over longer times are precise.
+    Orientations(Vec<(i64, UnitQuaternion<f64>)>),
 }
 
-impl OrientationSeries {
-    /// Series of orientations with stamps in nanoseconds; samples whose stamp does not increase are omitted.
+impl RotationReference {
+    /// Orientations with stamps in nanoseconds; those whose stamp does not increase are omitted.
     pub fn from_orientations(orientations: impl IntoIterator<Item = (i64, UnitQuaternion<f64>)>) -> Self {
         let mut samples: Vec<(i64, UnitQuaternion<f64>)> = Vec::new();
         for (stamp_ns, orientation) in orientations {
@@ -79,45 +79,33 @@ impl OrientationSeries {
                 samples.push((stamp_ns, orientation));
             }
         }
-        Self { samples, is_noisy: false }
+        Self::Orientations(samples)
     }
 
-    /// Marks the series as noisy: only rotations over longer times are precise.
-    #[must_use]
-    pub fn with_noise(self) -> Self {
-        Self { is_noisy: true, ..self }
-    }
-
-    /// Integral of angular velocities in rad/s with stamps in nanoseconds.
-    pub fn from_angular_velocities(rates: impl IntoIterator<Item = (i64, Vector3<f64>)>) -> Self {
-        let mut orientation = UnitQuaternion::identity();
-        let mut previous: Option<(i64, Vector3<f64>)> = None;
-        let integrated = rates.into_iter().filter_map(move |(stamp_ns, rate)| {
-            if let Some((before_ns, before)) = previous {
-                if stamp_ns <= before_ns {
-                    return None;
-                }
-                orientation *= so3::exp(&((before + rate) * (0.5 * seconds_from_ns(stamp_ns - before_ns))));
-            }
-            previous = Some((stamp_ns, rate));
-            Some((stamp_ns, orientation))
-        });
-        Self { samples: integrated.collect(), is_noisy: false }
+    fn is_noisy(&self) -> bool {
+        matches!(self, Self::Orientations(_))
     }
 
     /// First and last stamp; `None` without samples.
     fn range_ns(&self) -> Option<(i64, i64)> {
-        Some((self.samples.first()?.0, self.samples.last()?.0))
+        match self {
+            Self::Gyroscope(rates) => {
+                rates.range_s().map(|(from_s, to_s)| (ns_from_seconds(from_s), ns_from_seconds(to_s)))
+            }
+            Self::Orientations(samples) => Some((samples.first()?.0, samples.last()?.0)),
+        }
     }
 
-    /// Interpolated orientation; `None` outside the series.
-    fn at(&self, stamp_ns: i64) -> Option<UnitQuaternion<f64>> {
-        rotation_at(&self.samples, stamp_ns, i64::MAX)
-    }
-
-    /// Rotation vector of `second_from_first` between two times, in radians.
+    /// Rotation vector of `second_from_first` between two times, in radians; `None` outside the samples.
     fn rotation(&self, from_ns: i64, to_ns: i64) -> Option<Vector3<f64>> {
-        Some(so3::log(&(self.at(to_ns)?.inverse() * self.at(from_ns)?)))
+        let rotation = match self {
+            Self::Gyroscope(rates) => rates.rotation_between(seconds_from_ns(from_ns), seconds_from_ns(to_ns))?,
+            Self::Orientations(samples) => {
+                let at = |stamp_ns| rotation_at(samples, stamp_ns, i64::MAX);
+                at(to_ns)?.inverse() * at(from_ns)?
+            }
+        };
+        Some(so3::log(&rotation))
     }
 }
 
@@ -215,11 +203,11 @@ pub enum AlignmentError {
 /// If there are too few rotations, or no single offset explains them.
 pub fn align_clocks(
     images: &[ImageRotation],
-    reference: &OrientationSeries,
+    reference: &RotationReference,
     guess_s: f64,
     search_s: f64,
 ) -> Result<ClockAlignment, AlignmentError> {
-    if !reference.is_noisy {
+    if !reference.is_noisy() {
         return align_rotations(&single(images), reference, guess_s, search_s);
     }
     let images = &without_outliers(images);
@@ -298,7 +286,7 @@ fn mean_rate(images: &[ImageRotation], around_ns: i64, half_ns: i64) -> Option<V
 
 fn align_rotations(
     measured: &[Measured],
-    reference: &OrientationSeries,
+    reference: &RotationReference,
     guess_s: f64,
     search_s: f64,
 ) -> Result<ClockAlignment, AlignmentError> {
