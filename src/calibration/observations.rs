@@ -2,15 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector3;
-
 use super::frame_sets::FrameSet;
-use super::landmark::{self, AnchoredLandmark};
+use super::landmark::AnchoredLandmark;
 use super::state::{Camera, ViewId};
 use super::visual::{Observation, PixelModel, Track};
 use super::{CalibrationInput, CalibrationOptions};
 use crate::frontend::{FeatureId, TrackedFrame};
-use crate::optimization::CameraPose;
+use crate::optimization::{CameraPose, Ray};
 
 /// Tracked features of a camera in a frame set.
 pub(super) fn tracked<'a>(
@@ -66,12 +64,12 @@ pub(super) fn triangulated(
     tracks
         .into_iter()
         .filter_map(|track| {
-            let rays: Vec<(CameraPose, Vector3<f64>)> = track
-                .observations
-                .iter()
-                .filter_map(|observation| Some((*poses.get(&observation.view)?, observation.bearing)))
-                .collect();
-            let landmark = landmark::triangulate(&rays, options.min_parallax_rad)?;
+            let ray = |observation: &Observation| {
+                let pose = poses.get(&observation.view)?;
+                Some(Ray { centre: pose.position_m, direction: pose.rotation * observation.bearing })
+            };
+            let rays: Vec<Ray> = track.observations.iter().filter_map(ray).collect();
+            let landmark = AnchoredLandmark::triangulate(&rays, options.min_parallax_rad)?;
             Some((track, landmark))
         })
         .unzip()

@@ -14,6 +14,7 @@ mod problem;
 mod report;
 mod start;
 mod state;
+mod stationary;
 mod step_input;
 #[cfg(test)]
 mod tests;

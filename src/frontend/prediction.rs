@@ -2,7 +2,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 use crate::gimbal::ClassicalChain;
-use crate::sensors::ImuSample;
+use crate::sensors::{ImuSample, rotation_steps};
 
 /// Predicted rotation of a camera between two images, with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,18 +152,15 @@ pub fn predict_camera_rotation(
     noise: &PredictionNoise,
 ) -> Option<PredictedRotation> {
     let (first, last) = (imu.first()?, imu.last()?);
-    if imu.len() < 2 {
+    if imu.len() < 2 || !imu.is_sorted_by_key(|sample| sample.stamp_ns) {
         return None;
     }
     let mut imu_previous_from_imu_now = UnitQuaternion::identity();
-    for pair in imu.windows(2) {
-        let duration_s = seconds_from_ns(pair[1].stamp_ns - pair[0].stamp_ns);
-        let mean = 0.5 * (pair[0].angular_velocity_rad_per_s + pair[1].angular_velocity_rad_per_s);
-        let angle = (mean - gyroscope_bias_rad_per_s) * duration_s;
-        if duration_s < 0.0 || !angle.iter().all(|value| value.is_finite()) {
+    for step in rotation_steps(imu, gyroscope_bias_rad_per_s) {
+        if !step.iter().all(|value| value.is_finite()) {
             return None;
         }
-        imu_previous_from_imu_now *= so3::exp(&angle);
+        imu_previous_from_imu_now *= so3::exp(&step);
     }
     let imu_now_from_imu_previous = imu_previous_from_imu_now.inverse();
     let camera_now_from_imu = now.imu_from_camera().inverse();

@@ -1,4 +1,5 @@
-//! Rotations, rigid transforms and the perturbation rule; tangent plane of a direction, median, quantiles of χ².
+//! Rotations, rigid transforms and the perturbation rule; tangent plane of a direction, mean and spread of
+//! vectors, median, quantiles of χ².
 //!
 //! The rule is written here once: a perturbation is `[φ; δt]`, rotation first, with `R ← R·Exp(φ)` (right, local) and
 //! `t ← t + δt` (a vector in the outer frame).
@@ -13,6 +14,7 @@ mod split_mix;
 #[cfg(test)]
 mod tests;
 pub(crate) mod triangular_factor;
+mod vector_statistics;
 
 pub use dimension::Dimension;
 pub use rigid_transform::RigidTransform;
@@ -21,3 +23,4 @@ pub use scalars::{
     mean_square_quantile, median, ns_from_seconds, principal_angle, seconds_from_ns, tangent_basis, wrap_angle,
 };
 pub use split_mix::SplitMix64;
+pub use vector_statistics::{mean, standard_deviation};

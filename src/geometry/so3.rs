@@ -15,6 +15,12 @@ pub fn exp(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_scaled_axis(*phi)
 }
 
+/// Rotation vector (rad) of a body over `duration_s` whose angular rate (rad/s, body frame) changes linearly from
+/// `first` to `second`: two terms of the Magnus expansion, with an error of the fifth order in the duration.
+pub fn of_linear_rate(first: &Vector3<f64>, second: &Vector3<f64>, duration_s: f64) -> Vector3<f64> {
+    (first + second) * 0.5 * duration_s + first.cross(second) * (duration_s * duration_s / 12.0)
+}
+
 /// `Log(R)`, the rotation vector in radians with norm at most π.
 pub fn log(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     let q = if rotation.w < 0.0 { -rotation.into_inner() } else { rotation.into_inner() };

@@ -8,7 +8,7 @@ use super::readout::between_first_rows;
 use super::statistics::median;
 use super::survey::Survey;
 use super::{Area, Findings, ImageRotation, Severity};
-use crate::geometry::{ns_from_seconds, so3};
+use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
@@ -83,7 +83,8 @@ impl HandEye<'_> {
         };
         let pair = |rotation: &ImageRotation| {
             let (from_ns, to_ns) = (rotation.from_ns + shift, rotation.to_ns + shift);
-            let rotation_of_imu = imu_rotation(self.imu_facts, from_ns, to_ns)?;
+            let [from_s, to_s] = [from_ns, to_ns].map(seconds_from_ns);
+            let rotation_of_imu = self.imu_facts.gyroscope.rotation_between(from_s, to_s)?;
             let predicted =
                 so3::log(&(imu_from_camera(to_ns)?.inverse() * rotation_of_imu * imu_from_camera(from_ns)?));
             Some((predicted, so3::log(&rotation.second_from_first)))
@@ -198,28 +199,6 @@ impl HandEye<'_> {
         });
         misfits.filter(|(_, misfit)| *misfit < 0.5 * given_rad).min_by(|a, b| a.1.total_cmp(&b.1))
     }
-}
-
-/// Rotation of the IMU between two times by its gyroscope, bias removed: `second_from_first`, which rotates vectors
-/// from the first IMU frame to the second.
-pub(super) fn imu_rotation(imu_facts: &ImuFacts, from_ns: i64, to_ns: i64) -> Option<UnitQuaternion<f64>> {
-    let samples = &imu_facts.samples;
-    let (first, last) = (samples.first()?.stamp_ns, samples.last()?.stamp_ns);
-    if from_ns < first || to_ns > last || to_ns <= from_ns {
-        return None;
-    }
-    let bias = imu_facts.gyroscope_bias_rad_per_s.unwrap_or_default();
-    let mut first_from_now = UnitQuaternion::identity();
-    let first_sample = samples.partition_point(|sample| sample.stamp_ns <= from_ns).saturating_sub(1);
-    for pair in samples[first_sample..].windows(2) {
-        let (start, end) = (pair[0].stamp_ns.max(from_ns), pair[1].stamp_ns.min(to_ns));
-        if start >= to_ns {
-            break;
-        }
-        let rate = (pair[0].angular_velocity_rad_per_s + pair[1].angular_velocity_rad_per_s) * 0.5 - bias;
-        first_from_now *= so3::exp(&(rate * ((end - start).max(0) as f64 * 1e-9)));
-    }
-    Some(first_from_now.inverse())
 }
 
 /// Rotation that minimizes `Σ |measured − R·predicted|²` (Wahba's problem, by SVD), with the ratio of the second

@@ -2,41 +2,26 @@ use nalgebra::Vector3;
 
 use super::imu_noise::check_noise;
 use super::spectrum::Spectrum;
-use super::statistics::{mean, median, standard_deviation};
+use super::stationary::{Stamped, StationaryTest, WINDOW_NS, Window};
+use super::statistics::median;
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
-use crate::geometry::seconds_from_ns;
-use crate::sensors::{ImuSample, Rig};
+use crate::geometry::{mean, seconds_from_ns};
+use crate::sensors::{AngularRates, ImuSample, Rig};
 
 /// Norm of the specific force below which it counts as unset in the message.
 const NO_FORCE_M_PER_S2: f64 = 0.01;
-/// Length of the windows that are classified as stationary or moving.
-pub(super) const WINDOW_NS: i64 = 500_000_000;
-/// Half width of the Hann window that separates motion from vibration and white noise: frequencies below 4 Hz remain.
-pub(super) const SMOOTHING_NS: i64 = 125_000_000;
-/// Step of the smoothed signal.
-const SMOOTHED_STEP_NS: i64 = 31_250_000;
-/// Upper bound for a stationary window: standard deviation of the smoothed angular rate, white noise removed.
-const STATIONARY_RATE_RAD_PER_S: f64 = 0.012;
-/// Upper bound for a stationary window: standard deviation of the smoothed specific force, white noise removed.
-const STATIONARY_FORCE_M_PER_S2: f64 = 0.06;
-/// Upper bound for a stationary window: mean angular rate, bias included.
-const STATIONARY_MEAN_RAD_PER_S: f64 = 0.08;
-/// Half a second of IMU samples.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Window {
-    pub(super) start_ns: i64,
-    pub(super) end_ns: i64,
-    pub(super) stationary: bool,
-    mean_rate: Vector3<f64>,
-    mean_force: Vector3<f64>,
-}
+/// Standard deviations of the smoothed angular rate (rad/s) and specific force (m/s²) of a stationary or hovering
+/// vehicle, white noise removed.
+const STATIONARY_MOTION: [f64; 2] = [0.012, 0.06];
 
 /// IMU samples and quantities derived from them, for later checks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ImuFacts {
     /// Finite samples, ordered by stamp.
     pub(super) samples: Vec<ImuSample>,
+    /// Angular rates of the samples without bias.
+    pub(super) gyroscope: AngularRates,
     /// Mean angular rate while stationary, in the IMU frame; `None` if the vehicle is never stationary.
     pub(super) gyroscope_bias_rad_per_s: Option<Vector3<f64>>,
     /// Time and mean specific force (IMU frame, m/s²) of a stationary window; without one, the middle and the mean of
@@ -82,78 +67,31 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
     check_clipping(&samples, findings);
     check_stationary(&windows, findings);
     let forces = || samples.iter().map(|sample| sample.specific_force_m_per_s2).collect::<Vec<_>>();
+    let middle_ns = |(start_ns, end_ns): (i64, i64)| start_ns.midpoint(end_ns);
     let stationary_up =
-        stationary.get(stationary.len() / 2).map(|window| (window.start_ns.midpoint(window.end_ns), window.mean_force));
+        stationary.get(stationary.len() / 2).map(|window| (middle_ns(window.range_ns), window.mean_force));
     let up = stationary_up.unwrap_or_else(|| (samples[samples.len() / 2].stamp_ns, mean(&forces())));
-    ImuFacts { samples, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up) }
+    let bias = gyroscope_bias.unwrap_or_default();
+    let unbiased = rates.iter().map(|(stamp_ns, rate)| (seconds_from_ns(*stamp_ns), rate - bias));
+    let gyroscope = AngularRates::new(unbiased).bridging_gaps();
+    ImuFacts { samples, gyroscope, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up) }
 }
-
-/// Stamp and vector in the IMU frame.
-pub(super) type Stamped = (i64, Vector3<f64>);
 
 /// Windows of a log from its angular rates and specific forces, both ordered by stamp.
 fn windows_of(rates: &[Stamped], forces: &[Stamped], spectra: &[Option<Spectrum>; 2]) -> Vec<Window> {
+    let densities = spectra.each_ref().map(|spectrum| spectrum.as_ref().map_or(0.0, |spectrum| spectrum.density));
+    let test = StationaryTest::new(STATIONARY_MOTION, densities, 1.0);
     let mut windows = Vec::new();
-    let white = |sensor: usize| spectra[sensor].as_ref().map_or(0.0, |spectrum| smoothed_white(spectrum.density));
-    let slow_rate = |range: (i64, i64)| (smoothed_deviation(rates, range).powi(2) - white(0)).max(0.0).sqrt();
-    let slow_force = |range: (i64, i64)| (smoothed_deviation(forces, range).powi(2) - white(1)).max(0.0).sqrt();
     let mut begin = 0;
     while begin < rates.len() {
         let start_ns = rates[begin].0;
-        let end_ns = start_ns + WINDOW_NS;
-        let end = rates.partition_point(|(stamp_ns, _)| *stamp_ns < end_ns);
+        let end = rates.partition_point(|(stamp_ns, _)| *stamp_ns < start_ns + WINDOW_NS);
         if end - begin >= 20 && rates.len() > end {
-            let range = (start_ns, end_ns);
-            let mean_rate = mean(&vectors_within(rates, range));
-            windows.push(Window {
-                start_ns,
-                end_ns,
-                stationary: slow_rate(range) < STATIONARY_RATE_RAD_PER_S
-                    && slow_force(range) < STATIONARY_FORCE_M_PER_S2
-                    && mean_rate.norm() < STATIONARY_MEAN_RAD_PER_S,
-                mean_rate,
-                mean_force: mean(&vectors_within(forces, range)),
-            });
+            windows.push(test.window(rates, forces, start_ns));
         }
         begin = end;
     }
     windows
-}
-
-/// Variance of a smoothed vector of white noise of this density per axis. A Hann window of width `w` averages noise to a
-/// bandwidth of `1.5 / w`.
-pub(super) fn smoothed_white(density: f64) -> f64 {
-    3.0 * density * density * 1.5 / seconds_from_ns(2 * SMOOTHING_NS)
-}
-
-fn within(samples: &[Stamped], (start_ns, end_ns): (i64, i64)) -> &[Stamped] {
-    let before = |time_ns: i64| samples.partition_point(|(stamp_ns, _)| *stamp_ns < time_ns);
-    samples.get(before(start_ns)..before(end_ns)).unwrap_or_default()
-}
-
-pub(super) fn vectors_within(samples: &[Stamped], range: (i64, i64)) -> Vec<Vector3<f64>> {
-    within(samples, range).iter().map(|(_, vector)| *vector).collect()
-}
-
-/// Norm of the standard deviation of the smoothed signal within a range of time; infinite without samples.
-pub(super) fn smoothed_deviation(samples: &[Stamped], (start_ns, end_ns): (i64, i64)) -> f64 {
-    let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return f64::INFINITY };
-    let mut smoothed = Vec::new();
-    let mut centre_ns = start_ns.max(first.0 + SMOOTHING_NS);
-    while centre_ns < end_ns.min(last.0 - SMOOTHING_NS) {
-        let (mut sum, mut weights) = (Vector3::zeros(), 0.0);
-        for (stamp_ns, vector) in within(samples, (centre_ns - SMOOTHING_NS, centre_ns + SMOOTHING_NS)) {
-            let place = (stamp_ns - centre_ns) as f64 / SMOOTHING_NS as f64;
-            let weight = 0.5 + 0.5 * (std::f64::consts::PI * place).cos();
-            sum += vector * weight;
-            weights += weight;
-        }
-        if weights > 0.0 {
-            smoothed.push(sum / weights);
-        }
-        centre_ns += SMOOTHED_STEP_NS;
-    }
-    if smoothed.is_empty() { f64::INFINITY } else { standard_deviation(&smoothed).norm() }
 }
 
 fn check_gravity(
@@ -287,12 +225,12 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
 
 /// Finds periods in which the vehicle is stationary or hovers: such motion neither initializes nor calibrates.
 fn check_stationary(windows: &[Window], findings: &mut Findings) {
-    let total_s: f64 = windows.iter().map(|window| seconds_from_ns(window.end_ns - window.start_ns)).sum();
+    let total_s = windows.len() as f64 * seconds_from_ns(WINDOW_NS);
     let mut periods: Vec<(i64, i64)> = Vec::new();
-    for window in windows.iter().filter(|window| window.stationary) {
-        match periods.last_mut().filter(|last| window.start_ns - last.1 < WINDOW_NS / 2) {
-            Some(last) => last.1 = window.end_ns,
-            None => periods.push((window.start_ns, window.end_ns)),
+    for (start_ns, end_ns) in windows.iter().filter(|window| window.stationary).map(|window| window.range_ns) {
+        match periods.last_mut().filter(|last| start_ns - last.1 < WINDOW_NS / 2) {
+            Some(last) => last.1 = end_ns,
+            None => periods.push((start_ns, end_ns)),
         }
     }
     periods.retain(|(begin, end)| end - begin >= 2 * WINDOW_NS);

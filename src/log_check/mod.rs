@@ -20,6 +20,7 @@ mod rig_sanity;
 mod rotation;
 mod source_fit;
 mod spectrum;
+mod stationary;
 mod statistics;
 mod still_pixels;
 mod survey;
@@ -28,7 +29,7 @@ mod tests;
 mod timing;
 
 pub use self::clock_alignment::{
-    AlignmentError, AlignmentReference, ClockAlignment, OrientationSeries, align_camera, align_clocks,
+    AlignmentError, AlignmentReference, ClockAlignment, RotationReference, align_camera, align_clocks,
 };
 
 pub use self::noise::{

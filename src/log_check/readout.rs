@@ -3,10 +3,10 @@
 use super::imu_facts::ImuFacts;
 use super::{Area, Findings, ImageRotation, Severity};
 use crate::frontend::readout::{
-    AngularRates, ImagePair, ReadoutMeasurement, ReadoutOptions, measure_readout, rotations_of_first_rows,
+    ImagePair, ReadoutMeasurement, ReadoutOptions, measure_readout, rotations_of_first_rows,
 };
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
-use crate::sensors::{CameraMount, CameraRig};
+use crate::sensors::{AngularRates, CameraMount, CameraRig};
 
 /// A readout is reported if it differs from the rig's by more standard deviations than this.
 const SIGNIFICANT_SIGMAS: f64 = 5.0;

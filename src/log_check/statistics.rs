@@ -1,7 +1,5 @@
 //! Small statistics over plain numbers.
 
-use nalgebra::Vector3;
-
 use crate::geometry;
 
 /// Quantile at `fraction` (0 to 1) of the values, nearest rank; 0 without values.
@@ -15,20 +13,6 @@ pub(super) fn percentile(values: &[f64], fraction: f64) -> f64 {
 /// Median; 0 without values.
 pub(super) fn median(values: &[f64]) -> f64 {
     geometry::median(values.iter().copied()).unwrap_or(0.0)
-}
-
-/// Mean of vectors; zero without vectors.
-pub(super) fn mean(vectors: &[Vector3<f64>]) -> Vector3<f64> {
-    let sum: Vector3<f64> = vectors.iter().sum();
-    if vectors.is_empty() { sum } else { sum / vectors.len() as f64 }
-}
-
-/// Standard deviation of each component.
-pub(super) fn standard_deviation(vectors: &[Vector3<f64>]) -> Vector3<f64> {
-    let centre = mean(vectors);
-    let squares: Vec<Vector3<f64>> =
-        vectors.iter().map(|vector| (vector - centre).map(|entry| entry * entry)).collect();
-    mean(&squares).map(f64::sqrt)
 }
 
 /// Slope and standard error of `y` over `x` by least squares; zeros for fewer than three points.

@@ -1,5 +1,5 @@
-//! Shared parts of all least-squares problems: landmark and reprojection residual with their Jacobians, robust loss,
-//! elimination of landmarks, damped solver.
+//! Shared parts of all least-squares problems: landmark with its triangulation, reprojection residual with its
+//! Jacobians, robust loss, elimination of landmarks, damped solver.
 //!
 //! Residuals are predicted minus measured; poses are perturbed by the rule of [`crate::geometry`]. A problem has
 //! separate unknowns and assembly: it linearizes observations by camera poses here (`reprojection`), eliminates the
@@ -18,6 +18,7 @@ mod robust_loss;
 mod schur;
 #[cfg(test)]
 mod tests;
+mod triangulation;
 
 pub(crate) use block_term::{BlockTerm, PoseBlocksOf};
 pub(crate) use cholesky::Cholesky;
@@ -29,3 +30,4 @@ pub(crate) use reprojection::{CameraPose, RelativePose, RelativePoses, Reproject
 pub(crate) use robust_loss::LossSum;
 pub use robust_loss::RobustLoss;
 pub(crate) use schur::{DensePoseEquations, ReducedEquations, ReprojectionEquations, SparsePoseEquations};
+pub(crate) use triangulation::{Ray, TriangulationOptions, triangulate};

@@ -3,8 +3,8 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3, Vector6};
 use super::damped::{DampedOptions, DampedProblem, StopReason, minimize};
 use super::reprojection::{self, Projection, TangentPlane};
 use super::{
-    BlockTerm, CameraPose, Cholesky, DensePoseEquations, Landmark, LandmarkRows, LossSum, RelativePose, Reprojection,
-    ReprojectionEquations, RobustLoss,
+    BlockTerm, CameraPose, Cholesky, DensePoseEquations, Landmark, LandmarkRows, LossSum, Ray, RelativePose,
+    Reprojection, ReprojectionEquations, RobustLoss, TriangulationOptions, triangulate,
 };
 use crate::camera::{self, CameraModel, Distortion};
 use crate::geometry::{RigidTransform, SplitMix64, so3};
@@ -272,4 +272,48 @@ fn the_length_of_a_step_is_in_marginal_standard_deviations() {
         let length = factor.trailing_length(count, &step);
         assert!((length - expected).abs() < 1e-9 * expected, "{count} unknowns: {length}, {expected}");
     }
+}
+
+const TRIANGULATION: TriangulationOptions =
+    TriangulationOptions { rounds: 3, min_parallax_rad: 0.01, of_all_pairs: false, max_error_rad: 0.01 };
+
+fn ray(centre: Vector3<f64>, point: Vector3<f64>) -> Ray {
+    Ray { centre, direction: (point - centre).normalize() }
+}
+
+#[test]
+fn triangulation_meets_the_point() {
+    let mut random = SplitMix64::new(4);
+    let options = TriangulationOptions { of_all_pairs: true, min_parallax_rad: 1e-3, ..TRIANGULATION };
+    for _ in 0..100 {
+        let point = vector(&mut random, 3.0) + Vector3::new(0.0, 0.0, 7.0);
+        let rays: Vec<Ray> = (0..4).map(|_| ray(vector(&mut random, 1.0), point)).collect();
+        let found = triangulate(&rays, &TriangulationOptions { max_error_rad: 1e-9, ..options }).unwrap();
+        assert!((found - point).norm() < 1e-9);
+    }
+    assert!(triangulate(&[ray(Vector3::zeros(), Vector3::z())], &options).is_none());
+    let parallel = [Vector3::zeros(), Vector3::x()].map(|centre| ray(centre, centre + Vector3::z()));
+    assert!(triangulate(&parallel, &options).is_none());
+    assert!(triangulate(&[], &options).is_none());
+}
+
+#[test]
+fn parallax_of_a_triangulation_is_that_of_the_chosen_pairs() {
+    let point = Vector3::new(0.0, 0.0, 10.0);
+    // The other two rays differ from the first by less than the least parallax, from each other by more.
+    let rays = [0.0, 0.08, -0.08].map(|x| ray(Vector3::new(x, 0.0, 0.0), point));
+    assert!(triangulate(&rays, &TRIANGULATION).is_none());
+    assert!(triangulate(&rays, &TriangulationOptions { of_all_pairs: true, ..TRIANGULATION }).is_some());
+}
+
+#[test]
+fn points_behind_a_camera_or_far_from_a_ray_are_not_triangulated() {
+    let wide = TriangulationOptions::of_anchored(0.01);
+    let second = Vector3::x();
+    let diverging =
+        [ray(Vector3::zeros(), Vector3::new(-1.0, 0.0, 5.0)), ray(second, second + Vector3::new(1.0, 0.0, 5.0))];
+    assert!(triangulate(&diverging, &wide).is_none());
+    let skew = [ray(Vector3::zeros(), Vector3::new(0.0, 0.0, 5.0)), ray(second, Vector3::new(0.0, 0.4, 5.0))];
+    assert!(triangulate(&skew, &TRIANGULATION).is_none());
+    assert!(triangulate(&skew, &wide).is_some());
 }

@@ -1,5 +1,7 @@
 use nalgebra::Vector3;
 
+use crate::geometry::seconds_from_ns;
+
 /// IMU sample in the IMU frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuSample {
@@ -8,6 +10,14 @@ pub struct ImuSample {
     pub angular_velocity_rad_per_s: Vector3<f64>,
     /// Specific force: +g upwards when stationary.
     pub specific_force_m_per_s2: Vector3<f64>,
+}
+
+/// Rotation vector (rad) from each sample to the next, at their mean angular velocity without a bias (rad/s).
+pub fn rotation_steps<'a>(samples: &'a [ImuSample], bias: &'a Vector3<f64>) -> impl Iterator<Item = Vector3<f64>> + 'a {
+    samples.windows(2).map(move |pair| {
+        let mean = (pair[0].angular_velocity_rad_per_s + pair[1].angular_velocity_rad_per_s) * 0.5;
+        (mean - bias) * seconds_from_ns(pair[1].stamp_ns - pair[0].stamp_ns)
+    })
 }
 
 /// Continuous-time noise densities of an IMU, as in Kalibr.

@@ -1,6 +1,7 @@
 //! Plain types of sensor data and rig: IMU samples, joint angles, gray images, noise densities. They do not
 //! depend on the source of the data (log, simulation, driver).
 
+mod angular_rates;
 mod attitude_source;
 mod camera_values;
 mod fixed_gimbal;
@@ -13,12 +14,13 @@ mod named_axes;
 mod pose;
 mod rig;
 
+pub use angular_rates::AngularRates;
 pub use attitude_source::{
     AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, EulerAngles, EulerRotation,
 };
 pub use gray_image::GrayImage;
 pub use image_mask::ImageMask;
-pub use imu::{ImuNoise, ImuSample};
+pub use imu::{ImuNoise, ImuSample, rotation_steps};
 pub use imu_intrinsics::{ImuIntrinsics, ImuIntrinsicsParameters, KalibrImuMatrices, ScaleMisalignment};
 pub use joints::{JointAngles, JointMotionFit, JointSample};
 pub use named_axes::{BodyAxes, NamedAxes};

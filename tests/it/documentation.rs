@@ -9,9 +9,10 @@ use std::process::Command;
 
 use dcvins::session::{ForkChanges, ParameterizationChoice, RunSpec};
 use dcvins::simulation::Disturbances;
-use dcvins::text::Named;
+use dcvins::text::Named as _;
 
 const DOCUMENT: &str = "docs/mathematics.md";
+const MAP: &str = "docs/architecture.md";
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -202,7 +203,7 @@ fn commands_and_options_are_those_of_the_program() {
 
 /// Checks that a document holds a table with exactly these rows.
 fn has_table(document: &str, head: &str, rows: &[String]) {
-    let text = fs::read_to_string(root().join(document)).unwrap();
+    let text = fs::read_to_string(root().join(document)).expect("the document can be read");
     let table = text.split_once(&format!("\n{head}\n| --- | --- |\n")).map(|(_, rest)| rest);
     let table = table.unwrap_or_else(|| panic!("{document} has no table '{head}'"));
     let documented: Vec<&str> = table.lines().take_while(|line| line.starts_with('|')).collect();
@@ -226,4 +227,74 @@ fn tables_of_keys_are_those_of_the_definitions() {
     let keys = ForkChanges::KEYS.iter().map(|key| key.document_row(&ForkChanges::default()));
     let rows: Vec<String> = std::iter::once(parameterization).chain(keys).collect();
     has_table("docs/manual.md", "| change | meaning |", &rows);
+}
+
+/// Files and folders in backticks, without those in code blocks. A file that is followed by a colon and by names in
+/// backticks between commas has these names: `path.rs`: `function`, `Type::function`.
+fn named_paths(text: &str) -> Vec<(String, Vec<String>)> {
+    let mut code = false;
+    let prose = text.lines().filter(|line| {
+        let fence = line.starts_with("```");
+        code ^= fence;
+        !code && !fence
+    });
+    let prose = prose.collect::<Vec<_>>().join("\n");
+    let pieces: Vec<&str> = prose.split('`').collect();
+    let mut named: Vec<(String, Vec<String>)> = Vec::new();
+    // Text before the next name of the last file; `None` if it has no further names.
+    let mut separator = None;
+    for pair in pieces.chunks_exact(2) {
+        let (before, quoted) = (pair[0], pair[1]);
+        if [".rs", ".md", "/"].iter().any(|end| quoted.ends_with(end)) {
+            named.push((quoted.to_owned(), Vec::new()));
+            separator = (Path::new(quoted).extension() == Some(OsStr::new("rs"))).then_some(": ");
+        } else if let Some((_, names)) = named.last_mut().filter(|_| separator == Some(before)) {
+            names.push(quoted.to_owned());
+            separator = Some(", ");
+        } else {
+            separator = None;
+        }
+    }
+    named
+}
+
+fn has_word(text: &str, word: &str) -> bool {
+    let inside = |letter: char| letter.is_alphanumeric() || letter == '_';
+    text.match_indices(word)
+        .any(|(at, _)| !text[..at].ends_with(inside) && !text[at + word.len()..].starts_with(inside))
+}
+
+#[test]
+fn files_of_the_map_exist_and_contain_its_names() {
+    let named = named_paths(&fs::read_to_string(root().join(MAP)).unwrap());
+    let mut missing = Vec::new();
+    for (path, names) in &named {
+        let places = [root().join("src").join(path), root().join(path)];
+        let Some(found) = places.into_iter().find(|place| place.exists()) else {
+            missing.push(path.clone());
+            continue;
+        };
+        let source = if names.is_empty() { String::new() } else { fs::read_to_string(found).unwrap() };
+        let lacks = |name: &&String| !name.split("::").all(|word| has_word(&source, word));
+        missing.extend(names.iter().filter(lacks).map(|name| format!("{path}: {name}")));
+    }
+    assert!(missing.is_empty(), "{MAP} names what does not exist:\n{}", missing.join("\n"));
+    let names: usize = named.iter().map(|(_, names)| names.len()).sum();
+    assert!(named.len() >= 200 && names >= 150, "only {} paths and {names} names were found", named.len());
+}
+
+#[test]
+fn paths_of_the_map_are_read_with_their_names() {
+    let check = |text: &str, expected: &[(&str, &[&str])]| {
+        let found = named_paths(text);
+        let found: Vec<(&str, Vec<&str>)> =
+            found.iter().map(|(path, names)| (path.as_str(), names.iter().map(String::as_str).collect())).collect();
+        let expected: Vec<(&str, Vec<&str>)> = expected.iter().map(|(path, names)| (*path, names.to_vec())).collect();
+        assert_eq!(found, expected, "{text}");
+    };
+    check("in `a/b.rs`: `C::d`, `e` and `f`; `g`", &[("a/b.rs", &["C::d", "e"])]);
+    check("`a/b.rs`: `c`, `d/e.rs`: `f`", &[("a/b.rs", &["c"]), ("d/e.rs", &["f"])]);
+    check("`a/`: `b`, `c.md` or `d.rs` with `e`", &[("a/", &[]), ("c.md", &[]), ("d.rs", &[])]);
+    check("```sh\ncargo test `a.rs`\n```\n`b.rs`", &[("b.rs", &[])]);
+    assert!(has_word("fn step(&self)", "step") && !has_word("fn steps(my_step: f64)", "step"));
 }

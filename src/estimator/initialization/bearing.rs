@@ -1,4 +1,4 @@
-//! Geometry of unit bearings: rotation between two sets, triangulation, pose from known points.
+//! Geometry of unit bearings: rotation between two sets, pose from known points.
 
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
@@ -59,58 +59,6 @@ fn median_angle(pairs: &[(Vector3<f64>, Vector3<f64>)], rotation: &UnitQuaternio
 /// Angle between two unit vectors in radians, accurate for small angles too.
 pub fn angle_between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     a.cross(b).norm().atan2(a.dot(b))
-}
-
-/// Point triangulated from several bearings.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TriangulatedPoint {
-    /// Position in the frame of the camera poses.
-    pub position: Vector3<f64>,
-    /// Largest angle between two rays, in radians.
-    pub parallax_rad: f64,
-    /// True if the point lies in front of every observing camera.
-    pub in_front: bool,
-    /// Largest angle between a measured bearing and the direction to the point, in radians.
-    pub worst_angle_rad: f64,
-}
-
-/// Least-squares intersection of the rays `(world_from_camera, bearing)`, each weighted by the inverse square of its
-/// length; `None` when the rays are parallel or fewer than two.
-pub fn triangulate(rays: &[(RigidTransform, Vector3<f64>)]) -> Option<TriangulatedPoint> {
-    const ROUNDS: usize = 3;
-    if rays.len() < 2 {
-        return None;
-    }
-    let directions: Vec<Vector3<f64>> = rays.iter().map(|(pose, bearing)| pose.rotation * bearing).collect();
-    let pairs =
-        directions.iter().enumerate().flat_map(|(index, a)| directions[index + 1..].iter().map(move |b| (a, b)));
-    let widest = pairs.min_by(|(a, b), (c, d)| a.dot(b).total_cmp(&c.dot(d)));
-    let parallax_rad = widest.map_or(0.0, |(a, b)| angle_between(a, b));
-    let mut weights = vec![1.0; rays.len()];
-    let mut position = Vector3::zeros();
-    for _ in 0..ROUNDS {
-        let (mut normal, mut rhs) = (Matrix3::zeros(), Vector3::zeros());
-        for (((pose, _), direction), weight) in rays.iter().zip(&directions).zip(&weights) {
-            let across = (Matrix3::identity() - direction * direction.transpose()) * *weight;
-            normal += across;
-            rhs += across * pose.translation_m;
-        }
-        position = normal.cholesky()?.solve(&rhs);
-        for (weight, (pose, _)) in weights.iter_mut().zip(rays) {
-            *weight = 1.0 / (position - pose.translation_m).norm_squared().max(1e-12);
-        }
-    }
-    if !position.iter().all(|value| value.is_finite()) {
-        return None;
-    }
-    let mut in_front = true;
-    let mut worst_angle_rad = 0.0_f64;
-    for ((pose, _), direction) in rays.iter().zip(&directions) {
-        let to_point = position - pose.translation_m;
-        in_front &= to_point.dot(direction) > 0.0;
-        worst_angle_rad = worst_angle_rad.max(angle_between(&to_point, direction));
-    }
-    Some(TriangulatedPoint { position, parallax_rad, in_front, worst_angle_rad })
 }
 
 /// Camera pose estimated from known points.

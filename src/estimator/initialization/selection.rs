@@ -6,7 +6,7 @@ use super::bearing::fit_rotation;
 use super::{InitializationFrame, InitializationOptions};
 use crate::frontend::TrackedFeature;
 use crate::geometry::{seconds_from_ns, so3};
-use crate::sensors::ImuSample;
+use crate::sensors::rotation_steps;
 
 /// `first_imu_from_camera` rotation of every frame, from the bias-corrected gyroscope and the extrinsics.
 pub(super) fn guessed_rotations(
@@ -17,24 +17,13 @@ pub(super) fn guessed_rotations(
     let mut rotations = Vec::with_capacity(frames.len());
     for (index, frame) in frames.iter().enumerate() {
         if index > 0 {
-            first_from_imu *= gyroscope_rotation(frame.imu, gyroscope_bias);
+            let steps = rotation_steps(frame.imu, gyroscope_bias);
+            let finite = steps.filter(|step| step.iter().all(|value| value.is_finite()));
+            first_from_imu *= finite.fold(UnitQuaternion::identity(), |rotation, step| rotation * so3::exp(&step));
         }
         rotations.push(UnitQuaternion::new_normalize((first_from_imu * frame.imu_from_camera.rotation).into_inner()));
     }
     rotations
-}
-
-fn gyroscope_rotation(samples: &[ImuSample], bias: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let mut rotation = UnitQuaternion::identity();
-    for pair in samples.windows(2) {
-        let [from, to] = pair else { continue };
-        let rate = (from.angular_velocity_rad_per_s + to.angular_velocity_rad_per_s) * 0.5 - bias;
-        let rotation_vector = rate * seconds_from_ns(to.stamp_ns - from.stamp_ns);
-        if rotation_vector.iter().all(|value| value.is_finite()) {
-            rotation *= so3::exp(&rotation_vector);
-        }
-    }
-    rotation
 }
 
 /// Indices of the selected frames, ascending; the newest one is always selected.

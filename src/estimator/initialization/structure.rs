@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3, Vector6};
 
-use super::bearing::{RotationFit, fit_rotation, refine_camera_pose, triangulate};
+use super::bearing::{RotationFit, fit_rotation, refine_camera_pose};
 use super::relative_pose::{RelativePose, RotationPrior, relative_poses};
 use super::visual_problem::{
     BearingObservation, TrackedLandmark, between, mean_square, moved, visual_cost, visual_equations,
@@ -16,7 +16,7 @@ use super::visual_problem::{
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::RigidTransform;
 use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
-use crate::optimization::{DensePoseEquations, ReprojectionEquations};
+use crate::optimization::{DensePoseEquations, Ray, ReprojectionEquations, TriangulationOptions, triangulate};
 
 /// Smallest parallax of a landmark with a depth.
 const MIN_PARALLAX_RAD: f64 = 0.006;
@@ -278,18 +278,25 @@ impl GrowingMap<'_> {
     /// Retriangulates every feature of a view from all views placed so far; the other features have the same views as
     /// before.
     fn triangulate_seen_in(&mut self, view: usize) {
+        let limits = TriangulationOptions {
+            rounds: 3,
+            min_parallax_rad: MIN_PARALLAX_RAD,
+            of_all_pairs: true,
+            max_error_rad: OUTLIER_SIGMAS * self.sigma_rad,
+        };
         for (id, observations) in self.tracks {
             if observations.binary_search_by_key(&view, |(view, _)| *view).is_err() {
                 continue;
             }
-            let rays: Vec<(RigidTransform, Vector3<f64>)> =
-                observations.iter().filter_map(|(view, bearing)| Some((self.poses[*view]?, *bearing))).collect();
-            self.points.remove(id);
-            let Some(point) = triangulate(&rays) else { continue };
-            let fits = point.worst_angle_rad < OUTLIER_SIGMAS * self.sigma_rad;
-            if point.in_front && fits && point.parallax_rad > MIN_PARALLAX_RAD {
-                self.points.insert(*id, point.position);
-            }
+            let ray = |(view, bearing): &(usize, Vector3<f64>)| {
+                let pose = self.poses[*view]?;
+                Some(Ray { centre: pose.translation_m, direction: pose.rotation * bearing })
+            };
+            let rays: Vec<Ray> = observations.iter().filter_map(ray).collect();
+            match triangulate(&rays, &limits) {
+                Some(point) => self.points.insert(*id, point),
+                None => self.points.remove(id),
+            };
         }
     }
 

@@ -304,10 +304,10 @@ impl Preintegration {
         let a1 = to_corrected.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
         let a_half = (a0 + a1) * 0.5;
 
-        // Rotations over the first half and the whole interval, with the second Magnus term.
+        // Rotations over the first half and the whole interval.
         let w_half = (w0 + w1) * 0.5;
-        let phi_half = (w0 + w_half) * (0.25 * h) + w0.cross(&w_half) * (h * h / 48.0);
-        let phi = w_half * h + w0.cross(&w1) * (h * h / 12.0);
+        let phi_half = so3::of_linear_rate(&w0, &w_half, 0.5 * h);
+        let phi = so3::of_linear_rate(&w0, &w1, h);
         let half_rotation = so3::exp(&phi_half);
         let step_rotation = so3::exp(&phi);
 

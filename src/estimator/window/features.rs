@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 
 use crate::estimator::config::EstimatorOptions;
 use crate::estimator::state::camera_view::CameraView;
 use crate::frontend::{FeatureId, TrackedFeature};
-use crate::optimization::LandmarkModel;
-use crate::optimization::{CameraPose, Landmark};
+use crate::optimization::{self, CameraPose, Landmark, LandmarkModel, Ray, TriangulationOptions};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Observation {
@@ -78,42 +77,26 @@ fn moved(landmark: &Landmark, from: &CameraPose, to: &CameraPose) -> Option<Land
     })
 }
 
-/// Triangulates a feature from all its observations: least squares of the distances perpendicular to the bearings,
-/// weighted by depth in a second iteration. `None` when the parallax is too small, or the point is out of range
-/// or behind a camera.
+/// Triangulates a feature from all its observations. `None` with too few of them, or when the parallax is too small or
+/// the point out of range or behind a camera.
 pub(crate) fn triangulate(feature: &Feature, view: &CameraView<'_>, options: &EstimatorOptions) -> Option<Landmark> {
     let anchor = feature.observations.first()?;
     if feature.observations.len() < options.min_observations {
         return None;
     }
-    let in_world = |observation: &Observation| {
+    let ray = |observation: &Observation| {
         let pose = view.pose(observation.slot, &observation.uv_px);
-        (pose.rotation * view.bearing(&observation.uv_px, &observation.bearing), pose.position_m)
+        let direction = pose.rotation * view.bearing(&observation.uv_px, &observation.bearing);
+        Ray { centre: pose.position_m, direction }
     };
-    let rays: Vec<(Vector3<f64>, Vector3<f64>)> = feature.observations.iter().map(in_world).collect();
-    let opening = rays.iter().map(|(ray, _)| rays[0].0.cross(ray).norm()).fold(0.0, f64::max);
-    if opening < options.min_triangulation_angle_rad {
-        return None;
-    }
-    let mut point: Option<Vector3<f64>> = None;
-    for _ in 0..2 {
-        let mut normal = Matrix3::zeros();
-        let mut right = Vector3::zeros();
-        for (ray, centre) in &rays {
-            let distance = point.map_or(1.0, |known| (known - centre).norm().max(1e-3));
-            let across = (Matrix3::identity() - ray * ray.transpose()) / (distance * distance);
-            normal += across;
-            right += across * centre;
-        }
-        point = Some(normal.cholesky()?.solve(&right));
-    }
-    let point = point?;
-    let visible = rays.iter().all(|(ray, centre)| (point - centre).dot(ray) > 0.0);
+    let rays: Vec<Ray> = feature.observations.iter().map(ray).collect();
+    let limits = TriangulationOptions::of_anchored(options.min_triangulation_angle_rad);
+    let point = optimization::triangulate(&rays, &limits)?;
     let camera = view.pose(anchor.slot, &anchor.uv_px);
     let in_anchor = camera.rotation.transpose() * (point - camera.position_m);
     let distance = in_anchor.norm();
     let (nearest, farthest) = options.distance_range_m;
-    (visible && distance >= nearest && distance <= farthest).then(|| {
+    (distance >= nearest && distance <= farthest).then(|| {
         let bearing = match options.landmark_model {
             LandmarkModel::InverseDistance => view.bearing(&anchor.uv_px, &anchor.bearing),
             LandmarkModel::BearingAndInverseDistance => in_anchor / distance,

@@ -13,25 +13,14 @@ use crate::estimator::initialization::bearing::fit_rotation;
 use crate::estimator::report::{Event, EventKind};
 use crate::estimator::state::frame::Stationary;
 use crate::estimator::state::navigation::ImuBias;
+use crate::estimator::stationary::{ImuAverage, ImuSpread, MAX_PARALLAX_RAD, QUIET_NS};
 use crate::estimator::step_input::StepInput;
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::ImuNoise;
 
-/// Time for which both criteria must hold.
-const QUIET_NS: i64 = 1_000_000_000;
-
-/// Largest standard deviation of the angular velocity (worst axis, averaged between images), beyond the sensor noise.
-const MAX_ANGULAR_RATE_SPREAD_RAD_PER_S: f64 = 0.002;
-
 /// Largest mean angular velocity after bias correction (worst axis).
 const MAX_ANGULAR_RATE_RAD_PER_S: f64 = 0.01;
-
-/// Largest standard deviation of the specific force (worst axis, averaged between images), beyond the sensor noise.
-const MAX_FORCE_SPREAD_M_PER_S2: f64 = 0.03;
-
-/// Largest rotation-compensated parallax since the vehicle became stationary.
-const MAX_PARALLAX_RAD: f64 = 0.004;
 
 /// Largest estimated velocity: fast motion over a distant scene has no parallax either.
 const MAX_VELOCITY_M_PER_S: f64 = 0.5;
@@ -42,13 +31,12 @@ const MIN_COMMON: usize = 12;
 /// Resolution of the parallax: a tenth of a pixel at usual focal lengths.
 const MIN_PARALLAX_RAD: f64 = 2e-4;
 
-/// Angular velocity and specific force from one image to the next.
+/// IMU samples from one image to the next.
 #[derive(Clone, Copy, Debug)]
 struct Interval {
     end_ns: i64,
     duration_s: f64,
-    angular_velocity_rad_per_s: Vector3<f64>,
-    specific_force_m_per_s2: Vector3<f64>,
+    average: ImuAverage,
 }
 
 /// Reference image of the parallax.
@@ -104,9 +92,9 @@ impl StationaryDetector {
         self.take_interval(input);
         let before_ns = self.unmoved_since_ns;
         let parallax_rad = self.compare_image(input.stamp_ns, image);
-        let spread = self.spread(input.stamp_ns, image);
-        let quiet =
-            spread.as_ref().is_some_and(Spread::is_quiet) && image.velocity_norm_m_per_s <= MAX_VELOCITY_M_PER_S;
+        let spread = self.spread(input.stamp_ns, image.noise);
+        let quiet = spread.as_ref().is_some_and(|spread| is_quiet(spread, image.bias))
+            && image.velocity_norm_m_per_s <= MAX_VELOCITY_M_PER_S;
         let unmoved_ns = input.stamp_ns - self.unmoved_since_ns;
         if !quiet {
             self.required_ns = QUIET_NS;
@@ -158,17 +146,10 @@ impl StationaryDetector {
             self.intervals.clear();
             return;
         };
-        let count = samples.len() as f64;
         self.intervals.push_back(Interval {
             end_ns: last.stamp_ns,
             duration_s: seconds_from_ns(last.stamp_ns - first.stamp_ns),
-            angular_velocity_rad_per_s: samples
-                .iter()
-                .map(|sample| sample.angular_velocity_rad_per_s)
-                .sum::<Vector3<f64>>()
-                / count,
-            specific_force_m_per_s2: samples.iter().map(|sample| sample.specific_force_m_per_s2).sum::<Vector3<f64>>()
-                / count,
+            average: ImuAverage::of(&samples),
         });
         while self.intervals.get(1).is_some_and(|second| second.end_ns <= input.stamp_ns - QUIET_NS) {
             self.intervals.pop_front();
@@ -208,51 +189,22 @@ impl StationaryDetector {
         if fading && features.len() >= MIN_COMMON { Some(MAX_PARALLAX_RAD) } else { parallax_rad }
     }
 
-    /// Standard deviations of the samples of the last second, `None` without a full second.
-    fn spread(&self, stamp_ns: i64, image: &Observed<'_>) -> Option<Spread> {
+    /// Spread of the samples of the last second, `None` without a full second.
+    fn spread(&self, stamp_ns: i64, noise: &ImuNoise) -> Option<ImuSpread> {
         let first = self.intervals.front()?;
         let begin_ns = first.end_ns - (first.duration_s * 1e9) as i64;
         if begin_ns > stamp_ns - QUIET_NS || self.intervals.len() < 4 {
             return None;
         }
         let covered_s: f64 = self.intervals.iter().map(|interval| interval.duration_s).sum();
-        let averaged_s = covered_s / self.intervals.len() as f64;
-        let own = |density: f64| 1.5 * density / averaged_s.max(1e-3).sqrt();
-        let (angular_rate_mean, angular_rate) =
-            mean_and_spread(self.intervals.iter().map(|i| i.angular_velocity_rad_per_s));
-        let (_, force) = mean_and_spread(self.intervals.iter().map(|i| i.specific_force_m_per_s2));
-        Some(Spread {
-            angular_rate,
-            angular_rate_limit: MAX_ANGULAR_RATE_SPREAD_RAD_PER_S.hypot(own(image.noise.gyroscope_noise_density)),
-            mean_angular_rate: (angular_rate_mean - image.bias.gyroscope_rad_per_s).amax(),
-            force,
-            force_limit: MAX_FORCE_SPREAD_M_PER_S2.hypot(own(image.noise.accelerometer_noise_density)),
-        })
+        let averages: Vec<ImuAverage> = self.intervals.iter().map(|interval| interval.average).collect();
+        Some(ImuSpread::of(&averages, covered_s / averages.len() as f64, noise))
     }
 }
 
-/// Standard deviations of the IMU samples with their limits.
-#[derive(Clone, Copy, Debug)]
-struct Spread {
-    angular_rate: f64,
-    angular_rate_limit: f64,
-    mean_angular_rate: f64,
-    force: f64,
-    force_limit: f64,
-}
-
-impl Spread {
-    fn is_quiet(&self) -> bool {
-        self.angular_rate <= self.angular_rate_limit
-            && self.mean_angular_rate <= MAX_ANGULAR_RATE_RAD_PER_S
-            && self.force <= self.force_limit
-    }
-}
-
-/// Mean, and largest standard deviation of the components.
-fn mean_and_spread(values: impl Iterator<Item = Vector3<f64>> + Clone) -> (Vector3<f64>, f64) {
-    let count = values.clone().count().max(1) as f64;
-    let mean = values.clone().sum::<Vector3<f64>>() / count;
-    let squares: Vector3<f64> = values.map(|value| (value - mean).component_mul(&(value - mean))).sum();
-    (mean, (squares / count).max().sqrt())
+fn is_quiet(spread: &ImuSpread, bias: &ImuBias) -> bool {
+    let rate = spread.mean.angular_velocity_rad_per_s - bias.gyroscope_rad_per_s;
+    spread.angular_rate <= spread.angular_rate_limit
+        && rate.amax() <= MAX_ANGULAR_RATE_RAD_PER_S
+        && spread.force <= spread.force_limit
 }

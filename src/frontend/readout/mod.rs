@@ -12,17 +12,17 @@
 //! readings, whose noise would make the readout too small.
 
 mod pair_motion;
-mod rates;
 mod spline;
-
-pub use self::rates::AngularRates;
+mod sweep;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use self::pair_motion::PairMotion;
+use self::sweep::Sweep;
 use super::outliers::BearingPair;
 use crate::geometry::{median, so3};
+use crate::sensors::AngularRates;
 
 /// Observation of one feature in one image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -285,15 +285,19 @@ impl<'a> Search<'a> {
         self.offset_s = -0.5 * readout_s;
     }
 
+    /// Rotations of the camera during the readout of both images.
+    fn sweeps(&self, images: &ImagePair, readout_s: f64) -> [Sweep; 2] {
+        images.stamps_s.map(|stamp_s| Sweep::new(&self.rates, stamp_s + self.offset_s, readout_s))
+    }
+
     fn of_middle_rows(&self, pair: &Pair<'_>, readout_s: f64) -> UnitQuaternion<f64> {
-        let [previous, now] =
-            pair.images.stamps_s.map(|stamp_s| self.rates.sweep(stamp_s + self.offset_s, readout_s).at(0.5));
+        let [previous, now] = self.sweeps(pair.images, readout_s).map(|sweep| sweep.at(0.5));
         so3::exp(&-now) * pair.motion.rotation * so3::exp(&previous)
     }
 
     /// Bearings of a pair transformed to the first rows.
     fn carried(&self, images: &ImagePair, readout_s: f64) -> Vec<BearingPair> {
-        let [previous, now] = images.stamps_s.map(|stamp_s| self.rates.sweep(stamp_s + self.offset_s, readout_s));
+        let [previous, now] = self.sweeps(images, readout_s);
         let carried = |track: &RowTrack| BearingPair {
             previous: so3::exp(&previous.at(track.previous.row)) * track.previous.bearing,
             now: so3::exp(&now.at(track.now.row)) * track.now.bearing,

@@ -1,6 +1,6 @@
 use nalgebra::Vector3;
 
-use super::AngularRates;
+use crate::sensors::AngularRates;
 
 /// Step of the sampled rates, in seconds.
 const STEP_S: f64 = 0.0025;

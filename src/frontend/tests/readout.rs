@@ -3,8 +3,9 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::homography::Dice;
-use crate::frontend::readout::{AngularRates, ImagePair, ReadoutOptions, RowObservation, RowTrack, measure_readout};
+use crate::frontend::readout::{ImagePair, ReadoutOptions, RowObservation, RowTrack, measure_readout};
 use crate::geometry::{RigidTransform, so3};
+use crate::sensors::AngularRates;
 
 const FOCAL_PX: f64 = 360.0;
 const HEIGHT_PX: f64 = 480.0;

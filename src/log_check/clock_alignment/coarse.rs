@@ -1,6 +1,6 @@
 //! Correlation of angular speeds over all offsets of the search.
 
-use super::series::{DISTINCT_S, MIN_ROTATIONS, Measured, OrientationSeries};
+use super::series::{DISTINCT_S, MIN_ROTATIONS, Measured, RotationReference};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 
 /// Step of the search and of the sampled speeds, in seconds.
@@ -54,7 +54,7 @@ impl SpeedGrid {
 /// overlap are omitted.
 pub(super) fn correlation(
     measured: &[Measured],
-    reference: &OrientationSeries,
+    reference: &RotationReference,
     guess_s: f64,
     search_s: f64,
 ) -> Vec<Correlation> {

@@ -17,7 +17,7 @@ use nalgebra::Vector3;
 pub use self::references::{AlignmentReference, align_camera};
 pub use self::refinement::ClockAlignment;
 use self::refinement::Refined;
-pub use self::series::OrientationSeries;
+pub use self::series::RotationReference;
 use self::series::{DISTINCT_S, MIN_ROTATIONS, Measured};
 use super::ImageRotation;
 use super::statistics::median;
@@ -88,11 +88,11 @@ pub enum AlignmentError {
 /// If there are too few rotations, or no single offset explains them.
 pub fn align_clocks(
     images: &[ImageRotation],
-    reference: &OrientationSeries,
+    reference: &RotationReference,
     guess_s: f64,
     search_s: f64,
 ) -> Result<ClockAlignment, AlignmentError> {
-    if !reference.is_noisy {
+    if !reference.is_noisy() {
         return align_rotations(&single(images), reference, guess_s, search_s);
     }
     let images = &without_outliers(images);
@@ -171,7 +171,7 @@ fn mean_rate(images: &[ImageRotation], around_ns: i64, half_ns: i64) -> Option<V
 
 fn align_rotations(
     measured: &[Measured],
-    reference: &OrientationSeries,
+    reference: &RotationReference,
     guess_s: f64,
     search_s: f64,
 ) -> Result<ClockAlignment, AlignmentError> {

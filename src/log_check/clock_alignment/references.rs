@@ -4,11 +4,12 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::{AlignmentError, ClockAlignment, OrientationSeries, align_clocks};
+use super::{AlignmentError, ClockAlignment, RotationReference, align_clocks};
 use crate::flight_log::FlightLog;
+use crate::geometry::seconds_from_ns;
 use crate::log_check::ImageRotation;
 use crate::log_check::survey::Survey;
-use crate::sensors::{CameraMount, Rig};
+use crate::sensors::{AngularRates, CameraMount, Rig};
 
 /// Reference of the image rotations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -44,19 +45,19 @@ pub fn align_camera(
     let survey = Survey::of(log, Some(rig));
     let mut samples: Vec<_> =
         survey.imu.iter().map(|sample| (sample.stamp_ns, sample.angular_velocity_rad_per_s)).collect();
-    samples.retain(|(_, rate)| rate.iter().all(|value| value.is_finite()));
     samples.sort_by_key(|(stamp_ns, _)| *stamp_ns);
-    let gyroscope = OrientationSeries::from_angular_velocities(samples);
+    let in_seconds = samples.into_iter().map(|(stamp_ns, rate)| (seconds_from_ns(stamp_ns), rate));
+    let rates = AngularRates::new(in_seconds).bridging_gaps();
+    let gyroscope = RotationReference::Gyroscope(rates.clone());
     let rigid = align_clocks(rotations, &gyroscope, 0.0, search_s).map(|found| (AlignmentReference::Gyroscope, found));
     let on_gimbal = rig.cameras.iter().any(|camera| camera.key == camera_key && camera.mount == CameraMount::Gimbal);
     let Some(chain) = rig.chain_of_camera(camera_key).filter(|_| on_gimbal && !survey.joint_samples.is_empty()) else {
         return rigid;
     };
-    let camera = OrientationSeries::from_orientations(survey.joint_samples.iter().filter_map(|sample| {
+    let camera = RotationReference::from_orientations(survey.joint_samples.iter().filter_map(|sample| {
         let imu_from_camera = chain.imu_from_camera(&sample.angles_rad).rotation;
-        Some((sample.stamp_ns, gyroscope.at(sample.stamp_ns)? * imu_from_camera))
-    }))
-    .with_noise();
+        Some((sample.stamp_ns, rates.orientation_at(seconds_from_ns(sample.stamp_ns))? * imu_from_camera))
+    }));
     let moving =
         align_clocks(rotations, &camera, 0.0, search_s).map(|found| (AlignmentReference::GyroscopeAndJoints, found));
     match (rigid, moving) {

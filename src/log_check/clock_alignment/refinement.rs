@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::super::hand_eye::best_rotation;
 use super::super::statistics::median;
-use super::series::{MIN_ROTATIONS, Measured, OrientationSeries};
+use super::series::{MIN_ROTATIONS, Measured, RotationReference};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 
 /// Prior standard deviation of the drift between two quartz clocks.
@@ -54,7 +54,7 @@ enum Derivative {
 }
 
 /// Refines an offset; `None` if too few rotations overlap, or without convergence.
-pub(super) fn refine(measured: &[Measured], reference: &OrientationSeries, offset_s: f64) -> Option<Refined> {
+pub(super) fn refine(measured: &[Measured], reference: &RotationReference, offset_s: f64) -> Option<Refined> {
     let middles = measured.iter().map(Measured::middle_s);
     let (first_s, last_s) =
         middles.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), middle| (first.min(middle), last.max(middle)));
@@ -89,14 +89,14 @@ pub(super) fn refine(measured: &[Measured], reference: &OrientationSeries, offse
 }
 
 impl Refined {
-    fn rows(&self, measured: &[Measured], reference: &OrientationSeries) -> Vec<Row> {
+    fn rows(&self, measured: &[Measured], reference: &RotationReference) -> Vec<Row> {
         let row = |pair: &Measured| {
             let since_middle_s = pair.middle_s() - self.middle_s;
             let shift_ns = ns_from_seconds(self.offset_s + self.drift * since_middle_s);
             let at = |extra_ns: i64| {
                 reference.rotation(pair.from_ns + shift_ns + extra_ns, pair.to_ns + shift_ns + extra_ns)
             };
-            let derivative = if reference.is_noisy {
+            let derivative = if reference.is_noisy() {
                 Derivative::Images(pair.by_shift)
             } else {
                 let step_ns = ns_from_seconds(DIFFERENCE_S);
@@ -199,7 +199,7 @@ impl Refined {
     pub(super) fn alignment(
         &self,
         measured: &[Measured],
-        reference: &OrientationSeries,
+        reference: &RotationReference,
         next: Option<(f64, f64)>,
         correlation: Vec<(f64, f64)>,
     ) -> ClockAlignment {

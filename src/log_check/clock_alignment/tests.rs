@@ -15,14 +15,14 @@ fn rate(time_s: f64) -> Vector3<f64> {
 }
 
 /// Gyroscope at 200 Hz with bias and noise, between two times in seconds of its clock.
-fn gyroscope(from_s: f64, to_s: f64, rate: impl Fn(f64) -> Vector3<f64>) -> OrientationSeries {
+fn gyroscope(from_s: f64, to_s: f64, rate: impl Fn(f64) -> Vector3<f64>) -> AngularRates {
     let mut random = Noise(7);
     let samples = (0..((to_s - from_s) * 200.0) as i64).map(|k| {
-        let stamp_ns = ns_from_seconds(from_s) + 5 * MS * k;
+        let time_s = from_s + 0.005 * k as f64;
         let noise = 0.01 * random.vector();
-        (stamp_ns, rate(seconds_from_ns(stamp_ns)) + noise + Vector3::new(0.01, -0.02, 0.005))
+        (time_s, rate(time_s) + noise + Vector3::new(0.01, -0.02, 0.005))
     });
-    OrientationSeries::from_angular_velocities(samples)
+    AngularRates::new(samples)
 }
 
 struct Video {
@@ -85,7 +85,7 @@ impl Video {
 
 #[test]
 fn offset_drift_rotation_and_scale_are_found() {
-    let reference = gyroscope(0.0, 150.0, rate);
+    let reference = RotationReference::Gyroscope(gyroscope(0.0, 150.0, rate));
     for video in [
         Video::default(),
         Video { offset_s: -2.251, drift: -50e-6, count: 3000, ..Video::default() },
@@ -112,7 +112,9 @@ fn the_standard_deviation_of_the_offset_is_that_of_its_errors() {
     let count = 12;
     for seed in 0..count {
         let video = Video { offset_s: 9.0 + 0.37 * f64::from(seed), count: 400, ..Video::default() };
-        let found = align_clocks(&video.rotations(rate), &gyroscope(0.0, 60.0, rate), 10.0, 8.0).unwrap();
+        let found =
+            align_clocks(&video.rotations(rate), &RotationReference::Gyroscope(gyroscope(0.0, 60.0, rate)), 10.0, 8.0)
+                .unwrap();
         squares += ((found.offset_s - video.offset_at(found.middle_s)) / found.offset_sigma_s).powi(2);
     }
     let ratio = (squares / f64::from(count)).sqrt();
@@ -129,10 +131,12 @@ fn a_noisy_reference_gives_neither_a_bias_nor_a_small_standard_deviation() {
     for seed in 0..count {
         let mut noise = Noise(100 + u64::from(seed));
         let exact = gyroscope(0.0, 60.0, slow);
-        let orientations = exact.samples.iter().step_by(8).map(|(stamp_ns, orientation)| {
-            (*stamp_ns, orientation * so3::exp(&(noise.vector() * 0.5_f64.to_radians())))
+        let stamps_ns = (0..60 * 25).map(|number| number * 40 * MS);
+        let orientations = stamps_ns.filter_map(|stamp_ns| {
+            let orientation = exact.orientation_at(seconds_from_ns(stamp_ns))?;
+            Some((stamp_ns, orientation * so3::exp(&(noise.vector() * 0.5_f64.to_radians()))))
         });
-        let reference = OrientationSeries::from_orientations(orientations).with_noise();
+        let reference = RotationReference::from_orientations(orientations);
         let video = Video { noise_rad: 0.0005, scale: 1.0, offset_s: 5.0 + 0.3 * f64::from(seed), ..Video::default() };
         let found = align_clocks(&video.rotations(slow), &reference, 6.0, 15.0).unwrap();
         let error_s = found.offset_s - video.offset_at(found.middle_s);
@@ -146,7 +150,12 @@ fn a_noisy_reference_gives_neither_a_bias_nor_a_small_standard_deviation() {
 #[test]
 fn periodic_motion_is_ambiguous() {
     let periodic = |time_s: f64| Vector3::new(0.5 * (2.0 * time_s).sin(), 0.3 * (4.0 * time_s).cos(), 0.1);
-    let error = align_clocks(&Video::default().rotations(periodic), &gyroscope(0.0, 150.0, periodic), 0.0, 60.0);
+    let error = align_clocks(
+        &Video::default().rotations(periodic),
+        &RotationReference::Gyroscope(gyroscope(0.0, 150.0, periodic)),
+        0.0,
+        60.0,
+    );
     let error = error.unwrap_err();
     assert!(matches!(error, AlignmentError::Ambiguous { .. }), "{error}");
     assert!(error.to_string().contains("it is ambiguous"), "{error}");
@@ -155,13 +164,19 @@ fn periodic_motion_is_ambiguous() {
 #[test]
 fn unrelated_motion_is_refused() {
     let other = |time_s: f64| rate(3.0 * time_s + 500.0).yzx();
-    let error = align_clocks(&Video::default().rotations(other), &gyroscope(0.0, 150.0, rate), 0.0, 60.0).unwrap_err();
+    let error = align_clocks(
+        &Video::default().rotations(other),
+        &RotationReference::Gyroscope(gyroscope(0.0, 150.0, rate)),
+        0.0,
+        60.0,
+    )
+    .unwrap_err();
     assert!(matches!(error, AlignmentError::NoAgreement { .. }), "{error}");
 }
 
 #[test]
 fn a_camera_at_rest_and_short_recordings_are_refused() {
-    let reference = gyroscope(0.0, 150.0, rate);
+    let reference = RotationReference::Gyroscope(gyroscope(0.0, 150.0, rate));
     let check = |video: &Video, scale: f64, expected: &str| {
         let error = align_clocks(&video.rotations(|time_s| scale * rate(time_s)), &reference, 0.0, 60.0).unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");

@@ -15,8 +15,8 @@ use self::allan::{AllanVariance, NoiseKind, Phase, confidence, counts, degrees_o
 use self::samples::ImuSeries;
 use self::stretches::{evenly_sampled, stationary_stretches};
 use self::terms::Fit;
-use super::imu_facts::Stamped;
 use super::spectrum::{Spectrum, VibrationLine};
+use super::stationary::Stamped;
 use crate::flight_log::FlightLog;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::Rig;

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::flight_log::container::DecodedBlock;
 use crate::flight_log::log::relative_ns;
 use crate::flight_log::{FlightLog, messages, messages::MessageKind};
-use crate::log_check::imu_facts::Stamped;
+use crate::log_check::stationary::Stamped;
 use crate::sensors::Rig;
 
 /// Finite samples, ordered by stamp.

@@ -3,34 +3,22 @@
 use nalgebra::Vector3;
 
 use crate::geometry::seconds_from_ns;
-use crate::log_check::imu_facts::{
-    SMOOTHING_NS, Stamped, WINDOW_NS, smoothed_deviation, smoothed_white, vectors_within,
-};
-use crate::log_check::statistics::{mean, median};
+use crate::log_check::stationary::{SMOOTHING_NS, Stamped, StationaryTest, WINDOW_NS, Window};
+use crate::log_check::statistics::median;
 
-/// Largest standard deviation of the smoothed angular rate in addition to its noise; a hovering vehicle exceeds it.
-const RATE_RAD_PER_S: f64 = 0.003;
-/// Largest standard deviation of the smoothed specific force in addition to its noise.
-const FORCE_M_PER_S2: f64 = 0.03;
+/// Largest standard deviations of the smoothed angular rate (rad/s) and specific force (m/s²) in addition to noise; a
+/// hovering vehicle exceeds them.
+const MOTION: [f64; 2] = [0.003, 0.03];
 /// Tolerance of the smoothed noise, in standard deviations.
 const NOISE_SIGMAS: f64 = 2.0;
 /// Largest change of the mean angular rate from window to window in addition to noise.
 const RATE_STEP_RAD_PER_S: f64 = 0.004;
 /// Largest change of the mean specific force from window to window: a tilt of 0.3°.
 const FORCE_STEP_M_PER_S2: f64 = 0.05;
-/// Upper bound of the mean angular rate, bias included.
-const LARGEST_BIAS_RAD_PER_S: f64 = 0.08;
 /// Minimum length of a stretch.
 const SHORTEST_NS: i64 = 3_000_000_000;
 /// Number of periods between two samples from which the interval is a gap.
 const GAP_PERIODS: f64 = 1.5;
-
-/// Stationary window of half a second.
-struct Window {
-    range_ns: (i64, i64),
-    mean_rate: Vector3<f64>,
-    mean_force: Vector3<f64>,
-}
 
 /// Start and end of the stretches in the order of time; the densities are those of the white noise of both sensors.
 pub(super) fn stationary_stretches(
@@ -39,33 +27,25 @@ pub(super) fn stationary_stretches(
     densities: [f64; 2],
     (from_ns, to_ns): (i64, i64),
 ) -> Vec<(i64, i64)> {
-    let limit = |still: f64, density: f64| still.hypot(NOISE_SIGMAS * smoothed_white(density).sqrt());
-    let (rate_limit, force_limit) = (limit(RATE_RAD_PER_S, densities[0]), limit(FORCE_M_PER_S2, densities[1]));
+    let test = StationaryTest::new(MOTION, densities, NOISE_SIGMAS);
     // Difference of two means of noise, per axis, at four standard deviations.
     let step = |still: f64, density: f64| still.hypot(4.0 * density * (2.0 / seconds_from_ns(WINDOW_NS)).sqrt());
     let (rate_step, force_step) = (step(RATE_STEP_RAD_PER_S, densities[0]), step(FORCE_STEP_M_PER_S2, densities[1]));
     let mut stretches: Vec<Vec<Window>> = vec![Vec::new()];
     let mut start_ns = from_ns;
     while start_ns + WINDOW_NS <= to_ns {
-        let range_ns = (start_ns, start_ns + WINDOW_NS);
+        let window = test.window(rates, forces, start_ns);
         start_ns += WINDOW_NS;
-        let (mean_rate, mean_force) = (mean(&vectors_within(rates, range_ns)), mean(&vectors_within(forces, range_ns)));
-        let still = smoothed_deviation(rates, range_ns) < rate_limit
-            && smoothed_deviation(forces, range_ns) < force_limit
-            && mean_rate.norm() < LARGEST_BIAS_RAD_PER_S;
         let follows = |before: &Window| {
-            (before.mean_rate - mean_rate).amax() < rate_step && (before.mean_force - mean_force).amax() < force_step
+            (before.mean_rate - window.mean_rate).amax() < rate_step
+                && (before.mean_force - window.mean_force).amax() < force_step
         };
         let last = stretches.last_mut().expect("there is always a last stretch");
-        if !still || last.last().is_some_and(|before| !follows(before)) {
+        if !window.stationary || last.last().is_some_and(|before| !follows(before)) {
             stretches.push(Vec::new());
         }
-        if still {
-            stretches.last_mut().expect("there is always a last stretch").push(Window {
-                range_ns,
-                mean_rate,
-                mean_force,
-            });
+        if window.stationary {
+            stretches.last_mut().expect("there is always a last stretch").push(window);
         }
     }
     let ends = stretches.iter().filter_map(|windows| {

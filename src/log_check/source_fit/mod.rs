@@ -9,12 +9,12 @@ use nalgebra::{Unit, UnitQuaternion, Vector3};
 
 use self::meanings::{changes, difference};
 use super::attitude::AttitudeSurvey;
-use super::hand_eye::{imu_rotation, vertex};
+use super::hand_eye::vertex;
 use super::imu_facts::ImuFacts;
 use super::statistics::median;
 use super::survey::Survey;
 use super::{Area, Findings, ImageRotation, Severity};
-use crate::geometry::{ns_from_seconds, principal_angle, so3};
+use crate::geometry::{ns_from_seconds, principal_angle, seconds_from_ns, so3};
 use crate::sensors::{AttitudeSource, CameraMount, GimbalRig, Rig};
 
 /// Consecutive image rotations that are joined to one: over a third of a second the rotation exceeds the errors of
@@ -137,7 +137,7 @@ fn spans(rotations: &[&ImageRotation], timeshift_s: f64, imu_facts: &ImuFacts) -
         let (first, last) = (few.first()?, few.last().filter(|_| gapless)?);
         let rotation = few.iter().fold(UnitQuaternion::identity(), |before, next| next.second_from_first * before);
         let (from_ns, to_ns) = (first.from_ns + shift_ns, last.to_ns + shift_ns);
-        let of_imu = imu_rotation(imu_facts, from_ns, to_ns)?;
+        let of_imu = imu_facts.gyroscope.rotation_between(seconds_from_ns(from_ns), seconds_from_ns(to_ns))?;
         Some(Span { from_ns, to_ns, measured: so3::log(&rotation), of_imu })
     };
     rotations.windows(JOINED).filter_map(joined).collect()

@@ -119,7 +119,7 @@ fn parameterization(name: &str) -> Result<ParameterizationChoice, String> {
     let choice = ParameterizationChoice::from_name(name);
     choice.filter(|choice| FORK_PARAMETERIZATIONS.contains(choice)).ok_or_else(|| {
         if choice.is_some() {
-            return format!("'{name}' uses other cameras: {OTHER_CAMERA}; run {name} beside it instead");
+            return format!("'{name}' uses other cameras: {OTHER_CAMERA}; add a run {name} instead");
         }
         let known = FORK_PARAMETERIZATIONS.map(ParameterizationChoice::name).join(", ");
         format!("unknown parameterization '{name}', expected one of {known}")

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
 use super::flight::Random;
 use crate::estimator::initialization::alignment::{quadratic_on_sphere, solve_with_gravity_norm};
-use crate::estimator::initialization::bearing::{angle_between, fit_rotation, refine_camera_pose, triangulate};
+use crate::estimator::initialization::bearing::{angle_between, fit_rotation, refine_camera_pose};
 use crate::estimator::initialization::essential::{decompose, five_point};
 use crate::estimator::initialization::polynomial::{evaluate, real_roots};
 use crate::estimator::initialization::relative_pose::{RelativePose, RotationPrior, relative_poses};
@@ -143,28 +143,6 @@ fn rotation_fit_finds_rotation_and_parallax() {
         assert!(fit.median_parallax_rad > 0.005);
     }
     assert!(fit_rotation(&[], &UnitQuaternion::identity()).is_none());
-}
-
-#[test]
-fn triangulation_meets_the_point() {
-    let mut random = Random::new(4);
-    for _ in 0..100 {
-        let point = random.vector(3.0) + Vector3::new(0.0, 0.0, 7.0);
-        let rays: Vec<_> = (0..4)
-            .map(|_| {
-                let pose = random_pose(&mut random);
-                (pose, (pose.inverse().transform(&point)).normalize())
-            })
-            .collect();
-        let found = triangulate(&rays).unwrap();
-        assert!((found.position - point).norm() < 1e-9);
-        assert!(found.in_front && found.worst_angle_rad < 1e-9);
-    }
-    let pose = RigidTransform::identity();
-    assert!(triangulate(&[(pose, Vector3::z())]).is_none());
-    let parallel =
-        [(pose, Vector3::z()), (RigidTransform::new(UnitQuaternion::identity(), Vector3::x()), Vector3::z())];
-    assert!(triangulate(&parallel).is_none_or(|point| point.position.norm() > 1e6 || point.parallax_rad == 0.0));
 }
 
 #[test]
