@@ -1,6 +1,7 @@
-//! Crates of the build: their licences, crates in several versions, and crates without a maintainer.
+//! Crates of the build: their sources and licences, crates in several versions, and crates without a maintainer.
 //!
-//! Read from `cargo metadata` without network access; requires that the build has downloaded its dependencies.
+//! Read from the lock files and from `cargo metadata` without network access; requires that the build has downloaded its
+//! dependencies. Known vulnerabilities need a database from the network: `docs/packages.md`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
@@ -93,6 +94,18 @@ fn packages() -> Vec<Package> {
         }
     };
     nodes.map(package).collect()
+}
+
+#[test]
+fn every_crate_comes_from_crates_io_with_a_checksum() {
+    for lock in [include_str!("../../Cargo.lock"), include_str!("../../fuzz/Cargo.lock")] {
+        for package in lock.split("[[package]]").skip(1) {
+            let own = package.starts_with("\nname = \"dcvins");
+            let source = package.contains("\nsource = \"registry+https://github.com/rust-lang/crates.io-index\"\n");
+            let checksum = package.contains("\nchecksum = \"");
+            assert!(own || source && checksum, "{package}");
+        }
+    }
 }
 
 #[test]
