@@ -11,7 +11,7 @@ use std::fmt;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::columns::{PAIRING_COLUMNS, run_column};
+use super::columns::{Direction, PAIRING_COLUMNS, run_column};
 use super::pairing::{RunPair, pair_runs};
 use super::statistics::MeanInterval;
 use super::table::StudyTable;
@@ -21,21 +21,9 @@ pub const SUCCESS: &str = "success";
 /// Minimum number of pairs for a verdict on a metric.
 const LEAST_PAIRS: usize = 3;
 
-/// Direction of change of a metric that is worse.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Direction {
-    Larger,
-    Smaller,
-    /// Any change: a consistent estimator has an expected value, and deviations in both directions are worse.
-    Either,
-}
-
-impl Direction {
-    /// The direction of a column of the table of runs; of an unknown one, larger is worse.
-    fn of(column: &str) -> Self {
-        run_column(column).map_or(Self::Larger, |column| column.worse)
-    }
+/// Direction of change that is worse for a column of the table of runs; of an unknown one, larger is worse.
+fn worse_direction(column: &str) -> Direction {
+    run_column(column).map_or(Direction::Larger, |column| column.worse)
 }
 
 /// Verdict on a metric.
@@ -210,7 +198,7 @@ fn check_metric(table: &StudyTable, name: &str) -> Result<(), ComparisonError> {
 
 /// Compares one metric; `values` are the run, the old and the new value of each pair.
 fn compare_metric(name: &str, tolerance: f64, values: &[(&str, f64, f64)]) -> MetricComparison {
-    let direction = Direction::of(name);
+    let direction = worse_direction(name);
     // The logarithm of the ratio needs positive values.
     let positive: Vec<_> = values.iter().filter(|(_, old, new)| *old > 0.0 && *new > 0.0).collect();
     let ratios: Vec<f64> = positive.iter().map(|(_, old, new)| (new / old).ln()).collect();

@@ -5,7 +5,7 @@
 //!
 //! - `plan/`: the TOML text of a plan as typed values; every error names line and key.
 //! - `recipe`, `perturbation`: simulated flights and errors of a rig.
-//! - `job`: the jobs of a plan and their keys.
+//! - `job`, `expansion`: a job with its key, and the jobs of a plan.
 //! - `baseline`, `comparison`, `pairing`, `statistics`: a study against a baseline, paired and with intervals.
 //! - `summary_table`: statistics of groups of runs as Markdown.
 //! - `table`: columns of values with units and descriptions.
@@ -15,6 +15,7 @@
 mod baseline;
 mod columns;
 mod comparison;
+mod expansion;
 mod job;
 mod pairing;
 mod perturbation;
@@ -29,14 +30,12 @@ pub mod view;
 
 pub use baseline::baseline_table;
 pub use columns::{
-    JobCosts, JobResult, JobStatus, PAIRING_COLUMNS, RunResult, StudyTables, frames_table, parameters_table, runs_table,
+    Direction, JobCosts, JobResult, JobStatus, PAIRING_COLUMNS, RunResult, StudyTables, frames_table, parameters_table,
+    runs_table,
 };
-pub use comparison::{
-    ComparisonError, Direction, MetricComparison, SUCCESS, StudyComparison, Verdict, WorstPair, compare,
-};
-pub use job::{
-    JobLog, JobSubject, KeyedJob, RecordedLog, SimulatedFlight, StudyJob, StudyTrajectory, expand, hex, shard,
-};
+pub use comparison::{ComparisonError, MetricComparison, SUCCESS, StudyComparison, Verdict, WorstPair, compare};
+pub use expansion::{expand, shard};
+pub use job::{JobLog, JobSubject, KeyedJob, RecordedLog, SimulatedFlight, StudyJob, StudyTrajectory, hex};
 pub use perturbation::{
     Distribution, MagnitudeDimension, PerturbationError, PerturbationStart, RigChange, RigPerturbation, RigQuantity,
 };

@@ -72,7 +72,7 @@ impl Imports {
     }
 
     /// Circles of files that import each other: per circle one line `from -> to: names` per import inside it.
-    pub(crate) fn circles(&self, left_out: &[&str]) -> Vec<Vec<String>> {
+    pub(crate) fn circles(&self) -> Vec<Vec<String>> {
         let edges: Vec<BTreeMap<usize, BTreeSet<String>>> =
             (0..self.files.len()).map(|index| self.taken_by(index)).collect();
         let reached: Vec<BTreeSet<usize>> = (0..edges.len()).map(|index| reachable(&edges, index)).collect();
@@ -80,11 +80,9 @@ impl Imports {
         for (from, taken) in edges.iter().enumerate() {
             for (to, names) in taken.iter().filter(|(to, _)| reached[**to].contains(&from)) {
                 let (from_name, to_name) = (&self.files[from].name, &self.files[*to].name);
-                if left_out.iter().all(|folder| !from_name.starts_with(folder)) {
-                    let first = *reached[from].iter().find(|other| reached[**other].contains(&from)).unwrap_or(&from);
-                    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-                    circles.entry(first).or_default().push(format!("{from_name} -> {to_name}: {}", names.join(", ")));
-                }
+                let first = *reached[from].iter().find(|other| reached[**other].contains(&from)).unwrap_or(&from);
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                circles.entry(first).or_default().push(format!("{from_name} -> {to_name}: {}", names.join(", ")));
             }
         }
         circles.into_values().collect()

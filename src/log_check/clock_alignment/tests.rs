@@ -3,6 +3,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::*;
 use crate::geometry::ns_from_seconds;
 use crate::log_check::tests::Noise;
+use crate::sensors::AngularRates;
 
 const MS: i64 = 1_000_000;
 

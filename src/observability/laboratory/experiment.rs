@@ -4,16 +4,21 @@ use nalgebra::Vector3;
 
 use super::mechanism::Mechanism;
 use super::motion::{Flight, LaboratoryMotion};
-use super::sensors::{READOUT_S, SensorColumns, linearize_sensors, with_lens};
-use crate::camera::{CameraModel, Distortion};
+use super::sensors::SensorColumns;
+use crate::camera::{CameraModel, Distortion, Projection};
 use crate::estimator::{
     HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge, gravity_in_world,
 };
 use crate::geometry::{Dimension, SplitMix64};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
-use crate::observability::{RankReport, analyse};
+use crate::observability::RankReport;
 use crate::optimization::LandmarkModel;
 use crate::sensors::ImuNoise;
+
+/// Readout time of the rolling shutter, in seconds.
+pub(super) const READOUT_S: f64 = 0.02;
+/// Radial distortion of the lens: `k1 k2`, without tangential terms.
+const LENS: [f64; 2] = [-0.28, 0.07];
 
 /// A parameterization of the mechanism, with or without its joint offsets as columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -127,43 +132,6 @@ impl LaboratorySetup {
         self
     }
 
-    /// Runs the experiment in one parameterization; `None` when a value of the mechanism is not finite.
-    pub fn run(&self, form: LaboratoryForm) -> Option<LaboratoryResult> {
-        self.run_all(&[form]).pop()
-    }
-
-    /// Runs the experiment in several parameterizations; those with values that are not finite are omitted.
-    pub fn run_all(&self, forms: &[LaboratoryForm]) -> Vec<LaboratoryResult> {
-        let mut results = Vec::new();
-        self.run_each(forms, |result| {
-            results.push(result);
-            true
-        });
-        results
-    }
-
-    /// [`Self::run_all`] with a callback for each result as soon as it is ready; stops when `each` returns `false`.
-    pub fn run_each(&self, forms: &[LaboratoryForm], mut each: impl FnMut(LaboratoryResult) -> bool) {
-        let window = (!self.columns.any()).then(|| self.window());
-        let flight = self.flight();
-        let angles: Vec<Vec<f64>> = (0..self.frames).map(|slot| flight.joints_rad(Self::time_s(slot))).collect();
-        let free = self.joints_free();
-        for form in forms {
-            let chain = form.chain(&self.mechanism);
-            let linearization = match &window {
-                Some(window) => {
-                    Some(window.linearize(&self.mechanism.chain, form.parameterization, form.joint_offsets))
-                }
-                None => linearize_sensors(self, *form),
-            };
-            let Some(linearization) = linearization else { continue };
-            let Some(rank) = analyse(&linearization, &chain, &angles, free) else { continue };
-            if !each(LaboratoryResult { form: *form, rank }) {
-                return;
-            }
-        }
-    }
-
     pub fn window(&self) -> HypotheticalWindow {
         self.window_from(0)
     }
@@ -262,3 +230,10 @@ impl LaboratoryResult {
 
 /// Smallest scaled weight of a parameter that belongs to a null direction.
 const TAKES_PART: f64 = 1e-5;
+
+/// The camera with the radial distortion [`LENS`] in place of none.
+pub(super) fn with_lens(camera: &CameraModel) -> Option<CameraModel> {
+    let [k1, k2] = LENS;
+    let lens = Distortion::Radtan([k1, k2, 0.0, 0.0]);
+    CameraModel::new(Projection::Pinhole, lens, camera.intrinsics_px, camera.resolution_px).ok()
+}

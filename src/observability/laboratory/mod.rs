@@ -12,6 +12,7 @@ mod experiments;
 mod mechanism;
 mod motion;
 mod report;
+mod run;
 mod sensors;
 mod situation;
 mod spurious;

@@ -1,6 +1,6 @@
 //! Columns of the table of frames.
 
-use super::Column;
+use super::column::Column;
 use super::job_result::JobResult;
 use crate::estimator::FrameStateReport;
 use crate::geometry::seconds_from_ns;

@@ -1,6 +1,6 @@
 //! Columns of the table of parameters.
 
-use super::Column;
+use super::column::Column;
 use super::job_result::JobResult;
 use crate::session::ParameterSummary;
 

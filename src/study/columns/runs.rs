@@ -1,10 +1,10 @@
 //! Columns of the table of runs.
 
-use super::Column;
+use super::column::Column;
+use super::column::Direction;
 use super::job_result::JobResult;
 use crate::estimator::FailureCause;
 use crate::study::JobLog;
-use crate::study::comparison::Direction;
 use crate::text::Named as _;
 
 /// The column of a name.

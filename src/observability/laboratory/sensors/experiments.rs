@@ -1,18 +1,13 @@
 //! Experiments of the table of docs/mathematics.md, section 11.
 
-use crate::camera::{CameraModel, Distortion, Projection};
 use crate::estimator::{JointKnowledge, PoseKnowledge};
+use crate::observability::laboratory::experiment::{READOUT_S, with_lens};
 use crate::observability::laboratory::{LABORATORY_IMU, LaboratoryMotion as Motion, LaboratorySetup, Mechanism};
 
 /// Frames of an experiment: enough for every set of columns.
 const FRAMES: usize = 16;
 /// Landmarks of an experiment; each image shows only some of them.
 const LANDMARKS: usize = 160;
-/// Readout time of the rolling shutter, in seconds.
-pub(crate) const READOUT_S: f64 = 0.02;
-/// Radial distortion of the lens: `k1 k2`, without tangential terms.
-const LENS: [f64; 2] = [-0.28, 0.07];
-
 const RIGID: &str = "rigid";
 const GIMBAL: &str = "yaw-roll-pitch-offset";
 
@@ -66,13 +61,6 @@ impl SensorExperiment {
         }
         Some(setup)
     }
-}
-
-/// The camera with the radial distortion [`LENS`] in place of none.
-pub(crate) fn with_lens(camera: &CameraModel) -> Option<CameraModel> {
-    let [k1, k2] = LENS;
-    let lens = Distortion::Radtan([k1, k2, 0.0, 0.0]);
-    CameraModel::new(Projection::Pinhole, lens, camera.intrinsics_px, camera.resolution_px).ok()
 }
 
 const NO_RATE: &str = "no angular rate: the gyroscope's columns are zero; accelerations and gravity scale with the lengths, \

@@ -17,7 +17,6 @@ mod tests;
 mod values;
 mod window;
 
-pub(super) use experiments::{READOUT_S, with_lens};
 pub(super) use survey::survey_sensors;
 
 pub use columns::{SensorColumns, UnknownColumns};

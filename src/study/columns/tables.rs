@@ -1,0 +1,50 @@
+//! Tables of a study from the results of its jobs.
+
+use super::column::table;
+use super::frames::FrameRow;
+use super::job_result::JobResult;
+use super::parameters::ParameterRow;
+use crate::study::table::StudyTable;
+
+/// Table of runs without a row.
+pub fn runs_table() -> StudyTable {
+    table(JobResult::COLUMNS, &[])
+}
+
+/// Table of parameters without a row.
+pub fn parameters_table() -> StudyTable {
+    table(ParameterRow::COLUMNS, &[])
+}
+
+/// Table of frames without a row.
+pub fn frames_table() -> StudyTable {
+    table(FrameRow::COLUMNS, &[])
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct StudyTables {
+    /// One row per run.
+    pub runs: StudyTable,
+    /// One row per run and calibration parameter.
+    pub parameters: StudyTable,
+    /// One row per run and frame; empty unless the plan requests it.
+    pub frames: StudyTable,
+}
+
+impl Default for StudyTables {
+    fn default() -> Self {
+        Self { runs: runs_table(), parameters: parameters_table(), frames: frames_table() }
+    }
+}
+
+impl StudyTables {
+    /// The rows of one job, those of its frames if `with_frames`.
+    pub fn of(result: &JobResult<'_>, with_frames: bool) -> Self {
+        let frames = if with_frames { FrameRow::all(result) } else { Vec::new() };
+        Self {
+            runs: table(JobResult::COLUMNS, std::slice::from_ref(result)),
+            parameters: table(ParameterRow::COLUMNS, &ParameterRow::all(result)),
+            frames: table(FrameRow::COLUMNS, &frames),
+        }
+    }
+}
