@@ -188,7 +188,7 @@ fn only_some_folders_name_the_window_and_the_file_system() {
 #[test]
 fn circles_are_found_through_groups_parents_and_reexports() {
     let file = |name: &str, text: &str| (name.to_owned(), text.to_owned());
-    let circles = |texts: &[(String, String)]| Imports::of(texts.to_vec()).circles(&[]);
+    let circles = |texts: &[(String, String)]| Imports::of(texts.to_vec()).circles();
     let parent = file("a/mod.rs", "mod b;\nmod c;\npub use c::C;");
     let tied = [
         file("lib.rs", "mod a;"),
