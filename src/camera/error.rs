@@ -5,19 +5,12 @@ use thiserror::Error;
 /// Invalid description of a camera.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum CameraError {
-    /// No such projection.
     #[error("unknown camera_model '{name}': expected one of pinhole, omni, eucm, ds")]
-    UnknownModel {
-        /// What was written.
-        name: String,
-    },
+    UnknownModel { name: String },
     #[error(
         "unknown distortion_model '{name}': expected one of none, radtan, plumb_bob, rational_polynomial, equidistant, fov"
     )]
-    UnknownDistortion {
-        /// What was written.
-        name: String,
-    },
+    UnknownDistortion { name: String },
     /// Distortion that is not defined for the projection.
     #[error("camera_model '{model}' does not support distortion_model '{distortion}': expected {expected}")]
     Combination {

@@ -5,7 +5,7 @@ use std::path::Path;
 use dcvins::observability::{Estimability, MIN_SPURIOUS_GAIN};
 use dcvins::session::{EstimabilitySummary, KnownLossSummary, RunSummary, StageSummary, TrajectoryLane};
 
-/// The text of a trajectory beside the runs for the terminal.
+/// Text of a trajectory of another program for the terminal.
 pub(crate) fn describe_trajectory(lane: &TrajectoryLane) -> String {
     let accuracy = match (&lane.evaluation.accuracy, &lane.accuracy_missing) {
         (Some(accuracy), _) => accuracy.to_string(),

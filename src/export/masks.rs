@@ -21,7 +21,7 @@ pub(super) fn is_mask_name(name: &str) -> bool {
         .is_some_and(|number| number.parse::<u32>().is_ok())
 }
 
-/// Names the masks of a rig as they lie beside it in a new folder, and returns them with their content.
+/// Sets the mask names of a rig to files next to it in a new folder, and returns these files with their content.
 pub(crate) fn beside(rig: &mut Rig) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
     let mut files = Vec::new();
     for camera in &mut rig.cameras {

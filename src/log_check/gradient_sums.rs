@@ -74,7 +74,7 @@ impl GradientSums {
         [self.width / BLOCK, self.height / BLOCK]
     }
 
-    /// Whether each block is still, row by row; `None` for one without texture.
+    /// For each block, row by row: true if it is static; `None` for a block without texture.
     pub(super) fn judge(&self) -> Vec<Option<bool>> {
         let [columns, rows] = self.blocks();
         let block = |index: usize| {
@@ -108,7 +108,7 @@ impl GradientSums {
         ImageMask::from_image(&GrayImage { width, height, pixels: (0..width * height).map(pixel).collect() })
     }
 
-    /// Whether a mask covers most of a block.
+    /// True if a mask covers most of a block.
     pub(super) fn is_covered(&self, mask: &ImageMask, block: usize) -> bool {
         let side = BLOCK * self.scale;
         let [columns, _] = self.blocks();

@@ -150,7 +150,7 @@ fn compare_sigma(name: &str, measured: f64, given: f64, findings: &mut Findings)
     }
 }
 
-/// Whether the attitude could be read, whether the joints can make it, and whether it determines their angles.
+/// Checks that the attitude is readable, that the joints can reach it, and that it determines their angles.
 fn check_attitude(survey: &Survey, findings: &mut Findings) {
     if let Some(problem) = &survey.attitude_problem {
         let title = "the gimbal's attitude cannot be read";

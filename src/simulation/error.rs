@@ -12,21 +12,11 @@ pub enum SimulationError {
     BadDisturbance {
         /// As it was written.
         text: String,
-        /// What was expected.
         expected: String,
     },
     /// An option out of its range.
     #[error("{option} is {value}: expected {low} to {high}")]
-    BadOption {
-        /// Which.
-        option: &'static str,
-        /// What it holds.
-        value: f64,
-        /// Least value.
-        low: f64,
-        /// Largest value.
-        high: f64,
-    },
+    BadOption { option: &'static str, value: f64, low: f64, high: f64 },
     /// An image could not be compressed.
     #[error("cannot compress an image as JPEG: {problem}")]
     Image {

@@ -35,7 +35,6 @@ pub enum StudyFileError {
     Job { problem: String, path: PathBuf },
     #[error("the tables of two jobs differ: {source}: {path}")]
     Table {
-        /// The difference.
         source: Box<TableError>,
         /// Path of the second table.
         path: PathBuf,
@@ -47,7 +46,6 @@ pub enum StudyFileError {
         found: String,
         /// Name of the file by which a study is recognized.
         index: &'static str,
-        /// The folder.
         path: PathBuf,
     },
 }

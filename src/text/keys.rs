@@ -39,7 +39,7 @@ pub enum Field<T: 'static> {
 /// Texts of a key in a dialog.
 #[derive(Clone, Copy, Debug)]
 pub struct Label {
-    /// Left column beside a check box: what the check boxes of a group have in common.
+    /// Label left of a check box: the common subject of a group of check boxes.
     pub group: &'static str,
     /// Name of the value.
     pub text: &'static str,

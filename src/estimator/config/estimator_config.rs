@@ -188,7 +188,7 @@ impl EstimatorConfig {
         camera.checked_sub(1).map_or(main, |rigid| self.rigid_cameras[rigid].prior)
     }
 
-    /// Whether encoder readings with known noise are available and used.
+    /// Standard deviation of an encoder reading in radians, `None` if encoders are absent or unused.
     pub(crate) fn encoder_in_use(&self) -> Option<f64> {
         self.encoder_sigma_rad.filter(|_| self.use_encoder)
     }

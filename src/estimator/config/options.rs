@@ -83,9 +83,9 @@ pub struct EstimatorOptions {
     pub max_blind_s: f64,
     /// Number of observed landmarks below which the window counts as without visual measurements.
     pub min_landmarks: usize,
-    /// Whether to fill [`crate::estimator::StepReport::linearization`].
+    /// Fill [`crate::estimator::StepReport::linearization`].
     pub keep_linearization: bool,
-    /// Whether every report keeps the rows of factors without a feature: [`crate::estimator::StepReport::factor_rows`].
+    /// Keep the rows of factors without a feature in every report: [`crate::estimator::StepReport::factor_rows`].
     pub keep_factor_rows: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Files of a source that are read as a whole, and names beside them.
+//! Files of a source that are read as a whole, and names next to them.
 
 use std::fs;
 use std::path::{Path, PathBuf};

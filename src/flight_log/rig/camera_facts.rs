@@ -1,4 +1,4 @@
-//! What a rig file leaves to its log.
+//! Camera values that a rig file may omit because the log has them.
 
 use crate::camera::CameraModel;
 

@@ -35,7 +35,7 @@ impl Work {
         Self(WORK.map(|(key, _)| value.get(key).and_then(Value::as_array).cloned().unwrap_or_default()))
     }
 
-    /// What a file with the work `saved` lacks, as text: "1 fork, 2 markers"; `None` if it lacks nothing.
+    /// Work that a file with the work `saved` lacks, as text: "1 fork, 2 markers"; `None` if it lacks nothing.
     pub(super) fn missing_in(&self, saved: &Self) -> Option<String> {
         let counts = self.0.iter().zip(&saved.0).zip(WORK).filter_map(|((now, saved), (_, word))| {
             let count = now.iter().filter(|entry| !saved.contains(entry)).count();
@@ -50,7 +50,7 @@ impl Work {
 pub(super) struct Departure {
     /// Work stored in the log or in the session's file.
     pub(super) saved: Work,
-    /// Where the user goes after the answer of the dialog.
+    /// Request that waits for the answer of the dialog.
     pub(super) asked: Option<Leaving>,
     /// True if the window may close without a question.
     pub(super) quits: bool,

@@ -137,7 +137,7 @@ pub(super) fn move_inside_screen(window: &winit::window::Window) {
 pub(super) struct WindowKeeper {
     pub(super) kept: KeptWindow,
     pub(super) changed_s: Option<f64>,
-    /// Whether the window is to be maximized when it is shown.
+    /// True if the window is maximized when it is shown.
     pub(super) maximizes: bool,
     /// Number of frames in which the window was shown, until it has its place.
     pub(super) shown: u32,

@@ -143,7 +143,7 @@ fn item_ui(ui: &mut Ui, name: &str, keys: &str, enabled: bool, on: bool) -> bool
     response.clicked()
 }
 
-/// What belongs to the first group of a menu and depends on the session.
+/// Entries of the first group of a menu that depend on the session.
 fn first_group_ui(ui: &mut Ui, menu: Menu, state: &mut MainWindow, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
     match menu {
         Menu::File => {

@@ -26,7 +26,7 @@ pub struct ForkChanges {
     pub dropped: BTreeSet<u64>,
     /// Keys of cameras that are no longer used, for a run with two (`without=`).
     pub without: BTreeSet<String>,
-    /// Whether encoder readings are still used (`encoder=off` clears it).
+    /// Use encoder readings (`encoder=off` clears it).
     pub encoder: bool,
     /// Standard deviation of noise added to every joint angle, in radians; the estimator's σ stays as it is.
     pub joint_noise_rad: f64,

@@ -14,7 +14,7 @@ const NO_JOINT_OFFSETS: &str = "off: a calibration that was initialized without 
                                 with encoder=on instead";
 
 impl ForkChanges {
-    /// The changes beside the parameterization, in the order of the canonical text.
+    /// Changes other than the parameterization, in the order of the canonical text.
     pub const KEYS: &'static [Key<Self>] = &[
         Key::<Self>::new(
             "estimate",

@@ -167,7 +167,7 @@ impl RunSpec {
         }
     }
 
-    /// Whether the fixed calibration excludes a key: sensor columns require `calibrate=on`.
+    /// True if the fixed calibration excludes a key: sensor columns require `calibrate=on`.
     pub fn excludes(&self, key: &str) -> bool {
         !self.calibrate && SensorColumns::ALL.into_iter().any(|columns| columns.key() == key)
     }

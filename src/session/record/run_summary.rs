@@ -190,7 +190,7 @@ pub struct RunSummary {
     pub real_time_factor: Option<f64>,
     /// Warnings about the log and of the run.
     pub warnings: Vec<String>,
-    /// Trajectories of other programs beside the runs, evaluated like them.
+    /// Trajectories of other programs, evaluated like the runs.
     #[serde(serialize_with = "lanes", skip_serializing_if = "Vec::is_empty")]
     pub trajectories: Vec<Arc<TrajectoryLane>>,
 }

@@ -13,7 +13,7 @@ use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::PoseTrack;
 use crate::session::accuracy::path_length_m;
 
-/// A trajectory beside the runs, as in `summary.json`. It has poses only: no calibration, no features, no residuals.
+/// Trajectory of another program, as in `summary.json`. It has poses only: no calibration, features or residuals.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrajectoryLane {
     pub label: String,

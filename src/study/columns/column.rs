@@ -28,9 +28,9 @@ pub(in crate::study) struct Column<Row> {
     value: Value<Row>,
     /// Which change is worse in a comparison.
     pub(in crate::study) worse: Direction,
-    /// Whether equal results have different values on two machines: paths, the program, times and memory.
+    /// True if equal results have different values on two machines: paths, the program, times and memory.
     pub(in crate::study) local: bool,
-    /// Whether its lengths are shown in millimetres.
+    /// True if lengths are shown in millimetres.
     pub(in crate::study) fine: bool,
 }
 

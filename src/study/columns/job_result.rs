@@ -75,9 +75,8 @@ pub struct JobResult<'a> {
     pub key: &'a str,
     /// Inputs of the job.
     pub job: &'a StudyJob,
-    /// How it ended.
     pub status: JobStatus,
-    /// Why there is no result; empty with one.
+    /// Reason for a missing result; empty with a result.
     pub message: &'a str,
     /// Files and costs.
     pub costs: &'a JobCosts,
@@ -92,11 +91,9 @@ pub struct JobResult<'a> {
 pub struct RunResult<'a> {
     /// The recording of the run.
     pub recording: &'a Recording,
-    /// Its steps.
     pub record: &'a RunRecord,
-    /// Its summary.
     pub summary: &'a RunSummary,
-    /// Its [`RunRecord::pose_consistency`].
+    /// [`RunRecord::pose_consistency`] of the run.
     pub consistency: &'a [PoseConsistency],
     /// The offline calibration that its rig comes from.
     pub offline: Option<&'a CalibrationRun>,

@@ -48,22 +48,13 @@ pub enum TemplateError {
     },
     /// There is no camera model in the log.
     #[error("no camera model in the log: {reason}; give one with --camera fov:DEG")]
-    NoCameraInfo {
-        /// Why not.
-        reason: String,
-    },
+    NoCameraInfo { reason: String },
     /// The image size is not known.
     #[error("the size of the images is unknown: {reason}; give it with --size WxH")]
-    NoSize {
-        /// Why not.
-        reason: String,
-    },
+    NoSize { reason: String },
     /// The meaning of an attitude topic is not complete.
     #[error("--attitude: {problem}")]
-    Attitude {
-        /// What is missing or wrong.
-        problem: String,
-    },
+    Attitude { problem: String },
     /// The joints of the log do not match the mechanism.
     #[error("the joints of {topic} ({}) do not match the mechanism {mechanism}: name them in its order with --joints", found.join(", "))]
     Joints {

@@ -15,13 +15,13 @@ pub(crate) struct Tour {
     pub(super) stop: Option<usize>,
     /// Frames since the panels have been laid out for the stop; 0 before.
     pub(super) frames: u8,
-    /// Whether cursor, run and selection have been set, which may have to wait for the estimator.
+    /// True once cursor, run and selection are set, which may have to wait for the estimator.
     pub(super) arranged: bool,
     /// Id of the run that the tour is about, and its instant.
     pub(super) story: Option<Story>,
     /// True if the run `classical` has been added.
     added: bool,
-    /// Whether that run is to be shown as soon as it has a step.
+    /// True while that run waits to be shown until it has a step.
     pub(super) awaited: bool,
 }
 

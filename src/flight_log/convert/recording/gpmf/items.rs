@@ -101,7 +101,7 @@ impl Item<'_> {
     }
 }
 
-/// What the items of a stream say of its samples.
+/// Properties of a stream's samples: name, units, scale and times.
 #[derive(Debug, Default)]
 pub(super) struct Properties {
     pub(super) scales: Vec<f64>,

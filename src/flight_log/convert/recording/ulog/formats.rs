@@ -89,7 +89,7 @@ impl Formats {
         Ok(())
     }
 
-    /// Where the numbers of a format lie; `None` for a format that is not declared, or whose size cannot be told.
+    /// Offsets of the numbers of a format; `None` for a format that is not declared or has no determined size.
     pub(super) fn layout(&self, name: &str) -> Option<MessageLayout> {
         let mut sizes = BTreeMap::new();
         let mut layout = MessageLayout::default();
