@@ -65,7 +65,12 @@ impl AngularRates {
     /// Index of the sample before a time, and the fraction of the interval to the next one.
     fn place(&self, time_s: f64) -> Option<(usize, f64)> {
         let last = self.times_s.len().saturating_sub(1).max(1);
-        let after = self.times_s.partition_point(|sample_s| *sample_s <= time_s).clamp(1, last);
+        let mut after = self.times_s.partition_point(|sample_s| *sample_s <= time_s).clamp(1, last);
+        // The last sample before a gap belongs to the interval that ends there.
+        let starts_gap = self.times_s.get(after).is_some_and(|to_s| self.is_gap(self.times_s[after - 1], *to_s));
+        if starts_gap && after > 1 && self.times_s[after - 1] == time_s {
+            after -= 1;
+        }
         let (from_s, to_s) = (*self.times_s.get(after - 1)?, *self.times_s.get(after)?);
         let fraction = (time_s - from_s) / (to_s - from_s);
         ((0.0..=1.0).contains(&fraction) && !self.is_gap(from_s, to_s)).then_some((after - 1, fraction))

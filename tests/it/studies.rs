@@ -120,5 +120,5 @@ fn the_report_of_a_study_is_one_page_with_its_tables_and_the_same_twice() {
     fs::write(Path::new(&report).join("report.json"), "{\"log\": \"flight.mcap\"}").unwrap();
     let refused = write();
     assert_eq!(refused.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("something else than the study"));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("not of the study"));
 }

@@ -484,7 +484,7 @@ fn a_mask_lies_beside_the_rig_or_is_attached_with_it() {
     };
     check("small.png", &format!("16×8 pixels, expected the resolution of the camera, {width}×{height}"));
     check("missing.png", "no such file");
-    check("text.png", "no PNG that can be read");
+    check("text.png", "not a readable PNG");
     check("../arm.png", "in the folder of the rig");
     check("/dev/zero", "in the folder of the rig");
 

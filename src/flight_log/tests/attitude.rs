@@ -536,7 +536,7 @@ fn stamps_since_px4_started_give_way_to_the_times_of_recording() {
     let (frames, warnings) = boot.play(&rig_text("source: {topic: /gimbal, type: px4, frame: body}"), 0.0);
     warning_with(
         &warnings,
-        &["/gimbal: the stamps count from PX4's start (the first is 77.004 s)", "times of recording"],
+        &["/gimbal: the stamps count from PX4's start (the first is 77.004 s)", "the log times are used"],
     );
     for (stamp_ns, angles) in &frames[..frames.len() - 1] {
         // Messages are recorded 1 ms after their stamp.

@@ -75,7 +75,10 @@ fn decoding_starts_at_keyframes() {
             let decoded = decoder.decode(stream.messages[number], None);
             if number < period {
                 let problem = decoded.unwrap_err().to_string();
-                assert!(problem.contains("damaged or missing; reading continues at the next keyframe"), "{problem}");
+                assert!(
+                    problem.contains("damaged or missing frame; reading continues at the next keyframe"),
+                    "{problem}"
+                );
             } else {
                 assert_eq!(crc32fast::hash(&decoded.unwrap().pixels), stream.luma_crc32[number], "{name} {number}");
             }

@@ -153,8 +153,8 @@ fn mistakes_are_reported_with_their_column() {
     check("rank # 3", 6, &["'#'"]);
     check("sigma(\"yaw) > 1", 7, &["quote"]);
     check("σ < 3", 1, &["'σ'"]);
-    check(&format!("{}true", "(".repeat(200)), 62, &["60 brackets"]);
-    check(&format!("{}true", "not ".repeat(100_000)), 245, &["60 brackets"]);
+    check(&format!("{}true", "(".repeat(200)), 62, &["60 deep"]);
+    check(&format!("{}true", "not ".repeat(100_000)), 245, &["60 deep"]);
 }
 
 #[test]

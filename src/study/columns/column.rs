@@ -43,7 +43,7 @@ enum Value<Row> {
 }
 
 impl<Row> Column<Row> {
-    pub(super) const fn new(name: &'static str, unit: &'static str, meaning: &'static str, value: Value<Row>) -> Self {
+    const fn new(name: &'static str, unit: &'static str, meaning: &'static str, value: Value<Row>) -> Self {
         Self { name, unit, meaning, value, worse: Direction::Larger, local: false, fine: false }
     }
 

@@ -91,15 +91,12 @@ impl<'a> JobResult<'a> {
             JobLog::Recorded(log) => Some(log.start_s),
             JobLog::Simulated(_) => Some(0.0),
         }),
-        Column::number(
-            "duration_s",
-            "s",
-            "duration that was asked for; empty for the rest of the log",
-            |job| match &job.job.log {
+        Column::number("duration_s", "s", "requested duration; empty for the rest of the log", |job| {
+            match &job.job.log {
                 JobLog::Recorded(log) => log.duration_s,
                 JobLog::Simulated(flight) => flight.recipe.duration_s,
-            },
-        ),
+            }
+        }),
         Column::text("program", "version and SHA-256 of the program", |job: &Self| Some(job.costs.program.clone()))
             .local(),
         Column::number("initialized_at_s", "s", "time of the first pose since the log began", |job| {

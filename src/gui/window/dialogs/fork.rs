@@ -79,7 +79,7 @@ impl ForkDialog {
             ui.add_space(6.0);
             match &asked {
                 Ok(_) if written.is_empty() => ui.label(RichText::new("No changes").color(theme.text_weak)),
-                Ok(_) => ui.label(RichText::new(&written).monospace().color(theme.text_weak)),
+                Ok((changes, _)) => ui.label(RichText::new(changes.to_string()).monospace().color(theme.text_weak)),
                 Err(problem) => ui.add(egui::Label::new(RichText::new(problem).color(theme.error)).wrap()),
             };
             ui.add_space(6.0);
