@@ -1,6 +1,6 @@
 //! Configuration files of other estimators from a rig, with the gimbal fixed at given joint angles.
 //!
-//! Each module writes the text of one program's files from a rig of static cameras; [`Format`] describes the
+//! Each module writes the text of one program's files from a rig of static cameras; `Format` describes the
 //! capabilities of the program. Unsupported properties are noted at the head of the files, or are an error.
 
 mod basalt;

@@ -27,7 +27,7 @@ pub struct InitializationInput<'a> {
     pub frames: &'a [InitializationFrame<'a>],
     pub gravity_m_per_s2: f64,
     pub imu_noise: ImuNoise,
-    /// Last estimate of a stationary vehicle (from [`InitializationOutcome::Waiting`]), `None` if there was none.
+    /// Last estimate of a stationary vehicle (from [`super::InitializationOutcome::Waiting`]), `None` if there was none.
     pub stationary: Option<StationaryEstimate>,
     /// Biases estimated by an earlier pass over the log.
     pub bias: Option<BiasPrior>,
