@@ -8,11 +8,11 @@ use super::arrow::ArrowMatrix;
 use super::chain_prior::ChainTerm;
 use super::frame_sets::FrameSet;
 use super::pairs::{ViewPair, ViewRows, add_pairs};
-use super::state::{Camera, Columns, Estimate, ViewId, ViewMap};
-use super::visual::{self, PixelModel, ReducedVisualEquations, Track, VisualEquations};
+use super::state::{BundleEstimate, Camera, Columns, ViewId, ViewMap};
+use super::visual::{self, BundleTrack, PixelModel, ReducedVisualEquations, VisualEquations};
 use crate::estimator::factors::costs::Costs;
 use crate::estimator::factors::encoder::EncoderFactor;
-use crate::estimator::factors::factor::{Block, Factor, NavigationColumns, Rows, Sink};
+use crate::estimator::factors::factor::{Factor, JacobianBlock, NavigationColumns, Sink, WhitenedRows};
 use crate::estimator::factors::imu::ImuFactor;
 use crate::estimator::factors::kind::FactorLabel;
 use crate::estimator::factors::start_prior::{StartPrior, StartPriorFactor};
@@ -38,14 +38,14 @@ pub(super) struct Bundle<'a> {
     pub(super) gravity_in_world: Vector3<f64>,
     pub(super) priors: &'a Priors,
     pub(super) pixels: PixelModel<'a>,
-    pub(super) tracks: &'a [Track],
+    pub(super) tracks: &'a [BundleTrack],
 }
 
 /// Priors on the border: one row per column.
 struct BorderPrior<'a> {
     priors: &'a Priors,
     columns: Columns,
-    estimate: &'a Estimate,
+    estimate: &'a BundleEstimate,
 }
 
 /// Normal equations; those of the visual factors are kept over the view poses.
@@ -70,20 +70,20 @@ impl Bundle<'_> {
     }
 
     /// Poses `world_from_camera` of all views with an observation.
-    pub(super) fn poses(&self, estimate: &Estimate) -> BTreeMap<ViewId, CameraPose> {
+    pub(super) fn poses(&self, estimate: &BundleEstimate) -> BTreeMap<ViewId, CameraPose> {
         let pose = |view: ViewId| (view, estimate.view(view, self.frame_sets, &self.gravity_in_world));
         self.views().into_iter().map(pose).collect()
     }
 
     /// Twice the cost: sum of the robust squared whitened residuals.
-    pub(super) fn cost(&self, estimate: &Estimate) -> f64 {
+    pub(super) fn cost(&self, estimate: &BundleEstimate) -> f64 {
         let mut costs = Costs::default();
         self.factors(estimate, &mut costs);
         self.pixels.cost(&self.poses(estimate), self.tracks, &estimate.landmarks) + 2.0 * costs.total()
     }
 
     /// Passes all factors but the reprojections to a sink; columns are those of the band, then of the border.
-    fn factors(&self, estimate: &Estimate, sink: &mut impl Sink) {
+    fn factors(&self, estimate: &BundleEstimate, sink: &mut impl Sink) {
         for frame_set in 1..self.frame_sets.len() {
             sink.take(self.imu_factor(frame_set, estimate));
         }
@@ -96,7 +96,7 @@ impl Bundle<'_> {
     }
 
     /// IMU factor that ends at a frame set, `None` without samples.
-    fn imu_factor<'s>(&'s self, frame_set: usize, estimate: &'s Estimate) -> Option<ImuFactor<'s>> {
+    fn imu_factor<'s>(&'s self, frame_set: usize, estimate: &'s BundleEstimate) -> Option<ImuFactor<'s>> {
         let (motion, information) = self.frame_sets[frame_set].motion.as_ref()?;
         let states = [&estimate.navigation[frame_set - 1], &estimate.navigation[frame_set]];
         Some(ImuFactor {
@@ -112,7 +112,7 @@ impl Bundle<'_> {
     }
 
     /// Encoder factor of a frame set: the reading at the gimbal camera's image moves with the camera's time offset.
-    fn encoder_factor<'s>(&'s self, frame_set: usize, estimate: &'s Estimate) -> Option<EncoderFactor<'s>> {
+    fn encoder_factor<'s>(&'s self, frame_set: usize, estimate: &'s BundleEstimate) -> Option<EncoderFactor<'s>> {
         let gimbal = self.frame_sets[frame_set].gimbal.as_ref()?;
         Some(EncoderFactor {
             slot: frame_set,
@@ -125,7 +125,7 @@ impl Bundle<'_> {
         })
     }
 
-    fn border_prior<'s>(&'s self, estimate: &'s Estimate) -> BorderPrior<'s> {
+    fn border_prior<'s>(&'s self, estimate: &'s BundleEstimate) -> BorderPrior<'s> {
         BorderPrior { priors: self.priors, columns: self.columns, estimate }
     }
 
@@ -137,12 +137,12 @@ impl Bundle<'_> {
     }
 
     /// Information matrix of the priors on the border (borders × borders).
-    pub(super) fn border_prior_information(&self, estimate: &Estimate) -> DMatrix<f64> {
+    pub(super) fn border_prior_information(&self, estimate: &BundleEstimate) -> DMatrix<f64> {
         let (rows, _) = self.border_prior(estimate).jacobian_and_residual();
         rows.tr_mul(&rows)
     }
 
-    pub(super) fn linearize(&self, estimate: &Estimate) -> BundleEquations {
+    pub(super) fn linearize(&self, estimate: &BundleEstimate) -> BundleEquations {
         let poses = self.poses(estimate);
         let map =
             |view: ViewId| (view, estimate.view_map(view, &self.columns, self.frame_sets, &self.gravity_in_world));
@@ -158,7 +158,7 @@ impl Bundle<'_> {
 
     /// Largest number of frame sets between two observations of one landmark, at least one for the IMU factors.
     fn reach(&self) -> usize {
-        let span = |track: &Track| match (track.observations.first(), track.observations.last()) {
+        let span = |track: &BundleTrack| match (track.observations.first(), track.observations.last()) {
             (Some(first), Some(last)) => last.view.frame_set() - first.view.frame_set(),
             _ => 0,
         };
@@ -269,8 +269,8 @@ impl Factor for BorderPrior<'_> {
 
     fn rows<S: Sink>(&self, sink: &mut S) {
         let (jacobian, residual) = self.jacobian_and_residual();
-        let blocks = [Block { start: self.columns.band(), entries: jacobian.as_slice() }];
-        sink.add(self.label(), &Rows { residual: residual.as_slice(), blocks: &blocks, products: None });
+        let blocks = [JacobianBlock { start: self.columns.band(), entries: jacobian.as_slice() }];
+        sink.add(self.label(), &WhitenedRows { residual: residual.as_slice(), blocks: &blocks, products: None });
     }
 }
 
@@ -290,7 +290,7 @@ struct StoredFactor {
 impl Sink for StoredRows {
     const DERIVATIVES: bool = true;
 
-    fn add(&mut self, _label: FactorLabel, rows: &Rows<'_>) {
+    fn add(&mut self, _label: FactorLabel, rows: &WhitenedRows<'_>) {
         let height = rows.residual.len();
         let columns: Vec<usize> = rows.columns().collect();
         let entries = rows.blocks.iter().flat_map(|block| block.entries.iter().copied());

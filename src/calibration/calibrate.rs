@@ -14,7 +14,7 @@ use super::outcome::{
 use super::pose_loop::{PoseLoopSolution, PoseLoops, paired};
 use super::rounds::{Stage, StageResult};
 use super::segments::{self, Segment, SegmentCounts};
-use super::state::{Camera, Columns, Estimate};
+use super::state::{BundleEstimate, Camera, Columns};
 use super::statistics::Statistics;
 use super::trajectory::InitialTrajectory;
 use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
@@ -88,7 +88,7 @@ pub fn calibrate_along(
         pose_covariances: options.pose_covariances && name == BOTH,
     };
     let joints = input.gimbal_camera.chain.joint_count();
-    let first = Estimate {
+    let first = BundleEstimate {
         joints_rad: frame_sets
             .iter()
             .map(|frame_set| {
@@ -270,7 +270,7 @@ fn close_loops(
     priors: &Priors,
     frame_sets: &[FrameSet],
     segments: &[Segment],
-    estimate: &Estimate,
+    estimate: &BundleEstimate,
 ) -> Result<(PoseLoopSolution, Statistics), CalibrationError> {
     let gravity = gravity_in_world(input.gravity_m_per_s2);
     let pairs = paired(
@@ -315,7 +315,7 @@ fn parameters(prior: &ChainTerm, chain: &Chain, sigma: &dyn Fn(usize) -> f64) ->
 
 fn pixel_report(input: &CalibrationInput, result: &StageResult, camera: Camera) -> Option<PixelReport> {
     let camera_index = usize::from(camera == Camera::Gimbal);
-    let sees = |track: &&super::visual::Track| {
+    let sees = |track: &&super::visual::BundleTrack| {
         track.observations.iter().any(|observation| observation.view.camera() == camera)
     };
     Some(PixelReport {
@@ -330,7 +330,7 @@ fn pixel_report(input: &CalibrationInput, result: &StageResult, camera: Camera) 
 fn imu_residual_report(
     input: &CalibrationInput,
     frame_sets: &[FrameSet],
-    estimate: &Estimate,
+    estimate: &BundleEstimate,
 ) -> Option<ImuResidualReport> {
     let gravity: Vector3<f64> = gravity_in_world(input.gravity_m_per_s2);
     let (mut gyroscope, mut accelerometer) = (Vec::new(), Vec::new());

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::frame_sets::FrameSet;
 use super::landmark::AnchoredLandmark;
 use super::state::{Camera, ViewId};
-use super::visual::{Observation, PixelModel, Track};
+use super::visual::{BundleObservation, BundleTrack, PixelModel};
 use super::{CalibrationInput, CalibrationOptions};
 use crate::frontend::{FeatureId, TrackedFrame};
 use crate::optimization::{CameraPose, Ray};
@@ -30,8 +30,8 @@ pub(super) fn collect(
     frame_sets: &[FrameSet],
     camera: Camera,
     wanted: &dyn Fn(usize) -> bool,
-) -> Vec<Track> {
-    let mut open: BTreeMap<FeatureId, Track> = BTreeMap::new();
+) -> Vec<BundleTrack> {
+    let mut open: BTreeMap<FeatureId, BundleTrack> = BTreeMap::new();
     let mut finished = Vec::new();
     for (index, frame_set) in frame_sets.iter().enumerate() {
         let Some(frame) = tracked(input, frame_set, camera).filter(|_| wanted(index)) else { continue };
@@ -46,7 +46,7 @@ pub(super) fn collect(
                 finished.push(std::mem::take(track));
             }
             let view = ViewId::new(index, camera);
-            track.observations.push(Observation { view, uv_px: feature.uv_px, bearing: feature.bearing });
+            track.observations.push(BundleObservation { view, uv_px: feature.uv_px, bearing: feature.bearing });
         }
     }
     finished.extend(open.into_values());
@@ -57,14 +57,14 @@ pub(super) fn collect(
 
 /// Triangulates the tracks with the current poses; omits tracks without a landmark.
 pub(super) fn triangulated(
-    tracks: Vec<Track>,
+    tracks: Vec<BundleTrack>,
     poses: &BTreeMap<ViewId, CameraPose>,
     options: &CalibrationOptions,
-) -> (Vec<Track>, Vec<AnchoredLandmark>) {
+) -> (Vec<BundleTrack>, Vec<AnchoredLandmark>) {
     tracks
         .into_iter()
         .filter_map(|track| {
-            let ray = |observation: &Observation| {
+            let ray = |observation: &BundleObservation| {
                 let pose = poses.get(&observation.view)?;
                 Some(Ray { centre: pose.position_m, direction: pose.rotation * observation.bearing })
             };
@@ -78,13 +78,13 @@ pub(super) fn triangulated(
 /// Drops observations with residuals beyond `limit` standard deviations, and landmarks with too few
 /// remaining observations.
 pub(super) fn without_outliers(
-    tracks: Vec<Track>,
+    tracks: Vec<BundleTrack>,
     landmarks: &[AnchoredLandmark],
     poses: &BTreeMap<ViewId, CameraPose>,
     pixels: &PixelModel<'_>,
     limit: f64,
     options: &CalibrationOptions,
-) -> (Vec<Track>, Vec<AnchoredLandmark>) {
+) -> (Vec<BundleTrack>, Vec<AnchoredLandmark>) {
     tracks
         .into_iter()
         .zip(landmarks)
@@ -102,7 +102,7 @@ pub(super) fn without_outliers(
 
 /// Lengths of the reprojection residuals of one camera, in pixels.
 pub(super) fn residual_lengths_px(
-    tracks: &[Track],
+    tracks: &[BundleTrack],
     landmarks: &[AnchoredLandmark],
     poses: &BTreeMap<ViewId, CameraPose>,
     pixels: &PixelModel<'_>,

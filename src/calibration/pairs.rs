@@ -18,15 +18,15 @@ use super::state::ViewMap;
 #[derive(Clone, Debug)]
 pub(super) struct ViewRows<'a> {
     map: &'a ViewMap,
-    own: Rows,
-    shared: Rows,
+    own: PoseRows,
+    shared: PoseRows,
     /// First column of the view's frame set in the band.
     start: usize,
 }
 
 /// Six rows of the nonzero columns, row by row.
 #[derive(Clone, Debug)]
-struct Rows {
+struct PoseRows {
     columns: Range<usize>,
     entries: Vec<f64>,
 }
@@ -42,11 +42,11 @@ pub(super) struct ViewPair<'a> {
 impl<'a> ViewRows<'a> {
     /// `start` is the column of the band at which the view's frame set starts.
     pub(super) fn new(map: &'a ViewMap, start: usize) -> Self {
-        Self { map, own: Rows::shown(&map.own), shared: Rows::shown(&map.shared), start }
+        Self { map, own: PoseRows::shown(&map.own), shared: PoseRows::shown(&map.shared), start }
     }
 }
 
-impl Rows {
+impl PoseRows {
     /// Columns of a matrix with six rows.
     fn of<S: RawStorage<f64, R, Dyn>, R: Dim>(matrix: &Matrix<f64, R, Dyn, S>, columns: Range<usize>) -> Self {
         let mut entries = Vec::with_capacity(6 * columns.len());
@@ -165,7 +165,7 @@ impl NullaryFnOnce for Border<'_> {
     fn call(self) {
         let Self { pairs, border } = self;
         for ViewPair { first, second, block } in pairs {
-            let right = Rows::of(&(*block * &second.map.own), second.own.columns.clone());
+            let right = PoseRows::of(&(*block * &second.map.own), second.own.columns.clone());
             for unknown in first.shared.columns.clone() {
                 let target = &mut border[unknown][second.start..][second.own.columns.clone()];
                 right.add_products(&column_of(&first.map.shared, unknown), target);

@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, Vector3};
 use super::bundle::{Bundle, Priors};
 use super::frame_sets::FrameSet;
 use super::solver::{Covariances, adjust, covariances};
-use super::state::{Camera, Columns, Estimate};
-use super::visual::{PixelModel, Track};
+use super::state::{BundleEstimate, Camera, Columns};
+use super::visual::{BundleTrack, PixelModel};
 use super::{CalibrationError, CalibrationOptions, observations};
 use crate::camera::CameraModel;
 use crate::estimator::PoseCovariance;
@@ -36,8 +36,8 @@ pub(super) struct Stage<'a> {
 
 #[derive(Clone, Debug)]
 pub(super) struct StageResult {
-    pub(super) estimate: Estimate,
-    pub(super) tracks: Vec<Track>,
+    pub(super) estimate: BundleEstimate,
+    pub(super) tracks: Vec<BundleTrack>,
     /// Standard deviation of a pixel coordinate by camera, estimated from the residuals.
     pub(super) sigma_px: [f64; 2],
     pub(super) iterations: usize,
@@ -58,7 +58,7 @@ impl StageResult {
     }
 }
 
-fn columns(estimate: &Estimate) -> Columns {
+fn columns(estimate: &BundleEstimate) -> Columns {
     Columns { frame_sets: estimate.navigation.len(), joints: estimate.chain.joint_count(), chain: estimate.chain.dof() }
 }
 
@@ -71,7 +71,7 @@ impl Stage<'_> {
         &'b self,
         frame_sets: &'b [FrameSet],
         columns: Columns,
-        tracks: &'b [Track],
+        tracks: &'b [BundleTrack],
         sigma_px: [f64; 2],
     ) -> Bundle<'b> {
         Bundle {
@@ -88,8 +88,8 @@ impl Stage<'_> {
     pub(super) fn run(
         &self,
         frame_sets: &mut [FrameSet],
-        all_tracks: &[Track],
-        start: Estimate,
+        all_tracks: &[BundleTrack],
+        start: BundleEstimate,
         on_round: &mut dyn FnMut(usize) -> Result<(), CalibrationError>,
     ) -> Result<StageResult, CalibrationError> {
         let singular = || CalibrationError::Singular { stage: self.name };
@@ -97,7 +97,7 @@ impl Stage<'_> {
         let mut estimate = start;
         let mut sigma_px = [INITIAL_SIGMA_PX; 2];
         let mut iterations = 0;
-        let mut kept: Vec<Track> = Vec::new();
+        let mut kept: Vec<BundleTrack> = Vec::new();
         let rounds = self.options.rounds.max(1);
         for round in 0..=rounds {
             on_round(round)?;
@@ -144,7 +144,7 @@ impl Stage<'_> {
         })
     }
 
-    fn reintegrate(frame_sets: &mut [FrameSet], estimate: &Estimate) {
+    fn reintegrate(frame_sets: &mut [FrameSet], estimate: &BundleEstimate) {
         for index in 0..frame_sets.len() {
             let before = index.checked_sub(1).map(|before| estimate.navigation[before].bias);
             frame_sets[index].reintegrate(before.as_ref(), &estimate.navigation[index].bias);

@@ -6,7 +6,7 @@ use nalgebra::UnitQuaternion;
 use super::bundle::gimbal_view;
 use super::frame_sets::FrameSet;
 use super::observations::tracked;
-use super::state::{Camera, Estimate};
+use super::state::{BundleEstimate, Camera};
 use super::{CalibrationInput, CalibrationOptions};
 use crate::estimator::gravity_in_world;
 use crate::estimator::initialization::{InitializationOptions, ReconstructionGuess, reconstruct_views};
@@ -42,7 +42,7 @@ pub(super) fn reconstruct(
     input: &CalibrationInput,
     options: &CalibrationOptions,
     frame_sets: &[FrameSet],
-    estimate: &Estimate,
+    estimate: &BundleEstimate,
 ) -> (Vec<Segment>, SegmentCounts) {
     let gravity = gravity_in_world(input.gravity_m_per_s2);
     let gimbal = &input.gimbal_camera;

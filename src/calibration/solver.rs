@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, Matrix6};
 
 use super::CalibrationOptions;
 use super::bundle::{Bundle, BundleEquations};
-use super::state::{Columns, Estimate};
+use super::state::{BundleEstimate, Columns};
 use crate::estimator::PoseCovariance;
 use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
 
@@ -15,13 +15,13 @@ const FLOOR: f64 = 1e-6;
 
 #[derive(Clone, Debug)]
 pub(super) struct Adjusted {
-    pub(super) estimate: Estimate,
+    pub(super) estimate: BundleEstimate,
     /// Number of tried steps, accepted or not.
     pub(super) iterations: usize,
 }
 
 /// Minimizes the bundle's cost from `start`; `None` when the first equations are singular.
-pub(super) fn adjust(bundle: &Bundle<'_>, start: Estimate, options: &CalibrationOptions) -> Option<Adjusted> {
+pub(super) fn adjust(bundle: &Bundle<'_>, start: BundleEstimate, options: &CalibrationOptions) -> Option<Adjusted> {
     let options = DampedOptions {
         iterations: options.iterations,
         relative_cost_tolerance: options.relative_cost_tolerance,
@@ -42,18 +42,18 @@ struct DampedBundle<'a> {
 }
 
 impl DampedProblem for DampedBundle<'_> {
-    type Estimate = Estimate;
+    type Estimate = BundleEstimate;
     type Equations = BundleEquations;
 
-    fn cost(&self, estimate: &Estimate) -> f64 {
+    fn cost(&self, estimate: &BundleEstimate) -> f64 {
         self.bundle.cost(estimate)
     }
 
-    fn linearize(&self, estimate: &Estimate) -> BundleEquations {
+    fn linearize(&self, estimate: &BundleEstimate) -> BundleEquations {
         self.bundle.linearize(estimate)
     }
 
-    fn step(&mut self, estimate: &Estimate, equations: &BundleEquations, damping: f64) -> Option<Estimate> {
+    fn step(&mut self, estimate: &BundleEstimate, equations: &BundleEquations, damping: f64) -> Option<BundleEstimate> {
         let bundle = self.bundle;
         let reduced = equations.visual().eliminate_by_parts(damping);
         let (mut matrix, band, border) = bundle.assemble(equations, &reduced, std::mem::take(&mut self.memory));
@@ -76,7 +76,7 @@ pub(super) struct Covariances {
 }
 
 /// Covariances of the border and, if `of_poses`, of the poses; `None` when the equations are singular.
-pub(super) fn covariances(bundle: &Bundle<'_>, estimate: &Estimate, of_poses: bool) -> Option<Covariances> {
+pub(super) fn covariances(bundle: &Bundle<'_>, estimate: &BundleEstimate, of_poses: bool) -> Option<Covariances> {
     let equations = bundle.linearize(estimate);
     let reduced = equations.visual().eliminate_by_parts(0.0);
     let (mut matrix, _, _) = bundle.assemble(&equations, &reduced, Vec::new());

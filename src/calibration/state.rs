@@ -48,7 +48,7 @@ impl From<ViewId> for usize {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Estimate {
+pub(super) struct BundleEstimate {
     /// States by frame set.
     pub(super) navigation: Vec<NavigationState>,
     /// Joint angles at the gimbal camera's image, without static offsets, by frame set.
@@ -110,7 +110,7 @@ impl Columns {
     }
 }
 
-impl Estimate {
+impl BundleEstimate {
     /// Estimate after a step of band, border and landmarks.
     pub(super) fn moved(
         &self,

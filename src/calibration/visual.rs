@@ -14,7 +14,7 @@ use crate::optimization::{
 
 /// Observation of a landmark in one view.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Observation {
+pub(super) struct BundleObservation {
     pub(super) view: ViewId,
     pub(super) uv_px: Vector2<f64>,
     /// Unit bearing in the camera.
@@ -23,8 +23,8 @@ pub(super) struct Observation {
 
 /// Observations of one landmark, by ascending view.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Track {
-    pub(super) observations: Vec<Observation>,
+pub(super) struct BundleTrack {
+    pub(super) observations: Vec<BundleObservation>,
 }
 
 /// Pixel noise and camera models, indexed by [`super::state::Camera`].
@@ -46,7 +46,7 @@ impl PixelModel<'_> {
         &self,
         poses: &BTreeMap<ViewId, CameraPose>,
         anchored: &AnchoredLandmark,
-        observation: &Observation,
+        observation: &BundleObservation,
     ) -> Option<Vector2<f64>> {
         let camera = self.cameras[Self::camera_index(observation.view)];
         let relative = RelativePose::new(&anchored.anchor, poses.get(&observation.view)?);
@@ -57,11 +57,11 @@ impl PixelModel<'_> {
     pub(super) fn cost(
         &self,
         poses: &BTreeMap<ViewId, CameraPose>,
-        tracks: &[Track],
+        tracks: &[BundleTrack],
         landmarks: &[AnchoredLandmark],
     ) -> f64 {
         let costs = tracks.par_iter().zip(landmarks).map(|(track, landmark)| {
-            let cost = |observation: &Observation| {
+            let cost = |observation: &BundleObservation| {
                 let sigma = self.sigma_px[Self::camera_index(observation.view)];
                 self.loss.cost_of(self.residual_px(poses, landmark, observation), sigma)
             };
@@ -81,12 +81,12 @@ pub(super) type ReducedVisualEquations = ReducedEquations<SparsePoseEquations<Vi
 pub(super) fn equations(
     model: &PixelModel<'_>,
     poses: &BTreeMap<ViewId, CameraPose>,
-    tracks: &[Track],
+    tracks: &[BundleTrack],
     landmarks: &[AnchoredLandmark],
 ) -> VisualEquations {
     let mut equations = ReprojectionEquations::new(SparsePoseEquations::new(), tracks.len());
-    let terms_of = |(track, anchored): (&Track, &AnchoredLandmark)| {
-        let term = |observation: &Observation| {
+    let terms_of = |(track, anchored): (&BundleTrack, &AnchoredLandmark)| {
+        let term = |observation: &BundleObservation| {
             let relative = RelativePose::new(&anchored.anchor, poses.get(&observation.view)?);
             let camera_index = PixelModel::camera_index(observation.view);
             let camera = model.cameras[camera_index];

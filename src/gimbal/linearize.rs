@@ -53,7 +53,7 @@ impl Chain {
         }
     }
 
-    fn traverse<S: Sink>(&self, joint_angles_rad: &[f64], sink: &mut S) -> Frame {
+    fn traverse<S: MotionSink>(&self, joint_angles_rad: &[f64], sink: &mut S) -> Frame {
         assert_eq!(joint_angles_rad.len(), self.joint_count(), "one angle per joint");
         let mut frame = Frame::identity();
         match &self.form {
@@ -107,7 +107,7 @@ impl Chain {
 }
 
 /// Receives the elementary motions of a chain in column order.
-trait Sink {
+trait MotionSink {
     fn rotate(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>);
     fn translate(&mut self, axis: &Vector3<f64>);
     fn joint(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>);
@@ -117,7 +117,7 @@ trait Sink {
 /// Ignores all motions: forward kinematics without derivatives.
 struct Unrecorded;
 
-impl Sink for Unrecorded {
+impl MotionSink for Unrecorded {
     fn rotate(&mut self, _axis: &Vector3<f64>, _point: &Vector3<f64>) {}
     fn translate(&mut self, _axis: &Vector3<f64>) {}
     fn joint(&mut self, _axis: &Vector3<f64>, _point: &Vector3<f64>) {}
@@ -130,7 +130,7 @@ struct Recorder {
     offsets: bool,
 }
 
-impl Sink for Recorder {
+impl MotionSink for Recorder {
     fn rotate(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>) {
         self.parameters.push(axis, point);
     }
@@ -183,18 +183,18 @@ impl Columns {
     }
 }
 
-fn rotate<S: Sink>(frame: &mut Frame, axis: Axis, angle_rad: f64, sink: &mut S) {
+fn rotate<S: MotionSink>(frame: &mut Frame, axis: Axis, angle_rad: f64, sink: &mut S) {
     sink.rotate(&frame.axis(axis), &frame.origin);
     frame.rotate(axis, angle_rad);
 }
 
-fn translate<S: Sink>(frame: &mut Frame, axis: Axis, distance_m: f64, sink: &mut S) {
+fn translate<S: MotionSink>(frame: &mut Frame, axis: Axis, distance_m: f64, sink: &mut S) {
     sink.translate(&frame.axis(axis));
     frame.translate(axis, distance_m);
 }
 
 /// Adds a link without its twist.
-fn traverse_link<S: Sink>(frame: &mut Frame, link: &DhLink, joint_angle_rad: f64, sink: &mut S) {
+fn traverse_link<S: MotionSink>(frame: &mut Frame, link: &DhLink, joint_angle_rad: f64, sink: &mut S) {
     let axis = frame.axis(Axis::Z);
     sink.joint(&axis, &frame.origin);
     sink.offset(&axis, &frame.origin);
@@ -204,7 +204,7 @@ fn traverse_link<S: Sink>(frame: &mut Frame, link: &DhLink, joint_angle_rad: f64
 }
 
 /// Adds a rigid transform with its six columns: rotations about its inner axes, translations along its outer axes.
-fn traverse_block<S: Sink>(frame: &mut Frame, transform: &RigidTransform, sink: &mut S) {
+fn traverse_block<S: MotionSink>(frame: &mut Frame, transform: &RigidTransform, sink: &mut S) {
     let outer = *frame;
     frame.then(transform);
     for axis in [Axis::X, Axis::Y, Axis::Z] {

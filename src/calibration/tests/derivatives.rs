@@ -6,8 +6,8 @@ use super::fixture::{Flight, flight, true_states};
 use crate::calibration::bundle::{Bundle, Priors};
 use crate::calibration::chain_prior::ChainTerm;
 use crate::calibration::frame_sets::{FrameSet, frame_sets};
-use crate::calibration::state::{Camera, Columns, Estimate, ViewId};
-use crate::calibration::visual::{PixelModel, Track};
+use crate::calibration::state::{BundleEstimate, Camera, Columns, ViewId};
+use crate::calibration::visual::{BundleTrack, PixelModel};
 use crate::calibration::{CalibrationOptions, observations};
 use crate::estimator::factors::start_prior::StartPrior;
 use crate::estimator::{ImuBias, gravity_in_world};
@@ -21,8 +21,8 @@ const STEP: f64 = 1e-6;
 struct Example {
     flight: Flight,
     frame_sets: Vec<FrameSet>,
-    estimate: Estimate,
-    tracks: Vec<Track>,
+    estimate: BundleEstimate,
+    tracks: Vec<BundleTrack>,
     priors: Priors,
     columns: Columns,
 }
@@ -60,7 +60,7 @@ fn example() -> Example {
             .as_ref()
             .map_or_else(|| vec![0.0; 3], |g| g.encoder.angles_rad.iter().map(|q| q + 0.01).collect())
     };
-    let mut estimate = Estimate {
+    let mut estimate = BundleEstimate {
         joints_rad: frame_sets.iter().map(joint).collect(),
         navigation,
         extrinsics: flight.true_extrinsics,

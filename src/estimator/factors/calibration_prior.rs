@@ -1,6 +1,6 @@
 //! The rig's prior on the calibration.
 
-use super::factor::{Block, Factor, Point, Rows, Sink};
+use super::factor::{Factor, JacobianBlock, Point, Sink, WhitenedRows};
 use super::kind::FactorLabel;
 use crate::estimator::state::calibrations::Calibrations;
 
@@ -27,12 +27,12 @@ impl Factor for CalibrationPriorFactor<'_> {
 
     fn rows<S: Sink>(&self, sink: &mut S) {
         let residual = self.calibration.prior_residual();
-        let mut rows = Rows { residual: residual.as_slice(), blocks: &[], products: None };
+        let mut rows = WhitenedRows { residual: residual.as_slice(), blocks: &[], products: None };
         if !S::DERIVATIVES {
             return sink.add(self.label(), &rows);
         }
         let jacobian = self.calibration.prior_jacobian();
-        let blocks = [Block { start: self.start, entries: jacobian.as_slice() }];
+        let blocks = [JacobianBlock { start: self.start, entries: jacobian.as_slice() }];
         rows.blocks = &blocks;
         sink.add(self.label(), &rows);
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::DVectorView;
 
-use super::factor::{Rows, Sink};
+use super::factor::{Sink, WhitenedRows};
 use super::kind::{FactorKind, FactorLabel};
 
 /// Twice the cost and number of scalar residuals by kind of factor: the cost is robust for reprojections, χ² for the
@@ -39,7 +39,7 @@ impl Costs {
 impl Sink for Costs {
     const DERIVATIVES: bool = false;
 
-    fn add(&mut self, label: FactorLabel, rows: &Rows<'_>) {
+    fn add(&mut self, label: FactorLabel, rows: &WhitenedRows<'_>) {
         let residual = DVectorView::from_slice(rows.residual, rows.residual.len());
         self.add_to(label.kind(), residual.norm_squared(), rows.residual.len());
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 
-use super::factor::{Products, Rows, Sink};
+use super::factor::{Products, Sink, WhitenedRows};
 use super::kind::FactorLabel;
 use crate::estimator::state::layout::{POSE, VELOCITY_BIAS};
 
@@ -39,7 +39,7 @@ impl DenseEquations {
     }
 
     /// Adds rows with one block of consecutive columns.
-    fn add_block(&mut self, rows: &Rows<'_>, start: usize, entries: &[f64]) {
+    fn add_block(&mut self, rows: &WhitenedRows<'_>, start: usize, entries: &[f64]) {
         let height = rows.residual.len();
         let jacobian = DMatrixView::from_slice(entries, height, entries.len() / height);
         let mut corner = self.hessian.view_mut((start, start), (jacobian.ncols(), jacobian.ncols()));
@@ -49,7 +49,7 @@ impl DenseEquations {
     }
 
     /// Adds given products.
-    fn add_products(&mut self, rows: &Rows<'_>, products: Products<'_>) {
+    fn add_products(&mut self, rows: &WhitenedRows<'_>, products: Products<'_>) {
         let columns = &mut self.scratch.columns;
         columns.clear();
         columns.extend(rows.columns());
@@ -63,7 +63,7 @@ impl DenseEquations {
     }
 
     /// Adds rows with several blocks.
-    fn add_blocks(&mut self, rows: &Rows<'_>) {
+    fn add_blocks(&mut self, rows: &WhitenedRows<'_>) {
         let scratch = &mut self.scratch;
         scratch.columns.clear();
         scratch.columns.extend(rows.columns());
@@ -86,7 +86,7 @@ impl Scratch {
     /// Computes the products of the blocks; sums run over the rows in their order.
     #[expect(clippy::inline_always, reason = "the caller passes a constant width for the largest factor")]
     #[inline(always)]
-    fn multiply(&mut self, rows: &Rows<'_>, width: usize) {
+    fn multiply(&mut self, rows: &WhitenedRows<'_>, width: usize) {
         let height = rows.residual.len();
         self.hessian.clear();
         self.hessian.resize(width * width, 0.0);
@@ -114,7 +114,7 @@ impl Scratch {
 impl Sink for DenseEquations {
     const DERIVATIVES: bool = true;
 
-    fn add(&mut self, _label: FactorLabel, rows: &Rows<'_>) {
+    fn add(&mut self, _label: FactorLabel, rows: &WhitenedRows<'_>) {
         match (rows.products, rows.blocks) {
             (Some(products), _) => self.add_products(rows, products),
             (None, [block]) => self.add_block(rows, block.start, block.entries),

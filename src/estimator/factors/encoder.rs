@@ -1,6 +1,6 @@
 //! Encoder readings of a frame.
 
-use super::factor::{Block, Factor, Point, Rows, Sink};
+use super::factor::{Factor, JacobianBlock, Point, Sink, WhitenedRows};
 use super::kind::FactorLabel;
 use crate::estimator::state::calibrations::MAIN;
 use crate::geometry::wrap_angle;
@@ -81,9 +81,9 @@ impl Factor for EncoderFactor<'_> {
         let residual: Vec<f64> = terms.iter().map(|term| term.residual).collect();
         let by_angles = diagonal(terms.iter().map(|term| term.by_angle));
         let by_clock: Vec<f64> = terms.iter().map(|term| term.by_clock).collect();
-        let mut blocks = vec![Block { start: self.joints, entries: &by_angles }];
-        blocks.extend(self.clock.map(|start| Block { start, entries: &by_clock }));
-        sink.add(self.label(), &Rows { residual: &residual, blocks: &blocks, products: None });
+        let mut blocks = vec![JacobianBlock { start: self.joints, entries: &by_angles }];
+        blocks.extend(self.clock.map(|start| JacobianBlock { start, entries: &by_clock }));
+        sink.add(self.label(), &WhitenedRows { residual: &residual, blocks: &blocks, products: None });
     }
 }
 

@@ -28,7 +28,7 @@ pub(crate) trait Sink {
         true
     }
 
-    fn add(&mut self, label: FactorLabel, rows: &Rows<'_>);
+    fn add(&mut self, label: FactorLabel, rows: &WhitenedRows<'_>);
 
     /// Adds the rows of a factor, if there is one and they are wanted.
     fn take(&mut self, factor: Option<impl Factor>)
@@ -43,16 +43,16 @@ pub(crate) trait Sink {
 
 /// Whitened rows of a factor.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rows<'a> {
+pub(crate) struct WhitenedRows<'a> {
     /// Residual over its standard deviation (m × 1).
     pub(crate) residual: &'a [f64],
     /// Derivatives by columns of the layout; empty if the sink does not use derivatives.
-    pub(crate) blocks: &'a [Block<'a>],
+    pub(crate) blocks: &'a [JacobianBlock<'a>],
     /// Normal equations of these rows, `None` if they are to be computed from the blocks.
     pub(crate) products: Option<Products<'a>>,
 }
 
-impl Rows<'_> {
+impl WhitenedRows<'_> {
     /// Columns of the layout, block by block.
     pub(crate) fn columns(&self) -> impl Iterator<Item = usize> + '_ {
         let height = self.residual.len();
@@ -62,7 +62,7 @@ impl Rows<'_> {
 
 /// Derivative by consecutive columns of the layout.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Block<'a> {
+pub(crate) struct JacobianBlock<'a> {
     /// First column of the layout.
     pub(crate) start: usize,
     /// Entries (m × n), column by column.
@@ -107,14 +107,14 @@ impl NavigationColumns {
     }
 
     /// Blocks of a derivative by the state (m × 15, column by column).
-    pub(crate) fn blocks<'a>(&self, entries: &'a [f64]) -> [Block<'a>; 3] {
+    pub(crate) fn blocks<'a>(&self, entries: &'a [f64]) -> [JacobianBlock<'a>; 3] {
         let height = entries.len() / 15;
         let (by_pose, others) = entries.split_at(6 * height);
         let (by_velocity, by_biases) = others.split_at(3 * height);
         [
-            Block { start: self.pose, entries: by_pose },
-            Block { start: self.velocity, entries: by_velocity },
-            Block { start: self.biases, entries: by_biases },
+            JacobianBlock { start: self.pose, entries: by_pose },
+            JacobianBlock { start: self.velocity, entries: by_velocity },
+            JacobianBlock { start: self.biases, entries: by_biases },
         ]
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::factor::{Block, Factor, NavigationColumns, Point, Rows, Sink};
+use super::factor::{Factor, JacobianBlock, NavigationColumns, Point, Sink, WhitenedRows};
 use super::kind::FactorLabel;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::imu_errors::ImuErrors;
@@ -61,7 +61,7 @@ impl Factor for ImuFactor<'_> {
         let errors = self.intrinsics.map(|(errors, _)| errors);
         let [from, to] = self.current;
         let residual = self.information * residual(self.motion, from, to, self.gravity_in_world, errors);
-        let mut rows = Rows { residual: residual.as_slice(), blocks: &[], products: None };
+        let mut rows = WhitenedRows { residual: residual.as_slice(), blocks: &[], products: None };
         if !S::DERIVATIVES {
             return sink.add(self.label(), &rows);
         }
@@ -73,7 +73,7 @@ impl Factor for ImuFactor<'_> {
         blocks.extend(from.blocks(by_from.as_slice()));
         blocks.extend(to.blocks(by_to.as_slice()));
         let by_intrinsics = sparse_product(self.information, &by_intrinsics);
-        blocks.extend(self.intrinsics.map(|(_, start)| Block { start, entries: by_intrinsics.as_slice() }));
+        blocks.extend(self.intrinsics.map(|(_, start)| JacobianBlock { start, entries: by_intrinsics.as_slice() }));
         rows.blocks = &blocks;
         sink.add(self.label(), &rows);
     }

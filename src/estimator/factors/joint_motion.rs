@@ -1,7 +1,7 @@
 //! Joint rates and joint accelerations of a frame.
 
 use super::encoder::diagonal;
-use super::factor::{Block, Factor, Point, Rows, Sink};
+use super::factor::{Factor, JacobianBlock, Point, Sink, WhitenedRows};
 use super::kind::FactorLabel;
 use crate::sensors::JointAngles;
 
@@ -73,7 +73,7 @@ impl Factor for JointMotionFactor<'_> {
             .collect();
         let residual: Vec<f64> = terms.iter().map(|(residual, _)| *residual).collect();
         let entries = diagonal(terms.iter().map(|(_, slope)| *slope));
-        let blocks = [Block { start: self.start, entries: &entries }];
-        sink.add(self.label(), &Rows { residual: &residual, blocks: &blocks, products: None });
+        let blocks = [JacobianBlock { start: self.start, entries: &entries }];
+        sink.add(self.label(), &WhitenedRows { residual: &residual, blocks: &blocks, products: None });
     }
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView, DVectorView};
 
-use super::factor::{Rows, Sink};
+use super::factor::{Sink, WhitenedRows};
 use super::kind::FactorLabel;
 
 /// Whitened rows with the label of their factor, in the order in which they were added.
@@ -66,7 +66,7 @@ impl<W: Fn(FactorLabel) -> bool> Sink for LabelledRows<W> {
         (self.wanted)(label)
     }
 
-    fn add(&mut self, label: FactorLabel, rows: &Rows<'_>) {
+    fn add(&mut self, label: FactorLabel, rows: &WhitenedRows<'_>) {
         let height = rows.residual.len();
         let mut matrix = DMatrix::zeros(height, self.columns + 1);
         let mut blocks = Vec::with_capacity(rows.blocks.len());

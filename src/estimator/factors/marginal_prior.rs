@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::factor::{Block, Factor, Point, Products, Rows, Sink};
+use super::factor::{Factor, JacobianBlock, Point, Products, Sink, WhitenedRows};
 use super::kind::FactorLabel;
 use crate::estimator::state::layout::{Layout, POSE};
 use crate::optimization::dense;
@@ -214,13 +214,13 @@ impl Factor for MarginalPriorFactor<'_> {
     fn rows<S: Sink>(&self, sink: &mut S) {
         let prior = self.prior;
         let residual = &prior.residual + &prior.jacobian * &self.offset;
-        let mut rows = Rows { residual: residual.as_slice(), blocks: &[], products: None };
+        let mut rows = WhitenedRows { residual: residual.as_slice(), blocks: &[], products: None };
         if !S::DERIVATIVES {
             return sink.add(self.label(), &rows);
         }
         let columns = prior.columns.iter().zip(prior.jacobian.as_slice().chunks_exact(prior.len()));
-        let blocks: Vec<Block<'_>> =
-            columns.map(|(column, entries)| Block { start: column.index(&self.layout), entries }).collect();
+        let blocks: Vec<JacobianBlock<'_>> =
+            columns.map(|(column, entries)| JacobianBlock { start: column.index(&self.layout), entries }).collect();
         let gradient = &prior.gradient + &prior.hessian * &self.offset;
         rows.blocks = &blocks;
         rows.products = Some(Products { hessian: &prior.hessian, gradient: &gradient });

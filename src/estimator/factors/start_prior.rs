@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
-use super::factor::{Factor, NavigationColumns, Point, Rows, Sink};
+use super::factor::{Factor, NavigationColumns, Point, Sink, WhitenedRows};
 use super::kind::FactorLabel;
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::geometry::{RigidTransform, so3};
@@ -68,6 +68,6 @@ impl Factor for StartPriorFactor<'_> {
                 (bias.accelerometer_m_per_s2[axis] - prior.bias.accelerometer_m_per_s2[axis]) / accelerometer;
         }
         let blocks = self.columns.blocks(jacobian.as_slice());
-        sink.add(self.label(), &Rows { residual: residual.as_slice(), blocks: &blocks, products: None });
+        sink.add(self.label(), &WhitenedRows { residual: residual.as_slice(), blocks: &blocks, products: None });
     }
 }

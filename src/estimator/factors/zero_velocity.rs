@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use super::factor::{Block, Factor, Point, Rows, Sink};
+use super::factor::{Factor, JacobianBlock, Point, Sink, WhitenedRows};
 use super::kind::FactorLabel;
 use crate::estimator::state::frame::Stationary;
 
@@ -57,16 +57,18 @@ impl Factor for ZeroVelocityFactor {
         let slope = 1.0 / self.sigmas.velocity_sigma_m_per_s;
         for axis in 0..3 {
             let residual = [self.velocity_m_per_s[axis] * slope];
-            let blocks = [Block { start: self.velocity + axis, entries: &[slope] }];
-            sink.add(self.label(), &Rows { residual: &residual, blocks: &blocks, products: None });
+            let blocks = [JacobianBlock { start: self.velocity + axis, entries: &[slope] }];
+            sink.add(self.label(), &WhitenedRows { residual: &residual, blocks: &blocks, products: None });
         }
         let Some(Translation { moved_m, positions: [before, here] }) = self.translation else { return };
         let slope = 1.0 / self.sigmas.position_sigma_m;
         for axis in 0..3 {
             let residual = [moved_m[axis] * slope];
-            let blocks =
-                [Block { start: before + axis, entries: &[-slope] }, Block { start: here + axis, entries: &[slope] }];
-            sink.add(self.label(), &Rows { residual: &residual, blocks: &blocks, products: None });
+            let blocks = [
+                JacobianBlock { start: before + axis, entries: &[-slope] },
+                JacobianBlock { start: here + axis, entries: &[slope] },
+            ];
+            sink.add(self.label(), &WhitenedRows { residual: &residual, blocks: &blocks, products: None });
         }
     }
 }

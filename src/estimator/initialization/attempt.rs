@@ -149,7 +149,7 @@ fn from_motion(
     thin_out(&mut tracks, views.len(), options.max_landmarks);
     let structure = structure_of(&tracks, &pairs, &guesses, input, options, checklist)?;
     let kept: Vec<usize> = structure.views.iter().map(|&view| selected[view]).collect();
-    let problem = Problem { input, options, kept: &kept, structure: &structure, gyroscope_prior };
+    let problem = AttemptedProblem { input, options, kept: &kept, structure: &structure, gyroscope_prior };
     let (alignment, increments) = problem.align(checklist)?;
     let refined = problem.refine(&alignment, &increments, checklist)?;
     Some(problem.solution(&refined, parallax_rad))
@@ -237,7 +237,7 @@ fn upper_mean_square(count: usize) -> f64 {
 }
 
 /// Reconstructed views with the data of the metric part.
-struct Problem<'a> {
+struct AttemptedProblem<'a> {
     input: &'a InitializationInput<'a>,
     options: &'a InitializationOptions,
     /// Frame indices of the views.
@@ -246,7 +246,7 @@ struct Problem<'a> {
     gyroscope_prior: VectorPrior,
 }
 
-impl Problem<'_> {
+impl AttemptedProblem<'_> {
     fn extrinsics(&self) -> Vec<RigidTransform> {
         self.kept.iter().map(|&index| self.input.frames[index].imu_from_camera).collect()
     }

@@ -63,7 +63,7 @@ pub fn angle_between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
 
 /// Camera pose estimated from known points.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CameraPose {
+pub struct ResectedPose {
     pub world_from_camera: RigidTransform,
     /// One flag per point, in the order given.
     pub inliers: Vec<bool>,
@@ -81,7 +81,7 @@ pub fn refine_camera_pose(
     guess: &RigidTransform,
     bearing_sigma_rad: f64,
     inlier_sigmas: f64,
-) -> Option<CameraPose> {
+) -> Option<ResectedPose> {
     const TIGHTENING: [f64; 4] = [40.0, 10.0, 3.0, 1.5];
     const ROUNDS: usize = 6;
     if points.len() < 4 {
@@ -119,7 +119,7 @@ pub fn refine_camera_pose(
     let inliers: Vec<bool> = angles.iter().map(|angle| *angle < limit).collect();
     let count = inliers.iter().filter(|inlier| **inlier).count();
     let sum: f64 = angles.iter().filter(|angle| **angle < limit).map(|angle| angle * angle).sum();
-    Some(CameraPose { world_from_camera: pose, inliers, rms_rad: (sum / count.max(1) as f64).sqrt() })
+    Some(ResectedPose { world_from_camera: pose, inliers, rms_rad: (sum / count.max(1) as f64).sqrt() })
 }
 
 /// Angle error of a known point in the bearing's tangent plane (2 × 1) and its derivative by the camera pose `[φ; δt]`

@@ -61,12 +61,12 @@ pub(super) struct RefinementSigmas {
     pub(super) accelerometer_bias_m_per_s2: f64,
 }
 
-pub(super) struct Layout {
+pub(super) struct RefinementLayout {
     views: usize,
     per_view_rotations: bool,
 }
 
-impl Layout {
+impl RefinementLayout {
     const COMMON_ROTATION: usize = 0;
     const COMMON_SHIFT: usize = 3;
     const GYROSCOPE: usize = 6;
@@ -165,16 +165,21 @@ impl RefinedState {
         tangent_basis(&(self.gravity / norm)) * norm
     }
 
-    pub(super) fn moved(&self, step: &DVector<f64>, layout: &Layout, landmarks: Vec<TrackedLandmark>) -> Self {
+    pub(super) fn moved(
+        &self,
+        step: &DVector<f64>,
+        layout: &RefinementLayout,
+        landmarks: Vec<TrackedLandmark>,
+    ) -> Self {
         let three = |start: usize| -> Vector3<f64> { step.fixed_rows::<3>(start).into_owned() };
         let normalized = |q: UnitQuaternion<f64>| UnitQuaternion::new_normalize(q.into_inner());
         let mut next = self.clone();
         next.landmarks = landmarks;
-        next.common_rotation = normalized(self.common_rotation * so3::exp(&three(Layout::COMMON_ROTATION)));
-        next.common_shift += three(Layout::COMMON_SHIFT);
-        next.bias.gyroscope_rad_per_s += three(Layout::GYROSCOPE);
-        next.bias.accelerometer_m_per_s2 += three(Layout::ACCELEROMETER);
-        let gravity = self.gravity + self.gravity_basis() * step.fixed_rows::<2>(Layout::GRAVITY);
+        next.common_rotation = normalized(self.common_rotation * so3::exp(&three(RefinementLayout::COMMON_ROTATION)));
+        next.common_shift += three(RefinementLayout::COMMON_SHIFT);
+        next.bias.gyroscope_rad_per_s += three(RefinementLayout::GYROSCOPE);
+        next.bias.accelerometer_m_per_s2 += three(RefinementLayout::ACCELEROMETER);
+        let gravity = self.gravity + self.gravity_basis() * step.fixed_rows::<2>(RefinementLayout::GRAVITY);
         next.gravity = gravity * (self.gravity.norm() / gravity.norm());
         for view in 0..layout.views {
             next.velocities[view] += three(layout.velocity(view));
@@ -202,7 +207,7 @@ pub(super) struct Refinement<'a> {
     input: &'a RefinementInput<'a>,
     /// `W` (9 × 9) of each interval's `[φ, p, v]` with `Wᵀ W = covariance⁻¹`.
     whitening: Vec<Matrix9>,
-    pub(super) layout: Layout,
+    pub(super) layout: RefinementLayout,
 }
 
 #[derive(Clone, Debug)]
@@ -232,7 +237,7 @@ impl<'a> Refinement<'a> {
                 lower.solve_lower_triangular(&Matrix9::identity()).filter(|w| w.iter().all(|x| x.is_finite()))
             })
             .collect::<Option<Vec<_>>>()?;
-        let layout = Layout {
+        let layout = RefinementLayout {
             views: input.imu_from_camera.len(),
             per_view_rotations: input.extrinsics_rotation_noise_rad > 0.0,
         };
@@ -287,9 +292,9 @@ impl<'a> Refinement<'a> {
         Some(RefinementSigmas {
             scale: variance(&along).sqrt() / reach,
             velocity_m_per_s: block(layout.velocity(layout.views - 1), 3),
-            gravity_rad: block(Layout::GRAVITY, 2),
-            gyroscope_bias_rad_per_s: block(Layout::GYROSCOPE, 3),
-            accelerometer_bias_m_per_s2: block(Layout::ACCELEROMETER, 3),
+            gravity_rad: block(RefinementLayout::GRAVITY, 2),
+            gyroscope_bias_rad_per_s: block(RefinementLayout::GYROSCOPE, 3),
+            accelerometer_bias_m_per_s2: block(RefinementLayout::ACCELEROMETER, 3),
         })
     }
 
@@ -386,8 +391,8 @@ impl<'a> Refinement<'a> {
         };
         let start = self.layout.pose(view);
         let mut blocks = vec![
-            (Layout::COMMON_ROTATION, block(after_shared.transpose(), Matrix3::zeros())),
-            (Layout::COMMON_SHIFT, block(Matrix3::zeros(), rotation)),
+            (RefinementLayout::COMMON_ROTATION, block(after_shared.transpose(), Matrix3::zeros())),
+            (RefinementLayout::COMMON_SHIFT, block(Matrix3::zeros(), rotation)),
             (start, block(mount.transpose(), -rotation * so3::hat(&lever))),
             (start + 3, block(Matrix3::zeros(), Matrix3::identity())),
         ];
@@ -460,8 +465,8 @@ impl<'a> Refinement<'a> {
             (pose_j + 3, by_to.fixed_columns::<3>(3).into_owned()),
             (velocity_i, by_from.fixed_columns::<3>(6).into_owned()),
             (velocity_j, by_to.fixed_columns::<3>(6).into_owned()),
-            (Layout::GYROSCOPE, by_bias.fixed_columns::<3>(0).into_owned()),
-            (Layout::ACCELEROMETER, by_bias.fixed_columns::<3>(3).into_owned()),
+            (RefinementLayout::GYROSCOPE, by_bias.fixed_columns::<3>(0).into_owned()),
+            (RefinementLayout::ACCELEROMETER, by_bias.fixed_columns::<3>(3).into_owned()),
         ];
         let gravity_block = whitening * jacobians.by_gravity * state.gravity_basis();
         for (column_a, block_a) in &blocks {
@@ -472,14 +477,14 @@ impl<'a> Refinement<'a> {
                 target += block_a.tr_mul(block_b);
             }
             let cross = block_a.tr_mul(&gravity_block);
-            let mut target = normal.fixed_view_mut::<3, 2>(*column_a, Layout::GRAVITY);
+            let mut target = normal.fixed_view_mut::<3, 2>(*column_a, RefinementLayout::GRAVITY);
             target += cross;
-            let mut target = normal.fixed_view_mut::<2, 3>(Layout::GRAVITY, *column_a);
+            let mut target = normal.fixed_view_mut::<2, 3>(RefinementLayout::GRAVITY, *column_a);
             target += cross.transpose();
         }
-        let mut target = gradient.fixed_rows_mut::<2>(Layout::GRAVITY);
+        let mut target = gradient.fixed_rows_mut::<2>(RefinementLayout::GRAVITY);
         target += gravity_block.tr_mul(&residual);
-        let mut target = normal.fixed_view_mut::<2, 2>(Layout::GRAVITY, Layout::GRAVITY);
+        let mut target = normal.fixed_view_mut::<2, 2>(RefinementLayout::GRAVITY, RefinementLayout::GRAVITY);
         target += gravity_block.tr_mul(&gravity_block);
     }
 
@@ -494,17 +499,17 @@ impl<'a> Refinement<'a> {
         };
         let shared = so3::log(&state.common_rotation);
         add(
-            Layout::COMMON_ROTATION,
+            RefinementLayout::COMMON_ROTATION,
             &shared,
             &so3::right_jacobian_inverse(&shared),
             input.extrinsics_rotation_sigma_rad,
         );
         let identity = Matrix3::identity();
-        add(Layout::COMMON_SHIFT, &state.common_shift, &identity, input.extrinsics_translation_sigma_m);
+        add(RefinementLayout::COMMON_SHIFT, &state.common_shift, &identity, input.extrinsics_translation_sigma_m);
         let gyroscope = state.bias.gyroscope_rad_per_s - input.gyroscope_bias.mean;
-        add(Layout::GYROSCOPE, &gyroscope, &identity, input.gyroscope_bias.sigma);
+        add(RefinementLayout::GYROSCOPE, &gyroscope, &identity, input.gyroscope_bias.sigma);
         let accelerometer = state.bias.accelerometer_m_per_s2 - input.accelerometer_bias.mean;
-        add(Layout::ACCELEROMETER, &accelerometer, &identity, input.accelerometer_bias.sigma);
+        add(RefinementLayout::ACCELEROMETER, &accelerometer, &identity, input.accelerometer_bias.sigma);
         for (view, own) in state.per_view_rotations.iter().enumerate() {
             if let Some(start) = self.layout.view_rotation(view) {
                 let own = so3::log(own);

@@ -109,11 +109,11 @@ struct DampedWindow<'a> {
     /// Root mean square step of calibration and newest joint angles in the last solved step, in standard deviations.
     moved_sigmas: f64,
     /// Last linearization for which a step was solved.
-    last: Option<Linearization>,
+    last: Option<SolvedLinearization>,
 }
 
 /// Window linearized at an estimate.
-struct Linearization {
+struct SolvedLinearization {
     equations: Rc<NormalEquations>,
     /// Information after marginalization of the landmarks; `None` unless the last step was damped by [`DAMPING`] only.
     information: Option<DMatrix<f64>>,
@@ -134,7 +134,7 @@ impl DampedWindow<'_> {
     /// positive definite.
     fn posterior(&self) -> Option<Cholesky> {
         let layout = &self.problem.layout;
-        let Linearization { equations, information } = self.last.as_ref()?;
+        let SolvedLinearization { equations, information } = self.last.as_ref()?;
         if let Some(information) = information {
             return factor(layout, information, 0.0);
         }
@@ -212,7 +212,7 @@ impl DampedProblem for DampedWindow<'_> {
         self.moved_sigmas = self.moved_sigmas(&factor, &step);
         // With more damping, the eliminated landmarks withhold too much information.
         let information = (damping <= DAMPING).then_some(hessian);
-        self.last = Some(Linearization { equations: Rc::clone(equations), information });
+        self.last = Some(SolvedLinearization { equations: Rc::clone(equations), information });
         Some(self.evaluated(self.problem.stepped(&evaluated.estimate, &step, &landmarks)))
     }
 }

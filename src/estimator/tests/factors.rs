@@ -6,7 +6,7 @@ use super::fixture;
 use super::window::windows;
 use crate::estimator::factors::costs::Costs;
 use crate::estimator::factors::dense_equations::DenseEquations;
-use crate::estimator::factors::factor::{Block, Factor, Point, Rows, Sink};
+use crate::estimator::factors::factor::{Factor, JacobianBlock, Point, Sink, WhitenedRows};
 use crate::estimator::factors::kind::{FactorKind, FactorLabel};
 use crate::estimator::factors::labelled_rows::LabelledRows;
 use crate::estimator::state::frame::Stationary;
@@ -80,10 +80,10 @@ impl Factor for HeightFactor {
         let slope = 1.0 / Self::SIGMA;
         let residual = [self.height_m * slope, self.climb_m_per_s * slope];
         let blocks = [
-            Block { start: self.columns[0], entries: &[slope, 0.0] },
-            Block { start: self.columns[1], entries: &[0.0, slope] },
+            JacobianBlock { start: self.columns[0], entries: &[slope, 0.0] },
+            JacobianBlock { start: self.columns[1], entries: &[0.0, slope] },
         ];
-        sink.add(self.label(), &Rows { residual: &residual, blocks: &blocks, products: None });
+        sink.add(self.label(), &WhitenedRows { residual: &residual, blocks: &blocks, products: None });
     }
 }
 

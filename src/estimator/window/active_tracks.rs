@@ -1,6 +1,6 @@
 //! Features that take part in a solve.
 
-use super::features::{FeatureMap, Observation};
+use super::features::{FeatureMap, FeatureObservation};
 use crate::estimator::state::track::{Track, TrackObservation};
 use crate::frontend::FeatureId;
 use crate::optimization::Landmark;
@@ -22,8 +22,10 @@ impl ActiveTracks {
             if feature.observations.len() < 2 {
                 continue;
             }
-            let track_observation =
-                |observation: &Observation| TrackObservation { slot: observation.slot, uv_px: observation.uv_px };
+            let track_observation = |observation: &FeatureObservation| TrackObservation {
+                slot: observation.slot,
+                uv_px: observation.uv_px,
+            };
             active.ids.push(*id);
             active.tracks.push(Track { observations: feature.observations.iter().map(track_observation).collect() });
             active.landmarks.push(landmark);

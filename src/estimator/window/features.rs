@@ -10,7 +10,7 @@ use crate::frontend::{FeatureId, TrackedFeature};
 use crate::optimization::{self, CameraPose, Landmark, LandmarkModel, Ray, TriangulationOptions};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Observation {
+pub(crate) struct FeatureObservation {
     pub(crate) slot: usize,
     pub(crate) uv_px: Vector2<f64>,
     /// Measured unit bearing in the camera.
@@ -20,13 +20,13 @@ pub(crate) struct Observation {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Feature {
     /// By ascending slot; the first observation is the anchor's.
-    pub(crate) observations: Vec<Observation>,
+    pub(crate) observations: Vec<FeatureObservation>,
     /// Landmark in the anchor's camera, `None` until triangulated.
     pub(crate) landmark: Option<Landmark>,
 }
 
 impl Feature {
-    pub(crate) fn observation(&self, slot: usize) -> Option<&Observation> {
+    pub(crate) fn observation(&self, slot: usize) -> Option<&FeatureObservation> {
         self.observations.iter().find(|observation| observation.slot == slot)
     }
 }
@@ -41,7 +41,7 @@ pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFea
             continue;
         }
         let feature = features.entry(tracked.id).or_default();
-        feature.observations.push(Observation { slot, uv_px: tracked.uv_px, bearing: tracked.bearing });
+        feature.observations.push(FeatureObservation { slot, uv_px: tracked.uv_px, bearing: tracked.bearing });
     }
 }
 
@@ -84,7 +84,7 @@ pub(crate) fn triangulate(feature: &Feature, view: &CameraView<'_>, options: &Es
     if feature.observations.len() < options.min_observations {
         return None;
     }
-    let ray = |observation: &Observation| {
+    let ray = |observation: &FeatureObservation| {
         let pose = view.pose(observation.slot, &observation.uv_px);
         let direction = pose.rotation * view.bearing(&observation.uv_px, &observation.bearing);
         Ray { centre: pose.position_m, direction }
@@ -112,7 +112,7 @@ pub(crate) fn compensated_parallax(
     from: usize,
     to: usize,
 ) -> (f64, usize) {
-    let in_world = |observation: &Observation| {
+    let in_world = |observation: &FeatureObservation| {
         view.pose(observation.slot, &observation.uv_px).rotation
             * view.bearing(&observation.uv_px, &observation.bearing)
     };

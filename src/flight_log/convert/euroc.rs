@@ -12,7 +12,7 @@ use super::super::image_decoding::compressed_format;
 use super::super::limits::{LINE_BYTES, LogLimits};
 use super::ConvertError;
 use super::euroc_sensor::{CameraSensor, IMU_TOPIC, image_topic, rig_of, sensor_pose};
-use super::sink::Sink;
+use super::sink::LogSink;
 use crate::geometry::RigidTransform;
 use crate::sensors::Rig;
 
@@ -37,7 +37,7 @@ enum Sample {
 }
 
 /// Converts a folder into a log and returns its rig if the sensors are described.
-pub(super) fn convert(source: &Path, sink: &mut Sink<'_>) -> Result<Option<Rig>, ConvertError> {
+pub(super) fn convert(source: &Path, sink: &mut LogSink<'_>) -> Result<Option<Rig>, ConvertError> {
     let Some(root) = root(source) else { return Ok(None) };
     let mut folders = sensor_folders(&root)?;
     let mut samples: Vec<(i64, Sample)> = Vec::new();
@@ -105,7 +105,7 @@ fn write(
     sample: &Sample,
     cameras: &[CameraSensor],
     poses: &[String],
-    sink: &mut Sink<'_>,
+    sink: &mut LogSink<'_>,
 ) -> Result<(), ConvertError> {
     let times = MessageTimes { stamp_ns, log_time_ns: stamp_ns };
     match sample {

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::super::LogError;
 use super::ConvertError;
-use super::sink::Sink;
+use super::sink::LogSink;
 use super::source_file::read_description;
 use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, seconds_from_ns};
@@ -106,7 +106,7 @@ pub(super) fn rig_of(
     root: &Path,
     cameras: &[CameraSensor],
     ground_truth_topic: Option<String>,
-    sink: &mut Sink<'_>,
+    sink: &mut LogSink<'_>,
 ) -> Result<Option<Rig>, ConvertError> {
     let Some(imu_file) = SensorFile::read(&root.join("imu0"))? else {
         sink.note("imu0/sensor.yaml is missing, so no rig was written");

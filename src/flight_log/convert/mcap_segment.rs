@@ -8,13 +8,13 @@ use std::path::Path;
 use super::super::container::{ChannelRecord, ContainerIndex, DecodedBlock};
 use super::super::file::LogFile;
 use super::ConvertError;
-use super::sink::{Payload, Sink, SourceMessage};
+use super::sink::{LogSink, Payload, SourceMessage};
 use crate::geometry::seconds_from_ns;
 
 /// Reason for the missing messages of a damaged block.
 const IN_DAMAGED_CHUNK: &str = "in a damaged chunk";
 
-pub(super) fn open(path: &Path, sink: &Sink<'_>) -> Result<LogFile, ConvertError> {
+pub(super) fn open(path: &Path, sink: &LogSink<'_>) -> Result<LogFile, ConvertError> {
     let file = LogFile::open(path, sink.limits())?;
     let start = file.read(0..file.len().min(mcap::MAGIC.len()));
     match start {
@@ -25,7 +25,7 @@ pub(super) fn open(path: &Path, sink: &Sink<'_>) -> Result<LogFile, ConvertError
 }
 
 /// Converts a file with its attachments. All readable data of a damaged or unfinished file are converted.
-pub(super) fn convert(file: &LogFile, path: &Path, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
+pub(super) fn convert(file: &LogFile, path: &Path, sink: &mut LogSink<'_>) -> Result<(), ConvertError> {
     let index = ContainerIndex::read(file);
     let is_block = |byte: usize| index.blocks.binary_search_by_key(&byte, |block| block.bytes.start).is_ok();
     // Damage of blocks is reported together with the lost messages.
@@ -99,7 +99,7 @@ fn take(
     channel_id: u16,
     log_time_ns: i64,
     data: &[u8],
-    sink: &mut Sink<'_>,
+    sink: &mut LogSink<'_>,
 ) -> Result<(), ConvertError> {
     let Some(channel) = channel else {
         sink.leave(&format!("channel {channel_id}"), "", 1, "the log does not describe it");

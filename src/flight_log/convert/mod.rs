@@ -34,7 +34,7 @@ use super::{FlightLog, LogError, LogLimits, LogWriter, LogWriterOptions};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 use recording::VideoFacts;
-use sink::Sink;
+use sink::LogSink;
 
 /// Kind of a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -184,7 +184,7 @@ fn write(
 ) -> Result<(ConversionReport, SourceRig), ConvertError> {
     let limits = &options.limits;
     let writer = LogWriter::create(output, &LogWriterOptions::default())?;
-    let mut sink = Sink::new(writer, limits.clone(), progress);
+    let mut sink = LogSink::new(writer, limits.clone(), progress);
     let rig = match kind {
         SourceKind::Euroc => {
             let rig = euroc::convert(source, &mut sink)?;

@@ -10,7 +10,7 @@ use super::super::file::LogFile;
 use super::super::limits::LogLimits;
 use super::ConvertError;
 use super::ros1_record::{BagRecord, record_at, record_in_file, text_field};
-use super::sink::{Payload, Sink, SourceMessage};
+use super::sink::{LogSink, Payload, SourceMessage};
 
 /// First bytes of a bag of version 2.0.
 pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
@@ -49,7 +49,7 @@ struct BagState {
     read: ChunkContents,
 }
 
-pub(super) fn open(path: &Path, sink: &Sink<'_>) -> Result<LogFile, ConvertError> {
+pub(super) fn open(path: &Path, sink: &LogSink<'_>) -> Result<LogFile, ConvertError> {
     let bag = LogFile::open(path, sink.limits())?;
     if let Ok(record) = record_in_file(&bag, MAGIC.len())
         && let Ok(record) = record.record()
@@ -62,7 +62,7 @@ pub(super) fn open(path: &Path, sink: &Sink<'_>) -> Result<LogFile, ConvertError
 }
 
 /// Converts a bag into a log. After a damaged record, reading continues with the next chunk of the bag's index.
-pub(super) fn convert(bag: &LogFile, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
+pub(super) fn convert(bag: &LogFile, sink: &mut LogSink<'_>) -> Result<(), ConvertError> {
     let mut state = BagState::default();
     let mut at = MAGIC.len();
     while at < bag.len() {
@@ -120,7 +120,7 @@ pub(super) fn convert(bag: &LogFile, sink: &mut Sink<'_>) -> Result<(), ConvertE
 
 impl BagState {
     /// Counts the messages of the chunk at a byte that were not read, as far as the bag's index lists them.
-    fn report_lost(&self, at: usize, sink: &mut Sink<'_>) {
+    fn report_lost(&self, at: usize, sink: &mut LogSink<'_>) {
         let Some(promised) = self.chunks.get(&at) else {
             if !self.chunks.is_empty() {
                 return; // no chunk starts there
@@ -140,7 +140,7 @@ impl BagState {
 }
 
 /// Stores the connections and chunks of the bag's index, if it has one.
-fn read_bag_header(bag: &LogFile, record: &BagRecord<'_>, state: &mut BagState, sink: &mut Sink<'_>) {
+fn read_bag_header(bag: &LogFile, record: &BagRecord<'_>, state: &mut BagState, sink: &mut LogSink<'_>) {
     let mut at = record.large_number("index_pos").and_then(|at| usize::try_from(at).ok()).unwrap_or(0);
     if at == 0 {
         return sink
@@ -167,7 +167,7 @@ fn read_bag_header(bag: &LogFile, record: &BagRecord<'_>, state: &mut BagState, 
     }
 }
 
-fn read_connection(record: &BagRecord<'_>, connections: &mut Connections, sink: &mut Sink<'_>) {
+fn read_connection(record: &BagRecord<'_>, connections: &mut Connections, sink: &mut LogSink<'_>) {
     let (Some(id), Some(topic), Some(message_type)) =
         (record.number("conn"), record.text("topic"), text_field(record.data, "type"))
     else {
@@ -179,7 +179,7 @@ fn read_connection(record: &BagRecord<'_>, connections: &mut Connections, sink: 
 }
 
 /// Converts the messages of a chunk; returns its damage.
-fn take_chunk(chunk: &[u8], state: &mut BagState, sink: &mut Sink<'_>) -> Result<Option<String>, ConvertError> {
+fn take_chunk(chunk: &[u8], state: &mut BagState, sink: &mut LogSink<'_>) -> Result<Option<String>, ConvertError> {
     let mut at = 0;
     while at < chunk.len() {
         let record = match record_at(chunk, at) {
@@ -196,7 +196,7 @@ fn take_chunk(chunk: &[u8], state: &mut BagState, sink: &mut Sink<'_>) -> Result
     Ok(None)
 }
 
-fn take_message(record: &BagRecord<'_>, state: &mut BagState, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
+fn take_message(record: &BagRecord<'_>, state: &mut BagState, sink: &mut LogSink<'_>) -> Result<(), ConvertError> {
     let id = record.number("conn");
     if let Some(id) = id {
         *state.read.entry(id).or_default() += 1;

@@ -10,7 +10,7 @@ use tempfile::NamedTempFile;
 
 use super::super::file::{LogFile, unpacked_name};
 use super::super::limits::LogLimits;
-use super::sink::Sink;
+use super::sink::LogSink;
 use super::source_file::{read_description, with_suffix};
 use super::sqlite::BagDatabase;
 use super::{ConvertError, mcap_segment, sqlite};
@@ -109,7 +109,7 @@ enum Segment {
     Sqlite(BagDatabase, Option<NamedTempFile>),
 }
 
-fn open_segment(path: &Path, sink: &Sink<'_>) -> Result<Segment, ConvertError> {
+fn open_segment(path: &Path, sink: &LogSink<'_>) -> Result<Segment, ConvertError> {
     if unpacked_name(path).extension().is_some_and(|extension| extension == "mcap") {
         return Ok(Segment::Mcap(mcap_segment::open(path, sink)?));
     }
@@ -120,7 +120,7 @@ fn open_segment(path: &Path, sink: &Sink<'_>) -> Result<Segment, ConvertError> {
 }
 
 /// Converts a bag into a log. Missing and unreadable files are left out.
-pub(super) fn convert(folder: &Path, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
+pub(super) fn convert(folder: &Path, sink: &mut LogSink<'_>) -> Result<(), ConvertError> {
     let metadata = read_metadata(folder)?;
     if !folder.join("metadata.yaml").is_file() {
         sink.note("the bag has no metadata.yaml; its files were read in the order of their names");

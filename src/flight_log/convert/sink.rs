@@ -54,7 +54,7 @@ pub(super) struct Tally {
     reason: Option<String>,
 }
 
-pub(super) struct Sink<'a> {
+pub(super) struct LogSink<'a> {
     pub(super) writer: LogWriter,
     tallies: BTreeMap<(String, String), Tally>,
     /// Message type of each topic in the log.
@@ -75,7 +75,7 @@ pub(super) struct Sink<'a> {
 /// Number of messages between two progress reports of a source that does not report itself.
 const MESSAGES_PER_REPORT: u32 = 64;
 
-impl<'a> Sink<'a> {
+impl<'a> LogSink<'a> {
     pub(super) fn new(
         writer: LogWriter,
         limits: LogLimits,

@@ -15,7 +15,7 @@ use rusqlite::{Connection, OpenFlags, Row};
 use super::super::file::kind_of;
 use super::super::limits::{LimitExceeded, LimitKind, LogLimits};
 use super::ConvertError;
-use super::sink::{Payload, Sink, SourceMessage};
+use super::sink::{LogSink, Payload, SourceMessage};
 
 /// Steps of SQLite's virtual machine between two checks of the number of steps.
 const STEPS_PER_LOOK: i32 = 100_000;
@@ -158,7 +158,7 @@ const FROM_ROW: &str = "SELECT topic_id, timestamp, data, rowid FROM messages WH
 
 /// Converts a file into a log, in the order of log times. Where the database is damaged, the readable rows are
 /// converted in the order of their numbers.
-pub(super) fn convert(bag: &BagDatabase, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
+pub(super) fn convert(bag: &BagDatabase, sink: &mut LogSink<'_>) -> Result<(), ConvertError> {
     for topic in bag.topics.values() {
         sink.announce(&topic.name, &topic.message_type);
     }
@@ -179,7 +179,7 @@ pub(super) fn convert(bag: &BagDatabase, sink: &mut Sink<'_>) -> Result<(), Conv
 }
 
 impl BagDatabase {
-    fn report_damage(&self, state: &ReadState, holes: u32, sink: &mut Sink<'_>) {
+    fn report_damage(&self, state: &ReadState, holes: u32, sink: &mut LogSink<'_>) {
         let path = self.path.display();
         let what = match (self.promised_bytes, &state.problem) {
             (Some(promised), _) => format!("{path} is truncated: {} of {promised} bytes are left", self.bytes),
@@ -197,7 +197,7 @@ impl BagDatabase {
     }
 
     /// Converts a row; `false` if no more may be read.
-    fn take(&self, row: &Row<'_>, sink: &mut Sink<'_>, state: &mut ReadState) -> Result<bool, ConvertError> {
+    fn take(&self, row: &Row<'_>, sink: &mut LogSink<'_>, state: &mut ReadState) -> Result<bool, ConvertError> {
         state.rows += 1;
         if state.rows > self.most_messages {
             return Ok(false);
@@ -233,7 +233,7 @@ fn place_of(row: &Row<'_>) -> Option<(i64, i64)> {
     Some((row.get(1).ok()?, row.get(3).ok()?))
 }
 
-fn read_ordered(bag: &BagDatabase, sink: &mut Sink<'_>, state: &mut ReadState) -> Result<(), ConvertError> {
+fn read_ordered(bag: &BagDatabase, sink: &mut LogSink<'_>, state: &mut ReadState) -> Result<(), ConvertError> {
     let failed = |error: rusqlite::Error| ConvertError::unreadable(error.to_string(), &bag.path);
     let mut query = bag.connection.prepare(ORDERED).map_err(failed)?;
     let mut rows = query.query([]).map_err(failed)?;
@@ -255,7 +255,7 @@ fn read_ordered(bag: &BagDatabase, sink: &mut Sink<'_>, state: &mut ReadState) -
 }
 
 /// Converts the rows that were not read in the order of log times; returns the number of damaged places.
-fn salvage(bag: &BagDatabase, sink: &mut Sink<'_>, state: &mut ReadState) -> Result<u32, ConvertError> {
+fn salvage(bag: &BagDatabase, sink: &mut LogSink<'_>, state: &mut ReadState) -> Result<u32, ConvertError> {
     let failed = |error: rusqlite::Error| ConvertError::unreadable(error.to_string(), &bag.path);
     let already = state.last;
     let mut query = bag.connection.prepare(FROM_ROW).map_err(failed)?;

@@ -1,7 +1,7 @@
 //! Features of the window whose observations are references to the inputs of earlier steps.
 
 use crate::estimator::step_input::StepMeasurements;
-use crate::estimator::window::features::{Feature, FeatureMap, Observation};
+use crate::estimator::window::features::{Feature, FeatureMap, FeatureObservation};
 use crate::frontend::FeatureId;
 use crate::optimization::Landmark;
 
@@ -11,7 +11,7 @@ pub(crate) struct PackedFeatures {
     /// Twice the slot of each observation, plus one if it is copied.
     observations: Vec<u16>,
     /// Copied observations: those missing in the step of their frame.
-    own: Vec<Observation>,
+    own: Vec<FeatureObservation>,
 }
 
 #[derive(Clone, Debug)]
@@ -59,7 +59,7 @@ impl PackedFeatures {
         size_of::<Self>()
             + self.features.capacity() * size_of::<PackedFeature>()
             + self.observations.capacity() * size_of::<u16>()
-            + self.own.capacity() * size_of::<Observation>()
+            + self.own.capacity() * size_of::<FeatureObservation>()
     }
 }
 
@@ -69,9 +69,9 @@ fn observation_of(
     slot: usize,
     camera: usize,
     id: FeatureId,
-) -> Option<Observation> {
+) -> Option<FeatureObservation> {
     let features = (*steps.get(slot)?)?.features(camera);
     let place = features.binary_search_by_key(&id, |feature| feature.id).ok()?;
     let feature = &features[place];
-    Some(Observation { slot, uv_px: feature.uv_px, bearing: feature.bearing })
+    Some(FeatureObservation { slot, uv_px: feature.uv_px, bearing: feature.bearing })
 }

@@ -19,7 +19,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use super::super::file::ZSTD_MAGIC;
-use super::sink::Sink;
+use super::sink::LogSink;
 use super::{AutopilotLog, AutopilotLogKind, ConvertError, ConvertOptions, VideoClock};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use mp4::Movie;
@@ -46,7 +46,7 @@ pub(super) use mp4::is_movie;
 const START_BYTES: u64 = 16;
 
 /// Reads an autopilot's log.
-fn read_autopilot(log: &AutopilotLog, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
+fn read_autopilot(log: &AutopilotLog, sink: &mut LogSink<'_>) -> Result<Recorded, ConvertError> {
     let mut start = Vec::new();
     let file = File::open(&log.path).map_err(ConvertError::io("open the log of the autopilot", &log.path))?;
     file.take(START_BYTES).read_to_end(&mut start).map_err(ConvertError::io("read", &log.path))?;
@@ -68,7 +68,7 @@ fn read_autopilot(log: &AutopilotLog, sink: &mut Sink<'_>) -> Result<Recorded, C
 }
 
 /// Converts an autopilot's log without a video.
-pub(super) fn convert_autopilot(log: &AutopilotLog, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
+pub(super) fn convert_autopilot(log: &AutopilotLog, sink: &mut LogSink<'_>) -> Result<(), ConvertError> {
     let mut recorded = read_autopilot(log, sink)?;
     to_utc(&mut recorded);
     let mut topics = Topics::default();
@@ -94,7 +94,7 @@ const TIME_ZONES_NS: i64 = 14 * 3600 * 1_000_000_000;
 pub(super) fn convert_video(
     source: &Path,
     options: &ConvertOptions,
-    sink: &mut Sink<'_>,
+    sink: &mut LogSink<'_>,
 ) -> Result<VideoFacts, ConvertError> {
     let Movie { video, telemetry, created_ns, firmware, notes } = mp4::open(source, &options.limits)?;
     for note in notes {
@@ -160,7 +160,7 @@ fn place_video(
     (first_ns, last_ns): (i64, i64),
     video_utc_ns: Option<i64>,
     clock: Option<VideoClock>,
-    sink: &mut Sink<'_>,
+    sink: &mut LogSink<'_>,
 ) -> Place {
     let (log_start_ns, log_end_ns) = recorded.span_ns().unwrap_or((UNKNOWN_START_NS, UNKNOWN_START_NS));
     if let Some(clock) = clock {

@@ -4,7 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::super::MessageTimes;
 use super::super::ConvertError;
-use super::super::sink::Sink;
+use super::super::sink::LogSink;
 use super::attitude::{AttitudeTrack, earth_from_heading, enu_from_ned};
 use super::mp4::Video;
 use super::recorded::{Candidates, GimbalAttitude, GimbalFrame, NamedSamples, Recorded, RecordedImu, Samples, rate_hz};
@@ -65,7 +65,7 @@ pub(super) struct Topics {
 }
 
 /// Name and measurements of the best record; the others are counted as left out.
-fn chosen<T>(candidates: Candidates<T>, format: &str, topic: &str, sink: &mut Sink<'_>) -> Option<NamedSamples<T>> {
+fn chosen<T>(candidates: Candidates<T>, format: &str, topic: &str, sink: &mut LogSink<'_>) -> Option<NamedSamples<T>> {
     let (best, others) = candidates.into_best();
     let (record, samples) = best?;
     for (other, samples) in others {
@@ -75,7 +75,7 @@ fn chosen<T>(candidates: Candidates<T>, format: &str, topic: &str, sink: &mut Si
 }
 
 /// Measurements in time order; those whose time goes back, or jumps far ahead of the next one, are left out.
-fn in_order<T>(samples: Samples<T>, format: &str, record: &str, sink: &mut Sink<'_>) -> Samples<T> {
+fn in_order<T>(samples: Samples<T>, format: &str, record: &str, sink: &mut LogSink<'_>) -> Samples<T> {
     let times_ns: Vec<i64> = samples.iter().map(|(time_ns, _)| *time_ns).collect();
     let mut before_ns = None;
     let mut kept = Vec::with_capacity(samples.len());
@@ -126,7 +126,7 @@ impl Topics {
     }
 
     /// Adds all measurements of a recorder, at log times.
-    pub(super) fn add_recorded(&mut self, recorded: Recorded, sink: &mut Sink<'_>) {
+    pub(super) fn add_recorded(&mut self, recorded: Recorded, sink: &mut LogSink<'_>) {
         let Recorded { format, prefix, imus, attitudes, gimbal, positions, fixes, left, notes, utc: _ } = recorded;
         for note in notes {
             sink.note(note);
@@ -165,7 +165,7 @@ impl Topics {
         }
     }
 
-    fn add_imu(&mut self, topic: &str, format: &str, record: &str, imu: RecordedImu, sink: &mut Sink<'_>) {
+    fn add_imu(&mut self, topic: &str, format: &str, record: &str, imu: RecordedImu, sink: &mut LogSink<'_>) {
         let remark = |rate_hz: f64, what: &str| format!("{record}, {rate_hz:.1} Hz{what}");
         let combined = in_order(imu.combined, format, record, sink);
         let text = remark(rate_hz(&combined), "");
@@ -187,7 +187,7 @@ impl Topics {
         format: &str,
         (record, samples): NamedSamples<GimbalAttitude>,
         vehicle: &AttitudeTrack<'_>,
-        sink: &mut Sink<'_>,
+        sink: &mut LogSink<'_>,
     ) {
         let in_earth = samples.iter().filter(|(_, attitude)| attitude.frame == GimbalFrame::Earth).count();
         let frame = if in_earth * 2 > samples.len() { GimbalFrame::Earth } else { GimbalFrame::Vehicle };
@@ -225,7 +225,7 @@ impl Topics {
         format: &str,
         (record, samples): NamedSamples<Vector3<f64>>,
         vehicle: &AttitudeTrack<'_>,
-        sink: &mut Sink<'_>,
+        sink: &mut LogSink<'_>,
     ) {
         let count = samples.len();
         let poses: Samples<RigidTransform> = samples
@@ -270,7 +270,7 @@ impl Topics {
     }
 
     /// Writes all messages in the order of log times.
-    pub(super) fn write(self, video: Option<&Video>, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
+    pub(super) fn write(self, video: Option<&Video>, sink: &mut LogSink<'_>) -> Result<(), ConvertError> {
         let Self { topics, .. } = self;
         let mut order: Vec<(i64, usize, usize)> = Vec::new();
         for (number, topic) in topics.iter().enumerate() {
@@ -295,7 +295,7 @@ fn write_message(
     topic: &Topic,
     message: &Message,
     video: Option<&Video>,
-    sink: &mut Sink<'_>,
+    sink: &mut LogSink<'_>,
 ) -> Result<(), ConvertError> {
     let Topic { name, message_type, frame_id, .. } = topic;
     let times = MessageTimes { stamp_ns: message.stamp_ns, log_time_ns: message.log_time_ns };

@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 use super::propagation::{Change, IMU_COLUMNS};
-use super::state::State;
+use super::state::SensorState;
 use super::values::{ACCELEROMETER, GYROSCOPE, INTRINSICS};
-use super::window::{Observation, Prediction, SensorWindow};
+use super::window::{Prediction, SensorObservation, SensorWindow};
 use crate::estimator::imu_factor::{self, MotionJacobians};
 use crate::estimator::{ColumnBlock, ColumnId, FrameId, JointKnowledge, Linearization, MotionIncrement, PoseKnowledge};
 use crate::geometry::dense;
@@ -18,7 +18,7 @@ const DEPENDENT: f64 = 1e-11;
 
 /// Rows of one landmark or of one other factor.
 #[derive(Debug)]
-pub(super) struct Rows {
+pub(super) struct SensorRows {
     pub(super) residual: DVector<f64>,
     /// By the columns of the window.
     pub(super) jacobian: DMatrix<f64>,
@@ -26,7 +26,7 @@ pub(super) struct Rows {
     pub(super) by_landmark: DMatrix<f64>,
 }
 
-impl Rows {
+impl SensorRows {
     fn zeros(rows: usize, columns: usize, landmark: usize) -> Self {
         Self {
             residual: DVector::zeros(rows),
@@ -55,7 +55,7 @@ impl Rows {
 
 impl SensorWindow<'_> {
     /// Rows of every factor at a state; `None` when a landmark is behind a camera that observed it.
-    pub(super) fn rows(&self, state: &State) -> Option<Vec<Rows>> {
+    pub(super) fn rows(&self, state: &SensorState) -> Option<Vec<SensorRows>> {
         let mut rows = Vec::new();
         for (position, observations) in state.landmarks.iter().zip(&self.observations) {
             rows.push(self.landmark_rows(state, position, observations)?);
@@ -74,8 +74,13 @@ impl SensorWindow<'_> {
         Some(rows)
     }
 
-    fn landmark_rows(&self, state: &State, position: &Vector3<f64>, observations: &[Observation]) -> Option<Rows> {
-        let mut rows = Rows::zeros(2 * observations.len(), self.columns.count(), 3);
+    fn landmark_rows(
+        &self,
+        state: &SensorState,
+        position: &Vector3<f64>,
+        observations: &[SensorObservation],
+    ) -> Option<SensorRows> {
+        let mut rows = SensorRows::zeros(2 * observations.len(), self.columns.count(), 3);
         for (index, observation) in observations.iter().enumerate() {
             let prediction = self.predict(state, position, observation.frame, observation.row_ratio)?;
             let residual = (prediction.uv_px - observation.uv_px) / PIXEL_SIGMA_PX;
@@ -91,7 +96,7 @@ impl SensorWindow<'_> {
     fn write_prediction(
         &self,
         prediction: &Prediction,
-        observation: &Observation,
+        observation: &SensorObservation,
         jacobian: &mut nalgebra::DMatrixViewMut<'_, f64>,
     ) {
         let columns = &self.columns;
@@ -125,10 +130,10 @@ impl SensorWindow<'_> {
     }
 
     /// Rows of one encoder reading per joint at the time of the frame.
-    fn encoder_rows(&self, state: &State, frame: usize, sigma_rad: f64) -> Rows {
+    fn encoder_rows(&self, state: &SensorState, frame: usize, sigma_rad: f64) -> SensorRows {
         let columns = &self.columns;
         let joints = self.truth.chain.joint_count();
-        let mut rows = Rows::zeros(joints, columns.count(), 0);
+        let mut rows = SensorRows::zeros(joints, columns.count(), 0);
         let (angles, rates) = self.flight.joint_motion(self.times_s[frame] - state.sensors.encoder_timeshift_s);
         let shift = columns.sensors.iter().position(|(_, parameter)| *parameter == ParameterId::ENCODER_TIMESHIFT);
         for joint in 0..joints {
@@ -155,7 +160,7 @@ impl SensorWindow<'_> {
     }
 
     /// Rows of the preintegrated motion from the previous frame.
-    fn imu_rows(&self, state: &State, frame: usize) -> Rows {
+    fn imu_rows(&self, state: &SensorState, frame: usize) -> SensorRows {
         let columns = &self.columns;
         let (start_s, end_s) = (self.times_s[frame - 1], self.times_s[frame]);
         let duration_s = end_s - start_s;
@@ -169,7 +174,7 @@ impl SensorWindow<'_> {
         let by_imu = jacobians.by_parameters(&change.by_imu());
 
         let whitening = self.weights[frame - 1];
-        let mut rows = Rows::zeros(9, columns.count(), 0);
+        let mut rows = SensorRows::zeros(9, columns.count(), 0);
         rows.residual.copy_from(&(whitening * residual));
         let by_imu = whitening * by_imu;
         let (by_before, by_after) = (whitening * jacobians.by_from, whitening * jacobians.by_to);
@@ -189,11 +194,11 @@ impl SensorWindow<'_> {
     }
 
     /// Rows of the random walk of the biases.
-    fn bias_rows(&self, state: &State, frame: usize, noise: &ImuNoise) -> Rows {
+    fn bias_rows(&self, state: &SensorState, frame: usize, noise: &ImuNoise) -> SensorRows {
         let columns = &self.columns;
         let root_s = (self.times_s[frame] - self.times_s[frame - 1]).sqrt();
         let [before, after] = [frame - 1, frame].map(|frame| state.frames[frame].navigation.bias);
-        let mut rows = Rows::zeros(6, columns.count(), 0);
+        let mut rows = SensorRows::zeros(6, columns.count(), 0);
         let gyroscope = after.gyroscope_rad_per_s - before.gyroscope_rad_per_s;
         let accelerometer = after.accelerometer_m_per_s2 - before.accelerometer_m_per_s2;
         let walks = [(gyroscope, noise.gyroscope_random_walk), (accelerometer, noise.accelerometer_random_walk)];
@@ -210,7 +215,7 @@ impl SensorWindow<'_> {
     }
 
     /// Linearization at a state with all its columns, as input of [`crate::observability::analyse`].
-    pub(super) fn linearization(&self, state: &State) -> Option<Linearization> {
+    pub(super) fn linearization(&self, state: &SensorState) -> Option<Linearization> {
         let rows = self.rows(state)?;
         let count = self.columns.calibration();
         let norms = DVector::from_fn(count, |column, _| {
@@ -263,8 +268,8 @@ impl SensorWindow<'_> {
 }
 
 /// Residuals and Jacobians of all factors stacked, the landmarks projected out.
-pub(super) fn stacked(rows: &[Rows]) -> DMatrix<f64> {
-    let parts: Vec<DMatrix<f64>> = rows.iter().map(Rows::without_landmark).collect();
+pub(super) fn stacked(rows: &[SensorRows]) -> DMatrix<f64> {
+    let parts: Vec<DMatrix<f64>> = rows.iter().map(SensorRows::without_landmark).collect();
     let count = parts.iter().map(DMatrix::nrows).sum();
     let mut whole = DMatrix::zeros(count, parts.first().map_or(1, DMatrix::ncols));
     let mut start = 0;

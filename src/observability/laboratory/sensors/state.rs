@@ -8,8 +8,8 @@ use crate::gimbal::{Chain, ParameterId};
 
 /// Trajectory, joints, landmarks and calibration.
 #[derive(Clone, Debug)]
-pub(super) struct State {
-    pub(super) frames: Vec<FrameState>,
+pub(super) struct SensorState {
+    pub(super) frames: Vec<SensorFrameState>,
     /// Positions in the world, in metres.
     pub(super) landmarks: Vec<Vector3<f64>>,
     pub(super) chain: Chain,
@@ -18,7 +18,7 @@ pub(super) struct State {
 
 /// Unknowns of one frame.
 #[derive(Clone, Debug)]
-pub(super) struct FrameState {
+pub(super) struct SensorFrameState {
     pub(super) navigation: NavigationState,
     pub(super) joints_rad: Vec<f64>,
     /// Unknowns only without encoders; measured by the encoders otherwise.

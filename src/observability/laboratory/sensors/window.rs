@@ -4,7 +4,7 @@ use nalgebra::{Matrix2xX, Matrix3, SMatrix, Vector2, Vector3};
 
 use super::columns::{SensorColumns, all_parameters};
 use super::propagation::{Change, IMU_COLUMNS, Measured};
-use super::state::{Columns, FrameState, State};
+use super::state::{Columns, SensorFrameState, SensorState};
 use super::values::SensorValues;
 use crate::estimator::{HypotheticalFrame, JointKnowledge, NavigationState, PoseKnowledge};
 use crate::geometry::{RigidTransform, so3};
@@ -19,7 +19,7 @@ const ROW_ITERATIONS: usize = 25;
 const ROW_TOLERANCE: f64 = 1e-12;
 /// Observation of one landmark in one image.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Observation {
+pub(super) struct SensorObservation {
     pub(super) frame: usize,
     pub(super) uv_px: Vector2<f64>,
     /// Row of the pixel as a ratio of the image height.
@@ -34,8 +34,8 @@ pub(super) struct SensorWindow<'a> {
     /// Times of the frames: exposure of the first row at the true time offset.
     pub(super) times_s: Vec<f64>,
     /// Observations by landmark.
-    pub(super) observations: Vec<Vec<Observation>>,
-    pub(super) truth: State,
+    pub(super) observations: Vec<Vec<SensorObservation>>,
+    pub(super) truth: SensorState,
     pub(super) columns: Columns,
     /// Weights of the preintegrated motion to each frame but the first: inverse of its covariance at the true state.
     pub(super) weights: Vec<SMatrix<f64, 9, 9>>,
@@ -115,7 +115,7 @@ impl<'a> SensorWindow<'a> {
             pose,
             velocity_bias,
         };
-        let truth = State { frames, landmarks: Vec::new(), chain, sensors };
+        let truth = SensorState { frames, landmarks: Vec::new(), chain, sensors };
         let mut window = Self { flight, setup, times_s, observations: Vec::new(), truth, columns, weights: Vec::new() };
         window.weights = window.imu_weights();
         window.observe();
@@ -125,7 +125,7 @@ impl<'a> SensorWindow<'a> {
     /// Draws the landmarks and computes their pixels.
     fn observe(&mut self) {
         let height = self.setup.camera.resolution_px[1] as f64;
-        let hypothetical = |(frame, time_s): (&FrameState, &f64)| HypotheticalFrame {
+        let hypothetical = |(frame, time_s): (&SensorFrameState, &f64)| HypotheticalFrame {
             time_s: *time_s,
             navigation: frame.navigation,
             joints_rad: frame.joints_rad.clone(),
@@ -138,7 +138,7 @@ impl<'a> SensorWindow<'a> {
                 anchor.navigation.world_from_imu * self.truth.chain.imu_from_camera(&anchor.joints_rad);
             let position = world_from_camera.transform(&(landmark.bearing / landmark.inverse_distance_per_m));
             let observers = [landmark.anchor].into_iter().chain(landmark.observers.iter().copied());
-            let mut observations: Vec<Observation> =
+            let mut observations: Vec<SensorObservation> =
                 observers.filter_map(|frame| self.observation(&position, frame, height)).collect();
             if observations.len() > 1 {
                 observations.sort_by_key(|it| it.frame);
@@ -149,7 +149,7 @@ impl<'a> SensorWindow<'a> {
     }
 
     /// Observation of a position in one frame; `None` outside the image.
-    fn observation(&self, position: &Vector3<f64>, frame: usize, height: f64) -> Option<Observation> {
+    fn observation(&self, position: &Vector3<f64>, frame: usize, height: f64) -> Option<SensorObservation> {
         let readout_s = self.truth.sensors.readout_s;
         let mut row_ratio = 0.5;
         for _ in 0..ROW_ITERATIONS {
@@ -164,7 +164,7 @@ impl<'a> SensorWindow<'a> {
             }
         }
         let uv_px = self.predict(&self.truth, position, frame, row_ratio)?.uv_px;
-        self.truth.sensors.camera.contains(&uv_px, 0.0).then_some(Observation { frame, uv_px, row_ratio })
+        self.truth.sensors.camera.contains(&uv_px, 0.0).then_some(SensorObservation { frame, uv_px, row_ratio })
     }
 
     /// Pixel of a position at a time of the true motion.
@@ -183,7 +183,7 @@ impl<'a> SensorWindow<'a> {
     /// Predicted pixel of a position in a frame, at the row in which it was observed; `None` behind the camera.
     pub(super) fn predict(
         &self,
-        state: &State,
+        state: &SensorState,
         position: &Vector3<f64>,
         frame: usize,
         row_ratio: f64,
@@ -229,7 +229,7 @@ impl<'a> SensorWindow<'a> {
         })
     }
 
-    fn exposure(&self, state: &State, frame: usize, since_s: f64) -> Exposure {
+    fn exposure(&self, state: &SensorState, frame: usize, since_s: f64) -> Exposure {
         let time_s = self.times_s[frame];
         if self.setup.poses == PoseKnowledge::Known {
             let kinematics = self.flight.kinematics(time_s + since_s);
@@ -264,7 +264,7 @@ impl<'a> SensorWindow<'a> {
         }
     }
 
-    fn joints_at(&self, state: &State, frame: usize, since_s: f64, row_ratio: f64) -> JointsAt {
+    fn joints_at(&self, state: &SensorState, frame: usize, since_s: f64, row_ratio: f64) -> JointsAt {
         let time_s = self.times_s[frame];
         let encoder_s = state.sensors.encoder_timeshift_s;
         let (angles, rates) = self.flight.joint_motion(time_s + since_s - encoder_s);
@@ -306,8 +306,8 @@ impl<'a> SensorWindow<'a> {
     }
 }
 
-fn frame_at(kinematics: &Kinematics) -> FrameState {
-    FrameState {
+fn frame_at(kinematics: &Kinematics) -> SensorFrameState {
+    SensorFrameState {
         navigation: NavigationState {
             world_from_imu: kinematics.world_from_imu,
             velocity_m_per_s: kinematics.velocity_m_per_s,

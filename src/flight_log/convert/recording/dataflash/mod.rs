@@ -8,14 +8,14 @@ use nalgebra::UnitQuaternion;
 
 use super::super::super::file::LogFile;
 use super::super::ConvertError;
-use super::super::sink::Sink;
+use super::super::sink::LogSink;
 use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, finite, from_euler, nanoseconds};
 use crate::flight_log::geodesy::Geodetic;
 use records::Record;
 pub(super) use records::START;
 
 /// Reads a log in time since the start of the autopilot.
-pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
+pub(super) fn read(path: &Path, sink: &mut LogSink<'_>) -> Result<Recorded, ConvertError> {
     let file = LogFile::open(path, sink.limits())?;
     let mut recorded = Recorded::new("ArduPilot DataFlash", "");
     let length = file.len();

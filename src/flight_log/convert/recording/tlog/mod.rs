@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use super::super::super::file::LogFile;
 use super::super::ConvertError;
-use super::super::sink::Sink;
+use super::super::sink::LogSink;
 use super::mavlink_gimbal::gimbal_attitude;
 use super::recorded::{
     GimbalAttitude, GimbalFrame, Recorded, STANDARD_GRAVITY_M_PER_S2, finite, from_euler, nanoseconds, rotation,
@@ -99,7 +99,7 @@ fn empty() -> Recorded {
 }
 
 /// Reads a log in UTC of the autopilot (`SYSTEM_TIME`), else of the ground station.
-pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
+pub(super) fn read(path: &Path, sink: &mut LogSink<'_>) -> Result<Recorded, ConvertError> {
     let file = LogFile::open(path, sink.limits())?;
     let mut frames = Frames::new(&file, checksum_byte);
     let mut state =

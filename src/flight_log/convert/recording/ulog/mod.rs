@@ -8,7 +8,7 @@ use std::path::Path;
 
 use super::super::super::file::LogFile;
 use super::super::ConvertError;
-use super::super::sink::Sink;
+use super::super::sink::LogSink;
 use super::damage::Damage;
 use super::mavlink_gimbal::gimbal_attitude;
 use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, finite, from_euler, nanoseconds, rotation};
@@ -43,7 +43,7 @@ struct Declarations {
 }
 
 /// Reads a log in the clock of its timestamps, usually the time since the autopilot started.
-pub(super) fn read(path: &Path, sink: &mut Sink<'_>) -> Result<Recorded, ConvertError> {
+pub(super) fn read(path: &Path, sink: &mut LogSink<'_>) -> Result<Recorded, ConvertError> {
     let file = LogFile::open(path, sink.limits())?;
     let mut recorded = Recorded::new("PX4 ULog", "");
     let mut state = Declarations::default();

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Vector3, Vector6};
 
 use super::super::columns::all_parameters;
 use super::super::rows::stacked;
-use super::super::state::{Columns, State};
+use super::super::state::{Columns, SensorState};
 use super::super::values::{ACCELEROMETER, GYROSCOPE, INTRINSICS, SensorValues};
 use super::super::window::SensorWindow;
 use crate::camera::CameraError;
@@ -33,7 +33,7 @@ impl SensorValues {
     }
 }
 
-impl State {
+impl SensorState {
     /// State changed by one number per column.
     pub(super) fn plus(&self, columns: &Columns, delta: &[f64]) -> Result<Self, CameraError> {
         let mut by_sensor = vec![0.0; all_parameters().len()];
@@ -71,7 +71,7 @@ impl State {
 impl SensorWindow<'_> {
     /// Residuals (first column) with the Jacobian, the landmarks projected out; `None` under the condition of
     /// [`SensorWindow::rows`].
-    pub(super) fn reduced(&self, state: &State) -> Option<DMatrix<f64>> {
+    pub(super) fn reduced(&self, state: &SensorState) -> Option<DMatrix<f64>> {
         Some(stacked(&self.rows(state)?))
     }
 }

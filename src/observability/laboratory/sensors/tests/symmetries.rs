@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::super::state::State;
+use super::super::state::SensorState;
 use super::super::table::set_ranks;
 use super::super::window::SensorWindow;
 use super::super::{LaboratoryForm, SensorColumns};
@@ -42,7 +42,7 @@ fn step(reduced: &DMatrix<f64>, delta: &DVector<f64>, fixed: usize) -> DVector<f
 }
 
 /// State after a step of the columns, with the landmarks that fit best.
-fn moved(window: &SensorWindow<'_>, state: &State, delta: &DVector<f64>) -> State {
+fn moved(window: &SensorWindow<'_>, state: &SensorState, delta: &DVector<f64>) -> SensorState {
     let rows = window.rows(state).unwrap();
     let mut next = state.plus(&window.columns, delta.as_slice()).unwrap();
     for (position, rows) in next.landmarks.iter_mut().zip(&rows) {
@@ -58,7 +58,7 @@ fn moved(window: &SensorWindow<'_>, state: &State, delta: &DVector<f64>) -> Stat
     next
 }
 
-fn residual(window: &SensorWindow<'_>, state: &State) -> f64 {
+fn residual(window: &SensorWindow<'_>, state: &SensorState) -> f64 {
     window.rows(state).unwrap().iter().map(|rows| rows.residual.amax()).fold(0.0, f64::max)
 }
 
