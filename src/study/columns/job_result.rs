@@ -37,11 +37,6 @@ impl JobStatus {
             Self::Timeout => "timeout",
         }
     }
-
-    /// True if the job has run to its end.
-    pub fn has_run(self) -> bool {
-        matches!(self, Self::Ok | Self::NotInitialized)
-    }
 }
 
 /// Files and costs of a job.
