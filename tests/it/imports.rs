@@ -40,27 +40,32 @@ pub(crate) struct Imports {
     modules: BTreeMap<ModulePath, usize>,
 }
 
+/// Name below `src`, with `/`, and text of every Rust file, in the order of their paths.
+pub(crate) fn source_files() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut open = vec![root.clone()];
+    let mut files = Vec::new();
+    while let Some(folder) = open.pop() {
+        for entry in fs::read_dir(&folder).expect("the folder can be listed") {
+            let path = entry.expect("the entry can be read").path();
+            if path.is_dir() {
+                open.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                let inside = path.strip_prefix(&root).expect("the file is below the root");
+                let name = inside.to_string_lossy().replace('\\', "/");
+                files.push((name, fs::read_to_string(&path).expect("the source is UTF-8")));
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
 impl Imports {
     /// Reads all files below `src` but `main.rs` and the files of tests.
     pub(crate) fn read() -> Self {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-        let mut files = Vec::new();
-        let mut open = vec![root.clone()];
-        while let Some(folder) = open.pop() {
-            for entry in fs::read_dir(&folder).expect("the folder can be listed") {
-                let path = entry.expect("the entry can be read").path();
-                if path.is_dir() {
-                    open.push(path);
-                } else if path.extension().is_some_and(|extension| extension == "rs") {
-                    let inside = path.strip_prefix(&root).expect("the file is below the root");
-                    let name = inside.to_string_lossy().replace('\\', "/");
-                    if name != "main.rs" && !is_test_file(&name) {
-                        files.push((name, fs::read_to_string(&path).expect("the source is UTF-8")));
-                    }
-                }
-            }
-        }
-        Self::of(files)
+        let library = source_files().into_iter().filter(|(name, _)| name != "main.rs" && !is_test_file(name));
+        Self::of(library.collect())
     }
 
     /// Reads files given as name below `src` and text.

@@ -1,9 +1,6 @@
 //! The one-way order of the folders of `src/` and of the files in them, read from their imports.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-
-use super::imports::{Imports, is_test_file};
+use super::imports::{Imports, is_test_file, source_files};
 
 /// Folders from the first to the last; each may use those before it. The table in `src/lib.rs` says what each promises.
 const ORDER: [&str; 23] = [
@@ -49,7 +46,8 @@ const WINDOW: [&str; 3] = ["gui", "export", "cli"];
 
 /// One source file: the folder it belongs to and its text without comments.
 struct Source {
-    path: PathBuf,
+    /// Path below `src`.
+    name: String,
     folder: String,
     text: String,
     /// True if it contains tests only.
@@ -57,24 +55,18 @@ struct Source {
 }
 
 fn sources() -> Vec<Source> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut open = vec![root.clone()];
-    let mut sources = Vec::new();
-    while let Some(folder) = open.pop() {
-        for entry in fs::read_dir(&folder).expect("the folder can be listed") {
-            let path = entry.expect("the entry can be read").path();
-            if path.is_dir() {
-                open.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
-                let inside = path.strip_prefix(&root).expect("the file is below the root");
-                let first = inside.components().next().expect("the path has a name").as_os_str().to_string_lossy();
-                let test = is_test_file(&inside.to_string_lossy().replace('\\', "/"));
-                let text = code_of(&fs::read_to_string(&path).expect("the source is UTF-8"));
-                sources.push(Source { folder: first.trim_end_matches(".rs").to_owned(), text, test, path });
+    let sources: Vec<Source> = source_files()
+        .into_iter()
+        .map(|(name, text)| {
+            let first = name.split('/').next().expect("a split has a first part");
+            Source {
+                folder: first.trim_end_matches(".rs").to_owned(),
+                text: code_of(&text),
+                test: is_test_file(&name),
+                name,
             }
-        }
-    }
-    sources.sort_by(|a, b| a.path.cmp(&b.path));
+        })
+        .collect();
     assert!(sources.len() > 300, "only {} source files found", sources.len());
     sources
 }
@@ -143,7 +135,7 @@ fn every_folder_has_its_place_in_the_order() {
     let sources = sources();
     let placed = |source: &Source| source.folder == "lib" || position(&source.folder).is_some();
     let violations: Vec<String> =
-        sources.iter().filter(|source| !placed(source)).map(|source| source.path.display().to_string()).collect();
+        sources.iter().filter(|source| !placed(source)).map(|source| source.name.clone()).collect();
     fail_on(&violations);
 }
 
@@ -154,15 +146,11 @@ fn imports_point_one_way() {
         let own = position(&source.folder).unwrap();
         for name in named_folders(&source.text) {
             if position(&name).is_some_and(|other| other > own) {
-                violations.push(format!(
-                    "{}: '{}' uses '{name}', which comes later",
-                    source.path.display(),
-                    source.folder
-                ));
+                violations.push(format!("{}: '{}' uses '{name}', which comes later", source.name, source.folder));
             }
             let unknown = UNKNOWN_TO.iter().filter(|(folder, _)| *folder == source.folder);
             if unknown.flat_map(|(_, names)| names.iter()).any(|unknown| *unknown == name) {
-                violations.push(format!("{}: '{}' must not know '{name}'", source.path.display(), source.folder));
+                violations.push(format!("{}: '{}' must not know '{name}'", source.name, source.folder));
             }
         }
     }
@@ -176,7 +164,7 @@ fn only_some_folders_name_the_window_and_the_file_system() {
         let mut only_in = |folders: &[&str], words: &[&str]| {
             let named = words.iter().find(|word| source.text.contains(**word));
             if let Some(word) = named.filter(|_| !folders.contains(&source.folder.as_str())) {
-                violations.push(format!("{}: names {word}", source.path.display()));
+                violations.push(format!("{}: names {word}", source.name));
             }
         };
         only_in(&WINDOW, &["egui", "wgpu"]);
