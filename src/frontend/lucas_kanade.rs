@@ -63,7 +63,7 @@ impl Default for LucasKanadeOptions {
 ///
 /// With `T` the window of the first image, `g` its gradient and `J` the second image, the shift `d` satisfies
 /// `Σ g'·J(x + d) = 0`, where `g'` is `g` minus its projection on `1` and `T`.
-/// That is the least-squares solution for `d` with gain and offset eliminated, and `Σ g'·T = 0`.
+/// This `d` is the least-squares solution with gain and offset eliminated, and `Σ g'·T = 0`.
 /// As `J(x + d)` is interpolated, the sum is a polynomial in the fraction of `d` whose coefficients are sums over whole
 /// pixels: iterations within one pixel cost nothing, and the sums are exact in integers.
 #[derive(Clone, Debug)]

@@ -34,7 +34,7 @@ impl fmt::Display for AlignmentReference {
 /// gyroscope and joint angles; returns the better of both.
 ///
 /// # Errors
-/// That of the better reference, if no offset explains the rotations.
+/// The error of the better reference, if no offset explains the rotations.
 pub fn align_camera(
     log: &FlightLog,
     rig: &Rig,
