@@ -155,22 +155,13 @@ impl HypotheticalWindow {
             }),
             JointKnowledge::Known | JointKnowledge::Unknown => None,
         };
-        Frame {
-            index: slot,
-            stamp_ns: ns_from_seconds(hypothetical.time_s),
-            state: FrameState {
-                navigation,
-                joints_rad: hypothetical.joints_rad.clone(),
-                joint_motion: Vec::new(),
-                rates: Arc::new(Rates::default()),
-            },
-            first_estimate: None,
-            encoder,
-            stationary: None,
-            keyframe: true,
-            motion_information: motion.square_root_information(),
-            motion,
-        }
+        let state = FrameState {
+            navigation,
+            joints_rad: hypothetical.joints_rad.clone(),
+            joint_motion: Vec::new(),
+            rates: Arc::new(Rates::default()),
+        };
+        Frame::new(slot, ns_from_seconds(hypothetical.time_s), state, encoder, motion)
     }
 
     /// Landmarks with exact pixels; a frame into which a landmark does not project has no observation.

@@ -73,22 +73,9 @@ impl<'a> FirstWindow<'a> {
             let joints_rad = waiting.initial_joints_rad(joints);
             let joint_motion = setup.initial_joint_motion(waiting.encoder.as_ref(), joints_rad.len());
             let profile = setup.motion_profile(&waiting.imu, &waiting.imu_after, solution.bias);
-            let frame = Frame {
-                index: waiting.index,
-                stamp_ns: waiting.stamp_ns,
-                state: FrameState {
-                    navigation,
-                    joints_rad,
-                    joint_motion,
-                    rates: Rates::at(&waiting.imu, waiting.encoder.as_ref(), profile),
-                },
-                first_estimate: None,
-                encoder: waiting.encoder,
-                stationary: None,
-                keyframe: true,
-                motion_information: motion.square_root_information(),
-                motion,
-            };
+            let rates = Rates::at(&waiting.imu, waiting.encoder.as_ref(), profile);
+            let state = FrameState { navigation, joints_rad, joint_motion, rates };
+            let frame = Frame::new(waiting.index, waiting.stamp_ns, state, waiting.encoder, motion);
             match &mut frames {
                 None => frames = Some(Frames::new(frame)),
                 Some(frames) => frames.push(frame),

@@ -37,6 +37,27 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
+    /// A keyframe outside the prior, without a zero-velocity update; `motion` are the samples since the previous frame.
+    pub(crate) fn new(
+        index: usize,
+        stamp_ns: i64,
+        state: FrameState,
+        encoder: Option<JointAngles>,
+        motion: Preintegration,
+    ) -> Self {
+        Self {
+            index,
+            stamp_ns,
+            state,
+            first_estimate: None,
+            encoder,
+            stationary: None,
+            keyframe: true,
+            motion_information: motion.square_root_information(),
+            motion,
+        }
+    }
+
     /// State at which derivatives are evaluated: the first estimate while `current` is within `reach_rad` of it in
     /// attitude and joint angles, else `current`.
     pub(crate) fn linearization_point<'a>(&'a self, current: &'a FrameState, reach_rad: f64) -> &'a FrameState {

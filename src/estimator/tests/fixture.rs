@@ -182,26 +182,17 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
         }
         let profile = setup.motion_profile(&ground_truth.imu, &flight.frames[index + 1].imu, bias);
         let joint_motion = setup.initial_joint_motion(encoder.as_ref(), ground_truth.true_joint_angles_rad.len());
-        let frame = Frame {
-            index,
-            stamp_ns: ground_truth.stamp_ns,
-            state: FrameState {
-                navigation: NavigationState {
-                    world_from_imu: ground_truth.true_world_from_imu,
-                    velocity_m_per_s: ground_truth.true_velocity_m_per_s,
-                    bias,
-                },
-                joints_rad: ground_truth.true_joint_angles_rad.clone(),
-                joint_motion,
-                rates: Rates::at(&ground_truth.imu, encoder.as_ref(), profile),
+        let state = FrameState {
+            navigation: NavigationState {
+                world_from_imu: ground_truth.true_world_from_imu,
+                velocity_m_per_s: ground_truth.true_velocity_m_per_s,
+                bias,
             },
-            first_estimate: None,
-            encoder,
-            stationary: None,
-            keyframe: true,
-            motion_information: motion.square_root_information(),
-            motion,
+            joints_rad: ground_truth.true_joint_angles_rad.clone(),
+            joint_motion,
+            rates: Rates::at(&ground_truth.imu, encoder.as_ref(), profile),
         };
+        let frame = Frame::new(index, ground_truth.stamp_ns, state, encoder, motion);
         match &mut frames {
             None => frames = Some(Frames::new(frame)),
             Some(frames) => frames.push(frame),

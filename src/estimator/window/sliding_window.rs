@@ -135,25 +135,12 @@ impl SlidingWindow {
         let encoder = setup.encoder_reading(input, window.calibration.of(MAIN).joint_count());
         let joints_rad =
             encoder.as_ref().map_or_else(|| last.state.joints_rad.clone(), |encoder| encoder.angles_rad.clone());
-        let motion_information = motion.square_root_information();
         let joint_motion = setup.initial_joint_motion(encoder.as_ref(), joints_rad.len());
         let profile = setup.motion_profile(input.imu, input.imu_after, navigation.bias);
-        window.frames.push(Frame {
-            index: input.frame_index,
-            stamp_ns: input.stamp_ns,
-            state: FrameState {
-                navigation,
-                joints_rad,
-                joint_motion,
-                rates: Rates::at(input.imu, encoder.as_ref(), profile),
-            },
-            first_estimate: None,
-            encoder,
-            stationary: None,
-            keyframe: false,
-            motion,
-            motion_information,
-        });
+        let rates = Rates::at(input.imu, encoder.as_ref(), profile);
+        let state = FrameState { navigation, joints_rad, joint_motion, rates };
+        let frame = Frame::new(input.frame_index, input.stamp_ns, state, encoder, motion);
+        window.frames.push(Frame { keyframe: false, ..frame });
         let slot = window.frames.newest_slot();
         for (camera, features) in window.features.iter_mut().enumerate() {
             features::observe(features, slot, input.features(camera));
