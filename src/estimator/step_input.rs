@@ -45,9 +45,9 @@ impl StepInput<'_> {
 
 /// Measurements of one step, from which a packed estimator restores those of its window.
 pub trait StepMeasurements {
-    /// Stamp of the image, as in [`StepInput`](crate::estimator::StepInput).
+    /// Stamp of the image, as in [`StepInput`].
     fn stamp_ns(&self) -> i64;
-    /// The IMU samples, as in [`StepInput`](crate::estimator::StepInput).
+    /// The IMU samples, as in [`StepInput`].
     fn imu(&self) -> &[ImuSample];
     /// Features of a camera, ordered by id; index 0 is the main camera.
     fn features(&self, camera: usize) -> &[TrackedFeature];

@@ -142,7 +142,7 @@ impl FrameState {
         self.rates.gyroscope_rad_per_s - self.navigation.bias.gyroscope_rad_per_s
     }
 
-    /// `x ⊞ δ` with `δ` in the order of [`Layout`]: pose, joints, velocity and biases.
+    /// `x ⊞ δ` with `δ` in the order of [`Layout`](super::layout::Layout): pose, joints, velocity and biases.
     pub(crate) fn plus(&self, delta: &[f64]) -> Self {
         let block = self.joint_block();
         let mut navigation = Vector15::zeros();
@@ -158,7 +158,7 @@ impl FrameState {
         }
     }
 
-    /// `self ⊟ origin` in the order of [`Layout`].
+    /// `self ⊟ origin` in the order of [`Layout`](super::layout::Layout).
     pub(crate) fn minus(&self, origin: &Self) -> DVector<f64> {
         let (joints, block) = (self.joints_rad.len(), self.joint_block());
         let navigation = self.navigation.minus(&origin.navigation);

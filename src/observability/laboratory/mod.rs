@@ -3,7 +3,7 @@
 //!
 //! An experiment makes a hypothetical window, linearizes it with the estimator's own factors
 //! ([`crate::estimator::HypotheticalWindow`]) and analyses it in the same way as a step of a run.
-//! [`survey`] runs the built-in experiments.
+//! [`survey`](fn@survey) runs the built-in experiments.
 
 mod advice;
 mod excitation;

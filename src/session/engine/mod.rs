@@ -1,9 +1,9 @@
 //! Computation of runs on threads, and recomputation of their steps.
 //!
 //! [`Engine`] runs a tracker thread per camera and an estimator thread per run and reports over a channel;
-//! [`Computation`] is the one place where those messages enter the record. A [`RunEngine`] is one estimator as a plain
-//! value, a [`History`] its snapshots and step inputs, and the [`RecomputeThread`] answers requests of playback from
-//! them.
+//! [`Computation`] is the one place where those messages enter the record. A
+//! [`RunEngine`](run_engine::RunEngine) is one estimator as a plain value, a [`History`] its snapshots and step inputs,
+//! and the [`RecomputeThread`] answers requests of playback from them.
 
 mod altered_measurements;
 mod calibrate;
