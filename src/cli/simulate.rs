@@ -21,6 +21,9 @@ pub(crate) struct SimulateArguments {
     /// The log to write; its rig and the ground truth of the rig get the same name with .rig.yaml and .truth.yaml.
     #[arg(short, long, visible_alias = "out", value_name = "LOG.mcap")]
     pub output: PathBuf,
+    /// Mirror the path, so that T1 circles to the right instead of to the left.
+    #[arg(long)]
+    pub mirror: bool,
     /// Seed of the random numbers.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -93,6 +96,7 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<Outcome> {
         ExperimentArgument::T4 => Experiment::T4,
     };
     let mut options = SimulationOptions::new(experiment);
+    options.mirrored = arguments.mirror;
     options.seed = arguments.seed;
     options.duration_s = arguments.duration;
     options.resolution_px = arguments.size;

@@ -80,6 +80,12 @@ impl LookAround {
         }
     }
 
+    /// Commands of a mirrored flight: the mean heading relative to the vehicle's changes its side.
+    pub(crate) fn mirrored(mut self) -> Self {
+        self.yaw_rad[0] = -self.yaw_rad[0];
+        self
+    }
+
     /// A triangle wave of 60° to each side at the motors' largest rate while the camera is slewed.
     fn slew_rad(&self, time_s: f64) -> f64 {
         let Some([start_s, length_s]) = self.slew_s else { return 0.0 };

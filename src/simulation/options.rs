@@ -10,6 +10,8 @@ use crate::sensors::ChainPrior;
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulationOptions {
     pub experiment: Experiment,
+    /// True if the path is mirrored at the x–z plane of the world: T1 then circles to the right.
+    pub mirrored: bool,
     /// Seed of all random numbers.
     pub seed: u64,
     /// Length in seconds; with `None` the path has the experiment's length. A shorter flight equals the beginning of a
@@ -38,6 +40,7 @@ impl SimulationOptions {
     pub fn new(experiment: Experiment) -> Self {
         Self {
             experiment,
+            mirrored: false,
             seed: 1,
             duration_s: None,
             encoder_sigma_rad: Some(experiment.encoder_sigma_rad()),

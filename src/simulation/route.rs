@@ -30,6 +30,21 @@ pub(crate) trait Flight {
     fn point(&self, time_s: f64) -> FlightPoint;
 }
 
+/// Flight mirrored at the x–z plane: an orbit to the left becomes one to the right.
+pub(crate) struct Mirrored(pub(crate) Box<dyn Flight>);
+
+impl Flight for Mirrored {
+    fn knot_s(&self) -> f64 {
+        self.0.knot_s()
+    }
+
+    fn point(&self, time_s: f64) -> FlightPoint {
+        let point = self.0.point(time_s);
+        let mirror = Vector3::new(1.0, -1.0, 1.0);
+        FlightPoint { position_m: point.position_m.component_mul(&mirror), heading_rad: -point.heading_rad, ..point }
+    }
+}
+
 /// Speed and size of the manoeuvres of a flight.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pace {

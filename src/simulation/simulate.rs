@@ -17,6 +17,7 @@ use super::interval::during;
 use super::options::{SimulationOptions, SimulationProgress, SimulationSummary};
 use super::random::RandomStream;
 use super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
+use super::route::Mirrored;
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{AIR_DRAG_PER_S, Trajectory, VehicleLimits};
 use super::vibration::shake;
@@ -115,7 +116,12 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
     let variant = 100 * Experiment::all().position(|other| other == experiment).unwrap_or(0) as u64;
     let random = |stream: u64| RandomStream::new(options.seed, stream + variant);
     let planned_s = (experiment.length_m() / PLANNED_M_PER_S).max(options.duration_s.unwrap_or(0.0));
-    let flight = experiment.flight(4.0 * planned_s, &mut random(stream::ROUTE));
+    let mut flight = experiment.flight(4.0 * planned_s, &mut random(stream::ROUTE));
+    let mut look = experiment.look_around(&mut random(stream::LOOK));
+    if options.mirrored {
+        flight = Box::new(Mirrored(flight));
+        look = look.mirrored();
+    }
     let mut trajectory = Trajectory::new(
         flight.as_ref(),
         &mut random(stream::MANOEUVRES),
@@ -130,7 +136,6 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
     if let Some([start_s, length_s, rate_rad_per_s]) = options.disturbances.spin {
         trajectory.spin([start_s, length_s], rate_rad_per_s);
     }
-    let mut look = experiment.look_around(&mut random(stream::LOOK));
     look.slew_s = options.disturbances.gimbal_slew_s;
     look.stabilized_s = options.disturbances.stabilized_s;
     look.fixed_joint = options.disturbances.fixed_joint.map(|[joint, start_s, length_s]| {

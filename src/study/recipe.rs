@@ -25,6 +25,8 @@ pub struct FlightRecipe {
     pub name: String,
     /// Name of the experiment, `T1` to `T4`.
     pub experiment: String,
+    /// True if the path is mirrored: T1 then circles to the right.
+    pub mirrored: bool,
     /// Duration in seconds, `None` for the experiment's.
     pub duration_s: Option<f64>,
     pub encoder: EncoderNoise,
@@ -73,6 +75,7 @@ impl FlightRecipe {
     /// For a disturbance that cannot be parsed.
     pub fn options(&self, seed: u64, disturb: &[String]) -> Result<SimulationOptions, SimulationError> {
         let mut options = SimulationOptions::new(self.experiment().unwrap_or(Experiment::T3));
+        options.mirrored = self.mirrored;
         options.seed = seed;
         options.duration_s = self.duration_s;
         match self.encoder {

@@ -5,6 +5,7 @@ use super::super::experiment::Experiment;
 use super::super::gimbal::{JointMotion, Stabilizer, joints, true_chain};
 use super::super::imu::{FIREFLY_IMU, ImuRecord};
 use super::super::random::RandomStream;
+use super::super::route::{Flight, Mirrored};
 use super::super::scenario::{Scenario, ScenarioOptions, stream};
 use super::super::spline::Spline;
 use super::super::trajectory::{Trajectory, VehicleLimits};
@@ -117,6 +118,23 @@ fn every_experiment_lasts_its_length_and_keeps_the_limits() {
         let hover = trajectory.at(1.0).velocity_m_per_s.norm();
         assert!(hover < 0.1 && trajectory.length_m(2.0) < 0.15, "{experiment:?} hovers at {hover} m/s");
     }
+}
+
+#[test]
+fn a_mirrored_orbit_turns_to_the_right() {
+    let route = || Experiment::T1.flight(400.0, &mut RandomStream::new(3, stream::ROUTE));
+    let (left, right) = (route(), Mirrored(route()));
+    let turned_rad = |flight: &dyn Flight| flight.point(60.0).heading_rad - flight.point(0.0).heading_rad;
+    assert!(turned_rad(left.as_ref()) > 10.0);
+    assert!((turned_rad(left.as_ref()) + turned_rad(&right)).abs() < 1e-9);
+    let (seen, mirrored) = (left.point(20.0).position_m, right.point(20.0).position_m);
+    assert_eq!((mirrored.x, mirrored.y, mirrored.z), (seen.x, -seen.y, seen.z));
+    assert_eq!(left.knot_s(), right.knot_s());
+    let looks = |mirror: bool| {
+        let look = Experiment::T1.look_around(&mut RandomStream::new(3, stream::LOOK));
+        if mirror { look.mirrored() } else { look }.yaw_rad[0]
+    };
+    assert_eq!(looks(true), -looks(false), "towards the house, on the other side");
 }
 
 #[test]

@@ -151,6 +151,7 @@ fn flight(section: &Section<'_>) -> Result<FlightRecipe, PlanError> {
     section.allow(&[
         "name",
         "experiment",
+        "mirrored",
         "duration_s",
         "encoder_sigma_deg",
         "size_px",
@@ -178,6 +179,7 @@ fn flight(section: &Section<'_>) -> Result<FlightRecipe, PlanError> {
     let recipe = FlightRecipe {
         name,
         experiment,
+        mirrored: section.boolean("mirrored")?.unwrap_or(false),
         duration_s: section.number("duration_s", 0.5..=3600.0)?,
         encoder: encoder.unwrap_or(EncoderNoise::OfExperiment),
         size_px,

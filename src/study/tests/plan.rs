@@ -15,6 +15,7 @@ duration_s = 5.5
 [[flights]]
 name = "town"
 experiment = "T3"
+mirrored = true
 duration_s = 20
 encoder_sigma_deg = 0.5
 size_px = [320, 240]
@@ -96,6 +97,7 @@ fn every_key_is_read() {
     assert_eq!((plan.logs[0].start_s, plan.logs[0].duration_s), (1.0, Some(5.5)));
     let [town, t4] = plan.flights.as_slice() else { panic!("two flights") };
     assert_eq!((town.size_px, town.encoder, town.static_camera), ([320, 240], EncoderNoise::Degrees(0.5), false));
+    assert!(town.mirrored && !t4.mirrored);
     assert_eq!((t4.name.as_str(), t4.experiment.as_str(), t4.encoder), ("t4", "T4", EncoderNoise::None));
     assert_eq!(plan.disturbances[1].disturb, ["blank=11,1"]);
     let errors = &plan.perturbations[1];
