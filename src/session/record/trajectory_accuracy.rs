@@ -5,7 +5,8 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::session::accuracy::{
-    Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, path_length_m, relative_errors,
+    Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, heading_drift_rad, path_length_m,
+    relative_errors,
 };
 use crate::session::antenna::{AntennaAlignment, AntennaPair, antenna_statistics};
 
@@ -35,6 +36,10 @@ pub struct TrajectoryAccuracy {
     pub ate_max_m: f64,
     /// `ate_rmse_m` in percent of `length_m`; zero for a path without length.
     pub ate_percent_of_length: f64,
+    /// Heading error gained per full turn in degrees, negative if the estimate lags behind the turn; `None` if the
+    /// vehicle turns by less than half a turn, or against positions of an antenna.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heading_drift_deg_per_turn: Option<f64>,
     /// Length of the ground-truth path over the estimated frames, in metres.
     #[serde(skip)]
     pub length_m: f64,
@@ -73,7 +78,11 @@ impl TrajectoryAccuracy {
         });
         let length_m = path_length_m(pairs.iter().map(|(_, ground_truth)| &ground_truth.pose.translation_m));
         let errors_m = ErrorStatistics::of(&absolute_errors_m(pairs, &transform))?;
-        Some(Self { rpe: relative.collect(), ..Self::absolute(&errors_m, length_m) })
+        Some(Self {
+            rpe: relative.collect(),
+            heading_drift_deg_per_turn: heading_drift_rad(pairs).map(f64::to_degrees),
+            ..Self::absolute(&errors_m, length_m)
+        })
     }
 
     /// Errors of the antenna position, `None` if there are no pairs.
@@ -91,6 +100,7 @@ impl TrajectoryAccuracy {
             ate_median_m: errors_m.median,
             ate_max_m: errors_m.max,
             ate_percent_of_length: if length_m > 0.0 { 100.0 * errors_m.rmse / length_m } else { 0.0 },
+            heading_drift_deg_per_turn: None,
             length_m,
             rpe: Vec::new(),
             antenna: None,

@@ -1,3 +1,4 @@
+mod accuracy;
 mod covariance;
 mod forks;
 pub(crate) mod memory;

@@ -157,6 +157,16 @@ impl<'a> JobResult<'a> {
             Some(job.accuracy()?.ate_percent_of_length)
         }),
         Column::number(
+            "heading_drift_rad",
+            "rad",
+            "heading error gained per full turn, negative behind the turn; only of flights that turn by half a turn or more",
+            |job: &Self| Some(job.accuracy()?.heading_drift_deg_per_turn?.to_radians()),
+        )
+        .worse(Direction::Either),
+        Column::number("heading_drift_size_rad", "rad", "its size", |job: &Self| {
+            Some(job.accuracy()?.heading_drift_deg_per_turn?.to_radians().abs())
+        }),
+        Column::number(
             "rpe_5m_translation_m",
             "m",
             "relative error over 5 m of path, root mean square of the translation",
