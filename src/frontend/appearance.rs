@@ -2,7 +2,7 @@
 
 #![expect(clippy::inline_always, reason = "code not inlined is not compiled for the registers of its caller")]
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix6, Matrix6x2, Vector2, Vector6};
 use pulp::{Arch, NullaryFnOnce};
 
 use super::lucas_kanade::REGISTER;
@@ -40,6 +40,9 @@ pub(super) struct Appearance {
     inverse: Matrix6<f64>,
     /// `Σ value²`.
     square: f32,
+    /// Affine displacement `[dx, dy]` and its derivatives (6 × 2, in px² and px) that a comparison finds per unit of
+    /// perspective.
+    by_perspective: Matrix6x2<f64>,
 }
 
 impl Appearance {
@@ -63,6 +66,7 @@ impl Appearance {
 
         let [mut value, mut along_x, mut along_y] = [[[0.0; LANES]; WINDOW]; 3];
         let mut slopes = [[[0.0; LANES]; WINDOW]; 6];
+        let mut perspective = [[[0.0; LANES]; WINDOW]; 2];
         let mut squares = [0.0_f32; LANES];
         let mut sums = [[[0.0_f32; LANES]; 2]; 6];
         for row in 0..WINDOW {
@@ -78,6 +82,9 @@ impl Appearance {
                 along_y[row][c] = y;
                 squares[c] += grey * grey;
                 let parts = [x, y, x * across[c], x * down, y * across[c], y * down];
+                let outward = x * across[c] + y * down;
+                perspective[0][row][c] = outward * across[c];
+                perspective[1][row][c] = outward * down;
                 for k in 0..6 {
                     slopes[k][row][c] = parts[k];
                     sums[k][0][c] += parts[k];
@@ -107,12 +114,24 @@ impl Appearance {
             }
         }
         let inverse = normal.cholesky()?.inverse();
-        Some(Self { level, value, along_x, along_y, means, regressions, inverse, square })
+        let by_perspective = inverse * Matrix6x2::from_fn(|k, j| f64::from(dot(&slopes[k], &perspective[j])));
+        Some(Self { level, value, along_x, along_y, means, regressions, inverse, square, by_perspective })
     }
 
     /// Grey level to subtract from a window before the comparison.
     pub(super) fn level(&self) -> f32 {
         self.level
+    }
+
+    /// Displacement of an affine match at an offset from the window's centre that perspective `w` (1/px) causes, in pixels
+    /// of this window: matched minus true.
+    pub(super) fn perspective_shift(&self, perspective: &Vector2<f64>, offset_px: &Vector2<f64>) -> Vector2<f64> {
+        let found = self.by_perspective * perspective;
+        let matched = Vector2::new(
+            found[0] + found[2] * offset_px.x + found[3] * offset_px.y,
+            found[1] + found[4] * offset_px.x + found[5] * offset_px.y,
+        );
+        offset_px * perspective.dot(offset_px) - matched
     }
 
     /// Normalized correlation of `window` with this one, and the Gauss–Newton step of this one towards it (6 × 1):

@@ -160,6 +160,7 @@ impl FrontEnd {
         let steps = self.follow(expected.as_ref(), rows.as_ref());
         statistics.lost = before - steps.len();
         let (steps, motion) = self.reject(steps, expected.as_ref(), predicted);
+        let steps = self.correct_perspective(steps, &motion.rotation);
         let steps = self.thin_out(steps);
         statistics.tracked = steps.len();
         statistics.rejected = before - statistics.lost - steps.len();
@@ -186,7 +187,8 @@ impl FrontEnd {
             age: feature.age,
             uv_px: feature.uv_px,
             bearing: feature.bearing,
-            reference: reference.or_else(|| ReferencePatch::cut(image, &feature.uv_px, &Vector2::zeros())),
+            reference:
+                reference.or_else(|| ReferencePatch::cut(image, &self.camera, &feature.uv_px, &Vector2::zeros())),
         }));
         std::mem::swap(&mut self.previous, &mut self.now);
         Ok(TrackedFrame { stamp_ns, features, statistics })
@@ -242,7 +244,10 @@ impl FrontEnd {
         let Buffers { motion, search } = buffers;
         let near_px = lucas_kanade::approach(&self.previous, &self.now, &track.uv_px, guess_px, options, motion)?;
         let (previous, now) = (self.previous.levels().first()?, self.now.levels().first()?);
-        let renewed = || ReferencePatch::cut(previous, &track.uv_px, &(near_px - track.uv_px));
+        let renewed = || {
+            let motion_px = near_px - track.uv_px;
+            ReferencePatch::cut(previous, &self.camera, &track.uv_px, &motion_px)
+        };
         let mut matched = |mut reference: ReferencePatch| {
             let uv_px = reference.find(now, &near_px, &self.options.reference, search)?;
             Some((uv_px, Some(reference)))
@@ -326,6 +331,18 @@ impl FrontEnd {
         let motion = outliers::estimate_motion(&pairs, &start, predicted, focal_px, &self.options.outliers);
         let kept = steps.into_iter().zip(&motion.is_inlier).filter_map(|(step, inlier)| inlier.then_some(step));
         (kept.collect(), motion)
+    }
+
+    /// Removes the errors of the matches that are caused by perspective.
+    fn correct_perspective(&self, mut steps: Vec<Step>, rotation: &UnitQuaternion<f64>) -> Vec<Step> {
+        for step in &mut steps {
+            let Some(reference) = &mut step.reference else { continue };
+            let uv_px = step.uv_px - reference.perspective_error_px(&self.camera, rotation, &step.bearing);
+            if let Some(bearing) = self.camera.unproject(&uv_px) {
+                (step.uv_px, step.bearing) = (uv_px, bearing);
+            }
+        }
+        steps
     }
 
     /// Keeps the longest of tracks that are too near to each other.

@@ -13,6 +13,7 @@ pub mod corners;
 mod front_end;
 pub mod lucas_kanade;
 pub mod outliers;
+mod perspective;
 mod prediction;
 mod products;
 mod pyramid;

@@ -8,11 +8,13 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
 
 use super::appearance::{Appearance, CENTRE, LANES, Rows, SIDE, WINDOW};
+use super::perspective::Surface;
 use super::pyramid::cut_out;
 use super::resample::{BORDER, Patch};
+use crate::camera::CameraModel;
 use crate::sensors::GrayImage;
 
 /// Distance from the image's first column or row to the centre of the first window that can be resampled, in pixels.
@@ -50,6 +52,8 @@ pub(super) struct ReferencePatch {
     offset_px: Vector2<f64>,
     /// Map from offsets in the reference to offsets in the newest image.
     warp: Matrix2<f64>,
+    /// `None` far from the optical axis.
+    surface: Option<Surface>,
 }
 
 impl ReferencePatch {
@@ -57,7 +61,12 @@ impl ReferencePatch {
     ///
     /// Near the border the feature is not in the centre: the window is moved until it is inside both images. `None` if
     /// the feature is then outside the window, or the window has no texture.
-    pub(super) fn cut(image: &GrayImage, uv_px: &Vector2<f64>, motion_px: &Vector2<f64>) -> Option<Self> {
+    pub(super) fn cut(
+        image: &GrayImage,
+        camera: &CameraModel,
+        uv_px: &Vector2<f64>,
+        motion_px: &Vector2<f64>,
+    ) -> Option<Self> {
         let mut middle = uv_px.map(f64::round);
         for (axis, count) in [image.width, image.height].into_iter().enumerate() {
             let first = NEAR_BORDER + RESERVE_PX - motion_px[axis].min(0.0);
@@ -75,7 +84,26 @@ impl ReferencePatch {
         let mut grey = [[0.0; SIDE]; SIDE];
         cut_out(image, first, &mut grey, f32::from);
         let appearance = Appearance::new(&grey)?;
-        Some(Self { appearance: Arc::new(appearance), offset_px: uv_px - middle, warp: Matrix2::identity() })
+        Some(Self {
+            appearance: Arc::new(appearance),
+            offset_px: uv_px - middle,
+            warp: Matrix2::identity(),
+            surface: Surface::new(camera, &middle),
+        })
+    }
+
+    /// Error of the newest match that is caused by perspective, in pixels of the image, after the camera rotated by
+    /// `rotation` since the previous image. To be called once for each match.
+    pub(super) fn perspective_error_px(
+        &mut self,
+        camera: &CameraModel,
+        rotation: &UnitQuaternion<f64>,
+        bearing: &Vector3<f64>,
+    ) -> Vector2<f64> {
+        let Self { appearance, offset_px, warp, surface } = self;
+        let perspective = surface.as_mut().and_then(|surface| surface.perspective(camera, rotation, bearing, warp));
+        perspective
+            .map_or_else(Vector2::zeros, |perspective| *warp * appearance.perspective_shift(&perspective, offset_px))
     }
 
     /// Matches the reference around a tracked position and returns the position of the feature in pixels; `None` if the

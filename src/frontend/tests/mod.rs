@@ -4,6 +4,7 @@ mod following;
 mod front_end;
 mod homography;
 mod motion;
+mod perspective;
 mod products;
 mod readout;
 mod reference;
