@@ -22,7 +22,7 @@ mod window;
 
 pub use config::{
     CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, EstimatorOptions, RigidCamera, TrackContinuation,
-    imu_columns, imu_intrinsics, rigid_columns,
+    VisualLoss, imu_columns, imu_intrinsics, rigid_columns,
 };
 pub use estimator::Estimator;
 pub use explain::{FeatureRows, StepJacobian};

@@ -15,6 +15,14 @@ pub enum RobustLoss {
 }
 
 impl RobustLoss {
+    /// Residual in standard deviations beyond which a measurement loses weight; infinite for [`Self::None`].
+    pub(crate) fn scale(self) -> f64 {
+        match self {
+            Self::None => f64::INFINITY,
+            Self::Huber(scale) | Self::Cauchy(scale) => scale,
+        }
+    }
+
     /// `ρ(s)` and its derivative `dρ/ds`, the weight in iteratively reweighted least squares.
     pub fn cost_and_weight(self, squared: f64) -> (f64, f64) {
         match self {

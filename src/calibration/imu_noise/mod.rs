@@ -14,7 +14,7 @@ use std::ops::ControlFlow;
 pub use self::innovations::NoiseDensity;
 use self::innovations::{Innovations, Sums};
 use super::input::TrackedView;
-use crate::estimator::{Estimator, EstimatorConfig, StepInput};
+use crate::estimator::{Estimator, EstimatorConfig, StepInput, VisualLoss};
 use crate::geometry::seconds_from_ns;
 use crate::optimization::RobustLoss;
 use crate::sensors::ImuNoise;
@@ -100,7 +100,7 @@ pub fn fit_imu_noise(
 ) -> Result<FlightNoise, ImuNoiseError> {
     let mut noise = config.imu_noise;
     let mut config = config.clone();
-    config.options.loss = LOSS;
+    config.options.loss = VisualLoss::Fixed(LOSS);
     let mut before = None;
     let mut converged = false;
     let mut run = 0;

@@ -7,4 +7,4 @@ pub(crate) use estimator_config::rigid_chain;
 pub use estimator_config::{
     CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidCamera, imu_columns, imu_intrinsics, rigid_columns,
 };
-pub use options::{EstimatorOptions, TrackContinuation};
+pub use options::{EstimatorOptions, TrackContinuation, VisualLoss};

@@ -18,6 +18,14 @@ pub enum TrackContinuation {
     DropAnchor,
 }
 
+/// Robust loss of the visual residuals, of each observation and of each track as a whole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum VisualLoss {
+    /// Cauchy's loss with a scale that follows the residuals of the window, for each camera.
+    Adaptive,
+    Fixed(RobustLoss),
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatorOptions {
     /// Number of keyframes in the window, not counting the newest frame.
@@ -29,8 +37,7 @@ pub struct EstimatorOptions {
     /// Standard deviation of a well tracked pixel, per coordinate. Most tracks are better; some have errors of a
     /// pixel, whose weight `loss` limits.
     pub pixel_sigma_px: f64,
-    /// Robust loss of the visual residuals.
-    pub loss: RobustLoss,
+    pub loss: VisualLoss,
     pub landmark_model: LandmarkModel,
     /// Treatment of tracks whose anchor leaves the window.
     pub track_continuation: TrackContinuation,
@@ -96,7 +103,7 @@ impl Default for EstimatorOptions {
             first_window_factor: 2,
             inaccurate_first_window_factor: 4,
             pixel_sigma_px: 0.25,
-            loss: RobustLoss::Cauchy(1.0),
+            loss: VisualLoss::Adaptive,
             landmark_model: LandmarkModel::BearingAndInverseDistance,
             track_continuation: TrackContinuation::UseOnce,
             iterations: 6,

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, Vector3};
 
 use crate::camera::CameraModel;
-use crate::estimator::factors::reprojection::{Anchor, VisualModel, whitened};
+use crate::estimator::factors::reprojection::{Anchor, RobustWeight, VisualModel, whitened};
 use crate::estimator::problem::linearization::column_blocks;
 use crate::estimator::report::{FeatureReport, JacobianFactor, JacobianRow, JacobianSource, StepReport};
 use crate::estimator::state::camera_pose::{self, CameraMaps, CameraSensor};
@@ -16,7 +16,7 @@ use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{Layout, POSE, VELOCITY_BIAS};
 use crate::estimator::state::track::TrackObservation;
 use crate::frontend::FeatureId;
-use crate::optimization::{BlockTerm, CameraPose, Landmark};
+use crate::optimization::{BlockTerm, CameraPose, Landmark, RobustLoss};
 
 /// Jacobian of a step in blocks.
 #[derive(Clone, Debug, PartialEq)]
@@ -137,7 +137,7 @@ impl<'a> Writer<'a> {
             let Some(slot) = slot_of(seen.frame_index) else { continue };
             let observation = TrackObservation { slot, uv_px: seen.measured_px };
             // Stored residuals are rounded: take the robust weight of the step instead of recomputing it.
-            let weight = seen.residual_after_px.map(|_| seen.robust_weight);
+            let weight = RobustWeight::Known(seen.robust_weight);
             let mut target = rows.rows_mut(2 * frames.len(), 2);
             let written = match camera.current.blocks_per_frame() {
                 1 => self.write::<1>(&mut target, camera, &anchor, &landmark, &observation, weight),
@@ -172,7 +172,7 @@ impl<'a> Writer<'a> {
         anchor: &Anchor<'_>,
         landmark: &Landmark,
         observation: &TrackObservation,
-        weight: Option<f64>,
+        weight: RobustWeight,
     ) -> Option<()> {
         let term: BlockTerm<usize, N> = whitened(&camera.model, anchor, landmark, observation, weight)?;
         rows.column_mut(rows.ncols() - 1).copy_from(&term.by_landmark.column(2));
@@ -226,8 +226,9 @@ fn window_camera<'a>(
     model: &'a CameraModel,
     start: usize,
 ) -> WindowCamera<'a> {
-    let (sigma_px, loss, landmark_model) = (source.pixel_sigma_px, source.loss, source.landmark_model);
-    let visual = VisualModel { camera: model, sigma_px, loss, landmark_model };
+    let (sigma_px, landmark_model) = (source.pixel_sigma_px, source.landmark_model);
+    // The robust weights are known.
+    let visual = VisualModel { camera: model, sigma_px, loss: RobustLoss::None, landmark_model };
     if let Some(exact) = &source.exact {
         let (current, linearized) = (exact.current.1.of(camera), exact.linearized.1.of(camera));
         return WindowCamera {

@@ -69,8 +69,9 @@ impl ProjectedRows {
             let anchor = Anchor::new(current, linearized, first);
             let observers = N * (track.observations.len() - 1);
             local.begin(CameraView::blocks_of::<N>(first.slot), current.intrinsics_block(), observers);
+            let weight = anchor.weight(model, landmark, track);
             for observation in &track.observations {
-                let Some(term) = whitened::<N>(model, &anchor, landmark, observation, None) else { continue };
+                let Some(term) = whitened::<N>(model, &anchor, landmark, observation, weight) else { continue };
                 blocks.add(&term);
                 local.push(&term);
             }

@@ -12,19 +12,61 @@ use crate::optimization::{
     RobustLoss, reprojection,
 };
 
+/// Number of observations that determine a landmark: three unknowns, two coordinates each.
+const OBSERVATIONS_PER_LANDMARK: f64 = 1.5;
+
 /// Camera model of the rig, pixel noise and robust loss.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct VisualModel<'a> {
     /// Rig's model; a [`CameraView`] has the model with estimated intrinsics.
     pub(crate) camera: &'a CameraModel,
     pub(crate) sigma_px: f64,
+    /// Robust loss of each observation, and of each track as a whole: see [`Self::track_cost_and_weight`].
     pub(crate) loss: RobustLoss,
     pub(crate) landmark_model: LandmarkModel,
 }
 
 impl<'a> VisualModel<'a> {
-    pub(crate) fn new(camera: &'a CameraModel, options: &EstimatorOptions) -> Self {
-        Self { camera, sigma_px: options.pixel_sigma_px, loss: options.loss, landmark_model: options.landmark_model }
+    pub(crate) fn new(camera: &'a CameraModel, options: &EstimatorOptions, loss: RobustLoss) -> Self {
+        Self { camera, sigma_px: options.pixel_sigma_px, loss, landmark_model: options.landmark_model }
+    }
+
+    /// Robust cost of a track and the weight of all its observations, from the sum of their robust costs.
+    ///
+    /// The loss is applied once more to the mean over the degrees of freedom: a feature that is no point of the scene,
+    /// such as a corner where an outline crosses the background, slides with the viewpoint. Each of its residuals is
+    /// moderate, but they do not average out, so the track loses weight as a whole.
+    pub(crate) fn track_cost_and_weight(&self, sum: f64, observations: usize) -> (f64, f64) {
+        let freedom = (observations as f64 - OBSERVATIONS_PER_LANDMARK).max(0.5);
+        let (cost, weight) = self.loss.cost_and_weight(sum / freedom);
+        (freedom * cost, weight)
+    }
+
+    /// Robust weights of a track's observations by their residuals in pixels, zero where there is none.
+    pub(crate) fn robust_weights(&self, residuals_px: &[Option<Vector2<f64>>]) -> Vec<f64> {
+        let squared = |residual: &Option<Vector2<f64>>| residual.map(|it| it.norm_squared() / self.sigma_px.powi(2));
+        let mut sum = LossSum::new(self.loss, self.sigma_px);
+        for residual in residuals_px {
+            sum.add(*residual);
+        }
+        let (_, of_track) = self.track_cost_and_weight(sum.get(), residuals_px.len());
+        let weight = |squared: f64| of_track * self.loss.cost_and_weight(squared).1;
+        residuals_px.iter().map(|residual| squared(residual).map_or(0.0, weight)).collect()
+    }
+
+    /// Sum of the robust costs of a track's observations.
+    fn observation_costs(
+        &self,
+        view: &CameraView<'_>,
+        anchor: &RelativeTo<'_>,
+        landmark: &Landmark,
+        track: &Track,
+    ) -> f64 {
+        let mut sum = LossSum::new(self.loss, self.sigma_px);
+        for observation in &track.observations[usize::from(!self.measures_in_anchor())..] {
+            sum.add(observation_residual_px(view, anchor, landmark, observation));
+        }
+        sum.get()
     }
 
     /// True if the anchor's own observation has a residual.
@@ -46,19 +88,13 @@ pub(crate) fn observation_residual_px(
 
 /// Robust cost (half the sum of losses) of all reprojection factors.
 pub(crate) fn cost(model: &VisualModel<'_>, view: &CameraView<'_>, tracks: &[Track], landmarks: &[Landmark]) -> f64 {
-    let mut total = LossSum::new(model.loss, model.sigma_px);
+    let mut total = 0.0;
     for (track, landmark) in tracks.iter().zip(landmarks) {
         let Some(first) = track.observations.first() else { continue };
-        let anchor = view.relative_to(first);
-        for observation in &track.observations {
-            if observation.slot == first.slot && !model.measures_in_anchor() {
-                continue;
-            }
-            let residual = observation_residual_px(view, &anchor, landmark, observation);
-            total.add(residual);
-        }
+        let sum = model.observation_costs(view, &view.relative_to(first), landmark, track);
+        total += model.track_cost_and_weight(sum, track.observations.len()).0;
     }
-    0.5 * total.get()
+    0.5 * total
 }
 
 /// Normal equations of the reprojection factors of one camera over the blocks of its [`CameraView`].
@@ -94,10 +130,11 @@ fn equations_by_blocks<const N: usize>(
         // Observations are in ascending order of the slots; the first one is the anchor's.
         let anchor = track.observations.first().map(|first| Anchor::new(current, linearized, first));
         let blocks = anchor.as_ref().map(|anchor| CameraView::blocks_of::<N>(anchor.observation.slot));
+        let weight = anchor.as_ref().map_or(RobustWeight::OfTrack(1.0), |anchor| anchor.weight(model, landmark, track));
         let terms = track
             .observations
             .iter()
-            .filter_map(|observation| whitened(model, anchor.as_ref()?, landmark, observation, None));
+            .filter_map(|observation| whitened(model, anchor.as_ref()?, landmark, observation, weight));
         let observations = track.observations.len() * current.blocks_per_frame();
         equations.add_landmark_by_blocks(blocks, current.intrinsics_block(), observations, terms);
     }
@@ -123,17 +160,32 @@ impl<'a> Anchor<'a> {
         let (to_current, to_linearized) = (current.relative_to(observation), linearized.relative_to(observation));
         Self { current, linearized, observation, to_current, to_linearized }
     }
+
+    /// Weight of a track as a whole at the current estimate.
+    pub(crate) fn weight(&self, model: &VisualModel<'_>, landmark: &Landmark, track: &Track) -> RobustWeight {
+        let sum = model.observation_costs(self.current, &self.to_current, landmark, track);
+        RobustWeight::OfTrack(model.track_cost_and_weight(sum, track.observations.len()).1)
+    }
+}
+
+/// Robust weight of an observation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum RobustWeight {
+    /// Weight of the track as a whole, to be multiplied by that of the observation's residual.
+    OfTrack(f64),
+    /// Product of both, from a report.
+    Known(f64),
 }
 
 /// Linearizes one observation by the `N` blocks per frame, divided by sigma and multiplied by the root of its robust
-/// weight: `known_weight`, or else that of the residual.
+/// weight.
 #[inline]
 pub(crate) fn whitened<const N: usize>(
     model: &VisualModel<'_>,
     anchor: &Anchor<'_>,
     landmark: &Landmark,
     observation: &TrackObservation,
-    known_weight: Option<f64>,
+    weight: RobustWeight,
 ) -> Option<BlockTerm<usize, N>> {
     let camera = anchor.current.model();
     let in_anchor = observation.slot == anchor.observation.slot;
@@ -147,7 +199,10 @@ pub(crate) fn whitened<const N: usize>(
     } else {
         reprojection::linearize(camera, &relative, &linearized, landmark, &observation.uv_px)?
     };
-    let weight = known_weight.unwrap_or_else(|| term.robust_weight(model.sigma_px, model.loss));
+    let weight = match weight {
+        RobustWeight::OfTrack(of_track) => of_track * term.robust_weight(model.sigma_px, model.loss),
+        RobustWeight::Known(weight) => weight,
+    };
     let mut term = term.weighted(model.sigma_px, weight);
     if !model.measures_in_anchor() {
         term.by_landmark.fixed_view_mut::<2, 2>(0, 0).fill(0.0);

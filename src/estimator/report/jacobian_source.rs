@@ -13,7 +13,7 @@ use crate::estimator::state::layout::POSE;
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, ParameterId};
-use crate::optimization::{LandmarkModel, RobustLoss};
+use crate::optimization::LandmarkModel;
 
 /// Linearization points of the step's Jacobian, and blocks that cannot be reproduced from the report.
 ///
@@ -42,7 +42,6 @@ pub struct JacobianSource {
     pub(crate) columns: Box<[u16]>,
     pub(crate) norms: Box<[f32]>,
     pub(crate) pixel_sigma_px: f64,
-    pub(crate) loss: RobustLoss,
     pub(crate) landmark_model: LandmarkModel,
 }
 

@@ -104,6 +104,9 @@ pub struct StepReport {
     pub pixel_sigma_px: f64,
     /// Standard deviation of a pixel with the same average information, robust weights of this step included.
     pub effective_pixel_sigma_px: f64,
+    /// Scale of the robust loss by camera, in pixels; with Cauchy's loss an observation with this residual has half
+    /// weight. Empty while initializing, infinite without a loss.
+    pub loss_scales_px: Vec<f64>,
     pub events: Vec<Event>,
     /// Frames of the window after the solve, oldest first; empty while initializing.
     pub window: Vec<FrameStateReport>,

@@ -19,6 +19,7 @@ use crate::estimator::step_input::StepInput;
 use crate::estimator::window::drop_or_marginalize_frame;
 use crate::estimator::window::features::{self, FeatureMap};
 use crate::estimator::window::frames::Frames;
+use crate::estimator::window::loss_scale::LossScale;
 use crate::estimator::window::setup::Setup;
 use crate::estimator::window::sliding_window::SlidingWindow;
 use crate::estimator::window::window_state::WindowState;
@@ -103,7 +104,8 @@ impl<'a> FirstWindow<'a> {
             accelerometer_bias_sigma: bias.accelerometer_sigma_m_per_s2,
             gyroscope_bias_sigma: bias.gyroscope_sigma_rad_per_s,
         };
-        let state = WindowState { frames, features, calibration, prior: None, start: Some(start) };
+        let loss_scales = vec![LossScale::default(); calibration.cameras()];
+        let state = WindowState { frames, features, calibration, prior: None, start: Some(start), loss_scales };
         Some(Self { solution, window: SlidingWindow::new(state), observed })
     }
 

@@ -20,6 +20,7 @@ use crate::estimator::state::preintegration::Preintegration;
 use crate::estimator::window::active_tracks::ActiveTracks;
 use crate::estimator::window::features::{self, FeatureMap};
 use crate::estimator::window::frames::Frames;
+use crate::estimator::window::loss_scale::LossScale;
 use crate::estimator::window::setup::Setup;
 use crate::estimator::window::window_state::WindowState;
 use crate::estimator::{DEFAULT_CHAIN_PRIOR, Estimator, StepInput};
@@ -209,7 +210,8 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
         accelerometer_bias_sigma: Vector3::repeat(0.5),
         gyroscope_bias_sigma: Vector3::repeat(0.02),
     };
-    let mut window = WindowState { frames, features, calibration, prior: None, start: Some(start) };
+    let loss_scales = vec![LossScale::default(); calibration.cameras()];
+    let mut window = WindowState { frames, features, calibration, prior: None, start: Some(start), loss_scales };
     window.triangulate_new(&setup);
     assert!(window.active_tracks().iter().all(|active| active.ids.len() > 20), "enough landmarks");
     TestWindow { setup, window }

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::fixture::{self, TestWindow};
 use super::flight::step;
 use crate::estimator::Estimator;
-use crate::estimator::config::EstimatorOptions;
+use crate::estimator::config::{EstimatorOptions, VisualLoss};
 use crate::estimator::factors::projected_rows::NewestRows;
 use crate::estimator::problem::information_gain::{CameraInformation, InformationGain, Motion};
 use crate::estimator::problem::motion_parts::motion_parts;
@@ -21,7 +21,7 @@ use crate::simulation::{Exercise, JointSwing, SyntheticMotion, SyntheticOptions,
 
 /// Windows with a prior, away from the ground truth.
 fn windows() -> Vec<(&'static str, TestWindow)> {
-    let options = EstimatorOptions { loss: RobustLoss::None, ..EstimatorOptions::default() };
+    let options = EstimatorOptions { loss: VisualLoss::Fixed(RobustLoss::None), ..EstimatorOptions::default() };
     let gimbal = |parameterization| fixture::window(parameterization, true, options);
     let mut windows = vec![
         ("minimal", gimbal(Parameterization::Minimal)),

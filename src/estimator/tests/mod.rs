@@ -12,6 +12,7 @@ mod jacobian;
 mod packed;
 mod preintegration;
 mod sensors;
+mod sliding;
 mod stationary;
 mod trouble;
 mod window;

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::fixture;
 use super::fixture::TestWindow;
-use crate::estimator::config::EstimatorOptions;
+use crate::estimator::config::{EstimatorOptions, VisualLoss};
 use crate::estimator::factors::kind::{FactorKind, FactorLabel};
 use crate::estimator::factors::labelled_rows::stack;
 use crate::estimator::problem::marginalization;
@@ -18,7 +18,7 @@ use crate::optimization::RobustLoss;
 use crate::optimization::{Cholesky, dense};
 
 fn quadratic() -> EstimatorOptions {
-    EstimatorOptions { loss: RobustLoss::None, ..EstimatorOptions::default() }
+    EstimatorOptions { loss: VisualLoss::Fixed(RobustLoss::None), ..EstimatorOptions::default() }
 }
 
 /// Windows of a gimbal in each parameterization, a rigid camera, both cameras with and without time offsets, a

@@ -85,7 +85,6 @@ impl WindowState {
             columns: norms.iter().map(|(column, _)| *column).collect(),
             norms: norms.iter().map(|(_, norm)| *norm).collect(),
             pixel_sigma_px: options.pixel_sigma_px,
-            loss: options.loss,
             landmark_model: options.landmark_model,
         };
         (source, kept)

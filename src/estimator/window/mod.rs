@@ -15,6 +15,7 @@ pub(crate) mod frames;
 pub(crate) mod jacobian_source;
 pub(crate) mod joints;
 pub(crate) mod keyframes;
+pub(crate) mod loss_scale;
 pub(crate) mod packed;
 pub(crate) mod reporting;
 pub(crate) mod setup;

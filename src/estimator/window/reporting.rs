@@ -1,9 +1,7 @@
 //! Report of a step from the window.
 
-use nalgebra::Vector2;
-
 use super::setup::Setup;
-use super::solve::{SolvedWindow, TrackResiduals};
+use super::solve::{SolvedWindow, TrackResiduals, median_length};
 use super::window_state::WindowState;
 use crate::estimator::factors::FactorKind;
 use crate::estimator::problem::solver::Solution;
@@ -13,7 +11,6 @@ use crate::estimator::report::{
 };
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::step_input::StepInput;
-use crate::geometry::median;
 
 /// Report with the calibration only.
 pub(crate) fn empty_report(
@@ -29,6 +26,7 @@ pub(crate) fn empty_report(
         restarts: 0,
         pixel_sigma_px: setup.config.options.pixel_sigma_px,
         effective_pixel_sigma_px: setup.config.options.pixel_sigma_px,
+        loss_scales_px: Vec::new(),
         events: Vec::new(),
         window: Vec::new(),
         newest_pose_covariance: None,
@@ -67,6 +65,10 @@ impl WindowState {
         report.features = self.feature_reports(setup, solved);
         report.counts = FeatureCounts::of(&report.features);
         report.effective_pixel_sigma_px = effective_sigma(report.pixel_sigma_px, &report.features);
+        report.loss_scales_px = (0..solved.cameras.len())
+            .map(|camera| self.visual_model(setup, camera))
+            .map(|model| model.loss.scale() * model.sigma_px)
+            .collect();
         report.landmarks = self.landmark_reports(setup, solved);
         report.residuals = residual_summaries(&solved.solution);
         report.reprojection_rms_before_px =
@@ -111,36 +113,28 @@ impl WindowState {
     }
 
     fn feature_reports(&self, setup: &Setup, solved: &SolvedWindow) -> Vec<FeatureReport> {
-        let sigma = setup.config.options.pixel_sigma_px;
-        let loss = setup.config.options.loss;
-        let observation =
-            |slot: usize, uv_px: Vector2<f64>, before: Option<Vector2<f64>>, after: Option<Vector2<f64>>| {
-                let chi2 = after.map_or(0.0, |residual| residual.norm_squared() / (sigma * sigma));
-                ObservationReport {
-                    frame_index: self.frames[slot].index,
-                    measured_px: uv_px,
-                    residual_before_px: before,
-                    residual_after_px: after,
-                    chi2,
-                    robust_weight: after.map_or(0.0, |_| loss.cost_and_weight(chi2).1),
-                }
-            };
         let mut reports = Vec::new();
         for (camera, of_camera) in solved.cameras.iter().enumerate() {
             let checks = &solved.checks[camera];
+            let model = self.visual_model(setup, camera);
             reports.extend((0..of_camera.ids.len()).map(|index| {
                 let observations = &of_camera.tracks[index].observations;
                 let landmark = &solved.solution.estimate.landmarks[camera][index];
                 let (before, after) = (&checks.residuals_before[index], &checks.residuals_after[index]);
+                let weights = model.robust_weights(after);
+                let observation = |number: usize| ObservationReport {
+                    frame_index: self.frames[observations[number].slot].index,
+                    measured_px: observations[number].uv_px,
+                    residual_before_px: before[number],
+                    residual_after_px: after[number],
+                    chi2: after[number].map_or(0.0, |residual| residual.norm_squared() / model.sigma_px.powi(2)),
+                    robust_weight: weights[number],
+                };
                 FeatureReport {
                     id: of_camera.ids[index].of_camera(camera),
                     anchor_frame_index: self.frames[observations[0].slot].index,
                     inverse_depth_per_m: landmark.inverse_distance / landmark.bearing.z,
-                    observations: observations
-                        .iter()
-                        .zip(before.iter().zip(after))
-                        .map(|(tracked, (before, after))| observation(tracked.slot, tracked.uv_px, *before, *after))
-                        .collect(),
+                    observations: (0..observations.len()).map(observation).collect(),
                     rejected: checks.rejected[index],
                 }
             }));
@@ -202,8 +196,4 @@ fn root_mean_square<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> 
         .flatten()
         .fold((0.0, 0_usize), |(sum, count), residual| (sum + residual.norm_squared(), count + 1));
     (sum / count.max(1) as f64).sqrt()
-}
-
-fn median_length<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> f64 {
-    median(residuals.flatten().flatten().flatten().map(|residual| residual.norm())).unwrap_or(f64::NAN)
 }

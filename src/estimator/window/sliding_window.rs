@@ -84,6 +84,7 @@ impl SlidingWindow {
         self.state.drop_rejected(&solved, options, &mut events);
         events.extend(self.switch_near_singularity(setup));
         self.state.drop_or_marginalize_frame(setup, &mut events);
+        self.state.follow_residuals(setup, &solved, seconds_from_ns(input.stamp_ns - newest_stamp_ns));
         report.times.optimize_ms = optimized_ms - begin_ms;
         report.times.marginalize_ms = setup.clock_ms() - marginalizing_ms;
         report.events.extend(events);

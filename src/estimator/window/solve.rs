@@ -15,6 +15,7 @@ use crate::estimator::report::{Event, EventKind};
 use crate::estimator::state::columns::FrameId;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::track::TrackObservation;
+use crate::geometry::median;
 
 /// Reprojection residuals in pixels, by track and observation; `None` behind the camera.
 pub(crate) type TrackResiduals = Vec<Vec<Option<Vector2<f64>>>>;
@@ -136,4 +137,9 @@ fn track_residuals(problem: &Problem<'_>, estimate: &Estimate) -> Vec<TrackResid
             .collect()
     };
     problem.cameras.iter().enumerate().map(of_camera).collect()
+}
+
+/// Median length of residuals in pixels, NaN without any.
+pub(crate) fn median_length<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> f64 {
+    median(residuals.flatten().flatten().flatten().map(|residual| residual.norm())).unwrap_or(f64::NAN)
 }

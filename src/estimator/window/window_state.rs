@@ -3,7 +3,9 @@
 use super::active_tracks::ActiveTracks;
 use super::features::{self, FeatureMap};
 use super::frames::Frames;
+use super::loss_scale::LossScale;
 use super::setup::Setup;
+use super::solve::{SolvedWindow, median_length};
 use crate::estimator::factors::marginal_prior::Prior;
 use crate::estimator::factors::reprojection::VisualModel;
 use crate::estimator::factors::start_prior::StartPrior;
@@ -26,6 +28,8 @@ pub(crate) struct WindowState {
     pub(crate) prior: Option<Prior>,
     /// Prior on the first frame, until that frame is marginalized.
     pub(crate) start: Option<StartPrior>,
+    /// Scales of the robust loss by camera.
+    pub(crate) loss_scales: Vec<LossScale>,
 }
 
 impl WindowState {
@@ -44,7 +48,7 @@ impl WindowState {
         let factors = |camera: usize| {
             let columns = self.calibration.columns(camera);
             CameraFactors {
-                visual: VisualModel::new(setup.config.model(camera), options),
+                visual: self.visual_model(setup, camera),
                 tracks: active.get(camera).map_or(&[], |active| &active.tracks),
                 columns: start + columns.start..start + columns.end,
             }
@@ -58,6 +62,20 @@ impl WindowState {
             start: self.start.as_ref(),
             first_estimate_reach_rad: options.first_estimate_reach_rad,
             calibration_first_estimates: options.calibration_first_estimates,
+        }
+    }
+
+    /// Camera model, pixel noise and current robust loss of a camera.
+    pub(crate) fn visual_model<'a>(&self, setup: &'a Setup, camera: usize) -> VisualModel<'a> {
+        let options = &setup.config.options;
+        VisualModel::new(setup.config.model(camera), options, self.loss_scales[camera].loss(options.loss))
+    }
+
+    /// Adapts the scales of the loss to the residuals of a solved window, over an interval in seconds.
+    pub(crate) fn follow_residuals(&mut self, setup: &Setup, solved: &SolvedWindow, interval_s: f64) {
+        let sigma_px = setup.config.options.pixel_sigma_px;
+        for (scale, checks) in self.loss_scales.iter_mut().zip(&solved.checks) {
+            scale.follow(median_length(std::iter::once(&checks.residuals_after)) / sigma_px, interval_s);
         }
     }
 

@@ -1,6 +1,6 @@
 //! Options of the estimator that a run specification changes, to study their effect.
 
-use crate::estimator::EstimatorConfig;
+use crate::estimator::{EstimatorConfig, VisualLoss};
 use crate::optimization::RobustLoss;
 
 /// Deviations from the estimator's standard options; meaning and range of each: its row of
@@ -31,7 +31,7 @@ impl EstimatorTuning {
         let options = &mut config.options;
         options.pixel_sigma_px *= self.pixel_noise;
         options.imu_noise_factor *= self.imu_noise;
-        options.loss = self.loss.unwrap_or(options.loss);
+        options.loss = self.loss.map_or(options.loss, VisualLoss::Fixed);
         options.iterations = self.iterations.unwrap_or(options.iterations);
         config.encoder_sigma_rad = config.encoder_sigma_rad.map(|sigma_rad| sigma_rad * self.encoder_noise);
     }

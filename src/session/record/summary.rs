@@ -30,6 +30,7 @@ impl StepRecord {
                 restarts: report.restarts,
                 pixel_sigma_px: report.pixel_sigma_px,
                 effective_pixel_sigma_px: report.effective_pixel_sigma_px,
+                loss_scales_px: report.loss_scales_px.clone(),
                 events: report.events.clone(),
                 window: report.window[first_frame..].to_vec(),
                 newest_pose_covariance: report.newest_pose_covariance,

@@ -1,5 +1,6 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
+use crate::estimator::VisualLoss;
 use crate::optimization::RobustLoss;
 use crate::sensors::{CameraRig, Rig};
 use crate::session::accuracy::{Alignment, AlignmentSums};
@@ -62,7 +63,7 @@ fn tuning_changes_the_configuration() {
     assert_eq!(tuned.options.imu_noise_factor, 3.0 * standard.options.imu_noise_factor);
     assert_eq!(tuned.encoder_sigma_rad, standard.encoder_sigma_rad.map(|sigma_rad| 4.0 * sigma_rad));
     assert!(standard.encoder_sigma_rad.is_some());
-    assert_eq!((tuned.options.loss, tuned.options.iterations), (RobustLoss::Huber(1.5), 12));
+    assert_eq!((tuned.options.loss, tuned.options.iterations), (VisualLoss::Fixed(RobustLoss::Huber(1.5)), 12));
 }
 
 #[test]

@@ -12,6 +12,7 @@ use crate::estimator::state::navigation::ImuBias;
 use crate::estimator::state::preintegration::Preintegration;
 use crate::estimator::step_input::StepMeasurements;
 use crate::estimator::window::frames::Frames;
+use crate::estimator::window::loss_scale::LossScale;
 use crate::estimator::window::sliding_window::{Monitors, SlidingWindow};
 use crate::estimator::window::window_state::WindowState;
 use crate::sensors::{ImuNoise, ImuSample, JointAngles};
@@ -24,6 +25,7 @@ pub(crate) struct PackedWindow {
     calibration: Calibrations,
     prior: Option<PackedPrior>,
     start: Option<StartPrior>,
+    loss_scales: Vec<LossScale>,
     monitors: Monitors,
 }
 
@@ -75,6 +77,7 @@ impl PackedWindow {
             calibration: state.calibration.clone(),
             prior: state.prior.as_ref().map(PackedPrior::new),
             start: state.start.clone(),
+            loss_scales: state.loss_scales.clone(),
             monitors: window.monitors.clone(),
         }
     }
@@ -92,6 +95,7 @@ impl PackedWindow {
                 calibration: self.calibration.clone(),
                 prior: self.prior.as_ref().map(PackedPrior::unpacked),
                 start: self.start.clone(),
+                loss_scales: self.loss_scales.clone(),
             },
             monitors: self.monitors.clone(),
         }
