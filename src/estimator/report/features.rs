@@ -19,6 +19,22 @@ pub struct FeatureReport {
     pub rejected: bool,
 }
 
+impl FeatureReport {
+    /// Weight below which a track does not fit one point of the scene.
+    const FITTING_WEIGHT: f64 = 0.5;
+
+    /// Weight of the track as a whole: the largest robust weight of its observations.
+    pub fn track_weight(&self) -> f64 {
+        self.observations.iter().map(|seen| seen.robust_weight).fold(0.0, f64::max)
+    }
+
+    /// True if not even the best observation has half weight: the feature slides with the viewpoint, as where an outline
+    /// crosses the background, or moves, or was mistracked.
+    pub fn slides(&self) -> bool {
+        self.track_weight() < Self::FITTING_WEIGHT
+    }
+}
+
 /// Feature counts; also kept for steps whose features are not stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FeatureCounts {

@@ -209,7 +209,7 @@ pub(crate) mod window {
         FRAME: "frame" => "Number of the image at the cursor in its camera's stream, from 0.";
         COST: "cost" => "Half the sum of all squared whitened residuals before and after the shown solver iteration. No unit.";
         CONVERGENCE: "convergence" => "Estimate ± posterior σ at the cursor, from the window and all priors. Band: ±3σ; Δ: estimate minus ground truth.";
-        CAPTION: "caption" => "Frame number, stamp, features tracked, new, lost and rejected (front end and solve), and the RMS and median of the reprojection residuals in px over all observations of the window.";
+        CAPTION: "caption" => "Frame number, stamp, features tracked, new, lost, rejected (front end and solve) and sliding, and the RMS and median of the reprojection residuals in px over all observations of the window.";
         CHAIN_ROW: "chain table" => "Denavit–Hartenberg parameters of the estimated chain at the cursor: joint angle q, offset θ₀ and twist α in degrees, d and a in mm.";
         CHAIN_FRAMES: "chain frames" => "Frames of the chain: I IMU, B base, J2, J3 … after each joint, E end effector, C camera. Axes x red, y green, z blue; dashed: ground truth.";
         CHAIN_ERROR: "extrinsics error" => "Distance and angle between imu_from_camera of the estimate and of the ground truth at the joint angles of the cursor.";

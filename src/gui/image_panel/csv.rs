@@ -1,6 +1,7 @@
 //! Observations in the image at the cursor; one feature per row.
 
 use super::ImagePanel;
+use crate::estimator::FeatureReport;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::gui::{CsvTable, PanelContext};
 
@@ -20,6 +21,7 @@ impl CsvTable for ImagePanel {
             "weight",
             "depth_m",
             "rejected",
+            "track_weight",
         ]);
         let Some(step) = run.step_at(ctx.cursor_ns) else { return table.into_text() };
         for feature in &step.tracks.features {
@@ -45,6 +47,7 @@ impl CsvTable for ImagePanel {
                 number_cell(here.map_or(f64::NAN, |seen| seen.robust_weight)),
                 number_cell(solved.map_or(f64::NAN, |solved| 1.0 / solved.inverse_depth_per_m)),
                 solved.map_or_else(String::new, |solved| solved.rejected.to_string()),
+                number_cell(solved.map_or(f64::NAN, FeatureReport::track_weight)),
             ]);
         }
         table.into_text()

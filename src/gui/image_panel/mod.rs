@@ -33,6 +33,7 @@ const OPTIONS_WIDTH: f32 = 395.0;
 const MASK_WIDTH: f32 = 60.0;
 /// The legend as text, for images that are too narrow for the painted one.
 const LEGEND: &str = "Colour: age of the track in frames\nRing: used in the solve\nDot: tracked only\nCross: rejected\n\
+    Slash: little weight, its observations do not fit one point of the scene\n\
     Line: residual (prediction − measurement), magnified";
 /// Period at which an image that is being decoded is requested again.
 const DECODING_PERIOD: Duration = Duration::from_millis(15);

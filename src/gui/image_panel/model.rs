@@ -42,6 +42,10 @@ pub(super) struct SolvedMark {
     pub(super) residual_after_px: Option<Vector2<f64>>,
     pub(super) chi2: f64,
     pub(super) robust_weight: f64,
+    /// Weight of the track as a whole.
+    pub(super) track_weight: f64,
+    /// True if the observations do not fit one point of the scene.
+    pub(super) slides: bool,
     pub(super) depth_m: f64,
     pub(super) observation_count: usize,
     pub(super) rejected: bool,
@@ -65,6 +69,8 @@ pub(super) struct ImageModel {
     pub(super) statistics: FrontEndStatistics,
     /// Number of features rejected in the solve.
     pub(super) rejected: usize,
+    /// Number of features that have little weight because they slide.
+    pub(super) sliding: usize,
     pub(super) rms_before_px: f64,
     pub(super) rms_after_px: f64,
     /// Median of the residuals after the solve; the RMS is dominated by a few large ones.
@@ -104,6 +110,8 @@ impl ImageModel {
                         residual_after_px: here.and_then(|seen| seen.residual_after_px),
                         chi2: here.map_or(f64::NAN, |seen| seen.chi2),
                         robust_weight: here.map_or(f64::NAN, |seen| seen.robust_weight),
+                        track_weight: solved.track_weight(),
+                        slides: solved.slides(),
                         depth_m: 1.0 / solved.inverse_depth_per_m,
                         observation_count: solved.observations.len(),
                         rejected: solved.rejected,
@@ -119,6 +127,7 @@ impl ImageModel {
             keyframe: report.keyframe,
             statistics: step.tracks.statistics,
             rejected: report.features.iter().filter(|feature| feature.rejected).count(),
+            sliding: report.features.iter().filter(|feature| feature.slides() && !feature.rejected).count(),
             rms_before_px: report.reprojection_rms_before_px,
             rms_after_px: report.reprojection_rms_after_px,
             median_after_px: report.reprojection_median_after_px,
@@ -127,7 +136,7 @@ impl ImageModel {
     }
 
     /// The parts of the caption, the most important first: `frame 120`, `6.000 s`, `reprojection RMS 0.40 px`,
-    /// `tracked 98`, `keyframe`, `before the solve 0.93 px`, `median 0.12 px`, `new 12`, `lost 9`, `rejected 5`.
+    /// `tracked 98`, `keyframe`, `before the solve 0.93 px`, `median 0.12 px`, `new 12`, `lost 9`, `rejected 5`, `sliding 14`.
     fn caption_parts(&self) -> Vec<String> {
         let mut parts = vec![format!("frame {}", self.frame_index), format!("{:.3} s", seconds_from_ns(self.stamp_ns))];
         let tracking = self.phase == Phase::Tracking;
@@ -150,6 +159,9 @@ impl ImageModel {
             format!("lost {lost}"),
             format!("rejected {}", rejected + self.rejected),
         ]);
+        if tracking {
+            parts.push(format!("sliding {}", self.sliding));
+        }
         parts
     }
 
@@ -184,6 +196,10 @@ pub(super) fn description(mark: &FeatureMark) -> String {
     lines.push(format!("residual after the solve: {}", residual(solved.residual_after_px)));
     lines.push(format!("χ² {:.2}, robust weight {:.2}", solved.chi2, solved.robust_weight));
     lines.push(format!("depth: {:.2} m, {} observations", solved.depth_m, solved.observation_count));
+    lines.push(format!("weight of the track {:.2}", solved.track_weight));
+    if solved.slides {
+        lines.push("slides: its observations do not fit one point of the scene".to_owned());
+    }
     if solved.rejected {
         lines.push("outlier, rejected".to_owned());
     }

@@ -117,6 +117,10 @@ pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureM
         }
         if solved.rejected {
             cross(painter, at, marker_radius + 3.0);
+        } else if solved.slides {
+            for stroke in [Stroke::new(4.0, HALO), Stroke::new(2.0, ink().warn)] {
+                slash(painter, at, marker_radius + 3.0, stroke);
+            }
         }
     } else {
         painter.circle_filled(at, DOT_RADIUS + 1.0, halo_of(color));
@@ -150,6 +154,12 @@ fn residual_arrow(painter: &Painter, from: Pos2, tip: Pos2) {
     let side = 2.2;
     let diamond = [vec2(side, 0.0), vec2(0.0, side), vec2(-side, 0.0), vec2(0.0, -side)].map(|corner| tip + corner);
     painter.add(Shape::convex_polygon(diamond.to_vec(), color, Stroke::NONE));
+}
+
+/// Draws the mark of a sliding feature.
+fn slash(painter: &Painter, at: Pos2, radius: f32, stroke: Stroke) {
+    let arm = radius * std::f32::consts::FRAC_1_SQRT_2;
+    painter.line_segment([at + vec2(-arm, arm), at + vec2(arm, -arm)], stroke);
 }
 
 /// Draws the mark of a rejected feature.
@@ -203,6 +213,7 @@ pub(super) fn legend(painter: &Painter, rect: Rect, theme: &Theme, options: &Mar
         painter.line_segment([at + vec2(-arm, -arm), at + vec2(arm, arm)], stroke);
         painter.line_segment([at + vec2(-arm, arm), at + vec2(arm, -arm)], stroke);
     });
+    pen.symbol("slides", |painter, at| slash(painter, at, 5.7, Stroke::new(2.0, theme.warn)));
     if options.residuals {
         let name = format!("prediction − measurement, ×{:.0}", options.magnification);
         pen.symbol(&name, |painter, at| {

@@ -7,6 +7,7 @@ use nalgebra::Vector2;
 use super::ImagePanel;
 use super::model::{ImageModel, SolveSide, description};
 use super::paint::{ImagePlacement, tint};
+use crate::estimator::FeatureReport;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
 use crate::gui::samples::{FRAME_PERIOD_NS, first_tracked_frame, sample_images, sample_recording_of};
 use crate::gui::tests::{keep_screenshot, with_context};
@@ -34,9 +35,11 @@ fn the_caption_is_that_of_the_step_at_or_before_the_cursor() {
     let step = &recording.runs[0].steps[70];
     let statistics = step.tracks.statistics;
     let rejected = statistics.rejected + step.report.features.iter().filter(|feature| feature.rejected).count();
+    let slides = |feature: &&FeatureReport| feature.slides() && !feature.rejected;
+    let sliding = step.report.features.iter().filter(slides).count();
     let expected = format!(
         "frame 70 · 3.500 s · reprojection RMS {:.2} px · tracked {} · before the solve {:.2} px · median {:.2} px · \
-         new {} · lost {} · rejected {rejected}",
+         new {} · lost {} · rejected {rejected} · sliding {sliding}",
         step.report.reprojection_rms_after_px,
         statistics.tracked,
         step.report.reprojection_rms_before_px,
@@ -77,6 +80,8 @@ fn marks_have_the_values_of_the_report() {
     let rejected = model.marks.iter().find(|mark| mark.solved.is_some_and(|solved| solved.rejected)).unwrap();
     let text = description(rejected);
     assert!(text.contains(&format!("feature {}", rejected.id.0)) && text.contains("outlier, rejected"), "{text}");
+    let sliding = model.marks.iter().find(|mark| mark.solved.is_some_and(|solved| solved.slides)).unwrap();
+    assert!(sliding.solved.unwrap().robust_weight < 0.5 && description(sliding).contains("slides"));
     let fresh = model.marks.iter().find(|mark| mark.solved.is_none()).unwrap();
     assert!(description(fresh).contains("not used in the solve"));
 }

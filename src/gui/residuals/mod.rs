@@ -156,6 +156,10 @@ fn summary_ui(ui: &mut Ui, theme: &Theme, report: &StepReport, histogram: &Resid
         );
         let hover = "Observations in the window with a residual after the solve";
         pair("observations", histogram.observations.to_string(), hover);
+        let scales = report.loss_scales_px.iter().map(|scale_px| fixed(*scale_px, 2)).collect::<Vec<_>>().join(", ");
+        let hover = "Scale of the robust loss for each camera: an observation with this residual has half weight. It \
+                     follows the median of the residuals";
+        pair("loss scale", format!("{scales} px"), hover);
         let hover = "Observations with a robust weight below 0.5";
         pair("downweighted", histogram.downweighted.to_string(), hover);
         pair("rejected", histogram.rejected.to_string(), "Features rejected as outliers");
