@@ -75,6 +75,7 @@ fn image_pairs(camera: &CameraRig, rotations: &[ImageRotation]) -> Vec<ImagePair
         .map(|rotation| ImagePair {
             stamps_s: [rotation.from_ns, rotation.to_ns]
                 .map(|stamp_ns| seconds_from_ns(stamp_ns) + camera.timeshift_cam_imu_s),
+            rotation: rotation.second_from_first,
             tracks: rotation.tracks.clone(),
         })
         .collect()
