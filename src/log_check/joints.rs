@@ -1,8 +1,8 @@
-use super::statistics::{median, percentile};
+use super::statistics::{median, percentile, white_sigma};
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
 use crate::flight_log::attitude::MAX_VEHICLE_GAP_NS;
-use crate::geometry::{seconds_from_ns, wrap_angle};
+use crate::geometry::seconds_from_ns;
 use crate::sensors::{GimbalRig, Joint, Rig};
 
 /// Tolerated rotation that the joints cannot reach: before calibration the chain may have an error of degrees.
@@ -120,18 +120,6 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
         findings.add(Severity::Note, Area::Encoders, format!("'{name}' reaches its limit"), evidence, remedy);
     }
     compare_sigma(name, white, sigma, findings);
-}
-
-/// Standard deviation of the white part of the readings, from second differences of the unwrapped angles, in
-/// radians. Their median is insensitive to jumps.
-fn white_sigma(values: &[f64]) -> f64 {
-    let difference = |from: f64, to: f64| wrap_angle(to - from);
-    let second: Vec<f64> = values
-        .windows(3)
-        .map(|three| (difference(three[1], three[2]) - difference(three[0], three[1])).abs())
-        .collect();
-    // The median of |x| for a normal x is 0.6745 of its standard deviation.
-    percentile(&second, 0.5) / 0.6745 / 6.0_f64.sqrt()
 }
 
 fn compare_sigma(name: &str, measured: f64, given: f64, findings: &mut Findings) {

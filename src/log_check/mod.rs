@@ -18,6 +18,7 @@ mod render;
 mod report;
 mod rig_sanity;
 mod rotation;
+mod rotation_fit;
 mod source_fit;
 mod spectrum;
 mod stationary;

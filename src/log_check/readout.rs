@@ -1,9 +1,11 @@
 //! Rolling shutters: the readout of each camera, measured from the variation of the image motion over the rows.
 
+use nalgebra::Matrix3;
+
 use super::imu_facts::ImuFacts;
 use super::{Area, Findings, ImageRotation, Severity};
 use crate::frontend::readout::{
-    ImagePair, ReadoutMeasurement, ReadoutOptions, measure_readout, rotations_of_first_rows,
+    FirstRowRotation, ImagePair, ReadoutMeasurement, ReadoutOptions, measure_readout, rotations_of_first_rows,
 };
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::{AngularRates, CameraMount, CameraRig};
@@ -75,35 +77,32 @@ fn image_pairs(camera: &CameraRig, rotations: &[ImageRotation]) -> Vec<ImagePair
         .map(|rotation| ImagePair {
             stamps_s: [rotation.from_ns, rotation.to_ns]
                 .map(|stamp_ns| seconds_from_ns(stamp_ns) + camera.timeshift_cam_imu_s),
+            rotation: rotation.second_from_first,
             tracks: rotation.tracks.clone(),
         })
         .collect()
 }
 
-/// A camera's rotations between the first rows of its images, to which their stamps refer; images with too few features
-/// are omitted.
+/// A camera's rotations between the first rows of its images, to which their stamps refer, each with the covariance of its
+/// rotation vector in rad²; images with too few features are omitted.
 pub(super) fn between_first_rows(
     camera: &CameraRig,
     rotations: &[ImageRotation],
     readout_s: f64,
-) -> Vec<ImageRotation> {
-    let of_camera = rotations.iter().filter(|rotation| rotation.camera_key == camera.key);
-    if readout_s == 0.0 {
-        return of_camera.cloned().collect();
-    }
+) -> Vec<(ImageRotation, Matrix3<f64>)> {
     let options = ReadoutOptions::for_focal_length(camera.model.focal_length_px());
-    let corrected = rotations_of_first_rows(&image_pairs(camera, rotations), readout_s, &options);
     let stamp_ns = |time_s: f64| ns_from_seconds(time_s - camera.timeshift_cam_imu_s);
-    corrected
-        .into_iter()
-        .map(|found| ImageRotation {
+    let rotation = |found: FirstRowRotation| {
+        let rotation = ImageRotation {
             camera_key: camera.key.clone(),
             from_ns: stamp_ns(found.stamps_s[0]),
             to_ns: stamp_ns(found.stamps_s[1]),
             second_from_first: found.rotation,
             tracks: Vec::new(),
-        })
-        .collect()
+        };
+        (rotation, found.covariance_rad2)
+    };
+    rotations_of_first_rows(&image_pairs(camera, rotations), readout_s, &options).into_iter().map(rotation).collect()
 }
 
 fn measured(camera: &CameraRig, images: &[ImagePair], imu_facts: &ImuFacts) -> Option<ReadoutMeasurement> {

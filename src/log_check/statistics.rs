@@ -1,6 +1,6 @@
 //! Small statistics over plain numbers.
 
-use crate::geometry;
+use crate::geometry::{self, wrap_angle};
 
 /// Quantile at `fraction` (0 to 1) of the values, nearest rank; 0 without values.
 pub(super) fn percentile(values: &[f64], fraction: f64) -> f64 {
@@ -27,4 +27,16 @@ pub(super) fn slope(points: &[(f64, f64)]) -> (f64, f64) {
     let slope = points.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum::<f64>() / spread.max(f64::MIN_POSITIVE);
     let rest = points.iter().map(|(x, y)| (y - mean_y - slope * (x - mean_x)).powi(2)).sum::<f64>();
     (slope, (rest / (count - 2.0) / spread.max(f64::MIN_POSITIVE)).sqrt())
+}
+
+/// Standard deviation of the white part of the readings, from second differences of angles, in
+/// radians. Their median is insensitive to jumps.
+pub(super) fn white_sigma(values: &[f64]) -> f64 {
+    let difference = |from: f64, to: f64| wrap_angle(to - from);
+    let second: Vec<f64> = values
+        .windows(3)
+        .map(|three| (difference(three[1], three[2]) - difference(three[0], three[1])).abs())
+        .collect();
+    // The median of |x| for a normal x is 0.6745 of its standard deviation.
+    percentile(&second, 0.5) / 0.6745 / 6.0_f64.sqrt()
 }

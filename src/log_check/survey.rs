@@ -5,14 +5,14 @@ use nalgebra::Vector3;
 use super::attitude::{AttitudeSurvey, SolvedAttitude};
 use super::gradient_sums::GradientSums;
 use super::image_measure::{ImageMeasure, measure};
-use super::statistics::median;
+use super::statistics::{median, white_sigma};
 use crate::flight_log::bit_depth::BitDepth;
 use crate::flight_log::container::DecodedBlock;
 use crate::flight_log::image_decoding::{bit_depth_of_message, decode_image};
 use crate::flight_log::imu_merge::ImuMerge;
 use crate::flight_log::joint_merge::{JointMerge, JointReading};
 use crate::flight_log::log::relative_ns;
-use crate::flight_log::stream::angle_fit;
+use crate::flight_log::stream::angle_fit::{self, FittedAngle};
 use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
 use crate::sensors::{AttitudeSource, GimbalRig, ImuSample, JointSample, Rig};
@@ -105,8 +105,8 @@ pub(super) struct Survey {
     pub(super) attitude_problem: Option<String>,
     /// Joint angles of `attitude`.
     pub(super) solved: Vec<SolvedAttitude>,
-    /// Variance of an encoder reading by the rig.
-    encoder_variance_rad2: f64,
+    /// Variance of a reading of each joint: the rig's, or that of its white noise if it is larger.
+    encoder_variances_rad2: Vec<f64>,
     /// Names in the joint messages.
     pub(super) joint_names: Vec<String>,
     /// Images by camera key.
@@ -127,8 +127,6 @@ impl Survey {
         let named = rig.map(|rig| rig.imu.topic.clone()).filter(|topic| imu_topics.contains(topic));
         survey.imu_topic = named.or_else(|| imu_topics.first().cloned());
         survey.imu_topics = imu_topics;
-        let sigma_rad = rig.and_then(|rig| rig.gimbal.as_ref()?.encoder_sigma_rad).unwrap_or(0.0);
-        survey.encoder_variance_rad2 = sigma_rad.max(MIN_SIGMA_RAD).powi(2);
         if let Some(gimbal) = rig.and_then(|rig| rig.gimbal.as_ref()) {
             match AttitudeSurvey::new(log, gimbal) {
                 Ok(attitude) => survey.attitude = attitude,
@@ -188,6 +186,11 @@ impl Survey {
     /// All joint angles in radians at a time, by a fit to the readings around it; `None` without readings on both
     /// sides.
     pub(super) fn joint_angles_at(&self, stamp_ns: i64) -> Option<Vec<f64>> {
+        Some(self.fitted_angles_at(stamp_ns)?.iter().map(|fitted| fitted.angle_rad).collect())
+    }
+
+    /// [`Self::joint_angles_at`] with the variances of the angles.
+    pub(super) fn fitted_angles_at(&self, stamp_ns: i64) -> Option<Vec<FittedAngle>> {
         let before = |time_ns: i64| self.joint_samples.partition_point(|sample| sample.stamp_ns < time_ns);
         let after = before(stamp_ns);
         let start = before(stamp_ns - HALF_BATCH_NS).min(after.checked_sub(1)?);
@@ -203,7 +206,7 @@ impl Survey {
                 (seconds_from_ns(sample.stamp_ns - stamp_ns), around[joint] + change)
             };
             let readings: Vec<_> = batch.iter().map(reading).collect();
-            angle_fit::fit(&readings, self.encoder_variance_rad2).map(|fitted| fitted.angle_rad)
+            angle_fit::fit(&readings, self.encoder_variances_rad2[joint])
         };
         (0..around.len()).map(angle).collect()
     }
@@ -220,7 +223,17 @@ impl Survey {
                 reading.stamp_ns = reading.stamp_ns.saturating_add(shift_ns);
             }
         }
-        self.joint_samples = merged(&self.joints);
+        self.set_joint_samples(gimbal, merged(&self.joints));
+    }
+
+    fn set_joint_samples(&mut self, gimbal: &GimbalRig, samples: Vec<JointSample>) {
+        let given_rad = gimbal.encoder_sigma_rad.unwrap_or(0.0).max(MIN_SIGMA_RAD);
+        let variance = |joint: usize| {
+            let angles: Vec<f64> = samples.iter().map(|sample| sample.angles_rad[joint]).collect();
+            white_sigma(&angles).max(given_rad).powi(2)
+        };
+        self.encoder_variances_rad2 = (0..gimbal.joints.len()).map(variance).collect();
+        self.joint_samples = samples;
     }
 
     /// Recomputes the joint angles with another interpretation of the gimbal's attitude than the rig's.
@@ -229,7 +242,7 @@ impl Survey {
             let gimbal = GimbalRig { attitude: Some(source), timeshift_gimbal_imu_s: timeshift_s, ..gimbal.clone() };
             let readings: Vec<JointReading> =
                 attitude.solve(&gimbal).into_iter().map(|solved| solved.reading).collect();
-            self.joint_samples = merged(&readings);
+            self.set_joint_samples(&gimbal, merged(&readings));
         }
     }
 

@@ -7,6 +7,7 @@ use tempfile::TempDir;
 use super::{CheckReport, ImageRotation, Severity, check};
 use crate::camera::CameraModel;
 use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes};
+use crate::frontend::readout::{RowObservation, RowTrack};
 use crate::geometry::{SplitMix64, so3};
 use crate::sensors::{GrayImage, Rig};
 
@@ -530,8 +531,23 @@ fn a_log_without_a_rig_is_checked() {
     assert!(report.findings.iter().any(|finding| finding.title == "the accelerometer measures gravity"), "{report}");
 }
 
-/// Image rotations of the true motion, with the images `late_s` late and the camera rotated by `error`.
-fn rotations(late_s: f64, error: UnitQuaternion<f64>) -> Vec<ImageRotation> {
+/// Features of two images between which the camera rotates, with noise of 0.1 px.
+fn tracks(second_from_first: &UnitQuaternion<f64>, noise: &mut Noise) -> Vec<RowTrack> {
+    let observation = |bearing: Vector3<f64>| RowObservation { bearing: bearing.normalize(), row: 0.5 };
+    (0..60)
+        .map(|_| {
+            let point = 0.3 * noise.vector();
+            let bearing = Vector3::new(point.x, point.y, 1.0).normalize();
+            let now = second_from_first * bearing + 0.1 / 80.0 * noise.vector();
+            RowTrack { previous: observation(bearing), now: observation(now) }
+        })
+        .collect()
+}
+
+/// Image rotations of the true motion, with the images `late_s` late and the camera rotated by `error`; `mirrored` as
+/// against an IMU whose axes form a left-handed frame.
+fn rotations(late_s: f64, error: UnitQuaternion<f64>, mirrored: bool) -> Vec<ImageRotation> {
+    let mut noise = Noise(23);
     let camera_from_imu = {
         let columns = nalgebra::Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
         error * UnitQuaternion::from_matrix(&columns)
@@ -546,15 +562,18 @@ fn rotations(late_s: f64, error: UnitQuaternion<f64>) -> Vec<ImageRotation> {
     (60..200)
         .map(|number| {
             let from_s = f64::from(number) * 0.05;
-            let second_from_first =
-                camera_from_imu * imu_rotation(from_s + late_s).inverse() * camera_from_imu.inverse();
+            let mut vector = so3::log(&imu_rotation(from_s + late_s).inverse());
+            if mirrored {
+                vector.swap_rows(0, 1);
+            }
+            let second_from_first = so3::exp(&(camera_from_imu * vector));
             let from_ns = i64::from(number) * 50 * MS;
             ImageRotation {
                 camera_key: "cam0".into(),
                 from_ns,
                 to_ns: from_ns + 50 * MS,
                 second_from_first,
-                tracks: Vec::new(),
+                tracks: tracks(&second_from_first, &mut noise),
             }
         })
         .collect()
@@ -563,7 +582,7 @@ fn rotations(late_s: f64, error: UnitQuaternion<f64>) -> Vec<ImageRotation> {
 #[test]
 fn image_rotations_detect_time_offsets_and_wrong_extrinsics() {
     let check = |late_s: f64, error: Vector3<f64>, words: &[&str], severity: Severity| {
-        let report = Flight::default().check(&rotations(late_s, so3::exp(&error)));
+        let report = Flight::default().check(&rotations(late_s, so3::exp(&error), false));
         let found = report.findings.iter().filter(|finding| {
             finding.severity == severity
                 && words.iter().all(|word| format!("{} {}", finding.title, finding.remedy).contains(word))
@@ -576,4 +595,13 @@ fn image_rotations_detect_time_offsets_and_wrong_extrinsics() {
     check(0.03, Vector3::zeros(), &["the orientation of cam0 agrees with the rig"], Severity::Good);
     check(0.0, Vector3::new(0.0, 0.2, 0.0), &["the orientation of cam0 differs from the rig"], Severity::Warning);
     check(-0.05, Vector3::new(1.5, 0.0, 0.0), &["the orientation of cam0 differs from the rig"], Severity::Error);
+}
+
+#[test]
+fn a_left_handed_imu_frame_does_not_agree() {
+    let report = Flight::default().check(&rotations(0.0, UnitQuaternion::identity(), true));
+    let unexplained =
+        report.findings.iter().filter(|finding| finding.title.starts_with("unexplained: the rotations of cam0"));
+    assert_eq!(unexplained.filter(|finding| finding.severity == Severity::Warning).count(), 1, "{report}");
+    assert!(!report.findings.iter().any(|finding| finding.title.contains("orientation of cam0")), "{report}");
 }

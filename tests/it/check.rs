@@ -33,8 +33,15 @@ impl Measured {
     }
 
     fn static_camera(&self) -> &str {
-        let is_static = |mount: &CameraMount| matches!(mount, CameraMount::Static { .. });
-        &self.rig.cameras.iter().find(|camera| is_static(&camera.mount)).expect("there is a static camera").key
+        self.camera(|mount| matches!(mount, CameraMount::Static { .. }))
+    }
+
+    fn gimbal_camera(&self) -> &str {
+        self.camera(|mount| *mount == CameraMount::Gimbal)
+    }
+
+    fn camera(&self, has_mount: impl Fn(&CameraMount) -> bool) -> &str {
+        &self.rig.cameras.iter().find(|camera| has_mount(&camera.mount)).expect("there is such a camera").key
     }
 }
 
@@ -68,6 +75,11 @@ fn rotations_of_the_sample_log_detect_a_wrong_rig() {
     assert!(correct.worst() < Severity::Error, "{correct}");
     assert!(!correct.findings.iter().any(|finding| finding.title.contains("to the gyroscope:")), "{correct}");
 
+    // Noise of the encoders is no time offset, and the misfit of both cameras is what noise predicts.
+    let gimbal = sample.gimbal_camera();
+    expect(&correct, Severity::Good, &format!("the orientation of {gimbal} agrees with the rig"));
+    assert!(!correct.findings.iter().any(|finding| finding.title.contains("unexplained")), "{correct}");
+
     // The rig's time offset is too small.
     for shift_ms in [10, 30] {
         let report = sample.check(|rig| shifted(rig, -1e-3 * f64::from(shift_ms)));
@@ -90,6 +102,15 @@ fn rotations_of_the_sample_log_detect_a_wrong_rig() {
         chain.effector_from_camera = chain.effector_from_camera.inverse();
     });
     expect(&end, Severity::Error, "gimbal.T_E_C is inverted");
+
+    // Against a gyroscope with left-handed axes (here all three are reversed) no rotation of the extrinsics helps.
+    let mut reversed = sample;
+    for rotation in &mut reversed.rotations {
+        rotation.second_from_first = rotation.second_from_first.inverse();
+        rotation.tracks.iter_mut().for_each(|track| std::mem::swap(&mut track.previous, &mut track.now));
+    }
+    let camera = reversed.static_camera().to_owned();
+    expect(&reversed.check(|_| {}), Severity::Warning, &format!("unexplained: the rotations of {camera}"));
 }
 
 #[test]

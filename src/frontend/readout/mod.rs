@@ -15,7 +15,7 @@ mod pair_motion;
 mod spline;
 mod sweep;
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use self::pair_motion::PairMotion;
@@ -47,6 +47,8 @@ pub struct RowTrack {
 pub struct ImagePair {
     /// Times of the first rows of the previous and the current image in the camera's clock, in seconds.
     pub stamps_s: [f64; 2],
+    /// Initial `camera_now_from_camera_previous`: points near a plane have two solutions.
+    pub rotation: UnitQuaternion<f64>,
     /// Common features; outliers are tolerated.
     pub tracks: Vec<RowTrack>,
 }
@@ -168,9 +170,12 @@ pub struct FirstRowRotation {
     pub stamps_s: [f64; 2],
     /// `camera_now_from_camera_previous`.
     pub rotation: UnitQuaternion<f64>,
+    /// Covariance of the rotation vector from the noise of the tracks, with the direction of translation unknown.
+    pub covariance_rad2: Matrix3<f64>,
 }
 
-/// Rotations between the first rows of consecutive images at a readout, by the rates of the images themselves.
+/// Rotations between the first rows of consecutive images at a readout, by the rates of the images themselves; the noise
+/// of the tracks is that of their distances from the motions.
 ///
 /// A rotation fitted to all features as if they were exposed at once is that of their mean row only if features do not
 /// move over the rows. Pairs with too few features are omitted.
@@ -186,8 +191,12 @@ pub fn rotations_of_first_rows(
         search.take_rates(readout_s);
     }
     search.fit(readout_s);
-    let of_pair = |pair: &Pair<'_>| FirstRowRotation { stamps_s: pair.images.stamps_s, rotation: pair.motion.rotation };
-    search.pairs.iter().map(of_pair).collect()
+    let of_pair = |pair: &Pair<'_>| {
+        let carried = search.carried(pair.images, readout_s);
+        let covariance_rad2 = pair.motion.rotation_covariance(&carried, search.sigma_rad)?;
+        Some(FirstRowRotation { stamps_s: pair.images.stamps_s, rotation: pair.motion.rotation, covariance_rad2 })
+    };
+    search.pairs.iter().filter_map(of_pair).collect()
 }
 
 /// A pair of images with its current motion.
@@ -217,7 +226,7 @@ impl<'a> Search<'a> {
         let options = ReadoutOptions { largest_s: intervals_s.fold(options.largest_s, f64::min), ..*options };
         let usable = images.iter().filter(|pair| pair.tracks.len() >= MIN_TRACKS);
         let unfitted =
-            |images| Pair { images, motion: PairMotion::of_rotation(UnitQuaternion::identity()), counts: true };
+            |images: &'a ImagePair| Pair { images, motion: PairMotion::of_rotation(images.rotation), counts: true };
         let mut search = Self {
             of_images: gyroscope.is_none(),
             rates: gyroscope.map(|gyroscope| gyroscope.smoothed(SMOOTHING_S)).unwrap_or_default(),

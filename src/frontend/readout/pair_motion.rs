@@ -35,12 +35,8 @@ impl PairMotion {
         let rotation = fit_rotation(pairs, &self.rotation, WEIGHT_SIGMAS * sigma_rad);
         let mut best = Self { rotation, direction: None, cost: 0.0 };
         best.cost = best.cost_of(pairs, sigma_rad);
-        let lines = pairs.iter().map(|pair| (rotation * pair.previous).cross(&pair.now));
-        let sum: Matrix3<f64> = lines.map(|normal| normal * normal.transpose()).sum();
-        let eigen = sum.symmetric_eigen();
-        let flattest: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-        let starts = [self.direction.map(|direction| (self.rotation, direction)), Some((rotation, flattest))];
-        for (rotation, direction) in starts.into_iter().flatten() {
+        let before = self.direction.unwrap_or_else(|| direction_of(pairs, &self.rotation));
+        for (rotation, direction) in [(self.rotation, before), (rotation, direction_of(pairs, &rotation))] {
             let mut at = Hypothesis { rotation, direction, cost: 0.0 };
             for _ in 0..STEPS {
                 let scale = WEIGHT_SIGMAS * sigma_rad;
@@ -83,16 +79,38 @@ impl PairMotion {
         step: f64,
         sigma_rad: f64,
     ) -> Option<(f64, f64)> {
-        let mut sums = Sums::default();
-        for ((pair, before), after) in at.iter().zip(around[0]).zip(around[1]) {
-            let change = [after.previous - before.previous, after.now - before.now].map(|change| change / step);
+        let changes = around[0].iter().zip(around[1]).map(|(before, after)| {
+            [after.previous - before.previous, after.now - before.now].map(|change| change / step)
+        });
+        self.sums(at.iter().zip(changes), sigma_rad).eliminated()
+    }
+
+    /// Covariance of the rotation vector in rad², from the noise of the tracks; `None` if they do not constrain it.
+    pub(super) fn rotation_covariance(&self, pairs: &[BearingPair], sigma_rad: f64) -> Option<Matrix3<f64>> {
+        let mut sums = self.sums(pairs.iter().map(|pair| (pair, Default::default())), sigma_rad);
+        sums.damp();
+        Some(sums.motion.cholesky()?.inverse().fixed_view::<3, 3>(0, 0).into_owned())
+    }
+
+    /// Normal equations of pairs with the derivatives of their bearings by the parameter.
+    fn sums<'a>(&self, pairs: impl Iterator<Item = (&'a BearingPair, [Vector3<f64>; 2])>, sigma_rad: f64) -> Sums {
+        let mut sums = Sums { unknowns: if self.direction.is_some() { 5 } else { 3 }, ..Sums::default() };
+        for (pair, change) in pairs {
             match &self.direction {
                 Some(direction) => sums.add_epipolar(pair, change, &self.rotation, direction, sigma_rad),
                 None => sums.add_rotation(pair, change, &self.rotation, sigma_rad),
             }
         }
-        sums.eliminated(if self.direction.is_some() { 5 } else { 3 })
+        sums
     }
+}
+
+/// Direction of translation closest to all epipolar planes of a rotation.
+fn direction_of(pairs: &[BearingPair], rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
+    let normals = pairs.iter().map(|pair| (rotation * pair.previous).cross(&pair.now));
+    let sum: Matrix3<f64> = normals.map(|normal| normal * normal.transpose()).sum();
+    let eigen = sum.symmetric_eigen();
+    eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned()
 }
 
 /// Normal equations of a motion (rotation and direction) and one parameter.
@@ -103,6 +121,8 @@ struct Sums {
     mixed: SVector<f64, 5>,
     parameter: f64,
     parameter_right: f64,
+    /// Number of the motion's unknowns: 3 without a direction, otherwise 5.
+    unknowns: usize,
 }
 
 impl Sums {
@@ -161,11 +181,15 @@ impl Sums {
         self.add(&(by_motion * scale), by_parameter * scale, gap * scale, weight);
     }
 
-    fn eliminated(mut self, unknowns: usize) -> Option<(f64, f64)> {
+    fn damp(&mut self) {
         let damping = DAMPING * self.motion.trace() + f64::MIN_POSITIVE;
         for k in 0..5 {
-            self.motion[(k, k)] += if k < unknowns { damping } else { 1.0 };
+            self.motion[(k, k)] += if k < self.unknowns { damping } else { 1.0 };
         }
+    }
+
+    fn eliminated(mut self) -> Option<(f64, f64)> {
+        self.damp();
         let factor = self.motion.cholesky()?;
         let information = self.parameter - self.mixed.dot(&factor.solve(&self.mixed));
         let gradient = self.parameter_right - self.mixed.dot(&factor.solve(&self.motion_right));

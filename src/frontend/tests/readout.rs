@@ -96,7 +96,7 @@ impl Flight {
                 }
                 tracks.push(RowTrack { previous, now });
             }
-            ImagePair { stamps_s, tracks }
+            ImagePair { stamps_s, tracks, ..ImagePair::default() }
         };
         let images = (0..180).map(pair).collect();
         // Gyroscope with a time offset, bias, noise and axes with an error of two degrees.

@@ -3,7 +3,8 @@
 //!
 //! The angular speeds, which do not depend on the extrinsics, are correlated over all offsets of the search. Each of
 //! the best offsets is then refined by least squares on the rotation vectors: offset, drift, the constant rotation from
-//! the reference to the camera, and a scale, because a wrong focal length scales the rotations measured from images.
+//! the reference to the camera, the bias of a gyroscope, and a scale, because a wrong focal length scales the rotations
+//! measured from images.
 
 mod coarse;
 mod references;
@@ -17,6 +18,7 @@ use nalgebra::Vector3;
 pub use self::references::{AlignmentReference, align_camera};
 pub use self::refinement::ClockAlignment;
 use self::refinement::Refined;
+pub(super) use self::refinement::{BIAS_SIGMA_RAD_PER_S, best_rotation};
 pub use self::series::RotationReference;
 use self::series::{DISTINCT_S, MIN_ROTATIONS, Measured};
 use super::ImageRotation;

@@ -7,9 +7,10 @@ use serde::Serialize;
 use super::{AlignmentError, ClockAlignment, RotationReference, align_clocks};
 use crate::flight_log::FlightLog;
 use crate::geometry::seconds_from_ns;
+use crate::gimbal::ClassicalChain;
 use crate::log_check::ImageRotation;
 use crate::log_check::survey::Survey;
-use crate::sensors::{AngularRates, CameraMount, Rig};
+use crate::sensors::{AngularRates, CameraMount, JointSample, Rig};
 
 /// Reference of the image rotations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -54,15 +55,30 @@ pub fn align_camera(
     let Some(chain) = rig.chain_of_camera(camera_key).filter(|_| on_gimbal && !survey.joint_samples.is_empty()) else {
         return rigid;
     };
-    let camera = RotationReference::from_orientations(survey.joint_samples.iter().filter_map(|sample| {
-        let imu_from_camera = chain.imu_from_camera(&sample.angles_rad).rotation;
-        Some((sample.stamp_ns, rates.orientation_at(seconds_from_ns(sample.stamp_ns))? * imu_from_camera))
-    }));
+    let camera = RotationReference::from_chain(&rates, &survey.joint_samples, &chain);
     let moving =
         align_clocks(rotations, &camera, 0.0, search_s).map(|found| (AlignmentReference::GyroscopeAndJoints, found));
     match (rigid, moving) {
         (Ok(rigid), Ok(moving)) => Ok(if moving.1.explained >= rigid.1.explained { moving } else { rigid }),
         (rigid @ Ok(_), Err(_)) => rigid,
         (Err(_), moving) => moving,
+    }
+}
+
+impl RotationReference {
+    /// Orientations of a camera at the end of a chain, at the stamps of the joint angles; the gyroscope alone for a chain
+    /// without joints.
+    pub(in crate::log_check) fn from_chain(
+        gyroscope: &AngularRates,
+        joint_samples: &[JointSample],
+        chain: &ClassicalChain,
+    ) -> Self {
+        if chain.links.is_empty() {
+            return Self::Gyroscope(gyroscope.clone());
+        }
+        Self::from_orientations(joint_samples.iter().filter_map(|sample| {
+            let imu_from_camera = chain.imu_from_camera(&sample.angles_rad).rotation;
+            Some((sample.stamp_ns, gyroscope.orientation_at(seconds_from_ns(sample.stamp_ns))? * imu_from_camera))
+        }))
     }
 }

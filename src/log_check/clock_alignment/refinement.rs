@@ -1,9 +1,8 @@
-//! Offset, drift, rotation and scale by robust least squares on rotation vectors.
+//! Offset, drift, rotation, scale and bias by robust least squares on rotation vectors.
 
-use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
 use serde::Serialize;
 
-use super::super::hand_eye::best_rotation;
 use super::super::statistics::median;
 use super::series::{MIN_ROTATIONS, Measured, RotationReference};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
@@ -12,6 +11,10 @@ use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 const DRIFT_SIGMA: f64 = 1e-4;
 /// Prior standard deviation of the scale: a focal length from a field of view is known to some tenths.
 const SCALE_SIGMA: f64 = 0.3;
+/// Prior standard deviation of the gyroscope's bias: a consumer sensor has up to 5 °/s.
+pub(in crate::log_check) const BIAS_SIGMA_RAD_PER_S: f64 = 0.09;
+/// Prior standard deviation of the bias of orientations, which have none.
+const NO_BIAS_SIGMA_RAD_PER_S: f64 = 1e-6;
 const ITERATIONS: usize = 20;
 /// Update of the offset below which the iterations end.
 const CONVERGED_S: f64 = 1e-7;
@@ -24,6 +27,11 @@ const HUBER: f64 = 1.345;
 /// Ratio of a normal distribution's standard deviation to the median norm of three such residuals.
 const SIGMA_PER_MEDIAN_NORM: f64 = 1.0 / 1.538;
 
+/// Unknowns: offset, drift, rotation (3), scale, bias of the reference (3).
+const UNKNOWNS: usize = 9;
+type Information = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
+type Gradient = SVector<f64, UNKNOWNS>;
+
 /// Best solution near one offset.
 pub(super) struct Refined {
     pub(super) offset_s: f64,
@@ -32,7 +40,10 @@ pub(super) struct Refined {
     middle_s: f64,
     camera_from_body: UnitQuaternion<f64>,
     scale: f64,
-    covariance: Matrix6<f64>,
+    /// Rotation of the body per second that the reference lacks, in rad/s.
+    bias: Vector3<f64>,
+    bias_sigma_rad_per_s: f64,
+    covariance: Information,
     residual_rad: f64,
     rotations: usize,
 }
@@ -43,6 +54,7 @@ struct Row {
     predicted: Vector3<f64>,
     derivative: Derivative,
     since_middle_s: f64,
+    interval_s: f64,
 }
 
 /// Source of the derivatives of a prediction: noise in them would bias the solution and make its σ too small.
@@ -66,7 +78,9 @@ pub(super) fn refine(measured: &[Measured], reference: &RotationReference, offse
         middle_s,
         camera_from_body: UnitQuaternion::identity(),
         scale: 1.0,
-        covariance: Matrix6::zeros(),
+        bias: Vector3::zeros(),
+        bias_sigma_rad_per_s: if reference.is_noisy() { NO_BIAS_SIGMA_RAD_PER_S } else { BIAS_SIGMA_RAD_PER_S },
+        covariance: Information::zeros(),
         residual_rad: 0.0,
         rotations: 0,
     };
@@ -102,7 +116,9 @@ impl Refined {
                 let step_ns = ns_from_seconds(DIFFERENCE_S);
                 Derivative::Reference((at(step_ns)? - at(-step_ns)?) / (2.0 * DIFFERENCE_S))
             };
-            Some(Row { measured: pair.rotation, predicted: at(0)?, derivative, since_middle_s })
+            let interval_s = pair.interval_s();
+            let predicted = at(0)? + self.bias * interval_s;
+            Some(Row { measured: pair.rotation, predicted, derivative, since_middle_s, interval_s })
         };
         measured.iter().filter_map(row).collect()
     }
@@ -122,26 +138,27 @@ impl Refined {
         (HUBER * 3.0_f64.sqrt() * sigma_rad / residual.norm().max(1e-12)).min(1.0)
     }
 
-    /// Columns: offset, drift, rotation (3), scale.
-    fn jacobian(&self, row: &Row) -> SMatrix<f64, 3, 6> {
+    fn jacobian(&self, row: &Row) -> SMatrix<f64, 3, UNKNOWNS> {
         let (rotated, by_offset) = match row.derivative {
             Derivative::Reference(by_offset) => {
                 (self.camera_from_body * row.predicted, self.scale * (self.camera_from_body * by_offset))
             }
             Derivative::Images(by_offset) => (row.measured / self.scale, by_offset),
         };
-        let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
+        let mut jacobian = SMatrix::<f64, 3, UNKNOWNS>::zeros();
         jacobian.set_column(0, &by_offset);
         jacobian.set_column(1, &(by_offset * row.since_middle_s));
         jacobian.fixed_view_mut::<3, 3>(0, 2).copy_from(&(-self.scale * so3::hat(&rotated)));
         jacobian.set_column(5, &rotated);
+        let by_bias = self.camera_from_body.to_rotation_matrix().into_inner() * (self.scale * row.interval_s);
+        jacobian.fixed_view_mut::<3, 3>(0, 6).copy_from(&by_bias);
         jacobian
     }
 
     /// Normal equations in units of the residuals' variance, with the prior of the drift.
-    fn normal_equations(&self, rows: &[Row]) -> (Matrix6<f64>, Vector6<f64>) {
+    fn normal_equations(&self, rows: &[Row]) -> (Information, Gradient) {
         let sigma_rad = self.sigma_rad(rows);
-        let (mut information, mut gradient) = (Matrix6::zeros(), Vector6::zeros());
+        let (mut information, mut gradient) = (Information::zeros(), Gradient::zeros());
         for row in rows {
             let residual = self.residual(row);
             let jacobian = self.jacobian(row);
@@ -153,6 +170,10 @@ impl Refined {
         gradient[1] -= self.drift / (DRIFT_SIGMA * DRIFT_SIGMA);
         information[(5, 5)] += 1.0 / (SCALE_SIGMA * SCALE_SIGMA);
         gradient[5] -= (self.scale - 1.0) / (SCALE_SIGMA * SCALE_SIGMA);
+        for axis in 0..3 {
+            information[(6 + axis, 6 + axis)] += self.bias_sigma_rad_per_s.powi(-2);
+            gradient[6 + axis] -= self.bias[axis] * self.bias_sigma_rad_per_s.powi(-2);
+        }
         // With rotations about one axis only, the rotation about that axis is unobservable.
         for axis in 2..5 {
             information[(axis, axis)] += 1.0;
@@ -170,6 +191,7 @@ impl Refined {
         self.drift += step[1];
         self.camera_from_body = so3::exp(&Vector3::new(step[2], step[3], step[4])) * self.camera_from_body;
         self.scale = (self.scale + step[5]).clamp(0.3, 3.0);
+        self.bias += Vector3::new(step[6], step[7], step[8]);
         Some(step[0])
     }
 
@@ -235,6 +257,20 @@ impl Refined {
 fn constant_rotation(rows: &[Row]) -> Option<UnitQuaternion<f64>> {
     let pairs: Vec<_> = rows.iter().map(|row| (row.predicted, row.measured)).collect();
     best_rotation(&pairs).filter(|_| rows.len() >= MIN_ROTATIONS).map(|(rotation, _)| rotation)
+}
+
+/// Rotation that minimizes `Σ |measured − R·predicted|²` over pairs `(predicted, measured)` (Wahba's problem, by SVD),
+/// with the ratio of the second singular value to the first, which is near zero if all rotations are about one axis.
+pub(in crate::log_check) fn best_rotation(
+    pairs: &[(Vector3<f64>, Vector3<f64>)],
+) -> Option<(UnitQuaternion<f64>, f64)> {
+    let sum: Matrix3<f64> = pairs.iter().map(|(predicted, measured)| measured * predicted.transpose()).sum();
+    let svd = sum.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let mut handed = Matrix3::identity();
+    handed[(2, 2)] = (u * v_t).determinant().signum();
+    let rotation = Rotation3::from_matrix_unchecked(u * handed * v_t);
+    Some((UnitQuaternion::from_rotation_matrix(&rotation), svd.singular_values[1] / svd.singular_values[0].max(1e-12)))
 }
 
 /// Times of the camera on the clock of the reference: `t_reference = t_camera + offset + drift · (t_camera − middle)`.

@@ -9,7 +9,6 @@ use nalgebra::{Unit, UnitQuaternion, Vector3};
 
 use self::meanings::{changes, difference};
 use super::attitude::AttitudeSurvey;
-use super::hand_eye::vertex;
 use super::imu_facts::ImuFacts;
 use super::statistics::median;
 use super::survey::Survey;
@@ -282,4 +281,17 @@ fn listed(gimbal: &GimbalRig, source: &AttitudeSource, given: &Meaning, others: 
     };
     let all: Vec<String> = others.iter().filter_map(best).collect();
     format!("misfit as in the rig {}, with {}", degrees(given.misfit_rad), all.join("; "))
+}
+
+/// Minimum of the parabola through the squared costs around the best offset, in seconds; the offset itself at the end of
+/// the range.
+fn vertex(costs: &[(f64, f64)], best: usize, step: f64) -> f64 {
+    let square = |index: usize| costs[index].1 * costs[index].1;
+    let offset_s = costs[best].0;
+    if best == 0 || best + 1 >= costs.len() {
+        return offset_s;
+    }
+    let (left, middle, right) = (square(best - 1), square(best), square(best + 1));
+    let curvature = left - 2.0 * middle + right;
+    if curvature > 0.0 { offset_s + 0.5 * step * (left - right) / curvature } else { offset_s }
 }
