@@ -14,39 +14,22 @@ use crate::geometry::RigidTransform;
 /// Supported message type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum MessageKind {
-    /// `sensor_msgs/msg/Imu`.
     Imu,
-    /// `sensor_msgs/msg/Image`.
     Image,
-    /// `sensor_msgs/msg/CompressedImage`.
     CompressedImage,
-    /// `foxglove_msgs/msg/CompressedVideo`.
     CompressedVideo,
-    /// `foxglove.CompressedVideo`, encoded as protobuf.
     CompressedVideoProtobuf,
-    /// `ffmpeg_image_transport_msgs/msg/FFMPEGPacket`.
     FfmpegPacket,
-    /// `sensor_msgs/msg/CameraInfo`.
     CameraInfo,
-    /// `sensor_msgs/msg/JointState`.
     JointState,
-    /// `nav_msgs/msg/Odometry`.
     Odometry,
-    /// `geometry_msgs/msg/PoseStamped`.
     PoseStamped,
-    /// `geometry_msgs/msg/TransformStamped`.
     TransformStamped,
-    /// `geometry_msgs/msg/QuaternionStamped`.
     QuaternionStamped,
-    /// `geometry_msgs/msg/Vector3Stamped`.
     Vector3Stamped,
-    /// `tf2_msgs/msg/TFMessage`.
     Transforms,
-    /// `mavros_msgs/msg/GimbalDeviceAttitudeStatus`.
     MavrosGimbalAttitude,
-    /// `px4_msgs/msg/GimbalDeviceAttitudeStatus`.
     Px4GimbalAttitude,
-    /// `px4_msgs/msg/VehicleAttitude`.
     Px4VehicleAttitude,
 }
 
@@ -107,7 +90,6 @@ impl MessageKind {
         Self::from_schema_name(schema_name).filter(|kind| kind.encoding() == encoding)
     }
 
-    /// Supported message encoding.
     pub fn encoding(self) -> &'static str {
         if self == Self::CompressedVideoProtobuf { "protobuf" } else { "cdr" }
     }
@@ -136,11 +118,6 @@ impl MessageKind {
     /// True if the stamps are in microseconds, by default of PX4's clock, which counts from its start.
     pub fn counts_since_boot(self) -> bool {
         matches!(self, Self::Px4GimbalAttitude | Self::Px4VehicleAttitude)
-    }
-
-    /// True if the messages are poses.
-    pub fn is_pose(self) -> bool {
-        matches!(self, Self::Odometry | Self::PoseStamped | Self::TransformStamped)
     }
 }
 

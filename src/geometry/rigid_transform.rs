@@ -1,6 +1,6 @@
 use std::ops::Mul;
 
-use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion, Vector3, Vector6};
 
 use super::so3;
 
@@ -60,11 +60,6 @@ impl RigidTransform {
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.inverse();
         Self::new(rotation, -(rotation * self.translation_m))
-    }
-
-    /// Transforms a point from the inner to the outer frame.
-    pub fn transform_point(&self, point: &Point3<f64>) -> Point3<f64> {
-        self.rotation * point + self.translation_m
     }
 
     /// Transforms a position vector from the inner to the outer frame (rotation and translation).
