@@ -82,7 +82,6 @@ impl StagedFile {
         Ok(Self { temporary, target })
     }
 
-    /// Final path.
     pub fn path(&self) -> &Path {
         &self.target
     }

@@ -11,7 +11,6 @@ use crate::sensors::ImageMask;
 const HATCH_PX: usize = 12;
 /// Age in frames of the last colour of the map.
 const MAX_AGE: f64 = 100.0;
-/// Ages in the legend.
 const LEGEND_AGES: [u32; 4] = [0, 10, 40, 100];
 /// Maximum radius of the keypoint marker of a solved feature, in points.
 const MARKER_RADIUS: f32 = 4.0;
@@ -52,7 +51,6 @@ impl ImagePlacement {
     }
 }
 
-/// Options of the marks of a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MarkOptions {
     pub(super) side: SolveSide,

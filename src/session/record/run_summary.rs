@@ -21,14 +21,12 @@ use crate::sensors::Rig;
 use crate::session::accuracy::path_length_m;
 use crate::text::Named as _;
 
-/// Frame counts of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FrameCounts {
     /// Number of images passed to the estimator.
     pub total: usize,
     /// Number of images with an estimated pose.
     pub estimated: usize,
-    /// Number of keyframes.
     pub keyframes: usize,
     /// Stamp of the first pose, in seconds since the log began.
     pub initialized_at_s: Option<f64>,
@@ -50,7 +48,6 @@ pub struct ParameterSummary {
     #[serde(rename = "final")]
     pub last: f64,
     pub sigma: Option<f64>,
-    /// Ground-truth value.
     #[serde(rename = "truth", skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<f64>,
     /// Final minus ground-truth value.
@@ -58,12 +55,10 @@ pub struct ParameterSummary {
     pub error: Option<f64>,
 }
 
-/// The calibration of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CalibrationSummary {
     /// Name of the final parameterization.
     pub parameterization: String,
-    /// Number of parameters.
     pub columns: usize,
     /// The parameters in column order.
     pub parameters: Vec<ParameterSummary>,
@@ -88,7 +83,6 @@ impl CalibrationSummary {
     }
 }
 
-/// Weight of one parameter in a direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DirectionWeight {
     pub name: String,
@@ -99,7 +93,6 @@ pub struct DirectionWeight {
 /// Observability of the calibration at the last step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RankSummary {
-    /// Number of calibration columns.
     pub columns: usize,
     pub rank_structural: usize,
     pub rank_informed: usize,
@@ -124,11 +117,9 @@ pub struct InformationSummary {
     pub parameters: Vec<ParameterInformation>,
 }
 
-/// Information gain of one parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterInformation {
     pub name: String,
-    /// Gain in bits per second.
     pub bits_per_s: f64,
     /// Contribution of each motion in bits per second; negative for a motion that reduces the contribution of others.
     pub by_motion: Vec<f64>,
@@ -154,13 +145,9 @@ pub struct TimingSummary {
     pub optimize: StageSummary,
     /// Linearization for the observability analysis.
     pub linearize: StageSummary,
-    /// Building the report.
     pub report: StageSummary,
-    /// Marginalization.
     pub marginalize: StageSummary,
-    /// Observability analysis.
     pub observability: StageSummary,
-    /// Whole step.
     pub step: StageSummary,
 }
 
@@ -171,7 +158,6 @@ pub struct RunSummary {
     pub log: String,
     /// Specification of the run in the syntax of the command line.
     pub run: String,
-    /// Keys of the cameras.
     pub camera: String,
     pub frames: FrameCounts,
     /// Path length over the estimated frames in metres, of the ground truth if there is one, else of the estimate.
