@@ -10,6 +10,7 @@ use super::cdr::{CdrError, CdrReader};
 use super::protobuf::{ProtobufReader, ProtobufValue};
 use super::video::codec::VideoCodec;
 use crate::geometry::RigidTransform;
+use crate::text::Named;
 
 /// Supported message type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -33,53 +34,37 @@ pub enum MessageKind {
     Px4VehicleAttitude,
 }
 
-impl MessageKind {
-    pub const ALL: [Self; 17] = [
-        Self::Imu,
-        Self::Image,
-        Self::CompressedImage,
-        Self::CompressedVideo,
-        Self::CompressedVideoProtobuf,
-        Self::FfmpegPacket,
-        Self::CameraInfo,
-        Self::JointState,
-        Self::Odometry,
-        Self::PoseStamped,
-        Self::TransformStamped,
-        Self::QuaternionStamped,
-        Self::Vector3Stamped,
-        Self::Transforms,
-        Self::MavrosGimbalAttitude,
-        Self::Px4GimbalAttitude,
-        Self::Px4VehicleAttitude,
+impl Named for MessageKind {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Imu, "sensor_msgs/msg/Imu"),
+        (Self::Image, "sensor_msgs/msg/Image"),
+        (Self::CompressedImage, "sensor_msgs/msg/CompressedImage"),
+        (Self::CompressedVideo, "foxglove_msgs/msg/CompressedVideo"),
+        (Self::CompressedVideoProtobuf, "foxglove.CompressedVideo"),
+        (Self::FfmpegPacket, "ffmpeg_image_transport_msgs/msg/FFMPEGPacket"),
+        (Self::CameraInfo, "sensor_msgs/msg/CameraInfo"),
+        (Self::JointState, "sensor_msgs/msg/JointState"),
+        (Self::Odometry, "nav_msgs/msg/Odometry"),
+        (Self::PoseStamped, "geometry_msgs/msg/PoseStamped"),
+        (Self::TransformStamped, "geometry_msgs/msg/TransformStamped"),
+        (Self::QuaternionStamped, "geometry_msgs/msg/QuaternionStamped"),
+        (Self::Vector3Stamped, "geometry_msgs/msg/Vector3Stamped"),
+        (Self::Transforms, "tf2_msgs/msg/TFMessage"),
+        (Self::MavrosGimbalAttitude, "mavros_msgs/msg/GimbalDeviceAttitudeStatus"),
+        (Self::Px4GimbalAttitude, "px4_msgs/msg/GimbalDeviceAttitudeStatus"),
+        (Self::Px4VehicleAttitude, "px4_msgs/msg/VehicleAttitude"),
     ];
+}
 
+impl MessageKind {
     /// Name of the schema in the log.
     pub fn schema_name(self) -> &'static str {
-        match self {
-            Self::Imu => "sensor_msgs/msg/Imu",
-            Self::Image => "sensor_msgs/msg/Image",
-            Self::CompressedImage => "sensor_msgs/msg/CompressedImage",
-            Self::CompressedVideo => "foxglove_msgs/msg/CompressedVideo",
-            Self::CompressedVideoProtobuf => "foxglove.CompressedVideo",
-            Self::FfmpegPacket => "ffmpeg_image_transport_msgs/msg/FFMPEGPacket",
-            Self::CameraInfo => "sensor_msgs/msg/CameraInfo",
-            Self::JointState => "sensor_msgs/msg/JointState",
-            Self::Odometry => "nav_msgs/msg/Odometry",
-            Self::PoseStamped => "geometry_msgs/msg/PoseStamped",
-            Self::TransformStamped => "geometry_msgs/msg/TransformStamped",
-            Self::QuaternionStamped => "geometry_msgs/msg/QuaternionStamped",
-            Self::Vector3Stamped => "geometry_msgs/msg/Vector3Stamped",
-            Self::Transforms => "tf2_msgs/msg/TFMessage",
-            Self::MavrosGimbalAttitude => "mavros_msgs/msg/GimbalDeviceAttitudeStatus",
-            Self::Px4GimbalAttitude => "px4_msgs/msg/GimbalDeviceAttitudeStatus",
-            Self::Px4VehicleAttitude => "px4_msgs/msg/VehicleAttitude",
-        }
+        self.name()
     }
 
     /// Kind with this schema name; `sensor_msgs/Imu` equals `sensor_msgs/msg/Imu`.
     pub fn from_schema_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| {
+        Self::all().find(|kind| {
             let full = kind.schema_name();
             name == full || name == full.replace("/msg/", "/")
         })
