@@ -49,10 +49,6 @@ impl Parameterization {
         }
     }
 
-    pub fn is_minimal(self) -> bool {
-        !matches!(self, Self::Classical | Self::Poe)
-    }
-
     /// True if the base rotates about y first.
     pub(super) fn base_yx(self) -> bool {
         matches!(self, Self::MinimalYx | Self::MinimalSwappedYx)
