@@ -6,18 +6,12 @@ use super::so3;
 
 /// Rigid transform that maps points from one frame to another; a value is named `to_from_from`, as in
 /// `world_from_imu`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RigidTransform {
     /// Rotates vectors into the outer frame.
     pub rotation: UnitQuaternion<f64>,
     /// Origin of the inner frame in the outer frame, in metres.
     pub translation_m: Vector3<f64>,
-}
-
-impl Default for RigidTransform {
-    fn default() -> Self {
-        Self::identity()
-    }
 }
 
 impl RigidTransform {

@@ -88,10 +88,6 @@ fn ink() -> Theme {
     Theme::of(ThemeName::Dark)
 }
 
-fn residual_color() -> Color32 {
-    ink().runs[1]
-}
-
 /// Draws one feature: trail, keypoint marker, residual, cross, id.
 pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureMark, options: &MarkOptions) {
     let at = place.position(&mark.measured_px);
@@ -142,7 +138,7 @@ fn upright_cross(painter: &Painter, at: Pos2, reach: f32, stroke: Stroke) {
 
 /// Draws a line from the measurement to the (magnified) prediction, with a diamond at its end.
 fn residual_arrow(painter: &Painter, from: Pos2, tip: Pos2) {
-    let color = residual_color();
+    let color = ink().runs[1];
     painter.line_segment([from, tip], Stroke::new(3.0, HALO));
     painter.line_segment([from, tip], Stroke::new(1.5, color));
     let side = 2.2;
