@@ -82,6 +82,7 @@ impl StagedFile {
         Ok(Self { temporary, target })
     }
 
+    /// Final path.
     pub fn path(&self) -> &Path {
         &self.target
     }

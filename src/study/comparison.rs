@@ -81,6 +81,7 @@ pub struct WorstPair {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StudyComparison {
+    /// Number of runs of the baseline.
     pub old_runs: usize,
     pub new_runs: usize,
     /// Number of runs in both studies.

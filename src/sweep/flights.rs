@@ -19,6 +19,7 @@ const NOTES: &str = "rendered.json";
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RenderedFlight {
+    /// SHA-256 of the log.
     pub sha256: String,
     pub duration_s: f64,
     /// Wall time of the rendering in seconds.

@@ -34,6 +34,7 @@ struct StudyIndex {
     /// Version of the folder's layout.
     dcvins_study: u32,
     name: String,
+    /// Absolute path of the plan.
     plan: PathBuf,
 }
 

@@ -56,6 +56,7 @@ pub(super) struct Alignment {
     pub(super) gravity: Vector3<f64>,
     /// `start_from_imu` per view.
     pub(super) poses: Vec<RigidTransform>,
+    /// Velocity per view, in m/s.
     pub(super) velocities: Vec<Vector3<f64>>,
     /// Extrinsics per view, with the rotation from the images.
     pub(super) imu_from_camera: Vec<RigidTransform>,

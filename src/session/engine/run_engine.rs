@@ -20,6 +20,7 @@ pub(in crate::session) struct RunEngine {
     settings: EngineSettings,
 }
 
+/// Constant settings of an engine.
 #[derive(Clone, Debug)]
 struct EngineSettings {
     has_joints: bool,

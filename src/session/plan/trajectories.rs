@@ -88,6 +88,7 @@ pub struct LoadedPositions {
 /// Ground truth from another source than the frames of the log.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum LoadedTruth {
+    /// Poses of the IMU.
     Poses(PoseTrack),
     Positions(LoadedPositions),
 }

@@ -59,6 +59,7 @@ pub struct ParameterSummary {
 pub struct CalibrationSummary {
     /// Name of the final parameterization.
     pub parameterization: String,
+    /// Number of parameters.
     pub columns: usize,
     /// The parameters in column order.
     pub parameters: Vec<ParameterSummary>,
@@ -158,6 +159,7 @@ pub struct RunSummary {
     pub log: String,
     /// Specification of the run in the syntax of the command line.
     pub run: String,
+    /// Keys of the cameras.
     pub camera: String,
     pub frames: FrameCounts,
     /// Path length over the estimated frames in metres, of the ground truth if there is one, else of the estimate.
