@@ -10,6 +10,7 @@ use dcvins::gui::window::{MainWindow, Preset, window_ui};
 use dcvins::gui::{PanelContext, Playback, Presentation, Selection};
 use dcvins::sensors::GrayImage;
 use dcvins::session::{Recording, SessionPlan};
+use dcvins::text::Named as _;
 
 use super::Table;
 use super::figures::Times;
@@ -115,7 +116,7 @@ pub(crate) fn measure(recording: &Recording, player: &mut Player) -> Table {
     let stamps_ns: Vec<i64> = steps.iter().map(|step| step.report.stamp_ns).collect();
     let played = &stamps_ns[stamps_ns.len().saturating_sub(PLAYED)..];
     let Some(first_ns) = played.first().copied() else { return table };
-    for preset in Preset::ALL {
+    for preset in Preset::all() {
         player.state.arrange(preset);
         for _ in 0..SETTLING {
             player.picture(recording, first_ns);

@@ -17,6 +17,7 @@ use dcvins::log_check;
 use dcvins::sensors::Rig;
 use dcvins::session::breakpoints::Condition;
 use dcvins::session::{RunSpec, SavedSession};
+use dcvins::text::Named as _;
 use tempfile::TempDir;
 
 /// Rig of the seed logs: a gimballed and a rigid camera of 16 × 12 pixels.
@@ -118,7 +119,7 @@ pub fn video(bytes: &[u8]) {
 /// Fuzzes a message in CDR, wrapped into a log: the first byte selects the type, the rest is the message.
 pub fn message(bytes: &[u8]) {
     let Some((kind, message)) = bytes.split_first() else { return };
-    let kind = MessageKind::ALL[usize::from(*kind) % MessageKind::ALL.len()];
+    let kind = MessageKind::NAMES[usize::from(*kind) % MessageKind::NAMES.len()].0;
     let folder = folder();
     let path = folder.path().join("input.mcap");
     let mut writer = LogWriter::create(&path, &LogWriterOptions::default()).expect("the log can be created");

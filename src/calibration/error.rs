@@ -3,7 +3,6 @@ use thiserror::Error;
 /// Reason for the failure of a calibration.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum CalibrationError {
-    /// The estimator of the static camera did not initialize.
     #[error("the static camera '{camera}' has no trajectory: {reason}; details: 'dcvins check'")]
     NoTrajectory {
         camera: String,
@@ -18,13 +17,11 @@ pub enum CalibrationError {
     NoJointMotion {
         /// Smallest standard deviation of the angle of a moving joint.
         limit_deg: f64,
-        /// Start of the examined interval.
         from_s: f64,
         to_s: f64,
         /// Measured standard deviations, joint by joint.
         spreads: String,
     },
-    /// Fewer pairs of camera poses than the calibration needs.
     #[error(
         "only {found} pose pairs of static and gimbal camera between {from_s:.1} and {to_s:.1} s, {needed} required \
          ({reason}): record a longer flight with both cameras over textured ground"
@@ -32,14 +29,11 @@ pub enum CalibrationError {
     TooFewMeasurements {
         found: usize,
         needed: usize,
-        /// Start of the interval with a trajectory.
         from_s: f64,
-        /// End of the interval with a trajectory.
         to_s: f64,
         /// Numbers of frame sets and missing pairs, by cause.
         reason: String,
     },
-    /// Singular equations of a least-squares problem.
     #[error("the {stage} did not converge: its equations are singular; possible reasons: 'dcvins check'")]
     Singular { stage: &'static str },
     /// The caller ended the calibration.

@@ -127,7 +127,6 @@ pub(super) struct LoopState {
     pub(super) frames: Vec<SegmentFrame>,
 }
 
-/// Whitened rows of one pair.
 pub(super) struct PairRows {
     pub(super) residual: Vector6<f64>,
     pub(super) by_frame: Matrix6xX<f64>,

@@ -34,7 +34,6 @@ pub(super) fn adjust(bundle: &Bundle<'_>, start: BundleEstimate, options: &Calib
     (!solution.iterations.is_empty()).then_some(Adjusted { estimate: solution.estimate, iterations: solution.tried })
 }
 
-/// The bundle as a problem of the damped solver.
 struct DampedBundle<'a> {
     bundle: &'a Bundle<'a>,
     /// Memory of the previous equations.

@@ -19,7 +19,6 @@ const NAVIGATION: usize = 15;
 pub(super) enum Camera {
     /// Fixed to the vehicle.
     Static,
-    /// On the gimbal.
     Gimbal,
 }
 

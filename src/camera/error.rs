@@ -11,7 +11,6 @@ pub enum CameraError {
         "unknown distortion_model '{name}': expected one of none, radtan, plumb_bob, rational_polynomial, equidistant, fov"
     )]
     UnknownDistortion { name: String },
-    /// Distortion that is not defined for the projection.
     #[error("camera_model '{model}' does not support distortion_model '{distortion}': expected {expected}")]
     Combination {
         model: &'static str,
@@ -29,12 +28,6 @@ pub enum CameraError {
         /// Names of the numbers, in order.
         meaning: &'static str,
     },
-    /// Number out of its range.
     #[error("{field} is {value}, expected {expected}")]
-    Value {
-        field: &'static str,
-        value: f64,
-        /// Valid range.
-        expected: &'static str,
-    },
+    Value { field: &'static str, value: f64, expected: &'static str },
 }

@@ -11,6 +11,7 @@ use dcvins::observability::laboratory::{
     SensorColumns, SensorExcitation, Situation, advise, excitation, sensor_excitation, survey,
 };
 use dcvins::sensors::Rig;
+use dcvins::text::Named as _;
 
 use crate::cli::terminal::{print, print_report};
 
@@ -169,8 +170,7 @@ const DEFAULT_FORMS: [LaboratoryForm; 4] = [
 fn list() -> String {
     let line = |(name, meaning): (&str, &str)| format!("  {name:<28}{meaning}\n");
     let mechanisms: String = Mechanism::NAMES.into_iter().map(line).collect();
-    let motions: String =
-        LaboratoryMotion::ALL.into_iter().map(|motion| line((motion.name(), motion.meaning()))).collect();
+    let motions: String = LaboratoryMotion::all().map(|motion| line((motion.name(), motion.meaning()))).collect();
     format!("mechanisms\n{mechanisms}motions\n{motions}")
 }
 

@@ -42,13 +42,10 @@ pub(crate) const PLAIN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use.";
 /// Exit codes of `simulate`, `convert`, `calibrate`, `noise` and `screenshot`.
 pub(crate) const INTERRUPTIBLE: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 130 interrupted (Ctrl+C; files \
     that are not complete are not written; a second Ctrl+C ends at once).";
-/// Exit codes of `run`.
 pub(crate) const RUN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 3 a run never initialized, 5 the condition of \
     --break became true, 130 interrupted (Ctrl+C; the steps so far are written; a second Ctrl+C ends at once).";
-/// Exit codes of `report`.
 pub(crate) const REPORT: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 3 a run never initialized, 130 \
     interrupted (Ctrl+C; the steps so far are written; a second Ctrl+C ends at once).";
-/// Exit codes of `sweep`.
 pub(crate) const SWEEP: &str = "Exit codes: 0 success, 1 failure, worse than the baseline, or jobs that have not run, 2 wrong \
     use, 6 jobs without a result (reasons in their rows), 130 interrupted (Ctrl+C; the next sweep resumes; a second Ctrl+C ends \
     at once).";

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use dcvins::flight_log::FlightLog;
 use dcvins::interop::{FixedJointAngles, OtherEstimator, configure, write_configuration};
 use dcvins::sensors::Rig;
-use dcvins::text::{Entry, FINITE};
+use dcvins::text::{Entry, FINITE, Named as _};
 use serde::Serialize;
 
 use crate::cli::limit_arguments::LimitArguments;
@@ -115,7 +115,7 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<()> {
     let files: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     if arguments.json {
         return print_json(&Written {
-            program: program.title(),
+            program: program.name(),
             joint_angles_rad: &angles.angles_rad,
             files,
             notes: &configuration.notes,

@@ -133,7 +133,6 @@ fn of_study(arguments: &ReportArguments) -> Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// The command line of this process.
 fn own_command_line() -> String {
     command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
 }

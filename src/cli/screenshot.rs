@@ -18,6 +18,7 @@ use dcvins::gui::window::Preset;
 use dcvins::gui::{ImageSource, Playback, Presentation};
 use dcvins::session::{Computation, Session, SessionPlan};
 use dcvins::sweep::{OpenedStudy, is_study};
+use dcvins::text::Named as _;
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
@@ -267,7 +268,7 @@ fn drawing_options(arguments: &ScreenshotArguments) -> ScreenshotOptions {
             RendererArgument::Cpu => Renderer::Cpu,
             RendererArgument::Wgpu => Renderer::Wgpu,
         },
-        layout: Preset::ALL.get(usize::from(arguments.layout) - 1).copied().unwrap_or_default(),
+        layout: Preset::all().nth(usize::from(arguments.layout) - 1).unwrap_or_default(),
         presentation: if arguments.controls { Presentation::Interactive } else { Presentation::Figure },
         ..ScreenshotOptions::default()
     }

@@ -67,7 +67,6 @@ pub(crate) struct StudyPicture<'a> {
     pub(crate) output: &'a Path,
 }
 
-/// Writes a screenshot of a study.
 pub(crate) fn write_study_picture(
     study: &OpenedStudy,
     view: &StudyOptions,

@@ -11,7 +11,6 @@ use crate::gui::desktop::SampleProgress;
 use crate::simulation::{Experiment, SimulationOptions, simulate_interruptible};
 
 const NAME: &str = "garden.mcap";
-/// Duration of the flight in seconds.
 const DURATION_S: f64 = 8.5;
 /// Capacity of the channel to the window; further progress messages are dropped.
 const WAITING_MESSAGES: usize = 4;

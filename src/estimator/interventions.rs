@@ -13,14 +13,13 @@ use crate::gimbal::{ParameterId, Parameterization};
 pub enum InterventionError {
     #[error("there is no parameter {0:?} in this parameterization")]
     UnknownParameter(ParameterId),
-    /// The calibration is not estimated.
     #[error("the calibration of this run is fixed (calibrate=off)")]
     FixedCalibration,
 }
 
 /// Calibration columns in addition to the chain that are enabled together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum SensorColumns {
+pub enum SensorParameters {
     Timeshift,
     /// Readout times of rolling shutters.
     Readout,
@@ -28,7 +27,7 @@ pub enum SensorColumns {
     ImuIntrinsics,
 }
 
-impl SensorColumns {
+impl SensorParameters {
     pub const ALL: [Self; 4] = [Self::Timeshift, Self::Readout, Self::Intrinsics, Self::ImuIntrinsics];
 
     /// Key in the specification of a run.
@@ -68,16 +67,16 @@ impl Estimator {
 
     /// Estimates further sensor parameters from the next solve on, starting at the rig's values; the frames of the
     /// window and the marginalization prior stay.
-    pub fn estimate_sensors(&mut self, columns: SensorColumns) -> Result<(), InterventionError> {
+    pub fn estimate_sensors(&mut self, columns: SensorParameters) -> Result<(), InterventionError> {
         let config = &mut self.setup.config;
         if !config.calibrate {
             return Err(InterventionError::FixedCalibration);
         }
         match columns {
-            SensorColumns::Timeshift => config.estimate_timeshift = true,
-            SensorColumns::Readout => config.estimate_readout = true,
-            SensorColumns::Intrinsics => config.estimate_intrinsics = true,
-            SensorColumns::ImuIntrinsics => config.estimate_imu_intrinsics = true,
+            SensorParameters::Timeshift => config.estimate_timeshift = true,
+            SensorParameters::Readout => config.estimate_readout = true,
+            SensorParameters::Intrinsics => config.estimate_intrinsics = true,
+            SensorParameters::ImuIntrinsics => config.estimate_imu_intrinsics = true,
         }
         match &mut self.phase {
             PhaseState::Tracking(window) => window.state.add_columns(&self.setup),
@@ -127,7 +126,6 @@ impl Estimator {
         }
     }
 
-    /// Column of an estimated parameter.
     fn free_column(&self, parameter: ParameterId) -> Result<usize, InterventionError> {
         let known = self.calibration().parameters();
         let column = known.iter().position(|known| *known == parameter);

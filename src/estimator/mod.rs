@@ -27,7 +27,7 @@ pub use config::{
 pub use estimator::Estimator;
 pub use explain::{FeatureRows, StepJacobian};
 pub use factors::{FactorKind, imu as imu_factor};
-pub use interventions::{InterventionError, SensorColumns};
+pub use interventions::{InterventionError, SensorParameters};
 pub use packed::PackedEstimator;
 pub use problem::hypothetical::{
     HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge,

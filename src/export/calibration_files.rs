@@ -11,7 +11,6 @@ use super::trajectory::tum_of_calibration;
 use crate::flight_log::output::OutputSet;
 use crate::session::CalibrationRun;
 
-/// Files of a trajectory.
 pub(super) const TRAJECTORY_FILES: [&str; 2] = ["trajectory.tum", "covariance.csv"];
 
 /// Writes `rig.yaml`, `calibration.json` and `report.txt` into a folder, and on request the trajectory with its

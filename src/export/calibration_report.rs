@@ -11,6 +11,7 @@ use crate::geometry::{Dimension, RigidTransform, seconds_from_ns, so3};
 use crate::gimbal::{Chain, Quantity};
 use crate::sensors::Rig;
 use crate::session::{CalibrationErrors, CalibrationRun};
+use crate::text::Named as _;
 
 /// One parameter before and after the calibration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -22,13 +23,11 @@ pub struct ParameterReport {
     pub dimension: Dimension,
     /// Value in the given rig.
     pub initial: f64,
-    /// Calibrated value.
     #[serde(rename = "final")]
     pub last: f64,
     pub sigma: f64,
     /// Prior standard deviation from the rig.
     pub prior_sigma: Option<f64>,
-    /// Ground-truth value.
     #[serde(rename = "truth", skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<f64>,
     /// Calibrated minus ground-truth value.
@@ -68,7 +67,6 @@ pub struct CalibrationReport {
     pub gyroscope_error_rad_per_s: Statistics,
     /// Difference of mean accelerations between frames and the accelerometer's, in m/s².
     pub accelerometer_error_m_per_s2: Statistics,
-    /// Result of the pose loops.
     pub pose_loops: PoseLoopReport,
     /// Every calibrated parameter: static camera, time offsets, chain.
     pub parameters: Vec<ParameterReport>,

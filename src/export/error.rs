@@ -13,11 +13,7 @@ pub enum ExportError {
     Write { source: io::Error, path: PathBuf },
     /// The folder or file contains something other than results that may be replaced.
     #[error("{problem}; give --force to overwrite, or another output path: {path}")]
-    Existing {
-        /// Description of the existing content.
-        problem: String,
-        path: PathBuf,
-    },
+    Existing { problem: String, path: PathBuf },
     #[error("cannot read: {source}: {path}")]
     Read { source: io::Error, path: PathBuf },
     /// A file is not a saved session that this version can read.
@@ -27,10 +23,7 @@ pub enum ExportError {
     Log(#[from] LogError),
     /// Two trajectories cannot be compared.
     #[error("{problem}")]
-    NotComparable {
-        /// Problem and remedy.
-        problem: String,
-    },
+    NotComparable { problem: String },
 }
 
 impl ExportError {

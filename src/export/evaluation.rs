@@ -36,9 +36,7 @@ pub struct EvaluationReport {
     pub alignment: Alignment,
     /// Number of associated poses.
     pub pairs: usize,
-    /// Number of poses of the estimate.
     pub estimate_poses: usize,
-    /// Number of poses of the reference.
     pub reference_poses: usize,
     /// Path length of the reference over the associated poses, in metres.
     pub reference_length_m: f64,

@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::calibration::{FittedDensity, FlightNoise, NoiseDensity};
 use crate::flight_log::printable;
 use crate::geometry::seconds_from_ns;
+use crate::text::Named as _;
 
 /// One density of [`FlightNoiseReport`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -40,7 +41,6 @@ pub struct FlightNoiseReport {
     pub intervals: usize,
     /// Mean length of these intervals in seconds.
     pub mean_interval_s: f64,
-    /// Number of runs of the estimator.
     pub runs: usize,
     pub converged: bool,
     /// White noise of gyroscope and accelerometer, then the random walks of their biases.
@@ -51,7 +51,7 @@ impl FlightNoiseReport {
     /// Report of a fit; the texts are the names of log, rig and camera.
     pub fn new(noise: &FlightNoise, [log, rig, camera]: [String; 3]) -> Self {
         let density = |fitted: &FittedDensity| DensityReport {
-            key: fitted.density.key(),
+            key: fitted.density.name(),
             unit: fitted.density.unit(),
             rig: fitted.given,
             found: fitted.found,
@@ -82,7 +82,7 @@ impl FlightNoiseReport {
             NoiseDensity::Gyroscope,
             NoiseDensity::GyroscopeWalk,
         ];
-        for found in order.iter().filter_map(|density| self.densities.iter().find(|it| it.key == density.key())) {
+        for found in order.iter().filter_map(|density| self.densities.iter().find(|it| it.key == density.name())) {
             let note = found
                 .sigma
                 .map_or_else(|| "unchanged: unobservable in this flight".to_owned(), |sigma| format!("σ {sigma:.1e}"));

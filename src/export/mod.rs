@@ -34,12 +34,11 @@ pub use flight_noise::{DensityReport, FlightNoiseReport};
 pub use masks::write_masks;
 pub use noise_files::{write_allan, write_flight_noise};
 pub use result_cache::{CachedFile, ResultCache, ResultKey, ResultKeyBuilder};
-pub use results::write_results;
 pub use run_files::{RunFileOptions, write_run};
 #[cfg(feature = "gui")]
 pub use screenshot::{
     PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotError, ScreenshotOptions, draw_panel, draw_panel_svg,
-    panel_csv, panel_names, png_bytes, write_csv, write_png, write_screenshot, write_svg,
+    panel_csv, png_bytes, write_csv, write_png, write_screenshot, write_svg,
 };
 pub use session_file::{is_session, read_session};
 #[cfg(feature = "gui")]

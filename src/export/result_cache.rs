@@ -84,7 +84,6 @@ impl ResultKeyBuilder {
         Ok(())
     }
 
-    /// Returns the key.
     pub fn finish(self) -> ResultKey {
         ResultKey { name: hex(&self.hash.finalize()), inputs: self.inputs }
     }

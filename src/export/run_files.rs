@@ -17,7 +17,6 @@ const EUROC_TRAJECTORY: &str = "trajectory.euroc.csv";
 /// The run for Foxglove and Rerun.
 const RESULTS: &str = "results.mcap";
 
-/// Options of the files of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RunFileOptions {
     /// True to write measured times; without them two runs give the same bytes in every file.

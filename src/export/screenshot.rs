@@ -19,39 +19,29 @@ use crate::gui::window::{MainWindow, Preset, alone_ui, panel_table, window_ui};
 use crate::gui::{ImageSource, PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
+use crate::text::Named as _;
 
-/// Name of the whole window.
-const WHOLE_WINDOW: &str = "all";
+/// Name of the whole window, and of the whole view of a study.
+pub(super) const WHOLE: &str = "all";
 
-/// Names of the panels; `all` is the whole window.
-pub const PANEL_NAMES: [&str; PanelName::ALL.len() + 1] = {
-    let mut names = [WHOLE_WINDOW; PanelName::ALL.len() + 1];
+/// [`WHOLE`], then the names of the panels.
+const fn with_whole<Panel, const COUNT: usize>(panels: &[(Panel, &'static str)]) -> [&'static str; COUNT] {
+    let mut names = [WHOLE; COUNT];
     let mut index = 0;
-    while index < PanelName::ALL.len() {
-        names[index + 1] = PanelName::ALL[index].as_str();
+    while index < panels.len() {
+        names[index + 1] = panels[index].1;
         index += 1;
     }
     names
-};
+}
 
-/// The name of the whole view.
-pub(super) const WHOLE_VIEW: &str = "all";
+pub const PANEL_NAMES: [&str; PanelName::NAMES.len() + 1] = with_whole(PanelName::NAMES);
 
-/// Names of the panels of a study; `all` is the whole view.
-pub const STUDY_PANEL_NAMES: [&str; StudyPanel::ALL.len() + 1] = {
-    let mut names = [WHOLE_VIEW; StudyPanel::ALL.len() + 1];
-    let mut index = 0;
-    while index < StudyPanel::ALL.len() {
-        names[index + 1] = StudyPanel::ALL[index].as_str();
-        index += 1;
-    }
-    names
-};
+pub const STUDY_PANEL_NAMES: [&str; StudyPanel::NAMES.len() + 1] = with_whole(StudyPanel::NAMES);
 
 /// Largest side of a screenshot in pixels.
 const MAX_SIDE_PX: u32 = 16_384;
 
-/// Renderer of a screenshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Renderer {
     /// The CPU painter: needs no driver, and gives the same bytes on every machine.
@@ -101,28 +91,15 @@ impl Default for ScreenshotOptions {
 /// Reason why a screenshot cannot be made.
 #[derive(Debug, Error)]
 pub enum ScreenshotError {
-    /// There is no panel with this name.
     #[error("unknown panel '{name}': expected one of {}", PANEL_NAMES.join(", "))]
-    UnknownPanel {
-        /// The name as written.
-        name: String,
-    },
-    /// There is no panel of that name in the view of a study.
+    UnknownPanel { name: String },
     #[error("unknown panel '{name}' of a study: expected one of {}", STUDY_PANEL_NAMES.join(", "))]
-    UnknownStudyPanel {
-        /// The name as written.
-        name: String,
-    },
+    UnknownStudyPanel { name: String },
     /// Filter, groups or metric of a study are invalid.
     #[error("{problem}")]
-    StudyOptions {
-        /// The problem and the expected input.
-        problem: String,
-    },
-    /// The size is out of range.
+    StudyOptions { problem: String },
     #[error("a screenshot of {width}×{height} pixels cannot be drawn: expected 16 to {MAX_SIDE_PX} each way")]
     Size { width: u32, height: u32 },
-    /// The scale is out of range.
     #[error("a scale of {scale} cannot be drawn: expected 0.25 to 8 pixels per point")]
     Scale { scale: f32 },
     /// The graphics adapter could not paint it.
@@ -132,11 +109,6 @@ pub enum ScreenshotError {
     Encode { source: image::ImageError },
     #[error(transparent)]
     Write(#[from] ExportError),
-}
-
-/// Names of the panels as accepted by [`draw_panel`].
-pub fn panel_names() -> &'static [&'static str] {
-    &PANEL_NAMES
 }
 
 /// Draws one panel, or the whole window, for a recording at a cursor.
@@ -180,7 +152,7 @@ pub fn panel_csv(
     images: &mut dyn ImageSource,
     options: &ScreenshotOptions,
 ) -> Result<String, ScreenshotError> {
-    let panel = PanelName::ALL.into_iter().find(|known| known.as_str() == name);
+    let panel = PanelName::from_name(name);
     let panel = panel.ok_or_else(|| ScreenshotError::UnknownPanel { name: name.to_owned() })?;
     let theme = Theme::of(options.theme);
     let mut selection = Selection { run: options.run, slide: options.slide, ..Selection::default() };
@@ -200,8 +172,8 @@ fn with_panel<T>(
     options: &ScreenshotOptions,
     draw: impl FnOnce(HeadlessOptions, &mut dyn FnMut(&mut Ui)) -> Result<T, ScreenshotError>,
 ) -> Result<T, ScreenshotError> {
-    let panel = PanelName::ALL.into_iter().find(|known| known.as_str() == name);
-    if panel.is_none() && name != WHOLE_WINDOW {
+    let panel = PanelName::from_name(name);
+    if panel.is_none() && name != WHOLE {
         return Err(ScreenshotError::UnknownPanel { name: name.to_owned() });
     }
     check(options)?;
@@ -283,7 +255,7 @@ mod tests {
     fn every_panel_is_drawn_twice_alike() {
         let recording = sample_recording();
         let mut seen: Vec<Vec<u8>> = Vec::new();
-        for name in panel_names() {
+        for name in PANEL_NAMES {
             let options = ScreenshotOptions { size_px: [800, 500], ..ScreenshotOptions::default() };
             let draw = || {
                 let screenshot = draw_panel(name, &recording, 5_500_000_000, &mut sample_images(), &options).unwrap();
@@ -336,7 +308,7 @@ mod tests {
             ("residuals", "reprojection RMS after the solve, px"),
             ("timeline", "features"),
         ];
-        for name in panel_names() {
+        for name in PANEL_NAMES {
             for (theme, ground) in [(ThemeName::Light, "light"), (ThemeName::Dark, "dark"), (ThemeName::Print, "print")]
             {
                 let options = ScreenshotOptions { size_px: [1200, 800], theme, ..ScreenshotOptions::default() };
@@ -349,7 +321,7 @@ mod tests {
                 assert!(svg.starts_with("<svg xmlns") && svg.ends_with("</svg>\n"), "{name}, {ground}");
                 assert!(svg.contains("<title>a &amp; b</title>") && svg.contains("<text"), "{name}, {ground}");
                 assert!(svg.contains(r#"width="1200" height="800" viewBox="0 0 1200 800""#), "{name}, {ground}");
-                for (_, word) in words.iter().filter(|(panel, _)| panel == name) {
+                for (_, word) in words.iter().filter(|(panel, _)| *panel == name) {
                     assert!(svg.contains(word), "'{name}' does not say '{word}' as text");
                 }
             }
@@ -366,7 +338,7 @@ mod tests {
         ] {
             let options = ScreenshotOptions { size_px, pixels_per_point: scale, theme, ..ScreenshotOptions::default() };
             let screenshot = draw_panel("all", &recording, 5_500_000_000, &mut sample_images(), &options).unwrap();
-            keep_screenshot(&format!("all-{}", theme.as_str()), &screenshot);
+            keep_screenshot(&format!("all-{}", theme.name()), &screenshot);
             assert_eq!([screenshot.width(), screenshot.height()], size_px);
         }
     }

@@ -5,16 +5,17 @@ use std::sync::Arc;
 use egui::Ui;
 use image::RgbaImage;
 
-use super::screenshot::{Renderer, ScreenshotError, ScreenshotOptions, WHOLE_VIEW, check};
+use super::screenshot::{Renderer, ScreenshotError, ScreenshotOptions, WHOLE, check};
 use crate::gui::rendering::offscreen::Offscreen;
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
 use crate::gui::study::{StudyOptions, StudyPanel, StudyState, study_panel_ui, study_ui};
 use crate::gui::theme::Theme;
 use crate::study::view::Study;
+use crate::text::Named as _;
 
 fn panel_of(name: &str) -> Result<Option<StudyPanel>, ScreenshotError> {
-    let panel = StudyPanel::ALL.into_iter().find(|known| known.as_str() == name);
-    if panel.is_none() && name != WHOLE_VIEW {
+    let panel = StudyPanel::from_name(name);
+    if panel.is_none() && name != WHOLE {
         return Err(ScreenshotError::UnknownStudyPanel { name: name.to_owned() });
     }
     Ok(panel)

@@ -1,6 +1,6 @@
 //! The CSV tables of a run, one row per frame.
 
-use crate::estimator::{Event, Motion};
+use crate::estimator::Motion;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gimbal::{ParameterId, ParameterNames, Singularity};
 use crate::sensors::Rig;
@@ -199,13 +199,10 @@ pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
             times.step_ms,
         ];
         row.extend(stages_ms.map(|time_ms| if timing { format!("{time_ms:.3}") } else { String::new() }));
-        row.push(report.events.iter().map(event_text).collect::<Vec<_>>().join("; "));
+        let events = report.events.iter().map(|event| format!("{:?}: {}", event.kind, event.message));
+        row.push(events.collect::<Vec<_>>().join("; "));
         row.push(report.warnings.join("; "));
         table.row(row);
     }
     table.into_text()
-}
-
-fn event_text(event: &Event) -> String {
-    format!("{:?}: {}", event.kind, event.message)
 }

@@ -18,12 +18,7 @@ pub enum LogError {
         path: PathBuf,
     },
     #[error("not an MCAP log: {found}; {remedy}: {}", path.display())]
-    NotALog {
-        /// Description of the file.
-        found: String,
-        remedy: &'static str,
-        path: PathBuf,
-    },
+    NotALog { found: String, remedy: &'static str, path: PathBuf },
     /// The file contains or declares more than a limit allows.
     #[error("{exceeded}: {}", path.display())]
     Limit { exceeded: LimitExceeded, path: PathBuf },
@@ -34,7 +29,6 @@ pub enum LogError {
         problem: String,
         path: PathBuf,
     },
-    /// No usable message of an MCAP file could be read.
     #[error("nothing in the log can be used: {problem}: {}", path.display())]
     NothingReadable {
         /// Problem with its byte offset, if there is one.
@@ -54,7 +48,6 @@ pub enum LogError {
         problem: String,
         path: PathBuf,
     },
-    /// The log lacks a topic of the rig.
     #[error(
         "{field} names the topic '{topic}', which is not in the log; its topics of type {expected} are {}; name one of them in \
          the rig: {}",
@@ -64,9 +57,7 @@ pub enum LogError {
     MissingTopic {
         /// Field of the rig, such as `cam0.rostopic`.
         field: String,
-        /// Topic in that field.
         topic: String,
-        /// Accepted message types.
         expected: String,
         /// Topics of those types in the log.
         available: Vec<String>,
@@ -74,21 +65,12 @@ pub enum LogError {
     },
     #[error(transparent)]
     UnknownCamera(#[from] UnknownCamera),
-    /// A joint of the rig does not occur in the joint messages.
     #[error(
         "gimbal.links[{link}].joint is '{joint}', but the messages on '{topic}' name {}; use those names in the rig: {}",
         list(available),
         path.display()
     )]
-    UnknownJoint {
-        link: usize,
-        /// Name of the joint in the rig.
-        joint: String,
-        topic: String,
-        /// Names of the joints in the messages.
-        available: Vec<String>,
-        path: PathBuf,
-    },
+    UnknownJoint { link: usize, joint: String, topic: String, available: Vec<String>, path: PathBuf },
     /// The frames of a gimbal's attitude are not connected in the log.
     #[error(
         "gimbal.source: parent and child are not connected by '{topic}' and '/tf_static': {problem}: {}",
@@ -114,11 +96,9 @@ pub enum LogError {
     Rig {
         /// Path of the field, such as `cam0.intrinsics`.
         field: String,
-        /// Value of the field and the expected one.
         problem: String,
         path: PathBuf,
     },
-    /// The rig is not valid YAML.
     #[error("the rig is not valid YAML: {problem}: {}", path.display())]
     RigSyntax {
         /// The parser's error with line and column.
@@ -130,7 +110,6 @@ pub enum LogError {
     NoRig {
         /// Expected path of the rig file.
         beside: PathBuf,
-        /// Path of the log.
         path: PathBuf,
     },
     #[error("message at {second:.3} s on '{topic}' (block at byte {byte}): {problem}: {}", path.display())]
@@ -144,15 +123,7 @@ pub enum LogError {
         path: PathBuf,
     },
     #[error("'{topic}' has {count} images, none with number {index}: {}", path.display())]
-    NoSuchImage {
-        /// Topic of the camera.
-        topic: String,
-        /// Requested number.
-        index: usize,
-        /// Number of images on the topic.
-        count: usize,
-        path: PathBuf,
-    },
+    NoSuchImage { topic: String, index: usize, count: usize, path: PathBuf },
     /// The MCAP writer or the image encoder failed.
     #[error("cannot write the log: {problem}: {}", path.display())]
     Write { problem: String, path: PathBuf },

@@ -70,7 +70,6 @@ pub(crate) fn decode_image(
     gray_from_compressed(format, data, depth, limits, expected_px)
 }
 
-/// Remedy for an unsupported encoding.
 fn encoding_remedy(encoding: &str) -> &'static str {
     if encoding.starts_with("32F") || encoding.starts_with("64F") {
         "numbers such as depths, not gray values: give the topic of the camera's images"

@@ -10,7 +10,6 @@ const LARGEST_SIDE_PX: usize = 65_535;
 pub(crate) enum ImageProblem {
     /// The resolution differs from the expected one; the image was not decoded.
     OtherResolution([usize; 2]),
-    /// Description of the problem.
     Unreadable(String),
 }
 
@@ -28,7 +27,6 @@ pub(super) fn unreadable(problem: impl ToString) -> ImageProblem {
     ImageProblem::Unreadable(problem.to_string())
 }
 
-/// Checks the resolution in an image's header.
 pub(super) fn check_resolution(
     claimed_px: [usize; 2],
     limits: &LogLimits,

@@ -50,7 +50,6 @@ pub(crate) const DESCRIPTION_BYTES: u64 = 16 << 20;
 /// Length of a line of a table, such as EuRoC's `data.csv`.
 pub(crate) const LINE_BYTES: u64 = 64 << 10;
 
-/// Limited quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LimitKind {
     /// Bytes of one record in memory: a decompressed chunk, a message, an attachment, a row of a database.
@@ -61,7 +60,6 @@ pub enum LimitKind {
     Topics,
     /// Bytes of a topic's or a type's name.
     NameBytes,
-    /// Pixels of an image.
     ImagePixels,
 }
 
@@ -77,7 +75,6 @@ impl Named for LimitKind {
 }
 
 impl LimitKind {
-    /// Unit of the limited number.
     fn unit(self) -> &'static str {
         match self {
             Self::RecordBytes | Self::UnpackedBytes | Self::NameBytes => "bytes",

@@ -14,7 +14,6 @@ const CLOCK_TOLERANCE_NS: i64 = 60_000_000_000;
 /// Number of bytes at the start that identify the kind of a file.
 const START_BYTES: usize = 512;
 
-/// Topic of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TopicInfo {
     pub topic: String,
@@ -38,17 +37,14 @@ pub struct FlightLog {
     path: PathBuf,
     file: LogFile,
     index: ContainerIndex,
-    /// Channel ids by topic.
     channel_ids: BTreeMap<String, Vec<u16>>,
     topics: Vec<TopicInfo>,
     epoch_ns: i64,
     duration_ns: i64,
     warnings: Vec<LogWarning>,
-    /// Kind of each warning.
     warning_kinds: Vec<WarningKind>,
 }
 
-/// Subject of a warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WarningKind {
     /// Unreadable bytes.

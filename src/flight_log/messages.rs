@@ -10,93 +10,61 @@ use super::cdr::{CdrError, CdrReader};
 use super::protobuf::{ProtobufReader, ProtobufValue};
 use super::video::codec::VideoCodec;
 use crate::geometry::RigidTransform;
+use crate::text::Named;
 
 /// Supported message type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum MessageKind {
-    /// `sensor_msgs/msg/Imu`.
     Imu,
-    /// `sensor_msgs/msg/Image`.
     Image,
-    /// `sensor_msgs/msg/CompressedImage`.
     CompressedImage,
-    /// `foxglove_msgs/msg/CompressedVideo`.
     CompressedVideo,
-    /// `foxglove.CompressedVideo`, encoded as protobuf.
     CompressedVideoProtobuf,
-    /// `ffmpeg_image_transport_msgs/msg/FFMPEGPacket`.
     FfmpegPacket,
-    /// `sensor_msgs/msg/CameraInfo`.
     CameraInfo,
-    /// `sensor_msgs/msg/JointState`.
     JointState,
-    /// `nav_msgs/msg/Odometry`.
     Odometry,
-    /// `geometry_msgs/msg/PoseStamped`.
     PoseStamped,
-    /// `geometry_msgs/msg/TransformStamped`.
     TransformStamped,
-    /// `geometry_msgs/msg/QuaternionStamped`.
     QuaternionStamped,
-    /// `geometry_msgs/msg/Vector3Stamped`.
     Vector3Stamped,
-    /// `tf2_msgs/msg/TFMessage`.
     Transforms,
-    /// `mavros_msgs/msg/GimbalDeviceAttitudeStatus`.
     MavrosGimbalAttitude,
-    /// `px4_msgs/msg/GimbalDeviceAttitudeStatus`.
     Px4GimbalAttitude,
-    /// `px4_msgs/msg/VehicleAttitude`.
     Px4VehicleAttitude,
 }
 
-impl MessageKind {
-    pub const ALL: [Self; 17] = [
-        Self::Imu,
-        Self::Image,
-        Self::CompressedImage,
-        Self::CompressedVideo,
-        Self::CompressedVideoProtobuf,
-        Self::FfmpegPacket,
-        Self::CameraInfo,
-        Self::JointState,
-        Self::Odometry,
-        Self::PoseStamped,
-        Self::TransformStamped,
-        Self::QuaternionStamped,
-        Self::Vector3Stamped,
-        Self::Transforms,
-        Self::MavrosGimbalAttitude,
-        Self::Px4GimbalAttitude,
-        Self::Px4VehicleAttitude,
+impl Named for MessageKind {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Imu, "sensor_msgs/msg/Imu"),
+        (Self::Image, "sensor_msgs/msg/Image"),
+        (Self::CompressedImage, "sensor_msgs/msg/CompressedImage"),
+        (Self::CompressedVideo, "foxglove_msgs/msg/CompressedVideo"),
+        (Self::CompressedVideoProtobuf, "foxglove.CompressedVideo"),
+        (Self::FfmpegPacket, "ffmpeg_image_transport_msgs/msg/FFMPEGPacket"),
+        (Self::CameraInfo, "sensor_msgs/msg/CameraInfo"),
+        (Self::JointState, "sensor_msgs/msg/JointState"),
+        (Self::Odometry, "nav_msgs/msg/Odometry"),
+        (Self::PoseStamped, "geometry_msgs/msg/PoseStamped"),
+        (Self::TransformStamped, "geometry_msgs/msg/TransformStamped"),
+        (Self::QuaternionStamped, "geometry_msgs/msg/QuaternionStamped"),
+        (Self::Vector3Stamped, "geometry_msgs/msg/Vector3Stamped"),
+        (Self::Transforms, "tf2_msgs/msg/TFMessage"),
+        (Self::MavrosGimbalAttitude, "mavros_msgs/msg/GimbalDeviceAttitudeStatus"),
+        (Self::Px4GimbalAttitude, "px4_msgs/msg/GimbalDeviceAttitudeStatus"),
+        (Self::Px4VehicleAttitude, "px4_msgs/msg/VehicleAttitude"),
     ];
+}
 
+impl MessageKind {
     /// Name of the schema in the log.
     pub fn schema_name(self) -> &'static str {
-        match self {
-            Self::Imu => "sensor_msgs/msg/Imu",
-            Self::Image => "sensor_msgs/msg/Image",
-            Self::CompressedImage => "sensor_msgs/msg/CompressedImage",
-            Self::CompressedVideo => "foxglove_msgs/msg/CompressedVideo",
-            Self::CompressedVideoProtobuf => "foxglove.CompressedVideo",
-            Self::FfmpegPacket => "ffmpeg_image_transport_msgs/msg/FFMPEGPacket",
-            Self::CameraInfo => "sensor_msgs/msg/CameraInfo",
-            Self::JointState => "sensor_msgs/msg/JointState",
-            Self::Odometry => "nav_msgs/msg/Odometry",
-            Self::PoseStamped => "geometry_msgs/msg/PoseStamped",
-            Self::TransformStamped => "geometry_msgs/msg/TransformStamped",
-            Self::QuaternionStamped => "geometry_msgs/msg/QuaternionStamped",
-            Self::Vector3Stamped => "geometry_msgs/msg/Vector3Stamped",
-            Self::Transforms => "tf2_msgs/msg/TFMessage",
-            Self::MavrosGimbalAttitude => "mavros_msgs/msg/GimbalDeviceAttitudeStatus",
-            Self::Px4GimbalAttitude => "px4_msgs/msg/GimbalDeviceAttitudeStatus",
-            Self::Px4VehicleAttitude => "px4_msgs/msg/VehicleAttitude",
-        }
+        self.name()
     }
 
     /// Kind with this schema name; `sensor_msgs/Imu` equals `sensor_msgs/msg/Imu`.
     pub fn from_schema_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| {
+        Self::all().find(|kind| {
             let full = kind.schema_name();
             name == full || name == full.replace("/msg/", "/")
         })
@@ -107,7 +75,6 @@ impl MessageKind {
         Self::from_schema_name(schema_name).filter(|kind| kind.encoding() == encoding)
     }
 
-    /// Supported message encoding.
     pub fn encoding(self) -> &'static str {
         if self == Self::CompressedVideoProtobuf { "protobuf" } else { "cdr" }
     }
@@ -136,11 +103,6 @@ impl MessageKind {
     /// True if the stamps are in microseconds, by default of PX4's clock, which counts from its start.
     pub fn counts_since_boot(self) -> bool {
         matches!(self, Self::Px4GimbalAttitude | Self::Px4VehicleAttitude)
-    }
-
-    /// True if the messages are poses.
-    pub fn is_pose(self) -> bool {
-        matches!(self, Self::Odometry | Self::PoseStamped | Self::TransformStamped)
     }
 }
 

@@ -14,10 +14,8 @@ pub enum Dimension {
     /// Seconds.
     #[serde(rename = "s")]
     Time,
-    /// Pixels.
     #[serde(rename = "px")]
     Pixel,
-    /// Dimensionless.
     #[serde(rename = "")]
     Ratio,
 }

@@ -1,23 +1,17 @@
 use std::ops::Mul;
 
-use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion, Vector3, Vector6};
 
 use super::so3;
 
 /// Rigid transform that maps points from one frame to another; a value is named `to_from_from`, as in
 /// `world_from_imu`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RigidTransform {
     /// Rotates vectors into the outer frame.
     pub rotation: UnitQuaternion<f64>,
     /// Origin of the inner frame in the outer frame, in metres.
     pub translation_m: Vector3<f64>,
-}
-
-impl Default for RigidTransform {
-    fn default() -> Self {
-        Self::identity()
-    }
 }
 
 impl RigidTransform {
@@ -60,11 +54,6 @@ impl RigidTransform {
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.inverse();
         Self::new(rotation, -(rotation * self.translation_m))
-    }
-
-    /// Transforms a point from the inner to the outer frame.
-    pub fn transform_point(&self, point: &Point3<f64>) -> Point3<f64> {
-        self.rotation * point + self.translation_m
     }
 
     /// Transforms a position vector from the inner to the outer frame (rotation and translation).

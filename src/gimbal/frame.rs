@@ -40,7 +40,6 @@ impl Frame {
         self.rotation.column(axis.index()).into_owned()
     }
 
-    /// Rotates about an axis of the frame.
     pub(super) fn rotate(&mut self, axis: Axis, angle_rad: f64) {
         let (sine, cosine) = angle_rad.sin_cos();
         let (next, after) = ((axis.index() + 1) % 3, (axis.index() + 2) % 3);
@@ -50,7 +49,6 @@ impl Frame {
         self.rotation.set_column(after, &second);
     }
 
-    /// Translates along an axis of the frame.
     pub(super) fn translate(&mut self, axis: Axis, distance_m: f64) {
         self.origin += self.rotation.column(axis.index()) * distance_m;
     }

@@ -1,6 +1,7 @@
 //! Identity of a calibration parameter and its name.
 
 use crate::geometry::{Dimension, principal_angle};
+use crate::text::Named;
 
 /// A scalar parameter of the static calibration: one column of its Jacobian.
 ///
@@ -23,18 +24,10 @@ pub enum ParameterGroup {
     Clocks,
 }
 
-impl ParameterGroup {
-    /// In the order of display.
-    pub const ALL: [Self; 4] = [Self::Chain, Self::Camera, Self::Imu, Self::Clocks];
-
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Chain => "chain",
-            Self::Camera => "camera",
-            Self::Imu => "IMU",
-            Self::Clocks => "clocks",
-        }
-    }
+/// In the order of display.
+impl Named for ParameterGroup {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::Chain, "chain"), (Self::Camera, "camera"), (Self::Imu, "IMU"), (Self::Clocks, "clocks")];
 }
 
 /// Transform, link or sensor that has calibration parameters.
@@ -172,7 +165,6 @@ impl ParameterId {
         if is_angle { principal_angle(value) } else { value }
     }
 
-    /// True for the offset of a joint angle.
     pub const fn is_joint_offset(self) -> bool {
         matches!(self.quantity, Quantity::Theta)
     }
@@ -227,6 +219,42 @@ impl ParameterPart {
     }
 }
 
+/// Second half of a parameter's name, after the dot.
+impl Named for Quantity {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Rx, "rx"),
+        (Self::Ry, "ry"),
+        (Self::Rz, "rz"),
+        (Self::Tx, "tx"),
+        (Self::Ty, "ty"),
+        (Self::Tz, "tz"),
+        (Self::Theta, "theta"),
+        (Self::D, "d"),
+        (Self::A, "a"),
+        (Self::Alpha, "alpha"),
+        (Self::Beta, "beta"),
+        (Self::Y, "y"),
+        (Self::Wx, "wx"),
+        (Self::Wy, "wy"),
+        (Self::Vx, "vx"),
+        (Self::Vy, "vy"),
+        (Self::Timeshift, "timeshift"),
+        (Self::Readout, "readout"),
+        (Self::Fx, "fx"),
+        (Self::Fy, "fy"),
+        (Self::Cx, "cx"),
+        (Self::Cy, "cy"),
+        (Self::K1, "k1"),
+        (Self::K2, "k2"),
+        (Self::Sx, "sx"),
+        (Self::Sy, "sy"),
+        (Self::Sz, "sz"),
+        (Self::Mxy, "mxy"),
+        (Self::Mxz, "mxz"),
+        (Self::Myz, "myz"),
+    ];
+}
+
 impl Quantity {
     /// Columns of a rigid transform: rotation vector, then translation.
     pub const TRANSFORM: [Self; 6] = [Self::Rx, Self::Ry, Self::Rz, Self::Tx, Self::Ty, Self::Tz];
@@ -239,75 +267,6 @@ impl Quantity {
     pub const INTRINSICS: [Self; 6] = [Self::Fx, Self::Fy, Self::Cx, Self::Cy, Self::K1, Self::K2];
     /// Columns of scale and misalignment of a gyroscope or accelerometer.
     pub const SCALE_MISALIGNMENT: [Self; 6] = [Self::Sx, Self::Sy, Self::Sz, Self::Mxy, Self::Mxz, Self::Myz];
-
-    const ALL: [Self; 30] = [
-        Self::Rx,
-        Self::Ry,
-        Self::Rz,
-        Self::Tx,
-        Self::Ty,
-        Self::Tz,
-        Self::Theta,
-        Self::D,
-        Self::A,
-        Self::Alpha,
-        Self::Beta,
-        Self::Y,
-        Self::Wx,
-        Self::Wy,
-        Self::Vx,
-        Self::Vy,
-        Self::Timeshift,
-        Self::Readout,
-        Self::Fx,
-        Self::Fy,
-        Self::Cx,
-        Self::Cy,
-        Self::K1,
-        Self::K2,
-        Self::Sx,
-        Self::Sy,
-        Self::Sz,
-        Self::Mxy,
-        Self::Mxz,
-        Self::Myz,
-    ];
-
-    /// Second half of a parameter's name, after the dot.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Rx => "rx",
-            Self::Ry => "ry",
-            Self::Rz => "rz",
-            Self::Tx => "tx",
-            Self::Ty => "ty",
-            Self::Tz => "tz",
-            Self::Theta => "theta",
-            Self::D => "d",
-            Self::A => "a",
-            Self::Alpha => "alpha",
-            Self::Beta => "beta",
-            Self::Y => "y",
-            Self::Wx => "wx",
-            Self::Wy => "wy",
-            Self::Vx => "vx",
-            Self::Vy => "vy",
-            Self::Timeshift => "timeshift",
-            Self::Readout => "readout",
-            Self::Fx => "fx",
-            Self::Fy => "fy",
-            Self::Cx => "cx",
-            Self::Cy => "cy",
-            Self::K1 => "k1",
-            Self::K2 => "k2",
-            Self::Sx => "sx",
-            Self::Sy => "sy",
-            Self::Sz => "sz",
-            Self::Mxy => "mxy",
-            Self::Mxz => "mxz",
-            Self::Myz => "myz",
-        }
-    }
 
     pub const fn dimension(self) -> Dimension {
         match self {
@@ -377,7 +336,6 @@ impl ParameterNames {
         }
     }
 
-    /// Parses the name of a singularity.
     pub fn parse_singularity(&self, name: &str) -> Option<Singularity> {
         match name {
             "base" => Some(Singularity::Base),
@@ -394,7 +352,7 @@ impl ParameterNames {
     /// Parses the name of a parameter; a link by its joint name or as `L1`.
     pub fn parse(&self, name: &str) -> Option<ParameterId> {
         let (part, quantity) = name.rsplit_once('.').unwrap_or(("", name));
-        let quantity = Quantity::ALL.into_iter().find(|known| known.name() == quantity)?;
+        let quantity = Quantity::from_name(quantity)?;
         let index_of = |names: &[String]| names.iter().position(|known| known == part);
         let number = |prefix: &str| part.strip_prefix(prefix)?.parse::<u8>().ok();
         let camera = index_of(&self.cameras).and_then(|index| u8::try_from(index + 1).ok());
@@ -423,7 +381,6 @@ impl ParameterNames {
     }
 }
 
-/// Location of a singularity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Singularity {
     /// Base block of a minimal parameterization.
@@ -449,7 +406,7 @@ mod tests {
         let mut random = Random::new(31);
         for joints in [0, 1, 3] {
             let classical = random.chain(joints);
-            for parameterization in Parameterization::ALL {
+            for parameterization in Parameterization::all() {
                 let mut parameters = Chain::from_classical(&classical, parameterization).parameters();
                 parameters.extend([
                     ParameterId::timeshift(0),

@@ -3,6 +3,8 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
+use crate::text::Named;
+
 /// Parameterization of a chain; all but `Classical` have 4N + 6 columns.
 ///
 /// Minimal parameterizations start with `Rx·Ry·T(tx, ty, 0)` (Eq. 20), or with `Ry·Rx·…` where the name has
@@ -25,23 +27,18 @@ pub enum Parameterization {
     Poe,
 }
 
+impl Named for Parameterization {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Classical, "classical"),
+        (Self::Minimal, "minimal"),
+        (Self::MinimalYx, "minimal-yx"),
+        (Self::MinimalSwapped, "minimal-swapped"),
+        (Self::MinimalSwappedYx, "minimal-swapped-yx"),
+        (Self::Poe, "poe"),
+    ];
+}
+
 impl Parameterization {
-    /// All parameterizations, in the order of the manual.
-    pub const ALL: [Self; 6] =
-        [Self::Classical, Self::Minimal, Self::MinimalYx, Self::MinimalSwapped, Self::MinimalSwappedYx, Self::Poe];
-
-    /// Name on the command line and in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Classical => "classical",
-            Self::Minimal => "minimal",
-            Self::MinimalYx => "minimal-yx",
-            Self::MinimalSwapped => "minimal-swapped",
-            Self::MinimalSwappedYx => "minimal-swapped-yx",
-            Self::Poe => "poe",
-        }
-    }
-
     /// Returns the minimal parameterization with this base order and end block.
     pub fn minimal(yx: bool, swapped: bool) -> Self {
         match (yx, swapped) {
@@ -50,11 +47,6 @@ impl Parameterization {
             (false, true) => Self::MinimalSwapped,
             (true, true) => Self::MinimalSwappedYx,
         }
-    }
-
-    /// True for the four minimal parameterizations.
-    pub fn is_minimal(self) -> bool {
-        !matches!(self, Self::Classical | Self::Poe)
     }
 
     /// True if the base rotates about y first.
@@ -75,15 +67,13 @@ impl fmt::Display for Parameterization {
 }
 
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error(
-    "unknown parameterization '{0}': expected one of classical, minimal, minimal-yx, minimal-swapped, minimal-swapped-yx, poe"
-)]
+#[error("unknown parameterization '{0}': expected one of {names}", names = Parameterization::names())]
 pub struct UnknownParameterization(pub String);
 
 impl FromStr for Parameterization {
     type Err = UnknownParameterization;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        Self::ALL.into_iter().find(|it| it.name() == name).ok_or_else(|| UnknownParameterization(name.to_owned()))
+        Self::from_name(name).ok_or_else(|| UnknownParameterization(name.to_owned()))
     }
 }

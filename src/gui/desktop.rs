@@ -6,7 +6,6 @@ use std::sync::mpsc::Receiver;
 
 use image::RgbaImage;
 
-/// A completion of a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PathEntry {
     /// Whole path, as typed.

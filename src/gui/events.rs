@@ -17,7 +17,6 @@ pub(crate) enum Mark {
     Square,
 }
 
-/// The name of a kind of event in the window.
 pub(crate) fn name_of(kind: EventKind) -> &'static str {
     match kind {
         EventKind::InitializationWaits => "waiting for initialization",
@@ -34,7 +33,6 @@ pub(crate) fn name_of(kind: EventKind) -> &'static str {
     }
 }
 
-/// Symbol and colour of a kind of event.
 pub(crate) fn look_of(kind: EventKind, theme: &Theme) -> (Mark, Color32) {
     match kind {
         EventKind::InitializedFromMotion | EventKind::InitializedFromStationary => (Mark::Triangle, theme.ok),

@@ -11,7 +11,6 @@ pub(crate) struct Follower {
     run: Option<u64>,
 }
 
-/// The new steps of a run.
 pub(crate) struct NewSteps<'a> {
     /// True if the run was replaced or recomputed, so that everything read before is invalid.
     pub(crate) restarted: bool,

@@ -12,6 +12,7 @@ use crate::gimbal::{ParameterId, ParameterNames};
 use crate::observability::{ChainSlide, SlidePosition};
 use crate::session::breakpoints::Breakpoints;
 use crate::session::{Command, FrameImage, Recording, RunRecord, SolverPosition};
+use crate::text::Named;
 
 /// One of the panels: it draws itself, and gives its values.
 pub trait Panel: CsvTable {
@@ -163,7 +164,6 @@ pub enum PanelName {
     Inspector,
     /// Observability of a mechanism and a motion without a log.
     Laboratory,
-    /// Comparison of all runs.
     Comparison,
     /// Breakpoints and their hits.
     Breakpoints,
@@ -171,56 +171,44 @@ pub enum PanelName {
     Timeline,
 }
 
-impl PanelName {
-    pub const ALL: [Self; 11] = [
-        Self::Image,
-        Self::Scene,
-        Self::Convergence,
-        Self::Rank,
-        Self::Jacobian,
-        Self::Residuals,
-        Self::Inspector,
-        Self::Laboratory,
-        Self::Comparison,
-        Self::Breakpoints,
-        Self::Timeline,
+/// Names on the command line, which are also the anchors of the panels' sections in the manual.
+impl Named for PanelName {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Image, "image"),
+        (Self::Scene, "scene"),
+        (Self::Convergence, "convergence"),
+        (Self::Rank, "rank"),
+        (Self::Jacobian, "jacobian"),
+        (Self::Residuals, "residuals"),
+        (Self::Inspector, "inspector"),
+        (Self::Laboratory, "laboratory"),
+        (Self::Comparison, "comparison"),
+        (Self::Breakpoints, "breakpoints"),
+        (Self::Timeline, "timeline"),
     ];
+}
 
+impl PanelName {
     /// The panels that can be moved and hidden: all but the timeline.
     pub fn movable() -> impl Iterator<Item = Self> {
-        Self::ALL.into_iter().filter(|panel| *panel != Self::Timeline)
-    }
-
-    /// Name on the command line, and title.
-    const fn names(self) -> (&'static str, &'static str) {
-        match self {
-            Self::Image => ("image", "Image"),
-            Self::Scene => ("scene", "Scene"),
-            Self::Convergence => ("convergence", "Convergence"),
-            Self::Rank => ("rank", "Rank"),
-            Self::Jacobian => ("jacobian", "Jacobian"),
-            Self::Residuals => ("residuals", "Residuals"),
-            Self::Inspector => ("inspector", "Inspector"),
-            Self::Laboratory => ("laboratory", "Laboratory"),
-            Self::Comparison => ("comparison", "Comparison"),
-            Self::Breakpoints => ("breakpoints", "Breakpoints"),
-            Self::Timeline => ("timeline", "Timeline"),
-        }
-    }
-
-    /// Name on the command line.
-    pub const fn as_str(self) -> &'static str {
-        self.names().0
-    }
-
-    /// Anchor of the panel's section in the manual.
-    pub(crate) const fn section(self) -> &'static str {
-        self.as_str()
+        Self::all().filter(|panel| *panel != Self::Timeline)
     }
 
     /// Title in the window.
     pub const fn title(self) -> &'static str {
-        self.names().1
+        match self {
+            Self::Image => "Image",
+            Self::Scene => "Scene",
+            Self::Convergence => "Convergence",
+            Self::Rank => "Rank",
+            Self::Jacobian => "Jacobian",
+            Self::Residuals => "Residuals",
+            Self::Inspector => "Inspector",
+            Self::Laboratory => "Laboratory",
+            Self::Comparison => "Comparison",
+            Self::Breakpoints => "Breakpoints",
+            Self::Timeline => "Timeline",
+        }
     }
 }
 

@@ -17,7 +17,6 @@ pub(crate) struct PathField {
     desktop: Option<Arc<dyn Desktop>>,
     typed: String,
     chosen: Option<usize>,
-    /// Completed text and its completions.
     completed: Option<(String, Vec<PathEntry>)>,
 }
 

@@ -8,7 +8,6 @@ pub enum ConfigurationError {
     /// The rig has no such camera.
     #[error(transparent)]
     Camera(#[from] UnknownCamera),
-    /// The program does not support this lens.
     #[error(
         "{camera} is {model}, which {program} lacks; it takes {takes}. Calibrate the camera with one of these models (Kalibr \
          fits any of its own to the same images), or undistort its images and describe them as pinhole with none"
@@ -18,46 +17,22 @@ pub enum ConfigurationError {
         /// Projection and distortion of the camera in Kalibr's names.
         model: String,
         program: &'static str,
-        /// Lenses that the program supports.
         takes: &'static str,
     },
-    /// More cameras than the program supports.
     #[error("{program} takes {}, {given} were requested", cameras(*most))]
-    TooManyCameras {
-        program: &'static str,
-        /// Supported number of cameras.
-        most: usize,
-        /// Requested number of cameras.
-        given: usize,
-    },
-    /// A camera was named twice.
+    TooManyCameras { program: &'static str, most: usize, given: usize },
     #[error("--camera {camera} is given twice")]
     CameraTwice { camera: String },
-    /// The rig has no joint with this name.
     #[error("the rig has no joint '{name}'; {}", joints(available))]
     UnknownJoint { name: String, available: Vec<String> },
-    /// A joint was named twice.
     #[error("the angle of joint '{name}' is given twice")]
     JointTwice { name: String },
-    /// An angle beyond the joint's limits.
     #[error("{name}={angle_deg} lies beyond the joint's limits, {:.1}° to {:.1}°", limits_deg.0, limits_deg.1)]
-    BeyondLimits {
-        name: String,
-        angle_deg: f64,
-        /// Lower and upper limit in degrees.
-        limits_deg: (f64, f64),
-    },
-    /// The number of angles differs from the number of joints.
+    BeyondLimits { name: String, angle_deg: f64, limits_deg: (f64, f64) },
     #[error("{given} joint angles, expected {expected} as in the rig")]
-    AngleCount {
-        given: usize,
-        /// Number of joints.
-        expected: usize,
-    },
-    /// Measured angles were requested, but no camera is on a gimbal.
+    AngleCount { given: usize, expected: usize },
     #[error("the rig has no camera on a gimbal, so there are no joint angles to take from a log")]
     NoGimbal,
-    /// The log has no joint angles at that time.
     #[error(
         "the log has no joint angles within 1 s after {time_s} s; give another time with --at, or the angles with --joints"
     )]

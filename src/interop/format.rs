@@ -3,6 +3,7 @@
 use super::{ConfigurationError, OtherEstimator};
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::sensors::{CameraMount, Rig};
+use crate::text::Named as _;
 
 /// Support of a program for time offsets between cameras and IMU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +34,7 @@ fn is_radtan(lens: &Distortion) -> bool {
 
 impl Format {
     pub(super) fn of(program: OtherEstimator) -> Self {
-        let title = program.title();
+        let title = program.name();
         match program {
             OtherEstimator::Kalibr => Self {
                 title,

@@ -10,14 +10,11 @@ use crate::sensors::{CameraMount, Rig};
 /// Search range in seconds after the requested time for an image with joint angles.
 const SEARCHED_S: f64 = 1.0;
 
-/// Source of joint angles.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AngleOrigin {
-    /// The neutral angles of the rig.
     Neutral,
     /// Given by the user, neutral for the other joints.
     Given,
-    /// Measured in a log.
     Measured {
         log: String,
         /// In seconds since the log began.

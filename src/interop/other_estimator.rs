@@ -1,5 +1,7 @@
 //! The programs whose configuration can be written.
 
+use crate::text::Named;
+
 /// A program whose configuration can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OtherEstimator {
@@ -15,18 +17,13 @@ pub enum OtherEstimator {
     OrbSlam3,
 }
 
-impl OtherEstimator {
-    /// All programs.
-    pub const ALL: [Self; 5] = [Self::Kalibr, Self::VinsFusion, Self::OpenVins, Self::Basalt, Self::OrbSlam3];
-
-    /// Name used by its authors.
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::Kalibr => "Kalibr",
-            Self::VinsFusion => "VINS-Fusion",
-            Self::OpenVins => "OpenVINS",
-            Self::Basalt => "Basalt",
-            Self::OrbSlam3 => "ORB-SLAM3",
-        }
-    }
+/// Names used by their authors.
+impl Named for OtherEstimator {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Kalibr, "Kalibr"),
+        (Self::VinsFusion, "VINS-Fusion"),
+        (Self::OpenVins, "OpenVINS"),
+        (Self::Basalt, "Basalt"),
+        (Self::OrbSlam3, "ORB-SLAM3"),
+    ];
 }

@@ -9,13 +9,14 @@ use crate::flight_log::printable;
 use crate::flight_log::yaml::{number, numbers};
 use crate::geometry::RigidTransform;
 use crate::sensors::{CameraMount, CameraRig, GrayImage, ImageMask, Rig};
+use crate::text::Named as _;
 
 /// Text in the first line of every file, which identifies files of this program.
 pub(super) const MARK: &str = "Written by dcvins export";
 
 /// The first lines of every file.
 pub(super) fn head(program: OtherEstimator, rig: &str, notes: &[String]) -> Vec<String> {
-    let mut head = vec![format!("{MARK} for {} from the rig '{}'.", program.title(), printable(rig))];
+    let mut head = vec![format!("{MARK} for {} from the rig '{}'.", program.name(), printable(rig))];
     head.extend(notes.iter().map(|note| {
         let mut letters = note.chars();
         let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
@@ -26,7 +27,6 @@ pub(super) fn head(program: OtherEstimator, rig: &str, notes: &[String]) -> Vec<
     head
 }
 
-/// The head as comments of YAML.
 pub(super) fn comments(head: &[String]) -> String {
     head.iter().map(|line| format!("# {line}\n")).collect::<Vec<_>>().concat()
 }

@@ -83,7 +83,6 @@ fn configuration(rig: &Rig, head: &[String]) -> String {
     out
 }
 
-/// A camera in camodocal's keys.
 fn camodocal(model: &CameraModel) -> String {
     let [fx, fy, cx, cy] = model.intrinsics_px;
     let radtan = match &model.distortion {

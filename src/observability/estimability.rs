@@ -30,7 +30,6 @@ pub enum Estimability {
     Weak,
     /// The prior determines the value.
     NotFromThisFlight,
-    /// Fixed at its value.
     Fixed,
     /// Not estimated yet.
     Waiting,
@@ -115,7 +114,6 @@ pub fn estimability(
     rows
 }
 
-/// Number of parameters with this estimability.
 pub fn count_of(rows: &[ParameterEstimability], estimability: Estimability) -> usize {
     rows.iter().filter(|row| row.estimability == estimability).count()
 }

@@ -15,7 +15,6 @@ pub struct InformationRate {
     pub parameters: Vec<ParameterRate>,
 }
 
-/// Information gain of one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterRate {
     pub parameter: ParameterId,

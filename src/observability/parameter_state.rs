@@ -13,7 +13,6 @@ const MIN_LOST_RATIO: f64 = 0.25;
 pub enum ParameterState {
     /// The window constrains it more than the prior.
     Informed,
-    /// Fixed at its value.
     Fixed,
     /// The window constrains it less than the prior.
     Weak,

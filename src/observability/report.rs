@@ -25,7 +25,6 @@ pub struct RankReport {
     pub rank_structural: usize,
     /// Number of singular values at or over the informed threshold.
     pub rank_informed: usize,
-    /// Deficit due to the parameterization.
     pub deficit_parameterization: usize,
     /// Deficit due to joints that did not move in the window.
     pub deficit_joints: usize,
@@ -35,11 +34,9 @@ pub struct RankReport {
     pub deficit_motion: usize,
     /// Null and weak directions, the least observable first.
     pub directions: Vec<CalibrationDirection>,
-    /// Singularity margins of the parameterization.
     pub margins: Vec<(Singularity, f64)>,
     /// Null directions of the chain in closed form, compared with this measurement.
     pub known: Vec<KnownDirection>,
-    /// Number of joints of the chain.
     pub joint_count: usize,
     /// Posterior information of the calibration after the step, priors included, columns in units of the scale.
     pub posterior: PackedFactor,
@@ -69,7 +66,6 @@ pub struct CalibrationDirection {
 }
 
 impl RankReport {
-    /// The deficit by cause.
     pub fn deficit(&self) -> Deficit {
         Deficit {
             parameterization: self.deficit_parameterization,

@@ -23,7 +23,6 @@ pub enum SlideDirection {
 /// Direction and amount of a change of the chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlidePosition {
-    /// Direction of the change.
     pub direction: SlideDirection,
     /// Amount in units of 10° and 3 cm along the unit direction.
     pub amount: f64,

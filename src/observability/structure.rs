@@ -165,7 +165,6 @@ fn links(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<
 pub(super) struct Measured<'a> {
     pub(super) scale: &'a DVector<f64>,
     pub(super) block: &'a DMatrix<f64>,
-    /// Null space of `block`.
     pub(super) null_space: DMatrixView<'a, f64>,
     pub(super) with_priors: &'a DMatrix<f64>,
     /// Rows of the rig's prior alone.

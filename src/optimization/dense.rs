@@ -19,7 +19,6 @@ const DEPENDENT: f64 = 1e-9;
 pub(crate) struct Echelon {
     /// Rows `[R | Qᵀb]`, as many as `A` has rank: each starts at a column that is independent of the previous ones.
     pub(crate) rows: DMatrix<f64>,
-    /// Rank of the leading columns.
     pub(crate) leading_rank: usize,
 }
 

@@ -10,13 +10,10 @@ use pulp::{Arch, NullaryFnOnce};
 
 use super::BlockTerm;
 
-/// Number of columns of a landmark.
 const LANDMARK: usize = 3;
 /// Number of columns before the blocks: landmark and residual.
 const LEADING: usize = LANDMARK + 1;
-/// Number of columns of a block.
 const BLOCK: usize = 6;
-/// Number of rows of an observation.
 const OBSERVATION: usize = 2;
 /// A column of the landmark depends on the previous ones when no more than this fraction of it is independent.
 const DEPENDENT: f64 = 1e-12;

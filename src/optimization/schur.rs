@@ -31,7 +31,6 @@ pub(crate) trait PoseEquations: Clone {
     /// Block of the Hessian, `row ≤ column`.
     fn hessian_mut(&mut self, row: Self::Pose, column: Self::Pose) -> &mut Matrix6<f64>;
 
-    /// Gradient by one pose.
     fn gradient_mut(&mut self, pose: Self::Pose) -> &mut Vector6<f64>;
 }
 
@@ -40,7 +39,6 @@ pub(crate) trait PoseEquations: Clone {
 pub(crate) struct DensePoseEquations {
     /// Upper blocks of the Hessian.
     pub(crate) hessian: PoseBlocks,
-    /// Gradient by pose.
     pub(crate) gradient: Vec<Vector6<f64>>,
 }
 

@@ -21,7 +21,6 @@ impl Ray {
     }
 }
 
-/// Options of [`triangulate`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TriangulationOptions {
     /// Rounds of least squares; each after the first weights a ray by the inverse square of its length.

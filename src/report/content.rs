@@ -30,25 +30,20 @@ pub(super) struct RunContent {
     pub(super) label: String,
     /// The verdict at the top of the page.
     pub(super) verdict: RunVerdict,
-    /// The summary, as in `summary.json`.
     pub(super) summary: RunSummary,
     /// Estimability of the calibration parameters, in groups.
     pub(super) estimability: Vec<EstimabilitySummary>,
-    /// Intervals of constant rank.
     #[serde(rename = "rank_story")]
     pub(super) rank_intervals: Vec<RankInterval>,
-    /// Notable events.
     pub(super) events: Vec<ReportEvent>,
     /// Counts of the frequent kinds of events.
     pub(super) frequent_events: BTreeMap<String, usize>,
 }
 
-/// The content of the whole report.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct ReportContent {
     /// Program and version.
     pub(super) program: &'static str,
-    /// Command line of the report.
     pub(super) command: String,
     pub(super) log: String,
     pub(super) rig: String,
@@ -56,13 +51,11 @@ pub(super) struct ReportContent {
     pub(super) duration_s: f64,
     /// Input files with their hashes.
     pub(super) inputs: Vec<InputFile>,
-    /// The verdict on the log and the rig.
     pub(super) log_verdict: Statement,
     /// Runs in the order of the command line.
     pub(super) runs: Vec<RunContent>,
     /// Findings about the log and its rig, as printed by `check --json`.
     pub(super) check: Option<CheckReport>,
-    /// Warnings about the log.
     pub(super) log_warnings: Vec<String>,
 }
 

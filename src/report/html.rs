@@ -64,7 +64,6 @@ pub(super) fn table<S: AsRef<str>>(caption: &str, header: &[S], rows: &[Vec<Stri
     }
 }
 
-/// A figure with its number and caption.
 pub(super) fn figure(number: usize, figure: &ReportFigure) -> Markup {
     let ReportFigure { title, reading, drawing, .. } = figure;
     html! {

@@ -12,7 +12,6 @@ use crate::study::hex;
 pub(super) struct InputFile {
     /// File name without the folder.
     pub(super) name: String,
-    /// Size in bytes.
     pub(super) bytes: u64,
     /// SHA-256 of its content, in hexadecimal.
     pub(super) sha256: String,

@@ -21,7 +21,6 @@ pub(super) struct RankInterval {
     pub(super) from_s: f64,
     /// End, in seconds since the log began.
     pub(super) to_s: f64,
-    /// Number of calibration columns.
     pub(super) columns: usize,
     pub(super) structural: usize,
     pub(super) informed: usize,

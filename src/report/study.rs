@@ -20,13 +20,11 @@ const INDEX: &str = "report.json";
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StudyReport {
     pub study: String,
-    /// Number of runs of the study.
     pub runs: usize,
     /// Number of runs that pass the filter.
     pub shown: usize,
     /// Filter condition, empty for all runs.
     pub filter: String,
-    /// Grouping column.
     pub group: Option<String>,
     /// Title of the metric with its unit.
     pub metric: String,

@@ -161,7 +161,6 @@ fn calibration_row(parameter: &ParameterSummary, with_ground_truth: bool) -> Vec
     row
 }
 
-/// Notable events of one run.
 pub(super) fn events(run: &RunContent) -> Markup {
     let rows: Vec<Vec<String>> = run
         .events

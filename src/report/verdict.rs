@@ -33,7 +33,6 @@ pub(super) enum Mark {
     Error,
 }
 
-/// One statement of the verdict.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(super) struct Statement {
     /// Subject in one word.

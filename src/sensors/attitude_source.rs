@@ -78,7 +78,6 @@ pub enum AttitudeValue {
 }
 
 impl AttitudeSource {
-    /// Frame of a recorded attitude.
     pub fn frame_of(&self, value: &AttitudeValue) -> AttitudeFrame {
         match (self.frame, value) {
             (AttitudeFrame::Flags, AttitudeValue::Flagged(_, flags)) => AttitudeFrame::of_flags(*flags),
@@ -152,7 +151,6 @@ const MIN_HORIZONTAL: f64 = 0.0175;
 /// Frame that a gimbal's attitude is relative to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AttitudeFrame {
-    /// Body of the vehicle.
     Body,
     /// `MAVLink`'s vehicle frame: levelled, x towards the vehicle's heading.
     Vehicle,
@@ -183,7 +181,6 @@ impl AttitudeFrame {
     }
 }
 
-/// Unit of recorded angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AngleUnit {
     Radians,
@@ -209,11 +206,9 @@ impl AngleUnit {
 pub struct EulerAngles {
     /// At most one rotation about each axis, in the order of the rotations.
     pub order: Vec<EulerRotation>,
-    /// Unit of the fields.
     pub unit: AngleUnit,
 }
 
-/// One of the rotations of Euler angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EulerRotation {
     /// 0 (x, roll), 1 (y, pitch) or 2 (z, yaw).

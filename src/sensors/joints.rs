@@ -44,7 +44,6 @@ impl JointMotionFit {
 }
 
 impl JointAngles {
-    /// Bytes on the heap.
     pub fn heap_bytes(&self) -> usize {
         let all = [&self.angles_rad, &self.sigmas_rad, &self.lasting_sigmas_rad, &self.rates_rad_per_s];
         all.iter().map(|numbers| numbers.capacity() * size_of::<f64>()).sum::<usize>()

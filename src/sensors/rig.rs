@@ -40,10 +40,11 @@ pub struct ImuRig {
 /// Extrinsics of a camera: rigid, or by the gimbal.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CameraMount {
-    /// At the end of the rig's gimbal.
     Gimbal,
     /// Rigid, at this pose (the inverse of Kalibr's `T_cam_imu`).
-    Static { imu_from_camera: RigidTransform },
+    Static {
+        imu_from_camera: RigidTransform,
+    },
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -139,7 +140,6 @@ pub struct GimbalRig {
     pub rate_hz: f64,
     /// Standard deviation of a reading, `None` without encoders.
     pub encoder_sigma_rad: Option<f64>,
-    /// Prior of `chain`.
     pub prior: ChainPrior,
     /// True if runs in a minimal parameterization switch to another one near a singularity (`parameterization: auto`).
     pub switches_parameterization: bool,

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Serialize, Serializer};
 
+use crate::calibration::Statistics;
 use crate::geometry::{RigidTransform, so3, wrap_angle};
 
 /// A stamped pose. Stamps are in seconds, on a clock that both trajectories share.
@@ -63,25 +64,11 @@ pub struct ErrorStatistics {
 impl ErrorStatistics {
     /// Statistics of the errors, `None` if there are none.
     pub fn of(errors: &[f64]) -> Option<Self> {
-        if errors.is_empty() {
-            return None;
-        }
-        let count = errors.len();
-        let mean = errors.iter().sum::<f64>() / count as f64;
-        let square = errors.iter().map(|error| error * error).sum::<f64>() / count as f64;
-        let variance = errors.iter().map(|error| (error - mean).powi(2)).sum::<f64>() / count as f64;
+        let Statistics { count, mean, std, rms, .. } = Statistics::of(errors)?;
         let mut sorted = errors.to_vec();
         sorted.sort_by(f64::total_cmp);
         let median = if count % 2 == 1 { sorted[count / 2] } else { 0.5 * (sorted[count / 2 - 1] + sorted[count / 2]) };
-        Some(Self {
-            count,
-            rmse: square.sqrt(),
-            mean,
-            median,
-            std: variance.sqrt(),
-            min: sorted[0],
-            max: sorted[count - 1],
-        })
+        Some(Self { count, rmse: rms, mean, median, std, min: sorted[0], max: sorted[count - 1] })
     }
 }
 
@@ -239,7 +226,6 @@ fn heading_rad(rotation: &UnitQuaternion<f64>) -> f64 {
 /// Distance between the two poses of a relative error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RelativeDelta {
-    /// This number of frames.
     Frames(usize),
     /// This path length along the aligned estimate, in metres.
     Metres(f64),

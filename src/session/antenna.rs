@@ -73,7 +73,6 @@ pub enum AntennaError {
     /// Too few pairs, or positions that do not determine the alignment.
     #[error("{pairs} poses with a position of the antenna do not determine the alignment")]
     NotDetermined { pairs: usize },
-    /// The rotations of the flight do not determine the lever arm.
     #[error(
         "lever arm not observable: the rotations of the flight excite direction ({:.2}, {:.2}, {:.2}) of the IMU frame by only \
          {excitation_deg:.1}° (at least {MIN_EXCITATION_DEG}° needed); measure it with a ruler and give it as \
@@ -123,7 +122,6 @@ pub fn antenna_statistics(pairs: &[AntennaPair], alignment: &AntennaAlignment) -
     Some((statistics, path_length_m(pairs.iter().map(|pair| &pair.antenna_m))))
 }
 
-/// Alignment with a known lever arm.
 fn aligned(pairs: &[AntennaPair], lever_arm_m: &Vector3<f64>) -> Result<RigidTransform, AntennaError> {
     let mut sums = AlignmentSums::default();
     for pair in pairs {

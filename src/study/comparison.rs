@@ -26,7 +26,6 @@ fn worse_direction(column: &str) -> Direction {
     run_column(column).map_or(Direction::Larger, |column| column.worse)
 }
 
-/// Verdict on a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -36,7 +35,6 @@ pub enum Verdict {
     Better,
     /// Worse beyond the tolerance and the noise.
     Worse,
-    /// Too few pairs for a verdict.
     TooFewPairs,
 }
 
@@ -72,23 +70,19 @@ pub struct MetricComparison {
     pub verdict: Verdict,
 }
 
-/// One pair of runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WorstPair {
     /// Log, levels, seed and specification.
     pub run: String,
     /// Value in the baseline.
     pub old: f64,
-    /// Value in the new study.
     pub new: f64,
 }
 
-/// The result of a comparison.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StudyComparison {
     /// Number of runs of the baseline.
     pub old_runs: usize,
-    /// Number of runs of the new study.
     pub new_runs: usize,
     /// Number of runs in both studies.
     pub pairs: usize,
@@ -107,21 +101,18 @@ pub struct StudyComparison {
 /// Reason why two studies cannot be compared.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum ComparisonError {
-    /// A tolerance does not name a numeric column.
     #[error("tolerance '{name}': the table of runs has no column of numbers of that name; it has {}", known.join(", "))]
     UnknownMetric {
         name: String,
         /// Numeric columns of the table of runs.
         known: Vec<String>,
     },
-    /// A column by which runs are paired is missing.
     #[error("the {which} has no column '{column}': not a table of runs of a study (results.parquet)")]
     MissingColumn {
         /// The baseline or the new study.
         which: &'static str,
         column: &'static str,
     },
-    /// No run of the new study is in the baseline.
     #[error(
         "no run of the study is in the baseline: they are paired by log, disturbance, perturbation, seed and the settings or \
          the name of the run"

@@ -226,12 +226,10 @@ impl StudyJob {
     }
 }
 
-/// Bytes in hexadecimal.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
 }
 
-/// A job with its key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeyedJob {
     /// See [`StudyJob::key`].

@@ -38,7 +38,6 @@ pub enum RigQuantity {
     Centre,
     /// The first two coefficients of the distortion.
     Distortion,
-    /// The time offsets of the cameras.
     CameraTimeshift,
     /// The readout times of the cameras.
     Readout,
@@ -151,7 +150,6 @@ impl fmt::Display for MagnitudeError {
     }
 }
 
-/// Distribution of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Distribution {
@@ -168,10 +166,8 @@ impl Named for Distribution {
         &[(Self::Uniform, "uniform"), (Self::Normal, "normal"), (Self::Constant, "constant")];
 }
 
-/// One error of a perturbation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RigChange {
-    /// The perturbed quantity.
     pub quantity: RigQuantity,
     /// Distribution of each value of the quantity; the values are independent.
     pub distribution: Distribution,
@@ -183,7 +179,6 @@ pub struct RigChange {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PerturbationStart {
-    /// The rig of the log.
     #[default]
     Rig,
     /// The ground-truth rig of the log, with the noise and the prior of the log's rig.
@@ -212,7 +207,6 @@ pub struct RigPerturbation {
 /// Reason why a rig cannot be perturbed.
 #[derive(Debug, Error)]
 pub enum PerturbationError {
-    /// The rig does not have the quantity.
     #[error("perturbation '{perturbation}' changes {quantity}, but the rig has {missing}")]
     NothingToChange {
         perturbation: String,
@@ -220,10 +214,8 @@ pub enum PerturbationError {
         /// The missing entry of the rig.
         missing: &'static str,
     },
-    /// A camera would have impossible intrinsics.
     #[error("perturbation '{perturbation}' gives {camera} impossible intrinsics: {source}")]
     Camera { perturbation: String, camera: String, source: CameraError },
-    /// The perturbation starts from the ground truth, which is unknown.
     #[error("perturbation '{perturbation}' starts from the truth, but the log has no ground-truth rig")]
     NoGroundTruth { perturbation: String },
 }

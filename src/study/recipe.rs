@@ -6,7 +6,6 @@ use crate::sensors::ChainPrior;
 use crate::simulation::{Experiment, Lens, SimulationError, SimulationOptions};
 use crate::text::Named as _;
 
-/// Noise of the simulated encoders.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EncoderNoise {

@@ -3,9 +3,7 @@
 /// Mean of paired differences with its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeanInterval {
-    /// Number of pairs.
     pub pairs: usize,
-    /// Mean difference.
     pub mean: f64,
     /// Lower end of the two-sided 95 % interval of the mean.
     pub low: f64,

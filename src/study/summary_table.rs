@@ -27,7 +27,6 @@ impl Named for Statistic {
         &[(Self::Median, "median"), (Self::Mean, "mean"), (Self::Sum, "sum"), (Self::Ratio, "ratio")];
 }
 
-/// A column of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SummaryColumn {
     /// Numeric column of the table of runs.

@@ -16,7 +16,6 @@ pub enum ColumnType {
     Number,
     /// 64-bit signed integer.
     Integer,
-    /// UTF-8 text.
     Text,
     Bool,
 }
@@ -33,7 +32,6 @@ impl ColumnType {
     }
 }
 
-/// One cell as a value.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
     /// No value, of any type.
@@ -140,7 +138,6 @@ impl<T: Into<Self>> From<Option<T>> for Cell {
 /// The values of one column, one per row; `None` is an empty cell.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ColumnValues {
-    /// Finite numbers.
     Number(Vec<Option<f64>>),
     Integer(Vec<Option<i64>>),
     Text(Vec<Option<String>>),
@@ -217,7 +214,6 @@ pub struct StudyColumn {
     pub unit: String,
     /// Meaning of a cell in one line.
     pub description: String,
-    /// One value per row.
     pub values: ColumnValues,
 }
 
@@ -235,10 +231,8 @@ impl StudyColumn {
 /// Reason why rows or columns do not fit into a table.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum TableError {
-    /// Two columns have the same name.
     #[error("two columns are named '{name}'")]
     TwoColumns { name: String },
-    /// A column has another number of rows than the first one.
     #[error("column '{name}' has {found} rows, the first column {expected}")]
     UnequalLength {
         name: String,
@@ -247,18 +241,10 @@ pub enum TableError {
         /// Number of rows of the first column.
         expected: usize,
     },
-    /// A value for a column that does not exist.
     #[error("there is no column '{name}'")]
     NoColumn { name: String },
-    /// A value of another type than its column.
     #[error("column '{name}' holds {expected}, not {found}")]
-    WrongType {
-        name: String,
-        /// Type of the column.
-        expected: &'static str,
-        /// Type of the value.
-        found: &'static str,
-    },
+    WrongType { name: String, expected: &'static str, found: &'static str },
 }
 
 /// A table of a study: columns in order, all with the same number of rows.
@@ -434,18 +420,6 @@ impl StudyTable {
             StudyColumn { values, ..column.clone() }
         };
         Self { columns: self.columns.iter().map(select).collect(), places: self.places.clone(), rows: rows.len() }
-    }
-
-    /// Row indices sorted by the values of these columns, ascending, empty cells last; equal rows keep their order.
-    pub fn sorted_by(&self, columns: &[&str]) -> Vec<usize> {
-        let mut rows: Vec<usize> = (0..self.rows).collect();
-        let columns: Vec<&ColumnValues> =
-            columns.iter().filter_map(|name| self.column(name)).map(|column| &column.values).collect();
-        rows.sort_by(|a, b| {
-            let orders = columns.iter().map(|values| values.cell(*a).order(&values.cell(*b)));
-            orders.fold(Ordering::Equal, Ordering::then)
-        });
-        rows
     }
 
     /// Row indices by the text of a column's cell, in the order of the texts; an empty cell is an empty text.

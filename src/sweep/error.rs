@@ -24,7 +24,6 @@ pub enum StudyFileError {
         source: Box<PlanError>,
         path: PathBuf,
     },
-    /// A pattern of a plan matches no log, or is invalid.
     #[error("logs '{pattern}' of the plan: {problem}: {path}")]
     Logs { pattern: String, problem: String, path: PathBuf },
     #[error(transparent)]
@@ -39,7 +38,6 @@ pub enum StudyFileError {
         /// Path of the second table.
         path: PathBuf,
     },
-    /// The folder contains something other than a study.
     #[error("the folder holds '{found}' and no {index}; give another folder, or an empty one: {path}")]
     NoStudy {
         /// Name of an existing entry.

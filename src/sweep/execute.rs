@@ -51,10 +51,8 @@ pub enum JobError {
     /// The estimator stopped early.
     #[error("{0}")]
     Estimator(String),
-    /// The simulated flight of the job is missing.
     #[error("the flight of the job is not rendered: {}", .0.display())]
     NoFlight(PathBuf),
-    /// No image of the log could be used.
     #[error("no image of the log could be used; reasons: 'dcvins check {}'", .0.display())]
     NoImage(PathBuf),
 }

@@ -17,7 +17,6 @@ use crate::study::SimulatedFlight;
 /// File with the metadata of a rendered flight.
 const NOTES: &str = "rendered.json";
 
-/// Metadata of a rendered flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RenderedFlight {
     /// SHA-256 of the log.
@@ -27,7 +26,6 @@ pub struct RenderedFlight {
     pub rendered_in_s: f64,
 }
 
-/// File name of a flight.
 fn file_name(flight: &SimulatedFlight) -> String {
     let plain = |letter: char| if letter.is_ascii_alphanumeric() || "-_".contains(letter) { letter } else { '-' };
     let name: String = flight.recipe.name.chars().map(plain).collect();

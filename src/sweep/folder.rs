@@ -24,14 +24,11 @@ use crate::study::{KeyedJob, SimulatedFlight, StudyJob, StudyOutput, StudyPlan, 
 pub(super) const INDEX: &str = "study.json";
 /// The table of runs; the rows of a job have the same name in its folder.
 const RUNS: &str = "results";
-/// The table of parameters.
 const PARAMETERS: &str = "parameters";
-/// The table of frames.
 const FRAMES: &str = "frames";
 /// The Markdown tables of the plan.
 const SUMMARY: &str = "tables.md";
 
-/// Content of [`INDEX`].
 #[derive(Debug, Serialize, Deserialize)]
 struct StudyIndex {
     /// Version of the folder's layout.

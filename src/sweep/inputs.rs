@@ -36,7 +36,6 @@ pub fn read_plan(path: &Path) -> Result<StudyPlan, StudyFileError> {
     Ok(plan)
 }
 
-/// SHA-256 of a file's content.
 pub(super) fn file_sha256(path: &Path) -> Result<String, StudyFileError> {
     let mut hash = Sha256::new();
     file_hash::add_file(&mut hash, path).map_err(StudyFileError::read(path))?;

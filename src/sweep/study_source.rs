@@ -22,19 +22,16 @@ pub enum StudySourceError {
     /// A table cannot be read.
     #[error(transparent)]
     File(#[from] StudyFileError),
-    /// A CSV file cannot be read.
     #[error("cannot read the table: {problem}: {}", path.display())]
     Csv {
         /// The problem, with its line.
         problem: String,
         path: PathBuf,
     },
-    /// A table without the column that identifies runs.
     #[error("the table has no column 'run': not a table of runs of a study: {}", .0.display())]
     NoRuns(PathBuf),
 }
 
-/// A study in a folder.
 #[derive(Clone, Debug)]
 pub struct OpenedStudy {
     root: PathBuf,

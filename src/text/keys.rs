@@ -27,7 +27,6 @@ pub enum Field<T: 'static> {
     Switch(fn(&mut T) -> &mut bool),
     /// Whole number within a range.
     Count(fn(&mut T) -> &mut usize, RangeInclusive<usize>),
-    /// Factor within a range.
     Factor(fn(&mut T) -> &mut f64, RangeInclusive<f64>),
     /// Finite numbers between commas, with the range of each, which the user of the table checks.
     Numbers(fn(&mut T) -> &mut dyn Numbers, &'static [RangeInclusive<f64>]),

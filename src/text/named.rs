@@ -16,7 +16,7 @@ pub trait Named: Copy + PartialEq + 'static {
     }
 
     /// All variants, in the order of [`Self::NAMES`].
-    fn all() -> impl Iterator<Item = Self> {
+    fn all() -> impl DoubleEndedIterator<Item = Self> + ExactSizeIterator {
         Self::NAMES.iter().map(|(value, _)| *value)
     }
 

@@ -24,6 +24,7 @@ use dcvins::gui::{Dialog, PanelContext, PanelName, Playback, Presentation, Selec
 use dcvins::session::breakpoints::Breakpoints;
 use dcvins::session::{self, Recording, SessionPlan, SessionRequest};
 use dcvins::study::view::Study;
+use dcvins::text::Named as _;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{DynamicImage, Rgba, RgbaImage};
 use rayon::prelude::*;
@@ -57,10 +58,10 @@ enum Subject {
 
 fn subjects() -> Vec<Subject> {
     let dialogs = [Dialog::AddRun, Dialog::Fork, Dialog::Palette, Dialog::Settings];
-    let panels = PanelName::ALL.into_iter().map(Subject::Panel);
-    let layouts = Preset::ALL.into_iter().map(Subject::Layout);
+    let panels = PanelName::all().map(Subject::Panel);
+    let layouts = Preset::all().map(Subject::Layout);
     let dialogs = dialogs.into_iter().map(Subject::Dialog);
-    let study = StudyPanel::ALL.into_iter().map(Some).chain([None]).map(Subject::Study);
+    let study = StudyPanel::all().map(Some).chain([None]).map(Subject::Study);
     panels.chain(layouts).chain(dialogs).chain([Subject::Shortcuts, Subject::Welcome]).chain(study).collect()
 }
 
@@ -69,12 +70,12 @@ impl Subject {
     fn file(self) -> String {
         let name = |kind: &str, name: &str| format!("{kind}-{}.png", name.to_lowercase().replace(' ', "-"));
         match self {
-            Self::Panel(panel) => name("panel", panel.as_str()),
+            Self::Panel(panel) => name("panel", panel.name()),
             Self::Layout(preset) => name("layout", preset.name()),
             Self::Dialog(dialog) => name("dialog", &format!("{dialog:?}")),
             Self::Shortcuts => name("dialog", "shortcuts"),
             Self::Welcome => "welcome.png".to_owned(),
-            Self::Study(panel) => name("study", panel.map_or("all", StudyPanel::as_str)),
+            Self::Study(panel) => name("study", panel.map_or("all", StudyPanel::name)),
         }
     }
 
@@ -110,9 +111,9 @@ impl Subject {
         };
         match self {
             Self::Panel(name @ PanelName::Breakpoints) => {
-                panel(name.as_str(), ScreenshotOptions { playback: playback.clone(), ..Default::default() })
+                panel(name.name(), ScreenshotOptions { playback: playback.clone(), ..Default::default() })
             }
-            Self::Panel(name) => panel(name.as_str(), ScreenshotOptions::default()),
+            Self::Panel(name) => panel(name.name(), ScreenshotOptions::default()),
             Self::Layout(layout) => panel("all", ScreenshotOptions { layout, ..Default::default() }),
             Self::Dialog(_) | Self::Shortcuts => {
                 let (mut state, mut selection) = (MainWindow::default(), Selection::default());
@@ -150,7 +151,7 @@ impl Subject {
                 };
                 let [runs, parameters] = study_sample::tables(study_sample::SEEDS);
                 let study = Arc::new(Study { name: "gimbal-mounts".to_owned(), runs, parameters });
-                let name = panel.map_or("all", StudyPanel::as_str);
+                let name = panel.map_or("all", StudyPanel::name);
                 draw_study_panel(name, &study, &StudyOptions::default(), &options).expect("the picture is drawn")
             }
         }

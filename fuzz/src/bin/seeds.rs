@@ -14,6 +14,7 @@ use dcvins::flight_log::{
 };
 use dcvins::geometry::RigidTransform;
 use dcvins::sensors::Rig;
+use dcvins::text::Named as _;
 use dcvins_fuzz::{EUROC_FILES, RIG, SOURCES, recordings, rig_with_source, topic_of};
 use libfuzzer_sys as _; // defines the functions that the coverage counters call
 use nalgebra::Vector3;
@@ -183,7 +184,7 @@ fn messages(corpus: &Path, log: &Path) -> Result<(), Failed> {
     for message in mcap::MessageStream::new(&file)? {
         let message = message?;
         let name = message.channel.schema.as_ref().map_or("", |schema| schema.name.as_str());
-        if let Some(kind) = MessageKind::ALL.iter().position(|kind| kind.schema_name() == name) {
+        if let Some(kind) = MessageKind::NAMES.iter().position(|(_, known)| *known == name) {
             let input = [&[kind as u8], message.data.as_ref()].concat();
             fs::write(folder.join(name.replace('/', "-")), input)?;
         }

@@ -16,6 +16,7 @@ use nalgebra::DMatrix;
 
 use crate::estimator::{FactorRows, FrameId, JacobianFactor, StepReport};
 use crate::optimization::Cholesky;
+use crate::text::Named;
 
 /// Number of rows of an IMU factor.
 const ROWS: usize = 15;
@@ -24,7 +25,6 @@ const FLOOR: f64 = 1e-6;
 /// Number of frames at either end of a window that are excluded because they are less certain.
 const EDGE_FRAMES: usize = 3;
 
-/// Noise density of a rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoiseDensity {
     /// White noise of the gyroscope.
@@ -37,19 +37,17 @@ pub enum NoiseDensity {
     AccelerometerWalk,
 }
 
+/// Keys in the rig's `imu0`.
+impl Named for NoiseDensity {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Gyroscope, "gyroscope_noise_density"),
+        (Self::Accelerometer, "accelerometer_noise_density"),
+        (Self::GyroscopeWalk, "gyroscope_random_walk"),
+        (Self::AccelerometerWalk, "accelerometer_random_walk"),
+    ];
+}
+
 impl NoiseDensity {
-    pub const ALL: [Self; 4] = [Self::Gyroscope, Self::Accelerometer, Self::GyroscopeWalk, Self::AccelerometerWalk];
-
-    /// Key in the rig's `imu0`.
-    pub fn key(self) -> &'static str {
-        match self {
-            Self::Gyroscope => "gyroscope_noise_density",
-            Self::Accelerometer => "accelerometer_noise_density",
-            Self::GyroscopeWalk => "gyroscope_random_walk",
-            Self::AccelerometerWalk => "accelerometer_random_walk",
-        }
-    }
-
     pub fn unit(self) -> &'static str {
         match self {
             Self::Gyroscope => "rad/s/√Hz",
@@ -85,7 +83,7 @@ pub(super) struct Sums {
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Innovations {
-    /// Sums in the order of [`NoiseDensity::ALL`].
+    /// Sums in the order of [`NoiseDensity::NAMES`].
     pub(super) sums: [Sums; 4],
     /// Weighted squared residuals of the observations, and their degrees of freedom.
     pub(super) visual: (f64, f64),
@@ -146,7 +144,7 @@ impl Innovations {
             gains.set_column(row, &cholesky.solve(&of_interval.row(row).transpose()));
         }
         let residual = factors[own].rows.column(factors[own].rows.ncols() - 1).into_owned();
-        for (density, sums) in NoiseDensity::ALL.into_iter().zip(&mut self.sums) {
+        for (density, sums) in NoiseDensity::all().zip(&mut self.sums) {
             let rows = density.rows();
             for (index, other) in factors.iter().enumerate() {
                 // Block of R between the density's rows of this interval and those of `other`.

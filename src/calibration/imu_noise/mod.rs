@@ -18,6 +18,7 @@ use crate::estimator::{Estimator, EstimatorConfig, StepInput, VisualLoss};
 use crate::geometry::seconds_from_ns;
 use crate::optimization::RobustLoss;
 use crate::sensors::ImuNoise;
+use crate::text::Named as _;
 
 const MAX_RUNS: usize = 12;
 /// First run in which random walks are fitted too.
@@ -60,7 +61,7 @@ pub struct FittedDensity {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlightNoise {
-    /// Densities in the order of [`NoiseDensity::ALL`].
+    /// Densities in the order of [`NoiseDensity::NAMES`].
     pub densities: [FittedDensity; 4],
     /// Start and end of the used intervals, in nanoseconds since the start of the log.
     pub span_ns: (i64, i64),
@@ -70,7 +71,6 @@ pub struct FlightNoise {
     pub mean_interval_s: f64,
     /// Standard deviation of an observation with which the residuals agree, in pixels.
     pub pixel_sigma_px: f64,
-    /// Number of runs of the estimator.
     pub runs: usize,
     /// True if the last change was smaller than a fifth of each standard deviation.
     pub converged: bool,
@@ -79,7 +79,6 @@ pub struct FlightNoise {
 /// Reason for the failure of a fit.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ImuNoiseError {
-    /// Too few intervals between keyframes with images on both sides.
     #[error(
         "the estimator has {intervals} intervals between keyframes with images on both sides, {FEWEST_INTERVALS} are needed"
     )]
@@ -118,7 +117,7 @@ pub fn fit_imu_noise(
         let pixel_ratio = (found.visual.0 / found.visual.1.max(1.0)).clamp(0.05, 20.0).sqrt();
         config.options.pixel_sigma_px *= pixel_ratio;
         converged = (pixel_ratio - 1.0).abs() < PIXEL_CONVERGED && run >= FIRST_WALK_RUN;
-        for (density, sums) in NoiseDensity::ALL.into_iter().zip(&found.sums) {
+        for (density, sums) in NoiseDensity::all().zip(&found.sums) {
             // White noise that is far too small would be fitted as a random walk.
             let waits = density.is_random_walk() && run < FIRST_WALK_RUN;
             if waits || !is_shown(sums) && (density.is_random_walk() || !is_wrong(sums)) {
@@ -132,7 +131,7 @@ pub fn fit_imu_noise(
     let before = before.unwrap_or_default();
     let mut given = config.imu_noise;
     let densities = [0, 1, 2, 3].map(|index| {
-        let density = NoiseDensity::ALL[index];
+        let density = NoiseDensity::NAMES[index].0;
         let (sums, found, given) = (&last.sums[index], *value(&mut noise, density), *value(&mut given, density));
         FittedDensity {
             density,

@@ -35,7 +35,6 @@ struct SweepReport {
     jobs: usize,
     /// Number of jobs done before this sweep.
     skipped: usize,
-    /// Number of jobs done by this sweep.
     done: usize,
     /// Number of rows without a result.
     failed: usize,

@@ -23,7 +23,6 @@ const KEPT_LINES: usize = 8;
 /// Number of bytes at the end of standard error that are read for these lines.
 const KEPT_BYTES: usize = 4096;
 
-/// Limits of the pool.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PoolLimits {
     /// Number of jobs at a time.
@@ -48,7 +47,6 @@ pub(super) struct PoolOutcome {
 /// Task of one child process.
 #[derive(Clone, Debug)]
 enum Task {
-    /// Rendering of a flight.
     Flight(Box<SimulatedFlight>),
     /// A job, by its index among the jobs of the pool.
     Job(usize),

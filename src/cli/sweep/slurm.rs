@@ -143,7 +143,6 @@ fn write_script(sweep: &Sweep, arguments: &SweepArguments, tasks: usize) -> Resu
     Ok(path)
 }
 
-/// Runs a command of Slurm.
 fn slurm(command: &mut Command) -> Result<Output> {
     let name = command.get_program().to_string_lossy().into_owned();
     command.output().with_context(|| {

@@ -18,7 +18,6 @@ use crate::estimator::state::track::TrackObservation;
 use crate::frontend::FeatureId;
 use crate::optimization::{BlockTerm, CameraPose, Landmark, RobustLoss};
 
-/// Jacobian of a step in blocks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepJacobian {
     /// Calibration, joint angles, poses, velocities and biases, then the inverse depths as one block: each feature

@@ -4,13 +4,14 @@ use nalgebra::DVectorView;
 
 use super::factor::{Sink, WhitenedRows};
 use super::kind::{FactorKind, FactorLabel};
+use crate::text::Named as _;
 
 /// Twice the cost and number of scalar residuals by kind of factor: the cost is robust for reprojections, χ² for the
 /// other factors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Costs {
-    squared: [f64; FactorKind::ALL.len()],
-    counts: [usize; FactorKind::ALL.len()],
+    squared: [f64; FactorKind::NAMES.len()],
+    counts: [usize; FactorKind::NAMES.len()],
 }
 
 impl Costs {

@@ -56,7 +56,6 @@ impl<'a> EncoderFactor<'a> {
         Some(point.layout.calibration().start + calibration.columns(MAIN).start + column)
     }
 
-    /// Residuals by joint.
     pub(crate) fn residuals(&self) -> impl Iterator<Item = EncoderResidual> + '_ {
         let readings = self.reading.angles_rad.iter().zip(&self.reading.sigmas_rad);
         let joints = self.angles_rad.iter().zip(&self.rates_rad_per_s);

@@ -41,7 +41,6 @@ pub(crate) trait Sink {
     }
 }
 
-/// Whitened rows of a factor.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WhitenedRows<'a> {
     /// Residual over its standard deviation (m × 1).

@@ -106,7 +106,6 @@ pub struct MotionJacobians {
     pub by_from: Matrix9,
     /// By `[φ, p, v]` of the later state (9 × 9).
     pub by_to: Matrix9,
-    /// By gravity (9 × 3).
     pub by_gravity: SMatrix<f64, 9, 3>,
     /// Of the rows φ by the rotation of the increment (3 × 3); the rows p and v have −I by its position and velocity.
     pub rotation_by_motion: Matrix3<f64>,

@@ -1,5 +1,7 @@
 //! Kinds of factors, and the label of each factor of a window.
 
+use crate::text::Named;
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FactorKind {
     /// Reprojections of features.
@@ -16,18 +18,21 @@ pub enum FactorKind {
     ZeroVelocity,
 }
 
-impl FactorKind {
-    pub const ALL: [Self; 6] = [
-        Self::Visual,
-        Self::Imu,
-        Self::Encoder,
-        Self::CalibrationPrior,
-        Self::MarginalizationPrior,
-        Self::ZeroVelocity,
+/// Keys in tables and conditions, without spaces.
+impl Named for FactorKind {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Visual, "visual"),
+        (Self::Imu, "imu"),
+        (Self::Encoder, "encoder"),
+        (Self::CalibrationPrior, "calibration_prior"),
+        (Self::MarginalizationPrior, "marginalization_prior"),
+        (Self::ZeroVelocity, "standstill"),
     ];
+}
 
+impl FactorKind {
     /// Label for display.
-    pub const fn name(self) -> &'static str {
+    pub const fn label(self) -> &'static str {
         match self {
             Self::Visual => "visual",
             Self::Imu => "IMU",
@@ -35,17 +40,6 @@ impl FactorKind {
             Self::CalibrationPrior => "calibration prior",
             Self::MarginalizationPrior => "marginalization prior",
             Self::ZeroVelocity => "zero velocity",
-        }
-    }
-
-    /// Key in tables and conditions, without spaces.
-    pub const fn key(self) -> &'static str {
-        match self {
-            Self::Imu => "imu",
-            Self::CalibrationPrior => "calibration_prior",
-            Self::MarginalizationPrior => "marginalization_prior",
-            Self::ZeroVelocity => "standstill",
-            _ => self.name(),
         }
     }
 }

@@ -3,11 +3,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::reprojection::{Anchor, VisualModel, whitened};
+use super::reprojection::{Anchor, VisualFactors, whitened};
 use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS};
-use crate::estimator::state::track::Track;
 use crate::geometry::triangular_factor::{PORTION, TriangularFactor};
-use crate::optimization::{Landmark, LandmarkRows, PoseBlocks};
+use crate::optimization::{LandmarkRows, PoseBlocks};
 
 /// Columns of a block of the camera: a pose, or its intrinsics.
 const BLOCK: usize = 6;
@@ -27,30 +26,16 @@ pub(crate) struct ProjectedRows {
 }
 
 impl ProjectedRows {
-    /// Linearizes at `current`, with derivatives by the poses at `linearized`.
-    pub(crate) fn new(
-        model: &VisualModel<'_>,
-        current: &CameraView<'_>,
-        linearized: &CameraView<'_>,
-        tracks: &[Track],
-        landmarks: &[Landmark],
-        apart: NewestRows,
-    ) -> Self {
-        match current.blocks_per_frame() {
-            1 => Self::by_blocks::<1>(model, current, linearized, tracks, landmarks, apart),
-            _ => Self::by_blocks::<ROLLING_BLOCKS>(model, current, linearized, tracks, landmarks, apart),
+    pub(crate) fn new(factors: &VisualFactors<'_>, apart: NewestRows) -> Self {
+        match factors.current.blocks_per_frame() {
+            1 => Self::by_blocks::<1>(factors, apart),
+            _ => Self::by_blocks::<ROLLING_BLOCKS>(factors, apart),
         }
     }
 
     /// [`Self::new`] for a camera with `N` blocks per frame.
-    fn by_blocks<const N: usize>(
-        model: &VisualModel<'_>,
-        current: &CameraView<'_>,
-        linearized: &CameraView<'_>,
-        tracks: &[Track],
-        landmarks: &[Landmark],
-        apart: NewestRows,
-    ) -> Self {
+    fn by_blocks<const N: usize>(factors: &VisualFactors<'_>, apart: NewestRows) -> Self {
+        let VisualFactors { model, current, linearized, tracks, landmarks } = *factors;
         let frames = current.frames();
         let newest = frames.saturating_sub(1);
         let mut blocks = PoseBlocks::new(current.blocks());

@@ -103,42 +103,45 @@ pub(crate) type VisualEquations = ReprojectionEquations<DensePoseEquations>;
 /// [`VisualEquations`] with the landmarks eliminated.
 pub(crate) type ReducedVisualEquations = ReducedEquations<DensePoseEquations>;
 
-/// Linearizes all observations at `current`, with derivatives by the poses at `linearized`.
-pub(crate) fn equations(
-    model: &VisualModel<'_>,
-    current: &CameraView<'_>,
-    linearized: &CameraView<'_>,
-    tracks: &[Track],
-    landmarks: &[Landmark],
-) -> VisualEquations {
-    match current.blocks_per_frame() {
-        1 => equations_by_blocks::<1>(model, current, linearized, tracks, landmarks),
-        _ => equations_by_blocks::<ROLLING_BLOCKS>(model, current, linearized, tracks, landmarks),
-    }
+/// Reprojection factors of one camera, linearized at an estimate.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct VisualFactors<'a> {
+    pub(crate) model: &'a VisualModel<'a>,
+    /// Estimate of the residuals.
+    pub(crate) current: &'a CameraView<'a>,
+    /// Poses by which the derivatives are taken.
+    pub(crate) linearized: &'a CameraView<'a>,
+    pub(crate) tracks: &'a [Track],
+    pub(crate) landmarks: &'a [Landmark],
 }
 
-/// [`equations`] of a camera with `N` blocks per frame.
-fn equations_by_blocks<const N: usize>(
-    model: &VisualModel<'_>,
-    current: &CameraView<'_>,
-    linearized: &CameraView<'_>,
-    tracks: &[Track],
-    landmarks: &[Landmark],
-) -> VisualEquations {
-    let mut equations = ReprojectionEquations::new(DensePoseEquations::new(current.blocks()), tracks.len());
-    for (track, landmark) in tracks.iter().zip(landmarks) {
-        // Observations are in ascending order of the slots; the first one is the anchor's.
-        let anchor = track.observations.first().map(|first| Anchor::new(current, linearized, first));
-        let blocks = anchor.as_ref().map(|anchor| CameraView::blocks_of::<N>(anchor.observation.slot));
-        let weight = anchor.as_ref().map_or(RobustWeight::OfTrack(1.0), |anchor| anchor.weight(model, landmark, track));
-        let terms = track
-            .observations
-            .iter()
-            .filter_map(|observation| whitened(model, anchor.as_ref()?, landmark, observation, weight));
-        let observations = track.observations.len() * current.blocks_per_frame();
-        equations.add_landmark_by_blocks(blocks, current.intrinsics_block(), observations, terms);
+impl VisualFactors<'_> {
+    pub(crate) fn equations(&self) -> VisualEquations {
+        match self.current.blocks_per_frame() {
+            1 => self.equations_by_blocks::<1>(),
+            _ => self.equations_by_blocks::<ROLLING_BLOCKS>(),
+        }
     }
-    equations
+
+    /// [`Self::equations`] of a camera with `N` blocks per frame.
+    fn equations_by_blocks<const N: usize>(&self) -> VisualEquations {
+        let current = self.current;
+        let mut equations = ReprojectionEquations::new(DensePoseEquations::new(current.blocks()), self.tracks.len());
+        for (track, landmark) in self.tracks.iter().zip(self.landmarks) {
+            // Observations are in ascending order of the slots; the first one is the anchor's.
+            let anchor = track.observations.first().map(|first| Anchor::new(current, self.linearized, first));
+            let blocks = anchor.as_ref().map(|anchor| CameraView::blocks_of::<N>(anchor.observation.slot));
+            let of_anchor = |anchor: &Anchor<'_>| anchor.weight(self.model, landmark, track);
+            let weight = anchor.as_ref().map_or(RobustWeight::OfTrack(1.0), of_anchor);
+            let terms = track
+                .observations
+                .iter()
+                .filter_map(|observation| whitened(self.model, anchor.as_ref()?, landmark, observation, weight));
+            let observations = track.observations.len() * current.blocks_per_frame();
+            equations.add_landmark_by_blocks(blocks, current.intrinsics_block(), observations, terms);
+        }
+        equations
+    }
 }
 
 /// Anchor of a track at the current estimate and at the linearization point.

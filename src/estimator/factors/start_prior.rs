@@ -25,7 +25,6 @@ const ORIGIN_SIGMA_M: f64 = 1e-3;
 /// Standard deviation of the first yaw, in radians: only fixes the direction of the axes.
 const YAW_SIGMA_RAD: f64 = 1e-4;
 
-/// Number of rows.
 const ROWS: usize = 10;
 
 /// [`StartPrior`] on the oldest state.

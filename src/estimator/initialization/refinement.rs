@@ -22,7 +22,6 @@ const MIN_SIGMA: f64 = 1e-5;
 type Matrix9 = SMatrix<f64, 9, 9>;
 type Vector9 = SVector<f64, 9>;
 
-/// Constant input of the refinement.
 pub(super) struct RefinementInput<'a> {
     /// Extrinsics from calibration and encoders, one per view.
     pub(super) imu_from_camera: &'a [RigidTransform],

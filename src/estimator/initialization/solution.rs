@@ -21,7 +21,6 @@ pub enum InitializationOutcome {
     },
 }
 
-/// Origin of the initial state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InitializationOrigin {
     /// Motion: scale and all states are estimated.
@@ -75,7 +74,6 @@ pub struct InitializationDiagnostics {
     pub imu_mean_square: f64,
     /// Largest rotation-compensated parallax between two views.
     pub parallax_rad: f64,
-    /// Iterations of the refinement.
     pub refinement_rounds: usize,
 }
 

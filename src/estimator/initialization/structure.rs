@@ -26,7 +26,6 @@ const PARALLAX_PAIRS: usize = 60;
 const AMPLE_PARALLAX_RAD: f64 = 0.14;
 /// Number of common features above which the score of a pair of views no longer grows.
 const AMPLE_PAIRS: f64 = 60.0;
-/// Number of initial pairs to try.
 const PAIRS_TRIED: usize = 3;
 /// A landmark with an observation beyond this many standard deviations is dropped.
 const OUTLIER_SIGMAS: f64 = 4.0;
@@ -164,7 +163,6 @@ pub(super) struct Structure {
 }
 
 impl Structure {
-    /// Number of observations of all landmarks.
     fn observations(&self) -> usize {
         self.landmarks.iter().map(|landmark| landmark.observations.len()).sum()
     }

@@ -13,7 +13,6 @@ use crate::optimization::{
     CameraPose, DensePoseEquations, Landmark, RelativePoses, Reprojection, ReprojectionEquations, RobustLoss,
 };
 
-/// Robust loss of all observations.
 const LOSS: RobustLoss = RobustLoss::Huber(1.5);
 /// Residual of a point behind a camera, in standard deviations.
 const BEHIND_SIGMAS: f64 = 100.0;

@@ -29,7 +29,6 @@ pub enum Motion {
     Translation(usize),
     /// Rotation about an axis of the IMU, 0 to 2.
     Rotation(usize),
-    /// Joint index.
     Joint(usize),
 }
 

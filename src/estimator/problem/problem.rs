@@ -11,7 +11,9 @@ use crate::estimator::factors::factor::{Point, Sink};
 use crate::estimator::factors::kind::FactorKind;
 use crate::estimator::factors::marginal_prior::{MarginalPriorFactor, Prior};
 use crate::estimator::factors::measurements::measurements;
-use crate::estimator::factors::reprojection::{self, ReducedVisualEquations, VisualEquations, VisualModel};
+use crate::estimator::factors::reprojection::{
+    self, ReducedVisualEquations, VisualEquations, VisualFactors, VisualModel,
+};
 use crate::estimator::factors::start_prior::{StartPrior, StartPriorFactor};
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::camera_pose::CameraMaps;
@@ -91,7 +93,6 @@ impl Problem<'_> {
         }
     }
 
-    /// Passes the priors to a sink.
     pub(crate) fn priors(&self, point: &Point<'_>, sink: &mut impl Sink) {
         sink.take(CalibrationPriorFactor::of(point));
         if let Some(prior) = self.prior {
@@ -145,10 +146,11 @@ impl Problem<'_> {
             .zip(&estimate.landmarks)
             .enumerate()
             .map(|(camera, (factors, landmarks))| {
-                let current = self.view(camera, &estimate.frames, &estimate.calibration);
-                let linearized = self.view(camera, &frames, &calibration);
+                let current = &self.view(camera, &estimate.frames, &estimate.calibration);
+                let linearized = &self.view(camera, &frames, &calibration);
+                let (model, tracks) = (&factors.visual, factors.tracks);
                 CameraEquations {
-                    visual: reprojection::equations(&factors.visual, &current, &linearized, factors.tracks, landmarks),
+                    visual: VisualFactors { model, current, linearized, tracks, landmarks }.equations(),
                     maps: CameraMaps::new(&frames, calibration.of(camera)),
                     columns: factors.columns.clone(),
                 }

@@ -2,9 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use super::problem::Problem;
+use super::problem::{CameraFactors, Problem};
 use crate::estimator::factors::labelled_rows::stack;
 use crate::estimator::factors::projected_rows::{NewestRows, ProjectedRows};
+use crate::estimator::factors::reprojection::VisualFactors;
 use crate::estimator::state::camera_pose::CameraMaps;
 use crate::estimator::state::camera_view::CameraView;
 use crate::estimator::state::estimate::Estimate;
@@ -34,10 +35,10 @@ impl Problem<'_> {
         linearized: &CameraView<'_>,
         apart: NewestRows,
     ) -> ProjectedRows {
-        let factors = &self.cameras[camera];
-        let current = self.view(camera, &estimate.frames, &estimate.calibration);
+        let CameraFactors { visual: model, tracks, .. } = &self.cameras[camera];
+        let current = &self.view(camera, &estimate.frames, &estimate.calibration);
         let landmarks = &estimate.landmarks[camera];
-        ProjectedRows::new(&factors.visual, &current, linearized, factors.tracks, landmarks, apart)
+        ProjectedRows::new(&VisualFactors { model, current, linearized, tracks, landmarks }, apart)
     }
 
     /// Converts rows by the blocks of a camera to rows by the unknowns.

@@ -88,7 +88,6 @@ impl Event {
         Self { kind, message: message.into(), value: None, threshold: None, cause: None }
     }
 
-    /// Event with the deciding value and its threshold.
     pub(crate) fn decided(kind: EventKind, message: impl Into<String>, value: f64, threshold: f64) -> Self {
         Self { kind, message: message.into(), value: Some(value), threshold: Some(threshold), cause: None }
     }

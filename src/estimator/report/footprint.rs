@@ -13,7 +13,6 @@ pub struct ReportBytes {
     /// Features without their observations.
     pub features: usize,
     pub observations: usize,
-    /// Landmark positions.
     pub landmarks: usize,
     /// Linearization, if stored.
     pub linearization: usize,

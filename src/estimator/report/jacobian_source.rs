@@ -48,7 +48,6 @@ pub struct JacobianSource {
 /// States by slot with the calibrations, in full precision.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ExactSource {
-    /// Linearization point.
     pub(crate) linearized: (Vec<FrameState>, Calibrations),
     /// Final estimate.
     pub(crate) current: (Vec<FrameState>, Calibrations),

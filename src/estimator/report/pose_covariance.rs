@@ -50,12 +50,6 @@ impl PoseCovariance {
     pub fn nees(&self, error: &Vector6<f64>) -> Option<f64> {
         Some(error.dot(&self.0.cholesky()?.solve(error)))
     }
-
-    /// NEES of the rotation alone, 3 on average.
-    pub fn rotation_nees(&self, error: &Vector6<f64>) -> Option<f64> {
-        let error = error.fixed_rows::<3>(0).into_owned();
-        Some(error.dot(&self.0.fixed_view::<3, 3>(0, 0).into_owned().cholesky()?.solve(&error)))
-    }
 }
 
 #[cfg(test)]
@@ -79,6 +73,5 @@ mod tests {
         assert!((covariance.attitude_sigma_rad() - 0.0402_f64.sqrt()).abs() < 1e-12);
         let error = Vector6::new(0.2, 0.0, 0.0, 1.0, 0.0, 0.0);
         assert!((covariance.nees(&error).unwrap() - 2.0).abs() < 1e-12);
-        assert!((covariance.rotation_nees(&error).unwrap() - 1.0).abs() < 1e-12);
     }
 }

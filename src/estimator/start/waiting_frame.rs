@@ -8,7 +8,6 @@ use crate::sensors::{ImuSample, JointAngles};
 pub(super) struct WaitingFrame {
     pub(super) index: usize,
     pub(super) stamp_ns: i64,
-    /// Features by camera.
     pub(super) features: Vec<Vec<TrackedFeature>>,
     pub(super) encoder: Option<JointAngles>,
     /// Extrinsics of the leading camera.

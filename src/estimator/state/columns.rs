@@ -17,7 +17,6 @@ impl fmt::Display for FrameId {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ColumnId {
-    /// A parameter of the static calibration, one column.
     Calibration(ParameterId),
     /// Joint angles of a frame; with a rolling shutter also joint rates and joint accelerations, in this order.
     Joints(FrameId),

@@ -72,7 +72,6 @@ impl GivenChain {
         Self::with_covariance(classical, chain, Uncertainty::Rig(sigmas), covariance)
     }
 
-    /// Chain of an earlier pass.
     pub(super) fn of_earlier_pass(classical: &ClassicalChain, chain: Chain, earlier: EarlierPrior) -> Self {
         let covariance = earlier.covariance.clone();
         Self::with_covariance(classical, chain, Uncertainty::Earlier(earlier), covariance)

@@ -22,7 +22,6 @@ pub struct ImuBias {
 /// Pose, velocity and IMU biases of the vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NavigationState {
-    /// Pose `world_from_imu`.
     pub world_from_imu: RigidTransform,
     /// Velocity in the world, in m/s.
     pub velocity_m_per_s: Vector3<f64>,

@@ -186,7 +186,6 @@ impl Preintegration {
         &self.bias
     }
 
-    /// Duration of the interval in seconds.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }

@@ -10,6 +10,7 @@ use crate::estimator::factors::factor::{Factor, JacobianBlock, Point, Sink, Whit
 use crate::estimator::factors::kind::{FactorKind, FactorLabel};
 use crate::estimator::factors::labelled_rows::LabelledRows;
 use crate::estimator::state::frame::Stationary;
+use crate::text::Named as _;
 
 /// The normal equations of all factors are the products of their rows, and their costs the squared residuals.
 #[test]
@@ -42,9 +43,9 @@ fn sinks_agree_on_the_factors_of_a_window() {
         }
         assert!((&equations.gradient - &gradient).amax() < 1e-9 * gradient.amax(), "{name}: gradient");
         let costs = problem.costs(&estimate);
-        let squared: f64 = FactorKind::ALL.into_iter().map(|kind| costs.of(kind)).sum();
+        let squared: f64 = FactorKind::all().map(|kind| costs.of(kind)).sum();
         assert!((squared - residual.norm_squared()).abs() < 1e-9 * squared, "{name}: {squared}");
-        let count: usize = FactorKind::ALL.into_iter().map(|kind| costs.count(kind)).sum();
+        let count: usize = FactorKind::all().map(|kind| costs.count(kind)).sum();
         assert_eq!(count, rows.nrows(), "{name}");
         assert!(costs.count(FactorKind::ZeroVelocity) > 0, "{name}");
     }

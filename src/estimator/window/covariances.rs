@@ -12,7 +12,6 @@ const VELOCITY: usize = 3;
 /// Posterior covariances of a window at its current estimate, all other unknowns marginalized.
 #[derive(Clone, Debug)]
 pub(crate) struct WindowCovariances {
-    /// Covariance of the calibration's columns.
     pub(crate) calibration: DMatrix<f64>,
     /// Covariance of the newest frame's biases, gyroscope first.
     pub(crate) newest_bias: Matrix6<f64>,

@@ -15,7 +15,6 @@ const REINTEGRATION_INTRINSICS_CHANGE: f64 = 1e-3;
 pub(crate) struct Frames(Vec<Frame>);
 
 impl Frames {
-    /// Window of one frame.
     pub(crate) fn new(first: Frame) -> Self {
         Self(vec![first])
     }
@@ -24,7 +23,6 @@ impl Frames {
         self.0.push(newest);
     }
 
-    /// Slot of the newest frame.
     pub(crate) fn newest_slot(&self) -> usize {
         self.0.len() - 1
     }

@@ -11,6 +11,7 @@ use crate::estimator::report::{
 };
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::step_input::StepInput;
+use crate::text::Named as _;
 
 /// Report with the calibration only.
 pub(crate) fn empty_report(
@@ -174,7 +175,7 @@ fn residual_summaries(solution: &Solution) -> Vec<ResidualSummary> {
         chi2_before: before.of(factor),
         chi2_after: after.of(factor),
     };
-    FactorKind::ALL.into_iter().filter(shown).map(summary).collect()
+    FactorKind::all().filter(shown).map(summary).collect()
 }
 
 /// Standard deviation of a pixel with the same average information as the observations, robust weights included.

@@ -26,15 +26,6 @@ const PATH_PERIOD_NS: i64 = 1_000_000_000;
 /// Maximum number of poses of a path message; longer paths are thinned.
 const PATH_POSES: usize = 300;
 
-/// Writes one run of a recording.
-///
-/// # Errors
-/// If the file cannot be written.
-pub fn write_results(recording: &Recording, run: &RunRecord, path: &Path) -> Result<(), LogError> {
-    let staged = stage_results(recording, run, path)?;
-    staged.commit().map_err(|source| LogError::Io { action: "write the log", source, path: path.to_owned() })
-}
-
 /// Writes one run of a recording under a temporary name.
 pub(super) fn stage_results(recording: &Recording, run: &RunRecord, path: &Path) -> Result<StagedFile, LogError> {
     let mut results = Results {

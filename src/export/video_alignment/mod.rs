@@ -58,7 +58,6 @@ pub enum VideoAlignmentError {
         guess_s: f64,
         path: PathBuf,
     },
-    /// The log for the first guess cannot be written.
     #[error("cannot write a log for the alignment: {source}: {path}")]
     Write { source: io::Error, path: PathBuf },
 }

@@ -77,7 +77,6 @@ impl Plot {
     }
 }
 
-/// The drawing as SVG.
 fn drawing(aligned: &VideoAlignment) -> String {
     let found = &aligned.alignment;
     let offsets = found.correlation.iter().map(|(offset_s, _)| *offset_s);

@@ -39,7 +39,6 @@ pub(crate) fn gimbal_kinds(gimbal: &GimbalRig) -> &'static [MessageKind] {
     }
 }
 
-/// Rig field of the gimbal's topic.
 pub(crate) fn topic_field(gimbal: &GimbalRig) -> &'static str {
     if gimbal.attitude.is_some() { "gimbal.source.topic" } else { "gimbal.rostopic" }
 }

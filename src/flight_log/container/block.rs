@@ -13,13 +13,11 @@ use super::{RECORD_HEADER, record_at};
 pub(crate) struct Block {
     /// Range in the file; its end lies beyond the file's end if the log is truncated inside the block.
     pub(crate) bytes: Range<usize>,
-    /// True for a chunk record.
     pub(crate) is_chunk: bool,
     /// Smallest and largest log time of the messages.
     pub(crate) log_time_ns: (u64, u64),
 }
 
-/// Message of a decoded block.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct MessageSpan {
     pub(crate) channel_id: u16,

@@ -16,7 +16,6 @@ const NO_END_MAGIC: &str = "the file does not end with the MCAP magic";
 /// Messages outside of chunks are gathered into blocks of about this size.
 const PLAIN_BLOCK_BYTES: usize = 1 << 20;
 
-/// Channel of a log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ChannelRecord {
     pub(crate) topic: String,
@@ -49,7 +48,6 @@ struct Definitions {
 pub(crate) struct MessagePosition {
     /// Nanoseconds since the epoch.
     pub(crate) log_time_ns: u64,
-    /// Number of the block.
     pub(crate) block: usize,
     /// Offset of the message record in the block's records.
     pub(crate) offset: u64,

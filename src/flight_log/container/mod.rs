@@ -17,7 +17,6 @@ use super::file::{FileWindow, LogFile};
 /// Every record starts with its opcode (1 byte) and the length of its body (8 bytes).
 const RECORD_HEADER: usize = 9;
 
-/// Record in memory.
 #[derive(Clone, Copy, Debug)]
 struct RawRecord<'a> {
     opcode: u8,

@@ -18,24 +18,14 @@ pub enum ConvertError {
          or a log of an autopilot (.ulg, .bin, .tlog): {}",
         path.display()
     )]
-    UnknownSource {
-        /// Description of the source.
-        found: String,
-        path: PathBuf,
-    },
+    UnknownSource { found: String, path: PathBuf },
     /// Source of a known kind that cannot be read.
     #[error("{problem}: {}", path.display())]
-    Unreadable {
-        /// Problem and remedy.
-        problem: String,
-        path: PathBuf,
-    },
-    /// Invalid line of a table.
+    Unreadable { problem: String, path: PathBuf },
     #[error("line {line}: {problem}: {}", path.display())]
     Line {
         /// Counted from 1.
         line: usize,
-        /// Value of the line and the expected one.
         problem: String,
         path: PathBuf,
     },
@@ -45,34 +35,17 @@ pub enum ConvertError {
         topics: String,
         path: PathBuf,
     },
-    /// Options that need a video, for another kind of source.
     #[error("{kind} has no video: --ulog, --dataflash, --tlog and --video-offset are for an MP4 video as the source: {}", path.display())]
-    NoVideo {
-        /// Kind of the source.
-        kind: &'static str,
-        path: PathBuf,
-    },
+    NoVideo { kind: &'static str, path: PathBuf },
     /// The autopilot's log of a video is of another kind than given.
     #[error("no {expected}, {found}: {}", path.display())]
-    NotThatLog {
-        /// Name of the expected kind.
-        expected: &'static str,
-        /// Actual kind.
-        found: String,
-        path: PathBuf,
-    },
+    NotThatLog { expected: &'static str, found: String, path: PathBuf },
     /// The caller stopped the conversion.
     #[error("interrupted; nothing is written: {}", path.display())]
-    Interrupted {
-        /// Path of the source.
-        path: PathBuf,
-    },
+    Interrupted { path: PathBuf },
     /// The log would overwrite its source.
     #[error("the log would be inside or overwrite its own source; give another -o: {}", path.display())]
-    OntoItself {
-        /// Path of the log.
-        path: PathBuf,
-    },
+    OntoItself { path: PathBuf },
 }
 
 impl ConvertError {

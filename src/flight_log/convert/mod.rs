@@ -36,7 +36,6 @@ use crate::sensors::Rig;
 use recording::VideoFacts;
 use sink::LogSink;
 
-/// Kind of a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum SourceKind {
     Euroc,
@@ -46,7 +45,6 @@ enum SourceKind {
     /// SQLite compressed with Zstandard.
     PackedSqlite,
     Mcap,
-    /// MP4 video.
     Video,
     Autopilot(AutopilotLogKind),
 }
@@ -141,7 +139,6 @@ pub fn convert_with(
     Ok(report)
 }
 
-/// Rig data of a source.
 enum SourceRig {
     None,
     /// Complete calibration.
@@ -221,7 +218,6 @@ fn write(
 /// Number of bytes at the start that identify the kind of a source.
 const START_BYTES: usize = 512;
 
-/// Kind of the source at a path.
 fn detect(source: &Path, limits: &LogLimits) -> Result<SourceKind, ConvertError> {
     let metadata = fs::metadata(source).map_err(ConvertError::io("open the source", source))?;
     let unknown = |found: String| ConvertError::UnknownSource { found, path: source.to_owned() };

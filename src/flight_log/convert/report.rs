@@ -27,7 +27,6 @@ pub struct ConversionReport {
     pub kind: String,
     #[serde(serialize_with = "as_text")]
     pub source: PathBuf,
-    /// Path of the written log.
     #[serde(serialize_with = "as_text")]
     pub log: PathBuf,
     /// Rig next to the log: written from the source's calibration, or existing before.

@@ -215,7 +215,6 @@ fn take_message(record: &BagRecord<'_>, state: &mut BagState, sink: &mut LogSink
     })
 }
 
-/// Decompresses the records of a chunk.
 fn decompress<'a>(record: &BagRecord<'a>, limits: &LogLimits) -> Result<Cow<'a, [u8]>, String> {
     let size = record.number("size").ok_or_else(|| "its size is missing".to_owned())?;
     let check =

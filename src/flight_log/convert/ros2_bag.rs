@@ -23,10 +23,6 @@ pub(super) fn is_bag(folder: &Path) -> bool {
     folder.join("metadata.yaml").is_file() || segments(folder).is_ok_and(|segments| !segments.is_empty())
 }
 
-fn is_packed(path: &Path) -> bool {
-    unpacked_name(path) != path
-}
-
 fn is_segment(path: &Path) -> bool {
     unpacked_name(path).extension().is_some_and(|extension| extension == "db3" || extension == "mcap")
 }
@@ -113,7 +109,7 @@ fn open_segment(path: &Path, sink: &LogSink<'_>) -> Result<Segment, ConvertError
     if unpacked_name(path).extension().is_some_and(|extension| extension == "mcap") {
         return Ok(Segment::Mcap(mcap_segment::open(path, sink)?));
     }
-    let unpacked = if is_packed(path) { Some(unpack_to_path(path, sink.limits())?) } else { None };
+    let unpacked = if unpacked_name(path) == path { None } else { Some(unpack_to_path(path, sink.limits())?) };
     let plain = unpacked.as_ref().map_or(path, NamedTempFile::path);
     let database = sqlite::open(plain, sink.limits())?;
     Ok(Segment::Sqlite(database, unpacked))

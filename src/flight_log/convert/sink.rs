@@ -33,7 +33,6 @@ pub(super) enum Payload<'a> {
     Other(&'a str),
 }
 
-/// Message of a source.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SourceMessage<'a> {
     pub(super) topic: &'a str,

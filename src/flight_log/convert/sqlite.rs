@@ -37,7 +37,6 @@ struct Topic {
     definition: Option<String>,
 }
 
-/// Open database of a bag.
 pub(super) struct BagDatabase {
     connection: Connection,
     path: PathBuf,
@@ -57,7 +56,6 @@ struct ReadState {
     last: Option<(i64, i64)>,
     /// Largest row number, for the progress.
     last_row: i64,
-    /// First problem.
     problem: Option<String>,
 }
 

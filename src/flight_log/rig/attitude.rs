@@ -17,7 +17,6 @@ const ORDER: &str = "rotations in their order from the frame to the gimbal with 
 const VEHICLE: &str = "the topic of the vehicle's attitude (QuaternionStamped, PoseStamped, Odometry, TransformStamped, Imu or px4's \
                        VehicleAttitude)";
 
-/// Reads the topic and the source.
 pub(super) fn read(source: &Field<'_>) -> Result<(String, AttitudeSource), LogError> {
     source.keys("a mapping with topic, type, frame, axes, …")?;
     let topic = source.field("topic").text("the topic of the gimbal's attitude")?.to_owned();
@@ -108,7 +107,6 @@ fn named_axes(field: &Field<'_>) -> Result<NamedAxes, LogError> {
     field.text(NAMED_AXES)?.parse().map_err(|()| field.unexpected(NAMED_AXES))
 }
 
-/// The value of a name.
 fn one_of<N: Named>(field: &Field<'_>, expected: &str, allowed: impl Fn(&N) -> bool) -> Result<N, LogError> {
     N::from_name(field.text(expected)?).filter(allowed).ok_or_else(|| field.unexpected(expected))
 }

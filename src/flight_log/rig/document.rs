@@ -54,7 +54,6 @@ impl Document {
         }
     }
 
-    /// Whole document as a field.
     pub(super) fn root(&self) -> Field<'_> {
         Field::root(&self.value, &self.file)
     }

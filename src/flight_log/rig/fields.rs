@@ -63,7 +63,6 @@ impl<'a> Field<'a> {
         self.is_present().then_some(self)
     }
 
-    /// Error about this field.
     pub(super) fn error(&self, problem: impl Into<String>) -> LogError {
         let field = if self.path.is_empty() { "the rig" } else { &self.path };
         LogError::Rig { field: field.to_owned(), problem: problem.into(), path: self.file.to_owned() }
@@ -141,7 +140,6 @@ impl<'a> Field<'a> {
         if number > 0.0 { Ok(number) } else { Err(self.unexpected(expected)) }
     }
 
-    /// Number that is not negative.
     pub(super) fn not_negative(&self, expected: &str) -> Result<f64, LogError> {
         let number = self.number(expected)?;
         if number >= 0.0 { Ok(number) } else { Err(self.unexpected(expected)) }
@@ -213,7 +211,6 @@ impl<'a> Field<'a> {
     }
 }
 
-/// Short description of a value.
 fn describe(value: &Value) -> String {
     match value {
         Value::Null => "nothing".into(),

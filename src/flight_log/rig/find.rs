@@ -23,12 +23,6 @@ impl Rig {
         from_document(&Document::parse(text.to_owned(), file)?, &facts).map(|(rig, _)| rig)
     }
 
-    /// Reads `NAME.rig.yaml` next to `NAME.mcap`, `None` if there is no such file.
-    pub fn beside_log(log_path: &Path) -> Result<Option<Self>, LogError> {
-        let path = log_path.with_extension("rig.yaml");
-        path.is_file().then(|| Self::from_file(&path)).transpose()
-    }
-
     /// Finds the rig of a log: the file given by the user, else the one next to the log, else the one attached to it.
     /// Missing intrinsics and image rates are taken from the log.
     pub fn for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Self, LogError> {

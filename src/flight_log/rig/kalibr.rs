@@ -13,7 +13,6 @@ use crate::sensors::{CameraMount, Rig};
 /// Usual names of Kalibr's IMU file.
 const IMU_FILES: [&str; 3] = ["imu.yaml", "imu0.yaml", "imu-calib.yaml"];
 
-/// True for Kalibr's camera chain.
 pub(super) fn is_camera_chain(document: &Value) -> bool {
     document.get("rig_version").is_none()
         && document

@@ -9,7 +9,6 @@ use super::super::text::{nearest_name, printable, shortened};
 
 /// Keys of one kind of mapping.
 struct Keys {
-    /// Keys that are read.
     read: &'static [&'static str],
     /// Keys of other programs without a meaning here, and this program's entries for human readers.
     unused: &'static [&'static str],

@@ -7,7 +7,6 @@ use crate::gimbal::DhLink;
 /// A joint offset or twist beyond a full revolution is an angle in degrees.
 const MAX_OFFSET_RAD: f64 = std::f64::consts::TAU;
 
-/// Reads the numbers of a link.
 pub(super) fn read_link(link: &Field<'_>) -> Result<DhLink, LogError> {
     let angle = |key: &str| {
         let angle_rad = link.field(key).number("an angle in rad")?;

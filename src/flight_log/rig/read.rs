@@ -15,11 +15,9 @@ use crate::sensors::{
     Rig,
 };
 
-/// Version of the schema.
 const RIG_VERSION: u64 = 1;
 /// Largest number of joints of a gimbal: the covariance of the chain grows with the square of its links.
 const MAX_LINKS: usize = 16;
-/// Largest number of cameras of a rig.
 const MAX_CAMERAS: usize = 16;
 /// Largest number of assumed fields of a rig.
 const MAX_ASSUMED: usize = 256;

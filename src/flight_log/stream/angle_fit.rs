@@ -58,7 +58,6 @@ struct Parabola {
     /// Coefficients of 1, u and u² with `u` the time over `span_s`.
     coefficients: Vector3<f64>,
     span_s: f64,
-    /// Variances of the coefficients.
     variances: Vector3<f64>,
 }
 

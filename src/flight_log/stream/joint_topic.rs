@@ -20,7 +20,6 @@ pub(super) struct JointSamples {
     timeshift_ns: i64,
 }
 
-/// Source of the samples.
 enum JointSource {
     Encoders(Box<EncoderJoints>),
     Attitude(Box<AttitudeJoints>),

@@ -5,9 +5,7 @@ use std::ops::RangeInclusive;
 /// Compression of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum VideoCodec {
-    /// H.264 (AVC).
     H264,
-    /// H.265 (HEVC).
     H265,
 }
 

@@ -13,8 +13,6 @@ use std::error::Error;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
-use image::codecs::jpeg::JpegEncoder;
-use image::{ExtendedColorType, ImageEncoder as _};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -23,20 +21,16 @@ use super::output::{OutputFile, StagedFile};
 use super::{LogError, MessageKind};
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
-use crate::sensors::GrayImage;
 
-/// Compression of a log's chunks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogCompression {
     None,
     Lz4,
-    /// Zstandard.
     Zstd,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogWriterOptions {
-    /// Compression of the chunks.
     pub compression: LogCompression,
     /// Maximum size of a chunk in bytes; `None` writes messages without chunks.
     pub chunk_bytes: Option<u64>,
@@ -60,7 +54,6 @@ pub struct MessageTimes {
     pub log_time_ns: i64,
 }
 
-/// Message type with its definition.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MessageType<'a> {
     /// Such as `nav_msgs/msg/Path`.
@@ -135,7 +128,6 @@ impl LogWriter {
         Ok(Self { writer, channels: BTreeMap::new(), path: path.to_owned() })
     }
 
-    /// Final path.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
@@ -152,22 +144,6 @@ impl LogWriter {
     ) -> Result<(), LogError> {
         let message = encode::imu(times.stamp_ns, frame_id, angular_velocity_rad_per_s, specific_force_m_per_s2);
         self.write(topic, MessageKind::Imu, times, &message)
-    }
-
-    /// Writes an image as JPEG with a quality from 1 to 100.
-    pub fn write_jpeg(
-        &mut self,
-        topic: &str,
-        frame_id: &str,
-        times: MessageTimes,
-        image: &GrayImage,
-        quality: u8,
-    ) -> Result<(), LogError> {
-        let mut jpeg = Vec::with_capacity(image.pixels.len() / 4);
-        JpegEncoder::new_with_quality(&mut jpeg, quality)
-            .write_image(&image.pixels, image.width as u32, image.height as u32, ExtendedColorType::L8)
-            .map_err(|error| write_error(&self.path, &error))?;
-        self.write_compressed_image(topic, frame_id, times, "jpeg", &jpeg)
     }
 
     /// Writes a compressed image; `format` is `jpeg` or `png`.
@@ -210,7 +186,6 @@ impl LogWriter {
         self.write(topic, MessageKind::Image, times, &message)
     }
 
-    /// Writes a camera's intrinsics.
     pub fn write_camera_info(
         &mut self,
         topic: &str,

@@ -6,6 +6,7 @@ use crate::gimbal::{
     Chain, ClassicalChain, DhLink, ParameterId, ParameterNames, ParameterPart, Parameterization, Quantity, Singularity,
     auto_parameterization,
 };
+use crate::text::Named as _;
 
 fn distance(a: &RigidTransform, b: &RigidTransform) -> f64 {
     (a.to_matrix() - b.to_matrix()).amax()
@@ -15,7 +16,7 @@ fn distance(a: &RigidTransform, b: &RigidTransform) -> f64 {
 fn every_form_has_the_same_forward_kinematics() {
     let mut random = Random::new(1);
     for (name, classical) in all_chains() {
-        for parameterization in Parameterization::ALL {
+        for parameterization in Parameterization::all() {
             let chain = Chain::from_classical(&classical, parameterization);
             let back = chain.to_classical();
             for _ in 0..5 {
@@ -30,7 +31,7 @@ fn every_form_has_the_same_forward_kinematics() {
                 assert!(distance(&canonical, &expected) < 1e-13, "{name} canonical {parameterization}");
                 assert_eq!(chain.linearize(&angles).imu_from_camera, chain.imu_from_camera(&angles));
             }
-            for other in Parameterization::ALL {
+            for other in Parameterization::all() {
                 let angles = random.angles(classical.joint_count());
                 let converted = chain.in_parameterization(other);
                 assert_eq!(converted.parameterization(), other);
@@ -95,7 +96,7 @@ fn column_counts_match_the_parameterization() {
     let mut random = Random::new(4);
     for joints in 0..=5 {
         let classical = random.chain(joints);
-        for parameterization in Parameterization::ALL {
+        for parameterization in Parameterization::all() {
             let chain = Chain::from_classical(&classical, parameterization);
             let columns =
                 if parameterization == Parameterization::Classical { 12 + 4 * joints } else { 6 + 4 * joints };
@@ -115,7 +116,7 @@ fn column_counts_match_the_parameterization() {
 
 #[test]
 fn command_line_names_convert_both_ways() {
-    for parameterization in Parameterization::ALL {
+    for parameterization in Parameterization::all() {
         assert_eq!(parameterization.name().parse(), Ok(parameterization));
     }
     let error = "minimum".parse::<Parameterization>().unwrap_err();
@@ -205,7 +206,9 @@ fn canonical_numbers_do_not_depend_on_how_the_chain_was_written() {
             other.imu_from_base = other.imu_from_base * shift.transform(0.0);
             other.links[0].theta_offset_rad -= 0.3;
             other.links[0].d_m -= 0.1;
-            for parameterization in Parameterization::ALL.into_iter().filter(|it| it.is_minimal()) {
+            for parameterization in
+                Parameterization::all().filter(|it| !matches!(it, Parameterization::Classical | Parameterization::Poe))
+            {
                 let first = Chain::from_classical(&classical, parameterization).canonical();
                 let second = Chain::from_classical(&other, parameterization).canonical();
                 for (a, b) in first.values().iter().zip(&second.values()) {

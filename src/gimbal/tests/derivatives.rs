@@ -4,12 +4,13 @@ use super::random::{Random, all_chains};
 use crate::gimbal::{
     Chain, ParameterPart, Parameterization, Quantity, generic_joint_angles, redundant_directions, stacked_jacobian,
 };
+use crate::text::Named as _;
 
 /// Every chain in every parameterization, with and without offsets.
 fn every_chain() -> Vec<(String, Chain)> {
     let mut chains = vec![];
     for (name, classical) in all_chains() {
-        for parameterization in Parameterization::ALL {
+        for parameterization in Parameterization::all() {
             let chain = Chain::from_classical(&classical, parameterization);
             chains.push((format!("{name} as {parameterization}"), chain.clone()));
             chains.push((format!("{name} as {parameterization} without offsets"), chain.without_joint_offsets()));
@@ -115,7 +116,7 @@ fn ranks_over_all_joint_angles_are_four_per_joint_and_six() {
     let mut random = Random::new(15);
     for joints in 0..=4 {
         let classical = random.chain(joints);
-        for parameterization in Parameterization::ALL {
+        for parameterization in Parameterization::all() {
             let chain = Chain::from_classical(&classical, parameterization);
             assert_eq!(rank(&chain), 6 + 4 * joints, "{parameterization} with {joints} joints");
         }

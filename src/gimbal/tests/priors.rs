@@ -3,6 +3,7 @@ use nalgebra::{DMatrix, DVector};
 use super::random::{Random, all_chains, special_chains};
 use crate::geometry::Dimension;
 use crate::gimbal::{Chain, Parameterization, transport, transport_covariance};
+use crate::text::Named as _;
 
 const TRANSLATION_SIGMA_M: f64 = 0.003;
 const ROTATION_SIGMA_RAD: f64 = 0.0087;
@@ -12,7 +13,7 @@ fn transported_steps_move_the_camera_equally() {
     let mut random = Random::new(21);
     for (name, classical) in all_chains() {
         let given = Chain::from_classical(&classical, Parameterization::Classical);
-        for parameterization in Parameterization::ALL {
+        for parameterization in Parameterization::all() {
             let chain = Chain::from_classical(&classical, parameterization);
             if chain.margins().iter().any(|(_, margin)| *margin < 0.05) {
                 continue;
@@ -71,7 +72,7 @@ fn the_prior_covers_the_error_bounds_of_the_rig() {
 #[test]
 fn every_prior_is_invertible_even_at_a_singularity() {
     for (name, classical) in all_chains() {
-        for parameterization in Parameterization::ALL {
+        for parameterization in Parameterization::all() {
             let chain = Chain::from_classical(&classical, parameterization);
             for chain in [chain.clone(), chain.without_joint_offsets()] {
                 let covariance = chain.prior_covariance(&classical, TRANSLATION_SIGMA_M, ROTATION_SIGMA_RAD);

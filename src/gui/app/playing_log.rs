@@ -6,7 +6,6 @@ use std::sync::Arc;
 use crate::gui::{ImageSource, Playback};
 use crate::session::{Command, FrameImage, Recording, Wake};
 
-/// A log during playback.
 pub trait PlayingLog: Send {
     /// Results so far; cheap to clone.
     fn recording(&self) -> Arc<Recording>;

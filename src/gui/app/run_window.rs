@@ -30,11 +30,7 @@ pub enum WindowError {
     NoDisplay,
     /// A library or a graphics driver is missing, or the display refused the connection.
     #[error("the window cannot be opened: {problem}\n{remedy}")]
-    Refused {
-        /// The error of the operating system.
-        problem: String,
-        remedy: String,
-    },
+    Refused { problem: String, remedy: String },
 }
 
 pub struct WindowOptions {
@@ -44,7 +40,6 @@ pub struct WindowOptions {
     pub log_path: Option<PathBuf>,
     /// Opens the logs that the user selects.
     pub open_log: OpenLog,
-    /// Opens paths that are studies.
     pub open_study: OpenStudy,
     pub desktop: Arc<dyn Desktop>,
     pub theme: ThemeName,

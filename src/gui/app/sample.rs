@@ -9,7 +9,6 @@ use egui::{ProgressBar, RichText, Ui};
 use crate::gui::desktop::{Desktop, SampleProgress};
 use crate::gui::theme::Theme;
 
-/// A running simulation.
 struct Simulation {
     news: Receiver<SampleProgress>,
     images: Option<(usize, usize)>,

@@ -12,9 +12,6 @@ pub trait StudySource: Send + Sync {
     fn study(&self) -> Arc<Study>;
     /// Opens a session on the log of the first row with the runs of all rows. Its cursor goes to the worst frame of the
     /// first row as soon as that is computed. An error message states cause and remedy.
-    ///
-    /// # Errors
-    /// When the log or the rig can no longer be read.
     fn open_runs(&self, rows: &[usize]) -> Result<Box<dyn PlayingLog>, String>;
 }
 

@@ -14,7 +14,6 @@ use crate::gui::theme::Theme;
 /// Maximum width of the content in points.
 const WIDTH: f32 = 760.0;
 
-/// Choice of the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Choice {
     Open(PathBuf),

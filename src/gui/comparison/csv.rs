@@ -5,6 +5,7 @@ use super::columns::label_of;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gui::{CsvTable, PanelContext};
 use crate::session::Quantity;
+use crate::text::Named as _;
 
 impl CsvTable for ComparisonPanel {
     /// Accuracy of all runs, their first divergences from the reference, and the differences of every common frame.
@@ -41,7 +42,7 @@ impl CsvTable for ComparisonPanel {
                     number_cell(value),
                 ]);
             };
-            for (quantity, divergence) in Quantity::ALL.into_iter().zip(&comparison.divergences) {
+            for (quantity, divergence) in Quantity::all().zip(&comparison.divergences) {
                 let at = |stamp_ns: i64| comparison.at(quantity, stamp_ns).unwrap_or(f64::NAN);
                 for (kind, stamp_ns) in
                     [("first different", divergence.exact_ns), ("first notable", divergence.notable_ns)]
@@ -54,7 +55,7 @@ impl CsvTable for ComparisonPanel {
                     push_row("largest", quantity, stamp_ns, largest);
                 }
             }
-            for quantity in Quantity::ALL {
+            for quantity in Quantity::all() {
                 let known = comparison.stamps_ns.iter().zip(comparison.column(quantity));
                 for (stamp_ns, apart) in known.filter(|(_, apart)| apart.is_finite()) {
                     push_row("difference", quantity, *stamp_ns, *apart);

@@ -55,7 +55,6 @@ impl View {
 /// State of the comparison panel: reference run, view, and the cached comparisons.
 #[derive(Default)]
 pub struct ComparisonPanel {
-    /// Index of the reference run.
     pub reference: usize,
     /// Chosen view; `None` until the user chooses.
     view: Option<View>,

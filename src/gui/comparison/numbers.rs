@@ -9,6 +9,7 @@ use crate::gui::help::terms::divergence;
 use crate::gui::theme::ROW_HEIGHT;
 use crate::gui::units::{fixed, seconds, significant};
 use crate::session::{Command, Comparison, Divergence, Quantity};
+use crate::text::Named as _;
 
 /// Factor from stored to shown unit, and the shown unit.
 pub(super) fn shown(quantity: Quantity) -> (f64, &'static str) {
@@ -20,7 +21,6 @@ pub(super) fn shown(quantity: Quantity) -> (f64, &'static str) {
     }
 }
 
-/// A difference with its unit.
 pub(super) fn difference_text(quantity: Quantity, apart: f64) -> String {
     let (factor, unit) = shown(quantity);
     let space = if unit.is_empty() || unit.starts_with('°') { "" } else { " " };
@@ -145,7 +145,7 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
             ui.label(RichText::new(term.name).small().color(theme.text_weak)).on_hover_text(term.meaning);
         }
         ui.end_row();
-        for (quantity, divergence) in Quantity::ALL.into_iter().zip(&comparison.divergences) {
+        for (quantity, divergence) in Quantity::all().zip(&comparison.divergences) {
             let Divergence { exact_ns, notable_ns, largest } = *divergence;
             let Some((largest, largest_ns)) = largest else { continue };
             let name = |what: &str| format!("{own}, {}: {what}", quantity.name());

@@ -8,6 +8,7 @@ use super::row::{Line, MIN_HEIGHT, Row, row_ui};
 use crate::gui::PanelContext;
 use crate::gui::plot::Curve;
 use crate::session::{Comparison, Quantity};
+use crate::text::Named as _;
 
 /// Range of the row height in points.
 const HEIGHTS: std::ops::RangeInclusive<f32> = MIN_HEIGHT..=120.0;

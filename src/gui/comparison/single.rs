@@ -53,7 +53,6 @@ const OFFERS: [(&str, &str); 5] = [
     ("auto:first-estimates=off", "spurious information that first-estimate Jacobians avoid"),
 ];
 
-/// Preview of a comparison.
 const PREVIEW: &str = "Two to four runs share log, tracks and cursor. Shown are the accuracy of each with the best of each row \
     marked, the first difference and the first notable divergence of 14 quantities, differences over time, images and \
     scenes side by side, and lost directions with common rows.";

@@ -10,6 +10,7 @@ use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{Dialog, Panel as _, PanelContext, Playback, Presentation, Selection};
 use crate::session::{Command, Quantity, Recording};
+use crate::text::Named as _;
 
 struct Bench {
     recording: Recording,

@@ -5,6 +5,7 @@ use egui::{Align2, Rect, Role, Ui, WidgetInfo, pos2};
 use crate::gimbal::{ParameterGroup, ParameterId};
 use crate::gui::PanelContext;
 use crate::gui::theme;
+use crate::text::Named as _;
 
 /// Content of the panel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -16,7 +16,6 @@ pub(crate) const HEADING_WIDTH: f32 = 46.0;
 /// Height of the headings above groups, in points.
 const GROUP_HEIGHT: f32 = 17.0;
 
-/// Rectangles of the plots.
 #[derive(Debug, PartialEq)]
 pub(crate) struct PlotGrid {
     /// One cell per shown parameter, in order.

@@ -32,7 +32,6 @@ pub struct ConvergencePanel {
     histories: Vec<CalibrationHistory>,
     /// The other runs in the parameterization of the shown run.
     converted: Vec<ConvertedHistory>,
-    /// Curves by run and parameter.
     curves: BTreeMap<(usize, ParameterId), ParameterCurves>,
     /// View of a calibration with more than one group.
     view: View,

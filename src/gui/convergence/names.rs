@@ -3,9 +3,9 @@
 use crate::gimbal::{ParameterGroup, ParameterId, ParameterPart, Quantity};
 use crate::sensors::Rig;
 
-/// Part of the calibration to which a parameter belongs, in the order of [`ParameterGroup::ALL`].
+/// Part of the calibration to which a parameter belongs, in the order of [`ParameterGroup::NAMES`].
 ///
-/// [`ParameterGroup::ALL`]: crate::gimbal::ParameterGroup::ALL
+/// [`ParameterGroup::NAMES`]: crate::gimbal::ParameterGroup
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum CalibrationPart {
     /// Between the IMU and the first joint.
@@ -37,7 +37,6 @@ pub(crate) fn part_of(parameter: ParameterId) -> CalibrationPart {
     }
 }
 
-/// A short heading for a part of the calibration.
 pub(crate) fn heading_of(part: CalibrationPart, rig: &Rig) -> String {
     match part {
         CalibrationPart::Base => "base".to_owned(),
@@ -56,7 +55,6 @@ fn joint_name(number: usize, rig: &Rig) -> Option<&str> {
     joints.get(number.checked_sub(1)?).map(|joint| joint.name.as_str())
 }
 
-/// Meaning of a parameter in words.
 pub(crate) fn meaning_of(parameter: ParameterId, rig: &Rig) -> String {
     let part = part_of(parameter);
     let kind = match parameter.quantity {

@@ -30,7 +30,6 @@ const SAMPLE_WIDTH: f32 = 26.0;
 /// Height of the line with name and value, in points.
 const TITLE_HEIGHT: f32 = 15.0;
 
-/// States that are marked in the plots.
 pub(super) const MARKED: [ParameterState; 3] =
     [ParameterState::Weak, ParameterState::Unobservable, ParameterState::Waiting];
 
@@ -104,7 +103,6 @@ fn legend_entries(ctx: &PanelContext<'_>, add_entry: &mut dyn FnMut(&str, PaintS
     }
 }
 
-/// Inputs of the plots.
 pub(super) struct PlotData<'a> {
     /// Calibration of each run in its own parameterization.
     pub(super) histories: &'a [CalibrationHistory],
@@ -112,7 +110,6 @@ pub(super) struct PlotData<'a> {
     pub(super) converted: &'a [ConvertedHistory],
     /// Ground-truth values in the shown run's parameterization.
     pub(super) ground_truth: &'a ParameterValues,
-    /// Index of the shown run.
     pub(super) shown: usize,
     pub(super) wheel: Wheel,
 }

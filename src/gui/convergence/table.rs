@@ -10,6 +10,7 @@ use crate::gui::theme::Theme;
 use crate::gui::units::{Shown, fixed};
 use crate::observability::{Estimability, ParameterEstimability, count_of, estimability};
 use crate::session::RunRecord;
+use crate::text::Named as _;
 
 const HEADS: [(&str, &str); 8] = [
     ("Parameter", "Click: select it in all panels"),

@@ -5,18 +5,15 @@ use pulldown_cmark::{Event, HeadingLevel, Options, Parser, Tag, TagEnd};
 /// A piece of text with one style.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Span {
-    /// Text without markup.
     pub(super) text: String,
     pub(super) strong: bool,
     pub(super) emphasis: bool,
     pub(super) code: bool,
-    /// Link as written.
     pub(super) link: Option<String>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Block {
-    /// A heading with its anchor.
     Heading {
         /// 1 for the title of the document.
         level: u8,
@@ -37,7 +34,6 @@ pub(super) enum Block {
     Table(Vec<Vec<Vec<Span>>>),
 }
 
-/// The links of a block as written.
 #[cfg(test)]
 pub(super) fn links_of(block: &Block) -> impl Iterator<Item = &str> {
     let spans: Vec<&Span> = match block {

@@ -15,6 +15,7 @@ pub(crate) use self::manual::Manual;
 use self::manual::first_paragraph;
 use super::PanelName;
 use super::theme::Theme;
+use crate::text::Named as _;
 
 /// Width of the popup in points.
 const WIDTH: f32 = 360.0;
@@ -88,13 +89,13 @@ impl Help {
         let shown = popup.show(|ui| {
             ui.set_width(WIDTH);
             ui.label(RichText::new(panel.title()).size(15.0).color(theme.text_strong));
-            let mut link = first_paragraph(panel.section()).and_then(|spans| spans_ui(ui, theme, spans, None));
+            let mut link = first_paragraph(panel.name()).and_then(|spans| spans_ui(ui, theme, spans, None));
             let button = ui.button(format!("Open manual: {}", panel.title()));
             if by_key {
                 button.request_focus();
             }
             if button.clicked() {
-                link = Some(format!("#{}", panel.section()));
+                link = Some(format!("#{}", panel.name()));
             }
             link
         });
@@ -123,8 +124,8 @@ mod tests {
 
     #[test]
     fn the_manual_has_a_paragraph_about_every_panel() {
-        for panel in PanelName::ALL {
-            let spans = first_paragraph(panel.section());
+        for panel in PanelName::all() {
+            let spans = first_paragraph(panel.name());
             let text: String = spans.unwrap_or_default().iter().map(|span| span.text.as_str()).collect();
             assert!((80..=700).contains(&text.len()), "{}: {} letters: {text}", panel.title(), text.len());
         }

@@ -44,7 +44,6 @@ const LINE_HEIGHT: f32 = 18.0;
 pub struct ImagePanel {
     /// Residuals before or after the solve.
     pub side: SolveSide,
-    /// Magnification of the residuals.
     pub magnification: f32,
     pub residuals: bool,
     pub trails: bool,

@@ -165,7 +165,6 @@ impl ImageModel {
         parts
     }
 
-    /// The caption with all parts.
     pub(super) fn caption(&self) -> String {
         self.caption_parts().join(SEPARATOR)
     }

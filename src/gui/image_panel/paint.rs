@@ -11,7 +11,6 @@ use crate::sensors::ImageMask;
 const HATCH_PX: usize = 12;
 /// Age in frames of the last colour of the map.
 const MAX_AGE: f64 = 100.0;
-/// Ages in the legend.
 const LEGEND_AGES: [u32; 4] = [0, 10, 40, 100];
 /// Maximum radius of the keypoint marker of a solved feature, in points.
 const MARKER_RADIUS: f32 = 4.0;
@@ -52,7 +51,6 @@ impl ImagePlacement {
     }
 }
 
-/// Options of the marks of a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MarkOptions {
     pub(super) side: SolveSide,
@@ -88,10 +86,6 @@ fn halo_of(color: Color32) -> Color32 {
 /// Theme of the overlay: the same in every theme, because the image is its background.
 fn ink() -> Theme {
     Theme::of(ThemeName::Dark)
-}
-
-fn residual_color() -> Color32 {
-    ink().runs[1]
 }
 
 /// Draws one feature: trail, keypoint marker, residual, cross, id.
@@ -148,7 +142,7 @@ fn upright_cross(painter: &Painter, at: Pos2, reach: f32, stroke: Stroke) {
 
 /// Draws a line from the measurement to the (magnified) prediction, with a diamond at its end.
 fn residual_arrow(painter: &Painter, from: Pos2, tip: Pos2) {
-    let color = residual_color();
+    let color = ink().runs[1];
     painter.line_segment([from, tip], Stroke::new(3.0, HALO));
     painter.line_segment([from, tip], Stroke::new(1.5, color));
     let side = 2.2;

@@ -9,6 +9,7 @@ use crate::gimbal::{ParameterGroup, ParameterId, ParameterNames};
 use crate::gui::units::{Shown, counted};
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
+use crate::text::Named as _;
 
 /// Maximum number of decades of the colour map.
 const MAX_DECADES: f64 = 6.0;
@@ -42,7 +43,6 @@ pub(super) struct JacobianModel {
     pub(super) columns: Axis,
     /// Exponents of the norms with the first and last colour.
     pub(super) decades: (f64, f64),
-    /// Number of joints of the chain.
     pub(super) joint_count: usize,
 }
 
@@ -166,17 +166,18 @@ fn rows_of(jacobian: &StepJacobian) -> Axis {
 /// Lays out the columns: wide for the calibration, so that they can be read one by one, narrow for the states of the
 /// frames. The calibration is split by the group of its parameters if it has several.
 pub(super) fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> Axis {
-    let mut groups = ParameterGroup::ALL.map(|group| group.name().to_owned()).to_vec();
-    groups.extend(["joints", "poses", "velocities, biases", "depth"].map(str::to_owned));
+    let states = ["joints", "poses", "velocities, biases", "depth"];
+    let mut groups: Vec<String> =
+        ParameterGroup::all().map(ParameterGroup::name).chain(states).map(str::to_owned).collect();
     let parameters = || jacobian.columns.iter().filter_map(|block| block.id.parameter());
     if parameters().all(|parameter| Some(parameter.group()) == parameters().next().map(ParameterId::group)) {
-        groups[..ParameterGroup::ALL.len()].fill(ONE_GROUP.to_owned());
+        groups[..ParameterGroup::NAMES.len()].fill(ONE_GROUP.to_owned());
     }
-    let states = ParameterGroup::ALL.len();
+    let states = ParameterGroup::NAMES.len();
     let strips = jacobian.columns.iter().map(|block| {
         let (group, weight) = match block.id {
             ColumnId::Calibration(parameter) => {
-                let place = ParameterGroup::ALL.iter().position(|group| *group == parameter.group());
+                let place = ParameterGroup::all().position(|group| group == parameter.group());
                 (place.unwrap_or(0), 3.0)
             }
             ColumnId::Joints(_) => (states, 1.0),

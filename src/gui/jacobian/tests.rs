@@ -15,6 +15,7 @@ use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{Panel as _, Selection};
 use crate::session::Recording;
+use crate::text::Named as _;
 
 type Shown = (JacobianPanel, Selection);
 
@@ -142,10 +143,10 @@ fn the_matrix_zooms_and_steps_without_a_linearization_are_reported() {
         let mut shown = (JacobianPanel::default(), selection);
         let options = HeadlessOptions { size_px: [1000, 640], pixels_per_point: 1.0, theme };
         let whole = draw(options, |ui| show(ui, &mut shown, sample(), theme));
-        keep_screenshot(&format!("jacobian-flown-{}", theme.as_str()), &whole);
+        keep_screenshot(&format!("jacobian-flown-{}", theme.name()), &whole);
         shown.0.view = PanZoom { zoom: 6.0, centre: egui::vec2(0.15, 0.3) };
         let near = draw(options, |ui| show(ui, &mut shown, sample(), theme));
-        keep_screenshot(&format!("jacobian-near-{}", theme.as_str()), &near);
+        keep_screenshot(&format!("jacobian-near-{}", theme.name()), &near);
         assert!(whole != near);
     }
     let place = PanZoom { zoom: 2.0, centre: egui::vec2(0.25, 0.5) }

@@ -8,9 +8,7 @@ use crate::gimbal::Parameterization;
 use crate::gui::PanelContext;
 use crate::gui::help::terms::window;
 use crate::observability::laboratory::{LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
-
-/// Parameterizations to choose from.
-const PARAMETERIZATIONS: [Parameterization; 6] = Parameterization::ALL;
+use crate::text::Named as _;
 
 /// Knowledge of the joint angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +18,6 @@ enum Joints {
     Unknown,
 }
 
-/// Knowledge of the poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Poses {
     Known,
@@ -33,7 +30,7 @@ pub(super) struct Choices {
     /// Name of a mechanism; `None` for the rig's.
     mechanism: Option<&'static str>,
     motion: LaboratoryMotion,
-    parameterizations: [bool; PARAMETERIZATIONS.len()],
+    parameterizations: [bool; Parameterization::NAMES.len()],
     joint_offsets: bool,
     frozen: Vec<bool>,
     joints: Joints,
@@ -46,9 +43,9 @@ impl Default for Choices {
         Self {
             mechanism: None,
             motion: LaboratoryMotion::Aggressive,
-            parameterizations: PARAMETERIZATIONS.map(|parameterization| {
+            parameterizations: std::array::from_fn(|index| {
                 use Parameterization::{Classical, Minimal, MinimalSwapped};
-                matches!(parameterization, Classical | Minimal | MinimalSwapped)
+                matches!(Parameterization::NAMES[index].0, Classical | Minimal | MinimalSwapped)
             }),
             joint_offsets: true,
             frozen: Vec::new(),
@@ -68,7 +65,7 @@ impl Choices {
         });
         ui.horizontal_wrapped(|ui| {
             ui.label("Parameterizations");
-            for (chosen, parameterization) in self.parameterizations.iter_mut().zip(PARAMETERIZATIONS) {
+            for (chosen, parameterization) in self.parameterizations.iter_mut().zip(Parameterization::all()) {
                 ui.checkbox(chosen, parameterization.name());
             }
             ui.checkbox(&mut self.joint_offsets, "Joint offsets")
@@ -111,7 +108,7 @@ impl Choices {
         let name = ui.label("Motion");
         let combo = ComboBox::from_id_salt("motion").width(150.0).selected_text(self.motion.name());
         let shown = combo.show_ui(ui, |ui| {
-            for motion in LaboratoryMotion::ALL {
+            for motion in LaboratoryMotion::all() {
                 ui.selectable_value(&mut self.motion, motion, motion.name()).on_hover_text(motion.meaning());
             }
         });
@@ -163,12 +160,9 @@ impl Choices {
 
     /// The chosen experiment, or the reason why it is invalid.
     pub(super) fn experiment(&self, ctx: &PanelContext<'_>) -> Result<Experiment, String> {
-        let parameterizations = PARAMETERIZATIONS.iter().zip(self.parameterizations).filter(|(_, chosen)| *chosen);
+        let parameterizations = Parameterization::all().zip(self.parameterizations).filter(|(_, chosen)| *chosen);
         let parameterizations: Vec<LaboratoryForm> = parameterizations
-            .map(|(parameterization, _)| LaboratoryForm {
-                parameterization: *parameterization,
-                joint_offsets: self.joint_offsets,
-            })
+            .map(|(parameterization, _)| LaboratoryForm { parameterization, joint_offsets: self.joint_offsets })
             .collect();
         if parameterizations.is_empty() {
             return Err("No parameterization selected".to_owned());

@@ -11,6 +11,7 @@ use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{Panel as _, Selection};
 use crate::observability::laboratory::{LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
 use crate::session::Recording;
+use crate::text::Named as _;
 
 fn show(ui: &mut egui::Ui, panel: &mut LaboratoryPanel, recording: &Recording, theme: ThemeName) {
     let theme = Theme::of(theme);
@@ -83,7 +84,7 @@ fn screenshots_wait_for_their_experiments() {
         let mut panel = LaboratoryPanel::default();
         let options = HeadlessOptions { size_px: [1200, 760], pixels_per_point: 1.0, theme };
         let screenshot = draw(options, |ui| show(ui, &mut panel, &recording, theme));
-        keep_screenshot(&format!("laboratory-{}", theme.as_str()), &screenshot);
+        keep_screenshot(&format!("laboratory-{}", theme.name()), &screenshot);
         let mut copy = panel.view_copy();
         assert!(screenshot == draw(options, |ui| show(ui, &mut copy, &recording, theme)));
     }

@@ -110,7 +110,6 @@ pub(crate) fn paint_line(painter: &Painter, points: &[Pos2], style: RunStyle, wi
     }
 }
 
-/// Fills the area of a band.
 pub(crate) fn paint_band(painter: &Painter, area: &PlotArea, band: &BandCurve, fill: Color32) {
     for segment in &band.segments {
         let mut mesh = Mesh::default();

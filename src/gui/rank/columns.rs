@@ -4,13 +4,14 @@
 use egui::{Align2, Color32, Grid, Label, Rangef, Rect, RichText, Role, Stroke, Ui, WidgetInfo};
 use egui::{StrokeKind, pos2, vec2};
 
+use super::heat_map::paint_weight;
 use super::{groups, spectrum};
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::{meaning_of, part_of};
 use crate::gui::theme::{self, Theme};
 use crate::gui::units::counted;
-use crate::observability::{CalibrationDirection, RankReport};
+use crate::observability::RankReport;
 
 /// One report with its title.
 pub(in crate::gui) struct RankColumn<'a> {
@@ -160,7 +161,9 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
             let top = whole.top() + HEADER + row as f32 * row_height;
             for (place, direction) in directions.iter().enumerate() {
                 let cell = Rect::from_min_size(pos2(left + place as f32 * pitch, top), vec2(pitch, row_height));
-                cell_ui(ui, &theme, direction, entry, cell.shrink(0.5));
+                let weight = direction.weights.get(entry).copied().unwrap_or(0.0);
+                let cell = cell.shrink(0.5);
+                paint_weight(ui.painter(), &theme, weight, cell, cell.width() >= MIN_COLUMN_WIDTH);
             }
         }
     }
@@ -191,21 +194,6 @@ fn parameters_of(columns: &[RankColumn<'_>]) -> Vec<ParameterId> {
     }
     parameters.sort_by_key(|parameter| part_of(*parameter));
     parameters
-}
-
-fn cell_ui(ui: &Ui, theme: &Theme, direction: &CalibrationDirection, entry: usize, cell: Rect) {
-    let weight = direction.weights.get(entry).copied().unwrap_or(0.0);
-    let ground = theme.diverging(weight);
-    let painter = ui.painter();
-    painter.rect_filled(cell, 1.0, ground);
-    let text = if weight.abs() >= 0.05 && cell.width() >= MIN_COLUMN_WIDTH {
-        format!("{weight:+.2}")
-    } else if weight.abs() >= 0.2 {
-        if weight < 0.0 { "−" } else { "+" }.to_owned()
-    } else {
-        return;
-    };
-    painter.text(cell.center(), Align2::CENTER_CENTER, text, theme::number_font(), Theme::text_on(ground));
 }
 
 fn name_ui(ui: &Ui, ctx: &mut PanelContext<'_>, parameter: ParameterId, line: Rect, indent: f32) {

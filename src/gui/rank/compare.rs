@@ -8,8 +8,8 @@ use crate::gui::PanelContext;
 use crate::gui::help::terms::window;
 use crate::observability::RankReport;
 use crate::session::{Command, MAX_RUNS, RunRecord, RunSpec, StepRecord};
+use crate::text::Named as _;
 
-/// Width of a run in points.
 pub(super) const WIDTH_OF_A_RUN: f32 = 300.0;
 
 /// Number of runs with a rank at the cursor.

@@ -5,6 +5,7 @@ use egui::{Painter, Rangef, Stroke, pos2};
 
 use crate::gimbal::{ParameterGroup, ParameterId};
 use crate::gui::theme::{Theme, label_font};
+use crate::text::Named as _;
 
 /// Width of the names of groups in points.
 const STRIP_WIDTH: f32 = 15.0;

@@ -1,7 +1,7 @@
 //! Null and weak directions by parameter name: a heat map with the signed weights as text.
 
 use egui::epaint::TextShape;
-use egui::{Align2, Rangef, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
+use egui::{Align2, Painter, Rangef, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
 use super::groups;
 use crate::gimbal::ParameterId;
@@ -206,16 +206,7 @@ fn row_ui(
         let weight = direction.weights.get(row).copied().unwrap_or(0.0);
         let left = line.left() + name_width + column as f32 * pitch;
         let cell = Rect::from_min_size(pos2(left, line.top()), vec2(pitch, line.height())).shrink(0.5);
-        let ground = theme.diverging(weight);
-        painter.rect_filled(cell, 1.0, ground);
-        let text = if weight.abs() >= MIN_SHOWN_WEIGHT && pitch >= NUMBER_WIDTH {
-            format!("{weight:+.2}")
-        } else if weight.abs() >= 0.2 {
-            if weight < 0.0 { "−" } else { "+" }.to_owned()
-        } else {
-            continue;
-        };
-        painter.text(cell.center(), Align2::CENTER_CENTER, text, theme::number_font(), Theme::text_on(ground));
+        paint_weight(painter, &theme, weight, cell, pitch >= NUMBER_WIDTH);
     }
     let (sense, role) = ctx.presentation.clickable(Role::Label);
     let response = ui.interact(line, ui.unique_id().with(("row", &name)), sense);
@@ -234,6 +225,20 @@ fn row_ui(
         "{name}: {}\nWeights in the unit right singular vectors, columns scaled by 10° and 3 cm",
         meaning_of(parameter, &ctx.recording.rig)
     ));
+}
+
+/// Paints the cell of a weight: as a number if there is room for it, else the sign of a large weight.
+pub(super) fn paint_weight(painter: &Painter, theme: &Theme, weight: f64, cell: Rect, numbers: bool) {
+    let ground = theme.diverging(weight);
+    painter.rect_filled(cell, 1.0, ground);
+    let text = if weight.abs() >= MIN_SHOWN_WEIGHT && numbers {
+        format!("{weight:+.2}")
+    } else if weight.abs() >= 0.2 {
+        if weight < 0.0 { "−" } else { "+" }.to_owned()
+    } else {
+        return;
+    };
+    painter.text(cell.center(), Align2::CENTER_CENTER, text, theme::number_font(), Theme::text_on(ground));
 }
 
 #[cfg(test)]

@@ -110,16 +110,12 @@ impl SliderUi {
             ui.ctx().request_repaint();
         }
         let untouched = ctx.selection.slide.is_none() && amount == 0.0 && !self.playing;
-        let unchosen = directions_first(rank).as_ref() == Some(&direction);
+        let unchosen = SlideDirection::of_step(rank).first() == Some(&direction);
         ctx.selection.slide = (!(untouched && unchosen)).then_some(SlidePosition { direction, amount });
         if let Some(slide) = ctx.moved_chain(step.report.stamp_ns) {
             outcome_ui(ui, ctx, slide, &parameters);
         }
     }
-}
-
-fn directions_first(rank: &RankReport) -> Option<SlideDirection> {
-    SlideDirection::of_step(rank).into_iter().next()
 }
 
 /// True if the direction is not one of the step's.

@@ -184,6 +184,7 @@ pub fn svg_of(options: HeadlessOptions, prefix: &str, title: &str, ui: impl FnMu
 mod tests {
     use super::*;
     use crate::gui::tests::keep_screenshot;
+    use crate::text::Named as _;
 
     fn options(theme: ThemeName, scale: f32) -> HeadlessOptions {
         HeadlessOptions { size_px: [(200.0 * scale) as u32, (60.0 * scale) as u32], pixels_per_point: scale, theme }
@@ -200,7 +201,7 @@ mod tests {
             for scale in [1.0, 1.5, 2.0] {
                 let options = options(theme, scale);
                 let image = draw(options, text_ui);
-                keep_screenshot(&format!("text-{}-{scale}", theme.as_str()), &image);
+                keep_screenshot(&format!("text-{}-{scale}", theme.name()), &image);
                 assert_eq!([image.width(), image.height()], options.size_px);
                 assert!(image == draw(options, text_ui), "two screenshots differ");
                 assert!(image.pixels().all(|pixel| pixel.0[3] == 255));

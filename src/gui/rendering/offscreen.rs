@@ -24,32 +24,18 @@ const DRIVER_HANGS_AFTER: Duration = Duration::from_mins(1);
 /// Reason why a screenshot cannot be painted.
 #[derive(Debug, Error)]
 pub enum OffscreenError {
-    /// No driver, or no usable one.
     #[error("no graphics adapter: {problem}; use --renderer cpu")]
     NoAdapter {
         /// Backends that were tried.
         problem: String,
     },
-    /// The screenshot is larger than the adapter's largest texture.
     #[error(
         "a screenshot of {width}×{height} pixels exceeds the limit of the graphics adapter {adapter}, {largest} pixels per \
          side; use --renderer cpu"
     )]
-    TooLarge {
-        /// Width in pixels.
-        width: u32,
-        /// Height in pixels.
-        height: u32,
-        /// Largest side of a texture in pixels.
-        largest: u32,
-        adapter: String,
-    },
+    TooLarge { width: u32, height: u32, largest: u32, adapter: String },
     #[error("the graphics adapter {adapter} returned no image: {problem}; use --renderer cpu")]
-    NotDelivered {
-        adapter: String,
-        /// Error of the driver.
-        problem: String,
-    },
+    NotDelivered { adapter: String, problem: String },
 }
 
 /// A graphics adapter without a window.

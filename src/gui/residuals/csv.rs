@@ -5,6 +5,7 @@ use crate::estimator::FactorKind;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gui::{CsvTable, PanelContext};
 use crate::session::StepRecord;
+use crate::text::Named as _;
 
 impl CsvTable for ResidualsPanel {
     /// Reprojection RMS and χ² by kind of factor, for every step of every run.
@@ -18,7 +19,7 @@ impl CsvTable for ResidualsPanel {
         }
         let mut columns = ["t_s", "run", "rms_before_px", "rms_after_px"].map(str::to_owned).to_vec();
         for factor in &factors {
-            let factor = factor.key();
+            let factor = factor.name();
             columns.extend(["count", "chi2_before", "chi2_after"].map(|part| format!("{factor}_{part}")));
         }
         let mut table = CsvWriter::new(columns);

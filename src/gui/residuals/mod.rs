@@ -31,7 +31,6 @@ use crate::session::StepRecord;
 pub struct ResidualsPanel {
     tables: RunTables,
     curves: Vec<Curve>,
-    /// Step and its histogram.
     counted: Option<(Arc<StepRecord>, ResidualHistogram)>,
     /// True if the content is higher than the panel, so that the wheel scrolls.
     overflows: bool,
@@ -124,7 +123,6 @@ pub(crate) fn rms_px(report: &StepReport) -> f64 {
 /// Height of a line of the summary in points.
 const SUMMARY_LINE: f32 = 14.0;
 
-/// Summary of the step in one line.
 fn summary_ui(ui: &mut Ui, theme: &Theme, report: &StepReport, histogram: &ResidualHistogram) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(12.0, 2.0);
@@ -245,7 +243,7 @@ fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
         }
         ui.end_row();
         for summary in residuals {
-            let name = ui.label(RichText::new(summary.factor.name()).color(theme.text));
+            let name = ui.label(RichText::new(summary.factor.label()).color(theme.text));
             name.on_hover_text(term_of(summary.factor).meaning);
             let number = |ui: &mut Ui, text: String, term: Term| {
                 ui.label(RichText::new(text).monospace().color(theme.text_strong)).on_hover_text(term.meaning);
@@ -259,7 +257,6 @@ fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
     });
 }
 
-/// Definition of a kind of factor.
 const fn term_of(factor: FactorKind) -> Term {
     match factor {
         FactorKind::Visual => factors::VISUAL,

@@ -6,7 +6,6 @@ use crate::gui::ImageSource;
 use crate::sensors::GrayImage;
 use crate::session::FrameImage;
 
-/// Size of the images in pixels.
 const SIZE_PX: [usize; 2] = [640, 480];
 /// Size of a field of the checkerboard in pixels.
 const FIELD_PX: usize = 40;

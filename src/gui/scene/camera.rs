@@ -124,7 +124,6 @@ impl View {
         (in_view.z >= self.near_m).then(|| self.on_screen(&in_view))
     }
 
-    /// Metres per pixel at the target.
     pub(super) fn metres_per_px(&self) -> f64 {
         self.camera.distance_m / self.viewport.focal_px()
     }

@@ -7,7 +7,6 @@ use egui::{Context, Id, Pos2, Rect, TextureHandle, TextureOptions, Ui, pos2};
 use super::layout::Drawing;
 use super::{cpu, gpu};
 
-/// Renderer of the scenes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SceneBackend {
     /// On the CPU into a texture: for screenshots, and for windows on a CPU adapter.
@@ -27,7 +26,6 @@ impl SceneBackend {
         context.data_mut(|data| data.insert_temp(Self::key(), self));
     }
 
-    /// The backend of a context.
     pub fn of(context: &Context) -> Self {
         context.data(|data| data.get_temp(Self::key())).unwrap_or_default()
     }

@@ -261,7 +261,6 @@ impl ChainPose {
     }
 }
 
-/// Colours of x, y, z.
 pub(super) fn axis_colors(theme: &Theme) -> [Color32; 3] {
     [theme.axis_x, theme.axis_y, theme.axis_z]
 }

@@ -40,7 +40,6 @@ use crate::session::RunRecord;
 pub enum Follow {
     #[default]
     Trajectory,
-    /// The vehicle at the cursor.
     Vehicle,
 }
 

@@ -17,6 +17,7 @@ use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{Panel as _, Selection};
 use crate::sensors::GrayImage;
 use crate::session::Recording;
+use crate::text::Named as _;
 
 const GROUND: Color32 = Color32::from_rgb(1, 2, 3);
 
@@ -291,7 +292,7 @@ fn screenshots_repeat_and_every_stamp_can_be_drawn() {
     };
     for theme in [ThemeName::Dark, ThemeName::Light, ThemeName::Print] {
         let late = screenshot(5_500_000_000, theme, Follow::Trajectory);
-        keep_screenshot(&format!("scene-{}", theme.as_str()), &late);
+        keep_screenshot(&format!("scene-{}", theme.name()), &late);
         assert!(late == screenshot(5_500_000_000, theme, Follow::Trajectory));
     }
     let vehicle = screenshot(4_000_000_000, ThemeName::Dark, Follow::Vehicle);

@@ -6,6 +6,7 @@ use super::model::StudyModel;
 use crate::gui::Presentation;
 use crate::gui::theme::Theme;
 use crate::study::view::{Metric, Study};
+use crate::text::Named;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum StudyPanel {
@@ -23,30 +24,29 @@ pub enum StudyPanel {
     Parameters,
 }
 
+/// Names on the command line.
+impl Named for StudyPanel {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Runs, "runs"),
+        (Self::Distributions, "distributions"),
+        (Self::Differences, "differences"),
+        (Self::Success, "success"),
+        (Self::Parallel, "parallel"),
+        (Self::Parameters, "parameters"),
+    ];
+}
+
 impl StudyPanel {
-    pub const ALL: [Self; 6] =
-        [Self::Runs, Self::Distributions, Self::Differences, Self::Success, Self::Parallel, Self::Parameters];
-
-    /// Name on the command line, and title.
-    const fn names(self) -> (&'static str, &'static str) {
-        match self {
-            Self::Runs => ("runs", "Runs"),
-            Self::Distributions => ("distributions", "Distributions"),
-            Self::Differences => ("differences", "Paired differences"),
-            Self::Success => ("success", "Success rate"),
-            Self::Parallel => ("parallel", "Parallel coordinates"),
-            Self::Parameters => ("parameters", "Parameter errors"),
-        }
-    }
-
-    /// Name on the command line.
-    pub const fn as_str(self) -> &'static str {
-        self.names().0
-    }
-
     /// Title in the window.
     pub const fn title(self) -> &'static str {
-        self.names().1
+        match self {
+            Self::Runs => "Runs",
+            Self::Distributions => "Distributions",
+            Self::Differences => "Paired differences",
+            Self::Success => "Success rate",
+            Self::Parallel => "Parallel coordinates",
+            Self::Parameters => "Parameter errors",
+        }
     }
 }
 
@@ -91,7 +91,6 @@ impl StudyContext<'_> {
         }
     }
 
-    /// The metric of all plots.
     pub(crate) fn metric(&self) -> Option<Metric> {
         self.model.metric().cloned()
     }

@@ -32,6 +32,7 @@ use super::Presentation;
 use super::theme::{PANEL_MARGIN, Theme};
 use super::units::counted;
 use crate::study::view::{GroupSummary, Metric, ParameterErrors, Study, parameter_errors, summarize_groups};
+use crate::text::Named as _;
 
 pub struct StudyState {
     study: Arc<Study>,
@@ -106,7 +107,6 @@ impl StudyState {
         }
     }
 
-    /// Summary values of the groups.
     pub fn group_summaries(&mut self) -> Vec<GroupSummary> {
         self.model.update(&self.study);
         let (model, study) = (&self.model, &self.study);
@@ -209,7 +209,7 @@ fn framed_ui(
 ) {
     ui.painter().rect_filled(place, 0.0, theme.surface);
     let inner = place.shrink(f32::from(PANEL_MARGIN));
-    ui.scope_builder(UiBuilder::new().max_rect(inner).id_salt(panel.as_str()), |ui| {
+    ui.scope_builder(UiBuilder::new().max_rect(inner).id_salt(panel.name()), |ui| {
         ui.set_clip_rect(place.intersect(ui.clip_rect()));
         ui.spacing_mut().item_spacing.y = 3.0;
         ui.horizontal(|ui| {

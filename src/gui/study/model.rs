@@ -124,7 +124,6 @@ impl StudyModel {
         }
     }
 
-    /// All options in effect.
     pub(crate) fn options(&self) -> StudyOptions {
         StudyOptions {
             filter: self.filter.text.clone(),
@@ -140,7 +139,6 @@ impl StudyModel {
         self.stale = true;
     }
 
-    /// Column of groups.
     pub(crate) fn group(&self) -> Option<&str> {
         self.group.as_deref()
     }
@@ -205,7 +203,6 @@ fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> 
     format!("unknown {what} '{name}': expected one of {}", known.join(", "))
 }
 
-/// Shown name of a group.
 pub(crate) fn shown_group(name: &str, column: Option<&str>) -> String {
     match (name.is_empty(), column) {
         (true, None) => "all runs".to_owned(),

@@ -21,7 +21,6 @@ const ABOVE: f32 = 34.0;
 const BELOW: f32 = 18.0;
 /// Number of colours of the metric.
 const SHADES: usize = 12;
-/// Maximum number of axes.
 const MAX_AXES: usize = 12;
 
 /// Inputs of the drawn lines; equal keys have equal lines.

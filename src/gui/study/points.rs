@@ -45,7 +45,6 @@ impl Points {
         near.filter(|(_, distance)| *distance <= REACH).min_by(|(_, a), (_, b)| a.total_cmp(b))
     }
 
-    /// Marks the points of a row.
     pub(super) fn mark(&self, painter: &Painter, row: usize, color: Color32) {
         for (place, _) in self.places.iter().filter(|(_, of)| *of == row) {
             painter.circle_stroke(*place, 5.0, Stroke::new(2.0, color));

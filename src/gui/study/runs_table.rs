@@ -46,9 +46,7 @@ const FIRST: [&str; 18] = [
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Line {
-    /// Heading of a group, by its index.
     Group(usize),
-    /// A row of the study.
     Run(usize),
 }
 

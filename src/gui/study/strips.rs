@@ -30,7 +30,6 @@ pub(super) struct Strip {
     pub(super) spread: Option<Spread>,
     /// Lower end, middle and upper end of an interval.
     pub(super) interval: Option<[f64; 3]>,
-    /// Colour index.
     pub(super) color: usize,
 }
 

@@ -14,6 +14,7 @@ use crate::gui::tests::keep_screenshot;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::study::view::tests::synthetic_study;
 use crate::study::view::{Study, ValueAxis};
+use crate::text::Named as _;
 
 fn state(seeds: usize, options: &StudyOptions) -> StudyState {
     StudyState::new(Arc::new(synthetic_study(seeds)), options).unwrap()
@@ -157,20 +158,20 @@ fn every_panel_is_drawn_in_every_theme_also_without_data() {
         let study = Arc::new(study);
         for theme_name in [ThemeName::Dark, ThemeName::Light, ThemeName::Print] {
             let theme = Theme::of(theme_name);
-            for panel in StudyPanel::ALL {
+            for panel in StudyPanel::all() {
                 for (file, size_px) in [("", [900, 500]), ("-tiny", [80, 60])] {
                     let presentation = if file.is_empty() { Presentation::Interactive } else { Presentation::Figure };
                     let mut state = StudyState::new(Arc::clone(&study), &options).unwrap();
                     let drawing = HeadlessOptions { size_px, pixels_per_point: 1.0, theme: theme_name };
                     let image = draw(drawing, |ui| study_panel_ui(panel, ui, &mut state, &theme, presentation));
-                    let name = format!("study-{}-{case}-{}{file}", panel.as_str(), theme_name.as_str());
+                    let name = format!("study-{}-{case}-{}{file}", panel.name(), theme_name.name());
                     keep_screenshot(&name, &image);
                 }
             }
             let mut state = StudyState::new(Arc::clone(&study), &options).unwrap();
             let drawing = HeadlessOptions { size_px: [1920, 1080], pixels_per_point: 1.0, theme: theme_name };
             let image = draw(drawing, |ui| study_ui(ui, &mut state, &theme));
-            keep_screenshot(&format!("study-all-{case}-{}", theme_name.as_str()), &image);
+            keep_screenshot(&format!("study-all-{case}-{}", theme_name.name()), &image);
         }
     }
 }

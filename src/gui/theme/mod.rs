@@ -5,8 +5,6 @@
 mod color;
 mod style;
 
-use std::str::FromStr;
-
 use egui::Color32;
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +12,7 @@ use self::color::{contrast, rgb};
 pub use self::color::{mix, viridis};
 pub(crate) use self::style::dialog_frame;
 pub use self::style::{label_font, number_font};
+use crate::text::Named;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -27,34 +26,9 @@ pub enum ThemeName {
     Print,
 }
 
-impl ThemeName {
-    /// Name on the command line.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Dark => "dark",
-            Self::Light => "light",
-            Self::Print => "print",
-        }
-    }
-}
-
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown theme '{name}': expected dark, light or print")]
-pub struct UnknownTheme {
-    pub name: String,
-}
-
-impl FromStr for ThemeName {
-    type Err = UnknownTheme;
-
-    fn from_str(name: &str) -> Result<Self, UnknownTheme> {
-        match name {
-            "dark" => Ok(Self::Dark),
-            "light" => Ok(Self::Light),
-            "print" => Ok(Self::Print),
-            _ => Err(UnknownTheme { name: name.to_owned() }),
-        }
-    }
+impl Named for ThemeName {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::Dark, "dark"), (Self::Light, "light"), (Self::Print, "print")];
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,7 +42,6 @@ pub struct RunStyle {
 /// Dash, gap, … of run 0, 1, 2, 3: solid, long, dash-dot, short.
 const RUN_DASHES: [&[f32]; 4] = [&[], &[11.0, 4.0], &[8.0, 3.0, 2.0, 3.0], &[4.0, 3.0]];
 
-/// Dash and gap of the ground truth.
 const GROUND_TRUTH_DASHES: &[f32] = &[5.0, 4.0];
 
 /// Dashes and gaps of trajectories of other programs: each has dots.
@@ -90,7 +63,6 @@ pub const ROW_HEIGHT: f32 = 16.0;
 pub const LANE_HEIGHT: f32 = 18.0;
 /// Width of the lane names in points.
 pub const LANE_LABEL_WIDTH: f32 = 118.0;
-/// Width of a curve in points.
 pub const CURVE_WIDTH: f32 = 1.5;
 /// Width of a thin line such as a grid in points.
 pub const HAIRLINE_WIDTH: f32 = 1.0;
@@ -103,7 +75,6 @@ pub struct Theme {
     pub surface: Color32,
     /// Background of buttons and header rows.
     pub surface_raised: Color32,
-    /// Background of plots and of the scene.
     pub plot_background: Color32,
     /// Lines between panels and around frames.
     pub outline: Color32,
@@ -259,15 +230,6 @@ impl Theme {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_are_read_back() {
-        for name in [ThemeName::Dark, ThemeName::Light, ThemeName::Print] {
-            assert_eq!(name.as_str().parse(), Ok(name));
-        }
-        let error = "blue".parse::<ThemeName>().unwrap_err();
-        assert_eq!(error.to_string(), "unknown theme 'blue': expected dark, light or print");
-    }
 
     #[test]
     fn maps_reach_their_ends_and_accept_nan() {

@@ -37,7 +37,6 @@ pub(crate) enum Lane {
 }
 
 impl Lane {
-    /// Name next to the lane.
     pub(crate) fn name(self, ctx: &PanelContext<'_>) -> String {
         match self {
             Self::Run(run) => ctx.recording.runs.get(run).map_or_else(String::new, |run| run.spec.label.clone()),
@@ -74,7 +73,6 @@ impl Lane {
         }
     }
 
-    /// The value of a run at the cursor.
     pub(crate) fn value(self, lanes: &RunLanes, cursor_ns: i64) -> Option<String> {
         match self {
             Self::Rank => lanes.at(INFORMED, cursor_ns).map(|value| fixed(value, 0)),
@@ -293,7 +291,6 @@ pub(super) fn label(painter: &Painter, theme: &Theme, rect: Rect, name: &str, va
     clipped.galley(place, galley, color);
 }
 
-/// Width of the name of a lane in points.
 pub(super) fn name_width(ui: &Ui, ctx: &PanelContext<'_>, lane: Lane) -> f32 {
     ui.painter().layout_no_wrap(lane.name(ctx), theme::label_font(), ctx.theme.text).size().x
 }

@@ -10,9 +10,7 @@ use crate::session::RunRecord;
 pub(crate) struct TimedEvent {
     pub(crate) stamp_ns: i64,
     pub(crate) kind: EventKind,
-    /// Index of the step in the run.
     pub(crate) step: usize,
-    /// Index of the event in the step.
     pub(crate) event: usize,
 }
 
@@ -23,7 +21,6 @@ pub(crate) const INFORMED: usize = 2;
 pub(crate) const STRUCTURAL: usize = 3;
 pub(crate) const COLUMNS: usize = 4;
 
-/// The lanes of one run.
 #[derive(Debug, Default)]
 pub(crate) struct RunLanes {
     follower: Follower,

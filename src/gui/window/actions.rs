@@ -39,7 +39,6 @@ pub(crate) enum Action {
     Dialog(Dialog),
     Explain,
     Manual,
-    /// Start the tour.
     Tour,
     Shortcuts,
     Warnings,
@@ -49,7 +48,6 @@ pub(crate) enum Action {
     Export,
     /// Copy the value under the pointer, or the table of the panel with the focus.
     Copy,
-    /// Copy the table of a panel.
     CopyTable(PanelName),
     /// Undo the last change of settings or layout.
     Undo,
@@ -72,7 +70,6 @@ pub(crate) enum Action {
     Feature(FeatureId),
     /// Show a run in the panels that show one.
     Run(usize),
-    /// Remove the last run.
     RemoveRun(usize),
     Show(PanelName),
     Hide(PanelName),
@@ -159,7 +156,6 @@ pub(crate) const TABLE: &[Entry] = &[
 const LAYOUT_KEYS: [Key; 9] =
     [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
 
-/// Keys of an action for display.
 pub(crate) fn keys_of(action: Action) -> &'static str {
     TABLE.iter().find(|entry| entry.action == action).map_or("", |entry| entry.keys)
 }

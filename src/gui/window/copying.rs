@@ -19,7 +19,6 @@ pub(super) fn value_under_pointer(ui: &Ui) -> Option<String> {
     free.then(|| offered(ui.ctx()).or_else(|| text_at(ui, ui.layer_id(), pointer))).flatten()
 }
 
-/// Text painted at a position of a layer.
 fn text_at(ui: &Ui, layer: LayerId, position: Pos2) -> Option<String> {
     fn text_in(shape: &Shape, position: Pos2) -> Option<&TextShape> {
         match shape {

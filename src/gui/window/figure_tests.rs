@@ -14,6 +14,7 @@ use crate::gui::{PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::{SlideDirection, SlidePosition};
 use crate::session::Recording;
 use crate::session::breakpoints::Breakpoints;
+use crate::text::Named as _;
 
 /// Accessibility roles of widgets that a click, a drag or a key changes.
 const OPERABLE: [Role; 12] = [
@@ -85,15 +86,15 @@ fn operable(recording: &Recording, panel: PanelName, presentation: Presentation,
 fn figures_have_no_buttons_sliders_or_selectors() {
     for runs in [&["auto"][..], &["auto", "classical"]] {
         let recording = sample_recording_of(80, runs);
-        for panel in PanelName::ALL {
+        for panel in PanelName::all() {
             for size in [[1400.0, 900.0], [640.0, 480.0]] {
                 let found = operable(&recording, panel, Presentation::Figure, size);
-                assert!(found.is_empty(), "{} with {} runs at {size:?}: {found:?}", panel.as_str(), runs.len());
+                assert!(found.is_empty(), "{} with {} runs at {size:?}: {found:?}", panel.name(), runs.len());
             }
             // The same panels in the window, to verify that the list of roles finds controls.
             if WITH_CONTROLS.contains(&panel) {
                 let found = operable(&recording, panel, Presentation::Interactive, [1400.0, 900.0]);
-                assert!(!found.is_empty(), "{} has no controls", panel.as_str());
+                assert!(!found.is_empty(), "{} has no controls", panel.name());
             }
         }
     }

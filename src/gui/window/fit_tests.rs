@@ -10,6 +10,7 @@ use super::tests::{Bench, bench_of, sample};
 use crate::gui::PanelName;
 use crate::gui::theme::SMALLEST_TEXT;
 use crate::session::Recording;
+use crate::text::Named as _;
 
 /// Screen of a small laptop in points.
 const SMALL: [f32; 2] = [1366.0, 768.0];
@@ -72,7 +73,7 @@ fn runs(count: usize) -> Recording {
 #[test]
 fn a_small_screen_shows_whole_texts_in_every_layout() {
     for count in [1, 2] {
-        for preset in Preset::ALL {
+        for preset in Preset::all() {
             let mut harness = bench_of(runs(count), SMALL);
             harness.state_mut().window.arrange(preset);
             harness.run_steps(4);
@@ -94,7 +95,7 @@ fn a_small_screen_shows_whole_texts_in_every_panel() {
 #[test]
 fn the_heat_map_is_above_the_fold_in_every_layout() {
     for (count, run) in [(1, 0), (2, 0), (2, 1)] {
-        for preset in Preset::ALL {
+        for preset in Preset::all() {
             let mut harness = bench_of(runs(count), SMALL);
             harness.state_mut().window.arrange(preset);
             harness.state_mut().selection.run = run;

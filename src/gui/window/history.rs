@@ -12,7 +12,6 @@ const MAX_CHANGES: usize = 100;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Arrangement {
     pub(super) settings: Settings,
-    /// The layout of the panels.
     pub(super) layout: PanelLayout,
 }
 

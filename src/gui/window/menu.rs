@@ -12,6 +12,7 @@ use super::tiles::Preset;
 use crate::gui::theme::{MAX_RUNS, ThemeName};
 use crate::gui::timeline::SPEEDS;
 use crate::gui::{Dialog, PanelContext, PanelName};
+use crate::text::Named;
 
 /// Maximum number of recent files in the menu.
 const MAX_RECENT: usize = 10;
@@ -25,20 +26,18 @@ pub(super) enum Menu {
     Help,
 }
 
+/// Titles from left to right; the menu of the panels follows after the view.
+impl Named for Menu {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::File, "File"),
+        (Self::View, "View"),
+        (Self::Run, "Run"),
+        (Self::Playback, "Playback"),
+        (Self::Help, "Help"),
+    ];
+}
+
 impl Menu {
-    /// All menus from left to right; the menu of the panels follows after the view.
-    pub(super) const ALL: [Self; 5] = [Self::File, Self::View, Self::Run, Self::Playback, Self::Help];
-
-    pub(super) const fn title(self) -> &'static str {
-        match self {
-            Self::File => "File",
-            Self::View => "View",
-            Self::Run => "Run",
-            Self::Playback => "Playback",
-            Self::Help => "Help",
-        }
-    }
-
     /// Actions of the menu in groups, from top to bottom.
     const fn actions(self) -> &'static [&'static [Action]] {
         match self {
@@ -90,9 +89,8 @@ impl Menu {
             })
             .collect();
         if self == Self::View {
-            let placed = |action: Action| {
-                Self::ALL.into_iter().any(|menu| menu.actions().iter().any(|group| group.contains(&action)))
-            };
+            let placed =
+                |action: Action| Self::all().any(|menu| menu.actions().iter().any(|group| group.contains(&action)));
             groups.push(TABLE.iter().filter(|entry| !placed(entry.action)).collect());
         }
         groups.retain(|group| !group.is_empty());
@@ -102,8 +100,8 @@ impl Menu {
 
 /// Draws the buttons of all menus, and the menu that is open.
 pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
-    for menu in Menu::ALL {
-        MenuButton::from_button(Button::new(menu.title()).frame_when_inactive(false)).ui(ui, |ui| {
+    for menu in Menu::all() {
+        MenuButton::from_button(Button::new(menu.name()).frame_when_inactive(false)).ui(ui, |ui| {
             ui.set_min_width(230.0);
             for (number, group) in menu.groups().into_iter().enumerate() {
                 if number > 0 {
@@ -124,7 +122,6 @@ pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>, ac
     }
 }
 
-/// One action with its keys.
 fn entry_ui(ui: &mut Ui, state: &MainWindow, ctx: &PanelContext<'_>, entry: &Entry, actions: &mut Vec<Action>) {
     if matches!(entry.action, Action::SavedLayout(_)) {
         return;
@@ -203,7 +200,7 @@ fn recent_ui(ui: &mut Ui, path: &Path) -> bool {
 fn last_group_ui(ui: &mut Ui, menu: Menu, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
     if menu == Menu::View {
         for theme in [ThemeName::Light, ThemeName::Dark, ThemeName::Print] {
-            if item_ui(ui, &format!("Theme: {}", theme.as_str()), "", true, ctx.theme.name == theme) {
+            if item_ui(ui, &format!("Theme: {}", theme.name()), "", true, ctx.theme.name == theme) {
                 actions.push(Action::SetTheme(theme));
             }
         }
@@ -237,10 +234,10 @@ mod tests {
         for entry in TABLE {
             let count =
                 |menu: Menu| menu.groups().iter().flatten().filter(|other| other.action == entry.action).count();
-            let counts: usize = Menu::ALL.into_iter().map(count).sum();
+            let counts: usize = Menu::all().map(count).sum();
             assert_eq!(counts, 1, "{}", entry.name);
         }
-        let listed = Menu::ALL.into_iter().flat_map(|menu| menu.actions().iter().copied().flatten());
+        let listed = Menu::all().flat_map(|menu| menu.actions().iter().copied().flatten());
         for action in listed {
             assert!(TABLE.iter().any(|entry| entry.action == *action), "{action:?} is not in the table");
         }

@@ -37,7 +37,6 @@ pub struct Notices {
 }
 
 impl Notices {
-    /// Shows a message in the corner of the window.
     pub fn show_message(&mut self, level: NoticeLevel, text: impl Into<String>) {
         let text = text.into();
         if !self.toasts.iter().any(|toast| toast.text == text) {

@@ -8,6 +8,7 @@ use crate::gui::desktop::PanelExport;
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
 use crate::gui::theme::PANEL_MARGIN;
 use crate::gui::{PanelContext, PanelName, Playback, Presentation};
+use crate::text::Named as _;
 
 /// Pixels per point of the screenshot: twice an ordinary screen, so that it can be printed.
 const PIXELS_PER_POINT: f32 = 2.0;
@@ -48,9 +49,9 @@ pub(super) fn export(state: &MainWindow, ctx: &mut PanelContext<'_>) -> PanelExp
         alone_ui(panel, ui, &mut copy, context);
     };
     let screenshot = headless::draw(options, &mut draw_ui);
-    let drawing = headless::svg_of(options, "clip", panel.as_str(), &mut draw_ui);
+    let drawing = headless::svg_of(options, "clip", panel.name(), &mut draw_ui);
     let log = recording.log_path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
-    let name = format!("{log}/{}-{:.3}s", panel.as_str(), seconds_from_ns(cursor_ns));
+    let name = format!("{log}/{}-{:.3}s", panel.name(), seconds_from_ns(cursor_ns));
     PanelExport { name, screenshot, drawing, table: copy.panels.csv_table(panel, ctx) }
 }
 

@@ -46,7 +46,6 @@ impl Panels {
         }
     }
 
-    /// A panel by name.
     pub(super) fn get(&mut self, panel: PanelName) -> &mut dyn Panel {
         match panel {
             PanelName::Image => &mut self.image,

@@ -11,7 +11,6 @@ use crate::gui::timeline::toggled_loop;
 use crate::gui::{PanelContext, PanelName};
 use crate::session::{Command, PlaybackSpeed};
 
-/// Executes an action.
 pub(super) fn perform(action: Action, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
     match action {
         Action::TogglePlay => ctx.commands.push(Command::TogglePlay),

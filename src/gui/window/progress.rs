@@ -15,7 +15,6 @@ pub struct ProgressMeter {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// Number of unfinished runs.
     pub runs: usize,
     /// Processed fraction of the log, 0 to 1.
     pub fraction: f64,

@@ -8,8 +8,8 @@ use egui_tiles::Tree;
 use super::tiles::{PanelLayout, Preset};
 use crate::gui::PanelName;
 use crate::gui::theme::Theme;
+use crate::text::Named as _;
 
-/// Maximum number of saved layouts.
 const MAX_LAYOUTS: usize = 12;
 
 /// Layouts by name, and the name that is being typed.
@@ -40,7 +40,6 @@ impl SavedLayouts {
         tree.is_some()
     }
 
-    /// The layouts as JSON.
     pub fn to_text(&self) -> String {
         serde_json::to_string(&self.layouts).unwrap_or_default()
     }
@@ -108,8 +107,7 @@ pub(super) fn last_layout_value(layout: &PanelLayout) -> Option<serde_json::Valu
 pub(super) fn take_last_layout(layout: &mut PanelLayout, value: &serde_json::Value) {
     if let Some(panels) = value.get("panels") {
         take_layout(layout, panels);
-        let name = value.get("preset").and_then(serde_json::Value::as_str);
-        let preset = Preset::ALL.into_iter().find(|preset| name == Some(preset.name()));
+        let preset = value.get("preset").and_then(serde_json::Value::as_str).and_then(Preset::from_name);
         layout.preset = layout.preset.or(preset);
     }
 }

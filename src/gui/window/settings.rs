@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 use crate::gui::theme::ThemeName;
 use crate::session::DEFAULT_MEMORY_BUDGET_BYTES;
 
-/// Range of the scale factor.
 pub const SCALES: std::ops::RangeInclusive<f32> = 0.5..=3.0;
 /// Range of the memory budget of a recording in MiB.
 pub(super) const MEMORY_MIB: std::ops::RangeInclusive<usize> = 64..=65_536;
@@ -58,7 +57,6 @@ impl Settings {
         serde_json::from_value(value).map_or(standard, Self::within_ranges)
     }
 
-    /// The settings as JSON.
     pub fn to_text(&self) -> String {
         serde_json::to_string_pretty(self).unwrap_or_default()
     }

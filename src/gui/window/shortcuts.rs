@@ -4,8 +4,8 @@ use egui::{Align, Align2, Label, Layout, RichText, ScrollArea, Ui, vec2};
 
 use super::menu::Menu;
 use crate::gui::theme::Theme;
+use crate::text::Named as _;
 
-/// Actions of the pointer.
 const POINTER: [(&str, &str); 8] = [
     ("Scroll, pinch", "zoom about the pointer (Ctrl+scroll where the panel scrolls)"),
     ("Drag", "pan; on the timeline: move the cursor"),
@@ -31,7 +31,6 @@ const KEYS_WIDTH: f32 = 116.0;
 const GAP: f32 = 18.0;
 /// Distance in points between the list and the edges of the window.
 const MARGIN: f32 = 60.0;
-/// Height of a heading in rows.
 const HEADING_ROWS: usize = 2;
 
 /// A group of rows under a heading.
@@ -51,11 +50,11 @@ impl Section {
 fn sections() -> Vec<Section> {
     let of_menu = |menu: Menu| {
         let rows = menu.groups().into_iter().flatten().map(|entry| (entry.keys, entry.name)).collect();
-        Section { title: menu.title(), rows }
+        Section { title: menu.name(), rows }
     };
     let others = [("Everywhere", &EVERYWHERE[..]), ("Pointer on a plot or the timeline", &POINTER[..])];
     let others = others.map(|(title, rows)| Section { title, rows: rows.to_vec() });
-    Menu::ALL.into_iter().map(of_menu).chain(others).collect()
+    Menu::all().map(of_menu).chain(others).collect()
 }
 
 /// Distributes sections over at most `count` columns of about equal height, in their order.

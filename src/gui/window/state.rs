@@ -19,6 +19,7 @@ use super::tour::state::Tour;
 use crate::gui::PanelName;
 use crate::gui::help::Help;
 use crate::gui::theme::Theme;
+use crate::text::Named as _;
 
 /// Size in points of a panel that is not on the screen.
 const HIDDEN_PANEL_SIZE: Vec2 = Vec2::new(960.0, 540.0);
@@ -70,7 +71,6 @@ pub struct MainWindow {
     pub(super) pointed: Option<String>,
     /// Text for the clipboard.
     pub(super) copied: Option<String>,
-    /// The open menu of a panel.
     pub(super) menu: Option<PanelMenu>,
     /// The panel that was clicked last.
     pub(super) focus: Option<PanelName>,
@@ -191,14 +191,13 @@ impl MainWindow {
         }
     }
 
-    /// Arranges the panels as in a preset.
     pub fn arrange(&mut self, preset: Preset) {
         self.layout.arrange(preset);
     }
 
     /// Arranges the panels as in a preset or a saved layout, by name; no change for an unknown name.
     pub fn arrange_by_name(&mut self, name: &str) {
-        if let Some(preset) = Preset::ALL.into_iter().find(|preset| preset.name() == name) {
+        if let Some(preset) = Preset::from_name(name) {
             self.layout.arrange(preset);
         } else if let Some(number) = self.saved_layouts.names().position(|known| known == name) {
             self.saved_layouts.take(number, &mut self.layout);

@@ -10,7 +10,7 @@ use super::warning_lines::warning_lines;
 use crate::gui::PanelContext;
 use crate::gui::theme::{self, Theme};
 use crate::gui::units::{bytes, counted, fixed};
-use crate::session::{Recording, RunRecord, StepRecord};
+use crate::session::{Recording, RunRecord};
 
 /// Widths in points of the warnings, of the progress, and of the log that is being opened.
 const RIGHT_WIDTH: f32 = 110.0;
@@ -44,8 +44,10 @@ pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
             let (text, hover) = recorded(ctx.recording);
             pair(0, "recording", text, &hover);
         }
-        let delay = run.and_then(|run| run.step_at(ctx.cursor_ns)).map(|step| log_delay(step));
-        let clock = delay.map_or_else(|| "header stamp".to_owned(), |delay| format!("header stamp (log time {delay})"));
+        let step = run.and_then(|run| run.step_at(ctx.cursor_ns));
+        let delay_ms = step.map(|step| (step.log_time_ns - step.report.stamp_ns) as f64 * 1e-6);
+        let with_delay = |delay_ms| format!("header stamp (log time {delay_ms:+.1} ms)");
+        let clock = delay_ms.map_or_else(|| "header stamp".to_owned(), with_delay);
         pair(
             3,
             "clock",
@@ -142,10 +144,6 @@ fn recorded(recording: &Recording) -> (String, String) {
                  landmarks of older steps are evicted (summary only) and recomputed bit by bit from the nearest \
                  snapshot when the cursor moves there";
     (text, hover.to_owned())
-}
-
-fn log_delay(step: &StepRecord) -> String {
-    format!("{:+.1} ms", (step.log_time_ns - step.report.stamp_ns) as f64 * 1e-6)
 }
 
 /// Log time over computing time of the steps up to the cursor.

@@ -9,6 +9,7 @@ use super::panels::Panels;
 use crate::gui::help;
 use crate::gui::theme::{PANEL_MARGIN, Theme};
 use crate::gui::{PanelContext, PanelName};
+use crate::text::Named;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Preset {
@@ -25,22 +26,17 @@ pub enum Preset {
     Comparison,
 }
 
-impl Preset {
-    /// All presets in the order of their keys 1 to 5.
-    pub const ALL: [Self; 5] = [Self::Overview, Self::Calibration, Self::FrontEnd, Self::Scene, Self::Comparison];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Overview => "Overview",
-            Self::Calibration => "Calibration",
-            Self::FrontEnd => "Front end",
-            Self::Scene => "Scene",
-            Self::Comparison => "Comparison",
-        }
-    }
+/// In the order of the keys 1 to 5.
+impl Named for Preset {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Overview, "Overview"),
+        (Self::Calibration, "Calibration"),
+        (Self::FrontEnd, "Front end"),
+        (Self::Scene, "Scene"),
+        (Self::Comparison, "Comparison"),
+    ];
 }
 
-/// The layout of the movable panels.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PanelLayout {
     tree: Tree<PanelName>,
@@ -67,7 +63,6 @@ impl PanelLayout {
         self.preset = None;
     }
 
-    /// The tree of panels, for storing.
     pub(crate) fn tree(&self) -> &Tree<PanelName> {
         &self.tree
     }
@@ -178,7 +173,6 @@ fn split(tiles: &mut Tiles<PanelName>, direction: LinearDir, children: [TileId; 
     tiles.insert_container(Container::Linear(Linear::new_binary(direction, children, fraction)))
 }
 
-/// Ids of the drawn tree.
 #[derive(Clone, Copy)]
 struct TreeIds {
     id: Id,

@@ -10,6 +10,7 @@ use super::state::MainWindow;
 use super::tiles::Preset;
 use crate::gui::theme::MAX_RUNS;
 use crate::gui::{Dialog, PanelContext};
+use crate::text::Named as _;
 
 /// Buttons to the right of the menus, shown if they fit: text and action.
 const BUTTONS: [(&str, Action); 2] =
@@ -33,8 +34,8 @@ pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
             rig: text_width(ui, &rig),
             buttons: BUTTONS.iter().map(|(text, _)| button_width(ui, text)).sum(),
             runs: state.legend.widths(ui, ctx),
-            layout_names: Preset::ALL.into_iter().map(|preset| button_width(ui, preset.name())).sum(),
-            layout_numbers: 26.0 * Preset::ALL.len() as f32,
+            layout_names: Preset::all().map(|preset| button_width(ui, preset.name())).sum(),
+            layout_numbers: 26.0 * Preset::NAMES.len() as f32,
             gap: 2.0 * ui.spacing().item_spacing.x + 6.0,
         };
         let shown = widths.shown(ui.available_width());
@@ -56,7 +57,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
             }
         }
         ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {
-            for (number, preset) in Preset::ALL.into_iter().enumerate().rev() {
+            for (number, preset) in Preset::all().enumerate().rev() {
                 layout_button(ui, state, preset, number + 1, shown.layout_names, actions);
             }
         });

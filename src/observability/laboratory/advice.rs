@@ -57,7 +57,6 @@ pub struct Advice {
 /// A direction of the calibration with its posterior standard deviation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WeakDirection {
-    /// Names of the columns.
     pub names: Vec<String>,
     /// Weights of the unit direction (one per column), in units of 10° and 3 cm.
     pub weights: Vec<f64>,
@@ -370,7 +369,6 @@ impl Advice {
         self.candidates.first().map(|best| self.line(best))
     }
 
-    /// A candidate and its effect in one line.
     pub fn line(&self, candidate: &CandidateReport) -> String {
         let least = &self.least_observable;
         let (factor, unit) = least.unit();

@@ -75,7 +75,6 @@ fn variances(window: &HypotheticalWindow, chain: &Chain) -> Option<Vec<f64>> {
     Some(covariance.diagonal().iter().copied().collect())
 }
 
-/// The window without one motion.
 fn without(window: &HypotheticalWindow, chain: &Chain, motion: Motion) -> HypotheticalWindow {
     let middle = &window.frames[window.frames.len() / 2];
     let about = middle.navigation.world_from_imu;

@@ -40,7 +40,6 @@ impl LaboratoryForm {
         format!("{}{suffix}", self.parameterization)
     }
 
-    /// The mechanism's chain in this parameterization.
     pub fn chain(self, mechanism: &Mechanism) -> Chain {
         let chain = Chain::from_classical(&mechanism.chain, self.parameterization);
         if self.joint_offsets { chain } else { chain.without_joint_offsets() }
@@ -59,7 +58,6 @@ impl std::str::FromStr for LaboratoryForm {
     }
 }
 
-/// Setup of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaboratorySetup {
     pub mechanism: Mechanism,
@@ -141,7 +139,6 @@ impl LaboratorySetup {
         Flight { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world }
     }
 
-    /// Time of a frame, in seconds.
     pub(super) fn time_s(slot: usize) -> f64 {
         slot as f64 * FRAME_PERIOD_S
     }

@@ -8,7 +8,6 @@ use crate::gimbal::Parameterization;
 /// Landmarks of the windows with unknown joint angles; all other windows have a hundred.
 const LANDMARKS_WITHOUT_ENCODER: usize = 130;
 
-/// An experiment of the survey.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Experiment {
     /// Label in the table.
@@ -43,6 +42,16 @@ const fn experiment(scenario: &'static str, mechanism: &'static str) -> Experime
         frames: 10,
         forms: CLASSICAL_MINIMAL,
     }
+}
+
+/// [`experiment`], also as a product of exponentials.
+const fn with_poe(scenario: &'static str, mechanism: &'static str) -> Experiment {
+    experiment(scenario, mechanism).forms(CLASSICAL_MINIMAL_POE)
+}
+
+/// [`experiment`] in all parameterizations.
+const fn in_all_forms(scenario: &'static str, mechanism: &'static str) -> Experiment {
+    experiment(scenario, mechanism).forms(ALL_FORMS)
 }
 
 impl Experiment {
@@ -88,7 +97,6 @@ impl Experiment {
         Some(setup)
     }
 
-    /// Setup with another number of frames.
     pub(super) fn setup_of(&self, frames: usize) -> Option<LaboratorySetup> {
         self.frames(frames).setup()
     }
@@ -134,48 +142,23 @@ pub(super) const SECTIONS: [Section; 6] = [
     Section {
         title: "Joint angles and poses (exciting motion)",
         experiments: &[
-            experiment("encoder known, poses known", OFFSET).forms(CLASSICAL_MINIMAL_POE),
-            experiment("encoder known, poses known, generic", "generic").forms(CLASSICAL_MINIMAL_POE),
-            experiment("encoder known, IMU, bias known", OFFSET).poses(IMU_BIASES_KNOWN).forms(CLASSICAL_MINIMAL_POE),
-            experiment("encoder known, IMU, bias free", OFFSET).poses(IMU).forms(CLASSICAL_MINIMAL_POE),
-            experiment("encoder prior 7 deg, poses known", OFFSET).encoder_deg(7.0).forms(CLASSICAL_MINIMAL_POE),
-            experiment("encoder prior 10 deg, IMU, bias free", OFFSET)
-                .encoder_deg(10.0)
-                .poses(IMU)
-                .forms(CLASSICAL_MINIMAL_POE),
-            experiment("no encoder, poses known", OFFSET).without_encoder().frames(16).forms(CLASSICAL_MINIMAL_POE),
-            experiment("no encoder, poses known, generic", "generic")
-                .without_encoder()
-                .frames(16)
-                .forms(CLASSICAL_MINIMAL_POE),
-            experiment("no encoder, IMU, bias known", OFFSET)
+            with_poe("encoder known, poses known", OFFSET),
+            with_poe("encoder known, poses known, generic", "generic"),
+            with_poe("encoder known, IMU, bias known", OFFSET).poses(IMU_BIASES_KNOWN),
+            with_poe("encoder known, IMU, bias free", OFFSET).poses(IMU),
+            with_poe("encoder prior 7 deg, poses known", OFFSET).encoder_deg(7.0),
+            with_poe("encoder prior 10 deg, IMU, bias free", OFFSET).encoder_deg(10.0).poses(IMU),
+            with_poe("no encoder, poses known", OFFSET).without_encoder().frames(16),
+            with_poe("no encoder, poses known, generic", "generic").without_encoder().frames(16),
+            with_poe("no encoder, IMU, bias known", OFFSET).without_encoder().poses(IMU_BIASES_KNOWN).frames(16),
+            with_poe("no encoder, IMU, bias free, 10 frames", OFFSET).without_encoder().poses(IMU),
+            with_poe("no encoder, IMU, bias free, 11 frames", OFFSET).without_encoder().poses(IMU).frames(11),
+            with_poe("no encoder, ideal gimbal, poses known", IDEAL).without_encoder().frames(16),
+            with_poe("no encoder, ideal gimbal, IMU, bias known", IDEAL)
                 .without_encoder()
                 .poses(IMU_BIASES_KNOWN)
-                .frames(16)
-                .forms(CLASSICAL_MINIMAL_POE),
-            experiment("no encoder, IMU, bias free, 10 frames", OFFSET)
-                .without_encoder()
-                .poses(IMU)
-                .forms(CLASSICAL_MINIMAL_POE),
-            experiment("no encoder, IMU, bias free, 11 frames", OFFSET)
-                .without_encoder()
-                .poses(IMU)
-                .frames(11)
-                .forms(CLASSICAL_MINIMAL_POE),
-            experiment("no encoder, ideal gimbal, poses known", IDEAL)
-                .without_encoder()
-                .frames(16)
-                .forms(CLASSICAL_MINIMAL_POE),
-            experiment("no encoder, ideal gimbal, IMU, bias known", IDEAL)
-                .without_encoder()
-                .poses(IMU_BIASES_KNOWN)
-                .frames(16)
-                .forms(CLASSICAL_MINIMAL_POE),
-            experiment("no encoder, ideal gimbal, IMU, bias free", IDEAL)
-                .without_encoder()
-                .poses(IMU)
-                .frames(16)
-                .forms(CLASSICAL_MINIMAL_POE),
+                .frames(16),
+            with_poe("no encoder, ideal gimbal, IMU, bias free", IDEAL).without_encoder().poses(IMU).frames(16),
             experiment("no encoder, without offsets (21 and 15)", OFFSET)
                 .without_encoder()
                 .frames(16)
@@ -185,28 +168,28 @@ pub(super) const SECTIONS: [Section; 6] = [
     Section {
         title: "Number of joints (12 + 4N columns, 4N + 6 identifiable)",
         experiments: &[
-            experiment("no joints", "rigid").forms(CLASSICAL_MINIMAL_POE),
-            experiment("one joint", "generic-1").forms(CLASSICAL_MINIMAL_POE),
-            experiment("two joints", "generic-2").forms(CLASSICAL_MINIMAL_POE),
-            experiment("three joints", "generic").forms(CLASSICAL_MINIMAL_POE),
-            experiment("four joints", "generic-4").forms(CLASSICAL_MINIMAL_POE),
+            with_poe("no joints", "rigid"),
+            with_poe("one joint", "generic-1"),
+            with_poe("two joints", "generic-2"),
+            with_poe("three joints", "generic"),
+            with_poe("four joints", "generic-4"),
         ],
     },
     Section {
         title: "Mechanisms (exciting, encoder known, poses known)",
         experiments: &[
-            experiment("generic", "generic").forms(ALL_FORMS),
-            experiment("yaw-roll-pitch, 2-8 cm offsets, optical", OFFSET).forms(ALL_FORMS),
-            experiment("yaw-roll-pitch, axes intersect, optical", IDEAL).forms(ALL_FORMS),
-            experiment("yaw-roll-pitch, camera frame FLU", "yaw-roll-pitch-flu").forms(ALL_FORMS),
-            experiment("same, camera centre on the last axis", "yaw-roll-pitch-flu-centred").forms(ALL_FORMS),
-            experiment("pitch-roll-yaw, optical", "pitch-roll-yaw").forms(ALL_FORMS),
+            in_all_forms("generic", "generic"),
+            in_all_forms("yaw-roll-pitch, 2-8 cm offsets, optical", OFFSET),
+            in_all_forms("yaw-roll-pitch, axes intersect, optical", IDEAL),
+            in_all_forms("yaw-roll-pitch, camera frame FLU", "yaw-roll-pitch-flu"),
+            in_all_forms("same, camera centre on the last axis", "yaw-roll-pitch-flu-centred"),
+            in_all_forms("pitch-roll-yaw, optical", "pitch-roll-yaw"),
             experiment("roll first (first axis || IMU x)", "roll-first").forms(ALL_FORMS),
-            experiment("axes 1, 2 parallel", "parallel-axes").forms(ALL_FORMS),
-            experiment("axes 2, 3 parallel", "parallel-axes-2-3").forms(ALL_FORMS),
-            experiment("axes 1, 2 coaxial", "coaxial-axes").forms(ALL_FORMS),
-            experiment("pan only, optical", "one-joint").forms(ALL_FORMS),
-            experiment("pan-tilt", "pan-tilt").forms(ALL_FORMS),
+            in_all_forms("axes 1, 2 parallel", "parallel-axes"),
+            in_all_forms("axes 2, 3 parallel", "parallel-axes-2-3"),
+            in_all_forms("axes 1, 2 coaxial", "coaxial-axes"),
+            in_all_forms("pan only, optical", "one-joint"),
+            in_all_forms("pan-tilt", "pan-tilt"),
         ],
     },
     Section {

@@ -9,7 +9,6 @@ use crate::geometry::{RigidTransform, SplitMix64, so3};
 use crate::gimbal::{ClassicalChain, DhLink, JointAxis, ParameterNames};
 use crate::sensors::Rig;
 
-/// A joint of a mechanism.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaboratoryJoint {
     pub name: String,

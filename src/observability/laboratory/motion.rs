@@ -9,118 +9,70 @@ use super::mechanism::Mechanism;
 use crate::estimator::{ImuBias, NavigationState};
 use crate::geometry::{RigidTransform, ns_from_seconds, so3};
 use crate::sensors::ImuSample;
+use crate::text::Named;
 
 /// Motion of the vehicle, or constraint on the motion of the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LaboratoryMotion {
-    /// The vehicle rotates and translates about all axes.
     Aggressive,
-    /// Translates and never rotates.
     TranslationOnly,
-    /// Neither translates nor rotates.
     Hover,
-    /// Constant velocity without rotation.
     ConstantVelocity,
-    /// Constant acceleration without rotation.
     ConstantAcceleration,
-    /// Rolls about the body's x axis and translates in space.
     RollOnly,
-    /// Pitches about the body's y axis and translates in space.
     PitchOnly,
-    /// Yaws and translates in space, level.
     YawOnly,
-    /// Yaws and translates in the horizontal plane, level.
     YawPlanar,
-    /// Yaws about the vertical and translates, the body tilted.
     YawTilted,
-    /// Yaws without translating.
     YawInPlace,
-    /// Rotates about all axes without translating.
     RotationOnly,
-    /// Rotates about all axes at constant velocity.
     ConstantVelocityRotation,
-    /// Turns about the vertical and climbs, angular rate and velocity constant in the body.
     SteadyTurn,
-    /// Rotates about all axes and accelerates on a straight line.
     StraightLine,
-    /// The camera never rotates in the world while vehicle and joints move.
     Stabilized,
-    /// The camera rotates about the vertical only.
     YawFollowing,
-    /// The camera never rotates in the world; the vehicle rotates without translating.
     StabilizedRotationOnly,
-    /// The camera never rotates in the world; the vehicle translates only, so that no joint moves.
     StabilizedTranslationOnly,
-    /// The camera neither rotates nor translates in the world.
     CameraStationary,
-    /// As aggressive, the second joint (or the only one) fixed.
     OneJointFrozen,
-    /// As aggressive, all joints fixed.
     AllJointsFrozen,
 }
 
 /// Error: unknown name of a motion.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("unknown motion '{given}': expected one of {}", LaboratoryMotion::ALL.map(|it| it.name()).join(", "))]
+#[error("unknown motion '{given}': expected one of {}", LaboratoryMotion::names())]
 pub struct UnknownMotion {
     pub given: String,
 }
 
-impl LaboratoryMotion {
-    /// All motions, in the order of the manual.
-    pub const ALL: [Self; 22] = [
-        Self::Aggressive,
-        Self::TranslationOnly,
-        Self::Hover,
-        Self::ConstantVelocity,
-        Self::ConstantAcceleration,
-        Self::RollOnly,
-        Self::PitchOnly,
-        Self::YawOnly,
-        Self::YawPlanar,
-        Self::YawTilted,
-        Self::YawInPlace,
-        Self::RotationOnly,
-        Self::ConstantVelocityRotation,
-        Self::SteadyTurn,
-        Self::StraightLine,
-        Self::Stabilized,
-        Self::YawFollowing,
-        Self::StabilizedRotationOnly,
-        Self::StabilizedTranslationOnly,
-        Self::CameraStationary,
-        Self::OneJointFrozen,
-        Self::AllJointsFrozen,
+impl Named for LaboratoryMotion {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Aggressive, "aggressive"),
+        (Self::TranslationOnly, "translation-only"),
+        (Self::Hover, "hover"),
+        (Self::ConstantVelocity, "constant-velocity"),
+        (Self::ConstantAcceleration, "constant-acceleration"),
+        (Self::RollOnly, "roll-only"),
+        (Self::PitchOnly, "pitch-only"),
+        (Self::YawOnly, "yaw-only"),
+        (Self::YawPlanar, "yaw-planar"),
+        (Self::YawTilted, "yaw-tilted"),
+        (Self::YawInPlace, "yaw-in-place"),
+        (Self::RotationOnly, "rotation-only"),
+        (Self::ConstantVelocityRotation, "constant-velocity-rotation"),
+        (Self::SteadyTurn, "steady-turn"),
+        (Self::StraightLine, "straight-line"),
+        (Self::Stabilized, "stabilized"),
+        (Self::YawFollowing, "yaw-following"),
+        (Self::StabilizedRotationOnly, "stabilized-rotation-only"),
+        (Self::StabilizedTranslationOnly, "stabilized-translation-only"),
+        (Self::CameraStationary, "camera-held-still"),
+        (Self::OneJointFrozen, "one-joint-frozen"),
+        (Self::AllJointsFrozen, "all-joints-frozen"),
     ];
+}
 
-    /// Name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Aggressive => "aggressive",
-            Self::TranslationOnly => "translation-only",
-            Self::Hover => "hover",
-            Self::ConstantVelocity => "constant-velocity",
-            Self::ConstantAcceleration => "constant-acceleration",
-            Self::RollOnly => "roll-only",
-            Self::PitchOnly => "pitch-only",
-            Self::YawOnly => "yaw-only",
-            Self::YawPlanar => "yaw-planar",
-            Self::YawTilted => "yaw-tilted",
-            Self::YawInPlace => "yaw-in-place",
-            Self::RotationOnly => "rotation-only",
-            Self::ConstantVelocityRotation => "constant-velocity-rotation",
-            Self::SteadyTurn => "steady-turn",
-            Self::StraightLine => "straight-line",
-            Self::Stabilized => "stabilized",
-            Self::YawFollowing => "yaw-following",
-            Self::StabilizedRotationOnly => "stabilized-rotation-only",
-            Self::StabilizedTranslationOnly => "stabilized-translation-only",
-            Self::CameraStationary => "camera-held-still",
-            Self::OneJointFrozen => "one-joint-frozen",
-            Self::AllJointsFrozen => "all-joints-frozen",
-        }
-    }
-
+impl LaboratoryMotion {
     pub fn meaning(self) -> &'static str {
         match self {
             Self::Aggressive => "the vehicle rotates and translates about all axes",
@@ -168,7 +120,7 @@ impl std::str::FromStr for LaboratoryMotion {
     type Err = UnknownMotion;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        Self::ALL.into_iter().find(|it| it.name() == name).ok_or_else(|| UnknownMotion { given: name.to_owned() })
+        Self::from_name(name).ok_or_else(|| UnknownMotion { given: name.to_owned() })
     }
 }
 

@@ -9,6 +9,7 @@ use super::{FRAME_PERIOD_S, LaboratoryResult, LaboratorySetup, PIXEL_SIGMA_PX};
 use crate::estimator::{JointKnowledge, PoseKnowledge};
 use crate::gimbal::ParameterNames;
 use crate::observability::{CalibrationDirection, Deficit};
+use crate::text::Named as _;
 
 /// Results of an experiment in several parameterizations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -16,13 +17,11 @@ pub struct LaboratoryReport {
     pub mechanism: String,
     pub joint_count: usize,
     pub motion: String,
-    /// Description of the motion.
     pub motion_meaning: String,
     /// Names of the joints that do not move.
     pub frozen_joints: Vec<String>,
     /// Source of the joint angles, with its σ.
     pub joint_angles: String,
-    /// Source of the poses.
     pub poses: String,
     pub frames: usize,
     /// Time between frames, in seconds.
@@ -43,7 +42,6 @@ pub struct LaboratoryReport {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FormReport {
     pub form: String,
-    /// Names of the columns.
     pub names: Vec<String>,
     pub rank_structural: usize,
     pub rank_informed: usize,
@@ -88,7 +86,6 @@ pub struct DirectionReport {
     /// True if structurally unobservable, false if only uninformed.
     pub null: bool,
     pub singular_value: f64,
-    /// Parameters by descending weight.
     pub parameters: Vec<ParameterWeight>,
 }
 

@@ -11,6 +11,7 @@ use super::spurious::{self, SpuriousRow};
 use super::{LaboratoryForm, LaboratoryResult};
 use crate::gimbal::{ParameterNames, Parameterization};
 use crate::observability::Deficit;
+use crate::text::Named as _;
 
 /// Number of frames for which a window is taken to have its largest rank.
 const MAX_FRAMES: usize = 16;

@@ -17,7 +17,6 @@ pub(crate) struct SparsePoseEquations<K> {
     rows: Vec<Option<PoseRow<K>>>,
 }
 
-/// Row of one pose.
 #[derive(Clone, Debug)]
 struct PoseRow<K> {
     gradient: Vector6<f64>,

@@ -5,6 +5,7 @@ use super::quantities::NamedNumber;
 use crate::estimator::ResidualSummary;
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::session::record::StepRecord;
+use crate::text::Named as _;
 
 /// The inputs of the evaluation of a condition.
 #[derive(Clone, Copy, Debug)]
@@ -13,7 +14,6 @@ pub struct StepContext<'a> {
     pub step: &'a StepRecord,
     /// The step before it.
     pub previous: Option<&'a StepRecord>,
-    /// Names of parameters and joints.
     pub names: &'a ParameterNames,
 }
 
@@ -161,7 +161,7 @@ fn named(kind: NamedNumber, name: &str, context: &StepContext<'_>) -> Option<f64
         let parameter = context.names.parse(name)?;
         values.get(calibration.parameters.iter().position(|known| *known == parameter)?).copied()
     };
-    let factor = || report.residuals.iter().find(|summary| summary.factor.key() == name);
+    let factor = || report.residuals.iter().find(|summary| summary.factor.name() == name);
     match kind {
         NamedNumber::Sigma => parameter(&calibration.sigmas),
         NamedNumber::PriorSigma => parameter(&calibration.prior_sigmas),

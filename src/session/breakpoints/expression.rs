@@ -85,7 +85,6 @@ pub(super) enum Predicate {
     Or(Box<Self>, Box<Self>),
 }
 
-/// A comparison operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Comparison {
     Less,

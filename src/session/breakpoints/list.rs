@@ -13,7 +13,6 @@ pub struct Hit {
     /// Stamp of the step, in nanoseconds since the log began.
     pub stamp_ns: i64,
     pub run: usize,
-    /// Index of the step in the run.
     pub step: usize,
     pub breakpoint: usize,
 }
@@ -94,7 +93,6 @@ impl Breakpoints {
         self.list.push(Breakpoint::new(condition));
     }
 
-    /// Removes a breakpoint by its index.
     pub fn remove(&mut self, number: usize) {
         if number < self.list.len() {
             self.list.remove(number);
@@ -116,7 +114,6 @@ impl Breakpoints {
         }
     }
 
-    /// Enables or disables a breakpoint.
     pub fn enable(&mut self, number: usize, enabled: bool) {
         if let Some(breakpoint) = self.list.get_mut(number) {
             breakpoint.enabled = enabled;

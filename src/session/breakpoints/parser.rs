@@ -7,6 +7,7 @@ use super::lexer::{Token, tokens};
 use super::quantities::{CAUSES, EVENTS, FLAGS, NAMED, NUMBERS, NamedNumber};
 use crate::estimator::FactorKind;
 use crate::flight_log::nearest_name;
+use crate::text::Named as _;
 
 /// Limit of nested parentheses and signs; deeper nesting is an error, because it could overflow the stack.
 const MAX_DEPTH: usize = 60;
@@ -369,7 +370,7 @@ impl Parser<'_> {
         let name = self.name(&format!("a name, as in {function}({example})"))?;
         let choices: Vec<&str> = match kind {
             NamedNumber::Lost => CAUSES.into(),
-            NamedNumber::Chi2 | NamedNumber::Nis => FactorKind::ALL.map(FactorKind::key).into(),
+            NamedNumber::Chi2 | NamedNumber::Nis => FactorKind::all().map(FactorKind::name).collect(),
             _ => Vec::new(),
         };
         if !choices.is_empty() && !choices.contains(&name.as_str()) {

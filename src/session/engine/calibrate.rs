@@ -34,7 +34,6 @@ pub enum CalibrationRunError {
     /// A run could not be configured.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The rig lacks something that is to be calibrated.
     #[error("the rig '{rig}' has no {missing}; {remedy}: {path}")]
     Missing { rig: String, missing: &'static str, remedy: &'static str, path: PathBuf },
     /// The calibration is not observable from the log, or does not converge.
@@ -73,9 +72,7 @@ pub struct CalibrationRun {
     pub rig: Rig,
     /// The ground-truth rig, when known.
     pub ground_truth_rig: Option<Rig>,
-    /// Key of the static camera.
     pub static_camera: String,
-    /// Key of the camera on the gimbal.
     pub gimbal_camera: String,
     /// Estimates, covariances and residuals.
     pub outcome: CalibrationOutcome,
@@ -119,7 +116,6 @@ pub fn calibrate(
     })
 }
 
-/// The entries of a rig that are calibrated.
 #[derive(Clone, Debug)]
 struct CalibratedEntries {
     static_camera: CameraRig,

@@ -52,7 +52,6 @@ impl Computation {
         self.histories.get(&self.recording.runs.get(run)?.id)
     }
 
-    /// Adds a run with its history, to be computed.
     pub(in crate::session) fn add_run(&mut self, run: RunRecord, history: Arc<History>) {
         self.histories.insert(run.id, history);
         self.recording_mut().runs.push(run);

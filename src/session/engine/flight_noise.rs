@@ -23,7 +23,6 @@ pub enum FlightNoiseError {
     /// The log cannot be read, or the rig has no camera.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The fit failed; the densities are not observable from this flight.
     #[error("no noise densities can be fitted to the flight: {0}")]
     Fit(#[from] ImuNoiseError),
 }

@@ -21,9 +21,7 @@ const PAST: usize = 256;
 /// Number and memory of the kept estimator snapshots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SnapshotUse {
-    /// Number of snapshots.
     pub count: usize,
-    /// Bytes of all snapshots.
     pub bytes: usize,
     /// Steps between two snapshots, in the newer part of the run; in the older part up to twice as many.
     pub spacing: usize,

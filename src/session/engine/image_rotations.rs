@@ -25,7 +25,6 @@ const PIXEL_SIGMA_PX: f64 = 0.5;
 const ROTATION_SIGMA_RAD: f64 = 0.3;
 /// Minimum number of common features for a rotation.
 const MIN_PAIRS: usize = 30;
-/// Minimum ratio of inliers for a rotation.
 const MIN_INLIER_RATIO: f64 = 0.6;
 
 /// Rotations between consecutive images of some sections of the log, for every camera of the rig that the log has.

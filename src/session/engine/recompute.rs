@@ -29,7 +29,6 @@ pub(in crate::session) enum Detail {
     FactorRows,
 }
 
-/// A request to recompute a step.
 #[derive(Clone, Debug)]
 pub(in crate::session) struct RecomputeRequest {
     /// [`RunRecord::id`](crate::session::RunRecord::id).
@@ -55,7 +54,6 @@ impl PartialEq for RecomputeRequest {
 pub(in crate::session) enum Recomputed {
     /// Steps with their indices.
     Steps(Vec<(usize, StepRecord)>),
-    /// Solver states of one step.
     SolverStates(Vec<StepRecord>),
     /// The factor rows of one step, `None` where it has none.
     FactorRows(Option<Vec<FactorRows>>),

@@ -43,13 +43,11 @@ impl PackedEngine {
         RunEngine { estimator: self.estimator.unpacked(&measurements(past)), settings: self.settings.clone() }
     }
 
-    /// Memory in bytes.
     pub(super) fn bytes(&self) -> usize {
         size_of::<Self>() - size_of::<PackedEstimator>() + self.estimator.bytes()
     }
 }
 
-/// Steps as measurements of the estimator.
 fn measurements(past: &[Arc<OwnedStepInput>]) -> Vec<&dyn StepMeasurements> {
     past.iter().map(|step| &**step as &dyn StepMeasurements).collect()
 }
@@ -78,7 +76,6 @@ impl RunEngine {
         &self.estimator
     }
 
-    /// Number of cameras of the estimator.
     pub(in crate::session) fn cameras(&self) -> usize {
         1 + self.estimator.config().rigid_cameras.len()
     }

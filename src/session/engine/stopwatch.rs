@@ -14,7 +14,6 @@ pub struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// Starts the measurement.
     #[expect(clippy::disallowed_methods, reason = "stage timings are measured; nothing is computed from them")]
     pub fn start() -> Self {
         Self { begin: Instant::now() }

@@ -31,7 +31,6 @@ pub(in crate::session) struct SynchronizationError {
     count: usize,
 }
 
-/// The inputs of one camera of a run.
 #[derive(Debug)]
 struct CameraInputs {
     key: String,

@@ -48,7 +48,6 @@ impl Default for Engine {
 }
 
 impl Engine {
-    /// Starts all runs of the plan.
     pub(in crate::session) fn start(plan: &SessionPlan, computation: &Computation) -> Result<Self, SessionError> {
         let mut engine = Self::default();
         engine.start_runs(plan, computation, &(0..plan.runs.len()).collect::<Vec<_>>())?;
@@ -165,7 +164,6 @@ fn track_thread(
     }
 }
 
-/// A run from the start of the log.
 struct RunOverLog {
     run: usize,
     passes: usize,

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use thiserror::Error;
 
 use super::run_spec::{ParameterizationChoice, RunSpec};
-use crate::estimator::{InterventionError, SensorColumns};
+use crate::estimator::{InterventionError, SensorParameters};
 use crate::text::Named as _;
 
 /// The changes of a fork against its parent run.
@@ -17,7 +17,7 @@ pub struct ForkChanges {
     /// Another parameterization of the same chain.
     pub parameterization: Option<ParameterizationChoice>,
     /// Sensor parameters that are estimated from here on (`estimate=readout+intrinsics`).
-    pub estimated: BTreeSet<SensorColumns>,
+    pub estimated: BTreeSet<SensorParameters>,
     /// Names of parameters that are fixed at their values (`freeze=`).
     pub frozen: Vec<String>,
     /// Names and new values of parameters, in radians or metres (`set=`).
@@ -61,23 +61,15 @@ impl Default for ForkChanges {
 pub enum ForkError {
     /// A change that is not supported, or an invalid value.
     #[error("fork '{text}': {problem}")]
-    BadChange {
-        /// The change as written.
-        text: String,
-        /// The problem, and the expected input.
-        problem: String,
-    },
-    /// The run does not use this camera.
+    BadChange { text: String, problem: String },
     #[error("the run uses no camera '{camera}', only {present}")]
     NoCamera {
         camera: String,
         /// Keys of the cameras of the run.
         present: String,
     },
-    /// The fork would have no camera.
     #[error("without {without} the run has no visual measurements: keep one of its cameras")]
     Blind { without: String },
-    /// The run has no such parameter.
     #[error(
         "cannot fork this run: no parameter '{name}' in this parameterization; expected one of {}",
         known.join(", ")

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError, OTHER_CAMERA};
 use super::run_options::{encoder_noise, imu_noise, pixel_noise};
 use super::run_spec::ParameterizationChoice;
-use crate::estimator::SensorColumns;
+use crate::estimator::SensorParameters;
 use crate::text::{Entry, Field, Key, Named as _, items, read_entry, written_items};
 
 /// Reason why a fork cannot use encoder readings that its parent does not use.
@@ -139,8 +139,8 @@ fn several<'a>(entry: &Entry<'a>) -> impl Iterator<Item = &'a str> {
 
 fn read_estimated(changes: &mut ForkChanges, entry: &Entry<'_>) -> Result<(), String> {
     for name in several(entry) {
-        let columns = SensorColumns::ALL.into_iter().find(|columns| columns.key() == name);
-        let known = SensorColumns::ALL.map(SensorColumns::key).join(", ");
+        let columns = SensorParameters::ALL.into_iter().find(|columns| columns.key() == name);
+        let known = SensorParameters::ALL.map(SensorParameters::key).join(", ");
         let expected = || format!("estimate is '{name}', expected one of {known}");
         changes.estimated.insert(columns.ok_or_else(expected)?);
     }

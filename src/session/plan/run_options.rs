@@ -2,13 +2,12 @@
 //! run" and docs/commands.md come from this table.
 
 use super::run_spec::{RunSpec, folder_name};
-use crate::estimator::SensorColumns;
+use crate::estimator::SensorParameters;
 use crate::optimization::RobustLoss;
 use crate::text::{Entry, Field, Key};
 
 /// Range of the scale of a robust loss, in standard deviations.
 const LOSS_SCALES: std::ops::RangeInclusive<f64> = 0.05..=100.0;
-/// Range of the iterations of a solve.
 const ITERATIONS: std::ops::RangeInclusive<usize> = 1..=100;
 
 impl RunSpec {
@@ -27,21 +26,23 @@ impl RunSpec {
         )
         .labelled("Estimate", "Calibration parameters", ""),
         Key::<Self>::switch(
-            SensorColumns::Timeshift.key(),
+            SensorParameters::Timeshift.key(),
             "estimate the time offsets of cameras and encoders to the IMU",
             |spec| &mut spec.timeshift,
         )
         .labelled("", "Time offsets of cameras and encoders", ""),
-        Key::<Self>::switch(SensorColumns::Readout.key(), "estimate the readout times of rolling shutters", |spec| {
-            &mut spec.readout
-        }),
         Key::<Self>::switch(
-            SensorColumns::Intrinsics.key(),
+            SensorParameters::Readout.key(),
+            "estimate the readout times of rolling shutters",
+            |spec| &mut spec.readout,
+        ),
+        Key::<Self>::switch(
+            SensorParameters::Intrinsics.key(),
             "estimate fx, fy, cx, cy and the first two coefficients of the lens of each camera",
             |spec| &mut spec.intrinsics,
         ),
         Key::<Self>::switch(
-            SensorColumns::ImuIntrinsics.key(),
+            SensorParameters::ImuIntrinsics.key(),
             "estimate scale and misalignment of gyroscope and accelerometer, and the rotation between them",
             |spec| &mut spec.imu_intrinsics,
         ),

@@ -4,7 +4,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use super::tuning::EstimatorTuning;
-use crate::estimator::SensorColumns;
+use crate::estimator::SensorParameters;
 use crate::sensors::Rig;
 use crate::text::{Named, items, read_item, written_items};
 
@@ -43,7 +43,6 @@ impl Named for ParameterizationChoice {
 }
 
 impl ParameterizationChoice {
-    /// Summary for the window.
     pub const fn summary(self) -> &'static str {
         self.texts().0
     }
@@ -140,36 +139,27 @@ impl Default for RunSpec {
 /// The reason why a run specification was rejected.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum RunSpecError {
-    /// Unknown parameterization.
     #[error("unknown run '{name}': expected one of {}", ParameterizationChoice::names())]
-    UnknownName {
-        /// The name as written.
-        name: String,
-    },
+    UnknownName { name: String },
     /// Unknown key, or invalid value.
     #[error("run '{spec}': {problem}")]
-    BadOption {
-        /// The whole specification.
-        spec: String,
-        /// The problem, and the expected input.
-        problem: String,
-    },
+    BadOption { spec: String, problem: String },
 }
 
 impl RunSpec {
     /// True if these columns are estimated in addition to the chain's.
-    pub fn estimates(&self, columns: SensorColumns) -> bool {
+    pub fn estimates(&self, columns: SensorParameters) -> bool {
         match columns {
-            SensorColumns::Timeshift => self.timeshift,
-            SensorColumns::Readout => self.readout,
-            SensorColumns::Intrinsics => self.intrinsics,
-            SensorColumns::ImuIntrinsics => self.imu_intrinsics,
+            SensorParameters::Timeshift => self.timeshift,
+            SensorParameters::Readout => self.readout,
+            SensorParameters::Intrinsics => self.intrinsics,
+            SensorParameters::ImuIntrinsics => self.imu_intrinsics,
         }
     }
 
     /// True if the fixed calibration excludes a key: sensor columns require `calibrate=on`.
     pub fn excludes(&self, key: &str) -> bool {
-        !self.calibrate && SensorColumns::ALL.into_iter().any(|columns| columns.key() == key)
+        !self.calibrate && SensorParameters::ALL.into_iter().any(|columns| columns.key() == key)
     }
 
     /// Text of all settings that affect the results, without the name. Keys with default values are omitted and the
@@ -181,12 +171,12 @@ impl RunSpec {
     }
 
     /// Mutable reference to the flag of [`Self::estimates`].
-    pub(super) fn estimates_mut(&mut self, columns: SensorColumns) -> &mut bool {
+    pub(super) fn estimates_mut(&mut self, columns: SensorParameters) -> &mut bool {
         match columns {
-            SensorColumns::Timeshift => &mut self.timeshift,
-            SensorColumns::Readout => &mut self.readout,
-            SensorColumns::Intrinsics => &mut self.intrinsics,
-            SensorColumns::ImuIntrinsics => &mut self.imu_intrinsics,
+            SensorParameters::Timeshift => &mut self.timeshift,
+            SensorParameters::Readout => &mut self.readout,
+            SensorParameters::Intrinsics => &mut self.intrinsics,
+            SensorParameters::ImuIntrinsics => &mut self.imu_intrinsics,
         }
     }
 }
@@ -201,8 +191,8 @@ impl FromStr for RunSpec {
         let bad = |problem: String| RunSpecError::BadOption { spec: spec.to_owned(), problem };
         let mut run = Self { label: folder_name(spec), parameterization, ..Self::default() };
         items(options).try_for_each(|item| read_item(Self::KEYS, &mut run, item)).map_err(bad)?;
-        let estimated = |columns: &SensorColumns| run.estimates(*columns) && run.excludes(columns.key());
-        if let Some(columns) = SensorColumns::ALL.into_iter().find(estimated) {
+        let estimated = |columns: &SensorParameters| run.estimates(*columns) && run.excludes(columns.key());
+        if let Some(columns) = SensorParameters::ALL.into_iter().find(estimated) {
             return Err(bad(format!("{}=on requires calibrate=on", columns.key())));
         }
         Ok(run)

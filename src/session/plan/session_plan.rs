@@ -15,6 +15,7 @@ use crate::flight_log::{FlightLog, LogLimits, is_batch_reference};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::{CameraMount, CameraRig, LeverArm, PoseTrack, Rig};
+use crate::text::Named as _;
 
 /// The arguments of a session, as on the command line.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -149,7 +150,7 @@ impl SessionPlan {
         let mut parameters: Vec<ParameterId> = Vec::new();
         for (spec, camera_key) in &self.runs {
             let chain = self.rig.chain_of_camera(camera_key).unwrap_or_default();
-            for parameterization in Parameterization::ALL {
+            for parameterization in Parameterization::all() {
                 parameters.extend(Chain::from_classical(&chain, parameterization).parameters());
             }
             let rigid = cameras_of_run(&self.rig, spec).ok().and_then(|cameras| cameras.rigid);
@@ -186,7 +187,6 @@ impl<'rig> RunCameras<'rig> {
     }
 }
 
-/// Finds the cameras of a run.
 pub(in crate::session) fn cameras_of_run<'rig>(
     rig: &'rig Rig,
     spec: &RunSpec,

@@ -15,7 +15,6 @@ const TOPIC: &str = "topic:";
 /// Longest label in characters.
 const MAX_LABEL: usize = 40;
 
-/// Source of a trajectory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TrajectorySource {
     /// A file in TUM's or EuRoC's format.

@@ -26,7 +26,6 @@ impl Default for EstimatorTuning {
 }
 
 impl EstimatorTuning {
-    /// Applies the options to a configuration.
     pub(in crate::session) fn apply(&self, config: &mut EstimatorConfig) {
         let options = &mut config.options;
         options.pixel_sigma_px *= self.pixel_noise;

@@ -10,9 +10,9 @@ use crate::flight_log::ImageReader;
 use crate::sensors::GrayImage;
 use crate::session::plan::SessionError;
 
-/// Longest time that a window waits for an image; the next image of a video is decoded within it, so that playback
-/// shows every image.
-const WINDOW_WAITS: Duration = Duration::from_millis(25);
+/// Longest time that a window waits for an image or a recomputed step; the next image of a video is decoded within it, so
+/// that playback shows every image.
+pub(super) const WINDOW_WAIT: Duration = Duration::from_millis(25);
 /// Number of decoded images that are kept: those of all panels of a window.
 const DELIVERED: usize = 8;
 
@@ -36,7 +36,6 @@ impl FrameImage {
     }
 }
 
-/// Camera key and index of an image.
 type Key = (String, usize);
 
 /// Images of a log. In a log without videos each image is decoded alone, so images are read synchronously; a video is
@@ -78,7 +77,7 @@ impl BackgroundImages {
 
     /// Image of a camera; for a video, only if it is decoded within a few milliseconds.
     pub(super) fn image(&self, camera_key: &str, index: usize) -> FrameImage {
-        self.image_within(camera_key, index, Some(WINDOW_WAITS))
+        self.image_within(camera_key, index, Some(WINDOW_WAIT))
     }
 
     /// Image of a camera; blocks until it is decoded.

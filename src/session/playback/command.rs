@@ -8,9 +8,7 @@ pub struct PlaybackSpeed(pub f64);
 /// A command from a button, a key or the command line; applied between two frames of the window, in one place.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Command {
-    /// Start playback.
     Play,
-    /// Pause playback.
     Pause,
     /// Toggle between playback and pause.
     TogglePlay,
@@ -39,13 +37,11 @@ pub enum Command {
         number: usize,
         condition: Condition,
     },
-    /// Enable or disable a breakpoint.
     EnableBreakpoint {
         number: usize,
         /// True if it stops the cursor.
         enabled: bool,
     },
-    /// Remove a breakpoint by its index.
     RemoveBreakpoint(usize),
     /// Add a breakpoint at the frame of the cursor, or remove it.
     ToggleBreakpointHere,
@@ -71,7 +67,6 @@ pub enum Command {
         /// Label of the fork; `None` derives it from the changes and the stamp.
         label: Option<String>,
     },
-    /// Remove a run by its index.
     RemoveRun(usize),
     /// Recompute the linearized rows of a step's factors. They are stored in `RunRecord::factor_rows` and stay
     /// requested while the cursor is at the step.

@@ -25,7 +25,6 @@ pub struct Cursor {
 pub enum MoveOutcome {
     /// The cursor stopped at a breakpoint.
     Hit(Hit),
-    /// No breakpoint is enabled.
     NoBreakpoint,
     /// There is no hit before the cursor.
     NoHitBefore,

@@ -1,14 +1,11 @@
 //! Recomputation of steps for the view at the cursor.
 
 use std::sync::Arc;
-use std::time::Duration;
 
+use super::background_images::WINDOW_WAIT;
 use super::session::{FactorRowsView, Session};
 use crate::session::engine::{Detail, RecomputeRequest, STEPS_AT_ONCE};
 use crate::session::record::RunRecord;
-
-/// Longest time that a window waits for a recomputed step.
-const WINDOW_WAITS: Duration = Duration::from_millis(25);
 
 impl Session {
     /// Blocks until the record has all data that the view at the cursor needs.
@@ -22,7 +19,7 @@ impl Session {
     /// Waits a few milliseconds for the data that the view at the cursor needs: most steps are recomputed within that
     /// time, so the window draws one frame instead of one before and one after.
     pub fn settle_shortly(&self) {
-        self.recompute.settle_within(WINDOW_WAITS);
+        self.recompute.settle_within(WINDOW_WAIT);
     }
 
     /// True while steps at the cursor are being recomputed.

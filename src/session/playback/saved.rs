@@ -17,10 +17,8 @@ pub(super) const VERSION: u32 = 1;
 /// Reason why a text is not a saved session, or its session cannot be opened.
 #[derive(Debug, Error)]
 pub enum SavedSessionError {
-    /// The text does not have the format of a session.
     #[error("not a saved session: {problem}")]
     Format { problem: String },
-    /// The file was written by a later version of the program.
     #[error(
         "session version {found}, but this program reads version {VERSION}: open it with the program that saved it"
     )]
@@ -81,7 +79,6 @@ pub struct SavedLog {
     pub crc32: u32,
 }
 
-/// A fork of a saved session.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SavedFork {
     pub parent: String,
@@ -92,7 +89,6 @@ pub struct SavedFork {
     pub changes: String,
 }
 
-/// A breakpoint of a saved session.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SavedBreakpoint {
     pub condition: String,

@@ -51,7 +51,6 @@ impl Session {
         Self::start(SessionPlan::open(request)?)
     }
 
-    /// Starts the runs of a plan.
     pub fn start(plan: SessionPlan) -> Result<Self, SessionError> {
         let computation = Computation::new(&plan);
         let mut engine = Engine::start(&plan, &computation)?;
@@ -177,7 +176,6 @@ impl Session {
         self.request_recomputation();
     }
 
-    /// Executes a command.
     pub fn apply(&mut self, command: Command) {
         self.evaluate_breakpoints();
         let recording = self.recording();

@@ -9,80 +9,60 @@ use super::step::StepRecord;
 use super::trajectory_lane::{TrajectoryLane, yaw_and_position};
 use crate::estimator::{FrameStateReport, Phase};
 use crate::geometry::{RigidTransform, so3, wrap_angle};
+use crate::text::Named;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
-    /// Phase of the estimator, initializing or tracking; 1 where they differ.
     Phase,
-    /// Number of features that only one of the runs received.
     Tracks,
-    /// Keyframe decision; 1 where they differ.
     Keyframe,
-    /// Position of the newest frame.
     Position,
-    /// Attitude of the newest frame.
     Attitude,
-    /// Velocity of the newest frame.
     Velocity,
     AccelerometerBias,
     GyroscopeBias,
-    /// Joint angles of the newest frame.
     JointAngles,
-    /// Position of the camera on the IMU at the newest frame.
     ChainTranslation,
-    /// Attitude of the camera on the IMU at the newest frame.
     ChainRotation,
-    /// Reprojection RMS after the solve.
     Reprojection,
-    /// Structural rank of the calibration.
     RankStructural,
-    /// Informed rank of the calibration.
     RankInformed,
 }
 
-impl Quantity {
-    /// All quantities, in the order in which a difference usually spreads.
-    pub const ALL: [Self; 14] = [
-        Self::Phase,
-        Self::Tracks,
-        Self::Keyframe,
-        Self::Position,
-        Self::Attitude,
-        Self::Velocity,
-        Self::AccelerometerBias,
-        Self::GyroscopeBias,
-        Self::JointAngles,
-        Self::ChainTranslation,
-        Self::ChainRotation,
-        Self::Reprojection,
-        Self::RankStructural,
-        Self::RankInformed,
+/// In the order in which a difference usually spreads.
+impl Named for Quantity {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Phase, "phase"),
+        (Self::Tracks, "tracks"),
+        (Self::Keyframe, "keyframes"),
+        (Self::Position, "position"),
+        (Self::Attitude, "attitude"),
+        (Self::Velocity, "velocity"),
+        (Self::AccelerometerBias, "accelerometer bias"),
+        (Self::GyroscopeBias, "gyroscope bias"),
+        (Self::JointAngles, "joint angles"),
+        (Self::ChainTranslation, "extrinsics, translation"),
+        (Self::ChainRotation, "extrinsics, rotation"),
+        (Self::Reprojection, "reprojection RMS"),
+        (Self::RankStructural, "structural rank"),
+        (Self::RankInformed, "informed rank"),
     ];
+}
 
-    /// Name, unit as stored, and threshold of a notable difference: 1 cm and 0.1° for a trajectory, 1 mm and 0.1° for a
-    /// calibration; for biases, the values that change the trajectory by the same amount within a second.
-    const fn facts(self) -> (&'static str, &'static str, f64) {
+impl Quantity {
+    /// Unit as stored, empty for counts, and threshold of a notable difference: 1 cm and 0.1° for a trajectory, 1 mm and
+    /// 0.1° for a calibration; for biases, the values that change the trajectory by the same amount within a second.
+    const fn unit_and_threshold(self) -> (&'static str, f64) {
         match self {
-            Self::Phase => ("phase", "", 1.0),
-            Self::Tracks => ("tracks", "", 1.0),
-            Self::Keyframe => ("keyframes", "", 1.0),
-            Self::Position => ("position", "m", 0.01),
-            Self::Attitude => ("attitude", "rad", 0.001_745),
-            Self::Velocity => ("velocity", "m/s", 0.01),
-            Self::AccelerometerBias => ("accelerometer bias", "m/s²", 0.01),
-            Self::GyroscopeBias => ("gyroscope bias", "rad/s", 0.000_1),
-            Self::JointAngles => ("joint angles", "rad", 0.001_745),
-            Self::ChainTranslation => ("extrinsics, translation", "m", 0.001),
-            Self::ChainRotation => ("extrinsics, rotation", "rad", 0.001_745),
-            Self::Reprojection => ("reprojection RMS", "px", 0.05),
-            Self::RankStructural => ("structural rank", "", 1.0),
-            Self::RankInformed => ("informed rank", "", 1.0),
+            Self::Phase | Self::Tracks | Self::Keyframe | Self::RankStructural | Self::RankInformed => ("", 1.0),
+            Self::Position => ("m", 0.01),
+            Self::Attitude | Self::JointAngles | Self::ChainRotation => ("rad", 0.001_745),
+            Self::Velocity => ("m/s", 0.01),
+            Self::AccelerometerBias => ("m/s²", 0.01),
+            Self::GyroscopeBias => ("rad/s", 0.000_1),
+            Self::ChainTranslation => ("m", 0.001),
+            Self::Reprojection => ("px", 0.05),
         }
-    }
-
-    /// Name in tables and plots.
-    pub const fn name(self) -> &'static str {
-        self.facts().0
     }
 
     /// Definition of the difference.
@@ -107,12 +87,12 @@ impl Quantity {
 
     /// Unit as stored; empty for counts.
     pub const fn unit(self) -> &'static str {
-        self.facts().1
+        self.unit_and_threshold().0
     }
 
     /// Threshold of a notable difference, in its unit.
     pub const fn notable(self) -> f64 {
-        self.facts().2
+        self.unit_and_threshold().1
     }
 
     /// Difference of two steps with the same stamp. The world of `b` is transformed by `gauge` (`world_a_from_world_b`)
@@ -217,8 +197,8 @@ pub struct Comparison {
     /// Stamps common to both runs, in nanoseconds since the log began.
     pub stamps_ns: Vec<i64>,
     /// Differences by quantity and row; NaN where a run does not have the quantity.
-    pub columns: [Vec<f64>; Quantity::ALL.len()],
-    pub divergences: [Divergence; Quantity::ALL.len()],
+    pub columns: [Vec<f64>; Quantity::NAMES.len()],
+    pub divergences: [Divergence; Quantity::NAMES.len()],
     /// Counter that changes when rows are removed.
     pub epoch: u64,
 }
@@ -290,7 +270,7 @@ impl Comparison {
     fn push_row(&mut self, stamp_ns: i64, difference: impl Fn(&RigidTransform, Quantity) -> Option<f64>) {
         self.stamps_ns.push(stamp_ns);
         let gauge = self.gauge.unwrap_or_default();
-        for (index, quantity) in Quantity::ALL.into_iter().enumerate() {
+        for (index, quantity) in Quantity::all().enumerate() {
             let apart = difference(&gauge, quantity);
             self.columns[index].push(apart.unwrap_or(f64::NAN));
             let Some(apart) = apart else { continue };
@@ -335,7 +315,7 @@ impl Comparison {
     }
 
     fn first(&self, of: impl Fn(&Divergence) -> Option<i64>) -> Option<(i64, Quantity)> {
-        let known = self.divergences.iter().zip(Quantity::ALL);
+        let known = self.divergences.iter().zip(Quantity::all());
         known
             .filter_map(|(divergence, quantity)| Some((of(divergence)?, quantity)))
             .min_by_key(|(stamp_ns, _)| *stamp_ns)
@@ -362,7 +342,7 @@ mod tests {
         let end_ns = run.steps.last().unwrap().report.stamp_ns;
         assert_eq!(comparison.at(Quantity::Position, end_ns), Some(0.0));
         assert_eq!(comparison.at(Quantity::Position, -1), None);
-        assert!(Quantity::ALL.into_iter().enumerate().all(|(index, quantity)| index == quantity as usize));
+        assert!(Quantity::all().enumerate().all(|(index, quantity)| index == quantity as usize));
     }
 
     #[test]

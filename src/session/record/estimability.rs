@@ -7,6 +7,7 @@ use super::run::RunRecord;
 use crate::geometry::Dimension;
 use crate::gimbal::{ParameterGroup, ParameterId, Quantity};
 use crate::observability::{Estimability, ParameterEstimability, estimability};
+use crate::text::Named as _;
 
 /// A calibration parameter and its estimability from the flight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -22,7 +23,6 @@ pub struct EstimabilitySummary {
     pub prior_sigma: Option<f64>,
     /// Posterior divided by prior standard deviation.
     pub ratio: Option<f64>,
-    /// The verdict in words.
     pub verdict: &'static str,
     /// Null or weak direction of the last window, or correlation, that explains a large ratio; empty without one.
     pub reason: String,

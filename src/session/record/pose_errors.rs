@@ -18,7 +18,6 @@ pub struct PoseError {
     /// Estimate minus ground truth in the rows of [`PoseCovariance`]: rotation vector in the IMU frame (rad), position
     /// in the world of the run (m).
     pub error: Vector6<f64>,
-    /// Covariance of the estimate.
     pub covariance: PoseCovariance,
 }
 

@@ -14,7 +14,6 @@ use crate::session::plan::{LoadedTrajectory, RunSpec, SessionPlan};
 #[derive(Clone, Debug)]
 pub struct Recording {
     pub log_path: PathBuf,
-    /// Rig of the runs.
     pub rig: Arc<Rig>,
     /// The ground-truth rig, if known.
     pub ground_truth_rig: Option<Arc<Rig>>,
@@ -38,7 +37,6 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// File name of the log.
     pub fn log_name(&self) -> String {
         self.log_path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     }

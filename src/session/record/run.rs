@@ -18,7 +18,6 @@ const MAX_RECOMPUTED: usize = 96;
 
 pub(super) static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 
-/// Memory of a run in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunMemory {
     /// Steps without their tracks.

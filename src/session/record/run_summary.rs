@@ -21,14 +21,12 @@ use crate::sensors::Rig;
 use crate::session::accuracy::path_length_m;
 use crate::text::Named as _;
 
-/// Frame counts of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FrameCounts {
     /// Number of images passed to the estimator.
     pub total: usize,
     /// Number of images with an estimated pose.
     pub estimated: usize,
-    /// Number of keyframes.
     pub keyframes: usize,
     /// Stamp of the first pose, in seconds since the log began.
     pub initialized_at_s: Option<f64>,
@@ -50,7 +48,6 @@ pub struct ParameterSummary {
     #[serde(rename = "final")]
     pub last: f64,
     pub sigma: Option<f64>,
-    /// Ground-truth value.
     #[serde(rename = "truth", skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<f64>,
     /// Final minus ground-truth value.
@@ -58,7 +55,6 @@ pub struct ParameterSummary {
     pub error: Option<f64>,
 }
 
-/// The calibration of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CalibrationSummary {
     /// Name of the final parameterization.
@@ -88,7 +84,6 @@ impl CalibrationSummary {
     }
 }
 
-/// Weight of one parameter in a direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DirectionWeight {
     pub name: String,
@@ -99,7 +94,6 @@ pub struct DirectionWeight {
 /// Observability of the calibration at the last step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RankSummary {
-    /// Number of calibration columns.
     pub columns: usize,
     pub rank_structural: usize,
     pub rank_informed: usize,
@@ -124,11 +118,9 @@ pub struct InformationSummary {
     pub parameters: Vec<ParameterInformation>,
 }
 
-/// Information gain of one parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterInformation {
     pub name: String,
-    /// Gain in bits per second.
     pub bits_per_s: f64,
     /// Contribution of each motion in bits per second; negative for a motion that reduces the contribution of others.
     pub by_motion: Vec<f64>,
@@ -154,13 +146,9 @@ pub struct TimingSummary {
     pub optimize: StageSummary,
     /// Linearization for the observability analysis.
     pub linearize: StageSummary,
-    /// Building the report.
     pub report: StageSummary,
-    /// Marginalization.
     pub marginalize: StageSummary,
-    /// Observability analysis.
     pub observability: StageSummary,
-    /// Whole step.
     pub step: StageSummary,
 }
 

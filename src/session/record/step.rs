@@ -40,7 +40,6 @@ impl StepRecord {
             + self.rank.as_ref().map_or(0, RankReport::heap_bytes)
     }
 
-    /// Memory of the tracks in bytes.
     pub fn tracks_bytes(&self) -> usize {
         tracks_bytes(&self.tracks)
     }

@@ -8,10 +8,8 @@ use crate::session::{
 };
 use crate::study::StudyJob;
 
-/// Outcome of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum JobStatus {
-    /// The job has results.
     Ok,
     /// The estimator never initialized.
     NotInitialized,
@@ -19,7 +17,6 @@ pub enum JobStatus {
     Failed,
     /// The job ended by a panic, or by a signal of a fault.
     Crashed,
-    /// The job was killed.
     Killed,
     /// The job exceeded the plan's time limit and was killed.
     Timeout,
@@ -39,7 +36,6 @@ impl JobStatus {
     }
 }
 
-/// Files and costs of a job.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JobCosts {
     /// SHA-256 of the log, if it is known.
@@ -57,7 +53,6 @@ pub struct JobCosts {
     pub program: String,
     /// Number of times that the job was started.
     pub attempts: usize,
-    /// Wall time in seconds.
     pub wall_s: f64,
     /// Largest resident memory in bytes.
     pub peak_memory_bytes: Option<u64>,
@@ -66,25 +61,19 @@ pub struct JobCosts {
 /// A job that has ended, with its run or its trajectory where it has a result.
 #[derive(Clone, Debug)]
 pub struct JobResult<'a> {
-    /// Key of the job.
     pub key: &'a str,
-    /// Inputs of the job.
     pub job: &'a StudyJob,
     pub status: JobStatus,
     /// Reason for a missing result; empty with a result.
     pub message: &'a str,
-    /// Files and costs.
     pub costs: &'a JobCosts,
-    /// The run of the estimator.
     pub run: Option<RunResult<'a>>,
     /// The evaluated trajectory of another program.
     pub trajectory: Option<&'a TrajectoryLane>,
 }
 
-/// A run of the estimator.
 #[derive(Clone, Debug)]
 pub struct RunResult<'a> {
-    /// The recording of the run.
     pub recording: &'a Recording,
     pub record: &'a RunRecord,
     pub summary: &'a RunSummary,
@@ -99,7 +88,6 @@ pub struct RunResult<'a> {
 pub(super) struct WorstFrame {
     /// Stamp in seconds since the log began.
     pub(super) at_s: f64,
-    /// Position error.
     pub(super) error_m: Option<f64>,
     /// Reprojection RMS after the solve.
     pub(super) reprojection_px: Option<f64>,
@@ -137,7 +125,6 @@ impl JobResult<'_> {
 }
 
 impl RunResult<'_> {
-    /// Number of failures by a cause.
     pub(super) fn failures(&self, cause: FailureCause) -> usize {
         let events = self.record.steps.iter().flat_map(|step| &step.report.events);
         events.filter(|event| event.kind == EventKind::Failure && event.cause == Some(cause)).count()

@@ -7,7 +7,6 @@ use crate::estimator::FailureCause;
 use crate::study::JobLog;
 use crate::text::Named as _;
 
-/// The column of a name.
 pub(in crate::study) fn run_column(name: &str) -> Option<&'static Column<JobResult<'static>>> {
     JobResult::COLUMNS.iter().find(|column| column.name == name)
 }

@@ -49,7 +49,6 @@ struct Entry<'a> {
 }
 
 impl<'a> Section<'a> {
-    /// Root table of the plan.
     pub(super) fn root(text: &'a str, table: &'a Spanned<DeTable<'a>>) -> Self {
         Self { text, path: String::new(), span: table.span(), table: table.get_ref() }
     }
@@ -179,7 +178,6 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// An integer within a range.
     pub(super) fn integer(&self, name: &str, range: RangeInclusive<u64>) -> Result<Option<u64>, PlanError> {
         self.entry(name).map(|entry| self.integer_of(&entry, &range)).transpose()
     }

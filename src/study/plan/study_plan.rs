@@ -47,7 +47,6 @@ pub struct DisturbanceSet {
 pub struct Exclusion {
     /// Names of logs and flights.
     pub logs: Vec<String>,
-    /// Names of disturbances.
     pub disturbances: Vec<String>,
     /// Names of rig errors.
     pub perturbations: Vec<String>,
@@ -79,7 +78,6 @@ pub struct StudyOutput {
     pub files: bool,
 }
 
-/// Slurm options of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SlurmOptions {
     /// Partition, `None` for the cluster's default.
@@ -113,7 +111,6 @@ pub struct StudyPlan {
     pub specs: Vec<RunSpec>,
     /// Levels of the rig's errors.
     pub perturbations: Vec<RigPerturbation>,
-    /// Levels of disturbances.
     pub disturbances: Vec<DisturbanceSet>,
     /// Seeds of simulated flights and of random perturbations.
     pub seeds: Vec<u64>,

@@ -6,7 +6,6 @@ use super::document::{PlanError, SEEDS, Section};
 use super::study_plan::{Exclusion, StudyPlan};
 use crate::study::summary_table::{ReferenceValue, Statistic, SummaryColumn, SummaryTable, is_run_column};
 
-/// Range of the factor of a column.
 const FACTORS: std::ops::RangeInclusive<f64> = -1e12..=1e12;
 /// Maximum number of digits after the decimal point.
 const MOST_DIGITS: u64 = 12;

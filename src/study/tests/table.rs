@@ -59,16 +59,6 @@ fn columns_must_have_one_length_and_different_names() {
 }
 
 #[test]
-fn rows_are_sorted_with_empty_cells_last() {
-    let table = table();
-    assert_eq!(table.sorted_by(&["log", "seed"]), [1, 2, 0]);
-    assert_eq!(table.sorted_by(&["ate_rmse_m"]), [2, 0, 1]);
-    assert_eq!(table.sorted_by(&["initialized"]), [1, 0, 2]);
-    let sorted = table.select(&table.sorted_by(&["log", "seed"]));
-    assert_eq!((sorted.rows(), sorted.text(0, "log"), sorted.integer(2, "seed")), (3, Some("a"), Some(2)));
-}
-
-#[test]
 fn tables_of_other_columns_are_merged_by_name() {
     let mut merged = table();
     let mut other = StudyTable::new(vec![

@@ -84,7 +84,6 @@ impl RowFilter {
         }
     }
 
-    /// True if a row passes.
     pub fn passes(&self, table: &StudyTable, row: usize) -> bool {
         self.predicate.as_ref().is_none_or(|predicate| predicate.holds(table, row))
     }

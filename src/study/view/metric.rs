@@ -12,7 +12,6 @@ pub struct Metric {
     pub factor: f64,
     /// The shown unit, empty for dimensionless numbers.
     pub unit: &'static str,
-    /// Description of the column.
     pub description: String,
 }
 
@@ -49,7 +48,6 @@ impl Metric {
         if self.unit.is_empty() { self.column.clone() } else { format!("{name} [{}]", self.unit) }
     }
 
-    /// The shown value of a row.
     pub fn value(&self, table: &StudyTable, row: usize) -> Option<f64> {
         table.number(row, &self.column).map(|stored| stored * self.factor)
     }
@@ -73,7 +71,6 @@ pub fn metrics(table: &StudyTable) -> Vec<Metric> {
 /// An axis over values: linear, or logarithmic over positive values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ValueAxis {
-    /// True for a logarithmic scale.
     pub logarithmic: bool,
     /// Value at the lower end.
     pub low: f64,

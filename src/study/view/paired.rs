@@ -10,7 +10,6 @@ use crate::study::{Cell, MeanInterval, PAIRING_COLUMNS, StudyTable};
 /// Difference between a row of a group and the reference's row on the same inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairedDifference {
-    /// The row of the group.
     pub row: usize,
     /// Value of the row in the shown unit.
     pub value: f64,

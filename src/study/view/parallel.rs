@@ -5,7 +5,6 @@ use super::metric::{Metric, ValueAxis, metrics};
 use super::study::columns;
 use crate::study::{ColumnType, StudyTable};
 
-/// The scale of a parallel axis.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AxisScale {
     /// A numeric scale.

@@ -8,10 +8,8 @@ use super::metric::Metric;
 use super::study::{Study, columns};
 use crate::geometry::mean_square_quantile;
 
-/// One parameter of one run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterPoint {
-    /// Row of the run.
     pub row: usize,
     /// Standard deviation at the end, in the shown unit.
     pub sigma: f64,

@@ -8,7 +8,6 @@ use crate::study::StudyTable;
 pub mod columns {
     /// Key of the run, in the tables of runs and of parameters.
     pub const KEY: &str = "key";
-    /// Name of the log.
     pub const LOG: &str = "log";
     /// Name of the disturbances of a simulated flight.
     pub const DISTURBANCE: &str = "disturbance";
@@ -18,7 +17,6 @@ pub mod columns {
     pub const NONE: &str = "none";
     /// Seed of the flight and of the errors.
     pub const SEED: &str = "seed";
-    /// Specification of the run.
     pub const RUN: &str = "run";
     /// Outcome of the run; [`STATUS_OK`] with a result.
     pub const STATUS: &str = "status";
@@ -32,7 +30,6 @@ pub mod columns {
     pub const ATE: &str = "ate_rmse_m";
     /// Name of a calibration parameter, in the table of parameters.
     pub const PARAMETER: &str = "parameter";
-    /// Unit of the parameter.
     pub const UNIT: &str = "unit";
     /// Final standard deviation of the parameter.
     pub const SIGMA: &str = "sigma";

@@ -45,7 +45,6 @@ pub(super) use mp4::is_movie;
 /// Number of bytes at the start that identify the kind of a log.
 const START_BYTES: u64 = 16;
 
-/// Reads an autopilot's log.
 fn read_autopilot(log: &AutopilotLog, sink: &mut LogSink<'_>) -> Result<Recorded, ConvertError> {
     let mut start = Vec::new();
     let file = File::open(&log.path).map_err(ConvertError::io("open the log of the autopilot", &log.path))?;

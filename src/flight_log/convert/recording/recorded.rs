@@ -13,7 +13,6 @@ pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.80665;
 /// Measurements with their times in nanoseconds of the recorder's clock.
 pub(super) type Samples<T> = Vec<(i64, T)>;
 
-/// Name and measurements of a record.
 pub(super) type NamedSamples<T> = (String, Samples<T>);
 
 /// IMU of a recording: angular velocities in rad/s and specific forces in m/s², in the IMU frame.
@@ -93,7 +92,6 @@ fn map_times<T>(samples: &mut Samples<T>, map: &impl Fn(i64) -> i64) {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Left {
     pub(super) count: u64,
-    /// Reason of the first one.
     pub(super) reason: String,
 }
 
@@ -145,7 +143,6 @@ impl Recorded {
         self.map_times(|time_ns| time_ns.saturating_add(offset_ns));
     }
 
-    /// Maps all times.
     pub(super) fn map_times(&mut self, map: impl Fn(i64) -> i64) {
         for imu in self.imus.values_mut() {
             map_times(&mut imu.combined, &map);

@@ -53,7 +53,6 @@ impl VideoFacts {
         format!("gopro-{model}-{lens}").parse().unwrap_or(usual)
     }
 
-    /// Template of a rig for the log.
     pub(in super::super) fn template(&self, name: &str, log: &FlightLog) -> Result<RigTemplate, TemplateError> {
         let prefix = if self.has_autopilot { "/imu" } else { "/camera/imu" };
         let both = |suffix: &str| [format!("{prefix}{suffix}"), format!("{prefix}0{suffix}")];

@@ -60,7 +60,6 @@ struct Topic {
 #[derive(Debug, Default)]
 pub(super) struct Topics {
     topics: Vec<Topic>,
-    /// Frame of the gimbal's attitude.
     pub(super) gimbal_frame: Option<GimbalFrame>,
 }
 

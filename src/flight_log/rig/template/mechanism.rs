@@ -9,7 +9,6 @@ use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, DhLink, JointAxis};
 use crate::sensors::{BodyAxes, Joint};
 
-/// Largest number of axes of a mechanism.
 const MAX_AXES: usize = 8;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,10 +34,10 @@ impl GimbalAxis {
     /// Rotation axis suggested by the joint's name ('pan' → z).
     pub fn of_joint(name: &str) -> Option<Self> {
         let name = name.to_ascii_lowercase();
-        let names = [
-            (Self::Yaw, ["yaw", "pan", "azimuth"]),
-            (Self::Roll, ["roll", "bank", "roll"]),
-            (Self::Pitch, ["pitch", "tilt", "elevation"]),
+        let names: [(Self, &[&str]); 3] = [
+            (Self::Yaw, &["yaw", "pan", "azimuth"]),
+            (Self::Roll, &["roll", "bank"]),
+            (Self::Pitch, &["pitch", "tilt", "elevation"]),
         ];
         names.into_iter().find(|(_, words)| words.iter().any(|word| name.contains(word))).map(|(axis, _)| axis)
     }
@@ -117,7 +116,6 @@ impl MechanismAxes {
         ClassicalChain::from_axes(&axes, last, &camera)
     }
 
-    /// Joints with these names.
     pub(super) fn joints(&self, names: &[String], positive: BodyAxes) -> Vec<Joint> {
         let joint =
             |(name, axis): (&String, &GimbalAxis)| Joint { name: name.clone(), limits_rad: axis.limits_rad(positive) };

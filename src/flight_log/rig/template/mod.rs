@@ -44,7 +44,6 @@ pub const TYPICAL_IMU_NOISE: ImuNoise = ImuNoise {
     gyroscope_random_walk: 4e-5,
 };
 
-/// Value with its source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sourced<T> {
     pub value: T,

@@ -29,7 +29,6 @@ const GROUND_TRUTH_WORDS: [&str; 6] = ["truth", "vicon", "optitrack", "mocap", "
 const IMU_RATE_HZ: f64 = 200.0;
 const IMAGE_RATE_HZ: f64 = 30.0;
 
-/// Choices of the user for a template.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigChoices {
     pub name: String,

@@ -16,7 +16,6 @@ use egui::{Context, Galley};
 
 use self::shape_hash::ShapeHasher;
 
-/// Maximum number of shapes of a chunk.
 const MOST_SHAPES: usize = 64;
 /// A chunk ends after a shape whose hash has none of these bits: after eight shapes on average.
 const ENDING_BITS: u64 = 7;

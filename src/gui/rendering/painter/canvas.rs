@@ -29,7 +29,6 @@ struct Tile {
     changed: bool,
 }
 
-/// A rectangle of the image in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelRect {
     /// Column and row of the upper left pixel.

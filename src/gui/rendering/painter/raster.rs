@@ -69,7 +69,6 @@ fn rounded(number: f32) -> i32 {
     (number + 0.5_f64.copysign(number)) as i32
 }
 
-/// A mesh with its texture.
 #[derive(Clone, Copy)]
 pub(super) struct PreparedMesh<'a> {
     pub(super) mesh: &'a Mesh,
@@ -272,7 +271,6 @@ impl PreparedMesh<'_> {
     }
 }
 
-/// A texel times a colour.
 #[inline]
 fn tinted(kind: TexelKind, texel: u32, color: u32) -> u32 {
     if color == u32::MAX {

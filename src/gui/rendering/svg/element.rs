@@ -19,7 +19,6 @@ pub(super) fn number(value: f32) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// An attribute with a number.
 pub(super) fn attribute(name: &str, value: f32) -> String {
     format!(" {name}=\"{}\"", number(value))
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use egui::{ComboBox, DragValue, Grid, RichText, TextEdit, Ui, vec2};
 
 use super::modal::{Modal, accept_or_cancel_ui};
-use crate::estimator::SensorColumns;
+use crate::estimator::SensorParameters;
 use crate::gui::PanelContext;
 use crate::gui::units::seconds;
 use crate::session::{Command, FORK_PARAMETERIZATIONS, ForkChanges, RunSpec};
@@ -106,7 +106,7 @@ impl ForkDialog {
             ui.end_row();
             let parameter = selected.0.map_or_else(|| "yaw.alpha".to_owned(), |parameter| ctx.names().name(parameter));
             let feature = selected.1.map_or_else(|| "12 15".to_owned(), |id| id.0.to_string());
-            let sensors = SensorColumns::ALL.map(SensorColumns::key).join(" ");
+            let sensors = SensorParameters::ALL.map(SensorParameters::key).join(" ");
             let camera = second_camera(ctx).unwrap_or_else(|| "cluster runs only: one of the two cameras".to_owned());
             let text_ui = |ui: &mut Ui, label: &str, text: &mut String, hint: &str| {
                 let name = ui.label(label);

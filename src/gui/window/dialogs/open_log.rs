@@ -24,7 +24,6 @@ pub(super) struct OpenLogDialog {
     picker: Option<FilePicker>,
 }
 
-/// Open file dialog of the desktop.
 struct FilePicker {
     answer: Receiver<Option<PathBuf>>,
     /// Time in seconds of the first frame in which it was polled.

@@ -9,7 +9,6 @@ use crate::gui::window::actions::Action;
 use crate::gui::window::saved_layouts::SavedLayouts;
 use crate::gui::window::tiles::PanelLayout;
 
-/// Height of the list in points.
 const LIST_HEIGHT: f32 = 360.0;
 /// Number of rows that Page up and Page down move.
 const PAGE_ROWS: usize = 10;

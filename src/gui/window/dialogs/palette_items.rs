@@ -13,16 +13,14 @@ use crate::gui::window::saved_layouts::SavedLayouts;
 use crate::gui::window::tiles::PanelLayout;
 use crate::gui::{Dialog, PanelContext, PanelName};
 use crate::session::RunRecord;
+use crate::text::Named as _;
 
-/// The effect of an item.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Choice {
     Action(Action),
-    /// Selection of a parameter.
     Parameter(ParameterId),
 }
 
-/// A row of the palette.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Item {
     pub(super) name: String,
@@ -62,14 +60,14 @@ fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &PanelLayout
         let keys = KEYS.get(number).copied().unwrap_or_default();
         Item { keys, ..item(format!("Layout: {name}"), Action::SavedLayout(number)) }
     }));
-    for panel in PanelName::ALL {
-        items.push(item(format!("Panel: show {}", panel.as_str()), Action::Show(panel)));
+    for panel in PanelName::all() {
+        items.push(item(format!("Panel: show {}", panel.name()), Action::Show(panel)));
     }
-    for panel in PanelName::ALL {
-        items.push(item(format!("Copy table of {} (CSV)", panel.as_str()), Action::CopyTable(panel)));
+    for panel in PanelName::all() {
+        items.push(item(format!("Copy table of {} (CSV)", panel.name()), Action::CopyTable(panel)));
     }
     for panel in PanelName::movable().filter(|panel| layout.is_visible(*panel)) {
-        items.push(item(format!("Panel: hide {}", panel.as_str()), Action::Hide(panel)));
+        items.push(item(format!("Panel: hide {}", panel.name()), Action::Hide(panel)));
     }
     let runs = &ctx.recording.runs;
     for (number, run) in runs.iter().enumerate() {
@@ -83,7 +81,7 @@ fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &PanelLayout
     }
     items.extend(SPEEDS.map(|speed| item(format!("Speed: {speed}×"), Action::Speed(speed))));
     for theme in [ThemeName::Light, ThemeName::Dark, ThemeName::Print] {
-        items.push(item(format!("Theme: {}", theme.as_str()), Action::SetTheme(theme)));
+        items.push(item(format!("Theme: {}", theme.name()), Action::SetTheme(theme)));
     }
     items
 }

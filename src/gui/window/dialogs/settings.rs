@@ -9,6 +9,7 @@ use crate::gui::window::actions::Action;
 use crate::gui::window::history::History;
 use crate::gui::window::settings::{LAST_LAYOUT, MEMORY_MIB, SCALES, Settings};
 use crate::gui::window::tiles::Preset;
+use crate::text::Named as _;
 
 /// Draws the dialog; changes have effect immediately. Returns true if it stays open.
 pub(super) fn ui<'a>(
@@ -60,10 +61,10 @@ fn fields_ui<'a>(ui: &mut Ui, settings: &mut Settings, layouts: impl Iterator<It
     Grid::new("settings").num_columns(2).spacing(vec2(12.0, 6.0)).show(ui, |ui| {
         let name = ui.label("Theme");
         let themes = [ThemeName::Light, ThemeName::Dark, ThemeName::Print];
-        let combo = ComboBox::from_id_salt("theme").width(200.0).selected_text(settings.theme.as_str());
+        let combo = ComboBox::from_id_salt("theme").width(200.0).selected_text(settings.theme.name());
         let shown = combo.show_ui(ui, |ui| {
             for theme in themes {
-                ui.selectable_value(&mut settings.theme, theme, theme.as_str());
+                ui.selectable_value(&mut settings.theme, theme, theme.name());
             }
         });
         shown.response.labelled_by(name.id);
@@ -80,7 +81,8 @@ fn fields_ui<'a>(ui: &mut Ui, settings: &mut Settings, layouts: impl Iterator<It
         let name = ui.label("Initial layout");
         let combo = ComboBox::from_id_salt("layout").width(200.0).selected_text(&settings.layout);
         let shown = combo.show_ui(ui, |ui| {
-            for layout in [LAST_LAYOUT].into_iter().chain(Preset::ALL.map(Preset::name)).chain(layouts) {
+            let presets = Preset::NAMES.iter().map(|(_, name)| *name);
+            for layout in [LAST_LAYOUT].into_iter().chain(presets).chain(layouts) {
                 ui.selectable_value(&mut settings.layout, layout.to_owned(), layout);
             }
         });

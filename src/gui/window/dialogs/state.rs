@@ -43,12 +43,10 @@ impl Dialogs {
         self.open = Some(Dialog::Unsaved);
     }
 
-    /// True if a dialog is open.
     pub fn is_open(&self) -> bool {
         self.open.is_some()
     }
 
-    /// Closes the open dialog.
     pub fn close(&mut self) {
         self.open = None;
     }

@@ -12,14 +12,12 @@ const GAP: f32 = 14.0;
 /// Distance of the card from the edges of the window in points.
 const MARGIN: f32 = 6.0;
 
-/// A button of the card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pressed {
     /// Go to the next stop; at the last one, end the tour.
     Next,
     /// Go to the previous stop.
     Back,
-    /// End the tour.
     End,
 }
 

@@ -3,7 +3,6 @@
 use crate::gui::PanelName;
 use crate::gui::window::tiles::Preset;
 
-/// A stop of the tour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stop {
     Log,

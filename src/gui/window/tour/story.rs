@@ -30,7 +30,6 @@ impl Story {
         runs.iter().find(|run| run.id == self.run)
     }
 
-    /// The step at the stamp.
     pub(super) fn step(self, runs: &[RunRecord]) -> Option<&Arc<StepRecord>> {
         self.run(runs)?.step_at(self.instant_ns?)
     }

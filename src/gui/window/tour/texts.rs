@@ -11,7 +11,6 @@ use crate::gui::units::{Shown, counted, fixed};
 use crate::observability::{RankReport, parameters_of};
 use crate::session::{LostSince, RunRecord, StepRecord};
 
-/// Content of a card.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct CardText {
     /// Question of the stop.
@@ -50,7 +49,6 @@ pub(super) fn of(stop: Stop, story: Story, ctx: &PanelContext<'_>, excitation: O
     CardText { title, lines, waiting }
 }
 
-/// Progress of a run as text.
 fn progress(ctx: &PanelContext<'_>, run: &RunRecord) -> String {
     let done_s = run.steps.last().map_or(0.0, |last| seconds_from_ns(last.report.stamp_ns));
     let end_s = seconds_from_ns(ctx.recording.duration_ns);

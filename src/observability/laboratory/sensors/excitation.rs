@@ -11,6 +11,7 @@ use super::{LaboratoryForm, LaboratorySetup};
 use crate::gimbal::{ParameterGroup, ParameterId};
 use crate::observability::analysis::measured_block;
 use crate::observability::laboratory::LaboratoryMotion;
+use crate::text::Named as _;
 
 /// Motions that are compared, each for the duration of the experiment.
 const MOTIONS: [LaboratoryMotion; 8] = [

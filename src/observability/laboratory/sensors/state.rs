@@ -16,7 +16,6 @@ pub(super) struct SensorState {
     pub(super) sensors: SensorValues,
 }
 
-/// Unknowns of one frame.
 #[derive(Clone, Debug)]
 pub(super) struct SensorFrameState {
     pub(super) navigation: NavigationState,

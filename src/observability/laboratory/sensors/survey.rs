@@ -9,6 +9,7 @@ use super::experiments::{SECTIONS, SensorExperiment};
 use super::table::{SetRank, set_ranks};
 use super::{LaboratoryForm, SensorColumns};
 use crate::gimbal::{ParameterGroup, ParameterNames, Parameterization};
+use crate::text::Named as _;
 
 /// Experiments with columns of sensors under one heading.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

@@ -33,7 +33,6 @@ pub(super) struct SensorWindow<'a> {
     pub(super) setup: &'a LaboratorySetup,
     /// Times of the frames: exposure of the first row at the true time offset.
     pub(super) times_s: Vec<f64>,
-    /// Observations by landmark.
     pub(super) observations: Vec<Vec<SensorObservation>>,
     pub(super) truth: SensorState,
     pub(super) columns: Columns,
@@ -46,15 +45,11 @@ pub(super) struct Prediction {
     pub(super) uv_px: Vector2<f64>,
     /// By the landmark's position in the world.
     pub(super) by_landmark: SMatrix<f64, 2, 3>,
-    /// By the columns of the chain.
     pub(super) by_chain: Matrix2xX<f64>,
-    /// By the joint angles.
     pub(super) by_joints: Matrix2xX<f64>,
-    /// By the rates of the joints.
     pub(super) by_joint_rates: Matrix2xX<f64>,
     /// By `[φ; δp]` of the frame's pose.
     pub(super) by_pose: SMatrix<f64, 2, 6>,
-    /// By the frame's velocity.
     pub(super) by_velocity: SMatrix<f64, 2, 3>,
     /// By biases and intrinsics of the IMU.
     pub(super) by_imu: SMatrix<f64, 2, IMU_COLUMNS>,

@@ -17,11 +17,9 @@ const FORMAT_TYPE: u8 = 128;
 /// Size of an `FMT` record: type, length, name (4), format (16) and columns (64).
 const FORMAT_BYTES: usize = 89;
 
-/// Field of a record type.
 #[derive(Clone, Debug, PartialEq)]
 struct Field {
     name: String,
-    /// Format letter.
     letter: u8,
     /// In bytes from the end of the header.
     offset: usize,
@@ -146,7 +144,6 @@ impl Types {
     }
 }
 
-/// Record of a log.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Record<'a> {
     pub(super) record_type: &'a RecordType,

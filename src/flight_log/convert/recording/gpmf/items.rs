@@ -12,7 +12,6 @@ pub(super) struct Item<'a> {
     pub(super) kind: u8,
     /// Size of a sample in bytes.
     size: usize,
-    /// Number of samples.
     pub(super) count: usize,
     pub(super) data: &'a [u8],
 }
@@ -70,7 +69,6 @@ impl Item<'_> {
         self.data[..end].iter().map(|byte| char::from(*byte)).collect()
     }
 
-    /// All numbers of the item in order.
     pub(super) fn numbers(&self) -> Vec<f64> {
         let Some((scalar, divisor)) = scalar(self.kind) else { return Vec::new() };
         let number = |bytes: &[u8]| scalar.big_endian(bytes, 0).map(|number| number / divisor);

@@ -49,11 +49,8 @@ struct ReadPayloads {
 /// Telemetry of a video, in nanoseconds since its start.
 #[derive(Debug)]
 pub(super) struct Telemetry {
-    /// Measurements of the camera.
     pub(super) camera: Recorded,
-    /// Measurements of the drone.
     pub(super) drone: Option<Recorded>,
-    /// Letter of the field of view.
     pub(super) field_of_view: Option<String>,
 }
 

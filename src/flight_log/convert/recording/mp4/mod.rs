@@ -29,7 +29,6 @@ pub(super) struct Picture {
     length: usize,
 }
 
-/// Video of a file.
 #[derive(Debug)]
 pub(super) struct Video {
     file: LogFile,

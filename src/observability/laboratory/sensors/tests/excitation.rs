@@ -6,6 +6,7 @@ use crate::observability::laboratory::{
     LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism, SensorColumns, SensorExcitation,
     sensor_excitation,
 };
+use crate::text::Named as _;
 
 /// σ of a parameter after a motion, in units of its column scale.
 fn sigma(table: &SensorExcitation, parameter: &str, motion: LaboratoryMotion) -> f64 {

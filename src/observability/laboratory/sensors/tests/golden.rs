@@ -12,6 +12,7 @@ use crate::camera::{CameraModel, Distortion, Projection};
 use crate::estimator::{JointKnowledge, PoseKnowledge};
 use crate::gimbal::{ParameterNames, Parameterization};
 use crate::observability::laboratory::{LABORATORY_IMU, LaboratoryMotion, Mechanism};
+use crate::text::Named as _;
 
 /// One window of the golden file.
 #[derive(Clone, Copy, Debug)]
