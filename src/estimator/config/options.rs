@@ -18,11 +18,13 @@ pub enum TrackContinuation {
     DropAnchor,
 }
 
-/// Robust loss of the visual residuals, of each observation and of each track as a whole.
+/// Robust loss of the visual residuals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum VisualLoss {
-    /// Cauchy's loss with a scale that follows the residuals of the window, for each camera.
+    /// Cauchy's loss of each observation, and of each track as a whole, with scales that follow the residuals of the
+    /// window, for each camera.
     Adaptive,
+    /// Loss of each observation.
     Fixed(RobustLoss),
 }
 

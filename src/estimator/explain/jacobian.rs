@@ -227,7 +227,8 @@ fn window_camera<'a>(
 ) -> WindowCamera<'a> {
     let (sigma_px, landmark_model) = (source.pixel_sigma_px, source.landmark_model);
     // The robust weights are known.
-    let visual = VisualModel { camera: model, sigma_px, loss: RobustLoss::None, landmark_model };
+    let visual =
+        VisualModel { camera: model, sigma_px, loss: RobustLoss::None, track_loss: RobustLoss::None, landmark_model };
     if let Some(exact) = &source.exact {
         let (current, linearized) = (exact.current.1.of(camera), exact.linearized.1.of(camera));
         return WindowCamera {

@@ -21,24 +21,28 @@ pub(crate) struct VisualModel<'a> {
     /// Rig's model; a [`CameraView`] has the model with estimated intrinsics.
     pub(crate) camera: &'a CameraModel,
     pub(crate) sigma_px: f64,
-    /// Robust loss of each observation, and of each track as a whole: see [`Self::track_cost_and_weight`].
+    /// Robust loss of each observation.
     pub(crate) loss: RobustLoss,
+    /// Robust loss of each track as a whole: see [`Self::track_cost_and_weight`].
+    pub(crate) track_loss: RobustLoss,
     pub(crate) landmark_model: LandmarkModel,
 }
 
 impl<'a> VisualModel<'a> {
-    pub(crate) fn new(camera: &'a CameraModel, options: &EstimatorOptions, loss: RobustLoss) -> Self {
-        Self { camera, sigma_px: options.pixel_sigma_px, loss, landmark_model: options.landmark_model }
+    /// Model with the robust losses of observations and of tracks.
+    pub(crate) fn new(camera: &'a CameraModel, options: &EstimatorOptions, losses: [RobustLoss; 2]) -> Self {
+        let [loss, track_loss] = losses;
+        Self { camera, sigma_px: options.pixel_sigma_px, loss, track_loss, landmark_model: options.landmark_model }
     }
 
     /// Robust cost of a track and the weight of all its observations, from the sum of their robust costs.
     ///
-    /// The loss is applied once more to the mean over the degrees of freedom: a feature that is no point of the scene,
+    /// The loss is that of the mean over the degrees of freedom: a feature that is no point of the scene,
     /// such as a corner where an outline crosses the background, slides with the viewpoint. Each of its residuals is
     /// moderate, but they do not average out, so the track loses weight as a whole.
     pub(crate) fn track_cost_and_weight(&self, sum: f64, observations: usize) -> (f64, f64) {
         let freedom = (observations as f64 - OBSERVATIONS_PER_LANDMARK).max(0.5);
-        let (cost, weight) = self.loss.cost_and_weight(sum / freedom);
+        let (cost, weight) = self.track_loss.cost_and_weight(sum / freedom);
         (freedom * cost, weight)
     }
 

@@ -110,6 +110,7 @@ impl HypotheticalWindow {
             camera: &self.camera,
             sigma_px: self.pixel_sigma_px,
             loss: RobustLoss::None,
+            track_loss: RobustLoss::None,
             landmark_model: self.landmark_model,
         };
         let problem = Problem {

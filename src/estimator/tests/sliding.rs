@@ -10,7 +10,7 @@ use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synth
 /// Ratio of the features that slide: one in four.
 const SLIDING: u64 = 4;
 
-/// Rigid flight in which a quarter of the features slide to the right by this number of pixels in an image.
+/// Rigid flight in which a quarter of the features slide to the right, by this number of pixels times the square of their age in images.
 fn sliding_flight(slide_px: f64) -> SyntheticFlight {
     let options = SyntheticOptions {
         mount: SyntheticMount::Static,
@@ -22,7 +22,7 @@ fn sliding_flight(slide_px: f64) -> SyntheticFlight {
     let camera = flight.given_rig.cameras[0].model.clone();
     for frame in &mut flight.frames {
         for feature in frame.tracks.features.iter_mut().filter(|feature| feature.id.0 % SLIDING == 0) {
-            feature.uv_px.x += slide_px * f64::from(feature.age);
+            feature.uv_px.x += slide_px * f64::from(feature.age).powi(2);
             feature.bearing = camera.unproject(&feature.uv_px).unwrap_or(feature.bearing);
         }
     }
@@ -60,13 +60,13 @@ fn weights(reports: &[StepReport]) -> [f64; 2] {
 
 #[test]
 fn sliding_features_lose_weight_as_a_whole_and_hardly_turn_the_estimate() {
-    let flight = sliding_flight(0.03);
+    let flight = sliding_flight(0.004);
     let adaptive = reports(&flight, VisualLoss::Adaptive);
     let wide = reports(&flight, VisualLoss::Fixed(RobustLoss::Cauchy(1.0)));
     let [sliding, others] = weights(&adaptive);
-    assert!(sliding < 0.6 * others && others > 0.6, "weights {sliding} and {others}");
+    assert!(sliding < 0.7 * others && others > 0.6, "weights {sliding} and {others}");
     let [drift, wide_drift] = [&adaptive, &wide].map(|reports| heading_drift_rad(&flight, reports).abs());
-    assert!(drift < 0.5 * wide_drift, "heading drift {drift} rad, with a wide loss {wide_drift} rad");
+    assert!(drift < 0.8 * wide_drift, "heading drift {drift} rad, with a wide loss {wide_drift} rad");
 }
 
 #[test]

@@ -94,6 +94,14 @@ impl WindowState {
         (linearization, problem.information_gain(estimate, &cameras))
     }
 
+    /// Adapts the scales of the loss to the residuals of a solved window, over an interval in seconds.
+    pub(crate) fn follow_residuals(&mut self, setup: &Setup, solved: &SolvedWindow, interval_s: f64) {
+        let sigma_px = setup.config.options.pixel_sigma_px;
+        for (scale, checks) in self.loss_scales.iter_mut().zip(&solved.checks) {
+            scale.follow(median_length(std::iter::once(&checks.residuals_after)) / sigma_px, interval_s);
+        }
+    }
+
     /// Drops rejected features; a continuing track becomes a new feature at its next observation.
     pub(crate) fn drop_rejected(&mut self, solved: &SolvedWindow, options: &EstimatorOptions, events: &mut Vec<Event>) {
         let (mut count, mut all) = (0, 0);

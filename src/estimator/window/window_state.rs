@@ -5,7 +5,6 @@ use super::features::{self, FeatureMap};
 use super::frames::Frames;
 use super::loss_scale::LossScale;
 use super::setup::Setup;
-use super::solve::{SolvedWindow, median_length};
 use crate::estimator::factors::marginal_prior::Prior;
 use crate::estimator::factors::reprojection::VisualModel;
 use crate::estimator::factors::start_prior::StartPrior;
@@ -65,18 +64,10 @@ impl WindowState {
         }
     }
 
-    /// Camera model, pixel noise and current robust loss of a camera.
+    /// Camera model, pixel noise and current robust losses of a camera.
     pub(crate) fn visual_model<'a>(&self, setup: &'a Setup, camera: usize) -> VisualModel<'a> {
         let options = &setup.config.options;
-        VisualModel::new(setup.config.model(camera), options, self.loss_scales[camera].loss(options.loss))
-    }
-
-    /// Adapts the scales of the loss to the residuals of a solved window, over an interval in seconds.
-    pub(crate) fn follow_residuals(&mut self, setup: &Setup, solved: &SolvedWindow, interval_s: f64) {
-        let sigma_px = setup.config.options.pixel_sigma_px;
-        for (scale, checks) in self.loss_scales.iter_mut().zip(&solved.checks) {
-            scale.follow(median_length(std::iter::once(&checks.residuals_after)) / sigma_px, interval_s);
-        }
+        VisualModel::new(setup.config.model(camera), options, self.loss_scales[camera].losses(options.loss))
     }
 
     /// Features that take part in the solve, by camera.

@@ -3,10 +3,8 @@
 use nalgebra::{Matrix2, Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3};
 
 use super::homography::Dice;
-use super::{camera_of, scene, texture};
 use crate::camera::CameraModel;
 use crate::frontend::perspective::Surface;
-use crate::frontend::reference::{ReferenceOptions, ReferencePatch, ReferenceSearch};
 use crate::geometry::median;
 
 /// Homography of pixels around a feature: position in the second image, affine part and perspective.
@@ -74,40 +72,4 @@ fn perspective_follows_from_the_warps_and_the_rotation() {
         let median = median(errors).unwrap();
         assert!(median < limit, "relative error {median} with a noise of the warps of {noise}");
     }
-}
-
-/// Median over features of a plane of the signed error along their motion, of the matches and of the corrected ones, in
-/// pixels.
-fn errors_along_motion_px() -> [f64; 2] {
-    let (scene, texture) = (scene(0.6), texture());
-    let camera = camera_of(&scene);
-    let images: Vec<_> = (4..=10).map(|image| scene.render(&texture, image)).collect();
-    let mut errors = [Vec::new(), Vec::new()];
-    for (x, y) in (40..200).step_by(9).flat_map(|y| (40..280).step_by(9).map(move |x| (x, y))) {
-        let uv_px = Vector2::new(f64::from(x), f64::from(y));
-        let Some(mut reference) = ReferencePatch::cut(&images[0], &camera, &uv_px, &Vector2::zeros()) else { continue };
-        let mut search = ReferenceSearch::new();
-        for (number, image) in images.iter().enumerate().skip(1) {
-            let to = 4 + number;
-            let expected = scene.flow(4, to, &uv_px);
-            let Some(found) = reference.find(image, &expected, &ReferenceOptions::default(), &mut search) else {
-                break;
-            };
-            let turn = scene.camera_from_plane(to) * scene.camera_from_plane(to - 1).inverse();
-            let bearing = camera.unproject(&found).unwrap();
-            let rotation = UnitQuaternion::from_rotation_matrix(&turn);
-            let error_px = reference.perspective_error_px(&camera, &rotation, &bearing);
-            let along = (expected - uv_px).normalize();
-            for (errors, seen) in errors.iter_mut().zip([found, found - error_px]) {
-                errors.push(along.dot(&(seen - expected)).abs());
-            }
-        }
-    }
-    errors.map(|errors| median(errors).unwrap())
-}
-
-#[test]
-fn correction_for_perspective_moves_matches_to_the_surface() {
-    let [matched_px, corrected_px] = errors_along_motion_px();
-    assert!(corrected_px < 0.8 * matched_px, "{matched_px} px before, {corrected_px} px after");
 }

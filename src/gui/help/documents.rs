@@ -18,7 +18,7 @@ macro_rules! document {
 }
 
 /// The manual is first.
-const DOCUMENTS: [Document; 25] = [
+const DOCUMENTS: [Document; 26] = [
     document!("docs/manual.md"),
     document!("docs/tutorial.md"),
     document!("docs/recordings.md"),
@@ -43,6 +43,7 @@ const DOCUMENTS: [Document; 25] = [
     document!("docs/experiments/batch_reference.md"),
     document!("docs/experiments/speed_and_memory.md"),
     document!("docs/experiments/regression_guard.md"),
+    document!("docs/experiments/heading_in_an_orbit.md"),
     document!("docs/experiments/tried_and_not_used.md"),
 ];
 

@@ -78,8 +78,8 @@ impl RunSpec {
         Key::<Self>::new(
             "loss",
             "none|huber-K|cauchy-K",
-            "robust loss of the reprojection residuals and of whole tracks with its scale in σ; by default `cauchy` with a \
-             scale that follows the residuals, from 0.2 to 1",
+            "robust loss of the reprojection residuals with its scale in σ; by default `cauchy` with a scale that follows \
+             the residuals, from 0.3 to 1, and a loss of whole tracks",
             Field::Other(read_loss, |spec| spec.tuning.loss.iter().map(loss_text).collect()),
         ),
         Key::<Self>::new(
