@@ -63,6 +63,28 @@ pub enum LogError {
         available: Vec<String>,
         path: PathBuf,
     },
+    #[error("{field} names the topic '{topic}', which cannot be read: {found}; {remedy}: {}", path.display())]
+    UnreadEncoding {
+        /// Field of the rig, such as `cam0.rostopic`.
+        field: String,
+        topic: String,
+        /// Type and encoding of its messages.
+        found: String,
+        remedy: &'static str,
+        path: PathBuf,
+    },
+    #[error(
+        "{field} names the topic '{topic}', which has messages of another type: {found}; name one of them in the rig: {}",
+        path.display()
+    )]
+    OtherType {
+        /// Field of the rig, such as `cam0.rostopic`.
+        field: String,
+        topic: String,
+        /// Type and encoding of its messages, then the topics of the log with the expected types.
+        found: String,
+        path: PathBuf,
+    },
     #[error(transparent)]
     UnknownCamera(#[from] UnknownCamera),
     #[error(
@@ -130,7 +152,7 @@ pub enum LogError {
 }
 
 /// `'a', 'b'`, or `none`.
-fn list(items: &[String]) -> String {
+pub(super) fn list(items: &[String]) -> String {
     if items.is_empty() {
         return "none".into();
     }

@@ -2,9 +2,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::container::{BlockCache, ContainerIndex, DecodedBlock, MessagePosition, MessageSpan, TopicIndex};
+use super::error::list;
 use super::file::LogFile;
 use super::limits::{LimitExceeded, LimitKind, LogLimits};
 use super::messages::{self, MessageKind};
+use super::topic_info::{TopicInfo, nothing_read};
 use super::{LogError, LogWarning};
 use crate::geometry::seconds_from_ns;
 
@@ -13,23 +15,6 @@ const CLOCK_TOLERANCE_NS: i64 = 60_000_000_000;
 
 /// Number of bytes at the start that identify the kind of a file.
 const START_BYTES: usize = 512;
-
-#[derive(Clone, Debug, PartialEq)]
-pub struct TopicInfo {
-    pub topic: String,
-    /// Schema name, such as `sensor_msgs/msg/Imu`.
-    pub schema: String,
-    /// Kind of the messages, `None` if they are ignored.
-    pub kind: Option<MessageKind>,
-    /// Number of messages by the log's index.
-    pub count: u64,
-    /// Log time of the first message since the start of the log.
-    pub first_ns: i64,
-    /// Log time of the last message since the start of the log.
-    pub last_ns: i64,
-    /// Mean rate over the log times in Hz, 0 for fewer than two messages.
-    pub rate_hz: f64,
-}
 
 /// Open flight log: an MCAP file with the index of its chunks.
 #[derive(Debug)]
@@ -51,8 +36,10 @@ pub(crate) enum WarningKind {
     Damage,
     /// Header stamps of another clock, or without stamp.
     Stamps,
-    /// Topics that are not read.
+    /// Topics beyond the limit.
     Topics,
+    /// No topic has messages that are read.
+    NothingRead,
 }
 
 impl FlightLog {
@@ -165,14 +152,41 @@ impl FlightLog {
         topic: &str,
         kinds: &[MessageKind],
     ) -> Result<&TopicInfo, LogError> {
-        let found = self.topic(topic).filter(|info| info.kind.is_some_and(|kind| kinds.contains(&kind)));
-        found.ok_or_else(|| LogError::MissingTopic {
-            field: field.to_owned(),
-            topic: topic.to_owned(),
-            expected: kinds.iter().map(|kind| kind.schema_name()).collect::<Vec<_>>().join(" or "),
-            available: self.topics_of(kinds),
-            path: self.path.clone(),
-        })
+        let (field, path) = (field.to_owned(), self.path.clone());
+        let expected = || kinds.iter().map(|kind| kind.schema_name()).collect::<Vec<_>>().join(" or ");
+        match self.topic(topic) {
+            Some(info) if info.kind.is_some_and(|kind| kinds.contains(&kind)) => Ok(info),
+            Some(info) if info.has_unread_encoding(kinds) => Err(LogError::UnreadEncoding {
+                field,
+                topic: topic.to_owned(),
+                found: info.type_in_encoding(),
+                remedy: info.encoding_remedy(),
+                path,
+            }),
+            Some(info) => Err(LogError::OtherType {
+                field,
+                topic: topic.to_owned(),
+                found: format!(
+                    "{}; the log's topics of type {} are {}",
+                    info.type_in_encoding(),
+                    expected(),
+                    list(&self.topics_of(kinds))
+                ),
+                path,
+            }),
+            None => Err(LogError::MissingTopic {
+                field,
+                topic: topic.to_owned(),
+                expected: expected(),
+                available: self.topics_of(kinds),
+                path,
+            }),
+        }
+    }
+
+    /// Topic of one of these kinds whose messages are not read in their encoding.
+    pub(crate) fn unread_topic_of(&self, kinds: &[MessageKind]) -> Option<&TopicInfo> {
+        self.topics.iter().find(|info| info.has_unread_encoding(kinds))
     }
 
     /// Positions of the messages of a topic.
@@ -267,7 +281,8 @@ impl FlightLog {
                 counts.fold(0_u64, |sum, count| sum.saturating_add(*count)).min(most)
             });
             let count = counted.unwrap_or_else(|| positions.count(&self.index, &self.file) as u64);
-            infos.push((topic.clone(), channel.schema_name.clone(), kind, count, *first, *last));
+            let names = [topic, &channel.schema_name, &channel.encoding].map(Clone::clone);
+            infos.push((names, kind, count, *first, *last));
         }
         if infos.is_empty() {
             let problem = match self.index.damages.first() {
@@ -276,14 +291,14 @@ impl FlightLog {
             };
             return Err(LogError::NothingReadable { problem, path: self.path.clone() });
         }
-        self.set_start(&stamps, infos.iter().map(|info| info.4.log_time_ns).min().unwrap_or(0));
+        self.set_start(&stamps, infos.iter().map(|info| info.3.log_time_ns).min().unwrap_or(0));
         self.topics = infos
             .into_iter()
-            .map(|(topic, schema, kind, count, first, last)| {
+            .map(|([topic, schema, encoding], kind, count, first, last)| {
                 let (first_ns, last_ns) = (self.since_start(first.log_time_ns), self.since_start(last.log_time_ns));
                 let span_s = seconds_from_ns(last_ns.saturating_sub(first_ns));
                 let rate_hz = if span_s > 0.0 { count.saturating_sub(1) as f64 / span_s } else { 0.0 };
-                TopicInfo { topic, schema, kind, count, first_ns, last_ns, rate_hz }
+                TopicInfo { topic, schema, encoding, kind, count, first_ns, last_ns, rate_hz }
             })
             .collect();
         Ok(())
@@ -325,12 +340,9 @@ impl FlightLog {
             );
             self.warn(WarningKind::Damage, stamp_ns, message);
         }
-        if self.index.profile != "ros2" && !self.topics.iter().any(|info| info.kind.is_some()) {
-            let message = format!(
-                "no topic has messages that are read: the profile is {:?}, expected 'ros2' with CDR messages; convert the log",
-                self.index.profile
-            );
-            self.warn(WarningKind::Topics, 0, message);
+        if !self.topics.iter().any(|info| info.kind.is_some()) {
+            let (problem, remedy) = nothing_read(&self.topics);
+            self.warn(WarningKind::NothingRead, 0, format!("{problem}; {remedy}"));
         }
     }
 }
@@ -364,7 +376,7 @@ fn check_magic(file: &LogFile, path: &Path) -> Result<(), LogError> {
     if file.starts_with(mcap::MAGIC) {
         return Ok(());
     }
-    let convert = "convert it with `dcvins convert` or `mcap convert`";
+    let convert = "convert it with `dcvins convert`";
     let (found, remedy) = if file.starts_with(b"#ROSBAG") {
         ("a ROS 1 bag".to_owned(), convert)
     } else if file.starts_with(b"SQLite format 3") {

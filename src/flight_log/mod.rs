@@ -29,6 +29,7 @@ pub(crate) mod stream;
 #[cfg(test)]
 pub(crate) mod tests;
 mod text;
+pub(crate) mod topic_info;
 mod trajectory;
 pub(crate) mod video;
 mod writer;
@@ -37,12 +38,13 @@ pub(crate) mod yaml;
 pub use error::LogError;
 pub use image_reader::ImageReader;
 pub use limits::{LimitExceeded, LimitKind, LimitSetting, LogLimits};
-pub use log::{FlightLog, TopicInfo};
+pub use log::FlightLog;
 pub use messages::MessageKind;
 pub use rig::template as rig_template;
 pub use sensor_frame::{LogWarning, SensorFrame};
 pub use stream::FrameStream;
 pub use text::{edit_distance, log_name, nearest_name, printable, printable_lines, shortened};
+pub use topic_info::TopicInfo;
 pub use trajectory::{BATCH_REFERENCE, RecordedPose, is_batch_reference, read_trajectory_file};
 pub use writer::{
     CircleAnnotation, LinesAnnotation, LogCompression, LogLevel, LogWriter, LogWriterOptions, MessageTimes,

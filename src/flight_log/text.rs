@@ -36,6 +36,11 @@ fn escaped(text: &str, keeps: impl Fn(char) -> bool) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
+/// Text without the byte order mark that some editors and spreadsheets write at its start.
+pub(crate) fn without_bom(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}
+
 /// Name of external origin (topic, frame, joint, file) for one line of text: characters that control a terminal or
 /// reorder text are written as escapes such as `\u{1b}` and `\n`.
 pub fn printable(name: &str) -> Cow<'_, str> {

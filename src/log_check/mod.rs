@@ -43,6 +43,7 @@ use self::report::Findings;
 use self::survey::Survey;
 use crate::flight_log::attitude::{VEHICLE_KINDS, gimbal_kinds, topic_field};
 use crate::flight_log::log::WarningKind;
+use crate::flight_log::topic_info::nothing_read;
 use crate::flight_log::{FlightLog, LogError, MessageKind, TopicInfo};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
@@ -112,6 +113,11 @@ fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
                 "set header.stamp to the time of measurement in the driver",
             ),
             WarningKind::Topics => (Area::Log, "topics are not read", ""),
+            WarningKind::NothingRead => {
+                let (problem, remedy) = nothing_read(log.topics());
+                findings.add(Severity::Error, Area::Log, "no topic can be read", problem, remedy);
+                continue;
+            }
         };
         findings.add(Severity::Warning, area, title, warning.message.clone(), remedy);
     }
@@ -125,28 +131,51 @@ fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
         let evidence = format!("{} of {count}; the first: {}", topic.unreadable, topic.first_problem);
         findings.add(Severity::Warning, Area::Log, title, evidence, "check the recorder's message definitions");
     }
-    let ignored: Vec<&str> =
-        log.topics().iter().filter(|info| info.kind.is_none()).map(|info| info.topic.as_str()).collect();
+    let ignored: Vec<String> =
+        log.topics().iter().filter(|info| info.kind.is_none()).map(TopicInfo::name_with_encoding).collect();
     if !ignored.is_empty() {
-        let title = "topics of types that are not read";
+        let title = "topics of types or encodings that are not read";
         findings.add(Severity::Note, Area::Log, title, ignored.join(", "), "");
     }
 }
 
 const POSES: [MessageKind; 3] = [MessageKind::Odometry, MessageKind::PoseStamped, MessageKind::TransformStamped];
 
+/// Title, evidence and remedy of a topic of the rig that the log does not have in a readable form.
+fn topic_problem(log: &FlightLog, error: &LogError, kinds: &[MessageKind]) -> [String; 3] {
+    let quoted: Vec<String> = log.topics_of(kinds).iter().map(|topic| format!("'{topic}'")).collect();
+    let expected: Vec<&str> = kinds.iter().map(|kind| kind.schema_name()).collect();
+    let available = match (quoted.as_slice(), log.unread_topic_of(kinds)) {
+        ([], Some(unread)) => format!("'{}', which cannot be read: {}", unread.topic, unread.type_in_encoding()),
+        ([], None) => "none".to_owned(),
+        _ => quoted.join(", "),
+    };
+    let available = format!("the log's topics of type {} are {available}", expected.join(" or "));
+    let name = "name one of the log's topics in the rig".to_owned();
+    match error {
+        LogError::UnreadEncoding { field, topic, found, remedy, .. } => {
+            let title = format!("{field} names a topic whose messages cannot be read");
+            [title, format!("'{topic}': {found}"), (*remedy).to_owned()]
+        }
+        LogError::OtherType { field, topic, found, .. } => {
+            let title = format!("{field} names a topic with messages of another type");
+            [title, format!("'{topic}': {found}"), name]
+        }
+        LogError::MissingTopic { field, topic, .. } => {
+            [format!("{field} names a topic that is not in the log"), format!("'{topic}'; {available}"), name]
+        }
+        other => ["a topic of the rig cannot be used".to_owned(), other.to_string(), String::new()],
+    }
+}
+
 /// Checks that the log has the topics that the rig names.
 fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     let mut named = 0;
     let mut require = |field: String, topic: &str, kinds: &[MessageKind], severity| {
         named += 1;
-        if log.require_topic(&field, topic, kinds).is_err() {
-            let quoted: Vec<String> = log.topics_of(kinds).iter().map(|topic| format!("'{topic}'")).collect();
-            let available = if quoted.is_empty() { "none".to_owned() } else { quoted.join(", ") };
-            let expected: Vec<&str> = kinds.iter().map(|kind| kind.schema_name()).collect();
-            let evidence = format!("'{topic}'; the log's topics of type {} are {available}", expected.join(" or "));
-            let title = format!("{field} names a topic that is not in the log");
-            findings.add(severity, Area::Log, title, evidence, "name one of the log's topics in the rig");
+        if let Err(error) = log.require_topic(&field, topic, kinds) {
+            let [title, evidence, remedy] = topic_problem(log, &error, kinds);
+            findings.add(severity, Area::Log, title, evidence, remedy);
             named -= 1;
         }
     };

@@ -10,6 +10,7 @@ use super::super::MessageTimes;
 use super::super::file::kind_of;
 use super::super::image_decoding::compressed_format;
 use super::super::limits::{LINE_BYTES, LogLimits};
+use super::super::text::without_bom;
 use super::ConvertError;
 use super::euroc_sensor::{CameraSensor, IMU_TOPIC, image_topic, rig_of, sensor_pose};
 use super::sink::LogSink;
@@ -60,7 +61,7 @@ pub(super) fn convert(source: &Path, sink: &mut LogSink<'_>) -> Result<Option<Ri
             let stamps_ns: Vec<i64> = samples[first..].iter().map(|(stamp_ns, _)| *stamp_ns).collect();
             cameras.push(CameraSensor { key: name.clone(), folder: root.join(name), stamps_ns });
         } else if POSE_FOLDERS.contains(&name.as_str()) {
-            let imu_from_sensor = sensor_pose(&root, name)?;
+            let imu_from_sensor = sensor_pose(&root, name, sink);
             read_poses(&table, poses.len(), &imu_from_sensor.inverse(), &mut samples)?;
             poses.push(name.clone());
         } else {
@@ -81,7 +82,7 @@ pub(super) fn convert(source: &Path, sink: &mut LogSink<'_>) -> Result<Option<Ri
         sink.ensure_running()?;
     }
     let ground_truth = POSE_FOLDERS.into_iter().find(|name| poses.iter().any(|present| present == name));
-    rig_of(source, &root, &cameras, ground_truth.map(pose_topic), sink)
+    Ok(rig_of(source, &root, &cameras, ground_truth.map(pose_topic), sink))
 }
 
 fn pose_topic(folder: &str) -> String {
@@ -183,9 +184,13 @@ fn for_each_row(
         }
         let text =
             std::str::from_utf8(&bytes).map_err(|error| bad_line(line, format!("not UTF-8 text ({error})"), table))?;
-        let text = text.trim();
+        let text = if line == 1 { without_bom(text) } else { text }.trim();
         if !text.is_empty() && !text.starts_with('#') {
-            let cells: Vec<&str> = text.split(',').map(str::trim).collect();
+            let cells: Vec<&str> = if text.contains(',') {
+                text.split(',').map(str::trim).collect()
+            } else {
+                text.split_whitespace().collect()
+            };
             visit(line, &cells)?;
         }
     }

@@ -7,6 +7,7 @@ use nalgebra::Matrix4;
 use serde_json::Value;
 
 use super::super::LogError;
+use super::super::text::without_bom;
 use super::ConvertError;
 use super::sink::LogSink;
 use super::source_file::read_description;
@@ -49,7 +50,8 @@ impl SensorFile {
         }
         let text = read_description(&path, "read the sensor's description")?;
         // OpenCV's files start with `%YAML:1.0`, which is not a YAML directive.
-        let text = if text.starts_with("%YAML:") { text.split_once('\n').map_or("", |(_, rest)| rest) } else { &text };
+        let text = without_bom(&text);
+        let text = if text.starts_with("%YAML:") { text.split_once('\n').map_or("", |(_, rest)| rest) } else { text };
         let document = serde_saphyr::from_str(text).map_err(|error| {
             let problem = error.to_string();
             LogError::RigSyntax { problem: problem.lines().next().unwrap_or_default().to_owned(), path: path.clone() }
@@ -95,51 +97,54 @@ fn body_from_sensor(folder: &Path) -> Result<RigidTransform, ConvertError> {
     SensorFile::read(folder)?.map_or_else(|| Ok(RigidTransform::identity()), |file| file.body_from_sensor())
 }
 
-/// Returns `imu_from_sensor` of the sensor in a folder; the identity if it is not described.
-pub(super) fn sensor_pose(root: &Path, name: &str) -> Result<RigidTransform, ConvertError> {
-    Ok(body_from_sensor(&root.join("imu0"))?.inverse() * body_from_sensor(&root.join(name))?)
+/// Returns `imu_from_sensor` of the sensor in a folder; the identity if it is not described, with a note if its
+/// description cannot be used.
+pub(super) fn sensor_pose(root: &Path, name: &str, sink: &mut LogSink<'_>) -> RigidTransform {
+    // An unusable description of the IMU is reported with the rig.
+    let body_from_imu = body_from_sensor(&root.join("imu0")).unwrap_or_else(|_| RigidTransform::identity());
+    let body_from_sensor = body_from_sensor(&root.join(name)).unwrap_or_else(|error| {
+        sink.note(format!("{name}/sensor.yaml cannot be used, so its poses are taken as poses of the body: {error}"));
+        RigidTransform::identity()
+    });
+    body_from_imu.inverse() * body_from_sensor
 }
 
-/// Rig of a folder, `None` with a note if its sensors are not described.
+/// Rig of a folder, `None` with a note if its sensors are not described or their descriptions cannot be used.
 pub(super) fn rig_of(
     source: &Path,
     root: &Path,
     cameras: &[CameraSensor],
     ground_truth_topic: Option<String>,
     sink: &mut LogSink<'_>,
-) -> Result<Option<Rig>, ConvertError> {
-    let Some(imu_file) = SensorFile::read(&root.join("imu0"))? else {
-        sink.note("imu0/sensor.yaml is missing, so no rig was written");
-        return Ok(None);
-    };
-    let body_from_imu = imu_file.body_from_sensor()?;
-    let imu = ImuRig {
-        topic: IMU_TOPIC.to_owned(),
-        accelerometer_topic: None,
-        frame_id: "imu0".to_owned(),
-        rate_hz: imu_file.positive("rate_hz", "the rate in Hz")?,
-        noise: ImuNoise {
-            accelerometer_noise_density: imu_file.positive("accelerometer_noise_density", "m/s²/√Hz above 0")?,
-            accelerometer_random_walk: imu_file.positive("accelerometer_random_walk", "m/s³/√Hz above 0")?,
-            gyroscope_noise_density: imu_file.positive("gyroscope_noise_density", "rad/s/√Hz above 0")?,
-            gyroscope_random_walk: imu_file.positive("gyroscope_random_walk", "rad/s²/√Hz above 0")?,
-        },
-        intrinsics: ImuIntrinsics::default(),
+) -> Option<Rig> {
+    let (imu, body_from_imu) = match imu_rig(root) {
+        Ok(Some(imu)) => imu,
+        Ok(None) => {
+            sink.note("imu0/sensor.yaml is missing, so no rig was written");
+            return None;
+        }
+        Err(error) => {
+            sink.note(format!("imu0/sensor.yaml cannot be used, so no rig was written: {error}"));
+            return None;
+        }
     };
     let mut described = Vec::new();
     for camera in cameras {
-        match SensorFile::read(&camera.folder)? {
-            Some(file) => described.push(camera_rig(camera, &file, &body_from_imu)?),
-            None => sink.note(format!("{}/sensor.yaml is missing, so the rig has no such camera", camera.key)),
+        match described_camera(camera, &body_from_imu) {
+            Ok(Some(rig)) => described.push(rig),
+            Ok(None) => sink.note(format!("{}/sensor.yaml is missing, so the rig has no such camera", camera.key)),
+            Err(error) => {
+                sink.note(format!("{}/sensor.yaml cannot be used, so the rig has no such camera: {error}", camera.key));
+            }
         }
     }
     if described.is_empty() {
         sink.note("no camera is described, so no rig was written");
-        return Ok(None);
+        return None;
     }
     let absolute = fs::canonicalize(source).unwrap_or_else(|_| source.to_owned());
     let name = absolute.file_name().map_or_else(|| "euroc".to_owned(), |name| name.to_string_lossy().into_owned());
-    Ok(Some(Rig {
+    Some(Rig {
         name,
         gravity_m_per_s2: GRAVITY_M_PER_S2,
         imu,
@@ -148,7 +153,31 @@ pub(super) fn rig_of(
         ground_truth_topic,
         ground_truth_lever_arm: None,
         assumed: Vec::new(),
-    }))
+    })
+}
+
+/// IMU of a folder with `body_from_imu`, `None` without a description.
+fn imu_rig(root: &Path) -> Result<Option<(ImuRig, RigidTransform)>, ConvertError> {
+    let Some(file) = SensorFile::read(&root.join("imu0"))? else { return Ok(None) };
+    let imu = ImuRig {
+        topic: IMU_TOPIC.to_owned(),
+        accelerometer_topic: None,
+        frame_id: "imu0".to_owned(),
+        rate_hz: file.positive("rate_hz", "the rate in Hz")?,
+        noise: ImuNoise {
+            accelerometer_noise_density: file.positive("accelerometer_noise_density", "m/s²/√Hz above 0")?,
+            accelerometer_random_walk: file.positive("accelerometer_random_walk", "m/s³/√Hz above 0")?,
+            gyroscope_noise_density: file.positive("gyroscope_noise_density", "rad/s/√Hz above 0")?,
+            gyroscope_random_walk: file.positive("gyroscope_random_walk", "rad/s²/√Hz above 0")?,
+        },
+        intrinsics: ImuIntrinsics::default(),
+    };
+    Ok(Some((imu, file.body_from_sensor()?)))
+}
+
+/// Camera of a folder, `None` without a description.
+fn described_camera(camera: &CameraSensor, body_from_imu: &RigidTransform) -> Result<Option<CameraRig>, ConvertError> {
+    SensorFile::read(&camera.folder)?.map(|file| camera_rig(camera, &file, body_from_imu)).transpose()
 }
 
 fn camera_rig(

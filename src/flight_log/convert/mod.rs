@@ -22,7 +22,7 @@ mod sqlite;
 use std::fs;
 use std::io::Read as _;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use error::ConvertError;
 pub use options::{AutopilotLog, AutopilotLogKind, ConvertOptions, VideoClock};
@@ -130,6 +130,12 @@ pub fn convert_with(
         report.rig = Some(path);
     } else if output.with_extension("rig.yaml").is_file() {
         report.rig = Some(output.with_extension("rig.yaml"));
+    } else if let Some(beside) = rig_beside(source) {
+        report.notes.push(format!(
+            "the rig of the source is not copied: use it with --rig, or copy it to {}: {}",
+            output.with_extension("rig.yaml").display(),
+            beside.display()
+        ));
     } else if log.attachment(".rig.yaml").is_none() {
         report.notes.push(format!(
             "the source has no rig: write {} (or a Kalibr camchain-imucam.yaml for --rig) before running on it",
@@ -137,6 +143,11 @@ pub fn convert_with(
         ));
     }
     Ok(report)
+}
+
+/// Rig file next to a source that is a file.
+fn rig_beside(source: &Path) -> Option<PathBuf> {
+    Some(source.with_extension("rig.yaml")).filter(|path| path.is_file())
 }
 
 enum SourceRig {

@@ -10,6 +10,7 @@ use serde_saphyr::{Error, Spanned};
 
 use super::super::LogError;
 use super::super::text::shortened;
+use super::super::text::without_bom;
 use super::fields::Field;
 
 /// Largest rig file in bytes; the rig of 16 links and 16 cameras takes 16 kB.
@@ -44,7 +45,7 @@ impl Document {
             let line = error.as_bytes()[..valid].split(|byte| *byte == b'\n').count();
             syntax(format!("line {line}: byte {valid} is not UTF-8, expected a text file"))
         })?;
-        Self::parse(text, file)
+        Self::parse(without_bom(&text).to_owned(), file)
     }
 
     pub(super) fn parse(text: String, file: &Path) -> Result<Self, LogError> {

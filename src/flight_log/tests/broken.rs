@@ -1,7 +1,7 @@
 use std::fs;
 
 use super::*;
-use crate::flight_log::LogError;
+use crate::flight_log::{LogError, MessageKind, MessageType};
 
 fn open_error(content: &[u8]) -> String {
     let folder = TempDir::new().unwrap();
@@ -300,4 +300,37 @@ fn a_log_without_a_rig_names_the_files_looked_for() {
     let log = FlightLog::open(&Flight::default().write(folder.path())).unwrap();
     let error = Rig::for_log(&log, None).unwrap_err();
     assert!(matches!(error, LogError::NoRig { .. }) && error.to_string().contains("flight.rig.yaml"), "{error}");
+}
+
+/// Error of a rig's IMU topic whose only messages are of a type and encoding.
+fn error_of_imu_topic(name: &str, message_encoding: &'static str) -> (LogError, FlightLog, TempDir) {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("other.mcap");
+    let mut writer = LogWriter::create(&path, &LogWriterOptions::default()).unwrap();
+    let message_type = MessageType { name, definition_encoding: "", definition: "".into(), message_encoding };
+    for number in 0..3 {
+        let times = MessageTimes { stamp_ns: EPOCH_NS, log_time_ns: EPOCH_NS + number * 5 * MS };
+        writer.write_typed("/imu", &message_type, times, &[0; 4]).unwrap();
+    }
+    writer.finish().unwrap();
+    let log = FlightLog::open(&path).unwrap();
+    let error = log.require_topic("imu0.rostopic", "/imu", &[MessageKind::Imu]).unwrap_err();
+    (error, log, folder)
+}
+
+#[test]
+fn topics_that_cannot_be_read_are_named_with_type_encoding_and_remedy() {
+    let check = |name: &str, encoding, words: &[&str]| {
+        let (error, log, _folder) = error_of_imu_topic(name, encoding);
+        let texts = [error.to_string(), log.warnings()[0].message.clone()];
+        assert!(words.iter().all(|word| texts[0].contains(word)), "{words:?} in {texts:?}");
+        assert!(texts.iter().all(|text| !text.contains("not in the log")), "{texts:?}");
+        texts
+    };
+    let [_, warning] = check("sensor_msgs/Imu", "ros1", &["'/imu'", "sensor_msgs/Imu in ROS 1", "`dcvins convert LOG"]);
+    assert!(warning.contains("1 topics are in ROS 1 encoding") && warning.contains("`dcvins convert LOG"), "{warning}");
+    // `convert` does not read JSON.
+    let [error, _] = check("sensor_msgs/msg/Imu", "json", &["sensor_msgs/msg/Imu in JSON", "record ROS 2 messages"]);
+    assert!(!error.contains("convert LOG"), "{error}");
+    check("sensor_msgs/msg/PointCloud2", "cdr", &["another type: sensor_msgs/msg/PointCloud2 in CDR"]);
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::super::LogError;
-use super::super::text::shortened;
+use super::super::text::{shortened, without_bom};
 use super::RecordedPose;
 
 /// Largest file: an hour of poses in steps of 1 ms, with about 100 bytes each.
@@ -47,7 +47,7 @@ pub fn read_trajectory_file(path: &Path) -> Result<Vec<RecordedPose>, LogError> 
     let no_text = "no text, expected 't x y z qx qy qz qw' on each line (TUM) or a table of EuRoC";
     let text = String::from_utf8(bytes).map_err(|_binary| unusable(no_text.to_owned()))?;
     let mut poses = Vec::new();
-    for (index, line) in text.lines().enumerate() {
+    for (index, line) in without_bom(&text).lines().enumerate() {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
             continue;

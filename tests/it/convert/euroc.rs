@@ -139,6 +139,48 @@ fn a_wrong_folder_says_where() {
     check("imu0/data.csv", "1,2,3,4,5,6,7\n12,0,0,x,0,0,0\n", &["line 2", "'x'", "data.csv"]);
     check("imu0/data.csv", "1.5,2,3,4,5,6,7\n", &["line 1", "'1.5'", "nanoseconds"]);
     check("imu0/data.csv", "1,2,3\n", &["line 1", "2 numbers", "expected 6"]);
+}
+
+#[test]
+fn byte_order_marks_line_ends_and_spaces_do_not_matter() {
+    let folder = tempfile::tempdir().unwrap();
+    let (source, path) = (folder.path().join("flight"), folder.path().join("flight.mcap"));
+    write_folder(&source);
+    let expected = run(&source, &path).map(|_| fs::read(&path).unwrap()).unwrap();
+    let rig = fs::read_to_string(path.with_extension("rig.yaml")).unwrap();
+    for name in ["imu0", "cam0", "state_groundtruth_estimate0"] {
+        for file in ["data.csv", "sensor.yaml"] {
+            let path = source.join("mav0").join(name).join(file);
+            let Ok(text) = fs::read_to_string(&path) else { continue };
+            let text = if file == "data.csv" { text.replace(',', " , ") } else { text };
+            fs::write(&path, format!("\u{feff}{}", text.replace('\r', "").replace('\n', "\r\n"))).unwrap();
+        }
+    }
+    let again = folder.path().join("again.mcap");
+    run(&source, &again).unwrap();
+    assert!(fs::read(&again).unwrap() == expected, "the same samples give the same bytes");
+    assert_eq!(fs::read_to_string(again.with_extension("rig.yaml")).unwrap(), rig);
+}
+
+#[test]
+fn a_folder_with_an_unusable_description_converts_with_a_note() {
+    let folder = tempfile::tempdir().unwrap();
+    let (source, path) = (folder.path().join("flight"), folder.path().join("flight.mcap"));
+    let check = |file: &str, text: &str, words: &[&str]| {
+        write_folder(&source);
+        fs::write(source.join("mav0").join(file), text).unwrap();
+        let report = run(&source, &path).unwrap();
+        assert_eq!((topic(&report, "/imu0").taken, report.rig.as_ref()), (60, None), "{report}");
+        let notes = report.notes.join("\n");
+        for word in words.iter().chain(&["no rig was written"]) {
+            assert!(notes.contains(word), "'{word}' is missing in: {notes}");
+        }
+    };
+    check(
+        "imu0/sensor.yaml",
+        &IMU_YAML.replace("imu\n", "imu: b: c\n"),
+        &["imu0/sensor.yaml cannot be used", "line 1"],
+    );
     check("cam0/sensor.yaml", &CAMERA_YAML.replace("[64, 48]", "[64]"), &["resolution", "sensor.yaml"]);
     check("cam0/sensor.yaml", &CAMERA_YAML.replace("pinhole", "fisheye"), &["fisheye"]);
     check("cam0/sensor.yaml", &CAMERA_YAML.replace("0.0, 0.0, 1.0, 0.1", "0.0, 0.0, 2.0, 0.1"), &["T_BS", "rigid"]);

@@ -115,7 +115,10 @@ fn one_topic<'a>(
     let of_name: Vec<_> =
         topics.iter().copied().filter(|info| info.topic.to_ascii_lowercase().contains(preferred)).collect();
     match (topics.as_slice(), of_name.as_slice()) {
-        ([], _) => Ok(None),
+        ([], _) => log.unread_topic_of(kinds).map_or(Ok(None), |unread| {
+            let remedy = format!("'{}' is {}; {}", unread.topic, unread.type_in_encoding(), unread.encoding_remedy());
+            Err(TemplateError::NoTopic { what: format!("readable {what}"), remedy })
+        }),
         ([only], _) | (_, [only]) => Ok(Some(only)),
         _ => Err(TemplateError::SeveralTopics { what: what.to_owned(), option, available: available() }),
     }
