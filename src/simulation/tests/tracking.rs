@@ -127,9 +127,9 @@ fn tracks_follow_the_surfaces() {
     println!("along the motion at 1.5 to 1.9 times the area: {mean_px:+.4} px, {} observations", slanted.len());
     assert!(slanted.len() > 150 && mean_px.abs() < 0.02, "{mean_px} px over {} observations", slanted.len());
     for (name, errors_px, least, limit_px) in [
-        ("all", all, 3000, 0.06),
-        ("grown to twice the area", grown, 150, 0.25),
-        ("near the border", at_border, 100, 0.17),
+        ("all", all, 3000, 0.05),
+        ("grown to twice the area", grown, 150, 0.16),
+        ("near the border", at_border, 100, 0.14),
     ] {
         let count = errors_px.len();
         let median_px = median(errors_px).unwrap();
