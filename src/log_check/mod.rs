@@ -20,6 +20,7 @@ mod rig_sanity;
 mod rotation;
 mod rotation_fit;
 mod source_fit;
+mod spacing;
 mod spectrum;
 mod stationary;
 mod statistics;
