@@ -303,12 +303,14 @@ pub(crate) fn read_camera_info(message: &[u8]) -> Result<CameraInfoMessage, CdrE
     Ok(CameraInfoMessage { width, height, distortion_model, distortion, intrinsic_matrix })
 }
 
-/// `sensor_msgs/msg/JointState` without velocities and efforts.
+/// `sensor_msgs/msg/JointState`, of whose velocities and efforts only the numbers are kept.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct JointMessage<'a> {
     pub(crate) stamp_ns: i64,
     pub(crate) names: Vec<&'a str>,
     pub(crate) positions_rad: Vec<f64>,
+    velocities: usize,
+    efforts: usize,
 }
 
 impl JointMessage<'_> {
@@ -317,8 +319,22 @@ impl JointMessage<'_> {
         self.positions_rad.len() < self.names.len()
     }
 
+    /// Content of a message without any position: `velocities`, `efforts` or both, else `names`.
+    pub(crate) fn content_without_positions(&self) -> Option<&'static str> {
+        let content = match (self.velocities > 0, self.efforts > 0) {
+            (true, true) => "velocities and efforts",
+            (true, false) => "velocities",
+            (false, true) => "efforts",
+            (false, false) => "names",
+        };
+        (self.positions_rad.is_empty() && !self.names.is_empty()).then_some(content)
+    }
+
     /// Description of a message in which the numbers of names and positions differ.
     pub(crate) fn length_problem(&self) -> String {
+        if let Some(content) = self.content_without_positions() {
+            return format!("it has {content} of {} joints but no positions", self.names.len());
+        }
         format!("it names {} joints and has {} positions", self.names.len(), self.positions_rad.len())
     }
 }
@@ -328,7 +344,10 @@ pub(crate) fn read_joint_state(message: &[u8]) -> Result<JointMessage<'_>, CdrEr
     let header = read_header(&mut reader)?;
     let names = reader.read_strings()?;
     let positions_rad = reader.read_f64_sequence()?;
-    Ok(JointMessage { stamp_ns: header.stamp_ns, names, positions_rad })
+    // A message that is cut behind its positions is still used.
+    let velocities = reader.read_f64_sequence().map_or(0, |values| values.len());
+    let efforts = reader.read_f64_sequence().map_or(0, |values| values.len());
+    Ok(JointMessage { stamp_ns: header.stamp_ns, names, positions_rad, velocities, efforts })
 }
 
 /// Pose of any of the pose messages, `None` for numbers that are not finite or a zero quaternion.

@@ -20,6 +20,7 @@ mod rig_sanity;
 mod rotation;
 mod rotation_fit;
 mod source_fit;
+mod spacing;
 mod spectrum;
 mod stationary;
 mod statistics;
@@ -130,6 +131,14 @@ fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
         let count = log.topic(&topic.topic).map_or(0, |info| info.count).max(topic.unreadable as u64);
         let evidence = format!("{} of {count}; the first: {}", topic.unreadable, topic.first_problem);
         findings.add(Severity::Warning, Area::Log, title, evidence, "check the recorder's message definitions");
+    }
+    for topic in survey.topics.values() {
+        let Some((count, content)) = topic.without_positions else { continue };
+        let title = format!("messages of {} have {content} but no positions", topic.topic);
+        let evidence = format!("{count} of {} messages", log.topic(&topic.topic).map_or(0, |info| info.count));
+        let remedy = "record joint positions (absolute encoder angles), or compute the angles from attitudes with \
+                      gimbal.source; velocities are not integrated";
+        findings.add(Severity::Error, Area::Encoders, title, evidence, remedy);
     }
     let ignored: Vec<String> =
         log.topics().iter().filter(|info| info.kind.is_none()).map(TopicInfo::name_with_encoding).collect();

@@ -47,6 +47,8 @@ pub(super) struct TopicSurvey {
     /// Number of messages that cannot be decoded.
     pub(super) unreadable: usize,
     pub(super) first_problem: String,
+    /// Number of joint messages without any position, and the content of the first.
+    pub(super) without_positions: Option<(usize, &'static str)>,
 }
 
 impl TopicSurvey {
@@ -299,7 +301,10 @@ impl Survey {
         let encoders = rig.gimbal.as_ref().filter(|gimbal| gimbal.attitude.is_none());
         if let Some(gimbal) = encoders.filter(|gimbal| gimbal.topic.as_deref() == Some(topic)) {
             match messages::read_joint_state(data) {
-                Ok(message) if message.lacks_positions() => entry.refuse(message.length_problem()),
+                Ok(message) if message.lacks_positions() => match message.content_without_positions() {
+                    Some(content) => entry.without_positions.get_or_insert((0, content)).0 += 1,
+                    None => entry.refuse(message.length_problem()),
+                },
                 Ok(message) => {
                     let angle = |name: &str| {
                         let place = message.names.iter().position(|known| *known == name)?;

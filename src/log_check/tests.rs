@@ -414,6 +414,33 @@ fn faults_of_time_are_found() {
 }
 
 #[test]
+fn batches_and_messages_out_of_order_miss_nothing() {
+    let check = |imu, severity, words: &[&str]| {
+        let flight = Flight { imu, ..Flight::default() };
+        expect(&flight, severity, words);
+        let report = flight.check(&[]);
+        let gap = |title: &str| title.contains("imu0 has gaps") || title.contains("rate of imu0");
+        assert!(!report.findings.iter().any(|finding| gap(&finding.title)), "{report}");
+    };
+    let batches = |ms: i64, times: &mut MessageTimes, _: &mut Vector3<f64>, _: &mut Vector3<f64>| {
+        let place = ms / 5 % 6;
+        times.stamp_ns += (5 - place) * 5 * MS - (5 - place) * MS / 5;
+        true
+    };
+    let words = ["imu0 is stamped on arrival, in batches", "of 6, 0.200 ms apart", "200.", "miss no messages"];
+    check(batches, Severity::Warning, &words);
+    let swapped = |ms: i64, times: &mut MessageTimes, _: &mut Vector3<f64>, _: &mut Vector3<f64>| {
+        times.stamp_ns += if ms / 5 % 10 == 4 { 20 * MS } else { 0 };
+        times.stamp_ns -= if ms / 5 % 10 == 8 { 20 * MS } else { 0 };
+        true
+    };
+    check(swapped, Severity::Error, &["stamps of imu0 run backwards"]);
+    // More than half of the messages are missing: no batches.
+    let lossy = |ms: i64, _: &mut MessageTimes, _: &mut Vector3<f64>, _: &mut Vector3<f64>| ms % 100 < 40;
+    expect(&Flight { imu: lossy, ..Flight::default() }, Severity::Warning, &["imu0 has gaps", "are missing"]);
+}
+
+#[test]
 fn faults_of_images_and_lenses_are_found() {
     use Severity::{Error, Note, Warning};
     let image = |image| Flight { image, ..Flight::default() };

@@ -1,3 +1,4 @@
+use super::spacing::Spacing;
 use super::statistics::{median, percentile, slope};
 use super::survey::{Survey, TopicSurvey};
 use super::{Area, Findings, Severity};
@@ -31,11 +32,14 @@ pub(super) fn check_timing(survey: &Survey, rig: Option<&Rig>, findings: &mut Fi
     let mut regular = Vec::new();
     for (role, topic, nominal_hz, sparse) in &used {
         let before = findings.list.len();
-        check_order_and_gaps(role, topic, *sparse, findings);
-        check_rate(role, topic, *nominal_hz, findings);
+        let spacing = Spacing::of(topic, *nominal_hz);
+        check_order(role, topic, findings);
+        check_gaps(role, &spacing, *sparse, findings);
+        check_jitter(role, &spacing, findings);
+        check_rate(role, spacing.period_s, *nominal_hz, findings);
         check_latency(role, topic, findings);
-        if findings.list.len() == before && period_s(topic) > 0.0 {
-            regular.push(format!("{role} {:.1} Hz", 1.0 / period_s(topic)));
+        if findings.list.len() == before && spacing.period_s > 0.0 {
+            regular.push(format!("{role} {:.1} Hz", 1.0 / spacing.period_s));
         }
     }
     if !regular.is_empty() {
@@ -73,19 +77,10 @@ fn used_topics<'a>(survey: &'a Survey, rig: Option<&Rig>) -> Vec<Used<'a>> {
     used
 }
 
-/// Median difference of consecutive header stamps, in seconds.
-fn period_s(topic: &TopicSurvey) -> f64 {
-    median(&steps_s(topic))
-}
-
-fn steps_s(topic: &TopicSurvey) -> Vec<f64> {
-    topic.times.windows(2).map(|pair| seconds_from_ns(pair[1].stamp_ns - pair[0].stamp_ns)).collect()
-}
-
-fn check_order_and_gaps(role: &str, topic: &TopicSurvey, sparse: bool, findings: &mut Findings) {
-    let steps = steps_s(topic);
-    let period = median(&steps);
-    let at = |index: usize| seconds_from_ns(topic.times[index].stamp_ns);
+/// Checks the order of the messages by their stamps, and equal stamps.
+fn check_order(role: &str, topic: &TopicSurvey, findings: &mut Findings) {
+    let steps: Vec<f64> =
+        topic.times.windows(2).map(|pair| seconds_from_ns(pair[1].stamp_ns - pair[0].stamp_ns)).collect();
     let backwards: Vec<usize> = (0..steps.len()).filter(|index| steps[*index] < 0.0).collect();
     if let Some(first) = backwards.first() {
         let deepest = steps.iter().copied().fold(0.0, f64::min);
@@ -93,7 +88,7 @@ fn check_order_and_gaps(role: &str, topic: &TopicSurvey, sparse: bool, findings:
             "{} of {} steps are negative, the first after {:.3} s, the largest {:.3} s",
             backwards.len(),
             steps.len(),
-            at(*first),
+            seconds_from_ns(topic.times[*first].stamp_ns),
             -deepest
         );
         let severity =
@@ -104,30 +99,49 @@ fn check_order_and_gaps(role: &str, topic: &TopicSurvey, sparse: bool, findings:
     let repeats = steps.iter().filter(|step| **step == 0.0).count();
     if repeats > 0 {
         let evidence = format!("{repeats} of {} stamps equal the previous one", steps.len());
-        let remedy = "the driver or a relay sends messages twice; repeats are dropped";
+        let remedy = "the driver or a relay sends messages twice, or stamps a batch once; repeats are dropped";
         findings.add(Severity::Warning, Area::Time, format!("stamps of {role} repeat"), evidence, remedy);
     }
-    let limit = if sparse { 1.75 * period } else { 2.5 * period };
+}
+
+/// Reports steps between stamps in which messages are missing.
+fn check_gaps(role: &str, spacing: &Spacing, sparse: bool, findings: &mut Findings) {
+    let (steps, period) = (&spacing.steps_s, spacing.period_s);
+    let limit = spacing.longest_s(if sparse { 1.75 } else { 2.5 });
     let gaps: Vec<usize> = (0..steps.len()).filter(|index| period > 0.0 && steps[*index] > limit).collect();
-    if let Some(longest) = gaps.iter().copied().max_by(|a, b| steps[*a].total_cmp(&steps[*b])) {
-        let lost: f64 = gaps.iter().map(|index| (steps[*index] / period).round() - 1.0).sum();
+    let Some(longest) = gaps.iter().copied().max_by(|a, b| steps[*a].total_cmp(&steps[*b])) else { return };
+    let lost: f64 = gaps.iter().map(|index| (steps[*index] / period).round() - 1.0).sum();
+    let received = steps.len() as f64 + 1.0;
+    let evidence = format!(
+        "{} gaps, the longest {:.3} s after {:.3} s; about {lost:.0} of {} messages are missing",
+        gaps.len(),
+        steps[longest],
+        spacing.start_s(longest),
+        lost + received
+    );
+    let severity = if lost > 0.01 * received || steps[longest] > 0.5 { Severity::Warning } else { Severity::Note };
+    let remedy = "record with less load or a larger buffer; over a gap the IMU is interpolated and features are lost";
+    findings.add(severity, Area::Time, format!("{role} has gaps"), evidence, remedy);
+}
+
+/// Reports stamps that are those of the arrival: batches, or steps that scatter.
+fn check_jitter(role: &str, spacing: &Spacing, findings: &mut Findings) {
+    if let Some(batches) = &spacing.batches {
         let evidence = format!(
-            "{} gaps, the longest {:.3} s after {:.3} s; about {lost:.0} of {} messages are missing",
-            gaps.len(),
-            steps[longest],
-            at(longest),
-            lost + topic.times.len() as f64
+            "{} batches of {:.0}, {:.3} ms apart, with pauses of {:.1} ms; {:.1} Hz by first stamp, last stamp and count: \
+             the pauses miss no messages",
+            batches.count,
+            batches.size,
+            batches.inner_s * 1e3,
+            batches.pause_s * 1e3,
+            1.0 / spacing.period_s
         );
-        let severity = if lost > 0.01 * topic.times.len() as f64 || steps[longest] > 0.5 {
-            Severity::Warning
-        } else {
-            Severity::Note
-        };
-        let remedy =
-            "record with less load or a larger buffer; over a gap the IMU is interpolated and features are lost";
-        findings.add(severity, Area::Time, format!("{role} has gaps"), evidence, remedy);
+        let title = format!("{role} is stamped on arrival, in batches");
+        let remedy = "stamp each measurement in the driver, from the sensor's own clock or trigger";
+        return findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
     }
-    let scatter: Vec<f64> = steps.iter().map(|step| (step - period).abs()).collect();
+    let period = spacing.period_s;
+    let scatter: Vec<f64> = spacing.steps_s.iter().map(|step| (step - period).abs()).collect();
     let jitter = percentile(&scatter, 0.95);
     if period > 0.0 && jitter > JITTER_TOLERANCE * period {
         let evidence =
@@ -138,8 +152,7 @@ fn check_order_and_gaps(role: &str, topic: &TopicSurvey, sparse: bool, findings:
     }
 }
 
-fn check_rate(role: &str, topic: &TopicSurvey, nominal_hz: Option<f64>, findings: &mut Findings) {
-    let period_s = period_s(topic);
+fn check_rate(role: &str, period_s: f64, nominal_hz: Option<f64>, findings: &mut Findings) {
     if period_s <= 0.0 {
         return; // stamps that repeat or run backwards are reported as such
     }

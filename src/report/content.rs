@@ -11,7 +11,9 @@ use super::verdict::{RunVerdict, Statement, log_statement};
 use crate::flight_log::log_name;
 use crate::geometry::seconds_from_ns;
 use crate::log_check::CheckReport;
-use crate::session::{EstimabilitySummary, Recording, RunRecord, RunSummary, estimability_summary};
+use crate::session::{
+    EstimabilitySummary, Recording, RunRecord, RunSummary, WarningLine, estimability_summary, log_warning_lines,
+};
 
 /// A notable event of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -79,10 +81,8 @@ impl ReportContent {
                 frequent_events,
             }
         });
-        let warnings = recording.warnings.iter();
-        let log_warnings: Vec<String> = warnings
-            .map(|warning| format!("{:.3} s: {}", seconds_from_ns(warning.stamp_ns), warning.message))
-            .collect();
+        let log_warnings: Vec<String> =
+            log_warning_lines(&recording.warnings).iter().map(WarningLine::with_time).collect();
         Self {
             program: concat!("dcvins ", env!("CARGO_PKG_VERSION")),
             command: options.command.clone(),

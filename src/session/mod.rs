@@ -43,6 +43,6 @@ pub use record::{
     Comparison, Divergence, EstimabilitySummary, ForkOrigin, KnownLossSummary, LostSince, ParameterSummary,
     PassProgress, PoseConsistency, PoseError, PositionTruth, Quantity, RELATIVE_LENGTHS_M, Recording, RelativeAccuracy,
     RunMemory, RunRecord, RunSummary, RunWarning, SolverPosition, SolverTrace, StageSummary, StepFactorRows,
-    StepRecord, TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane, estimability_summary, evaluate_trajectory,
-    summarize,
+    StepRecord, TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane, WarningLine, estimability_summary,
+    evaluate_trajectory, log_warning_lines, summarize, warning_lines,
 };

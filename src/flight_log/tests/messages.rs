@@ -216,3 +216,26 @@ fn an_image_is_not_decoded_when_its_header_claims_too_much() {
     let raw = encode::image(0, "camera", [60_000, 60_000], "mono8", &[0; 16]);
     assert!(decode_image(MessageKind::Image, &raw, BitDepth::default()).unwrap_err().contains("--limit image-pixels="));
 }
+
+#[test]
+fn joints_without_positions_are_described_by_their_content() {
+    let check = |positions: &[f64], velocities: &[f64], efforts: &[f64], expected: &str| {
+        let mut out = CdrWriter::new();
+        out.i32(1);
+        out.u32(0);
+        out.string("base");
+        out.strings(&["yaw".to_owned(), "roll".to_owned()]);
+        for values in [positions, velocities, efforts] {
+            out.f64_sequence(values);
+        }
+        let bytes = out.finish();
+        let message = messages::read_joint_state(&bytes).unwrap();
+        let problem = if message.lacks_positions() { message.length_problem() } else { String::new() };
+        assert_eq!(problem, expected);
+    };
+    check(&[0.1, 0.2], &[], &[], "");
+    check(&[0.1], &[], &[], "it names 2 joints and has 1 positions");
+    check(&[], &[0.1, 0.2], &[], "it has velocities of 2 joints but no positions");
+    check(&[], &[], &[1.0, 2.0], "it has efforts of 2 joints but no positions");
+    check(&[], &[0.1, 0.2], &[1.0, 2.0], "it has velocities and efforts of 2 joints but no positions");
+}

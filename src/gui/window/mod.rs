@@ -33,7 +33,6 @@ mod tests;
 mod tiles;
 mod top_bar;
 mod tour;
-mod warning_lines;
 
 use egui::{CentralPanel, Frame, Margin, Rect, Ui, UiBuilder, vec2};
 

@@ -2,11 +2,11 @@
 
 use egui::{Align2, Area, Button, Frame, Id, Margin, Order, Panel, RichText, ScrollArea, Ui, vec2};
 
-use super::warning_lines::warning_lines;
 use crate::gui::PanelContext;
 use crate::gui::theme::{Theme, dialog_frame};
 use crate::gui::units::seconds;
 use crate::session::Command;
+use crate::session::warning_lines;
 
 /// Severity of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

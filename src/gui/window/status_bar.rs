@@ -6,10 +6,10 @@ use egui::{Align, Button, FontId, Label, Layout as UiLayout, ProgressBar, RichTe
 
 use super::progress::Progress;
 use super::state::MainWindow;
-use super::warning_lines::warning_lines;
 use crate::gui::PanelContext;
 use crate::gui::theme::{self, Theme};
 use crate::gui::units::{bytes, counted, fixed};
+use crate::session::warning_lines;
 use crate::session::{Recording, RunRecord};
 
 /// Widths in points of the warnings, of the progress, and of the log that is being opened.

@@ -18,6 +18,7 @@ mod summary;
 mod trajectory_accuracy;
 mod trajectory_evaluation;
 mod trajectory_lane;
+mod warning_lines;
 mod warnings;
 
 pub use antenna_record::PositionTruth;
@@ -36,6 +37,7 @@ pub use step::{StepFactorRows, StepRecord};
 pub use trajectory_accuracy::{RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};
 pub use trajectory_evaluation::{TrajectoryEvaluation, evaluate_trajectory};
 pub use trajectory_lane::TrajectoryLane;
+pub use warning_lines::{WarningLine, log_warning_lines, warning_lines};
 pub use warnings::RunWarning;
 #[cfg(test)]
 pub(in crate::session) use warnings::warnings_of;

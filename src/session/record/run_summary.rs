@@ -10,7 +10,7 @@ use super::recording::Recording;
 use super::run::RunRecord;
 use super::trajectory_accuracy::TrajectoryAccuracy;
 use super::trajectory_lane::TrajectoryLane;
-use super::warnings::RunWarning;
+use super::warning_lines::{log_warning_lines, run_warning_lines};
 use crate::calibration::ChainDistance;
 use crate::estimator::{EventKind, Phase, StageTimes};
 use crate::flight_log::log_name;
@@ -368,19 +368,8 @@ fn real_time_factor(run: &RunRecord) -> Option<f64> {
     (work_ms > 0.0).then(|| log_s * 1e3 / work_ms)
 }
 
-/// Warnings about the log, then of the run, each with its stamp; a repeated warning is listed once with its count and
-/// its last stamp.
+/// Warnings about the log, then of the run, each kind once with the stamp of the first, the count and the time span.
 fn warnings(recording: &Recording, run: &RunRecord) -> Vec<String> {
-    let mut texts: Vec<String> = recording
-        .warnings
-        .iter()
-        .map(|warning| format!("{:.3} s: {}", seconds_from_ns(warning.stamp_ns), warning.message))
-        .collect();
-    for RunWarning { message, first_ns, last_ns, steps } in &run.warnings {
-        let last_s = seconds_from_ns(*last_ns);
-        let times = if *steps > 1 { format!(" ({steps} steps, last at {last_s:.3} s)") } else { String::new() };
-        texts.push(format!("{:.3} s: {message}{times}", seconds_from_ns(*first_ns)));
-    }
-    texts.extend(run.error.iter().cloned());
-    texts
+    let lines = log_warning_lines(&recording.warnings).into_iter().chain(run_warning_lines(run));
+    lines.map(|line| line.with_time()).chain(run.error.iter().cloned()).collect()
 }
