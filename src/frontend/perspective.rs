@@ -16,7 +16,7 @@
 //! The first line determines `h` and `m` from a matched warp and the camera's rotation, without its translation; the
 //! second one is the perspective. `m` belongs to the reference, so all its matches contribute.
 //!
-//! [`Appearance::perspective_shift`]: super::appearance::Appearance
+//! [`Appearance::perspective_shift`]: super::appearance::Appearance::perspective_shift
 
 use nalgebra::{Matrix2, Matrix3, Matrix4x2, UnitQuaternion, Vector2, Vector3, Vector4};
 
