@@ -3,7 +3,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{Matrix3x2, Vector3};
+use nalgebra::{Matrix3x2, UnitQuaternion, Vector3};
 
 pub fn seconds_from_ns(time_ns: i64) -> f64 {
     time_ns as f64 * 1e-9
@@ -25,6 +25,11 @@ pub fn wrap_angle(angle_rad: f64) -> f64 {
 pub fn principal_angle(angle_rad: f64) -> f64 {
     let revolutions = ((angle_rad - PI) / TAU).ceil();
     angle_rad - revolutions * TAU
+}
+
+/// Angle about the vertical (z) of the rotation about it that is nearest to `rotation`, in radians from −2π to 2π.
+pub fn vertical_angle(rotation: &UnitQuaternion<f64>) -> f64 {
+    2.0 * rotation.k.atan2(rotation.w)
 }
 
 /// Median by total order, the upper one for an even count; `None` without values.

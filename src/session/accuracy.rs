@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Serialize, Serializer};
 
 use crate::calibration::Statistics;
-use crate::geometry::{RigidTransform, so3, wrap_angle};
+use crate::geometry::{RigidTransform, so3, vertical_angle, wrap_angle};
 
 /// A stamped pose. Stamps are in seconds, on a clock that both trajectories share.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -208,19 +208,14 @@ pub fn heading_drift_rad(pairs: &[(StampedPose, StampedPose)]) -> Option<f64> {
     for ends in pairs.windows(2) {
         let [(estimate, reference), (next_estimate, next_reference)] = ends else { continue };
         let heading_error = |estimate: &StampedPose, reference: &StampedPose| {
-            heading_rad(&(estimate.pose.rotation * reference.pose.rotation.inverse()))
+            vertical_angle(&(estimate.pose.rotation * reference.pose.rotation.inverse()))
         };
         let turn = next_reference.pose.rotation * reference.pose.rotation.inverse();
-        turned_rad += heading_rad(&turn);
+        turned_rad += wrap_angle(vertical_angle(&turn));
         error_rad += wrap_angle(heading_error(next_estimate, next_reference) - heading_error(estimate, reference));
     }
     let turns = turned_rad / std::f64::consts::TAU;
     (turned_rad.abs() >= MIN_TURN_RAD).then(|| error_rad / turns)
-}
-
-/// Angle about the vertical of the rotation about it that is nearest to a rotation of the world.
-fn heading_rad(rotation: &UnitQuaternion<f64>) -> f64 {
-    wrap_angle(2.0 * rotation.k.atan2(rotation.w))
 }
 
 /// Distance between the two poses of a relative error.

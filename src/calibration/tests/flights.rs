@@ -9,7 +9,7 @@ use super::fixture::{flight, true_states};
 use crate::calibration::{
     CalibrationError, CalibrationOptions, ChainDistance, Statistics, calibrate, transform_distance,
 };
-use crate::geometry::{Dimension, RigidTransform, wrap_angle};
+use crate::geometry::{Dimension, RigidTransform, vertical_angle, wrap_angle};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::sensors::ChainPrior;
 use crate::simulation::SyntheticOptions;
@@ -137,7 +137,7 @@ fn the_batch_trajectory_is_within_its_sigmas() {
         let first = &outcome.trajectory[0];
         let true_first = truths[&first.stamp_ns];
         let turn = first.world_from_imu.rotation * true_first.rotation.inverse();
-        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * turn.k.atan2(turn.w));
+        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), vertical_angle(&turn));
         let moved = first.world_from_imu.translation_m - yaw * true_first.translation_m;
         let world_from_true = RigidTransform::new(yaw, moved);
         let errors = outcome.trajectory.iter().filter_map(|pose| {

@@ -40,7 +40,7 @@ impl<'a> VisualModel<'a> {
     /// The loss is that of the mean over the degrees of freedom: a feature that is no point of the scene,
     /// such as a corner where an outline crosses the background, slides with the viewpoint. Each of its residuals is
     /// moderate, but they do not average out, so the track loses weight as a whole.
-    pub(crate) fn track_cost_and_weight(&self, sum: f64, observations: usize) -> (f64, f64) {
+    fn track_cost_and_weight(&self, sum: f64, observations: usize) -> (f64, f64) {
         let freedom = (observations as f64 - OBSERVATIONS_PER_LANDMARK).max(0.5);
         let (cost, weight) = self.track_loss.cost_and_weight(sum / freedom);
         (freedom * cost, weight)
@@ -49,11 +49,8 @@ impl<'a> VisualModel<'a> {
     /// Robust weights of a track's observations by their residuals in pixels, zero where there is none.
     pub(crate) fn robust_weights(&self, residuals_px: &[Option<Vector2<f64>>]) -> Vec<f64> {
         let squared = |residual: &Option<Vector2<f64>>| residual.map(|it| it.norm_squared() / self.sigma_px.powi(2));
-        let mut sum = LossSum::new(self.loss, self.sigma_px);
-        for residual in residuals_px {
-            sum.add(*residual);
-        }
-        let (_, of_track) = self.track_cost_and_weight(sum.get(), residuals_px.len());
+        let sum = self.sum_of_costs(residuals_px.iter().copied());
+        let (_, of_track) = self.track_cost_and_weight(sum, residuals_px.len());
         let weight = |squared: f64| of_track * self.loss.cost_and_weight(squared).1;
         residuals_px.iter().map(|residual| squared(residual).map_or(0.0, weight)).collect()
     }
@@ -66,10 +63,14 @@ impl<'a> VisualModel<'a> {
         landmark: &Landmark,
         track: &Track,
     ) -> f64 {
+        let measured = &track.observations[usize::from(!self.measures_in_anchor())..];
+        self.sum_of_costs(measured.iter().map(|seen| observation_residual_px(view, anchor, landmark, seen)))
+    }
+
+    /// Sum of the robust costs of residuals in pixels.
+    fn sum_of_costs(&self, residuals_px: impl Iterator<Item = Option<Vector2<f64>>>) -> f64 {
         let mut sum = LossSum::new(self.loss, self.sigma_px);
-        for observation in &track.observations[usize::from(!self.measures_in_anchor())..] {
-            sum.add(observation_residual_px(view, anchor, landmark, observation));
-        }
+        residuals_px.for_each(|residual| sum.add(residual));
         sum.get()
     }
 
@@ -170,6 +171,10 @@ impl<'a> Anchor<'a> {
 
     /// Weight of a track as a whole at the current estimate.
     pub(crate) fn weight(&self, model: &VisualModel<'_>, landmark: &Landmark, track: &Track) -> RobustWeight {
+        if model.track_loss == RobustLoss::None {
+            // No residuals are needed.
+            return RobustWeight::OfTrack(1.0);
+        }
         let sum = model.observation_costs(self.current, &self.to_current, landmark, track);
         RobustWeight::OfTrack(model.track_cost_and_weight(sum, track.observations.len()).1)
     }

@@ -3,6 +3,7 @@
 use super::fixture;
 use crate::estimator::config::{EstimatorOptions, VisualLoss};
 use crate::estimator::{Estimator, Phase, StepReport};
+use crate::geometry::{vertical_angle, wrap_angle};
 use crate::gimbal::Parameterization;
 use crate::optimization::RobustLoss;
 use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
@@ -40,11 +41,10 @@ fn reports(flight: &SyntheticFlight, loss: VisualLoss) -> Vec<StepReport> {
 fn heading_drift_rad(flight: &SyntheticFlight, reports: &[StepReport]) -> f64 {
     let heading = |report: &StepReport| {
         let truth = flight.frames[report.frame_index].true_world_from_imu.rotation;
-        let error = report.newest().unwrap().world_from_imu.rotation * truth.inverse();
-        2.0 * error.k.atan2(error.w)
+        vertical_angle(&(report.newest().unwrap().world_from_imu.rotation * truth.inverse()))
     };
     let first = reports.iter().find(|report| report.phase == Phase::Tracking).unwrap();
-    crate::geometry::wrap_angle(heading(reports.last().unwrap()) - heading(first))
+    wrap_angle(heading(reports.last().unwrap()) - heading(first))
 }
 
 /// Mean robust weight of the observations of features that slide, and of the others, over the last second.

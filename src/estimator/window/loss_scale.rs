@@ -29,8 +29,8 @@ impl Default for LossScale {
 impl LossScale {
     /// Losses of the camera's observations and of whole tracks.
     ///
-    /// That of the tracks is as narrow on clean images and fades out as the scale opens: with wrong clocks, lenses or
-    /// shutters every track has residuals that do not average out.
+    /// The loss of the tracks is nearly as narrow on clean images and fades out as the scale opens: with wrong clocks,
+    /// lenses or shutters every track has residuals that do not average out.
     pub(crate) fn losses(self, option: VisualLoss) -> [RobustLoss; 2] {
         match option {
             VisualLoss::Adaptive => [RobustLoss::Cauchy(self.0), self.track_loss()],

@@ -9,7 +9,7 @@ use super::antenna_record::PositionTruth;
 use super::run::{NEXT_ID, RunRecord};
 use super::trajectory_accuracy::MAX_POSITION_AGE_NS;
 use super::trajectory_evaluation::{TrajectoryEvaluation, evaluate_trajectory};
-use crate::geometry::{RigidTransform, seconds_from_ns};
+use crate::geometry::{RigidTransform, seconds_from_ns, vertical_angle};
 use crate::sensors::PoseTrack;
 use crate::session::accuracy::path_length_m;
 
@@ -110,7 +110,7 @@ pub(super) fn yaw_and_position(onto: &RigidTransform, from: &RigidTransform) -> 
         return RigidTransform::default();
     }
     let rotation = onto.rotation * from.rotation.inverse();
-    let yaw = 2.0 * rotation.k.atan2(rotation.w);
+    let yaw = vertical_angle(&rotation);
     let rotation = UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), yaw);
     RigidTransform::new(rotation, onto.translation_m - rotation * from.translation_m)
 }
