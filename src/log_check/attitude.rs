@@ -148,6 +148,12 @@ impl AttitudeSurvey {
         Some(source.enu_from_flu(&rotation, *kind == MessageKind::Px4VehicleAttitude))
     }
 
+    /// Attitudes `enu_from_flu` of the vehicle, ordered by stamp.
+    pub(super) fn vehicle_in_enu(&self, source: &AttitudeSource) -> Vec<(i64, UnitQuaternion<f64>)> {
+        let of_px4 = self.vehicle_topic.as_ref().is_some_and(|(_, kind, _)| *kind == MessageKind::Px4VehicleAttitude);
+        self.vehicle.iter().map(|(stamp_ns, rotation)| (*stamp_ns, source.enu_from_flu(rotation, of_px4))).collect()
+    }
+
     /// True if there are attitudes of the vehicle.
     pub(super) fn has_vehicle(&self) -> bool {
         !self.vehicle.is_empty()

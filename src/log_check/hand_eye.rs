@@ -1,16 +1,14 @@
 //! Cameras against the gyroscope: rotations measured from the images alone, compared with those that gyroscope,
 //! encoders and rig predict. A constant rotation between them is an error of the extrinsics, a delay is a time offset.
 
-use nalgebra::{Matrix3, Vector3};
-
 use super::clock_alignment::{ClockAlignment, RotationReference, align_clocks, best_rotation};
+use super::correction::Correction;
 use super::imu_facts::ImuFacts;
-use super::readout::between_first_rows;
+use super::rotation_data::{JOINED_S, RotationData, joined};
 use super::rotation_fit::{FitPriors, RotationFit, RotationPair};
 use super::statistics::median;
 use super::survey::Survey;
-use super::{Area, Findings, ImageRotation, Severity};
-use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
+use super::{Area, Findings, ImageRotation, Severity, hypotheses};
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
@@ -25,28 +23,31 @@ const MAX_OFFSET_S: f64 = 0.15;
 const OFFSET_TOLERANCE_S: f64 = 0.004;
 /// Number of standard deviations from which a time offset, an orientation error or a scale is reported.
 const SIGNIFICANT_SIGMAS: f64 = 3.0;
+/// The same for a time offset of a camera on joints: its derivatives are those of noisy images, and its standard deviation
+/// is too small by up to a third.
+const SIGNIFICANT_SIGMAS_ON_JOINTS: f64 = 5.0;
 /// Largest standard deviation of a time offset that counts as observable.
 const MAX_OFFSET_SIGMA_S: f64 = 0.01;
 /// Tolerated error of a camera's orientation.
 const ROTATION_TOLERANCE_RAD: f64 = 0.07;
 /// A larger error means a wrong matrix, not an inaccurate one.
 const WRONG_ROTATION_RAD: f64 = 0.35;
+/// Prior standard deviation of the ratio of image rotations to predicted ones, and the smallest difference of it from 1
+/// that is traced to its cause: gyroscopes and focal lengths are known to a percent.
+const SCALE_SIGMA: f64 = 0.3;
+const SCALE_TOLERANCE: f64 = 0.02;
 /// Smallest ratio of the second singular value to the first; below it all rotations are about one axis, and the rotation
 /// about that axis is unobservable.
 const MIN_SPREAD: f64 = 0.02;
 
-/// Measured rotations of one camera and the data that predict them.
+/// Comparison of a camera's rotations with those predicted by gyroscope and chain.
 struct HandEye<'a> {
-    survey: &'a Survey,
-    rig: &'a Rig,
-    imu_facts: &'a ImuFacts,
+    data: RotationData<'a>,
     camera: &'a CameraRig,
-    rotations: Vec<ImageRotation>,
-    /// Covariance of each rotation, in rad².
-    covariances_rad2: Vec<Matrix3<f64>>,
 }
 
-/// Checks the orientation and time offset of a camera with a readout by its image rotations, if there are any.
+/// Checks the orientation and time offset of a camera with a readout by its image rotations, if there are any; a misfit
+/// beyond the noise is traced to its cause.
 pub(super) fn check_against_gyroscope(
     survey: &Survey,
     rig: &Rig,
@@ -56,11 +57,10 @@ pub(super) fn check_against_gyroscope(
     readout_s: f64,
     findings: &mut Findings,
 ) {
-    let (rotations, covariances_rad2): (Vec<_>, Vec<_>) =
-        between_first_rows(camera, rotations, readout_s).into_iter().unzip();
-    let Some(chain) = rig.chain_of_camera(&camera.key).filter(|_| rotations.len() >= MIN_ROTATIONS) else { return };
-    let hand_eye = HandEye { survey, rig, imu_facts, camera, rotations, covariances_rad2 };
-    let given = hand_eye.pairs(&chain, 0.0);
+    let data = RotationData::new(survey, rig, imu_facts, camera, rotations, readout_s);
+    let Some(chain) = rig.chain_of_camera(&camera.key).filter(|_| data.measured.len() >= MIN_ROTATIONS) else { return };
+    let hand_eye = HandEye { data, camera };
+    let given = hand_eye.pairs(&chain, 0.0, 0.0);
     let angles_rad: Vec<f64> = given.iter().map(|pair| pair.measured.norm()).collect();
     let rotation_rad = median(&angles_rad);
     if given.len() < MIN_ROTATIONS || rotation_rad < MIN_ROTATION_RAD {
@@ -72,54 +72,38 @@ pub(super) fn check_against_gyroscope(
     let (offset_s, sigma_s) = aligned
         .as_ref()
         .map_or((0.0, MAX_OFFSET_SIGMA_S), |found| (found.offset_s - camera.timeshift_cam_imu_s, found.offset_sigma_s));
-    let pairs = hand_eye.pairs(&chain, offset_s);
+    let pairs = hand_eye.pairs(&chain, offset_s, 0.0);
     let chain_sigma = rig.gimbal.as_ref().map_or(1.0, |gimbal| gimbal.prior.rotation_bound_rad);
-    let priors = FitPriors { time_offset_s: sigma_s, chain: chain_sigma };
+    let priors = FitPriors { time_offset_s: sigma_s, scale: SCALE_SIGMA, chain: chain_sigma };
     let Some(fit) = RotationFit::of(&pairs, &chain, &priors) else { return };
-    hand_eye.report_time_offset(aligned, fit.is_explained(), findings);
-    hand_eye.report_orientation(&fit, &pairs, &chain, offset_s, findings);
+    // Over longer times the rotations of a gimbal exceed the noise of its joint angles.
+    let longer = (!chain.links.is_empty())
+        .then(|| RotationFit::of(&hand_eye.pairs(&chain, offset_s, JOINED_S), &chain, &priors))
+        .flatten();
+    let is_scaled = chain.links.is_empty()
+        && (fit.scale - 1.0).abs() > SCALE_TOLERANCE.max(SIGNIFICANT_SIGMAS * fit.orientation_sigma_rad);
+    let is_explained = fit.is_explained() && longer.is_none_or(|longer| longer.is_explained()) && !is_scaled;
+    hand_eye.report_time_offset(aligned, is_explained, findings);
+    hand_eye.report_orientation(&fit, &pairs, &chain, offset_s, is_explained, findings);
 }
 
 impl HandEye<'_> {
-    /// Rotations with the data that predict them at an additional time offset.
-    fn pairs(&self, chain: &ClassicalChain, offset_s: f64) -> Vec<RotationPair> {
-        let shift = ns_from_seconds(self.camera.timeshift_cam_imu_s + offset_s);
-        let angles_at = |stamp_ns: i64| {
-            if chain.links.is_empty() { Some(Vec::new()) } else { self.survey.fitted_angles_at(stamp_ns) }
-        };
-        let gyroscope_variance = self.rig.imu.noise.gyroscope_noise_density.powi(2);
-        let pair = |(index, rotation): (usize, &ImageRotation)| {
-            let (from_ns, to_ns) = (rotation.from_ns + shift, rotation.to_ns + shift);
-            let [from_s, to_s] = [from_ns, to_ns].map(seconds_from_ns);
-            let interval_s = to_s - from_s;
-            Some(RotationPair {
-                measured: so3::log(&rotation.second_from_first),
-                covariance_rad2: self.covariances_rad2[index] + Matrix3::identity() * (gyroscope_variance * interval_s),
-                of_imu: self.imu_facts.gyroscope.rotation_between(from_s, to_s)?,
-                interval_s,
-                rate_change: self.rate_change(index),
-                angles: [angles_at(from_ns)?, angles_at(to_ns)?],
-            })
-        };
-        self.rotations.iter().enumerate().filter_map(pair).collect()
-    }
-
-    /// Derivative of a measured rotation by a shift of both its times, from the neighbouring rotations, in rad/s; zero
-    /// without neighbours.
-    fn rate_change(&self, index: usize) -> Vector3<f64> {
-        let neighbours = index.checked_sub(1).and_then(|before| self.rotations.get(before..index + 2));
-        let Some([before, at, after]) = neighbours else { return Vector3::zeros() };
-        if before.to_ns != at.from_ns || at.to_ns != after.from_ns {
-            return Vector3::zeros();
+    /// Rotations over at least `length_s` with the data that predict them at an additional time offset.
+    fn pairs(&self, chain: &ClassicalChain, offset_s: f64, length_s: f64) -> Vec<RotationPair> {
+        let correction = Correction { camera_delay_s: offset_s, ..Correction::none(chain.joint_count()) };
+        let predictor = self.data.predictor(chain, &correction);
+        if length_s > 0.0 {
+            return joined(&self.data.measured, length_s).iter().filter_map(|it| predictor.pair(it)).collect();
         }
-        let [before_s, after_s] = [before, after].map(|pair| 0.5 * seconds_from_ns(pair.from_ns + pair.to_ns));
-        (so3::log(&after.second_from_first) - so3::log(&before.second_from_first)) / (after_s - before_s)
+        self.data.measured.iter().filter_map(|it| predictor.pair(it)).collect()
     }
 
     /// Alignment of the camera's clock, or the reason that its time offset is unobservable.
     fn aligned(&self, chain: &ClassicalChain) -> Result<ClockAlignment, String> {
-        let reference = RotationReference::from_chain(&self.imu_facts.gyroscope, &self.survey.joint_samples, chain);
-        let found = align_clocks(&self.rotations, &reference, self.camera.timeshift_cam_imu_s, MAX_OFFSET_S)
+        let data = &self.data;
+        let reference = RotationReference::from_chain(&data.imu_facts.gyroscope, &data.survey.joint_samples, chain);
+        let rotations: Vec<ImageRotation> = data.measured.iter().map(|it| it.rotation.clone()).collect();
+        let found = align_clocks(&rotations, &reference, self.camera.timeshift_cam_imu_s, MAX_OFFSET_S)
             .map_err(|error| error.to_string())?;
         if found.offset_sigma_s < MAX_OFFSET_SIGMA_S {
             return Ok(found);
@@ -147,7 +131,11 @@ impl HandEye<'_> {
             found.rotation_deg,
             found.residual_deg
         );
-        if offset_s.abs() < OFFSET_TOLERANCE_S.max(SIGNIFICANT_SIGMAS * sigma_s) {
+        let sigmas = match self.camera.mount {
+            CameraMount::Gimbal => SIGNIFICANT_SIGMAS_ON_JOINTS,
+            CameraMount::Static { .. } => SIGNIFICANT_SIGMAS,
+        };
+        if offset_s.abs() < OFFSET_TOLERANCE_S.max(sigmas * sigma_s) {
             findings.good(Area::Time, format!("{key} and the gyroscope are synchronized"), evidence);
         } else if is_explained {
             let title = format!("time offset of {key} to the gyroscope: {:+.0} ms", offset_s * 1e3);
@@ -165,6 +153,7 @@ impl HandEye<'_> {
         pairs: &[RotationPair],
         chain: &ClassicalChain,
         offset_s: f64,
+        is_explained: bool,
         findings: &mut Findings,
     ) {
         let key = &self.camera.key;
@@ -193,17 +182,15 @@ impl HandEye<'_> {
                 "write the inverse of {field}: T_a_b maps points from b to a (Kalibr: T_cam_imu from the IMU to the camera)"
             );
             findings.add(Severity::Error, Area::Extrinsics, title, evidence, remedy);
-        } else if !fit.is_explained() {
-            let title =
-                format!("unexplained: the rotations of {key} differ from the prediction by more than their noise");
+        } else if !is_explained {
             let remedy = if self.camera.mount == CameraMount::Gimbal {
-                "no orientation and no time offset of the camera explains it: check signs, order and units of the joints, \
-                 the intrinsics and the axes of the IMU"
+                "no orientation, no time offset and none of the causes that are tried explains it: check joints, intrinsics \
+                 and the axes of the IMU"
             } else {
-                "no orientation and no time offset of the camera explains it: check the intrinsics, also whether they \
-                 change, and axes, signs and units of the IMU"
+                "no orientation, no time offset and none of the causes that are tried explains it: check intrinsics, shutter, \
+                 and axes, signs and units of the IMU"
             };
-            findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedy);
+            hypotheses::explain(&self.data, chain).report(key, &evidence, remedy, findings);
         } else if fit.spread < MIN_SPREAD {
             let title = format!("{key} rotated about one axis only: its orientation cannot be checked");
             findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");
@@ -239,7 +226,7 @@ impl HandEye<'_> {
             vec![(format!("{key}.T_cam_imu"), base)]
         };
         let misfits = candidates.into_iter().filter_map(|(field, chain)| {
-            let pairs = self.pairs(&chain, offset_s);
+            let pairs = self.pairs(&chain, offset_s, 0.0);
             let vectors: Vec<_> = pairs.iter().map(|pair| (pair.predicted(&chain), pair.measured)).collect();
             let (error, _) = best_rotation(&vectors)?;
             let misfit = misfit_rad(&pairs, &chain);

@@ -3,7 +3,7 @@ use nalgebra::Vector3;
 use super::imu_noise::check_noise;
 use super::spectrum::Spectrum;
 use super::stationary::{Stamped, StationaryTest, WINDOW_NS, Window};
-use super::statistics::median;
+use super::statistics::{median, percentile};
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
 use crate::geometry::{mean, seconds_from_ns};
@@ -11,6 +11,8 @@ use crate::sensors::{AngularRates, ImuSample, Rig};
 
 /// Norm of the specific force below which it counts as unset in the message.
 const NO_FORCE_M_PER_S2: f64 = 0.01;
+/// Ratio of the specific force to gravity below which it does not contain gravity.
+const NO_GRAVITY_RATIO: f64 = 0.3;
 /// Standard deviations of the smoothed angular rate (rad/s) and specific force (m/s²) of a stationary or hovering
 /// vehicle, white noise removed.
 const STATIONARY_MOTION: [f64; 2] = [0.012, 0.06];
@@ -137,11 +139,26 @@ fn check_gravity(
             &remedy,
         );
     }
-    let (severity, title, remedy) = if (measured - 1.0).abs() < 0.2 {
+    let is_steady = stationary.is_empty() && has_steady_norm(samples);
+    let range_factor =
+        [0.25, 0.5, 2.0, 4.0].into_iter().find(|factor| (measured / (factor * gravity) - 1.0).abs() < 0.03);
+    let (severity, title, remedy) = if (measured - 1.0).abs() < 0.2 && (is_steady || !stationary.is_empty()) {
         (
             Severity::Error,
             "accelerations are in g, not m/s²",
             "multiply by 9.80665 in the driver: sensor_msgs/Imu requires m/s²",
+        )
+    } else if measured < NO_GRAVITY_RATIO * gravity {
+        (
+            Severity::Error,
+            "gravity is already removed from the accelerations",
+            "record the raw accelerometer (specific force): linear accelerations of a filter cannot be used",
+        )
+    } else if range_factor.is_some() && (is_steady || !stationary.is_empty()) {
+        (
+            Severity::Error,
+            "the accelerometer measures a multiple of gravity",
+            "the range setting of the sensor and the scale of its driver differ: correct one of them",
         )
     } else if difference.abs() > 2.0 {
         (
@@ -159,6 +176,12 @@ fn check_gravity(
         return findings.good(Area::Imu, "the accelerometer measures gravity", evidence);
     };
     findings.add(severity, Area::Imu, title, evidence, remedy);
+}
+
+/// True if the norm of the specific force varies little around its median: it contains gravity, in whatever unit.
+fn has_steady_norm(samples: &[ImuSample]) -> bool {
+    let norms: Vec<f64> = samples.iter().map(|sample| sample.specific_force_m_per_s2.norm()).collect();
+    percentile(&norms, 0.9) - percentile(&norms, 0.1) < 0.5 * median(&norms)
 }
 
 fn check_gyroscope_bias(stationary: &[Window], findings: &mut Findings) -> Option<Vector3<f64>> {

@@ -3,22 +3,31 @@
 
 mod attitude;
 mod clock_alignment;
+mod correction;
 mod gradient_sums;
+mod ground_truth;
 mod hand_eye;
+mod hypotheses;
 mod image_measure;
 mod images;
+mod imu_axes;
 mod imu_facts;
 mod imu_noise;
 mod imu_topics;
+mod joint_coverage;
 mod joints;
 mod noise;
+mod permutations;
 mod pictures;
 mod readout;
 mod render;
 mod report;
 mod rig_sanity;
 mod rotation;
+mod rotation_data;
 mod rotation_fit;
+#[cfg(test)]
+mod rotation_tests;
 mod source_fit;
 mod spacing;
 mod spectrum;
@@ -29,6 +38,7 @@ mod survey;
 #[cfg(test)]
 mod tests;
 mod timing;
+mod vehicle_attitude;
 
 pub use self::clock_alignment::{
     AlignmentError, AlignmentReference, ClockAlignment, RotationReference, align_camera, align_clocks,
@@ -74,9 +84,13 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
     timing::check_timing(&survey, rig.ok(), &mut findings);
     imu_topics::check_orientation_topics(log, rig, &mut findings);
     let imu_facts = imu_facts::check_imu(&survey, rig.ok(), &mut findings);
+    imu_axes::check_imu_axes(&imu_facts, &mut findings);
     let mut proposed_masks = Vec::new();
     if let Ok(rig) = rig {
         joints::check_joints(&survey, rig, &mut findings);
+        joint_coverage::check_joint_coverage(&survey, rig, &mut findings);
+        vehicle_attitude::check_vehicle_attitude(&survey, rig, &imu_facts, &mut findings);
+        ground_truth::check_ground_truth(log, rig, &imu_facts, &mut findings);
         pictures::check_pictures(log, &survey, rig, &mut findings);
         images::check_images(&survey, rig, &imu_facts, &mut findings);
         if let Some(fitted) = source_fit::check_source(&survey, rig, &imu_facts, image_rotations, &mut findings) {

@@ -16,8 +16,10 @@ const NOISE_TOLERANCE: f64 = 2.0;
 /// of ten image rotations may be wrong, because points near a plane have two solutions.
 const COMPARED_QUANTILE: f64 = 0.7;
 const COMPARED_SIGMAS: f64 = 0.5244;
-/// Prior standard deviation of the ratio of image rotations to predicted ones.
-const SCALE_SIGMA: f64 = 0.3;
+/// Degrees of freedom of the t distribution of a misfit: a wrong image rotation counts less than its square.
+const TAIL_DEGREES: f64 = 3.0;
+/// Steps between 1 and [`NOISE_TOLERANCE`] at which the noise level of a likelihood is tried.
+const NOISE_STEPS: u32 = 10;
 /// Standard deviation of a column that is fixed.
 const SMALLEST_SIGMA: f64 = 1e-6;
 const ITERATIONS: usize = 10;
@@ -50,8 +52,24 @@ pub(super) struct RotationPair {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FitPriors {
     pub(super) time_offset_s: f64,
+    /// Of the ratio of image rotations to predicted ones, for a rigid camera.
+    pub(super) scale: f64,
     /// Of every parameter of a chain with joints.
     pub(super) chain: f64,
+}
+
+/// Predicted rotation vector in the frame of the measured one, in radians, and the covariance of their difference in rad².
+pub(super) type Prediction = (Vector3<f64>, Matrix3<f64>);
+
+/// Parameter of a correction: derivatives of the rotations of every pair, in rad per unit.
+#[derive(Clone, Debug)]
+pub(super) struct ExtraColumn {
+    /// Of the predicted rotations, before the fitted orientation is applied.
+    pub(super) of_predicted: Vec<Vector3<f64>>,
+    /// Of the measured rotations.
+    pub(super) of_measured: Vec<Vector3<f64>>,
+    /// Prior standard deviation of the parameter.
+    pub(super) sigma: f64,
 }
 
 /// Orientation of a camera by its image rotations, and the misfit that remains with its prediction.
@@ -71,6 +89,10 @@ pub(super) struct RotationFit {
     /// χ² over its degrees of freedom, from the quantile of the pairs' χ².
     pub(super) mean_square: f64,
     pub(super) degrees_of_freedom: usize,
+    /// Values of the extra columns.
+    pub(super) extra: Vec<f64>,
+    /// −2 times the logarithm of the likelihood of the misfits by a t distribution, without constants.
+    pub(super) deviance: f64,
 }
 
 impl RotationPair {
@@ -108,7 +130,8 @@ impl RotationPair {
             let by_chain = turned * from.by_parameters.fixed_rows::<3>(0) - to.by_parameters.fixed_rows::<3>(0);
             jacobian.columns_mut(CHAIN, chain.dof()).copy_from(&by_chain);
         }
-        Row { measured: self.measured, predicted, jacobian, covariance: self.covariance_rad2 + noise }
+        let by_measured = Matrix3xX::zeros(columns);
+        Row { measured: self.measured, predicted, jacobian, by_measured, covariance: self.covariance_rad2 + noise }
     }
 }
 
@@ -117,24 +140,75 @@ struct Row {
     measured: Vector3<f64>,
     predicted: Vector3<f64>,
     jacobian: Matrix3xX<f64>,
+    /// Derivative of the measured rotation by the columns: zero but for extra ones.
+    by_measured: Matrix3xX<f64>,
     covariance: Matrix3<f64>,
+}
+
+impl Row {
+    /// The row with further columns, those of this pair.
+    fn with_columns(mut self, pair: usize, extra: &[ExtraColumn]) -> Self {
+        let first = self.jacobian.ncols();
+        self.jacobian = self.jacobian.resize_horizontally(first + extra.len(), 0.0);
+        self.by_measured = self.by_measured.resize_horizontally(first + extra.len(), 0.0);
+        for (number, column) in extra.iter().enumerate() {
+            self.jacobian.set_column(first + number, &column.of_predicted[pair]);
+            self.by_measured.set_column(first + number, &column.of_measured[pair]);
+        }
+        self
+    }
 }
 
 impl RotationFit {
     /// Fits the camera's orientation and, within their priors, the gyroscope's bias, the time offset, the scale of a rigid
     /// camera and the chain's parameters; `None` if the rotations do not constrain the orientation.
     pub(super) fn of(pairs: &[RotationPair], chain: &ClassicalChain, priors: &FitPriors) -> Option<Self> {
+        Self::with_columns(pairs, chain, priors, &[])
+    }
+
+    /// [`Self::of`] with further columns.
+    pub(super) fn with_columns(
+        pairs: &[RotationPair],
+        chain: &ClassicalChain,
+        priors: &FitPriors,
+        extra: &[ExtraColumn],
+    ) -> Option<Self> {
+        let (fit, covariance, spread) = Self::fitted(pairs, chain, priors, extra)?;
+        Some(fit.finish(&covariance, spread))
+    }
+
+    /// [`Self::of`] with the prediction of each pair by the fit in the frame of the measured rotations, and its covariance
+    /// in rad².
+    pub(super) fn with_predictions(
+        pairs: &[RotationPair],
+        chain: &ClassicalChain,
+        priors: &FitPriors,
+    ) -> Option<(Self, Vec<Prediction>)> {
+        let (fit, covariance, spread) = Self::fitted(pairs, chain, priors, &[])?;
+        let predictions = fit.rows.iter().map(|row| (row.measured - fit.residual(row), fit.covariance(row))).collect();
+        Some((fit.finish(&covariance, spread), predictions))
+    }
+
+    /// Fit with the covariance of its columns, and the ratio of the second singular value of the rotations to the first.
+    fn fitted(
+        pairs: &[RotationPair],
+        chain: &ClassicalChain,
+        priors: &FitPriors,
+        extra: &[ExtraColumn],
+    ) -> Option<(Fit, DMatrix<f64>, f64)> {
         let is_rigid = chain.links.is_empty();
         let parameterized = Chain::from_classical(chain, Parameterization::Classical);
-        let rows: Vec<Row> = pairs.iter().map(|pair| pair.row(&parameterized, is_rigid)).collect();
+        let row =
+            |(number, pair): (usize, &RotationPair)| pair.row(&parameterized, is_rigid).with_columns(number, extra);
+        let rows: Vec<Row> = pairs.iter().enumerate().map(row).collect();
         let vectors: Vec<_> = rows.iter().map(|row| (row.predicted, row.measured)).collect();
         let (start, spread) = best_rotation(&vectors)?;
-        let mut fit = Fit::new(rows, start, priors, is_rigid);
+        let mut fit = Fit::new(rows, start, priors, is_rigid, extra);
         let mut covariance = None;
         for _ in 0..ITERATIONS {
             covariance = Some(fit.update()?);
         }
-        Some(fit.finish(&covariance?, spread))
+        Some((fit, covariance?, spread))
     }
 
     /// Largest χ² over its degrees of freedom that noise explains.
@@ -153,13 +227,21 @@ struct Fit {
     /// Values of all columns but those of the orientation, which are zero.
     values: DVector<f64>,
     prior_information: DVector<f64>,
+    /// Number of extra columns, which are the last ones.
+    extra: usize,
 }
 
 impl Fit {
-    fn new(rows: Vec<Row>, orientation: UnitQuaternion<f64>, priors: &FitPriors, is_rigid: bool) -> Self {
-        let columns = rows.first().map_or(CHAIN, |row| row.jacobian.ncols());
+    fn new(
+        rows: Vec<Row>,
+        orientation: UnitQuaternion<f64>,
+        priors: &FitPriors,
+        is_rigid: bool,
+        extra: &[ExtraColumn],
+    ) -> Self {
+        let columns = rows.first().map_or(CHAIN + extra.len(), |row| row.jacobian.ncols());
         // Noise of a prediction by encoders would shorten the estimated scale.
-        let scale = if is_rigid { SCALE_SIGMA } else { SMALLEST_SIGMA };
+        let scale = if is_rigid { priors.scale } else { SMALLEST_SIGMA };
         let mut sigmas = DVector::repeat(columns, priors.chain);
         sigmas.rows_mut(0, CHAIN).copy_from_slice(&[
             1.0,
@@ -171,12 +253,17 @@ impl Fit {
             priors.time_offset_s,
             scale,
         ]);
+        for (number, column) in extra.iter().enumerate() {
+            sigmas[columns - extra.len() + number] = column.sigma;
+        }
         let prior_information = sigmas.map(|sigma: f64| sigma.max(SMALLEST_SIGMA).powi(-2));
-        Self { rows, orientation, values: DVector::zeros(columns), prior_information }
+        let values = DVector::zeros(columns);
+        Self { rows, orientation, values, prior_information, extra: extra.len() }
     }
 
     fn residual(&self, row: &Row) -> Vector3<f64> {
-        row.measured - self.orientation * (row.predicted + &row.jacobian * &self.values)
+        let measured = row.measured + &row.by_measured * &self.values;
+        measured - self.orientation * (row.predicted + &row.jacobian * &self.values)
     }
 
     /// Covariance of a residual, in the frame of the measured rotation.
@@ -200,7 +287,7 @@ impl Fit {
         for row in &self.rows {
             // Decreases with the square of the misfit beyond what noise explains.
             let weight = (largest / self.square(row)?.max(f64::MIN_POSITIVE)).min(1.0);
-            let jacobian = rotation * &row.jacobian;
+            let jacobian = rotation * &row.jacobian - &row.by_measured;
             let weighted = self.covariance(row).cholesky()?.inverse() * weight;
             information += jacobian.transpose() * weighted * &jacobian;
             gradient += jacobian.transpose() * (weighted * self.residual(row));
@@ -220,6 +307,7 @@ impl Fit {
         let norms: Vec<f64> = self.rows.iter().map(|row| self.residual(row).norm()).collect();
         let predicted: Vec<f64> =
             self.rows.iter().map(|row| MEDIAN_NORM_RATIO * row.covariance.trace().sqrt()).collect();
+        let extra = self.values.rows(self.values.len() - self.extra, self.extra).iter().copied().collect();
         let of_orientation = covariance.fixed_view::<3, 3>(0, 0).into_owned().symmetric_eigenvalues();
         RotationFit {
             orientation: self.orientation,
@@ -230,8 +318,23 @@ impl Fit {
             predicted_misfit_rad: median(&predicted),
             mean_square,
             degrees_of_freedom,
+            extra,
+            deviance: deviance(&squares),
         }
     }
+}
+
+/// −2 times the logarithm of the likelihood of squared misfits (three degrees of freedom each) by a t distribution, at the
+/// best noise level up to [`NOISE_TOLERANCE`] times the stated one.
+pub(super) fn deviance(squares: &[f64]) -> f64 {
+    let at = |step: u32| {
+        let level = 1.0 + (NOISE_TOLERANCE - 1.0) * f64::from(step) / f64::from(NOISE_STEPS);
+        let variance = level * level;
+        let of_pair =
+            |square: &f64| 3.0 * variance.ln() + (TAIL_DEGREES + 3.0) * (square / (TAIL_DEGREES * variance)).ln_1p();
+        squares.iter().map(of_pair).sum::<f64>()
+    };
+    (0..=NOISE_STEPS).map(at).fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
@@ -272,7 +375,7 @@ mod tests {
 
     fn fit(variance_rad2: f64) -> RotationFit {
         let (pairs, chain) = pairs(variance_rad2);
-        RotationFit::of(&pairs, &chain, &FitPriors { time_offset_s: 1e-3, chain: 1e-6 }).unwrap()
+        RotationFit::of(&pairs, &chain, &FitPriors { time_offset_s: 1e-3, scale: 0.3, chain: 1e-6 }).unwrap()
     }
 
     #[test]

@@ -7,12 +7,11 @@ use tempfile::TempDir;
 use super::{CheckReport, ImageRotation, Severity, check};
 use crate::camera::CameraModel;
 use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes};
-use crate::frontend::readout::{RowObservation, RowTrack};
-use crate::geometry::{SplitMix64, so3};
+use crate::geometry::SplitMix64;
 use crate::sensors::{GrayImage, Rig};
 
 const EPOCH_NS: i64 = 1_700_000_000_000_000_000;
-const MS: i64 = 1_000_000;
+pub(super) const MS: i64 = 1_000_000;
 const DURATION_MS: i64 = 12_000;
 const RATE_HZ: f64 = 200.0;
 const GYRO_DENSITY: f64 = 3.4e-4;
@@ -27,7 +26,7 @@ impl Noise {
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn normal(&mut self) -> f64 {
+    pub(super) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 
@@ -37,23 +36,23 @@ impl Noise {
 }
 
 /// Angular velocity: stationary for 2.5 s, then rotation about all axes.
-fn rate_at(time_s: f64) -> Vector3<f64> {
+pub(super) fn rate_at(time_s: f64) -> Vector3<f64> {
     let t = (time_s - 2.5).max(0.0);
     let grow = (t / 2.0).min(1.0);
     Vector3::new((1.1 * t).sin(), 0.8 * (1.7 * t).sin(), 0.9 * (0.7 * t).sin()) * (0.5 * grow)
 }
 
 /// Changes to a faultless flight.
-struct Flight {
-    imu: fn(i64, &mut MessageTimes, &mut Vector3<f64>, &mut Vector3<f64>) -> bool,
-    image: fn(i64, &mut MessageTimes, &mut GrayImage) -> bool,
-    joint: fn(i64, &mut f64),
-    rig: String,
-    camera_info: [f64; 4],
+pub(super) struct Flight {
+    pub(super) imu: fn(i64, &mut MessageTimes, &mut Vector3<f64>, &mut Vector3<f64>) -> bool,
+    pub(super) image: fn(i64, &mut MessageTimes, &mut GrayImage) -> bool,
+    pub(super) joint: fn(i64, &mut f64),
+    pub(super) rig: String,
+    pub(super) camera_info: [f64; 4],
     /// True if the accelerometer has a separate topic, at 62.5 Hz.
-    accelerometer_apart: bool,
+    pub(super) accelerometer_apart: bool,
     /// Topic with orientations only.
-    orientations: Option<&'static str>,
+    pub(super) orientations: Option<&'static str>,
 }
 
 impl Default for Flight {
@@ -70,7 +69,7 @@ impl Default for Flight {
     }
 }
 
-fn rig_text() -> String {
+pub(super) fn rig_text() -> String {
     // The camera looks along the IMU's x axis, the IMU's z axis is up.
     format!(
         "rig_version: 1
@@ -160,7 +159,7 @@ impl Flight {
         FlightLog::open(&path).unwrap()
     }
 
-    fn check(&self, rotations: &[ImageRotation]) -> CheckReport {
+    pub(super) fn check(&self, rotations: &[ImageRotation]) -> CheckReport {
         let folder = TempDir::new().unwrap();
         let log = self.write(folder.path());
         let rig = Rig::from_yaml(&self.rig, Path::new("test.rig.yaml"));
@@ -169,7 +168,7 @@ impl Flight {
 }
 
 /// Checks that exactly one finding of this severity contains all these words.
-fn expect(flight: &Flight, severity: Severity, words: &[&str]) {
+pub(super) fn expect(flight: &Flight, severity: Severity, words: &[&str]) {
     let report = flight.check(&[]);
     let found: Vec<_> = report
         .findings
@@ -556,79 +555,4 @@ fn a_log_without_a_rig_is_checked() {
     expect(&flight, Severity::Error, &["no usable rig", "gravity: missing"]);
     let report = flight.check(&[]);
     assert!(report.findings.iter().any(|finding| finding.title == "the accelerometer measures gravity"), "{report}");
-}
-
-/// Features of two images between which the camera rotates, with noise of 0.1 px.
-fn tracks(second_from_first: &UnitQuaternion<f64>, noise: &mut Noise) -> Vec<RowTrack> {
-    let observation = |bearing: Vector3<f64>| RowObservation { bearing: bearing.normalize(), row: 0.5 };
-    (0..60)
-        .map(|_| {
-            let point = 0.3 * noise.vector();
-            let bearing = Vector3::new(point.x, point.y, 1.0).normalize();
-            let now = second_from_first * bearing + 0.1 / 80.0 * noise.vector();
-            RowTrack { previous: observation(bearing), now: observation(now) }
-        })
-        .collect()
-}
-
-/// Image rotations of the true motion, with the images `late_s` late and the camera rotated by `error`; `mirrored` as
-/// against an IMU whose axes form a left-handed frame.
-fn rotations(late_s: f64, error: UnitQuaternion<f64>, mirrored: bool) -> Vec<ImageRotation> {
-    let mut noise = Noise(23);
-    let camera_from_imu = {
-        let columns = nalgebra::Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
-        error * UnitQuaternion::from_matrix(&columns)
-    };
-    let imu_rotation = |from_s: f64| {
-        let mut rotation = UnitQuaternion::identity();
-        for step in 0..500 {
-            rotation *= so3::exp(&(rate_at(from_s + (f64::from(step) + 0.5) * 1e-4) * 1e-4));
-        }
-        rotation
-    };
-    (60..200)
-        .map(|number| {
-            let from_s = f64::from(number) * 0.05;
-            let mut vector = so3::log(&imu_rotation(from_s + late_s).inverse());
-            if mirrored {
-                vector.swap_rows(0, 1);
-            }
-            let second_from_first = so3::exp(&(camera_from_imu * vector));
-            let from_ns = i64::from(number) * 50 * MS;
-            ImageRotation {
-                camera_key: "cam0".into(),
-                from_ns,
-                to_ns: from_ns + 50 * MS,
-                second_from_first,
-                tracks: tracks(&second_from_first, &mut noise),
-            }
-        })
-        .collect()
-}
-
-#[test]
-fn image_rotations_detect_time_offsets_and_wrong_extrinsics() {
-    let check = |late_s: f64, error: Vector3<f64>, words: &[&str], severity: Severity| {
-        let report = Flight::default().check(&rotations(late_s, so3::exp(&error), false));
-        let found = report.findings.iter().filter(|finding| {
-            finding.severity == severity
-                && words.iter().all(|word| format!("{} {}", finding.title, finding.remedy).contains(word))
-        });
-        assert_eq!(found.count(), 1, "{words:?} in\n{report}");
-    };
-    check(0.0, Vector3::zeros(), &["the orientation of cam0 agrees with the rig"], Severity::Good);
-    check(0.0, Vector3::zeros(), &["cam0 and the gyroscope are synchronized"], Severity::Good);
-    check(0.03, Vector3::zeros(), &["time offset of cam0 to the gyroscope: +30 ms", "to +0.030"], Severity::Warning);
-    check(0.03, Vector3::zeros(), &["the orientation of cam0 agrees with the rig"], Severity::Good);
-    check(0.0, Vector3::new(0.0, 0.2, 0.0), &["the orientation of cam0 differs from the rig"], Severity::Warning);
-    check(-0.05, Vector3::new(1.5, 0.0, 0.0), &["the orientation of cam0 differs from the rig"], Severity::Error);
-}
-
-#[test]
-fn a_left_handed_imu_frame_does_not_agree() {
-    let report = Flight::default().check(&rotations(0.0, UnitQuaternion::identity(), true));
-    let unexplained =
-        report.findings.iter().filter(|finding| finding.title.starts_with("unexplained: the rotations of cam0"));
-    assert_eq!(unexplained.filter(|finding| finding.severity == Severity::Warning).count(), 1, "{report}");
-    assert!(!report.findings.iter().any(|finding| finding.title.contains("orientation of cam0")), "{report}");
 }

@@ -49,6 +49,13 @@ impl AngularRates {
         Self { bridges_gaps: true, ..self }
     }
 
+    /// The rates times a factor.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let samples = self.times_s.iter().zip(&self.rates_rad_per_s).map(|(time_s, rate)| (*time_s, rate * factor));
+        Self { bridges_gaps: self.bridges_gaps, ..Self::new(samples) }
+    }
+
     /// Mean rates over `half_s` to each side of each sample, to remove vibration.
     #[must_use]
     pub fn smoothed(&self, half_s: f64) -> Self {

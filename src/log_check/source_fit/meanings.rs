@@ -1,6 +1,7 @@
 //! Alternative interpretations of a gimbal's attitude.
 
 use crate::flight_log::rig::attitude::entries;
+use crate::log_check::permutations::permutations;
 use crate::sensors::{AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, BodyAxes, GimbalRig, NamedAxes};
 use crate::text::Named as _;
 
@@ -65,19 +66,6 @@ pub(super) fn changes(source: &AttitudeSource, has_vehicle: bool) -> Vec<Vec<Att
     }
     for sources in &mut all {
         sources.retain(|other| other != source);
-    }
-    all
-}
-
-/// All permutations of the numbers below `count`, which is at most three.
-fn permutations(count: usize) -> Vec<Vec<usize>> {
-    let mut all: Vec<Vec<usize>> = vec![Vec::new()];
-    for _ in 0..count {
-        let longer = |before: &Vec<usize>| {
-            let rest = (0..count).filter(|next| !before.contains(next)).collect::<Vec<_>>();
-            rest.into_iter().map(|next| before.iter().copied().chain([next]).collect()).collect::<Vec<Vec<usize>>>()
-        };
-        all = all.iter().flat_map(longer).collect();
     }
     all
 }

@@ -14,8 +14,9 @@ use crate::geometry::seconds_from_ns;
 use crate::log_check::ImageRotation;
 use crate::sensors::{CameraRig, GrayImage, Rig};
 
-/// Number of sections of the log, evenly spaced.
-const SECTIONS: usize = 3;
+/// Smallest and largest number of sections of the log, evenly spaced: a fault that begins in the flight is found in logs
+/// up to their length together, and a section per processor core is read at a time.
+const SECTIONS: [usize; 2] = [2, 10];
 /// Length of a section in seconds.
 const SECTION_S: f64 = 5.0;
 /// Standard deviation of a tracked feature's position, per coordinate, in pixels.
@@ -39,13 +40,14 @@ pub fn image_rotations(log: &Arc<FlightLog>, rig: &Rig) -> Vec<ImageRotation> {
     }
     let rig = &rig;
     let duration_s = seconds_from_ns(log.duration_ns());
-    let length_s = SECTION_S.min(duration_s / SECTIONS as f64);
+    let sections = ((duration_s / SECTION_S).ceil() as usize).clamp(SECTIONS[0], SECTIONS[1]);
+    let length_s = SECTION_S.min(duration_s / sections as f64);
     let section = |number: usize| {
-        let middle_s = duration_s * (number as f64 + 0.5) / SECTIONS as f64;
+        let middle_s = duration_s * (number as f64 + 0.5) / sections as f64;
         middle_s - 0.5 * length_s
     };
     let jobs: Vec<(&CameraRig, f64)> =
-        rig.cameras.iter().flat_map(|camera| (0..SECTIONS).map(move |number| (camera, section(number)))).collect();
+        rig.cameras.iter().flat_map(|camera| (0..sections).map(move |number| (camera, section(number)))).collect();
     let found: Vec<Vec<ImageRotation>> =
         jobs.par_iter().map(|(camera, start_s)| rotations_of(log, rig, camera, *start_s, length_s)).collect();
     found.into_iter().flatten().collect()

@@ -1,0 +1,100 @@
+//! The hypotheses that are tried for a camera.
+
+use std::f64::consts::PI;
+
+use super::super::correction::{Correction, Parameter};
+use super::super::permutations::permutations;
+use super::super::rotation_data::RotationData;
+use super::fit::{Hypothesis, Kind, middle_s};
+use crate::gimbal::ClassicalChain;
+use crate::sensors::CameraMount;
+
+/// Ratios from which a factor is fitted.
+const SCALES: [f64; 4] = [1.0, 2.0, 0.5, PI / 180.0];
+const FOCAL_RATIOS: [f64; 3] = [0.65, 1.0, 1.5];
+/// Delays of joint angles from which the delay is fitted, in seconds.
+const DELAYS_S: [f64; 5] = [-0.1, 0.0, 0.1, 0.2, 0.35];
+/// Offsets of a joint from which its offset is fitted, in radians.
+const OFFSETS_RAD: [f64; 5] = [0.0, 0.6, -0.6, PI / 2.0, -PI / 2.0];
+/// Number of times at which a change is tried.
+const TIMES: usize = 12;
+
+/// Hypotheses for a camera on a chain; a chain without joints is that of a rigid camera.
+pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec<Hypothesis> {
+    let joints = chain.joint_count();
+    let none = Correction::none(joints);
+    let changed = |change: &dyn Fn(&mut Correction)| {
+        let mut correction = none.clone();
+        change(&mut correction);
+        correction
+    };
+    let whole = |kind: Kind, starts: Vec<Correction>, parameters: &[Parameter]| Hypothesis {
+        kind,
+        starts,
+        parameters: parameters.to_vec(),
+        since_s: Vec::new(),
+    };
+    let lenses = || FOCAL_RATIOS.iter().map(|ratio| changed(&|it| it.lens.focal = *ratio)).collect::<Vec<_>>();
+    let [centre_x, centre_y] = [0, 1].map(Parameter::Centre);
+    let mut all = vec![
+        whole(Kind::LeftHanded, vec![changed(&|it| it.gyroscope_scale = -1.0)], &[]),
+        whole(
+            Kind::GyroscopeScale,
+            SCALES.iter().map(|scale| changed(&|it| it.gyroscope_scale = *scale)).collect(),
+            &[Parameter::GyroscopeScale],
+        ),
+        whole(Kind::Focal, lenses(), &[Parameter::Focal]),
+        whole(Kind::Centre, vec![none.clone()], &[centre_x, centre_y]),
+        whole(Kind::Intrinsics, lenses(), &[Parameter::Focal, centre_x, centre_y]),
+        whole(Kind::CameraDrift, vec![none.clone()], &[Parameter::CameraDelay, Parameter::CameraDrift]),
+        Hypothesis {
+            kind: Kind::Mount,
+            starts: vec![none.clone()],
+            parameters: [0, 1, 2].map(Parameter::Mount).to_vec(),
+            since_s: times_s(data),
+        },
+    ];
+    if data.camera.mount != CameraMount::Gimbal || joints == 0 {
+        return all;
+    }
+    all.push(whole(
+        Kind::JointDelay,
+        DELAYS_S.iter().map(|delay_s| changed(&|it| it.joint_delay_s = *delay_s)).collect(),
+        &[Parameter::JointDelay],
+    ));
+    // Joint angles that are computed from an attitude have neither sign nor order of their own.
+    if data.rig.gimbal.as_ref().is_some_and(|gimbal| gimbal.attitude.is_some()) {
+        return all;
+    }
+    for signs in 1..1_usize << joints {
+        let reversed: Vec<usize> = (0..joints).filter(|joint| signs >> joint & 1 == 1).collect();
+        let start = changed(&|it| reversed.iter().for_each(|joint| it.joints[*joint].scale = -1.0));
+        let offsets: Vec<Parameter> = reversed.iter().map(|joint| Parameter::JointOffset(*joint)).collect();
+        all.push(whole(Kind::JointSigns(reversed), vec![start], &offsets));
+    }
+    let orders = permutations(joints).into_iter().skip(1);
+    let swapped =
+        orders.map(|order| changed(&|it| order.iter().enumerate().for_each(|(at, from)| it.joints[at].source = *from)));
+    all.push(whole(Kind::JointOrder, swapped.collect(), &[]));
+    let in_unit = |scale: f64| changed(&|it| it.joints.iter_mut().for_each(|joint| joint.scale = scale));
+    all.push(whole(Kind::JointUnit, vec![in_unit(PI / 180.0), in_unit(180.0 / PI)], &[]));
+    for joint in 0..joints {
+        let offsets =
+            || OFFSETS_RAD.iter().map(|offset| changed(&|it| it.joints[joint].offset_rad = *offset)).collect();
+        all.push(whole(Kind::JointScale(joint), vec![none.clone()], &[Parameter::JointScale(joint)]));
+        all.push(whole(Kind::JointOffset(joint), offsets(), &[Parameter::JointOffset(joint)]));
+        all.push(Hypothesis {
+            kind: Kind::JointOffset(joint),
+            starts: vec![none.clone()],
+            parameters: vec![Parameter::JointOffset(joint)],
+            since_s: times_s(data),
+        });
+    }
+    all
+}
+
+/// Times within the rotations at which a change is tried, in seconds.
+fn times_s(data: &RotationData<'_>) -> Vec<f64> {
+    let middles: Vec<f64> = data.measured.iter().map(middle_s).collect();
+    (1..=TIMES).filter_map(|number| middles.get(number * middles.len() / (TIMES + 1)).copied()).collect()
+}

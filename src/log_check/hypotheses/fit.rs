@@ -1,0 +1,284 @@
+//! Fit of a hypothesis to the rotations of a camera.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::super::correction::{Correction, LensChange, Parameter};
+use super::super::rotation_data::{JOINED_S, MeasuredRotation, RotationData, joined};
+use super::super::rotation_fit::{ExtraColumn, FitPriors, Prediction, RotationFit, RotationPair};
+use crate::geometry::seconds_from_ns;
+use crate::gimbal::ClassicalChain;
+
+/// Prior standard deviation of the time offset of camera and gyroscope beyond the rig's.
+const OFFSET_SIGMA_S: f64 = 0.02;
+/// Prior standard deviation of the ratio of image rotations to predicted ones: a change of it is a hypothesis.
+const SCALE_SIGMA: f64 = 0.005;
+const ITERATIONS: usize = 6;
+/// Change of all parameters, in units of their steps, at which the iterations end.
+const CONVERGED: f64 = 0.05;
+/// Number of starts from which a hypothesis is fitted until it converges: the best after one iteration.
+const FOLLOWED: usize = 2;
+/// Minimum number of rotations.
+const MIN_ROTATIONS: usize = 12;
+
+/// Possible cause of a misfit.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::log_check) struct Hypothesis {
+    pub(super) kind: Kind,
+    /// Corrections from which the parameters are fitted; the best fit is taken.
+    pub(super) starts: Vec<Correction>,
+    pub(super) parameters: Vec<Parameter>,
+    /// Times in seconds from which on the correction may apply; the best one is taken. Empty: to the whole log.
+    pub(super) since_s: Vec<f64>,
+}
+
+/// Kind of a hypothesis, from which its text is made.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::log_check) enum Kind {
+    LeftHanded,
+    GyroscopeScale,
+    Focal,
+    Centre,
+    /// Focal length and principal point.
+    Intrinsics,
+    CameraDelay,
+    CameraDrift,
+    /// Joints whose readings have the other sign.
+    JointSigns(Vec<usize>),
+    /// Joints are recorded under each other's names.
+    JointOrder,
+    /// Readings of all joints are in another unit.
+    JointUnit,
+    JointScale(usize),
+    JointOffset(usize),
+    JointDelay,
+    /// The mount of the camera moves at a time.
+    Mount,
+    /// The focal length changes: times in seconds from which on a ratio to the rig's holds.
+    FocalPieces(Vec<(f64, f64)>),
+}
+
+/// Fit of a hypothesis.
+#[derive(Clone, Debug)]
+pub(in crate::log_check) struct Fitted {
+    pub(super) kind: Kind,
+    pub(super) correction: Correction,
+    pub(super) since_s: Option<f64>,
+    /// Rotation of the measured rotations against the predicted ones.
+    pub(super) orientation: UnitQuaternion<f64>,
+    pub(super) misfit_rad: f64,
+    pub(super) predicted_misfit_rad: f64,
+    pub(super) mean_square: f64,
+    pub(super) is_explained: bool,
+    /// Deviance plus the logarithm of the number of measurements per parameter.
+    pub(super) criterion: f64,
+}
+
+impl Fitted {
+    /// True if this hypothesis has the other one as a special case: it cannot exclude it by fitting as well.
+    pub(super) fn contains(&self, other: &Self) -> bool {
+        match (&self.kind, &other.kind) {
+            (Kind::FocalPieces(_) | Kind::Intrinsics, Kind::Focal)
+            | (Kind::Intrinsics, Kind::Centre)
+            | (Kind::CameraDrift, Kind::CameraDelay) => true,
+            (mine, others) => mine == others,
+        }
+    }
+}
+
+/// Length over which rotations of consecutive images are joined, in seconds; that of one pair for a rigid camera.
+pub(super) fn length_s(chain: &ClassicalChain) -> f64 {
+    if chain.links.is_empty() { 0.0 } else { JOINED_S }
+}
+
+/// Fits hypotheses to the rotations of one camera.
+pub(super) struct Fitter<'a> {
+    pub(super) data: &'a RotationData<'a>,
+    pub(super) chain: &'a ClassicalChain,
+    priors: FitPriors,
+    /// Rotations as recorded.
+    pub(super) measured: Vec<MeasuredRotation>,
+}
+
+/// Middle of a rotation in seconds since the log began.
+pub(super) fn middle_s(measured: &MeasuredRotation) -> f64 {
+    0.5 * (seconds_from_ns(measured.rotation.from_ns) + seconds_from_ns(measured.rotation.to_ns))
+}
+
+impl<'a> Fitter<'a> {
+    pub(super) fn new(data: &'a RotationData<'a>, chain: &'a ClassicalChain) -> Self {
+        let chain_sigma = data.rig.gimbal.as_ref().map_or(1.0, |gimbal| gimbal.prior.rotation_bound_rad);
+        let priors = FitPriors { time_offset_s: OFFSET_SIGMA_S, scale: SCALE_SIGMA, chain: chain_sigma };
+        let measured = joined(&data.measured, length_s(chain));
+        Self { data, chain, priors, measured }
+    }
+
+    /// Criterion of a fit with a number of parameters.
+    pub(super) fn criterion(&self, deviance: f64, parameters: usize) -> f64 {
+        deviance + parameters as f64 * (3.0 * self.measured.len() as f64).ln()
+    }
+
+    /// Rotations with the lens of a correction.
+    fn measured(&self, correction: &Correction) -> Cow<'_, [MeasuredRotation]> {
+        if correction.lens == LensChange::NONE {
+            return Cow::Borrowed(&self.measured);
+        }
+        Cow::Owned(joined(&self.data.with_lens(&correction.lens), length_s(self.chain)))
+    }
+
+    /// Fit without a correction.
+    pub(super) fn fit_given(&self) -> Option<Fitted> {
+        let correction = Correction::none(self.chain.joint_count());
+        self.converged(&Kind::CameraDelay, &correction, &[], None)
+    }
+
+    /// Best fit of a hypothesis over its starts and times.
+    pub(super) fn best(&self, hypothesis: Hypothesis) -> Option<Fitted> {
+        let Hypothesis { kind, starts, parameters, since_s } = hypothesis;
+        let times: Vec<Option<f64>> =
+            if since_s.is_empty() { vec![None] } else { since_s.iter().copied().map(Some).collect() };
+        let mut tried: Vec<(f64, &Correction, Option<f64>)> = Vec::new();
+        for start in &starts {
+            for since_s in &times {
+                if let Some(fit) = self.linear_fit(start, &parameters, *since_s) {
+                    tried.push((fit.deviance, start, *since_s));
+                }
+            }
+        }
+        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let followed = tried.into_iter().take(FOLLOWED);
+        let fits = followed.filter_map(|(_, start, since_s)| self.converged(&kind, start, &parameters, since_s));
+        fits.min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+    }
+
+    /// Iterates corrections of the data and linear fits until the parameters no longer change.
+    fn converged(
+        &self,
+        kind: &Kind,
+        start: &Correction,
+        parameters: &[Parameter],
+        since_s: Option<f64>,
+    ) -> Option<Fitted> {
+        let mut correction = start.clone();
+        let mut best: Option<(RotationFit, Correction)> = None;
+        for _ in 0..ITERATIONS {
+            let fit = self.linear_fit(&correction, parameters, since_s)?;
+            let values = fit.extra.clone();
+            // With the parameters fitted, the misfit is that of the linear model; it is repeated with corrected data.
+            if best.as_ref().is_none_or(|(before, _)| fit.deviance < before.deviance) {
+                let mut applied = correction.clone();
+                apply(parameters, &values, &mut applied);
+                best = Some((fit, applied));
+            }
+            apply(parameters, &values, &mut correction);
+            let change = parameters.iter().zip(&values).map(|(parameter, value)| value.abs() / parameter.step());
+            if change.fold(0.0, f64::max) < CONVERGED {
+                break;
+            }
+        }
+        let (_, correction) = best?;
+        // What is reported is the misfit of corrected data, not that of a linear model of the correction.
+        let fit = self.linear_fit(&correction, &[], since_s)?;
+        let parameters = parameters.len() + usize::from(since_s.is_some());
+        Some(Fitted {
+            kind: kind.clone(),
+            since_s,
+            orientation: fit.orientation,
+            misfit_rad: fit.misfit_rad,
+            predicted_misfit_rad: fit.predicted_misfit_rad,
+            mean_square: fit.mean_square,
+            is_explained: fit.is_explained(),
+            criterion: self.criterion(fit.deviance, parameters),
+            correction,
+        })
+    }
+
+    fn linear_fit(
+        &self,
+        correction: &Correction,
+        parameters: &[Parameter],
+        since_s: Option<f64>,
+    ) -> Option<RotationFit> {
+        let none = Correction::none(self.chain.joint_count());
+        let at = self.pairs(&none, correction, since_s);
+        if at.len() < MIN_ROTATIONS {
+            return None;
+        }
+        let column = |parameter: &Parameter| {
+            let step = parameter.step();
+            let mut changed = correction.clone();
+            parameter.add(&mut changed, step);
+            let stepped = self.pairs(&none, &changed, since_s);
+            // A rotation that the changed data no longer cover does not constrain the parameter.
+            let derivative = |of: &dyn Fn(&RotationPair) -> Vector3<f64>| {
+                let quotient = |(key, pair): (&i64, &RotationPair)| {
+                    stepped.get(key).map_or_else(Vector3::zeros, |stepped| (of(stepped) - of(pair)) / step)
+                };
+                at.iter().map(quotient).collect::<Vec<_>>()
+            };
+            ExtraColumn {
+                of_predicted: derivative(&|pair| pair.predicted(self.chain)),
+                of_measured: derivative(&|pair| pair.measured),
+                sigma: parameter.bounds().0,
+            }
+        };
+        let columns: Vec<ExtraColumn> = parameters.iter().map(column).collect();
+        let pairs: Vec<RotationPair> = at.values().cloned().collect();
+        RotationFit::with_columns(&pairs, self.chain, &self.priors, &columns)
+    }
+
+    /// Pairs by the stamp of their first image, with one correction before and another one after a time.
+    fn pairs(&self, before: &Correction, after: &Correction, since_s: Option<f64>) -> BTreeMap<i64, RotationPair> {
+        let mut pairs = BTreeMap::new();
+        let mut extend = |correction: &Correction, from_s: f64, to_s: f64| {
+            let predictor = self.data.predictor(self.chain, correction);
+            let measured = self.measured(correction);
+            let within = measured.iter().filter(|it| (from_s..to_s).contains(&middle_s(it)));
+            pairs.extend(within.filter_map(|it| Some((it.rotation.from_ns, predictor.pair(it)?))));
+        };
+        let split_s = since_s.unwrap_or(f64::NEG_INFINITY);
+        extend(after, split_s, f64::INFINITY);
+        if since_s.is_some() {
+            extend(before, f64::NEG_INFINITY, split_s);
+        }
+        pairs
+    }
+
+    /// Fit of rotations as measured with another lens each, and their predictions in the frame of the measured rotations
+    /// with covariances in rad², by the stamp of the first image.
+    pub(super) fn fit_measured(&self, measured: &[MeasuredRotation]) -> Option<(RotationFit, Predictions)> {
+        let none = Correction::none(self.chain.joint_count());
+        let predictor = self.data.predictor(self.chain, &none);
+        let (keys, pairs): (Vec<i64>, Vec<RotationPair>) =
+            measured.iter().filter_map(|it| Some((it.rotation.from_ns, predictor.pair(it)?))).unzip();
+        if pairs.len() < MIN_ROTATIONS {
+            return None;
+        }
+        let (fit, predictions) = RotationFit::with_predictions(&pairs, self.chain, &self.priors)?;
+        Some((fit, keys.into_iter().zip(predictions).collect()))
+    }
+
+    /// Predictions by the rig, as [`Self::fit_measured`] returns them.
+    pub(super) fn predictions_by_rig(&self, measured: &[MeasuredRotation]) -> Predictions {
+        let none = Correction::none(self.chain.joint_count());
+        let predictor = self.data.predictor(self.chain, &none);
+        let predicted = |it: &MeasuredRotation| {
+            let pair = predictor.pair(it)?;
+            Some((it.rotation.from_ns, (pair.predicted(self.chain), pair.covariance_rad2)))
+        };
+        measured.iter().filter_map(predicted).collect()
+    }
+}
+
+/// Predicted rotation vectors and their covariances by the stamp of the first image.
+pub(super) type Predictions = BTreeMap<i64, Prediction>;
+
+/// Adds fitted values to a correction, none by more than its largest change.
+fn apply(parameters: &[Parameter], values: &[f64], correction: &mut Correction) {
+    for (parameter, value) in parameters.iter().zip(values) {
+        let largest = parameter.bounds().1;
+        parameter.add(correction, value.clamp(-largest, largest));
+    }
+}

@@ -1,0 +1,151 @@
+//! A focal length that changes in the flight: pieces of constant focal length by dynamic programming over a grid.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::super::ImageRotation;
+use super::super::correction::{Correction, LensChange};
+use super::super::rotation_data::{MeasuredRotation, joined};
+use super::fit::{Fitted, Fitter, Kind, Predictions, length_s, middle_s};
+use crate::geometry::so3;
+
+/// Range of the ratios of a focal length to the rig's, and the number of steps whose rotations are measured.
+const RATIOS: [f64; 2] = [0.4, 2.6];
+const MEASURED_STEPS: usize = 24;
+/// Interpolated states per measured step.
+const STATES_PER_STEP: usize = 4;
+/// Squared noise level and degrees of freedom of the t distribution of a misfit, see `rotation_fit::deviance`.
+const NOISE_LEVEL_SQUARED: f64 = 2.25;
+const TAIL_DEGREES: f64 = 3.0;
+/// Cost of a change of the focal length beyond that of its two parameters.
+const CHANGE_COST: f64 = 10.0;
+/// Smallest relative change that counts.
+const MIN_CHANGE: f64 = 0.04;
+/// Shortest piece that is reported, in seconds.
+const MIN_PIECE_S: f64 = 0.4;
+const ROUNDS: usize = 3;
+
+/// Fit with a focal length that changes, `None` if it does not.
+pub(super) fn focal_pieces(fitter: &Fitter<'_>) -> Option<Fitted> {
+    let lenses: Vec<LensChange> = (0..=MEASURED_STEPS)
+        .map(|step| LensChange { focal: ratio(step * STATES_PER_STEP), ..LensChange::NONE })
+        .collect();
+    let grid = Grid::new(fitter, &lenses);
+    let mut predictions = fitter.predictions_by_rig(&fitter.measured);
+    let mut chosen = Vec::new();
+    let mut fit = None;
+    for _ in 0..ROUNDS {
+        chosen = grid.cheapest(&predictions, 2.0 * fitter.criterion(0.0, 1) + CHANGE_COST);
+        let (found, next) = fitter.fit_measured(&grid.rotations(&chosen))?;
+        (fit, predictions) = (Some(found), next);
+    }
+    let (fit, pieces) = (fit?, grid.pieces(&chosen));
+    let (low, high) =
+        pieces.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), (_, ratio)| (low.min(*ratio), high.max(*ratio)));
+    if pieces.len() < 2 || high < low * (1.0 + MIN_CHANGE) {
+        return None;
+    }
+    let changes = chosen.windows(2).filter(|pair| pair[0].1 != pair[1].1).count();
+    Some(Fitted {
+        kind: Kind::FocalPieces(pieces),
+        correction: Correction::none(fitter.chain.joint_count()),
+        since_s: None,
+        orientation: fit.orientation,
+        misfit_rad: fit.misfit_rad,
+        predicted_misfit_rad: fit.predicted_misfit_rad,
+        mean_square: fit.mean_square,
+        is_explained: fit.is_explained(),
+        criterion: fitter.criterion(fit.deviance, 2 * changes + 1),
+    })
+}
+
+/// Ratio of the focal length of a state to the rig's.
+fn ratio(state: usize) -> f64 {
+    let last = (MEASURED_STEPS * STATES_PER_STEP) as f64;
+    RATIOS[0] * (RATIOS[1] / RATIOS[0]).powf(state as f64 / last)
+}
+
+/// Rotations by the focal length.
+struct Grid {
+    /// Rotation of each step by the stamp of its first image.
+    steps: Vec<BTreeMap<i64, MeasuredRotation>>,
+    /// Rotations that all steps have, in order of time.
+    keys: Vec<i64>,
+}
+
+impl Grid {
+    fn new(fitter: &Fitter<'_>, lenses: &[LensChange]) -> Self {
+        let by_stamp = |measured: Vec<MeasuredRotation>| {
+            let all = joined(&measured, length_s(fitter.chain)).into_iter();
+            all.map(|it| (it.rotation.from_ns, it)).collect::<BTreeMap<_, _>>()
+        };
+        let steps: Vec<_> = fitter.data.with_lenses(lenses).into_iter().map(by_stamp).collect();
+        let in_all = |key: &i64| steps.iter().all(|step| step.contains_key(key));
+        let keys = steps.first().map(|step| step.keys().copied().filter(in_all).collect()).unwrap_or_default();
+        Self { steps, keys }
+    }
+
+    /// Rotation vector in a state, interpolated between two steps.
+    fn vector(&self, key: i64, state: usize) -> Vector3<f64> {
+        let step = (state / STATES_PER_STEP).min(MEASURED_STEPS - 1);
+        let fraction = (state - step * STATES_PER_STEP) as f64 / STATES_PER_STEP as f64;
+        let [from, to] = [step, step + 1].map(|step| so3::log(&self.steps[step][&key].rotation.second_from_first));
+        from.lerp(&to, fraction)
+    }
+
+    /// Rotations in the chosen states.
+    fn rotations(&self, chosen: &[(i64, usize)]) -> Vec<MeasuredRotation> {
+        let rotation = |(key, state): &(i64, usize)| {
+            let near = &self.steps[state / STATES_PER_STEP][key];
+            let second_from_first = so3::exp(&self.vector(*key, *state));
+            MeasuredRotation { rotation: ImageRotation { second_from_first, ..near.rotation.clone() }, ..near.clone() }
+        };
+        chosen.iter().map(rotation).collect()
+    }
+
+    /// Sequence of states with the least sum of misfits and changes (Viterbi's algorithm).
+    fn cheapest(&self, predictions: &Predictions, change_cost: f64) -> Vec<(i64, usize)> {
+        let states = MEASURED_STEPS * STATES_PER_STEP + 1;
+        let keys: Vec<i64> = self.keys.iter().copied().filter(|key| predictions.contains_key(key)).collect();
+        let mut costs: Vec<f64> = vec![0.0; states];
+        let mut sources: Vec<Vec<usize>> = Vec::new();
+        for key in &keys {
+            let (predicted, covariance) = &predictions[key];
+            let information = covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
+            let best = (0..states).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).unwrap_or(0);
+            let changed = costs[best] + change_cost;
+            let from: Vec<usize> =
+                (0..states).map(|state| if costs[state] <= changed { state } else { best }).collect();
+            let next = |state: usize| {
+                let misfit = self.vector(*key, state) - predicted;
+                let square = misfit.dot(&(information * misfit)) / (TAIL_DEGREES * NOISE_LEVEL_SQUARED);
+                costs[state].min(changed) + (TAIL_DEGREES + 3.0) * square.ln_1p()
+            };
+            costs = (0..states).map(next).collect();
+            sources.push(from);
+        }
+        let mut state = (0..states).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).unwrap_or(0);
+        let mut chosen = Vec::new();
+        for (key, from) in keys.iter().zip(&sources).rev() {
+            chosen.push((*key, state));
+            state = from[state];
+        }
+        chosen.reverse();
+        chosen
+    }
+
+    /// Begins in seconds and ratios of the pieces that last long enough.
+    fn pieces(&self, chosen: &[(i64, usize)]) -> Vec<(f64, f64)> {
+        let time_s = |key: i64| middle_s(&self.steps[0][&key]);
+        let mut pieces: Vec<(f64, f64)> = Vec::new();
+        for piece in chosen.chunk_by(|a, b| a.1 == b.1) {
+            let (first, last) = (piece[0], piece[piece.len() - 1]);
+            let near = pieces.last().is_some_and(|(_, before)| (ratio(first.1) / before - 1.0).abs() < MIN_CHANGE);
+            if time_s(last.0) - time_s(first.0) >= MIN_PIECE_S && !near {
+                pieces.push((time_s(first.0), ratio(first.1)));
+            }
+        }
+        pieces
+    }
+}

@@ -1,0 +1,121 @@
+//! Explanations of rotations that neither noise nor a constant orientation and time offset explain.
+//!
+//! A hypothesis is a correction of the measurements with a few parameters, for the whole log or from a time on. Each one
+//! is fitted with the camera's orientation, the gyroscope's bias, the time offset and the chain within its prior, and all
+//! are compared by their likelihood and their number of parameters (BIC). A cause is named if what remains is explained by
+//! noise and no other cause comes near; else those that remain are listed.
+
+mod axes;
+mod candidates;
+mod fit;
+mod focal_pieces;
+mod text;
+
+pub(super) use self::axes::SignedAxes;
+
+use rayon::prelude::*;
+
+use self::candidates::candidates;
+use self::fit::{Fitted, Fitter, length_s};
+use self::focal_pieces::focal_pieces;
+use super::rotation_data::RotationData;
+use super::{Area, Findings, Severity};
+use crate::gimbal::ClassicalChain;
+
+/// Difference of the criterion by which a hypothesis must be better than another to exclude it: odds of e⁻¹⁰.
+const DECISIVE: f64 = 20.0;
+/// Largest number of causes that are listed.
+const LISTED: usize = 3;
+/// A cause must explain at least this ratio of the misfit to be listed.
+const MIN_IMPROVEMENT: f64 = 0.5;
+
+/// Cause of a misfit in words.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Cause {
+    pub(super) severity: Severity,
+    pub(super) area: Area,
+    /// Names the cause with its value and time.
+    pub(super) title: String,
+    pub(super) remedy: String,
+}
+
+/// Result of a comparison of all hypotheses.
+pub(super) enum Explanation {
+    /// One cause explains the misfit, and no other does.
+    Decisive(Cause, String),
+    /// Causes that remain, best first, each with what it leaves; may be empty.
+    Open(Vec<(Cause, String)>),
+}
+
+/// Searches for the cause of a misfit between the rotations of a camera and their prediction by a chain.
+pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain) -> Explanation {
+    let fitter = Fitter::new(data, chain);
+    let Some(given) = fitter.fit_given() else { return Explanation::Open(Vec::new()) };
+    let mut fitted: Vec<Fitted> =
+        candidates(data, chain).into_par_iter().filter_map(|hypothesis| fitter.best(hypothesis)).collect();
+    fitted.extend(focal_pieces(&fitter));
+    fitted.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let compared = match length_s(chain) {
+        0.0 => "rotations from image to image".to_owned(),
+        length_s => format!("rotations over {length_s:.1} s"),
+    };
+    let evidence = |found: &Fitted| {
+        format!(
+            "{compared} then differ by {:.3}°, {:.3}° without; noise predicts {:.3}° (χ²/dof {:.2}, {:.2} without)",
+            found.misfit_rad.to_degrees(),
+            given.misfit_rad.to_degrees(),
+            found.predicted_misfit_rad.to_degrees(),
+            found.mean_square,
+            given.mean_square
+        )
+    };
+    let describe = |found: &Fitted| (text::cause(data, found), evidence(found));
+    let Some(best) = fitted.first() else { return Explanation::Open(Vec::new()) };
+    let rival = fitted.iter().skip(1).find(|other| !other.contains(best));
+    let is_alone = rival.is_none_or(|rival| rival.criterion > best.criterion + DECISIVE);
+    if best.is_explained && is_alone && best.criterion + DECISIVE < given.criterion {
+        let (cause, evidence) = describe(best);
+        return Explanation::Decisive(cause, evidence);
+    }
+    let mut open: Vec<(Cause, String)> = Vec::new();
+    for found in &fitted {
+        let remains = found.criterion < best.criterion + DECISIVE || (best.is_explained && found.is_explained);
+        let improves = found.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
+            || found.mean_square < MIN_IMPROVEMENT * given.mean_square;
+        let (cause, evidence) = describe(found);
+        if remains && improves && open.len() < LISTED && open.iter().all(|(listed, _)| listed.title != cause.title) {
+            open.push((cause, evidence));
+        }
+    }
+    Explanation::Open(open)
+}
+
+impl Explanation {
+    /// Adds the finding; `evidence` has the numbers of the misfit as recorded.
+    pub(super) fn report(self, key: &str, evidence: &str, remedy: &str, findings: &mut Findings) {
+        match self {
+            Self::Decisive(cause, of_cause) => {
+                let evidence = format!("{of_cause}; as recorded: {evidence}");
+                findings.add(cause.severity, cause.area, cause.title, evidence, cause.remedy);
+            }
+            Self::Open(causes) => {
+                let title =
+                    format!("unexplained: the rotations of {key} differ from the prediction by more than their noise");
+                if causes.is_empty() {
+                    return findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedy);
+                }
+                let listed: Vec<String> =
+                    causes.iter().map(|(cause, evidence)| format!("{} ({evidence})", cause.title)).collect();
+                let remedies: Vec<&str> = causes.iter().map(|(cause, _)| cause.remedy.as_str()).collect();
+                let title = match causes.as_slice() {
+                    [(only, _)] => {
+                        format!("the rotations of {key} differ from the prediction; most likely {}", only.title)
+                    }
+                    _ => format!("the rotations of {key} differ from the prediction; one of {} causes", causes.len()),
+                };
+                let evidence = format!("{}; as recorded: {evidence}", listed.join("; or "));
+                findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedies.join("; or "));
+            }
+        }
+    }
+}
