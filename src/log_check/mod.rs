@@ -39,6 +39,7 @@ mod survey;
 mod tests;
 mod timing;
 mod vehicle_attitude;
+mod verdict;
 
 pub use self::clock_alignment::{
     AlignmentError, AlignmentReference, ClockAlignment, RotationReference, align_camera, align_clocks,
@@ -47,6 +48,8 @@ pub use self::clock_alignment::{
 pub use self::noise::{
     AllanPoint, AllanReport, AxisNoise, GivenNoise, NoiseTerm, NoiseTerms, SensorNoise, measure_noise,
 };
+
+pub use self::verdict::{Usability, Verdict};
 
 pub use self::report::{Area, CheckReport, Finding, ImageRotation, ProposedMask, Severity, TopicReport};
 

@@ -30,11 +30,12 @@ impl Area {
     }
 }
 
-/// Text report: a table of topics, then the findings, most severe first.
+/// Text report: the verdict, a table of topics, then all findings, most severe first.
 impl Display for CheckReport {
     fn fmt(&self, out: &mut Formatter<'_>) -> Result {
         let rig = self.rig.as_deref().map_or_else(|| "no rig".to_owned(), |name| format!("rig {name}"));
         writeln!(out, "{}: {:.3} s, {rig}", self.log, self.duration_s)?;
+        write!(out, "{}", self.verdict())?;
         writeln!(out)?;
         let header = ["topic", "type", "role", "messages", "Hz", "first, s", "last, s", "delay, ms"].map(str::to_owned);
         let mut rows = vec![header];

@@ -1,7 +1,8 @@
 //! Findings of a check and the report that holds them.
 
 use nalgebra::UnitQuaternion;
-use serde::Serialize;
+use serde::ser::SerializeStruct as _;
+use serde::{Serialize, Serializer};
 
 use crate::frontend::readout::RowTrack;
 use crate::sensors::ImageMask;
@@ -51,6 +52,9 @@ pub struct Finding {
     pub evidence: String,
     /// Instruction; empty if nothing needs to be done.
     pub remedy: String,
+    /// True for a value of the rig that is only assumed, without a sign that it is wrong.
+    #[serde(skip)]
+    pub is_assumption: bool,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -85,8 +89,8 @@ pub struct ImageRotation {
     pub tracks: Vec<RowTrack>,
 }
 
-/// Result of [`check`](super::check).
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// Result of [`check`](super::check); as JSON it begins with the verdict.
+#[derive(Clone, Debug, PartialEq)]
 pub struct CheckReport {
     pub log: String,
     /// Name of the rig, `None` without a readable one.
@@ -100,7 +104,6 @@ pub struct CheckReport {
     /// Most severe first, then by area.
     pub findings: Vec<Finding>,
     /// Masks for cameras with the vehicle in view.
-    #[serde(skip)]
     pub proposed_masks: Vec<ProposedMask>,
 }
 
@@ -110,6 +113,20 @@ pub struct ProposedMask {
     pub camera_key: String,
     /// The proposed pixels, without those of the rig's mask.
     pub mask: ImageMask,
+}
+
+impl Serialize for CheckReport {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut fields = serializer.serialize_struct("CheckReport", 7)?;
+        fields.serialize_field("verdict", &self.verdict())?;
+        fields.serialize_field("log", &self.log)?;
+        fields.serialize_field("rig", &self.rig)?;
+        fields.serialize_field("epoch_ns", &self.epoch_ns)?;
+        fields.serialize_field("duration_s", &self.duration_s)?;
+        fields.serialize_field("topics", &self.topics)?;
+        fields.serialize_field("findings", &self.findings)?;
+        fields.end()
+    }
 }
 
 impl CheckReport {
@@ -135,7 +152,13 @@ impl Findings {
         remedy: impl Into<String>,
     ) {
         let (title, evidence, remedy) = (title.into(), evidence.into(), remedy.into());
-        self.list.push(Finding { severity, area, title, evidence, remedy });
+        self.list.push(Finding { severity, area, title, evidence, remedy, is_assumption: false });
+    }
+
+    /// Adds a warning about a value that is only assumed.
+    pub(super) fn assumption(&mut self, area: Area, title: String, evidence: String, remedy: String) {
+        let severity = Severity::Warning;
+        self.list.push(Finding { severity, area, title, evidence, remedy, is_assumption: true });
     }
 
     pub(super) fn good(&mut self, area: Area, title: impl Into<String>, evidence: impl Into<String>) {

@@ -24,6 +24,7 @@ impl CheckReport {
             title: "keys of the rig that are not used".to_owned(),
             evidence: keys.join(", "),
             remedy: String::new(),
+            is_assumption: false,
         };
         self.findings.insert(place.unwrap_or(self.findings.len()), note);
     }
@@ -52,7 +53,7 @@ fn check_assumed(rig: &Rig, findings: &mut Findings) {
     for AssumedField { field, reason } in &rig.assumed {
         let (area, how) = how_to_measure(field);
         let remedy = format!("{how}; then remove assumed.{field} from the rig");
-        findings.add(Severity::Warning, area, format!("{field} is only assumed"), reason.clone(), remedy);
+        findings.assumption(area, format!("{field} is only assumed"), reason.clone(), remedy);
     }
 }
 

@@ -336,11 +336,15 @@ pub(super) fn log_statement(check: Option<&CheckReport>, reader_warnings: &[Stri
             format!("{} about the log and the rig.", capitalized(&counts))
         }
     };
-    let line = |finding: &&crate::log_check::Finding| {
+    let line = |finding: &crate::log_check::Finding| {
         let remedy = if finding.remedy.is_empty() { String::new() } else { format!(" Remedy: {}", finding.remedy) };
         format!("{}: {}.{remedy}", capitalized(&finding.title), finding.evidence)
     };
-    let details = errors.iter().chain(&warnings).map(line).chain(reader_warnings.iter().cloned()).collect();
+    // What matters most comes first.
+    let first = check.map(|check| check.verdict().first).unwrap_or_default();
+    let (named, others): (Vec<_>, Vec<_>) = errors.iter().chain(&warnings).copied().partition(|it| first.contains(it));
+    let named = first.iter().filter(|it| named.contains(it));
+    let details = named.chain(others).map(line).chain(reader_warnings.iter().cloned()).collect();
     statement("Log and rig", mark, text, details)
 }
 
