@@ -11,7 +11,6 @@ use crate::sensors::CameraMount;
 
 /// Ratios from which a factor is fitted.
 const SCALES: [f64; 4] = [1.0, 2.0, 0.5, PI / 180.0];
-const FOCAL_RATIOS: [f64; 3] = [0.65, 1.0, 1.5];
 /// Delays of joint angles from which the delay is fitted, in seconds.
 const DELAYS_S: [f64; 5] = [-0.1, 0.0, 0.1, 0.2, 0.35];
 /// Offsets of a joint from which its offset is fitted, in radians.
@@ -19,7 +18,27 @@ const OFFSETS_RAD: [f64; 5] = [0.0, 0.6, -0.6, PI / 2.0, -PI / 2.0];
 /// Number of times at which a change is tried.
 const TIMES: usize = 12;
 
-/// Hypotheses for a camera on a chain; a chain without joints is that of a rigid camera.
+/// Hypotheses about intrinsics that do not change, from an approximate ratio of the focal length to the rig's.
+pub(super) fn intrinsics(joints: usize, focal: f64) -> Vec<Hypothesis> {
+    let none = Correction::none(joints);
+    let mut scaled = none.clone();
+    scaled.lens.focal = focal;
+    let [centre_x, centre_y] = [0, 1].map(Parameter::Centre);
+    let hypothesis = |kind: Kind, start: &Correction, parameters: &[Parameter]| Hypothesis {
+        kind,
+        starts: vec![start.clone()],
+        parameters: parameters.to_vec(),
+        since_s: Vec::new(),
+    };
+    vec![
+        hypothesis(Kind::Focal, &scaled, &[Parameter::Focal]),
+        hypothesis(Kind::Centre, &none, &[centre_x, centre_y]),
+        hypothesis(Kind::Intrinsics, &scaled, &[Parameter::Focal, centre_x, centre_y]),
+    ]
+}
+
+/// Hypotheses for a camera on a chain, but for those about its intrinsics; a chain without joints is that of a rigid
+/// camera.
 pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec<Hypothesis> {
     let joints = chain.joint_count();
     let none = Correction::none(joints);
@@ -34,8 +53,6 @@ pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec
         parameters: parameters.to_vec(),
         since_s: Vec::new(),
     };
-    let lenses = || FOCAL_RATIOS.iter().map(|ratio| changed(&|it| it.lens.focal = *ratio)).collect::<Vec<_>>();
-    let [centre_x, centre_y] = [0, 1].map(Parameter::Centre);
     let mut all = vec![
         whole(Kind::LeftHanded, vec![changed(&|it| it.gyroscope_scale = -1.0)], &[]),
         whole(
@@ -43,9 +60,6 @@ pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec
             SCALES.iter().map(|scale| changed(&|it| it.gyroscope_scale = *scale)).collect(),
             &[Parameter::GyroscopeScale],
         ),
-        whole(Kind::Focal, lenses(), &[Parameter::Focal]),
-        whole(Kind::Centre, vec![none.clone()], &[centre_x, centre_y]),
-        whole(Kind::Intrinsics, lenses(), &[Parameter::Focal, centre_x, centre_y]),
         whole(Kind::CameraDrift, vec![none.clone()], &[Parameter::CameraDelay, Parameter::CameraDrift]),
         Hypothesis {
             kind: Kind::Mount,

@@ -15,9 +15,9 @@ use crate::gimbal::ClassicalChain;
 const OFFSET_SIGMA_S: f64 = 0.02;
 /// Prior standard deviation of the ratio of image rotations to predicted ones: a change of it is a hypothesis.
 const SCALE_SIGMA: f64 = 0.005;
-const ITERATIONS: usize = 6;
+const ITERATIONS: usize = 8;
 /// Change of all parameters, in units of their steps, at which the iterations end.
-const CONVERGED: f64 = 0.05;
+const CONVERGED: f64 = 0.2;
 /// Number of starts from which a hypothesis is fitted until it converges: the best after one iteration.
 const FOLLOWED: usize = 2;
 /// Minimum number of rotations.
@@ -162,23 +162,17 @@ impl<'a> Fitter<'a> {
         since_s: Option<f64>,
     ) -> Option<Fitted> {
         let mut correction = start.clone();
-        let mut best: Option<(RotationFit, Correction)> = None;
         for _ in 0..ITERATIONS {
-            let fit = self.linear_fit(&correction, parameters, since_s)?;
-            let values = fit.extra.clone();
-            // With the parameters fitted, the misfit is that of the linear model; it is repeated with corrected data.
-            if best.as_ref().is_none_or(|(before, _)| fit.deviance < before.deviance) {
-                let mut applied = correction.clone();
-                apply(parameters, &values, &mut applied);
-                best = Some((fit, applied));
+            if parameters.is_empty() {
+                break;
             }
+            let values = self.linear_fit(&correction, parameters, since_s)?.extra;
             apply(parameters, &values, &mut correction);
             let change = parameters.iter().zip(&values).map(|(parameter, value)| value.abs() / parameter.step());
             if change.fold(0.0, f64::max) < CONVERGED {
                 break;
             }
         }
-        let (_, correction) = best?;
         // What is reported is the misfit of corrected data, not that of a linear model of the correction.
         let fit = self.linear_fit(&correction, &[], since_s)?;
         let parameters = parameters.len() + usize::from(since_s.is_some());

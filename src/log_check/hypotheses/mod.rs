@@ -8,16 +8,16 @@
 mod axes;
 mod candidates;
 mod fit;
-mod focal_pieces;
+mod focal_grid;
 mod text;
 
 pub(super) use self::axes::SignedAxes;
 
 use rayon::prelude::*;
 
-use self::candidates::candidates;
-use self::fit::{Fitted, Fitter, length_s};
-use self::focal_pieces::focal_pieces;
+use self::candidates::{candidates, intrinsics};
+use self::fit::{Fitted, Fitter, Hypothesis, Kind, length_s};
+use self::focal_grid::FocalGrid;
 use super::rotation_data::RotationData;
 use super::{Area, Findings, Severity};
 use crate::gimbal::ClassicalChain;
@@ -51,9 +51,17 @@ pub(super) enum Explanation {
 pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain) -> Explanation {
     let fitter = Fitter::new(data, chain);
     let Some(given) = fitter.fit_given() else { return Explanation::Open(Vec::new()) };
-    let mut fitted: Vec<Fitted> =
-        candidates(data, chain).into_par_iter().filter_map(|hypothesis| fitter.best(hypothesis)).collect();
-    fitted.extend(focal_pieces(&fitter));
+    let fit_all =
+        |all: Vec<Hypothesis>| all.into_par_iter().filter_map(|one| fitter.best(one)).collect::<Vec<Fitted>>();
+    let mut fitted = fit_all(candidates(data, chain));
+    // Other intrinsics need all rotations measured again; only a wrong scale of the gyroscope resembles them.
+    let found =
+        |it: &Fitted| it.is_explained && it.kind != Kind::GyroscopeScale && it.criterion + DECISIVE < given.criterion;
+    if !fitted.iter().any(found) {
+        let grid = FocalGrid::new(&fitter);
+        fitted.extend(fit_all(intrinsics(chain.joint_count(), grid.best_constant(&fitter))));
+        fitted.extend(grid.pieces_fit(&fitter));
+    }
     fitted.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     let compared = match length_s(chain) {
         0.0 => "rotations from image to image".to_owned(),

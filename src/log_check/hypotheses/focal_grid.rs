@@ -1,4 +1,4 @@
-//! A focal length that changes in the flight: pieces of constant focal length by dynamic programming over a grid.
+//! Focal lengths on a grid: the best constant one, and pieces of constant focal length by dynamic programming.
 
 use std::collections::BTreeMap;
 
@@ -12,53 +12,20 @@ use crate::geometry::so3;
 
 /// Range of the ratios of a focal length to the rig's, and the number of steps whose rotations are measured.
 const RATIOS: [f64; 2] = [0.4, 2.6];
-const MEASURED_STEPS: usize = 24;
+const MEASURED_STEPS: usize = 16;
 /// Interpolated states per measured step.
-const STATES_PER_STEP: usize = 4;
+const STATES_PER_STEP: usize = 6;
 /// Squared noise level and degrees of freedom of the t distribution of a misfit, see `rotation_fit::deviance`.
 const NOISE_LEVEL_SQUARED: f64 = 2.25;
 const TAIL_DEGREES: f64 = 3.0;
-/// Cost of a change of the focal length beyond that of its two parameters.
-const CHANGE_COST: f64 = 10.0;
+/// Cost of a change of the focal length beyond that of its two parameters:
+/// measurements that are wrong for a few images must not pay for two changes.
+const CHANGE_COST: f64 = 60.0;
 /// Smallest relative change that counts.
 const MIN_CHANGE: f64 = 0.04;
 /// Shortest piece that is reported, in seconds.
 const MIN_PIECE_S: f64 = 0.4;
 const ROUNDS: usize = 3;
-
-/// Fit with a focal length that changes, `None` if it does not.
-pub(super) fn focal_pieces(fitter: &Fitter<'_>) -> Option<Fitted> {
-    let lenses: Vec<LensChange> = (0..=MEASURED_STEPS)
-        .map(|step| LensChange { focal: ratio(step * STATES_PER_STEP), ..LensChange::NONE })
-        .collect();
-    let grid = Grid::new(fitter, &lenses);
-    let mut predictions = fitter.predictions_by_rig(&fitter.measured);
-    let mut chosen = Vec::new();
-    let mut fit = None;
-    for _ in 0..ROUNDS {
-        chosen = grid.cheapest(&predictions, 2.0 * fitter.criterion(0.0, 1) + CHANGE_COST);
-        let (found, next) = fitter.fit_measured(&grid.rotations(&chosen))?;
-        (fit, predictions) = (Some(found), next);
-    }
-    let (fit, pieces) = (fit?, grid.pieces(&chosen));
-    let (low, high) =
-        pieces.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), (_, ratio)| (low.min(*ratio), high.max(*ratio)));
-    if pieces.len() < 2 || high < low * (1.0 + MIN_CHANGE) {
-        return None;
-    }
-    let changes = chosen.windows(2).filter(|pair| pair[0].1 != pair[1].1).count();
-    Some(Fitted {
-        kind: Kind::FocalPieces(pieces),
-        correction: Correction::none(fitter.chain.joint_count()),
-        since_s: None,
-        orientation: fit.orientation,
-        misfit_rad: fit.misfit_rad,
-        predicted_misfit_rad: fit.predicted_misfit_rad,
-        mean_square: fit.mean_square,
-        is_explained: fit.is_explained(),
-        criterion: fitter.criterion(fit.deviance, 2 * changes + 1),
-    })
-}
 
 /// Ratio of the focal length of a state to the rig's.
 fn ratio(state: usize) -> f64 {
@@ -67,23 +34,62 @@ fn ratio(state: usize) -> f64 {
 }
 
 /// Rotations by the focal length.
-struct Grid {
+pub(super) struct FocalGrid {
     /// Rotation of each step by the stamp of its first image.
     steps: Vec<BTreeMap<i64, MeasuredRotation>>,
     /// Rotations that all steps have, in order of time.
     keys: Vec<i64>,
 }
 
-impl Grid {
-    fn new(fitter: &Fitter<'_>, lenses: &[LensChange]) -> Self {
+impl FocalGrid {
+    pub(super) fn new(fitter: &Fitter<'_>) -> Self {
+        let lens = |step: usize| LensChange { focal: ratio(step * STATES_PER_STEP), ..LensChange::NONE };
+        let lenses: Vec<LensChange> = (0..=MEASURED_STEPS).map(lens).collect();
         let by_stamp = |measured: Vec<MeasuredRotation>| {
             let all = joined(&measured, length_s(fitter.chain)).into_iter();
             all.map(|it| (it.rotation.from_ns, it)).collect::<BTreeMap<_, _>>()
         };
-        let steps: Vec<_> = fitter.data.with_lenses(lenses).into_iter().map(by_stamp).collect();
+        let steps: Vec<_> = fitter.data.with_lenses(&lenses).into_iter().map(by_stamp).collect();
         let in_all = |key: &i64| steps.iter().all(|step| step.contains_key(key));
         let keys = steps.first().map(|step| step.keys().copied().filter(in_all).collect()).unwrap_or_default();
         Self { steps, keys }
+    }
+
+    /// Ratio of the best constant focal length to the rig's, by the rig's prediction.
+    pub(super) fn best_constant(&self, fitter: &Fitter<'_>) -> f64 {
+        let predictions = fitter.predictions_by_rig(&fitter.measured);
+        // A change that costs more than any misfit never occurs.
+        self.cheapest(&predictions, f64::MAX).first().map_or(1.0, |(_, state)| ratio(*state))
+    }
+
+    /// Fit with a focal length that changes, `None` if it does not.
+    pub(super) fn pieces_fit(&self, fitter: &Fitter<'_>) -> Option<Fitted> {
+        let mut predictions = fitter.predictions_by_rig(&fitter.measured);
+        let mut chosen = Vec::new();
+        let mut fit = None;
+        for _ in 0..ROUNDS {
+            chosen = self.cheapest(&predictions, 2.0 * fitter.criterion(0.0, 1) + CHANGE_COST);
+            let (found, next) = fitter.fit_measured(&self.rotations(&chosen))?;
+            (fit, predictions) = (Some(found), next);
+        }
+        let (fit, pieces) = (fit?, self.pieces(&chosen));
+        let ratios = || pieces.iter().map(|(_, ratio)| *ratio);
+        let (low, high) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
+        if pieces.len() < 2 || high < low * (1.0 + MIN_CHANGE) {
+            return None;
+        }
+        let changes = chosen.windows(2).filter(|pair| pair[0].1 != pair[1].1).count();
+        Some(Fitted {
+            kind: Kind::FocalPieces(pieces),
+            correction: Correction::none(fitter.chain.joint_count()),
+            since_s: None,
+            orientation: fit.orientation,
+            misfit_rad: fit.misfit_rad,
+            predicted_misfit_rad: fit.predicted_misfit_rad,
+            mean_square: fit.mean_square,
+            is_explained: fit.is_explained(),
+            criterion: fitter.criterion(fit.deviance, 2 * changes + 1),
+        })
     }
 
     /// Rotation vector in a state, interpolated between two steps.
