@@ -4,8 +4,7 @@ use std::io::Cursor;
 
 use image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader as CodecReader, Limits};
 
-use super::FlightLog;
-use super::bit_depth::BitDepth;
+use super::grey_levels::Narrowing;
 use super::image_problem::{ImageProblem, check_resolution, unreadable};
 use super::limits::{LogLimits, can_hold_image};
 use super::messages::{ImageMessage, MessageKind, read_compressed_image, read_image, read_video_packet};
@@ -18,34 +17,43 @@ const DECODER_BYTES_PER_PIXEL: u64 = 8;
 /// First bytes of a PNG file.
 const PNG: [u8; 4] = [0x89, b'P', b'N', b'G'];
 
-/// Bits in use by the images of a topic, from its first image that can be decoded; 16 without one.
-pub(crate) fn bit_depth_of_topic(log: &FlightLog, topic: &str, kind: MessageKind) -> BitDepth {
-    let limits = log.file().limits();
-    log.find_message(topic, |message| bit_depth_of_message(kind, message, limits)).unwrap_or_default()
+/// Gray values of an image message with more than 8 bits.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum WideValues {
+    /// 16 bits per value.
+    Of(Vec<u16>),
+    /// The image has 8 bits, or is a frame of a video, which states its bits.
+    Narrow,
 }
 
-/// Bits in use by one image message; `None` when it cannot be decoded or is black. Images of 8 bits have the default.
-pub(crate) fn bit_depth_of_message(kind: MessageKind, message: &[u8], limits: &LogLimits) -> Option<BitDepth> {
+/// Gray values of an image message before they are converted to 8 bits; `None` when it cannot be decoded.
+pub(super) fn wide_values(kind: MessageKind, message: &[u8], limits: &LogLimits) -> Option<WideValues> {
     if kind.is_video() {
-        return Some(BitDepth::default());
+        return Some(WideValues::Narrow);
     }
-    let brightest = if kind == MessageKind::Image {
+    if kind == MessageKind::Image {
         let raw = read_image(message).ok()?;
-        match RawEncoding::from_name(raw.encoding) {
-            Some(encoding) if encoding.is_wide() => encoding.brightest(&raw)?,
-            _ => return Some(BitDepth::default()),
+        let encoding = checked_encoding(&raw, limits, None).ok()?;
+        return Some(if encoding.is_wide() { WideValues::Of(encoding.values(&raw)) } else { WideValues::Narrow });
+    }
+    let (_, data) = read_compressed_image(message).ok()?;
+    if !data.starts_with(&PNG) {
+        return Some(WideValues::Narrow);
+    }
+    let image = decode_within(data, ImageFormat::Png, limits, None).ok()?;
+    Some(wide_gray(image).map_or(WideValues::Narrow, WideValues::Of))
+}
+
+/// Gray values of a decoded image with 16 bits per sample, or the image itself.
+fn wide_gray(image: DynamicImage) -> Result<Vec<u16>, DynamicImage> {
+    match image {
+        DynamicImage::ImageLuma16(gray) => Ok(gray.into_raw()),
+        DynamicImage::ImageLumaA16(_) | DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) => {
+            let color = |rgb: &[u16]| luma([rgb[0], rgb[1], rgb[2]]);
+            Ok(image.into_rgb16().into_raw().chunks_exact(3).map(color).collect())
         }
-    } else {
-        let (_, data) = read_compressed_image(message).ok()?;
-        if !data.starts_with(&PNG) {
-            return Some(BitDepth::default());
-        }
-        match decode_within(data, ImageFormat::Png, limits, None).ok()? {
-            DynamicImage::ImageLuma16(gray) => gray.into_raw().into_iter().max()?,
-            _ => return Some(BitDepth::default()),
-        }
-    };
-    BitDepth::of_brightest(brightest)
+        other => Err(other),
+    }
 }
 
 /// Decodes a raw or compressed image message, or a keyframe of a video, into 8-bit gray values. If a resolution is
@@ -55,19 +63,29 @@ pub(crate) fn bit_depth_of_message(kind: MessageKind, message: &[u8], limits: &L
 pub(crate) fn decode_image(
     kind: MessageKind,
     message: &[u8],
-    depth: BitDepth,
+    narrowing: Narrowing,
     limits: &LogLimits,
     expected_px: Option<[usize; 2]>,
 ) -> Result<GrayImage, ImageProblem> {
     if kind == MessageKind::Image {
-        return gray_from_raw(&read_image(message).map_err(unreadable)?, depth, limits, expected_px);
+        return gray_from_raw(&read_image(message).map_err(unreadable)?, narrowing, limits, expected_px);
     }
     if kind.is_video() {
         let packet = read_video_packet(kind, message).map_err(unreadable)?;
         return VideoDecoder::new(packet.codec().map_err(unreadable)?, limits).decode(packet.data, expected_px);
     }
     let (format, data) = read_compressed_image(message).map_err(unreadable)?;
-    gray_from_compressed(format, data, depth, limits, expected_px)
+    gray_from_compressed(format, data, narrowing, limits, expected_px)
+}
+
+/// Width and height of an image message in pixels, by its header if it has one; `None` when it cannot be read.
+pub(super) fn image_size(kind: MessageKind, message: &[u8], limits: &LogLimits) -> Option<[usize; 2]> {
+    if kind == MessageKind::Image {
+        let raw = read_image(message).ok()?;
+        return checked_encoding(&raw, limits, None).ok().map(|_| [raw.width, raw.height]);
+    }
+    let image = decode_image(kind, message, Narrowing::default(), limits, None).ok()?;
+    Some([image.width, image.height])
 }
 
 fn encoding_remedy(encoding: &str) -> &'static str {
@@ -80,10 +98,20 @@ fn encoding_remedy(encoding: &str) -> &'static str {
 
 fn gray_from_raw(
     raw: &ImageMessage<'_>,
-    depth: BitDepth,
+    narrowing: Narrowing,
     limits: &LogLimits,
     expected_px: Option<[usize; 2]>,
 ) -> Result<GrayImage, ImageProblem> {
+    let encoding = checked_encoding(raw, limits, expected_px)?;
+    Ok(GrayImage { width: raw.width, height: raw.height, pixels: encoding.gray(raw, narrowing) })
+}
+
+/// Encoding of a raw image that has all of its pixels.
+fn checked_encoding(
+    raw: &ImageMessage<'_>,
+    limits: &LogLimits,
+    expected_px: Option<[usize; 2]>,
+) -> Result<RawEncoding, ImageProblem> {
     let (width, height) = (raw.width, raw.height);
     check_resolution([width, height], limits, expected_px)?;
     let name = raw.encoding;
@@ -102,7 +130,7 @@ fn gray_from_raw(
             row_bytes * height
         )));
     }
-    Ok(GrayImage { width, height, pixels: encoding.gray(raw, depth) })
+    Ok(encoding)
 }
 
 /// Decodes a compressed image if its number of bytes and the limits allow the resolution in its header.
@@ -144,7 +172,7 @@ pub(crate) fn compressed_format(data: &[u8]) -> Option<&'static str> {
 fn gray_from_compressed(
     format: &str,
     data: &[u8],
-    depth: BitDepth,
+    narrowing: Narrowing,
     limits: &LogLimits,
     expected_px: Option<[usize; 2]>,
 ) -> Result<GrayImage, ImageProblem> {
@@ -154,10 +182,10 @@ fn gray_from_compressed(
     })?;
     let image = decode_within(data, codec, limits, expected_px)?;
     let (width, height) = (image.width() as usize, image.height() as usize);
-    let pixels = match image {
-        DynamicImage::ImageLuma8(gray) => gray.into_raw(),
-        DynamicImage::ImageLuma16(gray) => gray.into_raw().into_iter().map(|value| depth.narrowed(value)).collect(),
-        other => {
+    let pixels = match wide_gray(image) {
+        Ok(values) => values.into_iter().map(|value| narrowing.narrowed(value)).collect(),
+        Err(DynamicImage::ImageLuma8(gray)) => gray.into_raw(),
+        Err(other) => {
             let color = |rgb: &[u8]| luma([rgb[0], rgb[1], rgb[2]].map(u16::from)) as u8;
             other.into_rgb8().into_raw().chunks_exact(3).map(color).collect()
         }

@@ -2,9 +2,10 @@ use std::sync::Arc;
 
 use parking_lot::Mutex;
 
-use super::bit_depth::BitDepth;
 use super::container::{BlockCache, TopicIndex};
-use super::image_decoding::{bit_depth_of_topic, decode_image};
+use super::grey_levels::GreyLevels;
+use super::grey_sampling::grey_levels_of_topic;
+use super::image_decoding::decode_image;
 use super::log::relative_ns;
 use super::messages::{MessageKind, read_video_packet, stamp_ns};
 use super::video::{PictureStream, keyframe_before};
@@ -32,7 +33,7 @@ struct CameraImages {
     key: String,
     topic: String,
     kind: MessageKind,
-    depth: BitDepth,
+    grey_levels: Arc<GreyLevels>,
     count: usize,
 }
 
@@ -62,8 +63,8 @@ impl ImageReader {
                 let info = log.topic(&camera.topic)?;
                 let kind = info.kind.filter(|kind| kind.is_image())?;
                 let (key, topic) = (camera.key.clone(), camera.topic.clone());
-                let depth = bit_depth_of_topic(&log, &topic, kind);
-                Some(CameraImages { key, topic, kind, depth, count: info.count as usize })
+                let grey_levels = grey_levels_of_topic(&log, &topic, kind);
+                Some(CameraImages { key, topic, kind, grey_levels, count: info.count as usize })
             })
             .collect();
         let topics = cameras.iter().map(|camera| log.topic_index(&camera.topic)).collect();
@@ -157,7 +158,8 @@ impl ImageReader {
             return Err(bad(damage.unwrap_or_else(|| "the index points to no message".into())));
         };
         let data = block.bytes(&message.data);
-        let image = decode_image(camera.kind, data, camera.depth, self.log.file().limits(), None);
+        let narrowing = camera.grey_levels.at(self.log.since_start(position.log_time_ns));
+        let image = decode_image(camera.kind, data, narrowing, self.log.file().limits(), None);
         let image = Arc::new(image.map_err(|problem| bad(problem.to_string()))?);
         if cache.images.len() == IMAGES {
             cache.images.remove(0);

@@ -1,9 +1,13 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use parking_lot::Mutex;
 
 use super::container::{BlockCache, ContainerIndex, DecodedBlock, MessagePosition, MessageSpan, TopicIndex};
 use super::error::list;
 use super::file::LogFile;
+use super::grey_levels::GreyLevels;
 use super::limits::{LimitExceeded, LimitKind, LogLimits};
 use super::messages::{self, MessageKind};
 use super::topic_info::{TopicInfo, nothing_read};
@@ -28,6 +32,8 @@ pub struct FlightLog {
     duration_ns: i64,
     warnings: Vec<LogWarning>,
     warning_kinds: Vec<WarningKind>,
+    /// Conversions of 16-bit images by topic, as far as they are known.
+    grey_levels: Mutex<BTreeMap<String, Arc<GreyLevels>>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,6 +78,7 @@ impl FlightLog {
             duration_ns: 0,
             warning_kinds: vec![WarningKind::Topics; warnings.len()],
             warnings,
+            grey_levels: Mutex::default(),
         };
         log.find_topics_and_times()?;
         log.report_damage();
@@ -235,7 +242,7 @@ impl FlightLog {
         &self,
         cache: &mut BlockCache,
         position: MessagePosition,
-    ) -> Option<(std::sync::Arc<DecodedBlock>, MessageSpan)> {
+    ) -> Option<(Arc<DecodedBlock>, MessageSpan)> {
         let block = cache.get(&self.file, &self.index.blocks, position.block)?;
         let message = block.message_at(position.offset)?.clone();
         Some((block, message))
@@ -249,6 +256,12 @@ impl FlightLog {
             found.is_none()
         });
         found
+    }
+
+    /// Conversion of a topic's 16-bit images, computed at the first call for the topic.
+    pub(super) fn grey_levels(&self, topic: &str, compute: impl FnOnce() -> GreyLevels) -> Arc<GreyLevels> {
+        let mut known = self.grey_levels.lock();
+        Arc::clone(known.entry(topic.to_owned()).or_insert_with(|| Arc::new(compute())))
     }
 
     fn find_topics_and_times(&mut self) -> Result<(), LogError> {

@@ -280,7 +280,7 @@ fn read_protobuf_timestamp(message: &[u8]) -> Result<i64, CdrError> {
     Ok(seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds))
 }
 
-/// `sensor_msgs/msg/CameraInfo`: resolution, distortion and intrinsics.
+/// `sensor_msgs/msg/CameraInfo`: resolution, distortion and intrinsics of a sensor, and the part of it in an image.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CameraInfoMessage {
     pub(crate) width: usize,
@@ -290,6 +290,12 @@ pub(crate) struct CameraInfoMessage {
     pub(crate) distortion: Vec<f64>,
     /// `K`, row by row.
     pub(crate) intrinsic_matrix: [f64; 9],
+    /// Width and height of the pixels joined to one; 0 and 1 mean none.
+    pub(crate) binning_px: [usize; 2],
+    /// Column and row of the first pixel of the region of interest.
+    pub(crate) region_offset_px: [usize; 2],
+    /// Width and height of the region of interest before binning, 0 for the whole sensor.
+    pub(crate) region_size_px: [usize; 2],
 }
 
 pub(crate) fn read_camera_info(message: &[u8]) -> Result<CameraInfoMessage, CdrError> {
@@ -300,7 +306,22 @@ pub(crate) fn read_camera_info(message: &[u8]) -> Result<CameraInfoMessage, CdrE
     let distortion_model = reader.read_string()?.to_owned();
     let distortion = reader.read_f64_sequence()?;
     let intrinsic_matrix = reader.read_f64s::<9>()?;
-    Ok(CameraInfoMessage { width, height, distortion_model, distortion, intrinsic_matrix })
+    reader.read_f64s::<9>()?; // rectification
+    reader.read_f64s::<12>()?; // projection
+    let mut pixels = || reader.read_u32().map(|count| count as usize);
+    let binning_px = [pixels()?, pixels()?];
+    let region_offset_px = [pixels()?, pixels()?];
+    let [region_height, region_width] = [pixels()?, pixels()?];
+    Ok(CameraInfoMessage {
+        width,
+        height,
+        distortion_model,
+        distortion,
+        intrinsic_matrix,
+        binning_px,
+        region_offset_px,
+        region_size_px: [region_width, region_height],
+    })
 }
 
 /// `sensor_msgs/msg/JointState`, of whose velocities and efforts only the numbers are kept.

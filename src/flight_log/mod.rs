@@ -4,7 +4,6 @@
 //! Time is nanoseconds since the first message of the log (header stamps; the log time is kept too).
 
 pub(crate) mod attitude;
-pub(crate) mod bit_depth;
 mod cdr;
 pub(crate) mod container;
 pub mod convert;
@@ -12,6 +11,8 @@ pub mod csv_writer;
 mod error;
 mod file;
 mod geodesy;
+pub(crate) mod grey_levels;
+pub(crate) mod grey_sampling;
 pub(crate) mod image_decoding;
 mod image_problem;
 mod image_reader;

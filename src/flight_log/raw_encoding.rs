@@ -1,6 +1,6 @@
 //! Pixel encodings of raw images (`sensor_msgs/msg/Image`) and their gray values.
 
-use super::bit_depth::BitDepth;
+use super::grey_levels::Narrowing;
 use super::messages::ImageMessage;
 
 /// Storage of a raw image's pixels, by the names of ROS (`sensor_msgs/image_encodings.hpp`).
@@ -86,17 +86,24 @@ impl RawEncoding {
         width * samples * if self.is_wide() { 2 } else { 1 }
     }
 
-    /// Largest sample of an image, `None` without pixels.
-    pub(super) fn brightest(self, raw: &ImageMessage<'_>) -> Option<u16> {
-        self.rows(raw).flat_map(|row| self.samples(row, raw.big_endian)).max()
-    }
-
-    /// Gray values of all pixels, row by row. Each row of the image must have at least [`Self::row_bytes`].
-    pub(super) fn gray(self, raw: &ImageMessage<'_>, depth: BitDepth) -> Vec<u8> {
+    /// Gray values of all pixels in 8 bits, row by row. Each row of the image must have at least [`Self::row_bytes`].
+    pub(super) fn gray(self, raw: &ImageMessage<'_>, narrowing: Narrowing) -> Vec<u8> {
         if self == (Self { layout: PixelLayout::Luma { samples: 1, first: 0 }, sample: SampleWidth::Byte }) {
             return self.rows(raw).flatten().copied().collect();
         }
-        let narrow = |value: u16| if self.is_wide() { depth.narrowed(value) } else { value as u8 };
+        if self.is_wide() {
+            self.mapped(raw, |value| narrowing.narrowed(value))
+        } else {
+            self.mapped(raw, |value| value as u8)
+        }
+    }
+
+    /// Gray values of all pixels in the width of the samples, row by row; rows as for [`Self::gray`].
+    pub(super) fn values(self, raw: &ImageMessage<'_>) -> Vec<u16> {
+        self.mapped(raw, |value| value)
+    }
+
+    fn mapped<T>(self, raw: &ImageMessage<'_>, narrow: impl Fn(u16) -> T + Copy) -> Vec<T> {
         if let PixelLayout::Bayer { red } = self.layout {
             let samples: Vec<u16> = self.rows(raw).flat_map(|row| self.samples(row, raw.big_endian)).collect();
             return Mosaic { width: raw.width, height: raw.height, samples: &samples, red }.gray(narrow);
@@ -159,7 +166,7 @@ struct Mosaic<'a> {
 impl Mosaic<'_> {
     /// Gray values from bilinear interpolation of the three colors. At the border the image is mirrored at its
     /// outermost samples, which keeps the pattern.
-    fn gray(&self, narrow: impl Fn(u16) -> u8) -> Vec<u8> {
+    fn gray<T>(&self, narrow: impl Fn(u16) -> T) -> Vec<T> {
         let mirrored =
             |at: usize, size: usize| [at.checked_sub(1).unwrap_or(1), if at + 1 < size { at + 1 } else { size - 2 }];
         let [red, green, blue] = LUMA_WEIGHTS;
@@ -210,10 +217,11 @@ mod tests {
         samples
     }
 
-    fn decode(name: &str, [width, height]: [usize; 2], data: &[u8], depth: BitDepth) -> Vec<u8> {
+    fn decode(name: &str, [width, height]: [usize; 2], data: &[u8]) -> Vec<u8> {
         let encoding = RawEncoding::from_name(name).unwrap();
         let step = encoding.row_bytes(width);
-        encoding.gray(&ImageMessage { width, height, encoding: name, big_endian: false, step, data }, depth)
+        encoding
+            .gray(&ImageMessage { width, height, encoding: name, big_endian: false, step, data }, Narrowing::default())
     }
 
     #[test]
@@ -221,13 +229,10 @@ mod tests {
         for (name, red) in PATTERNS {
             let samples = mosaic([5, 4], red, |_, _| [200, 100, 50]);
             let bytes: Vec<u8> = samples.iter().map(|sample| *sample as u8).collect();
-            assert_eq!(
-                decode(&format!("{name}8"), [5, 4], &bytes, BitDepth::default()),
-                [luma([200, 100, 50]) as u8; 20]
-            );
+            assert_eq!(decode(&format!("{name}8"), [5, 4], &bytes), [luma([200, 100, 50]) as u8; 20]);
             let wide: Vec<u8> = samples.iter().flat_map(|sample| (sample << 8).to_le_bytes()).collect();
             assert_eq!(
-                decode(&format!("{name}16"), [5, 4], &wide, BitDepth::default()),
+                decode(&format!("{name}16"), [5, 4], &wide),
                 [(luma([200 << 8, 100 << 8, 50 << 8]) >> 8) as u8; 20]
             );
         }
@@ -240,7 +245,7 @@ mod tests {
             |x: usize, y: usize| [(10 + 8 * x + 4 * y) as u16, (200 - 6 * x - 2 * y) as u16, (30 + 20 * y) as u16];
         for (name, red) in PATTERNS {
             let bytes: Vec<u8> = mosaic(size, red, color).iter().map(|sample| *sample as u8).collect();
-            let gray = decode(&format!("{name}8"), size, &bytes, BitDepth::default());
+            let gray = decode(&format!("{name}8"), size, &bytes);
             for y in 1..size[1] - 1 {
                 for x in 1..size[0] - 1 {
                     assert_eq!(u16::from(gray[y * size[0] + x]), luma(color(x, y)), "{name} at ({x}, {y})");
@@ -251,16 +256,16 @@ mod tests {
 
     #[test]
     fn luma_of_packed_and_planar_images_is_taken_as_it_is() {
-        assert_eq!(decode("yuv422", [2, 2], &[128, 1, 128, 2, 128, 3, 128, 4], BitDepth::default()), [1, 2, 3, 4]);
-        assert_eq!(decode("yuyv", [2, 2], &[1, 128, 2, 128, 3, 128, 4, 128], BitDepth::default()), [1, 2, 3, 4]);
-        assert_eq!(decode("nv12", [2, 2], &[1, 2, 3, 4, 128, 128], BitDepth::default()), [1, 2, 3, 4]);
+        assert_eq!(decode("yuv422", [2, 2], &[128, 1, 128, 2, 128, 3, 128, 4]), [1, 2, 3, 4]);
+        assert_eq!(decode("yuyv", [2, 2], &[1, 128, 2, 128, 3, 128, 4, 128]), [1, 2, 3, 4]);
+        assert_eq!(decode("nv12", [2, 2], &[1, 2, 3, 4, 128, 128]), [1, 2, 3, 4]);
     }
 
     #[test]
     fn opacity_is_ignored() {
         let rgba = [255, 0, 0, 9, 0, 255, 0, 9, 0, 0, 255, 9, 255, 255, 255, 9];
-        assert_eq!(decode("rgba8", [2, 2], &rgba, BitDepth::default()), [76, 150, 29, 255]);
-        assert_eq!(decode("bgra8", [2, 2], &rgba, BitDepth::default()), [29, 150, 76, 255]);
+        assert_eq!(decode("rgba8", [2, 2], &rgba), [76, 150, 29, 255]);
+        assert_eq!(decode("bgra8", [2, 2], &rgba), [29, 150, 76, 255]);
     }
 
     #[test]
@@ -269,7 +274,7 @@ mod tests {
         let data: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         let encoding = RawEncoding::from_name("rgb16").unwrap();
         let raw = ImageMessage { width: 2, height: 2, encoding: "rgb16", big_endian: false, step: 12, data: &data };
-        assert_eq!(encoding.brightest(&raw), Some(4095));
-        assert_eq!(encoding.gray(&raw, BitDepth::of_brightest(4095).unwrap()), [255, 0, 128, 1]);
+        assert_eq!(encoding.values(&raw), [4095, 0, 2048, 16]);
+        assert_eq!(encoding.gray(&raw, Narrowing::Bits(12)), [255, 0, 128, 1]);
     }
 }

@@ -3,6 +3,8 @@ use super::imu_facts::ImuFacts;
 use super::statistics::{median, percentile};
 use super::survey::{SampledImage, Survey};
 use super::{Area, Findings, Severity};
+use crate::flight_log::FlightLog;
+use crate::flight_log::grey_levels::{GreyLevels, OUTSIDE_RATIO};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
@@ -12,14 +14,12 @@ const BLURRED: f64 = 0.5;
 const MIN_TEXTURE: f64 = 0.01;
 
 /// Checks size, blur, exposure and texture of each camera's images, and their motion by rotation.
-pub(super) fn check_images(survey: &Survey, rig: &Rig, imu_facts: &ImuFacts, findings: &mut Findings) {
+pub(super) fn check_images(log: &FlightLog, survey: &Survey, rig: &Rig, imu_facts: &ImuFacts, findings: &mut Findings) {
     for camera in &rig.cameras {
         let Some(images) = survey.images.get(&camera.key).filter(|images| !images.is_empty()) else { continue };
-        check_size(camera, images, findings);
-        if let Some(bits) = survey.depths.get(&camera.key).map(|depth| depth.bits()).filter(|bits| *bits < 16) {
-            let title = format!("{} has grey values of {bits} bits in 16", camera.key);
-            let evidence = format!("by the brightest pixel of its first image; bits {} to {bits} are used", bits - 7);
-            findings.add(Severity::Note, Area::Images, title, evidence, "");
+        check_size(log, camera, images, findings);
+        if let Some(levels) = survey.grey_levels.get(&camera.key) {
+            note_grey_levels(camera, levels, findings);
         }
         check_blur(camera, images, findings);
         check_exposure(camera, images, findings);
@@ -28,7 +28,33 @@ pub(super) fn check_images(survey: &Survey, rig: &Rig, imu_facts: &ImuFacts, fin
     }
 }
 
-fn check_size(camera: &CameraRig, images: &[SampledImage], findings: &mut Findings) {
+/// Adds a note on the conversion of images of 16 bits, unless the upper eight bits are taken.
+fn note_grey_levels(camera: &CameraRig, levels: &GreyLevels, findings: &mut Findings) {
+    let (key, bits, images) = (&camera.key, levels.bits(), levels.images());
+    let (title, evidence) = if let Some([low, high, smallest, largest]) = levels.stretched() {
+        let size = if largest - smallest < 1.0 {
+            format!("{largest:.0} values")
+        } else {
+            format!("{smallest:.0} to {largest:.0} values at a time")
+        };
+        let title = format!("{key} uses grey values from {low:.0} to {high:.0} of 16 bits");
+        let evidence = format!(
+            "all but {:.1} % of the pixels on either side, in {images} images of the recording; contrast is stretched over \
+             this range, {size}, which follows the recording",
+            OUTSIDE_RATIO * 100.0
+        );
+        (title, evidence)
+    } else if bits < 16 {
+        let title = format!("{key} has grey values of {bits} bits in 16");
+        let evidence = format!("by the brightest pixel of {images} images; bits {} to {bits} are used", bits - 7);
+        (title, evidence)
+    } else {
+        return;
+    };
+    findings.add(Severity::Note, Area::Images, title, evidence, "");
+}
+
+fn check_size(log: &FlightLog, camera: &CameraRig, images: &[SampledImage], findings: &mut Findings) {
     let [width, height] = camera.model.resolution_px;
     let Some(other) = images.iter().find(|image| image.measure.resolution_px != camera.model.resolution_px) else {
         let evidence = format!("{width}×{height} in {} images", images.len());
@@ -39,7 +65,9 @@ fn check_size(camera: &CameraRig, images: &[SampledImage], findings: &mut Findin
     let evidence =
         format!("{image_width}×{image_height} in {wrong} of {} images, {width}×{height} in the rig", images.len());
     let scale = image_width as f64 / width as f64;
-    let remedy = if (image_height as f64 / height as f64 - scale).abs() < 0.01 {
+    let remedy = if let Some(remedy) = window_remedy(log, camera, other.measure.resolution_px) {
+        remedy
+    } else if (image_height as f64 / height as f64 - scale).abs() < 0.01 {
         format!("the images are scaled by {scale:.3}: scale fx fy cx cy with them, or record the calibrated size")
     } else {
         "set resolution with its intrinsics; images of another size are skipped".to_owned()
@@ -51,6 +79,22 @@ fn check_size(camera: &CameraRig, images: &[SampledImage], findings: &mut Findin
         evidence,
         remedy,
     );
+}
+
+/// Values for a rig with the intrinsics of the whole sensor, if `CameraInfo` states the part of it in the images.
+fn window_remedy(log: &FlightLog, camera: &CameraRig, image_px: [usize; 2]) -> Option<String> {
+    let published = log.published_camera(&camera.topic, &camera.topic).ok()?;
+    let window = published.window?;
+    let is_of_sensor = camera.model.resolution_px == published.sensor.resolution_px;
+    if !is_of_sensor || published.image.resolution_px != image_px {
+        return None;
+    }
+    let [fx, fy, cx, cy] = window.applied_to(&camera.model).intrinsics_px;
+    let ([width, height], key) = (image_px, &camera.key);
+    Some(format!(
+        "CameraInfo states {window}: set {key}.intrinsics: [{fx:.3}, {fy:.3}, {cx:.3}, {cy:.3}] and \
+         {key}.resolution: [{width}, {height}], or remove both from the rig to take those of CameraInfo"
+    ))
 }
 
 fn check_blur(camera: &CameraRig, images: &[SampledImage], findings: &mut Findings) {

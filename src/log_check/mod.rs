@@ -95,7 +95,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         vehicle_attitude::check_vehicle_attitude(&survey, rig, &imu_facts, &mut findings);
         ground_truth::check_ground_truth(log, rig, &imu_facts, &mut findings);
         pictures::check_pictures(log, &survey, rig, &mut findings);
-        images::check_images(&survey, rig, &imu_facts, &mut findings);
+        images::check_images(log, &survey, rig, &imu_facts, &mut findings);
         if let Some(fitted) = source_fit::check_source(&survey, rig, &imu_facts, image_rotations, &mut findings) {
             // The cameras are checked with the corrected attitude.
             survey.use_source(rig, fitted.source, fitted.timeshift_s);

@@ -146,17 +146,26 @@ fn field_of_view_deg(model: &CameraModel) -> Option<f64> {
 }
 
 fn check_camera_info(log: &FlightLog, camera: &CameraRig, findings: &mut Findings) {
-    use crate::flight_log::rig::CameraFacts as _;
-    let Ok(from_log) = log.camera_model(&camera.topic) else { return };
+    let Ok(published) = log.published_camera(&camera.topic, &camera.topic) else { return };
     let model = &camera.model;
+    // Intrinsics of the whole sensor are compared as such; that they are not those of the images is another finding.
+    let of_sensor = model.resolution_px == published.sensor.resolution_px;
+    let from_log = if of_sensor { &published.sensor } else { &published.image };
     let (rig, log) = (model.intrinsics_px, from_log.intrinsics_px);
     let scale_px = model.focal_length_px();
     let of_intrinsics_px = rig.iter().zip(&log).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    let (of_lens_px, at_px) = largest_pixel_difference(model, &from_log);
+    let (of_lens_px, at_px) = largest_pixel_difference(model, from_log);
     let lens = format!("the same direction lies up to {of_lens_px:.1} px apart (at {:.0}, {:.0})", at_px.x, at_px.y);
+    let window = published.window.map_or_else(String::new, |window| {
+        let [width, height] = published.sensor.resolution_px;
+        let meant = if of_sensor { "of the sensor" } else { "of the images" };
+        format!(" {meant} ({width}×{height}, {window})")
+    });
     let evidence = format!(
-        "the rig has {rig:?} {}, the log's CameraInfo {log:?} {}: {lens}",
+        "the rig has {} {}, the log's CameraInfo {} {}{window}: {lens}",
+        in_tenths(rig),
         model.distortion.name(),
+        in_tenths(log),
         from_log.distortion.name()
     );
     let differs = of_intrinsics_px.max(of_lens_px) > INTRINSICS_TOLERANCE * scale_px;
@@ -167,6 +176,12 @@ fn check_camera_info(log: &FlightLog, camera: &CameraRig, findings: &mut Finding
     } else {
         findings.good(Area::Intrinsics, format!("CameraInfo agrees with the rig for {}", camera.key), evidence);
     }
+}
+
+/// Focal lengths and principal point in tenths of a pixel.
+fn in_tenths(intrinsics_px: [f64; 4]) -> String {
+    let [fx, fy, cx, cy] = intrinsics_px;
+    format!("[{fx:.1}, {fy:.1}, {cx:.1}, {cy:.1}]")
 }
 
 /// Largest distance between the pixels of one direction in two cameras, in pixels, and the pixel in the first one.

@@ -1,4 +1,5 @@
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
@@ -6,9 +7,10 @@ use super::attitude::{AttitudeSurvey, SolvedAttitude};
 use super::gradient_sums::GradientSums;
 use super::image_measure::{ImageMeasure, measure};
 use super::statistics::{median, white_sigma};
-use crate::flight_log::bit_depth::BitDepth;
 use crate::flight_log::container::DecodedBlock;
-use crate::flight_log::image_decoding::{bit_depth_of_message, decode_image};
+use crate::flight_log::grey_levels::GreyLevels;
+use crate::flight_log::grey_sampling::grey_levels_of_topic;
+use crate::flight_log::image_decoding::decode_image;
 use crate::flight_log::imu_merge::ImuMerge;
 use crate::flight_log::joint_merge::{JointMerge, JointReading};
 use crate::flight_log::log::relative_ns;
@@ -113,8 +115,8 @@ pub(super) struct Survey {
     pub(super) joint_names: Vec<String>,
     /// Images by camera key.
     pub(super) images: BTreeMap<String, Vec<SampledImage>>,
-    /// Bits per grey value by camera key.
-    pub(super) depths: BTreeMap<String, BitDepth>,
+    /// Conversion of grey values of 16 bits by camera key.
+    pub(super) grey_levels: BTreeMap<String, Arc<GreyLevels>>,
     /// Sums of the gradients of those images by camera key.
     pub(super) gradients: BTreeMap<String, GradientSums>,
     /// Position and damage of each damaged chunk.
@@ -323,12 +325,9 @@ impl Survey {
             }
         }
         if sampled && let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic && kind.is_image()) {
-            let known =
-                self.depths.get(&camera.key).copied().or_else(|| bit_depth_of_message(kind, data, log.file().limits()));
-            if let Some(depth) = known {
-                self.depths.insert(camera.key.clone(), depth);
-            }
-            match decode_image(kind, data, known.unwrap_or_default(), log.file().limits(), None) {
+            let levels = self.grey_levels.entry(camera.key.clone());
+            let narrowing = levels.or_insert_with(|| grey_levels_of_topic(log, topic, kind)).at(log_time_ns);
+            match decode_image(kind, data, narrowing, log.file().limits(), None) {
                 Ok(image) => {
                     self.gradients.entry(camera.key.clone()).or_default().add(&image);
                     let image = SampledImage { stamp_ns, measure: measure(&image) };

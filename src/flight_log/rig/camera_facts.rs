@@ -1,11 +1,11 @@
 //! Camera values that a rig file may omit because the log has them.
 
-use crate::camera::CameraModel;
+use super::camera_info::PublishedCamera;
 
 /// Values of a log that replace missing values of a rig, by image topic.
 pub(crate) trait CameraFacts {
-    /// Camera model from `CameraInfo`, or the reason why there is none.
-    fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String>;
+    /// Camera by `CameraInfo`, or the reason why there is none.
+    fn published(&self, image_topic: &str) -> Result<PublishedCamera, String>;
     /// Mean rate of the images.
     fn rate_hz(&self, image_topic: &str) -> Option<f64>;
     /// Content of a file of the rig, next to it or attached with it, or the reason why there is none.
@@ -18,7 +18,7 @@ pub(crate) trait CameraFacts {
 pub(super) struct NoFacts;
 
 impl CameraFacts for NoFacts {
-    fn camera_model(&self, _image_topic: &str) -> Result<CameraModel, String> {
+    fn published(&self, _image_topic: &str) -> Result<PublishedCamera, String> {
         Err("there is no log to take them from".into())
     }
 

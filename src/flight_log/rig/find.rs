@@ -1,13 +1,12 @@
 use std::path::{Path, PathBuf};
 
-use super::super::messages::{self, CameraInfoMessage, MessageKind};
 use super::super::{FlightLog, LogError};
 use super::camera_facts::{CameraFacts, NoFacts};
+use super::camera_info::PublishedCamera;
 use super::document::Document;
 use super::mask::{Attached, InFolder};
 use super::read;
 use super::{kalibr, keys};
-use crate::camera::CameraModel;
 use crate::sensors::Rig;
 
 impl Rig {
@@ -106,56 +105,11 @@ fn from_document(document: &Document, facts: &dyn CameraFacts) -> Result<RigWith
 }
 
 impl CameraFacts for FlightLog {
-    fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String> {
-        // By convention `camera_info` is published next to the images: `/ns/image_raw/compressed` → `/ns/camera_info`.
-        let mut parent = image_topic;
-        let mut tried = Vec::new();
-        while let Some((upper, _)) = parent.rsplit_once('/') {
-            parent = upper;
-            let topic = format!("{parent}/camera_info");
-            if self.topic(&topic).is_some_and(|info| info.kind == Some(MessageKind::CameraInfo)) {
-                let info = self.find_message(&topic, |data| messages::read_camera_info(data).ok());
-                let info = info.ok_or_else(|| format!("no readable message on {topic}"))?;
-                return model_of(&info).map_err(|problem| format!("{topic}: {problem}"));
-            }
-            tried.push(topic);
-        }
-        Err(format!("the log has none of {}", tried.join(", ")))
+    fn published(&self, image_topic: &str) -> Result<PublishedCamera, String> {
+        self.published_camera(image_topic, image_topic)
     }
 
     fn rate_hz(&self, image_topic: &str) -> Option<f64> {
         self.topic(image_topic).map(|info| info.rate_hz)
     }
-}
-
-fn model_of(info: &CameraInfoMessage) -> Result<CameraModel, String> {
-    let k = &info.intrinsic_matrix;
-    let intrinsics_px = [k[0], k[4], k[2], k[5]];
-    if !(intrinsics_px.iter().all(|value| value.is_finite()) && k[0] > 0.0 && k[4] > 0.0) {
-        return Err("matrix K is not set".into());
-    }
-    if info.width == 0 || info.height == 0 {
-        return Err("its width and height are not set".into());
-    }
-    let resolution_px = [info.width, info.height];
-    let coefficients = info.distortion.as_slice();
-    let (name, coefficients) = match (info.distortion_model.as_str(), coefficients) {
-        (_, coefficients) if coefficients.iter().all(|value| *value == 0.0) => ("none", &[][..]),
-        ("plumb_bob" | "radtan", [_, _, _, _] | [_, _, _, _, _]) => ("plumb_bob", coefficients),
-        // They are followed by OpenCV's coefficients of the thin prism and the tilted sensor, which are not modelled.
-        ("rational_polynomial", coefficients)
-            if matches!(coefficients.len(), 8 | 12 | 14) && coefficients[8..].iter().all(|value| *value == 0.0) =>
-        {
-            ("rational_polynomial", &coefficients[..8])
-        }
-        ("equidistant" | "fisheye", [_, _, _, _]) => ("equidistant", coefficients),
-        (other, coefficients) => {
-            return Err(format!(
-                "distortion '{other}' with {} coefficients, expected plumb_bob (4 or 5), rational_polynomial (8) or equidistant (4)",
-                coefficients.len()
-            ));
-        }
-    };
-    CameraModel::from_kalibr("pinhole", &intrinsics_px, name, coefficients, resolution_px)
-        .map_err(|error| error.to_string())
 }

@@ -9,8 +9,8 @@ use image::ImageFormat;
 use super::super::image_decoding::decode_within;
 use super::super::{FlightLog, LogError, LogLimits};
 use super::camera_facts::CameraFacts;
+use super::camera_info::PublishedCamera;
 use super::fields::Field;
-use crate::camera::CameraModel;
 use crate::sensors::{CameraMask, GrayImage, ImageMask};
 
 /// Largest file of a mask in bytes.
@@ -23,8 +23,8 @@ pub(super) struct InFolder<'a> {
 }
 
 impl CameraFacts for InFolder<'_> {
-    fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String> {
-        self.facts.camera_model(image_topic)
+    fn published(&self, image_topic: &str) -> Result<PublishedCamera, String> {
+        self.facts.published(image_topic)
     }
 
     fn rate_hz(&self, image_topic: &str) -> Option<f64> {
@@ -55,8 +55,8 @@ impl CameraFacts for InFolder<'_> {
 pub(super) struct Attached<'a>(pub(super) &'a FlightLog);
 
 impl CameraFacts for Attached<'_> {
-    fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String> {
-        self.0.camera_model(image_topic)
+    fn published(&self, image_topic: &str) -> Result<PublishedCamera, String> {
+        self.0.published(image_topic)
     }
 
     fn rate_hz(&self, image_topic: &str) -> Option<f64> {

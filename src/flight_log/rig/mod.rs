@@ -2,6 +2,7 @@
 
 pub(crate) mod attitude;
 mod camera_facts;
+pub(crate) mod camera_info;
 mod document;
 mod fields;
 mod find;
@@ -16,5 +17,3 @@ pub mod template;
 #[cfg(test)]
 mod tests;
 mod write;
-
-pub(crate) use camera_facts::CameraFacts;

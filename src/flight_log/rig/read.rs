@@ -4,6 +4,7 @@ use super::super::LogError;
 use super::super::text::shortened;
 use super::attitude;
 use super::camera_facts::CameraFacts;
+use super::camera_info::PublishedCamera;
 use super::fields::Field;
 use super::link::read_link;
 use super::mask;
@@ -163,10 +164,7 @@ pub(super) fn read_camera_as(
     let model = if camera.field("intrinsics").is_present() {
         read_camera_model(camera)?
     } else {
-        facts.camera_model(&topic).map_err(|reason| {
-            let expected = format!("4 numbers (fx fy cx cy), or a CameraInfo in the log ({reason})");
-            camera.field("intrinsics").unexpected(&expected)
-        })?
+        read_published_camera(camera, &topic, facts)?
     };
     let mask = mask::read(camera, model.resolution_px, facts)?;
     let shutter = sensor::read_shutter(camera, model.resolution_px[1])?;
@@ -186,6 +184,39 @@ pub(super) fn read_camera_as(
     })
 }
 
+/// Model of a camera without intrinsics: by `CameraInfo`, with whose sensor or images a given `resolution` must agree.
+fn read_published_camera(camera: &Field<'_>, topic: &str, facts: &dyn CameraFacts) -> Result<CameraModel, LogError> {
+    let PublishedCamera { sensor, window, image } = facts.published(topic).map_err(|reason| {
+        let expected = format!("4 numbers (fx fy cx cy), or a CameraInfo in the log ({reason})");
+        camera.field("intrinsics").unexpected(&expected)
+    })?;
+    let resolution = camera.field("resolution");
+    if resolution.is_present() {
+        let given_px = read_resolution(&resolution)?;
+        if ![sensor.resolution_px, image.resolution_px].contains(&given_px) {
+            let text = |[width, height]: [usize; 2]| format!("{width}×{height}");
+            let window =
+                window.map_or_else(String::new, |window| format!(" ({} with {window})", text(sensor.resolution_px)));
+            let problem = format!(
+                "{}, but CameraInfo has {}{window}; remove resolution, or give intrinsics that belong to it",
+                text(given_px),
+                text(image.resolution_px)
+            );
+            return Err(resolution.error(problem));
+        }
+    }
+    Ok(image)
+}
+
+/// Reads width and height in pixels.
+fn read_resolution(field: &Field<'_>) -> Result<[usize; 2], LogError> {
+    let [width, height] = field.exactly::<2>("2 (width height)")?;
+    if [width, height].iter().any(|side| *side < 1.0 || side.fract() != 0.0 || *side > 65_535.0) {
+        return Err(field.error(format!("{width}×{height}, expected whole pixels from 1 to 65535")));
+    }
+    Ok([width as usize, height as usize])
+}
+
 /// Reads projection, distortion, intrinsics and resolution in Kalibr's spelling and order.
 fn read_camera_model(camera: &Field<'_>) -> Result<CameraModel, LogError> {
     let model = camera.field("camera_model").text(CAMERA_MODELS)?;
@@ -197,13 +228,8 @@ fn read_camera_model(camera: &Field<'_>) -> Result<CameraModel, LogError> {
         None if distortion_model == "none" => Vec::new(),
         None => return Err(camera.field("distortion_coeffs").unexpected("the coefficients of the lens")),
     };
-    let [width, height] = camera.field("resolution").exactly::<2>("2 (width height)")?;
-    if [width, height].iter().any(|side| *side < 1.0 || side.fract() != 0.0 || *side > 65_535.0) {
-        return Err(camera
-            .field("resolution")
-            .error(format!("{width}×{height}, expected whole pixels from 1 to 65535")));
-    }
-    CameraModel::from_kalibr(model, &intrinsics, distortion_model, &coefficients, [width as usize, height as usize])
+    let resolution_px = read_resolution(&camera.field("resolution"))?;
+    CameraModel::from_kalibr(model, &intrinsics, distortion_model, &coefficients, resolution_px)
         .map_err(|error| name_the_field(camera, &error))
 }
 

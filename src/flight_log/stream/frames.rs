@@ -1,8 +1,9 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::super::bit_depth::BitDepth;
-use super::super::image_decoding::{bit_depth_of_topic, decode_image};
+use super::super::grey_levels::GreyLevels;
+use super::super::grey_sampling::grey_levels_of_topic;
+use super::super::image_decoding::decode_image;
 use super::super::image_problem::ImageProblem;
 use super::super::log::relative_ns;
 use super::super::messages::{self, MessageKind};
@@ -68,7 +69,7 @@ struct CameraStream {
     count: usize,
     topic: String,
     kind: MessageKind,
-    depth: BitDepth,
+    grey_levels: Arc<GreyLevels>,
     key: String,
     resolution_px: [usize; 2],
     shift_ns: i64,
@@ -113,7 +114,7 @@ impl FrameSource {
             count,
             topic: camera.topic.clone(),
             kind,
-            depth: bit_depth_of_topic(log, &camera.topic, kind),
+            grey_levels: grey_levels_of_topic(log, &camera.topic, kind),
             key: camera_key.to_owned(),
             resolution_px: camera.model.resolution_px,
             shift_ns,
@@ -331,7 +332,8 @@ impl CameraStream {
             ImageContent::Decoded(image) => return Some(image),
         };
         let limits = context.log.file().limits();
-        let problem = match decode_image(self.kind, &message, self.depth, limits, Some(self.resolution_px)) {
+        let narrowing = self.grey_levels.at(pending.log_time_ns);
+        let problem = match decode_image(self.kind, &message, narrowing, limits, Some(self.resolution_px)) {
             Ok(image) => return Some(image),
             Err(problem) => problem_text(problem, self.resolution_px, &self.key),
         };

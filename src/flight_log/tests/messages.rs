@@ -1,7 +1,6 @@
-use super::super::bit_depth::BitDepth;
 use super::super::cdr::{CdrReader, CdrWriter};
-use super::super::image_decoding;
-use super::super::image_decoding::bit_depth_of_message;
+use super::super::grey_levels::Narrowing;
+use super::super::image_decoding::{self, WideValues};
 use super::super::image_problem::ImageProblem;
 use super::super::limits::LogLimits;
 use super::super::messages::{self, MessageKind};
@@ -9,9 +8,9 @@ use super::*;
 use crate::flight_log::writer::testing as encode;
 
 /// Image of a message within the usual limits, or a description of the problem.
-fn decode_image(kind: MessageKind, message: &[u8], depth: BitDepth) -> Result<GrayImage, String> {
+fn decode_image(kind: MessageKind, message: &[u8], narrowing: Narrowing) -> Result<GrayImage, String> {
     let limits = LogLimits::default();
-    image_decoding::decode_image(kind, message, depth, &limits, None).map_err(|problem| problem.to_string())
+    image_decoding::decode_image(kind, message, narrowing, &limits, None).map_err(|problem| problem.to_string())
 }
 
 /// Converts the little-endian bytes of a message with 4- and 8-byte numbers after a header to big-endian.
@@ -74,7 +73,7 @@ fn foreign_encapsulations_and_absurd_lengths_are_refused() {
 fn raw_images_of_every_encoding_become_grey() {
     let decode = |encoding: &str, data: &[u8]| {
         let message = encode::image(0, "camera", [2, 2], encoding, data);
-        decode_image(MessageKind::Image, &message, BitDepth::default())
+        decode_image(MessageKind::Image, &message, Narrowing::default())
     };
     for encoding in ["mono8", "8UC1"] {
         assert_eq!(decode(encoding, &[1, 2, 3, 4]).unwrap().pixels, [1, 2, 3, 4]);
@@ -85,7 +84,7 @@ fn raw_images_of_every_encoding_become_grey() {
     assert_eq!(decode("bgr8", &rgb).unwrap().pixels, [29, 150, 76, 255]);
     assert_eq!(decode("bayer_rggb8", &[255, 0, 0, 0]).unwrap().pixels, [76; 4], "mirrored at the sides");
     let message = encode::image(0, "camera", [1, 1], "bayer_rggb8", &[9]);
-    let problem = decode_image(MessageKind::Image, &message, BitDepth::default()).unwrap_err();
+    let problem = decode_image(MessageKind::Image, &message, Narrowing::default()).unwrap_err();
     assert!(problem.contains("bayer_rggb8 image of 1×1 pixels"));
     assert!(decode("32FC1", &[0; 16]).unwrap_err().contains("not gray values"));
     assert!(decode("\u{1b}[2J", &[0; 4]).unwrap_err().contains(r#""\u{1b}[2J" is not read: expected mono8"#));
@@ -93,31 +92,32 @@ fn raw_images_of_every_encoding_become_grey() {
 }
 
 #[test]
-fn wide_grey_values_keep_the_bits_that_are_in_use() {
-    let message = |values: [u16; 4]| {
-        let data: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        encode::image(0, "camera", [2, 2], "mono16", &data)
+fn values_of_wide_images_are_read_before_their_conversion() {
+    let values = [0_u16, 29_500, 30_520, 65_535];
+    let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+    let gray = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 2, values.to_vec()).unwrap();
+    let rgb: Vec<u16> = values.iter().flat_map(|value| [*value; 3]).collect();
+    let color = image::ImageBuffer::<image::Rgb<u16>, _>::from_raw(2, 2, rgb).unwrap();
+    let png = |image: image::DynamicImage| {
+        let mut data = std::io::Cursor::new(Vec::new());
+        image.write_to(&mut data, image::ImageFormat::Png).unwrap();
+        (
+            MessageKind::CompressedImage,
+            encode::compressed_image(0, "camera", "16UC1; png compressed", &data.into_inner()),
+        )
     };
-    let depth_of = |values: [u16; 4]| bit_depth_of_message(MessageKind::Image, &message(values), &LogLimits::default());
-    let check = |values: [u16; 4], bits: u32, expected: [u8; 4]| {
-        let depth = depth_of(values).unwrap();
-        assert_eq!(depth.bits(), bits, "{values:?}");
-        let decoded = decode_image(MessageKind::Image, &message(values), depth).unwrap();
-        assert_eq!(decoded.pixels, expected, "{values:?}");
-    };
-    check([0, 1, 100, 255], 8, [0, 1, 100, 255]);
-    check([0, 16, 160, 4095], 12, [0, 1, 10, 255]);
-    check([0, 0, 600, 1023], 10, [0, 0, 150, 255]);
-    // Eleven bits are part of twelve.
-    check([0, 16, 160, 1500], 12, [0, 1, 10, 93]);
-    check([0, 256, 2560, 65_535], 16, [0, 1, 10, 255]);
-    assert_eq!(depth_of([0; 4]), None, "a black image has no bit depth");
-    // The first image decides: a brighter one later is white.
-    let first = depth_of([0, 0, 600, 1023]).unwrap();
-    let later = decode_image(MessageKind::Image, &message([4, 1023, 1024, 4000]), first).unwrap();
-    assert_eq!(later.pixels, [1, 255, 255, 255]);
-    let narrow = encode::image(0, "camera", [2, 2], "mono8", &[1, 2, 3, 4]);
-    assert_eq!(bit_depth_of_message(MessageKind::Image, &narrow, &LogLimits::default()).unwrap().bits(), 16);
+    let stretched = Narrowing::Range { low: 29_500.0, high: 30_520.0 };
+    for (kind, message) in
+        [(MessageKind::Image, encode::image(0, "camera", [2, 2], "16UC1", &bytes)), png(gray.into()), png(color.into())]
+    {
+        let found = image_decoding::wide_values(kind, &message, &LogLimits::default());
+        assert_eq!(found, Some(WideValues::Of(values.to_vec())));
+        assert_eq!(decode_image(kind, &message, stretched).unwrap().pixels, [0, 16, 239, 255]);
+        assert_eq!(decode_image(kind, &message, Narrowing::default()).unwrap().pixels, [0, 115, 119, 255]);
+    }
+    let wide_values = |message: &[u8]| image_decoding::wide_values(MessageKind::Image, message, &LogLimits::default());
+    assert_eq!(wide_values(&encode::image(0, "camera", [2, 2], "mono8", &[1, 2, 3, 4])), Some(WideValues::Narrow));
+    assert_eq!(wide_values(&encode::image(0, "camera", [2, 2], "mono16", &[1, 2, 3, 4])), None);
 }
 
 #[test]
@@ -130,17 +130,17 @@ fn compressed_images_are_known_by_their_bytes() {
         gray.save(&path).unwrap();
         let data = std::fs::read(&path).unwrap();
         let message = encode::compressed_image(0, "camera", "mono8; compressed", &data);
-        let decoded = decode_image(MessageKind::CompressedImage, &message, BitDepth::default()).unwrap();
+        let decoded = decode_image(MessageKind::CompressedImage, &message, Narrowing::default()).unwrap();
         assert_eq!((decoded.width, decoded.height), (WIDTH, HEIGHT));
         let worst = decoded.pixels.iter().zip(&original.pixels).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
         assert!(worst <= bound, "{format}: {worst}");
         let cut = encode::compressed_image(0, "camera", format, &data[..data.len() / 3]);
-        let cut = decode_image(MessageKind::CompressedImage, &cut, BitDepth::default());
+        let cut = decode_image(MessageKind::CompressedImage, &cut, Narrowing::default());
         assert!(cut.is_err() || format == "jpeg", "a JPEG may be completed in grey");
     }
     let text = encode::compressed_image(0, "camera", "jpeg", b"not an image");
     assert!(
-        decode_image(MessageKind::CompressedImage, &text, BitDepth::default())
+        decode_image(MessageKind::CompressedImage, &text, Narrowing::default())
             .unwrap_err()
             .contains("neither JPEG nor PNG")
     );
@@ -190,8 +190,8 @@ fn an_image_is_not_decoded_when_its_header_claims_too_much() {
         };
         let expect = |data: &[u8], expected_px: Option<[usize; 2]>| {
             let message = encode::compressed_image(0, "camera", "", data);
-            let (kind, depth, limits) = (MessageKind::CompressedImage, BitDepth::default(), LogLimits::default());
-            image_decoding::decode_image(kind, &message, depth, &limits, expected_px)
+            let (kind, narrowing, limits) = (MessageKind::CompressedImage, Narrowing::default(), LogLimits::default());
+            image_decoding::decode_image(kind, &message, narrowing, &limits, expected_px)
         };
         assert!(expect(&data, Some([WIDTH, HEIGHT])).is_ok());
         assert_eq!(expect(&data, Some([1, 1])).unwrap_err(), ImageProblem::OtherResolution([WIDTH, HEIGHT]));
@@ -214,7 +214,9 @@ fn an_image_is_not_decoded_when_its_header_claims_too_much() {
         assert!(problem.contains("a header of 5000×5000 pixels"), "{problem}");
     }
     let raw = encode::image(0, "camera", [60_000, 60_000], "mono8", &[0; 16]);
-    assert!(decode_image(MessageKind::Image, &raw, BitDepth::default()).unwrap_err().contains("--limit image-pixels="));
+    assert!(
+        decode_image(MessageKind::Image, &raw, Narrowing::default()).unwrap_err().contains("--limit image-pixels=")
+    );
 }
 
 #[test]

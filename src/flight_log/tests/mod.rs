@@ -2,10 +2,12 @@
 
 mod attitude;
 mod broken;
+mod camera_info;
 mod messages;
 mod rigs;
 mod streams;
 pub(crate) mod video;
+mod wide_images;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

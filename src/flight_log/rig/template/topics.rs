@@ -4,7 +4,6 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::super::camera_facts::CameraFacts as _;
 use super::super::fields::Field;
 use super::camera::{of_field_of_view, of_published};
 use super::{
@@ -12,8 +11,6 @@ use super::{
     MechanismAxes, RigTemplate, Sourced, TYPICAL_IMU_NOISE, TemplateError,
 };
 use crate::camera::CameraModel;
-use crate::flight_log::bit_depth::BitDepth;
-use crate::flight_log::image_decoding::decode_image;
 use crate::flight_log::messages::{self, MessageKind};
 use crate::flight_log::{FlightLog, LogError, TopicInfo};
 use crate::sensors::{BodyAxes, ImuNoise};
@@ -233,7 +230,8 @@ fn camera_model(
 ) -> Result<Sourced<CameraModel>, TemplateError> {
     let size = || match (choices.resolution_px, images) {
         (Some(resolution_px), _) => Ok(resolution_px),
-        (None, Some((log, info))) => image_size(log, info)
+        (None, Some((log, info))) => log
+            .image_size(&info.topic)
             .ok_or_else(|| TemplateError::NoSize { reason: format!("no image of {} can be decoded", info.topic) }),
         (None, None) => Err(TemplateError::NoSize { reason: "there is no log".to_owned() }),
     };
@@ -243,21 +241,14 @@ fn camera_model(
         CameraChoice::CameraInfo(topic) => {
             let missing = |reason: String| TemplateError::NoCameraInfo { reason };
             let (log, info) = images.ok_or_else(|| missing("there is no log".to_owned()))?;
-            // `camera_model` searches the parent namespaces of an image topic, so a given `camera_info` topic works as
+            // `published_camera` searches the parent namespaces of an image topic, so a given `camera_info` topic works as
             // well.
             let beside = topic.as_ref().map_or(info.topic.as_str(), String::as_str);
-            return log.camera_model(beside).map(Sourced::known).map_err(missing);
+            let published = log.published_camera(&info.topic, beside).map_err(missing)?;
+            return Ok(Sourced::known(published.image));
         }
     };
     Ok(Sourced::assumed(model, reason))
-}
-
-/// Size of the first image that can be decoded.
-fn image_size(log: &FlightLog, info: &TopicInfo) -> Option<[usize; 2]> {
-    let kind = info.kind?;
-    let limits = log.file().limits();
-    let decoded = |data: &[u8]| decode_image(kind, data, BitDepth::default(), limits, None).ok();
-    log.find_message(&info.topic, |data| decoded(data).map(|image| [image.width, image.height]))
 }
 
 fn gimbal(choices: &RigChoices, imu_axes: BodyAxes, log: Option<&FlightLog>) -> Result<GimbalTemplate, TemplateError> {
