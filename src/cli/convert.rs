@@ -33,6 +33,10 @@ pub(crate) struct ConvertArguments {
     /// rotations of the images with the gyroscope, up to 60 s from the times recorded by camera and autopilot.
     #[arg(long, value_name = "SECONDS", requires = "autopilot_log", allow_hyphen_values = true, value_parser = offset)]
     pub video_offset: Option<f64>,
+    /// Take this record of the autopilot's log instead of the one that is chosen, by its name in the report, such as
+    /// "MNT[1]", or "system 2" for another vehicle of a telemetry log. Can be repeated.
+    #[arg(long, value_name = "NAME")]
+    pub take: Vec<String>,
     /// Overwrite any existing file with the name of the log. Without it, only a log written by this command is
     /// replaced; an edited rig next to the log is always kept.
     #[arg(long)]
@@ -65,6 +69,7 @@ impl ConvertArguments {
             limits: self.limits.limits(),
             autopilot: given.next(),
             video_clock: self.video_offset.map(|offset_s| VideoClock { offset_s, drift_ppm: 0.0 }),
+            take: self.take.clone(),
         }
     }
 }

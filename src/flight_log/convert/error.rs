@@ -40,6 +40,19 @@ pub enum ConvertError {
     /// The autopilot's log of a video is of another kind than given.
     #[error("no {expected}, {found}: {}", path.display())]
     NotThatLog { expected: &'static str, found: String, path: PathBuf },
+    /// A record to take that the source does not have.
+    #[error(
+        "no record {record:?} to take; {}: {}",
+        if available.is_empty() { "only logs of autopilots and their videos have records to choose from".to_owned() }
+        else { format!("the source has {available}") },
+        path.display()
+    )]
+    NoSuchRecord {
+        record: String,
+        /// Names of the records of the source.
+        available: String,
+        path: PathBuf,
+    },
     /// The caller stopped the conversion.
     #[error("interrupted; nothing is written: {}", path.display())]
     Interrupted { path: PathBuf },

@@ -18,6 +18,7 @@ mod ros2_bag;
 mod sink;
 mod source_file;
 mod sqlite;
+mod taken_records;
 
 use std::fs;
 use std::io::Read as _;
@@ -35,6 +36,7 @@ use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 use recording::VideoFacts;
 use sink::LogSink;
+use taken_records::TakenRecords;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum SourceKind {
@@ -81,8 +83,8 @@ pub fn convert(source: &Path, output: &Path, progress: &mut dyn FnMut(f64)) -> R
 /// Converts like [`convert`], with options, and stops when `progress` breaks.
 ///
 /// # Errors
-/// As [`convert`], [`ConvertError::Interrupted`], in which case no file is written, and
-/// [`ConvertError::NoVideo`] for options that need a video.
+/// As [`convert`], [`ConvertError::Interrupted`], in which case no file is written,
+/// [`ConvertError::NoVideo`] for options that need a video, and [`ConvertError::NoSuchRecord`].
 pub fn convert_with(
     source: &Path,
     output: &Path,
@@ -192,7 +194,11 @@ fn write(
 ) -> Result<(ConversionReport, SourceRig), ConvertError> {
     let limits = &options.limits;
     let writer = LogWriter::create(output, &LogWriterOptions::default())?;
-    let mut sink = LogSink::new(writer, limits.clone(), progress);
+    let records = TakenRecords::new(options.take.clone());
+    if !matches!(kind, SourceKind::Video | SourceKind::Autopilot(_)) {
+        records.require_all(source)?;
+    }
+    let mut sink = LogSink::new(writer, limits.clone(), records, progress);
     let rig = match kind {
         SourceKind::Euroc => {
             let rig = euroc::convert(source, &mut sink)?;

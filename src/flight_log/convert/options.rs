@@ -13,6 +13,9 @@ pub struct ConvertOptions {
     /// Relation of the video's clock to the autopilot's log; if not given, by the recorded times of both, else both
     /// start together.
     pub video_clock: Option<VideoClock>,
+    /// Names of records that are taken in place of those that the conversion chooses, as reports name them; `system N`
+    /// for a vehicle of a telemetry log.
+    pub take: Vec<String>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -11,6 +11,7 @@ use super::super::messages::{read_video_packet, stamp_ns};
 use super::super::writer::MessageType;
 use super::super::{LogWriter, MessageKind, MessageTimes};
 use super::ros1_message::cdr_from_ros1;
+use super::taken_records::TakenRecords;
 use super::{ConversionReport, ConvertError, ConvertedTopic, VideoClock};
 
 /// Number of characters shown of a too long name.
@@ -62,6 +63,8 @@ pub(super) struct LogSink<'a> {
     limits: LogLimits,
     /// Relation of the video's clock to the autopilot's log.
     pub(super) video_clock: Option<VideoClock>,
+    /// Records of the source that can be chosen.
+    pub(super) records: TakenRecords,
     /// Number of messages in the log.
     count: u64,
     progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
@@ -78,12 +81,25 @@ impl<'a> LogSink<'a> {
     pub(super) fn new(
         writer: LogWriter,
         limits: LogLimits,
+        records: TakenRecords,
         progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Self {
         let (tallies, types, notes) = (BTreeMap::new(), BTreeMap::new(), Vec::new());
         let (fraction, since, interrupted) = (0.0, 0, false);
-        let video_clock = None;
-        Self { writer, tallies, types, notes, limits, video_clock, count: 0, progress, fraction, since, interrupted }
+        Self {
+            writer,
+            tallies,
+            types,
+            notes,
+            limits,
+            video_clock: None,
+            records,
+            count: 0,
+            progress,
+            fraction,
+            since,
+            interrupted,
+        }
     }
 
     /// Limits on reading the source.

@@ -2,6 +2,7 @@
 //! alone.
 
 mod attitude;
+mod candidates;
 mod damage;
 mod dataflash;
 mod gpmf;
@@ -72,7 +73,7 @@ pub(super) fn convert_autopilot(log: &AutopilotLog, sink: &mut LogSink<'_>) -> R
     to_utc(&mut recorded);
     let mut topics = Topics::default();
     topics.add_recorded(recorded, sink);
-    topics.write(None, sink)
+    topics.write(&log.path, None, sink)
 }
 
 /// Converts the times to UTC if the recorder had UTC.
@@ -133,7 +134,7 @@ pub(super) fn convert_video(
         gimbal_frame: topics.gimbal_frame,
         has_autopilot: options.autopilot.is_some(),
     };
-    topics.write(Some(&video), sink)?;
+    topics.write(source, Some(&video), sink)?;
     Ok(facts)
 }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
+use super::candidates::Candidates;
 use crate::flight_log::geodesy::Geodetic;
 use crate::geometry::seconds_from_ns;
 
@@ -18,6 +19,8 @@ pub(super) type NamedSamples<T> = (String, Samples<T>);
 /// IMU of a recording: angular velocities in rad/s and specific forces in m/s², in the IMU frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RecordedImu {
+    /// True for the IMU of another device than the autopilot, such as a gimbal.
+    pub(super) is_of_other_device: bool,
     /// Angular velocity and specific force of one record.
     pub(super) combined: Samples<[Vector3<f64>; 2]>,
     /// Angular velocities alone.
@@ -40,46 +43,6 @@ pub(super) enum GimbalFrame {
 pub(super) struct GimbalAttitude {
     pub(super) frame: GimbalFrame,
     pub(super) frame_from_camera: UnitQuaternion<f64>,
-}
-
-/// Measurements of one quantity by record; the record with the smallest rank is used.
-#[derive(Clone, Debug)]
-pub(super) struct Candidates<T>(BTreeMap<(u8, String), Samples<T>>);
-
-impl<T> Default for Candidates<T> {
-    fn default() -> Self {
-        Self(BTreeMap::new())
-    }
-}
-
-impl<T> Candidates<T> {
-    pub(super) fn push(&mut self, rank: u8, record: &str, time_ns: i64, value: T) {
-        self.0.entry((rank, record.to_owned())).or_default().push((time_ns, value));
-    }
-
-    fn map_times(&mut self, map: &impl Fn(i64) -> i64) {
-        self.0.values_mut().for_each(|samples| map_times(samples, map));
-    }
-
-    fn append(&mut self, other: Self) {
-        for (record, mut samples) in other.0 {
-            self.0.entry(record).or_default().append(&mut samples);
-        }
-    }
-
-    fn count(&self) -> usize {
-        self.0.values().map(Vec::len).sum()
-    }
-
-    /// Name and measurements of the best record, and the other records.
-    pub(super) fn into_best(self) -> (Option<NamedSamples<T>>, Vec<NamedSamples<T>>) {
-        let mut all = self.0.into_iter().map(|((_, name), samples)| (name, samples));
-        (all.next(), all.collect())
-    }
-
-    pub(super) fn samples(&self) -> impl Iterator<Item = &Samples<T>> {
-        self.0.values()
-    }
 }
 
 fn map_times<T>(samples: &mut Samples<T>, map: &impl Fn(i64) -> i64) {
@@ -149,10 +112,10 @@ impl Recorded {
             map_times(&mut imu.gyroscope, &map);
             map_times(&mut imu.accelerometer, &map);
         }
-        self.attitudes.map_times(&map);
-        self.gimbal.map_times(&map);
-        self.positions.map_times(&map);
-        self.fixes.map_times(&map);
+        self.attitudes.samples_mut().for_each(|samples| map_times(samples, &map));
+        self.gimbal.samples_mut().for_each(|samples| map_times(samples, &map));
+        self.positions.samples_mut().for_each(|samples| map_times(samples, &map));
+        self.fixes.samples_mut().for_each(|samples| map_times(samples, &map));
         map_times(&mut self.utc, &map);
     }
 
@@ -160,6 +123,7 @@ impl Recorded {
     pub(super) fn append(&mut self, other: Self) {
         for (record, mut imu) in other.imus {
             let merged = self.imu(&record);
+            merged.is_of_other_device |= imu.is_of_other_device;
             merged.combined.append(&mut imu.combined);
             merged.gyroscope.append(&mut imu.gyroscope);
             merged.accelerometer.append(&mut imu.accelerometer);

@@ -1,13 +1,16 @@
 //! Log topics of a recording.
 
+use std::path::Path;
+
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::super::MessageTimes;
 use super::super::ConvertError;
 use super::super::sink::LogSink;
 use super::attitude::{AttitudeTrack, earth_from_heading, enu_from_ned};
+use super::candidates::{Candidates, Choice};
 use super::mp4::Video;
-use super::recorded::{Candidates, GimbalAttitude, GimbalFrame, NamedSamples, Recorded, RecordedImu, Samples, rate_hz};
+use super::recorded::{GimbalAttitude, GimbalFrame, NamedSamples, Recorded, RecordedImu, Samples, rate_hz};
 use crate::geometry::RigidTransform;
 
 const IMU_TYPE: &str = "sensor_msgs/msg/Imu";
@@ -63,12 +66,15 @@ pub(super) struct Topics {
     pub(super) gimbal_frame: Option<GimbalFrame>,
 }
 
-/// Name and measurements of the best record; the others are counted as left out.
+/// Name and measurements of the chosen record; the others are counted as left out, and several devices are named.
 fn chosen<T>(candidates: Candidates<T>, format: &str, topic: &str, sink: &mut LogSink<'_>) -> Option<NamedSamples<T>> {
-    let (best, others) = candidates.into_best();
-    let (record, samples) = best?;
-    for (other, samples) in others {
-        sink.leave(&other, format, samples.len() as u64, format!("{topic} uses {record}"));
+    candidates.names().for_each(|name| sink.records.offer(name));
+    let Choice { record, samples, others, devices } = candidates.choose(|name| sink.records.wants(name))?;
+    for (other, count) in others {
+        sink.leave(&other, format, count, format!("{topic} uses {record}"));
+    }
+    if let Some(devices) = devices {
+        sink.note(format!("{topic}: several devices: {devices}; {record} is taken, another one with --take \"NAME\""));
     }
     Some((record.clone(), in_order(samples, format, &record, sink)))
 }
@@ -135,7 +141,9 @@ impl Topics {
         }
         let mut imus: Vec<(String, RecordedImu)> = imus.into_iter().collect();
         // Stable sort: IMUs of equal rates stay in the order of their names.
-        imus.sort_by(|(_, a), (_, b)| imu_rate_hz(b).total_cmp(&imu_rate_hz(a)));
+        imus.sort_by(|(_, a), (_, b)| {
+            a.is_of_other_device.cmp(&b.is_of_other_device).then(imu_rate_hz(b).total_cmp(&imu_rate_hz(a)))
+        });
         let only_one = imus.len() == 1;
         for (number, (record, imu)) in imus.into_iter().enumerate() {
             let number = if only_one { String::new() } else { number.to_string() };
@@ -269,7 +277,13 @@ impl Topics {
     }
 
     /// Writes all messages in the order of log times.
-    pub(super) fn write(self, video: Option<&Video>, sink: &mut LogSink<'_>) -> Result<(), ConvertError> {
+    pub(super) fn write(
+        self,
+        source: &Path,
+        video: Option<&Video>,
+        sink: &mut LogSink<'_>,
+    ) -> Result<(), ConvertError> {
+        sink.records.require_all(source)?;
         let Self { topics, .. } = self;
         let mut order: Vec<(i64, usize, usize)> = Vec::new();
         for (number, topic) in topics.iter().enumerate() {

@@ -99,15 +99,19 @@ fn one_sensor(record: &Record<'_>, name: &str, recorded: &mut Recorded) -> Resul
 fn attitude(record: &Record<'_>, name: &str, rank: u8, recorded: &mut Recorded) -> Result<(), &'static str> {
     let angles_deg = record.numbers(["Roll", "Pitch", "Yaw"]).ok_or("without roll, pitch and yaw")?;
     let rotation = from_euler(angles_deg.map(f64::to_radians)).ok_or(NOT_FINITE)?;
-    recorded.attitudes.push(rank, name, time_ns(record)?, rotation);
+    recorded.attitudes.push((rank, 0), name, time_ns(record)?, rotation);
     Ok(())
 }
 
-/// Reads the position of the first core of a Kalman filter.
+/// Number of the device of a record by a field, and the record's name with this number unless it is 0.
+fn device(record: &Record<'_>, name: &str, field: &str) -> (u16, String) {
+    let number = record.raw(field).map_or(0, |number| number as u16);
+    (number, if number == 0 { name.to_owned() } else { format!("{name}[{number}]") })
+}
+
+/// Reads the position of a core of a Kalman filter.
 fn position(record: &Record<'_>, name: &str, recorded: &mut Recorded) -> Result<(), &'static str> {
-    if record.raw("C").is_some_and(|core| core != 0.0) {
-        return Err("of another core of the filter");
-    }
+    let (core, core_name) = device(record, name, "C");
     let position_m = record.numbers(["PN", "PE", "PD"]).ok_or("without a position")?;
     let position_m = finite(position_m).ok_or(NOT_FINITE)?;
     let rank = match name {
@@ -115,7 +119,7 @@ fn position(record: &Record<'_>, name: &str, recorded: &mut Recorded) -> Result<
         "NKF1" => 1,
         _ => 2,
     };
-    recorded.positions.push(rank, name, time_ns(record)?, position_m);
+    recorded.positions.push((rank, core), &core_name, time_ns(record)?, position_m);
     Ok(())
 }
 
@@ -123,9 +127,7 @@ fn position(record: &Record<'_>, name: &str, recorded: &mut Recorded) -> Result<
 const FIX_3D: f64 = 3.0;
 
 fn fix(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static str> {
-    if record.raw("I").is_some_and(|instance| instance != 0.0) {
-        return Err("of another receiver");
-    }
+    let (receiver, receiver_name) = device(record, "GPS", "I");
     // In logs without microseconds, TimeMS is GPS time and T the time since the start.
     let time_ns = match record.raw("T") {
         Some(milliseconds) => nanoseconds(milliseconds, 1e6).ok_or("without a time")?,
@@ -137,7 +139,7 @@ fn fix(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static str>
     let [latitude_deg, longitude_deg, altitude_m] =
         record.numbers(["Lat", "Lng", "Alt"]).ok_or("without a position")?;
     let fix = Geodetic::from_deg(latitude_deg, longitude_deg, altitude_m).ok_or("without a position")?;
-    recorded.fixes.push(0, "GPS", time_ns, fix);
+    recorded.fixes.push((0, receiver), &receiver_name, time_ns, fix);
     let week = record.raw("GWk").or_else(|| record.raw("Week"));
     let in_week = record.raw("GMS").or_else(|| record.raw("TimeMS"));
     if let (Some(week), Some(milliseconds)) = (week, in_week)
@@ -162,9 +164,7 @@ fn utc_from_gps_ns(week: f64, milliseconds: f64) -> Option<i64> {
 
 /// Reads gimbal angles: roll and pitch from the horizon, yaw from the vehicle (`YawB`) or from north (`YawE`, `Yaw`).
 fn mount(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static str> {
-    if record.raw("I").is_some_and(|instance| instance != 0.0) {
-        return Err("of another gimbal");
-    }
+    let (gimbal, gimbal_name) = device(record, "MNT", "I");
     let angle_deg = |name: &str| record.number(name).filter(|angle| angle.is_finite());
     let (Some(roll_deg), Some(pitch_deg)) = (angle_deg("Roll"), angle_deg("Pitch")) else {
         return Err("without measured angles");
@@ -178,6 +178,6 @@ fn mount(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static st
     };
     let frame_from_camera: UnitQuaternion<f64> =
         from_euler([roll_deg, pitch_deg, yaw_deg].map(f64::to_radians)).ok_or(NOT_FINITE)?;
-    recorded.gimbal.push(0, "MNT", time_ns(record)?, GimbalAttitude { frame, frame_from_camera });
+    recorded.gimbal.push((0, gimbal), &gimbal_name, time_ns(record)?, GimbalAttitude { frame, frame_from_camera });
     Ok(())
 }

@@ -43,12 +43,12 @@ impl Karma {
         let time_ns = nanoseconds(*row.first()?, 1e9)?;
         let three = |at: usize| finite([*row.get(at)?, *row.get(at + 1)?, *row.get(at + 2)?]);
         match key {
-            "ATTD" => self.recorded.attitudes.push(0, key, time_ns, from_euler(three(1)?.into())?),
-            "LNED" => self.recorded.positions.push(0, key, time_ns, three(1)?),
+            "ATTD" => self.recorded.attitudes.push((0, 0), key, time_ns, from_euler(three(1)?.into())?),
+            "LNED" => self.recorded.positions.push((0, 0), key, time_ns, three(1)?),
             "GLPI" => {
                 let [latitude_deg, longitude_deg, altitude_m] = three(1)?.into();
                 let fix = Geodetic::from_deg(latitude_deg, longitude_deg, altitude_m)?;
-                self.recorded.fixes.push(0, key, time_ns, fix);
+                self.recorded.fixes.push((0, 0), key, time_ns, fix);
             }
             "SIMU" => {
                 let sample = [three(4)?, three(1)? * STANDARD_GRAVITY_M_PER_S2];

@@ -207,7 +207,7 @@ fn take_fixes(item: &Item<'_>, properties: &Properties, payload: &Payload, camer
             camera.leave(&key, "without a fix in three dimensions");
             continue;
         };
-        camera.fixes.push(u8::from(&item.key == b"GPS5"), &key, time_ns, place);
+        camera.fixes.push((u8::from(&item.key == b"GPS5"), 0), &key, time_ns, place);
         let utc_ns = match (row.get(5), row.get(6)) {
             (Some(days), Some(seconds)) => nanoseconds(EPOCH_2000_S + days * 86_400.0 + seconds, 1e9),
             _ => properties.utc_ns.filter(|_| index == 0),

@@ -1,6 +1,7 @@
 //! Telemetry logs of ground stations (`.tlog`): `MAVLink` messages with the times of their reception.
 
 mod frames;
+mod vehicles;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,6 +11,7 @@ use nalgebra::Vector3;
 use super::super::super::file::LogFile;
 use super::super::ConvertError;
 use super::super::sink::LogSink;
+use super::candidates::Preference;
 use super::mavlink_gimbal::gimbal_attitude;
 use super::recorded::{
     GimbalAttitude, GimbalFrame, Recorded, STANDARD_GRAVITY_M_PER_S2, finite, from_euler, nanoseconds, rotation,
@@ -18,6 +20,7 @@ use super::scalar::Scalar;
 use crate::flight_log::geodesy::Geodetic;
 pub(super) use frames::is_telemetry;
 use frames::{Frame, Frames};
+use vehicles::Vehicle;
 
 /// Numbers of the supported messages (`MAVLink` common).
 mod id {
@@ -65,69 +68,33 @@ fn checksum_byte(message: u32) -> Option<u8> {
 const RAW_IMU: &str = "RAW_IMU";
 /// `MAV_AUTOPILOT_INVALID`: a component that is no autopilot.
 const NO_AUTOPILOT: u8 = 8;
-/// `MAV_AUTOPILOT_ARDUPILOTMEGA`, whose `RAW_IMU` has the units of `SCALED_IMU`.
-const ARDUPILOT: u8 = 3;
 /// Component number of the autopilot.
 const AUTOPILOT_COMPONENT: u8 = 1;
-/// A component has restarted if its times go back by more than this.
-const RESTART_NS: i64 = 10_000_000_000;
 /// Times beyond this are since the epoch, others since the start of the component.
 const EPOCH_TIMES_NS: i64 = 1_000_000_000_000_000_000;
-
-/// Measurements of a component from one start to the next, in time since its start.
-#[derive(Debug)]
-struct Session {
-    recorded: Recorded,
-    last_ns: i64,
-    /// Smallest delay from a measurement to its reception: the offset of both clocks, and the fastest message's delay.
-    offset_ns: i64,
-}
-
-#[derive(Debug)]
-struct ReadMessages {
-    /// Measurements with times since the epoch.
-    recorded: Recorded,
-    sessions: BTreeMap<u8, Session>,
-    /// Number of the vehicle, and kind of its autopilot.
-    system: Option<u8>,
-    autopilot: Option<u8>,
-    restarts: u64,
-}
-
-fn empty() -> Recorded {
-    Recorded::new("MAVLink telemetry log", "")
-}
 
 /// Reads a log in UTC of the autopilot (`SYSTEM_TIME`), else of the ground station.
 pub(super) fn read(path: &Path, sink: &mut LogSink<'_>) -> Result<Recorded, ConvertError> {
     let file = LogFile::open(path, sink.limits())?;
     let mut frames = Frames::new(&file, checksum_byte);
-    let mut state =
-        ReadMessages { recorded: empty(), sessions: BTreeMap::new(), system: None, autopilot: None, restarts: 0 };
+    let mut vehicles: BTreeMap<u8, Vehicle> = BTreeMap::new();
+    let mut unread = vehicles::empty();
     let mut at = 0;
     while let Some(frame) = frames.next(at).map_err(|problem| ConvertError::unreadable(problem, path))? {
         at = frame.end;
-        state.take(&frame);
+        match described(frame.message) {
+            Some((name, _)) => take(&frame, name, vehicles.entry(frame.system).or_default()),
+            None => unread.leave(&format!("message {}", frame.message), "not read"),
+        }
         sink.advance(at, file.len())?;
     }
     let damage = frames.damage;
-    let ReadMessages { mut recorded, sessions, autopilot, restarts, .. } = state;
-    for session in sessions.into_values() {
-        recorded.append(session.finish());
-    }
-    if autopilot != Some(ARDUPILOT)
-        && let Some(raw) = recorded.imus.remove(RAW_IMU)
-    {
-        let reason = "in units of the sensor, which are known for ArduPilot only";
-        recorded.leave_many(RAW_IMU, raw.combined.len() as u64, reason);
-    }
+    let mut recorded = vehicles::chosen(vehicles, sink);
+    recorded.append(unread);
     recorded.notes.extend(
         damage
             .notes("are no records", |bytes| format!("the log ends within a record: its last {bytes} bytes are lost")),
     );
-    if restarts > 0 {
-        recorded.notes.push(format!("the autopilot or the gimbal has restarted {restarts} times during the log"));
-    }
     // The times are UTC already.
     if let Some((time_ns, _)) = recorded.span_ns() {
         recorded.utc = vec![(time_ns, time_ns)];
@@ -135,55 +102,62 @@ pub(super) fn read(path: &Path, sink: &mut LogSink<'_>) -> Result<Recorded, Conv
     Ok(recorded)
 }
 
-impl Session {
-    /// All measurements, at times since the epoch.
-    fn finish(mut self) -> Recorded {
-        let offset_ns = self.recorded.utc_offset_ns().unwrap_or(self.offset_ns);
-        self.recorded.shift(offset_ns);
-        self.recorded
+/// Takes a message of a vehicle.
+fn take(frame: &Frame, name: &'static str, vehicle: &mut Vehicle) {
+    if frame.message == id::HEARTBEAT {
+        let autopilot = frame.payload[5];
+        if autopilot != NO_AUTOPILOT {
+            vehicle.take_heartbeat(autopilot);
+        }
+        return;
+    }
+    vehicle.count(name);
+    let (Some(time_ns), false) = (time_ns(frame), frame.message == id::SYSTEM_TIME && unix_ns(frame).is_none()) else {
+        return vehicle.recorded.leave(name, "without a time");
+    };
+    if frame.message == id::RAW_IMU {
+        vehicle.raw_imus.insert(Component::of(frame).record(&raw_imu_name(frame)));
+    }
+    let recorded = if time_ns >= EPOCH_TIMES_NS { &mut vehicle.recorded } else { vehicle.session(frame, time_ns) };
+    if let Err(reason) = measure(frame, name, time_ns, recorded) {
+        recorded.leave(name, reason);
     }
 }
 
-impl ReadMessages {
-    fn take(&mut self, frame: &Frame) {
-        let Some((name, _)) = described(frame.message) else {
-            return self.recorded.leave(&format!("message {}", frame.message), "not read");
-        };
-        if frame.message == id::HEARTBEAT {
-            let autopilot = frame.payload[5];
-            if self.system.is_none() && autopilot != NO_AUTOPILOT {
-                (self.system, self.autopilot) = (Some(frame.system), Some(autopilot));
-            }
-            return;
-        }
-        if self.system.is_some_and(|system| system != frame.system) {
-            return self.recorded.leave(&format!("{name} of system {}", frame.system), "of another vehicle");
-        }
-        let (Some(time_ns), false) = (time_ns(frame), frame.message == id::SYSTEM_TIME && unix_ns(frame).is_none())
-        else {
-            return self.recorded.leave(name, "without a time");
-        };
-        let recorded = if time_ns >= EPOCH_TIMES_NS { &mut self.recorded } else { self.session(frame, time_ns) };
-        if let Err(reason) = measure(frame, name, time_ns, recorded) {
-            recorded.leave(name, reason);
-        }
-    }
-
-    /// Session of a component at a time since its start.
-    fn session(&mut self, frame: &Frame, time_ns: i64) -> &mut Recorded {
-        let offset_ns = frame.received_ns.saturating_sub(time_ns);
-        let new = || Session { recorded: empty(), last_ns: time_ns, offset_ns };
-        let session = self.sessions.entry(frame.component).or_insert_with(new);
-        if time_ns < session.last_ns.saturating_sub(RESTART_NS) {
-            let ended = std::mem::replace(session, new());
-            self.recorded.append(ended.finish());
-            self.restarts += 1;
-        }
-        session.last_ns = time_ns;
-        session.offset_ns = session.offset_ns.min(offset_ns);
-        &mut session.recorded
+/// Name of a raw IMU, with its number unless it is the first.
+fn raw_imu_name(frame: &Frame) -> String {
+    match frame.payload[26] {
+        0 => RAW_IMU.to_owned(),
+        number => format!("{RAW_IMU}[{number}]"),
     }
 }
+
+/// Sender of a message within its vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Component(u8);
+
+impl Component {
+    fn of(frame: &Frame) -> Self {
+        Self(frame.component)
+    }
+
+    fn is_autopilot(self) -> bool {
+        self.0 == AUTOPILOT_COMPONENT
+    }
+
+    /// Name of a record of this component.
+    fn record(self, name: &str) -> String {
+        if self.is_autopilot() { name.to_owned() } else { format!("{name} of component {}", self.0) }
+    }
+
+    /// Preference for a measurement of the vehicle: those of its autopilot come before those of its other components.
+    fn preference(self, rank: u8) -> Preference {
+        if self.is_autopilot() { (rank, 0) } else { (rank + OTHER_COMPONENTS, u16::from(self.0)) }
+    }
+}
+
+/// Added to the rank of a measurement that is not the autopilot's.
+const OTHER_COMPONENTS: u8 = 8;
 
 fn number(frame: &Frame, scalar: Scalar, at: usize) -> f64 {
     scalar.little_endian(&frame.payload, at).unwrap_or(f64::NAN)
@@ -210,6 +184,7 @@ fn unix_ns(frame: &Frame) -> Option<i64> {
 const NOT_FINITE: &str = "a number that is not finite";
 
 fn measure(frame: &Frame, name: &str, time_ns: i64, recorded: &mut Recorded) -> Result<(), &'static str> {
+    let sender = Component::of(frame);
     match frame.message {
         id::SYSTEM_TIME => {
             if frame.component == AUTOPILOT_COMPONENT {
@@ -221,7 +196,8 @@ fn measure(frame: &Frame, name: &str, time_ns: i64, recorded: &mut Recorded) -> 
             // Thousandths of g and of rad/s.
             let milli = |at: usize| Vector3::from(numbers::<3>(frame, Scalar::I16, at)) / 1e3;
             let sample = [milli(first + 6), milli(first) * STANDARD_GRAVITY_M_PER_S2];
-            recorded.imu(name).combined.push((time_ns, sample));
+            let name = if frame.message == id::RAW_IMU { raw_imu_name(frame) } else { name.to_owned() };
+            push_imu(sender, &name, time_ns, sample, recorded);
         }
         id::HIGHRES_IMU => {
             // The first six bits mark new accelerations and angular rates.
@@ -231,19 +207,19 @@ fn measure(frame: &Frame, name: &str, time_ns: i64, recorded: &mut Recorded) -> 
             }
             let force = finite(numbers(frame, Scalar::F32, 8)).ok_or(NOT_FINITE)?;
             let rate = finite(numbers(frame, Scalar::F32, 20)).ok_or(NOT_FINITE)?;
-            recorded.imu(&format!("HIGHRES_IMU[{}]", frame.payload[62])).combined.push((time_ns, [rate, force]));
+            push_imu(sender, &format!("HIGHRES_IMU[{}]", frame.payload[62]), time_ns, [rate, force], recorded);
         }
         id::ATTITUDE => {
             let rotation = from_euler(numbers(frame, Scalar::F32, 4)).ok_or(NOT_FINITE)?;
-            recorded.attitudes.push(1, name, time_ns, rotation);
+            recorded.attitudes.push(sender.preference(1), &sender.record(name), time_ns, rotation);
         }
         id::ATTITUDE_QUATERNION => {
             let rotation = rotation(numbers(frame, Scalar::F32, 4)).ok_or("no unit quaternion")?;
-            recorded.attitudes.push(0, name, time_ns, rotation);
+            recorded.attitudes.push(sender.preference(0), &sender.record(name), time_ns, rotation);
         }
         id::LOCAL_POSITION_NED => {
             let position_m = finite(numbers(frame, Scalar::F32, 4)).ok_or(NOT_FINITE)?;
-            recorded.positions.push(0, name, time_ns, position_m);
+            recorded.positions.push(sender.preference(0), &sender.record(name), time_ns, position_m);
         }
         id::GLOBAL_POSITION_INT => push_fix(frame, name, 1, 4, time_ns, recorded)?,
         id::GPS_RAW_INT => {
@@ -256,16 +232,29 @@ fn measure(frame: &Frame, name: &str, time_ns: i64, recorded: &mut Recorded) -> 
             let [roll_deg, pitch_deg, yaw_deg, _] = numbers(frame, Scalar::F32, 4);
             let angles_rad = [roll_deg, pitch_deg, yaw_deg].map(f64::to_radians);
             let frame_from_camera = from_euler(angles_rad).ok_or(NOT_FINITE)?;
-            recorded.gimbal.push(1, name, time_ns, GimbalAttitude { frame: GimbalFrame::Vehicle, frame_from_camera });
+            let attitude = GimbalAttitude { frame: GimbalFrame::Vehicle, frame_from_camera };
+            recorded.gimbal.push((1, u16::from(sender.0)), &sender.record(name), time_ns, attitude);
         }
         id::GIMBAL_DEVICE_ATTITUDE_STATUS => {
             let flags = number(frame, Scalar::U16, 36) as u32;
             let attitude = gimbal_attitude(flags, numbers(frame, Scalar::F32, 4)).ok_or("no unit quaternion")?;
-            recorded.gimbal.push(0, name, time_ns, attitude);
+            // Number of a gimbal without a component of its own; 0 for a gimbal that sends itself.
+            let gimbal = frame.payload[48];
+            let of_gimbal = if gimbal > 0 { format!(" of gimbal {gimbal}") } else { String::new() };
+            let record = format!("{}{of_gimbal}", sender.record(name));
+            let device = (u16::from(sender.0) << 8) + u16::from(gimbal);
+            recorded.gimbal.push((0, device), &record, time_ns, attitude);
         }
         _ => return Err("not read"),
     }
     Ok(())
+}
+
+/// Adds angular velocity and specific force of a component's IMU.
+fn push_imu(sender: Component, name: &str, time_ns: i64, sample: [Vector3<f64>; 2], recorded: &mut Recorded) {
+    let imu = recorded.imu(&sender.record(name));
+    imu.is_of_other_device = !sender.is_autopilot();
+    imu.combined.push((time_ns, sample));
 }
 
 /// Adds latitude and longitude in 1e-7 degrees and altitude in millimetres.
@@ -279,6 +268,7 @@ fn push_fix(
 ) -> Result<(), &'static str> {
     let [latitude, longitude, altitude] = numbers(frame, Scalar::I32, at);
     let fix = Geodetic::from_deg(latitude / 1e7, longitude / 1e7, altitude / 1e3).ok_or("without a position")?;
-    recorded.fixes.push(rank, name, time_ns, fix);
+    let sender = Component::of(frame);
+    recorded.fixes.push(sender.preference(rank), &sender.record(name), time_ns, fix);
     Ok(())
 }

@@ -165,6 +165,12 @@ struct Record<'a> {
 }
 
 impl Record<'_> {
+    /// Name of the message, with the number of its instance unless it is the first.
+    fn name(&self) -> String {
+        let Subscription { name, instance } = self.subscription;
+        if *instance == 0 { name.clone() } else { format!("{name}[{instance}]") }
+    }
+
     fn number(&self, name: &str) -> Option<f64> {
         self.layout.number(self.message, name)
     }
@@ -183,7 +189,7 @@ impl Record<'_> {
 /// Stores the measurement of a message: `None` for unusable numbers, the reason for a message that is left out.
 fn measure(record: &Record<'_>, recorded: &mut Recorded) -> Option<Result<(), &'static str>> {
     let Subscription { name, instance } = record.subscription;
-    let time_ns = record.time_ns()?;
+    let (time_ns, device) = (record.time_ns()?, u16::from(*instance));
     match name.as_str() {
         "sensor_combined" => {
             let rate = finite(record.numbers("gyro_rad")?)?;
@@ -196,9 +202,9 @@ fn measure(record: &Record<'_>, recorded: &mut Recorded) -> Option<Result<(), &'
             let samples = if name == "sensor_gyro" { &mut imu.gyroscope } else { &mut imu.accelerometer };
             samples.push((time_ns, components));
         }
-        _ if *instance > 0 => return Some(Err("of another instance")),
         "vehicle_attitude" => {
-            recorded.attitudes.push(0, name, time_ns, rotation(record.numbers("q")?)?);
+            let record_name = record.name();
+            recorded.attitudes.push((0, device), &record_name, time_ns, rotation(record.numbers("q")?)?);
         }
         "vehicle_local_position" => {
             let is_valid = |name: &str| record.number(name).is_none_or(|valid| valid != 0.0);
@@ -206,17 +212,23 @@ fn measure(record: &Record<'_>, recorded: &mut Recorded) -> Option<Result<(), &'
                 return Some(Err("marked as invalid by the autopilot"));
             }
             let position_m = finite([record.number("x")?, record.number("y")?, record.number("z")?])?;
-            recorded.positions.push(0, name, time_ns, position_m);
+            recorded.positions.push((0, device), &record.name(), time_ns, position_m);
         }
         "vehicle_gps_position" | "sensor_gps" => return fix(record, time_ns, recorded),
         "gimbal_device_attitude_status" => {
             let attitude = gimbal_attitude(record.number("device_flags")? as u32, record.numbers("q")?)?;
-            recorded.gimbal.push(0, name, time_ns, attitude);
+            // PX4 publishes the messages of all gimbals with the numbers that they have on the vehicle.
+            let gimbal = record.number("gimbal_device_id").filter(|gimbal| *gimbal > 0.0).map(|gimbal| gimbal as u8);
+            let record_name = match gimbal {
+                Some(gimbal) => format!("{} of gimbal {gimbal}", record.name()),
+                None => record.name(),
+            };
+            recorded.gimbal.push((0, (device << 8) + u16::from(gimbal.unwrap_or(0))), &record_name, time_ns, attitude);
         }
         "mount_orientation" => {
             let frame_from_camera = from_euler(record.numbers("attitude_euler_angle")?)?;
             let attitude = GimbalAttitude { frame: GimbalFrame::Vehicle, frame_from_camera };
-            recorded.gimbal.push(1, name, time_ns, attitude);
+            recorded.gimbal.push((1, device), &record.name(), time_ns, attitude);
         }
         _ => return Some(Err("not read")),
     }
@@ -239,7 +251,8 @@ fn fix(record: &Record<'_>, time_ns: i64, recorded: &mut Recorded) -> Option<Res
             Geodetic::from_deg(record.number("lat")? / 1e7, record.number("lon")? / 1e7, record.number("alt")? / 1e3)?
         }
     };
-    recorded.fixes.push(u8::from(name == "sensor_gps"), name, time_ns, fix);
+    let preference = (u8::from(name == "sensor_gps"), u16::from(record.subscription.instance));
+    recorded.fixes.push(preference, &record.name(), time_ns, fix);
     let message_ns = record.number("timestamp").and_then(|microseconds| nanoseconds(microseconds, 1e3))?;
     if let Some(utc_ns) =
         record.number("time_utc_usec").filter(|time| *time > 0.0).and_then(|time| nanoseconds(time, 1e3))
