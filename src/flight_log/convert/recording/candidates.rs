@@ -2,8 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::recorded::{NamedSamples, Samples};
 use crate::geometry::seconds_from_ns;
+
+/// Measurements with their times in nanoseconds of the recorder's clock.
+pub(super) type Samples<T> = Vec<(i64, T)>;
+
+pub(super) type NamedSamples<T> = (String, Samples<T>);
 
 /// Measurements further apart leave a gap.
 const MAX_GAP_NS: i64 = 1_000_000_000;

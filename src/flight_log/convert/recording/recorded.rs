@@ -4,17 +4,12 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use super::candidates::Candidates;
+use super::candidates::{Candidates, Samples};
 use crate::flight_log::geodesy::Geodetic;
 use crate::geometry::seconds_from_ns;
 
 /// Standard gravity (ISO 80000-3), the unit of accelerations in g.
 pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.80665;
-
-/// Measurements with their times in nanoseconds of the recorder's clock.
-pub(super) type Samples<T> = Vec<(i64, T)>;
-
-pub(super) type NamedSamples<T> = (String, Samples<T>);
 
 /// IMU of a recording: angular velocities in rad/s and specific forces in m/s², in the IMU frame.
 #[derive(Clone, Debug, Default)]

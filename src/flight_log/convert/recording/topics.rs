@@ -8,9 +8,9 @@ use super::super::super::MessageTimes;
 use super::super::ConvertError;
 use super::super::sink::LogSink;
 use super::attitude::{AttitudeTrack, earth_from_heading, enu_from_ned};
-use super::candidates::{Candidates, Choice};
+use super::candidates::{Candidates, Choice, NamedSamples, Samples};
 use super::mp4::Video;
-use super::recorded::{GimbalAttitude, GimbalFrame, NamedSamples, Recorded, RecordedImu, Samples, rate_hz};
+use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, RecordedImu, rate_hz};
 use crate::geometry::RigidTransform;
 
 const IMU_TYPE: &str = "sensor_msgs/msg/Imu";

@@ -1,6 +1,8 @@
 //! Telemetry logs of ground stations (`.tlog`): `MAVLink` messages with the times of their reception.
 
 mod frames;
+#[cfg(test)]
+mod tests;
 mod vehicles;
 
 use std::collections::BTreeMap;
