@@ -12,6 +12,7 @@ use super::super::LogError;
 use super::super::text::shortened;
 use super::super::text::without_bom;
 use super::fields::Field;
+use super::indentation;
 
 /// Largest rig file in bytes; the rig of 16 links and 16 cameras takes 16 kB.
 const MAX_RIG_BYTES: u64 = 1 << 20;
@@ -49,6 +50,7 @@ impl Document {
     }
 
     pub(super) fn parse(text: String, file: &Path) -> Result<Self, LogError> {
+        indentation::check(&text, file)?;
         match serde_saphyr::from_str(&text) {
             Ok(value) => Ok(Self { value, file: file.to_owned(), text }),
             Err(error) => Err(LogError::RigSyntax { problem: syntax_problem(&error, &text), path: file.to_owned() }),

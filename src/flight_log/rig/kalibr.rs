@@ -8,6 +8,7 @@ use super::super::LogError;
 use super::camera_facts::CameraFacts;
 use super::fields::Field;
 use super::read;
+use crate::geometry::RigidTransform;
 use crate::sensors::{CameraMount, Rig};
 
 /// Usual names of Kalibr's IMU file.
@@ -40,9 +41,12 @@ pub(super) fn read_camera_chain(
     let nested = imu.field("imu0");
     let imu = read::read_imu(if nested.is_present() { &nested } else { imu }, None)?;
     let mut cameras = Vec::new();
+    let mut previous_from_imu = None;
     for key in read::camera_keys(chain)? {
         let camera = chain.field(&key);
-        let imu_from_camera = camera.field("T_cam_imu").transform()?.inverse();
+        let camera_from_imu = camera_from_imu(&camera, previous_from_imu)?;
+        previous_from_imu = Some(camera_from_imu);
+        let imu_from_camera = camera_from_imu.inverse();
         cameras.push(read::read_camera_as(&camera, &key, CameraMount::Static { imu_from_camera }, facts)?);
     }
     Ok(Rig {
@@ -55,4 +59,20 @@ pub(super) fn read_camera_chain(
         ground_truth_lever_arm: None,
         assumed: Vec::new(),
     })
+}
+
+/// Transform `camera_from_imu`: `T_cam_imu`, else that of the previous camera followed by `T_cn_cnm1`, from the previous
+/// camera to this one.
+fn camera_from_imu(camera: &Field<'_>, previous_from_imu: Option<RigidTransform>) -> Result<RigidTransform, LogError> {
+    let (from_imu, from_previous) = (camera.field("T_cam_imu"), camera.field("T_cn_cnm1"));
+    match previous_from_imu {
+        Some(previous_from_imu) if !from_imu.is_present() && from_previous.is_present() => {
+            Ok(from_previous.transform()? * previous_from_imu)
+        }
+        None if !from_imu.is_present() => Err(from_imu.unexpected(
+            "4 rows of 4 numbers, from the IMU to the camera; kalibr_calibrate_imu_camera writes it into \
+             camchain-imucam.yaml (camchain.yaml of kalibr_calibrate_cameras has cameras alone)",
+        )),
+        _ => from_imu.transform(),
+    }
 }

@@ -127,6 +127,23 @@ pub(super) fn check_imu_file(document: &Value, file: &Path) -> Result<Vec<String
     found.into_result(file)
 }
 
+/// True for a key of a rig's outermost mapping.
+pub(super) fn is_of_root(key: &str) -> bool {
+    ROOT.read.contains(&key) || APPENDICES.contains(&key) || is_numbered(key, "cam") || is_numbered(key, "imu")
+}
+
+/// True for a key of the mapping with a key of the outermost one.
+pub(super) fn is_of_mapping(key: &str, mapping: &str) -> bool {
+    let keys = match mapping {
+        "gimbal" => &GIMBAL,
+        "ground_truth" => &GROUND_TRUTH,
+        mapping if is_numbered(mapping, "cam") => &CAMERA,
+        mapping if is_numbered(mapping, "imu") => &IMU,
+        _ => return false,
+    };
+    keys.read.contains(&key) || keys.unused.contains(&key)
+}
+
 /// True for a name followed by a number, such as `cam0`.
 fn is_numbered(key: &str, name: &str) -> bool {
     key.strip_prefix(name).is_some_and(|number| number.parse::<u32>().is_ok())
@@ -159,6 +176,10 @@ fn check_imu(imu: &Value, path: &str, found: &mut Found) {
 
 fn check_camera(camera: &Value, path: &str, found: &mut Found) {
     check_mapping(camera, path, &CAMERA, found);
+    if camera.get("T_cam_imu").is_none() {
+        // The pose relative to the previous camera is used.
+        found.unused.retain(|key| key.strip_suffix(".T_cn_cnm1") != Some(path));
+    }
     if let Some(sigma) = camera.get("intrinsics_sigma") {
         check_mapping(sigma, &format!("{path}.intrinsics_sigma"), &INTRINSICS_SIGMA, found);
     }

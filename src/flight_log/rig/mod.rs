@@ -6,6 +6,7 @@ pub(crate) mod camera_info;
 mod document;
 mod fields;
 mod find;
+mod indentation;
 mod kalibr;
 mod keys;
 mod link;

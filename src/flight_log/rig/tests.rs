@@ -428,6 +428,45 @@ fn kalibrs_files_are_a_rig() {
 }
 
 #[test]
+fn poses_of_kalibrs_cameras_are_chained() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let chain = folder.path().join("camchain-imucam.yaml");
+    fs::write(folder.path().join("imu.yaml"), IMU).unwrap();
+    let begin = CAMERA_CHAIN.find("  T_cam_imu").unwrap();
+    let end = CAMERA_CHAIN.find("  cam_overlaps").unwrap();
+    let relative = "  T_cn_cnm1:\n  - [0.0, 0.0, 1.0, 0.1]\n  - [0.0, 1.0, 0.0, 0.0]\n  - [-1.0, 0.0, 0.0, 0.0]\n  \
+                    - [0.0, 0.0, 0.0, 1.0]\n";
+    let lens = &CAMERA_CHAIN[end..];
+    fs::write(&chain, format!("{CAMERA_CHAIN}cam1:\n{relative}{lens}cam2:\n{relative}{lens}")).unwrap();
+    let rig = Rig::from_file(&chain).unwrap();
+    let from_imu = |camera: usize| {
+        let CameraMount::Static { imu_from_camera } = &rig.cameras[camera].mount else { panic!("static") };
+        imu_from_camera.inverse()
+    };
+    let at = Vector3::new(0.3, -0.2, 0.7);
+    for camera in [1, 2] {
+        let before = from_imu(camera - 1).transform(&at);
+        let expected = Vector3::new(before.z + 0.1, before.y, -before.x);
+        assert!((from_imu(camera).transform(&at) - expected).norm() < 1e-12, "cam{camera}");
+    }
+    let alone = format!("{}{}", &CAMERA_CHAIN[..begin], lens);
+    fs::write(&chain, alone).unwrap();
+    let message = Rig::from_file(&chain).unwrap_err().to_string();
+    assert!(
+        message.starts_with("cam0.T_cam_imu: missing") && message.contains("kalibr_calibrate_imu_camera"),
+        "{message}"
+    );
+}
+
+#[test]
+fn byte_order_marks_line_ends_and_spaces_make_no_difference() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let path = folder.path().join("windows.rig.yaml");
+    fs::write(&path, format!("\u{feff}{}", RIG.replace('\n', "  \r\n"))).unwrap();
+    check_same(&parse(RIG).unwrap(), &Rig::from_file(&path).unwrap());
+}
+
+#[test]
 fn keys_of_kalibr_without_a_use_are_listed() {
     use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes};
     let folder = tempfile::TempDir::new().unwrap();
