@@ -26,6 +26,7 @@ mod protobuf;
 mod raw_encoding;
 pub(crate) mod rig;
 mod sensor_frame;
+mod stamp_text;
 pub(crate) mod stream;
 #[cfg(test)]
 pub(crate) mod tests;

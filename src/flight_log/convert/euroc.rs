@@ -10,6 +10,7 @@ use super::super::MessageTimes;
 use super::super::file::kind_of;
 use super::super::image_decoding::compressed_format;
 use super::super::limits::{LINE_BYTES, LogLimits};
+use super::super::stamp_text::{StampUnit, WrittenStamp, is_heading, read_stamp};
 use super::super::text::without_bom;
 use super::ConvertError;
 use super::euroc_sensor::{CameraSensor, IMU_TOPIC, image_topic, rig_of, sensor_pose};
@@ -28,6 +29,39 @@ const POSE_TYPE: &str = "geometry_msgs/msg/PoseStamped";
 pub(super) fn root(source: &Path) -> Option<PathBuf> {
     let has_sensors = |folder: &Path| folder.join("imu0/data.csv").is_file() || folder.join("cam0/data.csv").is_file();
     [source.join("mav0"), source.to_owned()].into_iter().find(|folder| has_sensors(folder))
+}
+
+/// Shortest step between two images.
+const SHORTEST_STEP_NS: i64 = 500_000;
+/// Shortest step between two samples of an IMU, or two poses.
+const SHORTEST_IMU_STEP_NS: i64 = 50_000;
+
+/// Row of a table with its line and its stamp as written.
+struct Row {
+    line: usize,
+    stamp: WrittenStamp,
+    sample: Sample,
+}
+
+/// Samples of a table with stamps in nanoseconds; a note if the table has another unit.
+fn in_nanoseconds(
+    rows: Vec<Row>,
+    shortest_step_ns: i64,
+    table: &Path,
+    name: &str,
+    sink: &mut LogSink<'_>,
+) -> Result<Vec<(i64, Sample)>, ConvertError> {
+    let stamps: Vec<WrittenStamp> = rows.iter().map(|row| row.stamp).collect();
+    let unit = StampUnit::of(&stamps, StampUnit::Nanoseconds, shortest_step_ns);
+    if unit != StampUnit::Nanoseconds {
+        sink.note(format!("the stamps of {name}/data.csv are in {}, which are converted to nanoseconds", unit.name()));
+    }
+    let sample = |row: Row| {
+        let stamp_ns = unit.nanoseconds(row.stamp).filter(|stamp_ns| *stamp_ns >= 0);
+        let problem = || format!("a stamp of {} {}, which no clock has", row.stamp / 1_000_000_000, unit.name());
+        Ok((stamp_ns.ok_or_else(|| bad_line(row.line, problem(), table))?, row.sample))
+    };
+    rows.into_iter().map(sample).collect()
 }
 
 /// Row of any sensor.
@@ -53,16 +87,18 @@ pub(super) fn convert(source: &Path, sink: &mut LogSink<'_>) -> Result<Option<Ri
     for name in &folders {
         let table = root.join(name).join("data.csv");
         if name == "imu0" {
-            read_imu(&table, &mut samples)?;
+            samples.extend(in_nanoseconds(read_imu(&table)?, SHORTEST_IMU_STEP_NS, &table, name, sink)?);
         } else if name.starts_with("cam") {
             let camera = cameras.len();
             let first = samples.len();
-            read_images(&table, camera, &mut samples)?;
+            let rows = read_images(&table, camera)?;
+            samples.extend(in_nanoseconds(rows, SHORTEST_STEP_NS, &table, name, sink)?);
             let stamps_ns: Vec<i64> = samples[first..].iter().map(|(stamp_ns, _)| *stamp_ns).collect();
             cameras.push(CameraSensor { key: name.clone(), folder: root.join(name), stamps_ns });
         } else if POSE_FOLDERS.contains(&name.as_str()) {
             let imu_from_sensor = sensor_pose(&root, name, sink);
-            read_poses(&table, poses.len(), &imu_from_sensor.inverse(), &mut samples)?;
+            let rows = read_poses(&table, poses.len(), &imu_from_sensor.inverse())?;
+            samples.extend(in_nanoseconds(rows, SHORTEST_IMU_STEP_NS, &table, name, sink)?);
             poses.push(name.clone());
         } else {
             let mut rows = 0;
@@ -167,6 +203,7 @@ fn for_each_row(
 ) -> Result<(), ConvertError> {
     let mut reader = BufReader::new(File::open(table).map_err(ConvertError::io("read", table))?);
     let mut line = 0;
+    let mut is_first = true;
     let mut bytes = Vec::new();
     loop {
         bytes.clear();
@@ -191,7 +228,11 @@ fn for_each_row(
             } else {
                 text.split_whitespace().collect()
             };
-            visit(line, &cells)?;
+            // A row of names that is no comment.
+            let is_heading = std::mem::take(&mut is_first) && is_heading(cells[0]);
+            if !is_heading {
+                visit(line, &cells)?;
+            }
         }
     }
 }
@@ -200,10 +241,10 @@ fn bad_line(line: usize, problem: impl Into<String>, table: &Path) -> ConvertErr
     ConvertError::Line { line, problem: problem.into(), path: table.to_owned() }
 }
 
-fn stamp_of(line: usize, row: &[&str], table: &Path) -> Result<i64, ConvertError> {
+fn stamp_of(line: usize, row: &[&str], table: &Path) -> Result<WrittenStamp, ConvertError> {
     let text = row.first().copied().unwrap_or_default();
-    let stamp_ns = text.parse::<i64>().ok().filter(|stamp_ns| *stamp_ns >= 0);
-    stamp_ns.ok_or_else(|| bad_line(line, format!("the stamp is '{text}', expected whole nanoseconds"), table))
+    let stamp = read_stamp(text).filter(|stamp| *stamp >= 0);
+    stamp.ok_or_else(|| bad_line(line, format!("the stamp is '{text}', expected whole nanoseconds"), table))
 }
 
 /// First numbers after the stamp.
@@ -219,34 +260,35 @@ fn numbers<const N: usize>(line: usize, row: &[&str], table: &Path) -> Result<[f
     Ok(numbers)
 }
 
-fn read_imu(table: &Path, samples: &mut Vec<(i64, Sample)>) -> Result<(), ConvertError> {
+fn read_imu(table: &Path) -> Result<Vec<Row>, ConvertError> {
+    let mut rows = Vec::new();
     for_each_row(table, |line, row| {
         let [wx, wy, wz, ax, ay, az] = numbers(line, row, table)?;
         let sample = Sample::Imu {
             angular_velocity_rad_per_s: Vector3::new(wx, wy, wz),
             specific_force_m_per_s2: Vector3::new(ax, ay, az),
         };
-        samples.push((stamp_of(line, row, table)?, sample));
+        rows.push(Row { line, stamp: stamp_of(line, row, table)?, sample });
         Ok(())
-    })
+    })?;
+    Ok(rows)
 }
 
-fn read_images(table: &Path, camera: usize, samples: &mut Vec<(i64, Sample)>) -> Result<(), ConvertError> {
+fn read_images(table: &Path, camera: usize) -> Result<Vec<Row>, ConvertError> {
+    let mut rows = Vec::new();
     for_each_row(table, |line, row| {
         let name = row.get(1).filter(|name| !name.is_empty());
         let name = name.ok_or_else(|| bad_line(line, "no file name after the stamp", table))?;
-        samples.push((stamp_of(line, row, table)?, Sample::Image { camera, name: (*name).to_owned() }));
+        let sample = Sample::Image { camera, name: (*name).to_owned() };
+        rows.push(Row { line, stamp: stamp_of(line, row, table)?, sample });
         Ok(())
-    })
+    })?;
+    Ok(rows)
 }
 
 /// Reads poses of a sensor in the world (`p x y z`, `q w x y z`), transformed to the IMU.
-fn read_poses(
-    table: &Path,
-    source: usize,
-    sensor_from_imu: &RigidTransform,
-    samples: &mut Vec<(i64, Sample)>,
-) -> Result<(), ConvertError> {
+fn read_poses(table: &Path, source: usize, sensor_from_imu: &RigidTransform) -> Result<Vec<Row>, ConvertError> {
+    let mut rows = Vec::new();
     for_each_row(table, |line, row| {
         let [x, y, z, qw, qx, qy, qz] = numbers(line, row, table)?;
         let quaternion = Quaternion::new(qw, qx, qy, qz);
@@ -255,7 +297,8 @@ fn read_poses(
         }
         let world_from_sensor = RigidTransform::new(UnitQuaternion::new_normalize(quaternion), Vector3::new(x, y, z));
         let sample = Sample::Pose { source, world_from_imu: world_from_sensor * *sensor_from_imu };
-        samples.push((stamp_of(line, row, table)?, sample));
+        rows.push(Row { line, stamp: stamp_of(line, row, table)?, sample });
         Ok(())
-    })
+    })?;
+    Ok(rows)
 }

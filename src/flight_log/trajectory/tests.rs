@@ -28,6 +28,21 @@ fn tum_and_euroc_are_told_apart_by_their_commas() {
 }
 
 #[test]
+fn units_marks_and_headings_are_recognized() {
+    let expected = read("1403636580.788555 0 2 3 0 0 0 1\n1403636580.838555 1 2 3 0 0 0.6 0.8\n").unwrap();
+    for text in [
+        "1403636580788555000 0 2 3 0 0 0 1\n1403636580838555000 1 2 3 0 0 0.6 0.8\n",
+        "1403636580788555 0 2 3 0 0 0 1\n1403636580838555 1 2 3 0 0 0.6 0.8\n",
+        "1403636580788.555 0 2 3 0 0 0 1\n1403636580838.555 1 2 3 0 0 0.6 0.8\n",
+        "\u{feff}timestamp tx ty tz qx qy qz qw\r\n 1403636580.788555\t0 2 3 0 0 0 1 \r\n\r\n1403636580.838555 1 2 3 0 0 0.6 0.8\r\n",
+        "\u{feff}timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z\r\n1403636580788555000 , 0,2,3,1,0,0,0\r\n1403636580838555000,1,2,3,0.8,0,0,0.6\r\n",
+        "1403636580788555,0,2,3,1,0,0,0\n1403636580838555,1,2,3,0.8,0,0,0.6\n",
+    ] {
+        assert_eq!(read(text).unwrap(), expected, "{text}");
+    }
+}
+
+#[test]
 fn positions_have_no_attitude() {
     for text in ["1.5 1 2 3\n", "1.5 1 2 3 0 0 0 0\n", "1500000000,1,2,3\n", "1500000000,1,2,3,0,0,0,0\n"] {
         let poses = read(text).unwrap();
@@ -44,7 +59,15 @@ fn errors_name_the_line() {
     check("1 2 3 4 0 0 0 2\n", &format!("line 1 has a quaternion of norm 2.0000, not 1; {tum}"));
     check(
         "0.5,1,2,3\n",
-        &format!("line 1 begins with '0.5', expected a stamp in whole nanoseconds as in EuRoC's tables; {tum}"),
+        &format!(
+            "line 1 begins with '0.5', expected a stamp in whole nanoseconds as in EuRoC's tables with commas (w of the \
+             quaternion first); write seconds with spaces instead of commas (TUM, w last); {tum}"
+        ),
+    );
+    check("1e30 1 2 3\n", &format!("line 1 has a stamp of 1e30 s, which no clock has; {tum}"));
+    check(
+        "99999999999999 1 2 3\n",
+        &format!("line 1 has a stamp of 99999999999999 seconds, which no clock has; {tum}"),
     );
     check("# nothing\n", "cannot use the trajectory: no pose in it: FILE");
 }

@@ -137,7 +137,7 @@ fn a_wrong_folder_says_where() {
         }
     };
     check("imu0/data.csv", "1,2,3,4,5,6,7\n12,0,0,x,0,0,0\n", &["line 2", "'x'", "data.csv"]);
-    check("imu0/data.csv", "1.5,2,3,4,5,6,7\n", &["line 1", "'1.5'", "nanoseconds"]);
+    check("imu0/data.csv", "1:5,2,3,4,5,6,7\n", &["line 1", "'1:5'", "nanoseconds"]);
     check("imu0/data.csv", "1,2,3\n", &["line 1", "2 numbers", "expected 6"]);
 }
 
@@ -160,6 +160,36 @@ fn byte_order_marks_line_ends_and_spaces_do_not_matter() {
     run(&source, &again).unwrap();
     assert!(fs::read(&again).unwrap() == expected, "the same samples give the same bytes");
     assert_eq!(fs::read_to_string(again.with_extension("rig.yaml")).unwrap(), rig);
+}
+
+#[test]
+fn units_of_stamps_are_recognized() {
+    let folder = tempfile::tempdir().unwrap();
+    let (source, path) = (folder.path().join("flight"), folder.path().join("flight.mcap"));
+    write_folder(&source);
+    let expected = run(&source, &path).map(|_| fs::read(&path).unwrap()).unwrap();
+    // Nanoseconds of the unit, and its number of decimals.
+    for (name, unit_ns, decimals) in [("imu0", 1_000_000_000, 9), ("cam0", 1_000_000, 6), ("leica0", 1000, 3)] {
+        let table = source.join("mav0").join(name).join("data.csv");
+        let text = fs::read_to_string(&table).unwrap();
+        let row = |line: &str| match line.split_once(',').filter(|_| !line.starts_with('#')) {
+            Some((stamp_ns, rest)) => {
+                let stamp_ns: i64 = stamp_ns.parse().unwrap();
+                format!("{}.{:0decimals$},{rest}\n", stamp_ns / unit_ns, stamp_ns % unit_ns)
+            }
+            None => format!("{}\n", line.trim_start_matches('#')),
+        };
+        fs::write(&table, text.lines().map(row).collect::<String>()).unwrap();
+    }
+    let again = folder.path().join("again.mcap");
+    let report = run(&source, &again).unwrap();
+    assert!(fs::read(&again).unwrap() == expected, "the same samples give the same bytes");
+    let notes = report.notes.join("\n");
+    assert!(
+        notes.contains("the stamps of imu0/data.csv are in seconds, which are converted to nanoseconds"),
+        "{notes}"
+    );
+    assert!(notes.contains("the stamps of cam0/data.csv are in milliseconds"), "{notes}");
 }
 
 #[test]
