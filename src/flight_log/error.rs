@@ -101,15 +101,15 @@ pub enum LogError {
     NoTransform { topic: String, problem: String, path: PathBuf },
     /// The clock of a topic has no known relation to that of the log.
     #[error(
-        "'{topic}': the first stamp is {stamp_s:.3} s since an unknown start (PX4 counts from its start), the \
+        "'{topic}': the first stamp is {stamp} since an unknown start (PX4 counts from its start), the \
          first log time is {log_s:.3} s after the first stamp of the log; neither lies within the log, so the two \
          clocks cannot be related; record with synchronized clocks (UXRCE_DDS_SYNCT 1): {}",
         path.display()
     )]
     UnknownClock {
         topic: String,
-        /// First stamp of the topic in seconds.
-        stamp_s: f64,
+        /// First stamp of the topic, with its unit.
+        stamp: String,
         /// First log time of the topic since the start of the log, in seconds.
         log_s: f64,
         path: PathBuf,

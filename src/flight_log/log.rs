@@ -7,9 +7,11 @@ use parking_lot::Mutex;
 use super::container::{BlockCache, ContainerIndex, DecodedBlock, MessagePosition, MessageSpan, TopicIndex};
 use super::error::list;
 use super::file::LogFile;
+use super::foreign;
 use super::grey_levels::GreyLevels;
 use super::limits::{LimitExceeded, LimitKind, LogLimits};
 use super::messages::{self, MessageKind};
+use super::text::{log_name, without_signed_zeros};
 use super::topic_info::{TopicInfo, nothing_read};
 use super::{LogError, LogWarning};
 use crate::geometry::seconds_from_ns;
@@ -137,7 +139,7 @@ impl FlightLog {
 
     fn warn(&mut self, kind: WarningKind, stamp_ns: i64, message: String) {
         self.warning_kinds.push(kind);
-        self.warnings.push(LogWarning { stamp_ns, message });
+        self.warnings.push(LogWarning { stamp_ns, message: without_signed_zeros(message) });
     }
 
     /// Name and content of the first attachment whose name ends with `name_ends_with`.
@@ -389,11 +391,8 @@ fn check_magic(file: &LogFile, path: &Path) -> Result<(), LogError> {
     if file.starts_with(mcap::MAGIC) {
         return Ok(());
     }
-    let convert = "convert it with `dcvins convert`";
-    let (found, remedy) = if file.starts_with(b"#ROSBAG") {
-        ("a ROS 1 bag".to_owned(), convert)
-    } else if file.starts_with(b"SQLite format 3") {
-        ("a ROS 2 bag in SQLite".to_owned(), convert)
+    let (found, remedy) = if let Some((found, remedy)) = foreign::described(&file, &log_name(path)) {
+        (found.to_owned(), remedy)
     } else if let Some(bytes) = lfs_pointer(&file) {
         let found = format!("a Git LFS pointer in place of the file ({bytes} bytes)");
         (found, "fetch the log with `git lfs pull`")

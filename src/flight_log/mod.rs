@@ -10,6 +10,7 @@ pub mod convert;
 pub mod csv_writer;
 mod error;
 mod file;
+mod foreign;
 mod geodesy;
 pub(crate) mod grey_levels;
 pub(crate) mod grey_sampling;
@@ -45,7 +46,7 @@ pub use messages::MessageKind;
 pub use rig::template as rig_template;
 pub use sensor_frame::{LogWarning, SensorFrame};
 pub use stream::FrameStream;
-pub use text::{edit_distance, log_name, nearest_name, printable, printable_lines, shortened};
+pub use text::{edit_distance, log_name, nearest_name, printable, printable_lines, shortened, without_signed_zeros};
 pub use topic_info::TopicInfo;
 pub use trajectory::{BATCH_REFERENCE, RecordedPose, is_batch_reference, read_trajectory_file};
 pub use writer::{

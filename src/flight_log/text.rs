@@ -65,6 +65,30 @@ pub fn shortened(name: &str, max_length: usize) -> Cow<'_, str> {
     Cow::Owned(format!("{head}…{tail}"))
 }
 
+/// Text in which zeros have no minus sign: `-0.0 ms` becomes `0.0 ms`.
+pub fn without_signed_zeros(text: String) -> String {
+    let is_number = |letter: char| letter.is_ascii_digit() || letter == '.';
+    let mut out = String::new();
+    let mut rest = text.as_str();
+    while let Some(at) = rest.find("-0") {
+        let (before, number) = rest.split_at(at);
+        out.push_str(before);
+        let end = number[1..].find(|letter| !is_number(letter)).map_or(number.len(), |end| end + 1);
+        let (digits, behind) = (&number[1..end], &number[end..]);
+        // A range `3-0`, a date or a name is no negative number, nor is the start of `-0e5` or `-0x1`.
+        let begins = !out.ends_with(|letter: char| letter.is_alphanumeric() || "/._-".contains(letter));
+        let ends = !behind.starts_with(|letter: char| letter.is_alphanumeric() || "_-".contains(letter));
+        let is_zero = digits.chars().all(|letter| letter == '0' || letter == '.');
+        out.push_str(if begins && ends && is_zero { digits } else { &number[..end] });
+        rest = behind;
+    }
+    if out.is_empty() {
+        return text;
+    }
+    out.push_str(rest);
+    out
+}
+
 /// Edit distance: number of characters to replace, insert or delete.
 pub fn edit_distance(from: &str, to: &str) -> usize {
     let to: Vec<char> = to.chars().collect();
@@ -97,6 +121,17 @@ mod tests {
         assert_eq!(printable("a\u{1b}[2Jb\n\u{7f}\u{9b}"), r"a\u{1b}[2Jb\n\u{7f}\u{9b}");
         assert_eq!(printable("\u{202e}gpj.exe\u{2066}"), r"\u{202e}gpj.exe\u{2066}");
         assert_eq!(printable_lines("a\tb\nc\rd\u{1b}"), "a\tb\nc\\rd\\u{1b}");
+    }
+
+    #[test]
+    fn zeros_have_no_sign() {
+        let check = |text: &str, expected: &str| assert_eq!(without_signed_zeros(text.to_owned()), expected);
+        check("readout -0.0 ms ± 0.4 ms, (-0.00, -0, +0.0)", "readout 0.0 ms ± 0.4 ms, (0.00, 0, +0.0)");
+        check("-0", "0");
+        check("-0.0 s. Then -0.", "0.0 s. Then 0.");
+        for same in ["-0.01 s", "-10.0", "2020-00-00", "cam-0", "a -0.05e3", "-0x10", "3-0", "", "no number", "--0.0"] {
+            check(same, same);
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::messages::MessageKind;
 use super::text::printable;
+use crate::text::counted;
 
 /// Remedy for messages in an encoding that neither this program nor `dcvins convert` reads.
 const RECORD_CDR: &str = "neither is this encoding read nor does `dcvins convert` convert it: record ROS 2 messages in \
@@ -75,12 +76,14 @@ pub(crate) fn nothing_read(topics: &[TopicInfo]) -> (String, &'static str) {
         let shown: Vec<String> =
             topics.iter().take(3).map(|info| format!("{}: {}", info.topic, info.type_in_encoding())).collect();
         let more = if topics.len() > shown.len() { ", …" } else { "" };
-        let problem = format!("{} topics, none of a type that is read ({}{more})", topics.len(), shown.join(", "));
+        let count = counted(topics.len(), "topic");
+        let problem = format!("{count}, none of a type that is read ({}{more})", shown.join(", "));
         return (problem, "record images and sensor_msgs/msg/Imu of ROS 2");
     };
     let of_first = unread.iter().filter(|info| info.encoding == first.encoding).count();
     let problem = format!(
-        "the messages of {of_first} topics are in {} encoding, expected CDR of ROS 2",
+        "the messages of {} are in {} encoding, expected CDR of ROS 2",
+        counted(of_first, "topic"),
         encoding_name(&first.encoding)
     );
     (problem, first.encoding_remedy())

@@ -2,6 +2,7 @@
 
 use crate::geometry::Dimension;
 use crate::gimbal::{ParameterGroup, ParameterId};
+pub(crate) use crate::text::counted;
 
 /// Conversion of a stored unit to the shown one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,11 +87,6 @@ pub(crate) fn bytes(count: u64) -> String {
     if mebibytes < 1024.0 { format!("{mebibytes:.0} MiB") } else { format!("{:.2} GiB", mebibytes / 1024.0) }
 }
 
-/// A count with its noun: `1 run`, `2 runs`.
-pub(crate) fn counted(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -122,6 +118,5 @@ mod tests {
         assert_eq!(seconds(12_350_400_000), "12.350");
         assert_eq!(bytes(300 << 20), "300 MiB");
         assert_eq!(bytes(3 << 29), "1.50 GiB");
-        assert_eq!(counted(1, "run"), "1 run");
     }
 }

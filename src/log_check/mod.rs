@@ -81,7 +81,12 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
             Area::Log,
             "no usable rig",
             error.to_string(),
-            "put the rig beside the log as NAME.rig.yaml, or name one with --rig",
+            match error {
+                LogError::NoRig { .. } => {
+                    "put the rig beside the log as NAME.rig.yaml, name one with --rig, or write one with `dcvins rig new`"
+                }
+                _ => "correct the rig at the place that the error names",
+            },
         ),
     }
     timing::check_timing(&survey, rig.ok(), &mut findings);

@@ -1,7 +1,7 @@
 use std::fmt::{Display, Formatter, Result, Write as _};
 
 use super::{Area, CheckReport, Severity};
-use crate::flight_log::{printable, shortened};
+use crate::flight_log::{printable, shortened, without_signed_zeros};
 
 impl Severity {
     /// Lowercase name, printed before a finding.
@@ -46,9 +46,11 @@ impl Display for CheckReport {
                 topic.role.clone(),
                 topic.count.to_string(),
                 format!("{:.1}", topic.rate_hz),
-                format!("{:.3}", topic.first_s),
-                format!("{:.3}", topic.last_s),
-                topic.latency_s.map_or_else(String::new, |latency| format!("{:.1}", latency * 1e3)),
+                time_cell(topic.first_s),
+                time_cell(topic.last_s),
+                topic
+                    .latency_s
+                    .map_or_else(String::new, |latency| without_signed_zeros(format!("{:.1}", latency * 1e3))),
             ]);
         }
         write_table(out, &rows)?;
@@ -75,6 +77,13 @@ impl Display for CheckReport {
         }
         Ok(())
     }
+}
+
+/// Time in seconds, `unset` for one that no clock has.
+fn time_cell(time_s: f64) -> String {
+    /// 63 years: stamps that were never set are farther from those of a log.
+    const FARTHEST_S: f64 = 2e9;
+    if time_s.abs() > FARTHEST_S { "unset".to_owned() } else { without_signed_zeros(format!("{time_s:.3}")) }
 }
 
 /// Characters of a topic or a type in the table; longer ones are truncated.

@@ -4,6 +4,7 @@ use nalgebra::UnitQuaternion;
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
 
+use crate::flight_log::without_signed_zeros;
 use crate::frontend::readout::RowTrack;
 use crate::sensors::ImageMask;
 
@@ -151,7 +152,7 @@ impl Findings {
         evidence: impl Into<String>,
         remedy: impl Into<String>,
     ) {
-        let (title, evidence, remedy) = (title.into(), evidence.into(), remedy.into());
+        let [title, evidence, remedy] = [title.into(), evidence.into(), remedy.into()].map(without_signed_zeros);
         self.list.push(Finding { severity, area, title, evidence, remedy, is_assumption: false });
     }
 

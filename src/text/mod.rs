@@ -1,9 +1,11 @@
 //! Texts that people write and read: `KEY=VALUE` entries, tables of keys, names of enums.
 
+mod counted;
 mod entry;
 mod keys;
 mod named;
 
+pub use counted::counted;
 pub use entry::{Entry, FINITE, items, numbers};
 pub use keys::{Field, Key, Label, Numbers, key_list, read_entry, read_item, written_items};
 pub use named::Named;

@@ -36,8 +36,8 @@ impl StampClock {
         } else if fits(first_log_ns) {
             Ok(Self::LogTimes { first_stamp_ns })
         } else {
-            let (stamp_s, log_s) = (seconds_from_ns(first_stamp_ns), seconds_from_ns(first_log_ns));
-            Err(LogError::UnknownClock { topic: topic.to_owned(), stamp_s, log_s, path: log.path().to_owned() })
+            let (stamp, log_s) = (stamp_text(first_stamp_ns), seconds_from_ns(first_log_ns));
+            Err(LogError::UnknownClock { topic: topic.to_owned(), stamp, log_s, path: log.path().to_owned() })
         }
     }
 
@@ -53,10 +53,15 @@ impl StampClock {
     pub(crate) fn warning(self, topic: &str) -> Option<String> {
         let Self::LogTimes { first_stamp_ns } = self else { return None };
         Some(format!(
-            "{topic}: the stamps count from PX4's start (the first is {:.3} s), with an unknown offset to \
+            "{topic}: the stamps count from PX4's start (the first is {}), with an unknown offset to \
              the other topics; the log times are used, with their delay and jitter (synchronize the clocks: \
              UXRCE_DDS_SYNCT 1)",
-            seconds_from_ns(first_stamp_ns)
+            stamp_text(first_stamp_ns)
         ))
     }
+}
+
+/// Stamp in seconds, unless it is the largest number, with which unset stamps are written.
+fn stamp_text(stamp_ns: i64) -> String {
+    if stamp_ns == i64::MAX { "no time".to_owned() } else { format!("{:.3} s", seconds_from_ns(stamp_ns)) }
 }

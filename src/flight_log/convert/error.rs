@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::super::LogError;
+use super::super::foreign;
 
 /// Failure to convert a source; every message names the problem, its location and the remedy, the path last.
 #[derive(Debug, Error)]
@@ -19,6 +20,9 @@ pub enum ConvertError {
         path.display()
     )]
     UnknownSource { found: String, path: PathBuf },
+    /// Recording of a known kind that lacks what an estimation needs.
+    #[error("{found}; {}: {}", foreign::RECORD_AN_IMU, path.display())]
+    WithoutImu { found: &'static str, path: PathBuf },
     /// Source of a known kind that cannot be read.
     #[error("{problem}: {}", path.display())]
     Unreadable { problem: String, path: PathBuf },

@@ -30,7 +30,9 @@ pub use options::{AutopilotLog, AutopilotLogKind, ConvertOptions, VideoClock};
 pub use report::{ConversionReport, ConvertedTopic};
 
 use super::file::{LogFile, ZSTD_MAGIC, kind_of, unpacked_name};
+use super::foreign;
 use super::log::lfs_pointer;
+use super::text::log_name;
 use super::{FlightLog, LogError, LogLimits, LogWriter, LogWriterOptions};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
@@ -285,6 +287,8 @@ fn detect(source: &Path, limits: &LogLimits) -> Result<SourceKind, ConvertError>
         Ok(SourceKind::Video)
     } else if let Some(kind) = recording::autopilot_log_kind(&start) {
         Ok(SourceKind::Autopilot(kind))
+    } else if let Some(found) = foreign::without_imu(&start, &log_name(source)) {
+        Err(ConvertError::WithoutImu { found, path: source.to_owned() })
     } else if start.is_empty() {
         Err(unknown("an empty file".to_owned()))
     } else if let Some(bytes) = lfs_pointer(&start) {

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use super::super::container::unpack_message;
 use super::super::limits::{LimitExceeded, LimitKind, LogLimits};
 use super::super::messages::{read_video_packet, stamp_ns};
+use super::super::text::without_signed_zeros;
 use super::super::writer::MessageType;
 use super::super::{LogWriter, MessageKind, MessageTimes};
 use super::ros1_message::cdr_from_ros1;
@@ -142,7 +143,7 @@ impl<'a> LogSink<'a> {
 
     /// Adds a remark to the report.
     pub(super) fn note(&mut self, note: impl Into<String>) {
-        self.notes.push(note.into());
+        self.notes.push(without_signed_zeros(note.into()));
     }
 
     /// Adds a topic to the report, even without messages.

@@ -328,7 +328,7 @@ fn topics_that_cannot_be_read_are_named_with_type_encoding_and_remedy() {
         texts
     };
     let [_, warning] = check("sensor_msgs/Imu", "ros1", &["'/imu'", "sensor_msgs/Imu in ROS 1", "`dcvins convert LOG"]);
-    assert!(warning.contains("1 topics are in ROS 1 encoding") && warning.contains("`dcvins convert LOG"), "{warning}");
+    assert!(warning.contains("1 topic are in ROS 1 encoding") && warning.contains("`dcvins convert LOG"), "{warning}");
     // `convert` does not read JSON.
     let [error, _] = check("sensor_msgs/msg/Imu", "json", &["sensor_msgs/msg/Imu in JSON", "record ROS 2 messages"]);
     assert!(!error.contains("convert LOG"), "{error}");

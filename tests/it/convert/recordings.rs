@@ -172,7 +172,7 @@ fn damage_in_logs_of_autopilots_is_counted() {
         damaged[middle..middle + 100].fill(0x77);
         let (report, found) = run(folder.path(), name, &damaged);
         let note = report.notes.iter().find(|note| note.contains("are skipped")).unwrap();
-        assert!(note.contains("bytes at 1 places"), "{name}: {note}");
+        assert!(note.contains("bytes at 1 place,"), "{name}: {note}");
         let count = found[imu_topic].len();
         assert!((SAMPLES - 6..SAMPLES).contains(&count), "{name}: {count}");
         assert!(found[imu_topic].iter().all(|message| expected[imu_topic].contains(message)), "{name}");

@@ -1,9 +1,11 @@
+use crate::text::counted;
+
 /// Skipped bytes of an autopilot's log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Damage {
     skipped_bytes: usize,
     /// Number of places at which bytes were skipped.
-    places: u64,
+    places: usize,
     /// Position of the first place.
     first_at: usize,
     /// Number of bytes at the end that form no complete record.
@@ -30,8 +32,10 @@ impl Damage {
         let mut notes = Vec::new();
         if self.skipped_bytes > 0 {
             notes.push(format!(
-                "{} bytes at {} places, the first at byte {}, {skipped} and are skipped",
-                self.skipped_bytes, self.places, self.first_at
+                "{} bytes at {}, the first at byte {}, {skipped} and are skipped",
+                self.skipped_bytes,
+                counted(self.places, "place"),
+                self.first_at
             ));
         }
         if self.cut_bytes > 0 {
