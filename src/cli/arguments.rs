@@ -6,6 +6,7 @@ use crate::cli::calibrate::CalibrateArguments;
 use crate::cli::check::CheckArguments;
 use crate::cli::convert::ConvertArguments;
 use crate::cli::degeneracy::DegeneracyArguments;
+use crate::cli::diagnose::DiagnoseArguments;
 use crate::cli::evaluate::EvaluateArguments;
 use crate::cli::exit;
 use crate::cli::export::ExportArguments;
@@ -50,6 +51,9 @@ pub(crate) enum Command {
     /// Check a log and its rig: content, timing, calibration, noise; each finding with evidence and remedy.
     #[command(after_help = exit::CHECK)]
     Check(CheckArguments),
+    /// Find the cause of residuals that disagree with their noise: the run is computed again with one change each.
+    #[command(after_help = exit::DIAGNOSE)]
+    Diagnose(DiagnoseArguments),
     /// Measure the noise densities of the IMU: Allan deviation of stationary stretches, or fitted to a flight.
     #[command(after_help = exit::INTERRUPTIBLE)]
     Noise(NoiseArguments),

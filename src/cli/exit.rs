@@ -49,6 +49,9 @@ pub(crate) const REPORT: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 
 pub(crate) const SWEEP: &str = "Exit codes: 0 success, 1 failure, worse than the baseline, or jobs that have not run, 2 wrong \
     use, 6 jobs without a result (reasons in their rows), 130 interrupted (Ctrl+C; the next sweep resumes; a second Ctrl+C ends \
     at once).";
+/// Exit codes of `diagnose`.
+pub(crate) const DIAGNOSE: &str = "Exit codes: 0 a cause, several or none, 1 failure, 2 wrong use, 130 interrupted (Ctrl+C; what \
+    is known so far is printed; a second Ctrl+C ends at once).";
 /// Exit codes of `check`.
 pub(crate) const CHECK: &str =
     "Exit codes: 0 no errors found (possibly warnings and notes), 1 failure, 2 wrong use, 4 errors found.";

@@ -6,6 +6,7 @@ mod check;
 mod compute;
 mod convert;
 mod degeneracy;
+mod diagnose;
 mod estimation_arguments;
 mod evaluate;
 mod exit;
@@ -53,6 +54,7 @@ pub(crate) fn run() -> anyhow::Result<Outcome> {
         Command::Report(arguments) => report::report(&arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
         Command::Check(arguments) => check::check(&arguments),
+        Command::Diagnose(arguments) => diagnose::diagnose(&arguments),
         Command::Noise(arguments) => noise::noise(&arguments),
         Command::Rig(arguments) => rig::rig(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),

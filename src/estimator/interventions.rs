@@ -114,6 +114,21 @@ impl Estimator {
         self.setup.config.options.pixel_sigma_px *= factor;
     }
 
+    /// Scales the prior standard deviations of the main camera's chain from the next initialization on.
+    pub fn scale_chain_prior(&mut self, factor: f64) {
+        let config = &mut self.setup.config;
+        let (translation_m, rotation_rad) = config.extrinsics_sigmas(MAIN);
+        if factor == 1.0 {
+            return;
+        }
+        config.chain_prior = Some((factor * translation_m, factor * rotation_rad));
+        if let PhaseState::Initializing(initializer) = &mut self.phase {
+            let mut calibration = self.setup.given_calibration();
+            calibration.freeze_as(&initializer.calibration);
+            initializer.calibration = calibration;
+        }
+    }
+
     /// Drops features of a camera; their information stays in the marginalization prior.
     pub fn drop_features(&mut self, camera: usize, dropped: impl Fn(FeatureId) -> bool) {
         match &mut self.phase {

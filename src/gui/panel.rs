@@ -11,7 +11,7 @@ use crate::frontend::FeatureId;
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::observability::{ChainSlide, SlidePosition};
 use crate::session::breakpoints::Breakpoints;
-use crate::session::{Command, FrameImage, Recording, RunRecord, SolverPosition};
+use crate::session::{Command, DiagnosisProgress, FrameImage, Recording, RunRecord, SolverPosition};
 use crate::text::Named;
 
 /// One of the panels: it draws itself, and gives its values.
@@ -67,6 +67,8 @@ pub struct Playback {
     pub breakpoints: Arc<Breakpoints>,
     /// True while the cursor runs to a hit that the estimators have not reached yet.
     pub running_to_breakpoint: bool,
+    /// The last diagnosis of a run, `None` without one.
+    pub diagnosis: Option<DiagnosisProgress>,
 }
 
 impl Default for Playback {
@@ -80,6 +82,7 @@ impl Default for Playback {
             recomputing: false,
             breakpoints: Arc::default(),
             running_to_breakpoint: false,
+            diagnosis: None,
         }
     }
 }
@@ -220,6 +223,8 @@ pub enum Dialog {
     AddRun,
     /// Forks the selected run at the cursor.
     Fork,
+    /// Finds the cause of residuals of the selected run that disagree with their noise.
+    Diagnosis,
     Palette,
     Settings,
     /// Question asked before unsaved work is discarded.

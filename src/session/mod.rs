@@ -12,12 +12,14 @@
 //! - [`breakpoints`]: conditions on those reports.
 //! - `engine/`: runs on threads, and recomputation of their steps from step inputs and estimator snapshots. Messages of
 //!   the threads become records in [`Computation`], nowhere else.
+//! - `diagnosis/`: runs computed again with one change each, ranked by what the changes explain.
 //! - `playback/`: a cursor over the record, the commands that move it, and the session that connects cursor, engine and
 //!   record.
 
 pub mod accuracy;
 pub mod antenna;
 pub mod breakpoints;
+mod diagnosis;
 mod engine;
 mod plan;
 mod playback;
@@ -25,19 +27,21 @@ mod record;
 #[cfg(test)]
 pub(crate) mod tests;
 
+pub use diagnosis::{AgreementValue, Cause, Diagnosis, RankedCause, TruthAgreement, Verdict, WaitingReason, diagnose};
 pub use engine::{
     BreakpointHit, CalibrationErrors, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation,
     FlightNoiseError, SnapshotUse, Stopwatch, calibrate, camera_rotations, compute, compute_until, fit_flight_noise,
     image_rotations,
 };
 pub use plan::{
-    DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, ForkChanges, ForkError, LoadedPositions,
-    LoadedTrajectory, MAX_RUNS, MAX_TRAJECTORIES, ParameterizationChoice, RunSpec, RunSpecError, SessionError,
-    SessionPlan, SessionRequest, TrajectorySource, TrajectorySpec, TrajectorySpecError,
+    Correction, DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, ForkChanges, ForkError,
+    ImageFlip, ImageHalf, LoadedPositions, LoadedTrajectory, MAX_RUNS, MAX_TRAJECTORIES, ParameterizationChoice,
+    RunSpec, RunSpecError, SessionError, SessionPlan, SessionRequest, SignedAxes, TrajectorySource, TrajectorySpec,
+    TrajectorySpecError,
 };
 pub use playback::{
-    Command, Cursor, FrameImage, MoveOutcome, Moved, PlaybackSpeed, SavedBreakpoint, SavedFork, SavedLog, SavedSession,
-    SavedSessionError, Session, Wake,
+    Command, Cursor, DiagnosisProgress, FrameImage, MoveOutcome, Moved, PlaybackSpeed, SavedBreakpoint, SavedFork,
+    SavedLog, SavedSession, SavedSessionError, Session, Wake,
 };
 pub use record::{
     Comparison, Divergence, EstimabilitySummary, ForkOrigin, KnownLossSummary, LostSince, ParameterSummary,

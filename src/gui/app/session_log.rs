@@ -34,6 +34,7 @@ impl PlayingLog for Session {
             recomputing: self.is_recomputing(),
             breakpoints: Arc::clone(self.breakpoints()),
             running_to_breakpoint: self.is_running_to_breakpoint(),
+            diagnosis: self.diagnosis(),
         }
     }
 

@@ -62,6 +62,7 @@ impl Menu {
             ],
             Self::Run => &[
                 &[Action::Dialog(Dialog::AddRun), Action::Dialog(Dialog::Fork), Action::NextRun],
+                &[Action::Dialog(Dialog::Diagnosis)],
                 &[Action::Breakpoint, Action::Hit(true), Action::Hit(false)],
             ],
             Self::Playback => &[

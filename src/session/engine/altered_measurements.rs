@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::corrections::MeasurementCorrections;
 use crate::frontend::{FeatureId, TrackedFrame};
 use crate::geometry::SplitMix64;
 use crate::sensors::JointAngles;
@@ -15,6 +16,7 @@ pub(super) struct AlteredMeasurements {
     pub(super) encoder_off: bool,
     pub(super) joint_noise_rad: f64,
     pub(super) encoder_noise: f64,
+    pub(super) corrections: MeasurementCorrections,
 }
 
 impl Default for AlteredMeasurements {
@@ -25,6 +27,7 @@ impl Default for AlteredMeasurements {
             encoder_off: false,
             joint_noise_rad: 0.0,
             encoder_noise: 1.0,
+            corrections: MeasurementCorrections::default(),
         }
     }
 }
@@ -37,6 +40,7 @@ impl AlteredMeasurements {
         self.encoder_off |= other.encoder_off;
         self.joint_noise_rad = self.joint_noise_rad.hypot(other.joint_noise_rad);
         self.encoder_noise *= other.encoder_noise;
+        self.corrections.add(other.corrections);
     }
 
     /// True if encoder readings are not used.
@@ -44,8 +48,14 @@ impl AlteredMeasurements {
         self.encoder_off
     }
 
-    /// The tracks of a camera without the dropped features, `None` where no feature is dropped.
+    /// The corrected tracks of a camera without the dropped features, `None` where nothing is changed.
     pub(super) fn tracks(&self, camera: usize, tracks: &TrackedFrame) -> Option<TrackedFrame> {
+        let corrected = if camera == 0 { self.corrections.tracks(tracks) } else { None };
+        self.kept(camera, corrected.as_ref().unwrap_or(tracks)).or(corrected)
+    }
+
+    /// The tracks without the dropped features, `None` where no feature is dropped.
+    fn kept(&self, camera: usize, tracks: &TrackedFrame) -> Option<TrackedFrame> {
         let disabled = self.disabled_cameras.contains(&camera);
         let gone = |id: FeatureId| disabled || self.dropped.contains(&id.of_camera(camera).0);
         tracks.features.iter().any(|feature| gone(feature.id)).then(|| {
@@ -55,12 +65,14 @@ impl AlteredMeasurements {
         })
     }
 
-    /// Joint angles with added Gaussian noise that depends only on stamp and joint, `None` without noise.
+    /// Corrected joint angles with added Gaussian noise that depends only on stamp and joint, `None` where nothing is
+    /// changed.
     pub(super) fn joint_angles(&self, angles: &JointAngles, stamp_ns: i64) -> Option<JointAngles> {
-        if self.joint_noise_rad == 0.0 && self.encoder_noise == 1.0 {
+        if self.joint_noise_rad == 0.0 && self.encoder_noise == 1.0 && !self.corrections.changes_joints() {
             return None;
         }
         let mut altered = angles.clone();
+        self.corrections.joint_angles(&mut altered);
         let mut random = SplitMix64::new(stamp_ns.unsigned_abs());
         for angle in &mut altered.angles_rad {
             // Irwin–Hall distribution: the sum of twelve uniform numbers has variance one.

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::altered_measurements::AlteredMeasurements;
+use super::corrections::MeasurementCorrections;
 use super::run_engine::RunEngine;
 use crate::gimbal::{Parameterization, auto_parameterization};
 use crate::sensors::Rig;
@@ -17,6 +18,7 @@ pub(in crate::session) fn apply_fork(
     camera_key: &str,
 ) -> Result<(), ForkError> {
     let disabled_cameras = disabled_cameras(changes, &engine.camera_keys(camera_key))?;
+    let corrections = MeasurementCorrections::of(&changes.corrections, rig, camera_key)?;
     let estimator = engine.estimator_mut();
     if let Some(choice) = changes.parameterization {
         let (parameterization, auto_parameterize) = match choice {
@@ -48,6 +50,7 @@ pub(in crate::session) fn apply_fork(
     }
     estimator.scale_imu_noise(changes.imu_noise);
     estimator.scale_pixel_noise(changes.pixel_noise);
+    estimator.scale_chain_prior(changes.chain_prior);
     let dropped = changes.dropped.clone();
     for camera in 0..engine.cameras() {
         let all = disabled_cameras.contains(&camera);
@@ -59,6 +62,7 @@ pub(in crate::session) fn apply_fork(
         encoder_off: !changes.encoder,
         joint_noise_rad: changes.joint_noise_rad,
         encoder_noise: changes.encoder_noise,
+        corrections,
     });
     Ok(())
 }

@@ -132,8 +132,13 @@ fn row_tracks(camera: &CameraRig, first: &TrackedFrame, second: &TrackedFrame) -
     second.features.iter().filter_map(track).collect()
 }
 
-/// Rotation `second_from_first` of the camera from the features observed in both images, `None` with too few inliers.
-fn rotation_between(first: &TrackedFrame, second: &TrackedFrame, sigma_rad: f64) -> Option<UnitQuaternion<f64>> {
+/// Rotation `second_from_first` of the camera from the features observed in both images, `None` with too few inliers;
+/// `sigma_rad` is the standard deviation of a direction.
+pub(in crate::session) fn rotation_between(
+    first: &TrackedFrame,
+    second: &TrackedFrame,
+    sigma_rad: f64,
+) -> Option<UnitQuaternion<f64>> {
     let before: BTreeMap<FeatureId, Vector3<f64>> =
         first.features.iter().map(|feature| (feature.id, feature.bearing)).collect();
     let pairs: Vec<(Vector3<f64>, Vector3<f64>)> =

@@ -11,6 +11,7 @@ mod calibration_errors;
 mod computation;
 mod compute;
 mod configuration;
+mod corrections;
 mod flight_noise;
 mod fork;
 mod history;
@@ -19,6 +20,7 @@ mod message;
 mod passes;
 mod recompute;
 mod run_engine;
+mod shifted_imu;
 mod step_inputs;
 mod stopwatch;
 mod synchronized_frames;
@@ -35,14 +37,14 @@ pub use flight_noise::{FlightNoiseError, fit_flight_noise};
 pub(in crate::session) use fork::apply_fork;
 pub(in crate::session) use history::History;
 pub use history::SnapshotUse;
+pub(in crate::session) use image_rotations::rotation_between;
 pub use image_rotations::{camera_rotations, image_rotations};
 pub(in crate::session) use message::EngineMessage;
 #[cfg(test)]
 pub(in crate::session) use passes::EarlierPasses;
+pub(in crate::session) use passes::guarded;
 pub(in crate::session) use recompute::{Detail, RecomputeRequest, RecomputeThread, Recomputed, STEPS_AT_ONCE};
-#[cfg(test)]
 pub(in crate::session) use run_engine::RunEngine;
-#[cfg(test)]
 pub(in crate::session) use step_inputs::OwnedStepInput;
 pub use stopwatch::Stopwatch;
 pub(in crate::session) use threads::Engine;

@@ -77,7 +77,7 @@ fn latest_findings(
 }
 
 /// Runs a step; a panic inside it ends the run with a message instead of the program.
-pub(super) fn guarded<T>(stamp_ns: i64, step: impl FnOnce() -> T) -> Result<T, String> {
+pub(in crate::session) fn guarded<T>(stamp_ns: i64, step: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(step)).map_err(|_panic| {
         let time_s = seconds_from_ns(stamp_ns);
         format!("internal error in the estimator at {time_s:.3} s; please report it with the log")

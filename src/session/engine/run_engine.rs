@@ -2,6 +2,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::altered_measurements::AlteredMeasurements;
+use super::shifted_imu::ShiftedImu;
 use super::step_inputs::OwnedStepInput;
 use super::stopwatch::Stopwatch;
 use crate::estimator::{Estimator, EstimatorConfig, PackedEstimator, StepInput, StepMeasurements, StepReport};
@@ -28,6 +29,8 @@ struct EngineSettings {
     /// Every n-th report keeps its linearization; `None` keeps none.
     keep_linearization_every: Option<usize>,
     altered_measurements: AlteredMeasurements,
+    /// IMU samples of a fork with another time offset of its cameras.
+    shifted_imu: ShiftedImu,
 }
 
 /// A snapshot of a [`RunEngine`] with a packed estimator.
@@ -63,6 +66,7 @@ impl RunEngine {
             joints_free,
             keep_linearization_every,
             altered_measurements: AlteredMeasurements::default(),
+            shifted_imu: ShiftedImu::default(),
         };
         Self { estimator, settings }
     }
@@ -118,6 +122,12 @@ impl RunEngine {
         self.estimator.set_keep_linearization(keep);
     }
 
+    /// Runs the same step without the observability analysis and returns the estimator's report.
+    pub(in crate::session) fn report_without_rank(&mut self, input: &OwnedStepInput) -> StepReport {
+        self.estimator.set_keep_linearization(false);
+        self.estimate(input)
+    }
+
     /// Limits the iterations of the solver from the next step on.
     pub(in crate::session) fn set_iterations(&mut self, iterations: usize) {
         self.estimator.set_iterations(iterations);
@@ -142,11 +152,21 @@ impl RunEngine {
         let read = self.settings.has_joints && !self.settings.altered_measurements.encoder_off();
         let angles = input.joint_angles.as_ref().filter(|_| read);
         let noisy = angles.and_then(|angles| self.settings.altered_measurements.joint_angles(angles, input.stamp_ns));
+        let corrections = &self.settings.altered_measurements.corrections;
+        let (mut imu, mut imu_after) = (Cow::Borrowed(&*input.imu), Cow::Borrowed(&*input.imu_after));
+        let shift_ns = corrections.camera_shift_ns();
+        if shift_ns != 0 {
+            let (cut, cut_after) = self.settings.shifted_imu.cut(&imu, &imu_after, shift_ns);
+            (imu, imu_after) = (Cow::Owned(cut), Cow::Owned(cut_after));
+        }
+        if let (Some(corrected), Some(corrected_after)) = (corrections.imu(&imu), corrections.imu(&imu_after)) {
+            (imu, imu_after) = (Cow::Owned(corrected), Cow::Owned(corrected_after));
+        }
         self.estimator.step(&StepInput {
             frame_index: input.frame_index,
             stamp_ns: input.stamp_ns,
-            imu: &input.imu,
-            imu_after: &input.imu_after,
+            imu: &imu,
+            imu_after: &imu_after,
             joint_angles: noisy.as_ref().or(angles),
             tracks: &altered[0],
             rigid_tracks: &rigid,

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use thiserror::Error;
 
+use super::correction::Correction;
 use super::run_spec::{ParameterizationChoice, RunSpec};
 use crate::estimator::{InterventionError, SensorParameters};
 use crate::text::Named as _;
@@ -36,6 +37,10 @@ pub struct ForkChanges {
     pub pixel_noise: f64,
     /// Scale factor of the joint angles' standard deviations in the estimator.
     pub encoder_noise: f64,
+    /// Scale factor of the rig's standard deviations of the chain (`chain-prior=`).
+    pub chain_prior: f64,
+    /// Errors of recording or rig that are undone (`correct=`).
+    pub corrections: Vec<Correction>,
 }
 
 impl Default for ForkChanges {
@@ -52,6 +57,8 @@ impl Default for ForkChanges {
             imu_noise: 1.0,
             pixel_noise: 1.0,
             encoder_noise: 1.0,
+            chain_prior: 1.0,
+            corrections: Vec::new(),
         }
     }
 }

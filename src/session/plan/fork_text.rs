@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use super::correction::Correction;
 use super::fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError, OTHER_CAMERA};
 use super::run_options::{encoder_noise, imu_noise, pixel_noise};
 use super::run_spec::ParameterizationChoice;
@@ -82,6 +83,19 @@ impl ForkChanges {
         imu_noise::<Self>(|changes| &mut changes.imu_noise).labelled("", "Assumed IMU noise", ""),
         pixel_noise::<Self>(|changes| &mut changes.pixel_noise).labelled("", "Assumed pixel noise", ""),
         encoder_noise::<Self>(|changes| &mut changes.encoder_noise).labelled("", "Assumed encoder noise", ""),
+        Key::<Self>::new(
+            "chain-prior",
+            "F",
+            "factor on the rig's standard deviations of the gimbal chain or of the extrinsics, from the next initialization on",
+            Field::Factor(|changes| &mut changes.chain_prior, 1e-3..=1e3),
+        ),
+        Key::<Self>::new(
+            "correct",
+            "ERROR+…",
+            "errors of recording or rig that are undone, as `dcvins diagnose` names them: `focal:0.77`, `reversed:yaw`, \
+             `camera-shift:15ms`, `imu-axes:y/x/z`",
+            Field::Other(read_corrections, |changes| joined(changes.corrections.iter().map(Correction::to_string))),
+        ),
     ];
 }
 
@@ -163,6 +177,13 @@ fn read_dropped(changes: &mut ForkChanges, entry: &Entry<'_>) -> Result<(), Stri
     Ok(())
 }
 
+fn read_corrections(changes: &mut ForkChanges, entry: &Entry<'_>) -> Result<(), String> {
+    for text in several(entry) {
+        changes.corrections.push(text.parse()?);
+    }
+    Ok(())
+}
+
 fn read_joint_noise(changes: &mut ForkChanges, entry: &Entry<'_>) -> Result<(), String> {
     changes.joint_noise_rad = quantity(entry)?;
     if changes.joint_noise_rad < 0.0 { Err(entry.problem("0 or more")) } else { Ok(()) }
@@ -221,6 +242,7 @@ mod tests {
             "without=cam1,encoder=off",
             "pixel-noise=0.5,encoder-noise=3",
             "set=L1.d:-0.25",
+            "chain-prior=10,correct=focal:0.77+reversed:yaw+camera-shift:-0.015s",
         ] {
             assert_eq!(changes(&changes(text).to_string()), changes(text), "{text}");
         }

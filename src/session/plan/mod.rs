@@ -1,5 +1,6 @@
 //! The definition of a session: the log with its rig, its runs, and the changes of a fork. Plain data.
 
+mod correction;
 mod error;
 mod fork_changes;
 mod fork_text;
@@ -10,6 +11,8 @@ mod trajectories;
 mod trajectory_spec;
 mod tuning;
 
+pub(in crate::session) use correction::LONGEST_SHIFT_S;
+pub use correction::{Correction, ImageFlip, ImageHalf, SignedAxes};
 pub use error::SessionError;
 pub use fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError};
 pub use run_spec::{MAX_RUNS, ParameterizationChoice, RunSpec, RunSpecError};

@@ -68,6 +68,12 @@ pub enum Command {
         label: Option<String>,
     },
     RemoveRun(usize),
+    /// Find the cause of residuals of a run that disagree with their noise, on another thread.
+    Diagnose {
+        run: usize,
+    },
+    /// End the diagnosis with what is known so far.
+    StopDiagnosis,
     /// Recompute the linearized rows of a step's factors. They are stored in `RunRecord::factor_rows` and stay
     /// requested while the cursor is at the step.
     RequestFactorRows {

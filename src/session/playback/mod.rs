@@ -1,5 +1,6 @@
 //! A cursor over the record, the commands that move it, and the session that connects cursor, engine and record.
 
+mod background_diagnosis;
 mod background_images;
 mod command;
 mod cursor;
@@ -11,6 +12,7 @@ mod saved_path;
 mod session;
 mod shared;
 
+pub use background_diagnosis::DiagnosisProgress;
 pub use background_images::FrameImage;
 pub use command::{Command, PlaybackSpeed};
 pub use cursor::{Cursor, MoveOutcome, Moved};

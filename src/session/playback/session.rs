@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::background_diagnosis::{BackgroundDiagnosis, DiagnosisProgress};
 use super::background_images::{BackgroundImages, FrameImage};
 use super::command::{Command, PlaybackSpeed};
 use super::cursor::{Cursor, MoveOutcome};
@@ -43,6 +44,7 @@ pub struct Session {
     pub(super) layout: Option<serde_json::Value>,
     pub(super) notices: Vec<String>,
     images: BackgroundImages,
+    diagnosis: Option<BackgroundDiagnosis>,
 }
 
 impl Session {
@@ -71,6 +73,7 @@ impl Session {
             layout: None,
             notices: Vec::new(),
             images,
+            diagnosis: None,
         })
     }
 
@@ -213,6 +216,8 @@ impl Session {
                 }
             }
             Command::RemoveRun(run) => self.remove_run(run),
+            Command::Diagnose { run } => self.diagnose(run),
+            Command::StopDiagnosis => self.diagnosis.iter().for_each(BackgroundDiagnosis::stop),
             Command::RequestFactorRows { run, step } => self.request_factor_rows(run, step),
             Command::SetMemoryBudget(bytes) => {
                 self.plan.memory_budget_bytes = bytes;
@@ -230,6 +235,20 @@ impl Session {
             | Command::GoToStart
             | Command::GoToEnd
             | Command::SetLoop(_) => {}
+        }
+    }
+
+    /// Progress and result of the last diagnosis.
+    pub fn diagnosis(&self) -> Option<DiagnosisProgress> {
+        self.diagnosis.as_ref().map(BackgroundDiagnosis::progress)
+    }
+
+    fn diagnose(&mut self, run: usize) {
+        // The earlier diagnosis ends first.
+        self.diagnosis = None;
+        match BackgroundDiagnosis::start(self.computation(), run) {
+            Ok(diagnosis) => self.diagnosis = Some(diagnosis),
+            Err(error) => self.notices.push(error.to_string()),
         }
     }
 

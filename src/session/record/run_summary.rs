@@ -228,20 +228,34 @@ fn cameras(run: &RunRecord) -> String {
 
 /// Reasons of the last failed initialization attempt.
 fn never_initialized(run: &RunRecord) -> String {
-    let waits = run.steps.iter().rev().find_map(|step| {
-        let reasons: Vec<&str> = step
-            .report
-            .events
-            .iter()
-            .filter(|event| event.kind == EventKind::InitializationWaits)
-            .map(|event| event.message.as_str())
-            .collect();
-        (!reasons.is_empty()).then(|| reasons.join("; "))
-    });
-    waits.map_or_else(
-        || "the run never initialized: no image reached the estimator".to_owned(),
-        |reasons| format!("the run never initialized; last attempt: {reasons}"),
-    )
+    let reasons = run.waiting_reasons();
+    if reasons.is_empty() {
+        return "the run never initialized: no image reached the estimator".to_owned();
+    }
+    let shown = reasons.iter().take(WAITING_REASONS).map(|(reason, images)| format!("{reason} ({images} images)"));
+    format!("the run never initialized; reasons: {}", shown.collect::<Vec<_>>().join("; "))
+}
+
+/// Reasons of a run that never initialized that are named.
+const WAITING_REASONS: usize = 3;
+
+impl RunRecord {
+    /// Reasons for which attempts to initialize waited, each with its number of images, the most frequent first. A reason
+    /// is its last message.
+    pub(in crate::session) fn waiting_reasons(&self) -> Vec<(String, usize)> {
+        let mut reasons: Vec<(&str, usize)> = Vec::new();
+        let events = self.steps.iter().flat_map(|step| &step.report.events);
+        for event in events.filter(|event| event.kind == EventKind::InitializationWaits) {
+            let subject = |message: &str| message.split(':').next().map(str::to_owned);
+            let message = event.message.as_str();
+            match reasons.iter_mut().find(|(known, _)| subject(known) == subject(message)) {
+                Some((known, count)) => (*known, *count) = (message, *count + 1),
+                None => reasons.push((message, 1)),
+            }
+        }
+        reasons.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        reasons.into_iter().map(|(message, count)| (message.to_owned(), count)).collect()
+    }
 }
 
 fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {

@@ -1,6 +1,7 @@
 //! Modal dialogs; one is open at a time.
 
 mod add_run;
+mod diagnosis;
 mod fork;
 mod fuzzy;
 mod modal;
@@ -38,6 +39,7 @@ pub(super) fn ui(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>, ac
         }
         Some(Dialog::AddRun) => dialogs.add_run.ui(ui, ctx),
         Some(Dialog::Fork) => dialogs.fork.ui(ui, ctx),
+        Some(Dialog::Diagnosis) => diagnosis::ui(ui, ctx),
         Some(Dialog::Palette) => dialogs.palette.ui(ui, ctx, saved_layouts, layout, actions),
         Some(Dialog::Settings) => settings::ui(ui, ctx.theme, settings, history, saved_layouts.names(), actions),
         Some(Dialog::Unsaved) => unsaved::ui(ui, ctx, &dialogs.unsaved, requests),

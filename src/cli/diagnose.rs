@@ -1,0 +1,53 @@
+//! `dcvins diagnose`: the cause of residuals that disagree with their noise.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use dcvins::session::{self, Diagnosis, SessionPlan};
+
+use crate::cli::compute::compute;
+use crate::cli::estimation_arguments::EstimationArguments;
+use crate::cli::exit::Outcome;
+use crate::cli::interrupt::Interrupt;
+use crate::cli::terminal::{Progress, notify, print, print_json};
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct DiagnoseArguments {
+    pub log: PathBuf,
+    #[command(flatten)]
+    pub estimation: EstimationArguments,
+    /// Print the diagnoses as JSON, with all causes that were tried with a gain.
+    #[arg(long)]
+    pub json: bool,
+}
+
+pub(crate) fn diagnose(arguments: &DiagnoseArguments) -> Result<Outcome> {
+    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
+    let interrupt = Interrupt::watch()?;
+    let plan = SessionPlan { interrupted: interrupt.flag(), ..plan };
+    let computation = compute(&plan, None)?;
+    if computation.recording().runs.iter().all(|run| run.steps.is_empty()) && !interrupt.is_set() {
+        bail!("no image of the log could be used; reasons: 'dcvins check {}'", arguments.log.display());
+    }
+    let mut diagnoses: Vec<Diagnosis> = Vec::new();
+    for run in 0..plan.runs.len() {
+        let progress = Progress::new();
+        diagnoses.extend(session::diagnose(&computation, run, &mut |ratio, label| {
+            progress.show(ratio, || label.to_owned());
+            interrupt.control_flow()
+        }));
+    }
+    if arguments.json {
+        print_json(&diagnoses)?;
+    } else {
+        for diagnosis in &diagnoses {
+            print(&diagnosis.to_string())?;
+        }
+    }
+    if interrupt.is_set() {
+        notify("dcvins: interrupted; the diagnosis is what was known so far");
+        return Ok(Outcome::Interrupted);
+    }
+    Ok(Outcome::Success)
+}

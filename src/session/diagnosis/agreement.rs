@@ -1,0 +1,113 @@
+//! Agreement of residuals with their noise, and the step at which it ends.
+
+use serde::Serialize;
+
+use super::misfit::{Misfit, StepMisfit};
+
+/// Quantity whose mean over a run shows whether residuals agree with their noise.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AgreementValue {
+    /// Name with the unit.
+    pub name: &'static str,
+    pub value: f64,
+    /// Limit above which the residuals disagree.
+    pub limit: f64,
+}
+
+impl AgreementValue {
+    /// True if the value is within its limit.
+    pub fn agrees(&self) -> bool {
+        self.value <= self.limit
+    }
+}
+
+/// Limits of the means over a run. Most rows of IMU factors and of the prior are fitted by the states: sound simulated and
+/// real logs have 0.005 to 0.2 and 0.1 to 0.5, encoder readings 0.8 to 1, and residuals of 0.05 to 0.2 px in the median.
+const IMAGE_LIMIT_PX: f64 = 0.5;
+const FACTOR_LIMITS: [(&str, f64); 3] =
+    [("IMU χ² per row", 0.5), ("encoders χ² per row", 1.6), ("marginalization prior χ² per row", 0.7)];
+/// Limit of the ratio of images without a pose after the first one.
+const LOST_LIMIT: f64 = 0.1;
+/// Steps over which residuals are averaged for the onset of a disagreement.
+const ONSET_STEPS: usize = 10;
+/// Steps with a window and with agreement before an onset: without them the disagreement began with the run.
+const STEPS_BEFORE: usize = 25;
+
+/// Values of a run with their limits.
+pub(super) fn values(misfit: &Misfit) -> Vec<AgreementValue> {
+    let mut all = vec![
+        AgreementValue { name: "images without a pose", value: 1.0 - misfit.tracked_ratio(), limit: LOST_LIMIT },
+        AgreementValue {
+            name: "reprojection residual, median in px",
+            value: misfit.median_px().unwrap_or(0.0),
+            limit: IMAGE_LIMIT_PX,
+        },
+    ];
+    let factors = FACTOR_LIMITS.iter().zip(misfit.factors).filter(|(_, factor)| factor.rows > 0.0);
+    all.extend(factors.map(|((name, limit), factor)| AgreementValue {
+        name,
+        value: factor.mean_square(),
+        limit: *limit,
+    }));
+    all
+}
+
+/// Largest ratio of a value to its limit; at most 1 if the residuals agree with their noise.
+pub(super) fn disagreement(misfit: &Misfit) -> f64 {
+    if misfit.steps == 0 {
+        return f64::INFINITY;
+    }
+    values(misfit).iter().map(|value| value.value / value.limit).fold(0.0, f64::max)
+}
+
+/// Index of the step from which on the residuals disagree with their noise, after steps with agreement; `None` if they
+/// agree, or disagree from the start.
+pub(super) fn onset(steps: &[StepMisfit]) -> Option<usize> {
+    let means: Vec<Option<f64>> = steps
+        .windows(ONSET_STEPS)
+        .map(|some| some.iter().all(|step| step.tracking).then(|| disagreement(&Misfit::of_all(some))))
+        .collect();
+    let first = means.iter().position(Option::is_some)?;
+    // The values of the first window settle.
+    let settled = first + STEPS_BEFORE;
+    let place = (settled..means.len()).find(|place| means[*place].is_none_or(|mean| mean > 1.0))?;
+    let agreed = (settled..place).filter(|place| means[*place].is_some_and(|mean| mean <= 1.0)).count();
+    (agreed >= STEPS_BEFORE).then(|| (place + ONSET_STEPS - 1).min(steps.len() - 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::misfit::FactorMisfit;
+    use super::*;
+
+    fn steps(encoder: impl Fn(usize) -> f64) -> Vec<StepMisfit> {
+        let step = |number: usize| {
+            let mut step = StepMisfit {
+                stamp_ns: number as i64 * 50_000_000,
+                tracking: number >= 20,
+                frames: 11,
+                window_s: 2.0,
+                ..StepMisfit::default()
+            };
+            (0..50).for_each(|_| step.pixels.add(0.1));
+            step.factors = [(30.0, 150.0), (33.0 * encoder(number), 33.0), (10.0, 60.0)]
+                .map(|(chi2, rows)| FactorMisfit { chi2, rows });
+            step
+        };
+        (0..200).map(step).collect()
+    }
+
+    #[test]
+    fn a_disagreement_has_a_name_and_an_onset() {
+        let sound = steps(|_| 0.9);
+        assert!(disagreement(&Misfit::of(&sound, 0)) < 1.0);
+        assert_eq!(onset(&sound), None);
+        let always = steps(|_| 9.0);
+        let found = Misfit::of(&always, 1_000_000_000);
+        let wrong: Vec<&str> = values(&found).iter().filter(|it| !it.agrees()).map(|it| it.name).collect();
+        assert_eq!(wrong, ["encoders χ² per row"]);
+        assert_eq!(onset(&always), None);
+        let later = onset(&steps(|number| if number < 120 { 0.9 } else { 30.0 })).unwrap();
+        assert!((120..124).contains(&later), "{later}");
+    }
+}

@@ -1,0 +1,286 @@
+//! The search for a cause: a run is computed again with one change each, first on some seconds, then the best changes with
+//! refined values on more of them.
+//!
+//! The trials use the tracks of the run, so that their likelihoods compare equal measurements and a trial takes a few
+//! milliseconds per image. Tracks depend little on a wrong rig: the front end falls back to the images where the predicted
+//! rotation disagrees. Changes of the rig are corrections of the measurements, so that they act from any step on and are
+//! forks in the window as well.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+
+use super::agreement::{self, AgreementValue};
+use super::axes::plausible_axes;
+use super::hypotheses::{Cause, Hypothesis, first_hypotheses};
+use super::misfit::Misfit;
+use super::outcome::{Diagnosis, RankedCause, TruthAgreement, Verdict, WaitingReason};
+use super::ranking::{Candidate, Decision, by_cause, decide};
+use super::refinement::refined;
+use super::scoring::{LOST, Trials, scored};
+use super::span::{confirmed_span, screened_span};
+use super::statement::texts;
+use super::trial::{DiagnosedRun, TrialResult, TrialSpan};
+use super::truth;
+use crate::geometry::seconds_from_ns;
+use crate::session::engine::{Computation, History};
+use crate::session::plan::{Correction, ForkChanges};
+use crate::session::record::{Recording, RunRecord};
+
+/// Causes that are computed again on more of the run.
+const CONFIRMED: usize = 6;
+/// Trials between two reports of the progress.
+const AT_ONCE: usize = 8;
+/// Ratio of the progress after the first trials.
+const SCREENED: f64 = 0.6;
+/// Rounds of refined values.
+const ROUNDS: usize = 2;
+/// Causes in a diagnosis.
+const REPORTED: usize = 8;
+
+/// Progress of a diagnosis: a ratio from 0 to 1 and what is computed.
+type OnProgress<'a> = dyn FnMut(f64, &str) -> ControlFlow<()> + 'a;
+
+/// Finds the cause of residuals of a computed run that disagree with their noise.
+///
+/// `on_progress` may end it; the result then has what is known so far. `None` if the recording has no such run.
+pub fn diagnose(computation: &Computation, run: usize, on_progress: &mut OnProgress<'_>) -> Option<Diagnosis> {
+    let recording = computation.recording();
+    let record = recording.runs.get(run)?;
+    let history = computation.history(run)?;
+    let interrupted = AtomicBool::new(false);
+    let inputs = (0..record.steps.len()).map_while(|step| history.inputs().get(step)).collect();
+    let diagnosed = DiagnosedRun {
+        rig: &recording.rig,
+        spec: &record.spec,
+        camera_key: &record.camera_key,
+        inputs,
+        interrupted: &interrupted,
+    };
+    let mut search = Search { run: &diagnosed, history, recording, record, trials: 0, on_progress };
+    Some(search.diagnosis())
+}
+
+/// A search in progress.
+struct Search<'a, 'b> {
+    run: &'a DiagnosedRun<'a>,
+    history: &'a History,
+    recording: &'a Recording,
+    record: &'a RunRecord,
+    trials: usize,
+    on_progress: &'a mut OnProgress<'b>,
+}
+
+impl Search<'_, '_> {
+    fn diagnosis(&mut self) -> Diagnosis {
+        let mut diagnosis = self.empty();
+        let Some(whole) = self.whole() else { return diagnosis };
+        self.report(0.02, "the run without a change");
+        let Some(given) = self.run.trial(&whole, 0, &ForkChanges::default(), None) else {
+            return diagnosis;
+        };
+        let misfit = Misfit::of(&given.steps, given.initialized_ns().unwrap_or_default());
+        diagnosis.values = agreement::values(&misfit);
+        diagnosis.accuracy = truth::accuracy(self.record);
+        if given.initialized_ns().is_none() {
+            diagnosis.waiting = waiting_reasons(self.record);
+        } else if agreement::disagreement(&misfit) <= 1.0 {
+            diagnosis.verdict = Verdict::Agrees;
+            diagnosis.ground_truth = truth::disagreement(self.record);
+            return diagnosis;
+        }
+        let onset = agreement::onset(&given.steps);
+        diagnosis.onset_s = onset.map(|step| self.stamp_s(step));
+        self.search(&mut diagnosis, &given, misfit.tracked_ratio() < LOST, onset);
+        diagnosis.trials = self.trials;
+        diagnosis.interrupted = self.run.interrupted.load(Ordering::Relaxed);
+        diagnosis
+    }
+
+    /// Tries all causes and fills the diagnosis with the best ones.
+    fn search(&mut self, diagnosis: &mut Diagnosis, given: &TrialResult, lost: bool, onset: Option<usize>) {
+        let Some(span) = screened_span(self.run, self.history, given, onset) else { return };
+        let axes = lost.then(|| plausible_axes(self.run, span.steps.clone()));
+        let mut hypotheses = first_hypotheses(self.run, axes.as_ref());
+        if let Some(onset) = onset {
+            let later: Vec<Hypothesis> = hypotheses
+                .iter()
+                .filter(|it| !matches!(it.cause, Cause::Chain | Cause::ImageFlip))
+                .map(|it| it.starting(onset))
+                .collect();
+            hypotheses.extend(later);
+        }
+        let screened = self.candidates(&span, hypotheses, (0.05, SCREENED), None);
+        let Some(screened) = screened else { return };
+        let span = confirmed_span(self.run, &span);
+        let mut tried: Vec<Hypothesis> = by_cause(&screened.given, screened.others.clone())
+            .into_iter()
+            .take(CONFIRMED)
+            .map(|candidate| candidate.hypothesis)
+            .collect();
+        let mut next = refined(self.run, &screened.others);
+        let mut confirmed: Option<Trials> = None;
+        for round in 0..ROUNDS {
+            next.retain(|it| !tried.contains(it));
+            let now =
+                if round == 0 { tried.iter().cloned().chain(next.iter().cloned()).collect() } else { next.clone() };
+            tried.append(&mut next);
+            let progress = SCREENED + (1.0 - SCREENED) * round as f64 / ROUNDS as f64;
+            let until = SCREENED + (1.0 - SCREENED) * (round + 1) as f64 / ROUNDS as f64;
+            let Some(trials) = self.candidates(&span, now, (progress, until), confirmed.take()) else { break };
+            next = refined(self.run, &trials.others);
+            next.extend(moved(&trials));
+            confirmed = Some(trials);
+        }
+        let trials = confirmed.unwrap_or(screened);
+        diagnosis.span_s = Some((self.stamp_s(span.steps.start), self.stamp_s(span.steps.end.saturating_sub(1))));
+        self.conclude(diagnosis, &span, trials);
+    }
+
+    /// Computes trials of a span, with those that are already there, and scores all on one scale. `None` if the run itself
+    /// could not be computed.
+    fn candidates(
+        &mut self,
+        span: &TrialSpan,
+        hypotheses: Vec<Hypothesis>,
+        (from, to): (f64, f64),
+        known: Option<Trials>,
+    ) -> Option<Trials> {
+        let (given, mut done) = match known {
+            Some(known) => {
+                (known.given.result, known.others.into_iter().map(|it| (it.hypothesis, it.result)).collect())
+            }
+            None => (self.run.trial(span, span.steps.start, &ForkChanges::default(), None)?, Vec::new()),
+        };
+        let count = hypotheses.len();
+        let mut open = hypotheses;
+        while !open.is_empty() {
+            let rest = open.split_off(AT_ONCE.min(open.len()));
+            let run = self.run;
+            let trial = |it: Hypothesis| {
+                let result = run.trial(span, it.from.unwrap_or(span.steps.start), &it.changes, None)?;
+                Some((it, result))
+            };
+            let some: Vec<(Hypothesis, TrialResult)> = open.into_par_iter().filter_map(trial).collect();
+            self.trials += some.len();
+            done.extend(some);
+            open = rest;
+            let ratio = 1.0 - open.len() as f64 / count as f64;
+            let label = done.last().map_or_else(String::new, |(it, _): &(Hypothesis, _)| it.changes.to_string());
+            self.report(from + (to - from) * ratio, &label);
+        }
+        Some(scored(given, done))
+    }
+
+    /// Decides about the trials and describes the best causes.
+    fn conclude(&self, diagnosis: &mut Diagnosis, span: &TrialSpan, trials: Trials) {
+        let Trials { given, others } = trials;
+        let mut ranked = by_cause(&given, others);
+        // The columns of both clocks only find values for the shifts.
+        ranked.retain(|it| it.hypothesis.cause != Cause::Clocks || it.hypothesis.changes.estimated.is_empty());
+        let decision = decide(&given, &ranked);
+        (diagnosis.verdict, diagnosis.explaining) = match decision {
+            Decision::One => (Verdict::Cause, 1),
+            Decision::Several(count) => (Verdict::Several, count),
+            Decision::None => (Verdict::Unexplained, 0),
+        };
+        let with_truth = self.run.inputs.iter().any(|input| input.ground_truth.is_some());
+        let helps = ranked.into_iter().filter(|it| it.score < given.score).take(REPORTED);
+        diagnosis.causes = helps
+            .enumerate()
+            .map(|(place, candidate)| {
+                let accuracy = (with_truth && place < diagnosis.explaining).then(|| self.accuracy(span, &candidate));
+                self.ranked_cause(span, &candidate, given.score, accuracy.flatten())
+            })
+            .collect();
+    }
+
+    /// Errors with a change; `None` with another time offset of the camera, because the ground truth of an input is that at
+    /// the given one.
+    fn accuracy(&self, span: &TrialSpan, candidate: &Candidate) -> Option<TruthAgreement> {
+        let is_shift = |it: &Correction| matches!(it, Correction::CameraShift(_));
+        if candidate.hypothesis.changes.corrections.iter().any(is_shift) {
+            return None;
+        }
+        let mut record = RunRecord::new(self.record.spec.clone(), self.record.camera_key.clone());
+        let from = candidate.hypothesis.from.unwrap_or(span.steps.start);
+        self.run.trial(span, from, &candidate.hypothesis.changes, Some(&mut record))?;
+        truth::accuracy(&record)
+    }
+
+    fn ranked_cause(
+        &self,
+        span: &TrialSpan,
+        candidate: &Candidate,
+        given: f64,
+        accuracy: Option<TruthAgreement>,
+    ) -> RankedCause {
+        let hypothesis = &candidate.hypothesis;
+        let step = hypothesis.from.unwrap_or(if span.is_start { 0 } else { span.steps.start });
+        let from_s = hypothesis.from.map(|step| self.stamp_s(step));
+        let (statement, remedy) = texts(self.run, hypothesis, &candidate.result, from_s);
+        let values: Vec<AgreementValue> = agreement::values(&candidate.misfit);
+        RankedCause {
+            cause: hypothesis.cause,
+            statement,
+            remedy,
+            changes: hypothesis.changes.clone(),
+            from_ns: self.run.inputs.get(step).map_or(0, |input| input.stamp_ns),
+            from_s: self.stamp_s(step),
+            parameters: hypothesis.parameters,
+            gain: given - candidate.score,
+            values,
+            accuracy,
+        }
+    }
+
+    fn whole(&self) -> Option<TrialSpan> {
+        let engine = self.history.engine_before(0)?;
+        let steps = 0..self.run.inputs.len();
+        (!steps.is_empty()).then_some(TrialSpan { engine, steps, window_by: None, is_start: true })
+    }
+
+    fn stamp_s(&self, step: usize) -> f64 {
+        self.run.inputs.get(step).map_or(0.0, |input| seconds_from_ns(input.stamp_ns))
+    }
+
+    fn report(&mut self, ratio: f64, label: &str) {
+        if (self.on_progress)(ratio, label).is_break() {
+            self.run.interrupted.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn empty(&self) -> Diagnosis {
+        Diagnosis {
+            log: self.recording.log_name(),
+            run: self.record.spec.label.clone(),
+            verdict: Verdict::NoSteps,
+            values: Vec::new(),
+            onset_s: None,
+            waiting: Vec::new(),
+            accuracy: None,
+            ground_truth: None,
+            span_s: None,
+            explaining: 0,
+            causes: Vec::new(),
+            trials: 0,
+            interrupted: false,
+        }
+    }
+}
+
+/// The best change that begins at a step, at other steps around it.
+fn moved(trials: &Trials) -> Vec<Hypothesis> {
+    let later = trials.others.iter().filter(|it| it.hypothesis.from.is_some());
+    let Some(best) = later.min_by(|one, other| one.score.total_cmp(&other.score)) else { return Vec::new() };
+    let hypothesis = &best.hypothesis;
+    let steps = [-16, -8, -4, -2, -1, 1, 2].map(|by| hypothesis.from.and_then(|from| from.checked_add_signed(by)));
+    steps.into_iter().flatten().map(|step| Hypothesis { from: Some(step), ..hypothesis.clone() }).collect()
+}
+
+/// Reasons of all attempts of a run that never initialized, the most frequent first.
+fn waiting_reasons(record: &RunRecord) -> Vec<WaitingReason> {
+    let reasons = record.waiting_reasons();
+    reasons.into_iter().map(|(reason, images)| WaitingReason { reason, images }).collect()
+}

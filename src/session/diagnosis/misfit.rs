@@ -1,0 +1,339 @@
+//! Residuals of a trial by sensor, and their comparison on one scale.
+//!
+//! The trials of a diagnosis use the same measurements, so their likelihoods can be compared. A step contributes the
+//! χ² of the factors of its window and a cost of its reprojection residuals by Student's distribution, whose scale is that
+//! of the best trial: pixel noise is unknown, and a change that leaves larger residuals must not widen its own scale.
+//! Windows overlap; sums over the steps are divided by the number of steps in a window.
+
+use crate::estimator::{FactorKind, StepReport};
+use crate::geometry::seconds_from_ns;
+use crate::session::plan::ImageHalf;
+use crate::text::Named as _;
+
+/// Number of bins of the lengths of residuals.
+const BINS: usize = 40;
+/// Shortest length with a bin of its own, in pixels.
+const SHORTEST_PX: f64 = 0.01;
+/// Bins per factor of two.
+const BINS_PER_OCTAVE: f64 = 3.0;
+/// Median length of a normal error in two dimensions, in standard deviations of a coordinate.
+const MEDIAN_LENGTH: f64 = 1.177_410_022_515_474_7;
+
+/// Numbers of reprojection residuals by length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PixelHistogram([u32; BINS]);
+
+impl Default for PixelHistogram {
+    fn default() -> Self {
+        Self([0; BINS])
+    }
+}
+
+impl PixelHistogram {
+    /// Counts a residual by its length in pixels; infinite for a point behind the camera.
+    pub(super) fn add(&mut self, length_px: f64) {
+        let octaves = (length_px / SHORTEST_PX).max(1.0).log2();
+        self.0[((octaves * BINS_PER_OCTAVE) as usize).min(BINS - 1)] += 1;
+    }
+
+    /// One residual at which an observation says nothing.
+    fn lost() -> Self {
+        let mut histogram = Self::default();
+        histogram.add(LOST_PX);
+        histogram
+    }
+
+    pub(super) fn count(&self) -> u32 {
+        self.0.iter().sum()
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.0.iter_mut().zip(other.0).for_each(|(count, more)| *count += more);
+    }
+
+    /// Length in the middle of a bin, in pixels.
+    fn length_px(bin: usize) -> f64 {
+        SHORTEST_PX * ((bin as f64 + 0.5) / BINS_PER_OCTAVE).exp2()
+    }
+
+    /// Median length in pixels, `None` without residuals.
+    fn median_px(&self) -> Option<f64> {
+        let half = self.count().div_ceil(2);
+        let mut below = 0;
+        let bin = self.0.iter().position(|count| {
+            below += count;
+            below >= half && half > 0
+        })?;
+        Some(Self::length_px(bin))
+    }
+
+    /// Mean of −2·ln of Student's density in two dimensions with two degrees of freedom, without its constant, for a
+    /// standard deviation of a coordinate in pixels; `None` without residuals.
+    fn mean_cost(&self, sigma_px: f64) -> Option<f64> {
+        let cost = |bin: usize| 4.0 * (0.5 * (Self::length_px(bin) / sigma_px).powi(2)).ln_1p();
+        let sum: f64 = self.0.iter().enumerate().map(|(bin, count)| f64::from(*count) * cost(bin)).sum();
+        (self.count() > 0).then(|| sum / f64::from(self.count()))
+    }
+}
+
+/// χ² of the factors of one kind, and the number of their rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct FactorMisfit {
+    pub(super) chi2: f64,
+    pub(super) rows: f64,
+}
+
+impl FactorMisfit {
+    /// χ² per row, zero without rows.
+    pub(super) fn mean_square(self) -> f64 {
+        if self.rows > 0.0 { self.chi2 / self.rows } else { 0.0 }
+    }
+
+    fn add(&mut self, other: Self) {
+        self.chi2 += other.chi2;
+        self.rows += other.rows;
+    }
+}
+
+/// Kinds of factors in the order of [`StepMisfit::factors`].
+pub(super) const FACTORS: [FactorKind; 3] = [FactorKind::Imu, FactorKind::Encoder, FactorKind::MarginalizationPrior];
+
+/// Residuals of one step.
+#[derive(Clone, Debug, Default)]
+pub(super) struct StepMisfit {
+    pub(super) stamp_ns: i64,
+    /// True if there is a window.
+    pub(super) tracking: bool,
+    pub(super) pixels: PixelHistogram,
+    /// In the order of [`FACTORS`].
+    pub(super) factors: [FactorMisfit; 3],
+    /// Residuals outside each half of the image, in the order of [`ImageHalf::NAMES`].
+    pub(super) outside: [PixelHistogram; 4],
+    /// Length of the window in seconds.
+    pub(super) window_s: f64,
+    /// Number of frames in the window.
+    pub(super) frames: usize,
+}
+
+impl StepMisfit {
+    /// Residuals of a step whose pixels are `pixel_scale` times those of the image; `resolution_px` is that of the main
+    /// camera.
+    pub(super) fn of(report: &StepReport, pixel_scale: f64, resolution_px: [usize; 2]) -> Self {
+        let mut pixels = PixelHistogram::default();
+        let mut outside = [PixelHistogram::default(); 4];
+        for observation in report.features.iter().flat_map(|feature| feature.observations.iter()) {
+            let length_px = observation.residual_after_px.map_or(f64::INFINITY, |it| it.norm() / pixel_scale);
+            pixels.add(length_px);
+            for (half, histogram) in ImageHalf::all().zip(&mut outside) {
+                if !half.contains(&observation.measured_px, resolution_px) {
+                    histogram.add(length_px);
+                }
+            }
+        }
+        let factors = FACTORS.map(|kind| {
+            let summary = report.residuals.iter().find(|summary| summary.factor == kind);
+            summary.map_or_else(FactorMisfit::default, |it| FactorMisfit { chi2: it.chi2_after, rows: it.count as f64 })
+        });
+        let window_s = match (report.window.first(), report.window.last()) {
+            (Some(first), Some(last)) => seconds_from_ns(last.stamp_ns - first.stamp_ns),
+            _ => 0.0,
+        };
+        let frames = report.window.len();
+        Self { stamp_ns: report.stamp_ns, tracking: frames > 0, pixels, factors, outside, window_s, frames }
+    }
+}
+
+/// Scale on which trials are compared: that of the best one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scale {
+    /// Standard deviation of a coordinate of an observation.
+    pub(super) sigma_px: f64,
+    /// Observations and frames in a window.
+    pub(super) observations: f64,
+    pub(super) frames: f64,
+    /// Number of windows without common frames in the scored steps.
+    pub(super) windows: f64,
+}
+
+/// Averages over the scored steps of a trial.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Misfit {
+    pub(super) pixels: PixelHistogram,
+    /// In the order of [`FACTORS`].
+    pub(super) factors: [FactorMisfit; 3],
+    /// As in [`StepMisfit`].
+    pub(super) outside: [PixelHistogram; 4],
+    /// Frames of all windows.
+    pub(super) frames: usize,
+    /// Steps with a window and all scored steps.
+    pub(super) tracked: usize,
+    pub(super) steps: usize,
+    /// Mean length of the window in seconds.
+    pub(super) window_s: f64,
+}
+
+/// Time after an initialization that is not scored: the values of the first window are inaccurate.
+const SETTLING_NS: i64 = 1_000_000_000;
+/// Upper bound of the mean squared residual of a kind of factor: a larger one says no more.
+const LARGEST_MEAN_SQUARE: f64 = 25.0;
+/// Length of a residual in pixels at which an observation says nothing, as in a step without a window.
+const LOST_PX: f64 = 8.0;
+/// Lowest standard deviation of an observation, in pixels.
+const LEAST_SIGMA_PX: f64 = 0.03;
+
+impl Misfit {
+    /// Averages over all of some steps.
+    pub(super) fn of_all(steps: &[StepMisfit]) -> Self {
+        let mut found = Self { steps: steps.len(), ..Self::default() };
+        steps.iter().filter(|step| step.tracking).for_each(|step| found.add(step));
+        found.window_s /= found.tracked.max(1) as f64;
+        found
+    }
+
+    /// Averages over the steps from `from_ns` on, without those soon after an initialization.
+    pub(super) fn of(steps: &[StepMisfit], from_ns: i64) -> Self {
+        let mut found = Self::default();
+        let mut began_ns = None;
+        for step in steps {
+            if !step.tracking {
+                began_ns = None;
+                // A trial that begins a little later than others has lost nothing.
+                found.steps += usize::from(step.stamp_ns >= from_ns + SETTLING_NS);
+                continue;
+            }
+            let began_ns = *began_ns.get_or_insert(step.stamp_ns);
+            if step.stamp_ns < from_ns + SETTLING_NS || step.stamp_ns < began_ns + SETTLING_NS {
+                continue;
+            }
+            found.steps += 1;
+            found.add(step);
+        }
+        found.window_s /= found.tracked.max(1) as f64;
+        found
+    }
+
+    fn add(&mut self, step: &StepMisfit) {
+        self.tracked += 1;
+        self.pixels.merge(&step.pixels);
+        self.factors.iter_mut().zip(step.factors).for_each(|(sum, more)| sum.add(more));
+        self.outside.iter_mut().zip(&step.outside).for_each(|(sum, more)| sum.merge(more));
+        self.window_s += step.window_s;
+        self.frames += step.frames;
+    }
+
+    /// Ratio of the scored steps with a window.
+    pub(super) fn tracked_ratio(&self) -> f64 {
+        self.tracked as f64 / self.steps.max(1) as f64
+    }
+
+    /// Median length of the reprojection residuals in pixels, `None` without a window.
+    pub(super) fn median_px(&self) -> Option<f64> {
+        self.pixels.median_px()
+    }
+
+    /// Standard deviation of a coordinate of an observation by the median residual, in pixels.
+    pub(super) fn sigma_px(&self) -> Option<f64> {
+        self.median_px().map(|median_px| (median_px / MEDIAN_LENGTH).max(LEAST_SIGMA_PX))
+    }
+
+    /// Observations in a window, on average.
+    pub(super) fn observations(&self) -> f64 {
+        f64::from(self.pixels.count()) / self.tracked.max(1) as f64
+    }
+
+    /// −2·ln of the likelihood of the measurements of all windows, up to a constant that is common to the trials.
+    pub(super) fn cost(&self, scale: &Scale) -> f64 {
+        scale.windows * self.parts(scale).iter().sum::<f64>()
+    }
+
+    /// The same by sensor and for one window: images, then [`FACTORS`].
+    pub(super) fn parts(&self, scale: &Scale) -> [f64; 4] {
+        let tracked = self.tracked_ratio();
+        let blind = 1.0 - tracked;
+        let visual = visual_cost(&self.pixels, scale);
+        // Rows of IMU and encoders grow with the number of frames, those of the prior do not.
+        let of_steps = 1.0 / self.tracked.max(1) as f64;
+        let of_frames = scale.frames / self.frames.max(1) as f64;
+        let part = |index: usize, share: f64| {
+            let factor = self.factors[index];
+            let chi2 = factor.chi2.min(LARGEST_MEAN_SQUARE * factor.rows);
+            share * (tracked * chi2 + blind * LARGEST_MEAN_SQUARE * factor.rows)
+        };
+        let blind_visual = visual_cost(&PixelHistogram::lost(), scale);
+        [
+            scale.observations * (tracked * visual + blind * blind_visual),
+            part(0, of_frames),
+            part(1, of_frames),
+            part(2, of_steps),
+        ]
+    }
+
+    /// Decrease of the mean cost of an observation outside a half of the image from `given` to this trial, which does not
+    /// use that half, times the observations there.
+    pub(super) fn gain_outside(&self, given: &Self, half: ImageHalf, scale: &Scale) -> f64 {
+        let place = ImageHalf::all().position(|known| known == half).unwrap_or_default();
+        let (before, after) = (&given.outside[place], &self.outside[place]);
+        let ratio = f64::from(before.count()) / f64::from(given.pixels.count().max(1));
+        scale.observations * ratio * (visual_cost(before, scale) - visual_cost(after, scale))
+    }
+}
+
+/// Mean cost of an observation, that of a lost one without observations.
+fn visual_cost(pixels: &PixelHistogram, scale: &Scale) -> f64 {
+    let lost = PixelHistogram::lost().mean_cost(scale.sigma_px).unwrap_or_default();
+    pixels.mean_cost(scale.sigma_px).map_or(lost, |cost| cost.min(lost))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_histogram_has_the_median_and_a_cost_that_grows_with_the_residuals() {
+        let mut near = PixelHistogram::default();
+        let mut far = PixelHistogram::default();
+        for number in 1..=101 {
+            near.add(0.002 * f64::from(number));
+            far.add(0.02 * f64::from(number));
+        }
+        far.add(f64::INFINITY);
+        let median_px = near.median_px().unwrap();
+        assert!((median_px / 0.102 - 1.0).abs() < 0.13, "{median_px}");
+        let ratio = far.median_px().unwrap() / median_px;
+        assert!((ratio / 10.0 - 1.0).abs() < 0.3, "{ratio}");
+        assert!(far.mean_cost(0.1) > near.mean_cost(0.1));
+        assert_eq!(PixelHistogram::default().mean_cost(0.1), None);
+    }
+
+    fn step(stamp_s: f64, tracking: bool, length_px: f64) -> StepMisfit {
+        let mut step = StepMisfit {
+            stamp_ns: (stamp_s * 1e9) as i64,
+            tracking,
+            window_s: 2.0,
+            frames: 11,
+            ..StepMisfit::default()
+        };
+        if tracking {
+            (0..100).for_each(|_| step.pixels.add(length_px));
+            step.factors[0] = FactorMisfit { chi2: 80.0, rows: 150.0 };
+        }
+        step
+    }
+
+    #[test]
+    fn a_trial_without_a_window_costs_more_than_any_other() {
+        let scale = Scale { sigma_px: 0.1, observations: 100.0, frames: 11.0, windows: 3.0 };
+        let steps = |length_px: f64, until_s: f64| -> Vec<StepMisfit> {
+            (0..120).map(|number| 0.05 * f64::from(number)).map(|at_s| step(at_s, at_s < until_s, length_px)).collect()
+        };
+        let costs: Vec<f64> = [steps(0.1, 9.0), steps(0.3, 9.0), steps(0.3, 3.0), steps(0.3, 0.0)]
+            .iter()
+            .map(|steps| Misfit::of(steps, 0).cost(&scale))
+            .collect();
+        assert!(costs.windows(2).all(|pair| pair[0] < pair[1]), "{costs:?}");
+        let misfit = Misfit::of(&steps(0.1, 9.0), 0);
+        assert_eq!((misfit.tracked, misfit.steps, misfit.observations()), (100, 100, 100.0));
+        assert_eq!(misfit.window_s, 2.0);
+        assert!((misfit.factors[0].mean_square() - 80.0 / 150.0).abs() < 1e-12);
+    }
+}

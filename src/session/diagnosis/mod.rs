@@ -1,0 +1,28 @@
+//! Diagnosis of a run whose residuals disagree with their noise: trials with one change each, ranked by what they explain.
+//!
+//! - `misfit`: residuals of a trial by sensor, on one scale for all trials.
+//! - `agreement`: limits within which residuals agree with their noise, and the step at which that ends.
+//! - `trial`, `span`: a run computed again with a change, on a part of it.
+//! - `hypotheses`, `axes`, `refinement`: the causes that are tried, with the values to try.
+//! - `scoring`, `ranking`: the best cause of each kind, and whether it is decisive.
+//! - `statement`, `truth`, `outcome`: the result in words.
+//! - `diagnose`: the search.
+
+mod agreement;
+mod axes;
+mod diagnose;
+mod hypotheses;
+mod misfit;
+mod outcome;
+mod ranking;
+mod refinement;
+mod scoring;
+mod span;
+mod statement;
+mod trial;
+mod truth;
+
+pub use agreement::AgreementValue;
+pub use diagnose::diagnose;
+pub use hypotheses::Cause;
+pub use outcome::{Diagnosis, RankedCause, TruthAgreement, Verdict, WaitingReason};

@@ -1,0 +1,179 @@
+//! Result of a diagnosis, as text and as JSON.
+
+use std::fmt;
+
+use serde::{Serialize, Serializer};
+
+use super::agreement::AgreementValue;
+use super::hypotheses::Cause;
+use crate::session::plan::ForkChanges;
+use crate::text::Named as _;
+
+/// What a diagnosis has found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The residuals agree with their noise: no cause is looked for.
+    Agrees,
+    /// One cause explains the residuals.
+    Cause,
+    /// A few causes explain the residuals about as well.
+    Several,
+    /// No tried cause explains the residuals.
+    Unexplained,
+    /// No image reached the estimator.
+    NoSteps,
+}
+
+/// One tried cause.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RankedCause {
+    #[serde(serialize_with = "key")]
+    pub cause: Cause,
+    /// The cause with its value.
+    pub statement: String,
+    pub remedy: String,
+    /// Changes of a fork that undo the cause.
+    #[serde(serialize_with = "text")]
+    pub changes: ForkChanges,
+    /// Stamp of the fork's first step, in nanoseconds and in seconds since the log began.
+    #[serde(skip)]
+    pub from_ns: i64,
+    pub from_s: f64,
+    /// Number of values that the cause takes from the recording.
+    pub parameters: usize,
+    /// Decrease of −2·ln of the likelihood against the run without a change, less the penalty of the parameters.
+    pub gain: f64,
+    /// Values of the run with the change, over the scored steps.
+    pub values: Vec<AgreementValue>,
+    /// Against ground truth, if there is one.
+    pub accuracy: Option<TruthAgreement>,
+}
+
+fn key<S: Serializer>(cause: &Cause, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(cause.name())
+}
+
+fn text<S: Serializer>(changes: &ForkChanges, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(changes)
+}
+
+/// Errors against ground truth.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TruthAgreement {
+    /// Root mean square of the position error after alignment.
+    pub ate_m: f64,
+    /// Mean normalized error squared of the poses, 6 for consistent covariances.
+    pub nees: Option<f64>,
+}
+
+/// A reason for which attempts to initialize waited.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct WaitingReason {
+    pub reason: String,
+    /// Number of images at which it was a reason.
+    pub images: usize,
+}
+
+/// Result of [`diagnose`](super::diagnose).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// File name of the log.
+    pub log: String,
+    /// Specification of the run.
+    pub run: String,
+    pub verdict: Verdict,
+    /// Values of the whole run with their limits.
+    pub values: Vec<AgreementValue>,
+    /// Stamp from which on the residuals disagree after they agreed, in seconds since the log began.
+    pub onset_s: Option<f64>,
+    /// Reasons of the attempts of a run that never initialized, the most frequent first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub waiting: Vec<WaitingReason>,
+    pub accuracy: Option<TruthAgreement>,
+    /// Disagreement of the ground truth with a run whose residuals agree.
+    pub ground_truth: Option<String>,
+    /// Steps that were computed again for each cause, as stamps in seconds.
+    pub span_s: Option<(f64, f64)>,
+    /// Number of causes of `causes` that explain the residuals: 0, 1, or a few.
+    pub explaining: usize,
+    /// Causes with the largest gain, the best first.
+    pub causes: Vec<RankedCause>,
+    /// Number of trials.
+    pub trials: usize,
+    /// True if it was interrupted before the last trial.
+    pub interrupted: bool,
+}
+
+/// Causes that a text lists beside those that explain the residuals.
+const LISTED: usize = 4;
+
+impl fmt::Display for Diagnosis {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(out, "{} on {}: {}", self.run, self.log, self.headline())?;
+        let wrong = self.values.iter().filter(|value| !value.agrees());
+        let named: Vec<String> = wrong.map(described).collect();
+        if !named.is_empty() {
+            let since = self.onset_s.map_or_else(String::new, |onset_s| format!("; they agree until {onset_s:.2} s"));
+            writeln!(out, "  residuals    {}{since}", named.join(", "))?;
+        }
+        for waiting in self.waiting.iter().take(3) {
+            writeln!(out, "  waits        {} ({} images)", waiting.reason, waiting.images)?;
+        }
+        if let Some(accuracy) = self.accuracy {
+            writeln!(out, "  accuracy     {}", accuracy.text())?;
+        }
+        if let Some(text) = &self.ground_truth {
+            writeln!(out, "  ground truth {text}")?;
+        }
+        for (place, cause) in self.causes.iter().take(self.explaining.max(LISTED)).enumerate() {
+            let mark = if place < self.explaining { "→" } else { " " };
+            writeln!(out, "{mark} {}. {} (gain {:.0}, {})", place + 1, cause.statement, cause.gain, cause.text())?;
+            if place < self.explaining {
+                writeln!(out, "     fork       {} at {:.2} s", cause.changes, cause.from_s)?;
+                writeln!(out, "     remedy     {}", cause.remedy)?;
+            }
+        }
+        if let Some((from_s, to_s)) = self.span_s {
+            let ended = if self.interrupted { "; interrupted, other causes were not tried" } else { "" };
+            writeln!(out, "  tried        {} changes from {from_s:.2} to {to_s:.2} s{ended}", self.trials)?;
+        }
+        Ok(())
+    }
+}
+
+impl Diagnosis {
+    /// The finding in one sentence.
+    pub fn headline(&self) -> String {
+        let first = || self.causes.first().map_or_else(String::new, |cause| cause.statement.clone());
+        match self.verdict {
+            Verdict::Agrees if self.ground_truth.is_some() => {
+                "the residuals agree with their noise; the ground truth disagrees with the estimate".to_owned()
+            }
+            Verdict::Agrees => "nothing to diagnose: the residuals agree with their noise".to_owned(),
+            Verdict::Cause => first(),
+            Verdict::Several => format!("{} causes explain the residuals about as well", self.explaining),
+            Verdict::Unexplained => "unexplained: no tried change brings the residuals back to their noise".to_owned(),
+            Verdict::NoSteps => "no image reached the estimator: see dcvins check".to_owned(),
+        }
+    }
+}
+
+impl RankedCause {
+    fn text(&self) -> String {
+        let wrong: Vec<String> = self.values.iter().filter(|value| !value.agrees()).map(described).collect();
+        let left = if wrong.is_empty() { "residuals agree".to_owned() } else { format!("left: {}", wrong.join(", ")) };
+        self.accuracy.map_or_else(|| left.clone(), |accuracy| format!("{left}; {}", accuracy.text()))
+    }
+}
+
+impl TruthAgreement {
+    fn text(&self) -> String {
+        let nees = self.nees.map_or_else(String::new, |nees| format!(", NEES {nees:.1} (6 is consistent)"));
+        format!("ATE {:.3} m{nees}", self.ate_m)
+    }
+}
+
+fn described(value: &AgreementValue) -> String {
+    format!("{} {:.2} > {}", value.name, value.value, value.limit)
+}

@@ -1,0 +1,176 @@
+//! Ranking of trials by what they explain against their number of parameters, and the verdict.
+//!
+//! The score of a trial is −2·ln of its likelihood plus `ln(n)` for each parameter (BIC), n observations. A larger assumed
+//! noise lowers every χ²; its score has the logarithm of the density in addition, `2·ln(factor)` for each row. A half of the
+//! image that is not used is compared on the other half.
+
+use super::agreement::disagreement;
+use super::hypotheses::{Cause, Hypothesis};
+use super::misfit::{Misfit, Scale};
+use super::trial::TrialResult;
+use crate::session::plan::Correction;
+
+/// Trial of a hypothesis with its averages over the scored steps.
+#[derive(Clone, Debug)]
+pub(super) struct Candidate {
+    pub(super) hypothesis: Hypothesis,
+    pub(super) result: TrialResult,
+    pub(super) misfit: Misfit,
+    /// Lower is better.
+    pub(super) score: f64,
+}
+
+/// Smallest advantage of a cause over the next one, in units of −2·ln of a likelihood, and relative to the gain of the
+/// best cause: residuals of neighbouring images are not independent, so that a formal advantage is not enough.
+const MARGIN: f64 = 30.0;
+const MARGIN_RATIO: f64 = 0.05;
+/// Ratio of the disagreement that a cause may leave, unless it leaves none.
+const REMAINING: f64 = 0.4;
+/// Largest number of causes that remain.
+const MOST_REMAINING: usize = 3;
+
+/// What the ranked causes mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Decision {
+    /// The first cause explains the residuals, and no other one does.
+    One,
+    /// That many causes explain them about as well.
+    Several(usize),
+    /// No cause explains them.
+    None,
+}
+
+/// Score of a trial.
+pub(super) fn score(hypothesis: &Hypothesis, misfit: &Misfit, given: &Misfit, scale: &Scale) -> f64 {
+    let observations = (scale.observations * scale.windows).max(2.0);
+    let mut cost = misfit.cost(scale);
+    if let [Correction::Ignored(half)] = hypothesis.changes.corrections.as_slice() {
+        let [visual, ..] = given.parts(scale);
+        let [_, rest @ ..] = misfit.parts(scale);
+        cost = scale.windows * (visual - misfit.gain_outside(given, *half, scale) + rest.iter().sum::<f64>());
+    }
+    let rows = |factor: usize| misfit.factors[factor].rows * scale.frames / misfit.frames.max(1) as f64;
+    let noise = rows(0) * hypothesis.changes.imu_noise.ln() + rows(1) * hypothesis.changes.encoder_noise.ln();
+    cost + 2.0 * scale.windows * noise + hypothesis.parameters as f64 * observations.ln()
+}
+
+/// The best candidate of each cause, the best cause first; a special case that is about as good precedes the general
+/// cause.
+pub(super) fn by_cause(given: &Candidate, mut candidates: Vec<Candidate>) -> Vec<Candidate> {
+    candidates.sort_by(|one, other| one.score.total_cmp(&other.score));
+    let mut kept: Vec<Candidate> = Vec::new();
+    for candidate in candidates {
+        if kept.iter().all(|known| known.hypothesis.cause != candidate.hypothesis.cause) {
+            kept.push(candidate);
+        }
+    }
+    if let Some((best, score)) = kept.first().map(|best| (best.hypothesis.cause, best.score)) {
+        let margin = margin(given.score - score);
+        let special = kept.iter().position(|it| is_general(best, it.hypothesis.cause) && it.score < score + margin);
+        if let Some(special) = special {
+            kept[..=special].rotate_right(1);
+        }
+    }
+    kept
+}
+
+/// Smallest difference of two scores that tells causes apart, for a gain of the best one.
+fn margin(gain: f64) -> f64 {
+    MARGIN.max(MARGIN_RATIO * gain)
+}
+
+/// Decision about ranked causes; `given` is the run without a change.
+pub(super) fn decide(given: &Candidate, ranked: &[Candidate]) -> Decision {
+    let Some(best) = ranked.first() else { return Decision::None };
+    let gain = given.score - best.score;
+    let (before, after) = (disagreement(&given.misfit), disagreement(&best.misfit));
+    if gain < MARGIN || (after > 1.0 && after > REMAINING * before) {
+        return Decision::None;
+    }
+    let near = ranked.iter().filter(|candidate| candidate.score < best.score + margin(gain));
+    match near.filter(|candidate| !is_general(candidate.hypothesis.cause, best.hypothesis.cause)).count() {
+        0 | 1 => Decision::One,
+        count => Decision::Several(count.min(MOST_REMAINING)),
+    }
+}
+
+/// True if `cause` contains `best` as a special case, so that it cannot compete with it.
+fn is_general(cause: Cause, best: Cause) -> bool {
+    matches!(
+        (cause, best),
+        (Cause::Clocks, Cause::CameraClock | Cause::EncoderClock)
+            | (Cause::Intrinsics, Cause::Focal)
+            | (
+                Cause::EncoderNoise,
+                Cause::EncoderClock | Cause::JointOffset | Cause::JointReversed | Cause::JointScale
+            )
+            | (Cause::Chain, Cause::JointOffset)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::misfit::StepMisfit;
+    use super::*;
+    use crate::session::plan::ForkChanges;
+
+    const SCALE: Scale = Scale { sigma_px: 0.1, observations: 800.0, frames: 11.0, windows: 4.0 };
+
+    fn misfit(length_px: f64) -> Misfit {
+        let steps: Vec<StepMisfit> = (0..100)
+            .map(|number| {
+                let mut step = StepMisfit {
+                    stamp_ns: number * 50_000_000,
+                    tracking: true,
+                    frames: 11,
+                    window_s: 1.0,
+                    ..StepMisfit::default()
+                };
+                (0..800).for_each(|_| step.pixels.add(length_px));
+                step
+            })
+            .collect();
+        Misfit::of(&steps, 0)
+    }
+
+    fn candidate(cause: Cause, changes: ForkChanges, length_px: f64, given: &Misfit) -> Candidate {
+        let hypothesis = Hypothesis::change(cause, changes, 1);
+        let misfit = misfit(length_px);
+        let score = score(&hypothesis, &misfit, given, &SCALE);
+        Candidate { hypothesis, result: TrialResult::default(), misfit, score }
+    }
+
+    fn decision(given_px: f64, causes: &[(Cause, f64)]) -> (Decision, Vec<Cause>) {
+        let given = misfit(given_px);
+        let all = causes.iter().map(|(cause, px)| candidate(*cause, ForkChanges::default(), *px, &given)).collect();
+        let given = candidate(Cause::Focal, ForkChanges::default(), given_px, &given);
+        let ranked = by_cause(&given, all);
+        let decision = decide(&given, &ranked);
+        (decision, ranked.iter().map(|it| it.hypothesis.cause).collect())
+    }
+
+    #[test]
+    fn one_cause_several_or_none() {
+        let (focal, shutter, chain) = (Cause::Focal, Cause::Shutter, Cause::Chain);
+        let (found, order) = decision(1.5, &[(shutter, 0.9), (focal, 0.1), (focal, 0.4), (chain, 1.5)]);
+        assert_eq!((found, order), (Decision::One, vec![focal, shutter, chain]));
+        assert_eq!(decision(1.5, &[(shutter, 0.1), (focal, 0.1), (chain, 1.5)]).0, Decision::Several(2));
+        assert_eq!(decision(1.5, &[(shutter, 1.4), (focal, 1.5)]).0, Decision::None);
+        // A more general cause does not compete with its special case.
+        let (found, order) = decision(1.5, &[(Cause::Intrinsics, 0.1), (focal, 0.1)]);
+        assert_eq!((found, order), (Decision::One, vec![focal, Cause::Intrinsics]));
+        assert_eq!(decision(1.5, &[]).0, Decision::None);
+    }
+
+    #[test]
+    fn a_larger_assumed_noise_is_no_free_explanation() {
+        let given = misfit(0.1);
+        let mut wide = misfit(0.1);
+        wide.factors[1].rows = 33.0 * wide.tracked as f64;
+        let changes = ForkChanges { encoder_noise: 10.0, ..ForkChanges::default() };
+        let hypothesis = Hypothesis::change(Cause::EncoderNoise, changes, 1);
+        let plain = Hypothesis::change(Cause::EncoderNoise, ForkChanges::default(), 1);
+        let difference = score(&hypothesis, &wide, &given, &SCALE) - score(&plain, &wide, &given, &SCALE);
+        assert!((difference - 4.0 * 33.0 * 2.0 * 10.0_f64.ln()).abs() < 1e-6, "{difference}");
+    }
+}

@@ -1,0 +1,146 @@
+//! Values of causes from the trials so far: better hypotheses of the same kinds.
+
+use super::hypotheses::{Cause, Hypothesis};
+use super::ranking::Candidate;
+use super::trial::{DiagnosedRun, TrialResult};
+use crate::estimator::SensorParameters;
+use crate::gimbal::{ParameterId, ParameterPart, Quantity};
+use crate::session::plan::{Correction, ForkChanges, LONGEST_SHIFT_S};
+
+/// Smallest shift that is worth a trial, in seconds.
+const LEAST_SHIFT_S: f64 = 5e-4;
+/// Smallest relative change of the focal length that is worth a trial.
+const LEAST_FOCAL: f64 = 2e-3;
+/// Smallest offset of a joint that is worth a trial, in radians (1°).
+const LEAST_OFFSET_RAD: f64 = 0.017;
+/// Fewest steps on either side of a change of a joint's offset.
+const STEPS_BESIDE: usize = 15;
+
+/// Hypotheses with values from the trials.
+pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[Candidate]) -> Vec<Hypothesis> {
+    let mut all = Vec::new();
+    for candidate in candidates {
+        let changes = &candidate.hypothesis.changes;
+        if changes.estimated.contains(&SensorParameters::Timeshift) {
+            all.extend(shifts(run, &candidate.result));
+        }
+        if changes.estimated.contains(&SensorParameters::Intrinsics) {
+            all.extend(
+                focal(run, candidate).map(|factor| Hypothesis::correction(Cause::Focal, Correction::Focal(factor))),
+            );
+        }
+    }
+    let best_of = |cause: Cause| {
+        let of_cause = candidates.iter().filter(|it| it.hypothesis.cause == cause && it.hypothesis.from.is_none());
+        of_cause.min_by(|one, other| one.score.total_cmp(&other.score))
+    };
+    if let Some(best) = best_of(Cause::Focal).filter(|_| run.spec.calibrate && !run.spec.intrinsics) {
+        // The columns of the intrinsics find the rest of the error from here; the result is refined once more.
+        let estimated = [SensorParameters::Intrinsics].into();
+        let changes = ForkChanges { estimated, ..best.hypothesis.changes.clone() };
+        all.push(Hypothesis::change(Cause::Intrinsics, changes, best.hypothesis.parameters + 4));
+    }
+    if let Some(best) = best_of(Cause::EncoderNoise) {
+        let factor = best.hypothesis.changes.encoder_noise * best.misfit.factors[1].mean_square().sqrt();
+        if factor > 1.1 && factor < 1e3 {
+            let changes = ForkChanges { encoder_noise: factor, ..ForkChanges::default() };
+            all.push(Hypothesis::change(Cause::EncoderNoise, changes, 1));
+        }
+        all.extend(offsets(run, &best.result));
+    }
+    all
+}
+
+/// Value of a column of a trial.
+fn value(result: &TrialResult, part: ParameterPart, quantity: Quantity) -> Option<f64> {
+    result.calibration.get(&ParameterId { part, quantity }).map(|(value, _)| *value)
+}
+
+/// Shifts of each clock alone and of both from the columns of time offsets.
+fn shifts(run: &DiagnosedRun<'_>, result: &TrialResult) -> Vec<Hypothesis> {
+    let given_s = run.rig.camera(run.camera_key).map_or(0.0, |camera| camera.timeshift_cam_imu_s);
+    let camera = value(result, ParameterPart::Camera(0), Quantity::Timeshift).map(|total_s| total_s - given_s);
+    let encoder = value(result, ParameterPart::Encoder, Quantity::Timeshift);
+    let usable = |shift_s: &f64| (LEAST_SHIFT_S..=LONGEST_SHIFT_S).contains(&shift_s.abs());
+    let camera = camera.filter(usable).map(Correction::CameraShift);
+    let encoder = encoder.filter(usable).map(Correction::JointShift);
+    let mut all = Vec::new();
+    all.extend(camera.clone().map(|it| Hypothesis::correction(Cause::CameraClock, it)));
+    all.extend(encoder.clone().map(|it| Hypothesis::correction(Cause::EncoderClock, it)));
+    if let (Some(camera), Some(encoder)) = (camera, encoder) {
+        all.push(Hypothesis::corrections(Cause::Clocks, vec![camera, encoder]));
+    }
+    all
+}
+
+/// Factor on the rig's focal length from the columns of the intrinsics and the factor that the trial already has.
+fn focal(run: &DiagnosedRun<'_>, candidate: &Candidate) -> Option<f64> {
+    let [fx, fy, ..] = run.rig.camera(run.camera_key).ok()?.model.intrinsics();
+    let column = |quantity| value(&candidate.result, ParameterPart::Camera(0), quantity);
+    let ratio = 0.5 * (column(Quantity::Fx)? / fx + column(Quantity::Fy)? / fy);
+    let known: f64 = candidate
+        .hypothesis
+        .changes
+        .corrections
+        .iter()
+        .map(|correction| if let Correction::Focal(factor) = correction { *factor } else { 1.0 })
+        .product();
+    let factor = known * ratio;
+    ((factor - 1.0).abs() > LEAST_FOCAL && (0.1..10.0).contains(&factor)).then_some(factor)
+}
+
+/// Constant and stepping offsets of each joint, from the joint angles of a trial that hardly uses the readings.
+fn offsets(run: &DiagnosedRun<'_>, result: &TrialResult) -> Vec<Hypothesis> {
+    let mut all = Vec::new();
+    for (joint, name) in run.rig.joint_names().into_iter().enumerate() {
+        let differences: Vec<(usize, f64)> = result
+            .joints_rad
+            .iter()
+            .filter_map(|(step, angles)| {
+                let reading = run.inputs.get(*step)?.joint_angles.as_ref()?;
+                Some((*step, angles.get(joint)? - reading.angles_rad.get(joint)?))
+            })
+            .collect();
+        let Some((step, before, after)) = change_point(&differences) else { continue };
+        let offset =
+            |offset_rad: f64| Hypothesis::correction(Cause::JointOffset, Correction::Offset(name.clone(), offset_rad));
+        if (after - before).abs() > LEAST_OFFSET_RAD {
+            all.push(offset(after - before).starting(step));
+        }
+        let mean = differences.iter().map(|(_, difference)| difference).sum::<f64>() / differences.len() as f64;
+        if mean.abs() > LEAST_OFFSET_RAD {
+            all.push(offset(mean));
+        }
+    }
+    all
+}
+
+/// Step at which a constant changes with the least squared error, and the means before and after it; `None` with too few
+/// values.
+fn change_point(values: &[(usize, f64)]) -> Option<(usize, f64, f64)> {
+    let mean = |part: &[(usize, f64)]| part.iter().map(|(_, value)| value).sum::<f64>() / part.len() as f64;
+    let squares = |part: &[(usize, f64)]| {
+        let mean = mean(part);
+        part.iter().map(|(_, value)| (value - mean).powi(2)).sum::<f64>()
+    };
+    let places = STEPS_BESIDE..values.len().checked_sub(STEPS_BESIDE)?;
+    let cost = |place: &usize| squares(&values[..*place]) + squares(&values[*place..]);
+    let place = places.min_by(|one, other| cost(one).total_cmp(&cost(other)))?;
+    Some((values[place].0, mean(&values[..place]), mean(&values[place..])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_step_of_an_offset_is_found() {
+        let values: Vec<(usize, f64)> = (40..140)
+            .map(|step| (step, if step < 87 { 0.01 } else { -0.34 } + 0.003 * ((step * 37 % 11) as f64 - 5.0)))
+            .collect();
+        let (step, before, after) = change_point(&values).unwrap();
+        assert_eq!(step, 87);
+        assert!((before - 0.01).abs() < 2e-3 && (after + 0.34).abs() < 2e-3, "{before} {after}");
+        assert_eq!(change_point(&values[..20]), None);
+    }
+}

@@ -1,0 +1,50 @@
+//! Trials of one span on one scale.
+
+use super::hypotheses::{Cause, Hypothesis};
+use super::misfit::{Misfit, Scale};
+use super::ranking::{Candidate, score};
+use super::trial::TrialResult;
+use crate::geometry::seconds_from_ns;
+use crate::session::plan::ForkChanges;
+
+/// Ratio of the steps with a window below which a run is lost.
+pub(super) const LOST: f64 = 0.5;
+/// Standard deviation of an observation in pixels if no trial has a window.
+const DEFAULT_SIGMA_PX: f64 = 0.25;
+
+/// Scored trials of one span; `given` is the run without a change.
+pub(super) struct Trials {
+    pub(super) given: Candidate,
+    pub(super) others: Vec<Candidate>,
+}
+
+/// Trials on one scale: the observations and windows of the run itself, or of the trial with the most steps if the run has no
+/// window, and the noise of the trial with the smallest residuals.
+pub(super) fn scored(given: TrialResult, done: Vec<(Hypothesis, TrialResult)>) -> Trials {
+    let started = given.initialized_ns().or_else(|| done.iter().filter_map(|(_, it)| it.initialized_ns()).min());
+    let from_ns = started.unwrap_or_default();
+    let averages = |result: &TrialResult| Misfit::of(&result.steps, from_ns);
+    let given_misfit = averages(&given);
+    let misfits: Vec<Misfit> = done.iter().map(|(_, result)| averages(result)).collect();
+    let tracking = || misfits.iter().chain([&given_misfit]).filter(|misfit| misfit.tracked_ratio() > LOST);
+    let reference = if given_misfit.tracked_ratio() > LOST {
+        given_misfit.clone()
+    } else {
+        tracking().max_by_key(|misfit| misfit.tracked).cloned().unwrap_or_default()
+    };
+    let sigma_px = tracking().filter_map(Misfit::sigma_px).min_by(f64::total_cmp).unwrap_or(DEFAULT_SIGMA_PX);
+    let end_ns = given.steps.last().map_or(from_ns, |step| step.stamp_ns);
+    let scale = Scale {
+        sigma_px,
+        observations: reference.observations(),
+        frames: reference.frames as f64 / reference.tracked.max(1) as f64,
+        windows: (seconds_from_ns(end_ns - from_ns) / reference.window_s.max(0.5)).max(1.0),
+    };
+    let candidate = |hypothesis: Hypothesis, result: TrialResult, misfit: Misfit| {
+        let score = score(&hypothesis, &misfit, &given_misfit, &scale);
+        Candidate { hypothesis, result, misfit, score }
+    };
+    let unchanged = Hypothesis::change(Cause::Chain, ForkChanges::default(), 0);
+    let others = done.into_iter().zip(misfits).map(|((it, result), misfit)| candidate(it, result, misfit)).collect();
+    Trials { given: candidate(unchanged, given, given_misfit.clone()), others }
+}

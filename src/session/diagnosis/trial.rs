@@ -1,0 +1,131 @@
+//! One trial: a run computed again with one change, on the inputs of its steps.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::misfit::StepMisfit;
+use crate::estimator::StepReport;
+use crate::gimbal::{ClassicalChain, ParameterId};
+use crate::sensors::Rig;
+use crate::session::engine::{OwnedStepInput, RunEngine, apply_fork, guarded};
+use crate::session::plan::{Correction, ForkChanges, RunSpec};
+use crate::session::record::{RunRecord, StepRecord};
+
+/// The run to be diagnosed.
+pub(super) struct DiagnosedRun<'a> {
+    pub(super) rig: &'a Rig,
+    pub(super) spec: &'a RunSpec,
+    /// Key of the main camera.
+    pub(super) camera_key: &'a str,
+    /// Inputs of all steps.
+    pub(super) inputs: Vec<Arc<OwnedStepInput>>,
+    /// Ends all trials once it is set.
+    pub(super) interrupted: &'a AtomicBool,
+}
+
+/// Part of a run that trials compute again.
+#[derive(Clone, Debug)]
+pub(super) struct TrialSpan {
+    /// Engine in its state before the first step.
+    pub(super) engine: RunEngine,
+    pub(super) steps: Range<usize>,
+    /// Step by which a trial must have a window, `None` if none must.
+    pub(super) window_by: Option<usize>,
+    /// True if the engine is that of the start of the run, without a window.
+    pub(super) is_start: bool,
+}
+
+/// Result of a trial.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TrialResult {
+    pub(super) steps: Vec<StepMisfit>,
+    /// Last values of the calibration with their standard deviations.
+    pub(super) calibration: BTreeMap<ParameterId, (f64, f64)>,
+    pub(super) chain: Option<ClassicalChain>,
+    /// Estimated joint angles by step.
+    pub(super) joints_rad: Vec<(usize, Vec<f64>)>,
+    pub(super) restarts: usize,
+}
+
+impl DiagnosedRun<'_> {
+    /// Computes the steps of a span with changes from step `change_at` on; the reports go to `record` if there is one.
+    /// `None` if the changes do not fit the run, a step fails, or after an interrupt.
+    pub(super) fn trial(
+        &self,
+        span: &TrialSpan,
+        change_at: usize,
+        changes: &ForkChanges,
+        mut record: Option<&mut RunRecord>,
+    ) -> Option<TrialResult> {
+        let mut engine = span.engine.clone();
+        let change_at = change_at.max(span.steps.start);
+        let mut result = TrialResult::default();
+        let mut tracked = false;
+        for number in span.steps.clone() {
+            if self.interrupted.load(Ordering::Relaxed) {
+                return None;
+            }
+            if number == change_at {
+                apply_fork(changes, &mut engine, self.rig, self.camera_key).ok()?;
+            }
+            let input = self.inputs.get(number)?;
+            if !tracked && span.window_by.is_some_and(|limit| number > limit) {
+                result.steps.push(StepMisfit { stamp_ns: input.stamp_ns, ..StepMisfit::default() });
+                continue;
+            }
+            let report = guarded(input.stamp_ns, || engine.report_without_rank(input)).ok()?;
+            tracked |= !report.window.is_empty();
+            let scale = if number >= change_at { pixel_scale(changes) } else { 1.0 };
+            result.take(number, StepMisfit::of(&report, scale, self.resolution_px()), &report);
+            if let Some(record) = &mut record {
+                record.push(step_record(report, input));
+            }
+        }
+        Some(result)
+    }
+
+    fn resolution_px(&self) -> [usize; 2] {
+        self.rig.camera(self.camera_key).map_or([0; 2], |camera| camera.model.resolution_px)
+    }
+}
+
+fn step_record(report: StepReport, input: &OwnedStepInput) -> StepRecord {
+    StepRecord {
+        report,
+        rank: None,
+        tracks: Arc::clone(input.main_tracks()),
+        ground_truth: input.ground_truth,
+        log_time_ns: input.log_time_ns,
+        summary_only: false,
+    }
+}
+
+/// Scale of the pixels that the estimator uses, relative to those of the image.
+fn pixel_scale(changes: &ForkChanges) -> f64 {
+    let factors = changes.corrections.iter().filter_map(|correction| match correction {
+        Correction::Focal(factor) => Some(factor.recip()),
+        _ => None,
+    });
+    factors.product()
+}
+
+impl TrialResult {
+    fn take(&mut self, number: usize, misfit: StepMisfit, report: &StepReport) {
+        self.steps.push(misfit);
+        self.restarts = report.restarts;
+        let calibration = &report.calibration;
+        if let Some(newest) = report.window.last() {
+            let values = calibration.values.iter().copied().zip(calibration.sigmas.iter().copied());
+            self.calibration = calibration.parameters.iter().copied().zip(values).collect();
+            self.chain = Some(calibration.classical.clone());
+            self.joints_rad.push((number, newest.joint_angles_rad.clone()));
+        }
+    }
+
+    /// Stamp of the first step with a window.
+    pub(super) fn initialized_ns(&self) -> Option<i64> {
+        self.steps.iter().find(|step| step.tracking).map(|step| step.stamp_ns)
+    }
+}

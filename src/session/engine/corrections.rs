@@ -1,0 +1,205 @@
+//! Corrections of a fork, applied to the measurements of its steps.
+
+use nalgebra::{Matrix3, Vector2};
+
+use crate::camera::CameraModel;
+use crate::frontend::{TrackedFeature, TrackedFrame};
+use crate::geometry::ns_from_seconds;
+use crate::sensors::{ImuSample, JointAngles, Rig};
+use crate::session::plan::{Correction, ForkError, ImageFlip, ImageHalf};
+
+/// Corrections with the joints and the camera that they change.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct MeasurementCorrections {
+    /// Model of the main camera in the rig; `None` without a correction of its images.
+    camera: Option<CameraModel>,
+    image: Vec<ImageCorrection>,
+    joints: Vec<JointCorrection>,
+    /// `imu_from_recorded` of angular velocities and specific forces, where they are corrected.
+    imu: Option<[Matrix3<f64>; 2]>,
+    /// Additions to the time offsets of cameras and encoders, in seconds.
+    camera_shift_s: f64,
+    joint_shift_s: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum ImageCorrection {
+    Focal(f64),
+    Flip(ImageFlip),
+    Ignored(ImageHalf),
+}
+
+/// Correction of readings by the indices of their joints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum JointCorrection {
+    Reversed(usize),
+    Swapped(usize, usize),
+    Offset(usize, f64),
+    Scale(f64),
+}
+
+impl MeasurementCorrections {
+    /// The corrections of a fork. `camera_key` is the key of the main camera.
+    ///
+    /// # Errors
+    /// If the rig has no such joint.
+    pub(super) fn of(corrections: &[Correction], rig: &Rig, camera_key: &str) -> Result<Self, ForkError> {
+        let names = rig.joint_names();
+        let joint = |name: &String| {
+            names.iter().position(|known| known == name).ok_or_else(|| ForkError::BadChange {
+                text: format!("correct=…:{name}"),
+                problem: format!("the rig has no joint '{name}'; it has: {}", names.join(", ")),
+            })
+        };
+        let mut found = Self::default();
+        for correction in corrections {
+            match correction {
+                Correction::Focal(factor) => found.image.push(ImageCorrection::Focal(*factor)),
+                Correction::Image(flip) => found.image.push(ImageCorrection::Flip(*flip)),
+                Correction::Ignored(half) => found.image.push(ImageCorrection::Ignored(*half)),
+                Correction::CameraShift(shift_s) => found.camera_shift_s += shift_s,
+                Correction::JointShift(shift_s) => found.joint_shift_s += shift_s,
+                Correction::Reversed(name) => found.joints.push(JointCorrection::Reversed(joint(name)?)),
+                Correction::Swapped(first, second) => {
+                    found.joints.push(JointCorrection::Swapped(joint(first)?, joint(second)?));
+                }
+                Correction::Offset(name, offset) => found.joints.push(JointCorrection::Offset(joint(name)?, *offset)),
+                Correction::JointScale(factor) => found.joints.push(JointCorrection::Scale(*factor)),
+                Correction::ImuAxes(axes) => found.rotate([axes.matrix(), axes.matrix()]),
+                Correction::GyroscopeAxes(axes) => found.rotate([axes.matrix(), Matrix3::identity()]),
+                Correction::AccelerometerAxes(axes) => found.rotate([Matrix3::identity(), axes.matrix()]),
+                Correction::GyroscopeScale(factor) => {
+                    found.rotate([Matrix3::identity() * *factor, Matrix3::identity()]);
+                }
+                Correction::AccelerometerScale(factor) => {
+                    found.rotate([Matrix3::identity(), Matrix3::identity() * *factor]);
+                }
+            }
+        }
+        if !found.image.is_empty() {
+            found.camera = rig.camera(camera_key).ok().map(|camera| camera.model.clone());
+        }
+        Ok(found)
+    }
+
+    /// Adds the corrections of a fork to those of its parent.
+    pub(super) fn add(&mut self, other: Self) {
+        self.camera = other.camera.or_else(|| self.camera.take());
+        self.image.extend(other.image);
+        self.joints.extend(other.joints);
+        if let Some(matrices) = other.imu {
+            self.rotate(matrices);
+        }
+        self.camera_shift_s += other.camera_shift_s;
+        self.joint_shift_s += other.joint_shift_s;
+    }
+
+    fn rotate(&mut self, [gyroscope, accelerometer]: [Matrix3<f64>; 2]) {
+        let [before, of_force] = self.imu.unwrap_or_else(|| [Matrix3::identity(); 2]);
+        self.imu = Some([gyroscope * before, accelerometer * of_force]);
+    }
+
+    pub(super) fn camera_shift_ns(&self) -> i64 {
+        ns_from_seconds(self.camera_shift_s)
+    }
+
+    /// The main camera's tracks, `None` without a correction of images; features outside the domain of the camera model
+    /// are dropped.
+    ///
+    /// Positions are those at which the rig's camera would see the same directions: with a focal length `F` times the
+    /// rig's, their errors are `1/F` times those in the image.
+    pub(super) fn tracks(&self, tracks: &TrackedFrame) -> Option<TrackedFrame> {
+        let camera = self.camera.as_ref()?;
+        let features = tracks.features.iter().filter_map(|feature| {
+            let uv_px = self.place(camera, feature.uv_px)?;
+            let previous_uv_px = feature.previous_uv_px.and_then(|uv_px| self.place(camera, uv_px));
+            let bearing = camera.unproject(&uv_px)?;
+            Some(TrackedFeature { uv_px, previous_uv_px, bearing, ..*feature })
+        });
+        Some(TrackedFrame { features: features.collect(), ..tracks.clone() })
+    }
+
+    fn place(&self, camera: &CameraModel, uv_px: Vector2<f64>) -> Option<Vector2<f64>> {
+        let [width, height] = camera.resolution_px.map(|size| size as f64);
+        self.image.iter().try_fold(uv_px, |uv_px, correction| match correction {
+            ImageCorrection::Focal(factor) => {
+                let [fx, fy, cx, cy, k1, k2] = camera.intrinsics();
+                let corrected = camera.with_intrinsics([fx * factor, fy * factor, cx, cy, k1, k2]).ok()?;
+                camera.project(&corrected.unproject(&uv_px)?)
+            }
+            ImageCorrection::Flip(flip) => {
+                let (left, top) = (width - 1.0 - uv_px.x, height - 1.0 - uv_px.y);
+                Some(match flip {
+                    ImageFlip::Mirrored => Vector2::new(left, uv_px.y),
+                    ImageFlip::Flipped => Vector2::new(uv_px.x, top),
+                    ImageFlip::UpsideDown => Vector2::new(left, top),
+                })
+            }
+            ImageCorrection::Ignored(half) => (!half.contains(&uv_px, camera.resolution_px)).then_some(uv_px),
+        })
+    }
+
+    /// Corrected samples, `None` without a correction of the IMU.
+    pub(super) fn imu(&self, samples: &[ImuSample]) -> Option<Vec<ImuSample>> {
+        let [gyroscope, accelerometer] = self.imu?;
+        let corrected = samples.iter().map(|sample| ImuSample {
+            stamp_ns: sample.stamp_ns,
+            angular_velocity_rad_per_s: gyroscope * sample.angular_velocity_rad_per_s,
+            specific_force_m_per_s2: accelerometer * sample.specific_force_m_per_s2,
+        });
+        Some(corrected.collect())
+    }
+
+    /// Corrects the readings at an image; shifts follow the parabola of each joint.
+    pub(super) fn joint_angles(&self, angles: &mut JointAngles) {
+        let count = angles.angles_rad.len();
+        for correction in &self.joints {
+            match *correction {
+                JointCorrection::Reversed(joint) if joint < count => scale(angles, joint, -1.0),
+                JointCorrection::Scale(factor) => (0..count).for_each(|joint| scale(angles, joint, factor)),
+                JointCorrection::Offset(joint, offset_rad) if joint < count => angles.angles_rad[joint] += offset_rad,
+                JointCorrection::Swapped(first, second) if first.max(second) < count => swap(angles, first, second),
+                JointCorrection::Reversed(_) | JointCorrection::Offset(..) | JointCorrection::Swapped(..) => {}
+            }
+        }
+        let after_s = self.camera_shift_s - self.joint_shift_s;
+        if after_s == 0.0 {
+            return;
+        }
+        for joint in 0..count {
+            let rate = angles.rates_rad_per_s.get(joint).copied().unwrap_or(0.0);
+            let acceleration = angles.motion_fits.get(joint).map_or(0.0, |fit| fit.acceleration_rad_per_s2);
+            angles.angles_rad[joint] += after_s * (rate + 0.5 * after_s * acceleration);
+            if let Some(rate) = angles.rates_rad_per_s.get_mut(joint) {
+                *rate += after_s * acceleration;
+            }
+        }
+    }
+
+    pub(super) fn changes_joints(&self) -> bool {
+        !self.joints.is_empty() || self.camera_shift_s != self.joint_shift_s
+    }
+}
+
+fn scale(angles: &mut JointAngles, joint: usize, factor: f64) {
+    angles.angles_rad[joint] *= factor;
+    if let Some(rate) = angles.rates_rad_per_s.get_mut(joint) {
+        *rate *= factor;
+    }
+    if let Some(fit) = angles.motion_fits.get_mut(joint) {
+        fit.acceleration_rad_per_s2 *= factor;
+    }
+}
+
+fn swap(angles: &mut JointAngles, first: usize, second: usize) {
+    let lists =
+        [&mut angles.angles_rad, &mut angles.sigmas_rad, &mut angles.lasting_sigmas_rad, &mut angles.rates_rad_per_s];
+    for list in lists {
+        if first.max(second) < list.len() {
+            list.swap(first, second);
+        }
+    }
+    if first.max(second) < angles.motion_fits.len() {
+        angles.motion_fits.swap(first, second);
+    }
+}

@@ -1,0 +1,262 @@
+//! Corrections of measurements: what a fork assumes to be wrong in the recording or its rig.
+
+use std::fmt;
+use std::str::FromStr;
+
+use nalgebra::{Matrix3, Vector2};
+
+use crate::text::Named;
+
+/// Assumed error of the measurements, undone before the estimator uses them.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Correction {
+    /// Factor on the focal lengths of the rig's main camera.
+    Focal(f64),
+    /// Images of the main camera are mirrored or upside down.
+    Image(ImageFlip),
+    /// A part of the main camera's images is not used.
+    Ignored(ImageHalf),
+    /// Addition to `timeshift_cam_imu` of all cameras, in seconds.
+    CameraShift(f64),
+    /// Addition to `timeshift_gimbal_imu`, in seconds.
+    JointShift(f64),
+    /// The named joint counts in the other direction.
+    Reversed(String),
+    /// Two joints have each other's readings.
+    Swapped(String, String),
+    /// Addition to the readings of the named joint, in radians.
+    Offset(String, f64),
+    /// Factor on the readings of all joints.
+    JointScale(f64),
+    /// Axes of gyroscope and accelerometer.
+    ImuAxes(SignedAxes),
+    GyroscopeAxes(SignedAxes),
+    AccelerometerAxes(SignedAxes),
+    /// Factor on the angular velocities.
+    GyroscopeScale(f64),
+    /// Factor on the specific forces.
+    AccelerometerScale(f64),
+}
+
+/// Image operation that undoes a camera mounted or recorded the other way around.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageFlip {
+    /// Left and right exchanged.
+    Mirrored,
+    /// Top and bottom exchanged.
+    Flipped,
+    /// Rotated by 180°.
+    UpsideDown,
+}
+
+impl Named for ImageFlip {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::Mirrored, "mirrored"), (Self::Flipped, "flipped"), (Self::UpsideDown, "upside-down")];
+}
+
+/// Half of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageHalf {
+    Left,
+    Right,
+    Top,
+    Bottom,
+}
+
+impl Named for ImageHalf {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::Left, "left"), (Self::Right, "right"), (Self::Top, "top"), (Self::Bottom, "bottom")];
+}
+
+impl ImageHalf {
+    /// True for a pixel in this half of an image of this resolution.
+    pub fn contains(self, uv_px: &Vector2<f64>, resolution_px: [usize; 2]) -> bool {
+        let [width, height] = resolution_px.map(|size| size as f64);
+        match self {
+            Self::Left => uv_px.x < 0.5 * width,
+            Self::Right => uv_px.x >= 0.5 * width,
+            Self::Top => uv_px.y < 0.5 * height,
+            Self::Bottom => uv_px.y >= 0.5 * height,
+        }
+    }
+}
+
+/// Recorded axis (1 to 3 for x, y, z; negative if reversed) that is each axis of the IMU frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SignedAxes([i8; 3]);
+
+impl SignedAxes {
+    /// All permutations with all signs, except the identity: 47.
+    pub fn others() -> Vec<Self> {
+        let orders: [[i8; 3]; 6] = [[1, 2, 3], [2, 3, 1], [3, 1, 2], [2, 1, 3], [1, 3, 2], [3, 2, 1]];
+        let signed = |order: [i8; 3]| {
+            (0..8_u8).map(move |signs| {
+                let sign = |place: usize| if signs >> place & 1 == 1 { -order[place] } else { order[place] };
+                Self([sign(0), sign(1), sign(2)])
+            })
+        };
+        orders.into_iter().flat_map(signed).filter(|axes| axes.0 != [1, 2, 3]).collect()
+    }
+
+    /// Matrix `imu_from_recorded` (3 × 3).
+    pub fn matrix(self) -> Matrix3<f64> {
+        let mut matrix = Matrix3::zeros();
+        for (row, axis) in self.0.into_iter().enumerate() {
+            matrix[(row, usize::from(axis.unsigned_abs()) - 1)] = f64::from(axis.signum());
+        }
+        matrix
+    }
+
+    /// True if the recorded axes form a left-handed frame.
+    pub fn is_reflection(self) -> bool {
+        self.matrix().determinant() < 0.0
+    }
+}
+
+impl fmt::Display for SignedAxes {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let texts = self.0.map(|axis| {
+            let name = ["x", "y", "z"][usize::from(axis.unsigned_abs()) - 1];
+            if axis < 0 { format!("-{name}") } else { name.to_owned() }
+        });
+        out.write_str(&texts.join("/"))
+    }
+}
+
+impl FromStr for SignedAxes {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let known = std::iter::once(Self([1, 2, 3])).chain(Self::others());
+        let found = known.into_iter().find(|axes| axes.to_string() == text.trim());
+        found.ok_or_else(|| format!("'{text}' are no axes; expected three, as in y/x/-z"))
+    }
+}
+
+impl fmt::Display for Correction {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Focal(factor) => write!(out, "focal:{factor}"),
+            Self::Image(flip) => write!(out, "image:{}", flip.name()),
+            Self::Ignored(half) => write!(out, "ignored:{}", half.name()),
+            Self::CameraShift(shift_s) => write!(out, "camera-shift:{shift_s}s"),
+            Self::JointShift(shift_s) => write!(out, "joint-shift:{shift_s}s"),
+            Self::Reversed(joint) => write!(out, "reversed:{joint}"),
+            Self::Swapped(first, second) => write!(out, "swapped:{first}:{second}"),
+            Self::Offset(joint, offset_rad) => write!(out, "offset:{joint}:{offset_rad}rad"),
+            Self::JointScale(factor) => write!(out, "joint-scale:{factor}"),
+            Self::ImuAxes(axes) => write!(out, "imu-axes:{axes}"),
+            Self::GyroscopeAxes(axes) => write!(out, "gyroscope-axes:{axes}"),
+            Self::AccelerometerAxes(axes) => write!(out, "accelerometer-axes:{axes}"),
+            Self::GyroscopeScale(factor) => write!(out, "gyroscope-scale:{factor}"),
+            Self::AccelerometerScale(factor) => write!(out, "accelerometer-scale:{factor}"),
+        }
+    }
+}
+
+/// Names of the corrections with their values, for messages.
+const FORMS: &str = "focal:FACTOR, image:mirrored|flipped|upside-down, ignored:left|right|top|bottom, camera-shift:15ms, \
+                     joint-shift:15ms, reversed:JOINT, swapped:JOINT:JOINT, offset:JOINT:20deg, joint-scale:FACTOR, \
+                     imu-axes:y/x/-z, gyroscope-axes:…, accelerometer-axes:…, gyroscope-scale:FACTOR, \
+                     accelerometer-scale:FACTOR";
+
+impl FromStr for Correction {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let unknown = || format!("'{text}' is no correction; expected one of {FORMS}");
+        let (name, value) = text.split_once(':').ok_or_else(unknown)?;
+        let two = || value.rsplit_once(':').ok_or_else(unknown);
+        Ok(match name {
+            "focal" => Self::Focal(factor(value)?),
+            "image" => Self::Image(ImageFlip::from_name(value).ok_or_else(unknown)?),
+            "ignored" => Self::Ignored(ImageHalf::from_name(value).ok_or_else(unknown)?),
+            "camera-shift" => Self::CameraShift(shift_s(value)?),
+            "joint-shift" => Self::JointShift(shift_s(value)?),
+            "reversed" => Self::Reversed(value.to_owned()),
+            "swapped" => two().map(|(first, second)| Self::Swapped(first.to_owned(), second.to_owned()))?,
+            "offset" => {
+                let (joint, angle) = two()?;
+                let units = [("deg", std::f64::consts::PI / 180.0), ("mrad", 1e-3), ("rad", 1.0)];
+                Self::Offset(
+                    joint.to_owned(),
+                    quantity(angle, &units, 10.0, "an angle of at most 10 rad, as in 20deg")?,
+                )
+            }
+            "joint-scale" => Self::JointScale(factor(value)?),
+            "imu-axes" => Self::ImuAxes(value.parse()?),
+            "gyroscope-axes" => Self::GyroscopeAxes(value.parse()?),
+            "accelerometer-axes" => Self::AccelerometerAxes(value.parse()?),
+            "gyroscope-scale" => Self::GyroscopeScale(factor(value)?),
+            "accelerometer-scale" => Self::AccelerometerScale(factor(value)?),
+            _ => return Err(unknown()),
+        })
+    }
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    let value = text.trim().parse::<f64>().ok().filter(|factor| (1e-3..=1e3).contains(factor));
+    value.ok_or_else(|| format!("'{text}' is no factor from 0.001 to 1000"))
+}
+
+fn shift_s(text: &str) -> Result<f64, String> {
+    quantity(text, &[("ms", 1e-3), ("s", 1.0)], LONGEST_SHIFT_S, "a time of at most 50 ms, as in 15ms")
+}
+
+/// Longest shift of a clock, in seconds: samples of that time around an image are at hand.
+pub(in crate::session) const LONGEST_SHIFT_S: f64 = 0.05;
+
+/// Number with a unit, of at most `largest` in the unit of size 1.
+fn quantity(text: &str, units: &[(&str, f64)], largest: f64, expected: &str) -> Result<f64, String> {
+    let found = units.iter().find_map(|(unit, size)| Some((text.strip_suffix(unit)?, *size)));
+    let value = found.and_then(|(digits, size)| digits.trim().parse::<f64>().ok().map(|value| value * size));
+    value.filter(|value| value.abs() <= largest).ok_or_else(|| format!("'{text}' is not {expected}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corrections_are_read_as_they_are_written() {
+        for text in [
+            "focal:0.77",
+            "image:upside-down",
+            "ignored:top",
+            "camera-shift:0.015s",
+            "joint-shift:-0.03s",
+            "reversed:yaw",
+            "swapped:yaw:pitch",
+            "offset:yaw:0.35rad",
+            "joint-scale:57.3",
+            "imu-axes:y/x/-z",
+            "gyroscope-axes:-x/y/z",
+            "accelerometer-axes:z/x/y",
+            "gyroscope-scale:0.5",
+            "accelerometer-scale:9.81",
+        ] {
+            assert_eq!(text.parse::<Correction>().unwrap().to_string(), text);
+        }
+        assert_eq!("camera-shift:15ms".parse(), Ok(Correction::CameraShift(0.015)));
+        for (text, word) in [
+            ("focus:2", "'focus:2' is no correction"),
+            ("focal:0", "'0' is no factor"),
+            ("focal:NaN", "no factor"),
+            ("camera-shift:2s", "at most 50 ms"),
+            ("imu-axes:x/x/z", "no axes"),
+            ("offset:yaw", "no correction"),
+        ] {
+            let problem = text.parse::<Correction>().unwrap_err();
+            assert!(problem.contains(word), "{text}: {problem}");
+        }
+    }
+
+    #[test]
+    fn half_of_the_signed_axes_are_left_handed() {
+        let others = SignedAxes::others();
+        assert_eq!(others.len(), 47);
+        assert_eq!(others.iter().filter(|axes| axes.is_reflection()).count(), 24);
+        let swapped: SignedAxes = "y/x/z".parse().unwrap();
+        assert_eq!(swapped.matrix() * nalgebra::Vector3::new(1.0, 2.0, 3.0), nalgebra::Vector3::new(2.0, 1.0, 3.0));
+    }
+}
