@@ -21,7 +21,7 @@ pub(super) const SECOND_NS: i64 = 1_000_000_000;
 pub(super) struct Bench {
     pub(super) recording: Recording,
     pub(super) cursor_ns: i64,
-    playback: Playback,
+    pub(super) playback: Playback,
     pub(super) selection: Selection,
     pub(super) window: MainWindow,
     commands: Vec<Command>,

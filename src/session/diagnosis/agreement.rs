@@ -30,8 +30,13 @@ const FACTOR_LIMITS: [(&str, f64); 3] =
 const LOST_LIMIT: f64 = 0.1;
 /// Steps over which residuals are averaged for the onset of a disagreement.
 const ONSET_STEPS: usize = 10;
-/// Steps with a window and with agreement before an onset: without them the disagreement began with the run.
-const STEPS_BEFORE: usize = 25;
+/// Steps after the first window that are not looked at, and steps with agreement before an onset: without them the
+/// disagreement began with the run.
+const SETTLING_STEPS: usize = 6;
+const STEPS_BEFORE: usize = 8;
+/// Steps for which a disagreement lasts, and its ratio to the limit of the whole run: short parts vary more.
+const LASTING_STEPS: usize = 25;
+const LASTING_RATIO: f64 = 1.5;
 
 /// Values of a run with their limits.
 pub(super) fn values(misfit: &Misfit) -> Vec<AgreementValue> {
@@ -60,19 +65,36 @@ pub(super) fn disagreement(misfit: &Misfit) -> f64 {
     values(misfit).iter().map(|value| value.value / value.limit).fold(0.0, f64::max)
 }
 
+/// True if the residuals agree with their noise, as a whole and in every part of the run.
+pub(super) fn agrees(misfit: &Misfit, steps: &[StepMisfit]) -> bool {
+    disagreement(misfit) <= 1.0 && lasting(&means(steps), 0).is_none()
+}
+
 /// Index of the step from which on the residuals disagree with their noise, after steps with agreement; `None` if they
 /// agree, or disagree from the start.
 pub(super) fn onset(steps: &[StepMisfit]) -> Option<usize> {
-    let means: Vec<Option<f64>> = steps
-        .windows(ONSET_STEPS)
-        .map(|some| some.iter().all(|step| step.tracking).then(|| disagreement(&Misfit::of_all(some))))
-        .collect();
-    let first = means.iter().position(Option::is_some)?;
+    let means = means(steps);
     // The values of the first window settle.
-    let settled = first + STEPS_BEFORE;
-    let place = (settled..means.len()).find(|place| means[*place].is_none_or(|mean| mean > 1.0))?;
-    let agreed = (settled..place).filter(|place| means[*place].is_some_and(|mean| mean <= 1.0)).count();
-    (agreed >= STEPS_BEFORE).then(|| (place + ONSET_STEPS - 1).min(steps.len() - 1))
+    let settled = means.iter().position(Option::is_some)? + SETTLING_STEPS;
+    let place = lasting(&means, settled)?;
+    let agreed = means[settled.min(place)..place].iter().filter(|mean| mean.is_some_and(|mean| mean <= 1.0)).count();
+    let disagrees = |step: &usize| disagreement(&Misfit::of_all(&steps[*step..=*step])) > 1.0;
+    (agreed >= STEPS_BEFORE).then(|| (place..place + ONSET_STEPS).find(disagrees).unwrap_or(place))
+}
+
+/// Disagreement of some consecutive steps from each step on; `None` where a step has no window.
+fn means(steps: &[StepMisfit]) -> Vec<Option<f64>> {
+    let mean = |some: &[StepMisfit]| some.iter().all(|step| step.tracking).then(|| disagreement(&Misfit::of_all(some)));
+    steps.windows(ONSET_STEPS).map(mean).collect()
+}
+
+/// First place from `from` on with a disagreement that lasts.
+fn lasting(means: &[Option<f64>], from: usize) -> Option<usize> {
+    let disagrees = |mean: &Option<f64>| mean.is_some_and(|mean| mean > LASTING_RATIO);
+    (from..means.len().saturating_sub(LASTING_STEPS)).find(|place| {
+        let next = &means[*place..*place + LASTING_STEPS];
+        disagrees(&next[0]) && next.iter().filter(|mean| disagrees(mean)).count() * 5 >= LASTING_STEPS * 4
+    })
 }
 
 #[cfg(test)]
@@ -102,6 +124,7 @@ mod tests {
         let sound = steps(|_| 0.9);
         assert!(disagreement(&Misfit::of(&sound, 0)) < 1.0);
         assert_eq!(onset(&sound), None);
+        assert!(agrees(&Misfit::of(&sound, 0), &sound));
         let always = steps(|_| 9.0);
         let found = Misfit::of(&always, 1_000_000_000);
         let wrong: Vec<&str> = values(&found).iter().filter(|it| !it.agrees()).map(|it| it.name).collect();

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::agreement::{self, AgreementValue};
 use super::axes::plausible_axes;
-use super::hypotheses::{Cause, Hypothesis, first_hypotheses};
+use super::hypotheses::{Cause, Hypothesis, changes_at, first_hypotheses};
 use super::misfit::Misfit;
 use super::outcome::{Diagnosis, RankedCause, TruthAgreement, Verdict, WaitingReason};
 use super::ranking::{Candidate, Decision, by_cause, decide};
@@ -23,10 +23,12 @@ use super::span::{confirmed_span, screened_span};
 use super::statement::texts;
 use super::trial::{DiagnosedRun, TrialResult, TrialSpan};
 use super::truth;
+use super::tuning::{moved, tuned};
 use crate::geometry::seconds_from_ns;
+use crate::sensors::Rig;
 use crate::session::engine::{Computation, History};
 use crate::session::plan::{Correction, ForkChanges};
-use crate::session::record::{Recording, RunRecord};
+use crate::session::record::RunRecord;
 
 /// Causes that are computed again on more of the run.
 const CONFIRMED: usize = 6;
@@ -35,7 +37,7 @@ const AT_ONCE: usize = 8;
 /// Ratio of the progress after the first trials.
 const SCREENED: f64 = 0.6;
 /// Rounds of refined values.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 4;
 /// Causes in a diagnosis.
 const REPORTED: usize = 8;
 
@@ -48,25 +50,29 @@ type OnProgress<'a> = dyn FnMut(f64, &str) -> ControlFlow<()> + 'a;
 pub fn diagnose(computation: &Computation, run: usize, on_progress: &mut OnProgress<'_>) -> Option<Diagnosis> {
     let recording = computation.recording();
     let record = recording.runs.get(run)?;
-    let history = computation.history(run)?;
+    let mut diagnosis = diagnose_run(&recording.rig, record, computation.history(run)?, on_progress);
+    diagnosis.log = recording.log_name();
+    Some(diagnosis)
+}
+
+/// Diagnosis of a run with its history, without the name of the log.
+pub(in crate::session) fn diagnose_run(
+    rig: &Rig,
+    record: &RunRecord,
+    history: &History,
+    on_progress: &mut OnProgress<'_>,
+) -> Diagnosis {
     let interrupted = AtomicBool::new(false);
     let inputs = (0..record.steps.len()).map_while(|step| history.inputs().get(step)).collect();
-    let diagnosed = DiagnosedRun {
-        rig: &recording.rig,
-        spec: &record.spec,
-        camera_key: &record.camera_key,
-        inputs,
-        interrupted: &interrupted,
-    };
-    let mut search = Search { run: &diagnosed, history, recording, record, trials: 0, on_progress };
-    Some(search.diagnosis())
+    let (spec, camera_key) = (&record.spec, &*record.camera_key);
+    let diagnosed = DiagnosedRun { rig, spec, camera_key, inputs, interrupted: &interrupted };
+    Search { run: &diagnosed, history, record, trials: 0, on_progress }.diagnosis()
 }
 
 /// A search in progress.
 struct Search<'a, 'b> {
     run: &'a DiagnosedRun<'a>,
     history: &'a History,
-    recording: &'a Recording,
     record: &'a RunRecord,
     trials: usize,
     on_progress: &'a mut OnProgress<'b>,
@@ -85,7 +91,7 @@ impl Search<'_, '_> {
         diagnosis.accuracy = truth::accuracy(self.record);
         if given.initialized_ns().is_none() {
             diagnosis.waiting = waiting_reasons(self.record);
-        } else if agreement::disagreement(&misfit) <= 1.0 {
+        } else if agreement::agrees(&misfit, &given.steps) {
             diagnosis.verdict = Verdict::Agrees;
             diagnosis.ground_truth = truth::disagreement(self.record);
             return diagnosis;
@@ -104,16 +110,12 @@ impl Search<'_, '_> {
         let axes = lost.then(|| plausible_axes(self.run, span.steps.clone()));
         let mut hypotheses = first_hypotheses(self.run, axes.as_ref());
         if let Some(onset) = onset {
-            let later: Vec<Hypothesis> = hypotheses
-                .iter()
-                .filter(|it| !matches!(it.cause, Cause::Chain | Cause::ImageFlip))
-                .map(|it| it.starting(onset))
-                .collect();
+            let later = changes_at(onset, &hypotheses);
             hypotheses.extend(later);
         }
         let screened = self.candidates(&span, hypotheses, (0.05, SCREENED), None);
         let Some(screened) = screened else { return };
-        let span = confirmed_span(self.run, &span);
+        let span = confirmed_span(self.run, given, &span);
         let mut tried: Vec<Hypothesis> = by_cause(&screened.given, screened.others.clone())
             .into_iter()
             .take(CONFIRMED)
@@ -130,6 +132,7 @@ impl Search<'_, '_> {
             let until = SCREENED + (1.0 - SCREENED) * (round + 1) as f64 / ROUNDS as f64;
             let Some(trials) = self.candidates(&span, now, (progress, until), confirmed.take()) else { break };
             next = refined(self.run, &trials.others);
+            next.extend(tuned(&trials.others));
             next.extend(moved(&trials));
             confirmed = Some(trials);
         }
@@ -253,7 +256,7 @@ impl Search<'_, '_> {
 
     fn empty(&self) -> Diagnosis {
         Diagnosis {
-            log: self.recording.log_name(),
+            log: String::new(),
             run: self.record.spec.label.clone(),
             verdict: Verdict::NoSteps,
             values: Vec::new(),
@@ -268,15 +271,6 @@ impl Search<'_, '_> {
             interrupted: false,
         }
     }
-}
-
-/// The best change that begins at a step, at other steps around it.
-fn moved(trials: &Trials) -> Vec<Hypothesis> {
-    let later = trials.others.iter().filter(|it| it.hypothesis.from.is_some());
-    let Some(best) = later.min_by(|one, other| one.score.total_cmp(&other.score)) else { return Vec::new() };
-    let hypothesis = &best.hypothesis;
-    let steps = [-16, -8, -4, -2, -1, 1, 2].map(|by| hypothesis.from.and_then(|from| from.checked_add_signed(by)));
-    steps.into_iter().flatten().map(|step| Hypothesis { from: Some(step), ..hypothesis.clone() }).collect()
 }
 
 /// Reasons of all attempts of a run that never initialized, the most frequent first.

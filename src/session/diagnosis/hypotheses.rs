@@ -16,6 +16,7 @@ pub enum Cause {
     Clocks,
     Shutter,
     Focal,
+    Zoom,
     Intrinsics,
     ImageFlip,
     ImageRegion,
@@ -42,6 +43,7 @@ impl Named for Cause {
         (Self::Clocks, "clocks"),
         (Self::Shutter, "shutter"),
         (Self::Focal, "focal_length"),
+        (Self::Zoom, "zoom"),
         (Self::Intrinsics, "intrinsics"),
         (Self::ImageFlip, "image_flip"),
         (Self::ImageRegion, "image_region"),
@@ -94,13 +96,16 @@ impl Hypothesis {
 
 /// Focal lengths that are tried before the best one is refined.
 const FOCAL_FACTORS: [f64; 11] = [0.5, 0.6, 0.7, 0.78, 0.87, 0.95, 1.05, 1.15, 1.3, 1.5, 1.8];
+/// Changes of the focal length during a recording: factors, and seconds.
+const ZOOM_FACTORS: [f64; 4] = [0.6, 0.78, 1.28, 1.6];
+const ZOOM_S: [f64; 3] = [0.2, 1.0, 2.5];
 /// Factors on the noise densities of the IMU and on the noise of the encoders.
 const NOISE_FACTORS: [f64; 3] = [3.0, 10.0, 30.0];
 /// Factors of wrong units and ranges: g and m/s², degrees and radians, half and double the range.
 const ACCELEROMETER_FACTORS: [f64; 4] = [9.806_65, 1.0 / 9.806_65, 2.0, 0.5];
 const GYROSCOPE_FACTORS: [f64; 4] = [std::f64::consts::PI / 180.0, 180.0 / std::f64::consts::PI, 2.0, 0.5];
 /// Factors on the standard deviations of the chain.
-const CHAIN_FACTORS: [f64; 2] = [6.0, 25.0];
+const CHAIN_FACTORS: [f64; 2] = [5.0, 25.0];
 /// Tried shifts of clocks in seconds, beside those that the columns of time offsets find.
 const SHIFTS_S: [f64; 4] = [-0.04, -0.02, 0.02, 0.04];
 
@@ -124,6 +129,21 @@ pub(super) fn first_hypotheses(run: &DiagnosedRun<'_>, lost: Option<&PlausibleAx
     }
     if let Some(axes) = lost {
         all.extend(gross_hypotheses(axes));
+    }
+    all
+}
+
+/// Hypotheses of changes at a step.
+pub(super) fn changes_at(step: usize, first: &[Hypothesis]) -> Vec<Hypothesis> {
+    let whole_only = |cause| matches!(cause, Cause::Chain | Cause::ImageFlip | Cause::ImuAxes | Cause::Intrinsics);
+    let mut all: Vec<Hypothesis> =
+        first.iter().filter(|it| !whole_only(it.cause)).map(|it| it.starting(step)).collect();
+    for factor in ZOOM_FACTORS {
+        for over_s in ZOOM_S {
+            let zoom =
+                Hypothesis { parameters: 2, ..Hypothesis::correction(Cause::Zoom, Correction::Zoom(factor, over_s)) };
+            all.push(zoom.starting(step));
+        }
     }
     all
 }

@@ -107,6 +107,8 @@ pub(super) struct StepMisfit {
     pub(super) pixels: PixelHistogram,
     /// In the order of [`FACTORS`].
     pub(super) factors: [FactorMisfit; 3],
+    /// χ² of the rig's prior on the calibration.
+    pub(super) calibration: f64,
     /// Residuals outside each half of the image, in the order of [`ImageHalf::NAMES`].
     pub(super) outside: [PixelHistogram; 4],
     /// Length of the window in seconds.
@@ -121,15 +123,22 @@ impl StepMisfit {
     pub(super) fn of(report: &StepReport, pixel_scale: f64, resolution_px: [usize; 2]) -> Self {
         let mut pixels = PixelHistogram::default();
         let mut outside = [PixelHistogram::default(); 4];
-        for observation in report.features.iter().flat_map(|feature| feature.observations.iter()) {
-            let length_px = observation.residual_after_px.map_or(f64::INFINITY, |it| it.norm() / pixel_scale);
-            pixels.add(length_px);
-            for (half, histogram) in ImageHalf::all().zip(&mut outside) {
-                if !half.contains(&observation.measured_px, resolution_px) {
-                    histogram.add(length_px);
+        for feature in &report.features {
+            // A landmark takes three of the dimensions of its observations, more of a short track's.
+            let count = feature.observations.len().max(2) as f64;
+            let left = (1.0 - 1.5 / count).sqrt() * pixel_scale;
+            for observation in feature.observations.iter() {
+                let length_px = observation.residual_after_px.map_or(f64::INFINITY, |it| it.norm() / left);
+                pixels.add(length_px);
+                for (half, histogram) in ImageHalf::all().zip(&mut outside) {
+                    if !half.contains(&observation.measured_px, resolution_px) {
+                        histogram.add(length_px);
+                    }
                 }
             }
         }
+        let calibration = report.residuals.iter().find(|summary| summary.factor == FactorKind::CalibrationPrior);
+        let calibration = calibration.map_or(0.0, |summary| summary.chi2_after);
         let factors = FACTORS.map(|kind| {
             let summary = report.residuals.iter().find(|summary| summary.factor == kind);
             summary.map_or_else(FactorMisfit::default, |it| FactorMisfit { chi2: it.chi2_after, rows: it.count as f64 })
@@ -139,7 +148,16 @@ impl StepMisfit {
             _ => 0.0,
         };
         let frames = report.window.len();
-        Self { stamp_ns: report.stamp_ns, tracking: frames > 0, pixels, factors, outside, window_s, frames }
+        Self {
+            stamp_ns: report.stamp_ns,
+            tracking: frames > 0,
+            pixels,
+            factors,
+            calibration,
+            outside,
+            window_s,
+            frames,
+        }
     }
 }
 
@@ -161,6 +179,8 @@ pub(super) struct Misfit {
     pub(super) pixels: PixelHistogram,
     /// In the order of [`FACTORS`].
     pub(super) factors: [FactorMisfit; 3],
+    /// Mean χ² of the rig's prior on the calibration.
+    pub(super) calibration: f64,
     /// As in [`StepMisfit`].
     pub(super) outside: [PixelHistogram; 4],
     /// Frames of all windows.
@@ -186,7 +206,7 @@ impl Misfit {
     pub(super) fn of_all(steps: &[StepMisfit]) -> Self {
         let mut found = Self { steps: steps.len(), ..Self::default() };
         steps.iter().filter(|step| step.tracking).for_each(|step| found.add(step));
-        found.window_s /= found.tracked.max(1) as f64;
+        found.average();
         found
     }
 
@@ -208,8 +228,14 @@ impl Misfit {
             found.steps += 1;
             found.add(step);
         }
-        found.window_s /= found.tracked.max(1) as f64;
+        found.average();
         found
+    }
+
+    fn average(&mut self) {
+        let count = self.tracked.max(1) as f64;
+        self.window_s /= count;
+        self.calibration /= count;
     }
 
     fn add(&mut self, step: &StepMisfit) {
@@ -218,6 +244,7 @@ impl Misfit {
         self.factors.iter_mut().zip(step.factors).for_each(|(sum, more)| sum.add(more));
         self.outside.iter_mut().zip(&step.outside).for_each(|(sum, more)| sum.merge(more));
         self.window_s += step.window_s;
+        self.calibration += step.calibration;
         self.frames += step.frames;
     }
 
@@ -243,7 +270,8 @@ impl Misfit {
 
     /// −2·ln of the likelihood of the measurements of all windows, up to a constant that is common to the trials.
     pub(super) fn cost(&self, scale: &Scale) -> f64 {
-        scale.windows * self.parts(scale).iter().sum::<f64>()
+        // All windows have the same calibration, and its prior once.
+        self.calibration + scale.windows * self.parts(scale).iter().sum::<f64>()
     }
 
     /// The same by sensor and for one window: images, then [`FACTORS`].

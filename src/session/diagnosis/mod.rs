@@ -3,7 +3,7 @@
 //! - `misfit`: residuals of a trial by sensor, on one scale for all trials.
 //! - `agreement`: limits within which residuals agree with their noise, and the step at which that ends.
 //! - `trial`, `span`: a run computed again with a change, on a part of it.
-//! - `hypotheses`, `axes`, `refinement`: the causes that are tried, with the values to try.
+//! - `hypotheses`, `axes`, `refinement`, `tuning`: the causes that are tried, with the values to try.
 //! - `scoring`, `ranking`: the best cause of each kind, and whether it is decisive.
 //! - `statement`, `truth`, `outcome`: the result in words.
 //! - `diagnose`: the search.
@@ -21,8 +21,11 @@ mod span;
 mod statement;
 mod trial;
 mod truth;
+mod tuning;
 
 pub use agreement::AgreementValue;
 pub use diagnose::diagnose;
+#[cfg(test)]
+pub(in crate::session) use diagnose::diagnose_run;
 pub use hypotheses::Cause;
 pub use outcome::{Diagnosis, RankedCause, TruthAgreement, Verdict, WaitingReason};

@@ -47,7 +47,8 @@ pub(super) fn score(hypothesis: &Hypothesis, misfit: &Misfit, given: &Misfit, sc
     if let [Correction::Ignored(half)] = hypothesis.changes.corrections.as_slice() {
         let [visual, ..] = given.parts(scale);
         let [_, rest @ ..] = misfit.parts(scale);
-        cost = scale.windows * (visual - misfit.gain_outside(given, *half, scale) + rest.iter().sum::<f64>());
+        cost = misfit.calibration
+            + scale.windows * (visual - misfit.gain_outside(given, *half, scale) + rest.iter().sum::<f64>());
     }
     let rows = |factor: usize| misfit.factors[factor].rows * scale.frames / misfit.frames.max(1) as f64;
     let noise = rows(0) * hypothesis.changes.imu_noise.ln() + rows(1) * hypothesis.changes.encoder_noise.ln();
@@ -87,7 +88,9 @@ pub(super) fn decide(given: &Candidate, ranked: &[Candidate]) -> Decision {
     if gain < MARGIN || (after > 1.0 && after > REMAINING * before) {
         return Decision::None;
     }
-    let near = ranked.iter().filter(|candidate| candidate.score < best.score + margin(gain));
+    // A cause that leaves a disagreement does not compete with one that leaves none.
+    let as_good = |it: &&Candidate| after > 1.0 || disagreement(&it.misfit) <= 1.0;
+    let near = ranked.iter().filter(|candidate| candidate.score < best.score + margin(gain)).filter(as_good);
     match near.filter(|candidate| !is_general(candidate.hypothesis.cause, best.hypothesis.cause)).count() {
         0 | 1 => Decision::One,
         count => Decision::Several(count.min(MOST_REMAINING)),

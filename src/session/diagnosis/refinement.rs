@@ -3,6 +3,7 @@
 use super::hypotheses::{Cause, Hypothesis};
 use super::ranking::Candidate;
 use super::trial::{DiagnosedRun, TrialResult};
+use super::tuning::rounded;
 use crate::estimator::SensorParameters;
 use crate::gimbal::{ParameterId, ParameterPart, Quantity};
 use crate::session::plan::{Correction, ForkChanges, LONGEST_SHIFT_S};
@@ -26,7 +27,8 @@ pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[Candidate]) -> Vec<H
         }
         if changes.estimated.contains(&SensorParameters::Intrinsics) {
             all.extend(
-                focal(run, candidate).map(|factor| Hypothesis::correction(Cause::Focal, Correction::Focal(factor))),
+                focal(run, candidate)
+                    .map(|factor| Hypothesis::correction(Cause::Focal, Correction::Focal(rounded(factor)))),
             );
         }
     }
@@ -43,7 +45,7 @@ pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[Candidate]) -> Vec<H
     if let Some(best) = best_of(Cause::EncoderNoise) {
         let factor = best.hypothesis.changes.encoder_noise * best.misfit.factors[1].mean_square().sqrt();
         if factor > 1.1 && factor < 1e3 {
-            let changes = ForkChanges { encoder_noise: factor, ..ForkChanges::default() };
+            let changes = ForkChanges { encoder_noise: rounded(factor), ..ForkChanges::default() };
             all.push(Hypothesis::change(Cause::EncoderNoise, changes, 1));
         }
         all.extend(offsets(run, &best.result));
@@ -62,8 +64,8 @@ fn shifts(run: &DiagnosedRun<'_>, result: &TrialResult) -> Vec<Hypothesis> {
     let camera = value(result, ParameterPart::Camera(0), Quantity::Timeshift).map(|total_s| total_s - given_s);
     let encoder = value(result, ParameterPart::Encoder, Quantity::Timeshift);
     let usable = |shift_s: &f64| (LEAST_SHIFT_S..=LONGEST_SHIFT_S).contains(&shift_s.abs());
-    let camera = camera.filter(usable).map(Correction::CameraShift);
-    let encoder = encoder.filter(usable).map(Correction::JointShift);
+    let camera = camera.filter(usable).map(|shift_s| Correction::CameraShift(rounded(shift_s)));
+    let encoder = encoder.filter(usable).map(|shift_s| Correction::JointShift(rounded(shift_s)));
     let mut all = Vec::new();
     all.extend(camera.clone().map(|it| Hypothesis::correction(Cause::CameraClock, it)));
     all.extend(encoder.clone().map(|it| Hypothesis::correction(Cause::EncoderClock, it)));
@@ -102,8 +104,9 @@ fn offsets(run: &DiagnosedRun<'_>, result: &TrialResult) -> Vec<Hypothesis> {
             })
             .collect();
         let Some((step, before, after)) = change_point(&differences) else { continue };
-        let offset =
-            |offset_rad: f64| Hypothesis::correction(Cause::JointOffset, Correction::Offset(name.clone(), offset_rad));
+        let offset = |offset_rad: f64| {
+            Hypothesis::correction(Cause::JointOffset, Correction::Offset(name.clone(), rounded(offset_rad)))
+        };
         if (after - before).abs() > LEAST_OFFSET_RAD {
             all.push(offset(after - before).starting(step));
         }

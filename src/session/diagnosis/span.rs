@@ -13,6 +13,9 @@ const SCREENED_S: f64 = 4.5;
 const CONFIRMED_S: f64 = 12.0;
 /// The same for a run without a window, whose trials wait for one.
 const LOST_SCREENED_S: f64 = 6.0;
+/// Ratio of these times for a rolling shutter, whose steps take several times longer, and for a window of more frames.
+const SHUTTER_RATIO: f64 = 0.45;
+const FRAMES: f64 = 16.0;
 /// Delay in seconds after the run's own first window, by which a trial must have one.
 const LATER_S: f64 = 1.5;
 /// Standard deviation of the specific force over a second from which on a vehicle moves, in m/s².
@@ -34,6 +37,7 @@ pub(super) fn screened_span(
         None => (first_motion(&run.inputs), LOST_SCREENED_S),
     };
     let start = step_at(stamp_ns(anchor) - ns_from_seconds(BEFORE_S));
+    let length_s = length_s * speed_ratio(run, given);
     let end = step_at(stamp_ns(anchor) + ns_from_seconds(length_s)).max(start + 1).min(run.inputs.len());
     // Before the first window an engine that starts later waits for the same motion.
     let is_start = onset.is_none() || first_window.is_some_and(|window| start <= window);
@@ -46,10 +50,21 @@ pub(super) fn screened_span(
 }
 
 /// The same span with more seconds at its end.
-pub(super) fn confirmed_span(run: &DiagnosedRun<'_>, span: &TrialSpan) -> TrialSpan {
+pub(super) fn confirmed_span(run: &DiagnosedRun<'_>, given: &TrialResult, span: &TrialSpan) -> TrialSpan {
+    let length_s = BEFORE_S + CONFIRMED_S * speed_ratio(run, given);
     let from_ns = run.inputs.get(span.steps.start).map_or(0, |input| input.stamp_ns);
-    let end = run.inputs.partition_point(|input| input.stamp_ns < from_ns + ns_from_seconds(BEFORE_S + CONFIRMED_S));
+    let end = run.inputs.partition_point(|input| input.stamp_ns < from_ns + ns_from_seconds(length_s));
     TrialSpan { steps: span.steps.start..end.max(span.steps.end), ..span.clone() }
+}
+
+/// Ratio by which spans are shorter for runs with slow steps.
+fn speed_ratio(run: &DiagnosedRun<'_>, given: &TrialResult) -> f64 {
+    let shutter = run.spec.readout || run.rig.camera(run.camera_key).is_ok_and(|camera| camera.readout_s != 0.0);
+    let windows = given.steps.iter().filter(|step| step.tracking);
+    let (count, frames) = windows.fold((0_usize, 0), |(count, frames), step| (count + 1, frames + step.frames));
+    let mean = frames as f64 / count.max(1) as f64;
+    let of_frames = if mean > FRAMES { FRAMES / mean } else { 1.0 };
+    of_frames * if shutter { SHUTTER_RATIO } else { 1.0 }
 }
 
 /// First step after which the specific force changes over a second as in motion; 0 if it never does.

@@ -28,7 +28,7 @@ pub(super) fn texts(
         _ => of_estimate(run, hypothesis, result, camera),
     };
     let remedy = match (from_s, hypothesis.cause) {
-        (Some(from_s), Cause::Focal) => {
+        (Some(from_s), Cause::Focal | Cause::Zoom) => {
             format!(
                 "fix the zoom of {camera}; of this recording use --duration {from_s:.1}, or the rest with another rig"
             )
@@ -60,6 +60,10 @@ fn of_correction(run: &DiagnosedRun<'_>, correction: &Correction) -> (String, St
                 ),
             )
         }
+        Correction::Zoom(factor, over_s) => (
+            format!("the focal length of {camera} changes by a factor of {factor:.2} over {over_s:.1} s"),
+            format!("fix the zoom of {camera}"),
+        ),
         Correction::Image(flip) => (
             format!("the images of {camera} are {}", flip.name()),
             format!("record {camera} without this operation, or convert the images and give them their own extrinsics"),
@@ -153,10 +157,14 @@ fn of_estimate(
     match hypothesis.cause {
         Cause::Shutter => {
             let (readout_s, sigma_s) = value(ParameterPart::Camera(0), Quantity::Readout).unwrap_or_default();
-            (
-                format!("{camera} has a rolling shutter: readout {:.1} ± {:.1} ms", 1e3 * readout_s, 1e3 * sigma_s),
-                format!("set {camera}.readout: {readout_s:.4} in the rig, or run with readout=on"),
-            )
+            let given_s = run.rig.camera(camera).map_or(0.0, |camera| camera.readout_s);
+            let found = format!("{:.1} ± {:.1} ms", 1e3 * readout_s, 1e3 * sigma_s);
+            let statement = if given_s == 0.0 {
+                format!("{camera} has a rolling shutter: readout {found}")
+            } else {
+                format!("the readout of {camera} is {found}, not {:.1} ms", 1e3 * given_s)
+            };
+            (statement, format!("set {camera}.readout: {readout_s:.4} in the rig, or run with readout=on"))
         }
         Cause::Intrinsics => {
             let names = [("fx", Quantity::Fx), ("fy", Quantity::Fy), ("cx", Quantity::Cx), ("cy", Quantity::Cy)];
@@ -196,7 +204,7 @@ fn of_estimate(
 
 fn chain_texts(run: &DiagnosedRun<'_>, result: &TrialResult) -> (String, String) {
     let on_gimbal = run.rig.chain_of_camera(run.camera_key).is_some_and(|chain| !chain.links.is_empty());
-    let name = if on_gimbal { "gimbal chain" } else { "extrinsics" };
+    let name = if on_gimbal { "gimbal chain" } else { "pose" };
     let found = result.chain.as_ref().zip(run.rig.chain_of_camera(run.camera_key)).and_then(|(found, given)| {
         let angles = &result.joints_rad.last()?.1;
         let fits = found.links.len() == angles.len() && given.links.len() == angles.len();

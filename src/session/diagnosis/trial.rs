@@ -105,7 +105,7 @@ fn step_record(report: StepReport, input: &OwnedStepInput) -> StepRecord {
 /// Scale of the pixels that the estimator uses, relative to those of the image.
 fn pixel_scale(changes: &ForkChanges) -> f64 {
     let factors = changes.corrections.iter().filter_map(|correction| match correction {
-        Correction::Focal(factor) => Some(factor.recip()),
+        Correction::Focal(factor) | Correction::Zoom(factor, _) => Some(factor.recip()),
         _ => None,
     });
     factors.product()

@@ -7,8 +7,10 @@ use crate::geometry::seconds_from_ns;
 use crate::session::accuracy::{Alignment, AlignmentSums};
 use crate::session::record::{PoseError, RunRecord};
 
-/// Mean NEES above which the ground truth disagrees; 6 is consistent, and estimators are a few times too certain.
+/// Mean NEES and ratio of the position error to the length of the path above which the ground truth disagrees; 6 is
+/// consistent, and estimators are a few times too certain.
 const LARGEST_NEES: f64 = 60.0;
+const LARGEST_ERROR: f64 = 0.01;
 /// Largest and smallest delay of the ground truth that is looked for, and the spacing, in milliseconds.
 const DELAYS_MS: i32 = 400;
 const SPACING_MS: i32 = 5;
@@ -32,14 +34,20 @@ pub(super) fn disagreement(run: &RunRecord) -> Option<String> {
     if nees < LARGEST_NEES {
         return None;
     }
-    let delay = delay(run).map_or_else(
-        || "its frame, its stamps or the estimate may be wrong".to_owned(),
-        |(delay_ms, ate_m)| {
+    let explanation = match delay(run) {
+        Some((delay_ms, ate_m)) => {
             let side = if delay_ms > 0.0 { "late" } else { "early" };
             format!("it is {:.0} ms {side}: with that delay the ATE is {ate_m:.3} m", delay_ms.abs())
-        },
-    );
-    Some(format!("disagrees with the estimate (ATE {:.3} m, NEES {nees:.0}, 6 is consistent); {delay}", found.ate_m))
+        }
+        None if found.ate_m > LARGEST_ERROR * run.true_length_m()? => {
+            "its frame, its stamps or the estimate may be wrong".to_owned()
+        }
+        None => return None,
+    };
+    Some(format!(
+        "disagrees with the estimate (ATE {:.3} m, NEES {nees:.0}, 6 is consistent); {explanation}",
+        found.ate_m
+    ))
 }
 
 /// Delay of the ground truth in milliseconds at which the position error is least, with that error in metres; `None` if it

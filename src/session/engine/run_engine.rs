@@ -139,6 +139,7 @@ impl RunEngine {
     }
 
     fn estimate(&mut self, input: &OwnedStepInput) -> StepReport {
+        let unread = self.settings.altered_measurements.corrections.begin_step(input.stamp_ns);
         let altered: Vec<Cow<'_, TrackedFrame>> = input
             .tracks
             .iter()
@@ -149,7 +150,7 @@ impl RunEngine {
             })
             .collect();
         let rigid: Vec<&TrackedFrame> = altered.iter().skip(1).map(Cow::as_ref).collect();
-        let read = self.settings.has_joints && !self.settings.altered_measurements.encoder_off();
+        let read = self.settings.has_joints && !unread && !self.settings.altered_measurements.encoder_off();
         let angles = input.joint_angles.as_ref().filter(|_| read);
         let noisy = angles.and_then(|angles| self.settings.altered_measurements.joint_angles(angles, input.stamp_ns));
         let corrections = &self.settings.altered_measurements.corrections;

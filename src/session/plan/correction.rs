@@ -12,6 +12,8 @@ use crate::text::Named;
 pub enum Correction {
     /// Factor on the focal lengths of the rig's main camera.
     Focal(f64),
+    /// Factor by which the focal lengths of the main camera change over a number of seconds from the fork's first step on.
+    Zoom(f64, f64),
     /// Images of the main camera are mirrored or upside down.
     Image(ImageFlip),
     /// A part of the main camera's images is not used.
@@ -137,6 +139,7 @@ impl fmt::Display for Correction {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Focal(factor) => write!(out, "focal:{factor}"),
+            Self::Zoom(factor, over_s) => write!(out, "zoom:{factor}:{over_s}s"),
             Self::Image(flip) => write!(out, "image:{}", flip.name()),
             Self::Ignored(half) => write!(out, "ignored:{}", half.name()),
             Self::CameraShift(shift_s) => write!(out, "camera-shift:{shift_s}s"),
@@ -155,7 +158,7 @@ impl fmt::Display for Correction {
 }
 
 /// Names of the corrections with their values, for messages.
-const FORMS: &str = "focal:FACTOR, image:mirrored|flipped|upside-down, ignored:left|right|top|bottom, camera-shift:15ms, \
+const FORMS: &str = "focal:FACTOR, zoom:FACTOR:1s, image:mirrored|flipped|upside-down, ignored:left|right|top|bottom, camera-shift:15ms, \
                      joint-shift:15ms, reversed:JOINT, swapped:JOINT:JOINT, offset:JOINT:20deg, joint-scale:FACTOR, \
                      imu-axes:y/x/-z, gyroscope-axes:…, accelerometer-axes:…, gyroscope-scale:FACTOR, \
                      accelerometer-scale:FACTOR";
@@ -169,6 +172,11 @@ impl FromStr for Correction {
         let two = || value.rsplit_once(':').ok_or_else(unknown);
         Ok(match name {
             "focal" => Self::Focal(factor(value)?),
+            "zoom" => {
+                let (by, over) = two()?;
+                let over_s = quantity(over, &[("ms", 1e-3), ("s", 1.0)], 60.0, "a time of at most 60 s, as in 1s")?;
+                Self::Zoom(factor(by)?, over_s.max(0.0))
+            }
             "image" => Self::Image(ImageFlip::from_name(value).ok_or_else(unknown)?),
             "ignored" => Self::Ignored(ImageHalf::from_name(value).ok_or_else(unknown)?),
             "camera-shift" => Self::CameraShift(shift_s(value)?),
@@ -221,6 +229,7 @@ mod tests {
     fn corrections_are_read_as_they_are_written() {
         for text in [
             "focal:0.77",
+            "zoom:1.5:1.25s",
             "image:upside-down",
             "ignored:top",
             "camera-shift:0.015s",

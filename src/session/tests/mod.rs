@@ -1,5 +1,6 @@
 mod accuracy;
 mod covariance;
+mod diagnosis;
 mod forks;
 pub(crate) mod memory;
 mod passes;

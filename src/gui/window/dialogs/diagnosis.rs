@@ -90,3 +90,69 @@ fn capitalized(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use egui_kittest::kittest::Queryable as _;
+
+    use crate::gui::Dialog;
+    use crate::gui::window::tests::{SECOND_NS, bench, commands_of};
+    use crate::session::{Cause, Command, Diagnosis, DiagnosisProgress, ForkChanges, RankedCause, Verdict};
+
+    fn diagnosis() -> Diagnosis {
+        let changes: ForkChanges = "correct=reversed:yaw".parse().unwrap();
+        let cause = RankedCause {
+            cause: Cause::JointReversed,
+            statement: "joint yaw counts in the other direction".to_owned(),
+            remedy: "reverse the sign of yaw in the recording".to_owned(),
+            changes,
+            from_ns: 2 * SECOND_NS,
+            from_s: 2.0,
+            parameters: 1,
+            gain: 8000.0,
+            values: Vec::new(),
+            accuracy: None,
+        };
+        Diagnosis {
+            log: "flight.mcap".to_owned(),
+            run: "auto".to_owned(),
+            verdict: Verdict::Cause,
+            values: Vec::new(),
+            onset_s: None,
+            waiting: Vec::new(),
+            accuracy: None,
+            ground_truth: None,
+            span_s: None,
+            explaining: 1,
+            causes: vec![cause],
+            trials: 40,
+            interrupted: false,
+        }
+    }
+
+    #[test]
+    fn the_dialog_starts_a_diagnosis_and_opens_the_fork_of_its_cause() {
+        let mut harness = bench();
+        let started = commands_of(&mut harness, |_| ());
+        assert_eq!(started, []);
+        harness.state_mut().window.dialogs.show(Dialog::Diagnosis);
+        let started = commands_of(&mut harness, |_| ());
+        assert_eq!(started.first(), Some(&Command::Diagnose { run: 0 }));
+        let run = harness.state().recording.runs[0].id;
+        let mut progress = DiagnosisProgress { run, ratio: 0.3, label: "correct=focal:0.7".to_owned(), result: None };
+        harness.state_mut().playback.diagnosis = Some(progress.clone());
+        harness.run_steps(3);
+        let stopped = commands_of(&mut harness, |harness| harness.get_by_label("Stop").click());
+        assert_eq!(stopped, [Command::StopDiagnosis]);
+        progress.result = Some(Arc::new(diagnosis()));
+        harness.state_mut().playback.diagnosis = Some(progress);
+        harness.run_steps(3);
+        assert!(harness.query_all_by_label("Joint yaw counts in the other direction").count() > 0);
+        let pushed = commands_of(&mut harness, |harness| harness.get_by_label("Fork").click());
+        let changes = diagnosis().causes[0].changes.clone();
+        let expected = [Command::Seek { stamp_ns: 2 * SECOND_NS }, Command::Fork { run: 0, changes, label: None }];
+        assert_eq!(pushed, expected);
+    }
+}

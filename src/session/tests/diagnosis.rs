@@ -1,0 +1,94 @@
+//! Diagnoses of synthetic flights with one planted fault.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use crate::sensors::Rig;
+use crate::session::diagnosis::{Cause, Diagnosis, Verdict, diagnose_run};
+use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
+use crate::session::plan::{Correction, RunSpec};
+use crate::session::record::RunRecord;
+use crate::session::tests::memory::input_of;
+use crate::simulation::{SyntheticOptions, synthetic_tracks};
+
+/// Stamp from which on a fault of the recording acts, in nanoseconds.
+const LATER_NS: i64 = 3_500_000_000;
+
+/// Diagnosis of a flight whose rig and inputs have a fault.
+fn diagnosed(rig_fault: impl Fn(&mut Rig), input_fault: impl Fn(&mut OwnedStepInput, &Rig)) -> Diagnosis {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 6.0, ..SyntheticOptions::default() });
+    let mut rig = flight.given_rig.clone();
+    rig_fault(&mut rig);
+    let spec = RunSpec::default();
+    let config = estimator_config(&rig, &spec).unwrap();
+    let sigma_rad = config.encoder_sigma_rad.unwrap();
+    let mut engine = RunEngine::new(config, None);
+    let history = Arc::new(History::new(usize::MAX));
+    let mut record = RunRecord::new(spec, "cam0".to_owned());
+    for (step, frame) in flight.frames.iter().enumerate() {
+        let mut input = input_of(frame, sigma_rad);
+        input_fault(&mut input, &rig);
+        let input = Arc::new(input);
+        history.inputs().push(Arc::clone(&input));
+        history.before_step(step, &engine, &input);
+        record.push(engine.step(&input));
+    }
+    diagnose_run(&rig, &record, &history, &mut |_, _| ControlFlow::Continue(()))
+}
+
+fn no_fault(_: &mut OwnedStepInput, _: &Rig) {}
+
+#[test]
+fn a_sound_flight_has_no_cause() {
+    let found = diagnosed(|_| (), no_fault);
+    assert_eq!((found.verdict, found.trials, found.causes.len()), (Verdict::Agrees, 0, 0), "{found}");
+    assert!(found.to_string().contains("nothing to diagnose"), "{found}");
+}
+
+#[test]
+fn a_wrong_focal_length_is_named_with_its_value() {
+    let longer = |rig: &mut Rig| {
+        for camera in &mut rig.cameras {
+            let [fx, fy, cx, cy, k1, k2] = camera.model.intrinsics();
+            camera.model = camera.model.with_intrinsics([1.1 * fx, 1.1 * fy, cx, cy, k1, k2]).unwrap();
+        }
+    };
+    // The front end computes bearings with the camera of the rig.
+    let bearings = |input: &mut OwnedStepInput, rig: &Rig| {
+        let mut tracks = (*input.tracks[0]).clone();
+        for feature in &mut tracks.features {
+            feature.bearing = rig.cameras[0].model.unproject(&feature.uv_px).unwrap();
+        }
+        input.tracks[0] = Arc::new(tracks);
+    };
+    let found = diagnosed(longer, bearings);
+    assert_eq!((found.verdict, found.causes[0].cause), (Verdict::Cause, Cause::Focal), "{found}");
+    let [Correction::Focal(factor)] = found.causes[0].changes.corrections.as_slice() else { panic!("{found}") };
+    assert!((factor * 1.1 - 1.0).abs() < 0.01, "{factor}");
+    assert!(found.causes[0].values.iter().all(|value| value.agrees()), "{found}");
+}
+
+#[test]
+fn an_offset_of_a_joint_is_named_with_its_time() {
+    let offset_rad = 0.3;
+    let jump = |input: &mut OwnedStepInput, _: &Rig| {
+        if let Some(angles) = input.joint_angles.as_mut().filter(|_| input.stamp_ns >= LATER_NS) {
+            angles.angles_rad[0] += offset_rad;
+        }
+    };
+    let found = diagnosed(|_| (), jump);
+    assert_eq!((found.verdict, found.causes[0].cause), (Verdict::Cause, Cause::JointOffset), "{found}");
+    let [Correction::Offset(_, undone_rad)] = found.causes[0].changes.corrections.as_slice() else { panic!("{found}") };
+    assert!((undone_rad + offset_rad).abs() < 0.02, "{undone_rad}");
+    assert!((found.causes[0].from_s - 3.5).abs() < 0.21, "{found}");
+}
+
+#[test]
+fn a_run_without_steps_has_no_cause() {
+    let rig = synthetic_tracks(&SyntheticOptions { duration_s: 0.2, ..SyntheticOptions::default() }).given_rig;
+    let record = RunRecord::new(RunSpec::default(), "cam0".to_owned());
+    let history = History::new(usize::MAX);
+    let found = diagnose_run(&rig, &record, &history, &mut |_, _| ControlFlow::Continue(()));
+    assert_eq!(found.verdict, Verdict::NoSteps);
+    assert!(found.to_string().contains("no image reached the estimator"), "{found}");
+}
