@@ -10,7 +10,7 @@ use crate::flight_log::log_name;
 use crate::geometry::{Dimension, RigidTransform, seconds_from_ns, so3};
 use crate::gimbal::{Chain, Quantity};
 use crate::sensors::Rig;
-use crate::session::{CalibrationErrors, CalibrationRun};
+use crate::session::{CalibrationErrors, CalibrationRun, WarningLine, log_warning_lines};
 use crate::text::Named as _;
 
 /// One parameter before and after the calibration.
@@ -86,9 +86,7 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
     let outcome = &run.outcome;
     let zero = vec![0.0; outcome.chain.joint_count()];
     let mut warnings = outcome.warnings.clone();
-    warnings.extend(
-        run.warnings.iter().map(|warning| format!("{:.3} s: {}", seconds_from_ns(warning.stamp_ns), warning.message)),
-    );
+    warnings.extend(log_warning_lines(&run.warnings).iter().map(WarningLine::with_time));
     CalibrationReport {
         log: log_name(&run.log_path),
         stretch_s: [seconds_from_ns(outcome.stretch_ns.0), seconds_from_ns(outcome.stretch_ns.1)],

@@ -201,7 +201,7 @@ pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
         row.extend(stages_ms.map(|time_ms| if timing { format!("{time_ms:.3}") } else { String::new() }));
         let events = report.events.iter().map(|event| format!("{:?}: {}", event.kind, event.message));
         row.push(events.collect::<Vec<_>>().join("; "));
-        row.push(report.warnings.join("; "));
+        row.push(report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "));
         table.row(row);
     }
     table.into_text()

@@ -63,6 +63,11 @@ impl<'a> CdrReader<'a> {
         Ok(Self { message, position: ENCAPSULATION, big_endian })
     }
 
+    /// Bytes that are not read yet.
+    pub(crate) fn rest(&self) -> &'a [u8] {
+        self.message.get(self.position..).unwrap_or_default()
+    }
+
     fn align(&mut self, size: usize) {
         let offset = self.position - ENCAPSULATION;
         self.position = ENCAPSULATION + offset.next_multiple_of(size);

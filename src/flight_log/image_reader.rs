@@ -8,6 +8,7 @@ use super::grey_sampling::grey_levels_of_topic;
 use super::image_decoding::decode_image;
 use super::log::relative_ns;
 use super::messages::{MessageKind, read_video_packet, stamp_ns};
+use super::stamp_clock::StampClock;
 use super::video::{PictureStream, keyframe_before};
 use super::{FlightLog, LogError};
 use crate::geometry::seconds_from_ns;
@@ -34,6 +35,7 @@ struct CameraImages {
     topic: String,
     kind: MessageKind,
     grey_levels: Arc<GreyLevels>,
+    clock: StampClock,
     count: usize,
 }
 
@@ -64,7 +66,8 @@ impl ImageReader {
                 let kind = info.kind.filter(|kind| kind.is_image())?;
                 let (key, topic) = (camera.key.clone(), camera.topic.clone());
                 let grey_levels = grey_levels_of_topic(&log, &topic, kind);
-                Some(CameraImages { key, topic, kind, grey_levels, count: info.count as usize })
+                let clock = StampClock::of_rig(camera.use_log_time);
+                Some(CameraImages { key, topic, kind, grey_levels, clock, count: info.count as usize })
             })
             .collect();
         let topics = cameras.iter().map(|camera| log.topic_index(&camera.topic)).collect();
@@ -100,7 +103,7 @@ impl ImageReader {
         self.cache.lock().decode_pictures(&self.log, number, camera.kind, index, go_on)
     }
 
-    /// Numbers and header stamps of a camera's images in the order of the stamps, in nanoseconds since the start of the
+    /// Numbers and stamps (header stamps, or log times by the rig) of a camera's images in the order of the stamps, in nanoseconds since the start of the
     /// log;
     /// images with unreadable stamps are left out.
     pub fn stamps_ns(&self, camera_key: &str) -> Vec<(usize, i64)> {
@@ -112,6 +115,7 @@ impl ImageReader {
             let position = topics[number].get(self.log.index(), self.log.file(), index)?;
             let (block, message) = self.log.message(blocks, position)?;
             let stamp_ns = stamp_ns(camera.kind, block.bytes(&message.data)).ok()?;
+            let stamp_ns = camera.clock.stamp_ns(stamp_ns, position.log_time_ns);
             Some((index, relative_ns(stamp_ns, self.log.epoch_ns())))
         };
         let mut stamps: Vec<(usize, i64)> = (0..camera.count).filter_map(stamp_ns).collect();

@@ -13,7 +13,7 @@ use super::limits::{LimitExceeded, LimitKind, LogLimits};
 use super::messages::{self, MessageKind};
 use super::text::{log_name, without_signed_zeros};
 use super::topic_info::{TopicInfo, nothing_read};
-use super::{LogError, LogWarning};
+use super::{LogError, LogWarning, WarningKind};
 use crate::geometry::seconds_from_ns;
 
 /// First stamps further than this before the IMU's first one belong to another clock and do not define the log's start.
@@ -33,21 +33,8 @@ pub struct FlightLog {
     epoch_ns: i64,
     duration_ns: i64,
     warnings: Vec<LogWarning>,
-    warning_kinds: Vec<WarningKind>,
     /// Conversions of 16-bit images by topic, as far as they are known.
     grey_levels: Mutex<BTreeMap<String, Arc<GreyLevels>>>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum WarningKind {
-    /// Unreadable bytes.
-    Damage,
-    /// Header stamps of another clock, or without stamp.
-    Stamps,
-    /// Topics beyond the limit.
-    Topics,
-    /// No topic has messages that are read.
-    NothingRead,
 }
 
 impl FlightLog {
@@ -78,7 +65,6 @@ impl FlightLog {
             topics: Vec::new(),
             epoch_ns: 0,
             duration_ns: 0,
-            warning_kinds: vec![WarningKind::Topics; warnings.len()],
             warnings,
             grey_levels: Mutex::default(),
         };
@@ -132,14 +118,8 @@ impl FlightLog {
         &self.warnings
     }
 
-    /// Warnings of [`FlightLog::warnings`] with their kind.
-    pub(crate) fn warnings_by_kind(&self) -> impl Iterator<Item = (WarningKind, &LogWarning)> {
-        self.warning_kinds.iter().copied().zip(&self.warnings)
-    }
-
-    fn warn(&mut self, kind: WarningKind, stamp_ns: i64, message: String) {
-        self.warning_kinds.push(kind);
-        self.warnings.push(LogWarning { stamp_ns, message: without_signed_zeros(message) });
+    fn warn(&mut self, kind: WarningKind, subject: &str, stamp_ns: i64, message: String) {
+        self.warnings.push(LogWarning::new(kind, subject, stamp_ns, without_signed_zeros(message)));
     }
 
     /// Name and content of the first attachment whose name ends with `name_ends_with`.
@@ -268,8 +248,8 @@ impl FlightLog {
 
     fn find_topics_and_times(&mut self) -> Result<(), LogError> {
         let mut cache = BlockCache::new(4);
-        // Per topic that is read: true for an IMU, name, and stamps of the first and last message.
-        let mut stamps: Vec<(bool, String, i64, i64)> = Vec::new();
+        // Per topic that is read: name, and stamps of the first and last message.
+        let mut stamps: Vec<(MessageKind, String, i64, i64)> = Vec::new();
         let mut infos = Vec::new();
         for (topic, ids) in &self.channel_ids {
             let mut positions = TopicIndex::new(&self.index, ids);
@@ -286,7 +266,7 @@ impl FlightLog {
                 let first_stamp = first_ones.iter().take(8).find_map(&mut stamp);
                 let last_stamp = last_ones.iter().rev().take(8).find_map(&mut stamp);
                 if let (Some(first_stamp), Some(last_stamp)) = (first_stamp, last_stamp) {
-                    stamps.push((kind == MessageKind::Imu, topic.clone(), first_stamp, last_stamp));
+                    stamps.push((kind, topic.clone(), first_stamp, last_stamp));
                 }
             }
             // The statistics may be wrong, too.
@@ -319,25 +299,26 @@ impl FlightLog {
         Ok(())
     }
 
-    fn set_start(&mut self, stamps: &[(bool, String, i64, i64)], first_log_time_ns: u64) {
-        let imu_first = stamps.iter().filter(|entry| entry.0).map(|entry| entry.2).min();
+    fn set_start(&mut self, stamps: &[(MessageKind, String, i64, i64)], first_log_time_ns: u64) {
+        let imu_first = stamps.iter().filter(|entry| entry.0 == MessageKind::Imu).map(|entry| entry.2).min();
         let earliest_ns = imu_first.map_or(i64::MIN, |first| first.saturating_sub(CLOCK_TOLERANCE_NS));
         let counted = || stamps.iter().filter(|entry| entry.2 >= earliest_ns && entry.2 > 0);
         let log_start_ns = i64::try_from(first_log_time_ns).unwrap_or(0);
         self.epoch_ns = counted().map(|entry| entry.2).min().unwrap_or(log_start_ns);
         self.duration_ns = counted().map(|entry| relative_ns(entry.3, self.epoch_ns)).max().unwrap_or(0).max(0);
-        for (_, topic, first_ns, _) in stamps {
+        // Intrinsics are the same at any time.
+        for (_, topic, first_ns, _) in stamps.iter().filter(|entry| entry.0 != MessageKind::CameraInfo) {
             if *first_ns == 0 {
                 let message =
                     format!("{topic}: first header stamp 0 (never set); the topic does not define the log's start");
-                self.warn(WarningKind::Stamps, 0, message);
+                self.warn(WarningKind::Stamps, topic, 0, message);
             } else if *first_ns < earliest_ns || *first_ns < 0 {
                 let message = format!(
                     "{topic}: first header stamp {:.3} s before the log's start (another clock, or a stamp that was never \
                      set); the topic does not define the log's start",
                     seconds_from_ns(self.epoch_ns.saturating_sub(*first_ns))
                 );
-                self.warn(WarningKind::Stamps, 0, message);
+                self.warn(WarningKind::Stamps, topic, 0, message);
             }
         }
     }
@@ -353,11 +334,11 @@ impl FlightLog {
                 self.file.len(),
                 damage.problem
             );
-            self.warn(WarningKind::Damage, stamp_ns, message);
+            self.warn(WarningKind::Damage, "", stamp_ns, message);
         }
         if !self.topics.iter().any(|info| info.kind.is_some()) {
             let (problem, remedy) = nothing_read(&self.topics);
-            self.warn(WarningKind::NothingRead, 0, format!("{problem}; {remedy}"));
+            self.warn(WarningKind::NothingRead, "", 0, format!("{problem}; {remedy}"));
         }
     }
 }
@@ -382,7 +363,8 @@ fn refuse_topics(channel_ids: &mut BTreeMap<String, Vec<u16>>, limits: &LogLimit
         channel_ids.split_off(&last);
     }
     let exceeded = LimitExceeded { kind: LimitKind::Topics, subject: "a log", found, allowed };
-    Some(LogWarning { stamp_ns: 0, message: format!("{exceeded}; the others, in the order of their names, are read") })
+    let message = format!("{exceeded}; the others, in the order of their names, are read");
+    Some(LogWarning::new(WarningKind::Topics, "", 0, message))
 }
 
 fn check_magic(file: &LogFile, path: &Path) -> Result<(), LogError> {

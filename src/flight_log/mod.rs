@@ -14,19 +14,24 @@ mod foreign;
 mod geodesy;
 pub(crate) mod grey_levels;
 pub(crate) mod grey_sampling;
+pub(crate) mod image_copies;
 pub(crate) mod image_decoding;
 mod image_problem;
 mod image_reader;
+pub(crate) mod imu_filter;
 pub(crate) mod imu_merge;
 pub(crate) mod joint_merge;
 mod limits;
 pub(crate) mod log;
+pub(crate) mod message_content;
 pub(crate) mod messages;
 pub mod output;
 mod protobuf;
 mod raw_encoding;
 pub(crate) mod rig;
 mod sensor_frame;
+pub(crate) mod spacing;
+pub(crate) mod stamp_clock;
 mod stamp_text;
 pub(crate) mod stream;
 #[cfg(test)]
@@ -35,6 +40,7 @@ mod text;
 pub(crate) mod topic_info;
 mod trajectory;
 pub(crate) mod video;
+mod warning;
 mod writer;
 pub(crate) mod yaml;
 
@@ -44,11 +50,12 @@ pub use limits::{LimitExceeded, LimitKind, LimitSetting, LogLimits};
 pub use log::FlightLog;
 pub use messages::MessageKind;
 pub use rig::template as rig_template;
-pub use sensor_frame::{LogWarning, SensorFrame};
+pub use sensor_frame::SensorFrame;
 pub use stream::FrameStream;
 pub use text::{edit_distance, log_name, nearest_name, printable, printable_lines, shortened, without_signed_zeros};
 pub use topic_info::TopicInfo;
 pub use trajectory::{BATCH_REFERENCE, RecordedPose, is_batch_reference, read_trajectory_file};
+pub use warning::{LogWarning, Magnitude, WarningKind};
 pub use writer::{
     CircleAnnotation, LinesAnnotation, LogCompression, LogLevel, LogWriter, LogWriterOptions, MessageTimes,
     MessageType, NamedTransform, Odometry, Rgba,

@@ -1,16 +1,8 @@
 use std::sync::Arc;
 
+use super::LogWarning;
 use crate::geometry::RigidTransform;
 use crate::sensors::{GrayImage, ImuSample, JointAngles};
-
-/// Problem of the log that did not stop reading.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LogWarning {
-    /// Time of the problem, in nanoseconds since the start of the log.
-    pub stamp_ns: i64,
-    /// Problem, its location, and its treatment.
-    pub message: String,
-}
 
 /// Image of one camera with the measurements that belong to it: the input of front end and estimator in one step.
 #[derive(Clone, Debug)]

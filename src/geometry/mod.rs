@@ -20,8 +20,8 @@ pub use dimension::Dimension;
 pub use rigid_transform::RigidTransform;
 pub(crate) use scalars::planar_length;
 pub use scalars::{
-    mean_square_quantile, median, ns_from_seconds, principal_angle, seconds_from_ns, tangent_basis, vertical_angle,
-    wrap_angle,
+    mean_square_quantile, median, ns_from_seconds, principal_angle, quantile, seconds_from_ns, tangent_basis,
+    vertical_angle, wrap_angle,
 };
 pub use split_mix::SplitMix64;
 pub use vector_statistics::{mean, standard_deviation};

@@ -42,6 +42,14 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
+/// Quantile at `fraction` (0 to 1) of the values by total order, nearest rank; `None` without values.
+pub fn quantile(values: &[f64], fraction: f64) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let last = sorted.len().checked_sub(1)?;
+    sorted.get((fraction * last as f64).round() as usize).copied()
+}
+
 /// Quantile of the mean of squared standard normal numbers (χ² over its degrees of freedom) at a quantile of the standard
 /// normal distribution, by the cube root of Wilson and Hilferty (1931).
 ///

@@ -3,12 +3,12 @@
 use nalgebra::UnitQuaternion;
 
 use crate::flight_log::attitude::{
-    MAX_VEHICLE_GAP_NS, StampClock, TransformMerge, TransformPath, gimbal_kinds, rotation_at, topic_field,
-    vehicle_topic,
+    MAX_VEHICLE_GAP_NS, TransformMerge, TransformPath, gimbal_kinds, rotation_at, topic_field, vehicle_topic,
 };
 use crate::flight_log::joint_merge::JointReading;
 use crate::flight_log::log::relative_ns;
 use crate::flight_log::messages::{self, MessageKind};
+use crate::flight_log::stamp_clock::StampClock;
 use crate::flight_log::{FlightLog, LogError};
 use crate::geometry::ns_from_seconds;
 use crate::sensors::{AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig};
@@ -48,7 +48,10 @@ impl AttitudeSurvey {
     pub(super) fn new(log: &FlightLog, gimbal: &GimbalRig) -> Result<Option<Self>, LogError> {
         let (Some(source), Some(topic)) = (&gimbal.attitude, &gimbal.topic) else { return Ok(None) };
         let info = log.require_topic(topic_field(gimbal), topic, gimbal_kinds(gimbal))?;
-        let clock = StampClock::of(log, topic, info.kind.unwrap_or(MessageKind::QuaternionStamped))?;
+        let clock = match StampClock::of_rig(gimbal.use_log_time) {
+            StampClock::Stamps => StampClock::of(log, topic, info.kind.unwrap_or(MessageKind::QuaternionStamped))?,
+            given => given,
+        };
         let mut warnings: Vec<String> = clock.warning(topic).into_iter().collect();
         let merge = match &source.message {
             AttitudeMessage::Transforms { parent, child } => {
@@ -87,7 +90,7 @@ impl AttitudeSurvey {
     pub(super) fn counts_log_times(&self, topic: &str) -> bool {
         let of_vehicle = self.vehicle_topic.as_ref().filter(|(vehicle, ..)| vehicle == topic).map(|(.., clock)| *clock);
         let clock = if topic == self.topic { Some(self.clock) } else { of_vehicle };
-        matches!(clock, Some(StampClock::LogTimes { .. }))
+        matches!(clock, Some(StampClock::LogTimes { .. } | StampClock::LogTimesOfRig))
     }
 
     /// Reads a message of any topic; `stamp_ns` and the stamps within it are relative to the log's start. Returns the
@@ -106,7 +109,11 @@ impl AttitudeSurvey {
                 for entry in messages::read_transforms(data).map_err(|error| error.to_string())? {
                     let Some(transform) = path.moving(entry.child) else { continue };
                     let rotation = entry.rotation.ok_or(NO_ATTITUDE)?;
-                    self.moved.push((transform, relative_ns(entry.stamp_ns, epoch_ns), rotation));
+                    let entry_ns = match self.clock {
+                        StampClock::LogTimesOfRig => stamp_ns,
+                        _ => relative_ns(entry.stamp_ns, epoch_ns),
+                    };
+                    self.moved.push((transform, entry_ns, rotation));
                 }
             } else {
                 let message = messages::read_gimbal_attitude(kind, data).map_err(|error| error.to_string())?;

@@ -5,6 +5,7 @@ use super::spectrum::Spectrum;
 use super::stationary::{Stamped, StationaryTest, WINDOW_NS, Window};
 use super::statistics::{median, percentile};
 use super::survey::Survey;
+use super::unmeasured::check_unmeasured;
 use super::{Area, Findings, Severity};
 use crate::geometry::{mean, seconds_from_ns};
 use crate::sensors::{AngularRates, ImuSample, Rig};
@@ -13,6 +14,8 @@ use crate::sensors::{AngularRates, ImuSample, Rig};
 const NO_FORCE_M_PER_S2: f64 = 0.01;
 /// Ratio of the specific force to gravity below which it does not contain gravity.
 const NO_GRAVITY_RATIO: f64 = 0.3;
+/// Longest stretch of equal samples of a driver that sends faster than the sensor measures.
+const LONGEST_REPETITION: usize = 20;
 /// Standard deviations of the smoothed angular rate (rad/s) and specific force (m/s²) of a stationary or hovering
 /// vehicle, white noise removed.
 const STATIONARY_MOTION: [f64; 2] = [0.012, 0.06];
@@ -20,7 +23,7 @@ const STATIONARY_MOTION: [f64; 2] = [0.012, 0.06];
 /// IMU samples and quantities derived from them, for later checks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ImuFacts {
-    /// Finite samples, ordered by stamp.
+    /// Samples that are measurements, ordered by stamp.
     pub(super) samples: Vec<ImuSample>,
     /// Angular rates of the samples without bias.
     pub(super) gyroscope: AngularRates,
@@ -33,20 +36,8 @@ pub(super) struct ImuFacts {
 
 /// Checks units, gravity, biases, noise and saturation of the IMU, and finds stationary periods.
 pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) -> ImuFacts {
-    let finite = |sample: &&ImuSample| {
-        let numbers = sample.angular_velocity_rad_per_s.iter().chain(&sample.specific_force_m_per_s2);
-        numbers.copied().all(f64::is_finite)
-    };
-    let mut samples: Vec<ImuSample> = survey.imu.iter().filter(finite).copied().collect();
-    let lost = survey.imu.len() - samples.len();
-    if lost > 0 {
-        let first = survey.imu.iter().find(|sample| !finite(sample)).map_or(0, |sample| sample.stamp_ns);
-        let evidence = format!("{lost} of {} samples, the first at {:.3} s", survey.imu.len(), seconds_from_ns(first));
-        let remedy = "check the driver; these samples are dropped";
-        findings.add(Severity::Warning, Area::Imu, "IMU samples are not finite", evidence, remedy);
-    }
-    samples.sort_by_key(|sample| sample.stamp_ns);
-    samples.dedup_by_key(|sample| sample.stamp_ns);
+    check_unmeasured(survey, findings);
+    let samples = survey.imu.clone();
     if samples.len() < 10 {
         return ImuFacts { samples, ..ImuFacts::default() };
     }
@@ -234,11 +225,13 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
     } else if !clipped {
         findings.good(Area::Imu, "the IMU does not saturate", evidence);
     }
-    let same = samples.windows(2).filter(|pair| {
-        pair[0].angular_velocity_rad_per_s == pair[1].angular_velocity_rad_per_s
-            && pair[0].specific_force_m_per_s2 == pair[1].specific_force_m_per_s2
-    });
-    let repeated = same.count();
+    let equal = |one: &ImuSample, other: &ImuSample| {
+        one.angular_velocity_rad_per_s == other.angular_velocity_rad_per_s
+            && one.specific_force_m_per_s2 == other.specific_force_m_per_s2
+    };
+    // A simulated sensor without noise repeats its values for as long as nothing moves.
+    let stretches = samples.chunk_by(equal).filter(|equal| equal.len() <= LONGEST_REPETITION);
+    let repeated: usize = stretches.map(|equal| equal.len() - 1).sum();
     if repeated * 100 > samples.len() {
         let evidence = format!("{repeated} of {} samples equal the previous one in all six values", samples.len());
         let remedy = "the driver sends faster than the sensor measures, or fills gaps: send each measurement once";

@@ -3,7 +3,10 @@
 
 mod attitude;
 mod clock_alignment;
+mod clocks;
+mod copies;
 mod correction;
+mod frozen_joints;
 mod gradient_sums;
 mod ground_truth;
 mod hand_eye;
@@ -13,12 +16,14 @@ mod images;
 mod imu_axes;
 mod imu_facts;
 mod imu_noise;
+mod imu_samples;
 mod imu_topics;
 mod joint_coverage;
 mod joints;
 mod noise;
 mod permutations;
 mod pictures;
+mod publishers;
 mod readout;
 mod render;
 mod report;
@@ -29,7 +34,6 @@ mod rotation_fit;
 #[cfg(test)]
 mod rotation_tests;
 mod source_fit;
-mod spacing;
 mod spectrum;
 mod stationary;
 mod statistics;
@@ -38,6 +42,9 @@ mod survey;
 #[cfg(test)]
 mod tests;
 mod timing;
+mod topic_survey;
+mod unmeasured;
+mod used_topics;
 mod vehicle_attitude;
 mod verdict;
 
@@ -56,9 +63,8 @@ pub use self::report::{Area, CheckReport, Finding, ImageRotation, ProposedMask, 
 use self::report::Findings;
 use self::survey::Survey;
 use crate::flight_log::attitude::{VEHICLE_KINDS, gimbal_kinds, topic_field};
-use crate::flight_log::log::WarningKind;
 use crate::flight_log::topic_info::nothing_read;
-use crate::flight_log::{FlightLog, LogError, MessageKind, TopicInfo};
+use crate::flight_log::{FlightLog, LogError, MessageKind, TopicInfo, WarningKind};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 
@@ -70,7 +76,7 @@ use crate::sensors::Rig;
 pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[ImageRotation]) -> CheckReport {
     let mut survey = Survey::of(log, rig.ok());
     let mut findings = Findings::default();
-    check_file(log, &survey, &mut findings);
+    check_file(log, &survey, rig.ok(), &mut findings);
     match rig {
         Ok(rig) => {
             check_topics(log, rig, &mut findings);
@@ -101,6 +107,8 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         ground_truth::check_ground_truth(log, rig, &imu_facts, &mut findings);
         pictures::check_pictures(log, &survey, rig, &mut findings);
         images::check_images(log, &survey, rig, &imu_facts, &mut findings);
+        copies::check_image_copies(&survey, rig, &imu_facts, &mut findings);
+        frozen_joints::check_frozen_joints(&survey, rig, &imu_facts, &mut findings);
         if let Some(fitted) = source_fit::check_source(&survey, rig, &imu_facts, image_rotations, &mut findings) {
             // The cameras are checked with the corrected attitude.
             survey.use_source(rig, fitted.source, fitted.timeshift_s);
@@ -122,14 +130,24 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
 }
 
 /// Reports damage to the file, unreadable messages, and topics of other types.
-fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
-    for (kind, warning) in log.warnings_by_kind() {
-        let (area, title, remedy) = match kind {
+fn check_file(log: &FlightLog, survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) {
+    let is_used = |topic: &str| {
+        let role = role_of(topic, log.topic(topic).and_then(|info| info.kind), rig);
+        !["ignored", "intrinsics", "not in the rig"].contains(&role.as_str())
+    };
+    // The check of the stamps reports topics of the rig without any.
+    let is_known = |topic: &str| {
+        rig.is_some_and(|rig| rig.uses_log_time(topic))
+            || (is_used(topic) && survey.topics.get(topic).is_some_and(|topic| topic.has_one_stamp()))
+    };
+    for warning in log.warnings() {
+        let (area, title, remedy) = match warning.kind {
             WarningKind::Damage => (
                 Area::Log,
                 "the file is truncated or damaged",
                 "copy the file again from the recorder; data after the damage are not used",
             ),
+            WarningKind::Stamps if is_known(&warning.subject) => continue,
             WarningKind::Stamps => (
                 Area::Time,
                 "the stamps of a topic are not of the log's time",
@@ -141,6 +159,7 @@ fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
                 findings.add(Severity::Error, Area::Log, "no topic can be read", problem, remedy);
                 continue;
             }
+            _ => (Area::Log, "the log cannot be read completely", ""),
         };
         findings.add(Severity::Warning, area, title, warning.message.clone(), remedy);
     }

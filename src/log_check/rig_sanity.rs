@@ -30,17 +30,11 @@ impl CheckReport {
     }
 }
 
-/// Checks the plausibility of the rig's intrinsics, time offsets and chain.
+/// Checks the plausibility of the rig's intrinsics and chain.
 pub(super) fn check_rig(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     for camera in &rig.cameras {
         check_lens(camera, findings);
         check_camera_info(log, camera, findings);
-        if camera.timeshift_cam_imu_s.abs() > 0.1 {
-            let evidence = format!("{:+.4} s, t_imu = t_cam + shift", camera.timeshift_cam_imu_s);
-            let title = format!("{}.timeshift_cam_imu is large", camera.key);
-            let remedy = "check its sign and unit (seconds); preferably stamp images at mid-exposure";
-            findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
-        }
     }
     if let Some(gimbal) = &rig.gimbal {
         check_chain(gimbal, findings);

@@ -4,10 +4,7 @@ use crate::geometry::{self, wrap_angle};
 
 /// Quantile at `fraction` (0 to 1) of the values, nearest rank; 0 without values.
 pub(super) fn percentile(values: &[f64], fraction: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let last = sorted.len().saturating_sub(1);
-    sorted.get((fraction * last as f64).round() as usize).copied().unwrap_or(0.0)
+    geometry::quantile(values, fraction).unwrap_or(0.0)
 }
 
 /// Median; 0 without values.

@@ -6,14 +6,16 @@ use nalgebra::Vector3;
 use super::attitude::{AttitudeSurvey, SolvedAttitude};
 use super::gradient_sums::GradientSums;
 use super::image_measure::{ImageMeasure, measure};
-use super::statistics::{median, white_sigma};
+use super::imu_samples::{UnmeasuredStamps, measured, measured_apart};
+use super::statistics::white_sigma;
+use super::topic_survey::{Times, TopicSurvey};
 use crate::flight_log::container::DecodedBlock;
 use crate::flight_log::grey_levels::GreyLevels;
 use crate::flight_log::grey_sampling::grey_levels_of_topic;
 use crate::flight_log::image_decoding::decode_image;
-use crate::flight_log::imu_merge::ImuMerge;
 use crate::flight_log::joint_merge::{JointMerge, JointReading};
 use crate::flight_log::log::relative_ns;
+use crate::flight_log::message_content::frame_and_checksum;
 use crate::flight_log::stream::angle_fit::{self, FittedAngle};
 use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
@@ -34,51 +36,6 @@ const MAX_GAP_NS: i64 = 200_000_000;
 /// Lower bound of an encoder's standard deviation.
 const MIN_SIGMA_RAD: f64 = 1e-5;
 
-/// Log time and header stamp of a message, relative to the log's start.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Times {
-    pub(super) log_time_ns: i64,
-    pub(super) stamp_ns: i64,
-}
-
-/// Times of one topic, ordered by log time.
-#[derive(Clone, Debug, Default)]
-pub(super) struct TopicSurvey {
-    pub(super) topic: String,
-    pub(super) times: Vec<Times>,
-    /// Number of messages that cannot be decoded.
-    pub(super) unreadable: usize,
-    pub(super) first_problem: String,
-    /// Number of joint messages without any position, and the content of the first.
-    pub(super) without_positions: Option<(usize, &'static str)>,
-}
-
-impl TopicSurvey {
-    pub(super) fn stamp_range(&self) -> (i64, i64) {
-        let stamps = || self.times.iter().map(|times| times.stamp_ns);
-        (stamps().min().unwrap_or(0), stamps().max().unwrap_or(0))
-    }
-
-    /// True if there are several messages and all have the same stamp, as if it was never set.
-    pub(super) fn has_one_stamp(&self) -> bool {
-        let (first, last) = self.stamp_range();
-        self.times.len() > 2 && first == last
-    }
-
-    pub(super) fn median_latency_s(&self) -> f64 {
-        let latencies: Vec<f64> =
-            self.times.iter().map(|times| seconds_from_ns(times.log_time_ns - times.stamp_ns)).collect();
-        median(&latencies)
-    }
-
-    fn refuse(&mut self, problem: String) {
-        self.unreadable += 1;
-        if self.first_problem.is_empty() {
-            self.first_problem = problem;
-        }
-    }
-}
-
 #[derive(Clone, Debug)]
 pub(super) struct SampledImage {
     pub(super) stamp_ns: i64,
@@ -94,11 +51,14 @@ pub(super) struct Survey {
     pub(super) imu_topic: Option<String>,
     /// All topics of the IMU's type.
     pub(super) imu_topics: Vec<String>,
-    /// Samples of the IMU in the order of log times, not-finite ones included. With a separate accelerometer topic they
-    /// are merged, ordered by stamp and without those that are not finite.
+    /// Samples of the IMU in the order of their stamps, without those that are no measurement.
     pub(super) imu: Vec<ImuSample>,
-    /// Stamps and specific forces of a separate accelerometer topic, in the order of log times.
+    /// Topic of a separate accelerometer, if the log has it.
+    pub(super) accelerometer_topic: Option<String>,
+    /// Stamps and specific forces of that topic in the order of the stamps, without those that are no measurement.
     pub(super) accelerometer: Vec<(i64, Vector3<f64>)>,
+    /// Messages of the IMU that are no measurement.
+    pub(super) unmeasured: UnmeasuredStamps,
     /// Messages of the encoders in the order of log times.
     pub(super) joints: Vec<JointReading>,
     /// Angles of all joints at common stamps, ordered by stamp, from the finite readings.
@@ -179,11 +139,11 @@ impl Survey {
         if let Some(gimbal) = rig.and_then(|rig| rig.gimbal.as_ref()) {
             survey.set_joints(gimbal);
         }
-        if !survey.accelerometer.is_empty() {
-            survey.accelerometer.retain(|(_, force)| force.iter().all(|value| value.is_finite()));
-            survey.accelerometer.sort_by_key(|(stamp_ns, _)| *stamp_ns);
-            survey.imu = merged_imu(&survey.imu, &survey.accelerometer);
-        }
+        survey.imu = if survey.accelerometer.is_empty() {
+            measured(std::mem::take(&mut survey.imu), &mut survey.unmeasured)
+        } else {
+            measured_apart(&survey.imu, &mut survey.accelerometer, &mut survey.unmeasured)
+        };
         survey
     }
 
@@ -265,13 +225,18 @@ impl Survey {
             .topics
             .entry(topic.to_owned())
             .or_insert_with(|| TopicSurvey { topic: topic.to_owned(), ..TopicSurvey::default() });
-        let log_times = self.attitude.as_ref().is_some_and(|attitude| attitude.counts_log_times(topic));
+        let log_times = rig.is_some_and(|rig| rig.uses_log_time(topic))
+            || self.attitude.as_ref().is_some_and(|attitude| attitude.counts_log_times(topic));
         let stamp_ns = match messages::stamp_ns(kind, data) {
             Ok(_) if log_times => log_time_ns,
             Ok(absolute_ns) => relative_ns(absolute_ns, log.epoch_ns()),
             Err(error) => return entry.refuse(error.to_string()),
         };
-        entry.times.push(Times { log_time_ns, stamp_ns });
+        let (frame, checksum) = match frame_and_checksum(kind, data) {
+            Some((frame_id, checksum)) => (entry.frame(frame_id), Some(checksum)),
+            None => (0, None),
+        };
+        entry.times.push(Times { log_time_ns, stamp_ns, checksum, frame });
         if kind == MessageKind::Imu && self.imu_topic.as_deref() == Some(topic) {
             match messages::read_imu(data) {
                 Ok(imu) => {
@@ -289,6 +254,7 @@ impl Survey {
         if rig.imu.accelerometer_topic.as_deref() == Some(topic) {
             match messages::read_imu(data) {
                 Ok(imu) => {
+                    self.accelerometer_topic.get_or_insert_with(|| topic.to_owned());
                     let force = rig.imu.intrinsics.correct_specific_force(&imu.specific_force_m_per_s2);
                     self.accelerometer.push((stamp_ns, force));
                 }
@@ -337,21 +303,6 @@ impl Survey {
             }
         }
     }
-}
-
-/// Samples of the gyroscope with the specific forces of a separate accelerometer, both in any order.
-fn merged_imu(gyroscope: &[ImuSample], accelerometer: &[(i64, Vector3<f64>)]) -> Vec<ImuSample> {
-    let mut ordered: Vec<&ImuSample> = gyroscope.iter().collect();
-    ordered.retain(|sample| sample.angular_velocity_rad_per_s.iter().all(|value| value.is_finite()));
-    ordered.sort_by_key(|sample| sample.stamp_ns);
-    let mut merge = ImuMerge::default();
-    for sample in ordered {
-        merge.push_gyroscope(sample.stamp_ns, sample.angular_velocity_rad_per_s);
-    }
-    for (stamp_ns, force) in accelerometer {
-        merge.push_accelerometer(*stamp_ns, *force);
-    }
-    std::iter::from_fn(|| merge.pop()).collect()
 }
 
 /// Readings of all messages as samples of all joints; those that are not finite are omitted.

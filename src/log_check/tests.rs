@@ -1,3 +1,6 @@
+mod clocks;
+mod unmeasured;
+
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -53,7 +56,12 @@ pub(super) struct Flight {
     pub(super) accelerometer_apart: bool,
     /// Topic with orientations only.
     pub(super) orientations: Option<&'static str>,
+    /// Another message on the topic of the IMU, from the time in milliseconds and the sample of the first.
+    pub(super) second_imu: fn(i64, ImuMessage) -> Option<ImuMessage>,
 }
+
+/// Message of an IMU: frame, times, angular velocity and specific force.
+type ImuMessage = (&'static str, MessageTimes, Vector3<f64>, Vector3<f64>);
 
 impl Default for Flight {
     fn default() -> Self {
@@ -65,6 +73,7 @@ impl Default for Flight {
             camera_info: [80.0, 80.0, 79.5, 59.5],
             accelerometer_apart: false,
             orientations: None,
+            second_imu: |_, _| None,
         }
     }
 }
@@ -130,6 +139,9 @@ impl Flight {
                 let mut times = times;
                 if (self.imu)(millisecond, &mut times, &mut rate, &mut force) {
                     writer.write_imu("/imu", "imu", times, &rate, &force).unwrap();
+                }
+                if let Some((frame, times, rate, force)) = (self.second_imu)(millisecond, ("imu", times, rate, force)) {
+                    writer.write_imu("/imu", frame, times, &rate, &force).unwrap();
                 }
             }
             if let Some(topic) = self.orientations.filter(|_| millisecond % 10 == 4) {
@@ -259,7 +271,7 @@ fn imu_faults_are_found() {
         rate.y = if ms == 5000 { f64::NAN } else { rate.y };
         true
     };
-    expect(&imu(nan), Warning, &["not finite", "1 of 2400 samples, the first at 5.000 s"]);
+    expect(&imu(nan), Warning, &["not finite", "1 of 2400 samples (0.0 %), the first at 5.000 s"]);
     expect(
         &rig("gyroscope_noise_density: 0.00034", "gyroscope_noise_density: 3.4e-5"),
         Warning,
@@ -384,7 +396,7 @@ fn faults_of_time_are_found() {
         times.stamp_ns -= if ms == 6000 { 5 * MS } else { 0 };
         true
     };
-    expect(&imu(repeat), Warning, &["stamps of imu0 repeat", "1 of 2399"]);
+    expect(&imu(repeat), Warning, &["stamps of imu0 repeat", "1 of 2400 messages", "at 5.995 s", "with other content"]);
     let scatter = |ms: i64, times: &mut MessageTimes, _: &mut Vector3<f64>, _: &mut Vector3<f64>| {
         times.stamp_ns += if ms / 5 % 3 == 0 { 3 * MS } else { 0 };
         true

@@ -10,7 +10,7 @@ use crate::geometry::{Dimension, seconds_from_ns};
 use crate::log_check::{CheckReport, Severity};
 use crate::observability::laboratory::{Situation, advise};
 use crate::observability::{ParameterState, RankReport, parameter_states, parameters_of};
-use crate::session::{LostSince, PoseError, Recording, RunRecord, RunSummary, StepRecord};
+use crate::session::{LostSince, PoseError, Recording, RunRecord, RunSummary, StepRecord, run_warning_lines};
 
 /// A parameter is informed if its posterior σ is at most this ratio of its prior σ: the measurements then contribute at
 /// least as much information as the prior.
@@ -296,7 +296,7 @@ fn why(rank: &RankReport, step: &StepRecord) -> Vec<String> {
 
 /// Frames, restarts and warnings of the run.
 fn estimation(run: &RunRecord, summary: &RunSummary) -> Statement {
-    let frames = &summary.frames;
+    let (frames, warnings) = (&summary.frames, run_warning_lines(run).len());
     let initialized = frames
         .initialized_at_s
         .map_or_else(|| "never initialized".to_owned(), |at_s| format!("initialized at {} s", number(at_s, 2)));
@@ -305,9 +305,9 @@ fn estimation(run: &RunRecord, summary: &RunSummary) -> Statement {
         frames.estimated,
         frames.total,
         count(frames.restarts, "restart"),
-        count(run.warnings.len(), "warning")
+        count(warnings, "warning")
     );
-    let mark = match (frames.estimated, frames.restarts, run.warnings.len(), &run.error) {
+    let mark = match (frames.estimated, frames.restarts, warnings, &run.error) {
         (0, ..) | (_, _, _, Some(_)) => Mark::Error,
         (_, 0, 0, None) => Mark::Good,
         (_, 0, _, None) => Mark::Note,

@@ -29,6 +29,8 @@ pub struct ImuRig {
     /// Topic of the specific forces (`sensor_msgs/msg/Imu`), if they are recorded separately from the angular
     /// velocities.
     pub accelerometer_topic: Option<String>,
+    /// True if the log times of the messages replace their header stamps, which were never set.
+    pub use_log_time: bool,
     pub frame_id: String,
     /// Nominal rate.
     pub rate_hz: f64,
@@ -53,6 +55,8 @@ pub struct CameraRig {
     pub key: String,
     pub mount: CameraMount,
     pub topic: String,
+    /// True if the log times of the images replace their header stamps, which were never set.
+    pub use_log_time: bool,
     pub frame_id: String,
     /// Nominal rate.
     pub rate_hz: f64,
@@ -134,6 +138,8 @@ pub struct GimbalRig {
     pub topic: Option<String>,
     /// Interpretation of the topic's messages as attitudes, `None` for joint angles.
     pub attitude: Option<AttitudeSource>,
+    /// True if the log times of the messages of `topic` replace their header stamps, which were never set.
+    pub use_log_time: bool,
     /// `timeshift_gimbal_imu`: `t_imu = t_gimbal + shift`, for the stamps of `topic`.
     pub timeshift_gimbal_imu_s: f64,
     /// Nominal rate.
@@ -187,6 +193,8 @@ pub struct Rig {
     pub gimbal: Option<GimbalRig>,
     /// Topic of the ground-truth pose of the IMU in the world, or of the ground-truth position of an antenna.
     pub ground_truth_topic: Option<String>,
+    /// True if the log times of that topic replace its header stamps, which were never set.
+    pub ground_truth_use_log_time: bool,
     /// Position of that antenna, `None` if the rig does not give it.
     pub ground_truth_lever_arm: Option<LeverArm>,
     /// Fields that have not been measured yet.
@@ -206,6 +214,17 @@ impl Rig {
     pub fn vehicle_topic(&self) -> Option<&str> {
         let source = self.gimbal.as_ref()?.attitude.as_ref()?;
         source.vehicle_topic.as_deref().filter(|_| source.frame != AttitudeFrame::Body)
+    }
+
+    /// True if the log times of a topic replace its header stamps.
+    pub fn uses_log_time(&self, topic: &str) -> bool {
+        let of_imu = self.imu.topic == topic || self.imu.accelerometer_topic.as_deref() == Some(topic);
+        let camera = |camera: &CameraRig| camera.use_log_time && camera.topic == topic;
+        let gimbal = |gimbal: &GimbalRig| gimbal.use_log_time && gimbal.topic.as_deref() == Some(topic);
+        (self.imu.use_log_time && of_imu)
+            || self.cameras.iter().any(camera)
+            || self.gimbal.as_ref().is_some_and(gimbal)
+            || (self.ground_truth_use_log_time && self.ground_truth_topic.as_deref() == Some(topic))
     }
 
     /// Names of the gimbal's joints, starting at the base; empty without a gimbal.

@@ -48,5 +48,5 @@ pub use record::{
     PassProgress, PoseConsistency, PoseError, PositionTruth, Quantity, RELATIVE_LENGTHS_M, Recording, RelativeAccuracy,
     RunMemory, RunRecord, RunSummary, RunWarning, SolverPosition, SolverTrace, StageSummary, StepFactorRows,
     StepRecord, TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane, WarningLine, estimability_summary,
-    evaluate_trajectory, log_warning_lines, summarize, warning_lines,
+    evaluate_trajectory, log_warning_lines, run_warning_lines, summarize, warning_lines,
 };

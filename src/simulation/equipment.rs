@@ -82,6 +82,7 @@ impl Equipment {
                     key: format!("cam{}", cameras.len()),
                     mount,
                     topic: format!("/{camera}/image_raw/compressed"),
+                    use_log_time: false,
                     frame_id: camera.to_owned(),
                     rate_hz: self.camera_rate_hz,
                     model: camera_model(which, self.lens, self.resolution_px),
@@ -96,6 +97,7 @@ impl Equipment {
         let gimbal = self.gimbal_camera.then(|| GimbalRig {
             topic: self.encoder_sigma_rad.map(|_| "/gimbal/joint_states".to_owned()),
             attitude: None,
+            use_log_time: false,
             timeshift_gimbal_imu_s: 0.0,
             rate_hz: IMU_RATE_HZ,
             encoder_sigma_rad: self.encoder_sigma_rad,
@@ -110,6 +112,7 @@ impl Equipment {
             imu: ImuRig {
                 topic: "/imu".to_owned(),
                 accelerometer_topic: None,
+                use_log_time: false,
                 frame_id: "imu".to_owned(),
                 rate_hz: IMU_RATE_HZ,
                 noise: FIREFLY_IMU,
@@ -118,6 +121,7 @@ impl Equipment {
             cameras,
             gimbal,
             ground_truth_topic: Some("/ground_truth/odometry".to_owned()),
+            ground_truth_use_log_time: false,
             ground_truth_lever_arm: None,
             assumed: Vec::new(),
         }

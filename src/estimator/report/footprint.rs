@@ -46,7 +46,7 @@ impl StepReport {
     /// Memory use of the report.
     pub fn bytes(&self) -> ReportBytes {
         let messages = self.events.iter().map(|event| of_text(&event.message)).sum::<usize>()
-            + self.warnings.iter().map(of_text).sum::<usize>();
+            + self.warnings.iter().map(|warning| of_text(&warning.cause)).sum::<usize>();
         let linearization = self.linearization.as_ref().map_or(0, |linearization| {
             let numbers = linearization.jacobian.len()
                 + linearization.prior_jacobian.len()

@@ -10,6 +10,7 @@ mod observations;
 mod pose_covariance;
 mod residuals;
 mod step;
+mod step_warning;
 
 pub use events::{Event, EventKind, FailureCause};
 pub use features::{FeatureCounts, FeatureReport, LandmarkReport};
@@ -19,3 +20,4 @@ pub use observations::{ObservationReport, Observations};
 pub use pose_covariance::PoseCovariance;
 pub use residuals::ResidualSummary;
 pub use step::{CalibrationEstimate, FrameStateReport, Phase, StageTimes, StepReport};
+pub use step_warning::StepWarning;

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::features::{FeatureCounts, LandmarkReport};
 use super::pose_covariance::PoseCovariance;
-use super::{Event, FactorRows, FeatureReport, JacobianSource, ResidualSummary};
+use super::{Event, FactorRows, FeatureReport, JacobianSource, ResidualSummary, StepWarning};
 use crate::estimator::problem::information_gain::InformationGain;
 use crate::estimator::problem::linearization::Linearization;
 use crate::estimator::problem::solver::IterationReport;
@@ -143,7 +143,7 @@ pub struct StepReport {
     /// Stage timings (the only part of a report that may differ between replays).
     pub times: StageTimes,
     /// Problems that did not stop the step.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<StepWarning>,
 }
 
 impl StepReport {

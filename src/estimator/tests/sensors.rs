@@ -26,7 +26,7 @@ fn ignored(flight: &SyntheticFlight) -> (f64, BTreeSet<String>) {
     let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
     let (_, reports) = run_flight_by_rows(&flight.frames, config);
     let (error_m, _) = trajectory_error_m(&flight.frames, &reports);
-    (error_m, reports.into_iter().flat_map(|report| report.warnings).collect())
+    (error_m, reports.iter().flat_map(|report| &report.warnings).map(ToString::to_string).collect())
 }
 
 #[test]

@@ -7,7 +7,7 @@
 use super::column_groups::SuspectedParameter;
 use crate::estimator::config::EstimatorConfig;
 use crate::estimator::factors::FactorKind;
-use crate::estimator::report::ResidualSummary;
+use crate::estimator::report::{ResidualSummary, StepWarning};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::Quantity;
 
@@ -90,7 +90,7 @@ impl ConsistencyMonitor {
         residuals: &[ResidualSummary],
         config: &EstimatorConfig,
         scores: impl Fn() -> Vec<SuspectedParameter>,
-    ) -> Vec<String> {
+    ) -> Vec<StepWarning> {
         let Some(last_ns) = self.last_ns.replace(stamp_ns) else { return Vec::new() };
         if !self.is_suspicious() {
             self.suspected.clear();
@@ -117,7 +117,14 @@ impl ConsistencyMonitor {
             };
             let suspected = &self.suspected;
             let cause = mean.cause.get_or_insert_with(|| cause(suspected, config));
-            warnings.push(warning_text(monitored, value, cause));
+            warnings.push(StepWarning {
+                factor: monitored.factor,
+                inconsistency: monitored.inconsistency,
+                mean_square: value,
+                limit: monitored.limit,
+                averaged_s: seconds_from_ns(AVERAGED_NS),
+                cause: cause.clone(),
+            });
         }
         warnings
     }
@@ -154,14 +161,4 @@ fn usual_causes(config: &EstimatorConfig) -> String {
     let tries: Vec<&str> = options.into_iter().filter(|(_, on)| !on).map(|(option, _)| option).collect();
     let tries = if tries.is_empty() { String::new() } else { format!("; try {}", tries.join(" and ")) };
     format!("check time offsets, calibration, noise densities{tries}")
-}
-
-/// Warning with the mean that started it (χ²/dof), its limit, and the cause.
-fn warning_text(monitored: &MonitoredFactor, value: f64, cause: &str) -> String {
-    format!(
-        "{} (χ²/dof {value:.2} > {:.2} over {:.0} s): {cause}",
-        monitored.inconsistency,
-        monitored.limit,
-        seconds_from_ns(AVERAGED_NS)
-    )
 }

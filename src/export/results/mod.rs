@@ -143,7 +143,7 @@ impl Results {
             self.log.write_log_line(&topic, times, level, &format!("{:?}", event.kind), &event.message)?;
         }
         for warning in &step.report.warnings {
-            self.log.write_log_line(&topic, times, LogLevel::Warning, "warning", warning)?;
+            self.log.write_log_line(&topic, times, LogLevel::Warning, "warning", &warning.to_string())?;
         }
         Ok(())
     }

@@ -1,11 +1,9 @@
 //! Gimbal attitude of a log: topics, clocks, chains of transforms, and the vehicle's attitude between two messages.
 
-mod clock;
 mod transforms;
 
 use nalgebra::UnitQuaternion;
 
-pub(crate) use clock::StampClock;
 pub(crate) use transforms::{TransformMerge, TransformPath};
 
 use super::messages::{self, MessageKind};

@@ -151,6 +151,7 @@ pub(super) fn rig_of(
         cameras: described,
         gimbal: None,
         ground_truth_topic,
+        ground_truth_use_log_time: false,
         ground_truth_lever_arm: None,
         assumed: Vec::new(),
     })
@@ -162,6 +163,7 @@ fn imu_rig(root: &Path) -> Result<Option<(ImuRig, RigidTransform)>, ConvertError
     let imu = ImuRig {
         topic: IMU_TOPIC.to_owned(),
         accelerometer_topic: None,
+        use_log_time: false,
         frame_id: "imu0".to_owned(),
         rate_hz: file.positive("rate_hz", "the rate in Hz")?,
         noise: ImuNoise {
@@ -213,6 +215,7 @@ fn camera_rig(
         key: camera.key.clone(),
         mount: CameraMount::Static { imu_from_camera: body_from_imu.inverse() * file.body_from_sensor()? },
         topic: image_topic(&camera.key),
+        use_log_time: false,
         frame_id: camera.key.clone(),
         rate_hz: file
             .positive("rate_hz", "the rate in Hz")

@@ -129,6 +129,14 @@ impl<'a> Field<'a> {
     }
 
     /// Finite number.
+    /// True or false of this field; false if it is missing.
+    pub(super) fn flag(&self) -> Result<bool, LogError> {
+        match self.value.filter(|value| !value.is_null()) {
+            None => Ok(false),
+            Some(value) => value.as_bool().ok_or_else(|| self.unexpected("true or false")),
+        }
+    }
+
     pub(super) fn number(&self, expected: &str) -> Result<f64, LogError> {
         let number = self.value.and_then(Value::as_f64).filter(|number| number.is_finite());
         number.ok_or_else(|| self.unexpected(expected))

@@ -56,6 +56,7 @@ pub(super) fn read_camera_chain(
         cameras,
         gimbal: None,
         ground_truth_topic: None,
+        ground_truth_use_log_time: false,
         ground_truth_lever_arm: None,
         assumed: Vec::new(),
     })

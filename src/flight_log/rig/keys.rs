@@ -26,6 +26,7 @@ const IMU: Keys = Keys {
     read: &[
         "rostopic",
         "accelerometer_rostopic",
+        "use_log_time",
         "frame_id",
         "update_rate",
         "accelerometer_noise_density",
@@ -41,6 +42,7 @@ const CAMERA: Keys = Keys {
     read: &[
         "mount",
         "rostopic",
+        "use_log_time",
         "frame_id",
         "update_rate",
         "camera_model",
@@ -66,6 +68,7 @@ const GIMBAL: Keys = Keys {
     read: &[
         "rostopic",
         "source",
+        "use_log_time",
         "timeshift_gimbal_imu",
         "update_rate",
         "encoder_sigma",
@@ -99,7 +102,7 @@ const SOURCE: Keys = Keys {
 const CHAIN: Keys = Keys { read: &["T_I_B", "links", "T_E_C"], unused: &[] };
 const PRIOR: Keys = Keys { read: &["translation_bound", "rotation_bound"], unused: &[] };
 const LINK: Keys = Keys { read: &["joint", "theta_offset", "d", "a", "alpha", "limits"], unused: &[] };
-const GROUND_TRUTH: Keys = Keys { read: &["rostopic", "lever_arm"], unused: &["frame_id"] };
+const GROUND_TRUTH: Keys = Keys { read: &["rostopic", "use_log_time", "lever_arm"], unused: &["frame_id"] };
 
 /// Keys of a document that are not read.
 #[derive(Default)]

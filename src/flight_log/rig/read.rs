@@ -30,8 +30,8 @@ const MAX_LIMIT_RAD: f64 = 2.0 * std::f64::consts::TAU;
 /// An encoder with a larger standard deviation measures nothing; values of 0.5 to 1 are usually degrees.
 const MAX_SIGMA_RAD: f64 = 0.5;
 
-/// A larger time offset means that a clock was never set.
-const MAX_TIMESHIFT_S: f64 = 10.0;
+/// A larger time offset means that a clock was never set; the largest of a clock that is set is 37 s, of TAI to UTC.
+const MAX_TIMESHIFT_S: f64 = 60.0;
 
 /// Reads a rig in the schema of this program.
 pub(super) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraFacts) -> Result<Rig, LogError> {
@@ -58,9 +58,20 @@ pub(super) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraF
     let ground_truth = root.field("ground_truth").optional();
     let ground_truth_topic = ground_truth.and_then(|ground_truth| ground_truth.field("rostopic").optional());
     let ground_truth_topic = ground_truth_topic.map(|topic| topic.text("a topic").map(str::to_owned)).transpose()?;
+    let ground_truth_use_log_time = root.field("ground_truth").field("use_log_time").flag()?;
     let ground_truth_lever_arm = read_lever_arm(root.field("ground_truth").field("lever_arm"))?;
     let assumed = read_assumed(root)?;
-    Ok(Rig { name, gravity_m_per_s2, imu, cameras, gimbal, ground_truth_topic, ground_truth_lever_arm, assumed })
+    Ok(Rig {
+        name,
+        gravity_m_per_s2,
+        imu,
+        cameras,
+        gimbal,
+        ground_truth_topic,
+        ground_truth_use_log_time,
+        ground_truth_lever_arm,
+        assumed,
+    })
 }
 
 /// Reads the position of the ground-truth antenna.
@@ -126,6 +137,7 @@ pub(super) fn read_imu(imu: &Field<'_>, default_topic: Option<&str>) -> Result<I
     Ok(ImuRig {
         topic: topic.to_owned(),
         accelerometer_topic: accelerometer.map(str::to_owned),
+        use_log_time: imu.field("use_log_time").flag()?,
         frame_id: imu.field("frame_id").optional().map_or(Ok("imu"), |frame| frame.text("a frame's name"))?.to_owned(),
         rate_hz: imu.field("update_rate").positive("the rate in Hz")?,
         noise: ImuNoise {
@@ -180,6 +192,7 @@ pub(super) fn read_camera_as(
         intrinsics_sigma,
         frame_id: camera.field("frame_id").optional().map_or(Ok(key), |frame| frame.text("a frame's name"))?.to_owned(),
         timeshift_cam_imu_s: shift.map_or(Ok(0.0), |shift| shift.number("seconds, t_imu = t_cam + shift"))?,
+        use_log_time: camera.field("use_log_time").flag()?,
         topic,
     })
 }
@@ -271,7 +284,7 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
         shift.map_or(Ok(0.0), |shift| shift.number("seconds, t_imu = t_gimbal + shift")).and_then(|shift_s| {
             let limit = MAX_TIMESHIFT_S;
             let field = gimbal.field("timeshift_gimbal_imu");
-            if shift_s.abs() <= limit { Ok(shift_s) } else { Err(field.unexpected("seconds, at most 10 either way")) }
+            if shift_s.abs() <= limit { Ok(shift_s) } else { Err(field.unexpected("seconds, at most 60 either way")) }
         })?;
     let rate = gimbal.field("update_rate").optional();
     let rate_hz = match (&topic, rate) {
@@ -340,6 +353,7 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
     Ok(GimbalRig {
         topic,
         attitude,
+        use_log_time: gimbal.field("use_log_time").flag()?,
         timeshift_gimbal_imu_s,
         rate_hz,
         encoder_sigma_rad,

@@ -30,6 +30,27 @@ fn a_rig_reads_back_as_written() {
     check_same(&odd, &parse(&yaml).unwrap());
 }
 
+#[test]
+fn log_times_in_place_of_stamps_are_read_and_written() {
+    assert!(!parse(RIG).unwrap().to_yaml().contains("use_log_time"));
+    let flagged = RIG
+        .replace("rostopic: /imu,", "rostopic: /imu, use_log_time: true,")
+        .replace("rostopic: /camera\n", "rostopic: /camera\n  use_log_time: true\n")
+        .replace("rostopic: /joints", "rostopic: /joints\n  use_log_time: true")
+        .replace("{rostopic: /truth}", "{rostopic: /truth, use_log_time: true}");
+    let rig = parse(&flagged).unwrap();
+    for topic in ["/imu", "/camera", "/joints", "/truth"] {
+        assert!(rig.uses_log_time(topic), "{topic}");
+        assert!(!parse(RIG).unwrap().uses_log_time(topic), "{topic}");
+    }
+    assert!(!rig.uses_log_time("/other"));
+    let yaml = rig.to_yaml();
+    assert_eq!(yaml.matches("use_log_time: true").count(), 4, "{yaml}");
+    check_same(&rig, &parse(&yaml).unwrap());
+    let error = parse(&flagged.replace("/imu, use_log_time: true", "/imu, use_log_time: 1")).unwrap_err();
+    assert!(error.starts_with("imu0.use_log_time: holds 1, expected true or false"), "{error}");
+}
+
 /// Test rig with a source in place of its topic of joint angles.
 fn with_source(source: &str) -> String {
     RIG.replace("rostopic: /joints", &format!("source: {source}"))

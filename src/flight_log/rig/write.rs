@@ -21,6 +21,7 @@ impl Rig {
         if let Some(topic) = &self.imu.accelerometer_topic {
             line(&mut out, 1, "accelerometer_rostopic", &text(topic));
         }
+        log_time(&mut out, self.imu.use_log_time);
         line(&mut out, 1, "frame_id", &text(&self.imu.frame_id));
         line(&mut out, 1, "update_rate", &number(self.imu.rate_hz));
         line(&mut out, 1, "accelerometer_noise_density", &number(self.imu.noise.accelerometer_noise_density));
@@ -39,6 +40,7 @@ impl Rig {
         }
         if let Some(topic) = &self.ground_truth_topic {
             line(&mut out, 1, "rostopic", &text(topic));
+            log_time(&mut out, self.ground_truth_use_log_time);
         }
         match &self.ground_truth_lever_arm {
             Some(LeverArm::Known(position_m)) => line(&mut out, 1, "lever_arm", &numbers(position_m.as_slice())),
@@ -52,6 +54,13 @@ impl Rig {
             line(&mut out, 1, &text(field), &text(reason));
         }
         out
+    }
+}
+
+/// Writes that log times replace the header stamps.
+fn log_time(out: &mut String, used: bool) {
+    if used {
+        line(out, 1, "use_log_time", "true");
     }
 }
 
@@ -71,6 +80,7 @@ fn write_camera(out: &mut String, camera: &CameraRig) {
     let mount = if camera.mount == CameraMount::Gimbal { "gimbal" } else { "static" };
     line(out, 1, "mount", mount);
     line(out, 1, "rostopic", &text(&camera.topic));
+    log_time(out, camera.use_log_time);
     line(out, 1, "frame_id", &text(&camera.frame_id));
     line(out, 1, "update_rate", &number(camera.rate_hz));
     line(out, 1, "camera_model", camera.model.projection.name());
@@ -119,6 +129,7 @@ fn write_gimbal(out: &mut String, gimbal: &GimbalRig) {
     } else {
         line(out, 1, "rostopic", &gimbal.topic.as_deref().map_or_else(|| "null".into(), text));
     }
+    log_time(out, gimbal.use_log_time);
     if gimbal.timeshift_gimbal_imu_s != 0.0 {
         line(out, 1, "timeshift_gimbal_imu", &number(gimbal.timeshift_gimbal_imu_s));
     }

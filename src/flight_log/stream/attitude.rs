@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::UnitQuaternion;
 
-use super::super::attitude::{self, MAX_VEHICLE_GAP_NS, StampClock, TransformMerge, TransformPath, rotation_between};
+use super::super::attitude::{self, MAX_VEHICLE_GAP_NS, TransformMerge, TransformPath, rotation_between};
 use super::super::log::relative_ns;
 use super::super::messages::{self, MessageKind};
-use super::super::{FlightLog, LogError};
-use super::ordered::{Decoder, Lookup, MessageSource, OrderedSamples, ReadContext, Refusal};
+use super::super::stamp_clock::StampClock;
+use super::super::{FlightLog, LogError, LogWarning, Magnitude, WarningKind};
+use super::ordered::{Decoder, Lookup, MessageSource, OrderedSamples};
+use super::read_context::{ReadContext, Refusal};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::gimbal::{InverseChain, InverseSolution};
 use crate::sensors::{AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig, JointSample};
@@ -37,8 +39,8 @@ pub(super) struct AttitudeJoints {
     unreachable: Stretch,
     without_vehicle: Stretch,
     topic: String,
-    /// Warnings that belong to the start of the log.
-    warnings: Vec<String>,
+    /// Topics and warnings that belong to the start of the log.
+    warnings: Vec<(String, String)>,
 }
 
 /// Readings of the gimbal in time order.
@@ -92,19 +94,22 @@ impl AttitudeJoints {
         let mut warnings = Vec::new();
         let readings = if let AttitudeMessage::Transforms { parent, child } = &source.message {
             let path = TransformPath::find(log, topic, parent, child)?;
-            let decoder = transform_decoder(path.clone(), log.epoch_ns());
+            let decoder = transform_decoder(path.clone(), log.epoch_ns(), StampClock::of_rig(gimbal.use_log_time));
             let samples = OrderedSamples::new(log, topic, from_ns, false, decoder).with_equal_stamps();
             GimbalReadings::Transforms { samples, merge: TransformMerge::new(path), ended: false }
         } else {
-            let clock = StampClock::of(log, topic, kind)?;
-            warnings.extend(clock.warning(topic));
+            let clock = match StampClock::of_rig(gimbal.use_log_time) {
+                StampClock::Stamps => StampClock::of(log, topic, kind)?,
+                given => given,
+            };
+            warnings.extend(clock.warning(topic).map(|warning| (topic.to_owned(), warning)));
             GimbalReadings::Messages(OrderedSamples::new(log, topic, from_ns, false, value_decoder(kind, clock)))
         };
         let vehicle = match attitude::vehicle_topic(log, source)? {
             None => None,
             Some((vehicle, kind)) => {
                 let clock = StampClock::of(log, vehicle, kind)?;
-                warnings.extend(clock.warning(vehicle));
+                warnings.extend(clock.warning(vehicle).map(|warning| (vehicle.to_owned(), warning)));
                 let decoder = vehicle_decoder(source.clone(), kind, clock);
                 // The gimbal's stamps may be shifted back relative to these, and its messages recorded later.
                 let shift_ns = ns_from_seconds(gimbal.timeshift_gimbal_imu_s).min(0);
@@ -133,8 +138,8 @@ impl AttitudeJoints {
 
     /// Next sample, `None` at the end of the log.
     pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<JointSample> {
-        for warning in self.warnings.drain(..) {
-            context.warn(0, warning);
+        for (topic, warning) in self.warnings.drain(..) {
+            context.warn(WarningKind::Stamps, &topic, 0, warning);
         }
         let Some((stamp_ns, solution)) = self.next_solution(context) else {
             self.report_unreachable(context, i64::MAX);
@@ -177,7 +182,8 @@ impl AttitudeJoints {
             seconds_from_ns(first_ns),
             seconds_from_ns(last_ns)
         );
-        context.warn(first_ns, message);
+        let warning = LogWarning::new(WarningKind::UnreachableAttitude, &self.topic, first_ns, message);
+        context.warnings.push(warning.until(last_ns).with_magnitude(Magnitude::Radians(largest_rad)));
     }
 
     fn report_without_vehicle(&mut self, context: &mut ReadContext, now_ns: i64) {
@@ -194,7 +200,9 @@ impl AttitudeJoints {
             self.source.vehicle_topic.as_deref().unwrap_or("the vehicle"),
             seconds_from_ns(MAX_VEHICLE_GAP_NS)
         );
-        context.warn(first_ns, message);
+        let length = Magnitude::Seconds(seconds_from_ns(last_ns - first_ns));
+        let warning = LogWarning::new(WarningKind::NoVehicleAttitude, &self.topic, first_ns, message);
+        context.warnings.push(warning.until(last_ns).with_magnitude(length));
     }
 }
 
@@ -254,7 +262,7 @@ fn vehicle_decoder(rig: AttitudeSource, kind: MessageKind, clock: StampClock) ->
 }
 
 /// Reads the transforms of the path from a message; messages without one are skipped.
-fn transform_decoder(path: TransformPath, epoch_ns: i64) -> Decoder<Vec<MovedTransform>> {
+fn transform_decoder(path: TransformPath, epoch_ns: i64, clock: StampClock) -> Decoder<Vec<MovedTransform>> {
     Box::new(move |source: MessageSource<'_>| {
         let entries = messages::read_transforms(source.data).map_err(|error| Refusal::not_decodable(&error))?;
         let mut moved = Vec::new();
@@ -265,8 +273,9 @@ fn transform_decoder(path: TransformPath, epoch_ns: i64) -> Decoder<Vec<MovedTra
                 reason: "not a rotation",
                 detail: "not finite, or a zero quaternion".into(),
             })?;
-            first_ns.get_or_insert(entry.stamp_ns);
-            moved.push((transform, relative_ns(entry.stamp_ns, epoch_ns), rotation));
+            let stamp_ns = clock.stamp_ns(entry.stamp_ns, source.position.log_time_ns);
+            first_ns.get_or_insert(stamp_ns);
+            moved.push((transform, relative_ns(stamp_ns, epoch_ns), rotation));
         }
         let first_ns = first_ns.ok_or_else(Refusal::unneeded)?;
         Ok((first_ns, moved))

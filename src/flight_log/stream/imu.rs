@@ -2,11 +2,15 @@
 
 use nalgebra::Vector3;
 
+use super::super::imu_filter::{ImuFilter, Reading, Unmeasured, has_forces};
 use super::super::imu_merge::ImuMerge;
 use super::super::log::relative_ns;
 use super::super::messages::{self, ImuMessage, MessageKind};
+use super::super::stamp_clock::StampClock;
 use super::super::{FlightLog, LogError};
-use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
+use super::drops::Drops;
+use super::ordered::{Decoder, MessageSource, OrderedSamples};
+use super::read_context::{ReadContext, Refusal};
 use crate::sensors::{ImuIntrinsics, ImuRig, ImuSample};
 
 /// IMU samples in the order of their stamps, corrected by the rig's scale and misalignment.
@@ -18,33 +22,46 @@ pub(super) struct ImuStream {
 /// Uncorrected samples.
 enum ImuSource {
     /// All six values in each message.
-    Together(Box<OrderedSamples<ImuSample>>),
+    Together(Box<Measured<ImuSample>>),
     /// Angular velocities and specific forces on separate topics.
     Apart(Box<SeparateSensors>),
 }
 
 /// Two topics, merged at the gyroscope's stamps.
-pub(super) struct SeparateSensors {
-    gyroscope: OrderedSamples<Vector3<f64>>,
+struct SeparateSensors {
+    gyroscope: Measured<(i64, Vector3<f64>)>,
     accelerometer: OrderedSamples<Vector3<f64>>,
     merge: ImuMerge,
+}
+
+/// Samples of a topic without those that no sensor measured.
+struct Measured<T> {
+    samples: OrderedSamples<T>,
+    filter: ImuFilter<T>,
+    drops: Drops,
+    ended: bool,
 }
 
 impl ImuStream {
     /// Reads from a stamp on.
     pub(super) fn new(log: &FlightLog, rig: &ImuRig, from_ns: i64) -> Result<Self, LogError> {
         log.require_topic("imu0.rostopic", &rig.topic, &[MessageKind::Imu])?;
+        let clock = StampClock::of_rig(rig.use_log_time);
         let Some(accelerometer) = &rig.accelerometer_topic else {
-            let decoder = sample_decoder(log.epoch_ns());
-            let samples = OrderedSamples::new(log, &rig.topic, from_ns, false, decoder);
+            let decoder = sample_decoder(log.epoch_ns(), clock, has_forces(log, &rig.topic));
+            let samples = Measured::new(log, &rig.topic, from_ns, decoder);
             return Ok(Self { source: ImuSource::Together(Box::new(samples)), intrinsics: rig.intrinsics });
         };
         log.require_topic("imu0.accelerometer_rostopic", accelerometer, &[MessageKind::Imu])?;
-        let gyroscope = vector_decoder("angular velocity", |imu| imu.angular_velocity_rad_per_s);
-        let of_accelerometer = vector_decoder("specific force", |imu| imu.specific_force_m_per_s2);
+        let epoch_ns = log.epoch_ns();
+        let mut rate = vector_decoder("angular velocity", |imu| imu.angular_velocity_rad_per_s, clock, None);
+        let stamped: Decoder<(i64, Vector3<f64>)> =
+            Box::new(move |source| rate(source).map(|(at_ns, rate)| (at_ns, (relative_ns(at_ns, epoch_ns), rate))));
+        let zero = has_forces(log, accelerometer).then_some(Unmeasured::ZeroForce);
+        let force = vector_decoder("specific force", |imu| imu.specific_force_m_per_s2, clock, zero);
         let sensors = SeparateSensors {
-            gyroscope: OrderedSamples::new(log, &rig.topic, from_ns, false, gyroscope),
-            accelerometer: OrderedSamples::new(log, accelerometer, from_ns, false, of_accelerometer),
+            gyroscope: Measured::new(log, &rig.topic, from_ns, stamped),
+            accelerometer: OrderedSamples::new(log, accelerometer, from_ns, false, force),
             merge: ImuMerge::default(),
         };
         Ok(Self { source: ImuSource::Apart(Box::new(sensors)), intrinsics: rig.intrinsics })
@@ -64,10 +81,52 @@ impl ImuStream {
     /// Next sample, `None` at the end of the log.
     pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<ImuSample> {
         let measured = match &mut self.source {
-            ImuSource::Together(samples) => samples.next(context).map(|(_, sample)| sample),
+            ImuSource::Together(samples) => samples.next(context),
             ImuSource::Apart(sensors) => sensors.next(context),
         };
         measured.map(|sample| self.intrinsics.correct(&sample))
+    }
+}
+
+impl<T: Reading> Measured<T> {
+    fn new(log: &FlightLog, topic: &str, from_ns: i64, decoder: Decoder<T>) -> Self {
+        Self {
+            samples: OrderedSamples::new(log, topic, from_ns, false, decoder),
+            filter: ImuFilter::default(),
+            drops: Drops::new(topic),
+            ended: false,
+        }
+    }
+
+    fn next(&mut self, context: &mut ReadContext) -> Option<T> {
+        loop {
+            match self.filter.pop() {
+                Some((sample, None)) => {
+                    self.drops.end(context);
+                    return Some(sample);
+                }
+                Some((sample, Some(reason))) => {
+                    let refusal = Refusal { reason: reason.reason(), detail: String::new() };
+                    self.drops.add(context, sample.stamp_ns(), refusal);
+                }
+                None if self.ended => return None,
+                None => self.push_next(context),
+            }
+        }
+    }
+
+    fn push_next(&mut self, context: &mut ReadContext) {
+        if let Some((_, sample)) = self.samples.next(context) {
+            self.filter.push(sample);
+        } else {
+            self.ended = true;
+            self.filter.finish();
+        }
+    }
+
+    fn finish(&mut self, context: &mut ReadContext) {
+        self.drops.end(context);
+        self.samples.finish(context);
     }
 }
 
@@ -88,29 +147,40 @@ impl SeparateSensors {
     }
 }
 
-/// Decodes samples with all six values.
-fn sample_decoder(epoch_ns: i64) -> Decoder<ImuSample> {
+/// Decodes samples with all six values; `has_forces` is false for a topic without specific forces.
+fn sample_decoder(epoch_ns: i64, clock: StampClock, has_forces: bool) -> Decoder<ImuSample> {
     Box::new(move |source: MessageSource<'_>| {
         let imu = messages::read_imu(source.data).map_err(|error| Refusal::not_decodable(&error))?;
         let (rate, force) = (imu.angular_velocity_rad_per_s, imu.specific_force_m_per_s2);
-        if !rate.iter().chain(&force).all(|number| number.is_finite()) {
+        if let Some(reason) = Unmeasured::of(&rate, &force, has_forces) {
             let detail = format!("angular velocity {:?}, specific force {:?}", rate.as_slice(), force.as_slice());
-            return Err(Refusal { reason: "values are not finite", detail });
+            return Err(refusal(reason, detail));
         }
-        let stamp_ns = relative_ns(imu.stamp_ns, epoch_ns);
-        Ok((imu.stamp_ns, ImuSample { stamp_ns, angular_velocity_rad_per_s: rate, specific_force_m_per_s2: force }))
+        let absolute_ns = clock.stamp_ns(imu.stamp_ns, source.position.log_time_ns);
+        let stamp_ns = relative_ns(absolute_ns, epoch_ns);
+        Ok((absolute_ns, ImuSample { stamp_ns, angular_velocity_rad_per_s: rate, specific_force_m_per_s2: force }))
     })
 }
 
-/// Decodes one of the two vectors; drivers leave the other one unset.
-fn vector_decoder(name: &'static str, value: fn(&ImuMessage) -> Vector3<f64>) -> Decoder<Vector3<f64>> {
+/// Decodes one of the two vectors; drivers leave the other one unset. `zero` is the reason that a zero is dropped.
+fn vector_decoder(
+    name: &'static str,
+    value: fn(&ImuMessage) -> Vector3<f64>,
+    clock: StampClock,
+    zero: Option<Unmeasured>,
+) -> Decoder<Vector3<f64>> {
     Box::new(move |source: MessageSource<'_>| {
         let imu = messages::read_imu(source.data).map_err(|error| Refusal::not_decodable(&error))?;
         let vector = value(&imu);
-        if !vector.iter().all(|number| number.is_finite()) {
-            let detail = format!("{name} {:?}", vector.as_slice());
-            return Err(Refusal { reason: "values are not finite", detail });
+        match Unmeasured::of_vector(&vector, zero) {
+            Some(reason) => Err(refusal(reason, format!("{name} {:?}", vector.as_slice()))),
+            None => Ok((clock.stamp_ns(imu.stamp_ns, source.position.log_time_ns), vector)),
         }
-        Ok((imu.stamp_ns, vector))
     })
+}
+
+/// Refusal of a message; the values are given where the reason does not.
+fn refusal(reason: Unmeasured, values: String) -> Refusal {
+    let detail = if reason == Unmeasured::NotFinite { values } else { String::new() };
+    Refusal { reason: reason.reason(), detail }
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::angle_fit::{self, Reading};
 use super::joint_topic::JointSamples;
-use super::ordered::ReadContext;
+use super::read_context::ReadContext;
 use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::sensors::{JointAngles, JointMotionFit, JointSample};
 

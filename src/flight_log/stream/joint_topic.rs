@@ -5,9 +5,11 @@ use std::sync::Arc;
 use super::super::joint_merge::{JointMerge, JointReading};
 use super::super::log::relative_ns;
 use super::super::messages::{self, JointMessage, MessageKind};
-use super::super::{FlightLog, LogError};
+use super::super::stamp_clock::StampClock;
+use super::super::{FlightLog, LogError, WarningKind};
 use super::attitude::AttitudeJoints;
-use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
+use super::ordered::{Decoder, MessageSource, OrderedSamples};
+use super::read_context::{ReadContext, Refusal};
 use crate::geometry::ns_from_seconds;
 use crate::sensors::{GimbalRig, JointSample};
 
@@ -29,7 +31,8 @@ impl JointSamples {
     /// Reads from a stamp on; `topic` is the gimbal's.
     pub(super) fn new(log: &Arc<FlightLog>, gimbal: &GimbalRig, topic: &str, from_ns: i64) -> Result<Self, LogError> {
         let timeshift_ns = ns_from_seconds(gimbal.timeshift_gimbal_imu_s);
-        let from_ns = from_ns.saturating_sub(timeshift_ns);
+        // Log times are on the recorder's clock: of stamps ahead of it nothing may be left out.
+        let from_ns = from_ns.saturating_sub(timeshift_ns.max(0));
         let source = match &gimbal.attitude {
             None => JointSource::Encoders(Box::new(EncoderJoints::new(log, gimbal, topic, from_ns)?)),
             Some(source) => JointSource::Attitude(Box::new(AttitudeJoints::new(log, gimbal, source, topic, from_ns)?)),
@@ -70,7 +73,13 @@ impl EncoderJoints {
         let names: Vec<String> = gimbal.joints.iter().map(|joint| joint.name.clone()).collect();
         let together = named_together(log, topic, &names)?;
         let joints = names.len();
-        let readings = OrderedSamples::new(log, topic, from_ns, false, reading_decoder(names, log.epoch_ns()));
+        let readings = OrderedSamples::new(
+            log,
+            topic,
+            from_ns,
+            false,
+            reading_decoder(names, log.epoch_ns(), StampClock::of_rig(gimbal.use_log_time)),
+        );
         Ok(Self {
             topic: topic.to_owned(),
             readings: if together { readings } else { readings.with_equal_stamps() },
@@ -95,7 +104,7 @@ impl EncoderJoints {
             };
             if !self.merge.push(&reading) && !std::mem::replace(&mut self.repeats_reported, true) {
                 let message = format!("{}: a joint has two readings with one stamp; the first one is used", self.topic);
-                context.warn(stamp_ns, message);
+                context.warn(WarningKind::RepeatedReading, &self.topic, stamp_ns, message);
             }
         }
     }
@@ -134,7 +143,7 @@ fn named_together(log: &FlightLog, topic: &str, names: &[String]) -> Result<bool
     }
 }
 
-fn reading_decoder(names: Vec<String>, epoch_ns: i64) -> Decoder<JointReading> {
+fn reading_decoder(names: Vec<String>, epoch_ns: i64, clock: StampClock) -> Decoder<JointReading> {
     Box::new(move |source: MessageSource<'_>| {
         let message = messages::read_joint_state(source.data).map_err(|error| Refusal::not_decodable(&error))?;
         if message.lacks_positions() {
@@ -148,8 +157,8 @@ fn reading_decoder(names: Vec<String>, epoch_ns: i64) -> Decoder<JointReading> {
         if angles_rad.iter().all(Option::is_none) {
             return Err(Refusal { reason: "it names no joint of the rig", detail: message.names.join(", ") });
         }
-        let stamp_ns = relative_ns(message.stamp_ns, epoch_ns);
-        Ok((message.stamp_ns, JointReading { stamp_ns, angles_rad }))
+        let absolute_ns = clock.stamp_ns(message.stamp_ns, source.position.log_time_ns);
+        Ok((absolute_ns, JointReading { stamp_ns: relative_ns(absolute_ns, epoch_ns), angles_rad }))
     })
 }
 

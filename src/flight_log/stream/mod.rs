@@ -2,11 +2,16 @@
 
 pub(crate) mod angle_fit;
 mod attitude;
+mod camera;
+mod drops;
 mod frames;
+mod gaps;
+mod ground_truth;
 mod imu;
 mod joint_angles;
 mod joint_topic;
 mod ordered;
+mod read_context;
 #[cfg(test)]
 mod tests;
 
@@ -15,7 +20,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 
 use self::frames::FrameSource;
-use super::{FlightLog, LogError, LogWarning, SensorFrame};
+use super::{FlightLog, LogError, LogWarning, SensorFrame, WarningKind};
 use crate::sensors::Rig;
 
 /// Number of frames read ahead; one takes about half a megabyte.
@@ -88,7 +93,7 @@ impl FrameStream {
             Ok(Delivery::End(warnings)) => self.remaining_warnings = warnings,
             Err(_) => {
                 let message = "reading stopped before the log's end: the reading thread failed".to_owned();
-                self.remaining_warnings.push(LogWarning { stamp_ns: 0, message });
+                self.remaining_warnings.push(LogWarning::new(WarningKind::ReadingStopped, "", 0, message));
             }
         }
         self.receiver = None;

@@ -1,80 +1,21 @@
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::super::container::{BlockCache, MessagePosition, TopicIndex};
+use super::super::FlightLog;
+use super::super::container::{MessagePosition, TopicIndex};
 use super::super::log::relative_ns;
 use super::super::messages::MessageKind;
 use super::super::video::keyframe_before;
-use super::super::{FlightLog, LogWarning};
+use super::drops::Drops;
+use super::read_context::{ReadContext, Refusal};
 use crate::geometry::seconds_from_ns;
 
 /// Messages out of order by up to this are sorted; later ones are dropped.
 const HORIZON_NS: i64 = 100_000_000;
-/// Number of cached blocks: one per topic, and one ahead for topics whose messages are already in the next block.
-const BLOCKS: usize = 8;
-/// Size of cached blocks: the topics of a frame lie in one or two blocks, and large ones contain many frames.
-const BLOCK_BYTES: u64 = 10 << 20;
-
-/// Log and warnings, shared by all topics of a stream.
-#[derive(Debug)]
-pub(super) struct ReadContext {
-    pub(super) log: Arc<FlightLog>,
-    cache: BlockCache,
-    /// Damaged blocks that have been reported.
-    reported: BTreeSet<usize>,
-    /// Warnings since they were last collected.
-    pub(super) warnings: Vec<LogWarning>,
-}
-
-impl ReadContext {
-    pub(super) fn new(log: Arc<FlightLog>) -> Self {
-        Self {
-            log,
-            cache: BlockCache::new(BLOCKS).with_capacity_bytes(BLOCK_BYTES),
-            reported: BTreeSet::new(),
-            warnings: Vec::new(),
-        }
-    }
-
-    pub(super) fn warn(&mut self, stamp_ns: i64, message: String) {
-        self.warnings.push(LogWarning { stamp_ns, message });
-    }
-
-    fn report_block(&mut self, position: MessagePosition, damage: Option<&str>) {
-        let block = &self.log.index().blocks[position.block];
-        // A block beyond the file's end was reported when the log was opened.
-        if !self.reported.insert(position.block) || block.bytes.end > self.log.file().len() {
-            return;
-        }
-        let (first, last) = (self.log.since_start(block.log_time_ns.0), self.log.since_start(block.log_time_ns.1));
-        let message = format!(
-            "damaged chunk at byte {}, from second {:.3} to {:.3}: {}; reading continues after it",
-            block.bytes.start,
-            seconds_from_ns(first),
-            seconds_from_ns(last),
-            damage.unwrap_or("the index points to no message")
-        );
-        self.warn(first, message);
-    }
-}
-
-/// Reason why a message was dropped, with its stamp if that could be read.
-pub(super) struct Refusal {
-    pub(super) reason: &'static str,
-    pub(super) detail: String,
-}
-
-impl Refusal {
-    /// Skips the message without a warning (not needed, not faulty).
-    pub(super) fn unneeded() -> Self {
-        Self { reason: "", detail: String::new() }
-    }
-
-    /// Drops a message whose bytes do not match its schema.
-    pub(super) fn not_decodable(error: &impl ToString) -> Self {
-        Self { reason: "it cannot be decoded", detail: error.to_string() }
-    }
-}
+/// Logs that start later than this, in nanoseconds since the Unix epoch, have stamps of a clock that is set (1973), in
+/// which 0 is no time.
+const EARLIEST_CLOCK_NS: i64 = 100_000_000_000_000_000;
+const UNSET: &str = "the header stamp was never set (use_log_time: true of the sensor in the rig takes the log time)";
 
 /// Decodes a message into its absolute header stamp and a sample.
 pub(super) type Decoder<T> = Box<dyn FnMut(MessageSource<'_>) -> Result<(i64, T), Refusal> + Send>;
@@ -87,19 +28,8 @@ pub(super) struct MessageSource<'a> {
     pub(super) position: MessagePosition,
 }
 
-/// Consecutive messages that were dropped for one reason.
-#[derive(Debug)]
-struct DroppedRun {
-    reason: &'static str,
-    detail: String,
-    first_ns: i64,
-    last_ns: i64,
-    count: usize,
-}
-
 /// Samples of one topic in the order of their header stamps.
 pub(super) struct OrderedSamples<T> {
-    topic: String,
     messages: TopicIndex,
     /// Index of the next message to read.
     next: usize,
@@ -111,7 +41,7 @@ pub(super) struct OrderedSamples<T> {
     released_ns: Option<i64>,
     /// True if several samples may have one stamp.
     equal_stamps: bool,
-    dropped: Option<DroppedRun>,
+    drops: Drops,
 }
 
 impl<T> OrderedSamples<T> {
@@ -125,9 +55,8 @@ impl<T> OrderedSamples<T> {
             messages.skip_to(log.index(), log_time_ns);
         }
         let next = messages.first_at(log.index(), log.file(), log_time_ns);
-        let (topic, pending) = (topic.to_owned(), BTreeMap::new());
-        let (released_ns, equal_stamps, dropped) = (None, false, None);
-        Self { topic, messages, next, exhausted: false, decode, pending, released_ns, equal_stamps, dropped }
+        let (pending, drops) = (BTreeMap::new(), Drops::new(topic));
+        Self { messages, next, exhausted: false, decode, pending, released_ns: None, equal_stamps: false, drops }
     }
 
     /// Starts with the keyframe on which the first message depends, for a video topic.
@@ -178,6 +107,9 @@ impl<T> OrderedSamples<T> {
         match (self.decode)(MessageSource { data, number, position }) {
             Ok((absolute_ns, sample)) => {
                 let stamp_ns = relative_ns(absolute_ns, log.epoch_ns());
+                if absolute_ns == 0 && log.epoch_ns() > EARLIEST_CLOCK_NS {
+                    return self.drops.add(context, log_time_ns, Refusal { reason: UNSET, detail: String::new() });
+                }
                 let repeats = Some(stamp_ns) == self.released_ns && !self.equal_stamps;
                 let newest_out = repeats || self.released_ns.is_some_and(|released| stamp_ns < released);
                 let duplicate =
@@ -189,45 +121,20 @@ impl<T> OrderedSamples<T> {
                         "the header stamps run backwards"
                     };
                     let detail = format!("stamp {:.6} s", seconds_from_ns(stamp_ns));
-                    self.refuse(context, log_time_ns, Refusal { reason, detail });
+                    self.drops.add(context, log_time_ns, Refusal { reason, detail });
                 } else {
-                    self.end_run(context);
+                    self.drops.end(context);
                     self.pending.insert((stamp_ns, number), sample);
                 }
             }
             Err(refusal) if refusal.reason.is_empty() => {}
-            Err(refusal) => self.refuse(context, log_time_ns, refusal),
+            Err(refusal) => self.drops.add(context, log_time_ns, refusal),
         }
     }
 
-    fn refuse(&mut self, context: &mut ReadContext, log_time_ns: i64, refusal: Refusal) {
-        if let Some(run) = self.dropped.as_mut().filter(|run| run.reason == refusal.reason) {
-            run.count += 1;
-            run.last_ns = log_time_ns;
-            return;
-        }
-        self.end_run(context);
-        let Refusal { reason, detail } = refusal;
-        self.dropped = Some(DroppedRun { reason, detail, first_ns: log_time_ns, last_ns: log_time_ns, count: 1 });
-    }
-
-    /// Reports consecutive dropped messages, at the next valid one or the log's end.
-    fn end_run(&mut self, context: &mut ReadContext) {
-        let Some(run) = self.dropped.take() else { return };
-        let (first, last) = (seconds_from_ns(run.first_ns), seconds_from_ns(run.last_ns));
-        let message = if run.count == 1 {
-            format!("{}: message at {first:.3} s dropped: {} ({})", self.topic, run.reason, run.detail)
-        } else {
-            format!(
-                "{}: {} messages from {first:.3} s to {last:.3} s dropped: {} (the first: {})",
-                self.topic, run.count, run.reason, run.detail
-            )
-        };
-        context.warn(run.first_ns, message);
-    }
-
+    /// Reports the last dropped messages.
     pub(super) fn finish(&mut self, context: &mut ReadContext) {
-        self.end_run(context);
+        self.drops.end(context);
     }
 }
 

@@ -6,6 +6,7 @@ mod camera_info;
 mod messages;
 mod rigs;
 mod streams;
+mod unmeasured;
 pub(crate) mod video;
 mod wide_images;
 
@@ -36,6 +37,8 @@ struct Flight {
     imu: fn(&mut i64, &mut Vector3<f64>, &mut Vector3<f64>) -> bool,
     /// Changes an image's stamp and size; `false` omits it.
     image: fn(&mut i64, &mut [usize; 2]) -> bool,
+    /// Stamp of the image that is shown at a stamp.
+    shown: fn(i64) -> i64,
     joints: bool,
     /// Period of an accelerometer on a separate topic, in milliseconds; the IMU's messages then have no force.
     accelerometer_ms: Option<i64>,
@@ -49,6 +52,7 @@ impl Default for Flight {
             options,
             imu: |_, _, _| true,
             image: |_, _| true,
+            shown: |stamp_ns| stamp_ns,
             joints: true,
             accelerometer_ms: None,
         }
@@ -109,7 +113,7 @@ impl Flight {
             if millisecond % 50 == 27 {
                 let (mut at, mut size) = (stamp_ns, [WIDTH, HEIGHT]);
                 if (self.image)(&mut at, &mut size) {
-                    let image = image_at(stamp_ns, size);
+                    let image = image_at((self.shown)(stamp_ns), size);
                     writer.write_raw_image("/camera", "camera", times(at, 18), size, "mono8", &image.pixels).unwrap();
                 }
             }

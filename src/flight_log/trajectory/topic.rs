@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::super::cdr::{CdrError, CdrReader};
 use super::super::geodesy::Geodetic;
 use super::super::messages::{self, MessageKind};
+use super::super::stamp_clock::StampClock;
 use super::super::{FlightLog, LogError};
 use super::RecordedPose;
 
@@ -37,6 +38,11 @@ impl FlightLog {
     /// # Errors
     /// When the log has no such topic, its type is another one, or no message can be used.
     pub fn read_trajectory_topic(&self, topic: &str) -> Result<Vec<RecordedPose>, LogError> {
+        self.trajectory_of_topic(topic, StampClock::Stamps)
+    }
+
+    /// [`Self::read_trajectory_topic`] with the stamps of a clock.
+    pub(crate) fn trajectory_of_topic(&self, topic: &str, clock: StampClock) -> Result<Vec<RecordedPose>, LogError> {
         let unusable = |problem: String| LogError::Trajectory { problem, path: self.path().to_owned() };
         let info = self.topic(topic).ok_or_else(|| {
             let candidates = self.topics().iter().filter(|info| content_of(&info.schema, info.kind).is_some());
@@ -48,8 +54,10 @@ impl FlightLog {
             .ok_or_else(|| unusable(format!("topic '{topic}' is of type {}, expected one of {TYPES}", info.schema)))?;
         let mut origin = None;
         let mut poses: Vec<RecordedPose> = Vec::new();
-        self.for_each_message(topic, |_, data| {
-            poses.extend(read(content, data, &mut origin).ok().flatten());
+        self.for_each_message(topic, |log_time_ns, data| {
+            let logged_ns = u64::try_from(self.epoch_ns().saturating_add(log_time_ns)).unwrap_or(0);
+            let pose = read(content, data, &mut origin).ok().flatten();
+            poses.extend(pose.map(|pose| RecordedPose { stamp_ns: clock.stamp_ns(pose.stamp_ns, logged_ns), ..pose }));
             true
         });
         if poses.is_empty() {

@@ -42,7 +42,7 @@ use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::units::counted;
 use crate::gui::window::{MainWindow, NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, window_ui};
 use crate::gui::{PanelContext, Presentation, Selection};
-use crate::session::{Command, PlaybackSpeed, Recording};
+use crate::session::{Command, PlaybackSpeed, Recording, WarningLine, log_warning_lines};
 
 /// Longest pause between two frames in seconds after which the cursor catches up; after a longer one the window was
 /// hidden or the machine suspended.
@@ -247,9 +247,10 @@ impl App {
 
     /// Shows one notice about the warnings of the log; the list has all of them.
     fn report_warnings(&mut self, recording: &Recording) {
-        let count = recording.warnings.len();
+        let lines = log_warning_lines(&recording.warnings);
+        let count = lines.len();
         if count > 0 && self.reported_warnings == 0 {
-            let first = &recording.warnings[0].message;
+            let first = lines.first().map(WarningLine::text).unwrap_or_default();
             let text = format!("{} about the log; first: {first}\nFull list: W", counted(count, "warning"));
             self.state.notices.show_message(NoticeLevel::Warning, text);
         }

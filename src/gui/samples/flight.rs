@@ -9,7 +9,7 @@ use std::sync::{Arc, LazyLock};
 use rayon::prelude::*;
 
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput};
-use crate::flight_log::LogWarning;
+use crate::flight_log::{LogWarning, WarningKind};
 use crate::gimbal::{Chain, Parameterization, auto_parameterization};
 use crate::observability::analyse;
 use crate::sensors::Rig;
@@ -119,10 +119,12 @@ fn recording_of(flight: &SyntheticFlight, runs: &[&str]) -> Recording {
         truth_is_batch: false,
         position_truth: None,
         trajectories: Vec::new(),
-        warnings: vec![LogWarning {
-            stamp_ns: 6_000_000_000,
-            message: "no IMU sample for 0.034 s at 6.00 s; bridged by interpolation".to_owned(),
-        }],
+        warnings: vec![LogWarning::new(
+            WarningKind::ImuGap,
+            "/imu",
+            6_000_000_000,
+            "no IMU sample for 0.034 s at 6.00 s; bridged by interpolation".to_owned(),
+        )],
         memory_budget_bytes: crate::session::DEFAULT_MEMORY_BUDGET_BYTES,
     }
 }

@@ -7,6 +7,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 use super::{MainWindow, Preset, window_ui};
+use crate::estimator::{FactorKind, StepWarning};
 use crate::gimbal::tests::parameter;
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
@@ -426,7 +427,14 @@ fn warnings_are_listed_and_lead_to_their_time() {
     let pushed = commands_of(&mut harness, |harness| harness.get_by_label("6.000 s").click());
     assert_eq!(pushed, [Command::Seek { stamp_ns: 6 * SECOND_NS }]);
     let warning = RunWarning {
-        message: "joint angles inconsistent".to_owned(),
+        warning: StepWarning {
+            factor: FactorKind::Encoder,
+            inconsistency: "Joint angles inconsistent",
+            mean_square: 1.9,
+            limit: 1.6,
+            averaged_s: 4.0,
+            cause: "check noise densities".to_owned(),
+        },
         first_ns: 4 * SECOND_NS,
         last_ns: 8 * SECOND_NS,
         steps: 80,
@@ -434,7 +442,7 @@ fn warnings_are_listed_and_lead_to_their_time() {
     harness.state_mut().recording.runs[1].warnings.push(warning);
     harness.run_steps(2);
     assert!(harness.query_by_label("⚠ 2 warnings").is_some());
-    assert!(harness.query_by_label("classical: joint angles inconsistent (80 steps, 4.000–8.000 s)").is_some());
+    assert!(harness.query_by_label("classical: Joint angles inconsistent (χ²/dof 1.90 > 1.60 over 4 s): check noise densities (80 steps, 4.000–8.000 s)").is_some());
     let pushed = commands_of(&mut harness, |harness| harness.get_by_label("4.000 s").click());
     assert_eq!(pushed, [Command::Seek { stamp_ns: 4 * SECOND_NS }]);
 }

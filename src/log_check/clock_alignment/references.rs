@@ -44,10 +44,8 @@ pub fn align_camera(
     search_s: f64,
 ) -> Result<(AlignmentReference, ClockAlignment), AlignmentError> {
     let survey = Survey::of(log, Some(rig));
-    let mut samples: Vec<_> =
-        survey.imu.iter().map(|sample| (sample.stamp_ns, sample.angular_velocity_rad_per_s)).collect();
-    samples.sort_by_key(|(stamp_ns, _)| *stamp_ns);
-    let in_seconds = samples.into_iter().map(|(stamp_ns, rate)| (seconds_from_ns(stamp_ns), rate));
+    let samples = survey.imu.iter().map(|sample| (sample.stamp_ns, sample.angular_velocity_rad_per_s));
+    let in_seconds = samples.map(|(stamp_ns, rate)| (seconds_from_ns(stamp_ns), rate));
     let rates = AngularRates::new(in_seconds).bridging_gaps();
     let gyroscope = RotationReference::Gyroscope(rates.clone());
     let rigid = align_clocks(rotations, &gyroscope, 0.0, search_s).map(|found| (AlignmentReference::Gyroscope, found));

@@ -3,12 +3,14 @@
 use nalgebra::Vector3;
 
 use crate::flight_log::container::DecodedBlock;
+use crate::flight_log::imu_filter::{Unmeasured, has_forces};
 use crate::flight_log::log::relative_ns;
+use crate::flight_log::stamp_clock::StampClock;
 use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::log_check::stationary::Stamped;
 use crate::sensors::Rig;
 
-/// Finite samples, ordered by stamp.
+/// Samples that are measurements, ordered by stamp.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ImuSeries {
     pub(super) topic: String,
@@ -24,6 +26,8 @@ impl ImuSeries {
         let topic = named.or_else(|| topics.first().cloned())?;
         let apart = rig.and_then(|rig| rig.imu.accelerometer_topic.clone()).filter(|topic| topics.contains(topic));
         let force_topic = apart.unwrap_or_else(|| topic.clone());
+        let clock = StampClock::of_rig(rig.is_some_and(|rig| rig.imu.use_log_time));
+        let has_forces = has_forces(log, &force_topic);
         let mut series = Self { topic, ..Self::default() };
         for block in &log.index().blocks {
             let decoded = DecodedBlock::decode(log.file(), block);
@@ -34,7 +38,14 @@ impl ImuSeries {
                     continue;
                 }
                 let Ok(imu) = messages::read_imu(decoded.bytes(&message.data)) else { continue };
-                let stamp_ns = relative_ns(imu.stamp_ns, log.epoch_ns());
+                let stamp_ns = relative_ns(clock.stamp_ns(imu.stamp_ns, message.log_time_ns), log.epoch_ns());
+                let (of_rate, of_force) = (&imu.angular_velocity_rad_per_s, &imu.specific_force_m_per_s2);
+                let zero = has_forces.then_some(Unmeasured::ZeroForce);
+                if (rate && force && Unmeasured::of(of_rate, of_force, has_forces).is_some())
+                    || (force && Unmeasured::of_vector(of_force, zero).is_some())
+                {
+                    continue;
+                }
                 if rate {
                     series.rates.push((stamp_ns, imu.angular_velocity_rad_per_s));
                 }

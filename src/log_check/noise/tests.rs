@@ -78,6 +78,7 @@ fn rig() -> Rig {
         imu: ImuRig {
             topic: "/imu".into(),
             accelerometer_topic: None,
+            use_log_time: false,
             frame_id: "imu".into(),
             rate_hz: RATE_HZ,
             noise: ImuNoise {
@@ -91,6 +92,7 @@ fn rig() -> Rig {
         cameras: Vec::new(),
         gimbal: None,
         ground_truth_topic: None,
+        ground_truth_use_log_time: false,
         ground_truth_lever_arm: None,
         assumed: Vec::new(),
     }

@@ -19,6 +19,8 @@ use crate::sensors::{CameraRig, GrayImage, Rig};
 const SECTIONS: [usize; 2] = [2, 10];
 /// Length of a section in seconds.
 const SECTION_S: f64 = 5.0;
+/// Larger time offsets in seconds are those of another clock.
+const ANOTHER_CLOCK_S: f64 = 1.0;
 /// Standard deviation of a tracked feature's position, per coordinate, in pixels.
 const PIXEL_SIGMA_PX: f64 = 0.5;
 /// Standard deviation of a camera's rotation between consecutive images, per axis. It does not depend on the rig,
@@ -39,18 +41,38 @@ pub fn image_rotations(log: &Arc<FlightLog>, rig: &Rig) -> Vec<ImageRotation> {
         gimbal.topic = None;
     }
     let rig = &rig;
-    let duration_s = seconds_from_ns(log.duration_ns());
-    let sections = ((duration_s / SECTION_S).ceil() as usize).clamp(SECTIONS[0], SECTIONS[1]);
-    let length_s = SECTION_S.min(duration_s / sections as f64);
-    let section = |number: usize| {
-        let middle_s = duration_s * (number as f64 + 0.5) / sections as f64;
-        middle_s - 0.5 * length_s
-    };
-    let jobs: Vec<(&CameraRig, f64)> =
-        rig.cameras.iter().flat_map(|camera| (0..sections).map(move |number| (camera, section(number)))).collect();
-    let found: Vec<Vec<ImageRotation>> =
-        jobs.par_iter().map(|(camera, start_s)| rotations_of(log, rig, camera, *start_s, length_s)).collect();
+    let jobs: Vec<(&CameraRig, f64, f64)> = rig
+        .cameras
+        .iter()
+        .flat_map(|camera| {
+            let (begin_s, duration_s) = span_of(log, rig, camera);
+            let sections = ((duration_s / SECTION_S).ceil() as usize).clamp(SECTIONS[0], SECTIONS[1]);
+            let length_s = SECTION_S.min(duration_s / sections as f64);
+            let middle_s = move |number: usize| begin_s + duration_s * (number as f64 + 0.5) / sections as f64;
+            (0..sections).map(move |number| (camera, middle_s(number) - 0.5 * length_s, length_s))
+        })
+        .collect();
+    let found: Vec<Vec<ImageRotation>> = jobs
+        .par_iter()
+        .map(|(camera, start_s, length_s)| rotations_of(log, rig, camera, *start_s, *length_s))
+        .collect();
     found.into_iter().flatten().collect()
+}
+
+/// First stamp and duration of a camera's images in camera time, in seconds: those of the log, unless the time offset of
+/// the rig is that of another clock.
+fn span_of(log: &Arc<FlightLog>, rig: &Rig, camera: &CameraRig) -> (f64, f64) {
+    let of_log = (0.0, seconds_from_ns(log.duration_ns()));
+    if camera.timeshift_cam_imu_s.abs() < ANOTHER_CLOCK_S {
+        return of_log;
+    }
+    let stamps = ImageReader::new(Arc::clone(log), rig).stamps_ns(&camera.key);
+    match (stamps.first(), stamps.last()) {
+        (Some((_, first_ns)), Some((_, last_ns))) => {
+            (seconds_from_ns(*first_ns), seconds_from_ns(last_ns.saturating_sub(*first_ns)))
+        }
+        _ => of_log,
+    }
 }
 
 fn rotations_of(

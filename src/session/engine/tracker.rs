@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::step_inputs::OwnedStepInput;
 use super::stopwatch::Stopwatch;
-use crate::flight_log::{FlightLog, FrameStream, LogError, LogWarning, SensorFrame};
+use crate::flight_log::{FlightLog, FrameStream, LogError, LogWarning, SensorFrame, WarningKind};
 use crate::frontend::{
     ChainOrientation, FrontEnd, FrontEndOptions, PredictionNoise, camera_rates, predict_camera_rotation,
 };
@@ -100,7 +100,8 @@ impl CameraTracker {
                 }
                 Err(error) => {
                     rejected.append(&mut frame.warnings);
-                    rejected.push(LogWarning { stamp_ns: frame.stamp_ns, message: format!("image skipped: {error}") });
+                    let message = format!("image skipped: {error}");
+                    rejected.push(LogWarning::new(WarningKind::ImageUnreadable, "", frame.stamp_ns, message));
                 }
             }
         }

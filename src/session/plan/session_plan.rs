@@ -103,7 +103,7 @@ impl SessionPlan {
             .collect::<Result<Vec<_>, _>>()?;
         let labels: Vec<&str> = runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
         let span = (request.start_s, request.duration_s);
-        let trajectories = trajectories::load(&log, &request.trajectories, &labels, span)?;
+        let trajectories = trajectories::load(&log, &rig, &request.trajectories, &labels, span)?;
         let truth_request = (request.truth_trajectory.clone(), request.lever_arm);
         let positions_in_log = rig.ground_truth_topic.as_deref().is_some_and(|topic| log.is_position_topic(topic));
         let needed = truth_request != (None, None) || positions_in_log || !trajectories.is_empty();

@@ -4,6 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::error::SessionError;
 use super::trajectory_spec::{MAX_TRAJECTORIES, TrajectorySource, TrajectorySpec, distinct_trajectory_labels};
+use crate::flight_log::stamp_clock::StampClock;
 use crate::flight_log::{FlightLog, LogError, RecordedPose, read_trajectory_file};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{LeverArm, PoseSample, PoseTrack, PositionSample, Rig};
@@ -23,6 +24,7 @@ pub struct LoadedTrajectory {
 /// If there are too many, or if one cannot be read, has no attitudes, or has no pose within the time of the session.
 pub(super) fn load(
     log: &FlightLog,
+    rig: &Rig,
     specs: &[TrajectorySpec],
     run_labels: &[&str],
     (start_s, duration_s): (f64, Option<f64>),
@@ -35,7 +37,7 @@ pub(super) fn load(
     let begin_ns = ns_from_seconds(start_s);
     let end_ns = duration_s.map_or_else(|| log.duration_ns(), |duration_s| begin_ns + ns_from_seconds(duration_s));
     let of_spec = |spec: TrajectorySpec| {
-        let poses = recorded(log, &spec.source)?;
+        let poses = recorded(log, rig, &spec.source)?;
         let refuse = |problem: String| SessionError::Trajectory { source_name: spec.source.to_string(), problem };
         let sample = |pose: &RecordedPose| {
             let stamp_ns = pose.stamp_ns.checked_sub(log.epoch_ns())?;
@@ -54,10 +56,11 @@ pub(super) fn load(
     specs.into_iter().map(of_spec).collect()
 }
 
-fn recorded(log: &FlightLog, source: &TrajectorySource) -> Result<Vec<RecordedPose>, LogError> {
+/// Poses of a file or topic; stamps are log times where the rig says so.
+fn recorded(log: &FlightLog, rig: &Rig, source: &TrajectorySource) -> Result<Vec<RecordedPose>, LogError> {
     match source {
         TrajectorySource::File(path) => read_trajectory_file(path),
-        TrajectorySource::Topic(topic) => log.read_trajectory_topic(topic),
+        TrajectorySource::Topic(topic) => log.trajectory_of_topic(topic, StampClock::of_rig(rig.uses_log_time(topic))),
     }
 }
 
@@ -106,7 +109,7 @@ pub(super) fn ground_truth(
 ) -> Result<Option<LoadedTruth>, SessionError> {
     let of_rig = || rig.ground_truth_topic.clone().map(TrajectorySource::Topic);
     let Some(source) = asked.cloned().or_else(of_rig) else { return Ok(None) };
-    let poses = match (recorded(log, &source), asked) {
+    let poses = match (recorded(log, rig, &source), asked) {
         (Ok(poses), _) => poses,
         (Err(error), Some(_)) => return Err(error.into()),
         // The reader of the frames warns of a missing topic.

@@ -37,7 +37,7 @@ pub use step::{StepFactorRows, StepRecord};
 pub use trajectory_accuracy::{RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};
 pub use trajectory_evaluation::{TrajectoryEvaluation, evaluate_trajectory};
 pub use trajectory_lane::TrajectoryLane;
-pub use warning_lines::{WarningLine, log_warning_lines, warning_lines};
+pub use warning_lines::{WarningLine, log_warning_lines, run_warning_lines, warning_lines};
 pub use warnings::RunWarning;
 #[cfg(test)]
 pub(in crate::session) use warnings::warnings_of;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::antenna_record::PositionTruth;
 use super::run::RunRecord;
 use super::trajectory_lane::TrajectoryLane;
-use crate::flight_log::LogWarning;
+use crate::flight_log::{LogWarning, WarningKind};
 use crate::geometry::ns_from_seconds;
 use crate::sensors::Rig;
 use crate::session::plan::{LoadedTrajectory, RunSpec, SessionPlan};
@@ -72,7 +72,9 @@ impl Recording {
             warnings: Vec::new(),
             memory_budget_bytes: plan.memory_budget_bytes,
         };
-        recording.add_warnings(plan.log.warnings().to_vec());
+        let replaced =
+            |warning: &&LogWarning| warning.kind == WarningKind::Stamps && plan.rig.uses_log_time(&warning.subject);
+        recording.add_warnings(plan.log.warnings().iter().filter(|warning| !replaced(warning)).cloned().collect());
         recording
     }
 

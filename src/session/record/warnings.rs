@@ -1,15 +1,15 @@
-//! The warnings of a run's steps, each message once.
+//! The warnings of a run's steps, equal ones once.
 
 use std::sync::Arc;
 
 use super::step::StepRecord;
-use crate::estimator::StepReport;
+use crate::estimator::{StepReport, StepWarning};
 
-/// A warning message and the steps that reported it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// A warning and the steps that reported it.
+#[derive(Clone, Debug, PartialEq)]
 pub struct RunWarning {
     /// The problem and its remedy.
-    pub message: String,
+    pub warning: StepWarning,
     /// Header stamp of the first step that reported it.
     pub first_ns: i64,
     /// Header stamp of the last step that reported it.
@@ -29,14 +29,14 @@ pub(in crate::session) fn warnings_of(steps: &[Arc<StepRecord>]) -> Vec<RunWarni
 
 /// Adds the warnings of one more step.
 pub(in crate::session) fn add_warnings(warnings: &mut Vec<RunWarning>, report: &StepReport) {
-    for message in &report.warnings {
-        match warnings.iter_mut().find(|known| known.message == *message) {
+    for warning in &report.warnings {
+        match warnings.iter_mut().find(|known| known.warning == *warning) {
             Some(known) => {
                 known.steps += 1;
                 known.last_ns = report.stamp_ns;
             }
             None => warnings.push(RunWarning {
-                message: message.clone(),
+                warning: warning.clone(),
                 first_ns: report.stamp_ns,
                 last_ns: report.stamp_ns,
                 steps: 1,

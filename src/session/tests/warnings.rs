@@ -1,5 +1,6 @@
 //! The warnings of a run, over all its steps.
 
+use crate::estimator::StepWarning;
 use crate::session::plan::ForkChanges;
 use crate::session::record::{RunRecord, warnings_of};
 use crate::session::tests::memory::recorded;
@@ -10,13 +11,14 @@ use crate::simulation::{SyntheticOptions, synthetic_tracks};
 fn a_warning_is_kept_once_with_its_first_time_and_its_count() {
     let flight = synthetic_tracks(&SyntheticOptions { clock_offsets_s: [0.015, 0.0], ..SyntheticOptions::default() });
     let mut run = recorded(&flight, "auto");
-    let warns =
-        |step: &&std::sync::Arc<crate::session::StepRecord>, message: &String| step.report.warnings.contains(message);
+    let warns = |step: &&std::sync::Arc<crate::session::StepRecord>, warning: &StepWarning| {
+        step.report.warnings.contains(warning)
+    };
     assert!(!run.warnings.is_empty());
     for warning in &run.warnings {
-        let steps: Vec<_> = run.steps.iter().filter(|step| warns(step, &warning.message)).collect();
-        assert_eq!((warning.first_ns, warning.steps), (steps[0].report.stamp_ns, steps.len()), "{}", warning.message);
-        assert_eq!(Some(warning.last_ns), steps.last().map(|step| step.report.stamp_ns), "{}", warning.message);
+        let steps: Vec<_> = run.steps.iter().filter(|step| warns(step, &warning.warning)).collect();
+        assert_eq!((warning.first_ns, warning.steps), (steps[0].report.stamp_ns, steps.len()), "{}", warning.warning);
+        assert_eq!(Some(warning.last_ns), steps.last().map(|step| step.report.stamp_ns), "{}", warning.warning);
     }
     let first_ns = run.warnings.iter().map(|warning| warning.first_ns).min().unwrap();
     let first = run.steps.iter().position(|step| step.report.stamp_ns == first_ns).unwrap();

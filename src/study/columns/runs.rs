@@ -4,6 +4,7 @@ use super::column::Column;
 use super::column::Direction;
 use super::job_result::JobResult;
 use crate::estimator::FailureCause;
+use crate::session::{log_warning_lines, run_warning_lines};
 use crate::study::JobLog;
 use crate::text::Named as _;
 
@@ -141,7 +142,7 @@ impl<'a> JobResult<'a> {
         Column::number("lost_s", "s", "time without a pose after the first one", |job| job.run.as_ref()?.lost_s()),
         Column::count("warnings", "different warnings about the log and of the run", |job| {
             let run = job.run.as_ref()?;
-            Some(run.recording.warnings.len() + run.record.warnings.len())
+            Some(log_warning_lines(&run.recording.warnings).len() + run_warning_lines(run.record).len())
         }),
         Column::number(
             "ate_rmse_m",

@@ -156,6 +156,7 @@ impl RigTemplate {
             imu: ImuRig {
                 topic: self.imu.topic.value.clone(),
                 accelerometer_topic: self.imu.accelerometer_topic.clone(),
+                use_log_time: false,
                 frame_id: "imu".to_owned(),
                 rate_hz: self.imu.rate_hz,
                 noise: self.imu.noise.value,
@@ -165,6 +166,7 @@ impl RigTemplate {
                 key: "cam0".to_owned(),
                 mount,
                 topic: self.camera.topic.value.clone(),
+                use_log_time: false,
                 frame_id: self.camera.frame_id.clone(),
                 rate_hz: self.camera.rate_hz,
                 model: self.camera.model.value.clone(),
@@ -176,6 +178,7 @@ impl RigTemplate {
             }],
             gimbal: self.gimbal.as_ref().map(|gimbal| self.gimbal_rig(gimbal)),
             ground_truth_topic: self.ground_truth_topic.clone(),
+            ground_truth_use_log_time: false,
             ground_truth_lever_arm: None,
             assumed: self.assumed_fields(),
         }
@@ -198,6 +201,7 @@ impl RigTemplate {
                 AngleTemplate::Attitude(attitude) => Some(attitude.source.value.clone()),
                 _ => None,
             },
+            use_log_time: false,
             timeshift_gimbal_imu_s: 0.0,
             rate_hz,
             encoder_sigma_rad: sigma_rad,

@@ -1,6 +1,8 @@
-use super::super::log::relative_ns;
-use super::super::messages::{self, MessageKind};
-use super::super::{FlightLog, LogError};
+//! Source of the times of a topic: header stamps or log times.
+
+use super::log::relative_ns;
+use super::messages::{self, MessageKind};
+use super::{FlightLog, LogError};
 use crate::geometry::seconds_from_ns;
 
 /// Stamps and log times this far outside of the log's stamps belong to another clock.
@@ -16,9 +18,16 @@ pub(crate) enum StampClock {
         /// First stamp since the zero of that clock.
         first_stamp_ns: i64,
     },
+    /// Log times, because the rig has `use_log_time` for the sensor.
+    LogTimesOfRig,
 }
 
 impl StampClock {
+    /// Clock of a sensor whose stamps are of the log's time unless the rig has `use_log_time` for it.
+    pub(crate) fn of_rig(use_log_time: bool) -> Self {
+        if use_log_time { Self::LogTimesOfRig } else { Self::Stamps }
+    }
+
     /// Selects the clock of a topic. Stamps of PX4 count from its start unless its bridge has converted them; they are
     /// used if the first one lies within the times of the log. An error if neither stamps nor log times do.
     pub(crate) fn of(log: &FlightLog, topic: &str, kind: MessageKind) -> Result<Self, LogError> {
@@ -45,7 +54,7 @@ impl StampClock {
     pub(crate) fn stamp_ns(self, stamp_ns: i64, log_time_ns: u64) -> i64 {
         match self {
             Self::Stamps => stamp_ns,
-            Self::LogTimes { .. } => i64::try_from(log_time_ns).unwrap_or(i64::MAX),
+            Self::LogTimes { .. } | Self::LogTimesOfRig => i64::try_from(log_time_ns).unwrap_or(i64::MAX),
         }
     }
 
