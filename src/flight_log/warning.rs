@@ -27,6 +27,8 @@ pub enum WarningKind {
     ImageSize,
     /// Images that cannot be decoded or tracked.
     ImageUnreadable,
+    /// Images of a camera on a gimbal without joint angles.
+    NoJointAngles,
     /// Images before the first IMU sample.
     ImageBeforeImu,
     /// Images after the last IMU sample.
@@ -49,9 +51,12 @@ impl WarningKind {
         match self {
             Self::Dropped(_) => "messages",
             Self::ImuGap | Self::ImageGap => "gaps",
-            Self::ImageCopy | Self::ImageSize | Self::ImageUnreadable | Self::ImageBeforeImu | Self::ImageAfterImu => {
-                "images"
-            }
+            Self::ImageCopy
+            | Self::ImageSize
+            | Self::ImageUnreadable
+            | Self::NoJointAngles
+            | Self::ImageBeforeImu
+            | Self::ImageAfterImu => "images",
             Self::DamagedChunk => "chunks",
             Self::UnreachableAttitude | Self::NoVehicleAttitude => "intervals",
             _ => "warnings",

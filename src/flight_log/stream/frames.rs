@@ -14,7 +14,7 @@ use super::joint_angles::JointAngleStream;
 use super::joint_topic::JointSamples;
 use super::read_context::ReadContext;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
-use crate::sensors::{ImuSample, Rig};
+use crate::sensors::{CameraMount, CameraRig, ImuSample, Rig};
 
 /// Duration of the IMU samples before the first frame.
 const FIRST_FRAME_IMU_NS: i64 = 2_000_000_000;
@@ -33,6 +33,8 @@ pub(super) struct FrameSource {
     /// IMU samples not before the previous frame, and the first one after the frame.
     samples: VecDeque<ImuSample>,
     joints: Option<JointAngleStream>,
+    /// Topic of the joint angles of a camera on a gimbal.
+    joint_topic: Option<String>,
     ground_truth: Option<GroundTruth>,
     /// IMU sample interpolated at the previous frame's end.
     previous_end: Option<ImuSample>,
@@ -79,6 +81,7 @@ impl FrameSource {
             imu_ended: false,
             rotating_ns: None,
             samples: VecDeque::new(),
+            joint_topic: joints.is_some().then(|| joint_topic(rig, camera)).flatten(),
             joints,
             ground_truth,
             previous_end: None,
@@ -131,6 +134,7 @@ impl FrameSource {
             let context = &mut self.context;
             let joint_angles = self.joints.as_mut().and_then(|joints| joints.at(context, imu_stamp_ns, previous_ns));
             let ground_truth = self.ground_truth.as_mut().and_then(|poses| poses.at(context, imu_stamp_ns));
+            self.warn_of_joint_angles(stamp_ns, joint_angles.is_some());
             while self.log_warnings.front().is_some_and(|warning| warning.stamp_ns <= stamp_ns) {
                 self.context.warnings.extend(self.log_warnings.pop_front());
             }
@@ -158,6 +162,16 @@ impl FrameSource {
             self.context.warnings.extend(self.log_warnings.drain(..));
         }
         std::mem::take(&mut self.context.warnings)
+    }
+
+    /// Reports an image of a camera on a gimbal without joint angles, although the log has their topic.
+    fn warn_of_joint_angles(&mut self, stamp_ns: i64, found: bool) {
+        let Some(topic) = self.joint_topic.as_ref().filter(|_| !found) else { return };
+        let message = format!(
+            "{topic}: no joint angles near the image at {:.3} s: the camera's orientation is estimated without them",
+            seconds_from_ns(stamp_ns)
+        );
+        self.context.warn(WarningKind::NoJointAngles, topic, stamp_ns, message);
     }
 
     fn read_imu_until(&mut self, stamp_ns: i64) {
@@ -245,6 +259,11 @@ impl FrameSource {
             self.context.warnings.push(warning.with_count(left, last.stamp_ns));
         }
     }
+}
+
+/// Topic of the joint angles of a camera, `None` for a rigid one.
+fn joint_topic(rig: &Rig, camera: &CameraRig) -> Option<String> {
+    rig.gimbal.as_ref().filter(|_| camera.mount == CameraMount::Gimbal)?.topic.clone()
 }
 
 /// Half an interval between images, by the slower of the rig's rate and the log's mean rate.
