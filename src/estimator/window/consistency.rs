@@ -131,10 +131,10 @@ impl ConsistencyMonitor {
 }
 
 /// Cause of an inconsistency: a rolling shutter or wrong intrinsics if they explain the windows better than any time
-/// offset, else the usual causes.
+/// offset, else unknown.
 fn cause(suspected: &[SuspectedParameter], config: &EstimatorConfig) -> String {
     let strongest = suspected.iter().max_by(|one, other| one.chi2().total_cmp(&other.chi2()));
-    let Some(found) = strongest.filter(|it| it.chi2() > SIGNIFICANT_CHI2) else { return usual_causes(config) };
+    let Some(found) = strongest.filter(|it| it.chi2() > SIGNIFICANT_CHI2) else { return UNKNOWN_CAUSE.to_owned() };
     let rigid = found.parameter.part.camera().checked_sub(1).and_then(|rigid| config.rigid_cameras.get(rigid));
     let camera = rigid.map_or("the camera", |rigid| &rigid.key);
     let intrinsics = match found.parameter.quantity {
@@ -147,7 +147,7 @@ fn cause(suspected: &[SuspectedParameter], config: &EstimatorConfig) -> String {
         Quantity::Fx | Quantity::Fy => "focal length",
         Quantity::Cx | Quantity::Cy => "principal point",
         Quantity::K1 | Quantity::K2 => "distortion",
-        _ => return usual_causes(config),
+        _ => return UNKNOWN_CAUSE.to_owned(),
     };
     format!(
         "intrinsics of {camera} inconsistent with its images (another {intrinsics} explains the residuals better than a time \
@@ -155,10 +155,6 @@ fn cause(suspected: &[SuspectedParameter], config: &EstimatorConfig) -> String {
     )
 }
 
-/// Possible causes if no single parameter explains an inconsistency, and the options that may remove it.
-fn usual_causes(config: &EstimatorConfig) -> String {
-    let options = [("calibrate=on", config.calibrate), ("timeshift=on", config.estimate_timeshift)];
-    let tries: Vec<&str> = options.into_iter().filter(|(_, on)| !on).map(|(option, _)| option).collect();
-    let tries = if tries.is_empty() { String::new() } else { format!("; try {}", tries.join(" and ")) };
-    format!("check time offsets, calibration, noise densities{tries}")
-}
+/// Text for an inconsistency that no single parameter explains: a guess would send the reader the wrong way.
+const UNKNOWN_CAUSE: &str = "cause unknown: dcvins check measures clocks, shutter, intrinsics and axes, dcvins diagnose \
+                             compares the causes";
