@@ -8,6 +8,7 @@ use super::imu_facts::ImuFacts;
 use super::statistics::median;
 use super::{Area, Findings, ImageRotation, Severity};
 use crate::flight_log::log::relative_ns;
+use crate::flight_log::spacing::Spacing;
 use crate::flight_log::{FlightLog, RecordedPose};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns, so3};
 use crate::sensors::Rig;
@@ -55,11 +56,15 @@ pub(super) fn check_ground_truth(log: &FlightLog, rig: &Rig, imu_facts: &ImuFact
     if imu_facts.samples.is_empty() || truth.poses.is_empty() {
         return;
     }
-    truth.compare(imu_facts, findings);
+    // Stamps of a batch are late by up to its length.
+    let stamps = imu_facts.samples.iter().map(|sample| sample.stamp_ns);
+    let batches = Spacing::of(stamps, Some(rig.imu.rate_hz)).batches;
+    truth.compare(imu_facts, batches.map_or(0.0, |batches| batches.pause_s), findings);
 }
 
 impl GroundTruth<'_> {
-    fn compare(&self, imu_facts: &ImuFacts, findings: &mut Findings) {
+    /// `imu_delay_s` is the largest delay of the IMU's own stamps.
+    fn compare(&self, imu_facts: &ImuFacts, imu_delay_s: f64, findings: &mut Findings) {
         let [given, reversed] = [1.0, -1.0].map(|factor| {
             let reference = RotationReference::Gyroscope(imu_facts.gyroscope.scaled(factor));
             align_clocks(&self.rotations(), &reference, 0.0, MAX_OFFSET_S)
@@ -75,7 +80,7 @@ impl GroundTruth<'_> {
                 report_failure(&AlignmentError::NoAgreement { offset_s, explained }, findings);
             }
             Ok(found) => {
-                self.report_clock(&found, findings);
+                self.report_clock(&found, imu_delay_s, findings);
                 report_body(&found, findings);
                 self.report_world(&found, imu_facts, findings);
             }
@@ -113,7 +118,7 @@ impl GroundTruth<'_> {
         median(&self.poses.windows(2).map(speed).collect::<Vec<_>>())
     }
 
-    fn report_clock(&self, found: &ClockAlignment, findings: &mut Findings) {
+    fn report_clock(&self, found: &ClockAlignment, imu_delay_s: f64, findings: &mut Findings) {
         let (offset_s, sigma_s) = (found.offset_s, found.offset_sigma_s);
         let evidence = format!(
             "{:.1} ± {:.1} ms {} than the gyroscope, by {} rotations of {:.2}° in the median, which then differ by {:.3}°; \
@@ -127,7 +132,7 @@ impl GroundTruth<'_> {
             self.speed_m_per_s(),
             self.speed_m_per_s() * offset_s.abs()
         );
-        if offset_s.abs() < OFFSET_TOLERANCE_S.max(SIGNIFICANT_SIGMAS * sigma_s) {
+        if offset_s.abs() < OFFSET_TOLERANCE_S.max(SIGNIFICANT_SIGMAS * sigma_s) + imu_delay_s {
             return findings.good(Area::Time, "ground truth and gyroscope are synchronized", evidence);
         }
         let late = if offset_s < 0.0 { "late" } else { "early" };
@@ -304,7 +309,7 @@ mod tests {
         poses.iter_mut().for_each(change);
         let truth = GroundTruth { topic: "/truth", poses };
         let mut findings = Findings::default();
-        truth.compare(&imu_facts, &mut findings);
+        truth.compare(&imu_facts, 0.0, &mut findings);
         findings.list.into_iter().filter(|it| it.severity != Severity::Good).map(|it| it.title).collect()
     }
 
@@ -346,7 +351,7 @@ mod tests {
             imu_facts.samples.iter().map(|it| (seconds_from_ns(it.stamp_ns), swapped(it.angular_velocity_rad_per_s)));
         imu_facts.gyroscope = AngularRates::new(rates.collect::<Vec<_>>());
         let mut findings = Findings::default();
-        GroundTruth { topic: "/truth", poses }.compare(&imu_facts, &mut findings);
+        GroundTruth { topic: "/truth", poses }.compare(&imu_facts, 0.0, &mut findings);
         let titles: Vec<&str> = findings.list.iter().map(|finding| finding.title.as_str()).collect();
         assert_eq!(titles, ["the axes of the gyroscope form a left-handed frame, by the ground truth"]);
     }

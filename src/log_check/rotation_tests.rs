@@ -186,3 +186,20 @@ fn axes_that_differ_by_a_right_angle_are_an_orientation() {
     let images = Images { mount: |_| Vector3::new(0.0, 0.0, FRAC_PI_2), ..Images::default() };
     expect(&images.check(&Flight::default()), Severity::Error, &["the orientation of cam0 differs from the rig"]);
 }
+
+#[test]
+fn joint_angles_that_end_before_the_images_are_an_error() {
+    let ends = |ms: i64, angle: &mut f64| {
+        if ms > 7000 {
+            *angle = f64::NAN;
+        }
+    };
+    let report = Flight { joint: ends, ..on_gimbal() }.check(&[]);
+    expect(&report, Severity::Error, &["joint angles end at 7.0 s"]);
+    let begins = |ms: i64, angle: &mut f64| {
+        if ms < 700 {
+            *angle = f64::NAN;
+        }
+    };
+    expect(&Flight { joint: begins, ..on_gimbal() }.check(&[]), Severity::Warning, &["joint angles begin at 0.7 s"]);
+}

@@ -153,14 +153,14 @@ fn check_rate(role: &str, period_s: f64, nominal_hz: Option<f64>, findings: &mut
         && (measured_hz / nominal_hz - 1.0).abs() > RATE_TOLERANCE
     {
         let evidence = format!("{measured_hz:.1} Hz measured, {nominal_hz:.1} Hz in the rig");
-        let remedy = format!("set {role}.update_rate; where noise is given per sample, convert it with the true rate");
-        findings.add(
-            Severity::Warning,
-            Area::Time,
-            format!("the rate of {role} differs from the rig"),
-            evidence,
-            remedy,
-        );
+        // Only the noise of the IMU depends on the rate in the rig.
+        let (severity, remedy) = if role == "imu0" {
+            let remedy = "set imu0.update_rate; where noise is given per sample, convert it with the true rate";
+            (Severity::Warning, remedy.to_owned())
+        } else {
+            (Severity::Note, format!("set {role}.update_rate"))
+        };
+        findings.add(severity, Area::Time, format!("the rate of {role} differs from the rig"), evidence, remedy);
     }
     let slowest_hz = match role {
         "imu0" => 100.0,

@@ -17,7 +17,7 @@ const OFFSET_SIGMA_S: f64 = 0.02;
 const SCALE_SIGMA: f64 = 0.005;
 const ITERATIONS: usize = 8;
 /// Change of all parameters, in units of their steps, at which the iterations end.
-const CONVERGED: f64 = 0.2;
+const CONVERGED: f64 = 0.05;
 /// Number of starts from which a hypothesis is fitted until it converges: the best after one iteration.
 const FOLLOWED: usize = 2;
 /// Minimum number of rotations.

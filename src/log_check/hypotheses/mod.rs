@@ -78,8 +78,16 @@ pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain) -> Explan
         )
     };
     let describe = |found: &Fitted| (text::cause(data, found), evidence(found));
-    let Some(best) = fitted.first() else { return Explanation::Open(Vec::new()) };
-    let rival = fitted.iter().skip(1).find(|other| !other.contains(best));
+    // Of two that explain the misfit, a special case is preferred unless it is decisively worse.
+    let simpler = |best: &Fitted| {
+        fitted.iter().find(|it| {
+            best.contains(it) && it.kind != best.kind && it.is_explained && it.criterion < best.criterion + DECISIVE
+        })
+    };
+    let Some(best) = fitted.first().map(|best| simpler(best).unwrap_or(best)) else {
+        return Explanation::Open(Vec::new());
+    };
+    let rival = fitted.iter().find(|other| !other.contains(best));
     let is_alone = rival.is_none_or(|rival| rival.criterion > best.criterion + DECISIVE);
     if best.is_explained && is_alone && best.criterion + DECISIVE < given.criterion {
         let (cause, evidence) = describe(best);
@@ -112,15 +120,16 @@ impl Explanation {
                 if causes.is_empty() {
                     return findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedy);
                 }
+                if let [(only, of_cause)] = causes.as_slice() {
+                    let title = format!("most likely {}", only.title);
+                    let evidence = format!("{of_cause}; as recorded: {evidence}");
+                    return findings.add(only.severity, only.area, title, evidence, only.remedy.clone());
+                }
                 let listed: Vec<String> =
                     causes.iter().map(|(cause, evidence)| format!("{} ({evidence})", cause.title)).collect();
+                let titles: Vec<&str> = causes.iter().map(|(cause, _)| cause.title.as_str()).collect();
                 let remedies: Vec<&str> = causes.iter().map(|(cause, _)| cause.remedy.as_str()).collect();
-                let title = match causes.as_slice() {
-                    [(only, _)] => {
-                        format!("the rotations of {key} differ from the prediction; most likely {}", only.title)
-                    }
-                    _ => format!("the rotations of {key} differ from the prediction; one of {} causes", causes.len()),
-                };
+                let title = format!("the rotations of {key} differ from the prediction: {}", titles.join(", or "));
                 let evidence = format!("{}; as recorded: {evidence}", listed.join("; or "));
                 findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedies.join("; or "));
             }

@@ -186,7 +186,11 @@ fn intrinsics(data: &RotationData<'_>, found: &Fitted) -> Cause {
         format!("{centre}, and its focal length is {:.3} times the rig's", lens.focal)
     };
     Cause {
-        severity: if dx.hypot(dy) > USELESS_RATIO * fx { Severity::Error } else { Severity::Warning },
+        severity: if dx.hypot(dy) > USELESS_RATIO * fx || (lens.focal - 1.0).abs() > USELESS_RATIO {
+            Severity::Error
+        } else {
+            Severity::Warning
+        },
         area: Area::Intrinsics,
         title,
         remedy: format!(
