@@ -31,9 +31,9 @@ pub(super) fn root(source: &Path) -> Option<PathBuf> {
     [source.join("mav0"), source.to_owned()].into_iter().find(|folder| has_sensors(folder))
 }
 
-/// Shortest step between two images.
+/// Shortest step between two images or two poses.
 const SHORTEST_STEP_NS: i64 = 500_000;
-/// Shortest step between two samples of an IMU, or two poses.
+/// Shortest step between two samples of an IMU.
 const SHORTEST_IMU_STEP_NS: i64 = 50_000;
 
 /// Row of a table with its line and its stamp as written.
@@ -98,7 +98,7 @@ pub(super) fn convert(source: &Path, sink: &mut LogSink<'_>) -> Result<Option<Ri
         } else if POSE_FOLDERS.contains(&name.as_str()) {
             let imu_from_sensor = sensor_pose(&root, name, sink);
             let rows = read_poses(&table, poses.len(), &imu_from_sensor.inverse())?;
-            samples.extend(in_nanoseconds(rows, SHORTEST_IMU_STEP_NS, &table, name, sink)?);
+            samples.extend(in_nanoseconds(rows, SHORTEST_STEP_NS, &table, name, sink)?);
             poses.push(name.clone());
         } else {
             let mut rows = 0;

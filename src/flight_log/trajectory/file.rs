@@ -16,8 +16,8 @@ const MAX_BYTES: u64 = 512 << 20;
 /// Maximum deviation of a quaternion's norm from 1.
 const QUATERNION_TOLERANCE: f64 = 1e-2;
 
-/// Shortest step between two poses.
-const SHORTEST_STEP_NS: i64 = 50_000;
+/// Shortest step between two poses, which are written at up to 1 kHz.
+const SHORTEST_STEP_NS: i64 = 500_000;
 
 /// Start of the first line of a trajectory from an offline calibration, which is no independent ground truth.
 pub const BATCH_REFERENCE: &str = "# batch reference";
