@@ -26,6 +26,11 @@ impl AgreementValue {
 const IMAGE_LIMIT_PX: f64 = 0.5;
 const FACTOR_LIMITS: [(&str, f64); 3] =
     [("IMU χ² per row", 0.5), ("encoders χ² per row", 1.6), ("marginalization prior χ² per row", 0.7)];
+/// Length in pixels and largest ratio of the residuals above it, rejected ones included: 0.01 to 0.04 on sound logs.
+const LONG_PX: f64 = 2.0;
+const LONG_LIMIT: f64 = 0.1;
+/// Limit of the ratio of tracked features that the solve does not accept.
+const UNUSED_LIMIT: f64 = 0.35;
 /// Limit of the ratio of images without a pose after the first one.
 const LOST_LIMIT: f64 = 0.1;
 /// Steps over which residuals are averaged for the onset of a disagreement.
@@ -46,6 +51,16 @@ pub(super) fn values(misfit: &Misfit) -> Vec<AgreementValue> {
             name: "reprojection residual, median in px",
             value: misfit.median_px().unwrap_or(0.0),
             limit: IMAGE_LIMIT_PX,
+        },
+        AgreementValue {
+            name: "reprojection residuals above 2 px, ratio",
+            value: misfit.pixels.ratio_above(LONG_PX),
+            limit: LONG_LIMIT,
+        },
+        AgreementValue {
+            name: "tracked features without a landmark, ratio",
+            value: misfit.features.saturating_sub(misfit.inliers) as f64 / misfit.features.max(1) as f64,
+            limit: UNUSED_LIMIT,
         },
     ];
     let factors = FACTOR_LIMITS.iter().zip(misfit.factors).filter(|(_, factor)| factor.rows > 0.0);
@@ -112,6 +127,7 @@ mod tests {
                 ..StepMisfit::default()
             };
             (0..50).for_each(|_| step.pixels.add(0.1));
+            (step.features, step.inliers) = (50, 48);
             step.factors = [(30.0, 150.0), (33.0 * encoder(number), 33.0), (10.0, 60.0)]
                 .map(|(chi2, rows)| FactorMisfit { chi2, rows });
             step

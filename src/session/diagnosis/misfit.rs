@@ -5,76 +5,11 @@
 //! of the best trial: pixel noise is unknown, and a change that leaves larger residuals must not widen its own scale.
 //! Windows overlap; sums over the steps are divided by the number of steps in a window.
 
+use super::pixel_histogram::PixelHistogram;
 use crate::estimator::{FactorKind, StepReport};
 use crate::geometry::seconds_from_ns;
 use crate::session::plan::ImageHalf;
 use crate::text::Named as _;
-
-/// Number of bins of the lengths of residuals.
-const BINS: usize = 40;
-/// Shortest length with a bin of its own, in pixels.
-const SHORTEST_PX: f64 = 0.01;
-/// Bins per factor of two.
-const BINS_PER_OCTAVE: f64 = 3.0;
-/// Median length of a normal error in two dimensions, in standard deviations of a coordinate.
-const MEDIAN_LENGTH: f64 = 1.177_410_022_515_474_7;
-
-/// Numbers of reprojection residuals by length.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct PixelHistogram([u32; BINS]);
-
-impl Default for PixelHistogram {
-    fn default() -> Self {
-        Self([0; BINS])
-    }
-}
-
-impl PixelHistogram {
-    /// Counts a residual by its length in pixels; infinite for a point behind the camera.
-    pub(super) fn add(&mut self, length_px: f64) {
-        let octaves = (length_px / SHORTEST_PX).max(1.0).log2();
-        self.0[((octaves * BINS_PER_OCTAVE) as usize).min(BINS - 1)] += 1;
-    }
-
-    /// One residual at which an observation says nothing.
-    fn lost() -> Self {
-        let mut histogram = Self::default();
-        histogram.add(LOST_PX);
-        histogram
-    }
-
-    pub(super) fn count(&self) -> u32 {
-        self.0.iter().sum()
-    }
-
-    fn merge(&mut self, other: &Self) {
-        self.0.iter_mut().zip(other.0).for_each(|(count, more)| *count += more);
-    }
-
-    /// Length in the middle of a bin, in pixels.
-    fn length_px(bin: usize) -> f64 {
-        SHORTEST_PX * ((bin as f64 + 0.5) / BINS_PER_OCTAVE).exp2()
-    }
-
-    /// Median length in pixels, `None` without residuals.
-    fn median_px(&self) -> Option<f64> {
-        let half = self.count().div_ceil(2);
-        let mut below = 0;
-        let bin = self.0.iter().position(|count| {
-            below += count;
-            below >= half && half > 0
-        })?;
-        Some(Self::length_px(bin))
-    }
-
-    /// Mean of −2·ln of Student's density in two dimensions with two degrees of freedom, without its constant, for a
-    /// standard deviation of a coordinate in pixels; `None` without residuals.
-    fn mean_cost(&self, sigma_px: f64) -> Option<f64> {
-        let cost = |bin: usize| 4.0 * (0.5 * (Self::length_px(bin) / sigma_px).powi(2)).ln_1p();
-        let sum: f64 = self.0.iter().enumerate().map(|(bin, count)| f64::from(*count) * cost(bin)).sum();
-        (self.count() > 0).then(|| sum / f64::from(self.count()))
-    }
-}
 
 /// χ² of the factors of one kind, and the number of their rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -111,6 +46,9 @@ pub(super) struct StepMisfit {
     pub(super) calibration: f64,
     /// Residuals outside each half of the image, in the order of [`ImageHalf::NAMES`].
     pub(super) outside: [PixelHistogram; 4],
+    /// Features tracked from the previous image, and those that the solve accepted.
+    pub(super) features: usize,
+    pub(super) inliers: usize,
     /// Length of the window in seconds.
     pub(super) window_s: f64,
     /// Number of frames in the window.
@@ -119,8 +57,8 @@ pub(super) struct StepMisfit {
 
 impl StepMisfit {
     /// Residuals of a step whose pixels are `pixel_scale` times those of the image; `resolution_px` is that of the main
-    /// camera.
-    pub(super) fn of(report: &StepReport, pixel_scale: f64, resolution_px: [usize; 2]) -> Self {
+    /// camera, `features` the number of its features tracked from the previous image.
+    pub(super) fn of(report: &StepReport, features: usize, pixel_scale: f64, resolution_px: [usize; 2]) -> Self {
         let mut pixels = PixelHistogram::default();
         let mut outside = [PixelHistogram::default(); 4];
         for feature in &report.features {
@@ -155,6 +93,8 @@ impl StepMisfit {
             factors,
             calibration,
             outside,
+            features,
+            inliers: report.counts.inliers(),
             window_s,
             frames,
         }
@@ -169,6 +109,8 @@ pub(super) struct Scale {
     /// Observations and frames in a window.
     pub(super) observations: f64,
     pub(super) frames: f64,
+    /// Rows of the factors of a window, in the order of [`FACTORS`].
+    pub(super) rows: [f64; 3],
     /// Number of windows without common frames in the scored steps.
     pub(super) windows: f64,
 }
@@ -183,6 +125,9 @@ pub(super) struct Misfit {
     pub(super) calibration: f64,
     /// As in [`StepMisfit`].
     pub(super) outside: [PixelHistogram; 4],
+    /// Sums of features and inliers over the steps with a window.
+    pub(super) features: usize,
+    pub(super) inliers: usize,
     /// Frames of all windows.
     pub(super) frames: usize,
     /// Steps with a window and all scored steps.
@@ -196,8 +141,8 @@ pub(super) struct Misfit {
 const SETTLING_NS: i64 = 1_000_000_000;
 /// Upper bound of the mean squared residual of a kind of factor: a larger one says no more.
 const LARGEST_MEAN_SQUARE: f64 = 25.0;
-/// Length of a residual in pixels at which an observation says nothing, as in a step without a window.
-const LOST_PX: f64 = 8.0;
+/// Median length of a normal error in two dimensions, in standard deviations of a coordinate.
+const MEDIAN_LENGTH: f64 = 1.177_410_022_515_474_7;
 /// Lowest standard deviation of an observation, in pixels.
 const LEAST_SIGMA_PX: f64 = 0.03;
 
@@ -244,6 +189,9 @@ impl Misfit {
         self.factors.iter_mut().zip(step.factors).for_each(|(sum, more)| sum.add(more));
         self.outside.iter_mut().zip(&step.outside).for_each(|(sum, more)| sum.merge(more));
         self.window_s += step.window_s;
+        self.features += step.features;
+        // Features that are new in this image may be more than those that are lost.
+        self.inliers += step.inliers.min(step.features);
         self.calibration += step.calibration;
         self.frames += step.frames;
     }
@@ -284,8 +232,8 @@ impl Misfit {
         let of_frames = scale.frames / self.frames.max(1) as f64;
         let part = |index: usize, share: f64| {
             let factor = self.factors[index];
-            let chi2 = factor.chi2.min(LARGEST_MEAN_SQUARE * factor.rows);
-            share * (tracked * chi2 + blind * LARGEST_MEAN_SQUARE * factor.rows)
+            let chi2 = share * factor.chi2.min(LARGEST_MEAN_SQUARE * factor.rows);
+            tracked * chi2 + blind * LARGEST_MEAN_SQUARE * scale.rows[index]
         };
         let blind_visual = visual_cost(&PixelHistogram::lost(), scale);
         [
@@ -316,23 +264,6 @@ fn visual_cost(pixels: &PixelHistogram, scale: &Scale) -> f64 {
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_histogram_has_the_median_and_a_cost_that_grows_with_the_residuals() {
-        let mut near = PixelHistogram::default();
-        let mut far = PixelHistogram::default();
-        for number in 1..=101 {
-            near.add(0.002 * f64::from(number));
-            far.add(0.02 * f64::from(number));
-        }
-        far.add(f64::INFINITY);
-        let median_px = near.median_px().unwrap();
-        assert!((median_px / 0.102 - 1.0).abs() < 0.13, "{median_px}");
-        let ratio = far.median_px().unwrap() / median_px;
-        assert!((ratio / 10.0 - 1.0).abs() < 0.3, "{ratio}");
-        assert!(far.mean_cost(0.1) > near.mean_cost(0.1));
-        assert_eq!(PixelHistogram::default().mean_cost(0.1), None);
-    }
-
     fn step(stamp_s: f64, tracking: bool, length_px: f64) -> StepMisfit {
         let mut step = StepMisfit {
             stamp_ns: (stamp_s * 1e9) as i64,
@@ -350,7 +281,7 @@ mod tests {
 
     #[test]
     fn a_trial_without_a_window_costs_more_than_any_other() {
-        let scale = Scale { sigma_px: 0.1, observations: 100.0, frames: 11.0, windows: 3.0 };
+        let scale = Scale { sigma_px: 0.1, observations: 100.0, frames: 11.0, rows: [150.0, 0.0, 0.0], windows: 3.0 };
         let steps = |length_px: f64, until_s: f64| -> Vec<StepMisfit> {
             (0..120).map(|number| 0.05 * f64::from(number)).map(|at_s| step(at_s, at_s < until_s, length_px)).collect()
         };

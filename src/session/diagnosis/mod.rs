@@ -1,6 +1,6 @@
 //! Diagnosis of a run whose residuals disagree with their noise: trials with one change each, ranked by what they explain.
 //!
-//! - `misfit`: residuals of a trial by sensor, on one scale for all trials.
+//! - `misfit`, `pixel_histogram`: residuals of a trial by sensor, on one scale for all trials.
 //! - `agreement`: limits within which residuals agree with their noise, and the step at which that ends.
 //! - `trial`, `span`: a run computed again with a change, on a part of it.
 //! - `hypotheses`, `axes`, `refinement`, `tuning`: the causes that are tried, with the values to try.
@@ -14,6 +14,7 @@ mod diagnose;
 mod hypotheses;
 mod misfit;
 mod outcome;
+mod pixel_histogram;
 mod ranking;
 mod refinement;
 mod scoring;

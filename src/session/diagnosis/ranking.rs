@@ -26,6 +26,8 @@ const MARGIN: f64 = 30.0;
 const MARGIN_RATIO: f64 = 0.05;
 /// Ratio of the disagreement that a cause may leave, unless it leaves none.
 const REMAINING: f64 = 0.4;
+/// Smallest gain of images without a half of them, relative to the score of the run: halves of sound images differ, too.
+const REGION_RATIO: f64 = 0.2;
 /// Largest number of causes that remain.
 const MOST_REMAINING: usize = 3;
 
@@ -58,6 +60,10 @@ pub(super) fn score(hypothesis: &Hypothesis, misfit: &Misfit, given: &Misfit, sc
 /// The best candidate of each cause, the best cause first; a special case that is about as good precedes the general
 /// cause.
 pub(super) fn by_cause(given: &Candidate, mut candidates: Vec<Candidate>) -> Vec<Candidate> {
+    let is_slight = |it: &Candidate| {
+        it.hypothesis.cause == Cause::ImageRegion && given.score - it.score < REGION_RATIO * given.score
+    };
+    candidates.retain(|candidate| !is_slight(candidate));
     candidates.sort_by(|one, other| one.score.total_cmp(&other.score));
     let mut kept: Vec<Candidate> = Vec::new();
     for candidate in candidates {
@@ -105,7 +111,12 @@ fn is_general(cause: Cause, best: Cause) -> bool {
             | (Cause::Intrinsics, Cause::Focal)
             | (
                 Cause::EncoderNoise,
-                Cause::EncoderClock | Cause::JointOffset | Cause::JointReversed | Cause::JointScale
+                Cause::EncoderClock
+                    | Cause::JointOffset
+                    | Cause::JointReversed
+                    | Cause::JointsSwapped
+                    | Cause::JointScale
+                    | Cause::Chain
             )
             | (Cause::Chain, Cause::JointOffset)
     )
@@ -117,7 +128,7 @@ mod tests {
     use super::*;
     use crate::session::plan::ForkChanges;
 
-    const SCALE: Scale = Scale { sigma_px: 0.1, observations: 800.0, frames: 11.0, windows: 4.0 };
+    const SCALE: Scale = Scale { sigma_px: 0.1, observations: 800.0, frames: 11.0, rows: [0.0; 3], windows: 4.0 };
 
     fn misfit(length_px: f64) -> Misfit {
         let steps: Vec<StepMisfit> = (0..100)

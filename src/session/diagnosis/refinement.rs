@@ -48,7 +48,13 @@ pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[Candidate]) -> Vec<H
             let changes = ForkChanges { encoder_noise: rounded(factor), ..ForkChanges::default() };
             all.push(Hypothesis::change(Cause::EncoderNoise, changes, 1));
         }
-        all.extend(offsets(run, &best.result));
+    }
+    let noises =
+        candidates.iter().filter(|it| it.hypothesis.cause == Cause::EncoderNoise && it.hypothesis.from.is_none());
+    let widest = noises
+        .max_by(|one, other| one.hypothesis.changes.encoder_noise.total_cmp(&other.hypothesis.changes.encoder_noise));
+    if let Some(widest) = widest {
+        all.extend(offsets(run, &widest.result));
     }
     all
 }

@@ -38,6 +38,7 @@ pub(super) fn scored(given: TrialResult, done: Vec<(Hypothesis, TrialResult)>) -
         sigma_px,
         observations: reference.observations(),
         frames: reference.frames as f64 / reference.tracked.max(1) as f64,
+        rows: reference.factors.map(|factor| factor.rows / reference.tracked.max(1) as f64),
         windows: (seconds_from_ns(end_ns - from_ns) / reference.window_s.max(0.5)).max(1.0),
     };
     let candidate = |hypothesis: Hypothesis, result: TrialResult, misfit: Misfit| {

@@ -78,7 +78,11 @@ impl DiagnosedRun<'_> {
             let report = guarded(input.stamp_ns, || engine.report_without_rank(input)).ok()?;
             tracked |= !report.window.is_empty();
             let scale = if number >= change_at { pixel_scale(changes) } else { 1.0 };
-            result.take(number, StepMisfit::of(&report, scale, self.resolution_px()), &report);
+            result.take(
+                number,
+                StepMisfit::of(&report, input.main_tracks().statistics.tracked, scale, self.resolution_px()),
+                &report,
+            );
             if let Some(record) = &mut record {
                 record.push(step_record(report, input));
             }
