@@ -110,7 +110,9 @@ fn rotations_of_the_sample_log_detect_a_wrong_rig() {
         rotation.tracks.iter_mut().for_each(|track| std::mem::swap(&mut track.previous, &mut track.now));
     }
     let camera = reversed.static_camera().to_owned();
-    expect(&reversed.check(|_| {}), Severity::Warning, &format!("unexplained: the rotations of {camera}"));
+    let report = reversed.check(|_| {});
+    expect(&report, Severity::Error, "the axes of the gyroscope form a left-handed frame (all axes reversed)");
+    assert!(!report.findings.iter().any(|finding| finding.title.contains(&format!("{camera} agrees"))), "{report}");
 }
 
 #[test]

@@ -156,5 +156,4 @@ fn cause(suspected: &[SuspectedParameter], config: &EstimatorConfig) -> String {
 }
 
 /// Text for an inconsistency that no single parameter explains: a guess would send the reader the wrong way.
-const UNKNOWN_CAUSE: &str = "cause unknown: dcvins check measures clocks, shutter, intrinsics and axes, dcvins diagnose \
-                             compares the causes";
+const UNKNOWN_CAUSE: &str = "cause unknown: see dcvins check, and dcvins diagnose, which compares the causes";

@@ -16,6 +16,9 @@ use super::read_context::ReadContext;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ImuSample, Rig};
 
+/// Images without joint angles for a shorter time are not reported: attitudes of gimbals come at 5 Hz or more.
+const WITHOUT_JOINTS_NS: i64 = 400_000_000;
+
 /// Duration of the IMU samples before the first frame.
 const FIRST_FRAME_IMU_NS: i64 = 2_000_000_000;
 /// Largest delay of log times after header stamps; reading starts this much earlier.
@@ -35,6 +38,8 @@ pub(super) struct FrameSource {
     joints: Option<JointAngleStream>,
     /// Topic of the joint angles of a camera on a gimbal.
     joint_topic: Option<String>,
+    /// Stamp of the first of the last images without joint angles.
+    without_joints_ns: Option<i64>,
     ground_truth: Option<GroundTruth>,
     /// IMU sample interpolated at the previous frame's end.
     previous_end: Option<ImuSample>,
@@ -81,6 +86,7 @@ impl FrameSource {
             imu_ended: false,
             rotating_ns: None,
             samples: VecDeque::new(),
+            without_joints_ns: None,
             joint_topic: joints.is_some().then(|| joint_topic(rig, camera)).flatten(),
             joints,
             ground_truth,
@@ -164,9 +170,16 @@ impl FrameSource {
         std::mem::take(&mut self.context.warnings)
     }
 
-    /// Reports an image of a camera on a gimbal without joint angles, although the log has their topic.
+    /// Reports images of a camera on a gimbal without joint angles for some time, although the log has their topic.
     fn warn_of_joint_angles(&mut self, stamp_ns: i64, found: bool) {
-        let Some(topic) = self.joint_topic.as_ref().filter(|_| !found) else { return };
+        if found {
+            self.without_joints_ns = None;
+            return;
+        }
+        let Some(topic) = &self.joint_topic else { return };
+        if stamp_ns - *self.without_joints_ns.get_or_insert(stamp_ns) < WITHOUT_JOINTS_NS {
+            return;
+        }
         let message = format!(
             "{topic}: no joint angles near the image at {:.3} s: the camera's orientation is estimated without them",
             seconds_from_ns(stamp_ns)

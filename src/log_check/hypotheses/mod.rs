@@ -7,11 +7,13 @@
 
 mod axes;
 mod candidates;
+mod cause;
 mod fit;
 mod focal_grid;
 mod text;
 
 pub(super) use self::axes::SignedAxes;
+use self::cause::Cause;
 
 use rayon::prelude::*;
 
@@ -26,18 +28,10 @@ use crate::gimbal::ClassicalChain;
 const DECISIVE: f64 = 20.0;
 /// Largest number of causes that are listed.
 const LISTED: usize = 3;
-/// A cause must explain at least this ratio of the misfit to be listed.
+/// A cause must leave at most this ratio of the misfit to be listed.
 const MIN_IMPROVEMENT: f64 = 0.5;
-
-/// Cause of a misfit in words.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Cause {
-    pub(super) severity: Severity,
-    pub(super) area: Area,
-    /// Names the cause with its value and time.
-    pub(super) title: String,
-    pub(super) remedy: String,
-}
+/// The same for χ² of a cause that leaves more than noise explains.
+const UNEXPLAINED_IMPROVEMENT: f64 = 0.1;
 
 /// Result of a comparison of all hypotheses.
 pub(super) enum Explanation {
@@ -96,8 +90,8 @@ pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain) -> Explan
     let mut open: Vec<(Cause, String)> = Vec::new();
     for found in &fitted {
         let remains = found.criterion < best.criterion + DECISIVE || (best.is_explained && found.is_explained);
-        let improves = found.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
-            || found.mean_square < MIN_IMPROVEMENT * given.mean_square;
+        let improves = found.is_explained && found.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
+            || found.mean_square < UNEXPLAINED_IMPROVEMENT * given.mean_square;
         let (cause, evidence) = describe(found);
         if remains && improves && open.len() < LISTED && open.iter().all(|(listed, _)| listed.title != cause.title) {
             open.push((cause, evidence));

@@ -1,0 +1,13 @@
+//! Cause of a misfit as a finding.
+
+use super::super::{Area, Severity};
+
+/// Cause of a misfit in words.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::log_check) struct Cause {
+    pub(in crate::log_check) severity: Severity,
+    pub(in crate::log_check) area: Area,
+    /// Names the cause with its value and time.
+    pub(in crate::log_check) title: String,
+    pub(in crate::log_check) remedy: String,
+}
