@@ -16,6 +16,9 @@ const OFFSET_SIGMA_S: f64 = 0.02;
 /// Prior standard deviation of the ratio of image rotations to predicted ones: a change of it is a hypothesis.
 const SCALE_SIGMA: f64 = 0.005;
 const ITERATIONS: usize = 8;
+/// Half the relative range in which a focal length is searched around that of the grid, and the length at which it ends.
+const FOCAL_RANGE: f64 = 0.06;
+const FOCAL_PRECISION: f64 = 1e-3;
 /// Change of all parameters, in units of their steps, at which the iterations end.
 const CONVERGED: f64 = 0.05;
 /// Number of starts from which a hypothesis is fitted until it converges: the best after one iteration.
@@ -83,6 +86,8 @@ impl Fitted {
             (Kind::FocalPieces(_) | Kind::Intrinsics, Kind::Focal)
             | (Kind::Intrinsics, Kind::Centre)
             | (Kind::CameraDrift, Kind::CameraDelay) => true,
+            // Two axes reversed are half a turn about the third: other signs with an offset can be the same mechanism.
+            (Kind::JointSigns(mine), Kind::JointSigns(others)) => others.iter().all(|joint| mine.contains(joint)),
             (mine, others) => mine == others,
         }
     }
@@ -161,11 +166,9 @@ impl<'a> Fitter<'a> {
         parameters: &[Parameter],
         since_s: Option<f64>,
     ) -> Option<Fitted> {
-        let mut correction = start.clone();
-        for _ in 0..ITERATIONS {
-            if parameters.is_empty() {
-                break;
-            }
+        let mut correction = if *kind == Kind::Focal { self.best_focal(start) } else { start.clone() };
+        let iterations = if *kind == Kind::Focal || parameters.is_empty() { 0 } else { ITERATIONS };
+        for _ in 0..iterations {
             let values = self.linear_fit(&correction, parameters, since_s)?.extra;
             apply(parameters, &values, &mut correction);
             let change = parameters.iter().zip(&values).map(|(parameter, value)| value.abs() / parameter.step());
@@ -187,6 +190,34 @@ impl<'a> Fitter<'a> {
             criterion: self.criterion(fit.deviance, parameters),
             correction,
         })
+    }
+
+    /// Correction with the focal length near the start that has the largest likelihood, by golden section: every focal
+    /// length has other measured rotations, and other wrong ones among them.
+    fn best_focal(&self, start: &Correction) -> Correction {
+        let at = |logarithm: f64| {
+            let mut correction = start.clone();
+            correction.lens.focal *= logarithm.exp();
+            correction
+        };
+        let deviance =
+            |logarithm: f64| self.linear_fit(&at(logarithm), &[], None).map_or(f64::INFINITY, |fit| fit.deviance);
+        let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let (mut low, mut high) = (-FOCAL_RANGE, FOCAL_RANGE);
+        let (mut left, mut right) = (high - ratio * (high - low), low + ratio * (high - low));
+        let (mut at_left, mut at_right) = (deviance(left), deviance(right));
+        while high - low > FOCAL_PRECISION {
+            if at_left < at_right {
+                (high, right, at_right) = (right, left, at_left);
+                left = high - ratio * (high - low);
+                at_left = deviance(left);
+            } else {
+                (low, left, at_left) = (left, right, at_right);
+                right = low + ratio * (high - low);
+                at_right = deviance(right);
+            }
+        }
+        at(0.5 * (low + high))
     }
 
     fn linear_fit(

@@ -12,15 +12,15 @@ use crate::geometry::so3;
 
 /// Range of the ratios of a focal length to the rig's, and the number of steps whose rotations are measured.
 const RATIOS: [f64; 2] = [0.4, 2.6];
-const MEASURED_STEPS: usize = 16;
+const MEASURED_STEPS: usize = 24;
 /// Interpolated states per measured step.
-const STATES_PER_STEP: usize = 6;
+const STATES_PER_STEP: usize = 5;
 /// Squared noise level and degrees of freedom of the t distribution of a misfit, see `rotation_fit::deviance`.
 const NOISE_LEVEL_SQUARED: f64 = 2.25;
 const TAIL_DEGREES: f64 = 3.0;
 /// Cost of a change of the focal length beyond that of its two parameters:
 /// measurements that are wrong for a few images must not pay for two changes.
-const CHANGE_COST: f64 = 60.0;
+const CHANGE_COST: f64 = 40.0;
 /// Smallest relative change that counts.
 const MIN_CHANGE: f64 = 0.04;
 /// Shortest piece that is reported, in seconds.
