@@ -49,8 +49,12 @@ pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain) -> Explan
         |all: Vec<Hypothesis>| all.into_par_iter().filter_map(|one| fitter.best(one)).collect::<Vec<Fitted>>();
     let mut fitted = fit_all(candidates(data, chain));
     // Other intrinsics need all rotations measured again; only a wrong scale of the gyroscope resembles them.
-    let found =
-        |it: &Fitted| it.is_explained && it.kind != Kind::GyroscopeScale && it.criterion + DECISIVE < given.criterion;
+    let found = |it: &Fitted| {
+        it.is_explained
+            && it.kind != Kind::GyroscopeScale
+            && it.criterion + DECISIVE < given.criterion
+            && it.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
+    };
     if !fitted.iter().any(found) {
         let grid = FocalGrid::new(&fitter);
         fitted.extend(fit_all(intrinsics(chain.joint_count(), grid.best_constant(&fitter))));
