@@ -65,9 +65,10 @@ pub(super) fn check_ground_truth(log: &FlightLog, rig: &Rig, imu_facts: &ImuFact
 impl GroundTruth<'_> {
     /// `imu_delay_s` is the largest delay of the IMU's own stamps.
     fn compare(&self, imu_facts: &ImuFacts, imu_delay_s: f64, findings: &mut Findings) {
+        let rotations = self.rotations();
         let [given, reversed] = [1.0, -1.0].map(|factor| {
             let reference = RotationReference::Gyroscope(imu_facts.gyroscope.scaled(factor));
-            align_clocks(&self.rotations(), &reference, 0.0, MAX_OFFSET_S)
+            align_clocks(&rotations, &reference, 0.0, MAX_OFFSET_S)
         });
         if let Ok(reversed) = &reversed
             && given.as_ref().map_or(f64::INFINITY, |given| given.residual_deg) > REVERSED_RATIO * reversed.residual_deg

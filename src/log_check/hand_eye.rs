@@ -73,8 +73,7 @@ pub(super) fn check_against_gyroscope(
         .as_ref()
         .map_or((0.0, MAX_OFFSET_SIGMA_S), |found| (found.offset_s - camera.timeshift_cam_imu_s, found.offset_sigma_s));
     let pairs = hand_eye.pairs(&chain, offset_s, 0.0);
-    let chain_sigma = rig.gimbal.as_ref().map_or(1.0, |gimbal| gimbal.prior.rotation_bound_rad);
-    let priors = FitPriors { time_offset_s: sigma_s, scale: SCALE_SIGMA, chain: chain_sigma };
+    let priors = FitPriors { time_offset_s: sigma_s, scale: SCALE_SIGMA, chain: hand_eye.data.chain_sigma_rad() };
     let Some(fit) = RotationFit::of(&pairs, &chain, &priors) else { return };
     // Over longer times the rotations of a gimbal exceed the noise of its joint angles.
     let longer = (!chain.links.is_empty())

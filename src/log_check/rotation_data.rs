@@ -54,6 +54,11 @@ impl<'a> RotationData<'a> {
         Self { survey, rig, imu_facts, camera, readout_s, images, measured }
     }
 
+    /// Prior standard deviation of every parameter of the chain, in radians; a rigid camera has none.
+    pub(super) fn chain_sigma_rad(&self) -> f64 {
+        self.rig.gimbal.as_ref().map_or(1.0, |gimbal| gimbal.prior.rotation_bound_rad)
+    }
+
     /// Rotations with other intrinsics, from the features.
     pub(super) fn with_lens(&self, lens: &LensChange) -> Vec<MeasuredRotation> {
         if *lens == LensChange::NONE {

@@ -324,14 +324,19 @@ impl Fit {
     }
 }
 
+/// −2 times the logarithm of the density of a squared misfit with three degrees of freedom by a t distribution, without
+/// constants.
+pub(super) fn tail_cost(square: f64) -> f64 {
+    (TAIL_DEGREES + 3.0) * (square / TAIL_DEGREES).ln_1p()
+}
+
 /// −2 times the logarithm of the likelihood of squared misfits (three degrees of freedom each) by a t distribution, at the
 /// best noise level up to [`NOISE_TOLERANCE`] times the stated one.
 pub(super) fn deviance(squares: &[f64]) -> f64 {
     let at = |step: u32| {
         let level = 1.0 + (NOISE_TOLERANCE - 1.0) * f64::from(step) / f64::from(NOISE_STEPS);
         let variance = level * level;
-        let of_pair =
-            |square: &f64| 3.0 * variance.ln() + (TAIL_DEGREES + 3.0) * (square / (TAIL_DEGREES * variance)).ln_1p();
+        let of_pair = |square: &f64| 3.0 * variance.ln() + tail_cost(square / variance);
         squares.iter().map(of_pair).sum::<f64>()
     };
     (0..=NOISE_STEPS).map(at).fold(f64::INFINITY, f64::min)

@@ -6,11 +6,12 @@ use serde::Serialize;
 
 use super::{Area, CheckReport, Finding, Severity};
 use crate::flight_log::printable;
+use crate::text::counted;
 
 /// Number of findings that a verdict names.
 const NAMED: usize = 3;
 
-/// Whether results of a log can be trusted.
+/// Trust in the results of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Usability {
@@ -74,10 +75,6 @@ impl CheckReport {
 
 impl Display for Verdict {
     fn fmt(&self, out: &mut Formatter<'_>) -> Result {
-        let counted = |number: usize, noun: &str| match number {
-            1 => format!("1 {noun}"),
-            _ => format!("{number} {noun}s"),
-        };
         let (errors, warnings) = (counted(self.errors, "error"), counted(self.warnings, "warning"));
         match self.usability {
             Usability::Usable => writeln!(out, "usable: no errors and no warnings")?,

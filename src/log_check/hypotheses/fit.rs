@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
 use super::super::correction::{Correction, LensChange, Parameter};
 use super::super::rotation_data::{JOINED_S, MeasuredRotation, RotationData, joined};
@@ -46,7 +46,7 @@ pub(in crate::log_check) enum Kind {
     Centre,
     /// Focal length and principal point.
     Intrinsics,
-    CameraDelay,
+    /// Time offset and its drift.
     CameraDrift,
     /// Joints whose readings have the other sign.
     JointSigns(Vec<usize>),
@@ -69,12 +69,8 @@ pub(in crate::log_check) struct Fitted {
     pub(super) kind: Kind,
     pub(super) correction: Correction,
     pub(super) since_s: Option<f64>,
-    /// Rotation of the measured rotations against the predicted ones.
-    pub(super) orientation: UnitQuaternion<f64>,
-    pub(super) misfit_rad: f64,
-    pub(super) predicted_misfit_rad: f64,
-    pub(super) mean_square: f64,
-    pub(super) is_explained: bool,
+    /// Fit of the corrected data.
+    pub(super) fit: RotationFit,
     /// Deviance plus the logarithm of the number of measurements per parameter.
     pub(super) criterion: f64,
 }
@@ -83,9 +79,7 @@ impl Fitted {
     /// True if this hypothesis has the other one as a special case: it cannot exclude it by fitting as well.
     pub(super) fn contains(&self, other: &Self) -> bool {
         match (&self.kind, &other.kind) {
-            (Kind::FocalPieces(_) | Kind::Intrinsics, Kind::Focal)
-            | (Kind::Intrinsics, Kind::Centre)
-            | (Kind::CameraDrift, Kind::CameraDelay) => true,
+            (Kind::FocalPieces(_) | Kind::Intrinsics, Kind::Focal) | (Kind::Intrinsics, Kind::Centre) => true,
             // Two axes reversed are half a turn about the third: other signs with an offset can be the same mechanism.
             (Kind::JointSigns(mine), Kind::JointSigns(others)) => others.iter().all(|joint| mine.contains(joint)),
             (mine, others) => mine == others,
@@ -114,8 +108,7 @@ pub(super) fn middle_s(measured: &MeasuredRotation) -> f64 {
 
 impl<'a> Fitter<'a> {
     pub(super) fn new(data: &'a RotationData<'a>, chain: &'a ClassicalChain) -> Self {
-        let chain_sigma = data.rig.gimbal.as_ref().map_or(1.0, |gimbal| gimbal.prior.rotation_bound_rad);
-        let priors = FitPriors { time_offset_s: OFFSET_SIGMA_S, scale: SCALE_SIGMA, chain: chain_sigma };
+        let priors = FitPriors { time_offset_s: OFFSET_SIGMA_S, scale: SCALE_SIGMA, chain: data.chain_sigma_rad() };
         let measured = joined(&data.measured, length_s(chain));
         Self { data, chain, priors, measured }
     }
@@ -133,10 +126,9 @@ impl<'a> Fitter<'a> {
         Cow::Owned(joined(&self.data.with_lens(&correction.lens), length_s(self.chain)))
     }
 
-    /// Fit without a correction.
-    pub(super) fn fit_given(&self) -> Option<Fitted> {
-        let correction = Correction::none(self.chain.joint_count());
-        self.converged(&Kind::CameraDelay, &correction, &[], None)
+    /// Fit without a correction; its deviance is its criterion.
+    pub(super) fn fit_given(&self) -> Option<RotationFit> {
+        self.linear_fit(&Correction::none(self.chain.joint_count()), &[], None)
     }
 
     /// Best fit of a hypothesis over its starts and times.
@@ -179,17 +171,8 @@ impl<'a> Fitter<'a> {
         // What is reported is the misfit of corrected data, not that of a linear model of the correction.
         let fit = self.linear_fit(&correction, &[], since_s)?;
         let parameters = parameters.len() + usize::from(since_s.is_some());
-        Some(Fitted {
-            kind: kind.clone(),
-            since_s,
-            orientation: fit.orientation,
-            misfit_rad: fit.misfit_rad,
-            predicted_misfit_rad: fit.predicted_misfit_rad,
-            mean_square: fit.mean_square,
-            is_explained: fit.is_explained(),
-            criterion: self.criterion(fit.deviance, parameters),
-            correction,
-        })
+        let criterion = self.criterion(fit.deviance, parameters);
+        Some(Fitted { kind: kind.clone(), correction, since_s, fit, criterion })
     }
 
     /// Correction with the focal length near the start that has the largest likelihood, by golden section: every focal

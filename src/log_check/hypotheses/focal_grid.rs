@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::super::ImageRotation;
 use super::super::correction::{Correction, LensChange};
 use super::super::rotation_data::{MeasuredRotation, joined};
+use super::super::rotation_fit::tail_cost;
 use super::fit::{Fitted, Fitter, Kind, Predictions, length_s, middle_s};
 use crate::geometry::so3;
 
@@ -15,9 +16,8 @@ const RATIOS: [f64; 2] = [0.4, 2.6];
 const MEASURED_STEPS: usize = 24;
 /// Interpolated states per measured step.
 const STATES_PER_STEP: usize = 5;
-/// Squared noise level and degrees of freedom of the t distribution of a misfit, see `rotation_fit::deviance`.
+/// Squared noise level of the misfits.
 const NOISE_LEVEL_SQUARED: f64 = 2.25;
-const TAIL_DEGREES: f64 = 3.0;
 /// Cost of a change of the focal length beyond that of its two parameters:
 /// measurements that are wrong for a few images must not pay for two changes.
 const CHANGE_COST: f64 = 40.0;
@@ -39,6 +39,8 @@ pub(super) struct FocalGrid {
     steps: Vec<BTreeMap<i64, MeasuredRotation>>,
     /// Rotations that all steps have, in order of time.
     keys: Vec<i64>,
+    /// Predictions by the rig.
+    by_rig: Predictions,
 }
 
 impl FocalGrid {
@@ -52,19 +54,18 @@ impl FocalGrid {
         let steps: Vec<_> = fitter.data.with_lenses(&lenses).into_iter().map(by_stamp).collect();
         let in_all = |key: &i64| steps.iter().all(|step| step.contains_key(key));
         let keys = steps.first().map(|step| step.keys().copied().filter(in_all).collect()).unwrap_or_default();
-        Self { steps, keys }
+        Self { steps, keys, by_rig: fitter.predictions_by_rig(&fitter.measured) }
     }
 
     /// Ratio of the best constant focal length to the rig's, by the rig's prediction.
-    pub(super) fn best_constant(&self, fitter: &Fitter<'_>) -> f64 {
-        let predictions = fitter.predictions_by_rig(&fitter.measured);
+    pub(super) fn best_constant(&self) -> f64 {
         // A change that costs more than any misfit never occurs.
-        self.cheapest(&predictions, f64::MAX).first().map_or(1.0, |(_, state)| ratio(*state))
+        self.cheapest(&self.by_rig, f64::MAX).first().map_or(1.0, |(_, state)| ratio(*state))
     }
 
     /// Fit with a focal length that changes, `None` if it does not.
     pub(super) fn pieces_fit(&self, fitter: &Fitter<'_>) -> Option<Fitted> {
-        let mut predictions = fitter.predictions_by_rig(&fitter.measured);
+        let mut predictions = self.by_rig.clone();
         let mut chosen = Vec::new();
         let mut fit = None;
         for _ in 0..ROUNDS {
@@ -83,12 +84,8 @@ impl FocalGrid {
             kind: Kind::FocalPieces(pieces),
             correction: Correction::none(fitter.chain.joint_count()),
             since_s: None,
-            orientation: fit.orientation,
-            misfit_rad: fit.misfit_rad,
-            predicted_misfit_rad: fit.predicted_misfit_rad,
-            mean_square: fit.mean_square,
-            is_explained: fit.is_explained(),
             criterion: fitter.criterion(fit.deviance, 2 * changes + 1),
+            fit,
         })
     }
 
@@ -125,8 +122,7 @@ impl FocalGrid {
                 (0..states).map(|state| if costs[state] <= changed { state } else { best }).collect();
             let next = |state: usize| {
                 let misfit = self.vector(*key, state) - predicted;
-                let square = misfit.dot(&(information * misfit)) / (TAIL_DEGREES * NOISE_LEVEL_SQUARED);
-                costs[state].min(changed) + (TAIL_DEGREES + 3.0) * square.ln_1p()
+                costs[state].min(changed) + tail_cost(misfit.dot(&(information * misfit)) / NOISE_LEVEL_SQUARED)
             };
             costs = (0..states).map(next).collect();
             sources.push(from);

@@ -50,14 +50,14 @@ pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain) -> Explan
     let mut fitted = fit_all(candidates(data, chain));
     // Other intrinsics need all rotations measured again; only a wrong scale of the gyroscope resembles them.
     let found = |it: &Fitted| {
-        it.is_explained
+        it.fit.is_explained()
             && it.kind != Kind::GyroscopeScale
-            && it.criterion + DECISIVE < given.criterion
-            && it.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
+            && it.criterion + DECISIVE < given.deviance
+            && it.fit.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
     };
     if !fitted.iter().any(found) {
         let grid = FocalGrid::new(&fitter);
-        fitted.extend(fit_all(intrinsics(chain.joint_count(), grid.best_constant(&fitter))));
+        fitted.extend(fit_all(intrinsics(chain.joint_count(), grid.best_constant())));
         fitted.extend(grid.pieces_fit(&fitter));
     }
     fitted.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
@@ -68,10 +68,10 @@ pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain) -> Explan
     let evidence = |found: &Fitted| {
         format!(
             "{compared} then differ by {:.3}°, {:.3}° without; noise predicts {:.3}° (χ²/dof {:.2}, {:.2} without)",
-            found.misfit_rad.to_degrees(),
+            found.fit.misfit_rad.to_degrees(),
             given.misfit_rad.to_degrees(),
-            found.predicted_misfit_rad.to_degrees(),
-            found.mean_square,
+            found.fit.predicted_misfit_rad.to_degrees(),
+            found.fit.mean_square,
             given.mean_square
         )
     };
@@ -79,7 +79,10 @@ pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain) -> Explan
     // Of two that explain the misfit, a special case is preferred unless it is decisively worse.
     let simpler = |best: &Fitted| {
         fitted.iter().find(|it| {
-            best.contains(it) && it.kind != best.kind && it.is_explained && it.criterion < best.criterion + DECISIVE
+            best.contains(it)
+                && it.kind != best.kind
+                && it.fit.is_explained()
+                && it.criterion < best.criterion + DECISIVE
         })
     };
     let Some(best) = fitted.first().map(|best| simpler(best).unwrap_or(best)) else {
@@ -87,15 +90,16 @@ pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain) -> Explan
     };
     let rival = fitted.iter().find(|other| !other.contains(best));
     let is_alone = rival.is_none_or(|rival| rival.criterion > best.criterion + DECISIVE);
-    if best.is_explained && is_alone && best.criterion + DECISIVE < given.criterion {
+    if best.fit.is_explained() && is_alone && best.criterion + DECISIVE < given.deviance {
         let (cause, evidence) = describe(best);
         return Explanation::Decisive(cause, evidence);
     }
     let mut open: Vec<(Cause, String)> = Vec::new();
     for found in &fitted {
-        let remains = found.criterion < best.criterion + DECISIVE || (best.is_explained && found.is_explained);
-        let improves = found.is_explained && found.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
-            || found.mean_square < UNEXPLAINED_IMPROVEMENT * given.mean_square;
+        let is_explained = found.fit.is_explained();
+        let remains = found.criterion < best.criterion + DECISIVE || (best.fit.is_explained() && is_explained);
+        let improves = is_explained && found.fit.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
+            || found.fit.mean_square < UNEXPLAINED_IMPROVEMENT * given.mean_square;
         let (cause, evidence) = describe(found);
         if remains && improves && open.len() < LISTED && open.iter().all(|(listed, _)| listed.title != cause.title) {
             open.push((cause, evidence));

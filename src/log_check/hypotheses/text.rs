@@ -24,7 +24,7 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
         Kind::Focal => focal(data, correction.lens.focal),
         Kind::Centre | Kind::Intrinsics => intrinsics(data, found),
         Kind::FocalPieces(pieces) => focal_pieces(key, pieces),
-        Kind::CameraDelay | Kind::CameraDrift => {
+        Kind::CameraDrift => {
             let ppm = correction.camera_drift * 1e6;
             of(
                 Severity::Warning,
@@ -119,7 +119,7 @@ fn left_handed(data: &RotationData<'_>, found: &Fitted) -> Cause {
     // Recorded rates are ω' = P ω; the images measure R₀ ω = −R₁ R₀ ω' with the fitted orientation R₁.
     let axes = camera_from_imu.and_then(|rotation| {
         let rotation = rotation.to_rotation_matrix().into_inner();
-        let orientation = found.orientation.to_rotation_matrix().into_inner();
+        let orientation = found.fit.orientation.to_rotation_matrix().into_inner();
         let true_from_recorded: Matrix3<f64> = -(rotation.transpose() * orientation * rotation);
         SignedAxes::nearest(&true_from_recorded.transpose())
     });
