@@ -10,7 +10,7 @@ use super::visual::{BundleTrack, PixelModel};
 use super::{CalibrationError, CalibrationOptions, observations};
 use crate::camera::CameraModel;
 use crate::estimator::PoseCovariance;
-use crate::geometry::median;
+use crate::geometry::{MEDIAN_PLANAR_LENGTH, median};
 use crate::optimization::RobustLoss;
 
 /// Standard deviation of a tracked pixel coordinate before residuals are available.
@@ -19,8 +19,6 @@ const INITIAL_SIGMA_PX: f64 = 1.0;
 const MIN_SIGMA_PX: f64 = 0.05;
 /// Range of the quadratic part of the robust loss, in standard deviations.
 const HUBER_SIGMAS: f64 = 1.5;
-/// Median length of a two-dimensional normal error, in standard deviations of a coordinate.
-const MEDIAN_LENGTH: f64 = 1.177_410_022_515_474_7;
 
 /// Common input of the rounds of one stage.
 #[derive(Clone, Copy, Debug)]
@@ -119,7 +117,7 @@ impl Stage<'_> {
                 let lengths =
                     observations::residual_lengths_px(&tracks, &estimate.landmarks, &poses, &bundle.pixels, camera);
                 if let Some(median) = median(lengths) {
-                    sigma_px[usize::from(camera == Camera::Gimbal)] = (median / MEDIAN_LENGTH).max(MIN_SIGMA_PX);
+                    sigma_px[usize::from(camera == Camera::Gimbal)] = (median / MEDIAN_PLANAR_LENGTH).max(MIN_SIGMA_PX);
                 }
             }
             kept = tracks;

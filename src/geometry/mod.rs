@@ -9,6 +9,7 @@ pub mod dense;
 mod dimension;
 mod rigid_transform;
 mod scalars;
+mod signed_axes;
 pub mod so3;
 mod split_mix;
 #[cfg(test)]
@@ -20,8 +21,9 @@ pub use dimension::Dimension;
 pub use rigid_transform::RigidTransform;
 pub(crate) use scalars::planar_length;
 pub use scalars::{
-    mean_square_quantile, median, ns_from_seconds, principal_angle, quantile, seconds_from_ns, tangent_basis,
-    vertical_angle, wrap_angle,
+    MEDIAN_PLANAR_LENGTH, SIGMA_PER_MEDIAN, mean_square_quantile, median, ns_from_seconds, principal_angle, quantile,
+    seconds_from_ns, tangent_basis, vertical_angle, wrap_angle,
 };
+pub use signed_axes::SignedAxes;
 pub use split_mix::SplitMix64;
 pub use vector_statistics::{mean, standard_deviation};

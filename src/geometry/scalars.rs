@@ -32,6 +32,12 @@ pub fn vertical_angle(rotation: &UnitQuaternion<f64>) -> f64 {
     2.0 * rotation.k.atan2(rotation.w)
 }
 
+/// Ratio of a normal variable's standard deviation to the median of its magnitude.
+pub const SIGMA_PER_MEDIAN: f64 = 1.4826;
+
+/// Median length of a normal error in two dimensions, in standard deviations of a coordinate.
+pub const MEDIAN_PLANAR_LENGTH: f64 = 1.177_410_022_515_474_7;
+
 /// Median by total order, the upper one for an even count; `None` without values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();

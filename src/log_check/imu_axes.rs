@@ -3,10 +3,9 @@
 
 use nalgebra::Vector3;
 
-use super::hypotheses::SignedAxes;
 use super::imu_facts::ImuFacts;
 use super::{Area, Findings, Severity};
-use crate::geometry::{mean, seconds_from_ns};
+use crate::geometry::{SignedAxes, mean, seconds_from_ns};
 use crate::sensors::ImuSample;
 
 /// Length over which specific forces are averaged, in nanoseconds.

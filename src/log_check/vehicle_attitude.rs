@@ -9,7 +9,7 @@ use super::statistics::median;
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
 use crate::flight_log::attitude::MAX_VEHICLE_GAP_NS;
-use crate::geometry::{seconds_from_ns, so3};
+use crate::geometry::{SIGMA_PER_MEDIAN, seconds_from_ns, so3};
 use crate::sensors::{AttitudeFrame, Rig};
 
 /// Time over which a change of the heading counts as one step, in nanoseconds.
@@ -18,8 +18,6 @@ const STEP_NS: i64 = 500_000_000;
 const STEP_TOLERANCE_RAD: f64 = 0.035;
 /// Number of standard deviations, from the median change, of a reported step.
 const STEP_SIGMAS: f64 = 8.0;
-/// Ratio of a normal distribution's standard deviation to its median magnitude.
-const SIGMA_PER_MEDIAN: f64 = 1.4826;
 /// Minimum number of intervals.
 const MIN_INTERVALS: usize = 40;
 /// Minimum median rotation over [`STEP_NS`] with which the axes are found.

@@ -36,7 +36,7 @@ pub use engine::{
 pub use plan::{
     Correction, DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, ForkChanges, ForkError,
     ImageFlip, ImageHalf, LoadedPositions, LoadedTrajectory, MAX_RUNS, MAX_TRAJECTORIES, ParameterizationChoice,
-    RunSpec, RunSpecError, SessionError, SessionPlan, SessionRequest, SignedAxes, TrajectorySource, TrajectorySpec,
+    RunSpec, RunSpecError, SessionError, SessionPlan, SessionRequest, TrajectorySource, TrajectorySpec,
     TrajectorySpecError,
 };
 pub use playback::{

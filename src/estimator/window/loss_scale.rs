@@ -1,14 +1,13 @@
 //! Scale of the robust loss, which follows the residuals of the window.
 
 use crate::estimator::config::VisualLoss;
+use crate::geometry::MEDIAN_PLANAR_LENGTH;
 use crate::optimization::RobustLoss;
 
 /// Scale of Cauchy's loss in standard deviations of the residuals: an error of one standard deviation keeps a weight of
 /// 0.92. Narrower ones, such as 2.4 (an efficiency of 95 % under normal noise), lose more of the correct observations
 /// than of the sliding ones.
 const SCALE_IN_SIGMAS: f64 = 3.3;
-/// Median length of a normal error in two dimensions, in standard deviations of a coordinate.
-const MEDIAN_LENGTH: f64 = 1.177_410_022_515_474_7;
 /// Bounds of the scale, in standard deviations of a pixel: the largest is that of a recording whose clocks, lens or
 /// shutter are wrong, so that correct observations keep their weight.
 const BOUNDS: [f64; 2] = [0.3, 1.0];
@@ -50,7 +49,7 @@ impl LossScale {
             return;
         }
         let [lowest, highest] = BOUNDS;
-        let wanted = (SCALE_IN_SIGMAS / MEDIAN_LENGTH * median_residual).clamp(lowest, highest);
+        let wanted = (SCALE_IN_SIGMAS / MEDIAN_PLANAR_LENGTH * median_residual).clamp(lowest, highest);
         self.0 += (wanted - self.0) * (interval_s / TIME_CONSTANT_S).clamp(0.0, 1.0);
     }
 }

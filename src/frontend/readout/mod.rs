@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use self::pair_motion::PairMotion;
 use self::sweep::Sweep;
 use super::outliers::BearingPair;
-use crate::geometry::{median, so3};
+use crate::geometry::{SIGMA_PER_MEDIAN, median, so3};
 use crate::sensors::AngularRates;
 
 /// Observation of one feature in one image.
@@ -276,8 +276,6 @@ impl<'a> Search<'a> {
     /// Sets the standard deviation of the bearings from their distances to the motions: if it is too large, small
     /// parallax is treated as noise.
     fn take_sigma(&mut self, readout_s: f64) {
-        /// Ratio of the standard deviation and the median absolute value of a normal variable.
-        const SIGMA_PER_MEDIAN: f64 = 1.4826;
         let [largest, smallest] = self.options.bearing_sigmas_rad;
         self.sigma_rad = (SIGMA_PER_MEDIAN * self.misfit_rad(readout_s, 0.5)).clamp(smallest, largest);
     }

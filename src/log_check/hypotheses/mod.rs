@@ -5,19 +5,16 @@
 //! are compared by their likelihood and their number of parameters (BIC). A cause is named if what remains is explained by
 //! noise and no other cause comes near; else those that remain are listed.
 
-mod axes;
 mod candidates;
 mod cause;
 mod fit;
 mod focal_grid;
 mod text;
 
-pub(super) use self::axes::SignedAxes;
-use self::cause::Cause;
-
 use rayon::prelude::*;
 
 use self::candidates::{candidates, intrinsics};
+use self::cause::Cause;
 use self::fit::{Fitted, Fitter, Hypothesis, Kind, length_s};
 use self::focal_grid::FocalGrid;
 use super::rotation_data::RotationData;

@@ -4,9 +4,9 @@ use nalgebra::Matrix3;
 
 use super::super::rotation_data::RotationData;
 use super::super::{Area, Severity};
-use super::axes::SignedAxes;
 use super::cause::Cause;
 use super::fit::{Fitted, Kind};
+use crate::geometry::SignedAxes;
 use crate::sensors::CameraMount;
 
 /// Relative errors of intrinsics and scales above which results are useless.

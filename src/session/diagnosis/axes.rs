@@ -3,15 +3,12 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::trial::DiagnosedRun;
-use crate::geometry::so3;
+use crate::geometry::{SignedAxes, so3};
 use crate::sensors::rotation_steps;
 use crate::session::engine::rotation_between;
-use crate::session::plan::SignedAxes;
 
 /// Number of axes that are tried of each kind.
 const TRIED: usize = 3;
-/// Standard deviation of a direction of an image for relative poses, in pixels.
-const PIXEL_SIGMA_PX: f64 = 0.5;
 /// Ratio of the rotations that recorded axes explain above which the gyroscope is not suspected.
 const EXPLAINED: f64 = 0.8;
 /// Fewest rotations of images.
@@ -56,8 +53,7 @@ pub(super) fn plausible_axes(run: &DiagnosedRun<'_>, steps: std::ops::Range<usiz
 }
 
 fn best(score: impl Fn(&SignedAxes) -> f64) -> Vec<SignedAxes> {
-    let mut scored: Vec<(f64, SignedAxes)> =
-        SignedAxes::others().into_iter().map(|axes| (score(&axes), axes)).collect();
+    let mut scored: Vec<(f64, SignedAxes)> = SignedAxes::all().skip(1).map(|axes| (score(&axes), axes)).collect();
     scored.sort_by(|one, other| other.0.total_cmp(&one.0));
     scored.into_iter().take(TRIED).map(|(_, axes)| axes).collect()
 }
@@ -78,7 +74,6 @@ fn steadiness(intervals: &[Interval], matrix: &Matrix3<f64>) -> f64 {
 fn intervals(run: &DiagnosedRun<'_>, steps: std::ops::Range<usize>) -> Vec<Interval> {
     let Some(chain) = run.rig.chain_of_camera(run.camera_key) else { return Vec::new() };
     let Ok(camera) = run.rig.camera(run.camera_key) else { return Vec::new() };
-    let sigma_rad = PIXEL_SIGMA_PX / camera.model.focal_length_px();
     let joints = chain.links.len();
     let imu_from_camera = |number: usize| {
         let angles = match (&run.inputs.get(number)?.joint_angles, joints) {
@@ -90,7 +85,7 @@ fn intervals(run: &DiagnosedRun<'_>, steps: std::ops::Range<usize>) -> Vec<Inter
     };
     let interval = |number: usize| {
         let (before, now) = (run.inputs.get(number.checked_sub(1)?)?, run.inputs.get(number)?);
-        let now_from_before = rotation_between(before.main_tracks(), now.main_tracks(), sigma_rad)?;
+        let now_from_before = rotation_between(&camera.model, before.main_tracks(), now.main_tracks())?;
         let (from, to) = (imu_from_camera(number - 1)?, imu_from_camera(number)?);
         let before_from_now = from * now_from_before.inverse() * to.inverse();
         let none = Vector3::zeros();

@@ -7,7 +7,7 @@
 
 use super::pixel_histogram::PixelHistogram;
 use crate::estimator::{FactorKind, StepReport};
-use crate::geometry::seconds_from_ns;
+use crate::geometry::{MEDIAN_PLANAR_LENGTH, seconds_from_ns};
 use crate::session::plan::ImageHalf;
 use crate::text::Named as _;
 
@@ -141,8 +141,6 @@ pub(super) struct Misfit {
 const SETTLING_NS: i64 = 1_000_000_000;
 /// Upper bound of the mean squared residual of a kind of factor: a larger one says no more.
 const LARGEST_MEAN_SQUARE: f64 = 25.0;
-/// Median length of a normal error in two dimensions, in standard deviations of a coordinate.
-const MEDIAN_LENGTH: f64 = 1.177_410_022_515_474_7;
 /// Lowest standard deviation of an observation, in pixels.
 const LEAST_SIGMA_PX: f64 = 0.03;
 
@@ -208,7 +206,7 @@ impl Misfit {
 
     /// Standard deviation of a coordinate of an observation by the median residual, in pixels.
     pub(super) fn sigma_px(&self) -> Option<f64> {
-        self.median_px().map(|median_px| (median_px / MEDIAN_LENGTH).max(LEAST_SIGMA_PX))
+        self.median_px().map(|median_px| (median_px / MEDIAN_PLANAR_LENGTH).max(LEAST_SIGMA_PX))
     }
 
     /// Observations in a window, on average.

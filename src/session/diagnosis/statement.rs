@@ -111,7 +111,7 @@ fn of_correction(run: &DiagnosedRun<'_>, correction: &Correction) -> (String, St
             (format!("the joint angles are in {unit}"), "record radians, or set the unit of gimbal.source".to_owned())
         }
         Correction::ImuAxes(axes) => {
-            let frame = if axes.is_reflection() { "form a left-handed frame" } else { "belong to another frame" };
+            let frame = if axes.is_left_handed() { "form a left-handed frame" } else { "belong to another frame" };
             (
                 format!("the axes of the IMU {frame}: x/y/z of the rig's IMU are {axes} of the recording"),
                 "correct the axes in the driver or the converter; check T_cam_imu or T_I_B if the frame is right-handed"

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
+use crate::camera::CameraModel;
 use crate::estimator::initialization::relative_pose::{RotationPrior, relative_poses};
 use crate::flight_log::{FlightLog, FrameStream, ImageReader, LogError, MessageKind};
 use crate::frontend::readout::{RowObservation, RowTrack};
@@ -125,13 +126,12 @@ pub fn camera_rotations(
 fn between(camera: &CameraRig, images: impl Iterator<Item = (i64, Arc<GrayImage>)>) -> Vec<ImageRotation> {
     let mask = camera.mask.as_ref().map(|mask| mask.image.clone());
     let mut front_end = FrontEnd::new(camera.model.clone(), FrontEndOptions::default()).with_mask(mask);
-    let focal_px = 0.5 * (camera.model.intrinsics_px[0] + camera.model.intrinsics_px[1]);
     let mut previous: Option<(TrackedFrame, i64)> = None;
     let mut rotations = Vec::new();
     for (stamp_ns, image) in images {
         let Ok(tracks) = front_end.process(&image, stamp_ns, None) else { continue };
         if let Some((before, from_ns)) = &previous
-            && let Some(second_from_first) = rotation_between(before, &tracks, PIXEL_SIGMA_PX / focal_px)
+            && let Some(second_from_first) = rotation_between(&camera.model, before, &tracks)
         {
             let (camera_key, to_ns) = (camera.key.clone(), stamp_ns);
             let tracks = row_tracks(camera, before, &tracks);
@@ -154,13 +154,13 @@ fn row_tracks(camera: &CameraRig, first: &TrackedFrame, second: &TrackedFrame) -
     second.features.iter().filter_map(track).collect()
 }
 
-/// Rotation `second_from_first` of the camera from the features observed in both images, `None` with too few inliers;
-/// `sigma_rad` is the standard deviation of a direction.
+/// Rotation `second_from_first` of the camera from the features observed in both images, `None` with too few inliers.
 pub(in crate::session) fn rotation_between(
+    model: &CameraModel,
     first: &TrackedFrame,
     second: &TrackedFrame,
-    sigma_rad: f64,
 ) -> Option<UnitQuaternion<f64>> {
+    let focal_px = 0.5 * (model.intrinsics_px[0] + model.intrinsics_px[1]);
     let before: BTreeMap<FeatureId, Vector3<f64>> =
         first.features.iter().map(|feature| (feature.id, feature.bearing)).collect();
     let pairs: Vec<(Vector3<f64>, Vector3<f64>)> =
@@ -169,7 +169,8 @@ pub(in crate::session) fn rotation_between(
         return None;
     }
     let prior = RotationPrior { rotation: UnitQuaternion::identity(), sigma_rad: ROTATION_SIGMA_RAD };
-    let best = relative_poses(&pairs, &prior, sigma_rad, second.stamp_ns.unsigned_abs()).into_iter().next()?;
+    let best =
+        relative_poses(&pairs, &prior, PIXEL_SIGMA_PX / focal_px, second.stamp_ns.unsigned_abs()).into_iter().next()?;
     let fits = best.inliers.len() as f64 >= MIN_INLIER_RATIO * pairs.len() as f64;
     fits.then_some(best.camera_j_from_camera_i.rotation)
 }

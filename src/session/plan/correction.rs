@@ -3,8 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::Vector2;
 
+use crate::geometry::SignedAxes;
 use crate::text::Named;
 
 /// Assumed error of the measurements, undone before the estimator uses them.
@@ -80,58 +81,6 @@ impl ImageHalf {
             Self::Top => uv_px.y < 0.5 * height,
             Self::Bottom => uv_px.y >= 0.5 * height,
         }
-    }
-}
-
-/// Recorded axis (1 to 3 for x, y, z; negative if reversed) that is each axis of the IMU frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SignedAxes([i8; 3]);
-
-impl SignedAxes {
-    /// All permutations with all signs, except the identity: 47.
-    pub fn others() -> Vec<Self> {
-        let orders: [[i8; 3]; 6] = [[1, 2, 3], [2, 3, 1], [3, 1, 2], [2, 1, 3], [1, 3, 2], [3, 2, 1]];
-        let signed = |order: [i8; 3]| {
-            (0..8_u8).map(move |signs| {
-                let sign = |place: usize| if signs >> place & 1 == 1 { -order[place] } else { order[place] };
-                Self([sign(0), sign(1), sign(2)])
-            })
-        };
-        orders.into_iter().flat_map(signed).filter(|axes| axes.0 != [1, 2, 3]).collect()
-    }
-
-    /// Matrix `imu_from_recorded` (3 × 3).
-    pub fn matrix(self) -> Matrix3<f64> {
-        let mut matrix = Matrix3::zeros();
-        for (row, axis) in self.0.into_iter().enumerate() {
-            matrix[(row, usize::from(axis.unsigned_abs()) - 1)] = f64::from(axis.signum());
-        }
-        matrix
-    }
-
-    /// True if the recorded axes form a left-handed frame.
-    pub fn is_reflection(self) -> bool {
-        self.matrix().determinant() < 0.0
-    }
-}
-
-impl fmt::Display for SignedAxes {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let texts = self.0.map(|axis| {
-            let name = ["x", "y", "z"][usize::from(axis.unsigned_abs()) - 1];
-            if axis < 0 { format!("-{name}") } else { name.to_owned() }
-        });
-        out.write_str(&texts.join("/"))
-    }
-}
-
-impl FromStr for SignedAxes {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let known = std::iter::once(Self([1, 2, 3])).chain(Self::others());
-        let found = known.into_iter().find(|axes| axes.to_string() == text.trim());
-        found.ok_or_else(|| format!("'{text}' are no axes; expected three, as in y/x/-z"))
     }
 }
 
@@ -258,14 +207,5 @@ mod tests {
             let problem = text.parse::<Correction>().unwrap_err();
             assert!(problem.contains(word), "{text}: {problem}");
         }
-    }
-
-    #[test]
-    fn half_of_the_signed_axes_are_left_handed() {
-        let others = SignedAxes::others();
-        assert_eq!(others.len(), 47);
-        assert_eq!(others.iter().filter(|axes| axes.is_reflection()).count(), 24);
-        let swapped: SignedAxes = "y/x/z".parse().unwrap();
-        assert_eq!(swapped.matrix() * nalgebra::Vector3::new(1.0, 2.0, 3.0), nalgebra::Vector3::new(2.0, 1.0, 3.0));
     }
 }
