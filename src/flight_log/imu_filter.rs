@@ -86,7 +86,6 @@ pub(crate) fn is_measured(vector: &Vector3<f64>) -> bool {
 
 /// Sample that an [`ImuFilter`] judges.
 pub(crate) trait Reading: Clone {
-    /// Stamp in nanoseconds.
     fn stamp_ns(&self) -> i64;
     /// Angular velocity in rad/s.
     fn rate(&self) -> &Vector3<f64>;

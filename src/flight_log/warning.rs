@@ -97,7 +97,6 @@ impl LogWarning {
         Self { kind, subject: subject.to_owned(), stamp_ns, last_ns: stamp_ns, count: 1, magnitude: None, message }
     }
 
-    /// Sets the size.
     pub fn with_magnitude(self, magnitude: Magnitude) -> Self {
         Self { magnitude: Some(magnitude), ..self }
     }

@@ -9,7 +9,7 @@ use super::hypotheses::Cause;
 use crate::session::plan::ForkChanges;
 use crate::text::Named as _;
 
-/// What a diagnosis has found.
+/// Conclusion of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -25,7 +25,7 @@ pub enum Verdict {
     NoSteps,
 }
 
-/// One tried cause.
+/// Cause that was tried, with the fork that undoes it and what it leaves.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RankedCause {
     #[serde(serialize_with = "key")]
@@ -75,7 +75,7 @@ pub struct WaitingReason {
     pub images: usize,
 }
 
-/// Result of [`diagnose`](super::diagnose).
+/// Agreement of a run with its noise, and the causes of a disagreement, best first.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Diagnosis {
     /// File name of the log.
@@ -99,7 +99,6 @@ pub struct Diagnosis {
     pub explaining: usize,
     /// Causes with the largest gain, the best first.
     pub causes: Vec<RankedCause>,
-    /// Number of trials.
     pub trials: usize,
     /// True if it was interrupted before the last trial.
     pub interrupted: bool,

@@ -31,12 +31,12 @@ const REGION_RATIO: f64 = 0.2;
 /// Largest number of causes that remain.
 const MOST_REMAINING: usize = 3;
 
-/// What the ranked causes mean.
+/// Conclusion from the ranked causes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Decision {
     /// The first cause explains the residuals, and no other one does.
     One,
-    /// That many causes explain them about as well.
+    /// Number of causes that explain them about as well.
     Several(usize),
     /// No cause explains them.
     None,

@@ -17,7 +17,6 @@ pub struct WarningLine<'a> {
     magnitude: Option<LineMagnitude>,
     pub first_ns: i64,
     last_ns: i64,
-    /// Number of warnings.
     warnings: usize,
     /// Number of messages, images, …, or of steps of the run with the warning.
     count: usize,
@@ -25,12 +24,12 @@ pub struct WarningLine<'a> {
     varies: bool,
 }
 
-/// What warnings of one line have in common.
+/// Properties that the warnings of one line share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum WarningKey<'a> {
-    /// Kind and topic.
+    /// Kind of a warning of the log, and its topic.
     Log(WarningKind, &'a str),
-    /// Factor and cause.
+    /// Factor of an inconsistency in a run, and its cause.
     Run(FactorKind, &'a str),
 }
 
