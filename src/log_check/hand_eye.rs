@@ -91,10 +91,7 @@ impl HandEye<'_> {
     fn pairs(&self, chain: &ClassicalChain, offset_s: f64, length_s: f64) -> Vec<RotationPair> {
         let correction = Correction { camera_delay_s: offset_s, ..Correction::none(chain.joint_count()) };
         let predictor = self.data.predictor(chain, &correction);
-        if length_s > 0.0 {
-            return joined(&self.data.measured, length_s).iter().filter_map(|it| predictor.pair(it)).collect();
-        }
-        self.data.measured.iter().filter_map(|it| predictor.pair(it)).collect()
+        joined(&self.data.measured, length_s).iter().filter_map(|it| predictor.pair(it)).collect()
     }
 
     /// Alignment of the camera's clock, or the reason that its time offset is unobservable.

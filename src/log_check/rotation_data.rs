@@ -163,8 +163,11 @@ fn first_rows(camera: &CameraRig, images: &[ImageRotation], readout_s: f64) -> V
 }
 
 /// Joins consecutive rotations to ones over at least `length_s`, which do not overlap: the noise of joint angles does not
-/// grow with the time between two images, their rotation does.
+/// grow with the time between two images, their rotation does. A length of zero leaves them as they are.
 pub(super) fn joined(measured: &[MeasuredRotation], length_s: f64) -> Vec<MeasuredRotation> {
+    if length_s <= 0.0 {
+        return measured.to_vec();
+    }
     let rate = |of: &ImageRotation| so3::log(&of.second_from_first) / seconds_from_ns(of.to_ns - of.from_ns).max(1e-9);
     let mut all = Vec::new();
     let mut start = 0;
