@@ -16,6 +16,9 @@ const RATE_TOLERANCE: f64 = 0.05;
 /// Smallest reported jitter of the stamps, as a ratio of the period.
 const JITTER_TOLERANCE: f64 = 0.2;
 
+/// Lateness in seconds up to which a run sorts messages.
+const SORTED_S: f64 = 0.1;
+
 /// Checks rates, gaps, order and time bases of every topic that the rig names.
 pub(super) fn check_timing(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) {
     let mut used = used_topics(survey, rig);
@@ -90,10 +93,14 @@ fn check_order(used: &UsedTopic<'_>, findings: &mut Findings) {
         seconds_from_ns(stamps_ns[*first]),
         -deepest
     );
-    let severity =
-        if deepest < -0.1 || backwards.len() * 100 > steps.len() { Severity::Error } else { Severity::Warning };
-    let remedy = "check how the driver stamps; samples up to 0.1 s late are sorted, others are dropped";
-    findings.add(severity, Area::Time, format!("stamps of {} run backwards", used.role), evidence, remedy);
+    let (severity, title, remedy) = if deepest < -SORTED_S {
+        let title = format!("stamps of {} run backwards", used.role);
+        (Severity::Error, title, "check how the driver stamps; samples up to 0.1 s late are sorted, others are dropped")
+    } else {
+        let title = format!("messages of {} are out of order", used.role);
+        (Severity::Warning, title, "record them in the order of their stamps; nothing is missing: a run sorts them")
+    };
+    findings.add(severity, Area::Time, title, evidence, remedy);
 }
 
 /// Reports steps between stamps in which messages are missing.

@@ -15,6 +15,7 @@ use super::joint_topic::JointSamples;
 use super::read_context::ReadContext;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ImuSample, Rig};
+use crate::text::counted;
 
 /// Images without joint angles for a shorter time are not reported: attitudes of gimbals come at 5 Hz or more.
 const WITHOUT_JOINTS_NS: i64 = 400_000_000;
@@ -244,8 +245,9 @@ impl FrameSource {
         let count = std::mem::take(&mut self.skipped);
         if count > 0 {
             let message = format!(
-                "{}: {count} images before the first IMU sample at {:.3} s are not used",
+                "{}: {} before the first IMU sample at {:.3} s skipped",
                 self.camera.topic,
+                counted(count, "image"),
                 seconds_from_ns(self.samples.front().map_or(0, |first| first.stamp_ns))
             );
             let warning = LogWarning::new(WarningKind::ImageBeforeImu, &self.camera.topic, self.start_ns, message);
