@@ -170,6 +170,37 @@ impl AttitudeSurvey {
         &self.topic
     }
 
+    /// Topic of the vehicle's attitude, `None` if the rig needs none.
+    pub(super) fn vehicle_topic(&self) -> Option<&str> {
+        self.vehicle_topic.as_ref().map(|(topic, ..)| topic.as_str())
+    }
+
+    /// The attitudes with other rotations of gimbal and vehicle.
+    pub(super) fn with_rotations(
+        &self,
+        gimbal: impl Fn(&UnitQuaternion<f64>) -> UnitQuaternion<f64>,
+        vehicle: impl Fn(&UnitQuaternion<f64>) -> UnitQuaternion<f64>,
+    ) -> Self {
+        let value = |(stamp_ns, value): &(i64, AttitudeValue)| {
+            let changed = match value {
+                AttitudeValue::Rotation(rotation) => AttitudeValue::Rotation(gimbal(rotation)),
+                AttitudeValue::Flagged(rotation, flags) => AttitudeValue::Flagged(gimbal(rotation), *flags),
+                AttitudeValue::Vector(angles) => AttitudeValue::Vector(*angles),
+            };
+            (*stamp_ns, changed)
+        };
+        Self {
+            topic: self.topic.clone(),
+            clock: self.clock,
+            merge: None,
+            moved: Vec::new(),
+            vehicle_topic: self.vehicle_topic.clone(),
+            values: self.values.iter().map(value).collect(),
+            vehicle: self.vehicle.iter().map(|(at, rotation)| (*at, vehicle(rotation))).collect(),
+            warnings: Vec::new(),
+        }
+    }
+
     /// Orientation `imu_from_camera` at a time, interpolated between the recorded ones; `source` may differ from the
     /// rig's.
     pub(super) fn orientation_at(

@@ -1,12 +1,13 @@
 //! Ground truth compared with the gyroscope and with gravity: its clock, its body frame and the vertical of its world.
 //! Errors of an estimate against a reference that is itself wrong look like errors of the estimate.
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::clock_alignment::{AlignmentError, ClockAlignment, RotationReference, align_clocks};
 use super::imu_facts::ImuFacts;
+use super::placed_forces::{PlacedForces, velocity_at};
 use super::statistics::median;
-use super::{Area, Findings, ImageRotation, Severity};
+use super::{Area, Findings, ImageRotation, Measurement, Severity};
 use crate::flight_log::log::relative_ns;
 use crate::flight_log::spacing::Spacing;
 use crate::flight_log::{FlightLog, RecordedPose};
@@ -34,6 +35,8 @@ const SIGNIFICANT_SIGMAS: f64 = 4.0;
 const TILT_TOLERANCE_RAD: f64 = 0.05;
 /// A larger angle means other axes, not an inaccurate levelling.
 const OTHER_AXES_RAD: f64 = 1.0;
+/// Largest difference of rotations that count as the same, in radians.
+const SAME_TURN_RAD: f64 = 0.07;
 /// Accelerometer bias in m/s² that the angle to gravity tolerates.
 const ACCELEROMETER_BIAS: f64 = 0.3;
 
@@ -44,8 +47,18 @@ struct GroundTruth<'a> {
     poses: Vec<(i64, RigidTransform)>,
 }
 
-/// Compares the ground truth of the rig with the IMU, if the log has one with attitudes.
-pub(super) fn check_ground_truth(log: &FlightLog, rig: &Rig, imu_facts: &ImuFacts, findings: &mut Findings) {
+/// Compares the ground truth of the rig with the IMU, if the log has one with attitudes. `turns_of_imu` are rotations of
+/// the IMU, in its frame, that would explain the orientations of the cameras.
+pub(super) fn check_ground_truth(
+    log: &FlightLog,
+    rig: &Rig,
+    imu_facts: &ImuFacts,
+    turns_of_imu: &[UnitQuaternion<f64>],
+    findings: &mut Findings,
+) {
+    if !findings.can_compare(Measurement::Gyroscope) {
+        return;
+    }
     let Some(topic) = rig.ground_truth_topic.as_deref().filter(|topic| !log.is_position_topic(topic)) else { return };
     // A topic that is missing or unreadable is reported by other checks.
     let Ok(recorded) = log.read_trajectory_topic(topic) else { return };
@@ -59,12 +72,18 @@ pub(super) fn check_ground_truth(log: &FlightLog, rig: &Rig, imu_facts: &ImuFact
     // Stamps of a batch are late by up to its length.
     let stamps = imu_facts.samples.iter().map(|sample| sample.stamp_ns);
     let batches = Spacing::of(stamps, Some(rig.imu.rate_hz)).batches;
-    truth.compare(imu_facts, batches.map_or(0.0, |batches| batches.pause_s), findings);
+    truth.compare(imu_facts, batches.map_or(0.0, |batches| batches.pause_s), turns_of_imu, findings);
 }
 
 impl GroundTruth<'_> {
     /// `imu_delay_s` is the largest delay of the IMU's own stamps.
-    fn compare(&self, imu_facts: &ImuFacts, imu_delay_s: f64, findings: &mut Findings) {
+    fn compare(
+        &self,
+        imu_facts: &ImuFacts,
+        imu_delay_s: f64,
+        turns_of_imu: &[UnitQuaternion<f64>],
+        findings: &mut Findings,
+    ) {
         let rotations = self.rotations();
         let [given, reversed] = [1.0, -1.0].map(|factor| {
             let reference = RotationReference::Gyroscope(imu_facts.gyroscope.scaled(factor));
@@ -82,8 +101,11 @@ impl GroundTruth<'_> {
             }
             Ok(found) => {
                 self.report_clock(&found, imu_delay_s, findings);
-                report_body(&found, findings);
-                self.report_world(&found, imu_facts, findings);
+                report_body(&found, turns_of_imu, findings);
+                let placed = PlacedForces { poses: &self.poses, clock: &found, samples: &imu_facts.samples };
+                if findings.can_compare(Measurement::Accelerometer) && !placed.report_axes(findings) {
+                    self.report_world(&found, imu_facts, findings);
+                }
             }
             Err(error) => report_failure(&error, findings),
         }
@@ -195,18 +217,8 @@ impl GroundTruth<'_> {
             sum + (pair[0].1 + pair[1].1) * (0.5 * seconds_from_ns(pair[1].0 - pair[0].0))
         });
         let duration_s = seconds_from_ns(last - first);
-        let change = self.velocity_at(last)? - self.velocity_at(first)?;
+        let change = velocity_at(&self.poses, last)? - velocity_at(&self.poses, first)?;
         (duration_s > 1.0).then(|| (integral / duration_s, change / duration_s))
-    }
-
-    /// Mean velocity over [`STEP_NS`] to both sides of a stamp, in m/s; `None` without poses there.
-    fn velocity_at(&self, stamp_ns: i64) -> Option<Vector3<f64>> {
-        let start = self.poses.partition_point(|(at, _)| *at < stamp_ns - STEP_NS);
-        let end = self.poses.partition_point(|(at, _)| *at <= stamp_ns + STEP_NS);
-        let around = self.poses.get(start..end)?;
-        let (first, last) = (around.first()?, around.last()?);
-        let interval_s = seconds_from_ns(last.0 - first.0);
-        (interval_s > 0.0).then(|| (last.1.translation_m - first.1.translation_m) / interval_s)
     }
 }
 
@@ -238,7 +250,7 @@ fn report_failure(error: &AlignmentError, findings: &mut Findings) {
     findings.add(Severity::Note, Area::Log, title, error.to_string(), "");
 }
 
-fn report_body(found: &ClockAlignment, findings: &mut Findings) {
+fn report_body(found: &ClockAlignment, turns_of_imu: &[UnitQuaternion<f64>], findings: &mut Findings) {
     let body_from_imu = so3::exp(&Vector3::from(found.camera_from_body_rad));
     let angle_rad = body_from_imu.angle();
     // Each rotation measures two axes; the misfit of one is averaged over all.
@@ -257,6 +269,18 @@ fn report_body(found: &ClockAlignment, findings: &mut Findings) {
     }
     if angle_rad > BODY_TOLERANCE_RAD.max(SIGNIFICANT_SIGMAS * sigma_rad) {
         let vector = so3::log(&body_from_imu).map(f64::to_degrees);
+        let is_same = |turn: &UnitQuaternion<f64>| turn.angle_to(&body_from_imu) < SAME_TURN_RAD;
+        if !turns_of_imu.is_empty() && turns_of_imu.iter().all(is_same) {
+            let title =
+                format!("the axes of the IMU are not those of the rig: rotated by {:.1}°", angle_rad.to_degrees());
+            let evidence = format!(
+                "ground truth and cameras agree with each other: rotation vector ({:+.1}, {:+.1}, {:+.1})° in the IMU frame; {evidence}",
+                vector.x, vector.y, vector.z
+            );
+            let remedy = "publish the IMU in the axes of the calibration, or calibrate the extrinsics of all cameras with \
+                          the axes that it has";
+            return findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
+        }
         let title = format!("the ground truth is of another body frame: rotated by {:.1}°", angle_rad.to_degrees());
         let evidence = format!(
             "{evidence}; rotation vector ({:+.1}, {:+.1}, {:+.1})° in the IMU frame",
@@ -272,8 +296,6 @@ fn report_body(found: &ClockAlignment, findings: &mut Findings) {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::UnitQuaternion;
-
     use super::*;
     use crate::sensors::{AngularRates, ImuSample};
 
@@ -310,7 +332,7 @@ mod tests {
         poses.iter_mut().for_each(change);
         let truth = GroundTruth { topic: "/truth", poses };
         let mut findings = Findings::default();
-        truth.compare(&imu_facts, 0.0, &mut findings);
+        truth.compare(&imu_facts, 0.0, &[], &mut findings);
         findings.list.into_iter().filter(|it| it.severity != Severity::Good).map(|it| it.title).collect()
     }
 
@@ -352,7 +374,7 @@ mod tests {
             imu_facts.samples.iter().map(|it| (seconds_from_ns(it.stamp_ns), swapped(it.angular_velocity_rad_per_s)));
         imu_facts.gyroscope = AngularRates::new(rates.collect::<Vec<_>>());
         let mut findings = Findings::default();
-        GroundTruth { topic: "/truth", poses }.compare(&imu_facts, 0.0, &mut findings);
+        GroundTruth { topic: "/truth", poses }.compare(&imu_facts, 0.0, &[], &mut findings);
         let titles: Vec<&str> = findings.list.iter().map(|finding| finding.title.as_str()).collect();
         assert_eq!(titles, ["the axes of the gyroscope form a left-handed frame, by the ground truth"]);
     }
@@ -362,5 +384,53 @@ mod tests {
         let found =
             titles(|pose| pose.1.rotation = UnitQuaternion::from_euler_angles(0.0, 0.0, (pose.0 as f64 * 3e-9).sin()));
         assert!(found.iter().any(|title| title.starts_with("unexplained")), "{found:?}");
+    }
+
+    /// Flight with accelerations of up to 2 m/s², and titles of all findings that are not good after a change of the
+    /// specific forces.
+    fn titles_of_forces(change: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Vec<String> {
+        let (mut imu_facts, mut poses) = flight();
+        let position = |t: f64| Vector3::new((2.0 * t).sin(), 0.5 * (1.6 * t).cos(), 0.3 * (2.4 * t).sin()) * 0.5;
+        for (sample, (stamp_ns, pose)) in imu_facts.samples.iter_mut().zip(&mut poses) {
+            let t = seconds_from_ns(*stamp_ns);
+            pose.translation_m = position(t);
+            let acceleration = (position(t + 0.01) - 2.0 * position(t) + position(t - 0.01)) / 1e-4;
+            let force = pose.rotation.inverse() * (acceleration + Vector3::new(0.0, 0.0, GRAVITY));
+            sample.specific_force_m_per_s2 = change(force);
+        }
+        let mut findings = Findings::default();
+        GroundTruth { topic: "/truth", poses }.compare(&imu_facts, 0.0, &[], &mut findings);
+        findings.list.into_iter().filter(|it| it.severity != Severity::Good).map(|it| it.title).collect()
+    }
+
+    #[test]
+    fn axes_and_sign_of_the_accelerometer_are_named() {
+        assert_eq!(titles_of_forces(|force| force), Vec::<String>::new());
+        assert_eq!(
+            titles_of_forces(|force| -force),
+            ["the accelerometer has the opposite sign: it measures gravity, not specific force"]
+        );
+        assert_eq!(
+            titles_of_forces(|force| Vector3::new(force.y, force.x, force.z)),
+            ["the axes of the accelerometer differ from the gyroscope's: x and y swapped"]
+        );
+    }
+
+    #[test]
+    fn axes_of_the_imu_that_ground_truth_and_camera_agree_on_are_named() {
+        let (imu_facts, mut poses) = flight();
+        let turn = UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.0);
+        for (_, pose) in &mut poses {
+            pose.rotation *= turn;
+        }
+        let titles = |turns: &[UnitQuaternion<f64>]| {
+            let mut findings = Findings::default();
+            GroundTruth { topic: "/truth", poses: poses.clone() }.compare(&imu_facts, 0.0, turns, &mut findings);
+            findings.list.iter().map(|it| it.title.clone()).collect::<Vec<_>>().join("; ")
+        };
+        let by_both = titles(&[turn.inverse()]);
+        assert!(by_both.contains("the axes of the IMU are not those of the rig: rotated by 180.0°"), "{by_both}");
+        let by_one = titles(&[UnitQuaternion::from_euler_angles(0.0, 0.3, 0.0)]);
+        assert!(by_one.contains("the ground truth is of another body frame"), "{by_one}");
     }
 }

@@ -1,14 +1,20 @@
 //! Cameras against the gyroscope: rotations measured from the images alone, compared with those that gyroscope,
 //! encoders and rig predict. A constant rotation between them is an error of the extrinsics, a delay is a time offset.
 
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::{UnitQuaternion, Vector3};
+
 use super::clock_alignment::{ClockAlignment, RotationReference, align_clocks, best_rotation};
 use super::correction::Correction;
+use super::hypotheses::{Explanation, WithinNoise};
 use super::imu_facts::ImuFacts;
 use super::rotation_data::{JOINED_S, RotationData, joined};
-use super::rotation_fit::{FitPriors, RotationFit, RotationPair};
+use super::rotation_fit::{FREE_ORIENTATION_RAD, FitPriors, RotationFit, RotationPair};
 use super::statistics::median;
 use super::survey::Survey;
-use super::{Area, Findings, ImageRotation, Severity, hypotheses};
+use super::{Area, Findings, ImageRotation, Measurement, Severity, hypotheses};
+use crate::geometry::so3;
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
@@ -40,10 +46,23 @@ const SCALE_TOLERANCE: f64 = 0.02;
 /// about that axis is unobservable.
 const MIN_SPREAD: f64 = 0.02;
 
+const CALIBRATE: &str =
+    "check direction and axes of the extrinsics (T_cam_imu maps from the IMU to the camera), or calibrate";
+
 /// Comparison of a camera's rotations with those predicted by gyroscope and chain.
 struct HandEye<'a> {
     data: RotationData<'a>,
     camera: &'a CameraRig,
+}
+
+/// What a comparison says about other checks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Outcome {
+    /// The intrinsics are wrong, so that other measurements by the camera's features are, too.
+    WrongIntrinsics,
+    /// The orientation of a rigid camera differs from the rig: as if the IMU was rotated by this, IMU frame.
+    OtherOrientation(UnitQuaternion<f64>),
+    Other,
 }
 
 /// Checks the orientation and time offset of a camera with a readout by its image rotations, if there are any; a misfit
@@ -56,9 +75,23 @@ pub(super) fn check_against_gyroscope(
     rotations: &[ImageRotation],
     readout_s: f64,
     findings: &mut Findings,
-) {
+) -> Outcome {
     let data = RotationData::new(survey, rig, imu_facts, camera, rotations, readout_s);
-    let Some(chain) = rig.chain_of_camera(&camera.key).filter(|_| data.measured.len() >= MIN_ROTATIONS) else { return };
+    let chain = rig.chain_of_camera(&camera.key).filter(|_| data.measured.len() >= MIN_ROTATIONS);
+    let Some(chain) = chain else { return Outcome::Other };
+    let faulty = if !findings.can_compare(Measurement::Gyroscope) {
+        Some("gyroscope")
+    } else if !chain.links.is_empty() && !findings.can_compare(Measurement::Joints) {
+        Some("joint angles")
+    } else {
+        None
+    };
+    if let Some(faulty) = faulty {
+        let title = format!("the rotations of {} are not compared", camera.key);
+        let evidence = format!("the fault of the {faulty} is reported above");
+        findings.add(Severity::Note, Area::Extrinsics, title, evidence, "check again when it is corrected");
+        return Outcome::Other;
+    }
     let hand_eye = HandEye { data, camera };
     let given = hand_eye.pairs(&chain, 0.0, 0.0);
     let angles_rad: Vec<f64> = given.iter().map(|pair| pair.measured.norm()).collect();
@@ -66,15 +99,21 @@ pub(super) fn check_against_gyroscope(
     if given.len() < MIN_ROTATIONS || rotation_rad < MIN_ROTATION_RAD {
         let title = format!("too little rotation of {} to check its extrinsics", camera.key);
         let evidence = format!("{} image rotations, {:.2}° in the median", given.len(), rotation_rad.to_degrees());
-        return findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");
+        findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");
+        return Outcome::Other;
     }
     let aligned = hand_eye.aligned(&chain);
     let (offset_s, sigma_s) = aligned
         .as_ref()
         .map_or((0.0, MAX_OFFSET_SIGMA_S), |found| (found.offset_s - camera.timeshift_cam_imu_s, found.offset_sigma_s));
     let pairs = hand_eye.pairs(&chain, offset_s, 0.0);
-    let priors = FitPriors { time_offset_s: sigma_s, scale: SCALE_SIGMA, chain: hand_eye.data.chain_sigma_rad() };
-    let Some(fit) = RotationFit::of(&pairs, &chain, &priors) else { return };
+    let priors = FitPriors {
+        orientation_rad: FREE_ORIENTATION_RAD,
+        time_offset_s: sigma_s,
+        scale: SCALE_SIGMA,
+        chain: hand_eye.data.chain_sigma_rad(),
+    };
+    let Some(fit) = RotationFit::of(&pairs, &chain, &priors) else { return Outcome::Other };
     // Over longer times the rotations of a gimbal exceed the noise of its joint angles.
     let longer = (!chain.links.is_empty())
         .then(|| RotationFit::of(&hand_eye.pairs(&chain, offset_s, JOINED_S), &chain, &priors))
@@ -82,8 +121,12 @@ pub(super) fn check_against_gyroscope(
     let is_scaled = chain.links.is_empty()
         && (fit.scale - 1.0).abs() > SCALE_TOLERANCE.max(SIGNIFICANT_SIGMAS * fit.orientation_sigma_rad);
     let is_explained = fit.is_explained() && longer.is_none_or(|longer| longer.is_explained()) && !is_scaled;
-    hand_eye.report_time_offset(aligned, is_explained, findings);
-    hand_eye.report_orientation(&fit, &pairs, &chain, offset_s, is_explained, findings);
+    let within_noise = is_explained
+        .then(|| hypotheses::explain_within_noise(&hand_eye.data.delayed(offset_s), &chain, tolerance_rad(&fit)));
+    // A fault in a part of the log also changes the time offset that fits best.
+    let is_sound = within_noise.as_ref().is_some_and(|found| found.decisive.is_none());
+    hand_eye.report_time_offset(aligned, is_sound, findings);
+    hand_eye.report_orientation(&fit, &pairs, &chain, offset_s, within_noise, findings)
 }
 
 impl HandEye<'_> {
@@ -149,12 +192,13 @@ impl HandEye<'_> {
         pairs: &[RotationPair],
         chain: &ClassicalChain,
         offset_s: f64,
-        is_explained: bool,
+        within_noise: Option<WithinNoise>,
         findings: &mut Findings,
-    ) {
+    ) -> Outcome {
         let key = &self.camera.key;
         let given_rad = misfit_rad(pairs, chain);
         let (error_rad, sigma_rad) = (fit.orientation.angle(), fit.orientation_sigma_rad);
+        let tolerance_rad = tolerance_rad(fit);
         let evidence = format!(
             "image rotations differ from the gyroscope's by {:.3}° in the median; by {:.3}° with the camera rotated by \
              {:.1} ± {:.1}°, where noise predicts {:.3}° (χ²/dof {:.2}, at most {:.2} for {} dof); {} pairs, scale {:.3}, \
@@ -178,7 +222,9 @@ impl HandEye<'_> {
                 "write the inverse of {field}: T_a_b maps points from b to a (Kalibr: T_cam_imu from the IMU to the camera)"
             );
             findings.add(Severity::Error, Area::Extrinsics, title, evidence, remedy);
-        } else if !is_explained {
+            return Outcome::Other;
+        }
+        let Some(found) = within_noise else {
             let remedy = if self.camera.mount == CameraMount::Gimbal {
                 "no orientation, no time offset and none of the causes that are tried explains it: check joints, intrinsics \
                  and the axes of the IMU"
@@ -186,7 +232,18 @@ impl HandEye<'_> {
                 "no orientation, no time offset and none of the causes that are tried explains it: check intrinsics, shutter, \
                  and axes, signs and units of the IMU"
             };
-            hypotheses::explain(&self.data, chain).report(key, &evidence, remedy, findings);
+            let explanation = hypotheses::explain(&self.data, chain, tolerance_rad);
+            explanation.report(key, &evidence, remedy, findings);
+            if explanation.is_of(Area::Intrinsics) {
+                return Outcome::WrongIntrinsics;
+            }
+            if explanation.is_of(Area::Imu) {
+                findings.exclude(Measurement::Gyroscope);
+            }
+            return Outcome::Other;
+        };
+        if let Some((cause, of_cause)) = found.decisive {
+            Explanation::Decisive(cause, of_cause).report(key, &evidence, "", findings);
         } else if fit.spread < MIN_SPREAD {
             let title = format!("{key} rotated about one axis only: its orientation cannot be checked");
             findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");
@@ -194,15 +251,40 @@ impl HandEye<'_> {
             let title = format!("the rotations of {key} are predicted too inaccurately to check its orientation");
             let remedy = "noise of gyroscope or encoders is as large as the rotations: rotate faster or longer";
             findings.add(Severity::Note, Area::Extrinsics, title, evidence, remedy);
-        } else if error_rad > ROTATION_TOLERANCE_RAD.max(SIGNIFICANT_SIGMAS * sigma_rad) {
-            let severity = if error_rad > WRONG_ROTATION_RAD { Severity::Error } else { Severity::Warning };
-            let title = format!("the orientation of {key} differs from the rig");
-            let remedy =
-                "check direction and axes of the extrinsics (T_cam_imu maps from the IMU to the camera), or calibrate";
-            findings.add(severity, Area::Extrinsics, title, evidence, remedy);
+        } else if error_rad > tolerance_rad {
+            self.report_other_orientation(&fit.orientation, &found, evidence, findings);
+            if let CameraMount::Static { imu_from_camera } = &self.camera.mount {
+                let rotation = imu_from_camera.rotation;
+                return Outcome::OtherOrientation(rotation * fit.orientation * rotation.inverse());
+            }
         } else {
             findings.good(Area::Extrinsics, format!("the orientation of {key} agrees with the rig"), evidence);
         }
+        Outcome::Other
+    }
+
+    /// Reports an orientation of the camera against the rig, camera frame, with causes that explain it as well.
+    fn report_other_orientation(
+        &self,
+        orientation: &UnitQuaternion<f64>,
+        found: &WithinNoise,
+        evidence: String,
+        findings: &mut Findings,
+    ) {
+        let key = &self.camera.key;
+        let angle_rad = orientation.angle();
+        let severity = if angle_rad > WRONG_ROTATION_RAD { Severity::Error } else { Severity::Warning };
+        let (title, remedy) = if let Some((images, remedy)) = turned_images(orientation) {
+            (format!("the images of {key} are {images}, or its orientation differs from the rig"), remedy)
+        } else {
+            (format!("the orientation of {key} differs from the rig by {:.1}°", angle_rad.to_degrees()), CALIBRATE)
+        };
+        let causes = &found.instead_of_orientation;
+        let mut titles: Vec<&str> = causes.iter().map(|cause| cause.title.as_str()).collect();
+        let mut remedies: Vec<&str> = causes.iter().map(|cause| cause.remedy.as_str()).collect();
+        titles.insert(found.more_likely, &title);
+        remedies.insert(found.more_likely, remedy);
+        findings.add(severity, Area::Extrinsics, titles.join(", or "), evidence, remedies.join("; or "));
     }
 
     /// Transform of the rig whose inverse predicts the rotations much better, up to an error within tolerance, with the
@@ -230,6 +312,33 @@ impl HandEye<'_> {
         });
         misfits.filter(|(_, misfit)| *misfit < 0.5 * given_rad).min_by(|a, b| a.1.total_cmp(&b.1))
     }
+}
+
+/// Smallest error of the orientation that is one, in radians.
+fn tolerance_rad(fit: &RotationFit) -> f64 {
+    ROTATION_TOLERANCE_RAD.max(SIGNIFICANT_SIGMAS * fit.orientation_sigma_rad)
+}
+
+/// State of images by which the camera seems to be rotated, camera frame (x right, y down), with the remedy; `None` for
+/// other rotations.
+fn turned_images(orientation: &UnitQuaternion<f64>) -> Option<(&'static str, &'static str)> {
+    const TURN: &str = "turn them upright in the driver, or turn T_cam_imu (T_E_C on a gimbal) about the optical axis";
+    // Rotations are axial vectors: those in an image mirrored at an axis are rotated by half a turn about the other one.
+    const MIRROR: &str = "look at text in the images: mirror them back in the driver, or correct the extrinsics, by which \
+                          the camera then looks backwards";
+    let about = |axis: Vector3<f64>, angle_rad: f64| {
+        so3::exp(&(axis * angle_rad)).angle_to(orientation) < ROTATION_TOLERANCE_RAD
+    };
+    let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
+    [
+        (about(z, PI), ("upside down (rotated by 180°)", TURN)),
+        (about(z, FRAC_PI_2), ("rotated by 90°", TURN)),
+        (about(z, -FRAC_PI_2), ("rotated by -90°", TURN)),
+        (about(x, PI), ("mirrored (left and right exchanged)", MIRROR)),
+        (about(y, PI), ("mirrored (top and bottom exchanged)", MIRROR)),
+    ]
+    .into_iter()
+    .find_map(|(is_near, found)| is_near.then_some(found))
 }
 
 /// Median difference of predicted and measured rotations, in radians.

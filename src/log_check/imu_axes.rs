@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 
 use super::imu_facts::ImuFacts;
-use super::{Area, Findings, Severity};
+use super::{Area, Findings, Measurement, Severity};
 use crate::geometry::{SignedAxes, mean, seconds_from_ns};
 use crate::sensors::ImuSample;
 
@@ -34,6 +34,9 @@ struct Assumed {
 
 /// Compares the axes of both sensors of the IMU.
 pub(super) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) {
+    if !findings.can_compare(Measurement::Gyroscope) || !findings.can_compare(Measurement::Accelerometer) {
+        return;
+    }
     let windows = windows(&imu_facts.samples);
     let square = windows.iter().map(|(_, force)| force.norm_squared()).sum::<f64>() / windows.len().max(1) as f64;
     let tilt = scatter(&windows) / square;
@@ -85,6 +88,7 @@ pub(super) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) {
     };
     let remedy = "correct order and signs of the axes in the IMU's driver: both sensors need one right-handed frame";
     findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
+    findings.exclude(Measurement::Accelerometer);
 }
 
 /// Mean specific forces of consecutive windows at their middles, in seconds.

@@ -6,7 +6,7 @@ use super::stationary::{Stamped, StationaryTest, WINDOW_NS, Window};
 use super::statistics::{median, percentile};
 use super::survey::Survey;
 use super::unmeasured::check_unmeasured;
-use super::{Area, Findings, Severity};
+use super::{Area, Findings, Measurement, Severity};
 use crate::geometry::{mean, seconds_from_ns};
 use crate::sensors::{AngularRates, ImuSample, Rig};
 
@@ -14,6 +14,11 @@ use crate::sensors::{AngularRates, ImuSample, Rig};
 const NO_FORCE_M_PER_S2: f64 = 0.01;
 /// Ratio of the specific force to gravity below which it does not contain gravity.
 const NO_GRAVITY_RATIO: f64 = 0.3;
+/// Factors by which a wrong range setting changes measurements.
+const RANGE_FACTORS: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
+/// Relative error of such a factor, and bias of an accelerometer, in m/s², within which the factor counts as found.
+const RANGE_TOLERANCE: f64 = 0.03;
+const LARGEST_BIAS_M_PER_S2: f64 = 0.3;
 /// Longest stretch of equal samples of a driver that sends faster than the sensor measures.
 const LONGEST_REPETITION: usize = 20;
 /// Standard deviations of the smoothed angular rate (rad/s) and specific force (m/s²) of a stationary or hovering
@@ -56,8 +61,8 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
         survey.imu_topics.iter().filter(|topic| survey.imu_topic.as_ref() != Some(*topic)).collect();
     check_gravity(&samples, &stationary, rig, &others, findings);
     let gyroscope_bias = check_gyroscope_bias(&stationary, findings);
-    check_noise(&spectra, rig, findings);
     check_clipping(&samples, findings);
+    check_noise(&spectra, rig, findings);
     check_stationary(&windows, findings);
     let forces = || samples.iter().map(|sample| sample.specific_force_m_per_s2).collect::<Vec<_>>();
     let middle_ns = |(start_ns, end_ns): (i64, i64)| start_ns.midpoint(end_ns);
@@ -116,6 +121,7 @@ fn check_gravity(
     let difference = measured - gravity;
     let evidence = format!("|a| is {measured:.3} m/s² {when}, gravity {gravity:.3}: {difference:+.3} m/s²");
     if measured < NO_FORCE_M_PER_S2 {
+        findings.exclude(Measurement::Accelerometer);
         let quoted: Vec<String> = other_topics.iter().map(|topic| format!("'{topic}'")).collect();
         let remedy = if quoted.is_empty() {
             "record the accelerometer, too".to_owned()
@@ -131,8 +137,12 @@ fn check_gravity(
         );
     }
     let is_steady = stationary.is_empty() && has_steady_norm(samples);
-    let range_factor =
-        [0.25, 0.5, 2.0, 4.0].into_iter().find(|factor| (measured / (factor * gravity) - 1.0).abs() < 0.03);
+    let near = |factor: &f64| {
+        let expected = factor * gravity;
+        (measured - expected).abs() < LARGEST_BIAS_M_PER_S2.max(RANGE_TOLERANCE * expected)
+    };
+    let range_factor = RANGE_FACTORS.into_iter().find(near);
+    let multiple = format!("the accelerometer measures {} times gravity", range_factor.unwrap_or(1.0));
     let (severity, title, remedy) = if (measured - 1.0).abs() < 0.2 && (is_steady || !stationary.is_empty()) {
         (
             Severity::Error,
@@ -148,7 +158,7 @@ fn check_gravity(
     } else if range_factor.is_some() && (is_steady || !stationary.is_empty()) {
         (
             Severity::Error,
-            "the accelerometer measures a multiple of gravity",
+            multiple.as_str(),
             "the range setting of the sensor and the scale of its driver differ: correct one of them",
         )
     } else if difference.abs() > 2.0 {
@@ -167,6 +177,9 @@ fn check_gravity(
         return findings.good(Area::Imu, "the accelerometer measures gravity", evidence);
     };
     findings.add(severity, Area::Imu, title, evidence, remedy);
+    if severity == Severity::Error {
+        findings.exclude(Measurement::Accelerometer);
+    }
 }
 
 /// True if the norm of the specific force varies little around its median: it contains gravity, in whatever unit.
@@ -222,6 +235,7 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
     if largest[0] > 35.0 {
         let remedy = "check the unit: sensor_msgs/Imu requires rad/s, and 35 rad/s is 2000 °/s";
         findings.add(Severity::Error, Area::Imu, "angular velocities appear to be in degrees", evidence, remedy);
+        findings.exclude(Measurement::Gyroscope);
     } else if !clipped {
         findings.good(Area::Imu, "the IMU does not saturate", evidence);
     }

@@ -1,7 +1,7 @@
 //! White noise compared with the rig's densities, and vibration.
 
 use super::spectrum::Spectrum;
-use super::{Area, Findings, Severity};
+use super::{Area, Findings, Measurement, Severity};
 use crate::sensors::Rig;
 
 /// Ratio of measured noise to the rig's from which it is reported.
@@ -17,13 +17,14 @@ const VIBRATION_RATIO: f64 = 3.0;
 pub(super) fn check_noise(spectra: &[Option<Spectrum>; 2], rig: Option<&Rig>, findings: &mut Findings) {
     let noise = rig.map(|rig| &rig.imu.noise);
     let sensors = [
-        ("gyroscope", noise.map(|noise| noise.gyroscope_noise_density), "rad/s"),
-        ("accelerometer", noise.map(|noise| noise.accelerometer_noise_density), "m/s²"),
+        (Measurement::Gyroscope, "gyroscope", noise.map(|noise| noise.gyroscope_noise_density), "rad/s"),
+        (Measurement::Accelerometer, "accelerometer", noise.map(|noise| noise.accelerometer_noise_density), "m/s²"),
     ];
-    for ((name, given, unit), spectrum) in sensors.into_iter().zip(spectra) {
+    for ((measurement, name, given, unit), spectrum) in sensors.into_iter().zip(spectra) {
         let Some(spectrum) = spectrum else { continue };
         report_vibration(name, spectrum, unit, findings);
-        if let Some(given) = given {
+        // By a wrong unit, noise is wrong by the same factor.
+        if let Some(given) = given.filter(|_| findings.can_compare(measurement)) {
             compare_density(name, spectrum, given, unit, findings);
         }
     }

@@ -1,7 +1,10 @@
+use std::f64::consts::{PI, TAU};
+
 use super::statistics::{median, percentile, white_sigma};
-use super::survey::Survey;
-use super::{Area, Findings, Severity};
+use super::survey::{Survey, is_in_radians};
+use super::{Area, Findings, Measurement, Severity};
 use crate::flight_log::attitude::MAX_VEHICLE_GAP_NS;
+use crate::flight_log::joint_merge::JointReading;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{GimbalRig, Joint, Rig};
 
@@ -29,14 +32,57 @@ pub(super) fn check_joints(survey: &Survey, rig: &Rig, findings: &mut Findings) 
     if survey.joints.is_empty() {
         return;
     }
+    check_unit(survey, gimbal, findings);
     for (number, joint) in gimbal.joints.iter().enumerate() {
         check_joint(survey, gimbal, number, joint, findings);
     }
 }
 
+/// Finite readings of a joint with their stamps.
+fn finite_readings(survey: &Survey, number: usize) -> Vec<(i64, f64)> {
+    let reading = |message: &JointReading| Some((message.stamp_ns, message.angles_rad[number]?));
+    survey.joints.iter().filter_map(reading).filter(|(_, angle)| angle.is_finite()).collect()
+}
+
+fn exceeds_radians(readings: &[(i64, f64)]) -> bool {
+    readings.iter().any(|(_, reading)| !is_in_radians(*reading))
+}
+
+/// Reports readings that are not in radians.
+fn check_unit(survey: &Survey, gimbal: &GimbalRig, findings: &mut Findings) {
+    let joints = gimbal.joints.iter().enumerate();
+    let all: Vec<(&str, Vec<(i64, f64)>)> =
+        joints.map(|(number, joint)| (joint.name.as_str(), finite_readings(survey, number))).collect();
+    let beyond: Vec<&(&str, Vec<(i64, f64)>)> = all.iter().filter(|(_, readings)| exceeds_radians(readings)).collect();
+    if beyond.is_empty() {
+        return;
+    }
+    let is_whole = |(_, readings): &&&(&str, Vec<(i64, f64)>)| readings.iter().all(|(_, angle)| angle.fract() == 0.0);
+    let unit = if beyond.iter().filter(is_whole).count() == beyond.len() {
+        "encoder counts or whole degrees"
+    } else {
+        "degrees"
+    };
+    let names: Vec<String> = beyond.iter().map(|(name, _)| format!("'{name}'")).collect();
+    let title = format!("readings of {} appear to be in {unit}", names.join(", "));
+    let range = |(name, readings): &&(&str, Vec<(i64, f64)>)| {
+        let values: Vec<f64> = readings.iter().map(|(_, angle)| *angle).collect();
+        format!("'{name}' from {:.1} to {:.1}", percentile(&values, 0.0), percentile(&values, 1.0))
+    };
+    let evidence = beyond.iter().map(range).collect::<Vec<_>>().join(", ");
+    let remedy = "convert them in the driver: sensor_msgs/JointState requires radians";
+    findings.add(Severity::Error, Area::Encoders, title, evidence, remedy);
+}
+
+/// Time in seconds of the first step by more than half a turn between two readings.
+fn first_whole_turn_s(readings: &[(i64, f64)]) -> Option<f64> {
+    let step = readings.windows(2).find(|pair| (pair[1].1 - pair[0].1).abs() > PI)?;
+    Some(seconds_from_ns(step[1].0))
+}
+
 fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint, findings: &mut Findings) {
     let name = &joint.name;
-    let readings = || survey.joints.iter().filter_map(|message| Some((message.stamp_ns, message.angles_rad[number]?)));
+    let readings = || survey.joints.iter().filter_map(|message| message.angles_rad[number]);
     let missing = survey.joints.len() - readings().count();
     let all = survey.joints.len();
     // A message that names another joint may come from that joint's driver; a message that names no joint of the rig is
@@ -52,7 +98,7 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
         let evidence = format!("it is in {} of {all} messages; the joints are merged by name", all - missing);
         findings.add(Severity::Note, Area::Encoders, title, evidence, "");
     }
-    let bad = readings().filter(|(_, angle)| !angle.is_finite()).count();
+    let bad = readings().filter(|angle| !angle.is_finite()).count();
     if bad > 0 {
         let evidence = format!("{bad} readings");
         let remedy = "check the driver; these messages are dropped";
@@ -64,9 +110,9 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
             remedy,
         );
     }
-    let angles: Vec<(i64, f64)> = readings().filter(|(_, angle)| angle.is_finite()).collect();
+    let angles = finite_readings(survey, number);
     let values: Vec<f64> = angles.iter().map(|(_, angle)| *angle).collect();
-    if values.len() < 3 {
+    if values.len() < 3 || exceeds_radians(&angles) {
         return;
     }
     let (low, high) = (percentile(&values, 0.0), percentile(&values, 1.0));
@@ -80,23 +126,23 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
         degrees(lower),
         degrees(upper)
     );
-    if high.abs().max(low.abs()) > 2.0 * std::f64::consts::TAU {
-        let evidence = format!("readings from {low:.1} to {high:.1}");
-        let remedy = "sensor_msgs/JointState requires radians";
-        return findings.add(
-            Severity::Error,
-            Area::Encoders,
-            format!("'{name}' appears to be in degrees"),
-            evidence,
-            remedy,
-        );
-    }
     let margin = 0.03 + 4.0 * sigma;
-    if low < lower - margin || high > upper + margin {
+    let turned = |angle: &f64| *angle - TAU * ((*angle - 0.5 * (lower + upper)) / TAU).round();
+    let is_within = |angle: f64| (lower - margin..=upper + margin).contains(&angle);
+    let has_turns = values.iter().all(|angle| is_within(turned(angle))) && !(is_within(low) && is_within(high));
+    if has_turns {
+        let title = format!("readings of '{name}' contain whole turns");
+        let since = first_whole_turn_s(&angles).map_or_else(String::new, |at_s| format!("; a step at {at_s:.2} s"));
+        let remedy = "the orientation is the same: nothing to do";
+        findings.add(Severity::Note, Area::Encoders, title, format!("{range}{since}"), remedy);
+    } else if low < lower - margin || high > upper + margin {
         let remedy = format!("correct gimbal.links[{number}].limits, or the encoder's zero");
         findings.add(Severity::Warning, Area::Encoders, format!("'{name}' exceeds its limits"), range.clone(), remedy);
     }
-    let white = white_sigma(&values);
+    let angles: Vec<(i64, f64)> =
+        if has_turns { angles.iter().map(|(at, angle)| (*at, turned(angle))).collect() } else { angles };
+    let values: Vec<f64> = angles.iter().map(|(_, angle)| *angle).collect();
+    let white = white_sigma(&values, true);
     // The range without the noise of single readings.
     let moved = percentile(&values, 0.98) - percentile(&values, 0.02) - 4.0 * white;
     if moved < MIN_RANGE_RAD {
@@ -161,7 +207,7 @@ fn check_attitude(survey: &Survey, findings: &mut Findings) {
         );
         findings.add(Severity::Warning, Area::Encoders, "attitudes of the gimbal are not used", evidence, remedy);
     }
-    if solved.is_empty() {
+    if solved.is_empty() || !findings.can_compare(Measurement::Joints) {
         return;
     }
     let unreachable: Vec<f64> = solved.iter().map(|solved| solved.unreachable_rad).collect();

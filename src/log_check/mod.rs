@@ -23,6 +23,7 @@ mod joints;
 mod noise;
 mod permutations;
 mod pictures;
+mod placed_forces;
 mod publishers;
 mod readout;
 mod render;
@@ -60,7 +61,7 @@ pub use self::verdict::{Usability, Verdict};
 
 pub use self::report::{Area, CheckReport, Finding, ImageRotation, ProposedMask, Severity, TopicReport};
 
-use self::report::Findings;
+use self::report::{Findings, Measurement};
 use self::survey::Survey;
 use crate::flight_log::attitude::{VEHICLE_KINDS, gimbal_kinds, topic_field};
 use crate::flight_log::topic_info::nothing_read;
@@ -101,19 +102,19 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
     imu_axes::check_imu_axes(&imu_facts, &mut findings);
     let mut proposed_masks = Vec::new();
     if let Ok(rig) = rig {
+        if let Some(fitted) = source_fit::check_source(&survey, rig, &imu_facts, image_rotations, &mut findings) {
+            // Joints and cameras are checked with the corrected attitude.
+            survey.use_source(rig, fitted.source, fitted.timeshift_s);
+        }
         joints::check_joints(&survey, rig, &mut findings);
         joint_coverage::check_joint_coverage(&survey, rig, &mut findings);
         vehicle_attitude::check_vehicle_attitude(&survey, rig, &imu_facts, &mut findings);
-        ground_truth::check_ground_truth(log, rig, &imu_facts, &mut findings);
         pictures::check_pictures(log, &survey, rig, &mut findings);
         images::check_images(log, &survey, rig, &imu_facts, &mut findings);
         copies::check_image_copies(&survey, rig, &imu_facts, &mut findings);
         frozen_joints::check_frozen_joints(&survey, rig, &imu_facts, &mut findings);
-        if let Some(fitted) = source_fit::check_source(&survey, rig, &imu_facts, image_rotations, &mut findings) {
-            // The cameras are checked with the corrected attitude.
-            survey.use_source(rig, fitted.source, fitted.timeshift_s);
-        }
-        rotation::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);
+        let turns = rotation::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);
+        ground_truth::check_ground_truth(log, rig, &imu_facts, &turns, &mut findings);
         proposed_masks = still_pixels::check_still_pixels(&survey, rig, image_rotations, &mut findings);
     }
     let mut findings = findings.list;

@@ -3,7 +3,7 @@
 use super::statistics::{median, percentile};
 use super::topic_survey::TopicSurvey;
 use super::used_topics::UsedTopic;
-use super::{Area, Findings, Severity};
+use super::{Area, Findings, Measurement, Severity};
 use crate::flight_log::spacing::Spacing;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::ImuSample;
@@ -36,6 +36,15 @@ pub(super) fn has_two_publishers(
     let title = format!("two publishers send on the topic of {}", used.role);
     let remedy = "give each publisher its own topic; of this recording keep the messages of one of them";
     findings.add(Severity::Error, Area::Time, title, format!("{}: {evidence}", used.topic.topic), remedy);
+    let mixed: &[Measurement] = match used.role.as_str() {
+        "imu0" => &[Measurement::Gyroscope, Measurement::Accelerometer],
+        "imu0 accelerometer" => &[Measurement::Accelerometer],
+        "gimbal" => &[Measurement::Joints],
+        _ => &[],
+    };
+    for measurement in mixed {
+        findings.exclude(*measurement);
+    }
     true
 }
 

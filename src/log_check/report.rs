@@ -1,5 +1,7 @@
 //! Findings of a check and the report that holds them.
 
+use std::collections::BTreeSet;
+
 use nalgebra::UnitQuaternion;
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
@@ -137,10 +139,21 @@ impl CheckReport {
     }
 }
 
+/// Measurements that comparisons use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Measurement {
+    Gyroscope,
+    Accelerometer,
+    /// Angles of the joints.
+    Joints,
+}
+
 /// Findings in the order of the checks.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
     pub(super) list: Vec<Finding>,
+    /// Measurements with a fault that is reported: comparisons with them would report its consequences as causes.
+    faulty: BTreeSet<Measurement>,
 }
 
 impl Findings {
@@ -160,6 +173,16 @@ impl Findings {
     pub(super) fn assumption(&mut self, area: Area, title: String, evidence: String, remedy: String) {
         let severity = Severity::Warning;
         self.list.push(Finding { severity, area, title, evidence, remedy, is_assumption: true });
+    }
+
+    /// Excludes a measurement, whose fault is reported, from later comparisons.
+    pub(super) fn exclude(&mut self, measurement: Measurement) {
+        self.faulty.insert(measurement);
+    }
+
+    /// True unless a fault of the measurement is reported.
+    pub(super) fn can_compare(&self, measurement: Measurement) -> bool {
+        !self.faulty.contains(&measurement)
     }
 
     pub(super) fn good(&mut self, area: Area, title: impl Into<String>, evidence: impl Into<String>) {

@@ -2,26 +2,38 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+use super::hand_eye::Outcome;
 use super::imu_facts::ImuFacts;
 use super::readout::check_readout;
 use super::survey::Survey;
-use super::{Area, Findings, ImageRotation, Severity, hand_eye};
+use super::{Area, Findings, ImageRotation, Measurement, Severity, hand_eye};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
+/// Checks the extrinsics of all cameras; returns the rotations of the IMU, in its frame, that would explain the
+/// orientations of rigid cameras that differ from the rig.
 pub(super) fn check_rotations(
     survey: &Survey,
     rig: &Rig,
     imu_facts: &ImuFacts,
     rotations: &[ImageRotation],
     findings: &mut Findings,
-) {
+) -> Vec<UnitQuaternion<f64>> {
+    let mut of_imu = Vec::new();
     for camera in &rig.cameras {
         check_against_gravity(survey, rig, camera, imu_facts, findings);
         check_lever(camera, findings);
-        let readout_s = check_readout(camera, imu_facts, rotations, findings);
-        hand_eye::check_against_gyroscope(survey, rig, camera, imu_facts, rotations, readout_s, findings);
+        let mut of_readout = Findings::default();
+        let readout_s = check_readout(camera, imu_facts, rotations, &mut of_readout);
+        match hand_eye::check_against_gyroscope(survey, rig, camera, imu_facts, rotations, readout_s, findings) {
+            // By a wrong lens, features move faster in one half of the image, as by a rolling shutter.
+            Outcome::WrongIntrinsics => continue,
+            Outcome::OtherOrientation(rotation) => of_imu.push(rotation),
+            Outcome::Other => {}
+        }
+        findings.list.append(&mut of_readout.list);
     }
+    of_imu
 }
 
 /// `imu_from_camera` at a time, with the measured joint angles for a gimbal camera.
@@ -47,6 +59,10 @@ fn check_against_gravity(
     imu_facts: &ImuFacts,
     findings: &mut Findings,
 ) {
+    let moves = camera.mount == CameraMount::Gimbal;
+    if !findings.can_compare(Measurement::Accelerometer) || (moves && !findings.can_compare(Measurement::Joints)) {
+        return;
+    }
     let Some((stamp_ns, force)) = imu_facts.up else { return };
     let Some(up_in_imu) = force.try_normalize(1.0) else { return };
     let Some(pose) = imu_from_camera(survey, rig, camera, stamp_ns) else { return };

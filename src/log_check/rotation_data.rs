@@ -28,13 +28,23 @@ pub(super) struct MeasuredRotation {
     pub(super) rate_change: Vector3<f64>,
 }
 
+impl MeasuredRotation {
+    /// Middle of the rotation in seconds since the log began.
+    pub(super) fn middle_s(&self) -> f64 {
+        0.5 * (seconds_from_ns(self.rotation.from_ns) + seconds_from_ns(self.rotation.to_ns))
+    }
+}
+
 /// Rotations of one camera and the data that predict them.
+#[derive(Clone)]
 pub(super) struct RotationData<'a> {
     pub(super) survey: &'a Survey,
     pub(super) rig: &'a Rig,
     pub(super) imu_facts: &'a ImuFacts,
     pub(super) camera: &'a CameraRig,
     readout_s: f64,
+    /// Time to add to the camera's stamps beyond the rig's, in seconds, whatever the correction.
+    delay_s: f64,
     /// As measured, with their features.
     images: &'a [ImageRotation],
     /// Between the first rows of consecutive images.
@@ -51,7 +61,12 @@ impl<'a> RotationData<'a> {
         readout_s: f64,
     ) -> Self {
         let measured = first_rows(camera, images, readout_s);
-        Self { survey, rig, imu_facts, camera, readout_s, images, measured }
+        Self { survey, rig, imu_facts, camera, readout_s, delay_s: 0.0, images, measured }
+    }
+
+    /// The data with the camera's stamps changed by a time in seconds.
+    pub(super) fn delayed(&self, delay_s: f64) -> Self {
+        Self { delay_s, ..self.clone() }
     }
 
     /// Prior standard deviation of every parameter of the chain, in radians; a rigid camera has none.
@@ -105,7 +120,7 @@ impl Predictor<'_> {
         let rotation = &measured.rotation;
         let corrected_ns = |stamp_ns: i64| {
             let extra_s = self.correction.camera_delay_s + self.correction.camera_drift * seconds_from_ns(stamp_ns);
-            stamp_ns + ns_from_seconds(self.data.camera.timeshift_cam_imu_s + extra_s)
+            stamp_ns + ns_from_seconds(self.data.camera.timeshift_cam_imu_s + self.data.delay_s + extra_s)
         };
         let (from_ns, to_ns) = (corrected_ns(rotation.from_ns), corrected_ns(rotation.to_ns));
         let [from_s, to_s] = [from_ns, to_ns].map(seconds_from_ns);
@@ -117,6 +132,7 @@ impl Predictor<'_> {
         let turn = mount.to_rotation_matrix().into_inner();
         let covariance = turn * measured.covariance_rad2 * turn.transpose();
         Some(RotationPair {
+            middle_s: measured.middle_s(),
             measured: mount * so3::log(&rotation.second_from_first),
             covariance_rad2: covariance + Matrix3::identity() * (gyroscope_variance * interval_s),
             of_imu: rates.rotation_between(from_s, to_s)?,

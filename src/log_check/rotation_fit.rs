@@ -20,6 +20,8 @@ const COMPARED_SIGMAS: f64 = 0.5244;
 const TAIL_DEGREES: f64 = 3.0;
 /// Steps between 1 and [`NOISE_TOLERANCE`] at which the noise level of a likelihood is tried.
 const NOISE_STEPS: u32 = 10;
+/// Prior standard deviation of an orientation that may be any.
+pub(super) const FREE_ORIENTATION_RAD: f64 = 1.0;
 /// Standard deviation of a column that is fixed.
 const SMALLEST_SIGMA: f64 = 1e-6;
 const ITERATIONS: usize = 10;
@@ -35,6 +37,8 @@ const CHAIN: usize = 8;
 /// Rotation between two images with the measurements that predict it.
 #[derive(Clone, Debug)]
 pub(super) struct RotationPair {
+    /// Middle of the rotation by the camera's stamps, in seconds since the log began.
+    pub(super) middle_s: f64,
     /// Rotation vector `second_from_first` of the images in the camera frame, in radians.
     pub(super) measured: Vector3<f64>,
     /// Covariance of `measured` with that of the integrated gyroscope noise, in rad².
@@ -51,6 +55,8 @@ pub(super) struct RotationPair {
 /// Prior standard deviations of a fit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FitPriors {
+    /// Of the camera's orientation about each axis against the rig's, in radians.
+    pub(super) orientation_rad: f64,
     pub(super) time_offset_s: f64,
     /// Of the ratio of image rotations to predicted ones, for a rigid camera.
     pub(super) scale: f64,
@@ -83,6 +89,8 @@ pub(super) struct RotationFit {
     pub(super) scale: f64,
     /// Ratio of the second singular value of the rotations to the first; near zero for rotations about one axis only.
     pub(super) spread: f64,
+    /// Middle of each pair in seconds, and its misfit.
+    pub(super) misfits_rad: Vec<(f64, f64)>,
     /// Median misfit, and the median that the noise predicts.
     pub(super) misfit_rad: f64,
     pub(super) predicted_misfit_rad: f64,
@@ -131,18 +139,25 @@ impl RotationPair {
             jacobian.columns_mut(CHAIN, chain.dof()).copy_from(&by_chain);
         }
         let by_measured = Matrix3xX::zeros(columns);
-        Row { measured: self.measured, predicted, jacobian, by_measured, covariance: self.covariance_rad2 + noise }
+        let covariance = self.covariance_rad2 + noise;
+        let log_noise_ratio = (covariance.determinant() / self.covariance_rad2.determinant()).ln();
+        let (middle_s, measured) = (self.middle_s, self.measured);
+        Row { middle_s, measured, predicted, jacobian, by_measured, covariance, log_noise_ratio }
     }
 }
 
 /// Linearized prediction of one rotation; the columns are those of the fit before its orientation is applied.
 struct Row {
+    middle_s: f64,
     measured: Vector3<f64>,
     predicted: Vector3<f64>,
     jacobian: Matrix3xX<f64>,
     /// Derivative of the measured rotation by the columns: zero but for extra ones.
     by_measured: Matrix3xX<f64>,
     covariance: Matrix3<f64>,
+    /// Logarithm of the determinant of the covariance over that without the noise of joint angles: with other units or
+    /// gears, joint angles have other noise.
+    log_noise_ratio: f64,
 }
 
 impl Row {
@@ -202,7 +217,8 @@ impl RotationFit {
             |(number, pair): (usize, &RotationPair)| pair.row(&parameterized, is_rigid).with_columns(number, extra);
         let rows: Vec<Row> = pairs.iter().enumerate().map(row).collect();
         let vectors: Vec<_> = rows.iter().map(|row| (row.predicted, row.measured)).collect();
-        let (start, spread) = best_rotation(&vectors)?;
+        let (best, spread) = best_rotation(&vectors)?;
+        let start = if priors.orientation_rad < FREE_ORIENTATION_RAD { UnitQuaternion::identity() } else { best };
         let mut fit = Fit::new(rows, start, priors, is_rigid, extra);
         let mut covariance = None;
         for _ in 0..ITERATIONS {
@@ -244,9 +260,9 @@ impl Fit {
         let scale = if is_rigid { priors.scale } else { SMALLEST_SIGMA };
         let mut sigmas = DVector::repeat(columns, priors.chain);
         sigmas.rows_mut(0, CHAIN).copy_from_slice(&[
-            1.0,
-            1.0,
-            1.0,
+            priors.orientation_rad,
+            priors.orientation_rad,
+            priors.orientation_rad,
             BIAS_SIGMA_RAD_PER_S,
             BIAS_SIGMA_RAD_PER_S,
             BIAS_SIGMA_RAD_PER_S,
@@ -282,6 +298,8 @@ impl Fit {
     fn update(&mut self) -> Option<DMatrix<f64>> {
         let mut information = DMatrix::from_diagonal(&self.prior_information);
         let mut gradient = -self.prior_information.component_mul(&self.values);
+        let mut of_orientation = gradient.fixed_rows_mut::<3>(0);
+        of_orientation -= self.prior_information.fixed_rows::<3>(0).component_mul(&so3::log(&self.orientation));
         let rotation = self.orientation.to_rotation_matrix().into_inner();
         let largest = 3.0 * mean_square_quantile(3.0, SIGNIFICANT_SIGMAS);
         for row in &self.rows {
@@ -315,11 +333,12 @@ impl Fit {
             scale: 1.0 + self.values[SCALE],
             spread,
             misfit_rad: median(&norms),
+            misfits_rad: self.rows.iter().map(|row| row.middle_s).zip(norms).collect(),
             predicted_misfit_rad: median(&predicted),
             mean_square,
             degrees_of_freedom,
             extra,
-            deviance: deviance(&squares),
+            deviance: deviance(&squares) + self.rows.iter().map(|row| row.log_noise_ratio).sum::<f64>(),
         }
     }
 }
@@ -367,6 +386,7 @@ mod tests {
             let [from, to] = angles_rad.map(|angle_rad| chain.imu_from_camera(&[angle_rad]).rotation);
             let measured = so3::log(&(to.inverse() * of_imu * from)) + 1e-4 * noise.vector();
             RotationPair {
+                middle_s: 0.05 * (f64::from(number) + 0.5),
                 measured,
                 covariance_rad2: Matrix3::identity() * 1e-8,
                 of_imu,
@@ -380,7 +400,12 @@ mod tests {
 
     fn fit(variance_rad2: f64) -> RotationFit {
         let (pairs, chain) = pairs(variance_rad2);
-        RotationFit::of(&pairs, &chain, &FitPriors { time_offset_s: 1e-3, scale: 0.3, chain: 1e-6 }).unwrap()
+        RotationFit::of(
+            &pairs,
+            &chain,
+            &FitPriors { orientation_rad: FREE_ORIENTATION_RAD, time_offset_s: 1e-3, scale: 0.3, chain: 1e-6 },
+        )
+        .unwrap()
     }
 
     #[test]

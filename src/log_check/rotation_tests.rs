@@ -1,6 +1,6 @@
 //! Faults in the rotations of a camera: each is planted in synthetic image rotations and must be named.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -129,7 +129,7 @@ fn image_rotations_detect_time_offsets_and_wrong_extrinsics() {
     check(late(0.03), Severity::Warning, &["time offset of cam0 to the gyroscope: +30 ms", "to +0.030"]);
     check(late(0.03), Severity::Good, &["the orientation of cam0 agrees with the rig"]);
     let turned = Images { mount: |_| Vector3::new(0.0, 0.2, 0.0), ..Images::default() };
-    check(turned, Severity::Warning, &["the orientation of cam0 differs from the rig"]);
+    check(turned, Severity::Warning, &["the orientation of cam0 differs from the rig by 11."]);
     let wrong = Images { late_s: -0.05, mount: |_| Vector3::new(1.5, 0.0, 0.0), ..Images::default() };
     check(wrong, Severity::Error, &["the orientation of cam0 differs from the rig"]);
 }
@@ -183,9 +183,49 @@ fn faults_of_a_joint_are_named() {
 }
 
 #[test]
-fn axes_that_differ_by_a_right_angle_are_an_orientation() {
-    let images = Images { mount: |_| Vector3::new(0.0, 0.0, FRAC_PI_2), ..Images::default() };
-    expect(&images.check(&Flight::default()), Severity::Error, &["the orientation of cam0 differs from the rig"]);
+fn images_that_are_turned_or_mirrored_are_named() {
+    let of = |mount: fn(f64) -> Vector3<f64>| Images { mount, ..Images::default() }.check(&Flight::default());
+    let words = |images: &str| format!("the images of cam0 are {images}, or its orientation differs from the rig");
+    let quarter = of(|_| Vector3::new(0.0, 0.0, FRAC_PI_2));
+    expect(&quarter, Severity::Error, &[&words("rotated by 90°")]);
+    expect(&of(|_| Vector3::new(0.0, 0.0, PI)), Severity::Error, &[&words("upside down (rotated by 180°)")]);
+    // Rotations in mirrored images are those of a camera that is turned by half a turn.
+    let mirrored = of(|_| Vector3::new(PI, 0.0, 0.0));
+    expect(&mirrored, Severity::Error, &[&words("mirrored (left and right exchanged)"), "look at text"]);
+}
+
+#[test]
+fn faults_within_the_noise_of_single_rotations_are_named() {
+    // The rotations of two thirds of the flight fit the rig.
+    let late = Images {
+        mount: |time_s| if time_s < 7.5 { Vector3::zeros() } else { Vector3::new(0.0, 0.15, 0.1) },
+        ..Images::default()
+    };
+    expect(
+        &late.check(&Flight::default()),
+        Severity::Error,
+        &["the mount of cam0 moves: rotated by ", "from about 7."],
+    );
+    let jump = |time_s: f64| joint_at(time_s) + if time_s < 7.5 { 0.0 } else { 0.2 };
+    let report = Images { joint: Some(jump), ..Images::default() }.check(&on_gimbal());
+    expect(&report, Severity::Error, &["the angle of joint 'yaw' jumps by -11.", "at about 7."]);
+}
+
+#[test]
+fn units_of_joint_angles_are_named() {
+    let of = |joint: fn(i64, &mut f64)| {
+        let images = Images { joint: Some(joint_at), ..Images::default() };
+        images.check(&Flight { joint, ..on_gimbal() })
+    };
+    let degrees = of(|_, angle| *angle = angle.to_degrees());
+    expect(&degrees, Severity::Error, &["readings of 'yaw' appear to be in degrees"]);
+    expect(&degrees, Severity::Error, &["joint angles are in degrees"]);
+    let counts = of(|_, angle| *angle = (*angle * 4096.0 / TAU).round());
+    expect(&counts, Severity::Error, &["readings of 'yaw' appear to be in encoder counts or whole degrees"]);
+    expect(&counts, Severity::Error, &["joint angles are in encoder counts, 4096 per turn"]);
+    let turned = of(|ms, angle| *angle += if ms > 6000 { TAU } else { 0.0 });
+    expect(&turned, Severity::Note, &["readings of 'yaw' contain whole turns", "nothing to do"]);
+    expect(&turned, Severity::Good, &["the orientation of cam0 agrees with the rig"]);
 }
 
 #[test]

@@ -1,4 +1,5 @@
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -71,6 +72,8 @@ pub(super) struct Survey {
     pub(super) solved: Vec<SolvedAttitude>,
     /// Variance of a reading of each joint: the rig's, or that of its white noise if it is larger.
     encoder_variances_rad2: Vec<f64>,
+    /// True for joints whose readings are angles in radians, which repeat after a turn.
+    wraps: Vec<bool>,
     /// Names in the joint messages.
     pub(super) joint_names: Vec<String>,
     /// Images by camera key.
@@ -166,7 +169,8 @@ impl Survey {
         let around = &self.joint_samples.get(after)?.angles_rad;
         let angle = |joint: usize| {
             let reading = |sample: &JointSample| {
-                let change = wrap_angle(sample.angles_rad[joint] - around[joint]);
+                let change = sample.angles_rad[joint] - around[joint];
+                let change = if self.wraps[joint] { wrap_angle(change) } else { change };
                 (seconds_from_ns(sample.stamp_ns - stamp_ns), around[joint] + change)
             };
             let readings: Vec<_> = batch.iter().map(reading).collect();
@@ -192,9 +196,11 @@ impl Survey {
 
     fn set_joint_samples(&mut self, gimbal: &GimbalRig, samples: Vec<JointSample>) {
         let given_rad = gimbal.encoder_sigma_rad.unwrap_or(0.0).max(MIN_SIGMA_RAD);
+        let wraps = |joint: usize| samples.iter().all(|sample| is_in_radians(sample.angles_rad[joint]));
+        self.wraps = (0..gimbal.joints.len()).map(wraps).collect();
         let variance = |joint: usize| {
             let angles: Vec<f64> = samples.iter().map(|sample| sample.angles_rad[joint]).collect();
-            white_sigma(&angles).max(given_rad).powi(2)
+            white_sigma(&angles, self.wraps[joint]).max(given_rad).powi(2)
         };
         self.encoder_variances_rad2 = (0..gimbal.joints.len()).map(variance).collect();
         self.joint_samples = samples;
@@ -204,9 +210,9 @@ impl Survey {
     pub(super) fn use_source(&mut self, rig: &Rig, source: AttitudeSource, timeshift_s: f64) {
         if let (Some(attitude), Some(gimbal)) = (&self.attitude, &rig.gimbal) {
             let gimbal = GimbalRig { attitude: Some(source), timeshift_gimbal_imu_s: timeshift_s, ..gimbal.clone() };
-            let readings: Vec<JointReading> =
-                attitude.solve(&gimbal).into_iter().map(|solved| solved.reading).collect();
-            self.set_joint_samples(&gimbal, merged(&readings));
+            self.solved = attitude.solve(&gimbal);
+            self.joints = self.solved.iter().map(|solved| solved.reading.clone()).collect();
+            self.set_joint_samples(&gimbal, merged(&self.joints));
         }
     }
 
@@ -303,6 +309,11 @@ impl Survey {
             }
         }
     }
+}
+
+/// True for a reading that can be an angle in radians, with whole turns.
+pub(super) fn is_in_radians(reading: f64) -> bool {
+    reading.abs() <= 2.0 * TAU
 }
 
 /// Readings of all messages as samples of all joints; those that are not finite are omitted.

@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 use super::super::correction::{Correction, Parameter};
 use super::super::permutations::permutations;
 use super::super::rotation_data::RotationData;
-use super::fit::{Hypothesis, Kind, middle_s};
+use super::fit::{Hypothesis, Kind};
+use super::joint_unit::JointUnit;
 use crate::gimbal::ClassicalChain;
 use crate::sensors::CameraMount;
 
@@ -29,6 +30,7 @@ pub(super) fn intrinsics(joints: usize, focal: f64) -> Vec<Hypothesis> {
         starts: vec![start.clone()],
         parameters: parameters.to_vec(),
         since_s: Vec::new(),
+        keeps_orientation: false,
     };
     vec![
         hypothesis(Kind::Focal, &scaled, &[Parameter::Focal]),
@@ -52,6 +54,7 @@ pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec
         starts,
         parameters: parameters.to_vec(),
         since_s: Vec::new(),
+        keeps_orientation: false,
     };
     let mut all = vec![
         whole(Kind::LeftHanded, vec![changed(&|it| it.gyroscope_scale = -1.0)], &[]),
@@ -66,6 +69,7 @@ pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec
             starts: vec![none.clone()],
             parameters: [0, 1, 2].map(Parameter::Mount).to_vec(),
             since_s: times_s(data),
+            keeps_orientation: false,
         },
     ];
     if data.camera.mount != CameraMount::Gimbal || joints == 0 {
@@ -90,18 +94,21 @@ pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec
     let swapped =
         orders.map(|order| changed(&|it| order.iter().enumerate().for_each(|(at, from)| it.joints[at].source = *from)));
     all.push(whole(Kind::JointOrder, swapped.collect(), &[]));
-    let in_unit = |scale: f64| changed(&|it| it.joints.iter_mut().for_each(|joint| joint.scale = scale));
-    all.push(whole(Kind::JointUnit, vec![in_unit(PI / 180.0), in_unit(180.0 / PI)], &[]));
+    let in_unit = |unit: JointUnit| changed(&|it| it.joints.iter_mut().for_each(|joint| joint.scale = unit.size_rad()));
+    all.push(whole(Kind::JointUnit, JointUnit::all().map(in_unit).collect(), &[]));
     for joint in 0..joints {
         let offsets =
             || OFFSETS_RAD.iter().map(|offset| changed(&|it| it.joints[joint].offset_rad = *offset)).collect();
         all.push(whole(Kind::JointScale(joint), vec![none.clone()], &[Parameter::JointScale(joint)]));
-        all.push(whole(Kind::JointOffset(joint), offsets(), &[Parameter::JointOffset(joint)]));
+        // With any orientation of the camera, an offset of the last joint would be unobservable.
+        let offset = whole(Kind::JointOffset(joint), offsets(), &[Parameter::JointOffset(joint)]);
+        all.push(Hypothesis { keeps_orientation: true, ..offset });
         all.push(Hypothesis {
             kind: Kind::JointOffset(joint),
             starts: vec![none.clone()],
             parameters: vec![Parameter::JointOffset(joint)],
             since_s: times_s(data),
+            keeps_orientation: false,
         });
     }
     all
@@ -109,6 +116,6 @@ pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec
 
 /// Times within the rotations at which a change is tried, in seconds.
 fn times_s(data: &RotationData<'_>) -> Vec<f64> {
-    let middles: Vec<f64> = data.measured.iter().map(middle_s).collect();
+    let middles: Vec<f64> = data.measured.iter().map(|it| it.middle_s()).collect();
     (1..=TIMES).filter_map(|number| middles.get(number * middles.len() / (TIMES + 1)).copied()).collect()
 }

@@ -7,14 +7,16 @@ use nalgebra::Vector3;
 
 use super::super::correction::{Correction, LensChange, Parameter};
 use super::super::rotation_data::{JOINED_S, MeasuredRotation, RotationData, joined};
-use super::super::rotation_fit::{ExtraColumn, FitPriors, Prediction, RotationFit, RotationPair};
-use crate::geometry::seconds_from_ns;
+use super::super::rotation_fit::{ExtraColumn, FREE_ORIENTATION_RAD, FitPriors, Prediction, RotationFit, RotationPair};
+use super::super::statistics::median;
 use crate::gimbal::ClassicalChain;
 
 /// Prior standard deviation of the time offset of camera and gyroscope beyond the rig's.
 const OFFSET_SIGMA_S: f64 = 0.02;
 /// Prior standard deviation of the ratio of image rotations to predicted ones: a change of it is a hypothesis.
 const SCALE_SIGMA: f64 = 0.005;
+/// Prior standard deviation of the camera's orientation where a hypothesis takes it from the rig, in radians.
+const KEPT_ORIENTATION_RAD: f64 = 0.02;
 const ITERATIONS: usize = 8;
 /// Half the relative range in which a focal length is searched around that of the grid, and the length at which it ends.
 const FOCAL_RANGE: f64 = 0.06;
@@ -23,6 +25,14 @@ const FOCAL_PRECISION: f64 = 1e-3;
 const CONVERGED: f64 = 0.05;
 /// Number of starts from which a hypothesis is fitted until it converges: the best after one iteration.
 const FOLLOWED: usize = 2;
+/// Smallest corrections that count as a fault where noise explains the rotations without them.
+const NOTICEABLE_SCALE: f64 = 0.03;
+const NOTICEABLE_ANGLE_RAD: f64 = 0.026;
+const NOTICEABLE_DELAY_S: f64 = 0.01;
+/// In seconds per second.
+const NOTICEABLE_DRIFT: f64 = 2e-4;
+/// Ratio of the median misfit with a correction to that without up to which it removes a misfit.
+const REMOVED_MISFIT: f64 = 0.6;
 /// Minimum number of rotations.
 const MIN_ROTATIONS: usize = 12;
 
@@ -35,6 +45,8 @@ pub(in crate::log_check) struct Hypothesis {
     pub(super) parameters: Vec<Parameter>,
     /// Times in seconds from which on the correction may apply; the best one is taken. Empty: to the whole log.
     pub(super) since_s: Vec<f64>,
+    /// True if the camera's orientation is the rig's: else it is estimated, whatever it is.
+    pub(super) keeps_orientation: bool,
 }
 
 /// Kind of a hypothesis, from which its text is made.
@@ -76,10 +88,46 @@ pub(in crate::log_check) struct Fitted {
 }
 
 impl Fitted {
+    /// True if the correction removes a misfit, in all rotations or, if it begins at a time, in those before or after it: a
+    /// larger likelihood alone can be that of a few wrong rotations.
+    pub(super) fn removes_misfit(&self, given: &RotationFit) -> bool {
+        let split_s = self.since_s.unwrap_or(f64::NEG_INFINITY);
+        let is_removed = |is_after: bool| {
+            let [without, with] = [given, &self.fit].map(|fit| {
+                let part = fit.misfits_rad.iter().filter(|(middle_s, _)| (*middle_s >= split_s) == is_after);
+                median(&part.map(|(_, misfit_rad)| *misfit_rad).collect::<Vec<_>>())
+            });
+            with < REMOVED_MISFIT * without
+        };
+        is_removed(true) || (self.since_s.is_some() && is_removed(false))
+    }
+
+    /// True if the correction is larger than what sound sensors and rigs differ by.
+    pub(super) fn is_noticeable(&self) -> bool {
+        let correction = &self.correction;
+        match &self.kind {
+            Kind::GyroscopeScale => (correction.gyroscope_scale - 1.0).abs() > NOTICEABLE_SCALE,
+            Kind::CameraDrift => correction.camera_drift.abs() > NOTICEABLE_DRIFT,
+            Kind::JointScale(joint) => (correction.joints[*joint].scale - 1.0).abs() > NOTICEABLE_SCALE,
+            Kind::JointOffset(joint) => correction.joints[*joint].offset_rad.abs() > NOTICEABLE_ANGLE_RAD,
+            Kind::JointDelay => correction.joint_delay_s.abs() > NOTICEABLE_DELAY_S,
+            Kind::Mount => correction.mount.angle() > NOTICEABLE_ANGLE_RAD,
+            Kind::LeftHanded
+            | Kind::Focal
+            | Kind::Centre
+            | Kind::Intrinsics
+            | Kind::FocalPieces(_)
+            | Kind::JointSigns(_)
+            | Kind::JointOrder
+            | Kind::JointUnit => true,
+        }
+    }
+
     /// True if this hypothesis has the other one as a special case: it cannot exclude it by fitting as well.
     pub(super) fn contains(&self, other: &Self) -> bool {
         match (&self.kind, &other.kind) {
             (Kind::FocalPieces(_) | Kind::Intrinsics, Kind::Focal) | (Kind::Intrinsics, Kind::Centre) => true,
+            (Kind::Mount, Kind::JointOffset(_)) => self.since_s.is_some() && other.since_s.is_some(),
             // Two axes reversed are half a turn about the third: other signs with an offset can be the same mechanism.
             (Kind::JointSigns(mine), Kind::JointSigns(others)) => others.iter().all(|joint| mine.contains(joint)),
             (mine, others) => mine == others,
@@ -96,26 +144,40 @@ pub(super) fn length_s(chain: &ClassicalChain) -> f64 {
 pub(super) struct Fitter<'a> {
     pub(super) data: &'a RotationData<'a>,
     pub(super) chain: &'a ClassicalChain,
+    /// With any orientation of the camera.
     priors: FitPriors,
+    /// Smallest error of the orientation that counts as one, in radians.
+    orientation_tolerance_rad: f64,
     /// Rotations as recorded.
     pub(super) measured: Vec<MeasuredRotation>,
 }
 
-/// Middle of a rotation in seconds since the log began.
-pub(super) fn middle_s(measured: &MeasuredRotation) -> f64 {
-    0.5 * (seconds_from_ns(measured.rotation.from_ns) + seconds_from_ns(measured.rotation.to_ns))
-}
-
 impl<'a> Fitter<'a> {
-    pub(super) fn new(data: &'a RotationData<'a>, chain: &'a ClassicalChain) -> Self {
-        let priors = FitPriors { time_offset_s: OFFSET_SIGMA_S, scale: SCALE_SIGMA, chain: data.chain_sigma_rad() };
+    pub(super) fn new(data: &'a RotationData<'a>, chain: &'a ClassicalChain, orientation_tolerance_rad: f64) -> Self {
+        let priors = FitPriors {
+            orientation_rad: FREE_ORIENTATION_RAD,
+            time_offset_s: OFFSET_SIGMA_S,
+            scale: SCALE_SIGMA,
+            chain: data.chain_sigma_rad(),
+        };
         let measured = joined(&data.measured, length_s(chain));
-        Self { data, chain, priors, measured }
+        Self { data, chain, priors, orientation_tolerance_rad, measured }
     }
 
-    /// Criterion of a fit with a number of parameters.
-    pub(super) fn criterion(&self, deviance: f64, parameters: usize) -> f64 {
-        deviance + parameters as f64 * (3.0 * self.measured.len() as f64).ln()
+    /// Criterion of a fit with a number of parameters: those of the orientation count if it is not the rig's.
+    pub(super) fn criterion(&self, fit: &RotationFit, parameters: usize) -> f64 {
+        let turned = if self.has_other_orientation(fit) { 3 } else { 0 };
+        fit.deviance + (parameters + turned) as f64 * self.parameter_cost()
+    }
+
+    /// Cost of a parameter in the criterion.
+    pub(super) fn parameter_cost(&self) -> f64 {
+        (3.0 * self.measured.len() as f64).ln()
+    }
+
+    /// True if the orientation of a fit differs from the rig's.
+    pub(super) fn has_other_orientation(&self, fit: &RotationFit) -> bool {
+        fit.orientation.angle() > self.orientation_tolerance_rad
     }
 
     /// Rotations with the lens of a correction.
@@ -126,27 +188,30 @@ impl<'a> Fitter<'a> {
         Cow::Owned(joined(&self.data.with_lens(&correction.lens), length_s(self.chain)))
     }
 
-    /// Fit without a correction; its deviance is its criterion.
+    /// Fit without a correction.
     pub(super) fn fit_given(&self) -> Option<RotationFit> {
-        self.linear_fit(&Correction::none(self.chain.joint_count()), &[], None)
+        self.linear_fit(&Correction::none(self.chain.joint_count()), &[], None, &self.priors)
     }
 
     /// Best fit of a hypothesis over its starts and times.
     pub(super) fn best(&self, hypothesis: Hypothesis) -> Option<Fitted> {
-        let Hypothesis { kind, starts, parameters, since_s } = hypothesis;
+        let Hypothesis { kind, starts, parameters, since_s, keeps_orientation } = hypothesis;
+        let orientation_rad = if keeps_orientation { KEPT_ORIENTATION_RAD } else { FREE_ORIENTATION_RAD };
+        let priors = FitPriors { orientation_rad, ..self.priors };
         let times: Vec<Option<f64>> =
             if since_s.is_empty() { vec![None] } else { since_s.iter().copied().map(Some).collect() };
         let mut tried: Vec<(f64, &Correction, Option<f64>)> = Vec::new();
         for start in &starts {
             for since_s in &times {
-                if let Some(fit) = self.linear_fit(start, &parameters, *since_s) {
+                if let Some(fit) = self.linear_fit(start, &parameters, *since_s, &priors) {
                     tried.push((fit.deviance, start, *since_s));
                 }
             }
         }
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         let followed = tried.into_iter().take(FOLLOWED);
-        let fits = followed.filter_map(|(_, start, since_s)| self.converged(&kind, start, &parameters, since_s));
+        let fits =
+            followed.filter_map(|(_, start, since_s)| self.converged(&kind, start, &parameters, since_s, &priors));
         fits.min_by(|a, b| a.criterion.total_cmp(&b.criterion))
     }
 
@@ -157,11 +222,12 @@ impl<'a> Fitter<'a> {
         start: &Correction,
         parameters: &[Parameter],
         since_s: Option<f64>,
+        priors: &FitPriors,
     ) -> Option<Fitted> {
         let mut correction = if *kind == Kind::Focal { self.best_focal(start) } else { start.clone() };
         let iterations = if *kind == Kind::Focal || parameters.is_empty() { 0 } else { ITERATIONS };
         for _ in 0..iterations {
-            let values = self.linear_fit(&correction, parameters, since_s)?.extra;
+            let values = self.linear_fit(&correction, parameters, since_s, priors)?.extra;
             apply(parameters, &values, &mut correction);
             let change = parameters.iter().zip(&values).map(|(parameter, value)| value.abs() / parameter.step());
             if change.fold(0.0, f64::max) < CONVERGED {
@@ -169,9 +235,9 @@ impl<'a> Fitter<'a> {
             }
         }
         // What is reported is the misfit of corrected data, not that of a linear model of the correction.
-        let fit = self.linear_fit(&correction, &[], since_s)?;
+        let fit = self.linear_fit(&correction, &[], since_s, priors)?;
         let parameters = parameters.len() + usize::from(since_s.is_some());
-        let criterion = self.criterion(fit.deviance, parameters);
+        let criterion = self.criterion(&fit, parameters);
         Some(Fitted { kind: kind.clone(), correction, since_s, fit, criterion })
     }
 
@@ -183,8 +249,9 @@ impl<'a> Fitter<'a> {
             correction.lens.focal *= logarithm.exp();
             correction
         };
-        let deviance =
-            |logarithm: f64| self.linear_fit(&at(logarithm), &[], None).map_or(f64::INFINITY, |fit| fit.deviance);
+        let deviance = |logarithm: f64| {
+            self.linear_fit(&at(logarithm), &[], None, &self.priors).map_or(f64::INFINITY, |fit| fit.deviance)
+        };
         let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
         let (mut low, mut high) = (-FOCAL_RANGE, FOCAL_RANGE);
         let (mut left, mut right) = (high - ratio * (high - low), low + ratio * (high - low));
@@ -208,6 +275,7 @@ impl<'a> Fitter<'a> {
         correction: &Correction,
         parameters: &[Parameter],
         since_s: Option<f64>,
+        priors: &FitPriors,
     ) -> Option<RotationFit> {
         let none = Correction::none(self.chain.joint_count());
         let at = self.pairs(&none, correction, since_s);
@@ -234,7 +302,7 @@ impl<'a> Fitter<'a> {
         };
         let columns: Vec<ExtraColumn> = parameters.iter().map(column).collect();
         let pairs: Vec<RotationPair> = at.values().cloned().collect();
-        RotationFit::with_columns(&pairs, self.chain, &self.priors, &columns)
+        RotationFit::with_columns(&pairs, self.chain, priors, &columns)
     }
 
     /// Pairs by the stamp of their first image, with one correction before and another one after a time.
@@ -243,7 +311,7 @@ impl<'a> Fitter<'a> {
         let mut extend = |correction: &Correction, from_s: f64, to_s: f64| {
             let predictor = self.data.predictor(self.chain, correction);
             let measured = self.measured(correction);
-            let within = measured.iter().filter(|it| (from_s..to_s).contains(&middle_s(it)));
+            let within = measured.iter().filter(|it| (from_s..to_s).contains(&it.middle_s()));
             pairs.extend(within.filter_map(|it| Some((it.rotation.from_ns, predictor.pair(it)?))));
         };
         let split_s = since_s.unwrap_or(f64::NEG_INFINITY);

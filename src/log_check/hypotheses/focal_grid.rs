@@ -8,7 +8,7 @@ use super::super::ImageRotation;
 use super::super::correction::{Correction, LensChange};
 use super::super::rotation_data::{MeasuredRotation, joined};
 use super::super::rotation_fit::tail_cost;
-use super::fit::{Fitted, Fitter, Kind, Predictions, length_s, middle_s};
+use super::fit::{Fitted, Fitter, Kind, Predictions, length_s};
 use crate::geometry::so3;
 
 /// Range of the ratios of a focal length to the rig's, and the number of steps whose rotations are measured.
@@ -69,7 +69,7 @@ impl FocalGrid {
         let mut chosen = Vec::new();
         let mut fit = None;
         for _ in 0..ROUNDS {
-            chosen = self.cheapest(&predictions, 2.0 * fitter.criterion(0.0, 1) + CHANGE_COST);
+            chosen = self.cheapest(&predictions, 2.0 * fitter.parameter_cost() + CHANGE_COST);
             let (found, next) = fitter.fit_measured(&self.rotations(&chosen))?;
             (fit, predictions) = (Some(found), next);
         }
@@ -84,7 +84,7 @@ impl FocalGrid {
             kind: Kind::FocalPieces(pieces),
             correction: Correction::none(fitter.chain.joint_count()),
             since_s: None,
-            criterion: fitter.criterion(fit.deviance, 2 * changes + 1),
+            criterion: fitter.criterion(&fit, 2 * changes + 1),
             fit,
         })
     }
@@ -139,7 +139,7 @@ impl FocalGrid {
 
     /// Begins in seconds and ratios of the pieces that last long enough.
     fn pieces(&self, chosen: &[(i64, usize)]) -> Vec<(f64, f64)> {
-        let time_s = |key: i64| middle_s(&self.steps[0][&key]);
+        let time_s = |key: i64| self.steps[0][&key].middle_s();
         let mut pieces: Vec<(f64, f64)> = Vec::new();
         for piece in chosen.chunk_by(|a, b| a.1 == b.1) {
             let (first, last) = (piece[0], piece[piece.len() - 1]);

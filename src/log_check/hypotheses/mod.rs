@@ -9,15 +9,17 @@ mod candidates;
 mod cause;
 mod fit;
 mod focal_grid;
+mod joint_unit;
 mod text;
 
 use rayon::prelude::*;
 
 use self::candidates::{candidates, intrinsics};
-use self::cause::Cause;
+pub(super) use self::cause::Cause;
 use self::fit::{Fitted, Fitter, Hypothesis, Kind, length_s};
 use self::focal_grid::FocalGrid;
 use super::rotation_data::RotationData;
+use super::rotation_fit::RotationFit;
 use super::{Area, Findings, Severity};
 use crate::gimbal::ClassicalChain;
 
@@ -25,6 +27,8 @@ use crate::gimbal::ClassicalChain;
 const DECISIVE: f64 = 20.0;
 /// Largest number of causes that are listed.
 const LISTED: usize = 3;
+/// The same for a cause of rotations that noise explains: many are tried, at many times.
+const DECISIVE_WITHIN_NOISE: f64 = 40.0;
 /// A cause must leave at most this ratio of the misfit to be listed.
 const MIN_IMPROVEMENT: f64 = 0.5;
 /// The same for χ² of a cause that leaves more than noise explains.
@@ -38,80 +42,182 @@ pub(super) enum Explanation {
     Open(Vec<(Cause, String)>),
 }
 
-/// Searches for the cause of a misfit between the rotations of a camera and their prediction by a chain.
-pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain) -> Explanation {
-    let fitter = Fitter::new(data, chain);
-    let Some(given) = fitter.fit_given() else { return Explanation::Open(Vec::new()) };
-    let fit_all =
-        |all: Vec<Hypothesis>| all.into_par_iter().filter_map(|one| fitter.best(one)).collect::<Vec<Fitted>>();
-    let mut fitted = fit_all(candidates(data, chain));
-    // Other intrinsics need all rotations measured again; only a wrong scale of the gyroscope resembles them.
-    let found = |it: &Fitted| {
-        it.fit.is_explained()
-            && it.kind != Kind::GyroscopeScale
-            && it.criterion + DECISIVE < given.deviance
-            && it.fit.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
-    };
-    if !fitted.iter().any(found) {
-        let grid = FocalGrid::new(&fitter);
-        fitted.extend(fit_all(intrinsics(chain.joint_count(), grid.best_constant())));
-        fitted.extend(grid.pieces_fit(&fitter));
-    }
-    fitted.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
-    let compared = match length_s(chain) {
-        0.0 => "rotations from image to image".to_owned(),
-        length_s => format!("rotations over {length_s:.1} s"),
-    };
-    let evidence = |found: &Fitted| {
-        format!(
-            "{compared} then differ by {:.3}°, {:.3}° without; noise predicts {:.3}° (χ²/dof {:.2}, {:.2} without)",
-            found.fit.misfit_rad.to_degrees(),
-            given.misfit_rad.to_degrees(),
-            found.fit.predicted_misfit_rad.to_degrees(),
-            found.fit.mean_square,
-            given.mean_square
-        )
-    };
-    let describe = |found: &Fitted| (text::cause(data, found), evidence(found));
-    // Of two that explain the misfit, a special case is preferred unless it is decisively worse.
-    let simpler = |best: &Fitted| {
-        fitted.iter().find(|it| {
-            best.contains(it)
-                && it.kind != best.kind
-                && it.fit.is_explained()
-                && it.criterion < best.criterion + DECISIVE
-        })
-    };
-    let Some(best) = fitted.first().map(|best| simpler(best).unwrap_or(best)) else {
+/// Causes of rotations that noise explains.
+pub(super) struct WithinNoise {
+    /// Cause with what it leaves, if it is much more likely than none.
+    pub(super) decisive: Option<(Cause, String)>,
+    /// Causes that explain the rotations as well as another orientation of the camera does, the most likely first.
+    pub(super) instead_of_orientation: Vec<Cause>,
+    /// Number of them that are more likely than another orientation.
+    pub(super) more_likely: usize,
+}
+
+/// Searches for the cause of a misfit between the rotations of a camera and their prediction by a chain. An orientation
+/// that differs from the rig's by more than the tolerance counts as a fault.
+pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain, orientation_tolerance_rad: f64) -> Explanation {
+    let Some(mut comparison) = Comparison::new(data, chain, orientation_tolerance_rad) else {
         return Explanation::Open(Vec::new());
     };
-    let rival = fitted.iter().find(|other| !other.contains(best));
-    let is_alone = rival.is_none_or(|rival| rival.criterion > best.criterion + DECISIVE);
-    if best.fit.is_explained() && is_alone && best.criterion + DECISIVE < given.deviance {
-        let (cause, evidence) = describe(best);
-        return Explanation::Decisive(cause, evidence);
+    comparison.add_intrinsics();
+    comparison.explanation()
+}
+
+/// Searches for faults that are within the noise of single rotations, such as a jump of a joint late in the log.
+pub(super) fn explain_within_noise(
+    data: &RotationData<'_>,
+    chain: &ClassicalChain,
+    orientation_tolerance_rad: f64,
+) -> WithinNoise {
+    let none = WithinNoise { decisive: None, instead_of_orientation: Vec::new(), more_likely: 0 };
+    let Some(comparison) = Comparison::new(data, chain, orientation_tolerance_rad) else { return none };
+    let given = comparison.criterion_given();
+    let explains = |found: &&Fitted| found.fit.is_explained() && found.is_noticeable();
+    let is_decisive =
+        |found: &&Fitted| found.criterion + DECISIVE_WITHIN_NOISE < given && found.removes_misfit(&comparison.given);
+    if let Some(best) = comparison.fitted.first().filter(explains).filter(is_decisive) {
+        return WithinNoise { decisive: Some(comparison.describe(best)), ..none };
     }
-    let mut open: Vec<(Cause, String)> = Vec::new();
-    for found in &fitted {
-        let is_explained = found.fit.is_explained();
-        let remains = found.criterion < best.criterion + DECISIVE || (best.fit.is_explained() && is_explained);
-        let improves = is_explained && found.fit.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
-            || found.fit.mean_square < UNEXPLAINED_IMPROVEMENT * given.mean_square;
-        let (cause, evidence) = describe(found);
-        if remains && improves && open.len() < LISTED && open.iter().all(|(listed, _)| listed.title != cause.title) {
-            open.push((cause, evidence));
+    if !comparison.fitter.has_other_orientation(&comparison.given) {
+        return none;
+    }
+    let instead = |found: &&Fitted| {
+        explains(found) && found.criterion < given + DECISIVE && !comparison.fitter.has_other_orientation(&found.fit)
+    };
+    let mut listed: Vec<&Fitted> = Vec::new();
+    for found in comparison.fitted.iter().filter(instead) {
+        // A movement of the mount can always replace a jump of the last joint.
+        if listed.len() + 1 < LISTED && !listed.iter().any(|special| found.contains(special)) {
+            listed.push(found);
         }
     }
-    Explanation::Open(open)
+    WithinNoise {
+        more_likely: listed.iter().filter(|found| found.criterion < given).count(),
+        instead_of_orientation: listed.into_iter().map(|found| text::cause(data, found)).collect(),
+        ..none
+    }
+}
+
+/// All hypotheses, fitted.
+struct Comparison<'a> {
+    data: &'a RotationData<'a>,
+    fitter: Fitter<'a>,
+    /// Fit without a correction.
+    given: RotationFit,
+    /// The most likely first.
+    fitted: Vec<Fitted>,
+}
+
+impl<'a> Comparison<'a> {
+    /// Fits all hypotheses but those about intrinsics; `None` without enough rotations.
+    fn new(data: &'a RotationData<'a>, chain: &'a ClassicalChain, orientation_tolerance_rad: f64) -> Option<Self> {
+        let fitter = Fitter::new(data, chain, orientation_tolerance_rad);
+        let given = fitter.fit_given()?;
+        let mut comparison = Self { data, fitter, given, fitted: Vec::new() };
+        comparison.add(candidates(data, chain));
+        comparison.sort();
+        Some(comparison)
+    }
+
+    fn add(&mut self, hypotheses: Vec<Hypothesis>) {
+        let fitted: Vec<Fitted> = hypotheses.into_par_iter().filter_map(|one| self.fitter.best(one)).collect();
+        self.fitted.extend(fitted);
+    }
+
+    fn sort(&mut self) {
+        self.fitted.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    }
+
+    /// Criterion without a correction.
+    fn criterion_given(&self) -> f64 {
+        self.fitter.criterion(&self.given, 0)
+    }
+
+    /// Adds the hypotheses about intrinsics unless another one explains the misfit: other intrinsics need all rotations
+    /// measured again; only a wrong scale of the gyroscope resembles them.
+    fn add_intrinsics(&mut self) {
+        let found = |it: &Fitted| {
+            it.fit.is_explained()
+                && it.kind != Kind::GyroscopeScale
+                && it.criterion + DECISIVE < self.criterion_given()
+                && it.fit.misfit_rad < MIN_IMPROVEMENT * self.given.misfit_rad
+        };
+        if self.fitted.iter().any(found) {
+            return;
+        }
+        let grid = FocalGrid::new(&self.fitter);
+        self.add(intrinsics(self.fitter.chain.joint_count(), grid.best_constant()));
+        self.fitted.extend(grid.pieces_fit(&self.fitter));
+        self.sort();
+    }
+
+    /// Cause in words, with what it leaves.
+    fn describe(&self, found: &Fitted) -> (Cause, String) {
+        let compared = match length_s(self.fitter.chain) {
+            0.0 => "rotations from image to image".to_owned(),
+            length_s => format!("rotations over {length_s:.1} s"),
+        };
+        let evidence = format!(
+            "{compared} then differ by {:.3}°, {:.3}° without; noise predicts {:.3}° (χ²/dof {:.2}, {:.2} without)",
+            found.fit.misfit_rad.to_degrees(),
+            self.given.misfit_rad.to_degrees(),
+            found.fit.predicted_misfit_rad.to_degrees(),
+            found.fit.mean_square,
+            self.given.mean_square
+        );
+        (text::cause(self.data, found), evidence)
+    }
+
+    fn explanation(&self) -> Explanation {
+        let (fitted, given) = (&self.fitted, &self.given);
+        // Of two that explain the misfit, a special case is preferred unless it is decisively worse.
+        let simpler = |best: &Fitted| {
+            fitted.iter().find(|it| {
+                best.contains(it)
+                    && it.kind != best.kind
+                    && it.fit.is_explained()
+                    && it.criterion < best.criterion + DECISIVE
+            })
+        };
+        let Some(best) = fitted.first().map(|best| simpler(best).unwrap_or(best)) else {
+            return Explanation::Open(Vec::new());
+        };
+        let rival = fitted.iter().find(|other| !other.contains(best));
+        let is_alone = rival.is_none_or(|rival| rival.criterion > best.criterion + DECISIVE);
+        if best.fit.is_explained() && is_alone && best.criterion + DECISIVE < self.criterion_given() {
+            let (cause, evidence) = self.describe(best);
+            return Explanation::Decisive(cause, evidence);
+        }
+        let mut open: Vec<(Cause, String)> = Vec::new();
+        for found in fitted {
+            let is_explained = found.fit.is_explained();
+            let remains = found.criterion < best.criterion + DECISIVE || (best.fit.is_explained() && is_explained);
+            let improves = is_explained && found.fit.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
+                || found.fit.mean_square < UNEXPLAINED_IMPROVEMENT * given.mean_square;
+            let (cause, evidence) = self.describe(found);
+            if remains && improves && open.len() < LISTED && open.iter().all(|(listed, _)| listed.title != cause.title)
+            {
+                open.push((cause, evidence));
+            }
+        }
+        Explanation::Open(open)
+    }
 }
 
 impl Explanation {
+    /// True if the cause, or the first of those that remain, is in this area.
+    pub(super) fn is_of(&self, area: Area) -> bool {
+        match self {
+            Self::Decisive(cause, _) => cause.area == area,
+            Self::Open(causes) => causes.first().is_some_and(|(cause, _)| cause.area == area),
+        }
+    }
+
     /// Adds the finding; `evidence` has the numbers of the misfit as recorded.
-    pub(super) fn report(self, key: &str, evidence: &str, remedy: &str, findings: &mut Findings) {
+    pub(super) fn report(&self, key: &str, evidence: &str, remedy: &str, findings: &mut Findings) {
         match self {
             Self::Decisive(cause, of_cause) => {
                 let evidence = format!("{of_cause}; as recorded: {evidence}");
-                findings.add(cause.severity, cause.area, cause.title, evidence, cause.remedy);
+                findings.add(cause.severity, cause.area, cause.title.clone(), evidence, cause.remedy.clone());
             }
             Self::Open(causes) => {
                 let title =

@@ -6,6 +6,7 @@ use super::super::rotation_data::RotationData;
 use super::super::{Area, Severity};
 use super::cause::Cause;
 use super::fit::{Fitted, Kind};
+use super::joint_unit::JointUnit;
 use crate::geometry::SignedAxes;
 use crate::sensors::CameraMount;
 
@@ -70,12 +71,9 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
             )
         }
         Kind::JointUnit => {
-            let in_degrees = correction.joints.first().is_some_and(|joint| joint.scale < 1.0);
-            let title = if in_degrees {
-                "joint angles are in degrees, not radians".to_owned()
-            } else {
-                "joint angles are 57 times too small: radians were converted as if they were degrees".to_owned()
-            };
+            let size_rad = correction.joints.first().map_or(1.0, |joint| joint.scale);
+            let unit = JointUnit::of_size(size_rad).map_or_else(|| "in another unit".to_owned(), JointUnit::describe);
+            let title = format!("joint angles are {unit}");
             let remedy = "sensor_msgs/JointState requires radians: correct the driver".to_owned();
             of(Severity::Error, Area::Encoders, title, remedy)
         }

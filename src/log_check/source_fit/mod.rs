@@ -2,17 +2,19 @@
 //! time offset that predict them, if those of the rig do not.
 
 mod meanings;
+mod quaternion_faults;
 #[cfg(test)]
 mod tests;
 
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 
 use self::meanings::{changes, difference};
+use self::quaternion_faults::corrected;
 use super::attitude::AttitudeSurvey;
 use super::imu_facts::ImuFacts;
 use super::statistics::median;
 use super::survey::Survey;
-use super::{Area, Findings, ImageRotation, Severity};
+use super::{Area, Findings, ImageRotation, Measurement, Severity};
 use crate::geometry::{ns_from_seconds, principal_angle, seconds_from_ns, so3};
 use crate::sensors::{AttitudeSource, CameraMount, GimbalRig, Rig};
 
@@ -47,6 +49,7 @@ pub(super) struct FittedSource {
 }
 
 /// Joined rotation of the camera.
+#[derive(Clone)]
 struct Span {
     /// In IMU time.
     from_ns: i64,
@@ -80,6 +83,9 @@ pub(super) fn check_source(
     rotations: &[ImageRotation],
     findings: &mut Findings,
 ) -> Option<FittedSource> {
+    if !findings.can_compare(Measurement::Gyroscope) {
+        return None;
+    }
     let (attitude, gimbal) = (survey.attitude.as_ref()?, rig.gimbal.as_ref()?);
     let source = gimbal.attitude.as_ref()?;
     let camera = rig.cameras.iter().find(|camera| camera.mount == CameraMount::Gimbal)?;
@@ -101,6 +107,10 @@ pub(super) fn check_source(
     let listed = listed(gimbal, source, &given, &others);
     let fits = best.misfit_rad < FITTING_RATIO * rotation_rad;
     if !fits {
+        findings.exclude(Measurement::Joints);
+        if fit.check_quaternions(source, given_s, &listed, findings) {
+            return None;
+        }
         let title = "no interpretation of gimbal.source predicts the rotations in the images";
         let evidence = format!("rotations of {:.2}° in the median; {listed}", rotation_rad.to_degrees());
         let remedy =
@@ -109,14 +119,16 @@ pub(super) fn check_source(
         return None;
     }
     let better = best.misfit_rad < BETTER_RATIO * given.misfit_rad;
-    let chosen = if better { best } else { given.clone() };
+    let (chosen, equivalent) =
+        if better { fit.within_reach(gimbal, best, &others) } else { (given.clone(), Vec::new()) };
     let evidence = format!(
         "rotations of {:.2}° in the median differ from the images' by {:.3}°; {listed}",
         rotation_rad.to_degrees(),
         chosen.misfit_rad.to_degrees()
     );
     if better {
-        let changes = difference(gimbal, source, &chosen.source);
+        let all = std::iter::once(&chosen).chain(&equivalent).map(|it| difference(gimbal, source, &it.source));
+        let changes = all.collect::<Vec<_>>().join(", or ");
         let title = format!("gimbal.source is wrong; correct values: {changes}");
         let remedy = format!("set {changes} in gimbal.source");
         findings.add(Severity::Error, Area::Encoders, title, evidence, remedy);
@@ -201,6 +213,65 @@ impl SourceFit<'_> {
             best = further.iter().flatten().fold(best, clearly_better);
         }
         best
+    }
+
+    /// Of the best interpretation and single changes that predict the rotations as well, the one whose attitudes the joints
+    /// can reach, with those that they reach as well.
+    fn within_reach(&self, gimbal: &GimbalRig, best: Meaning, others: &[Vec<Meaning>]) -> (Meaning, Vec<Meaning>) {
+        /// Largest ratio of the misfits of equivalent interpretations.
+        const EQUIVALENT: f64 = 1.1;
+        /// Largest difference of the median distances to the reachable attitudes, in radians.
+        const SAME_REACH_RAD: f64 = 0.01;
+        let is_equivalent =
+            |other: &&Meaning| other.misfit_rad < EQUIVALENT * best.misfit_rad && other.source != best.source;
+        let all: Vec<Meaning> = others.iter().flatten().filter(is_equivalent).cloned().collect();
+        if all.is_empty() {
+            return (best, all);
+        }
+        let distance_rad = |meaning: &Meaning| {
+            let gimbal = GimbalRig { attitude: Some(meaning.source.clone()), ..gimbal.clone() };
+            median(&self.attitude.solve(&gimbal).iter().map(|solved| solved.unreachable_rad).collect::<Vec<_>>())
+        };
+        let of_best = distance_rad(&best);
+        let distances: Vec<f64> = all.iter().map(distance_rad).collect();
+        let least = distances.iter().copied().fold(of_best, f64::min);
+        let is_near = |distance: f64| distance < least + SAME_REACH_RAD;
+        let mut near: Vec<Meaning> = all
+            .into_iter()
+            .zip(distances)
+            .filter(|(_, distance)| is_near(*distance))
+            .map(|(meaning, _)| meaning)
+            .collect();
+        if is_near(of_best) {
+            return (best, near);
+        }
+        // The least distance is that of one of them.
+        let chosen = near.remove(0);
+        (chosen, near)
+    }
+
+    /// Reports quaternions that were filled in wrongly, if their correction predicts the rotations; returns true if it
+    /// does.
+    fn check_quaternions(&self, source: &AttitudeSource, given_s: f64, listed: &str, findings: &mut Findings) -> bool {
+        let rotation_rad = self.rotation_rad();
+        let tried = corrected(self.attitude).into_iter().map(|corrected| {
+            let fit = SourceFit { attitude: &corrected.attitude, spans: self.spans.clone(), offset: self.offset };
+            let misfit_rad = fit.best_shift(source, given_s).misfit_rad;
+            (misfit_rad, corrected.fault)
+        });
+        let Some((misfit_rad, fault)) = tried.min_by(|a, b| a.0.total_cmp(&b.0)) else { return false };
+        if misfit_rad > FITTING_RATIO * rotation_rad {
+            return false;
+        }
+        let evidence = format!(
+            "rotations of {:.2}° in the median then differ from the images' by {:.3}°; {listed}",
+            rotation_rad.to_degrees(),
+            misfit_rad.to_degrees()
+        );
+        let remedy =
+            "correct the driver: geometry_msgs/Quaternion maps the body to its reference, with the fields x, y, z, w";
+        findings.add(Severity::Error, Area::Encoders, fault, evidence, remedy);
+        true
     }
 
     /// Time offset of the gimbal with the least misfit, in seconds.

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use tempfile::TempDir;
 
 use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes, MessageType};
@@ -237,4 +237,22 @@ fn an_attitude_of_something_else_fits_in_no_way() {
         Severity::Warning,
         &["no interpretation of gimbal.source predicts the rotations in the images"],
     );
+}
+
+#[test]
+fn quaternions_that_are_filled_in_wrongly_are_named() {
+    let inverted: Recorded = |writer, times, gimbal, attitude| {
+        let ned_from_enu = BodyAxes::Frd.enu_from_earth().inverse();
+        let rotation = ned_from_enu * attitude * gimbal * BodyAxes::Frd.flu_from_axes();
+        writer.write_rotation("/gimbal", "earth", times, &rotation.inverse()).unwrap();
+    };
+    let scalar_first: Recorded = |writer, times, gimbal, attitude| {
+        let ned_from_enu = BodyAxes::Frd.enu_from_earth().inverse();
+        let rotation = ned_from_enu * attitude * gimbal * BodyAxes::Frd.flu_from_axes();
+        let fields = Quaternion::new(rotation.k, rotation.w, rotation.i, rotation.j);
+        writer.write_rotation("/gimbal", "earth", times, &UnitQuaternion::new_unchecked(fields)).unwrap();
+    };
+    let source = "{topic: /gimbal, type: quaternion, frame: earth, axes: frd, vehicle: /vehicle, vehicle_axes: flu}";
+    expect(inverted, 0, source, Severity::Error, &["the quaternions of /gimbal are inverted", "correct the driver"]);
+    expect(scalar_first, 0, source, Severity::Error, &["the quaternions of /gimbal are in the order w, x, y, z"]);
 }
