@@ -12,6 +12,8 @@ use crate::flight_log::attitude::MAX_VEHICLE_GAP_NS;
 use crate::geometry::{SIGMA_PER_MEDIAN, seconds_from_ns, so3};
 use crate::sensors::{AttitudeFrame, Rig};
 
+/// Larger steps of the heading make joint angles useless, in radians.
+const USELESS_STEP_RAD: f64 = 0.09;
 /// Time over which a change of the heading counts as one step, in nanoseconds.
 const STEP_NS: i64 = 500_000_000;
 /// Smallest reported step of the heading, in radians.
@@ -74,7 +76,9 @@ pub(super) fn check_vehicle_attitude(survey: &Survey, rig: &Rig, imu_facts: &Imu
         let remedy = "joint angles that are computed from it are shifted from then on: take an attitude whose heading does \
                       not step (without compass or satellite corrections), or gimbal.source.frame body or vehicle if the \
                       gimbal reports it";
-        findings.add(Severity::Warning, Area::Encoders, title, scatter, remedy);
+        let largest_rad = steps.iter().map(|step| step.change_rad.abs()).fold(0.0, f64::max);
+        let severity = if largest_rad > USELESS_STEP_RAD { Severity::Error } else { Severity::Warning };
+        findings.add(severity, Area::Encoders, title, scatter, remedy);
     }
     if source.frame == AttitudeFrame::Earth {
         let title = format!("a constant error of the heading of {topic} is unobservable in the rotations");

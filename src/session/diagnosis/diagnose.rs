@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::agreement::{self, AgreementValue};
 use super::axes::plausible_axes;
 use super::hypotheses::{Cause, Hypothesis, changes_at, first_hypotheses};
+use super::log_faults::log_faults;
 use super::misfit::Misfit;
 use super::outcome::{Diagnosis, RankedCause, TruthAgreement, Verdict, WaitingReason};
 use super::ranking::{Candidate, Decision, by_cause, decide};
@@ -52,6 +53,11 @@ pub fn diagnose(computation: &Computation, run: usize, on_progress: &mut OnProgr
     let record = recording.runs.get(run)?;
     let mut diagnosis = diagnose_run(&recording.rig, record, computation.history(run)?, on_progress);
     diagnosis.log = recording.log_name();
+    if diagnosis.verdict != Verdict::Agrees && !diagnosis.interrupted {
+        // The trials are done; the check of the log cannot be interrupted.
+        let _ = on_progress(1.0, "check of the log");
+        diagnosis.log_faults = log_faults(&recording.log_path, &recording.rig);
+    }
     Some(diagnosis)
 }
 
@@ -257,6 +263,7 @@ impl Search<'_, '_> {
     fn empty(&self) -> Diagnosis {
         Diagnosis {
             log: String::new(),
+            log_faults: Vec::new(),
             run: self.record.spec.label.clone(),
             verdict: Verdict::NoSteps,
             values: Vec::new(),

@@ -6,6 +6,7 @@ use serde::{Serialize, Serializer};
 
 use super::agreement::AgreementValue;
 use super::hypotheses::Cause;
+use crate::log_check::{Finding, Severity};
 use crate::session::plan::ForkChanges;
 use crate::text::Named as _;
 
@@ -83,6 +84,9 @@ pub struct Diagnosis {
     /// Specification of the run.
     pub run: String,
     pub verdict: Verdict,
+    /// At most three errors and warnings of the log's check, those with the largest effect first; none if the residuals
+    /// agree.
+    pub log_faults: Vec<Finding>,
     /// Values of the whole run with their limits.
     pub values: Vec<AgreementValue>,
     /// Stamp from which on the residuals disagree after they agreed, in seconds since the log began.
@@ -116,6 +120,12 @@ impl fmt::Display for Diagnosis {
             let since = self.onset_s.map_or_else(String::new, |onset_s| format!("; they agree until {onset_s:.2} s"));
             writeln!(out, "  residuals    {}{since}", named.join(", "))?;
         }
+        for fault in &self.log_faults {
+            writeln!(out, "  log          {}: {}", fault.severity.label(), fault.title)?;
+            if !fault.remedy.is_empty() {
+                writeln!(out, "     remedy     {}", fault.remedy)?;
+            }
+        }
         for waiting in self.waiting.iter().take(3) {
             writeln!(out, "  waits        {} ({} images)", waiting.reason, waiting.images)?;
         }
@@ -142,8 +152,16 @@ impl fmt::Display for Diagnosis {
 }
 
 impl Diagnosis {
-    /// The finding in one sentence.
+    /// The finding in one sentence: an error that the check of the log measures precedes what the trials explain.
     pub fn headline(&self) -> String {
+        let of_trials = self.headline_of_trials();
+        match self.log_faults.iter().find(|fault| fault.severity == Severity::Error) {
+            Some(fault) => format!("{}, by the check of the log; by the trials: {of_trials}", fault.title),
+            None => of_trials,
+        }
+    }
+
+    fn headline_of_trials(&self) -> String {
         let first = || self.causes.first().map_or_else(String::new, |cause| cause.statement.clone());
         match self.verdict {
             Verdict::Agrees if self.ground_truth.is_some() => {
@@ -175,4 +193,46 @@ impl TruthAgreement {
 
 fn described(value: &AgreementValue) -> String {
     format!("{} {:.2} > {}", value.name, value.value, value.limit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log_check::Area;
+
+    #[test]
+    fn an_error_of_the_log_precedes_what_the_trials_say() {
+        let fault = |severity| Finding {
+            severity,
+            area: Area::Encoders,
+            title: "the heading of /vehicle/attitude steps by +20.1° at 4.00 s".to_owned(),
+            evidence: String::new(),
+            remedy: "take an attitude whose heading does not step".to_owned(),
+            is_assumption: false,
+        };
+        let mut diagnosis = Diagnosis {
+            log: "flight.mcap".to_owned(),
+            run: "auto".to_owned(),
+            verdict: Verdict::Unexplained,
+            log_faults: vec![fault(Severity::Error)],
+            values: Vec::new(),
+            onset_s: None,
+            waiting: Vec::new(),
+            accuracy: None,
+            ground_truth: None,
+            span_s: None,
+            explaining: 0,
+            causes: Vec::new(),
+            trials: 40,
+            interrupted: false,
+        };
+        let headline = diagnosis.headline();
+        assert!(headline.starts_with("the heading of /vehicle/attitude steps by +20.1° at 4.00 s, by the check"));
+        let text = diagnosis.to_string();
+        assert!(text.contains("  log          error: the heading"), "{text}");
+        assert!(text.contains("  remedy     take an attitude"), "{text}");
+        diagnosis.log_faults = vec![fault(Severity::Warning)];
+        assert!(diagnosis.headline().starts_with("unexplained"), "{}", diagnosis.headline());
+        assert!(diagnosis.to_string().contains("  log          warning: the heading"));
+    }
 }

@@ -48,6 +48,10 @@ fn result_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: usize, found: &Diagno
         let text = format!("{}: {:.2} (limit {})", value.name, value.value, value.limit);
         ui.label(RichText::new(text).color(theme.text_weak));
     }
+    for fault in &found.log_faults {
+        let text = format!("Check of the log, {}: {}", fault.severity.label(), fault.title);
+        ui.add(Label::new(text).wrap()).on_hover_text(format!("{}\n{}", fault.evidence, fault.remedy));
+    }
     if let Some(text) = &found.ground_truth {
         ui.add(Label::new(format!("Ground truth {text}")).wrap());
     }
@@ -99,6 +103,7 @@ mod tests {
 
     use crate::gui::Dialog;
     use crate::gui::window::tests::{SECOND_NS, bench, commands_of};
+    use crate::log_check::{Area, Finding, Severity};
     use crate::session::{Cause, Command, Diagnosis, DiagnosisProgress, ForkChanges, RankedCause, Verdict};
 
     fn diagnosis() -> Diagnosis {
@@ -120,6 +125,14 @@ mod tests {
             run: "auto".to_owned(),
             verdict: Verdict::Cause,
             values: Vec::new(),
+            log_faults: vec![Finding {
+                severity: Severity::Warning,
+                area: Area::Time,
+                title: "joint angles are 81 ms late".to_owned(),
+                evidence: String::new(),
+                remedy: "set gimbal.timeshift_gimbal_imu to -0.081".to_owned(),
+                is_assumption: false,
+            }],
             onset_s: None,
             waiting: Vec::new(),
             accuracy: None,
@@ -150,6 +163,7 @@ mod tests {
         harness.state_mut().playback.diagnosis = Some(progress);
         harness.run_steps(3);
         assert!(harness.query_all_by_label("Joint yaw counts in the other direction").count() > 0);
+        assert!(harness.query_all_by_label("Check of the log, warning: joint angles are 81 ms late").count() > 0);
         let pushed = commands_of(&mut harness, |harness| harness.get_by_label("Fork").click());
         let changes = diagnosis().causes[0].changes.clone();
         let expected = [Command::Seek { stamp_ns: 2 * SECOND_NS }, Command::Fork { run: 0, changes, label: None }];
