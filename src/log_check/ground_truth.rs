@@ -31,8 +31,9 @@ const REVERSED_RATIO: f64 = 4.0;
 const UNEXPLAINED_RATIO: f64 = 0.2;
 /// Number of standard deviations from which a value is reported.
 const SIGNIFICANT_SIGMAS: f64 = 4.0;
-/// Smallest reported angle between gravity and the vertical of the ground truth's world.
-const TILT_TOLERANCE_RAD: f64 = 0.05;
+/// Smallest reported angle between gravity and the vertical of the ground truth's world: biases of low-cost accelerometers
+/// tilt gravity by up to 4°.
+const TILT_TOLERANCE_RAD: f64 = 0.087;
 /// A larger angle means other axes, not an inaccurate levelling.
 const OTHER_AXES_RAD: f64 = 1.0;
 /// Largest difference of rotations that count as the same, in radians.

@@ -21,6 +21,9 @@ const DECISIVE: f64 = 20.0;
 /// Largest variance of the vertical, as a ratio of the square of the force, with which axes are believed.
 const LARGEST_SCATTER: f64 = 0.05;
 
+/// Largest ratio of that variance to the one in the IMU frame, without any rotation.
+const LARGEST_RATIO: f64 = 0.5;
+
 /// Axes with the scatter of the specific force that they leave.
 #[derive(Clone, Copy, Debug)]
 struct Assumed {
@@ -68,7 +71,8 @@ pub(super) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) {
         tilt.sqrt().to_degrees()
     );
     let odds = windows.len() as f64 / CORRELATED * (given.scatter / best.scatter).ln();
-    if odds < DECISIVE || best.scatter > LARGEST_SCATTER {
+    // A multirotor keeps the specific force along a body axis: then no axes make it vertical.
+    if odds < DECISIVE || best.scatter > LARGEST_SCATTER.min(LARGEST_RATIO * tilt) {
         if given.scatter < LARGEST_SCATTER && given.scatter < tilt {
             findings.good(Area::Imu, "accelerometer and gyroscope have the same axes", evidence);
         }
