@@ -141,7 +141,8 @@ impl Theme {
                 ok: rgb(0x3fbf8f),
                 warn: rgb(0xf0b429),
                 error: rgb(0xf0655b),
-                runs: [rgb(0x56b4e9), rgb(0xe69f00), rgb(0x1fb88a), rgb(0xcc79a7)],
+                // The orange of Okabe and Ito is too close to `warn`; the vermillion of the light theme, brighter.
+                runs: [rgb(0x56b4e9), rgb(0xe0691a), rgb(0x1fb88a), rgb(0xcc79a7)],
                 trajectories: [rgb(0xf0e442), rgb(0xf28e6b), rgb(0xa6a2f2), rgb(0xd9d9d9)],
                 diverging: [rgb(0x3f9ae0), rgb(0x23272e), rgb(0xf07a35)],
             },
@@ -264,6 +265,22 @@ mod tests {
             for weight in [-1.0, -0.5, 0.0, 0.5, 1.0] {
                 let ground = theme.diverging(weight);
                 assert!(contrast(Theme::text_on(ground), ground) >= 4.0, "{name:?} {weight}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_run_has_the_colour_of_a_warning_or_an_error() {
+        let distance = |a: Color32, b: Color32| {
+            let parts = [(a.r(), b.r()), (a.g(), b.g()), (a.b(), b.b())];
+            parts.map(|(a, b)| f64::from(a) - f64::from(b)).iter().map(|part| part * part).sum::<f64>().sqrt()
+        };
+        for name in [ThemeName::Dark, ThemeName::Light, ThemeName::Print] {
+            let theme = Theme::of(name);
+            for (number, run) in theme.runs.into_iter().enumerate() {
+                for state in [theme.warn, theme.error] {
+                    assert!(distance(run, state) > 55.0, "{name:?}: run {number} {run:?}, state {state:?}");
+                }
             }
         }
     }
