@@ -9,7 +9,7 @@ mod csv;
 mod tests;
 mod worker;
 
-use egui::{Label, RichText, ScrollArea, Ui};
+use egui::{Color32, Label, RichText, ScrollArea, Ui};
 
 use self::choices::Choices;
 use self::worker::Worker;
@@ -18,6 +18,7 @@ use super::rank::columns::{RankColumn, columns_ui};
 use super::{Panel, PanelContext};
 use crate::observability::RankReport;
 use crate::observability::laboratory::{LaboratoryReport, LaboratoryResult};
+use crate::text::Named as _;
 
 /// State of the laboratory panel: choices and results.
 #[derive(Default)]
@@ -59,14 +60,12 @@ impl Panel for LaboratoryPanel {
                 let line = Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).wrap();
                 ui.add(line).on_hover_text(window::ASSUMPTIONS.meaning);
             }
-            let theme = *ctx.theme;
-            let column = |(number, result): (usize, &LaboratoryResult)| (number, result.clone());
-            let results: Vec<_> = results.iter().enumerate().map(column).collect();
+            let results: Vec<LaboratoryResult> = results.to_vec();
             let columns: Vec<RankColumn<'_>> = results
                 .iter()
-                .map(|(number, result)| RankColumn {
+                .map(|result| RankColumn {
                     title: result.form.name(),
-                    color: theme.run(*number).color,
+                    color: color_of(&result.form.name(), ctx),
                     rank: &result.rank,
                 })
                 .collect();
@@ -87,6 +86,12 @@ impl LaboratoryPanel {
         }
         self.worker.results().0.iter().map(|result| (result.form.name(), result.rank.clone())).collect()
     }
+}
+
+/// Colour of the run with this parameterization, else that of text: the columns are no runs.
+fn color_of(form: &str, ctx: &PanelContext<'_>) -> Color32 {
+    let run = ctx.recording.runs.iter().position(|run| run.spec.parameterization.name() == form);
+    run.map_or(ctx.theme.text, |run| ctx.theme.run(run).color)
 }
 
 /// Assumptions of the experiment in one sentence.

@@ -40,6 +40,21 @@ fn choose(harness: &mut Harness<'static, LaboratoryPanel>, list: &str, entry: &s
 }
 
 #[test]
+fn a_column_has_the_colour_of_the_run_with_its_parameterization_only() {
+    let theme = Theme::of(ThemeName::Dark);
+    let colors = |runs: &[&str]| {
+        let (recording, mut selection) = (sample_recording_of(40, runs), Selection::default());
+        let mut colors = Vec::new();
+        with_context(&recording, 0, &mut sample_images(), &mut selection, &theme, |ctx| {
+            colors.extend(["classical", "minimal"].map(|form| super::color_of(form, ctx)));
+        });
+        colors
+    };
+    assert_eq!(colors(&["auto"]), [theme.text, theme.text]);
+    assert_eq!(colors(&["auto", "classical"]), [theme.run(1).color, theme.text]);
+}
+
+#[test]
 fn experiments_have_the_results_of_the_command() {
     let mut harness = bench(false);
     // The rig's mechanism with aggressive motion: rank is lost only by the parameterization.
