@@ -6,8 +6,9 @@ use egui::{Button, CollapsingHeader, Grid, Key, RichText, ScrollArea, TextEdit, 
 
 use super::units::counted;
 use super::{Panel, PanelContext};
-use crate::session::Command;
+use crate::flight_log::nearest_name;
 use crate::session::breakpoints::{Breakpoint, Condition, quantity_help};
+use crate::session::{Command, Recording};
 
 #[derive(Debug, Default)]
 pub struct BreakpointsPanel {
@@ -45,6 +46,8 @@ impl BreakpointsPanel {
     /// The input line for a condition with its syntax error.
     fn editor_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let parsed: Result<Condition, _> = self.typed.parse();
+        let names = parsed.as_ref().map_or_else(|_| Names::default(), |condition| Names::of(condition, ctx.recording));
+        let usable = parsed.is_ok() && names.unknown.is_empty();
         ui.horizontal(|ui| {
             let hint = "rank < 18 or features < 40";
             let width = (ui.available_width() - 74.0).max(60.0);
@@ -53,9 +56,9 @@ impl BreakpointsPanel {
             edit.widget_info(|| WidgetInfo::labeled(egui::Role::TextInput, true, "Condition"));
             let entered = edit.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
             let text = if self.changing.is_some() { "Change" } else { "Add" };
-            let set = ui.add_enabled(parsed.is_ok(), Button::new(text));
-            set.widget_info(|| WidgetInfo::labeled(egui::Role::Button, parsed.is_ok(), format!("{text} breakpoint")));
-            if let (true, Ok(condition)) = (set.clicked() || entered, &parsed) {
+            let set = ui.add_enabled(usable, Button::new(text));
+            set.widget_info(|| WidgetInfo::labeled(egui::Role::Button, usable, format!("{text} breakpoint")));
+            if let (true, Ok(condition)) = (usable && (set.clicked() || entered), &parsed) {
                 let condition = condition.clone();
                 ctx.commands.push(match self.changing.take() {
                     Some(number) => Command::ChangeBreakpoint { number, condition },
@@ -64,6 +67,12 @@ impl BreakpointsPanel {
                 self.typed.clear();
             }
         });
+        for text in names.unknown {
+            ui.add(egui::Label::new(RichText::new(text).color(ctx.theme.error)).wrap());
+        }
+        for text in names.absent {
+            ui.add(egui::Label::new(RichText::new(text).color(ctx.theme.text_weak)).wrap());
+        }
         if let Err(problem) = parsed
             && !self.typed.trim().is_empty()
         {
@@ -114,6 +123,31 @@ impl BreakpointsPanel {
                 self.changing = None;
             }
         });
+    }
+}
+
+/// Messages about parameters and joints of a condition that no run has.
+#[derive(Default)]
+struct Names {
+    /// Names that no run can have; the condition is refused.
+    unknown: Vec<String>,
+    /// Names that a run could have with other options.
+    absent: Vec<String>,
+}
+
+impl Names {
+    fn of(condition: &Condition, recording: &Recording) -> Self {
+        let names = recording.rig.parameter_names();
+        let parameters = recording.parameters();
+        let (possible, impossible): (Vec<String>, Vec<String>) =
+            condition.unknown_names(&names, &parameters).into_iter().partition(|name| names.parse(name).is_some());
+        let known: Vec<String> = parameters.iter().map(|parameter| names.name(*parameter)).collect();
+        let unknown = |name: &String| match nearest_name(name, known.iter().map(String::as_str)) {
+            Some((_, near)) => format!("Unknown name '{name}'; did you mean '{near}'?"),
+            None => format!("Unknown name '{name}'"),
+        };
+        let absent = |name: &String| format!("No run has '{name}': no hits unless a run estimates it");
+        Self { unknown: impossible.iter().map(unknown).collect(), absent: possible.iter().map(absent).collect() }
     }
 }
 

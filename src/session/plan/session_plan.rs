@@ -149,10 +149,7 @@ impl SessionPlan {
     pub fn parameters(&self) -> Vec<ParameterId> {
         let mut parameters: Vec<ParameterId> = Vec::new();
         for (spec, camera_key) in &self.runs {
-            let chain = self.rig.chain_of_camera(camera_key).unwrap_or_default();
-            for parameterization in Parameterization::all() {
-                parameters.extend(Chain::from_classical(&chain, parameterization).parameters());
-            }
+            parameters.extend(chain_parameters(&self.rig, camera_key));
             let rigid = cameras_of_run(&self.rig, spec).ok().and_then(|cameras| cameras.rigid);
             let pose = |key: &str| self.rig.chain_of_camera(key).unwrap_or_default().imu_from_camera(&[]);
             parameters.extend(rigid.into_iter().flat_map(|it| rigid_columns(1, &pose(&it.key))).map(|(id, _)| id));
@@ -161,6 +158,12 @@ impl SessionPlan {
         parameters.retain(|parameter| known.insert(*parameter));
         parameters
     }
+}
+
+/// The parameters of a camera's chain in all parameterizations; some occur several times.
+pub(in crate::session) fn chain_parameters(rig: &Rig, camera_key: &str) -> Vec<ParameterId> {
+    let chain = rig.chain_of_camera(camera_key).unwrap_or_default();
+    Parameterization::all().flat_map(|form| Chain::from_classical(&chain, form).parameters()).collect()
 }
 
 /// Returns an error if the start is after the end of the log.

@@ -7,8 +7,9 @@ use super::run::RunRecord;
 use super::trajectory_lane::TrajectoryLane;
 use crate::flight_log::{LogWarning, WarningKind};
 use crate::geometry::ns_from_seconds;
+use crate::gimbal::ParameterId;
 use crate::sensors::Rig;
-use crate::session::plan::{LoadedTrajectory, RunSpec, SessionPlan};
+use crate::session::plan::{LoadedTrajectory, RunSpec, SessionPlan, chain_parameters};
 
 /// Reports of all runs on one log so far.
 #[derive(Clone, Debug)]
@@ -37,6 +38,19 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// The calibration parameters of its runs: those of their chains in all parameterizations, and those of their last
+    /// steps.
+    pub fn parameters(&self) -> Vec<ParameterId> {
+        let mut parameters: Vec<ParameterId> = Vec::new();
+        for run in &self.runs {
+            parameters.extend(chain_parameters(&self.rig, &run.camera_key));
+            parameters.extend(run.steps.last().iter().flat_map(|step| &step.report.calibration.parameters));
+        }
+        parameters.sort();
+        parameters.dedup();
+        parameters
+    }
+
     pub fn log_name(&self) -> String {
         self.log_path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     }

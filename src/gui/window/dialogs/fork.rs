@@ -6,6 +6,8 @@ use egui::{ComboBox, DragValue, Grid, RichText, TextEdit, Ui, vec2};
 
 use super::modal::{Modal, accept_or_cancel_ui};
 use crate::estimator::SensorParameters;
+use crate::flight_log::nearest_name;
+use crate::gimbal::ParameterGroup;
 use crate::gui::PanelContext;
 use crate::gui::units::seconds;
 use crate::session::{Command, FORK_PARAMETERIZATIONS, ForkChanges, RunSpec};
@@ -75,7 +77,11 @@ impl ForkDialog {
             let written = self.written();
             let parsed: Result<ForkChanges, String> =
                 written.parse().map_err(|error: crate::session::ForkError| error.to_string());
-            let asked = parsed.and_then(|changes| Ok((changes, self.label()?)));
+            let checked = parsed.and_then(|changes| match unknown_name(&changes, ctx) {
+                Some(problem) => Err(problem),
+                None => Ok(changes),
+            });
+            let asked = checked.and_then(|changes| Ok((changes, self.label()?)));
             ui.add_space(6.0);
             match &asked {
                 Ok(_) if written.is_empty() => ui.label(RichText::new("No changes").color(theme.text_weak)),
@@ -145,6 +151,29 @@ impl ForkDialog {
             }
         });
     }
+}
+
+/// Message about the first parameter in the changes that the run does not have.
+fn unknown_name(changes: &ForkChanges, ctx: &PanelContext<'_>) -> Option<String> {
+    let names = ctx.names();
+    let report = &ctx.selected_run()?.step_at(ctx.cursor_ns)?.report;
+    let mut known = report.calibration.parameters.clone();
+    if changes.parameterization.is_some() {
+        known.retain(|parameter| parameter.group() != ParameterGroup::Chain);
+        known.extend(ctx.recording.parameters());
+    }
+    // Sensors that the fork begins to estimate.
+    let added = |name: &str| {
+        !changes.estimated.is_empty()
+            && names.parse(name).is_some_and(|parameter| parameter.group() != ParameterGroup::Chain)
+    };
+    let is_known = |name: &str| added(name) || names.parse(name).is_some_and(|parameter| known.contains(&parameter));
+    let mut used = changes.frozen.iter().chain(changes.values.iter().map(|(name, _)| name));
+    let unknown = used.find(|name| !is_known(name))?;
+    let known: Vec<String> = known.iter().map(|parameter| names.name(*parameter)).collect();
+    let near = nearest_name(unknown, known.iter().map(String::as_str));
+    let near = near.map_or_else(String::new, |(_, near)| format!("; did you mean '{near}'?"));
+    Some(format!("The run has no parameter '{unknown}'{near}"))
 }
 
 /// The keys that have a label.
