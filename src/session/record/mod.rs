@@ -3,6 +3,7 @@
 mod antenna_record;
 mod comparison;
 mod estimability;
+mod image_residuals;
 mod known_losses;
 mod lost_since;
 mod pose_consistency;
@@ -24,6 +25,7 @@ mod warnings;
 pub use antenna_record::PositionTruth;
 pub use comparison::{Comparison, Divergence, Quantity};
 pub use estimability::{EstimabilitySummary, estimability_summary};
+pub use image_residuals::{ImageResiduals, MeanResidual, ResidualSum};
 pub use known_losses::KnownLossSummary;
 pub use lost_since::LostSince;
 pub use pose_consistency::PoseConsistency;

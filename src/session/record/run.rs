@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::antenna_record::{AntennaRecord, PositionTruth};
+use super::image_residuals::ImageResiduals;
 use super::solver_trace::SolverTrace;
 use super::step::{StepFactorRows, StepRecord};
 use super::summary::SummaryOrder;
@@ -75,6 +76,8 @@ pub struct RunRecord {
     pub position_truth: Option<Arc<PositionTruth>>,
     /// Pairs of run poses and these positions, with their alignment.
     pub(super) antenna: AntennaRecord,
+    /// Residuals of every image in the step of that image, by place in the image.
+    pub image_residuals: ImageResiduals,
     /// Warnings of its steps, each message once.
     pub warnings: Vec<RunWarning>,
     /// Memory of the steps and the history.
@@ -106,6 +109,7 @@ impl RunRecord {
             alignment_sums: AlignmentSums::default(),
             position_truth: None,
             antenna: AntennaRecord::default(),
+            image_residuals: ImageResiduals::default(),
             warnings: Vec::new(),
             memory: RunMemory::default(),
             recomputed: BTreeMap::new(),
@@ -133,6 +137,8 @@ impl RunRecord {
         // The parent counts the bytes of the shared steps; tracks are counted once for all runs.
         fork.memory.tracks = fork.steps.iter().map(|step| step.tracks_bytes()).sum();
         fork.warnings = warnings_of(&fork.steps);
+        // Of steps that are kept as summaries the residuals are not known any more.
+        fork.image_residuals = ImageResiduals::of_steps(fork.steps.iter().map(Arc::as_ref));
         fork.align();
         fork
     }
@@ -150,6 +156,7 @@ impl RunRecord {
         self.memory.steps += record.own_bytes();
         self.memory.tracks += record.tracks_bytes();
         add_warnings(&mut self.warnings, &record.report);
+        self.image_residuals.add_step(&record.report);
         self.steps.push(Arc::new(record));
     }
 
@@ -165,6 +172,7 @@ impl RunRecord {
         self.memory.tracks -= back(StepRecord::tracks_bytes);
         self.finished = true;
         self.warnings = warnings_of(&self.steps);
+        self.image_residuals = ImageResiduals::of_steps(self.steps.iter().map(Arc::as_ref));
         self.align();
     }
 
