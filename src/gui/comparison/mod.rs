@@ -12,6 +12,7 @@ mod single;
 #[cfg(test)]
 mod tests;
 
+use egui::containers::scroll_area::ScrollAreaOutput;
 use egui::{ComboBox, Rect, RichText, ScrollArea, Ui, UiBuilder, Vec2, vec2};
 
 pub(in crate::gui) use self::numbers::POSES_ONLY;
@@ -21,6 +22,7 @@ use self::side_by_side::{Images, Scenes};
 use self::single::Single;
 use super::convergence::empty_ui;
 use super::rank;
+use super::theme::PANEL_MARGIN;
 use super::{Dialog, Panel, PanelContext};
 use crate::session::Comparison;
 
@@ -64,6 +66,8 @@ pub struct ComparisonPanel {
     images: Images,
     scenes: Scenes,
     single: Single,
+    /// Size in points at which a figure would show everything; zero in the window and for one run.
+    pub(in crate::gui) figure_size: Vec2,
     /// Dialog requested in the last frame; the window takes it.
     pub asked: Option<Dialog>,
 }
@@ -80,15 +84,20 @@ impl Panel for ComparisonPanel {
             self.asked = self.single.ui(ui, ctx, &self.scores);
             return;
         }
+        let top = ui.cursor().top();
         let view = self.controls_ui(ui, ctx);
-        let room = ui.available_size();
+        let (room, controls_height) = (ui.available_size(), ui.cursor().top() - top);
+        self.figure_size = Vec2::ZERO;
         match view {
             View::All if room.x >= MIN_SIZE_FOR_ALL.x && room.y >= MIN_SIZE_FOR_ALL.y => self.all_ui(ui, ctx),
-            View::All | View::Numbers => self.numbers_ui(ui, ctx),
-            View::OverTime => self.over_time_ui(ui, ctx),
+            View::All | View::Numbers => self.numbers_ui(ui, ctx, Vec2::splat(1.0)),
+            View::OverTime => self.over_time_ui(ui, ctx, Vec2::splat(1.0)),
             View::Images => self.images.ui(ui, ctx),
             View::Scenes => self.scenes.ui(ui, ctx),
             View::Directions => rank::all_runs_ui(ui, ctx),
+        }
+        if self.figure_size != Vec2::ZERO {
+            self.figure_size += vec2(0.0, controls_height) + Vec2::splat(2.0 * f32::from(PANEL_MARGIN));
         }
     }
 
@@ -151,9 +160,16 @@ impl ComparisonPanel {
         view
     }
 
-    fn numbers_ui(&self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+    /// Notes the content of a figure that takes a fraction of its width and height.
+    fn measure<R>(&mut self, ctx: &PanelContext<'_>, shown: &ScrollAreaOutput<R>, fraction: Vec2) {
+        if ctx.presentation.is_figure() {
+            self.figure_size = self.figure_size.max(shown.content_size / fraction + vec2(0.0, 8.0));
+        }
+    }
+
+    fn numbers_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, fraction: Vec2) {
         let wide = ui.available_width() >= MIN_WIDTH_FOR_BOTH_TABLES;
-        ScrollArea::both().id_salt("numbers").auto_shrink(false).show(ui, |ui| {
+        let shown = ScrollArea::both().id_salt("numbers").auto_shrink(false).show(ui, |ui| {
             let accuracy = |ui: &mut Ui, ctx: &mut PanelContext<'_>| {
                 ui.vertical(|ui| numbers::accuracy_ui(ui, ctx, &self.scores));
             };
@@ -172,19 +188,25 @@ impl ComparisonPanel {
                 divergences(ui, ctx);
             }
         });
+        self.measure(ctx, &shown, fraction);
     }
 
-    fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        self.over_time.ui(ui, ctx, self.reference, &self.comparisons);
+    fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, fraction: Vec2) {
+        if let Some(shown) = self.over_time.ui(ui, ctx, self.reference, &self.comparisons) {
+            self.measure(ctx, &shown, fraction);
+        }
     }
 
     /// Draws tables on the left; differences and images on the right.
     fn all_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         const GAP: f32 = 10.0;
+        /// Fractions of the panel for the numbers and, beside them, for the differences over time.
+        const NUMBERS_WIDTH: f32 = 0.44;
+        const OVER_TIME_HEIGHT: f32 = 0.42;
         let all = ui.available_rect_before_wrap();
         ui.advance_cursor_after_rect(all);
-        let (left, right) = all.split_left_right_at_fraction(0.44);
-        let (above, below) = right.split_top_bottom_at_fraction(0.42);
+        let (left, right) = all.split_left_right_at_fraction(NUMBERS_WIDTH);
+        let (above, below) = right.split_top_bottom_at_fraction(OVER_TIME_HEIGHT);
         let scenes = all.height() >= MIN_HEIGHT_FOR_SCENES;
         let (images, scene) = below.split_top_bottom_at_fraction(if scenes { 0.5 } else { 1.0 });
         let mut at = |rect: Rect, draw: &mut dyn FnMut(&mut Ui, &mut PanelContext<'_>)| {
@@ -193,8 +215,10 @@ impl ComparisonPanel {
                 draw(ui, ctx);
             });
         };
-        at(left.with_max_x(left.right() - GAP), &mut |ui, ctx| self.numbers_ui(ui, ctx));
-        at(above, &mut |ui, ctx| self.over_time_ui(ui, ctx));
+        // The gap is a part of the left fraction.
+        let numbers = vec2(NUMBERS_WIDTH * (1.0 - GAP / left.width().max(1.0)), 1.0);
+        at(left.with_max_x(left.right() - GAP), &mut |ui, ctx| self.numbers_ui(ui, ctx, numbers));
+        at(above, &mut |ui, ctx| self.over_time_ui(ui, ctx, vec2(1.0 - NUMBERS_WIDTH, OVER_TIME_HEIGHT)));
         at(images, &mut |ui, ctx| self.images.ui(ui, ctx));
         if scenes {
             at(scene, &mut |ui, ctx| self.scenes.ui(ui, ctx));

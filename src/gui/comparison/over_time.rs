@@ -1,5 +1,6 @@
 //! Plots of the differences of each run from the reference over time.
 
+use egui::containers::scroll_area::ScrollAreaOutput;
 use egui::{ScrollArea, Ui};
 
 use super::columns::label_of;
@@ -31,8 +32,14 @@ pub(super) struct OverTime {
 }
 
 impl OverTime {
-    /// Draws a row for every quantity that at least one run has.
-    pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, reference: usize, comparisons: &[Comparison]) {
+    /// Draws a row for every quantity that at least one run has; `None` without one.
+    pub(super) fn ui(
+        &mut self,
+        ui: &mut Ui,
+        ctx: &mut PanelContext<'_>,
+        reference: usize,
+        comparisons: &[Comparison],
+    ) -> Option<ScrollAreaOutput<()>> {
         let known = |quantity: Quantity| {
             comparisons.iter().enumerate().any(|(run, comparison)| {
                 run != reference && comparison.column(quantity).iter().any(|apart| apart.is_finite())
@@ -41,15 +48,16 @@ impl OverTime {
         let rows: Vec<(usize, Quantity)> = DRAWN.into_iter().enumerate().filter(|(_, it)| known(*it)).collect();
         if rows.is_empty() {
             super::empty_ui(ui, "No common estimated frames");
-            return;
+            return None;
         }
         let height = (ui.available_height() / rows.len() as f32 - 3.0).clamp(*HEIGHTS.start(), *HEIGHTS.end());
-        ScrollArea::vertical().id_salt("difference rows").auto_shrink(false).show(ui, |ui| {
+        let shown = ScrollArea::vertical().id_salt("difference rows").auto_shrink(false).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 3.0;
             for (index, quantity) in rows {
                 self.row_ui(ui, ctx, reference, comparisons, (index, quantity), height);
             }
         });
+        Some(shown)
     }
 
     fn row_ui(

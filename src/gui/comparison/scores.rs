@@ -9,6 +9,27 @@ use crate::session::{RELATIVE_LENGTHS_M, Recording, RunRecord, TrajectoryAccurac
 /// Number of new steps after which a run's accuracy is recomputed.
 const UPDATE_PERIOD_STEPS: usize = 20;
 
+/// Ratio of the estimated frames that runs may differ by and still be compared.
+const MAX_FRAME_RATIO: f64 = 0.02;
+/// Scatter of the extrinsics error as a ratio of its value: one calibration has no scatter of its own.
+const EXTRINSICS_SCATTER: f64 = 0.05;
+/// Number of parts of a flight whose mean errors are compared.
+const PARTS: usize = 10;
+
+/// Standard error of the mean of errors that depend on their neighbours: from the means of ten parts of the flight;
+/// `None` with too few errors.
+fn error_of_mean(errors: &[f64]) -> Option<f64> {
+    let length = errors.len() / PARTS;
+    if length < 2 {
+        return None;
+    }
+    let means: Vec<f64> =
+        errors.chunks_exact(length).take(PARTS).map(|part| part.iter().sum::<f64>() / part.len() as f64).collect();
+    let mean = means.iter().sum::<f64>() / PARTS as f64;
+    let variance = means.iter().map(|part| (part - mean).powi(2)).sum::<f64>() / (PARTS - 1) as f64;
+    Some((variance / PARTS as f64).sqrt())
+}
+
 /// The values of one run over all its steps so far.
 #[derive(Debug, Default)]
 struct RunScore {
@@ -16,6 +37,8 @@ struct RunScore {
     count: usize,
     finished: bool,
     accuracy: Option<TrajectoryAccuracy>,
+    /// Standard error of the mean position error in metres.
+    ate_scatter_m: Option<f64>,
     chain: Option<ChainDistance>,
     initialized_s: Option<f64>,
     /// `None` for a trajectory of another program, like the following fields.
@@ -31,6 +54,19 @@ pub(crate) struct Scores {
     runs: Vec<RunScore>,
 }
 
+/// Kind of a value, by the origin of its scatter.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) enum ScoreKind {
+    #[default]
+    Exact,
+    /// Absolute trajectory error.
+    Absolute,
+    /// Relative pose error over sub-trajectories of this length in metres.
+    Relative(f64),
+    /// Error of the extrinsics.
+    Extrinsics,
+}
+
 #[derive(Debug)]
 pub(crate) struct ScoreRow {
     pub(crate) name: String,
@@ -39,7 +75,11 @@ pub(crate) struct ScoreRow {
     pub(crate) unit: &'static str,
     /// Values by run and then by trajectory, in the shown unit.
     pub(crate) values: Vec<Option<f64>>,
-    /// True if smaller is better; `None` for a value that is no measure of quality.
+    /// Origin of the scatter of its values.
+    pub(super) kind: ScoreKind,
+    /// Scatter of the values in the shown unit; zero for exact ones.
+    pub(super) scatters: Vec<f64>,
+    /// True if smaller is better; `None` for a value that is no measure of quality, or if the values are not comparable.
     pub(super) less_is_better: Option<bool>,
     /// Decimals; `None` for three significant digits.
     pub(super) decimals: Option<usize>,
@@ -55,14 +95,17 @@ impl ScoreRow {
         )
     }
 
-    /// Index of the best run, `None` where no run is better.
+    /// Index of the best run, `None` where no run is better than all others by more than the scatter of both.
     pub(crate) fn best(&self) -> Option<usize> {
         let less = self.less_is_better?;
         let known = || self.values.iter().enumerate().filter_map(|(run, value)| Some((run, (*value)?)));
         let better = |a: &f64, b: &f64| if less { a.total_cmp(b) } else { b.total_cmp(a) };
         let (best, value) = known().min_by(|(_, a), (_, b)| better(a, b))?;
         // Equal texts count as equal values.
-        let differs = |run: usize, other: f64| other != value && self.text(run) != self.text(best);
+        let scatter = |run: usize| self.scatters.get(run).copied().unwrap_or(0.0);
+        let differs = |run: usize, other: f64| {
+            (other - value).abs() > scatter(run).hypot(scatter(best)) && self.text(run) != self.text(best)
+        };
         let alone = known().count() > 1 && known().all(|(run, other)| run == best || differs(run, other));
         alone.then_some(best)
     }
@@ -92,16 +135,19 @@ impl Scores {
             meaning: "",
             unit,
             values: self.runs.iter().map(of).collect(),
+            kind: ScoreKind::Exact,
+            scatters: Vec::new(),
             less_is_better: less,
             decimals,
         };
         let with = |meaning: &'static str, row: ScoreRow| ScoreRow { meaning, ..row };
         let less = Some(true);
         let ate = |row| {
-            with(
+            let row = with(
                 "Absolute trajectory error: distance to the ground truth after alignment in yaw and position, over the estimated frames",
                 row,
-            )
+            );
+            ScoreRow { kind: ScoreKind::Absolute, ..row }
         };
         let mut rows = vec![
             ate(row("ATE RMS", "m", less, None, &|score| Some(score.accuracy.as_ref()?.ate_rmse_m))),
@@ -113,17 +159,20 @@ impl Scores {
                 Some(accuracy.ate_percent_of_length)
             })),
         ];
-        let rpe =
-            |row| with("Relative pose error against the ground truth over sub-trajectories of this path length", row);
+        let rpe = |delta_m: f64, row| {
+            let meaning = "Relative pose error against the ground truth over sub-trajectories of this path length";
+            ScoreRow { kind: ScoreKind::Relative(delta_m), ..with(meaning, row) }
+        };
         let extrinsics = |row| {
-            with("Error of imu_from_camera against the ground-truth rig, mean over the visited joint angles", row)
+            let meaning = "Error of imu_from_camera against the ground-truth rig, mean over the visited joint angles";
+            ScoreRow { kind: ScoreKind::Extrinsics, ..with(meaning, row) }
         };
         for delta_m in RELATIVE_LENGTHS_M {
             let over =
                 |score: &RunScore| score.accuracy.as_ref()?.rpe.iter().find(|over| over.delta_m == delta_m).copied();
             let name = format!("RPE {delta_m:.0} m RMS");
-            rows.push(rpe(row(&name, "m", less, None, &|score| Some(over(score)?.translation_rmse_m))));
-            rows.push(rpe(row(&name, "°", less, None, &|score| Some(over(score)?.rotation_rmse_deg))));
+            rows.push(rpe(delta_m, row(&name, "m", less, None, &|score| Some(over(score)?.translation_rmse_m))));
+            rows.push(rpe(delta_m, row(&name, "°", less, None, &|score| Some(over(score)?.rotation_rmse_deg))));
         }
         let chain = |score: &RunScore| score.chain;
         rows.extend([
@@ -159,8 +208,32 @@ impl Scores {
                 row("informed rank at the end", "", None, Some(0), &|score| score.informed.map(|rank| rank as f64)),
             ),
         ]);
+        for row in &mut rows {
+            self.add_scatter(row);
+        }
         rows.retain(|row| row.values.iter().any(Option::is_some));
         rows
+    }
+
+    /// Sets the scatter of errors; they are not comparable if the runs have estimated different numbers of frames.
+    fn add_scatter(&self, row: &mut ScoreRow) {
+        let counts = || self.runs.iter().filter_map(|score| score.estimated);
+        let (fewest, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
+        let of_trajectory = matches!(row.kind, ScoreKind::Absolute | ScoreKind::Relative(_));
+        if of_trajectory && (most - fewest) as f64 > MAX_FRAME_RATIO * most as f64 {
+            row.less_is_better = None;
+        }
+        let ratio = |score: &RunScore| match row.kind {
+            ScoreKind::Exact => None,
+            ScoreKind::Absolute => Some(score.ate_scatter_m? / score.accuracy.as_ref()?.ate_mean_m),
+            // Sub-trajectories overlap; those that do not are independent.
+            ScoreKind::Relative(delta_m) => {
+                Some(1.0 / (2.0 * (score.accuracy.as_ref()?.length_m / delta_m).max(1.0)).sqrt())
+            }
+            ScoreKind::Extrinsics => Some(EXTRINSICS_SCATTER),
+        };
+        let values = self.runs.iter().zip(&row.values);
+        row.scatters = values.map(|(score, value)| ratio(score).unwrap_or(0.0) * value.unwrap_or(0.0).abs()).collect();
     }
 }
 
@@ -178,6 +251,7 @@ impl RunScore {
             count: run.steps.len(),
             finished: run.finished,
             accuracy: run.accuracy().ok(),
+            ate_scatter_m: error_of_mean(&run.position_errors_m()),
             chain,
             estimated: Some(run.steps.iter().filter(tracking).count()),
             initialized_s: first.map(|step| seconds_from_ns(step.report.stamp_ns)),
@@ -197,5 +271,42 @@ impl RunScore {
             initialized_s: samples.first().map(|sample| seconds_from_ns(sample.stamp_ns)),
             ..Self::default()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn score(estimated: usize, accuracy: Option<TrajectoryAccuracy>, ate_scatter_m: Option<f64>) -> RunScore {
+        RunScore { estimated: Some(estimated), accuracy, ate_scatter_m, ..RunScore::default() }
+    }
+
+    fn accuracy(ate_m: f64) -> TrajectoryAccuracy {
+        use crate::gui::samples::sample_recording;
+
+        let known = sample_recording().runs[0].accuracy().unwrap();
+        TrajectoryAccuracy { ate_rmse_m: ate_m, ate_mean_m: ate_m, ..known }
+    }
+
+    #[test]
+    fn a_run_is_better_only_beyond_the_scatter_and_with_as_many_frames() {
+        let best = |ate_m: [f64; 2], scatter_m: f64, frames: [usize; 2]| {
+            let runs = [0, 1].map(|run| score(frames[run], Some(accuracy(ate_m[run])), Some(scatter_m)));
+            let rows = Scores { runs: runs.into() }.rows();
+            rows.iter().find(|row| row.name == "ATE RMS").unwrap().best()
+        };
+        assert_eq!(best([0.100, 0.150], 0.01, [400, 400]), Some(0));
+        assert_eq!(best([0.100, 0.110], 0.01, [400, 400]), None, "within the scatter");
+        assert_eq!(best([0.100, 0.150], 0.01, [400, 300]), None, "one has skipped a part of the flight");
+    }
+
+    #[test]
+    fn the_error_of_a_mean_is_that_of_parts() {
+        assert_eq!(error_of_mean(&[0.1; 19]), None);
+        assert_eq!(error_of_mean(&[0.5; 40]), Some(0.0));
+        // Ten parts with the means 0 and 1 in turn: deviation 0.527, over √10.
+        let turns: Vec<f64> = (0..50).map(|place| f64::from(place / 5 % 2)).collect();
+        assert!((error_of_mean(&turns).unwrap() - 0.1667).abs() < 1e-3);
     }
 }

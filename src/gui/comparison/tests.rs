@@ -5,7 +5,7 @@ use egui_kittest::kittest::Queryable as _;
 
 use super::ComparisonPanel;
 use super::numbers::AGAINST_BATCH;
-use super::scores::ScoreRow;
+use super::scores::{ScoreKind, ScoreRow};
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{Dialog, Panel as _, PanelContext, Playback, Presentation, Selection};
@@ -56,11 +56,12 @@ fn numbers_show_accuracy_and_lead_to_the_divergence() {
     let rows = harness.state().panel.scores.rows();
     assert!(rows.iter().all(|row| row.meaning.len() > 15), "{rows:?}");
     let rms = rows.iter().find(|row| row.name == "ATE RMS").unwrap();
-    let [auto, classical] = [rms.values[0].unwrap(), rms.values[1].unwrap()];
-    assert_eq!(rms.best(), (rms.text(0) != rms.text(1)).then_some(usize::from(classical < auto)));
+    // Two parameterizations of one problem differ by less than the scatter of their errors.
+    assert_eq!(rms.best(), None, "{rms:?}");
     let row = |values: [f64; 2]| {
         let (name, values) = ("ATE RMS".to_owned(), values.map(Some).to_vec());
-        ScoreRow { name, meaning: "", unit: "m", values, less_is_better: Some(true), decimals: None }
+        let (kind, scatters) = (ScoreKind::Exact, Vec::new());
+        ScoreRow { name, meaning: "", unit: "m", kind, scatters, values, less_is_better: Some(true), decimals: None }
     };
     assert_eq!(
         [row([0.12, 0.11]), row([0.11, 0.12]), row([0.11, 0.110_000_1])].map(|row| row.best()),

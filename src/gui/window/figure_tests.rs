@@ -99,3 +99,27 @@ fn figures_have_no_buttons_sliders_or_selectors() {
         }
     }
 }
+
+#[test]
+fn an_exported_comparison_shows_its_tables_and_plots_completely() {
+    let recording = sample_recording_of(80, &["auto", "classical"]);
+    let theme = Theme::of(ThemeName::Light);
+    let (playback, mut commands, mut selection) = (Playback::default(), Vec::new(), Selection::default());
+    let mut state = MainWindow { focus: Some(PanelName::Comparison), ..MainWindow::default() };
+    // The panel is too low for its tables.
+    state.places.push((PanelName::Comparison, egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(700.0, 400.0))));
+    let mut context = PanelContext {
+        recording: &recording,
+        cursor_ns: recording.last_stamp_ns(),
+        playback: &playback,
+        images: &mut sample_images(),
+        selection: &mut selection,
+        theme: &theme,
+        presentation: Presentation::Interactive,
+        commands: &mut commands,
+    };
+    let export = super::panel_export::export(&state, &mut context);
+    let height = export.screenshot.height() as f32 / 2.0;
+    assert!(height > 550.0, "{height}");
+    crate::gui::tests::keep_screenshot("exported-comparison", &export.screenshot);
+}

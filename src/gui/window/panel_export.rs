@@ -1,5 +1,7 @@
 //! Export of the focused panel: a screenshot, a drawing and its values.
 
+use std::cell::RefCell;
+
 use egui::{CentralPanel, Frame, Ui, Vec2};
 
 use super::state::MainWindow;
@@ -23,6 +25,7 @@ pub(super) fn export(state: &MainWindow, ctx: &mut PanelContext<'_>) -> PanelExp
     let (panel, size) = state.focused();
     let mut copy = MainWindow { panels: state.panels.views(), show_times: state.show_times, ..MainWindow::default() };
     copy.panels.inspector.show_times = state.show_times;
+    let copy = RefCell::new(copy);
     // A scrolling list in a low panel is exported completely, up to a limit.
     let min_size = match panel {
         PanelName::Rank | PanelName::Inspector | PanelName::Breakpoints => MIN_LIST_SIZE,
@@ -30,11 +33,12 @@ pub(super) fn export(state: &MainWindow, ctx: &mut PanelContext<'_>) -> PanelExp
     };
     let size = size.max(min_size);
     let side = |points: f32| (points * PIXELS_PER_POINT).clamp(64.0, MAX_SIDE_PX) as u32;
-    let options = HeadlessOptions {
+    let options_of = |size: Vec2| HeadlessOptions {
         size_px: [side(size.x), side(size.y)],
         pixels_per_point: PIXELS_PER_POINT,
         theme: ctx.theme.name,
     };
+    let mut options = options_of(size);
     let PanelContext { recording, cursor_ns, theme, .. } = *ctx;
     let mut selection = ctx.selection.clone();
     let images = &mut *ctx.images;
@@ -46,13 +50,18 @@ pub(super) fn export(state: &MainWindow, ctx: &mut PanelContext<'_>) -> PanelExp
         let presentation = Presentation::Figure;
         let context =
             &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, presentation, commands };
-        alone_ui(panel, ui, &mut copy, context);
+        alone_ui(panel, ui, &mut copy.borrow_mut(), context);
     };
+    if panel == PanelName::Comparison {
+        // Tables and plots that would scroll are shown completely.
+        headless::svg_of(options, "clip", panel.name(), &mut draw_ui);
+        options = options_of(size.max(copy.borrow().panels.comparison.figure_size));
+    }
     let screenshot = headless::draw(options, &mut draw_ui);
     let drawing = headless::svg_of(options, "clip", panel.name(), &mut draw_ui);
     let log = recording.log_path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
     let name = format!("{log}/{}-{:.3}s", panel.name(), seconds_from_ns(cursor_ns));
-    PanelExport { name, screenshot, drawing, table: copy.panels.csv_table(panel, ctx) }
+    PanelExport { name, screenshot, drawing, table: copy.into_inner().panels.csv_table(panel, ctx) }
 }
 
 /// The values of a panel, comma separated.
