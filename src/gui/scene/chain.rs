@@ -139,6 +139,11 @@ pub(super) struct LinkRow {
 }
 
 impl ChainModel {
+    /// True if the camera is moved by joints.
+    pub(super) fn has_joints(&self) -> bool {
+        !self.rows.is_empty()
+    }
+
     /// The chain at given joint angles; missing angles count as zero.
     pub(super) fn at(
         angles_rad: &[f64],

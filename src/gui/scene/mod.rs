@@ -54,7 +54,9 @@ const LEGEND_WIDTH: f32 = 220.0;
 /// Height of the axes and the scale below the legend in points.
 const GIZMO_ROOM: f32 = 105.0;
 /// Smallest panel size with a close-up.
-const CLOSE_UP_FROM: Vec2 = vec2(440.0, 230.0);
+const CLOSE_UP_FROM: Vec2 = vec2(280.0, 160.0);
+/// Height in points of title and chain above a table of links, at least.
+const MIN_CHAIN_HEIGHT: f32 = 150.0;
 
 /// State of the scene panel: options and viewpoints.
 pub struct ScenePanel {
@@ -70,6 +72,8 @@ pub struct ScenePanel {
     world: Orbit,
     /// Viewpoint of the close-up, `None` before the user has rotated it.
     close_up: Option<Orbit>,
+    /// Position of the close-up; see [`close_up_rect`].
+    close_up_place: Vec2,
     world_canvas: Canvas,
     close_up_canvas: Canvas,
     trajectories: Trajectories,
@@ -86,6 +90,7 @@ impl Default for ScenePanel {
             tube: true,
             world: default_world_orbit(),
             close_up: None,
+            close_up_place: Vec2::splat(1.0),
             world_canvas: Canvas::new("world"),
             close_up_canvas: Canvas::new("close-up"),
             trajectories: Trajectories::default(),
@@ -108,16 +113,19 @@ impl Panel for ScenePanel {
         let area = on_pixels(area, ui.pixels_per_point());
         let has_room = area.width() >= CLOSE_UP_FROM.x && area.height() >= CLOSE_UP_FROM.y;
         let chain = (self.chain && has_room).then(|| chain_model(context)).flatten();
-        let close_up = chain.as_ref().map(|_| close_up_rect(area, ui.pixels_per_point()));
+        let close_up = chain.as_ref().map(|_| close_up_rect(area, self.close_up_place, ui.pixels_per_point()));
         self.world_ui(ui, area, close_up, &response, context);
         if let (Some(chain), Some(rect)) = (chain, close_up) {
             self.close_up_ui(ui, rect, &chain, context);
+            if !context.presentation.is_figure() {
+                self.move_close_up(ui, area, rect);
+            }
         }
     }
 
     fn view_copy(&self) -> Self {
-        let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, .. } = *self;
-        Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, ..Self::default() }
+        let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, close_up_place, .. } = *self;
+        Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, close_up_place, ..Self::default() }
     }
 }
 
@@ -241,6 +249,18 @@ impl ScenePanel {
         }
     }
 
+    /// Moves the close-up with a drag of its title.
+    fn move_close_up(&mut self, ui: &Ui, area: Rect, rect: Rect) {
+        let title = Rect::from_min_size(rect.min, vec2(rect.width(), overlay::LINE_HEIGHT + 4.0));
+        let handle = ui.interact(title, ui.scope_id().with("close-up title"), Sense::DRAG);
+        let drag = handle.drag_delta();
+        if handle.dragged() && drag != Vec2::ZERO {
+            let free = (area.size() - rect.size()).max(Vec2::splat(1.0));
+            self.close_up_place = (self.close_up_place + drag / free).clamp(Vec2::ZERO, Vec2::splat(1.0));
+        }
+        handle.on_hover_cursor(egui::CursorIcon::Grab).on_hover_text(window::CHAIN_FRAMES.meaning);
+    }
+
     fn close_up_ui(&mut self, ui: &Ui, rect: Rect, chain: &ChainModel, context: &PanelContext<'_>) {
         let theme = context.theme;
         let scale = ui.pixels_per_point();
@@ -248,7 +268,10 @@ impl ScenePanel {
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "View of the gimbal's chain"));
         let painter = ui.painter_at(rect.expand(1.0));
         painter.rect_filled(rect, 0.0, theme.surface);
+        // A small close-up has no table; the inspector has its values.
         let table_height = overlay::chain_table_height(chain);
+        let with_table = rect.width() >= TABLE_WIDTH && rect.height() >= table_height + MIN_CHAIN_HEIGHT;
+        let table_height = if with_table { table_height } else { 0.0 };
         let title = Rect::from_min_size(rect.min, vec2(rect.width(), overlay::LINE_HEIGHT + 4.0));
         let view_rect = Rect::from_min_max(title.left_bottom(), rect.max - vec2(0.0, table_height));
         let view_rect = on_pixels(view_rect, scale);
@@ -265,25 +288,30 @@ impl ScenePanel {
         overlay::labels(&painter, view_rect, scale, &drawing.labels, theme.surface);
         overlay::scale_bar(&painter, view_rect, scale, theme, &view, "");
         let label = context.recording.runs.get(context.selection.run).map_or("", |run| run.spec.label.as_str());
+        let kind = if chain.has_joints() { "Gimbal chain" } else { "Extrinsics" };
         let text = match &chain.ground_truth {
-            Some(_) if chain.moved => format!("Gimbal chain, {label}, moved; estimate dashed"),
-            Some(_) => format!("Gimbal chain, {label}; ground truth dashed"),
-            None => format!("Gimbal chain, {label}"),
+            Some(_) if chain.moved => format!("{kind}, {label}, moved; estimate dashed"),
+            Some(_) => format!("{kind}, {label}; ground truth dashed"),
+            None => format!("{kind}, {label}"),
         };
         let at = title.left_center() + vec2(8.0, 0.0);
-        painter.text(at, egui::Align2::LEFT_CENTER, &text, super::theme::label_font(), theme.text_strong);
+        let font = super::theme::label_font();
+        let width = painter.layout_no_wrap(text.clone(), font.clone(), theme.text_strong).size().x;
+        let shown = if width + 12.0 < title.width() { text.clone() } else { format!("{kind}, {label}") };
+        painter.text(at, egui::Align2::LEFT_CENTER, shown, font, theme.text_strong);
         let error = overlay::camera_error_text(chain);
         describe(&response, &error.map_or_else(|| text.clone(), |error| format!("{text}; {error}")));
-        let table = Rect::from_min_max(view_rect.left_bottom(), rect.max);
-        overlay::chain_table(&painter, table, theme, chain);
-        let (mut values, mut error) = (table, table);
-        if chain.camera_error.is_some() {
-            values.max.y -= overlay::LINE_HEIGHT;
-            error.min.y = values.max.y;
-            explain(ui, error, "chain error", window::CHAIN_ERROR);
+        if with_table {
+            let table = Rect::from_min_max(view_rect.left_bottom(), rect.max);
+            overlay::chain_table(&painter, table, theme, chain);
+            let (mut values, mut error) = (table, table);
+            if chain.camera_error.is_some() {
+                values.max.y -= overlay::LINE_HEIGHT;
+                error.min.y = values.max.y;
+                explain(ui, error, "chain error", window::CHAIN_ERROR);
+            }
+            explain(ui, values, "chain values", window::CHAIN_ROW);
         }
-        explain(ui, values, "chain values", window::CHAIN_ROW);
-        explain(ui, title, "chain title", window::CHAIN_FRAMES);
         let outline = egui::Stroke::new(1.0, theme.outline);
         painter.rect_stroke(rect, 0.0, outline, egui::StrokeKind::Inside);
     }
@@ -370,9 +398,14 @@ fn size_px(rect: Rect, pixels_per_point: f32) -> [u32; 2] {
 /// Viewport of the whole area; framing uses the region to the left of the close-up and below the legend.
 fn world_viewport(area: Rect, close_up: Option<Rect>, key_height: f32, pixels_per_point: f32) -> Viewport {
     let size_px = size_px(area, pixels_per_point);
-    let right = close_up.map_or_else(|| area.right(), |rect| rect.left());
+    // The larger part beside the close-up.
+    let (left, right) = match close_up {
+        Some(rect) if area.right() - rect.right() > rect.left() - area.left() => (rect.right(), area.right()),
+        Some(rect) => (area.left(), rect.left()),
+        None => (area.left(), area.right()),
+    };
     let frame_px = [
-        0.0,
+        (left - area.left()) * pixels_per_point,
         key_height * pixels_per_point,
         (right - area.left()) * pixels_per_point,
         area.height() * pixels_per_point,
@@ -380,13 +413,14 @@ fn world_viewport(area: Rect, close_up: Option<Rect>, key_height: f32, pixels_pe
     Viewport::world(size_px, frame_px.map(f64::from))
 }
 
-/// Rectangle of the close-up in the lower right corner.
-fn close_up_rect(area: Rect, pixels_per_point: f32) -> Rect {
+/// Rectangle of the close-up: a fifth of the view at most. `place` is its position in the free space, from (0, 0) in the
+/// upper left corner to (1, 1) in the lower right one.
+fn close_up_rect(area: Rect, place: Vec2, pixels_per_point: f32) -> Rect {
     const INSET: f32 = 6.0;
-    // The table of links has a minimum width, but at least half of the panel remains for the flight.
-    let min_width = (0.5 * area.width()).min(TABLE_WIDTH);
-    let size = vec2((0.42 * area.width()).clamp(min_width, 420.0), (0.8 * area.height()).clamp(180.0, 420.0));
-    on_pixels(Rect::from_min_max(area.max - size - Vec2::splat(INSET), area.max - Vec2::splat(INSET)), pixels_per_point)
+    let size = vec2((0.4 * area.width()).min(420.0), (0.5 * area.height()).min(420.0));
+    let free = area.size() - size - Vec2::splat(2.0 * INSET);
+    let corner = area.min + Vec2::splat(INSET) + free * place;
+    on_pixels(Rect::from_min_size(corner, size), pixels_per_point)
 }
 
 /// Navigation by pointer: dragging rotates, with Shift or another button it shifts, the wheel zooms, a double click

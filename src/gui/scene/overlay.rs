@@ -64,6 +64,14 @@ pub(super) fn legend(
 ) {
     let mut at = rect.left_top() + vec2(8.0, 6.0);
     let ground = theme.plot_background;
+    let height_text = height_range_m.map(|(low_m, high_m)| format!("landmarks, height {low_m:.1} to {high_m:.1} m"));
+    let texts = lines.iter().map(|line| &line.text).chain(&height_text);
+    let width = |text: &String| painter.layout_no_wrap(text.clone(), theme::label_font(), theme.text).size().x;
+    let size = vec2(
+        texts.map(width).fold(0.0, f32::max) + 38.0,
+        LINE_HEIGHT * (lines.len() + usize::from(height_text.is_some())) as f32,
+    );
+    painter.rect_filled(Rect::from_min_size(at, size).expand(4.0).intersect(rect), 3.0, ground.gamma_multiply(0.88));
     for line in lines {
         let middle = at.y + 0.5 * LINE_HEIGHT;
         let sample = [pos2(at.x, middle), pos2(at.x + 28.0, middle)];
@@ -79,14 +87,13 @@ pub(super) fn legend(
         plated(painter, at + vec2(34.0, 0.0), galley, theme.text, ground);
         at.y += LINE_HEIGHT;
     }
-    if let Some((low_m, high_m)) = height_range_m {
+    if let Some(text) = height_text {
         const STEPS: u16 = 14;
         for step in 0..STEPS {
             let slice = Rect::from_min_size(at + vec2(2.0 * f32::from(step), 4.0), vec2(2.0, 8.0));
             let color = theme.height_color((f64::from(step) + 0.5) / f64::from(STEPS));
             painter.rect_filled(slice, 0.0, color);
         }
-        let text = format!("landmarks, height {low_m:.1} to {high_m:.1} m");
         let galley = painter.layout_no_wrap(text, theme::label_font(), theme.text_weak);
         plated(painter, at + vec2(34.0, 0.0), galley, theme.text_weak, ground);
     }

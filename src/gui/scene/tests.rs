@@ -232,10 +232,12 @@ fn the_chain_is_the_product_of_its_links() {
     let (distance_m, angle_rad) = model.camera_error.unwrap();
     assert!((distance_m - error.translation_m.norm()).abs() < 1e-12);
     assert!((angle_rad - error.rotation.angle()).abs() < 1e-9);
+    assert!(model.has_joints(), "its title is that of a gimbal");
     // A rigid camera has the frames I and C.
     let rigid = crate::gimbal::ClassicalChain { imu_from_base: exact, ..Default::default() };
     let pose = ChainPose::at(&rigid, &[]);
     assert_eq!(pose.names, ["I", "C"]);
+    assert!(!ChainModel::at(&[], &rigid, None, &[]).has_joints(), "its title is that of extrinsics");
     assert_eq!(pose.skeleton_m().len(), 2);
     let rotated = UnitQuaternion::identity();
     assert!(pose.imu_from_frame[0].rotation.angle_to(&rotated) < 1e-12);
@@ -299,5 +301,19 @@ fn screenshots_repeat_and_every_stamp_can_be_drawn() {
     keep_screenshot("scene-vehicle", &vehicle);
     for cursor_ns in [-1, 0, 2_000_000_000] {
         keep_screenshot(&format!("scene-{cursor_ns}"), &screenshot(cursor_ns, ThemeName::Dark, Follow::Vehicle));
+    }
+}
+
+#[test]
+fn the_close_up_covers_at_most_a_fifth_wherever_it_is() {
+    use egui::{Rect, pos2, vec2};
+
+    for size in [vec2(300.0, 180.0), vec2(800.0, 500.0), vec2(1900.0, 900.0)] {
+        let area = Rect::from_min_size(pos2(10.0, 20.0), size);
+        for place in [vec2(0.0, 0.0), vec2(1.0, 1.0), vec2(0.3, 0.8)] {
+            let rect = super::close_up_rect(area, place, 1.0);
+            assert!(area.contains_rect(rect), "{rect:?} in {area:?}");
+            assert!(rect.area() <= 0.205 * area.area(), "{rect:?} of {area:?}");
+        }
     }
 }
