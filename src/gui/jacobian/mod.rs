@@ -49,6 +49,9 @@ pub struct JacobianPanel {
     row: Option<JacobianFactor>,
     /// Selected column if it is not a parameter.
     column: Option<ColumnId>,
+    /// Height in points of the column names: the largest so far of the run with this id, so that the matrix keeps its
+    /// size from step to step.
+    names_height: (u64, f32),
 }
 
 impl Panel for JacobianPanel {
@@ -83,15 +86,24 @@ impl JacobianPanel {
     ) {
         let height = ui.available_height();
         let selected_block = self.selected_block(ctx, model);
-        let with_details = height >= MIN_HEIGHT_WITH_DETAILS && selected_block.is_some();
-        let below = match selected_block {
-            Some((Some(_), Some(_))) if with_details => DETAILS_RATIO * height,
-            Some(_) if with_details => DETAILS_LINE,
-            _ => 0.0,
+        let with_details = height >= MIN_HEIGHT_WITH_DETAILS;
+        // The room follows the selection, which this step may lack.
+        let wanted = [
+            self.row.is_some() || ctx.selection.feature.is_some(),
+            self.column.is_some() || ctx.selection.parameter.is_some(),
+        ];
+        let below = match wanted {
+            _ if !with_details => 0.0,
+            [true, true] => DETAILS_RATIO * height,
+            [false, false] => 0.0,
+            _ => DETAILS_LINE,
         };
+        let names = paint::column_names_height(ui, model);
+        let known = if self.names_height.0 == run.id { self.names_height.1 } else { 0.0 };
+        self.names_height = (run.id, names.max(known));
         let size = vec2(ui.available_width(), height - below - LEGEND - 2.0 * ui.spacing().item_spacing.y);
         let (_, whole) = ui.allocate_space(size.max(Vec2::splat(8.0)));
-        let area = Rect::from_min_max(whole.min + vec2(ROW_NAMES, paint::column_names_height(ui, model)), whole.max);
+        let area = Rect::from_min_max(whole.min + vec2(ROW_NAMES, self.names_height.1), whole.max);
         if area.width() < 8.0 || area.height() < 8.0 {
             return;
         }

@@ -161,3 +161,20 @@ fn the_matrix_zooms_and_steps_without_a_linearization_are_reported() {
     harness.run_steps(2);
     assert!(harness.query_by_label("No linearization in this step").is_some());
 }
+
+#[test]
+fn the_matrix_keeps_its_size_when_the_step_lacks_the_selected_feature() {
+    let mut harness = bench();
+    let size = |harness: &mut Harness<'static, Shown>, selection: Selection| {
+        harness.state_mut().1 = selection;
+        harness.run_steps(2);
+        harness.get_by_label("Jacobian blocks").rect()
+    };
+    let step = sample().runs[0].steps.last().unwrap();
+    let parameter = Some(parameter("L2.alpha"));
+    let feature = step.report.features.first().map(|feature| feature.id);
+    let missing = Some(crate::frontend::FeatureId(u64::from(u32::MAX)));
+    let with = size(&mut harness, Selection { feature, parameter, ..Selection::default() });
+    let without = size(&mut harness, Selection { feature: missing, parameter, ..Selection::default() });
+    assert_eq!(with, without);
+}
