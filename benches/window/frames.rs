@@ -11,6 +11,7 @@ use dcvins::gui::{PanelContext, Playback, Presentation, Selection};
 use dcvins::sensors::GrayImage;
 use dcvins::session::{Recording, SessionPlan};
 use dcvins::text::Named as _;
+use egui::{Event, pos2};
 
 use super::Table;
 use super::figures::Times;
@@ -58,10 +59,10 @@ impl Player {
     }
 
     /// Lays out a frame and passes its textures to the painter.
-    fn lay_out(&mut self, recording: &Recording, cursor_ns: i64) -> Frame {
+    fn lay_out(&mut self, recording: &Recording, cursor_ns: i64, events: Vec<Event>) -> Frame {
         let Self { images, headless, state, selection, .. } = self;
         let (theme, playback) = (Theme::of(OPTIONS.theme), Playback::default());
-        let mut frame = headless.frame(Vec::new(), |ui| {
+        let mut frame = headless.frame(events, |ui| {
             let commands = &mut Vec::new();
             let (images, selection) = (&mut *images, &mut *selection);
             let (playback, theme) = (&playback, &theme);
@@ -92,21 +93,28 @@ impl Player {
 
     /// Draws one frame.
     pub(crate) fn picture(&mut self, recording: &Recording, cursor_ns: i64) {
-        let frame = self.lay_out(recording, cursor_ns);
+        let frame = self.lay_out(recording, cursor_ns, Vec::new());
         self.paint(&frame);
     }
 
     /// Draws one frame and measures the time of its parts.
-    fn measured(&mut self, recording: &Recording, cursor_ns: i64, times: &mut [Times; 3]) {
+    fn measured(&mut self, recording: &Recording, cursor_ns: i64, events: Vec<Event>, times: &mut [Times; 3]) {
         let [layout, paint, whole] = times;
         whole.take(|| {
-            let frame = layout.take(|| self.lay_out(recording, cursor_ns));
+            let frame = layout.take(|| self.lay_out(recording, cursor_ns, events));
             paint.take(|| self.paint(&frame));
         });
     }
 }
 
-/// Measures every preset, with the cursor moving through the last part of the recording, and stationary at its end.
+/// Motion of the pointer to the right over the lanes of the timeline.
+fn pointer_over_timeline(number: usize) -> Event {
+    let [width, height] = OPTIONS.size_px.map(|side| side as f32);
+    Event::PointerMoved(pos2(width * (0.3 + 0.5 * number as f32 / PAUSED as f32), height - 60.0))
+}
+
+/// Measures every preset, with the cursor moving through the last part of the recording, and stationary at its end,
+/// there also with the pointer moving over the timeline, so that all plots show the values at its time.
 pub(crate) fn measure(recording: &Recording, player: &mut Player) -> Table {
     let mut table = Table::new(
         "A frame of the window at 1920×1080, drawn on the CPU: ms, median / 95 % / largest",
@@ -122,14 +130,16 @@ pub(crate) fn measure(recording: &Recording, player: &mut Player) -> Table {
             player.picture(recording, first_ns);
         }
         let resting = vec![*played.last().unwrap_or(&first_ns); PAUSED];
-        for (what, cursors_ns) in [("moving", played), ("stationary", &resting[..])] {
+        for (what, cursors_ns) in [("moving", played), ("stationary", &resting[..]), ("pointer moves", &resting[..])] {
             // The first frame after a seek is not measured with the stationary cursor.
             player.picture(recording, cursors_ns[0]);
             let mut times = [Times::default(), Times::default(), Times::default()];
             let before_s = cpu_s();
-            for cursor_ns in cursors_ns {
-                player.measured(recording, *cursor_ns, &mut times);
+            for (number, cursor_ns) in cursors_ns.iter().enumerate() {
+                let moved = if what == "pointer moves" { vec![pointer_over_timeline(number)] } else { Vec::new() };
+                player.measured(recording, *cursor_ns, moved, &mut times);
             }
+            drop(player.lay_out(recording, cursors_ns[0], vec![Event::PointerGone]));
             let cpu_ms = cpu_s().zip(before_s).map(|(after, before)| 1e3 * (after - before) / cursors_ns.len() as f64);
             let cells = times.iter().map(|times| times.cells().join(" / "));
             let cpu = cpu_ms.map_or_else(String::new, |ms| format!("{ms:.1}"));
