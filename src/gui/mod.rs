@@ -23,6 +23,7 @@ mod panel_tests;
 mod path_field;
 mod plot;
 pub mod rank;
+mod reading;
 pub mod rendering;
 pub mod residuals;
 #[cfg(test)]
@@ -39,3 +40,4 @@ mod units;
 pub mod window;
 
 pub use panel::{CsvTable, Dialog, ImageSource, Panel, PanelContext, PanelName, Playback, Presentation, Selection};
+pub use reading::{Reading, ReadingCursor};

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use egui::{Role, Sense, Ui};
 use serde::{Deserialize, Serialize};
 
+use super::reading::Reading;
 use super::slide::MovedChain;
 use super::theme::Theme;
 use crate::frontend::FeatureId;
@@ -47,6 +48,8 @@ pub struct Selection {
     pub slide: Option<SlidePosition>,
     /// The moved chain at the cursor.
     pub(crate) moved: MovedChain,
+    /// Times and value ranges at which plots are read.
+    pub reading: Reading,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -144,9 +147,9 @@ impl<'a> PanelContext<'a> {
         moved.update(self.recording, step, slide.as_ref());
     }
 
-    /// The moved chain if it belongs to the step at the cursor.
+    /// The moved chain if it belongs to the selected run's step at the cursor.
     pub(crate) fn moved_chain(&self, stamp_ns: i64) -> Option<&Arc<ChainSlide>> {
-        self.selection.moved.at(stamp_ns)
+        self.selection.moved.at(self.selected_run()?, stamp_ns)
     }
 }
 
@@ -227,6 +230,8 @@ pub enum Dialog {
     Diagnosis,
     Palette,
     Settings,
+    /// Question asked before a run is removed.
+    RemoveRun,
     /// Question asked before unsaved work is discarded.
     Unsaved,
 }

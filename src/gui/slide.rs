@@ -9,6 +9,8 @@ use crate::session::{Recording, RunRecord, StepRecord};
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MovedChain {
     answered: Option<(SlidePosition, Arc<StepRecord>)>,
+    /// Id of the run.
+    run: Option<u64>,
     slide: Option<Arc<ChainSlide>>,
 }
 
@@ -35,12 +37,13 @@ impl MovedChain {
             return;
         }
         let slide = moved(recording, run, step, position);
-        *self = Self { answered: Some((*position, Arc::clone(step))), slide: slide.map(Arc::new) };
+        let answered = Some((*position, Arc::clone(step)));
+        *self = Self { answered, run: Some(run.id), slide: slide.map(Arc::new) };
     }
 
-    /// The moved chain if it belongs to the step with this stamp.
-    pub(super) fn at(&self, stamp_ns: i64) -> Option<&Arc<ChainSlide>> {
-        self.slide.as_ref().filter(|slide| slide.stamp_ns == stamp_ns)
+    /// The moved chain if it belongs to the step of this run with this stamp; other runs have steps at equal stamps.
+    pub(super) fn at(&self, run: &RunRecord, stamp_ns: i64) -> Option<&Arc<ChainSlide>> {
+        self.slide.as_ref().filter(|slide| self.run == Some(run.id) && slide.stamp_ns == stamp_ns)
     }
 }
 

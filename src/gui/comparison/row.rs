@@ -1,12 +1,13 @@
 //! One row of a plot over time: name and values at the cursor on the left, curves on the right.
 
-use egui::{Align2, Rect, Shape, Stroke, Ui, pos2, vec2};
+use egui::{Align2, Shape, Stroke, Ui, pos2, vec2};
 
 use super::columns::style_of;
 use crate::gui::PanelContext;
 use crate::gui::plot::{
-    Clicks, Curve, Interaction, PlotArea, Wheel, navigate, paint_cursor, paint_curve, paint_ground, paint_steps,
-    paint_value_grid, visible_range,
+    Clicks, Curve, Interaction, PlotArea, ReadLine, Readout, TIME_GUTTER, VALUE_GUTTER, Wheel, paint_curve,
+    paint_ground, paint_steps, paint_time_axis, paint_value_axis, plot_ui, value_range_of, visible_range,
+    within_gutters,
 };
 use crate::gui::theme::{self, CURVE_WIDTH, RunStyle};
 
@@ -15,7 +16,7 @@ const NAMES: f32 = 158.0;
 const BOUND_DASHES: &[f32] = &[4.0, 3.0];
 
 /// Minimum height of a row in points; a list of rows of this height may scroll.
-pub(super) const MIN_HEIGHT: f32 = 46.0;
+pub(super) const MIN_HEIGHT: f32 = 60.0;
 
 pub(super) struct Row<'a> {
     pub(super) name: &'a str,
@@ -69,7 +70,7 @@ pub(super) fn row_ui(
 ) {
     let theme = *ctx.theme;
     let (_, whole) = ui.allocate_space(vec2(ui.available_width(), height));
-    let rect = Rect::from_min_max(pos2(whole.left() + NAMES.min(0.4 * whole.width()), whole.top()), whole.max);
+    let rect = within_gutters(whole.with_min_x(whole.left() + NAMES.min(0.4 * whole.width())), TIME_GUTTER);
     let (begin_ns, end_ns) = visible_range(ctx);
     let mut area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: 1.0 };
     let mut max_value = 0.0_f64;
@@ -83,17 +84,19 @@ pub(super) fn row_ui(
         let most = bound.curve.extent.map_or(0.0, |(_, max_value)| max_value);
         max_value = max_value.max(most.min(3.0 * max_value));
     }
-    area = area.with_values(0.0, 1.15 * max_value.max(row.min_high));
+    let (low, high) = value_range_of(ctx, row.label, 0.0, 1.15 * max_value.max(row.min_high));
+    area = area.with_values(low, high);
     let painter = ui.painter_at(whole);
     paint_ground(&painter, &theme, rect);
-    paint_value_grid(&painter, &theme, &area, row.factor, (height / 16.0) as usize);
+    paint_value_axis(&painter, &theme, &area, row.factor);
+    paint_time_axis(&painter, &theme, &area, TIME_GUTTER);
     let threshold = row.threshold.map(|threshold| area.y(threshold)).filter(|y| rect.y_range().contains(*y));
     if let Some(y) = threshold {
         let ends = [pos2(rect.left(), y), pos2(rect.right(), y)];
         painter.extend(Shape::dotted_line(&ends, theme.warn.gamma_multiply(0.7), 6.0, 0.7));
     }
     let name = if row.unit.is_empty() { row.name.to_owned() } else { format!("{}, {}", row.name, row.unit) };
-    let names = painter.with_clip_rect(whole.with_max_x(rect.left() - 2.0));
+    let names = painter.with_clip_rect(whole.with_max_x(rect.left() - VALUE_GUTTER));
     let mut at = whole.left_top() + vec2(2.0, 0.0);
     names.text(at, Align2::LEFT_TOP, name, theme::label_font(), theme.text);
     let inner = painter.with_clip_rect(rect);
@@ -122,10 +125,23 @@ pub(super) fn row_ui(
         at.y += 13.0;
         names.text(at, Align2::LEFT_TOP, text, theme::label_font(), theme.text_weak);
     }
-    paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
     let id = ui.unique_id().with(("row over time", row.id));
     let values: Vec<&str> = lines.iter().filter_map(|line| line.text.as_deref()).collect();
     let wheel = Wheel::in_list(height <= MIN_HEIGHT);
     let plot = Interaction { id, name: row.label, value: &values.join(", "), clicks: Clicks::Seek, wheel };
-    navigate(ui, ctx, &area, &plot).on_hover_text(row.hover);
+    let read = lines.iter().map(|line| {
+        let color = style_of(ctx.recording, &theme, line.run).color;
+        ReadLine { color, stamps_ns: line.stamps_ns, values: line.values }
+    });
+    let read: Vec<ReadLine<'_>> = read.collect();
+    let unit = if row.unit.is_empty() || row.unit == "°" { row.unit.to_owned() } else { format!(" {}", row.unit) };
+    let readout = Readout {
+        key: row.label,
+        lines: &read,
+        factor: row.factor,
+        unit: &unit,
+        whole: row.unit.is_empty(),
+        principal: &|value| value,
+    };
+    plot_ui(ui, ctx, &area, &plot, &readout).on_hover_text(row.hover);
 }

@@ -4,11 +4,16 @@ use egui::{Rect, pos2, vec2};
 
 use super::names::{CalibrationPart, part_of};
 use crate::gimbal::{ParameterGroup, ParameterId};
+use crate::gui::plot::{TICKS_ONLY, TIME_GUTTER};
 
 /// Minimum height of a legible plot in points, including its title.
 const MIN_CELL_HEIGHT: f32 = 52.0;
 /// Minimum width of a legible plot in points.
 const MIN_CELL_WIDTH: f32 = 118.0;
+/// Height in points from which a cell shows the times itself where a cell below shows them too.
+const MIN_HEIGHT_WITH_TIMES: f32 = 92.0;
+/// Height of the labels of times in points.
+const TIMES_HEIGHT: f32 = TIME_GUTTER - TICKS_ONLY;
 /// Gap between plots in points.
 const GAP: f32 = 5.0;
 /// Width of the headings at the left of the rows, in points.
@@ -30,9 +35,38 @@ pub(crate) struct PlotGrid {
     pub(crate) height: f32,
 }
 
+impl PlotGrid {
+    /// Heights of the gutters of times in points. A low cell shows the ticks only if there is a cell below it, whose
+    /// times are the same.
+    pub(crate) fn time_gutters(&self) -> Vec<f32> {
+        let covered = |cell: &Rect| {
+            self.cells.iter().any(|other| (other.left() - cell.left()).abs() < 1.0 && other.top() > cell.top() + 1.0)
+        };
+        let gutter = |cell: &Rect| {
+            if cell.height() < MIN_HEIGHT_WITH_TIMES && covered(cell) { TICKS_ONLY } else { TIME_GUTTER }
+        };
+        self.cells.iter().map(gutter).collect()
+    }
+
+    /// Adds the height of the labels of times to the cells that are the only low ones with them.
+    fn with_room_for_times(mut self) -> Self {
+        let gutters = self.time_gutters();
+        for (cell, gutter) in self.cells.iter_mut().zip(gutters) {
+            let higher = cell.with_max_y(cell.bottom() + TIMES_HEIGHT);
+            let free = self.groups.iter().all(|(_, heading)| !heading.intersects(higher));
+            if gutter > TICKS_ONLY && cell.height() < MIN_HEIGHT_WITH_TIMES && free {
+                *cell = higher;
+            }
+        }
+        self.height += TIMES_HEIGHT;
+        self
+    }
+}
+
 /// Lays out one cell per parameter (sorted along the chain): one row per part of the chain if that fits, else flowing.
 pub(crate) fn lay_out(parameters: &[ParameterId], available: Rect) -> PlotGrid {
-    by_part(parameters, available).unwrap_or_else(|| flowing(parameters.len(), available))
+    let available = available.with_max_y(available.bottom() - TIMES_HEIGHT);
+    by_part(parameters, available).unwrap_or_else(|| flowing(parameters.len(), available)).with_room_for_times()
 }
 
 fn by_part(parameters: &[ParameterId], available: Rect) -> Option<PlotGrid> {
@@ -128,7 +162,7 @@ pub(crate) fn by_group(groups: &[(ParameterGroup, usize)], available: Rect) -> P
     let fewest = rows_of(max_columns);
     let columns = (1..=max_columns).find(|columns| rows_of(*columns) == fewest).unwrap_or(max_columns);
     let width = (available.width() - GAP * (columns as f32 - 1.0)) / columns as f32;
-    let room = available.height() - groups.len() as f32 * GROUP_HEIGHT;
+    let room = available.height() - groups.len() as f32 * GROUP_HEIGHT - TIMES_HEIGHT;
     let height = (room / fewest.max(1) as f32 - GAP).max(MIN_CELL_HEIGHT);
     let mut layout = PlotGrid {
         cells: Vec::new(),
@@ -149,7 +183,7 @@ pub(crate) fn by_group(groups: &[(ParameterGroup, usize)], available: Rect) -> P
         top += count.div_ceil(columns) as f32 * (height + GAP);
     }
     layout.height = top - available.top();
-    layout
+    layout.with_room_for_times()
 }
 
 #[cfg(test)]

@@ -171,7 +171,8 @@ impl ConvergencePanel {
         if let Some(rect) = layout.legend.filter(|_| !ctx.presentation.is_figure()) {
             paint::legend(ui, ctx, rect);
         }
-        for (parameter, rect) in parameters.iter().zip(&layout.cells) {
+        let gutters = layout.time_gutters();
+        for ((parameter, rect), below) in parameters.iter().zip(&layout.cells).zip(gutters) {
             if ui.is_rect_visible(*rect) {
                 let data = paint::PlotData {
                     histories: &self.histories,
@@ -180,7 +181,7 @@ impl ConvergencePanel {
                     shown,
                     wheel,
                 };
-                paint::cell_ui(ui, ctx, &data, &mut self.curves, *parameter, *rect);
+                paint::cell_ui(ui, ctx, &data, &mut self.curves, *parameter, (*rect, below));
             }
         }
     }

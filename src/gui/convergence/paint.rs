@@ -14,8 +14,9 @@ use crate::gui::chain_values::ParameterValues;
 use crate::gui::copied_value::offer;
 use crate::gui::help::terms::window;
 use crate::gui::plot::{
-    BandCurve, Clicks, Curve, Interaction, PlotArea, StateCurve, Wheel, navigate, paint_band, paint_cursor,
-    paint_curve, paint_ground, paint_hatch, paint_line, paint_value_grid, visible_range,
+    BandCurve, Clicks, Curve, Interaction, PlotArea, ReadLine, Readout, StateCurve, Wheel, paint_band, paint_curve,
+    paint_ground, paint_hatch, paint_line, paint_time_axis, paint_value_axis, plot_ui, value_range_of, visible_range,
+    within_gutters,
 };
 use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::gui::units::{Shown, fixed};
@@ -23,8 +24,6 @@ use crate::observability::ParameterState;
 
 /// Height of the state strip at the bottom of a plot, in points.
 const STRIP_HEIGHT: f32 = 3.0;
-/// Width reserved for the values of the axis next to the error, in points.
-const TICK_WIDTH: f32 = 46.0;
 /// Width of a sample in the legend, in points.
 const SAMPLE_WIDTH: f32 = 26.0;
 /// Height of the line with name and value, in points.
@@ -148,14 +147,14 @@ impl<'a> PlotData<'a> {
     }
 }
 
-/// Draws the plot of one parameter; a click selects the parameter.
+/// Draws the plot of one parameter in a cell with the height of its gutter of times; a click selects the parameter.
 pub(super) fn cell_ui(
     ui: &Ui,
     ctx: &mut PanelContext<'_>,
     data: &PlotData<'_>,
     curves: &mut BTreeMap<(usize, ParameterId), ParameterCurves>,
     id: ParameterId,
-    rect: Rect,
+    (rect, below): (Rect, f32),
 ) {
     let shown_run = data.shown;
     let Some(history) = data.histories.get(shown_run) else { return };
@@ -164,7 +163,7 @@ pub(super) fn cell_ui(
     let name = &ctx.names().name(id);
     let theme = *ctx.theme;
     let (begin_ns, end_ns) = visible_range(ctx);
-    let plot = Rect::from_min_max(pos2(rect.left(), rect.top() + TITLE_HEIGHT), rect.max);
+    let plot = within_gutters(rect.with_min_y(rect.top() + TITLE_HEIGHT), below);
     let mut area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0 };
 
     let overlaid: Vec<usize> = (0..data.histories.len()).filter(|run| data.values(*run, id).is_some()).collect();
@@ -184,6 +183,8 @@ pub(super) fn cell_ui(
     let extent_of = |run: usize| curve_of(run)?.value.extent;
     let others = overlaid.iter().filter(|run| **run != shown_run).filter_map(|run| extent_of(*run));
     let (low, high) = value_range(extent_of(shown_run), ground_truth, others, parameter);
+    let key = format!("convergence {name}");
+    let (low, high) = value_range_of(ctx, &key, low, high);
     area = area.with_values(low, high);
 
     let painter = ui.painter_at(rect.expand(1.0));
@@ -192,7 +193,8 @@ pub(super) fn cell_ui(
     if let Some(curves) = curve_of(shown_run) {
         paint_states(&inner, &theme, &area, curves);
     }
-    paint_value_grid(&inner, &theme, &area, shown.factor, (plot.height() / 22.0) as usize + 1);
+    paint_value_axis(&painter, &theme, &area, shown.factor);
+    paint_time_axis(&painter, &theme, &area, below);
     if let Some(curves) = curve_of(shown_run) {
         let fill = theme.run(shown_run).color.gamma_multiply(0.22);
         paint_band(&inner, &area, &curves.band, fill);
@@ -213,8 +215,6 @@ pub(super) fn cell_ui(
             paint_outside(&inner, &area, &curves.value, theme.run(*run), level);
         }
     }
-    paint_cursor(&inner, &theme, &area, ctx.cursor_ns);
-
     let selected = ctx.selection.parameter == Some(id);
     let border = if selected { Stroke::new(2.0, theme.accent) } else { Stroke::new(1.0, theme.outline) };
     painter.rect_stroke(plot, 0.0, border, StrokeKind::Inside);
@@ -235,7 +235,8 @@ pub(super) fn cell_ui(
         let far = error.abs() > 3.0 * sigma;
         let place = plot.right_bottom() + vec2(-3.0, -STRIP_HEIGHT - 1.0);
         let color = if far { theme.error } else { theme.text_weak };
-        let room = plot.width() - TICK_WIDTH;
+        // The longer text only in a plot that stays visible beside it.
+        let room = 0.6 * plot.width();
         let texts = [error_text(shown, error, sigma), signed(shown, error, sigma)].map(|text| format!("Δ {text}"));
         let width = |text: &String| painter.layout_no_wrap(text.clone(), theme::label_font(), color).size().x;
         let text = texts.iter().find(|text| width(text) <= room).unwrap_or(&texts[1]);
@@ -251,7 +252,19 @@ pub(super) fn cell_ui(
     let label = format!("{name} {text} {}", state.tag());
     let widget = ui.unique_id().with(("parameter", name));
     let plot = Interaction { id: widget, name: label.trim_end(), value: "", clicks: Clicks::Select, wheel: data.wheel };
-    let response = navigate(ui, ctx, &area, &plot);
+    let read_line = |run: usize| {
+        let (_, stamps_ns, values) = data.values(run, id)?;
+        Some(ReadLine { color: theme.run(run).color, stamps_ns, values })
+    };
+    let readout = Readout {
+        key: &key,
+        lines: &overlaid.iter().filter_map(|run| read_line(*run)).collect::<Vec<_>>(),
+        factor: shown.factor,
+        unit: shown.unit,
+        whole: false,
+        principal: &|value| id.principal_value(value),
+    };
+    let response = plot_ui(ui, ctx, &area, &plot, &readout);
     if response.hovered() {
         offer(ui, format!("{name} {text}"));
     }
@@ -342,7 +355,7 @@ fn fixed_value(shown: Shown, value: f64, sigma: f64) -> String {
 fn boxed_text(painter: &egui::Painter, theme: &theme::Theme, place: Pos2, align: Align2, text: &str, color: Color32) {
     let galley = painter.layout_no_wrap(text.to_owned(), theme::label_font(), color);
     let rect = align.anchor_size(place, galley.size());
-    painter.rect_filled(rect.expand2(vec2(2.0, 0.0)), 2.0, theme.plot_background.gamma_multiply(0.85));
+    painter.rect_filled(rect.expand2(vec2(2.0, 0.0)), 2.0, theme.plot_background);
     painter.galley(rect.min, galley, color);
 }
 

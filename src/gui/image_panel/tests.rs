@@ -216,3 +216,22 @@ fn a_mask_is_tinted_and_can_be_hidden() {
         assert!(pixel == before || pixel.r() > pixel.b());
     }
 }
+
+#[test]
+fn a_moved_chain_belongs_to_its_run_only() {
+    use crate::observability::{SlideDirection, SlidePosition};
+
+    let recording = sample_recording_of(80, &["auto", "classical"]);
+    let slide = Some(SlidePosition { direction: SlideDirection::Measured(0), amount: 0.5 });
+    let mut selection = Selection { slide, ..Selection::default() };
+    let theme = Theme::of(ThemeName::Dark);
+    with_context(&recording, recording.last_stamp_ns(), &mut sample_images(), &mut selection, &theme, |context| {
+        context.move_chain();
+        let stamp_ns = recording.runs[0].steps.last().unwrap().report.stamp_ns;
+        assert!(context.moved_chain(stamp_ns).is_some());
+        // The other run has a step with the same stamp.
+        context.selection.run = 1;
+        assert_eq!(recording.runs[1].steps.last().unwrap().report.stamp_ns, stamp_ns);
+        assert!(context.moved_chain(stamp_ns).is_none());
+    });
+}

@@ -36,6 +36,12 @@ impl PlotArea {
         self.rect.bottom() - fraction as f32 * self.rect.height()
     }
 
+    /// Value at a screen y.
+    pub(crate) fn value_at(&self, y: f32) -> f64 {
+        let fraction = f64::from((self.rect.bottom() - y) / self.rect.height().max(1.0));
+        self.low + fraction * (self.high - self.low)
+    }
+
     /// Stamp at a screen x.
     pub(crate) fn stamp_ns_at(&self, x: f32) -> i64 {
         let fraction = f64::from((x - self.rect.left()) / self.rect.width().max(1.0));
@@ -125,6 +131,8 @@ mod tests {
         let area = PlotArea { rect, begin_ns: 5, end_ns: 5_000_005, low: 0.0, high: 0.0 }.with_values(2.0, 2.0);
         assert_eq!(area.stamp_ns_at(area.x(2_500_005)), 2_500_005);
         assert_eq!(area.y(2.0), 35.0);
+        let tall = area.with_values(-3.0, 5.0);
+        assert!((tall.value_at(tall.y(1.25)) - 1.25).abs() < 1e-6);
         let nothing = PlotArea { end_ns: 5, ..area }.with_values(f64::NAN, f64::NAN);
         assert!(nothing.x(5).is_finite() && nothing.y(0.3).is_finite());
     }

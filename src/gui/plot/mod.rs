@@ -3,22 +3,50 @@
 //! All plots over time use the time range of [`Selection`](super::Selection), so that zooming one zooms all.
 
 mod area;
+mod axes;
 mod curve;
 mod navigate;
+mod on_screen;
+mod readout;
 mod run_legend;
 mod ticks;
+mod value_axis;
 
 use egui::containers::scroll_area::ScrollAreaOutput;
 use egui::epaint::{Mesh, Vertex, WHITE_UV};
-use egui::{Align2, Color32, Painter, Pos2, Rect, Shape, Stroke, pos2};
+use egui::{Color32, Painter, Pos2, Rect, Response, Shape, Stroke, Ui, pos2};
 
 pub(crate) use area::{PlotArea, visible_segments};
+pub(crate) use axes::{TICKS_ONLY, TIME_GUTTER, VALUE_GUTTER, paint_time_axis, paint_value_axis, within_gutters};
 pub(crate) use curve::{BandCurve, Curve, StateCurve};
 pub(crate) use navigate::{Clicks, Interaction, Wheel, navigate, visible_range, zoom_about_cursor};
+pub(crate) use on_screen::{PlotOnScreen, plot_under_pointer, register};
+pub(crate) use readout::{ReadLine, Readout, paint_time_labels, paint_times, paint_values, read_lines};
 pub(crate) use run_legend::run_legend_ui;
 pub(crate) use ticks::{decimals_of_step, ticks};
+pub(crate) use value_axis::value_range_of;
 
-use super::theme::{self, RunStyle, Theme};
+use self::readout::paint_readout;
+use self::value_axis::value_axis_ui;
+use super::PanelContext;
+use super::theme::{RunStyle, Theme};
+
+/// Completes a plot whose curves are painted: the cursor, events, reading cursors and the pointer's time with values,
+/// and navigation with the pointer.
+pub(crate) fn plot_ui(
+    ui: &Ui,
+    ctx: &mut PanelContext<'_>,
+    area: &PlotArea,
+    plot: &Interaction<'_>,
+    readout: &Readout<'_>,
+) -> Response {
+    register(ui, area, readout.key);
+    let response = navigate(ui, ctx, area, plot);
+    value_axis_ui(ui, ctx, area, readout.key, plot, response.hovered());
+    paint_cursor(&ui.painter_at(area.rect), ctx.theme, area, ctx.cursor_ns);
+    paint_readout(ui, ctx, area, readout, response.hovered());
+    response
+}
 
 /// True if the content of a list is higher than its panel.
 pub(crate) fn overflows<R>(list: &ScrollAreaOutput<R>) -> bool {
@@ -30,23 +58,8 @@ pub(crate) fn paint_ground(painter: &Painter, theme: &Theme, rect: Rect) {
     painter.rect_filled(rect, 0.0, theme.plot_background);
 }
 
-/// Draws horizontal grid lines with their values inside the left edge; `factor` converts stored values to shown ones.
-pub(crate) fn paint_value_grid(painter: &Painter, theme: &Theme, area: &PlotArea, factor: f64, max_count: usize) {
-    let (marks, step) = ticks(area.low * factor, area.high * factor, max_count);
-    for shown in marks {
-        let y = area.y(shown / factor).round() + 0.5;
-        painter.hline(area.rect.x_range(), y, Stroke::new(theme::HAIRLINE_WIDTH, theme.grid));
-        // Labels that would extend beyond the plot are omitted.
-        if y - 12.0 > area.rect.top() && y < area.rect.bottom() + 1.0 {
-            let text = super::units::fixed(shown, decimals_of_step(step));
-            let at = pos2(area.rect.left() + 2.0, y);
-            painter.text(at, Align2::LEFT_BOTTOM, text, theme::number_font(), theme.text_weak);
-        }
-    }
-}
-
 /// Draws the cursor as a vertical line.
-pub(crate) fn paint_cursor(painter: &Painter, theme: &Theme, area: &PlotArea, cursor_ns: i64) {
+fn paint_cursor(painter: &Painter, theme: &Theme, area: &PlotArea, cursor_ns: i64) {
     let x = area.x(cursor_ns);
     if area.rect.x_range().expand(0.5).contains(x) {
         painter.vline(x, area.rect.y_range(), Stroke::new(1.0, theme.cursor.gamma_multiply(0.8)));

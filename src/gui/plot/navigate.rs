@@ -128,11 +128,10 @@ impl Scroll {
     fn read(ui: &Ui, wheel: Wheel) -> Self {
         ui.input(|input| {
             let (pinched, scrolled) = (f64::from(input.zoom_delta()), input.smooth_scroll_delta());
-            let turned = if wheel == Wheel::Zooms && scrolled.y.abs() > scrolled.x.abs() {
-                (f64::from(scrolled.y) / 200.0).exp()
-            } else {
-                1.0
-            };
+            // With Alt the wheel zooms the value axis.
+            let turns = wheel == Wheel::Zooms && !input.modifiers.alt;
+            let turned =
+                if turns && scrolled.y.abs() > scrolled.x.abs() { (f64::from(scrolled.y) / 200.0).exp() } else { 1.0 };
             Self { zoom: pinched * turned, pan_x: scrolled.x }
         })
     }

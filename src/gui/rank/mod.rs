@@ -28,8 +28,9 @@ use super::convergence::empty_ui;
 use super::follow::RunTables;
 use super::help::terms::window;
 use super::plot::{
-    Clicks, Curve, Interaction, PlotArea, Wheel, navigate, overflows, paint_cursor, paint_ground, paint_steps,
-    run_legend_ui, visible_range,
+    Clicks, Curve, Interaction, PlotArea, Readout, TIME_GUTTER, Wheel, overflows, paint_ground, paint_steps,
+    paint_time_axis, paint_value_axis, plot_ui, read_lines, run_legend_ui, value_range_of, visible_range,
+    within_gutters,
 };
 use super::theme::{CURVE_WIDTH, RunStyle, Theme};
 use super::{Panel, PanelContext};
@@ -58,7 +59,7 @@ const DETAILS_HEIGHT: f32 = 210.0;
 const FIGURE_DETAILS_HEIGHT: f32 = 320.0;
 
 /// Height of the ranks over time in points.
-const OVER_TIME_HEIGHT: f32 = 62.0;
+const OVER_TIME_HEIGHT: f32 = 78.0;
 
 /// Height in points below the heat map in which its slider and the first heading stay visible.
 const HEAD_OF_DETAILS: f32 = 26.0;
@@ -227,30 +228,37 @@ impl RankPanel {
             return;
         }
         let (_, all) = ui.allocate_space(vec2(ui.available_width(), OVER_TIME_HEIGHT));
-        let rect = egui::Rect::from_min_max(all.min + vec2(0.0, CAPTION), all.max);
+        let outer = all.with_min_y(all.top() + CAPTION);
+        let rect = within_gutters(outer, TIME_GUTTER);
         let (begin_ns, end_ns) = visible_range(ctx);
-        let area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: max_rank * 1.08 };
+        let key = "Rank over time";
+        let (low, high) = value_range_of(ctx, key, 0.0, max_rank * 1.08);
+        let area = PlotArea { rect, begin_ns, end_ns, low, high };
         let caption = format!("informed rank over time, of {max_rank:.0} (faint: structural rank)");
         let place = all.left_top() + vec2(3.0, 0.0);
         ui.painter().text(place, egui::Align2::LEFT_TOP, caption, super::theme::label_font(), theme.text_weak);
-        let painter = ui.painter_at(rect);
+        let painter = ui.painter_at(outer);
         paint_ground(&painter, &theme, rect);
+        paint_value_axis(&painter, &theme, &area, 1.0);
+        paint_time_axis(&painter, &theme, &area, TIME_GUTTER);
+        let inner = painter.with_clip_rect(rect.intersect(painter.clip_rect()));
         self.curves.resize_with(tables.len(), Default::default);
         for (run, (table, [informed, structural])) in tables.iter().zip(&mut self.curves).enumerate() {
             informed.update(&area, table.epoch, &table.stamps_ns, &table.columns[INFORMED]);
             structural.update(&area, table.epoch, &table.stamps_ns, &table.columns[STRUCTURAL]);
             let style = theme.run(run);
             let faint = RunStyle { color: style.color.gamma_multiply(0.45), ..style };
-            paint_steps(&painter, &area, structural, faint, CURVE_WIDTH);
-            paint_steps(&painter, &area, informed, style, CURVE_WIDTH);
+            paint_steps(&inner, &area, structural, faint, CURVE_WIDTH);
+            paint_steps(&inner, &area, informed, style, CURVE_WIDTH);
         }
-        paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
         let id = ui.unique_id().with("rank over time");
         let value = ctx.selected_run().and_then(|run| run.step_at(ctx.cursor_ns)).and_then(|step| step.rank.as_ref());
         let value = value.map_or_else(String::new, ranks_text);
-        let (name, wheel) = ("Rank over time", Wheel::in_list(self.overflows));
-        let plot = Interaction { id, name, value: &value, clicks: Clicks::Seek, wheel };
-        navigate(ui, ctx, &area, &plot).on_hover_text(window::RANKS_OVER_TIME.meaning);
+        let wheel = Wheel::in_list(self.overflows);
+        let plot = Interaction { id, name: key, value: &value, clicks: Clicks::Seek, wheel };
+        let lines = read_lines(&theme, tables.iter().map(|table| (&*table.stamps_ns, &*table.columns[INFORMED])));
+        let readout = Readout { key, lines: &lines, factor: 1.0, unit: "", whole: true, principal: &|value| value };
+        plot_ui(ui, ctx, &area, &plot, &readout).on_hover_text(window::RANKS_OVER_TIME.meaning);
     }
 }
 

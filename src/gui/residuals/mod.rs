@@ -16,8 +16,9 @@ use super::convergence::empty_ui;
 use super::follow::RunTables;
 use super::help::terms::{Term, factors};
 use super::plot::{
-    Clicks, Curve, Interaction, PlotArea, Wheel, decimals_of_step, navigate, overflows, paint_cursor, paint_curve,
-    paint_ground, paint_value_grid, run_legend_ui, ticks, visible_range,
+    Clicks, Curve, Interaction, PlotArea, Readout, TIME_GUTTER, Wheel, decimals_of_step, overflows, paint_curve,
+    paint_ground, paint_time_axis, paint_value_axis, plot_ui, read_lines, run_legend_ui, ticks, value_range_of,
+    visible_range, within_gutters,
 };
 use super::theme::{CURVE_WIDTH, ROW_HEIGHT, Theme, label_font, number_font};
 use super::units::{fixed, significant};
@@ -73,7 +74,7 @@ impl ResidualsPanel {
         let top = ui.cursor().top();
         summary_ui(ui, &theme, report, histogram);
         let below = height - (ui.cursor().top() - top);
-        let over_time = (0.3 * height).max(44.0);
+        let over_time = (0.3 * height).max(60.0);
         histogram_ui(ui, &theme, histogram, (below - over_time - 24.0).max(60.0));
         self.over_time_ui(ui, ctx, over_time);
     }
@@ -87,7 +88,8 @@ impl ResidualsPanel {
             run_legend_ui(ui, ctx);
         });
         let height = height - (ui.cursor().top() - top);
-        let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
+        let (_, outer) = ui.allocate_space(vec2(ui.available_width(), height));
+        let rect = within_gutters(outer, TIME_GUTTER);
         let (begin_ns, end_ns) = visible_range(ctx);
         let mut area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: 1.0 };
         let tables = self.tables.read(&ctx.recording.runs, |step| [rms_px(&step.report)]);
@@ -97,20 +99,25 @@ impl ResidualsPanel {
         }
         let max_value =
             self.curves.iter().filter_map(|curve| curve.extent).map(|(_, max_value)| max_value).fold(0.0, f64::max);
-        area = area.with_values(0.0, if max_value > 0.0 { 1.1 * max_value } else { 1.0 });
-        let painter = ui.painter_at(rect);
+        let key = "Reprojection RMS over time";
+        let (low, high) = value_range_of(ctx, key, 0.0, if max_value > 0.0 { 1.1 * max_value } else { 1.0 });
+        area = area.with_values(low, high);
+        let painter = ui.painter_at(outer);
         paint_ground(&painter, &theme, rect);
-        paint_value_grid(&painter, &theme, &area, 1.0, (height / 22.0) as usize + 1);
+        paint_value_axis(&painter, &theme, &area, 1.0);
+        paint_time_axis(&painter, &theme, &area, TIME_GUTTER);
+        let inner = painter.with_clip_rect(rect.intersect(painter.clip_rect()));
         for (run, curve) in self.curves.iter().enumerate() {
-            paint_curve(&painter, &area, curve, theme.run(run), CURVE_WIDTH);
+            paint_curve(&inner, &area, curve, theme.run(run), CURVE_WIDTH);
         }
-        paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
         let id = ui.unique_id().with("rms over time");
         let value = ctx.selected_run().and_then(|run| run.step_at(ctx.cursor_ns));
         let value = value.map_or_else(String::new, |step| format!("{} px", fixed(rms_px(&step.report), 2)));
-        let (name, wheel) = ("Reprojection RMS over time", Wheel::in_list(self.overflows));
-        let plot = Interaction { id, name, value: &value, clicks: Clicks::Seek, wheel };
-        navigate(ui, ctx, &area, &plot)
+        let wheel = Wheel::in_list(self.overflows);
+        let plot = Interaction { id, name: key, value: &value, clicks: Clicks::Seek, wheel };
+        let lines = read_lines(&theme, tables.iter().map(|table| (&*table.stamps_ns, &*table.columns[0])));
+        let readout = Readout { key, lines: &lines, factor: 1.0, unit: " px", whole: false, principal: &|value| value };
+        plot_ui(ui, ctx, &area, &plot, &readout)
             .on_hover_text("Reprojection RMS after the solve, px (reprojection_rms_after_px in frames.csv)");
     }
 }

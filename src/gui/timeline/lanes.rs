@@ -8,7 +8,10 @@ use egui::{Align2, Color32, Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
 use super::model::{FEATURES, INFORMED, RMS, RunLanes, STRUCTURAL};
 use crate::gui::PanelContext;
 use crate::gui::events::{Mark, look_of, paint_mark};
-use crate::gui::plot::{Curve, PlotArea, paint_curve, paint_hatch, paint_steps, paint_value_grid, visible_segments};
+use crate::gui::plot::{
+    Curve, PlotArea, Readout, paint_curve, paint_hatch, paint_steps, paint_value_axis, paint_values, read_lines,
+    visible_segments,
+};
 use crate::gui::theme::{self, RunStyle, Theme};
 use crate::gui::units::fixed;
 use crate::sensors::{NEAREST_POSE_NS, PoseTrack};
@@ -17,6 +20,13 @@ use crate::sensors::{NEAREST_POSE_NS, PoseTrack};
 const MAX_BAR_HEIGHT: f32 = 24.0;
 /// Minimum height of a lane with a scale in points.
 const MIN_HEIGHT_WITH_SCALE: f32 = 28.0;
+/// Width of the scale of a lane in points.
+const SCALE_WIDTH: f32 = 34.0;
+
+/// Width of the scales of lanes of a height, in points; zero if they have none.
+pub(super) fn scale_width(height: f32) -> f32 {
+    if height >= MIN_HEIGHT_WITH_SCALE { SCALE_WIDTH } else { 0.0 }
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Lane {
@@ -174,7 +184,8 @@ pub(super) fn events(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[
     }
 }
 
-/// Draws a value of all runs as curves; integers as step curves.
+/// Draws a value of all runs as curves, integers as step curves, with a scale to the left of a high lane. Returns the
+/// area with its axis, `None` for a lane without a curve.
 pub(super) fn plotted_values(
     painter: &Painter,
     theme: &Theme,
@@ -182,8 +193,8 @@ pub(super) fn plotted_values(
     lane: Lane,
     runs: &[RunLanes],
     curves: &mut Vec<Curve>,
-) {
-    let Some(column) = lane.column() else { return };
+) -> Option<PlotArea> {
+    let column = lane.column()?;
     curves.resize_with(runs.len(), Curve::default);
     let mut max_value = 0.0_f64;
     for (lanes, curve) in runs.iter().zip(curves.iter_mut()) {
@@ -195,9 +206,10 @@ pub(super) fn plotted_values(
         }
     }
     let area = area.with_values(0.0, if max_value > 0.0 { max_value * 1.15 } else { 1.0 });
-    if area.rect.height() >= MIN_HEIGHT_WITH_SCALE {
-        paint_value_grid(painter, theme, &area, 1.0, (area.rect.height() / 22.0) as usize);
+    if scale_width(area.rect.height()) > 0.0 {
+        paint_value_axis(painter, theme, &area, 1.0);
     }
+    let painter = &painter.with_clip_rect(area.rect.intersect(painter.clip_rect()));
     for (run, curve) in curves.iter().enumerate() {
         let style = theme.run(run);
         if lane == Lane::Reprojection {
@@ -206,6 +218,20 @@ pub(super) fn plotted_values(
             paint_steps(painter, &area, curve, style, 1.2);
         }
     }
+    Some(area)
+}
+
+/// Draws the values of a lane at the reading cursors and at the pointer's time; `area` is that of [`plotted_values`].
+pub(super) fn read_values(painter: &Painter, ctx: &PanelContext<'_>, lane: Lane, area: &PlotArea, runs: &[RunLanes]) {
+    let Some(column) = lane.column() else { return };
+    let lines = read_lines(ctx.theme, runs.iter().map(|lanes| (&*lanes.stamps_ns, &*lanes.columns[column])));
+    let (unit, whole) = if lane == Lane::Reprojection { (" px", false) } else { ("", true) };
+    paint_values(
+        painter,
+        ctx,
+        area,
+        &Readout { key: "", lines: &lines, factor: 1.0, unit, whole, principal: &|it| it },
+    );
 }
 
 /// Draws hits of breakpoints: filled for enabled ones, in the colour of the run and in its section of the lane.

@@ -16,11 +16,12 @@ use self::model::RunLanes;
 use super::copied_value::offer;
 use super::events::name_of;
 use super::plot::{
-    Clicks, Curve, Interaction, PlotArea, Wheel, decimals_of_step, navigate, paint_ground, ticks, visible_range,
+    Clicks, Curve, Interaction, PlotArea, Wheel, decimals_of_step, navigate, paint_ground, paint_time_labels,
+    paint_times, register, ticks, visible_range,
 };
 use super::theme::{LANE_HEIGHT, LANE_LABEL_WIDTH, Theme, number_font};
 use super::units::{fixed, seconds};
-use super::{Panel, PanelContext};
+use super::{Panel, PanelContext, ReadingCursor};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::session::Command;
 
@@ -29,6 +30,8 @@ const RULER_HEIGHT: f32 = 18.0;
 const MAX_LABEL_WIDTH: f32 = 220.0;
 /// Maximum height of a lane in points.
 const MAX_LANE_HEIGHT: f32 = 90.0;
+/// Minimum height of a lane in points.
+const MIN_LANE_HEIGHT: f32 = 11.0;
 
 #[derive(Debug, Default)]
 pub struct TimelinePanel {
@@ -49,7 +52,16 @@ impl Panel for TimelinePanel {
         }
         transport::ui(ui, ctx, self.pace.reading());
         let rect = ui.available_rect_before_wrap();
-        let left = (rect.left() + self.label_width(ui, ctx)).min(rect.center().x);
+        let breaks = !ctx.playback.breakpoints.list().is_empty();
+        let shown: Vec<Lane> = (0..self.runs.len())
+            .map(Lane::Run)
+            .chain((0..ctx.recording.trajectories.len()).map(Lane::Trajectory))
+            .chain(breaks.then_some(Lane::Breakpoints))
+            .chain([Lane::Events, Lane::Rank, Lane::Features, Lane::Reprojection, Lane::Outliers, Lane::Warnings])
+            .collect();
+        let height = ((rect.height() - RULER_HEIGHT) / shown.len() as f32).clamp(MIN_LANE_HEIGHT, MAX_LANE_HEIGHT);
+        let scale = lanes::scale_width(height - 2.0);
+        let left = (rect.left() + self.label_width(ui, ctx) + scale).min(rect.center().x);
         let plot = Rect::from_min_max(pos2(left, rect.top()), rect.max - vec2(4.0, 0.0));
         if plot.width() < 8.0 || plot.height() < RULER_HEIGHT {
             return;
@@ -60,32 +72,33 @@ impl Panel for TimelinePanel {
         let area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0 };
         let theme = *ctx.theme;
         let painter = ui.painter_at(rect);
-        paint_ruler(&painter, &theme, &area);
+        paint_ruler(&painter, ctx, &area);
 
-        let breaks = !ctx.playback.breakpoints.list().is_empty();
-        let shown: Vec<Lane> = (0..self.runs.len())
-            .map(Lane::Run)
-            .chain((0..ctx.recording.trajectories.len()).map(Lane::Trajectory))
-            .chain(breaks.then_some(Lane::Breakpoints))
-            .chain([Lane::Events, Lane::Rank, Lane::Features, Lane::Reprojection, Lane::Outliers, Lane::Warnings])
-            .collect();
-        let lanes_height = plot.height() - RULER_HEIGHT;
-        let height = (lanes_height / shown.len() as f32).clamp(11.0, MAX_LANE_HEIGHT);
+        let mut read = Vec::new();
         for (place, lane) in shown.iter().enumerate() {
             let top = plot.top() + RULER_HEIGHT + place as f32 * height;
             if top + height > rect.bottom() + 1.0 {
                 break;
             }
             let lane_rect = Rect::from_min_size(pos2(plot.left(), top), vec2(plot.width(), height - 2.0));
-            let label_rect = Rect::from_min_max(pos2(rect.left(), top), pos2(plot.left(), top + height - 2.0));
-            self.lane(ui, ctx, *lane, PlotArea { rect: lane_rect, ..area }, label_rect);
+            let label_rect = Rect::from_min_max(pos2(rect.left(), top), pos2(plot.left() - scale, top + height - 2.0));
+            let axis = self.lane(ui, ctx, *lane, PlotArea { rect: lane_rect, ..area }, label_rect);
+            read.extend(axis.map(|area| (*lane, area)));
         }
         let lane_y = |run: usize| plot.top() + RULER_HEIGHT + (run as f32 + 0.5) * height - 1.0;
         paint_forks(&painter, ctx, &area, lane_y);
         paint_range(&painter, ctx, &area);
         paint_markers(&painter, &theme, &area, &ctx.playback.markers_ns);
         paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
+        let below_ruler = PlotArea { rect: plot.with_min_y(plot.top() + RULER_HEIGHT), ..area };
+        paint_times(&painter, ctx, &below_ruler);
+        paint_time_labels(&painter, ctx, &area, plot.top() + 1.0, false);
+        paint_interval(&painter, ctx, &area);
+        for (lane, area) in read {
+            lanes::read_values(&painter, ctx, lane, &area, &self.runs);
+        }
 
+        register(ui, &area, "");
         let id = ui.unique_id().with("timeline");
         let value = self.value_text(ctx);
         let (clicks, wheel) = (Clicks::Scrub, Wheel::Zooms);
@@ -115,9 +128,18 @@ impl TimelinePanel {
             .min(MAX_LABEL_WIDTH)
     }
 
-    fn lane(&mut self, ui: &Ui, ctx: &PanelContext<'_>, lane: Lane, area: PlotArea, label_rect: Rect) {
+    /// Draws a lane; returns its area with the value axis if it has curves.
+    fn lane(
+        &mut self,
+        ui: &Ui,
+        ctx: &PanelContext<'_>,
+        lane: Lane,
+        area: PlotArea,
+        label_rect: Rect,
+    ) -> Option<PlotArea> {
         let theme = *ctx.theme;
         let painter = ui.painter_at(area.rect.union(label_rect));
+        let mut axis = None;
         let inner = painter.with_clip_rect(area.rect.intersect(painter.clip_rect()));
         paint_ground(&painter, &theme, area.rect);
         match lane {
@@ -133,9 +155,14 @@ impl TimelinePanel {
             }
             Lane::Breakpoints => lanes::breakpoints(&inner, &theme, &area, ctx),
             Lane::Events => lanes::events(&inner, &theme, &area, &self.runs),
-            Lane::Rank => lanes::plotted_values(&inner, &theme, &area, lane, &self.runs, &mut self.curves[0]),
-            Lane::Features => lanes::plotted_values(&inner, &theme, &area, lane, &self.runs, &mut self.curves[1]),
-            Lane::Reprojection => lanes::plotted_values(&inner, &theme, &area, lane, &self.runs, &mut self.curves[2]),
+            Lane::Rank | Lane::Features | Lane::Reprojection => {
+                let curves = match lane {
+                    Lane::Rank => &mut self.curves[0],
+                    Lane::Features => &mut self.curves[1],
+                    _ => &mut self.curves[2],
+                };
+                axis = lanes::plotted_values(&painter, &theme, &area, lane, &self.runs, curves);
+            }
             Lane::Outliers => lanes::outliers(&inner, &theme, &area, &self.runs),
             Lane::Warnings => {
                 let stamps_ns: Vec<i64> = ctx.recording.warnings.iter().map(|warning| warning.stamp_ns).collect();
@@ -154,6 +181,7 @@ impl TimelinePanel {
         let text = value.map_or_else(|| lane.name(ctx), |value| format!("{} {value}", lane.name(ctx)));
         label.widget_info(|| WidgetInfo::labeled(Role::Label, true, &text));
         label.on_hover_text(format!("{}\n{}", lane.name(ctx), lane.meaning()));
+        axis
     }
 
     /// Position of the cursor, the frame there, and the visible range.
@@ -190,7 +218,6 @@ impl TimelinePanel {
         const REACH: f32 = 5.0;
         let Some(pointer) = response.hover_pos() else { return };
         let stamp_ns = area.stamp_ns_at(pointer.x);
-        ui.painter_at(area.rect).vline(pointer.x, area.rect.y_range(), Stroke::new(1.0, ctx.theme.outline));
         let reach_ns = area.stamp_ns_at(pointer.x + REACH) - stamp_ns;
         let near = |other_ns: i64| (other_ns - stamp_ns).abs() <= reach_ns;
         let mut text = format!("{} s", seconds(stamp_ns));
@@ -262,8 +289,27 @@ fn paint_range(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotArea)
     }
 }
 
+/// Draws the length of the interval between the reading cursors in the ruler, between their names if it fits there.
+fn paint_interval(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotArea) {
+    let reading = &ctx.selection.reading;
+    let ends = ReadingCursor::ALL.map(|cursor| reading.cursor_ns(cursor).map(|stamp_ns| area.x(stamp_ns)));
+    let (Some(interval_ns), [Some(a), Some(b)]) = (reading.interval_ns(), ends) else { return };
+    let text = format!("Δt {} s", seconds(interval_ns));
+    let galley = painter.layout_no_wrap(text, number_font(), ctx.theme.accent);
+    let inside = galley.size().x + 90.0 < (b - a).abs();
+    let left = if inside { 0.5 * (a + b - galley.size().x) } else { a.max(b) + 40.0 };
+    let place = pos2(left.min(area.rect.right() - galley.size().x), area.rect.top());
+    painter.rect_filled(Rect::from_min_size(place, galley.size()).expand2(vec2(8.0, 0.0)), 2.0, ctx.theme.surface);
+    painter.galley(place, galley, ctx.theme.accent);
+}
+
 /// Seconds along the upper edge, with a grid line through the lanes for each.
-fn paint_ruler(painter: &egui::Painter, theme: &Theme, area: &PlotArea) {
+fn paint_ruler(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotArea) {
+    /// Distance in points to a reading cursor, whose name replaces the label.
+    const TAKEN: f32 = 58.0;
+    let theme = ctx.theme;
+    let cursors = ReadingCursor::ALL.map(|cursor| ctx.selection.reading.cursor_ns(cursor));
+    let taken = |x: f32| cursors.iter().flatten().any(|stamp_ns| (area.x(*stamp_ns) - x).abs() < TAKEN);
     let (begin_s, end_s) = (seconds_from_ns(area.begin_ns), seconds_from_ns(area.end_ns));
     let (marks, step) = ticks(begin_s, end_s, ((area.rect.width() / 70.0) as usize).max(1));
     for mark in marks {
@@ -277,7 +323,9 @@ fn paint_ruler(painter: &egui::Painter, theme: &Theme, area: &PlotArea) {
         } else {
             Align2::CENTER_TOP
         };
-        painter.text(pos2(x, area.rect.top()), align, text, number_font(), theme.text_weak);
+        if !taken(x) {
+            painter.text(pos2(x, area.rect.top()), align, text, number_font(), theme.text_weak);
+        }
     }
 }
 

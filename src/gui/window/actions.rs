@@ -5,7 +5,7 @@ use egui::{Event, Key, KeyboardShortcut, Modifiers, Popup, Ui};
 use super::tiles::Preset;
 use crate::frontend::FeatureId;
 use crate::gui::theme::ThemeName;
-use crate::gui::{Dialog, PanelName};
+use crate::gui::{Dialog, PanelName, ReadingCursor};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Action {
@@ -32,6 +32,15 @@ pub(crate) enum Action {
     WholeLog,
     /// Zoom the time axis of all plots in (`true`) or out, about the cursor.
     ZoomTime(bool),
+    /// Set a reading cursor at the pointer's time in a plot, else at the playback cursor.
+    SetReading(ReadingCursor),
+    ClearReading,
+    /// Show or hide events and rank losses as lines in all plots.
+    EventLines,
+    /// Fix the value range of the plot under the pointer, or let it follow the data again.
+    LockValues,
+    /// Let the value ranges of all plots follow the data.
+    FollowValues,
     /// Clear the selection and close open lists.
     Dismiss,
     /// Show the next run in the panels that show one.
@@ -62,6 +71,8 @@ pub(crate) enum Action {
     SavedLayout(usize),
     /// Move the focus to the next (`true`) or previous panel on the screen.
     NextPanel(bool),
+    /// Maximize the focused panel, or restore the others.
+    Maximize,
     /// Toggle between dark and light theme.
     Theme,
     SetTheme(ThemeName),
@@ -113,7 +124,9 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Step(10), "Ten frames forward", "Shift+Right", &[(SHIFT, Key::ArrowRight)]),
     entry(Action::Step(-10), "Ten frames back", "Shift+Left", &[(SHIFT, Key::ArrowLeft)]),
     entry(Action::Hit(false), "Run back to the previous breakpoint hit", "Shift+N", &[(SHIFT, Key::N)]),
+    entry(Action::FollowValues, "Free the value axes of all plots", "Shift+Y", &[(SHIFT, Key::Y)]),
     entry(Action::NextPanel(false), "Focus the previous panel", "Shift+F6", &[(SHIFT, Key::F6)]),
+    entry(Action::Maximize, "Maximize the focused panel, or restore", "Ctrl+M", &[(CTRL, Key::M)]),
     entry(Action::Dialog(Dialog::Settings), "Settings…", "Ctrl+,", &[(CTRL, Key::Comma)]),
     entry(Action::Dialog(Dialog::OpenLog), "Open log or session…", "Ctrl+O", &[(CTRL, Key::O)]),
     entry(Action::Export, "Export focused panel (PNG, SVG, CSV)", "Ctrl+E", &[(CTRL, Key::E)]),
@@ -135,6 +148,11 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::WholeLog, "Zoom out to the whole log", "Z", &[(NONE, Key::Z)]),
     entry(Action::ZoomTime(true), "Zoom in on the cursor", "+", &[(NONE, Key::Plus), (NONE, Key::Equals)]),
     entry(Action::ZoomTime(false), "Zoom out from the cursor", "-", &[(NONE, Key::Minus)]),
+    entry(Action::SetReading(ReadingCursor::A), "Set reading cursor A at the pointer", "C", &[(NONE, Key::C)]),
+    entry(Action::SetReading(ReadingCursor::B), "Set reading cursor B at the pointer", "V", &[(NONE, Key::V)]),
+    entry(Action::ClearReading, "Clear the reading cursors", "X", &[(NONE, Key::X)]),
+    entry(Action::EventLines, "Show events and rank losses in all plots", "E", &[(NONE, Key::E)]),
+    entry(Action::LockValues, "Fix or free the value axis under the pointer", "Y", &[(NONE, Key::Y)]),
     entry(Action::NextRun, "Show the next run", "R", &[(NONE, Key::R)]),
     entry(Action::Dialog(Dialog::Fork), "Fork the shown run at the cursor…", "F", &[(NONE, Key::F)]),
     entry(Action::Dialog(Dialog::AddRun), "Add a run…", "A", &[(NONE, Key::A)]),

@@ -24,6 +24,8 @@ pub(super) struct History {
     current: Option<Arrangement>,
     /// State after a change that is not yet recorded.
     pending: Option<Arrangement>,
+    /// Message about an act after the last change that cannot be undone.
+    barrier: Option<String>,
 }
 
 impl History {
@@ -59,9 +61,20 @@ impl History {
         let Some(now) = self.pending.take() else { return };
         self.before.extend(self.current.replace(now));
         self.undone.clear();
+        self.barrier = None;
         if self.before.len() > MAX_CHANGES {
             self.before.pop_front();
         }
+    }
+
+    /// Lets the next undo report that the last act cannot be undone, instead of undoing an older change.
+    pub(super) fn set_barrier(&mut self, message: String) {
+        self.record();
+        self.barrier = Some(message);
+    }
+
+    pub(super) fn take_barrier(&mut self) -> Option<String> {
+        self.barrier.take()
     }
 
     pub(super) fn can_undo(&self) -> bool {
@@ -133,6 +146,24 @@ mod tests {
         complete(&mut history, &settings, &layout);
         assert!(!history.can_redo());
         assert_eq!(history.undo().map(|step| step.settings.theme), Some(ThemeName::default()));
+    }
+
+    #[test]
+    fn an_act_without_undo_is_not_skipped() {
+        let (mut settings, layout) = (Settings::default(), PanelLayout::default());
+        let mut history = History::default();
+        complete(&mut history, &settings, &layout);
+        settings.scale = 2.0;
+        complete(&mut history, &settings, &layout);
+        history.set_barrier("removed".to_owned());
+        assert_eq!(history.take_barrier().as_deref(), Some("removed"));
+        assert_eq!(history.take_barrier(), None);
+        // A change after the act is undone as usual.
+        history.set_barrier("removed".to_owned());
+        settings.scale = 3.0;
+        complete(&mut history, &settings, &layout);
+        assert_eq!(history.take_barrier(), None);
+        assert_eq!(history.undo().map(|step| step.settings.scale), Some(2.0));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::gui::plot::paint_line;
 use crate::gui::theme::{self, CURVE_WIDTH, RunStyle, Theme};
 use crate::gui::units::fixed;
 use crate::session::accuracy::ErrorStatistics;
-use crate::session::{Command, RunRecord, StepRecord, TrajectoryLane};
+use crate::session::{RunRecord, StepRecord, TrajectoryLane};
 
 /// Accuracy of one run, and the number of steps from which it was computed.
 #[derive(Debug, Default)]
@@ -46,18 +46,22 @@ impl RunLegend {
     }
 
     /// Draws one entry per run, then one per trajectory, in a total `width`; a click selects the run. Long names are
-    /// shortened.
-    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, accuracy: bool, width: f32) {
+    /// shortened. Returns the index of a run that is to be removed.
+    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, accuracy: bool, width: f32) -> Option<usize> {
         self.update(ctx);
         let count = (self.runs.len() + ctx.recording.trajectories.len()).max(1) as f32;
         let enough = self.widths(ui, ctx)[usize::from(!accuracy)] <= width + 0.5;
         let max_width = if enough { f32::INFINITY } else { width / count - ui.spacing().item_spacing.x };
+        let mut removed = None;
         for (number, (run, known)) in ctx.recording.runs.iter().zip(&self.runs).enumerate() {
-            entry_ui(ui, ctx, number, run, known, accuracy, max_width);
+            if entry_ui(ui, ctx, number, run, known, accuracy, max_width) {
+                removed = Some(number);
+            }
         }
         for (number, lane) in ctx.recording.trajectories.iter().enumerate() {
             lane_ui(ui, ctx, number, lane, accuracy, max_width);
         }
+        removed
     }
 
     fn update(&mut self, ctx: &PanelContext<'_>) {
@@ -141,6 +145,7 @@ impl Entry {
     }
 }
 
+/// Draws the entry of a run; returns true if the run is to be removed.
 fn entry_ui(
     ui: &mut Ui,
     ctx: &mut PanelContext<'_>,
@@ -149,7 +154,7 @@ fn entry_ui(
     known: &RunAccuracy,
     accuracy: bool,
     max_width: f32,
-) {
+) -> bool {
     let theme = *ctx.theme;
     let shown = ctx.selection.run == number;
     let text_color = if shown { theme.text_strong } else { theme.text };
@@ -170,9 +175,10 @@ fn entry_ui(
     if response.clicked() {
         ctx.selection.run = number;
     }
+    let mut removed = false;
     response.context_menu(|ui| {
-        if ui.button("Remove run").clicked() {
-            ctx.commands.push(Command::RemoveRun(number));
+        if ui.button("Remove run…").clicked() {
+            removed = true;
             ui.close();
         }
     });
@@ -180,6 +186,7 @@ fn entry_ui(
     response.on_hover_ui(|ui| {
         ui.label(details(run, known.statistics.as_ref()));
     });
+    removed
 }
 
 /// Draws the entry of a trajectory of another program; it cannot be selected, as it has no calibration and no features.

@@ -11,7 +11,7 @@ use super::state::MainWindow;
 use super::tiles::Preset;
 use crate::gui::theme::{MAX_RUNS, ThemeName};
 use crate::gui::timeline::SPEEDS;
-use crate::gui::{Dialog, PanelContext, PanelName};
+use crate::gui::{Dialog, PanelContext, PanelName, ReadingCursor};
 use crate::text::Named;
 
 /// Maximum number of recent files in the menu.
@@ -57,8 +57,16 @@ impl Menu {
                     Action::SavedLayout(0),
                 ],
                 &[Action::ZoomTime(true), Action::ZoomTime(false), Action::WholeLog],
+                &[
+                    Action::SetReading(ReadingCursor::A),
+                    Action::SetReading(ReadingCursor::B),
+                    Action::ClearReading,
+                    Action::EventLines,
+                    Action::LockValues,
+                    Action::FollowValues,
+                ],
                 &[Action::Dismiss, Action::Warnings],
-                &[Action::NextPanel(true), Action::NextPanel(false), Action::Theme],
+                &[Action::NextPanel(true), Action::NextPanel(false), Action::Maximize, Action::Theme],
             ],
             Self::Run => &[
                 &[Action::Dialog(Dialog::AddRun), Action::Dialog(Dialog::Fork), Action::NextRun],
@@ -129,7 +137,8 @@ fn entry_ui(ui: &mut Ui, state: &MainWindow, ctx: &PanelContext<'_>, entry: &Ent
     }
     let room = ctx.recording.runs.len() < MAX_RUNS;
     let enabled = room || !matches!(entry.action, Action::Dialog(Dialog::AddRun | Dialog::Fork));
-    let on = matches!(entry.action, Action::Layout(preset) if state.layout.preset == Some(preset));
+    let on = matches!(entry.action, Action::Layout(preset) if state.layout.preset == Some(preset))
+        || entry.action == Action::EventLines && state.settings.event_lines;
     if item_ui(ui, entry.name, entry.keys, enabled, on) {
         actions.push(entry.action);
     }
@@ -171,7 +180,7 @@ fn first_group_ui(ui: &mut Ui, menu: Menu, state: &mut MainWindow, ctx: &PanelCo
                 }
             }
             if let Some(last) = runs.last().filter(|_| runs.len() > 1)
-                && item_ui(ui, &format!("Remove run {}", last.spec.label), "", true, false)
+                && item_ui(ui, &format!("Remove run {}…", last.spec.label), "", true, false)
             {
                 actions.push(Action::RemoveRun(runs.len() - 1));
             }

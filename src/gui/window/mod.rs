@@ -4,6 +4,8 @@
 
 mod actions;
 mod copying;
+#[cfg(test)]
+mod dialog_tests;
 mod dialogs;
 #[cfg(test)]
 mod figure_tests;
@@ -22,6 +24,8 @@ mod perform;
 #[cfg(test)]
 mod pointer_tests;
 mod progress;
+#[cfg(test)]
+mod reading_tests;
 mod request;
 mod saved_layouts;
 mod settings;
@@ -33,6 +37,8 @@ mod tests;
 mod tiles;
 mod top_bar;
 mod tour;
+
+use std::sync::Arc;
 
 use egui::{CentralPanel, Frame, Margin, Rect, Ui, UiBuilder, vec2};
 
@@ -49,7 +55,9 @@ pub use self::saved_layouts::SavedLayouts;
 pub use self::settings::{SCALES, Settings};
 pub use self::state::MainWindow;
 pub use self::tiles::Preset;
+use self::tiles::TabClicks;
 use super::help;
+use super::plot::plot_under_pointer;
 use super::timeline::TimelinePanel;
 use super::{Panel as _, PanelContext, PanelName};
 
@@ -60,6 +68,7 @@ const STATUS_HEIGHT: f32 = 22.0;
 pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
     let theme = *ctx.theme;
     ctx.move_chain();
+    read_pointer(ui, state, ctx);
     tour::keys(ui, state);
     // Shortcuts have no effect while a dialog is open.
     let mut actions: Vec<Action> = if state.dialogs.is_open() { Vec::new() } else { actions::pressed(ui) };
@@ -80,12 +89,12 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
     let below = state.below_height.unwrap_or(wanted + STATUS_HEIGHT);
     let rest = ui.available_rect_before_wrap();
     let above = rest.with_max_y((rest.bottom() - below).max(rest.top()));
-    let mut asked = None;
+    let mut clicks = TabClicks::default();
     state.places.clear();
     let ground = Frame::new().fill(theme.background).inner_margin(Margin::same(3));
     let mut panels_ui = ui.new_child(UiBuilder::new().max_rect(above));
     CentralPanel::no_frame().frame(ground).show(&mut panels_ui, |ui| {
-        asked = state.layout.ui(ui, &mut state.panels, ctx, state.focus, &mut state.places);
+        clicks = state.layout.ui(ui, &mut state.panels, ctx, state.focus, &mut state.places);
     });
 
     // The status bar is laid out first, because it is the lowest.
@@ -99,7 +108,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
         state.panels.timeline.ui(ui, ctx);
         let place = UiBuilder::new().max_rect(Rect::from_min_size(corner, vec2(20.0, 18.0)));
         let pressed = ui.scope_builder(place, |ui| help::button_ui(ui, &theme, PanelName::Timeline)).inner;
-        asked = pressed.then_some(PanelName::Timeline).or(asked);
+        clicks.asked = pressed.then_some(PanelName::Timeline).or(clicks.asked);
     });
     state.places.push((PanelName::Timeline, timeline.response.rect));
     ui.scope_builder(UiBuilder::new().max_rect(status.inner), |ui| status_bar::ui(ui, state, ctx));
@@ -108,7 +117,8 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
         ui.request_repaint();
     }
     state.follow_focus(ui);
-    if let Some(panel) = asked {
+    state.focus = clicks.focused.or(state.focus);
+    if let Some(panel) = clicks.asked {
         state.help.toggle(ui.ctx(), panel);
     }
     actions.extend(state.panels.comparison.asked.take().map(Action::Dialog));
@@ -120,7 +130,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
     state.help.ui(ui, &theme, &state.places);
     state.notices.toasts_ui(ui, &theme);
     state.ring.ui(ui, &theme);
-    copying::menu_ui(ui, state, ctx);
+    copying::menu_ui(ui, state, ctx, &mut actions);
     if actions.contains(&Action::Copy) {
         state.pointed = copying::value_under_pointer(ui);
     }
@@ -134,4 +144,14 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
     if let Some(text) = state.copied.take() {
         ui.copy_text(text);
     }
+}
+
+/// Finds the plot under the pointer before the panels are drawn, and sets what all plots show.
+fn read_pointer(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
+    let pointed = plot_under_pointer(ui);
+    let reading = &mut ctx.selection.reading;
+    reading.pointer_ns = pointed.as_ref().map(|(_, stamp_ns)| *stamp_ns);
+    state.pointed_plot = pointed.map(|(plot, _)| plot);
+    reading.events =
+        if state.settings.event_lines { state.event_lines.read(&ctx.recording.runs) } else { Arc::default() };
 }

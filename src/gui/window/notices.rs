@@ -1,6 +1,8 @@
 //! Messages for the user: toasts, a banner for stopped runs, a list of all warnings.
 
-use egui::{Align2, Area, Button, Frame, Id, Margin, Order, Panel, RichText, ScrollArea, Ui, vec2};
+use std::collections::VecDeque;
+
+use egui::{Align2, Area, Button, Color32, Frame, Id, Margin, Order, Panel, RichText, ScrollArea, Ui, vec2};
 
 use crate::gui::PanelContext;
 use crate::gui::theme::{Theme, dialog_frame};
@@ -14,12 +16,31 @@ pub enum NoticeLevel {
     Info,
     /// A problem that does not stop the operation.
     Warning,
-    /// A failed operation; the message stays until it is dismissed.
+    /// A failed operation.
     Error,
 }
 
-/// Seconds for which a message below error level is shown.
-const SHOWN_S: f64 = 8.0;
+/// Maximum number of messages that are kept for the list.
+const MAX_KEPT: usize = 100;
+
+impl NoticeLevel {
+    /// Seconds for which a message is shown; the pointer on it holds it.
+    const fn shown_s(self) -> f64 {
+        match self {
+            Self::Info => 8.0,
+            Self::Warning => 12.0,
+            Self::Error => 40.0,
+        }
+    }
+
+    fn look(self, theme: &Theme) -> (&'static str, Color32) {
+        match self {
+            Self::Info => ("ℹ", theme.accent),
+            Self::Warning => ("⚠", theme.warn),
+            Self::Error => ("✖", theme.error),
+        }
+    }
+}
 
 #[derive(Debug)]
 struct Toast {
@@ -32,6 +53,8 @@ struct Toast {
 #[derive(Debug, Default)]
 pub struct Notices {
     toasts: Vec<Toast>,
+    /// Messages so far, the newest last.
+    kept: VecDeque<(NoticeLevel, String)>,
     /// True if the list of warnings is open.
     pub list_open: bool,
 }
@@ -40,32 +63,30 @@ impl Notices {
     pub fn show_message(&mut self, level: NoticeLevel, text: impl Into<String>) {
         let text = text.into();
         if !self.toasts.iter().any(|toast| toast.text == text) {
+            self.kept.push_back((level, text.clone()));
+            if self.kept.len() > MAX_KEPT {
+                self.kept.pop_front();
+            }
             self.toasts.push(Toast { level, text, since_s: None });
         }
     }
 
-    /// Draws the messages in the corner.
+    /// Draws the messages above the status bar, where they cover no verdict.
     pub(crate) fn toasts_ui(&mut self, ui: &Ui, theme: &Theme) {
         let now_s = ui.input(|input| input.time);
         for toast in &mut self.toasts {
             toast.since_s.get_or_insert(now_s);
         }
-        self.toasts.retain(|toast| {
-            toast.level == NoticeLevel::Error || toast.since_s.is_none_or(|since_s| now_s - since_s < SHOWN_S)
-        });
+        self.toasts.retain(|toast| toast.since_s.is_none_or(|since_s| now_s - since_s < toast.level.shown_s()));
         if self.toasts.is_empty() {
             return;
         }
         let mut dismissed = None;
         let area =
-            Area::new(Id::unique("notices")).order(Order::Foreground).anchor(Align2::RIGHT_TOP, vec2(-12.0, 40.0));
-        area.show(ui.ctx(), |ui| {
+            Area::new(Id::unique("notices")).order(Order::Foreground).anchor(Align2::RIGHT_BOTTOM, vec2(-12.0, -30.0));
+        let shown = area.show(ui.ctx(), |ui| {
             for (number, toast) in self.toasts.iter().enumerate() {
-                let (mark, color) = match toast.level {
-                    NoticeLevel::Info => ("ℹ", theme.accent),
-                    NoticeLevel::Warning => ("⚠", theme.warn),
-                    NoticeLevel::Error => ("✖", theme.error),
-                };
+                let (mark, color) = toast.level.look(theme);
                 dialog_frame(theme).inner_margin(8).show(ui, |ui| {
                     ui.set_max_width(420.0);
                     ui.horizontal_top(|ui| {
@@ -83,7 +104,13 @@ impl Notices {
         if let Some(number) = dismissed {
             self.toasts.remove(number);
         }
-        if self.toasts.iter().any(|toast| toast.level != NoticeLevel::Error) {
+        // A message is not taken away while it is read.
+        if shown.response.contains_pointer() {
+            for toast in &mut self.toasts {
+                toast.since_s = Some(now_s);
+            }
+        }
+        if !self.toasts.is_empty() {
             ui.ctx().request_repaint_after(std::time::Duration::from_secs(1));
         }
     }
@@ -97,6 +124,13 @@ impl Notices {
             let warnings = warning_lines(ctx.recording);
             if warnings.is_empty() {
                 ui.label(RichText::new("No warnings").color(theme.text_weak));
+            }
+            for (level, text) in self.kept.iter().filter(|(level, _)| *level != NoticeLevel::Info) {
+                let (mark, color) = level.look(&theme);
+                ui.horizontal_top(|ui| {
+                    ui.label(RichText::new(mark).color(color));
+                    ui.add(egui::Label::new(RichText::new(text).color(theme.text)).wrap());
+                });
             }
             ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
                 for warning in warnings {
@@ -126,5 +160,34 @@ pub(super) fn banner_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
             let text = format!("✖ Run {} stopped: {error}", run.spec.label);
             ui.add(egui::Label::new(RichText::new(text).color(theme.text_strong)).wrap());
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gui::rendering::headless::{Headless, HeadlessOptions};
+    use crate::gui::theme::ThemeName;
+
+    #[test]
+    fn messages_leave_by_themselves_and_are_low_in_the_window() {
+        let theme = Theme::of(ThemeName::Light);
+        let options = HeadlessOptions { size_px: [800, 600], pixels_per_point: 1.0, theme: theme.name };
+        // A frame per second.
+        let mut headless = Headless::new(options);
+        let mut notices = Notices::default();
+        notices.show_message(NoticeLevel::Info, "copied");
+        notices.show_message(NoticeLevel::Error, "failed");
+        let mut shown = Vec::new();
+        for second in 0..50 {
+            headless.frame(Vec::new(), |ui| notices.toasts_ui(ui, &theme)).textures.clear();
+            shown.push(notices.toasts.len());
+            let area = headless.context().memory(|memory| memory.area_rect(Id::unique("notices")));
+            // Its size is known after the first frames.
+            let low = area.is_some_and(|area| area.top() > 400.0);
+            assert!(second < 3 || notices.toasts.is_empty() || low, "{area:?}");
+        }
+        assert_eq!((shown[3], shown[20], shown[49]), (2, 1, 0), "{shown:?}");
+        assert_eq!(notices.kept.len(), 2, "the list has them still");
     }
 }

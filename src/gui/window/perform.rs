@@ -24,6 +24,22 @@ pub(super) fn perform(action: Action, state: &mut MainWindow, ctx: &mut PanelCon
         Action::Hit(forward) => ctx.commands.push(Command::RunToBreakpoint { forward }),
         Action::Marker => ctx.commands.push(Command::ToggleMarker),
         Action::WholeLog => ctx.selection.visible_ns = None,
+        Action::SetReading(cursor) => {
+            let stamp_ns = ctx.selection.reading.pointer_ns.unwrap_or(ctx.cursor_ns);
+            ctx.selection.reading.set_cursor(cursor, stamp_ns.clamp(0, ctx.recording.duration_ns.max(0)));
+        }
+        Action::ClearReading => ctx.selection.reading.clear_cursors(),
+        Action::EventLines => state.settings.event_lines = !state.settings.event_lines,
+        Action::LockValues => match &state.pointed_plot {
+            Some(plot) if !plot.key.is_empty() => {
+                ctx.selection.reading.toggle_fixed(&plot.key, [plot.area.low, plot.area.high]);
+            }
+            _ => {
+                let text = "No plot with a value axis is under the pointer";
+                state.notices.show_message(NoticeLevel::Info, text);
+            }
+        },
+        Action::FollowValues => ctx.selection.reading.fixed_values.clear(),
         Action::Dismiss if state.help.manual.is_open() => state.help.manual.close(),
         Action::Dismiss if state.tour.is_running() => state.tour.end(),
         Action::Tour => state.tour.start(),
@@ -62,6 +78,10 @@ pub(super) fn perform(action: Action, state: &mut MainWindow, ctx: &mut PanelCon
             }
         }
         Action::NextPanel(forward) => state.focus_neighbour(forward),
+        Action::Maximize => {
+            let (panel, _) = state.focused();
+            state.layout.toggle_maximized(panel);
+        }
         Action::Theme => {
             state.settings.theme = if ctx.theme.is_dark() { ThemeName::Light } else { ThemeName::Dark };
         }
@@ -69,7 +89,7 @@ pub(super) fn perform(action: Action, state: &mut MainWindow, ctx: &mut PanelCon
         Action::GoTo(stamp_ns) => ctx.commands.push(Command::Seek { stamp_ns }),
         Action::Feature(feature) => ctx.selection.feature = Some(feature),
         Action::Run(run) => ctx.selection.run = run,
-        Action::RemoveRun(run) => ctx.commands.push(Command::RemoveRun(run)),
+        Action::RemoveRun(run) => state.dialogs.ask_to_remove(run),
         Action::Show(panel) => {
             if panel != PanelName::Timeline {
                 state.layout.set_visible(panel, true);

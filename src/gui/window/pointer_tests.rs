@@ -244,3 +244,48 @@ fn the_value_under_the_pointer_or_the_table_is_copied() {
     assert!(table.starts_with("time_s,") || table.contains("I.rx"), "{}", &table[..80.min(table.len())]);
     assert!(harness.query_by_label("Copy value").is_none(), "the menu closes");
 }
+
+#[test]
+fn a_tab_focuses_its_panel_and_a_double_click_maximizes_it() {
+    let mut harness = bench();
+    let tab = |harness: &Harness<'static, Bench>, name: &str| {
+        // Buttons of the layouts have the same names.
+        let mut tabs = harness.query_all_by_role_and_label(Role::Button, name).map(|node| node.rect());
+        let tab = tabs.find(|rect| rect.top() > 28.0).unwrap_or_else(|| panic!("no tab {name}"));
+        tab.left_center() + vec2(12.0, 0.0)
+    };
+    let at = tab(&harness, "Scene");
+    click(&mut harness, at, PointerButton::Primary);
+    assert_eq!(harness.state().window.focus, Some(PanelName::Scene));
+    let double_click = |harness: &mut Harness<'static, Bench>, at: Pos2| {
+        harness.event(Event::PointerMoved(at));
+        harness.run_steps(4);
+        // In one frame: the frames of the harness are longer than the pause between two clicks.
+        let clicks = [true, false, true, false].map(|pressed| press(at, PointerButton::Primary, pressed));
+        harness.input_mut().events.extend(clicks);
+        harness.run_steps(4);
+    };
+    let at = tab(&harness, "Scene");
+    double_click(&mut harness, at);
+    assert_eq!(harness.state().window.layout.maximized(), Some(PanelName::Scene));
+    let shown = |harness: &Harness<'static, Bench>| harness.state().window.places.len();
+    assert_eq!(shown(&harness), 2, "the panel and the timeline");
+    let at = tab(&harness, "Scene");
+    double_click(&mut harness, at);
+    assert_eq!(harness.state().window.layout.maximized(), None);
+    assert!(shown(&harness) > 4);
+    // By key, and another layout restores the panels.
+    for _ in 0..2 {
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::M);
+        harness.run_steps(3);
+    }
+    assert!(shown(&harness) > 4);
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::M);
+    harness.run_steps(3);
+    assert_eq!(shown(&harness), 2);
+    harness.key_press(Key::Num2);
+    harness.run_steps(3);
+    assert!(shown(&harness) > 4);
+    // The size of a maximized panel is no change that undo reverts.
+    assert_eq!(harness.state().window.layout.preset, Some(Preset::Calibration));
+}

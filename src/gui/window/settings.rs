@@ -24,6 +24,8 @@ pub struct Settings {
     pub layout: String,
     /// Initial speed of playback in log seconds per second.
     pub speed: f64,
+    /// True if all plots show events and rank losses as vertical lines.
+    pub event_lines: bool,
 }
 
 impl Default for Settings {
@@ -34,6 +36,7 @@ impl Default for Settings {
             memory_mib: DEFAULT_MEMORY_BUDGET_BYTES >> 20,
             layout: LAST_LAYOUT.to_owned(),
             speed: 1.0,
+            event_lines: false,
         }
     }
 }
@@ -82,8 +85,14 @@ mod tests {
 
     #[test]
     fn settings_are_restored_and_invalid_entries_affect_nothing_else() {
-        let settings =
-            Settings { theme: ThemeName::Print, scale: 1.5, memory_mib: 700, layout: "mine".to_owned(), speed: 0.5 };
+        let settings = Settings {
+            theme: ThemeName::Print,
+            scale: 1.5,
+            memory_mib: 700,
+            layout: "mine".to_owned(),
+            speed: 0.5,
+            event_lines: true,
+        };
         assert_eq!(Settings::from_text(&settings.to_text(), ThemeName::Light), settings);
         let standard = Settings { theme: ThemeName::Light, ..Settings::default() };
         for text in ["", "no json", "[]", "{}", "{\"scale\": \"large\", \"theme\": \"pink\"}"] {

@@ -6,13 +6,16 @@ use super::menu::Menu;
 use crate::gui::theme::Theme;
 use crate::text::Named as _;
 
-const POINTER: [(&str, &str); 8] = [
+const POINTER: [(&str, &str); 11] = [
+    ("Click a tab", "focus the panel; double-click: maximize it, or restore the others"),
+    ("Hover", "values of all curves at the pointer's time, in all plots"),
+    ("Alt+scroll", "zoom the values (also scroll over a value axis; drag it: move, double-click: automatic)"),
     ("Scroll, pinch", "zoom about the pointer (Ctrl+scroll where the panel scrolls)"),
     ("Drag", "pan; on the timeline: move the cursor"),
     ("Shift+scroll", "pan in time, as horizontal scrolling and middle drag"),
     ("Right drag", "zoom to a time range, or to a box of the image"),
     ("Double-click", "show the whole log, fit the image"),
-    ("Right click", "copy the value or the panel's table"),
+    ("Right click", "copy the value or the panel's table, set a reading cursor, fix the value axis"),
     ("Shift+drag", "on the timeline: set the loop range"),
     ("Click", "a plot: move the cursor; a parameter or feature: select it"),
 ];

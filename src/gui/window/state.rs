@@ -18,6 +18,8 @@ use super::tiles::{PanelLayout, Preset};
 use super::tour::state::Tour;
 use crate::gui::PanelName;
 use crate::gui::help::Help;
+use crate::gui::plot::PlotOnScreen;
+use crate::gui::reading::EventLines;
 use crate::gui::theme::Theme;
 use crate::text::Named as _;
 
@@ -30,6 +32,8 @@ pub(super) struct PanelMenu {
     pub(super) at: Pos2,
     /// The value under the pointer when the menu was opened.
     pub(super) value: Option<String>,
+    /// The plot over time under the pointer then, with the time there in nanoseconds since the log began.
+    pub(super) plot: Option<(PlotOnScreen, i64)>,
 }
 
 /// State of the window without the session.
@@ -72,6 +76,9 @@ pub struct MainWindow {
     /// Text for the clipboard.
     pub(super) copied: Option<String>,
     pub(super) menu: Option<PanelMenu>,
+    /// The plot over time under the pointer.
+    pub(super) pointed_plot: Option<PlotOnScreen>,
+    pub(super) event_lines: EventLines,
     /// The panel that was clicked last.
     pub(super) focus: Option<PanelName>,
     /// Height of timeline and status bar in the last frame.
@@ -107,6 +114,10 @@ impl MainWindow {
 
     /// Restores settings and layout as before the last change.
     pub(super) fn undo(&mut self) {
+        if let Some(message) = self.history.take_barrier() {
+            self.notices.show_message(NoticeLevel::Info, message);
+            return;
+        }
         let before = self.history.undo();
         self.restore(before, "Nothing to undo");
     }

@@ -6,9 +6,9 @@ use egui::{Align, Button, FontId, Label, Layout as UiLayout, ProgressBar, RichTe
 
 use super::progress::Progress;
 use super::state::MainWindow;
-use crate::gui::PanelContext;
 use crate::gui::theme::{self, Theme};
-use crate::gui::units::{bytes, counted, fixed};
+use crate::gui::units::{bytes, counted, fixed, seconds};
+use crate::gui::{PanelContext, ReadingCursor};
 use crate::session::warning_lines;
 use crate::session::{Recording, RunRecord};
 
@@ -43,6 +43,14 @@ pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
             pair(4, "memory", bytes(memory), "Resident memory of the process");
             let (text, hover) = recorded(ctx.recording);
             pair(0, "recording", text, &hover);
+        }
+        for cursor in ReadingCursor::ALL {
+            if let Some(stamp_ns) = ctx.selection.reading.cursor_ns(cursor) {
+                pair(0, cursor.letter(), format!("{} s", seconds(stamp_ns)), "Reading cursor (C, V; X clears both)");
+            }
+        }
+        if let Some(interval_ns) = ctx.selection.reading.interval_ns() {
+            pair(0, "Δt", format!("{} s", seconds(interval_ns)), "Time from reading cursor A to B");
         }
         let step = run.and_then(|run| run.step_at(ctx.cursor_ns));
         let delay_ms = step.map(|step| (step.log_time_ns - step.report.stamp_ns) as f64 * 1e-6);

@@ -1,6 +1,6 @@
 //! The movable panels and their layouts.
 
-use egui::{Color32, CursorIcon, Id, Rect, Sense, Stroke, Ui, Visuals, WidgetText};
+use egui::{Color32, CursorIcon, Id, Rect, Response, Sense, Stroke, Ui, Visuals, WidgetText};
 use egui_tiles::{
     Behavior, Container, Linear, LinearDir, SimplificationOptions, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
 };
@@ -40,34 +40,46 @@ impl Named for Preset {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PanelLayout {
     tree: Tree<PanelName>,
+    /// Panel that fills the space of all panels.
+    maximized: Option<PanelName>,
     /// Preset that was chosen last; `None` for a saved layout.
     pub(crate) preset: Option<Preset>,
 }
 
 impl Default for PanelLayout {
     fn default() -> Self {
-        Self { tree: tree_of(Preset::default()), preset: Some(Preset::default()) }
+        Self { tree: tree_of(Preset::default()), maximized: None, preset: Some(Preset::default()) }
     }
 }
 
 impl PanelLayout {
     /// Arranges the panels as in a preset, with all panels visible.
     pub(crate) fn arrange(&mut self, preset: Preset) {
-        self.tree = tree_of(preset);
-        self.preset = Some(preset);
+        *self = Self { tree: tree_of(preset), maximized: None, preset: Some(preset) };
     }
 
     /// Applies a saved layout.
     pub(crate) fn take(&mut self, tree: Tree<PanelName>) {
-        self.tree = tree;
-        self.preset = None;
+        *self = Self { tree, maximized: None, preset: None };
     }
 
     pub(crate) fn tree(&self) -> &Tree<PanelName> {
         &self.tree
     }
 
-    /// True if another layout has the same panels in the same places, with other tabs in front.
+    /// Maximizes a visible panel, or restores the others if it is maximized.
+    pub(crate) fn toggle_maximized(&mut self, pane: PanelName) {
+        let shown = pane != PanelName::Timeline && self.is_visible(pane);
+        self.maximized = if self.maximized == Some(pane) || !shown { None } else { Some(pane) };
+    }
+
+    #[cfg(test)]
+    pub(crate) fn maximized(&self) -> Option<PanelName> {
+        self.maximized
+    }
+
+    /// True if another layout has the same panels in the same places, with other tabs in front or another panel
+    /// maximized.
     pub(crate) fn differs_by_open_tabs_only(&self, other: &Self) -> bool {
         let without_open_tabs = |layout: &Self| {
             let mut tree = layout.tree.clone();
@@ -86,6 +98,9 @@ impl PanelLayout {
     }
 
     pub(crate) fn set_visible(&mut self, pane: PanelName, visible: bool) {
+        if visible != (self.maximized == Some(pane)) {
+            self.maximized = None;
+        }
         if visible && self.tree.tiles.find_pane(&pane).is_none() {
             // A saved layout may be older than the panel.
             let tile = tabs(&mut self.tree.tiles, &[pane]);
@@ -101,7 +116,7 @@ impl PanelLayout {
         }
     }
 
-    /// Draws the panels, marks the focused one, and stores their rectangles. Returns the panel whose "?" was pressed.
+    /// Draws the panels, marks the focused one, and stores their rectangles.
     pub(crate) fn ui(
         &mut self,
         ui: &mut Ui,
@@ -109,12 +124,41 @@ impl PanelLayout {
         ctx: &mut PanelContext<'_>,
         focus: Option<PanelName>,
         places: &mut Vec<(PanelName, Rect)>,
-    ) -> Option<PanelName> {
-        let tree = TreeIds { id: self.tree.id(), root: self.tree.root() };
-        let mut shown = Shown { panels, ctx, focus, places, tree, asked: None };
-        self.tree.ui(&mut shown, ui);
-        shown.asked
+    ) -> TabClicks {
+        let mut alone = self.maximized.map(tree_of_one);
+        let drawn = alone.as_mut().unwrap_or(&mut self.tree);
+        let tree = TreeIds { id: drawn.id(), root: drawn.root() };
+        let mut shown = Shown { panels, ctx, focus, places, tree, clicks: TabClicks::default() };
+        drawn.ui(&mut shown, ui);
+        let clicks = shown.clicks;
+        // The close button of a maximized panel restores the others.
+        let is_open = |alone: &Tree<PanelName>| alone.tiles.tile_ids().all(|tile| alone.is_visible(tile));
+        if alone.as_ref().is_some_and(|alone| !is_open(alone)) {
+            self.maximized = None;
+        }
+        if let Some(panel) = clicks.maximized {
+            self.toggle_maximized(panel);
+        }
+        clicks
     }
+}
+
+/// Clicks on the tab bars in a frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct TabClicks {
+    /// The panel whose "?" was pressed.
+    pub(crate) asked: Option<PanelName>,
+    /// The panel whose tab was clicked.
+    pub(crate) focused: Option<PanelName>,
+    /// The panel whose tab was double-clicked.
+    maximized: Option<PanelName>,
+}
+
+/// A tree with one panel.
+fn tree_of_one(panel: PanelName) -> Tree<PanelName> {
+    let mut tiles = Tiles::default();
+    let root = tabs(&mut tiles, &[panel]);
+    Tree::new(egui::Id::unique("maximized panel"), root, tiles)
 }
 
 fn tree_of(preset: Preset) -> Tree<PanelName> {
@@ -185,8 +229,7 @@ struct Shown<'a, 'b> {
     focus: Option<PanelName>,
     places: &'a mut Vec<(PanelName, Rect)>,
     tree: TreeIds,
-    /// The panel whose "?" was pressed.
-    asked: Option<PanelName>,
+    clicks: TabClicks,
 }
 
 impl Behavior<PanelName> for Shown<'_, '_> {
@@ -219,8 +262,20 @@ impl Behavior<PanelName> for Shown<'_, '_> {
     ) {
         let Some(Tile::Pane(panel)) = tabs.active.and_then(|tile| tiles.get(tile)) else { return };
         if help::button_ui(ui, self.ctx.theme, *panel) {
-            self.asked = Some(*panel);
+            self.clicks.asked = Some(*panel);
         }
+    }
+
+    /// A click on a tab focuses its panel, a double-click maximizes it or restores the others.
+    fn on_tab_button(&mut self, tiles: &mut Tiles<PanelName>, tile: TileId, response: Response) -> Response {
+        let panel = tiles.get_pane(&tile).copied();
+        if response.clicked() {
+            self.clicks.focused = panel.or(self.clicks.focused);
+        }
+        if response.double_clicked() {
+            self.clicks.maximized = panel;
+        }
+        response
     }
 
     fn is_tab_closable(&self, tiles: &Tiles<PanelName>, tile: TileId) -> bool {

@@ -8,6 +8,7 @@ mod modal;
 mod open_log;
 mod palette;
 mod palette_items;
+mod remove_run;
 mod settings;
 pub(super) mod state;
 mod unsaved;
@@ -42,6 +43,7 @@ pub(super) fn ui(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>, ac
         Some(Dialog::Diagnosis) => diagnosis::ui(ui, ctx),
         Some(Dialog::Palette) => dialogs.palette.ui(ui, ctx, saved_layouts, layout, actions),
         Some(Dialog::Settings) => settings::ui(ui, ctx.theme, settings, history, saved_layouts.names(), actions),
+        Some(Dialog::RemoveRun) => remove_run::ui(ui, ctx, dialogs.removed_run, history),
         Some(Dialog::Unsaved) => unsaved::ui(ui, ctx, &dialogs.unsaved, requests),
     };
     if !stays_open {

@@ -74,7 +74,7 @@ fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &PanelLayout
         items.push(item(format!("Run: show {}", run.spec.label), Action::Run(number)));
     }
     if let Some(last) = runs.last().filter(|_| runs.len() > 1) {
-        items.push(item(format!("Run: remove {}", last.spec.label), Action::RemoveRun(runs.len() - 1)));
+        items.push(item(format!("Run: remove {}…", last.spec.label), Action::RemoveRun(runs.len() - 1)));
     }
     for stamp_ns in &ctx.playback.markers_ns {
         items.push(item(format!("Marker: go to {} s", seconds(*stamp_ns)), Action::GoTo(*stamp_ns)));

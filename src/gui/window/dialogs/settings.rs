@@ -98,5 +98,9 @@ fn fields_ui<'a>(ui: &mut Ui, settings: &mut Settings, layouts: impl Iterator<It
         });
         shown.response.labelled_by(name.id);
         ui.end_row();
+        ui.label("Plots");
+        ui.checkbox(&mut settings.event_lines, "Events and rank losses as lines")
+            .on_hover_text("Vertical lines in all plots (E): solid events, dashed losses of informed rank");
+        ui.end_row();
     });
 }

@@ -17,6 +17,8 @@ pub struct Dialogs {
     pub(super) add_run: AddRunDialog,
     pub(super) fork: ForkDialog,
     pub(super) palette: CommandPalette,
+    /// Index of the run that is to be removed.
+    pub(super) removed_run: usize,
     /// The work that is not saved, as text.
     pub(super) unsaved: String,
 }
@@ -41,6 +43,12 @@ impl Dialogs {
     pub fn ask_to_save(&mut self, lost: String) {
         self.unsaved = lost;
         self.open = Some(Dialog::Unsaved);
+    }
+
+    /// Asks whether to remove a run.
+    pub(in crate::gui::window) fn ask_to_remove(&mut self, run: usize) {
+        self.removed_run = run;
+        self.open = Some(Dialog::RemoveRun);
     }
 
     pub fn is_open(&self) -> bool {
