@@ -86,7 +86,7 @@ impl Subject {
             Self::Panel(PanelName::Rank) => [480, 860],
             Self::Panel(PanelName::Jacobian) => [900, 560],
             Self::Panel(PanelName::Image) => [500, 420],
-            Self::Panel(PanelName::Residuals) => [560, 480],
+            Self::Panel(PanelName::Residuals) => [1100, 480],
             Self::Panel(PanelName::Inspector) => [440, 480],
             Self::Panel(PanelName::Laboratory) => [1100, 760],
             Self::Panel(PanelName::Comparison) => [1200, 800],

@@ -226,6 +226,7 @@ pub(crate) mod window {
         SPURIOUS: "spurious information" => "Information of the priors on directions that no measurement constrains, as a singular value (1: σ of 10° or 3 cm).";
         RANKS_OVER_TIME: "ranks over time" => "Informed rank of each run by step, and faint the structural rank (rank.csv).";
         ASSUMPTIONS: "assumptions" => "Synthetic window of the experiment: motion, knowledge of joint angles and poses, number of frames and landmarks. No log is used.";
+        IMAGE_PLANE: "residuals over the image" => "Mean reprojection residual after the solve by place in the image. A wrong focal length or distortion is a radial pattern, a wrong readout time a slope over the rows, an object without a mask a group of cells.";
         JACOBIAN_NORM: "block norm" => "Frobenius norm of a block of the whitened Jacobian: change of the residuals in σ per 10°, 3 cm, 0.1 m/s, 1 °/s, 0.1 m/s² or 10 % of the inverse depth.";
     }
 }

@@ -79,7 +79,7 @@ impl ResidualHistogram {
 }
 
 /// The next of 1, 2, 3, 5, 10, … at or above a length, so that the axis does not change with every frame.
-fn round_up(length: f64) -> f64 {
+pub(super) fn round_up(length: f64) -> f64 {
     let length = if length.is_finite() { length.clamp(1e-3, 1e6) } else { 1.0 };
     let power = 10_f64.powf(length.log10().floor());
     [1.0, 2.0, 3.0, 5.0].into_iter().map(|digit| digit * power).find(|reach| *reach >= length).unwrap_or(10.0 * power)

@@ -2,19 +2,21 @@
 
 mod csv;
 mod histogram;
+mod image_plane;
 
 use std::sync::Arc;
 
 use egui::text::{LayoutJob, TextFormat};
 use egui::{
-    Align2, Grid, Label, Rect, RichText, Role, ScrollArea, Sense, Stroke, TextStyle, TextWrapMode, Ui, WidgetInfo,
-    pos2, vec2,
+    Align2, Grid, Label, Rect, RichText, Role, ScrollArea, Sense, Stroke, TextStyle, TextWrapMode, Ui, Vec2,
+    WidgetInfo, pos2, vec2,
 };
 
+use self::image_plane::ImagePlane;
 use super::accessible::describe;
 use super::convergence::empty_ui;
 use super::follow::RunTables;
-use super::help::terms::{Term, factors};
+use super::help::terms::{Term, factors, window};
 use super::plot::{
     Clicks, Curve, Interaction, PlotArea, Readout, TIME_GUTTER, Wheel, decimals_of_step, overflows, paint_curve,
     paint_ground, paint_time_axis, paint_value_axis, plot_ui, read_lines, run_legend_ui, ticks, value_range_of,
@@ -27,12 +29,27 @@ use crate::estimator::{FactorKind, ResidualSummary, StepReport};
 use crate::gui::residuals::histogram::ResidualHistogram;
 use crate::session::StepRecord;
 
-/// State of the residuals panel: RMS of all runs over time, and the histogram of the step.
+/// Panel size in points from which both views are shown.
+const MIN_SIZE_FOR_BOTH: Vec2 = vec2(1000.0, 360.0);
+
+/// View of a panel that is too small for both.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum View {
+    /// Histogram, RMS over time, χ² by factor.
+    #[default]
+    Distribution,
+    /// Means over the image.
+    ImagePlane,
+}
+
+/// State of the residuals panel: RMS of all runs over time, the histogram of the step, and means over the image.
 #[derive(Debug, Default)]
 pub struct ResidualsPanel {
     tables: RunTables,
     curves: Vec<Curve>,
     counted: Option<(Arc<StepRecord>, ResidualHistogram)>,
+    view: View,
+    image_plane: ImagePlane,
     /// True if the content is higher than the panel, so that the wheel scrolls.
     overflows: bool,
 }
@@ -48,6 +65,38 @@ impl Panel for ResidualsPanel {
         if !self.counted.as_ref().is_some_and(|(counted, _)| Arc::ptr_eq(counted, step)) {
             self.counted = Some((Arc::clone(step), ResidualHistogram::of(&step.report)));
         }
+        let room = ui.available_size();
+        if room.x >= MIN_SIZE_FOR_BOTH.x && room.y >= MIN_SIZE_FOR_BOTH.y {
+            ui.columns(2, |columns| {
+                self.distribution_ui(&mut columns[0], ctx, step);
+                self.image_plane.ui(&mut columns[1], ctx, &recording.runs[run], step, room.y - 4.0);
+            });
+            return;
+        }
+        if !ctx.presentation.is_figure() {
+            ui.horizontal(|ui| {
+                ui.selectable_value(&mut self.view, View::Distribution, "Distribution")
+                    .on_hover_text("Histogram, over time, and χ² by factor");
+                ui.selectable_value(&mut self.view, View::ImagePlane, "Image plane")
+                    .on_hover_text(window::IMAGE_PLANE.meaning);
+            });
+        }
+        match self.view {
+            View::Distribution => self.distribution_ui(ui, ctx, step),
+            View::ImagePlane => {
+                let height = ui.available_height() - 4.0;
+                self.image_plane.ui(ui, ctx, &recording.runs[run], step, height);
+            }
+        }
+    }
+
+    fn view_copy(&self) -> Self {
+        Self { view: self.view, ..Self::default() }
+    }
+}
+
+impl ResidualsPanel {
+    fn distribution_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, step: &Arc<StepRecord>) {
         let height = ui.available_height();
         let wide = ui.available_width() > 1.6 * height && ui.available_width() > 560.0;
         let shown = ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -65,9 +114,7 @@ impl Panel for ResidualsPanel {
         });
         self.overflows = overflows(&shown);
     }
-}
 
-impl ResidualsPanel {
     fn left_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, report: &StepReport, height: f32) {
         let theme = *ctx.theme;
         let Some((_, histogram)) = &self.counted else { return };
