@@ -22,7 +22,7 @@ const COLUMNS: usize = 12;
 /// Number of bins of the profiles.
 const BINS: usize = 12;
 /// Smallest number of residuals of a shown mean.
-const MIN_COUNT: usize = 5;
+const MIN_COUNT: usize = 8;
 /// Number of standard errors from which a mean is drawn as significant.
 const SIGNIFICANT: f64 = 2.0;
 /// Height of the profiles below the fields, at most, in points.
@@ -81,10 +81,12 @@ impl ImageMeans {
         }
     }
 
-    /// Largest length of a significant mean vector in pixels.
-    fn largest_px(&self) -> f64 {
-        let lengths = self.cells.iter().filter_map(significant_px).map(|mean_px| mean_px.norm());
-        lengths.fold(0.0, f64::max)
+    /// Length in pixels that nine of ten significant mean vectors do not exceed.
+    fn most_px(&self) -> f64 {
+        let mut lengths: Vec<f64> =
+            self.cells.iter().filter_map(significant_px).map(|mean_px| mean_px.norm()).collect();
+        lengths.sort_by(f64::total_cmp);
+        lengths.get((0.9 * lengths.len() as f64) as usize).or_else(|| lengths.last()).copied().unwrap_or(0.0)
     }
 }
 
@@ -132,7 +134,7 @@ impl ImagePlane {
         let (_, rect) = ui.allocate_space(vec2(ui.available_width(), below.max(120.0)));
         let profiles = (0.4 * rect.height()).min(MAX_PROFILE_HEIGHT);
         let (fields, profiles) = rect.split_top_bottom_at_y(rect.bottom() - profiles);
-        let scale_px = round_up(cached.window.largest_px().max(cached.flight.largest_px()).max(0.02));
+        let scale_px = round_up(cached.window.most_px().max(cached.flight.most_px()).max(0.02));
         let (left, right) = fields.split_left_right_at_fraction(0.5);
         let count = |means: &ImageMeans| counted(means.total.count, "residual");
         let field = |means: &ImageMeans, name: &str, rect: Rect| {
@@ -232,7 +234,7 @@ impl Field<'_> {
 
         let response = ui.interact(image, ui.unique_id().with(title), Sense::hover());
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, format!("Mean residuals: {title}")));
-        describe(&response, &format!("largest significant mean {} px", fixed(self.means.largest_px(), 3)));
+        describe(&response, &format!("nine of ten significant means below {} px", fixed(self.means.most_px(), 3)));
         if let Some(pointer) = response.hover_pos() {
             let index = (0..self.means.cells.len()).find(|index| place(*index).contains(pointer));
             if let Some(text) = index.map(|index| self.cell_text(index)) {

@@ -7,22 +7,34 @@ use nalgebra::Vector2;
 use super::step::StepRecord;
 use crate::estimator::{FeatureReport, ObservationReport, StepReport};
 
+/// Smallest weight of a residual, so that no mean is one of zeros.
+const MIN_WEIGHT: f64 = 1e-3;
 /// Side of a block in pixels.
 const BLOCK_PX: f64 = 16.0;
 
-/// Sums over residual vectors, each the prediction minus the measurement after the solve.
+/// Weighted sums over residual vectors, each the prediction minus the measurement after the solve.
+///
+/// The weights are the robust ones of the solve: a few mistracked features do not determine a mean, and the mean of an
+/// object whose residuals are all large is theirs, because their weights are alike.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ResidualSum {
     /// Number of residual vectors.
     pub count: usize,
+    weight: f64,
     /// Sum of the vectors in pixels.
     sum_px: Vector2<f64>,
-    /// Sum of their squared lengths in square pixels.
+    /// Sum of their squared weighted lengths in square pixels.
     squares_px2: f64,
-    /// Number of residuals of features that move in the image.
-    along_count: usize,
-    /// Sum of the components of these along the motion, in pixels.
-    along_px: f64,
+    along: AlongMotion,
+}
+
+/// Components of residuals along the motion of their features in the image.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct AlongMotion {
+    count: usize,
+    weight: f64,
+    sum_px: f64,
+    squares_px2: f64,
 }
 
 /// Mean of a component of residuals.
@@ -37,25 +49,23 @@ pub struct MeanResidual {
 impl ResidualSum {
     fn add(&mut self, other: &Self) {
         self.count += other.count;
+        self.weight += other.weight;
         self.sum_px += other.sum_px;
         self.squares_px2 += other.squares_px2;
-        self.along_count += other.along_count;
-        self.along_px += other.along_px;
+        self.along.count += other.along.count;
+        self.along.weight += other.along.weight;
+        self.along.sum_px += other.along.sum_px;
+        self.along.squares_px2 += other.along.squares_px2;
     }
 
     /// Mean vector in pixels; `None` without residuals.
     pub fn mean_px(&self) -> Option<Vector2<f64>> {
-        (self.count > 0).then(|| self.sum_px / self.count as f64)
-    }
-
-    /// Standard deviation of one component in pixels.
-    fn deviation_px(&self) -> f64 {
-        (self.squares_px2 / (2 * self.count.max(1)) as f64).sqrt()
+        (self.weight > 0.0).then(|| self.sum_px / self.weight)
     }
 
     /// Standard error in pixels of a component of the mean, for independent residuals.
     pub fn error_px(&self) -> f64 {
-        self.deviation_px() / (self.count.max(1) as f64).sqrt()
+        if self.weight > 0.0 { (0.5 * self.squares_px2).sqrt() / self.weight } else { 0.0 }
     }
 }
 
@@ -107,13 +117,13 @@ impl ImageResiduals {
         let motion_px = before.map(|before| observation.measured_px - before.measured_px);
         // The direction of a shorter motion is that of the noise.
         let direction = motion_px.filter(|motion_px| motion_px.norm() > 1.0).map(|motion_px| motion_px.normalize());
-        let one = ResidualSum {
-            count: 1,
-            sum_px: residual_px,
-            squares_px2: residual_px.norm_squared(),
-            along_count: usize::from(direction.is_some()),
-            along_px: direction.map_or(0.0, |direction| direction.dot(&residual_px)),
-        };
+        let weight = observation.robust_weight.clamp(MIN_WEIGHT, 1.0);
+        let along = direction.map_or_else(AlongMotion::default, |direction| {
+            let weighted_px = weight * direction.dot(&residual_px);
+            AlongMotion { count: 1, weight, sum_px: weighted_px, squares_px2: weighted_px.powi(2) }
+        });
+        let sum_px = weight * residual_px;
+        let one = ResidualSum { count: 1, weight, sum_px, squares_px2: sum_px.norm_squared(), along };
         let block = |uv_px: f64| (uv_px / BLOCK_PX).floor().clamp(0.0, f64::from(u16::MAX)) as u16;
         let place = (block(observation.measured_px.y), block(observation.measured_px.x));
         self.blocks.entry(place).or_default().add(&one);
@@ -154,7 +164,7 @@ impl ImageResiduals {
         }
         sums.iter()
             .map(|(sum, radial)| {
-                let mean_px = radial / sum.count.max(1) as f64;
+                let mean_px = radial / sum.weight.max(MIN_WEIGHT);
                 (sum.count > 0).then(|| MeanResidual { mean_px, error_px: sum.error_px(), count: sum.count })
             })
             .collect()
@@ -169,9 +179,8 @@ impl ImageResiduals {
             sums[bin.min(bins - 1)].add(sum);
         }
         let mean = |sum: &ResidualSum| {
-            let count = sum.along_count;
-            let error_px = sum.deviation_px() / (count.max(1) as f64).sqrt();
-            (count > 0).then(|| MeanResidual { mean_px: sum.along_px / count as f64, error_px, count })
+            let AlongMotion { count, weight, sum_px, squares_px2 } = sum.along;
+            (count > 0).then(|| MeanResidual { mean_px: sum_px / weight, error_px: squares_px2.sqrt() / weight, count })
         };
         sums.iter().map(mean).collect()
     }
@@ -240,6 +249,26 @@ mod tests {
         let rows = residuals.by_row(480, 6);
         let means: Vec<f64> = rows.iter().map(|mean| mean.unwrap().mean_px).collect();
         assert!(means.is_sorted() && means[0] < -0.15 && means[5] > 0.15, "{means:?}");
+    }
+
+    #[test]
+    fn a_few_mistracked_features_do_not_determine_a_mean() {
+        let mut residuals = ImageResiduals::default();
+        for number in 0..20 {
+            let (length_px, robust_weight) = if number < 2 { (5.0, 0.01) } else { (0.1, 1.0) };
+            let observation = ObservationReport {
+                frame_index: 1,
+                measured_px: Vector2::new(100.0, 100.0),
+                residual_before_px: None,
+                residual_after_px: Some(Vector2::new(length_px, 0.0)),
+                chi2: 1.0,
+                robust_weight,
+            };
+            residuals.add(&observation, None);
+        }
+        let total = residuals.total();
+        assert!((total.mean_px().unwrap().x - 0.1).abs() < 0.01, "{total:?}");
+        assert!(total.error_px() < 0.03, "{total:?}");
     }
 
     #[test]
