@@ -54,9 +54,10 @@ pub fn diagnose(computation: &Computation, run: usize, on_progress: &mut OnProgr
     let mut diagnosis = diagnose_run(&recording.rig, record, computation.history(run)?, on_progress);
     diagnosis.log = recording.log_name();
     if diagnosis.verdict != Verdict::Agrees && !diagnosis.interrupted {
-        // The trials are done; the check of the log cannot be interrupted.
-        let _ = on_progress(1.0, "check of the log");
-        diagnosis.log_faults = log_faults(&recording.log_path, &recording.rig);
+        match on_progress(1.0, "check of the log") {
+            ControlFlow::Continue(()) => diagnosis.log_faults = log_faults(&recording.log_path, &recording.rig),
+            ControlFlow::Break(()) => diagnosis.interrupted = true,
+        }
     }
     Some(diagnosis)
 }
