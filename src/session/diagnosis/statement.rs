@@ -141,7 +141,7 @@ fn scale_text(what: &str, factor: f64, of_unit: f64, unit: &str) -> String {
     if (factor / of_unit - 1.0).abs() < 0.05 {
         format!("the {what} are in {unit}")
     } else {
-        format!("the {what} are {:.3} times too large", 1.0 / factor)
+        format!("the {what} are {:.3} times the true ones", 1.0 / factor)
     }
 }
 
