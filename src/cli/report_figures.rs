@@ -194,7 +194,7 @@ fn at_stamp(recording: &Recording, cursor_ns: i64) -> Vec<Wanted> {
             run,
             height: (RANK_HEIGHT + RANK_ROW_HEIGHT * columns).min(MAX_HEIGHT) as u32,
             title: format!("Observability of the calibration of run {} at {at_s:.2} s", record.spec.label),
-            reading: "Top: the null and weak directions as columns with their singular value, least observable first, \
+            reading: "Top: the null and uninformed directions as columns with their singular value, least observable first, \
                       and the weight of each parameter in them; orange positive, blue negative. Bars: all singular \
                       values of the window's Jacobian without the priors, on a logarithmic axis; the short lines above \
                       them include the priors. A direction below the line \"informed\" (1) is constrained less than by \

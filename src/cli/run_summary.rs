@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use dcvins::observability::{Estimability, MIN_SPURIOUS_GAIN};
-use dcvins::session::{EstimabilitySummary, KnownLossSummary, RunSummary, StageSummary, TrajectoryLane};
+use dcvins::observability::{Determination, MIN_SPURIOUS_GAIN};
+use dcvins::session::{FlightParameter, KnownLossSummary, RunSummary, StageSummary, TrajectoryLane, least_determined};
+use dcvins::text::Named as _;
 
 /// Text of a trajectory of another program for the terminal.
 pub(crate) fn describe_trajectory(lane: &TrajectoryLane) -> String {
@@ -46,7 +47,7 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
             calibration.parameterization
         ));
     }
-    lines.extend(estimability_lines(&calibration.estimability));
+    lines.extend(verdict_lines(&calibration.estimability));
     if let Some(rank) = &summary.rank {
         lines.push(format!(
             "  rank         structural {} of {}, informed {}; deficit: {} parameterization, {} joints, {} absorbed, {} motion\n",
@@ -91,16 +92,26 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
     lines.concat()
 }
 
-/// The parameters by verdict, those of a group together.
-fn estimability_lines(parameters: &[EstimabilitySummary]) -> Vec<String> {
-    let verdicts = [Estimability::Known, Estimability::Weak, Estimability::NotFromThisFlight, Estimability::Fixed];
-    let line = |verdict: Estimability| {
-        let of = parameters.iter().filter(|parameter| parameter.estimability == verdict);
+/// The parameters by verdict, and the least determined one with its reason and its remedy.
+fn verdict_lines(parameters: &[FlightParameter]) -> Vec<String> {
+    let line = |verdict: Determination| {
+        let of = parameters.iter().filter(|parameter| parameter.verdict == verdict);
         let names: Vec<&str> = of.map(|parameter| parameter.name.as_str()).collect();
-        (!names.is_empty()).then(|| format!("{} ({}): {}\n", verdict.name(), names.len(), names.join(", ")))
+        (!names.is_empty()).then(|| format!("{} ({}): {}", verdict.name(), names.len(), names.join(", ")))
     };
-    let lines = verdicts.into_iter().filter_map(line).enumerate();
-    lines.map(|(place, text)| format!("  {:<13}{text}", if place == 0 { "calibration" } else { "" })).collect()
+    let mut lines: Vec<String> = Determination::all().filter_map(line).collect();
+    if lines.is_empty() {
+        lines.push("fixed at the values of the rig".to_owned());
+    }
+    if let Some(least) = least_determined(parameters) {
+        lines.push(format!("least determined: {}, {}", least.name, least.verdict_text()));
+        lines.push(format!("  why: {}", least.reason));
+        if !least.remedy.is_empty() {
+            lines.push(format!("  what helps: {}", least.remedy));
+        }
+    }
+    let indented = lines.iter().enumerate();
+    indented.map(|(place, text)| format!("  {:<13}{text}\n", if place == 0 { "calibration" } else { "" })).collect()
 }
 
 /// Spurious information of the priors along the unobservable directions.

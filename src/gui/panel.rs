@@ -5,6 +5,7 @@ use std::sync::Arc;
 use egui::{Role, Sense, Ui};
 use serde::{Deserialize, Serialize};
 
+use super::flight::{FlightReport, FlightTables};
 use super::reading::Reading;
 use super::slide::MovedChain;
 use super::theme::Theme;
@@ -50,6 +51,8 @@ pub struct Selection {
     pub(crate) moved: MovedChain,
     /// Times and value ranges at which plots are read.
     pub reading: Reading,
+    /// Calibration tables of the runs.
+    pub(crate) flight: FlightTables,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -139,6 +142,11 @@ impl<'a> PanelContext<'a> {
         self.recording.rig.parameter_names()
     }
 
+    /// Calibration table of a run over the whole flight.
+    pub(crate) fn flight(&self, ui: &Ui, run: &RunRecord) -> FlightReport {
+        self.selection.flight.report(ui.ctx(), self.recording, run)
+    }
+
     /// Computes the moved chain of the selected run when position, run or step has changed.
     pub(crate) fn move_chain(&mut self) {
         let run = self.recording.runs.get(self.selection.run);
@@ -158,6 +166,8 @@ impl<'a> PanelContext<'a> {
 pub enum PanelName {
     Image,
     Scene,
+    /// Verdicts of the whole flight on every calibration parameter.
+    Calibration,
     /// Calibration over time.
     Convergence,
     /// Rank and null directions.
@@ -182,6 +192,7 @@ impl Named for PanelName {
     const NAMES: &'static [(Self, &'static str)] = &[
         (Self::Image, "image"),
         (Self::Scene, "scene"),
+        (Self::Calibration, "calibration"),
         (Self::Convergence, "convergence"),
         (Self::Rank, "rank"),
         (Self::Jacobian, "jacobian"),
@@ -205,6 +216,7 @@ impl PanelName {
         match self {
             Self::Image => "Image",
             Self::Scene => "Scene",
+            Self::Calibration => "Calibration",
             Self::Convergence => "Convergence",
             Self::Rank => "Rank",
             Self::Jacobian => "Jacobian",

@@ -99,6 +99,12 @@ fn convergence_is_drawn_in_every_case() {
 }
 
 #[test]
+fn the_calibration_table_is_drawn_in_every_case() {
+    check("calibration", [1000, 420], super::calibration::CalibrationPanel::ui);
+    check("calibration-narrow", [500, 420], super::calibration::CalibrationPanel::ui);
+}
+
+#[test]
 fn rank_is_drawn_in_every_case() {
     check("rank", [480, 520], super::rank::RankPanel::ui);
 }

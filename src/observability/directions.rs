@@ -1,4 +1,4 @@
-//! Null and weak directions as weights by parameter.
+//! Null and uninformed directions as weights by parameter.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -9,16 +9,19 @@
 
 mod analysis;
 mod classification;
+mod correlation;
+mod determination;
 mod direction_words;
 mod directions;
 mod elimination;
-mod estimability;
 mod exciting_motion;
 mod factor;
 mod information;
 pub mod laboratory;
+mod loss_cause;
 mod parameter_state;
 mod persistence;
+mod redundancy;
 mod report;
 mod slide;
 mod slide_direction;
@@ -27,13 +30,16 @@ mod structure;
 mod tests;
 
 pub use analysis::{ScalingRule, analyse, analyse_with_scaling};
+pub use correlation::Correlations;
+pub use determination::{DETERMINED_RATIO, Determination, NOT_DETERMINED_RATIO};
 pub use direction_words::{parameters_of, parameters_of_weights};
-pub use estimability::{Estimability, ParameterEstimability, count_of, estimability};
 pub use exciting_motion::exciting_motion;
 pub use factor::PackedFactor;
 pub use information::{InformationRate, ParameterRate, information_rate};
+pub use loss_cause::LossCause;
 pub use parameter_state::{ParameterState, parameter_states};
 pub use persistence::steps_lost;
+pub use redundancy::Redundancy;
 pub use report::{CalibrationDirection, Deficit, RankReport};
 pub use slide::{ChainSlide, chain_of_step, slide};
 pub use slide_direction::{InvalidSlide, SlideDirection, SlidePosition, SlideRequest};

@@ -1,4 +1,4 @@
-//! Observability of single parameters, from the null and weak directions of a step.
+//! Observability of single parameters in a window, from the null and uninformed directions of its step.
 
 use std::collections::BTreeMap;
 
@@ -8,31 +8,16 @@ use crate::gimbal::ParameterId;
 /// A parameter counts as lost if at least this ratio of its squared unit vector lies in the span of the directions.
 const MIN_LOST_RATIO: f64 = 0.25;
 
-/// Observability of a parameter in a step.
+/// Observability of a parameter in a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ParameterState {
-    /// The window constrains it more than the prior.
+    /// The window constrains it more than a prior of 10° or 3 cm.
     Informed,
     Fixed,
-    /// The window constrains it less than the prior.
-    Weak,
+    /// It lies in null and uninformed directions: the window constrains it less than a prior of 10° or 3 cm.
+    Uninformed,
     /// Unobservable: it lies in a structural null direction.
     Unobservable,
-    /// The estimator is not initialized yet.
-    Waiting,
-}
-
-impl ParameterState {
-    /// A one-word tag, empty for an informed parameter.
-    pub fn tag(self) -> &'static str {
-        match self {
-            Self::Informed => "",
-            Self::Fixed => "fixed",
-            Self::Weak => "weak",
-            Self::Unobservable => "unobservable",
-            Self::Waiting => "initializing",
-        }
-    }
 }
 
 /// Observability of each parameter, `None` during initialization.
@@ -46,7 +31,7 @@ pub fn parameter_states(rank: Option<&RankReport>) -> Option<BTreeMap<ParameterI
         if lost_ratio(column, true) >= MIN_LOST_RATIO {
             ParameterState::Unobservable
         } else if lost_ratio(column, false) >= MIN_LOST_RATIO {
-            ParameterState::Weak
+            ParameterState::Uninformed
         } else {
             ParameterState::Informed
         }

@@ -5,11 +5,11 @@ use nalgebra::{DMatrix, DVector};
 use super::RankReport;
 use crate::gimbal::ParameterId;
 
-/// A direction is also unobservable in another step if this fraction of it lies in that step's null and weak
+/// A direction is also unobservable in another step if this fraction of it lies in that step's null and uninformed
 /// directions.
 const SAME_RATIO: f64 = 0.9;
 
-/// Counts the earlier steps, latest first, in which a direction was null or weak without interruption.
+/// Counts the earlier steps, latest first, in which a direction was null or uninformed without interruption.
 ///
 /// The count ends at the first step that observes the direction or has other columns.
 pub fn steps_lost<'a>(
@@ -23,7 +23,7 @@ pub fn steps_lost<'a>(
 }
 
 impl RankReport {
-    /// True if a unit direction lies in the span of the null and weak directions.
+    /// True if a unit direction lies in the span of the null and uninformed directions.
     fn loses(&self, direction: &DVector<f64>) -> bool {
         if self.directions.is_empty() {
             return false;

@@ -32,7 +32,7 @@ pub struct RankReport {
     pub deficit_absorbed: usize,
     /// Deficit due to the motion of the vehicle.
     pub deficit_motion: usize,
-    /// Null and weak directions, the least observable first.
+    /// Null and uninformed directions, the least observable first.
     pub directions: Vec<CalibrationDirection>,
     pub margins: Vec<(Singularity, f64)>,
     /// Null directions of the chain in closed form, compared with this measurement.
@@ -125,8 +125,8 @@ impl RankReport {
 
     /// Least observable direction that is not a structural zero, else the first null direction.
     pub fn least_observable_direction(&self) -> Option<&CalibrationDirection> {
-        let weak = self.directions.iter().find(|direction| !direction.structural);
-        weak.or_else(|| self.directions.first())
+        let uninformed = self.directions.iter().find(|direction| !direction.structural);
+        uninformed.or_else(|| self.directions.first())
     }
 
     /// Parameter with the largest weight in the least observable direction that is not a structural zero.
@@ -137,6 +137,11 @@ impl RankReport {
 }
 
 impl CalibrationDirection {
+    /// `null` or `uninformed`.
+    pub fn kind(&self) -> &'static str {
+        if self.structural { "null" } else { "uninformed" }
+    }
+
     /// Parameter with the largest weight.
     pub fn leading(&self, parameters: &[ParameterId]) -> Option<ParameterId> {
         let mut leading = None;

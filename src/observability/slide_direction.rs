@@ -13,7 +13,7 @@ use crate::text::{Entry, FINITE};
 /// Direction in which a chain is moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlideDirection {
-    /// A null or weak direction of the step, the least observable first, counted from 0.
+    /// A null or uninformed direction of the step, the least observable first, counted from 0.
     Measured(usize),
     /// A null direction in closed form.
     Known(KnownLoss),

@@ -11,9 +11,7 @@ use super::verdict::{RunVerdict, Statement, log_statement};
 use crate::flight_log::log_name;
 use crate::geometry::seconds_from_ns;
 use crate::log_check::CheckReport;
-use crate::session::{
-    EstimabilitySummary, Recording, RunRecord, RunSummary, WarningLine, estimability_summary, log_warning_lines,
-};
+use crate::session::{FlightParameter, Recording, RunRecord, RunSummary, WarningLine, log_warning_lines};
 
 /// A notable event of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -33,8 +31,8 @@ pub(super) struct RunContent {
     /// The verdict at the top of the page.
     pub(super) verdict: RunVerdict,
     pub(super) summary: RunSummary,
-    /// Estimability of the calibration parameters, in groups.
-    pub(super) estimability: Vec<EstimabilitySummary>,
+    /// Calibration table, equal to that of the summary.
+    pub(super) estimability: Vec<FlightParameter>,
     #[serde(rename = "rank_story")]
     pub(super) rank_intervals: Vec<RankInterval>,
     pub(super) events: Vec<ReportEvent>,
@@ -74,8 +72,8 @@ impl ReportContent {
             RunContent {
                 label: run.spec.label.clone(),
                 verdict: RunVerdict::new(recording, run, &summary),
+                estimability: summary.calibration.estimability.clone(),
                 summary,
-                estimability: estimability_summary(recording, run),
                 rank_intervals: rank_intervals(run, &recording.rig),
                 events,
                 frequent_events,

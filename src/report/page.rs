@@ -141,7 +141,6 @@ fn run_section(index: usize, run: &RunContent) -> Markup {
         h2 id={ "run-" (index) } { "Run " (run.label) }
         @if !calibration.parameters.is_empty() {
             (tables::calibration(run))
-            (tables::estimability(run))
         }
         (rank_section(run))
         h3 { "Events and warnings" }

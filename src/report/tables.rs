@@ -5,12 +5,10 @@ use maud::{Markup, html};
 use super::content::{ReportContent, RunContent};
 use super::html::{list, table};
 use super::numbers::{MS_PER_S, number, shown_unit};
-use super::verdict::ParameterVerdict;
 use crate::log_check::{CheckReport, Severity};
-use crate::session::{EstimabilitySummary, ParameterSummary, TrajectoryLane};
-
-/// Number of columns of the calibration table before the prior: name, unit, values and σ.
-const VALUE_COLUMNS: usize = 5;
+use crate::observability::Determination;
+use crate::session::{FlightParameter, ParameterSummary, TrajectoryLane};
+use crate::text::Named as _;
 
 /// Frame counts of each run.
 pub(super) fn frames(content: &ReportContent) -> Markup {
@@ -97,67 +95,54 @@ pub(super) fn trajectories(content: &ReportContent) -> Option<Markup> {
     (!rows.is_empty()).then(|| table(caption, &["trajectory", "file or topic", "poses", "path length, m"], &rows))
 }
 
-/// Calibration of one run in degrees, millimetres and milliseconds.
+/// Calibration table of one run in degrees, millimetres and milliseconds: values, verdicts of the flight, reasons.
 pub(super) fn calibration(run: &RunContent) -> Markup {
     let parameters = &run.summary.calibration.parameters;
     let with_ground_truth = parameters.iter().any(|parameter| parameter.ground_truth.is_some());
-    let mut header = vec!["parameter", "unit", "rig", "final", "± σ", "prior ± σ", "informed"];
+    let mut header = vec!["parameter", "rig", "final ± 1 σ", "σ / prior σ", "verdict", "since, s"];
     if with_ground_truth {
-        header.extend(["ground truth", "error", "error / σ"]);
+        header.push("error (multiple of σ)");
     }
-    let row = |(parameter, verdict): (&ParameterSummary, &ParameterVerdict)| {
-        let mut row = calibration_row(parameter, with_ground_truth);
-        let (_, scale, decimals) = shown_unit(parameter.dimension);
-        let prior =
-            verdict.prior_sigma.map_or_else(String::new, |sigma| format!("±{}", number(sigma * scale, decimals)));
-        let informed = if verdict.informed { "yes" } else { "no" };
-        row.splice(VALUE_COLUMNS..VALUE_COLUMNS, [prior, informed.to_owned()]);
-        row
-    };
-    let rows: Vec<Vec<String>> = parameters.iter().zip(&run.verdict.parameters).map(row).collect();
-    let caption =
-        format!("Calibration of run {}, parameterization {}", run.label, run.summary.calibration.parameterization);
-    table(&caption, &header, &rows)
-}
-
-/// Estimability of the parameters of one run, in groups.
-pub(super) fn estimability(run: &RunContent) -> Markup {
-    let header = ["parameter", "group", "unit", "final", "± σ", "prior ± σ", "σ / prior", "verdict", "reason"];
-    let row = |parameter: &EstimabilitySummary| {
-        let (unit, scale, decimals) = shown_unit(parameter.dimension);
-        let sigma = |sigma: Option<f64>| sigma.map_or_else(String::new, |sigma| number(sigma * scale, decimals));
-        vec![
-            parameter.name.clone(),
-            parameter.group.to_owned(),
-            unit.to_owned(),
-            number(parameter.value * scale, decimals),
-            sigma(parameter.sigma),
-            sigma(parameter.prior_sigma),
-            parameter.ratio.map_or_else(String::new, |ratio| number(ratio, 3)),
-            parameter.verdict.to_owned(),
-            parameter.reason.clone(),
-        ]
+    header.extend(["reason", "what helps"]);
+    let row = |verdict: &FlightParameter| {
+        let parameter = parameters.iter().find(|parameter| parameter.name == verdict.name);
+        calibration_row(verdict, parameter, with_ground_truth)
     };
     let rows: Vec<Vec<String>> = run.estimability.iter().map(row).collect();
     let caption = format!(
-        "What the flight determines, run {}: known with σ below 0.3 of the prior, not from this flight from 0.9 on; \
-         directions are those of the last window",
-        run.label
+        "Calibration of run {}, parameterization {}. Verdicts of the whole flight: {}",
+        run.label,
+        run.summary.calibration.parameterization,
+        Determination::RULE
     );
     table(&caption, &header, &rows)
 }
 
-fn calibration_row(parameter: &ParameterSummary, with_ground_truth: bool) -> Vec<String> {
-    let (unit, scale, decimals) = shown_unit(parameter.dimension);
+fn calibration_row(
+    verdict: &FlightParameter,
+    parameter: Option<&ParameterSummary>,
+    with_ground_truth: bool,
+) -> Vec<String> {
+    let (unit, scale, decimals) = shown_unit(verdict.dimension);
     let shown = |value: f64| number(value * scale, decimals);
-    let sigma = parameter.sigma.map_or_else(String::new, |sigma| format!("±{}", number(sigma * scale, decimals)));
-    let mut row = vec![parameter.name.clone(), unit.to_owned(), shown(parameter.initial), shown(parameter.last), sigma];
+    let unit = if unit.is_empty() || unit == "°" { unit.to_owned() } else { format!(" {unit}") };
+    let sigma = verdict.sigma.map_or_else(String::new, |sigma| format!(" ± {}", shown(sigma)));
+    let mut row = vec![
+        verdict.name.clone(),
+        parameter.map_or_else(String::new, |parameter| shown(parameter.initial)),
+        format!("{}{sigma}{unit}", shown(verdict.value)),
+        verdict.ratio.map_or_else(String::new, |ratio| number(ratio, 3)),
+        verdict.verdict.name().to_owned(),
+        verdict.since_s().map_or_else(String::new, |since_s| number(since_s, 2)),
+    ];
     if with_ground_truth {
-        row.push(parameter.ground_truth.map_or_else(String::new, shown));
-        row.push(parameter.error.map_or_else(String::new, shown));
-        let ratio = parameter.error.zip(parameter.sigma).filter(|(_, sigma)| *sigma > 0.0);
-        row.push(ratio.map_or_else(String::new, |(error, sigma)| number(error / sigma, 1)));
+        let error = parameter.and_then(|parameter| parameter.error);
+        let ratio = error.zip(verdict.sigma).filter(|(_, sigma)| *sigma > 0.0);
+        let ratio =
+            ratio.map_or_else(String::new, |(error, sigma)| format!(" ({} σ)", number((error / sigma).abs(), 1)));
+        row.push(error.map_or_else(String::new, |error| format!("{}{unit}{ratio}", shown(error))));
     }
+    row.extend([verdict.reason.clone(), verdict.remedy.clone()]);
     row
 }
 
@@ -229,15 +214,41 @@ mod tests {
 
     #[test]
     fn every_unit_is_shown_as_people_read_it() {
-        let check = |dimension: Dimension, expected: [&str; 8]| {
+        let check = |dimension: Dimension, expected: [&str; 3]| {
             let name = "parameter".to_owned();
             let (ground_truth, error, sigma) = (Some(0.5), Some(-0.25), Some(0.125));
-            let parameter = ParameterSummary { name, dimension, initial: 0.0, last: 0.25, sigma, ground_truth, error };
-            assert_eq!(calibration_row(&parameter, true), expected);
-            assert_eq!(calibration_row(&parameter, false), expected[..5]);
+            let summary = ParameterSummary {
+                name: name.clone(),
+                dimension,
+                initial: 0.0,
+                last: 0.25,
+                sigma,
+                ground_truth,
+                error,
+            };
+            let verdict = FlightParameter {
+                parameter: crate::gimbal::ParameterId::timeshift(0),
+                name,
+                group: "clocks",
+                dimension,
+                value: 0.25,
+                sigma,
+                prior_sigma: Some(0.25),
+                ratio: Some(0.5),
+                verdict: Determination::WeaklyDetermined,
+                since_ns: Some(1_500_000_000),
+                cause: None,
+                reason: "motion".to_owned(),
+                remedy: String::new(),
+            };
+            let [rig, last, error] = expected;
+            let verdicts = ["0.500", "weakly determined", "1.50"];
+            let expected = [&["parameter", rig, last], &verdicts[..], &[error, "motion", ""]].concat();
+            assert_eq!(calibration_row(&verdict, Some(&summary), true), expected);
+            assert_eq!(calibration_row(&verdict, None, false).len(), expected.len() - 1);
         };
-        check(Dimension::Angle, ["parameter", "°", "0.000", "14.324", "±7.162", "28.648", "−14.324", "−2.0"]);
-        check(Dimension::Length, ["parameter", "mm", "0.00", "250.00", "±125.00", "500.00", "−250.00", "−2.0"]);
-        check(Dimension::Time, ["parameter", "ms", "0.000", "250.000", "±125.000", "500.000", "−250.000", "−2.0"]);
+        check(Dimension::Angle, ["0.000", "14.324 ± 7.162°", "−14.324° (2.0 σ)"]);
+        check(Dimension::Length, ["0.00", "250.00 ± 125.00 mm", "−250.00 mm (2.0 σ)"]);
+        check(Dimension::Time, ["0.000", "250.000 ± 125.000 ms", "−250.000 ms (2.0 σ)"]);
     }
 }

@@ -1,7 +1,5 @@
 //! The verdict at the top of a report, before any figure.
 
-use std::f64::consts::FRAC_1_SQRT_2;
-
 use serde::Serialize;
 
 use super::numbers::{number, shown_unit};
@@ -9,12 +7,13 @@ use crate::calibration::ChainDistance;
 use crate::geometry::{Dimension, seconds_from_ns};
 use crate::log_check::{CheckReport, Severity};
 use crate::observability::laboratory::{Situation, advise};
-use crate::observability::{ParameterState, RankReport, parameter_states, parameters_of};
-use crate::session::{LostSince, PoseError, Recording, RunRecord, RunSummary, StepRecord, run_warning_lines};
+use crate::observability::{Determination, RankReport, parameters_of};
+use crate::session::{
+    FlightParameter, LostSince, PoseError, Recording, RunRecord, RunSummary, StepRecord, flight_headline,
+    least_determined, run_warning_lines,
+};
+use crate::text::Named as _;
 
-/// A parameter is informed if its posterior σ is at most this ratio of its prior σ: the measurements then contribute at
-/// least as much information as the prior.
-const INFORMED_RATIO: f64 = FRAC_1_SQRT_2;
 /// Largest trajectory error, in percent of the path length, with a good mark.
 const MAX_ATE_PERCENT: f64 = 1.0;
 /// Number of parameters by which a direction is named.
@@ -44,39 +43,19 @@ pub(super) struct Statement {
     pub(super) details: Vec<String>,
 }
 
-/// Comparison of a calibration parameter with its prior.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct ParameterVerdict {
-    pub(super) name: String,
-    /// Serialized as its unit.
-    #[serde(rename = "unit")]
-    pub(super) dimension: Dimension,
-    /// Posterior standard deviation.
-    pub(super) sigma: Option<f64>,
-    /// Prior standard deviation.
-    pub(super) prior_sigma: Option<f64>,
-    /// True if the posterior σ is at most 0.71 of the prior σ.
-    pub(super) informed: bool,
-    /// `weak` or `unobservable` in the last window, empty otherwise.
-    pub(super) state: &'static str,
-}
-
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct RunVerdict {
     /// Statements in the order of the page.
     pub(super) statements: Vec<Statement>,
-    /// Calibration parameters in column order.
-    pub(super) parameters: Vec<ParameterVerdict>,
 }
 
 impl RunVerdict {
     pub(super) fn new(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Self {
-        let parameters = parameters(recording, run);
         let mut statements = vec![accuracy(recording, run, summary)];
-        statements.push(calibration(&parameters, summary));
+        statements.push(calibration(summary));
         statements.extend(observability(recording, run));
         statements.push(estimation(run, summary));
-        Self { statements, parameters }
+        Self { statements }
     }
 }
 
@@ -138,71 +117,30 @@ fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Sta
     }
 }
 
-/// Posterior against prior σ of every parameter at the end of the run.
-fn parameters(recording: &Recording, run: &RunRecord) -> Vec<ParameterVerdict> {
-    let Some(last) = run.steps.last() else { return Vec::new() };
-    let calibration = &last.report.calibration;
-    let names = recording.rig.parameter_names();
-    let rank = run.steps.iter().rev().find_map(|step| step.rank.as_ref());
-    let states = parameter_states(rank).unwrap_or_default();
-    let finite = |sigmas: &[f64], index: usize| sigmas.get(index).copied().filter(|sigma| sigma.is_finite());
-    let verdict = |(index, parameter): (usize, &crate::gimbal::ParameterId)| {
-        let (sigma, prior_sigma) = (finite(&calibration.sigmas, index), finite(&calibration.prior_sigmas, index));
-        let informed = match (sigma, prior_sigma) {
-            (Some(sigma), Some(prior)) => sigma <= INFORMED_RATIO * prior,
-            (Some(_), None) => true,
-            (None, _) => false,
-        };
-        let state = match states.get(parameter) {
-            Some(state @ (ParameterState::Weak | ParameterState::Unobservable | ParameterState::Fixed)) => state.tag(),
-            _ => "",
-        };
-        ParameterVerdict {
-            name: names.name(*parameter),
-            dimension: parameter.dimension(),
-            sigma,
-            prior_sigma,
-            informed,
-            state,
-        }
-    };
-    calibration.parameters.iter().enumerate().map(verdict).collect()
-}
-
-fn calibration(parameters: &[ParameterVerdict], summary: &RunSummary) -> Statement {
-    let (informed, others): (Vec<_>, Vec<_>) = parameters.iter().partition(|parameter| parameter.informed);
+/// Verdicts of the flight on the parameters, with the reason for the least determined one.
+fn calibration(summary: &RunSummary) -> Statement {
+    let parameters = &summary.calibration.estimability;
     let estimated = summary.frames.estimated > 0;
     if parameters.is_empty() || !estimated {
         let text = if estimated { "Calibration fixed at the values of the rig." } else { "Not calibrated." };
         return statement("Calibration", Mark::Note, text.to_owned(), Vec::new());
     }
-    let rule = "at most 0.71 of the prior σ, from all windows together";
-    let count = parameters.len();
-    let (mark, text) = match (informed.len(), others.len()) {
-        (_, 0) => (Mark::Good, format!("Calibrated: all {count} parameters reached an informed σ ({rule}).")),
-        (0, _) => {
-            (Mark::Warning, format!("Not calibrated: none of {count} parameters reached an informed σ ({rule})."))
-        }
-        (known, _) => {
-            (Mark::Warning, format!("Partly calibrated: {known} of {count} parameters reached an informed σ ({rule})."))
-        }
-    };
-    let listed = |parameters: &[&ParameterVerdict]| {
-        parameters.iter().map(|parameter| parameter.text()).collect::<Vec<_>>().join(", ")
-    };
+    let all = parameters.iter().all(|parameter| parameter.verdict == Determination::Determined);
+    let text = format!("{}, from the whole flight ({}).", flight_headline(parameters), Determination::RULE);
     let mut details = Vec::new();
-    if !informed.is_empty() {
-        details.push(format!("Informed: {}.", listed(&informed)));
+    for verdict in Determination::all() {
+        let of = parameters.iter().filter(|parameter| parameter.verdict == verdict);
+        let listed: Vec<String> = of.map(with_sigma).collect();
+        if !listed.is_empty() {
+            details.push(format!("{}: {}.", capitalized(verdict.name()), listed.join(", ")));
+        }
     }
-    // Grouped by their observability in the last window.
-    let mut states: Vec<&str> = others.iter().map(|parameter| parameter.state).collect();
-    states.sort_unstable();
-    states.dedup();
-    for state in states {
-        let of_state: Vec<&ParameterVerdict> =
-            others.iter().copied().filter(|parameter| parameter.state == state).collect();
-        let state = if state.is_empty() { String::new() } else { format!(", {state} in the last window") };
-        details.push(format!("Not informed{state}: {}.", listed(&of_state)));
+    if let Some(least) = least_determined(parameters) {
+        details.push(format!("Least determined: {}, {}.", least.name, least.verdict_text()));
+        details.push(format!("Reason: {}.", least.reason));
+        if !least.remedy.is_empty() {
+            details.push(format!("Suggested for it: {}.", least.remedy));
+        }
     }
     let errors = (&summary.calibration.chain_error_initial, &summary.calibration.chain_error);
     if let (Some(first), Some(last)) = errors {
@@ -213,15 +151,14 @@ fn calibration(parameters: &[ParameterVerdict], summary: &RunSummary) -> Stateme
             chain_error(last)
         ));
     }
-    statement("Calibration", mark, text, details)
+    statement("Calibration", if all { Mark::Good } else { Mark::Warning }, text, details)
 }
 
-impl ParameterVerdict {
-    /// For example `yaw.alpha ±0.12°`.
-    fn text(&self) -> String {
-        let sigma = self.sigma.map_or_else(String::new, |sigma| format!(" ±{}", sigma_text(self.dimension, sigma)));
-        format!("{}{sigma}", self.name)
-    }
+/// For example `yaw.alpha ±0.12°`.
+fn with_sigma(parameter: &FlightParameter) -> String {
+    let sigma =
+        parameter.sigma.map_or_else(String::new, |sigma| format!(" ±{}", sigma_text(parameter.dimension, sigma)));
+    format!("{}{sigma}", parameter.name)
 }
 
 /// Ranks at the end of the run: the least observable direction, since when, the cause, and suggested excitation.
@@ -232,7 +169,7 @@ fn observability(recording: &Recording, run: &RunRecord) -> Option<Statement> {
     let names = recording.rig.parameter_names();
     let columns = rank.parameters.len();
     let text = format!(
-        "At {} s structural rank {} of {columns}, informed rank {}.",
+        "Last window, at {} s: structural rank {} of {columns}, informed rank {}.",
         number(seconds_from_ns(step.report.stamp_ns), 2),
         rank.rank_structural,
         rank.rank_informed
@@ -241,7 +178,7 @@ fn observability(recording: &Recording, run: &RunRecord) -> Option<Statement> {
     if let Some(direction) = rank.least_observable_direction() {
         let since = LostSince::of(earlier, step).map_or_else(String::new, |lost| format!(", {lost}"));
         let along = parameters_of(&names, &rank.parameters, direction, NAMED);
-        details.push(format!("Least observable direction: {along}{since}."));
+        details.push(format!("Least observable direction of this window: {along}{since}."));
     }
     details.extend(why(rank, step));
     let best = run.steps.iter().filter_map(|step| Some((step.rank.as_ref()?.rank_informed, step.report.stamp_ns)));
@@ -266,7 +203,7 @@ fn observability(recording: &Recording, run: &RunRecord) -> Option<Statement> {
     Some(statement("Observability", mark, text, details))
 }
 
-/// Causes of null and of weak directions.
+/// Causes of null and of uninformed directions.
 fn why(rank: &RankReport, step: &StepRecord) -> Vec<String> {
     let causes = [
         (rank.deficit_parameterization, "redundant in the parameterization"),
@@ -280,15 +217,15 @@ fn why(rank: &RankReport, step: &StepRecord) -> Vec<String> {
     if !named.is_empty() {
         reasons.push(format!("Unobservable directions: {}.", named.join(", ")));
     }
-    let weak = rank.rank_structural.saturating_sub(rank.rank_informed);
-    if let (Some(first), Some(last), true) = (step.report.window.first(), step.report.window.last(), weak > 0) {
+    let uninformed = rank.rank_structural.saturating_sub(rank.rank_informed);
+    if let (Some(first), Some(last), true) = (step.report.window.first(), step.report.window.last(), uninformed > 0) {
         let window_s = seconds_from_ns(last.stamp_ns - first.stamp_ns);
         reasons.push(format!(
             "{} because the motion in the window ({} frames, {} s) constrains {} less than a prior of 10° or 3 cm.",
-            if weak == 1 { "1 direction is weak" } else { "Directions are weak" },
+            if uninformed == 1 { "1 direction is uninformed" } else { "Directions are uninformed" },
             step.report.window.len(),
             number(window_s, 1),
-            if weak == 1 { "it".to_owned() } else { format!("{weak} of them") }
+            if uninformed == 1 { "it".to_owned() } else { format!("{uninformed} of them") }
         ));
     }
     reasons
@@ -392,22 +329,9 @@ fn in_words(sentence: &str) -> String {
 mod tests {
     use super::*;
 
-    fn parameter(name: &str, sigma: f64, prior_sigma: f64) -> ParameterVerdict {
-        ParameterVerdict {
-            name: name.to_owned(),
-            dimension: Dimension::Length,
-            sigma: Some(sigma),
-            prior_sigma: Some(prior_sigma),
-            informed: sigma <= INFORMED_RATIO * prior_sigma,
-            state: "weak",
-        }
-    }
-
     #[test]
-    fn parameters_are_named_with_their_sigma() {
-        assert_eq!(parameter("yaw.d", 0.00123, 0.003).text(), "yaw.d ±1.2 mm");
-        assert_eq!(parameter("yaw.d", 0.0025, 0.003).text(), "yaw.d ±2.5 mm");
-        assert!(parameter("yaw.d", 0.002, 0.003).informed && !parameter("yaw.d", 0.0025, 0.003).informed);
+    fn sigmas_have_two_digits() {
+        assert_eq!(sigma_text(Dimension::Length, 0.00123), "1.2 mm");
         assert_eq!(sigma_text(Dimension::Angle, 0.002), "0.11°");
         assert_eq!(sigma_text(Dimension::Length, 0.0), "0 mm");
     }

@@ -44,9 +44,10 @@ pub use playback::{
     SavedLog, SavedSession, SavedSessionError, Session, Wake,
 };
 pub use record::{
-    Comparison, Divergence, EstimabilitySummary, ForkOrigin, ImageResiduals, KnownLossSummary, LostSince, MeanResidual,
-    ParameterSummary, PassProgress, PoseConsistency, PoseError, PositionTruth, Quantity, RELATIVE_LENGTHS_M, Recording,
-    RelativeAccuracy, ResidualSum, RunMemory, RunRecord, RunSummary, RunWarning, SolverPosition, SolverTrace,
-    StageSummary, StepFactorRows, StepRecord, TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane, WarningLine,
-    estimability_summary, evaluate_trajectory, log_warning_lines, run_warning_lines, summarize, warning_lines,
+    Comparison, Divergence, FlightParameter, FlightVerdicts, ForkOrigin, ImageResiduals, KnownLossSummary, LostSince,
+    MeanResidual, ParameterSummary, PassProgress, PoseConsistency, PoseError, PositionTruth, Quantity,
+    RELATIVE_LENGTHS_M, Recording, RelativeAccuracy, ResidualSum, RunMemory, RunRecord, RunSummary, RunWarning,
+    SolverPosition, SolverTrace, StageSummary, StepFactorRows, StepRecord, TrajectoryAccuracy, TrajectoryEvaluation,
+    TrajectoryLane, WarningLine, evaluate_trajectory, flight_advice, flight_headline, flight_table, least_determined,
+    log_warning_lines, run_warning_lines, summarize, warning_lines,
 };

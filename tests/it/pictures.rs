@@ -31,7 +31,7 @@ use rayon::prelude::*;
 
 use crate::study_sample;
 
-/// Cursor of all screenshots in seconds: the vehicle is in flight, and some directions are still weak.
+/// Cursor of all screenshots in seconds: the vehicle is in flight, and some directions are uninformed.
 const AT_S: f64 = 6.0;
 /// Runs of all screenshots.
 const RUNS: [&str; 2] = ["auto", "classical"];
@@ -82,6 +82,7 @@ impl Subject {
     fn size_px(self) -> [u32; 2] {
         match self {
             Self::Panel(PanelName::Scene) => [800, 500],
+            Self::Panel(PanelName::Calibration) => [1200, 420],
             Self::Panel(PanelName::Convergence) => [1200, 480],
             Self::Panel(PanelName::Rank) => [480, 860],
             Self::Panel(PanelName::Jacobian) => [900, 560],

@@ -38,30 +38,28 @@ fn check_verdict(page: &str, report: &Value) {
         }
         let calibration: String =
             statements[1]["details"].as_array().expect("a list").iter().map(Value::to_string).collect();
-        let parameters = run["verdict"]["parameters"].as_array().expect("a list");
+        let parameters = run["estimability"].as_array().expect("a list");
+        assert_eq!(run["estimability"], run["summary"]["calibration"]["estimability"], "one table");
         assert_eq!(parameters.len(), run["summary"]["calibration"]["columns"].as_u64().expect("a count") as usize);
         for parameter in parameters {
             let named = format!("{} ±", parameter["name"].as_str().expect("a text"));
             assert_eq!(calibration.matches(&named).count(), 1, "{named} in {calibration}");
-            let [sigma, prior] = ["sigma", "prior_sigma"].map(|key| parameter[key].as_f64().expect("a number"));
-            assert_eq!(
-                parameter["informed"].as_bool().expect("a truth value"),
-                sigma <= 0.5_f64.sqrt() * prior,
-                "{parameter}"
-            );
-        }
-        let estimability = run["estimability"].as_array().expect("a list");
-        assert_eq!(estimability.len(), parameters.len());
-        for parameter in estimability {
             let ratio = parameter["ratio"].as_f64().expect("a number");
-            let verdict = match ratio {
-                ..0.3 => "known",
-                0.3..0.9 => "weakly known",
-                _ => "not from this flight",
+            let by_ratio = match ratio {
+                ..0.3 => "determined",
+                0.3..0.9 => "weakly determined",
+                _ => "not determined",
             };
-            assert_eq!(parameter["verdict"], verdict, "{parameter}");
+            let verdict = parameter["verdict"].as_str().expect("a text");
+            assert!(verdict == by_ratio || verdict == "redundant" && ratio >= 0.3, "{parameter}");
+            assert_eq!(verdict == "determined", parameter["cause"].is_null(), "{parameter}");
+            assert_eq!(verdict == "determined", parameter["reason"] == "", "{parameter}");
+            assert!(parameter["since_s"].as_f64().expect("a number") > 0.0, "{parameter}");
         }
-        assert!(page.contains(&format!("What the flight determines, run {}", run["label"].as_str().expect("a text"))));
+        let label = run["label"].as_str().expect("a text");
+        let redundant = parameters.iter().filter(|parameter| parameter["verdict"] == "redundant").count();
+        assert_eq!(redundant > 0, label == "old", "only the classical parameterization has redundant columns");
+        assert_eq!(page.matches(&format!("Calibration of run {label}, parameterization")).count(), 1, "one table");
     }
     assert!(page.contains("Suggested excitation: "));
     assert!(page.find(report["log_verdict"]["text"].as_str().expect("a text")).expect("it is in the page") < figures);

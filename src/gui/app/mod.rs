@@ -286,6 +286,7 @@ impl App {
         self.state.study = self.study.as_ref().map(ShownStudy::name);
         self.state.panels.timeline.pace.frame(playback.playing, now_s, log.cursor_ns());
         let mut commands = Vec::new();
+        self.selection.flight.compute_in_background();
         let mut context = PanelContext {
             recording: &recording,
             cursor_ns: log.cursor_ns(),

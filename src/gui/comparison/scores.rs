@@ -4,6 +4,7 @@ use crate::calibration::ChainDistance;
 use crate::estimator::Phase;
 use crate::geometry::seconds_from_ns;
 use crate::gui::units::{fixed, significant};
+use crate::observability::Determination;
 use crate::session::{RELATIVE_LENGTHS_M, Recording, RunRecord, TrajectoryAccuracy, TrajectoryLane};
 
 /// Number of new steps after which a run's accuracy is recomputed.
@@ -45,6 +46,7 @@ struct RunScore {
     estimated: Option<usize>,
     restarts: Option<usize>,
     columns: Option<usize>,
+    determined: Option<usize>,
     informed: Option<usize>,
 }
 
@@ -204,6 +206,10 @@ impl Scores {
                 row("calibration columns", "", None, Some(0), &|score| score.columns.map(|count| count as f64)),
             ),
             with(
+                "Parameters that the whole flight determines: σ below 0.3 of the prior σ",
+                row("determined parameters", "", None, Some(0), &|score| score.determined.map(|count| count as f64)),
+            ),
+            with(
                 "Informed rank of the last step with a calibration",
                 row("informed rank at the end", "", None, Some(0), &|score| score.informed.map(|rank| rank as f64)),
             ),
@@ -257,6 +263,10 @@ impl RunScore {
             initialized_s: first.map(|step| seconds_from_ns(step.report.stamp_ns)),
             restarts: Some(last.map_or(0, |last| last.report.restarts)),
             columns: Some(last.map_or(0, |last| last.report.calibration.parameters.len())),
+            determined: last.map(|last| {
+                let verdicts = last.determinations();
+                verdicts.iter().filter(|(_, verdict)| *verdict == Determination::Determined).count()
+            }),
             informed: run.steps.iter().rev().find_map(|step| step.rank.as_ref()).map(|rank| rank.rank_informed),
         }
     }

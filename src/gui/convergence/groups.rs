@@ -15,8 +15,6 @@ pub(super) enum View {
     All,
     /// One group fills the panel.
     Group(ParameterGroup),
-    /// Table of the parameters that the flight determines.
-    Table,
 }
 
 /// The groups of sorted parameters with their sizes.
@@ -34,8 +32,6 @@ pub(super) fn choice_ui(ui: &mut Ui, view: &mut View, groups: &[(ParameterGroup,
             let label = format!("{} ({count})", capitalized(group.name()));
             ui.selectable_value(view, View::Group(*group), label).on_hover_text("This group fills the panel");
         }
-        ui.separator();
-        ui.selectable_value(view, View::Table, "Table").on_hover_text("Parameters that the flight determines");
     });
 }
 

@@ -7,7 +7,6 @@ mod model;
 pub(crate) mod names;
 mod paint;
 mod range;
-mod table;
 #[cfg(test)]
 mod tests;
 
@@ -84,16 +83,11 @@ impl Panel for ConvergencePanel {
         let groups = groups_of(&parameters);
         if groups.len() > 1 && !ctx.presentation.is_figure() {
             groups::choice_ui(ui, &mut self.view, &groups);
-            if self.view == View::Table {
-                let recording = ctx.recording;
-                table::table_ui(ui, ctx, &recording.runs[shown]);
-                return;
-            }
             available = available.with_min_y(ui.cursor().top());
         }
         let chosen = match self.view {
             View::Group(chosen) => groups.iter().any(|(group, _)| *group == chosen).then_some(chosen),
-            View::All | View::Table => None,
+            View::All => None,
         };
         if let Some(chosen) = chosen {
             parameters.retain(|parameter| parameter.group() == chosen);

@@ -6,9 +6,9 @@ use crate::estimator::rigid_columns;
 use crate::gimbal::{NearestForm, ParameterId, Parameterization};
 use crate::gui::chain_values::{ParameterValues, parameter_values, principal_values, unwrap_towards};
 use crate::gui::follow::Follower;
-use crate::observability::{ParameterState, parameter_states};
+use crate::observability::Determination;
 use crate::sensors::Rig;
-use crate::session::{RunRecord, StepRecord};
+use crate::session::{FlightVerdicts, RunRecord, StepRecord};
 
 #[derive(Debug, Default)]
 pub(crate) struct ParameterHistory {
@@ -20,7 +20,8 @@ pub(crate) struct ParameterHistory {
     pub(crate) upper: Vec<f64>,
     /// Standard deviation by step.
     pub(crate) sigmas: Vec<f64>,
-    pub(crate) states: Vec<ParameterState>,
+    /// Verdict by step, from σ and prior σ.
+    pub(crate) verdicts: Vec<Determination>,
 }
 
 /// The calibration of one run over time.
@@ -34,6 +35,7 @@ pub(crate) struct CalibrationHistory {
     pub(crate) epoch: u64,
     /// Values of the last step, the reference for unwrapping angles.
     last: ParameterValues,
+    verdicts: FlightVerdicts,
 }
 
 impl CalibrationHistory {
@@ -44,9 +46,11 @@ impl CalibrationHistory {
             self.stamps_ns.clear();
             self.parameters.clear();
             self.last.clear();
+            self.verdicts = FlightVerdicts::default();
             self.epoch += 1;
         }
         for step in new_steps.steps {
+            self.verdicts.push(step);
             self.push(step);
         }
     }
@@ -55,7 +59,7 @@ impl CalibrationHistory {
         let calibration = &step.report.calibration;
         let row = self.stamps_ns.len();
         self.stamps_ns.push(step.report.stamp_ns);
-        let known = parameter_states(step.rank.as_ref());
+        let verdicts: BTreeMap<ParameterId, Determination> = self.verdicts.verdicts().collect();
         let mut values = principal_values(&calibration.parameters, &calibration.values);
         unwrap_towards(&mut values, &self.last);
         for (index, parameter) in calibration.parameters.iter().enumerate() {
@@ -72,10 +76,7 @@ impl CalibrationHistory {
             history.sigmas.push(sigma);
             history.lower.push(value - 3.0 * sigma);
             history.upper.push(value + 3.0 * sigma);
-            history.states.push(match &known {
-                Some(known) => known.get(parameter).copied().unwrap_or(ParameterState::Informed),
-                None => ParameterState::Waiting,
-            });
+            history.verdicts.push(verdicts.get(parameter).copied().unwrap_or(Determination::Initializing));
         }
         for (_, history) in &mut self.parameters {
             history.pad(row + 1);
@@ -164,7 +165,7 @@ impl ParameterHistory {
         for column in [&mut self.values, &mut self.sigmas, &mut self.lower, &mut self.upper] {
             column.resize(rows.max(column.len()), f64::NAN);
         }
-        self.states.resize(rows.max(self.states.len()), ParameterState::Waiting);
+        self.verdicts.resize(rows.max(self.verdicts.len()), Determination::Initializing);
     }
 }
 
@@ -225,14 +226,13 @@ mod tests {
     }
 
     #[test]
-    fn null_directions_make_their_parameters_unobservable() {
+    fn the_classical_chain_has_redundant_parameters() {
         let recording = sample_recording_of(first_tracked_frame() + 5, &["classical"]);
         let mut history = CalibrationHistory::default();
         history.read(&recording.runs[0]);
         let last = history.stamps_ns.len() - 1;
-        let lost =
-            history.parameters.iter().filter(|(_, one)| one.states[last] == ParameterState::Unobservable).count();
-        assert!(lost > 0, "the classical chain is redundant");
-        assert!(history.parameters.iter().all(|(_, one)| one.states[0] == ParameterState::Waiting));
+        let redundant = history.parameters.iter().filter(|(_, one)| one.verdicts[last] == Determination::Redundant);
+        assert!(redundant.count() > 5, "the classical chain is redundant");
+        assert!(history.parameters.iter().all(|(_, one)| one.verdicts[0] == Determination::Initializing));
     }
 }

@@ -1,5 +1,5 @@
 //! Painting of one small plot: value with ±3σ band, ground truth, and the ranges in which the parameter is not
-//! informed.
+//! determined.
 
 use std::collections::BTreeMap;
 
@@ -8,10 +8,11 @@ use egui::{Align2, Color32, Pos2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 use super::model::{CalibrationHistory, ConvertedHistory};
 use super::names::{CalibrationPart, heading_of, meaning_of};
 use super::range::{paint_outside, value_range};
-use crate::gimbal::ParameterId;
+use crate::gimbal::{ParameterId, Parameterization};
 use crate::gui::PanelContext;
 use crate::gui::chain_values::ParameterValues;
 use crate::gui::copied_value::offer;
+use crate::gui::determination::look_of;
 use crate::gui::help::terms::window;
 use crate::gui::plot::{
     BandCurve, Clicks, Curve, Interaction, PlotArea, ReadLine, Readout, StateCurve, Wheel, paint_band, paint_curve,
@@ -20,17 +21,23 @@ use crate::gui::plot::{
 };
 use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::gui::units::{Shown, fixed};
-use crate::observability::ParameterState;
+use crate::observability::Determination;
+use crate::text::Named as _;
 
-/// Height of the state strip at the bottom of a plot, in points.
+/// Height of the strip of the verdict at the bottom of a plot, in points.
 const STRIP_HEIGHT: f32 = 3.0;
 /// Width of a sample in the legend, in points.
 const SAMPLE_WIDTH: f32 = 26.0;
 /// Height of the line with name and value, in points.
 const TITLE_HEIGHT: f32 = 15.0;
 
-pub(super) const MARKED: [ParameterState; 3] =
-    [ParameterState::Weak, ParameterState::Unobservable, ParameterState::Waiting];
+/// Verdicts with a mark in the plots.
+pub(super) const MARKED: [Determination; 4] = [
+    Determination::WeaklyDetermined,
+    Determination::NotDetermined,
+    Determination::Redundant,
+    Determination::Initializing,
+];
 
 pub(super) fn heading(ui: &Ui, ctx: &PanelContext<'_>, part: CalibrationPart, rect: Rect) {
     let painter = ui.painter();
@@ -91,13 +98,16 @@ fn legend_entries(ctx: &PanelContext<'_>, add_entry: &mut dyn FnMut(&str, PaintS
             paint_line(painter, &[place.left_center(), place.right_center()], theme.ground_truth_style(), CURVE_WIDTH);
         });
     }
-    for (state, text) in MARKED.into_iter().zip(["weak: less than the prior", "unobservable", "initializing"]) {
-        add_entry(text, &|painter, place| {
-            if state != ParameterState::Weak {
+    let classical = ctx.recording.runs.iter().any(|run| {
+        run.steps.last().is_some_and(|last| last.report.calibration.parameterization == Parameterization::Classical)
+    });
+    for verdict in MARKED.into_iter().filter(|verdict| classical || *verdict != Determination::Redundant) {
+        add_entry(verdict.name(), &|painter, place| {
+            if verdict != Determination::WeaklyDetermined {
                 paint_hatch(painter, place, theme.hatch);
             }
             let strip = Rect::from_min_max(pos2(place.left(), place.bottom() - STRIP_HEIGHT), place.max);
-            painter.rect_filled(strip, 0.0, state_color(theme, state));
+            painter.rect_filled(strip, 0.0, look_of(verdict, theme).1);
         });
     }
 }
@@ -173,8 +183,8 @@ pub(super) fn cell_ui(
         curves.value.update(&area, epoch, stamps_ns, values);
         if *run == shown_run {
             curves.band.update(&area, epoch, stamps_ns, &parameter.lower, &parameter.upper);
-            for (segments, state) in curves.states.iter_mut().zip(MARKED) {
-                segments.update(&area, epoch, stamps_ns, |row| parameter.states[row] == state);
+            for (segments, verdict) in curves.verdicts.iter_mut().zip(MARKED) {
+                segments.update(&area, epoch, stamps_ns, |row| parameter.verdicts[row] == verdict);
             }
         }
     }
@@ -191,7 +201,7 @@ pub(super) fn cell_ui(
     let inner = painter.with_clip_rect(plot);
     paint_ground(&painter, &theme, plot);
     if let Some(curves) = curve_of(shown_run) {
-        paint_states(&inner, &theme, &area, curves);
+        paint_verdicts(&inner, &theme, &area, curves);
     }
     paint_value_axis(&painter, &theme, &area, shown.factor);
     paint_time_axis(&painter, &theme, &area, below);
@@ -220,13 +230,15 @@ pub(super) fn cell_ui(
     painter.rect_stroke(plot, 0.0, border, StrokeKind::Inside);
 
     let row = history.row_at(ctx.cursor_ns);
-    let state = row.map_or(ParameterState::Waiting, |row| parameter.states[row]);
+    let verdict = row.map_or(Determination::Initializing, |row| parameter.verdicts[row]);
     let value = row.map(|row| (parameter.values[row], parameter.sigmas[row]));
     let shown_value = value.map(|(value, sigma)| (id.principal_value(value), sigma));
-    title(&painter, ctx, rect, name, shown, shown_value, state, selected);
-    if !state.tag().is_empty() {
-        let place = plot.right_top() + vec2(-3.0, 1.0);
-        boxed_text(&inner, &theme, place, Align2::RIGHT_TOP, state.tag(), state_color(&theme, state));
+    title(&painter, ctx, rect, name, shown, shown_value, verdict, selected);
+    if MARKED.contains(&verdict) {
+        let (mark, color) = look_of(verdict, &theme);
+        let width = painter.layout_no_wrap(verdict.name().to_owned(), theme::label_font(), color).size().x;
+        let text = if width + TICK_WIDTH <= plot.width() { verdict.name() } else { mark };
+        boxed_text(&inner, &theme, plot.right_top() + vec2(-3.0, 1.0), Align2::RIGHT_TOP, text, color);
     }
 
     let error =
@@ -249,7 +261,7 @@ pub(super) fn cell_ui(
         text.push_str(", error ");
         text.push_str(&error_text(shown, error, sigma));
     }
-    let label = format!("{name} {text} {}", state.tag());
+    let label = format!("{name} {text} {}", verdict.name());
     let widget = ui.unique_id().with(("parameter", name));
     let plot = Interaction { id: widget, name: label.trim_end(), value: "", clicks: Clicks::Select, wheel: data.wheel };
     let read_line = |run: usize| {
@@ -293,26 +305,17 @@ fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
     if times.is_finite() { format!("{text} ({times:.1}σ)") } else { text }
 }
 
-/// Hatches the ranges in which the parameter is not informed; a strip at the bottom shows the state.
-fn paint_states(painter: &egui::Painter, theme: &theme::Theme, area: &PlotArea, curves: &ParameterCurves) {
-    for (segments, state) in curves.states.iter().zip(MARKED) {
+/// Hatches the ranges in which the flight has not determined the parameter; a strip at the bottom shows the verdict.
+fn paint_verdicts(painter: &egui::Painter, theme: &theme::Theme, area: &PlotArea, curves: &ParameterCurves) {
+    for (segments, verdict) in curves.verdicts.iter().zip(MARKED) {
         for segment in segments.on_screen(area) {
             let segment = Rect::from_x_y_ranges(segment, area.rect.y_range());
-            if state != ParameterState::Weak {
+            if verdict != Determination::WeaklyDetermined {
                 paint_hatch(painter, segment, theme.hatch);
             }
             let strip = Rect::from_min_max(pos2(segment.left(), segment.bottom() - STRIP_HEIGHT), segment.max);
-            painter.rect_filled(strip, 0.0, state_color(theme, state));
+            painter.rect_filled(strip, 0.0, look_of(verdict, theme).1);
         }
-    }
-}
-
-fn state_color(theme: &theme::Theme, state: ParameterState) -> Color32 {
-    match state {
-        ParameterState::Informed => theme.ok,
-        ParameterState::Weak => theme.warn,
-        ParameterState::Unobservable => theme.error,
-        ParameterState::Fixed | ParameterState::Waiting => theme.text_weak,
     }
 }
 
@@ -325,14 +328,14 @@ fn title(
     name: &str,
     shown: Shown,
     value: Option<(f64, f64)>,
-    state: ParameterState,
+    verdict: Determination,
     selected: bool,
 ) {
     let theme = ctx.theme;
     let name_color = if selected { theme.accent } else { theme.text_strong };
     let end = painter.text(rect.left_top(), Align2::LEFT_TOP, name, theme::label_font(), name_color).right();
     let Some((value, sigma)) = value else { return };
-    let color = if state == ParameterState::Informed { theme.text_strong } else { theme.text_weak };
+    let color = if verdict == Determination::Determined { theme.text_strong } else { theme.text_weak };
     let font = theme::number_font();
     let with_sigma = format!("{} ±{}", fixed_value(shown, value, sigma), shown.sigma(sigma));
     let texts = [with_sigma, shown.value(value, sigma)];
@@ -364,6 +367,6 @@ fn boxed_text(painter: &egui::Painter, theme: &theme::Theme, place: Pos2, align:
 pub(super) struct ParameterCurves {
     pub(super) value: Curve,
     pub(super) band: BandCurve,
-    /// Ranges in which it is weak, unobservable, or not estimated yet.
-    pub(super) states: [StateCurve; MARKED.len()],
+    /// Ranges of the marked verdicts.
+    pub(super) verdicts: [StateCurve; MARKED.len()],
 }

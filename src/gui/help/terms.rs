@@ -132,7 +132,8 @@ pub(crate) mod parameter {
         CHANGE: "change since the start" => "Estimate minus initial value; angles in (−180°, 180°].";
         GROUND_TRUTH: "ground truth" => "True value from NAME.truth.yaml, converted to the parameterization of the run.";
         ERROR: "error" => "Estimate minus ground truth, and its absolute value in posterior σ. Above 3 σ the estimate is inconsistent.";
-        OBSERVABILITY: "observability" => "Informed, weak or unobservable in this window: whether a quarter of the parameter lies in weak or null directions of the rank analysis.";
+        VERDICT_HERE: "at the cursor" => "Verdict from σ / prior σ of this step. Determined: below 0.3; weakly determined: below 0.9; not determined: from 0.9 on; redundant: by the parameterization.";
+        VERDICT: "whole flight" => "The same verdict at the end of the flight, and the time from which it holds without interruption.";
     }
 }
 
@@ -219,7 +220,7 @@ pub(crate) mod window {
         MOTION: "motion" => "Motion of vehicle and joints in the synthetic window.";
         JOINT_ANGLES: "joint angles" => "Joint angles: known, measured by encoders of this σ in degrees, or unknown.";
         POSES: "poses" => "Poses: known, or estimated from IMU samples with the noise of the rig.";
-        VERDICT: "verdict" => "Structural rank: directions that the measurements of the window constrain in principle. Informed rank: those with at least the information of a prior of 10° or 3 cm.";
+        RANKS: "ranks" => "Structural rank: directions that the measurements of the window constrain in principle. Informed rank: those with at least the information of a prior of 10° or 3 cm.";
         LEAST_OBSERVABLE: "least observable" => "Direction with the smallest singular value, by the parameters with the largest weights.";
         RANK_DEFICIT: "rank deficit" => "Unobservable directions by cause: parameterization, stationary joints, free joint angles, motion of the vehicle.";
         SINGULARITY_MARGIN: "singularity margin" => "Distance of the chain from a singularity of its parameterization: 1 far, 0 singular. The second value is that of the other minimal parameterization.";

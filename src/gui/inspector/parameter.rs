@@ -9,8 +9,8 @@ use crate::gui::chain_values::true_values;
 use crate::gui::convergence::names::meaning_of;
 use crate::gui::help::terms::parameter as terms;
 use crate::gui::units::{Shown, fixed};
-use crate::observability::{ParameterState, parameter_states};
 use crate::session::{RunRecord, StepRecord};
+use crate::text::Named as _;
 
 pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord, parameter: ParameterId) {
     let theme = ctx.theme;
@@ -46,9 +46,17 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
         let ratio = fixed(error.abs() / sigma, 1);
         rows.push((terms::ERROR, vec![format!("{} ({ratio} σ)", shown.value(error, sigma))]));
     }
-    let state = parameter_states(step.rank.as_ref())
-        .map_or(ParameterState::Waiting, |known| known.get(&parameter).copied().unwrap_or(ParameterState::Informed));
-    let state = if state == ParameterState::Informed { "informed" } else { state.tag() };
-    rows.push((terms::OBSERVABILITY, vec![state.to_owned()]));
+    let here = step.determinations().into_iter().find(|(known, _)| *known == parameter);
+    rows.push((terms::VERDICT_HERE, vec![here.map_or_else(String::new, |(_, verdict)| verdict.name().to_owned())]));
+    let report = ctx.flight(ui, run);
+    let flight = report.rows.iter().find(|row| row.parameter == parameter);
+    if let Some(flight) = flight {
+        let since = flight.since_s().map_or_else(String::new, |since_s| format!(" since {} s", fixed(since_s, 2)));
+        rows.push((terms::VERDICT, vec![format!("{}{since}", flight.verdict.name())]));
+    }
     rows_ui(ui, theme, "parameter", &rows);
+    let texts = flight.map(|flight| [("Why: ", &flight.reason), ("What helps: ", &flight.remedy)]);
+    for (head, text) in texts.into_iter().flatten().filter(|(_, text)| !text.is_empty()) {
+        ui.add(egui::Label::new(RichText::new(format!("{head}{text}")).color(theme.text)).wrap());
+    }
 }

@@ -16,12 +16,11 @@ impl CsvTable for LaboratoryPanel {
                 table.row(cells.into_iter().chain([String::new(), String::new()]));
             }
             for (index, direction) in rank.directions.iter().enumerate() {
-                let kind = if direction.structural { "null" } else { "weak" };
                 let weights = rank.parameters.iter().zip(&direction.weights);
                 for (parameter, weight) in weights.filter(|(_, weight)| **weight != 0.0) {
                     table.row([
                         parameterization.clone(),
-                        kind.to_owned(),
+                        direction.kind().to_owned(),
                         (index + 1).to_string(),
                         number_cell(direction.singular_value),
                         names.name(*parameter),

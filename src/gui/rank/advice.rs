@@ -26,8 +26,8 @@ const MIN_PERIOD_S: f64 = 1.0;
 
 #[derive(Debug)]
 struct StepAdvice {
-    /// Start of the present loss of observability: `weak since 5.55 s`.
-    since: Option<String>,
+    /// Start of the present loss of observability.
+    since: Option<LostSince>,
     advice: Option<Advice>,
 }
 
@@ -75,9 +75,9 @@ impl AdviceUi {
     }
 
     /// Start of the loss of observability of the step's least observable direction; `None` until it is computed.
-    pub(super) fn since(&self, step: &Arc<StepRecord>) -> Option<&str> {
+    pub(super) fn since(&self, step: &Arc<StepRecord>) -> Option<LostSince> {
         let (of, results) = self.results.last()?;
-        results.filter(|_| Arc::ptr_eq(of, step))?.since.as_deref()
+        results.filter(|_| Arc::ptr_eq(of, step))?.since
     }
 
     /// Draws the suggested excitation, with the stamp of its step if that is not the cursor's.
@@ -138,10 +138,7 @@ impl AdviceUi {
                 .and_then(|rank| Situation::of_step(&step.report, rank, &ctx.recording.rig, &run.camera_key));
             let step = Arc::clone(step);
             move || {
-                Some(StepAdvice {
-                    since: LostSince::of(&earlier, &step).map(|lost| lost.to_string()),
-                    advice: situation.as_ref().and_then(advise),
-                })
+                Some(StepAdvice { since: LostSince::of(&earlier, &step), advice: situation.as_ref().and_then(advise) })
             }
         });
     }

@@ -1,4 +1,4 @@
-//! Several rank reports side by side: causes of lost rank, spectra on one axis, and null and weak directions in one
+//! Several rank reports side by side: causes of lost rank, spectra on one axis, and null and uninformed directions in one
 //! heat map with a common order of rows.
 
 use egui::{Align2, Color32, Grid, Label, Rangef, Rect, RichText, Role, Stroke, Ui, WidgetInfo};
@@ -151,7 +151,7 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
             ui.painter().text(at, Align2::LEFT_TOP, "✔ full informed rank", theme::label_font(), theme.ok);
         }
         for (place, direction) in directions.iter().enumerate() {
-            let (mark, color) = if direction.structural { ("null", theme.error) } else { ("weak", theme.warn) };
+            let (mark, color) = if direction.structural { ("null", theme.error) } else { ("uninf.", theme.warn) };
             let mark = if pitch < MIN_COLUMN_WIDTH - 6.0 { &mark[..1] } else { mark };
             let at = pos2(left + (place as f32 + 0.5) * pitch, whole.top());
             ui.painter().text(at, Align2::CENTER_TOP, mark, theme::label_font(), color);

@@ -3,9 +3,10 @@
 use super::RankPanel;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::gui::{CsvTable, PanelContext};
+use crate::observability::CalibrationDirection;
 
 impl CsvTable for RankPanel {
-    /// Singular values of the step at the cursor, and each null or weak direction as weights by parameter name.
+    /// Singular values of the step at the cursor, and each null or uninformed direction as weights by parameter name.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let Some(run) = ctx.selected_run() else { return String::new() };
         let Some(rank) = run.step_at(ctx.cursor_ns).and_then(|step| step.rank.as_ref()) else { return String::new() };
@@ -16,7 +17,7 @@ impl CsvTable for RankPanel {
         for (index, value) in rank.singular_values.iter().enumerate() {
             // Directions start with the least observable one, singular values with the largest.
             let direction = rank.directions.get(rank.singular_values.len() - 1 - index);
-            let kind = direction.map_or("informed", |direction| if direction.structural { "null" } else { "weak" });
+            let kind = direction.map_or("informed", CalibrationDirection::kind);
             let with_priors = rank.singular_values_with_priors.get(index).copied().unwrap_or(f64::NAN);
             let weights = (0..rank.parameters.len()).map(|column| {
                 let weight = direction.and_then(|direction| direction.weights.get(column));

@@ -1,4 +1,4 @@
-//! Null and weak directions by parameter name: a heat map with the signed weights as text.
+//! Null and uninformed directions by parameter name: a heat map with the signed weights as text.
 
 use egui::epaint::TextShape;
 use egui::{Align2, Painter, Rangef, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
@@ -11,6 +11,7 @@ use crate::gui::convergence::names::{meaning_of, part_of};
 use crate::gui::theme::{self, Theme};
 use crate::gui::units::{counted, fixed, significant};
 use crate::observability::{CalibrationDirection, RankReport, parameters_of};
+use crate::session::FlightParameter;
 
 const HEADER_HEIGHT: f32 = 28.0;
 /// Height in points of the header of narrow columns, whose numbers are vertical.
@@ -35,11 +36,11 @@ const MIN_SHOWN_WEIGHT: f64 = 0.05;
 const NAME_WIDTHS: std::ops::RangeInclusive<f32> = 40.0..=130.0;
 
 /// Draws the heat map in the first of the `heights`, in points, if all parameters fit into it, else in the second with
-/// the parameters of the largest weights.
-pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, heights: [f32; 2]) {
+/// the first of the rows by `importance`.
+pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, importance: &[usize], heights: [f32; 2]) {
     let theme = *ctx.theme;
     if rank.directions.is_empty() {
-        ui.label(RichText::new("No null or weak direction").color(theme.text_weak));
+        ui.label(RichText::new("No null or uninformed direction").color(theme.text_weak));
         return;
     }
     let names = ctx.names();
@@ -56,7 +57,8 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, hei
     let directions = &rank.directions[..count];
 
     let header_height = if pitch >= HEAD_WIDTH { HEADER_HEIGHT } else { UPRIGHT_HEADER_HEIGHT };
-    let Rows { rows, row_height, omitted } = Rows::of(rank, directions, heights.map(|height| height - header_height));
+    let Rows { rows, row_height, omitted } =
+        Rows::of(rank, directions, importance, heights.map(|height| height - header_height));
     let (_, rect) = ui.allocate_space(vec2(width, header_height + row_height * rows.len() as f32));
 
     for (column, direction) in directions.iter().enumerate() {
@@ -100,14 +102,14 @@ struct Rows {
 }
 
 impl Rows {
-    /// All rows if they fit comfortably into the first of the `heights`; else those with shown weights, if they fit at
-    /// least into the second; else those with the largest weights that fit into the second.
-    fn of(rank: &RankReport, directions: &[CalibrationDirection], heights: [f32; 2]) -> Self {
+    /// All rows if they fit comfortably into the first of the `heights`; else the first ones by `importance` that fit into
+    /// the second.
+    fn of(rank: &RankReport, directions: &[CalibrationDirection], importance: &[usize], heights: [f32; 2]) -> Self {
         let height_of =
             |height: f32, count: usize| (height / count.max(1) as f32).clamp(MIN_ROW_HEIGHT, MAX_ROW_HEIGHT);
         let all = rank.parameters.len();
         let sorted = |mut rows: Vec<usize>| {
-            rows.sort_by_key(|row| part_of(rank.parameters[*row]));
+            rows.sort_by_key(|row| (part_of(rank.parameters[*row]), *row));
             rows
         };
         if COMFORTABLE_ROW_HEIGHT * all as f32 <= heights[0] {
@@ -116,7 +118,7 @@ impl Rows {
         }
         let [preferred, most] = heights.map(|height| height - NOTE_HEIGHT);
         let fitting = ((most / MIN_ROW_HEIGHT) as usize).clamp(MIN_ROWS.min(all), all);
-        let rows = sorted(largest_rows(all, directions, fitting));
+        let rows = sorted(importance.iter().copied().take(fitting).collect());
         let weight = |row: usize| {
             let weights = directions.iter().map(|direction| weight_of(direction, row));
             weights.fold(0.0, f64::max)
@@ -131,25 +133,25 @@ fn weight_of(direction: &CalibrationDirection, row: usize) -> f64 {
     direction.weights.get(row).copied().unwrap_or(0.0).abs()
 }
 
-/// At most `count` of `all` rows: the row with the largest weight in each direction, then the row with the second
-/// largest, and so on, as long as the weights are shown.
-fn largest_rows(all: usize, directions: &[CalibrationDirection], count: usize) -> Vec<usize> {
-    let by_weight: Vec<Vec<usize>> = directions
-        .iter()
-        .map(|direction| {
-            let mut rows: Vec<usize> = (0..all).filter(|row| weight_of(direction, *row) >= MIN_SHOWN_WEIGHT).collect();
-            rows.sort_by(|a, b| weight_of(direction, *b).total_cmp(&weight_of(direction, *a)));
-            rows
-        })
-        .collect();
-    let mut rows = Vec::new();
-    for place in 0..all {
-        for row in by_weight.iter().filter_map(|rows| rows.get(place)) {
-            if rows.len() < count && !rows.contains(row) {
-                rows.push(*row);
-            }
-        }
+/// All columns of a step by importance: the parameters by which its least observable direction is named, then the
+/// others from the least determined one of the flight on, so that a low map keeps its rows while the cursor moves.
+pub(super) fn important_rows(rank: &RankReport, flight: &[FlightParameter]) -> Vec<usize> {
+    /// Number and smallest weight of the parameters by which the headline names a direction.
+    const NAMED: (usize, f64) = (3, 0.2);
+    let ratio = |row: &usize| {
+        let of = flight.iter().find(|known| rank.parameters.get(*row) == Some(&known.parameter));
+        of.and_then(|known| known.ratio).unwrap_or(0.0)
+    };
+    let mut others: Vec<usize> = (0..rank.parameters.len()).collect();
+    let mut rows: Vec<usize> = Vec::new();
+    if let Some(direction) = rank.least_observable_direction() {
+        let weight = |row: &usize| weight_of(direction, *row);
+        others.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+        rows = others.iter().copied().filter(|row| weight(row) >= NAMED.1).take(NAMED.0).collect();
     }
+    others.retain(|row| !rows.contains(row));
+    others.sort_by(|a, b| ratio(b).total_cmp(&ratio(a)).then(a.cmp(b)));
+    rows.extend(others);
     rows
 }
 
@@ -165,12 +167,13 @@ fn header(
     let theme = ctx.theme;
     let color = if direction.structural { theme.error } else { theme.warn };
     let painter = ui.painter();
-    let mark = if direction.structural { "null" } else { "weak" };
+    let mark = direction.kind();
     let value = if direction.structural { "0".to_owned() } else { significant(direction.singular_value) };
     let small = theme::number_font();
     if cell.width() >= HEAD_WIDTH {
         let top = cell.center_top();
-        painter.text(top, Align2::CENTER_TOP, mark, theme::label_font(), color);
+        let short = if direction.structural { mark } else { "uninf." };
+        painter.text(top, Align2::CENTER_TOP, short, theme::label_font(), color);
         painter.text(top + vec2(0.0, 13.0), Align2::CENTER_TOP, value, small, theme.text_weak);
     } else {
         let galley = painter.layout_no_wrap(value, small, color);
@@ -244,15 +247,32 @@ pub(super) fn paint_weight(painter: &Painter, theme: &Theme, weight: f64, cell: 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gui::samples::sample_recording;
+    use crate::session::flight_table;
 
     #[test]
-    fn a_low_map_shows_the_largest_weights_of_every_direction() {
-        let direction =
-            |weights: &[f64]| CalibrationDirection { singular_value: 0.0, structural: true, weights: weights.to_vec() };
-        let directions = [direction(&[0.9, -0.4, 0.0, 0.1, 0.01]), direction(&[0.0, 0.3, -0.2, 0.8, 0.02])];
-        assert_eq!(largest_rows(5, &directions, 2), [0, 3]);
-        assert_eq!(largest_rows(5, &directions, 3), [0, 3, 1]);
-        // The weights of the last row are below the shown minimum.
-        assert_eq!(largest_rows(5, &directions, 5), [0, 3, 1, 2]);
+    fn a_low_map_keeps_its_rows_and_has_those_of_the_headline() {
+        let recording = sample_recording();
+        let run = &recording.runs[0];
+        let flight = flight_table(&recording, run);
+        let ranks: Vec<&RankReport> = run.steps.iter().filter_map(|step| step.rank.as_ref()).collect();
+        let low = [60.0, 8.0 * MIN_ROW_HEIGHT + NOTE_HEIGHT];
+        let mut without_named = Vec::new();
+        for rank in ranks {
+            let importance = important_rows(rank, &flight);
+            assert_eq!(importance.len(), rank.parameters.len());
+            let shown = Rows::of(rank, &rank.directions, &importance, low).rows;
+            assert_eq!(shown.len(), 8);
+            assert!(shown.is_sorted_by_key(|row| (part_of(rank.parameters[*row]), *row)), "{shown:?}");
+            let Some(direction) = rank.least_observable_direction() else { continue };
+            let leading = direction.leading(&rank.parameters);
+            assert!(shown.iter().any(|row| Some(rank.parameters[*row]) == leading), "{leading:?} is named");
+            let named = shown.iter().filter(|row| weight_of(direction, **row) < 0.2);
+            without_named.push(named.copied().collect::<Vec<usize>>());
+        }
+        // The other rows are those that the flight determines least, whatever the step.
+        let worst = important_rows(run.steps.last().unwrap().rank.as_ref().unwrap(), &flight);
+        let largest = without_named.iter().flatten().map(|row| worst.iter().position(|it| it == row)).max();
+        assert!(largest.flatten() < Some(11), "{largest:?}");
     }
 }

@@ -4,6 +4,7 @@ mod advice;
 pub(super) mod columns;
 mod compare;
 mod csv;
+mod flight;
 mod groups;
 mod heat_map;
 mod information;
@@ -20,7 +21,7 @@ use egui::{RichText, ScrollArea, Ui, UiBuilder, vec2};
 
 use self::advice::AdviceUi;
 use self::information::InformationUi;
-use self::sections::{fact_ui, section_ui};
+use self::sections::{MIN_HEIGHT_WITH_CAUSE, fact_at_ui, headline_ui, section_ui};
 use self::slider::SliderUi;
 use self::spectrum::ranks_text;
 use self::verdict::{Level, Verdict};
@@ -36,7 +37,7 @@ use super::theme::{CURVE_WIDTH, RunStyle, Theme};
 use super::{Panel, PanelContext};
 use crate::gimbal::ParameterNames;
 use crate::observability::RankReport;
-use crate::session::{RunRecord, StepRecord};
+use crate::session::{LostSince, RunRecord, StepRecord};
 
 /// Columns of the tables over time.
 const STRUCTURAL: usize = 0;
@@ -45,9 +46,6 @@ const PARAMETERS: usize = 2;
 
 /// Width in points of the lines about one run.
 const RUN_WIDTH: f32 = 480.0;
-
-/// Size of the headline of the verdict in points.
-const HEADLINE: f32 = 13.0;
 
 /// Width in points from which the details are to the right of the heat map instead of below it.
 const MIN_WIDTH_WITH_DETAILS_BESIDE: f32 = 760.0;
@@ -168,8 +166,8 @@ impl RankPanel {
         });
     }
 
-    /// Draws verdict, least observable direction with its start, suggested excitation and heat map. Returns true if the
-    /// step has a rank.
+    /// Draws the verdict of the whole flight, then that at the cursor: least observable direction with its start and its
+    /// reason, suggested excitation and heat map. Returns true if the step has a rank.
     ///
     /// The heat map leaves the first of the `details` heights above `bottom` free if all its rows fit, else the second.
     fn answers_ui(
@@ -181,17 +179,22 @@ impl RankPanel {
         bottom: f32,
         details: [f32; 2],
     ) -> bool {
-        ui.spacing_mut().item_spacing.y = 3.0;
         self.advice.update(ui, ctx, run, step, self.in_background);
+        let height = bottom - ui.cursor().top();
+        ui.spacing_mut().item_spacing.y = if height < MIN_HEIGHT_WITH_CAUSE { 1.0 } else { 3.0 };
+        flight::ui(ui, ctx, run, height);
         let verdict = verdict::verdict(step, &ctx.names());
-        verdict_ui(ui, ctx.theme, &verdict, self.advice.since(step));
+        let since = self.advice.since(step);
+        verdict_ui(ui, ctx, &verdict, since, height >= MIN_HEIGHT_WITH_CAUSE);
         let Some(rank) = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty()) else {
             self.over_time_ui(ui, ctx);
             return false;
         };
         self.advice.ui(ui, ctx, step);
         let left = bottom - ui.cursor().top();
-        heat_map::ui(ui, ctx, rank, details.map(|below| left - below));
+        let report = ctx.flight(ui, run);
+        let worst = heat_map::important_rows(rank, &report.rows);
+        heat_map::ui(ui, ctx, rank, &worst, details.map(|below| left - below));
         true
     }
 
@@ -275,26 +278,23 @@ fn halves(rect: egui::Rect, fraction: f32) -> [egui::Rect; 2] {
     [left.with_max_x(left.right() - GAP), right]
 }
 
-/// Draws the verdict: a symbol, one line, the reasons, and the least observable direction.
-fn verdict_ui(ui: &mut Ui, theme: &Theme, verdict: &Verdict, since: Option<&str>) {
-    let (mark, color) = mark_of(verdict.level, theme);
-    ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = 5.0;
-        ui.label(RichText::new(mark).color(color).size(HEADLINE));
-        let headline = RichText::new(&verdict.headline).color(theme.text_strong).size(HEADLINE);
-        ui.add(egui::Label::new(headline).wrap()).on_hover_text(window::VERDICT.meaning);
-    });
-    for reason in &verdict.reasons {
+/// Draws the verdict at the cursor: a symbol, one line, the reasons, and the least observable direction with its start;
+/// the cause of an uninformed direction if there is room.
+fn verdict_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, verdict: &Verdict, since: Option<LostSince>, with_cause: bool) {
+    let theme = *ctx.theme;
+    let look = mark_of(verdict.level, &theme);
+    headline_ui(ui, &theme, look, "At the cursor:", &verdict.headline, window::RANKS.meaning);
+    let cause = verdict.cause.iter().filter(|_| with_cause);
+    for reason in verdict.reasons.iter().chain(cause) {
         let line = ui.add(egui::Label::new(RichText::new(&reason.text).color(theme.text)).wrap());
         line.on_hover_text(reason.term.meaning);
     }
-    if let Some(direction) = &verdict.direction
-        && let Some((kind, names)) = direction.text.split_once(": ")
-    {
-        let since = since.map_or_else(String::new, |since| format!(", {since}"));
-        let line = fact_ui(ui, theme, &format!("{kind}: "), &format!("{names}{since}"), theme.text_strong);
-        line.on_hover_text(direction.term.meaning);
-    }
+    let Some(direction) = &verdict.direction else { return };
+    let Some((kind, names)) = direction.text.split_once(": ") else { return };
+    let kind_of_loss = since.map_or_else(String::new, |since| format!(", {}", since.kind()));
+    let (name, text) = (format!("{kind}: "), format!("{names}{kind_of_loss}"));
+    let since_ns = since.map(|since| since.stamp_ns);
+    fact_at_ui(ui, ctx, &name, &text, since_ns, direction.term.meaning);
 }
 
 /// Draws the null directions that are known in closed form.
@@ -325,7 +325,7 @@ fn structure_ui(ui: &mut Ui, ctx: &PanelContext<'_>, names: &ParameterNames, ran
 fn mark_of(level: Level, theme: &Theme) -> (&'static str, egui::Color32) {
     match level {
         Level::Good => ("✔", theme.ok),
-        Level::Weak => ("⚠", theme.warn),
+        Level::Uninformed => ("⚠", theme.warn),
         Level::Lost => ("✖", theme.error),
         Level::None => ("…", theme.text_weak),
     }

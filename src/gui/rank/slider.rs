@@ -1,4 +1,4 @@
-//! Slider that moves the chain along a null or weak direction: the scene shows the moved chain, the image the change of
+//! Slider that moves the chain along a null or uninformed direction: the scene shows the moved chain, the image the change of
 //! the reprojections.
 
 use egui::{ComboBox, Label, RichText, Role, Slider, Ui, WidgetInfo};
@@ -7,7 +7,7 @@ use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::units::{Shown, fixed, significant};
 use crate::observability::{
-    ChainSlide, RankReport, SlideDirection, SlidePosition, chain_of_step, parameters_of_weights,
+    CalibrationDirection, ChainSlide, RankReport, SlideDirection, SlidePosition, chain_of_step, parameters_of_weights,
 };
 use crate::session::StepRecord;
 
@@ -45,8 +45,8 @@ impl SliderUi {
             let weights = direction.weights(rank, &chain).unwrap_or_default();
             let kind = match direction {
                 SlideDirection::Measured(index) => {
-                    let structural = rank.directions.get(*index).is_some_and(|direction| direction.structural);
-                    format!("{} {}", if structural { "null" } else { "weak" }, index + 1)
+                    let kind = rank.directions.get(*index).map_or("", CalibrationDirection::kind);
+                    format!("{kind} {}", index + 1)
                 }
                 SlideDirection::Parameter(parameter) => return format!("{} only", names.name(*parameter)),
                 SlideDirection::Known(loss) if is_other(direction, rank) => return format!("{} only", loss.name()),

@@ -1,16 +1,18 @@
 //! Rank of a step in words.
 
 use crate::estimator::{EventKind, Phase};
+use crate::geometry::seconds_from_ns;
 use crate::gimbal::{ParameterNames, SWITCH_MARGIN};
 use crate::gui::help::terms::{Term, window};
+use crate::gui::units::significant;
 use crate::observability::{KnownDirection, RankReport, parameters_of};
 use crate::session::StepRecord;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Level {
     Good,
-    /// Some directions are weak.
-    Weak,
+    /// Some directions are uninformed.
+    Uninformed,
     /// Some directions are unobservable.
     Lost,
     None,
@@ -23,6 +25,8 @@ pub(crate) struct Verdict {
     pub(crate) headline: String,
     /// Causes of the lost rank, or the condition of the initialization that is not met.
     pub(crate) reasons: Vec<Reason>,
+    /// Cause of an uninformed direction.
+    pub(crate) cause: Option<Reason>,
     /// The least observable direction by parameter name.
     pub(crate) direction: Option<Reason>,
     pub(crate) notes: Vec<Reason>,
@@ -31,7 +35,14 @@ pub(crate) struct Verdict {
 impl Verdict {
     /// Verdict on a step without a rank.
     fn none(headline: &str, reasons: Vec<Reason>) -> Self {
-        Self { level: Level::None, headline: headline.to_owned(), reasons, direction: None, notes: Vec::new() }
+        Self {
+            level: Level::None,
+            headline: headline.to_owned(),
+            reasons,
+            cause: None,
+            direction: None,
+            notes: Vec::new(),
+        }
     }
 }
 
@@ -46,7 +57,7 @@ pub(crate) struct Reason {
 pub(crate) fn verdict(step: &StepRecord, names: &ParameterNames) -> Verdict {
     match &step.rank {
         Some(rank) if rank.parameters.is_empty() => Verdict::none("Calibration fixed in this run", Vec::new()),
-        Some(rank) => of_rank(rank, names),
+        Some(rank) => of_rank(rank, step, names),
         None => {
             let initializing = step.report.phase == Phase::Initializing;
             let headline =
@@ -58,19 +69,23 @@ pub(crate) fn verdict(step: &StepRecord, names: &ParameterNames) -> Verdict {
     }
 }
 
-fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
+fn of_rank(rank: &RankReport, step: &StepRecord, names: &ParameterNames) -> Verdict {
     let columns = rank.parameters.len();
     let null = columns.saturating_sub(rank.rank_structural);
-    let weak = rank.rank_structural.saturating_sub(rank.rank_informed);
-    let (level, headline) = match (null, weak) {
+    let uninformed = rank.rank_structural.saturating_sub(rank.rank_informed);
+    let (level, headline) = match (null, uninformed) {
         (0, 0) => (Level::Good, format!("Full rank: {columns} of {columns} directions informed")),
         (0, _) => (
-            Level::Weak,
-            format!("Structural rank {columns} of {columns}, informed rank {}: {weak} weak", rank.rank_informed),
+            Level::Uninformed,
+            format!(
+                "Structural rank {columns} of {columns}, informed rank {}: {uninformed} uninformed",
+                rank.rank_informed
+            ),
         ),
         _ => {
             let kept = rank.rank_structural;
-            (Level::Lost, format!("Structural rank {kept} of {columns}: {null} unobservable, {weak} weak"))
+            let headline = format!("Structural rank {kept} of {columns}: {null} unobservable, {uninformed} uninformed");
+            (Level::Lost, headline)
         }
     };
     let mut reasons = Vec::new();
@@ -85,6 +100,17 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
     if !causes.is_empty() {
         reasons.push(Reason { term: window::RANK_DEFICIT, text: format!("Rank deficit: {}", causes.join(", ")) });
     }
+    let window = &step.report.window;
+    let least = rank.directions.iter().find(|direction| !direction.structural);
+    let ends = window.first().zip(window.last());
+    let cause = ends.zip(least).map(|((first, last), least)| {
+        let text = format!(
+            "Why: motion in the window of {:.1} s, singular value {} (informed from 1)",
+            seconds_from_ns(last.stamp_ns - first.stamp_ns),
+            significant(least.singular_value)
+        );
+        Reason { term: window::LEAST_OBSERVABLE, text }
+    });
     let mut notes = Vec::new();
     if rank.claimed() > 0 {
         notes.push(Reason {
@@ -112,7 +138,7 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
             ),
         });
     }
-    Verdict { level, headline, reasons, direction, notes }
+    Verdict { level, headline, reasons, cause, direction, notes }
 }
 
 /// Every known loss with its reason and the measured response, one line each.
@@ -140,7 +166,7 @@ mod tests {
         let said = |run: usize, step: usize| verdict(&recording.runs[run].steps[step], &ParameterNames::default());
         let waiting = said(0, 3);
         assert_eq!((waiting.level, waiting.headline.as_str()), (Level::None, "Initializing: no rank yet"));
-        assert_eq!(said(0, first_tracked_frame() + 5).level, Level::Weak);
+        assert_eq!(said(0, first_tracked_frame() + 5).level, Level::Uninformed);
         let classical = said(1, first_tracked_frame() + 5);
         assert_eq!(classical.level, Level::Lost);
         assert!(classical.headline.starts_with("Structural rank 18 of 24: 6 unobservable"), "{}", classical.headline);

@@ -1,6 +1,7 @@
 //! State of all panels.
 
 use crate::gui::breakpoints::BreakpointsPanel;
+use crate::gui::calibration::CalibrationPanel;
 use crate::gui::comparison::ComparisonPanel;
 use crate::gui::convergence::ConvergencePanel;
 use crate::gui::image_panel::ImagePanel;
@@ -17,6 +18,7 @@ use crate::gui::{Panel, PanelContext, PanelName};
 pub struct Panels {
     pub image: ImagePanel,
     pub scene: ScenePanel,
+    pub calibration: CalibrationPanel,
     pub convergence: ConvergencePanel,
     pub rank: RankPanel,
     pub jacobian: JacobianPanel,
@@ -34,6 +36,7 @@ impl Panels {
         Self {
             image: self.image.view_copy(),
             scene: self.scene.view_copy(),
+            calibration: self.calibration.view_copy(),
             convergence: self.convergence.view_copy(),
             rank: self.rank.view_copy(),
             jacobian: self.jacobian.view_copy(),
@@ -50,6 +53,7 @@ impl Panels {
         match panel {
             PanelName::Image => &mut self.image,
             PanelName::Scene => &mut self.scene,
+            PanelName::Calibration => &mut self.calibration,
             PanelName::Convergence => &mut self.convergence,
             PanelName::Rank => &mut self.rank,
             PanelName::Jacobian => &mut self.jacobian,

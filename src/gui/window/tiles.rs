@@ -13,7 +13,7 @@ use crate::text::Named;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Preset {
-    /// Image and scene above convergence, rank and inspector on the right.
+    /// Image and scene above the calibration table, rank and inspector on the right.
     #[default]
     Overview,
     /// Convergence and rank large.
@@ -164,12 +164,13 @@ fn tree_of_one(panel: PanelName) -> Tree<PanelName> {
 fn tree_of(preset: Preset) -> Tree<PanelName> {
     use LinearDir::{Horizontal, Vertical};
     use PanelName::{
-        Breakpoints, Comparison, Convergence, Image, Inspector, Jacobian, Laboratory, Rank, Residuals, Scene,
+        Breakpoints, Calibration, Comparison, Convergence, Image, Inspector, Jacobian, Laboratory, Rank, Residuals,
+        Scene,
     };
     let mut all = Tiles::default();
     let tiles = &mut all;
     if preset == Preset::Comparison {
-        let left = tabs(tiles, &[Comparison, Convergence, Residuals, Image, Scene, Jacobian, Laboratory]);
+        let left = tabs(tiles, &[Comparison, Calibration, Convergence, Residuals, Image, Scene, Jacobian, Laboratory]);
         let (rank, inspector) = (tabs(tiles, &[Rank]), tabs(tiles, &[Inspector, Breakpoints]));
         let right = split(tiles, Vertical, [rank, inspector], 0.56);
         let root = split(tiles, Horizontal, [left, right], 0.76);
@@ -179,26 +180,26 @@ fn tree_of(preset: Preset) -> Tree<PanelName> {
     let (rank, inspector) = (tabs(tiles, &[Rank]), tabs(tiles, &[Inspector, Breakpoints]));
     let (left, right) = match preset {
         Preset::Overview | Preset::Comparison => {
-            let plots = tabs(tiles, &[Convergence, Residuals, Jacobian, Laboratory, Comparison]);
+            let plots = tabs(tiles, &[Calibration, Convergence, Residuals, Jacobian, Laboratory, Comparison]);
             let above = split(tiles, Horizontal, [image, scene], 0.5);
             (split(tiles, Vertical, [above, plots], 0.54), split(tiles, Vertical, [rank, inspector], 0.56))
         }
         Preset::Calibration => {
-            let convergence = tabs(tiles, &[Convergence, Comparison]);
+            let convergence = tabs(tiles, &[Convergence, Calibration, Comparison]);
             let residuals = tabs(tiles, &[Residuals, Jacobian, Laboratory]);
             let images = split(tiles, Horizontal, [image, scene], 0.5);
             let below = split(tiles, Horizontal, [images, residuals], 0.66);
             (split(tiles, Vertical, [convergence, below], 0.62), split(tiles, Vertical, [rank, inspector], 0.68))
         }
         Preset::FrontEnd => {
-            let convergence = tabs(tiles, &[Convergence, Comparison]);
+            let convergence = tabs(tiles, &[Convergence, Calibration, Comparison]);
             let residuals = tabs(tiles, &[Residuals, Jacobian, Laboratory]);
             let above = split(tiles, Horizontal, [image, residuals], 0.6);
             let below = split(tiles, Horizontal, [convergence, scene], 0.7);
             (split(tiles, Vertical, [above, below], 0.64), split(tiles, Vertical, [inspector, rank], 0.42))
         }
         Preset::Scene => {
-            let plots = tabs(tiles, &[Convergence, Residuals, Jacobian, Laboratory, Comparison]);
+            let plots = tabs(tiles, &[Calibration, Convergence, Residuals, Jacobian, Laboratory, Comparison]);
             let below = split(tiles, Horizontal, [image, plots], 0.32);
             (split(tiles, Vertical, [scene, below], 0.68), split(tiles, Vertical, [inspector, rank], 0.42))
         }

@@ -15,6 +15,7 @@ use crate::estimator::{
     EstimatorOptions, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, NavigationState, PoseKnowledge,
 };
 use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, so3};
+use crate::gimbal::ParameterId;
 use crate::optimization::LandmarkModel;
 use crate::sensors::ImuSample;
 use crate::simulation::{
@@ -52,6 +53,12 @@ pub struct Advice {
     pub candidates: Vec<CandidateReport>,
     /// Duration of each candidate, in seconds.
     pub duration_s: f64,
+    /// Columns of the chain.
+    #[serde(skip)]
+    pub parameters: Vec<ParameterId>,
+    /// Present standard deviation of each of them within the observable directions, in units of 10° and 3 cm.
+    #[serde(skip)]
+    pub sigmas: Vec<f64>,
 }
 
 /// A direction of the calibration with its posterior standard deviation.
@@ -82,6 +89,9 @@ pub struct CandidateReport {
     pub remaining: f64,
     #[serde(skip)]
     pub exercise: Exercise,
+    /// Predicted standard deviation of each column of the chain, as [`Advice::sigmas`].
+    #[serde(skip)]
+    pub sigmas: Vec<f64>,
 }
 
 /// Linearizes every candidate from the present state and sorts them by the predicted σ of the least observable
@@ -103,14 +113,21 @@ pub fn advise(situation: &Situation) -> Option<Advice> {
         Some(along.dot(&solved).sqrt()).filter(|sigma| sigma.is_finite())
     };
     let sigma = sigma_along(&known)?;
+    let sigmas = |information: &DMatrix<f64>| -> Option<Vec<f64>> {
+        let covariance = information.clone().cholesky()?.inverse();
+        let variances = (&excitable * covariance).component_mul(&excitable).column_sum();
+        Some(variances.iter().map(|variance| variance.max(0.0).sqrt()).collect())
+    };
     let candidates: Vec<Exercise> = candidates(situation);
     let mut reports: Vec<CandidateReport> = candidates
         .par_iter()
         .filter_map(|exercise| {
             let gained = information_of(situation, exercise)?;
             let gained = excitable.tr_mul(&(gained * &excitable));
-            let sigma_after = sigma_along(&(&known + gained))?;
+            let after = &known + gained;
+            let sigma_after = sigma_along(&after)?;
             Some(CandidateReport {
+                sigmas: sigmas(&after)?,
                 words: words(exercise, &situation.joints),
                 sigma_after,
                 remaining: sigma_after / sigma,
@@ -125,6 +142,8 @@ pub fn advise(situation: &Situation) -> Option<Advice> {
         least_observable: WeakDirection::new(situation, &direction, sigma),
         candidates: reports,
         duration_s: ADVICE_DURATION_S,
+        parameters: situation.chain.parameters(),
+        sigmas: sigmas(&known)?,
     })
 }
 
@@ -363,6 +382,15 @@ fn words(exercise: &Exercise, joints: &[LaboratoryJoint]) -> String {
 }
 
 impl Advice {
+    /// Candidate with the smallest predicted σ of a parameter of the chain, and the ratio of that σ to the present one;
+    /// `None` for another parameter or without a candidate.
+    pub fn for_parameter(&self, parameter: ParameterId) -> Option<(&CandidateReport, f64)> {
+        let column = self.parameters.iter().position(|known| *known == parameter)?;
+        let sigma = |candidate: &CandidateReport| candidate.sigmas.get(column).copied().unwrap_or(f64::INFINITY);
+        let best = self.candidates.iter().min_by(|a, b| sigma(a).total_cmp(&sigma(b)))?;
+        Some((best, sigma(best) / self.sigmas.get(column)?)).filter(|(_, ratio)| ratio.is_finite())
+    }
+
     /// Best candidate and its effect in one line:
     /// `roll gimbal ±15°, hover for 4 s → σ(L3.d, with L3.a) 1.68 → 1.26 mm`.
     pub fn sentence(&self) -> Option<String> {

@@ -211,7 +211,7 @@ impl LaboratorySetup {
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaboratoryResult {
     pub form: LaboratoryForm,
-    /// Ranks, null and weak directions.
+    /// Ranks, null and uninformed directions.
     pub rank: RankReport,
 }
 

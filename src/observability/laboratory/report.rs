@@ -54,7 +54,7 @@ pub struct FormReport {
     /// Directions with a smaller singular value are uninformed.
     pub informed_threshold: f64,
     pub margins: Vec<Margin>,
-    /// Null and weak directions, least observable first.
+    /// Null and uninformed directions, least observable first.
     pub directions: Vec<DirectionReport>,
     /// Null directions in closed form, compared with the measurement.
     pub known: Vec<KnownReport>,
@@ -80,7 +80,7 @@ pub struct Margin {
     pub margin: f64,
 }
 
-/// A null or weak direction.
+/// A null or uninformed direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DirectionReport {
     /// True if structurally unobservable, false if only uninformed.
@@ -258,13 +258,13 @@ impl fmt::Display for FormReport {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(out, "{}", self.form)?;
         if self.directions.is_empty() {
-            writeln!(out, "  no null or weak direction")?;
+            writeln!(out, "  no null or uninformed direction")?;
         }
         for direction in &self.directions {
             let (mark, value) = if direction.null {
                 ("null", String::new())
             } else {
-                ("weak", format!("{:.3}  ", direction.singular_value))
+                ("uninformed", format!("{:.3}  ", direction.singular_value))
             };
             writeln!(out, "  {mark}  {value}{direction}")?;
         }

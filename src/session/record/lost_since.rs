@@ -7,12 +7,12 @@ use super::StepRecord;
 use crate::geometry::seconds_from_ns;
 use crate::observability::steps_lost;
 
-/// Time since which the least observable direction of a step has been null or weak without interruption.
+/// Time since which the least observable direction of a step has been null or uninformed without interruption.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LostSince {
     /// Stamp of the first such step, in nanoseconds since the log began.
     pub stamp_ns: i64,
-    /// True for a structural null direction, false for a weak direction.
+    /// True for a structural null direction, false for an uninformed direction.
     pub structural: bool,
 }
 
@@ -31,10 +31,16 @@ impl LostSince {
     }
 }
 
+impl LostSince {
+    /// `unobservable` or `uninformed`.
+    pub fn kind(self) -> &'static str {
+        if self.structural { "unobservable" } else { "uninformed" }
+    }
+}
+
 impl fmt::Display for LostSince {
-    /// For example `weak since 5.55 s`.
+    /// For example `uninformed since 5.55 s`.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let kind = if self.structural { "unobservable" } else { "weak" };
-        write!(out, "{kind} since {:.2} s", seconds_from_ns(self.stamp_ns))
+        write!(out, "{} since {:.2} s", self.kind(), seconds_from_ns(self.stamp_ns))
     }
 }

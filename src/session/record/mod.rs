@@ -2,7 +2,9 @@
 
 mod antenna_record;
 mod comparison;
-mod estimability;
+mod flight_parameter;
+mod flight_table;
+mod flight_verdicts;
 mod image_residuals;
 mod known_losses;
 mod lost_since;
@@ -24,7 +26,9 @@ mod warnings;
 
 pub use antenna_record::PositionTruth;
 pub use comparison::{Comparison, Divergence, Quantity};
-pub use estimability::{EstimabilitySummary, estimability_summary};
+pub use flight_parameter::FlightParameter;
+pub use flight_table::{flight_headline, flight_table, least_determined};
+pub use flight_verdicts::{FlightVerdicts, flight_advice};
 pub use image_residuals::{ImageResiduals, MeanResidual, ResidualSum};
 pub use known_losses::KnownLossSummary;
 pub use lost_since::LostSince;

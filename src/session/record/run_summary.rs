@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use serde::{Serialize, Serializer};
 
-use super::estimability::{EstimabilitySummary, sensor_estimability};
+use super::flight_parameter::FlightParameter;
+use super::flight_table::flight_table;
 use super::known_losses::{KnownLossSummary, known_losses};
 use super::recording::Recording;
 use super::run::RunRecord;
@@ -63,9 +64,8 @@ pub struct CalibrationSummary {
     pub columns: usize,
     /// The parameters in column order.
     pub parameters: Vec<ParameterSummary>,
-    /// Estimability of the parameters, for a run that estimates more than chain and time offsets.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub estimability: Vec<EstimabilitySummary>,
+    /// Calibration table: verdicts of the whole flight, in groups; empty for a run with fixed calibration.
+    pub estimability: Vec<FlightParameter>,
     /// Final distance of the whole chain from the ground truth over the joint angles of the run.
     pub chain_error: Option<ChainDistance>,
     /// The same with the values of the rig.
@@ -304,7 +304,7 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
         parameterization: last.parameterization.to_string(),
         columns: last.parameters.len(),
         parameters,
-        estimability: sensor_estimability(recording, run),
+        estimability: flight_table(recording, run),
         chain_error: chain_error(&last.classical),
         chain_error_initial: given.as_ref().and_then(chain_error),
     }

@@ -3,7 +3,8 @@
 use super::memory::recorded;
 use crate::gimbal::tests::parameter;
 use crate::gimbal::{ParameterGroup, ParameterId, Quantity};
-use crate::observability::{Estimability, estimability};
+use crate::observability::Determination;
+use crate::session::FlightVerdicts;
 use crate::simulation::{IntrinsicsError, SyntheticOptions, synthetic_tracks};
 use crate::text::Named as _;
 
@@ -46,10 +47,9 @@ fn every_estimated_parameter_has_a_value_in_a_rig_and_leads_back_to_it() {
     }
     assert!(calibrated.cameras[0].value(Quantity::Readout) != Some(0.0) && !calibrated.imu.intrinsics.is_identity());
 
-    let rank = run.steps.iter().rev().find_map(|step| step.rank.as_ref());
-    let rows = estimability(estimate, rank, &flight.given_rig.parameter_names());
+    let rows = FlightVerdicts::of_run(&run).table(&flight.given_rig.parameter_names(), None);
     assert_eq!(rows.len(), estimate.parameters.len());
     assert!(rows.is_sorted_by_key(|row| row.parameter.group()));
-    let known = rows.iter().find(|row| row.parameter == parameter("readout")).unwrap();
-    assert!(known.estimability == Estimability::Known && known.sigma < 0.002, "{known:?}");
+    let readout = rows.iter().find(|row| row.parameter == parameter("readout")).unwrap();
+    assert!(readout.verdict == Determination::Determined && readout.sigma.unwrap() < 0.002, "{readout:?}");
 }

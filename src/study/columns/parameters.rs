@@ -2,19 +2,28 @@
 
 use super::column::Column;
 use super::job_result::JobResult;
-use crate::session::ParameterSummary;
+use crate::session::{FlightParameter, ParameterSummary};
+use crate::text::Named as _;
 
 /// One calibration parameter of a run.
 pub(super) struct ParameterRow<'a> {
     result: &'a JobResult<'a>,
     parameter: &'a ParameterSummary,
+    /// Verdict of the whole flight on the parameter.
+    verdict: Option<&'a FlightParameter>,
 }
 
 impl<'a> ParameterRow<'a> {
     /// The parameters of a run; none of a job without a run.
     pub(super) fn all(result: &'a JobResult<'a>) -> Vec<Self> {
-        let parameters = result.run.iter().flat_map(|run| &run.summary.calibration.parameters);
-        parameters.map(|parameter| Self { result, parameter }).collect()
+        let calibrations = result.run.iter().map(|run| &run.summary.calibration);
+        let rows = calibrations.flat_map(|calibration| {
+            calibration.parameters.iter().map(|parameter| {
+                let verdict = calibration.estimability.iter().find(|row| row.name == parameter.name);
+                Self { result, parameter, verdict }
+            })
+        });
+        rows.collect()
     }
 
     pub(super) const COLUMNS: &'a [Column<Self>] = &[
@@ -31,5 +40,11 @@ impl<'a> ParameterRow<'a> {
         Column::number("sigma", "", "posterior standard deviation at the end", |row| row.parameter.sigma),
         Column::number("truth", "", "ground-truth value", |row| row.parameter.ground_truth),
         Column::number("error", "", "final minus truth", |row| row.parameter.error),
+        Column::number("ratio", "", "sigma over prior sigma at the end", |row| row.verdict?.ratio),
+        Column::text(
+            "verdict",
+            "determined, weakly determined, not determined or redundant, from the whole flight",
+            |row| Some(row.verdict?.verdict.name().to_owned()),
+        ),
     ];
 }

@@ -1,5 +1,7 @@
 //! Items of the command palette: all actions, and the content of the recording at the cursor.
 
+use std::collections::BTreeMap;
+
 use super::fuzzy;
 use crate::frontend::FeatureId;
 use crate::geometry::ns_from_seconds;
@@ -12,6 +14,7 @@ use crate::gui::window::actions::{Action, TABLE, keys_of};
 use crate::gui::window::saved_layouts::SavedLayouts;
 use crate::gui::window::tiles::PanelLayout;
 use crate::gui::{Dialog, PanelContext, PanelName};
+use crate::observability::Determination;
 use crate::session::RunRecord;
 use crate::text::Named as _;
 
@@ -90,16 +93,20 @@ fn shown<'a>(ctx: &PanelContext<'a>) -> Option<&'a RunRecord> {
     ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)))
 }
 
-/// Parameters of the shown run at the cursor.
+/// Parameters of the shown run at the cursor, with the verdicts of the flight: the palette finds `weak`.
 fn parameters(ctx: &PanelContext<'_>) -> Vec<Item> {
     let step = shown(ctx).and_then(|run| run.step_at(ctx.cursor_ns).or_else(|| run.steps.first()));
     let names = ctx.names();
     let parameters = step.into_iter().flat_map(|step| &step.report.calibration.parameters);
+    let last = shown(ctx).and_then(|run| run.steps.last());
+    let verdicts: BTreeMap<ParameterId, Determination> =
+        last.into_iter().flat_map(|last| last.determinations()).collect();
     parameters
-        .map(|parameter| Item {
-            name: format!("Parameter {}: {}", names.name(*parameter), meaning_of(*parameter, &ctx.recording.rig)),
-            keys: "",
-            choice: Choice::Parameter(*parameter),
+        .map(|parameter| {
+            let verdict = verdicts.get(parameter).map_or_else(String::new, |verdict| format!(", {}", verdict.name()));
+            let meaning = meaning_of(*parameter, &ctx.recording.rig);
+            let name = format!("Parameter {}{verdict}: {meaning}", names.name(*parameter));
+            Item { name, keys: "", choice: Choice::Parameter(*parameter) }
         })
         .collect()
 }

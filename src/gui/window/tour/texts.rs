@@ -10,6 +10,7 @@ use crate::gui::theme::MAX_RUNS;
 use crate::gui::units::{Shown, counted, fixed};
 use crate::observability::{RankReport, parameters_of};
 use crate::session::{LostSince, RunRecord, StepRecord};
+use crate::text::Named as _;
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct CardText {
@@ -122,12 +123,13 @@ pub(super) fn least_reduced(run: &RunRecord, instant_ns: i64) -> Option<Paramete
 
 fn convergence_lines(step: &StepRecord, names: &ParameterNames) -> Vec<String> {
     let calibration = &step.report.calibration;
-    let reductions = reductions(step);
+    let (reductions, verdicts) = (reductions(step), step.determinations());
     let line = |(index, ratio): (usize, f64)| {
         let parameter = calibration.parameters[index];
         let shown = Shown::of_parameter(parameter);
         let [sigma, prior] = [&calibration.sigmas, &calibration.prior_sigmas].map(|column| shown.sigma(column[index]));
-        format!("{}, σ {prior} → {sigma} ({} %)", names.name(parameter), fixed(100.0 * ratio, 0))
+        let verdict = verdicts.get(index).map_or("", |(_, verdict)| verdict.name());
+        format!("{}, σ {prior} → {sigma} ({} %: {verdict})", names.name(parameter), fixed(100.0 * ratio, 0))
     };
     let Some((best, worst)) = reductions.first().zip(reductions.last()) else {
         return vec!["This run estimates no calibration parameter.".to_owned()];
@@ -141,7 +143,7 @@ fn convergence_lines(step: &StepRecord, names: &ParameterNames) -> Vec<String> {
             line(*worst)
         ),
         "Each plot has the value, its ±3σ band and, dashed, the ground truth. The strip at its lower edge marks where \
-         the parameter is weak or unobservable."
+         the flight has not determined the parameter, or only weakly."
             .to_owned(),
     ]
 }
@@ -154,7 +156,7 @@ pub(super) fn leading(run: &RunRecord, instant_ns: i64) -> Option<ParameterId> {
     rank.parameters.get(largest).copied()
 }
 
-/// Start of the loss, such as `weak since 5.55 s`.
+/// Start of the loss, such as `uninformed since 5.55 s`.
 fn lost_since(run: &RunRecord, step: &StepRecord) -> Option<String> {
     let before = run.steps.partition_point(|other| other.report.stamp_ns < step.report.stamp_ns);
     LostSince::of(&run.steps[..before], step).map(|lost| lost.to_string())
@@ -172,7 +174,7 @@ fn which_lines(run: &RunRecord, step: &StepRecord, names: &ParameterNames) -> Ve
     if let (Some(direction), Some(since)) = (direction_name(rank, names), lost_since(run, step)) {
         lines.push(format!("Least observable: {direction}, {since} without interruption."));
         lines.push(
-            "Weak: this window adds less information about the direction than a prior of 10° or 3 cm. Unobservable: \
+            "Uninformed: this window adds less information about the direction than a prior of 10° or 3 cm. Unobservable: \
              none at all."
                 .to_owned(),
         );

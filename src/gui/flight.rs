@@ -1,0 +1,206 @@
+//! Calibration tables of the runs over the whole flight, computed once for all panels.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use egui::Context;
+
+use super::follow::Follower;
+use super::step_work::{REPAINT, StepWork};
+use crate::gimbal::ParameterId;
+use crate::gui::convergence::names::part_of;
+use crate::observability::Determination;
+use crate::observability::laboratory::Advice;
+use crate::session::{FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord, flight_advice};
+
+/// Calibration tables of all runs; clones share them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FlightTables {
+    /// True if the suggested motions are computed on another thread, as in the window; screenshots wait for them.
+    in_background: bool,
+    runs: Arc<Mutex<Vec<FlightTable>>>,
+}
+
+impl PartialEq for FlightTables {
+    /// Always equal: the tables follow from the recording.
+    fn eq(&self, _other: &Self) -> bool {
+        true
+    }
+}
+
+/// Verdicts of one run so far, independent of the cursor.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FlightReport {
+    /// Rows in groups.
+    pub(crate) rows: Arc<[FlightParameter]>,
+    pub(crate) history: Arc<DeterminationHistory>,
+    /// True if motions for the chain are still being computed.
+    pub(crate) waits_for_advice: bool,
+}
+
+/// σ over prior σ and verdict of each parameter at each step.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DeterminationHistory {
+    /// Stamps of the steps, in nanoseconds since the log began.
+    pub(crate) stamps_ns: Vec<i64>,
+    /// Parameters along the chain and in groups; an order that does not depend on the values.
+    pub(crate) parameters: Vec<ParameterHistory>,
+    /// Changes when steps are removed.
+    pub(crate) epoch: u64,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct ParameterHistory {
+    pub(crate) parameter: ParameterId,
+    /// σ over prior σ by step; NaN where the parameter is not estimated.
+    pub(crate) ratios: Vec<f32>,
+    pub(crate) verdicts: Vec<Determination>,
+}
+
+#[derive(Debug, Default)]
+struct FlightTable {
+    follower: Follower,
+    verdicts: FlightVerdicts,
+    advice: StepWork<Advice>,
+    /// True if `report` contains the motions of the last step's advice.
+    advised: bool,
+    report: FlightReport,
+}
+
+impl FlightTables {
+    /// Computes the suggested motions on another thread from now on.
+    pub(crate) fn compute_in_background(&mut self) {
+        self.in_background = true;
+    }
+
+    /// Table of a run after all its steps so far; the suggested motions follow after the end of the run.
+    pub(crate) fn report(&self, ctx: &Context, recording: &Recording, run: &RunRecord) -> FlightReport {
+        let number = recording.runs.iter().position(|other| other.id == run.id).unwrap_or(0);
+        let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
+        runs.truncate(recording.runs.len());
+        if runs.len() <= number {
+            runs.resize_with(number + 1, FlightTable::default);
+        }
+        let table = &mut runs[number];
+        table.read(recording, run, self.in_background);
+        if table.report.waits_for_advice {
+            ctx.request_repaint_after(REPAINT);
+        }
+        table.report.clone()
+    }
+}
+
+impl FlightTable {
+    /// Reads the new steps of a run, and requests the suggested motions when it has ended.
+    fn read(&mut self, recording: &Recording, run: &RunRecord, in_background: bool) {
+        let new_steps = self.follower.new_steps(run);
+        if new_steps.restarted {
+            let epoch = self.report.history.epoch + 1;
+            (self.verdicts, self.advice) = Default::default();
+            self.report.history = Arc::new(DeterminationHistory { epoch, ..DeterminationHistory::default() });
+        }
+        let changed = new_steps.restarted || !new_steps.steps.is_empty();
+        if changed {
+            let history = Arc::make_mut(&mut self.report.history);
+            for step in new_steps.steps {
+                self.verdicts.push(step);
+                history.push(step, &self.verdicts);
+            }
+        }
+        let ended = run.finished || run.error.is_some();
+        let improvable = self.verdicts.verdicts().any(|(_, verdict)| verdict.is_improvable());
+        let step = self.verdicts.ranked_step().filter(|_| ended && improvable);
+        if let Some(step) = step {
+            self.advice.request(step, "flight advice", in_background, || {
+                let (step, rig, camera) = (Arc::clone(step), Arc::clone(&recording.rig), run.camera_key.clone());
+                move || flight_advice(&step, &rig, &camera)
+            });
+        }
+        let advised = step.is_some_and(|step| self.advice.has_result(step));
+        if changed || advised != self.advised {
+            let advice = self.advice.last().and_then(|(_, advice)| advice).filter(|_| advised);
+            self.report.rows = self.verdicts.table(&recording.rig.parameter_names(), advice).into();
+            self.advised = advised;
+        }
+        self.report.waits_for_advice = step.is_some() && !advised;
+    }
+}
+
+impl DeterminationHistory {
+    /// Appends a step that `verdicts` has just read.
+    fn push(&mut self, step: &StepRecord, verdicts: &FlightVerdicts) {
+        let row = self.stamps_ns.len();
+        self.stamps_ns.push(step.report.stamp_ns);
+        let calibration = &step.report.calibration;
+        for (parameter, verdict) in verdicts.verdicts() {
+            let place = self.parameters.iter().position(|known| known.parameter == parameter).unwrap_or_else(|| {
+                let (ratios, verdicts) = (Vec::new(), Vec::new());
+                let place = self.parameters.partition_point(|it| order(it.parameter) < order(parameter));
+                self.parameters.insert(place, ParameterHistory { parameter, ratios, verdicts });
+                place
+            });
+            let index = calibration.parameters.iter().position(|known| *known == parameter);
+            let entry = |values: &[f64]| index.and_then(|index| values.get(index)).copied().unwrap_or(f64::NAN);
+            let history = &mut self.parameters[place];
+            history.pad(row);
+            history.ratios.push((entry(&calibration.sigmas) / entry(&calibration.prior_sigmas)) as f32);
+            history.verdicts.push(verdict);
+        }
+        for history in &mut self.parameters {
+            history.pad(row + 1);
+        }
+    }
+
+    /// Row at or before a stamp.
+    pub(crate) fn row_at(&self, stamp_ns: i64) -> Option<usize> {
+        self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).checked_sub(1)
+    }
+}
+
+/// Place of a parameter along the chain.
+fn order(parameter: ParameterId) -> impl Ord {
+    (part_of(parameter), parameter)
+}
+
+impl ParameterHistory {
+    fn pad(&mut self, rows: usize) {
+        self.ratios.resize(rows.max(self.ratios.len()), f32::NAN);
+        self.verdicts.resize(rows.max(self.verdicts.len()), Determination::Initializing);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gui::samples::sample_recording_of;
+    use crate::session::{flight_table, summarize};
+
+    /// Window, report and files show the table of one function, also when the window reads the run in pieces.
+    #[test]
+    fn the_window_has_the_table_of_the_files() {
+        let recording = sample_recording_of(70, &["auto", "classical"]);
+        let context = Context::default();
+        for run in &recording.runs {
+            let tables = FlightTables::default();
+            let mut growing = run.clone();
+            for count in [10, 30, 69] {
+                growing.steps.truncate(0);
+                growing.steps.extend_from_slice(&run.steps[..count]);
+                tables.report(&context, &recording, &growing);
+            }
+            let report = tables.report(&context, &recording, run);
+            assert!(!report.waits_for_advice && run.finished);
+            assert_eq!(report.rows[..], flight_table(&recording, run)[..]);
+            assert_eq!(report.rows[..], summarize(&recording, run, false).calibration.estimability[..]);
+            assert!(report.rows.iter().any(|row| !row.remedy.is_empty()));
+            let history = &report.history;
+            assert_eq!((history.stamps_ns.len(), history.epoch), (70, 0));
+            assert_eq!(history.parameters.len(), report.rows.len());
+            for row in report.rows.iter() {
+                let of = history.parameters.iter().find(|it| it.parameter == row.parameter).unwrap();
+                assert_eq!(of.verdicts.last(), Some(&row.verdict), "{}", row.name);
+                let since = of.verdicts.iter().rposition(|verdict| *verdict != row.verdict).map_or(0, |it| it + 1);
+                assert_eq!(row.since_ns, Some(history.stamps_ns[since]), "{}", row.name);
+            }
+        }
+    }
+}

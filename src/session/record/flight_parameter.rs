@@ -1,0 +1,57 @@
+//! Rows of the calibration table: one parameter after a flight.
+
+use serde::{Serialize, Serializer};
+
+use crate::geometry::{Dimension, seconds_from_ns};
+use crate::gimbal::ParameterId;
+use crate::observability::{Determination, LossCause};
+use crate::text::Named as _;
+
+/// A calibration parameter at the end of a run, with the verdict of the whole flight on it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FlightParameter {
+    #[serde(skip)]
+    pub parameter: ParameterId,
+    pub name: String,
+    /// `chain`, `camera`, `IMU` or `clocks`.
+    pub group: &'static str,
+    /// Serialized as its unit.
+    #[serde(rename = "unit")]
+    pub dimension: Dimension,
+    /// Estimate; angles of links and of the base block in (−π, π].
+    pub value: f64,
+    /// Posterior standard deviation.
+    pub sigma: Option<f64>,
+    pub prior_sigma: Option<f64>,
+    /// Posterior divided by prior standard deviation.
+    pub ratio: Option<f64>,
+    pub verdict: Determination,
+    /// Stamp from which the verdict holds without interruption, in nanoseconds since the log began (in files seconds).
+    #[serde(rename = "since_s", serialize_with = "seconds")]
+    pub since_ns: Option<i64>,
+    /// Cause of any other verdict than determined.
+    pub cause: Option<LossCause>,
+    /// Cause with its evidence; empty without a cause.
+    pub reason: String,
+    /// Motion, record or run that would improve the verdict; empty if none is known.
+    pub remedy: String,
+}
+
+#[expect(clippy::ref_option, reason = "the signature that serde calls")]
+fn seconds<S: Serializer>(stamp_ns: &Option<i64>, serializer: S) -> Result<S::Ok, S::Error> {
+    stamp_ns.map(seconds_from_ns).serialize(serializer)
+}
+
+impl FlightParameter {
+    /// Stamp from which the verdict holds, in seconds since the log began.
+    pub fn since_s(&self) -> Option<f64> {
+        self.since_ns.map(seconds_from_ns)
+    }
+
+    /// Verdict, ratio and start: `not determined (σ 0.98 of the prior) since 3.55 s`.
+    pub fn verdict_text(&self) -> String {
+        let ratio = self.ratio.map_or_else(String::new, |ratio| format!(" (σ {ratio:.2} of the prior)"));
+        let since = self.since_s().map_or_else(String::new, |since_s| format!(" since {since_s:.2} s"));
+        format!("{}{ratio}{since}", self.verdict.name())
+    }
+}
