@@ -237,7 +237,7 @@ pub(super) fn cell_ui(
     if MARKED.contains(&verdict) {
         let (mark, color) = look_of(verdict, &theme);
         let width = painter.layout_no_wrap(verdict.name().to_owned(), theme::label_font(), color).size().x;
-        let text = if width + TICK_WIDTH <= plot.width() { verdict.name() } else { mark };
+        let text = if width + 6.0 <= plot.width() { verdict.name() } else { mark };
         boxed_text(&inner, &theme, plot.right_top() + vec2(-3.0, 1.0), Align2::RIGHT_TOP, text, color);
     }
 

@@ -23,6 +23,8 @@ pub(crate) fn visible_range(ctx: &PanelContext<'_>) -> (i64, i64) {
 pub(crate) enum Clicks {
     /// A click and a drag move the cursor: the timeline.
     Scrub,
+    /// A click moves the cursor, a drag selects a stretch: the parameters of the timeline.
+    Brush,
     /// A click moves the cursor, a drag pans.
     Seek,
     /// A click selects the plot, a drag pans.
@@ -63,7 +65,7 @@ pub(crate) fn navigate(ui: &Ui, ctx: &mut PanelContext<'_>, area: &PlotArea, plo
     let sense = if figure { Sense::hover() } else { Sense::click_and_drag() };
     let response = ui.interact(area.rect, id, sense);
     let role = match clicks {
-        Clicks::Scrub if !figure => Role::Slider,
+        Clicks::Scrub | Clicks::Brush if !figure => Role::Slider,
         Clicks::Select if !figure => Role::Button,
         _ => Role::Image,
     };
@@ -73,7 +75,7 @@ pub(crate) fn navigate(ui: &Ui, ctx: &mut PanelContext<'_>, area: &PlotArea, plo
         return response;
     }
     move_cursor(ui, ctx, area, clicks, &response);
-    let pans = clicks != Clicks::Scrub && response.dragged_by(PointerButton::Primary)
+    let pans = matches!(clicks, Clicks::Seek | Clicks::Select) && response.dragged_by(PointerButton::Primary)
         || response.dragged_by(PointerButton::Middle);
     if pans {
         pan(ctx, area, response.drag_delta().x);
@@ -104,7 +106,7 @@ fn move_cursor(ui: &Ui, ctx: &mut PanelContext<'_>, area: &PlotArea, clicks: Cli
     let Some(pointer) = response.interact_pointer_pos() else { return };
     let seeks = match clicks {
         Clicks::Scrub => response.is_pointer_button_down_on() || response.clicked(),
-        Clicks::Seek => response.clicked(),
+        Clicks::Seek | Clicks::Brush => response.clicked(),
         Clicks::Select => false,
     };
     let primary = ui.input(|input| {

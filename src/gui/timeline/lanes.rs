@@ -42,6 +42,8 @@ pub(crate) enum Lane {
     Features,
     Reprojection,
     Outliers,
+    /// σ over prior σ of each parameter of the selected run.
+    Parameters,
     /// Warnings about the log (gaps etc.) and of steps.
     Warnings,
 }
@@ -59,6 +61,7 @@ impl Lane {
             Self::Features => "features".to_owned(),
             Self::Reprojection => "reprojection, px".to_owned(),
             Self::Outliers => "outliers".to_owned(),
+            Self::Parameters => "parameters".to_owned(),
             Self::Warnings => "warnings".to_owned(),
         }
     }
@@ -79,6 +82,10 @@ impl Lane {
                 "Reprojection RMS after the solve, px (column reprojection_rms_after_px of frames.csv)"
             }
             Self::Outliers => "Number of features that the estimator rejects as outliers",
+            Self::Parameters => {
+                "σ over prior σ of each parameter of the selected run over time, coloured by the verdict; click: open or \
+                 close the rows; drag on open rows: effect of a stretch on every σ"
+            }
             Self::Warnings => "Warnings of the log (squares) and of the runs' steps; list: W",
         }
     }
@@ -88,9 +95,13 @@ impl Lane {
             Self::Rank => lanes.at(INFORMED, cursor_ns).map(|value| fixed(value, 0)),
             Self::Features => lanes.at(FEATURES, cursor_ns).map(|value| fixed(value, 0)),
             Self::Reprojection => lanes.at(RMS, cursor_ns).map(|value| fixed(value, 2)),
-            Self::Run(_) | Self::Trajectory(_) | Self::Breakpoints | Self::Events | Self::Outliers | Self::Warnings => {
-                None
-            }
+            Self::Run(_)
+            | Self::Trajectory(_)
+            | Self::Breakpoints
+            | Self::Events
+            | Self::Outliers
+            | Self::Parameters
+            | Self::Warnings => None,
         }
     }
 
@@ -100,9 +111,13 @@ impl Lane {
             Self::Rank => Some(INFORMED),
             Self::Features => Some(FEATURES),
             Self::Reprojection => Some(RMS),
-            Self::Run(_) | Self::Trajectory(_) | Self::Breakpoints | Self::Events | Self::Outliers | Self::Warnings => {
-                None
-            }
+            Self::Run(_)
+            | Self::Trajectory(_)
+            | Self::Breakpoints
+            | Self::Events
+            | Self::Outliers
+            | Self::Parameters
+            | Self::Warnings => None,
         }
     }
 }

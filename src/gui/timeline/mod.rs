@@ -1,9 +1,12 @@
 //! The timeline: lanes over the whole log, and the cursor of all panels.
 
 mod csv;
+mod determinations;
 mod lanes;
 mod model;
 mod pace;
+mod parameters_lane;
+mod stretch;
 mod transport;
 
 pub use pace::{Pace, Reading};
@@ -13,6 +16,7 @@ use egui::{Align2, PointerButton, Rect, Response, Role, Sense, Stroke, Ui, Widge
 
 use self::lanes::Lane;
 use self::model::RunLanes;
+use self::parameters_lane::{ParametersLane, history};
 use super::copied_value::offer;
 use super::events::name_of;
 use super::plot::{
@@ -42,6 +46,7 @@ pub struct TimelinePanel {
     curves: [Vec<Curve>; 3],
     /// Start of a range that is being selected with Shift.
     range_begin_ns: Option<i64>,
+    parameters: ParametersLane,
 }
 
 impl Panel for TimelinePanel {
@@ -52,14 +57,10 @@ impl Panel for TimelinePanel {
         }
         transport::ui(ui, ctx, self.pace.reading());
         let rect = ui.available_rect_before_wrap();
-        let breaks = !ctx.playback.breakpoints.list().is_empty();
-        let shown: Vec<Lane> = (0..self.runs.len())
-            .map(Lane::Run)
-            .chain((0..ctx.recording.trajectories.len()).map(Lane::Trajectory))
-            .chain(breaks.then_some(Lane::Breakpoints))
-            .chain([Lane::Events, Lane::Rank, Lane::Features, Lane::Reprojection, Lane::Outliers, Lane::Warnings])
-            .collect();
-        let height = ((rect.height() - RULER_HEIGHT) / shown.len() as f32).clamp(MIN_LANE_HEIGHT, MAX_LANE_HEIGHT);
+        let shown = self.shown_lanes(ctx);
+        let open = self.parameters.open;
+        let room = (rect.height() - RULER_HEIGHT) / shown.len() as f32;
+        let height = if open { LANE_HEIGHT } else { room.clamp(MIN_LANE_HEIGHT, MAX_LANE_HEIGHT) };
         let scale = lanes::scale_width(height - 2.0);
         let left = (rect.left() + self.label_width(ui, ctx) + scale).min(rect.center().x);
         let plot = Rect::from_min_max(pos2(left, rect.top()), rect.max - vec2(4.0, 0.0));
@@ -75,13 +76,16 @@ impl Panel for TimelinePanel {
         paint_ruler(&painter, ctx, &area);
 
         let mut read = Vec::new();
+        self.parameters.rows_rect = None;
         for (place, lane) in shown.iter().enumerate() {
             let top = plot.top() + RULER_HEIGHT + place as f32 * height;
-            if top + height > rect.bottom() + 1.0 {
+            // The open rows are last and fill the room.
+            let bottom = if open && *lane == Lane::Parameters { rect.bottom() } else { top + height };
+            if bottom > rect.bottom() + 1.0 || bottom < top + 3.0 {
                 break;
             }
-            let lane_rect = Rect::from_min_size(pos2(plot.left(), top), vec2(plot.width(), height - 2.0));
-            let label_rect = Rect::from_min_max(pos2(rect.left(), top), pos2(plot.left() - scale, top + height - 2.0));
+            let lane_rect = Rect::from_min_max(pos2(plot.left(), top), pos2(plot.right(), bottom - 2.0));
+            let label_rect = Rect::from_min_max(pos2(rect.left(), top), pos2(plot.left() - scale, bottom - 2.0));
             let axis = self.lane(ui, ctx, *lane, PlotArea { rect: lane_rect, ..area }, label_rect);
             read.extend(axis.map(|area| (*lane, area)));
         }
@@ -101,18 +105,51 @@ impl Panel for TimelinePanel {
         register(ui, &area, "");
         let id = ui.unique_id().with("timeline");
         let value = self.value_text(ctx);
-        let (clicks, wheel) = (Clicks::Scrub, Wheel::Zooms);
+        let origin = ui.input(|input| input.pointer.press_origin());
+        let on_rows = self.parameters.rows_rect.filter(|rows| origin.is_some_and(|origin| rows.contains(origin)));
+        let (clicks, wheel) = (if on_rows.is_some() { Clicks::Brush } else { Clicks::Scrub }, Wheel::Zooms);
         let response = navigate(ui, ctx, &area, &Interaction { id, name: "Timeline", value: &value, clicks, wheel });
         step_by_assistance(ui, ctx, &response);
         self.select_range(ui, ctx, &area, &response);
+        if on_rows.is_some() {
+            self.parameters.brush(ui, ctx, &area, &response);
+        }
+        self.parameters.stretch_ui(ui, ctx, &area);
         self.hover(ui, ctx, &area, response);
     }
 }
 
 impl TimelinePanel {
-    /// Height in points of the transport and of all lanes for this number of runs and trajectories.
-    pub fn height_for(lanes: usize) -> f32 {
-        transport::HEIGHT + RULER_HEIGHT + LANE_HEIGHT * (lanes + 7) as f32 + 10.0
+    /// Height in points of the transport and of all lanes: those of runs and trajectories, and either those of single
+    /// values or the open rows of the parameters.
+    pub(super) fn wanted_height(&self, ui: &Ui, ctx: &PanelContext<'_>) -> f32 {
+        let lanes = ctx.recording.runs.len() + ctx.recording.trajectories.len();
+        let below = if self.parameters.open {
+            let rows = history(ui, ctx).map_or(0, |history| history.parameters.len());
+            LANE_HEIGHT * 2.0 + determinations::HEADING_HEIGHT + determinations::ROW_HEIGHT * rows as f32
+        } else {
+            LANE_HEIGHT * 8.0
+        };
+        transport::HEIGHT + RULER_HEIGHT + LANE_HEIGHT * lanes as f32 + below + 10.0
+    }
+
+    /// True if the rows of the parameters are open.
+    pub(super) fn has_open_parameters(&self) -> bool {
+        self.parameters.open
+    }
+
+    fn shown_lanes(&self, ctx: &PanelContext<'_>) -> Vec<Lane> {
+        let breaks = !ctx.playback.breakpoints.list().is_empty();
+        let values = [Lane::Rank, Lane::Features, Lane::Reprojection, Lane::Outliers, Lane::Warnings];
+        let values = values.into_iter().filter(|_| !self.parameters.open);
+        (0..self.runs.len())
+            .map(Lane::Run)
+            .chain((0..ctx.recording.trajectories.len()).map(Lane::Trajectory))
+            .chain(breaks.then_some(Lane::Breakpoints))
+            .chain([Lane::Events])
+            .chain(values)
+            .chain([Lane::Parameters])
+            .collect()
     }
 
     /// Width in points of the lane names, large enough for those of the runs.
@@ -120,24 +157,28 @@ impl TimelinePanel {
         const MARGIN: f32 = 10.0;
         let width = |lane: Lane| lanes::name_width(ui, ctx, lane) + MARGIN;
         let trajectories = (0..ctx.recording.trajectories.len()).map(Lane::Trajectory);
-        (0..self.runs.len())
-            .map(Lane::Run)
-            .chain(trajectories)
-            .map(width)
-            .fold(LANE_LABEL_WIDTH, f32::max)
-            .min(MAX_LABEL_WIDTH)
+        let lanes = (0..self.runs.len()).map(Lane::Run).chain(trajectories).map(width);
+        let widest = lanes.fold(LANE_LABEL_WIDTH, f32::max);
+        let parameters = history(ui, ctx).filter(|_| self.parameters.open);
+        let names = parameters.map_or(0.0, |history| determinations::label_width(ui, ctx, &history));
+        widest.max(names).min(MAX_LABEL_WIDTH)
     }
 
     /// Draws a lane; returns its area with the value axis if it has curves.
     fn lane(
         &mut self,
         ui: &Ui,
-        ctx: &PanelContext<'_>,
+        ctx: &mut PanelContext<'_>,
         lane: Lane,
         area: PlotArea,
         label_rect: Rect,
     ) -> Option<PlotArea> {
         let theme = *ctx.theme;
+        if lane == Lane::Parameters {
+            paint_ground(&ui.painter_at(area.rect), &theme, area.rect);
+            self.parameters.ui(ui, ctx, area, label_rect);
+            return None;
+        }
         let painter = ui.painter_at(area.rect.union(label_rect));
         let mut axis = None;
         let inner = painter.with_clip_rect(area.rect.intersect(painter.clip_rect()));
@@ -164,6 +205,8 @@ impl TimelinePanel {
                 axis = lanes::plotted_values(&painter, &theme, &area, lane, &self.runs, curves);
             }
             Lane::Outliers => lanes::outliers(&inner, &theme, &area, &self.runs),
+            // Drawn above.
+            Lane::Parameters => {}
             Lane::Warnings => {
                 let stamps_ns: Vec<i64> = ctx.recording.warnings.iter().map(|warning| warning.stamp_ns).collect();
                 lanes::warnings(&inner, &theme, &area, &stamps_ns, &self.runs);
@@ -221,6 +264,11 @@ impl TimelinePanel {
         let reach_ns = area.stamp_ns_at(pointer.x + REACH) - stamp_ns;
         let near = |other_ns: i64| (other_ns - stamp_ns).abs() <= reach_ns;
         let mut text = format!("{} s", seconds(stamp_ns));
+        if let (Some(rows), Some(history)) = (self.parameters.rows_rect, history(ui, ctx)) {
+            let row = determinations::row_under(rows, pointer.y, history.parameters.len());
+            let line = row.and_then(|row| determinations::hover_text(ctx, &history, row, stamp_ns));
+            text.extend(line.map(|line| format!("\n{line}")));
+        }
         let mut lines = 0;
         let mut push_line = |line: String| {
             lines += 1;

@@ -58,7 +58,7 @@ fn check_texts(harness: &Harness<'static, Bench>, what: &str) {
         let (rect, clip) = (painted.rect, painted.clip.expand(1.0));
         let cut = rect.left() < clip.left() || rect.right() > clip.right();
         // The selector of the direction has a tooltip with the whole text.
-        let choice = painted.text.starts_with("weak ") || painted.text.starts_with("null ");
+        let choice = painted.text.starts_with("uninformed ") || painted.text.starts_with("null ");
         assert!(choice || !painted.elided, "{what}: shortened text {painted:?}");
         assert!(!cut || scene.contains(rect.center()), "{what}: text that is cut off {painted:?}");
     }
@@ -103,6 +103,7 @@ fn the_heat_map_is_above_the_fold_in_every_layout() {
             let what = format!("{}, run {run} of {count}", preset.name());
             let panel = harness.state().window.places.iter().find(|(panel, _)| *panel == PanelName::Rank).unwrap().1;
             for answers in [
+                ["Whole flight: ", "Flight to "],
                 ["Structural rank 18 of", "Full rank"],
                 ["Least observable: ", "Unobservable: "],
                 ["Suggested excitation", "No candidate motion"],

@@ -58,7 +58,6 @@ pub use self::tiles::Preset;
 use self::tiles::TabClicks;
 use super::help;
 use super::plot::plot_under_pointer;
-use super::timeline::TimelinePanel;
 use super::{Panel as _, PanelContext, PanelName};
 
 /// Height of the status bar in points.
@@ -84,8 +83,9 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
     notices::banner_ui(ui, ctx);
 
     // The panels are drawn before the timeline below them, because the Tab key follows the order of drawing.
-    let wanted = TimelinePanel::height_for(ctx.recording.runs.len() + ctx.recording.trajectories.len());
-    let wanted = wanted.min(0.25 * (ui.available_height() - STATUS_HEIGHT));
+    let open = state.panels.timeline.has_open_parameters();
+    let most = if open { 0.5 } else { 0.25 };
+    let wanted = state.panels.timeline.wanted_height(ui, ctx).min(most * (ui.available_height() - STATUS_HEIGHT));
     let below = state.below_height.unwrap_or(wanted + STATUS_HEIGHT);
     let rest = ui.available_rect_before_wrap();
     let above = rest.with_max_y((rest.bottom() - below).max(rest.top()));
@@ -102,7 +102,9 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
     let status = egui::Panel::bottom("status bar").exact_size(STATUS_HEIGHT).frame(status);
     let status = status.show(ui, |ui| ui.max_rect());
     let frame = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(6, 4));
-    let timeline = egui::Panel::bottom("timeline").resizable(true).default_size(wanted).min_size(60.0).frame(frame);
+    // Each of them keeps the height that was set by hand.
+    let name = if open { "timeline with parameters" } else { "timeline" };
+    let timeline = egui::Panel::bottom(name).resizable(true).default_size(wanted).min_size(60.0).frame(frame);
     let timeline = timeline.show(ui, |ui| {
         let corner = ui.max_rect().right_top() + vec2(-24.0, 2.0);
         state.panels.timeline.ui(ui, ctx);

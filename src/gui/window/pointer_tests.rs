@@ -8,7 +8,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
 use super::Preset;
-use super::tests::{Bench, SECOND_NS, bench};
+use super::tests::{Bench, SECOND_NS, bench, bench_with};
 use crate::gui::PanelName;
 use crate::session::Command;
 
@@ -69,7 +69,7 @@ fn place_in(harness: &Harness<'static, Bench>, plot: &str, x: f32, y: f32) -> Po
 
 #[test]
 fn plots_and_timeline_zoom_and_pan_alike() {
-    let mut harness = bench();
+    let mut harness = bench_with(PanelName::Convergence);
     for plot in PLOTS {
         harness.state_mut().selection.visible_ns = None;
         harness.run_steps(2);
@@ -147,7 +147,10 @@ fn tabs_and_their_bars_are_dragged_and_put_back_by_undo() {
     let shown = |harness: &Harness<'static, Bench>, panel: PanelName| {
         harness.state().window.places.iter().any(|(known, _)| *known == panel)
     };
-    assert!(shown(&harness, PanelName::Residuals), "it was behind the convergence, now it has a place of its own");
+    assert!(
+        shown(&harness, PanelName::Residuals),
+        "it was behind the calibration table, now it has a place of its own"
+    );
     assert!(place_of(&harness, PanelName::Residuals).left() > 1000.0, "on the right, beside the rank");
     harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
     harness.run_steps(3);
@@ -161,10 +164,10 @@ fn tabs_and_their_bars_are_dragged_and_put_back_by_undo() {
     // Dragging the empty part of a tab bar moves all its tabs; here those of the convergence to the right edge of the
     // inspector.
     let (convergence, inspector) =
-        (place_of(&harness, PanelName::Convergence), place_of(&harness, PanelName::Inspector));
+        (place_of(&harness, PanelName::Calibration), place_of(&harness, PanelName::Inspector));
     let bar = pos2(convergence.right() - 60.0, convergence.top() - 10.0);
     drag(&mut harness, PointerButton::Primary, bar, inspector.center());
-    assert!(place_of(&harness, PanelName::Convergence).left() > 1000.0, "{:?}", harness.state().window.places);
+    assert!(place_of(&harness, PanelName::Calibration).left() > 1000.0, "{:?}", harness.state().window.places);
     let titles = ["Residuals", "Jacobian", "Laboratory", "Comparison"];
     let on_the_right = |title: &&str| harness.query_all_by_label(title).any(|node| node.rect().left() > 1000.0);
     assert!(titles.iter().all(on_the_right));
@@ -217,7 +220,7 @@ fn copied(harness: &mut Harness<'static, Bench>, act: impl FnOnce(&mut Harness<'
 
 #[test]
 fn the_value_under_the_pointer_or_the_table_is_copied() {
-    let mut harness = bench();
+    let mut harness = bench_with(PanelName::Convergence);
     // A plot offers the value of its parameter.
     let cell = place_in(&harness, "I.rx", 0.5, 0.5);
     harness.event(Event::PointerMoved(cell));

@@ -6,7 +6,7 @@ use super::menu::Menu;
 use crate::gui::theme::Theme;
 use crate::text::Named as _;
 
-const POINTER: [(&str, &str); 11] = [
+const POINTER: [(&str, &str); 12] = [
     ("Click a tab", "focus the panel; double-click: maximize it, or restore the others"),
     ("Hover", "values of all curves at the pointer's time, in all plots"),
     ("Alt+scroll", "zoom the values (also scroll over a value axis; drag it: move, double-click: automatic)"),
@@ -17,6 +17,7 @@ const POINTER: [(&str, &str); 11] = [
     ("Double-click", "show the whole log, fit the image"),
     ("Right click", "copy the value or the panel's table, set a reading cursor, fix the value axis"),
     ("Shift+drag", "on the timeline: set the loop range"),
+    ("Drag on rows", "of the timeline's parameters: σ before and after"),
     ("Click", "a plot: move the cursor; a parameter or feature: select it"),
 ];
 

@@ -12,9 +12,12 @@ use crate::gimbal::tests::parameter;
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{PanelContext, PanelName, Playback, Presentation, Selection};
-use crate::observability::SlideRequest;
+use crate::observability::{Determination, SlideRequest};
 use crate::session::breakpoints::Breakpoints;
-use crate::session::{Command, ForkChanges, ForkOrigin, PlaybackSpeed, Recording, RunWarning};
+use crate::session::{
+    Command, ForkChanges, ForkOrigin, PlaybackSpeed, Recording, RunWarning, flight_headline, flight_table,
+    least_determined,
+};
 
 pub(super) const SECOND_NS: i64 = 1_000_000_000;
 
@@ -58,6 +61,14 @@ pub(super) fn sample() -> Recording {
 
 pub(super) fn bench() -> Harness<'static, Bench> {
     bench_of(sample(), [1600.0, 900.0])
+}
+
+/// A window in which a panel is in front.
+pub(super) fn bench_with(panel: PanelName) -> Harness<'static, Bench> {
+    let mut harness = bench();
+    harness.state_mut().window.layout.set_visible(panel, true);
+    harness.run_steps(3);
+    harness
 }
 
 /// A window of a size in points with a recording.
@@ -348,7 +359,7 @@ fn while_the_user_types_keys_are_letters() {
 
 #[test]
 fn panels_show_names_and_values() {
-    let mut harness = bench();
+    let mut harness = bench_with(PanelName::Convergence);
     let step = harness.state().recording.runs[0].step_at(3 * SECOND_NS).unwrap().clone();
     let names = harness.state().recording.rig.parameter_names();
     for parameter in &step.report.calibration.parameters {
@@ -372,8 +383,81 @@ fn panels_show_names_and_values() {
 }
 
 #[test]
-fn a_parameter_is_selected_everywhere() {
+fn the_palette_finds_parameters_by_their_verdict() {
     let mut harness = bench();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
+    harness.run_steps(2);
+    harness.event(egui::Event::Text("weakly".to_owned()));
+    harness.run_steps(3);
+    let run = &harness.state().recording.runs[0];
+    let rows = flight_table(&harness.state().recording, run);
+    let first = rows.iter().find(|row| row.verdict == Determination::WeaklyDetermined).expect("a weak parameter");
+    assert!(harness.query_all_by_label_contains(&format!("Parameter {}, weakly determined", first.name)).count() > 0);
+}
+
+/// The verdict of the flight stays while the cursor moves, and a click on its time moves the cursor there.
+#[test]
+fn the_verdict_of_the_flight_does_not_depend_on_the_cursor() {
+    let mut harness = bench();
+    let rows = flight_table(&harness.state().recording, &harness.state().recording.runs[0]);
+    let least = least_determined(&rows).expect("some parameter is not determined").clone();
+    let line =
+        format!("{} (σ / prior {:.2}) since {:.2} s", least.name, least.ratio.unwrap(), least.since_s().unwrap());
+    for cursor_ns in [SECOND_NS, 3 * SECOND_NS, 4 * SECOND_NS] {
+        harness.state_mut().cursor_ns = cursor_ns;
+        harness.run_steps(3);
+        let headline = flight_headline(&rows);
+        assert!(harness.query_all_by_label_contains(&headline).count() > 0, "{headline} at {cursor_ns}");
+        let label = harness.query_all_by_label_contains(&line).count();
+        assert_eq!(label, 1, "{line} at {cursor_ns}");
+    }
+    let pushed = commands_of(&mut harness, |harness| harness.get_by_label_contains(&line).click());
+    assert_eq!(pushed, [Command::Seek { stamp_ns: least.since_ns.unwrap() }]);
+    assert_eq!(harness.state().selection.parameter, Some(least.parameter));
+}
+
+#[test]
+fn a_drag_on_the_parameters_of_the_timeline_shows_what_a_stretch_brought() {
+    let mut harness = bench();
+    harness.get_by_label("Parameters over time").click();
+    harness.run_steps(4);
+    let columns = harness.state().recording.runs[0].steps[79].report.calibration.parameters.len();
+    let rows: Vec<egui::Rect> = harness
+        .query_all_by_label_contains(" at the cursor")
+        .map(|row| row.rect())
+        .filter(|row| row.height() < 20.0)
+        .collect();
+    assert_eq!(rows.len(), columns);
+    let timeline = harness.get_by_label("Timeline").rect();
+    let (y, width) = (rows[3].center().y, timeline.width());
+    let at = |fraction: f32| egui::pos2(timeline.left() + fraction * width, y);
+    let pushed = commands_of(&mut harness, |_| {});
+    assert!(pushed.is_empty());
+    let press = |pos, pressed| egui::Event::PointerButton {
+        pos,
+        button: egui::PointerButton::Primary,
+        pressed,
+        modifiers: Modifiers::NONE,
+    };
+    harness.event(egui::Event::PointerMoved(at(0.7)));
+    harness.run_steps(1);
+    harness.event(press(at(0.7), true));
+    harness.run_steps(1);
+    for fraction in [0.75, 0.85, 0.95] {
+        harness.event(egui::Event::PointerMoved(at(fraction)));
+        harness.run_steps(1);
+    }
+    harness.event(press(at(0.95), false));
+    harness.run_steps(4);
+    assert!(harness.query_by_label("σ before → after").is_some());
+    assert!(harness.query_by_label_contains("Vehicle: path ").is_some());
+    let commands = std::mem::take(&mut harness.state_mut().commands);
+    assert!(commands.is_empty(), "a drag on the rows does not move the cursor: {commands:?}");
+}
+
+#[test]
+fn a_parameter_is_selected_everywhere() {
+    let mut harness = bench_with(PanelName::Convergence);
     let label = |harness: &Harness<'static, Bench>| {
         let mut nodes = harness.query_all_by_label_contains("roll.alpha -");
         nodes.next().and_then(|node| node.accesskit_node().label()).unwrap()
