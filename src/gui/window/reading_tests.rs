@@ -4,14 +4,14 @@ use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, PointerButto
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
-use super::tests::{Bench, SECOND_NS, bench, sample};
+use super::tests::{Bench, SECOND_NS, bench_with, sample};
 use super::{MainWindow, Preset, window_ui};
 use crate::gui::rendering::headless::{Headless, HeadlessOptions};
 use crate::gui::rendering::painter::Painter;
 use crate::gui::samples::sample_images;
 use crate::gui::tests::keep_screenshot;
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::{PanelContext, Playback, Presentation, ReadingCursor, Selection};
+use crate::gui::{PanelContext, PanelName, Playback, Presentation, ReadingCursor, Selection};
 
 /// The plot of the first parameter.
 const PLOT: &str = "I.rx";
@@ -39,7 +39,7 @@ fn scroll(harness: &mut Harness<'static, Bench>, modifiers: Modifiers) {
 
 #[test]
 fn the_pointer_reads_all_plots_and_keys_set_both_cursors() {
-    let mut harness = bench();
+    let mut harness = bench_with(PanelName::Convergence);
     assert_eq!(harness.state().selection.reading.pointer_ns, None);
     for (x, key, cursor) in [(0.25, Key::C, ReadingCursor::A), (0.75, Key::V, ReadingCursor::B)] {
         let at = place(&harness, x, 0.5);
@@ -69,7 +69,7 @@ fn the_pointer_reads_all_plots_and_keys_set_both_cursors() {
 
 #[test]
 fn a_value_axis_is_zoomed_fixed_and_freed() {
-    let mut harness = bench();
+    let mut harness = bench_with(PanelName::Convergence);
     let fixed = |harness: &Harness<'static, Bench>| {
         harness.state().selection.reading.fixed_values.get("convergence I.rx").copied()
     };
@@ -118,7 +118,7 @@ fn a_value_axis_is_zoomed_fixed_and_freed() {
 
 #[test]
 fn the_menu_of_a_plot_offers_reading() {
-    let mut harness = bench();
+    let mut harness = bench_with(PanelName::Convergence);
     let at = place(&harness, 0.5, 0.5);
     let open = |harness: &mut Harness<'static, Bench>| {
         point_at(harness, at);
@@ -160,6 +160,9 @@ fn painted(
     let mut state = MainWindow::default();
     state.settings.event_lines = true;
     state.arrange(preset);
+    if preset == Preset::Overview {
+        state.layout.set_visible(PanelName::Convergence, true);
+    }
     let mut ui = |ui: &mut egui::Ui| {
         let mut context = PanelContext {
             recording: &recording,

@@ -187,8 +187,13 @@ fn reason(cause: LossCause, windows: Windows, partners: &[String], correlated: &
         return format!("redundant in the parameterization with {}", partners.join(", "));
     }
     let percent = 100.0 * windows.uninformed as f64 / windows.all.max(1) as f64;
-    let with = if correlated.is_empty() { String::new() } else { format!("; correlated with {correlated}") };
-    format!("{}: uninformed in {percent:.0} % of the windows{with}", cause.name())
+    let with = (!correlated.is_empty()).then(|| format!("correlated with {correlated}"));
+    let uninformed = (percent >= 0.5).then(|| format!("uninformed in {percent:.0} % of the windows"));
+    let causes: Vec<String> = uninformed.into_iter().chain(with).collect();
+    if causes.is_empty() {
+        return format!("{}: every window informs it, but too little", cause.name());
+    }
+    format!("{}: {}", cause.name(), causes.join("; "))
 }
 
 /// Change of flight, record or run that would determine a parameter; empty if none is known.
