@@ -4,6 +4,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::geometry::so3;
 
+/// Delay of images or joint angles in seconds above which results are useless.
+pub(super) const USELESS_DELAY_S: f64 = 0.05;
+
 /// Change of the measurements that removes a fault; the default changes nothing.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Correction {

@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::clock_alignment::{ClockAlignment, RotationReference, align_clocks, best_rotation};
-use super::correction::Correction;
+use super::correction::{Correction, USELESS_DELAY_S};
 use super::hypotheses::{Explanation, WithinNoise};
 use super::imu_facts::ImuFacts;
 use super::rotation_data::{JOINED_S, RotationData, joined};
@@ -179,7 +179,8 @@ impl HandEye<'_> {
         } else if is_explained {
             let title = format!("time offset of {key} to the gyroscope: {:+.0} ms", offset_s * 1e3);
             let remedy = format!("set {key}.timeshift_cam_imu to {:+.3}", given_s + offset_s);
-            findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
+            let severity = if offset_s.abs() > USELESS_DELAY_S { Severity::Error } else { Severity::Warning };
+            findings.add(severity, Area::Time, title, evidence, remedy);
         } else {
             let title = format!("no time offset of {key} explains its rotations");
             findings.add(Severity::Note, Area::Time, title, evidence, "see the finding on its orientation");

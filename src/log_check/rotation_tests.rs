@@ -177,7 +177,7 @@ fn faults_of_a_joint_are_named() {
     let of = |joint: fn(f64) -> f64| Images { joint: Some(joint), ..Images::default() }.check(&on_gimbal());
     expect(&of(joint_at), Severity::Good, &["the orientation of cam0 agrees with the rig"]);
     expect(&of(|time_s| -joint_at(time_s)), Severity::Error, &["joint 'yaw' counts in the other direction"]);
-    expect(&of(|time_s| joint_at(time_s + 0.12)), Severity::Warning, &["joint angles are 1", "ms late"]);
+    expect(&of(|time_s| joint_at(time_s + 0.12)), Severity::Error, &["joint angles are 1", "ms late"]);
     let halved = of(|time_s| 2.0 * joint_at(time_s));
     expect(&halved, Severity::Error, &["readings of joint 'yaw' are 0.5", "gear ratio"]);
 }

@@ -28,7 +28,7 @@ const FOLLOWED: usize = 2;
 /// Smallest corrections that count as a fault where noise explains the rotations without them.
 const NOTICEABLE_SCALE: f64 = 0.03;
 const NOTICEABLE_ANGLE_RAD: f64 = 0.026;
-const NOTICEABLE_DELAY_S: f64 = 0.01;
+const NOTICEABLE_DELAY_S: f64 = 0.02;
 /// In seconds per second.
 const NOTICEABLE_DRIFT: f64 = 2e-4;
 /// Ratio of the median misfit with a correction to that without up to which it removes a misfit.

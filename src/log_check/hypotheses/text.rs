@@ -2,6 +2,7 @@
 
 use nalgebra::Matrix3;
 
+use super::super::correction::USELESS_DELAY_S;
 use super::super::rotation_data::RotationData;
 use super::super::{Area, Severity};
 use super::cause::Cause;
@@ -93,7 +94,7 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
             let late = if delay_ms > 0.0 { "late" } else { "early" };
             let given_s = data.rig.gimbal.as_ref().map_or(0.0, |gimbal| gimbal.timeshift_gimbal_imu_s);
             of(
-                Severity::Warning,
+                if delay_ms.abs() > 1e3 * USELESS_DELAY_S { Severity::Error } else { Severity::Warning },
                 Area::Time,
                 format!("joint angles are {:.0} ms {late}", delay_ms.abs()),
                 format!("set gimbal.timeshift_gimbal_imu to {:+.3}", given_s - correction.joint_delay_s),
