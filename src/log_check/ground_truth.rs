@@ -270,23 +270,20 @@ fn report_body(found: &ClockAlignment, turns_of_imu: &[UnitQuaternion<f64>], fin
     }
     if angle_rad > BODY_TOLERANCE_RAD.max(SIGNIFICANT_SIGMAS * sigma_rad) {
         let vector = so3::log(&body_from_imu).map(f64::to_degrees);
-        let is_same = |turn: &UnitQuaternion<f64>| turn.angle_to(&body_from_imu) < SAME_TURN_RAD;
-        if !turns_of_imu.is_empty() && turns_of_imu.iter().all(is_same) {
-            let title =
-                format!("the axes of the IMU are not those of the rig: rotated by {:.1}°", angle_rad.to_degrees());
-            let evidence = format!(
-                "ground truth and cameras agree with each other: rotation vector ({:+.1}, {:+.1}, {:+.1})° in the IMU frame; {evidence}",
-                vector.x, vector.y, vector.z
-            );
-            let remedy = "publish the IMU in the axes of the calibration, or calibrate the extrinsics of all cameras with \
-                          the axes that it has";
-            return findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
-        }
-        let title = format!("the ground truth is of another body frame: rotated by {:.1}°", angle_rad.to_degrees());
         let evidence = format!(
             "{evidence}; rotation vector ({:+.1}, {:+.1}, {:+.1})° in the IMU frame",
             vector.x, vector.y, vector.z
         );
+        let turned = format!("rotated by {:.1}°", angle_rad.to_degrees());
+        let is_same = |turn: &UnitQuaternion<f64>| turn.angle_to(&body_from_imu) < SAME_TURN_RAD;
+        if !turns_of_imu.is_empty() && turns_of_imu.iter().all(is_same) {
+            let title = format!("the axes of the IMU are not those of the rig: {turned}");
+            let evidence = format!("ground truth and cameras agree with each other: {evidence}");
+            let remedy = "publish the IMU in the axes of the calibration, or calibrate the extrinsics of all cameras with \
+                          the axes that it has";
+            return findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
+        }
+        let title = format!("the ground truth is of another body frame: {turned}");
         let remedy = "publish the pose of the IMU: attitude errors and NEES contain this rotation, and position errors the \
                       distance between both origins";
         findings.add(Severity::Warning, Area::Log, title, evidence, remedy);

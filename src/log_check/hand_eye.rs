@@ -55,7 +55,7 @@ struct HandEye<'a> {
     camera: &'a CameraRig,
 }
 
-/// What a comparison says about other checks.
+/// Consequence of a comparison for other checks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Outcome {
     /// The intrinsics are wrong, so that other measurements by the camera's features are, too.

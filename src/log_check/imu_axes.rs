@@ -9,7 +9,7 @@ use crate::geometry::{SignedAxes, mean, seconds_from_ns};
 use crate::sensors::ImuSample;
 
 /// Length over which specific forces are averaged, in nanoseconds.
-const WINDOW_NS: i64 = 250_000_000;
+pub(super) const WINDOW_NS: i64 = 250_000_000;
 /// Length of the pieces in which the vertical is constant, in seconds: errors of the gyroscope's bias add up.
 const PIECE_S: f64 = 10.0;
 /// Windows whose accelerations count as one measurement.
@@ -23,6 +23,10 @@ const LARGEST_SCATTER: f64 = 0.05;
 
 /// Largest ratio of that variance to the one in the IMU frame, without any rotation.
 const LARGEST_RATIO: f64 = 0.5;
+
+/// Remedy for axes that differ.
+pub(super) const CORRECT_AXES: &str =
+    "correct order and signs of the axes in the IMU's driver: both sensors need one right-handed frame";
 
 /// Axes with the scatter of the specific force that they leave.
 #[derive(Clone, Copy, Debug)]
@@ -70,29 +74,33 @@ pub(super) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) {
         },
         tilt.sqrt().to_degrees()
     );
-    let odds = windows.len() as f64 / CORRELATED * (given.scatter / best.scatter).ln();
+    let is_decisive = fits_decisively(windows.len(), best.scatter, given.scatter);
     // A multirotor keeps the specific force along a body axis: then no axes make it vertical.
-    if odds < DECISIVE || best.scatter > LARGEST_SCATTER.min(LARGEST_RATIO * tilt) {
+    if !is_decisive || best.scatter > LARGEST_SCATTER.min(LARGEST_RATIO * tilt) {
         if given.scatter < LARGEST_SCATTER && given.scatter < tilt {
             findings.good(Area::Imu, "accelerometer and gyroscope have the same axes", evidence);
         }
         return;
     }
     let title = match (best.sign > 0.0, best.axes.is_identity()) {
-        (true, _) => {
-            format!(
-                "the axes of the accelerometer differ from the gyroscope's: {}",
-                best.axes.inverse().simpler().describe()
-            )
-        }
+        (true, _) => other_accelerometer_axes(&best.axes.inverse().simpler()),
         (false, true) => "the axes of gyroscope and accelerometer form a left-handed frame".to_owned(),
         (false, false) => {
             format!("the axes of the gyroscope form a left-handed frame: {}", best.axes.negated().describe())
         }
     };
-    let remedy = "correct order and signs of the axes in the IMU's driver: both sensors need one right-handed frame";
-    findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
+    findings.add(Severity::Error, Area::Imu, title, evidence, CORRECT_AXES);
     findings.exclude(Measurement::Accelerometer);
+}
+
+/// True if the accelerations of as many windows fit far better with a variance than with the given one.
+pub(super) fn fits_decisively(windows: usize, variance: f64, given: f64) -> bool {
+    windows as f64 / CORRELATED * (given / variance).ln() >= DECISIVE
+}
+
+/// Title of a finding on an accelerometer that records these axes of the gyroscope.
+pub(super) fn other_accelerometer_axes(recorded: &SignedAxes) -> String {
+    format!("the axes of the accelerometer differ from the gyroscope's: {}", recorded.describe())
 }
 
 /// Mean specific forces of consecutive windows at their middles, in seconds.

@@ -32,9 +32,11 @@ pub(super) fn check_joints(survey: &Survey, rig: &Rig, findings: &mut Findings) 
     if survey.joints.is_empty() {
         return;
     }
-    check_unit(survey, gimbal, findings);
-    for (number, joint) in gimbal.joints.iter().enumerate() {
-        check_joint(survey, gimbal, number, joint, findings);
+    let readings: Vec<Vec<(i64, f64)>> =
+        (0..gimbal.joints.len()).map(|number| finite_readings(survey, number)).collect();
+    check_unit(gimbal, &readings, findings);
+    for (number, (joint, readings)) in gimbal.joints.iter().zip(readings).enumerate() {
+        check_joint(survey, gimbal, number, joint, readings, findings);
     }
 }
 
@@ -48,26 +50,21 @@ fn exceeds_radians(readings: &[(i64, f64)]) -> bool {
     readings.iter().any(|(_, reading)| !is_in_radians(*reading))
 }
 
-/// Reports readings that are not in radians.
-fn check_unit(survey: &Survey, gimbal: &GimbalRig, findings: &mut Findings) {
-    let joints = gimbal.joints.iter().enumerate();
-    let all: Vec<(&str, Vec<(i64, f64)>)> =
-        joints.map(|(number, joint)| (joint.name.as_str(), finite_readings(survey, number))).collect();
-    let beyond: Vec<&(&str, Vec<(i64, f64)>)> = all.iter().filter(|(_, readings)| exceeds_radians(readings)).collect();
+/// Reports readings that are not in radians, from the finite ones of every joint.
+fn check_unit(gimbal: &GimbalRig, readings: &[Vec<(i64, f64)>], findings: &mut Findings) {
+    let joints = gimbal.joints.iter().zip(readings).filter(|(_, readings)| exceeds_radians(readings));
+    let beyond: Vec<(&str, Vec<f64>)> = joints
+        .map(|(joint, readings)| (joint.name.as_str(), readings.iter().map(|(_, angle)| *angle).collect()))
+        .collect();
     if beyond.is_empty() {
         return;
     }
-    let is_whole = |(_, readings): &&&(&str, Vec<(i64, f64)>)| readings.iter().all(|(_, angle)| angle.fract() == 0.0);
-    let unit = if beyond.iter().filter(is_whole).count() == beyond.len() {
-        "encoder counts or whole degrees"
-    } else {
-        "degrees"
-    };
+    let is_whole = beyond.iter().all(|(_, values)| values.iter().all(|angle| angle.fract() == 0.0));
+    let unit = if is_whole { "encoder counts or whole degrees" } else { "degrees" };
     let names: Vec<String> = beyond.iter().map(|(name, _)| format!("'{name}'")).collect();
     let title = format!("readings of {} appear to be in {unit}", names.join(", "));
-    let range = |(name, readings): &&(&str, Vec<(i64, f64)>)| {
-        let values: Vec<f64> = readings.iter().map(|(_, angle)| *angle).collect();
-        format!("'{name}' from {:.1} to {:.1}", percentile(&values, 0.0), percentile(&values, 1.0))
+    let range = |(name, values): &(&str, Vec<f64>)| {
+        format!("'{name}' from {:.1} to {:.1}", percentile(values, 0.0), percentile(values, 1.0))
     };
     let evidence = beyond.iter().map(range).collect::<Vec<_>>().join(", ");
     let remedy = "convert them in the driver: sensor_msgs/JointState requires radians";
@@ -80,7 +77,15 @@ fn first_whole_turn_s(readings: &[(i64, f64)]) -> Option<f64> {
     Some(seconds_from_ns(step[1].0))
 }
 
-fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint, findings: &mut Findings) {
+/// Checks one joint; `angles` are its finite readings.
+fn check_joint(
+    survey: &Survey,
+    gimbal: &GimbalRig,
+    number: usize,
+    joint: &Joint,
+    angles: Vec<(i64, f64)>,
+    findings: &mut Findings,
+) {
     let name = &joint.name;
     let readings = || survey.joints.iter().filter_map(|message| message.angles_rad[number]);
     let missing = survey.joints.len() - readings().count();
@@ -110,7 +115,6 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
             remedy,
         );
     }
-    let angles = finite_readings(survey, number);
     let values: Vec<f64> = angles.iter().map(|(_, angle)| *angle).collect();
     if values.len() < 3 || exceeds_radians(&angles) {
         return;

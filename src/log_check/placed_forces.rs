@@ -3,20 +3,15 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::clock_alignment::ClockAlignment;
+use super::imu_axes::{CORRECT_AXES, WINDOW_NS, fits_decisively, other_accelerometer_axes};
 use super::{Area, Findings, Measurement, Severity};
-use crate::geometry::{RigidTransform, SignedAxes, mean, ns_from_seconds, seconds_from_ns, so3};
+use crate::geometry::{RigidTransform, SignedAxes, ns_from_seconds, seconds_from_ns, so3, standard_deviation};
 use crate::sensors::ImuSample;
 
 /// Half the time over which a velocity is measured, in nanoseconds.
 const HALF_VELOCITY_NS: i64 = 100_000_000;
-/// Length over which accelerations are averaged, in nanoseconds.
-const WINDOW_NS: i64 = 250_000_000;
 /// Minimum number of windows.
 const MIN_WINDOWS: usize = 20;
-/// Windows whose accelerations count as one measurement.
-const CORRELATED: f64 = 4.0;
-/// Twice the logarithm of the odds from which other axes are reported.
-const DECISIVE: f64 = 20.0;
 /// Largest variance that the best axes leave, as a ratio of that of the accelerations.
 const LARGEST_REMAINDER: f64 = 0.25;
 
@@ -56,9 +51,7 @@ impl PlacedForces<'_> {
         }
         // Gravity and bias are constant.
         let scatter = |of: &dyn Fn(&Window) -> Vector3<f64>| {
-            let values: Vec<Vector3<f64>> = windows.iter().map(of).collect();
-            let middle = mean(&values);
-            values.iter().map(|value| (value - middle).norm_squared()).sum::<f64>() / values.len() as f64
+            standard_deviation(&windows.iter().map(of).collect::<Vec<_>>()).norm_squared()
         };
         let moved = scatter(&|window| window.acceleration);
         let remainder = |axes: &SignedAxes| {
@@ -68,17 +61,15 @@ impl PlacedForces<'_> {
         let all: Vec<(SignedAxes, f64)> = SignedAxes::all().map(|axes| (axes, remainder(&axes))).collect();
         let given = all.iter().find(|(axes, _)| axes.is_identity()).map_or(f64::INFINITY, |(_, scatter)| *scatter);
         let Some((axes, best)) = all.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) else { return false };
-        let odds = windows.len() as f64 / CORRELATED * (given / best).ln();
-        if axes.is_identity() || odds < DECISIVE || best > LARGEST_REMAINDER * moved {
+        let is_decisive = fits_decisively(windows.len(), best, given);
+        if axes.is_identity() || !is_decisive || best > LARGEST_REMAINDER * moved {
             return false;
         }
         let (title, remedy) = if axes.negated().is_identity() {
             let remedy = "reverse all three axes in the driver: at rest an accelerometer measures +9.81 m/s² upwards";
             ("the accelerometer has the opposite sign: it measures gravity, not specific force".to_owned(), remedy)
         } else {
-            let title =
-                format!("the axes of the accelerometer differ from the gyroscope's: {}", axes.inverse().describe());
-            (title, "correct order and signs of the axes in the IMU's driver: both sensors need one right-handed frame")
+            (other_accelerometer_axes(&axes.inverse()), CORRECT_AXES)
         };
         let evidence = format!(
             "{} windows of {:.2} s: specific forces differ from the accelerations of the ground truth by {:.2} m/s² (RMS \

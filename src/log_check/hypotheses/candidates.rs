@@ -25,17 +25,10 @@ pub(super) fn intrinsics(joints: usize, focal: f64) -> Vec<Hypothesis> {
     let mut scaled = none.clone();
     scaled.lens.focal = focal;
     let [centre_x, centre_y] = [0, 1].map(Parameter::Centre);
-    let hypothesis = |kind: Kind, start: &Correction, parameters: &[Parameter]| Hypothesis {
-        kind,
-        starts: vec![start.clone()],
-        parameters: parameters.to_vec(),
-        since_s: Vec::new(),
-        keeps_orientation: false,
-    };
     vec![
-        hypothesis(Kind::Focal, &scaled, &[Parameter::Focal]),
-        hypothesis(Kind::Centre, &none, &[centre_x, centre_y]),
-        hypothesis(Kind::Intrinsics, &scaled, &[Parameter::Focal, centre_x, centre_y]),
+        Hypothesis::new(Kind::Focal, vec![scaled.clone()], &[Parameter::Focal]),
+        Hypothesis::new(Kind::Centre, vec![none], &[centre_x, centre_y]),
+        Hypothesis::new(Kind::Intrinsics, vec![scaled], &[Parameter::Focal, centre_x, centre_y]),
     ]
 }
 
@@ -49,33 +42,20 @@ pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec
         change(&mut correction);
         correction
     };
-    let whole = |kind: Kind, starts: Vec<Correction>, parameters: &[Parameter]| Hypothesis {
-        kind,
-        starts,
-        parameters: parameters.to_vec(),
-        since_s: Vec::new(),
-        keeps_orientation: false,
-    };
     let mut all = vec![
-        whole(Kind::LeftHanded, vec![changed(&|it| it.gyroscope_scale = -1.0)], &[]),
-        whole(
+        Hypothesis::new(Kind::LeftHanded, vec![changed(&|it| it.gyroscope_scale = -1.0)], &[]),
+        Hypothesis::new(
             Kind::GyroscopeScale,
             SCALES.iter().map(|scale| changed(&|it| it.gyroscope_scale = *scale)).collect(),
             &[Parameter::GyroscopeScale],
         ),
-        whole(Kind::CameraDrift, vec![none.clone()], &[Parameter::CameraDelay, Parameter::CameraDrift]),
-        Hypothesis {
-            kind: Kind::Mount,
-            starts: vec![none.clone()],
-            parameters: [0, 1, 2].map(Parameter::Mount).to_vec(),
-            since_s: times_s(data),
-            keeps_orientation: false,
-        },
+        Hypothesis::new(Kind::CameraDrift, vec![none.clone()], &[Parameter::CameraDelay, Parameter::CameraDrift]),
+        Hypothesis::new(Kind::Mount, vec![none.clone()], &[0, 1, 2].map(Parameter::Mount)).since_one_of(times_s(data)),
     ];
     if data.camera.mount != CameraMount::Gimbal || joints == 0 {
         return all;
     }
-    all.push(whole(
+    all.push(Hypothesis::new(
         Kind::JointDelay,
         DELAYS_S.iter().map(|delay_s| changed(&|it| it.joint_delay_s = *delay_s)).collect(),
         &[Parameter::JointDelay],
@@ -88,28 +68,23 @@ pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec
         let reversed: Vec<usize> = (0..joints).filter(|joint| signs >> joint & 1 == 1).collect();
         let start = changed(&|it| reversed.iter().for_each(|joint| it.joints[*joint].scale = -1.0));
         let offsets: Vec<Parameter> = reversed.iter().map(|joint| Parameter::JointOffset(*joint)).collect();
-        all.push(whole(Kind::JointSigns(reversed), vec![start], &offsets));
+        all.push(Hypothesis::new(Kind::JointSigns(reversed), vec![start], &offsets));
     }
     let orders = permutations(joints).into_iter().skip(1);
     let swapped =
         orders.map(|order| changed(&|it| order.iter().enumerate().for_each(|(at, from)| it.joints[at].source = *from)));
-    all.push(whole(Kind::JointOrder, swapped.collect(), &[]));
+    all.push(Hypothesis::new(Kind::JointOrder, swapped.collect(), &[]));
     let in_unit = |unit: JointUnit| changed(&|it| it.joints.iter_mut().for_each(|joint| joint.scale = unit.size_rad()));
-    all.push(whole(Kind::JointUnit, JointUnit::all().map(in_unit).collect(), &[]));
+    all.push(Hypothesis::new(Kind::JointUnit, JointUnit::all().map(in_unit).collect(), &[]));
     for joint in 0..joints {
-        let offsets =
-            || OFFSETS_RAD.iter().map(|offset| changed(&|it| it.joints[joint].offset_rad = *offset)).collect();
-        all.push(whole(Kind::JointScale(joint), vec![none.clone()], &[Parameter::JointScale(joint)]));
+        let offsets = OFFSETS_RAD.iter().map(|offset| changed(&|it| it.joints[joint].offset_rad = *offset));
+        all.push(Hypothesis::new(Kind::JointScale(joint), vec![none.clone()], &[Parameter::JointScale(joint)]));
+        let offset = |starts: Vec<Correction>| {
+            Hypothesis::new(Kind::JointOffset(joint), starts, &[Parameter::JointOffset(joint)])
+        };
         // With any orientation of the camera, an offset of the last joint would be unobservable.
-        let offset = whole(Kind::JointOffset(joint), offsets(), &[Parameter::JointOffset(joint)]);
-        all.push(Hypothesis { keeps_orientation: true, ..offset });
-        all.push(Hypothesis {
-            kind: Kind::JointOffset(joint),
-            starts: vec![none.clone()],
-            parameters: vec![Parameter::JointOffset(joint)],
-            since_s: times_s(data),
-            keeps_orientation: false,
-        });
+        all.push(offset(offsets.collect()).with_orientation_of_rig());
+        all.push(offset(vec![none.clone()]).since_one_of(times_s(data)));
     }
     all
 }

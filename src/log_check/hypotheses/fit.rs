@@ -49,6 +49,23 @@ pub(in crate::log_check) struct Hypothesis {
     pub(super) keeps_orientation: bool,
 }
 
+impl Hypothesis {
+    /// A correction of the whole log, with any orientation of the camera.
+    pub(super) fn new(kind: Kind, starts: Vec<Correction>, parameters: &[Parameter]) -> Self {
+        Self { kind, starts, parameters: parameters.to_vec(), since_s: Vec::new(), keeps_orientation: false }
+    }
+
+    /// The same from one of these times on.
+    pub(super) fn since_one_of(self, since_s: Vec<f64>) -> Self {
+        Self { since_s, ..self }
+    }
+
+    /// The same with the camera's orientation by the rig.
+    pub(super) fn with_orientation_of_rig(self) -> Self {
+        Self { keeps_orientation: true, ..self }
+    }
+}
+
 /// Kind of a hypothesis, from which its text is made.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::log_check) enum Kind {

@@ -97,7 +97,7 @@ pub(super) fn explain_within_noise(
     }
 }
 
-/// All hypotheses, fitted.
+/// Hypotheses about one camera with their fits.
 struct Comparison<'a> {
     data: &'a RotationData<'a>,
     fitter: Fitter<'a>,

@@ -7,7 +7,7 @@ use super::super::attitude::AttitudeSurvey;
 /// Fault of the quaternions of an attitude.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum QuaternionFault {
-    /// The inverse rotation.
+    /// Conjugates: they map the reference to the body.
     Inverse,
     /// The fields x, y, z, w contain w, x, y, z.
     ScalarFirst,
