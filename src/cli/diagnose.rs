@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use dcvins::session::{self, Diagnosis, SessionPlan};
+use dcvins::session::{self, Diagnosis, LogFaults, SessionPlan};
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
@@ -30,10 +30,10 @@ pub(crate) fn diagnose(arguments: &DiagnoseArguments) -> Result<Outcome> {
     if computation.recording().runs.iter().all(|run| run.steps.is_empty()) && !interrupt.is_set() {
         bail!("no image of the log could be used; reasons: 'dcvins check {}'", arguments.log.display());
     }
-    let mut diagnoses: Vec<Diagnosis> = Vec::new();
+    let (mut diagnoses, log_faults): (Vec<Diagnosis>, _) = (Vec::new(), LogFaults::default());
     for run in 0..plan.runs.len() {
         let progress = Progress::new();
-        diagnoses.extend(session::diagnose(&computation, run, &mut |ratio, label| {
+        diagnoses.extend(session::diagnose(&computation, run, &log_faults, &mut |ratio, label| {
             progress.show(ratio, || label.to_owned());
             interrupt.control_flow()
         }));

@@ -27,7 +27,9 @@ mod record;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use diagnosis::{AgreementValue, Cause, Diagnosis, RankedCause, TruthAgreement, Verdict, WaitingReason, diagnose};
+pub use diagnosis::{
+    AgreementValue, Cause, Diagnosis, LogFaults, RankedCause, TruthAgreement, Verdict, WaitingReason, diagnose,
+};
 pub use engine::{
     BreakpointHit, CalibrationErrors, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation,
     FlightNoiseError, SnapshotUse, Stopwatch, calibrate, camera_rotations, compute, compute_until, fit_flight_noise,

@@ -159,7 +159,7 @@ fn named(kind: NamedNumber, name: &str, context: &StepContext<'_>) -> Option<f64
     let calibration = &report.calibration;
     let parameter = |values: &[f64]| {
         let parameter = context.names.parse(name)?;
-        values.get(calibration.parameters.iter().position(|known| *known == parameter)?).copied()
+        values.get(calibration.index_of(parameter)?).copied()
     };
     let factor = || report.residuals.iter().find(|summary| summary.factor.name() == name);
     match kind {

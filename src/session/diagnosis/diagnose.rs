@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::agreement::{self, AgreementValue};
 use super::axes::plausible_axes;
 use super::hypotheses::{Cause, Hypothesis, changes_at, first_hypotheses};
-use super::log_faults::log_faults;
+use super::log_faults::LogFaults;
 use super::misfit::Misfit;
 use super::outcome::{Diagnosis, RankedCause, TruthAgreement, Verdict, WaitingReason};
 use super::ranking::{Candidate, Decision, by_cause, decide};
@@ -47,15 +47,23 @@ type OnProgress<'a> = dyn FnMut(f64, &str) -> ControlFlow<()> + 'a;
 
 /// Finds the cause of residuals of a computed run that disagree with their noise.
 ///
-/// `on_progress` may end it; the result then has what is known so far. `None` if the recording has no such run.
-pub fn diagnose(computation: &Computation, run: usize, on_progress: &mut OnProgress<'_>) -> Option<Diagnosis> {
+/// `on_progress` may end it; the result then has what is known so far. `log_faults` is shared by the runs of a log, whose
+/// check is the same. `None` if the recording has no such run.
+pub fn diagnose(
+    computation: &Computation,
+    run: usize,
+    log_faults: &LogFaults,
+    on_progress: &mut OnProgress<'_>,
+) -> Option<Diagnosis> {
     let recording = computation.recording();
     let record = recording.runs.get(run)?;
     let mut diagnosis = diagnose_run(&recording.rig, record, computation.history(run)?, on_progress);
     diagnosis.log = recording.log_name();
     if diagnosis.verdict != Verdict::Agrees && !diagnosis.interrupted {
         match on_progress(1.0, "check of the log") {
-            ControlFlow::Continue(()) => diagnosis.log_faults = log_faults(&recording.log_path, &recording.rig),
+            ControlFlow::Continue(()) => {
+                diagnosis.log_faults = log_faults.of(&recording.log_path, &recording.rig).to_vec();
+            }
             ControlFlow::Break(()) => diagnosis.interrupted = true,
         }
     }
@@ -87,7 +95,7 @@ struct Search<'a, 'b> {
 
 impl Search<'_, '_> {
     fn diagnosis(&mut self) -> Diagnosis {
-        let mut diagnosis = self.empty();
+        let mut diagnosis = Diagnosis::before_trials(self.record.spec.label.clone());
         let Some(whole) = self.whole() else { return diagnosis };
         self.report(0.02, "the run without a change");
         let Some(given) = self.run.trial(&whole, 0, &ForkChanges::default(), None) else {
@@ -258,25 +266,6 @@ impl Search<'_, '_> {
     fn report(&mut self, ratio: f64, label: &str) {
         if (self.on_progress)(ratio, label).is_break() {
             self.run.interrupted.store(true, Ordering::Relaxed);
-        }
-    }
-
-    fn empty(&self) -> Diagnosis {
-        Diagnosis {
-            log: String::new(),
-            log_faults: Vec::new(),
-            run: self.record.spec.label.clone(),
-            verdict: Verdict::NoSteps,
-            values: Vec::new(),
-            onset_s: None,
-            waiting: Vec::new(),
-            accuracy: None,
-            ground_truth: None,
-            span_s: None,
-            explaining: 0,
-            causes: Vec::new(),
-            trials: 0,
-            interrupted: false,
         }
     }
 }

@@ -31,4 +31,5 @@ pub use diagnose::diagnose;
 #[cfg(test)]
 pub(in crate::session) use diagnose::diagnose_run;
 pub use hypotheses::Cause;
+pub use log_faults::LogFaults;
 pub use outcome::{Diagnosis, RankedCause, TruthAgreement, Verdict, WaitingReason};

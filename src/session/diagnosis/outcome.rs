@@ -152,6 +152,26 @@ impl fmt::Display for Diagnosis {
 }
 
 impl Diagnosis {
+    /// Diagnosis of a run of which nothing is known yet.
+    pub(in crate::session) fn before_trials(run: String) -> Self {
+        Self {
+            log: String::new(),
+            run,
+            verdict: Verdict::NoSteps,
+            log_faults: Vec::new(),
+            values: Vec::new(),
+            onset_s: None,
+            waiting: Vec::new(),
+            accuracy: None,
+            ground_truth: None,
+            span_s: None,
+            explaining: 0,
+            causes: Vec::new(),
+            trials: 0,
+            interrupted: false,
+        }
+    }
+
     /// The finding in one sentence: an error that the check of the log measures precedes what the trials explain.
     pub fn headline(&self) -> String {
         let of_trials = self.headline_of_trials();
@@ -211,20 +231,9 @@ mod tests {
             is_assumption: false,
         };
         let mut diagnosis = Diagnosis {
-            log: "flight.mcap".to_owned(),
-            run: "auto".to_owned(),
             verdict: Verdict::Unexplained,
             log_faults: vec![fault(Severity::Error)],
-            values: Vec::new(),
-            onset_s: None,
-            waiting: Vec::new(),
-            accuracy: None,
-            ground_truth: None,
-            span_s: None,
-            explaining: 0,
-            causes: Vec::new(),
-            trials: 40,
-            interrupted: false,
+            ..Diagnosis::before_trials("auto".to_owned())
         };
         let headline = diagnosis.headline();
         assert!(headline.starts_with("the heading of /vehicle/attitude steps by +20.1° at 4.00 s, by the check"));

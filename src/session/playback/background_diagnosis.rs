@@ -8,7 +8,7 @@ use std::thread::{Builder, JoinHandle};
 use parking_lot::Mutex;
 use rayon::ThreadPoolBuilder;
 
-use crate::session::diagnosis::{Diagnosis, diagnose};
+use crate::session::diagnosis::{Diagnosis, LogFaults, diagnose};
 use crate::session::engine::Computation;
 use crate::session::plan::SessionError;
 
@@ -47,7 +47,7 @@ impl BackgroundDiagnosis {
                 (progress.ratio, progress.label) = (ratio, label.to_owned());
                 if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
-            let found = diagnose(&computation, run, &mut on_progress);
+            let found = diagnose(&computation, run, &LogFaults::default(), &mut on_progress);
             let mut progress = shared.lock();
             (progress.ratio, progress.result) = (1.0, found.map(Arc::new));
         };

@@ -20,7 +20,7 @@ pub struct FlightParameter {
     pub dimension: Dimension,
     /// Estimate; angles of links and of the base block in (−π, π].
     pub value: f64,
-    /// Posterior standard deviation.
+    /// Posterior standard deviation in the unit of the value; `None` before the first solve.
     pub sigma: Option<f64>,
     pub prior_sigma: Option<f64>,
     /// Posterior divided by prior standard deviation.

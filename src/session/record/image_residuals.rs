@@ -80,13 +80,7 @@ impl ImageResiduals {
     /// Residuals of all observations in the window of a step; empty if only the summary of the step is kept.
     pub fn of_window(report: &StepReport) -> Self {
         let mut residuals = Self::default();
-        for feature in used(report) {
-            let mut before: Option<ObservationReport> = None;
-            for observation in feature.observations.iter() {
-                residuals.add(&observation, before.as_ref());
-                before = Some(observation);
-            }
-        }
+        residuals.add_observations(report, |_| true);
         residuals
     }
 
@@ -101,10 +95,15 @@ impl ImageResiduals {
 
     /// Adds the residuals of the newest image of a step.
     pub(super) fn add_step(&mut self, report: &StepReport) {
+        self.add_observations(report, |observation| observation.frame_index == report.frame_index);
+    }
+
+    /// Adds the chosen observations of a window, each with the motion from the one before.
+    fn add_observations(&mut self, report: &StepReport, is_chosen: impl Fn(&ObservationReport) -> bool) {
         for feature in used(report) {
             let mut before: Option<ObservationReport> = None;
             for observation in feature.observations.iter() {
-                if observation.frame_index == report.frame_index {
+                if is_chosen(&observation) {
                     self.add(&observation, before.as_ref());
                 }
                 before = Some(observation);
