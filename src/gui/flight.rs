@@ -7,7 +7,7 @@ use egui::Context;
 use super::follow::Follower;
 use super::step_work::{REPAINT, StepWork};
 use crate::gimbal::ParameterId;
-use crate::gui::convergence::names::part_of;
+use crate::gui::convergence::names::place_of;
 use crate::observability::Determination;
 use crate::observability::laboratory::Advice;
 use crate::session::{FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord, flight_advice};
@@ -30,7 +30,7 @@ impl PartialEq for FlightTables {
 /// Verdicts of one run so far, independent of the cursor.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FlightReport {
-    /// Rows in groups.
+    /// In the order of the chain's groups.
     pub(crate) rows: Arc<[FlightParameter]>,
     pub(crate) history: Arc<DeterminationHistory>,
     /// True if motions for the chain are still being computed.
@@ -134,11 +134,11 @@ impl DeterminationHistory {
         for (parameter, verdict) in verdicts.verdicts() {
             let place = self.parameters.iter().position(|known| known.parameter == parameter).unwrap_or_else(|| {
                 let (ratios, verdicts) = (Vec::new(), Vec::new());
-                let place = self.parameters.partition_point(|it| order(it.parameter) < order(parameter));
+                let place = self.parameters.partition_point(|it| place_of(it.parameter) < place_of(parameter));
                 self.parameters.insert(place, ParameterHistory { parameter, ratios, verdicts });
                 place
             });
-            let index = calibration.parameters.iter().position(|known| *known == parameter);
+            let index = calibration.index_of(parameter);
             let entry = |values: &[f64]| index.and_then(|index| values.get(index)).copied().unwrap_or(f64::NAN);
             let history = &mut self.parameters[place];
             history.pad(row);
@@ -154,11 +154,6 @@ impl DeterminationHistory {
     pub(crate) fn row_at(&self, stamp_ns: i64) -> Option<usize> {
         self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).checked_sub(1)
     }
-}
-
-/// Place of a parameter along the chain.
-fn order(parameter: ParameterId) -> impl Ord {
-    (part_of(parameter), parameter)
 }
 
 impl ParameterHistory {

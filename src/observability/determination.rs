@@ -24,7 +24,7 @@ pub enum Determination {
     Redundant,
     /// Not estimated: the value of the rig is kept.
     Fixed,
-    /// Not estimated yet.
+    /// Without a posterior: the run has not initialized.
     Initializing,
 }
 

@@ -75,6 +75,13 @@ pub struct CalibrationEstimate {
     pub rigid_cameras: Vec<(String, RigidTransform)>,
 }
 
+impl CalibrationEstimate {
+    /// Column of a parameter; `None` if it is not estimated.
+    pub fn index_of(&self, parameter: ParameterId) -> Option<usize> {
+        self.parameters.iter().position(|known| *known == parameter)
+    }
+}
+
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageTimes {
     /// Feature tracking and detection (images are read and decoded in advance on another thread).

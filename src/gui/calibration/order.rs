@@ -2,7 +2,7 @@
 
 use std::cmp::{Ordering, Reverse};
 
-use crate::gui::convergence::names::part_of;
+use crate::gui::convergence::names::place_of;
 use crate::observability::Determination;
 use crate::session::FlightParameter;
 
@@ -44,14 +44,14 @@ impl Order {
         rows.sort_by(|a, b| {
             let order = self.compare(a, b);
             let order = if self.descending { order.reverse() } else { order };
-            order.then_with(|| place(a).cmp(&place(b)))
+            order.then_with(|| place_of(a.parameter).cmp(&place_of(b.parameter)))
         });
     }
 
     fn compare(self, a: &FlightParameter, b: &FlightParameter) -> Ordering {
         let ratio = |row: &FlightParameter| row.ratio.unwrap_or(f64::NEG_INFINITY);
         match self.column {
-            Column::Parameter => place(a).cmp(&place(b)),
+            Column::Parameter => place_of(a.parameter).cmp(&place_of(b.parameter)),
             Column::Value => a.value.total_cmp(&b.value),
             Column::Ratio => ratio(a).total_cmp(&ratio(b)),
             Column::Verdict => {
@@ -67,10 +67,6 @@ impl Order {
             }
         }
     }
-}
-
-fn place(row: &FlightParameter) -> impl Ord {
-    (part_of(row.parameter), row.parameter)
 }
 
 /// Severity of a verdict: largest for a parameter that the flight does not determine.

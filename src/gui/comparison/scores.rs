@@ -61,7 +61,7 @@ pub(crate) struct Scores {
 pub(super) enum ScoreKind {
     #[default]
     Exact,
-    /// Absolute trajectory error.
+    /// ATE, over all estimated frames.
     Absolute,
     /// Relative pose error over sub-trajectories of this length in metres.
     Relative(f64),

@@ -24,6 +24,11 @@ pub(crate) enum CalibrationPart {
     Clocks,
 }
 
+/// Place of a parameter along the chain, then of the other parts.
+pub(crate) fn place_of(parameter: ParameterId) -> impl Ord {
+    (part_of(parameter), parameter)
+}
+
 pub(crate) fn part_of(parameter: ParameterId) -> CalibrationPart {
     match (parameter.group(), parameter.part) {
         (ParameterGroup::Clocks, _) => CalibrationPart::Clocks,

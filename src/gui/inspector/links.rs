@@ -129,7 +129,7 @@ pub(super) fn block_ui(
 ) {
     let report = &step.report;
     let cameras = cameras(&ctx.recording.rig, run, step);
-    let column = report.calibration.parameters.iter().position(|known| *known == parameter);
+    let column = report.calibration.index_of(parameter);
     let feature = report.features.iter().find(|feature| feature.id == id);
     let (Some(column), Some(feature), Some(rows)) = (column, feature, report.feature_rows(&cameras, id)) else {
         ui.label(RichText::new("No such block in this step").color(ctx.theme.text_weak));

@@ -16,7 +16,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
     let theme = ctx.theme;
     ui.add(egui::Label::new(RichText::new(meaning_of(parameter, &ctx.recording.rig)).color(theme.text)).wrap());
     let calibration = &step.report.calibration;
-    let Some(index) = calibration.parameters.iter().position(|known| *known == parameter) else {
+    let Some(index) = calibration.index_of(parameter) else {
         let text = format!("Not a parameter of run {} in this step", run.spec.label);
         ui.label(RichText::new(text).color(theme.text_weak));
         return;
@@ -32,8 +32,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
         (terms::RATIO, vec![fixed(sigma / prior, 3)]),
     ];
     let begin = run.steps.first().map(|first| &first.report.calibration);
-    let begin =
-        begin.and_then(|first| first.values.get(first.parameters.iter().position(|known| *known == parameter)?));
+    let begin = begin.and_then(|first| first.values.get(first.index_of(parameter)?));
     if let Some(begin) = begin {
         rows.push((terms::INITIAL, vec![shown.value(parameter.principal_value(*begin), sigma)]));
         rows.push((terms::CHANGE, vec![shown.value(parameter.principal_value(value - begin), sigma)]));

@@ -57,7 +57,7 @@ pub(crate) struct Readout<'a> {
     pub(crate) factor: f64,
     /// Shown unit with its leading space.
     pub(crate) unit: &'a str,
-    /// True for counts.
+    /// True for counts, which are shown without decimals.
     pub(crate) whole: bool,
     /// Shown value of a stored one within the period of an angle, both in stored units.
     pub(crate) principal: &'a dyn Fn(f64) -> f64,

@@ -91,18 +91,8 @@ impl Lane {
     }
 
     pub(crate) fn value(self, lanes: &RunLanes, cursor_ns: i64) -> Option<String> {
-        match self {
-            Self::Rank => lanes.at(INFORMED, cursor_ns).map(|value| fixed(value, 0)),
-            Self::Features => lanes.at(FEATURES, cursor_ns).map(|value| fixed(value, 0)),
-            Self::Reprojection => lanes.at(RMS, cursor_ns).map(|value| fixed(value, 2)),
-            Self::Run(_)
-            | Self::Trajectory(_)
-            | Self::Breakpoints
-            | Self::Events
-            | Self::Outliers
-            | Self::Parameters
-            | Self::Warnings => None,
-        }
+        let decimals = if self == Self::Reprojection { 2 } else { 0 };
+        lanes.at(self.column()?, cursor_ns).map(|value| fixed(value, decimals))
     }
 
     /// Plotted column of the runs' tables; `None` for lanes without a curve.

@@ -205,7 +205,7 @@ impl TimelinePanel {
                 axis = lanes::plotted_values(&painter, &theme, &area, lane, &self.runs, curves);
             }
             Lane::Outliers => lanes::outliers(&inner, &theme, &area, &self.runs),
-            // Drawn above.
+            // Has returned above: it draws its own label.
             Lane::Parameters => {}
             Lane::Warnings => {
                 let stamps_ns: Vec<i64> = ctx.recording.warnings.iter().map(|warning| warning.stamp_ns).collect();

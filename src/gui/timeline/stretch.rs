@@ -58,7 +58,7 @@ impl Stretch {
         let gains = steps[1..].iter().filter_map(|step| step.gain());
         let rate = information_rate(gains);
         let sigma = |calibration: &crate::estimator::CalibrationEstimate, parameter: ParameterId| {
-            let index = calibration.parameters.iter().position(|known| *known == parameter)?;
+            let index = calibration.index_of(parameter)?;
             Some((*calibration.sigmas.get(index)?, *calibration.prior_sigmas.get(index)?))
         };
         let verdicts = steps.last()?.determinations();

@@ -16,7 +16,6 @@ pub enum NoticeLevel {
     Info,
     /// A problem that does not stop the operation.
     Warning,
-    /// A failed operation.
     Error,
 }
 
