@@ -2,7 +2,7 @@
 
 use super::imu_facts::ImuFacts;
 use super::survey::Survey;
-use super::{Area, Findings, Measurement, Severity};
+use super::{Area, FaultySource, Findings, MeasuredFault, Measurement, Severity};
 use crate::flight_log::imu_filter::ROTATING_RAD_PER_S;
 use crate::flight_log::joint_merge::JointReading;
 use crate::geometry::seconds_from_ns;
@@ -69,6 +69,7 @@ fn check_joint(joint: &Joint, readings: &[(i64, f64)], imu: &ImuFacts, findings:
     let remedy = "the driver repeats its last reading: check the connection of the encoder; use --duration or --start to \
                   run on the log outside of these intervals";
     findings.add(Severity::Error, Area::Encoders, title, evidence, remedy);
+    findings.state_faults([MeasuredFault::Irreversible(FaultySource::Joints)]);
     findings.exclude(Measurement::Joints);
 }
 

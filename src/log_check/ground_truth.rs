@@ -7,11 +7,11 @@ use super::clock_alignment::{AlignmentError, ClockAlignment, RotationReference, 
 use super::imu_facts::ImuFacts;
 use super::placed_forces::{PlacedForces, velocity_at};
 use super::statistics::median;
-use super::{Area, Findings, ImageRotation, Measurement, Severity};
+use super::{Area, Findings, ImageRotation, MeasuredFault, Measurement, Severity};
 use crate::flight_log::log::relative_ns;
 use crate::flight_log::spacing::Spacing;
 use crate::flight_log::{FlightLog, RecordedPose};
-use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns, so3};
+use crate::geometry::{RigidTransform, SignedAxes, ns_from_seconds, seconds_from_ns, so3};
 use crate::sensors::Rig;
 
 /// Step between the compared orientations in nanoseconds; poses farther apart than three steps are not compared.
@@ -281,7 +281,9 @@ fn report_body(found: &ClockAlignment, turns_of_imu: &[UnitQuaternion<f64>], fin
             let evidence = format!("ground truth and cameras agree with each other: {evidence}");
             let remedy = "publish the IMU in the axes of the calibration, or calibrate the extrinsics of all cameras with \
                           the axes that it has";
-            return findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
+            findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
+            let axes = SignedAxes::nearest(&body_from_imu.to_rotation_matrix().into_inner());
+            return findings.state_faults(axes.map(MeasuredFault::GyroscopeAxes));
         }
         let title = format!("the ground truth is of another body frame: {turned}");
         let remedy = "publish the pose of the IMU: attitude errors and NEES contain this rotation, and position errors the \

@@ -13,7 +13,7 @@ use super::rotation_data::{JOINED_S, RotationData, joined};
 use super::rotation_fit::{FREE_ORIENTATION_RAD, FitPriors, RotationFit, RotationPair};
 use super::statistics::median;
 use super::survey::Survey;
-use super::{Area, Findings, ImageRotation, Measurement, Severity, hypotheses};
+use super::{Area, Findings, ImageRotation, MeasuredFault, Measurement, Severity, hypotheses};
 use crate::geometry::so3;
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, CameraRig, Rig};
@@ -181,6 +181,7 @@ impl HandEye<'_> {
             let remedy = format!("set {key}.timeshift_cam_imu to {:+.3}", given_s + offset_s);
             let severity = if offset_s.abs() > USELESS_DELAY_S { Severity::Error } else { Severity::Warning };
             findings.add(severity, Area::Time, title, evidence, remedy);
+            findings.state_faults([MeasuredFault::CameraShift { camera_key: key.clone(), shift_s: offset_s }]);
         } else {
             let title = format!("no time offset of {key} explains its rotations");
             findings.add(Severity::Note, Area::Time, title, evidence, "see the finding on its orientation");
@@ -286,6 +287,12 @@ impl HandEye<'_> {
         titles.insert(found.more_likely, &title);
         remedies.insert(found.more_likely, remedy);
         findings.add(severity, Area::Extrinsics, titles.join(", or "), evidence, remedies.join("; or "));
+        let camera_key = key.clone();
+        let fault = match turned_images(orientation) {
+            Some(_) => MeasuredFault::ImagesTurned { camera_key },
+            None => MeasuredFault::Orientation { camera_key },
+        };
+        findings.state_faults(causes.iter().filter_map(|cause| cause.fault.clone()).chain([fault]));
     }
 
     /// Transform of the rig whose inverse predicts the rotations much better, up to an error within tolerance, with the

@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 
 use super::imu_facts::ImuFacts;
-use super::{Area, Findings, Measurement, Severity};
+use super::{Area, Findings, MeasuredFault, Measurement, Severity};
 use crate::geometry::{SignedAxes, mean, seconds_from_ns};
 use crate::sensors::ImuSample;
 
@@ -90,6 +90,9 @@ pub(super) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) {
         }
     };
     findings.add(Severity::Error, Area::Imu, title, evidence, CORRECT_AXES);
+    if best.sign > 0.0 {
+        findings.state_faults([MeasuredFault::AccelerometerAxes(best.axes.simpler())]);
+    }
     findings.exclude(Measurement::Accelerometer);
 }
 

@@ -6,7 +6,7 @@ use super::stationary::{Stamped, StationaryTest, WINDOW_NS, Window};
 use super::statistics::{median, percentile};
 use super::survey::Survey;
 use super::unmeasured::check_unmeasured;
-use super::{Area, Findings, Measurement, Severity};
+use super::{Area, FaultySource, Findings, MeasuredFault, Measurement, Severity};
 use crate::geometry::{mean, seconds_from_ns};
 use crate::sensors::{AngularRates, ImuSample, Rig};
 
@@ -143,40 +143,47 @@ fn check_gravity(
     };
     let range_factor = RANGE_FACTORS.into_iter().find(near);
     let multiple = format!("the accelerometer measures {} times gravity", range_factor.unwrap_or(1.0));
-    let (severity, title, remedy) = if (measured - 1.0).abs() < 0.2 && (is_steady || !stationary.is_empty()) {
+    let is_scaled = is_steady || !stationary.is_empty();
+    let (severity, title, remedy, fault) = if (measured - 1.0).abs() < 0.2 && is_scaled {
         (
             Severity::Error,
             "accelerations are in g, not m/s²",
             "multiply by 9.80665 in the driver: sensor_msgs/Imu requires m/s²",
+            Some(MeasuredFault::AccelerometerScale(9.806_65)),
         )
     } else if measured < NO_GRAVITY_RATIO * gravity {
         (
             Severity::Error,
             "gravity is already removed from the accelerations",
             "record the raw accelerometer (specific force): linear accelerations of a filter cannot be used",
+            Some(MeasuredFault::Irreversible(FaultySource::Imu)),
         )
-    } else if range_factor.is_some() && (is_steady || !stationary.is_empty()) {
+    } else if let Some(factor) = range_factor.filter(|_| is_scaled) {
         (
             Severity::Error,
             multiple.as_str(),
             "the range setting of the sensor and the scale of its driver differ: correct one of them",
+            Some(MeasuredFault::AccelerometerScale(factor.recip())),
         )
     } else if difference.abs() > 2.0 {
         (
             Severity::Error,
             "the accelerometer does not measure gravity",
             "check units, scale and IMU intrinsics in the driver: while stationary the norm must be gravity",
+            None,
         )
     } else if difference.abs() > 0.2 && !stationary.is_empty() {
         (
             if difference.abs() > 1.0 { Severity::Warning } else { Severity::Note },
             "the accelerometer has a large bias or scale error along gravity",
             "the estimator finds the bias once the vehicle moves; expect a slow start, or calibrate the IMU",
+            None,
         )
     } else {
         return findings.good(Area::Imu, "the accelerometer measures gravity", evidence);
     };
     findings.add(severity, Area::Imu, title, evidence, remedy);
+    findings.state_faults(fault);
     if severity == Severity::Error {
         findings.exclude(Measurement::Accelerometer);
     }
@@ -235,6 +242,7 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
     if largest[0] > 35.0 {
         let remedy = "check the unit: sensor_msgs/Imu requires rad/s, and 35 rad/s is 2000 °/s";
         findings.add(Severity::Error, Area::Imu, "angular velocities appear to be in degrees", evidence, remedy);
+        findings.state_faults([MeasuredFault::GyroscopeScale(std::f64::consts::PI / 180.0)]);
         findings.exclude(Measurement::Gyroscope);
     } else if !clipped {
         findings.good(Area::Imu, "the IMU does not saturate", evidence);

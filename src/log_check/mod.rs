@@ -20,6 +20,7 @@ mod imu_samples;
 mod imu_topics;
 mod joint_coverage;
 mod joints;
+mod measured_fault;
 mod noise;
 mod permutations;
 mod pictures;
@@ -57,6 +58,7 @@ pub use self::noise::{
     AllanPoint, AllanReport, AxisNoise, GivenNoise, NoiseTerm, NoiseTerms, SensorNoise, measure_noise,
 };
 
+pub use self::measured_fault::{FaultySource, MeasuredFault};
 pub use self::verdict::{Usability, Verdict};
 
 pub use self::report::{Area, CheckReport, Finding, ImageRotation, ProposedMask, Severity, TopicReport};

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::clock_alignment::ClockAlignment;
 use super::imu_axes::{CORRECT_AXES, WINDOW_NS, fits_decisively, other_accelerometer_axes};
-use super::{Area, Findings, Measurement, Severity};
+use super::{Area, Findings, MeasuredFault, Measurement, Severity};
 use crate::geometry::{RigidTransform, SignedAxes, ns_from_seconds, seconds_from_ns, so3, standard_deviation};
 use crate::sensors::ImuSample;
 
@@ -81,6 +81,7 @@ impl PlacedForces<'_> {
             moved.sqrt()
         );
         findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
+        findings.state_faults([MeasuredFault::AccelerometerAxes(axes)]);
         findings.exclude(Measurement::Accelerometer);
         true
     }

@@ -3,7 +3,7 @@
 use super::statistics::{median, percentile};
 use super::topic_survey::TopicSurvey;
 use super::used_topics::UsedTopic;
-use super::{Area, Findings, Measurement, Severity};
+use super::{Area, FaultySource, Findings, MeasuredFault, Measurement, Severity};
 use crate::flight_log::spacing::Spacing;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::ImuSample;
@@ -43,6 +43,8 @@ pub(super) fn has_two_publishers(
         _ => &[],
     };
     for measurement in mixed {
+        let source = if *measurement == Measurement::Joints { FaultySource::Joints } else { FaultySource::Imu };
+        findings.state_faults([MeasuredFault::Irreversible(source)]);
         findings.exclude(*measurement);
     }
     true

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::imu_facts::ImuFacts;
-use super::{Area, Findings, ImageRotation, Severity};
+use super::{Area, Findings, ImageRotation, MeasuredFault, Severity};
 use crate::frontend::readout::{
     FirstRowRotation, ImagePair, ReadoutMeasurement, ReadoutOptions, measure_readout, rotations_of_first_rows,
 };
@@ -54,6 +54,7 @@ pub(super) fn check_readout(
         };
         let remedy = format!("set {key}.readout to {readout_s:.4} and {key}.readout_sigma to {:.4}", sigma_s.max(1e-4));
         findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
+        findings.state_faults([MeasuredFault::Readout { camera_key: key.clone() }]);
         return readout_s;
     }
     if sigma_s > USEFUL_SIGMA_S {

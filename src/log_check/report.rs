@@ -6,6 +6,7 @@ use nalgebra::UnitQuaternion;
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
 
+use super::measured_fault::MeasuredFault;
 use crate::flight_log::without_signed_zeros;
 use crate::frontend::readout::RowTrack;
 use crate::sensors::ImageMask;
@@ -45,7 +46,7 @@ pub enum Area {
     Extrinsics,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
     pub severity: Severity,
     pub area: Area,
@@ -58,6 +59,9 @@ pub struct Finding {
     /// True for a value of the rig that is only assumed, without a sign that it is wrong.
     #[serde(skip)]
     pub is_assumption: bool,
+    /// Faults with their values, of which one changes the estimates of a run; empty if none is known.
+    #[serde(skip)]
+    pub faults: Vec<MeasuredFault>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -166,13 +170,20 @@ impl Findings {
         remedy: impl Into<String>,
     ) {
         let [title, evidence, remedy] = [title.into(), evidence.into(), remedy.into()].map(without_signed_zeros);
-        self.list.push(Finding { severity, area, title, evidence, remedy, is_assumption: false });
+        self.list.push(Finding { severity, area, title, evidence, remedy, is_assumption: false, faults: Vec::new() });
+    }
+
+    /// States the fault of the finding that was added last with its value, or the faults one of which it is.
+    pub(super) fn state_faults(&mut self, faults: impl IntoIterator<Item = MeasuredFault>) {
+        if let Some(last) = self.list.last_mut() {
+            last.faults.extend(faults);
+        }
     }
 
     /// Adds a warning about a value that is only assumed.
     pub(super) fn assumption(&mut self, area: Area, title: String, evidence: String, remedy: String) {
         let severity = Severity::Warning;
-        self.list.push(Finding { severity, area, title, evidence, remedy, is_assumption: true });
+        self.list.push(Finding { severity, area, title, evidence, remedy, is_assumption: true, faults: Vec::new() });
     }
 
     /// Excludes a measurement, whose fault is reported, from later comparisons.

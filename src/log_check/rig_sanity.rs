@@ -25,6 +25,7 @@ impl CheckReport {
             evidence: keys.join(", "),
             remedy: String::new(),
             is_assumption: false,
+            faults: Vec::new(),
         };
         self.findings.insert(place.unwrap_or(self.findings.len()), note);
     }

@@ -7,7 +7,7 @@ use super::clock_alignment::best_rotation;
 use super::imu_facts::ImuFacts;
 use super::statistics::median;
 use super::survey::Survey;
-use super::{Area, Findings, Severity};
+use super::{Area, FaultySource, Findings, MeasuredFault, Severity};
 use crate::flight_log::attitude::MAX_VEHICLE_GAP_NS;
 use crate::geometry::{SIGMA_PER_MEDIAN, seconds_from_ns, so3};
 use crate::sensors::{AttitudeFrame, Rig};
@@ -79,6 +79,7 @@ pub(super) fn check_vehicle_attitude(survey: &Survey, rig: &Rig, imu_facts: &Imu
         let largest_rad = steps.iter().map(|step| step.change_rad.abs()).fold(0.0, f64::max);
         let severity = if largest_rad > USELESS_STEP_RAD { Severity::Error } else { Severity::Warning };
         findings.add(severity, Area::Encoders, title, scatter, remedy);
+        findings.state_faults([MeasuredFault::Irreversible(FaultySource::Joints)]);
     }
     if source.frame == AttitudeFrame::Earth {
         let title = format!("a constant error of the heading of {topic} is unobservable in the rotations");

@@ -24,7 +24,7 @@ pub enum Usability {
 }
 
 /// Usability of a log with its most important findings.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verdict {
     pub usability: Usability,
     pub errors: usize,
@@ -104,6 +104,7 @@ mod tests {
             evidence: "3 of 7".to_owned(),
             remedy: format!("mend {title}"),
             is_assumption: false,
+            faults: Vec::new(),
         }
     }
 

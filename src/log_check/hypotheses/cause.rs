@@ -1,6 +1,6 @@
 //! Cause of a misfit as a finding.
 
-use super::super::{Area, Severity};
+use super::super::{Area, MeasuredFault, Severity};
 
 /// Cause of a misfit in words.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,4 +10,12 @@ pub(in crate::log_check) struct Cause {
     /// Names the cause with its value and time.
     pub(in crate::log_check) title: String,
     pub(in crate::log_check) remedy: String,
+    pub(in crate::log_check) fault: Option<MeasuredFault>,
+}
+
+impl Cause {
+    /// A cause without its value.
+    pub(super) fn new(severity: Severity, area: Area, title: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { severity, area, title: title.into(), remedy: remedy.into(), fault: None }
+    }
 }

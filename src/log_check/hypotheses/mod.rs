@@ -7,6 +7,7 @@
 
 mod candidates;
 mod cause;
+mod fault;
 mod fit;
 mod focal_grid;
 mod joint_unit;
@@ -92,9 +93,14 @@ pub(super) fn explain_within_noise(
     }
     WithinNoise {
         more_likely: listed.iter().filter(|found| found.criterion < given).count(),
-        instead_of_orientation: listed.into_iter().map(|found| text::cause(data, found)).collect(),
+        instead_of_orientation: listed.into_iter().map(|found| cause(data, found)).collect(),
         ..none
     }
+}
+
+/// Cause that a fit describes, in words and with its value.
+fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
+    Cause { fault: fault::fault(data, found), ..text::cause(data, found) }
 }
 
 /// Hypotheses about one camera with their fits.
@@ -164,7 +170,7 @@ impl<'a> Comparison<'a> {
             found.fit.mean_square,
             self.given.mean_square
         );
-        (text::cause(self.data, found), evidence)
+        (cause(self.data, found), evidence)
     }
 
     fn explanation(&self) -> Explanation {
@@ -218,6 +224,7 @@ impl Explanation {
             Self::Decisive(cause, of_cause) => {
                 let evidence = format!("{of_cause}; as recorded: {evidence}");
                 findings.add(cause.severity, cause.area, cause.title.clone(), evidence, cause.remedy.clone());
+                findings.state_faults(cause.fault.clone());
             }
             Self::Open(causes) => {
                 let title =
@@ -228,7 +235,8 @@ impl Explanation {
                 if let [(only, of_cause)] = causes.as_slice() {
                     let title = format!("most likely {}", only.title);
                     let evidence = format!("{of_cause}; as recorded: {evidence}");
-                    return findings.add(only.severity, only.area, title, evidence, only.remedy.clone());
+                    findings.add(only.severity, only.area, title, evidence, only.remedy.clone());
+                    return findings.state_faults(only.fault.clone());
                 }
                 let listed: Vec<String> =
                     causes.iter().map(|(cause, evidence)| format!("{} ({evidence})", cause.title)).collect();
@@ -237,6 +245,7 @@ impl Explanation {
                 let title = format!("the rotations of {key} differ from the prediction: {}", titles.join(", or "));
                 let evidence = format!("{}; as recorded: {evidence}", listed.join("; or "));
                 findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedies.join("; or "));
+                findings.state_faults(causes.iter().filter_map(|(cause, _)| cause.fault.clone()));
             }
         }
     }

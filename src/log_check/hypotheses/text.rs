@@ -1,15 +1,12 @@
 //! Findings of the hypotheses in words, with values, times and remedies.
 
-use nalgebra::Matrix3;
-
 use super::super::correction::USELESS_DELAY_S;
 use super::super::rotation_data::RotationData;
 use super::super::{Area, Severity};
 use super::cause::Cause;
+use super::fault::recorded_axes;
 use super::fit::{Fitted, Kind};
 use super::joint_unit::JointUnit;
-use crate::geometry::SignedAxes;
-use crate::sensors::CameraMount;
 
 /// Relative errors of intrinsics and scales above which results are useless.
 const USELESS_RATIO: f64 = 0.05;
@@ -19,7 +16,7 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
     let key = &data.camera.key;
     let correction = &found.correction;
     let graded = |change: f64| if change.abs() > USELESS_RATIO { Severity::Error } else { Severity::Warning };
-    let of = |severity, area, title: String, remedy: String| Cause { severity, area, title, remedy };
+    let of = |severity, area, title: String, remedy: String| Cause::new(severity, area, title, remedy);
     match &found.kind {
         Kind::LeftHanded => left_handed(data, found),
         Kind::GyroscopeScale => gyroscope_scale(correction.gyroscope_scale),
@@ -111,26 +108,12 @@ fn joint_names(data: &RotationData<'_>, joints: &[usize]) -> String {
 
 /// Left-handed frame of the gyroscope; the camera's orientation by the rig says which axes are exchanged.
 fn left_handed(data: &RotationData<'_>, found: &Fitted) -> Cause {
-    let camera_from_imu = match &data.camera.mount {
-        CameraMount::Static { imu_from_camera } => Some(imu_from_camera.rotation.inverse()),
-        CameraMount::Gimbal => None,
-    };
-    // Recorded rates are ω' = P ω; the images measure R₀ ω = −R₁ R₀ ω' with the fitted orientation R₁.
-    let axes = camera_from_imu.and_then(|rotation| {
-        let rotation = rotation.to_rotation_matrix().into_inner();
-        let orientation = found.fit.orientation.to_rotation_matrix().into_inner();
-        let true_from_recorded: Matrix3<f64> = -(rotation.transpose() * orientation * rotation);
-        SignedAxes::nearest(&true_from_recorded.transpose())
-    });
+    let axes = recorded_axes(data, found).map(|axes| axes.inverse());
     let which = axes.map_or_else(String::new, |axes| format!(" ({})", axes.describe()));
-    Cause {
-        severity: Severity::Error,
-        area: Area::Imu,
-        title: format!("the axes of the gyroscope form a left-handed frame{which}"),
-        remedy: "correct order and signs of the axes in the IMU's driver, of gyroscope and accelerometer alike; no T_cam_imu \
-                 can describe it"
-            .to_owned(),
-    }
+    let title = format!("the axes of the gyroscope form a left-handed frame{which}");
+    let remedy = "correct order and signs of the axes in the IMU's driver, of gyroscope and accelerometer alike; no T_cam_imu \
+                  can describe it";
+    Cause::new(Severity::Error, Area::Imu, title, remedy)
 }
 
 fn gyroscope_scale(correction: f64) -> Cause {
@@ -151,7 +134,7 @@ fn gyroscope_scale(correction: f64) -> Cause {
         (format!("the gyroscope measures {measured:.3} times the rotation"), remedy.to_owned())
     };
     let severity = if (measured - 1.0).abs() > USELESS_RATIO { Severity::Error } else { Severity::Warning };
-    Cause { severity, area: Area::Imu, title, remedy }
+    Cause::new(severity, Area::Imu, title, remedy)
 }
 
 fn focal(data: &RotationData<'_>, ratio: f64) -> Cause {
@@ -162,16 +145,13 @@ fn focal(data: &RotationData<'_>, ratio: f64) -> Cause {
         format!("the focal length of {key} in the rig is {ratio:.3} times too short")
     };
     let [fx, fy, ..] = data.camera.model.intrinsics_px;
-    Cause {
-        severity: if (ratio - 1.0).abs() > USELESS_RATIO { Severity::Error } else { Severity::Warning },
-        area: Area::Intrinsics,
-        title,
-        remedy: format!(
-            "calibrate the camera at this image size and zoom; by the gyroscope the focal lengths are about {:.1} and {:.1} px",
-            fx * ratio,
-            fy * ratio
-        ),
-    }
+    let severity = if (ratio - 1.0).abs() > USELESS_RATIO { Severity::Error } else { Severity::Warning };
+    let remedy = format!(
+        "calibrate the camera at this image size and zoom; by the gyroscope the focal lengths are about {:.1} and {:.1} px",
+        fx * ratio,
+        fy * ratio
+    );
+    Cause::new(severity, Area::Intrinsics, title, remedy)
 }
 
 fn intrinsics(data: &RotationData<'_>, found: &Fitted) -> Cause {
@@ -185,36 +165,26 @@ fn intrinsics(data: &RotationData<'_>, found: &Fitted) -> Cause {
     } else {
         format!("{centre}, and its focal length is {:.3} times the rig's", lens.focal)
     };
-    Cause {
-        severity: if dx.hypot(dy) > USELESS_RATIO * fx || (lens.focal - 1.0).abs() > USELESS_RATIO {
-            Severity::Error
-        } else {
-            Severity::Warning
-        },
-        area: Area::Intrinsics,
-        title,
-        remedy: format!(
-            "check how the images were cropped or resized; by the gyroscope fx, fy, cx, cy are about {:.1}, {:.1}, {:.1}, {:.1}",
-            fx * lens.focal,
-            fy * lens.focal,
-            cx + dx,
-            cy + dy
-        ),
-    }
+    let is_useless = dx.hypot(dy) > USELESS_RATIO * fx || (lens.focal - 1.0).abs() > USELESS_RATIO;
+    let severity = if is_useless { Severity::Error } else { Severity::Warning };
+    let remedy = format!(
+        "check how the images were cropped or resized; by the gyroscope fx, fy, cx, cy are about {:.1}, {:.1}, {:.1}, {:.1}",
+        fx * lens.focal,
+        fy * lens.focal,
+        cx + dx,
+        cy + dy
+    );
+    Cause::new(severity, Area::Intrinsics, title, remedy)
 }
 
 fn focal_pieces(key: &str, pieces: &[(f64, f64)]) -> Cause {
     let first = pieces.first().map_or(1.0, |(_, ratio)| *ratio);
     let later: Vec<String> =
         pieces.iter().skip(1).map(|(from_s, ratio)| format!("{ratio:.2} from {from_s:.1} s on")).collect();
-    Cause {
-        severity: Severity::Error,
-        area: Area::Intrinsics,
-        title: format!("the focal length of {key} changes: {first:.2} times the rig's at first, {}", later.join(", ")),
-        remedy:
-            "switch off zoom and digital stabilization, or use the part of the log with the calibrated focal length"
-                .to_owned(),
-    }
+    let title = format!("the focal length of {key} changes: {first:.2} times the rig's at first, {}", later.join(", "));
+    let remedy =
+        "switch off zoom and digital stabilization, or use the part of the log with the calibrated focal length";
+    Cause::new(Severity::Error, Area::Intrinsics, title, remedy)
 }
 
 fn joint_offset(data: &RotationData<'_>, found: &Fitted, joint: usize) -> Cause {
@@ -230,10 +200,6 @@ fn joint_offset(data: &RotationData<'_>, found: &Fitted, joint: usize) -> Cause 
             format!("add {:+.4} to theta_offset of gimbal.links[{joint}]", offset_deg.to_radians()),
         ),
     };
-    Cause {
-        severity: if offset_deg.abs() > 10.0 { Severity::Error } else { Severity::Warning },
-        area: Area::Encoders,
-        title,
-        remedy,
-    }
+    let severity = if offset_deg.abs() > 10.0 { Severity::Error } else { Severity::Warning };
+    Cause::new(severity, Area::Encoders, title, remedy)
 }

@@ -14,7 +14,7 @@ use super::attitude::AttitudeSurvey;
 use super::imu_facts::ImuFacts;
 use super::statistics::median;
 use super::survey::Survey;
-use super::{Area, Findings, ImageRotation, Measurement, Severity};
+use super::{Area, FaultySource, Findings, ImageRotation, MeasuredFault, Measurement, Severity};
 use crate::geometry::{ns_from_seconds, principal_angle, seconds_from_ns, so3};
 use crate::sensors::{AttitudeSource, CameraMount, GimbalRig, Rig};
 
@@ -132,6 +132,7 @@ pub(super) fn check_source(
         let title = format!("gimbal.source is wrong; correct values: {changes}");
         let remedy = format!("set {changes} in gimbal.source");
         findings.add(Severity::Error, Area::Encoders, title, evidence, remedy);
+        findings.state_faults([MeasuredFault::Irreversible(FaultySource::Joints)]);
     } else {
         findings.good(Area::Encoders, "gimbal.source predicts the rotations in the images", evidence);
     }
@@ -271,6 +272,7 @@ impl SourceFit<'_> {
         let remedy =
             "correct the driver: geometry_msgs/Quaternion maps the body to its reference, with the fields x, y, z, w";
         findings.add(Severity::Error, Area::Encoders, fault, evidence, remedy);
+        findings.state_faults([MeasuredFault::Irreversible(FaultySource::Joints)]);
         true
     }
 

@@ -5,6 +5,9 @@
 //! milliseconds per image. Tracks depend little on a wrong rig: the front end falls back to the images where the predicted
 //! rotation disagrees. Changes of the rig are corrections of the measurements, so that they act from any step on and are
 //! forks in the window as well.
+//!
+//! The faults that the check of the log measures come first: if undoing them brings the residuals back to their noise, two
+//! independent measurements agree, and no other causes are tried.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,6 +18,7 @@ use super::agreement::{self, AgreementValue};
 use super::axes::plausible_axes;
 use super::hypotheses::{Cause, Hypothesis, changes_at, first_hypotheses};
 use super::log_faults::LogFaults;
+use super::measured::Undoing;
 use super::misfit::Misfit;
 use super::outcome::{Diagnosis, RankedCause, TruthAgreement, Verdict, WaitingReason};
 use super::ranking::{Candidate, Decision, by_cause, decide};
@@ -26,6 +30,7 @@ use super::trial::{DiagnosedRun, TrialResult, TrialSpan};
 use super::truth;
 use super::tuning::{moved, tuned};
 use crate::geometry::seconds_from_ns;
+use crate::log_check::Finding;
 use crate::sensors::Rig;
 use crate::session::engine::{Computation, History};
 use crate::session::plan::{Correction, ForkChanges};
@@ -57,31 +62,25 @@ pub fn diagnose(
 ) -> Option<Diagnosis> {
     let recording = computation.recording();
     let record = recording.runs.get(run)?;
-    let mut diagnosis = diagnose_run(&recording.rig, record, computation.history(run)?, on_progress);
+    let check = || log_faults.of(&recording.log_path, &recording.rig).to_vec();
+    let mut diagnosis = diagnose_run(&recording.rig, record, computation.history(run)?, &check, on_progress);
     diagnosis.log = recording.log_name();
-    if diagnosis.verdict != Verdict::Agrees && !diagnosis.interrupted {
-        match on_progress(1.0, "check of the log") {
-            ControlFlow::Continue(()) => {
-                diagnosis.log_faults = log_faults.of(&recording.log_path, &recording.rig).to_vec();
-            }
-            ControlFlow::Break(()) => diagnosis.interrupted = true,
-        }
-    }
     Some(diagnosis)
 }
 
-/// Diagnosis of a run with its history, without the name of the log.
+/// Diagnosis of a run with its history, without the name of the log; `check` finds the log's faults.
 pub(in crate::session) fn diagnose_run(
     rig: &Rig,
     record: &RunRecord,
     history: &History,
+    check: &dyn Fn() -> Vec<Finding>,
     on_progress: &mut OnProgress<'_>,
 ) -> Diagnosis {
     let interrupted = AtomicBool::new(false);
     let inputs = (0..record.steps.len()).map_while(|step| history.inputs().get(step)).collect();
     let (spec, camera_key) = (&record.spec, &*record.camera_key);
     let diagnosed = DiagnosedRun { rig, spec, camera_key, inputs, interrupted: &interrupted };
-    Search { run: &diagnosed, history, record, trials: 0, on_progress }.diagnosis()
+    Search { run: &diagnosed, history, record, check, trials: 0, on_progress }.diagnosis()
 }
 
 /// A search in progress.
@@ -89,6 +88,7 @@ struct Search<'a, 'b> {
     run: &'a DiagnosedRun<'a>,
     history: &'a History,
     record: &'a RunRecord,
+    check: &'a dyn Fn() -> Vec<Finding>,
     trials: usize,
     on_progress: &'a mut OnProgress<'b>,
 }
@@ -109,14 +109,47 @@ impl Search<'_, '_> {
         } else if agreement::agrees(&misfit, &given.steps) {
             diagnosis.verdict = Verdict::Agrees;
             diagnosis.ground_truth = truth::disagreement(self.record);
+            self.report(0.5, "check of the log");
+            if !self.is_interrupted() {
+                diagnosis.log_faults = (self.check)();
+            }
             return diagnosis;
         }
         let onset = agreement::onset(&given.steps);
         diagnosis.onset_s = onset.map(|step| self.stamp_s(step));
-        self.search(&mut diagnosis, &given, misfit.tracked_ratio() < LOST, onset);
+        self.report(0.03, "check of the log");
+        if !self.is_interrupted() {
+            diagnosis.log_faults = (self.check)();
+            if !self.undo_measured(&mut diagnosis, &given, onset) {
+                self.search(&mut diagnosis, &given, misfit.tracked_ratio() < LOST, onset);
+            }
+        }
         diagnosis.trials = self.trials;
-        diagnosis.interrupted = self.run.interrupted.load(Ordering::Relaxed);
+        diagnosis.interrupted = self.is_interrupted();
         diagnosis
+    }
+
+    /// Undoes the faults that the check of the log measures. True if that explains the residuals, or if an error can only be
+    /// corrected in the log: then no other causes are tried.
+    fn undo_measured(&mut self, diagnosis: &mut Diagnosis, given: &TrialResult, onset: Option<usize>) -> bool {
+        let undoing = Undoing::of(self.run, &diagnosis.log_faults);
+        let span = screened_span(self.run, self.history, given, undoing.since.or(onset));
+        if let Some(span) = span.filter(|_| !undoing.hypotheses.is_empty())
+            && let Some((span, trials)) = self.best_of(&span, given, undoing.hypotheses, 0.05, SCREENED)
+        {
+            let best = trials.others.iter().min_by(|one, other| one.score.total_cmp(&other.score));
+            if best.is_some_and(|best| agreement::disagreement(&best.misfit) <= 1.0) {
+                self.conclude(diagnosis, &span, trials);
+                diagnosis.measured = diagnosis.explaining > 0;
+                if diagnosis.measured {
+                    return true;
+                }
+            }
+        }
+        if undoing.has_irreversible {
+            diagnosis.verdict = Verdict::LogFault;
+        }
+        undoing.has_irreversible
     }
 
     /// Tries all causes and fills the diagnosis with the best ones.
@@ -128,32 +161,45 @@ impl Search<'_, '_> {
             let later = changes_at(onset, &hypotheses);
             hypotheses.extend(later);
         }
-        let screened = self.candidates(&span, hypotheses, (0.05, SCREENED), None);
-        let Some(screened) = screened else { return };
-        let span = confirmed_span(self.run, given, &span);
-        let mut tried: Vec<Hypothesis> = by_cause(&screened.given, screened.others.clone())
+        if let Some((span, trials)) = self.best_of(&span, given, hypotheses, 0.05, SCREENED) {
+            self.conclude(diagnosis, &span, trials);
+        }
+    }
+
+    /// Trials of hypotheses on a span, and of the best ones with refined values on more of the run, which is returned with
+    /// them; `from` and `screened` are the ratios of the progress before and after the first ones. `None` if the run itself
+    /// could not be computed.
+    fn best_of(
+        &mut self,
+        span: &TrialSpan,
+        given: &TrialResult,
+        hypotheses: Vec<Hypothesis>,
+        from: f64,
+        screened: f64,
+    ) -> Option<(TrialSpan, Trials)> {
+        let first = self.candidates(span, hypotheses, (from, screened), None)?;
+        let span = confirmed_span(self.run, given, span);
+        let mut tried: Vec<Hypothesis> = by_cause(&first.given, first.others.clone())
             .into_iter()
             .take(CONFIRMED)
             .map(|candidate| candidate.hypothesis)
             .collect();
-        let mut next = refined(self.run, &screened.others);
+        let mut next = refined(self.run, &first.others);
         let mut confirmed: Option<Trials> = None;
         for round in 0..ROUNDS {
             next.retain(|it| !tried.contains(it));
             let now =
                 if round == 0 { tried.iter().cloned().chain(next.iter().cloned()).collect() } else { next.clone() };
             tried.append(&mut next);
-            let progress = SCREENED + (1.0 - SCREENED) * round as f64 / ROUNDS as f64;
-            let until = SCREENED + (1.0 - SCREENED) * (round + 1) as f64 / ROUNDS as f64;
+            let progress = screened + (1.0 - screened) * round as f64 / ROUNDS as f64;
+            let until = screened + (1.0 - screened) * (round + 1) as f64 / ROUNDS as f64;
             let Some(trials) = self.candidates(&span, now, (progress, until), confirmed.take()) else { break };
             next = refined(self.run, &trials.others);
             next.extend(tuned(&trials.others));
             next.extend(moved(&trials));
             confirmed = Some(trials);
         }
-        let trials = confirmed.unwrap_or(screened);
-        diagnosis.span_s = Some((self.stamp_s(span.steps.start), self.stamp_s(span.steps.end.saturating_sub(1))));
-        self.conclude(diagnosis, &span, trials);
+        Some((span, confirmed.unwrap_or(first)))
     }
 
     /// Computes trials of a span, with those that are already there, and scores all on one scale. `None` if the run itself
@@ -191,9 +237,10 @@ impl Search<'_, '_> {
         Some(scored(given, done))
     }
 
-    /// Decides about the trials and describes the best causes.
+    /// Decides about the trials of a span and describes the best causes.
     fn conclude(&self, diagnosis: &mut Diagnosis, span: &TrialSpan, trials: Trials) {
         let Trials { given, others } = trials;
+        diagnosis.span_s = Some((self.stamp_s(span.steps.start), self.stamp_s(span.steps.end.saturating_sub(1))));
         let mut ranked = by_cause(&given, others);
         // The columns of both clocks only find values for the shifts.
         ranked.retain(|it| it.hypothesis.cause != Cause::Clocks || it.hypothesis.changes.estimated.is_empty());
@@ -251,6 +298,10 @@ impl Search<'_, '_> {
             values,
             accuracy,
         }
+    }
+
+    fn is_interrupted(&self) -> bool {
+        self.run.interrupted.load(Ordering::Relaxed)
     }
 
     fn whole(&self) -> Option<TrialSpan> {

@@ -98,7 +98,7 @@ impl Hypothesis {
 const FOCAL_FACTORS: [f64; 11] = [0.5, 0.6, 0.7, 0.78, 0.87, 0.95, 1.05, 1.15, 1.3, 1.5, 1.8];
 /// Changes of the focal length during a recording: factors, and seconds.
 const ZOOM_FACTORS: [f64; 4] = [0.6, 0.78, 1.28, 1.6];
-const ZOOM_S: [f64; 3] = [0.2, 1.0, 2.5];
+pub(super) const ZOOM_S: [f64; 3] = [0.2, 1.0, 2.5];
 /// Factors on the noise densities of the IMU and on the noise of the encoders.
 const NOISE_FACTORS: [f64; 3] = [3.0, 10.0, 30.0];
 /// Factors of wrong units and ranges: g and m/s², degrees and radians, half and double the range.
@@ -179,12 +179,17 @@ fn estimated_columns(run: &DiagnosedRun<'_>) -> Vec<Hypothesis> {
             Hypothesis::change(cause, changes, parameters)
         })
         .collect();
-    let parameters = if on_gimbal(run) { 6 + 4 * run.rig.joint_names().len() } else { 6 };
-    for factor in CHAIN_FACTORS {
-        let changes = ForkChanges { chain_prior: factor, ..ForkChanges::default() };
-        all.push(Hypothesis::change(Cause::Chain, changes, parameters));
-    }
+    all.extend(wider_chain_priors(run));
     all
+}
+
+/// Wider priors of the chain.
+pub(super) fn wider_chain_priors(run: &DiagnosedRun<'_>) -> impl Iterator<Item = Hypothesis> {
+    let parameters = if on_gimbal(run) { 6 + 4 * run.rig.joint_names().len() } else { 6 };
+    CHAIN_FACTORS.into_iter().map(move |chain_prior| {
+        let changes = ForkChanges { chain_prior, ..ForkChanges::default() };
+        Hypothesis::change(Cause::Chain, changes, parameters)
+    })
 }
 
 fn joint_hypotheses(joints: &[String]) -> Vec<Hypothesis> {
@@ -216,21 +221,31 @@ fn joint_hypotheses(joints: &[String]) -> Vec<Hypothesis> {
 
 /// Errors with which a run hardly initializes.
 fn gross_hypotheses(axes: &PlausibleAxes) -> Vec<Hypothesis> {
-    let mut all: Vec<Hypothesis> =
-        ImageFlip::all().map(|flip| Hypothesis::correction(Cause::ImageFlip, Correction::Image(flip))).collect();
-    for axes in &axes.gyroscope {
-        all.push(Hypothesis::correction(Cause::ImuAxes, Correction::ImuAxes(*axes)));
-        all.push(Hypothesis::correction(Cause::GyroscopeAxes, Correction::GyroscopeAxes(*axes)));
-    }
-    for axes in &axes.accelerometer {
-        all.push(Hypothesis::correction(Cause::AccelerometerAxes, Correction::AccelerometerAxes(*axes)));
-    }
+    let mut all: Vec<Hypothesis> = flips().chain(axes_hypotheses(axes)).collect();
     for factor in ACCELEROMETER_FACTORS {
         let scale = Correction::AccelerometerScale(factor);
         all.push(Hypothesis::correction(Cause::AccelerometerScale, scale));
     }
     for factor in GYROSCOPE_FACTORS {
         all.push(Hypothesis::correction(Cause::GyroscopeScale, Correction::GyroscopeScale(factor)));
+    }
+    all
+}
+
+/// Mirrored and rotated images.
+pub(super) fn flips() -> impl Iterator<Item = Hypothesis> {
+    ImageFlip::all().map(|flip| Hypothesis::correction(Cause::ImageFlip, Correction::Image(flip)))
+}
+
+/// Axes of gyroscope and accelerometer together, and of each alone.
+pub(super) fn axes_hypotheses(axes: &PlausibleAxes) -> Vec<Hypothesis> {
+    let mut all = Vec::new();
+    for axes in &axes.gyroscope {
+        all.push(Hypothesis::correction(Cause::ImuAxes, Correction::ImuAxes(*axes)));
+        all.push(Hypothesis::correction(Cause::GyroscopeAxes, Correction::GyroscopeAxes(*axes)));
+    }
+    for axes in &axes.accelerometer {
+        all.push(Hypothesis::correction(Cause::AccelerometerAxes, Correction::AccelerometerAxes(*axes)));
     }
     all
 }

@@ -5,7 +5,7 @@
 //! - `trial`, `span`: a run computed again with a change, on a part of it.
 //! - `hypotheses`, `axes`, `refinement`, `tuning`: the causes that are tried, with the values to try.
 //! - `scoring`, `ranking`: the best cause of each kind, and whether it is decisive.
-//! - `log_faults`: what the check of the log says.
+//! - `log_faults`, `measured`: faults that the check of the log measures, and the changes that undo them.
 //! - `statement`, `truth`, `outcome`: the result in words.
 //! - `diagnose`: the search.
 
@@ -14,6 +14,7 @@ mod axes;
 mod diagnose;
 mod hypotheses;
 mod log_faults;
+mod measured;
 mod misfit;
 mod outcome;
 mod pixel_histogram;

@@ -20,6 +20,8 @@ pub enum Verdict {
     Cause,
     /// A few causes explain the residuals about as well.
     Several,
+    /// The check of the log measures a fault that no change of a run undoes.
+    LogFault,
     /// No tried cause explains the residuals.
     Unexplained,
     /// No image reached the estimator.
@@ -84,9 +86,10 @@ pub struct Diagnosis {
     /// Specification of the run.
     pub run: String,
     pub verdict: Verdict,
-    /// At most three errors and warnings of the log's check, those with the largest effect first; none if the residuals
-    /// agree.
+    /// At most three errors and warnings of the log's check, those with the largest effect first.
     pub log_faults: Vec<Finding>,
+    /// True if the causes undo faults that the check of the log measures: no others were tried.
+    pub measured: bool,
     /// Values of the whole run with their limits.
     pub values: Vec<AgreementValue>,
     /// Stamp from which on the residuals disagree after they agreed, in seconds since the log began.
@@ -126,6 +129,12 @@ impl fmt::Display for Diagnosis {
                 writeln!(out, "     remedy     {}", fault.remedy)?;
             }
         }
+        if self.verdict == Verdict::LogFault {
+            writeln!(
+                out,
+                "  no trials    no change of a run undoes this fault: correct it in the log, then diagnose again"
+            )?;
+        }
         for waiting in self.waiting.iter().take(3) {
             writeln!(out, "  waits        {} ({} images)", waiting.reason, waiting.images)?;
         }
@@ -144,7 +153,13 @@ impl fmt::Display for Diagnosis {
             }
         }
         if let Some((from_s, to_s)) = self.span_s {
-            let ended = if self.interrupted { "; interrupted, other causes were not tried" } else { "" };
+            let ended = if self.interrupted {
+                "; interrupted, other causes were not tried"
+            } else if self.measured {
+                ", for the faults that the check measures"
+            } else {
+                ""
+            };
             writeln!(out, "  tried        {} changes from {from_s:.2} to {to_s:.2} s{ended}", self.trials)?;
         }
         Ok(())
@@ -159,6 +174,7 @@ impl Diagnosis {
             run,
             verdict: Verdict::NoSteps,
             log_faults: Vec::new(),
+            measured: false,
             values: Vec::new(),
             onset_s: None,
             waiting: Vec::new(),
@@ -172,10 +188,18 @@ impl Diagnosis {
         }
     }
 
-    /// The finding in one sentence: an error that the check of the log measures precedes what the trials explain.
+    /// The finding in one sentence: a fault that the check of the log measures precedes what the trials explain.
     pub fn headline(&self) -> String {
         let of_trials = self.headline_of_trials();
-        match self.log_faults.iter().find(|fault| fault.severity == Severity::Error) {
+        if self.measured {
+            return format!("{of_trials}, by the check of the log and by the trials");
+        }
+        let is_named = |fault: &&Finding| fault.severity == Severity::Error || !fault.faults.is_empty();
+        match self.log_faults.iter().find(is_named) {
+            Some(fault) if self.verdict == Verdict::Agrees => {
+                format!("the residuals agree with their noise; the check of the log says: {}", fault.title)
+            }
+            Some(fault) if self.verdict == Verdict::LogFault => format!("{}, by the check of the log", fault.title),
             Some(fault) => format!("{}, by the check of the log; by the trials: {of_trials}", fault.title),
             None => of_trials,
         }
@@ -190,6 +214,7 @@ impl Diagnosis {
             Verdict::Agrees => "nothing to diagnose: the residuals agree with their noise".to_owned(),
             Verdict::Cause => first(),
             Verdict::Several => format!("{} causes explain the residuals about as well", self.explaining),
+            Verdict::LogFault => "the log has a fault that no change of a run undoes".to_owned(),
             Verdict::Unexplained => "unexplained: no tried change brings the residuals back to their noise".to_owned(),
             Verdict::NoSteps => "no image reached the estimator: see dcvins check".to_owned(),
         }
@@ -218,7 +243,7 @@ fn described(value: &AgreementValue) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log_check::Area;
+    use crate::log_check::{Area, MeasuredFault};
 
     #[test]
     fn an_error_of_the_log_precedes_what_the_trials_say() {
@@ -229,6 +254,7 @@ mod tests {
             evidence: String::new(),
             remedy: "take an attitude whose heading does not step".to_owned(),
             is_assumption: false,
+            faults: Vec::new(),
         };
         let mut diagnosis = Diagnosis {
             verdict: Verdict::Unexplained,
@@ -243,5 +269,9 @@ mod tests {
         diagnosis.log_faults = vec![fault(Severity::Warning)];
         assert!(diagnosis.headline().starts_with("unexplained"), "{}", diagnosis.headline());
         assert!(diagnosis.to_string().contains("  log          warning: the heading"));
+        diagnosis.verdict = Verdict::Agrees;
+        assert!(diagnosis.headline().starts_with("nothing to diagnose"), "{}", diagnosis.headline());
+        diagnosis.log_faults[0].faults = vec![MeasuredFault::JointUnit(2.0)];
+        assert!(diagnosis.headline().contains("agree with their noise; the check of the log says: the heading"));
     }
 }
