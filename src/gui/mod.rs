@@ -8,7 +8,6 @@ pub mod calibration;
 mod chain_values;
 pub mod comparison;
 pub mod convergence;
-mod copied_value;
 pub mod desktop;
 mod determination;
 mod events;
@@ -39,6 +38,7 @@ pub mod study;
 pub(crate) mod tests;
 pub mod theme;
 pub mod timeline;
+mod under_pointer;
 mod units;
 pub mod window;
 

@@ -13,7 +13,7 @@ use crate::frontend::FeatureId;
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::observability::{ChainSlide, SlidePosition};
 use crate::session::breakpoints::Breakpoints;
-use crate::session::{Command, DiagnosisProgress, FrameImage, Recording, RunRecord, SolverPosition};
+use crate::session::{Command, DiagnosisProgress, FrameImage, Markers, Recording, RunRecord, SolverPosition};
 use crate::text::Named;
 
 /// One of the panels: it draws itself, and gives its values.
@@ -63,8 +63,7 @@ pub struct Playback {
     pub speed: f64,
     /// The loop range, in nanoseconds since the log began.
     pub loop_range_ns: Option<(i64, i64)>,
-    /// Stamps of the markers in ascending order.
-    pub markers_ns: Vec<i64>,
+    pub markers: Markers,
     /// The solver iteration at which the step is shown, `None` for the converged step.
     pub solver: Option<SolverPosition>,
     /// True if steps at the cursor are being recomputed.
@@ -83,7 +82,7 @@ impl Default for Playback {
             playing: false,
             speed: 1.0,
             loop_range_ns: None,
-            markers_ns: Vec::new(),
+            markers: Markers::default(),
             solver: None,
             recomputing: false,
             breakpoints: Arc::default(),
@@ -240,6 +239,8 @@ pub enum Dialog {
     Fork,
     /// Finds the cause of residuals of the selected run that disagree with their noise.
     Diagnosis,
+    /// Lists the markers with their names.
+    Markers,
     Palette,
     Settings,
     /// Question asked before a run is removed.

@@ -42,8 +42,8 @@ pub use plan::{
     TrajectorySpecError,
 };
 pub use playback::{
-    Command, Cursor, DiagnosisProgress, FrameImage, MoveOutcome, Moved, PlaybackSpeed, SavedBreakpoint, SavedFork,
-    SavedLog, SavedSession, SavedSessionError, Session, Wake,
+    Command, Cursor, DiagnosisProgress, FrameImage, Marker, Markers, MoveOutcome, Moved, PlaybackSpeed,
+    SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError, Session, Wake,
 };
 pub use record::{
     Comparison, Divergence, FlightParameter, FlightVerdicts, ForkOrigin, ImageResiduals, KnownLossSummary, LostSince,

@@ -8,7 +8,7 @@ use super::playing_log::PlayingLog;
 use crate::gui::units::counted;
 
 /// Keys of a saved session whose entries are stored nowhere else, each with the noun for one entry.
-const WORK: [(&str, &str); 3] = [("forks", "fork"), ("breakpoints", "breakpoint"), ("markers_ns", "marker")];
+const WORK: [(&str, &str); 3] = [("forks", "fork"), ("breakpoints", "breakpoint"), ("markers", "marker")];
 
 /// Destination when leaving the open session.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -64,7 +64,7 @@ mod tests {
     fn only_new_entries_would_be_lost() {
         let work = |forks: &str, breakpoints: &str, markers: &str| {
             Work::of_text(&format!(
-                "{{\"forks\": [{forks}], \"breakpoints\": [{breakpoints}], \"markers_ns\": [{markers}], \"cursor_ns\": 7}}"
+                "{{\"forks\": [{forks}], \"breakpoints\": [{breakpoints}], \"markers\": [{markers}], \"cursor_ns\": 7}}"
             ))
         };
         let saved = work("", "{\"condition\": \"frame == 3\"}", "5, 9");

@@ -64,7 +64,7 @@ fn unsaved_work_is_asked_about_before_it_is_left() {
     assert!(harness.query_by_label(question).is_some());
     harness.get_by_label("Save").click();
     run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/x/b.mcap")));
-    assert!(desktop.sessions.lock().unwrap()[0].contains("markers_ns"));
+    assert!(desktop.sessions.lock().unwrap()[0].contains("stamp_ns"));
     // The new log has its own marker, which is discarded.
     harness.key_press(Key::M);
     harness.run_steps(2);

@@ -5,6 +5,7 @@ mod kept_window;
 mod leaving;
 #[cfg(test)]
 mod leaving_tests;
+mod opening_cursor;
 mod playing_log;
 mod repaint;
 mod requests;
@@ -31,7 +32,8 @@ use egui::{CentralPanel, Frame, Ui, ViewportCommand, vec2};
 
 use self::departure::{Departure, Leaving, Work};
 use self::kept_window::{KeptWindow, SHOWN_FRAMES, STORED_AFTER_S, WindowKeeper, move_inside_screen};
-use self::playing_log::{Images, go_to_first_frame};
+use self::opening_cursor::OpeningCursor;
+use self::playing_log::Images;
 pub use self::playing_log::{OpenLog, PlayingLog};
 use self::repaint::{POLL_PERIOD, until_next_step};
 use self::shown_study::ShownStudy;
@@ -73,8 +75,7 @@ pub struct App {
     open_study: Option<OpenStudy>,
     /// The open study; its runs are shown in front of it.
     study: Option<ShownStudy>,
-    /// True if the cursor has been moved to the first frame of the log.
-    at_first_frame: bool,
+    opening_cursor: OpeningCursor,
     /// True if the session requests a frame when it has recomputed steps.
     wakes: bool,
     /// Wall-clock time of the window's last frame in seconds, if playback ran then.
@@ -118,7 +119,7 @@ impl App {
             log: None,
             open_study: None,
             study: None,
-            at_first_frame: false,
+            opening_cursor: OpeningCursor::default(),
             wakes: false,
             played_s: None,
             opening: None,
@@ -176,9 +177,10 @@ impl App {
             self.state.take_layout(layout);
         }
         self.departure.saved = Work::of(log.as_ref());
+        self.state.begin_session(&log.playback().markers);
         self.welcome.stop();
         self.log = Some(log);
-        self.at_first_frame = false;
+        self.opening_cursor = OpeningCursor::default();
         (self.wakes, self.played_s) = (false, None);
         self.selection = Selection::default();
         self.progress = ProgressMeter::default();
@@ -277,9 +279,7 @@ impl App {
         for notice in log.take_notices() {
             self.state.notices.show_message(NoticeLevel::Warning, notice);
         }
-        if !self.at_first_frame {
-            self.at_first_frame = go_to_first_frame(log.as_mut());
-        }
+        self.opening_cursor.update(log.as_mut(), now_s);
         let (recording, playback, generation) = (log.recording(), log.playback(), log.generation());
         self.state.progress = self.progress.read(&recording, Some(now_s));
         self.state.opening = self.opening.as_ref().map(|opening| opening.path.clone());

@@ -27,23 +27,14 @@ pub trait PlayingLog: Send {
     fn take_notices(&mut self) -> Vec<String>;
     /// The session as text, with the layout of the panels; `None` for a log without a session.
     fn saved(&self, layout: Option<serde_json::Value>) -> Option<String>;
+    /// True if the cursor's position in a saved session is still to be restored.
+    fn restores_cursor(&self) -> bool;
     /// Panel layout of the saved session.
     fn layout(&self) -> Option<&serde_json::Value>;
 }
 
 /// Opens a log. An error message states cause and remedy.
 pub type OpenLog = Arc<dyn Fn(&Path) -> Result<Box<dyn PlayingLog>, String> + Send + Sync>;
-
-/// Moves a cursor before the first frame to that frame, so that a newly opened log shows something. Returns true if
-/// there is a frame yet.
-pub(super) fn go_to_first_frame(log: &mut dyn PlayingLog) -> bool {
-    let recording = log.recording();
-    let first = recording.runs.iter().filter_map(|run| run.steps.first()).map(|step| step.report.stamp_ns).min();
-    if first.is_some_and(|first_ns| log.cursor_ns() < first_ns) {
-        log.apply(Command::GoToStart);
-    }
-    first.is_some()
-}
 
 /// The images of the session as an [`ImageSource`].
 pub(super) struct Images<'a>(pub(super) &'a mut dyn PlayingLog);

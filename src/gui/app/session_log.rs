@@ -29,7 +29,7 @@ impl PlayingLog for Session {
             playing: self.is_playing(),
             speed: self.speed().0,
             loop_range_ns: self.loop_range_ns(),
-            markers_ns: self.markers_ns().to_vec(),
+            markers: self.markers().clone(),
             solver: self.solver_position(),
             recomputing: self.is_recomputing(),
             breakpoints: Arc::clone(self.breakpoints()),
@@ -60,6 +60,10 @@ impl PlayingLog for Session {
 
     fn saved(&self, layout: Option<serde_json::Value>) -> Option<String> {
         Some(Self::saved(self, layout).to_text())
+    }
+
+    fn restores_cursor(&self) -> bool {
+        Self::restores_cursor(self)
     }
 
     fn layout(&self) -> Option<&serde_json::Value> {

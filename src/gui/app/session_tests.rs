@@ -54,6 +54,29 @@ fn painted_texts(harness: &Harness<'static, App>) -> Vec<(String, Rect)> {
     texts
 }
 
+/// While the run computes, the cursor is at its last frame; a key takes the cursor away from there.
+#[test]
+fn the_window_opens_at_the_last_computed_frame_until_the_cursor_is_moved() {
+    let mut harness = window_over_garden("auto", 4.0);
+    let cursor_ns = |harness: &Harness<'static, App>| harness.state().log().unwrap().cursor_ns();
+    run_until(&mut harness, all_finished);
+    harness.run_steps(3);
+    let last_ns = harness.state().log().unwrap().recording().last_stamp_ns();
+    assert!(last_ns > 3_500_000_000);
+    assert_eq!(cursor_ns(&harness), last_ns);
+    harness.key_press(Key::Home);
+    harness.run_steps(20);
+    assert!(cursor_ns(&harness) < 500_000_000, "{}", cursor_ns(&harness));
+
+    let mut harness = window_over_garden("auto", 6.0);
+    run_until(&mut harness, |harness| cursor_ns(harness) > 500_000_000);
+    assert!(!all_finished(&harness), "the cursor follows the run while it computes");
+    harness.key_press(Key::Home);
+    run_until(&mut harness, all_finished);
+    harness.run_steps(3);
+    assert!(cursor_ns(&harness) < 500_000_000, "{}", cursor_ns(&harness));
+}
+
 #[test]
 fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     let mut harness = window_over_garden("classical", 6.6);

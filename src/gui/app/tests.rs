@@ -10,7 +10,7 @@ use egui_kittest::kittest::Queryable as _;
 
 use super::{App, OpenLog, PlayingLog};
 use crate::gui::desktop::{Desktop, PanelExport, PathEntry, SampleProgress};
-use crate::gui::samples::{FRAME_PERIOD_NS, sample_images, sample_recording_of};
+use crate::gui::samples::{FRAME_PERIOD_NS, first_tracked_frame, sample_images, sample_recording_of};
 use crate::gui::theme::ThemeName;
 use crate::gui::{ImageSource as _, Playback};
 use crate::session::{Command, FrameImage, Recording, Wake};
@@ -58,7 +58,8 @@ impl PlayingLog for SampleLog {
             Command::StepFrames(count) => self.cursor_ns += count * FRAME_PERIOD_NS,
             Command::GoToStart => self.cursor_ns = 0,
             Command::GoToEnd => self.cursor_ns = self.recording.duration_ns,
-            Command::ToggleMarker => self.playback.markers_ns.push(self.cursor_ns),
+            Command::ToggleMarker => self.playback.markers = self.playback.markers.toggled(self.cursor_ns),
+            Command::SetMarkers(markers) => self.playback.markers = markers,
             _ => {}
         }
     }
@@ -80,7 +81,11 @@ impl PlayingLog for SampleLog {
     }
 
     fn saved(&self, layout: Option<serde_json::Value>) -> Option<String> {
-        Some(serde_json::json!({ "layout": layout, "markers_ns": self.playback.markers_ns }).to_string())
+        Some(serde_json::json!({ "layout": layout, "markers": self.playback.markers.to_vec() }).to_string())
+    }
+
+    fn restores_cursor(&self) -> bool {
+        false
     }
 
     fn layout(&self) -> Option<&serde_json::Value> {
@@ -236,7 +241,8 @@ fn the_welcome_view_offers_logs_and_opens_them() {
     assert_eq!(opened(&harness), Some(PathBuf::from("/samples/yard.mcap")));
     assert_eq!(*desktop.remembered.lock().unwrap(), [PathBuf::from("/samples/yard.mcap")]);
     assert!(harness.query_by_label("Play").is_some());
-    assert!(harness.query_by_label("Frame 0").is_some(), "the cursor goes to the first frame");
+    let first = format!("Frame {}", first_tracked_frame());
+    assert!(harness.query_by_label(&first).is_some(), "the cursor goes to the first frame with an estimate");
     assert!(harness.query_by_label("300 MiB").is_some(), "the status bar shows the memory");
 }
 
@@ -348,12 +354,13 @@ fn commands_reach_the_log_and_playing_moves_the_cursor() {
     harness.get_by_label("Open yard.mcap").click();
     run_until(&mut harness, |harness| opened(harness).is_some());
     let cursor = |harness: &Harness<'static, App>| harness.state().log().unwrap().cursor_ns();
+    let opened_at = cursor(&harness);
     harness.key_press(Key::ArrowRight);
     harness.run_steps(2);
-    assert_eq!(cursor(&harness), FRAME_PERIOD_NS);
+    assert_eq!(cursor(&harness), opened_at + FRAME_PERIOD_NS);
     harness.key_press(Key::Space);
     harness.run_steps(10);
-    assert!(cursor(&harness) > FRAME_PERIOD_NS);
+    assert!(cursor(&harness) > opened_at + FRAME_PERIOD_NS);
     harness.get_by_label("Pause").click();
     harness.run_steps(2);
     let before = cursor(&harness);

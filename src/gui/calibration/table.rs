@@ -7,9 +7,9 @@ use egui::{Align2, Color32, FontId, Galley, Role, ScrollArea, Sense, Stroke, Str
 use super::order::{Column, Order};
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::meaning_of;
-use crate::gui::copied_value::offer;
 use crate::gui::determination::look_of;
 use crate::gui::theme::{Theme, label_font, number_font};
+use crate::gui::under_pointer::{Item, offer, offer_item};
 use crate::gui::units::{Shown, fixed};
 use crate::session::{Command, FlightParameter};
 use crate::text::Named as _;
@@ -212,6 +212,7 @@ fn row_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, layout: &Layout, row: &Flight
     }
     if response.hovered() {
         offer(ui, sentence);
+        offer_item(ui, Item::Parameter(row.parameter));
     }
     if response.clicked() {
         ctx.selection.parameter = Some(row.parameter);

@@ -11,7 +11,6 @@ use super::range::{paint_outside, value_range};
 use crate::gimbal::{ParameterId, Parameterization};
 use crate::gui::PanelContext;
 use crate::gui::chain_values::ParameterValues;
-use crate::gui::copied_value::offer;
 use crate::gui::determination::look_of;
 use crate::gui::help::terms::window;
 use crate::gui::plot::{
@@ -20,6 +19,7 @@ use crate::gui::plot::{
     within_gutters,
 };
 use crate::gui::theme::{self, CURVE_WIDTH};
+use crate::gui::under_pointer::{Item, offer, offer_item};
 use crate::gui::units::{Shown, fixed};
 use crate::observability::Determination;
 use crate::text::Named as _;
@@ -279,6 +279,7 @@ pub(super) fn cell_ui(
     let response = plot_ui(ui, ctx, &area, &plot, &readout);
     if response.hovered() {
         offer(ui, format!("{name} {text}"));
+        offer_item(ui, Item::Parameter(id));
     }
     if response.clicked() {
         ctx.selection.parameter = if selected { None } else { Some(id) };

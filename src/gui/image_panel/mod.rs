@@ -17,9 +17,9 @@ pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
 use super::accessible::describe;
 use super::convergence::empty_ui;
-use super::copied_value::offer;
 use super::help::terms::window;
 use super::pan_zoom::PanZoom;
+use super::under_pointer::{Item, offer, offer_item};
 use super::units::significant;
 use super::{Panel, PanelContext};
 use crate::sensors::{GrayImage, ImageMask};
@@ -263,6 +263,7 @@ impl ImagePanel {
             ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
             let text = model::description(mark);
             offer(ui, text.clone());
+            offer_item(ui, Item::Feature(mark.id));
             describe(response, &text);
             response.clone().on_hover_text_at_pointer(text);
         }

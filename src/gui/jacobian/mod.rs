@@ -19,9 +19,9 @@ use self::model::JacobianModel;
 pub(super) use self::model::{cameras, column_name, name_of};
 use super::accessible::describe;
 use super::convergence::empty_ui;
-use super::copied_value::offer;
 use super::help::terms::window;
 use super::pan_zoom::PanZoom;
+use super::under_pointer::{Item, offer, offer_item};
 use super::{Panel, PanelContext};
 use crate::estimator::{ColumnId, JacobianFactor};
 use crate::session::{RunRecord, StepRecord};
@@ -122,6 +122,12 @@ impl JacobianPanel {
             paint::hover(ui, ctx.theme, area, place, model, (row, column));
             let text = details::headline(model, row, column);
             offer(ui, text.clone());
+            // The parameter of a block of both, as features have the image panel.
+            match (model.jacobian.rows[row].factor, model.jacobian.columns[column].id) {
+                (_, ColumnId::Calibration(parameter)) => offer_item(ui, Item::Parameter(parameter)),
+                (JacobianFactor::Feature(id), _) => offer_item(ui, Item::Feature(id)),
+                _ => {}
+            }
             response.on_hover_text_at_pointer(text);
         }
         let (legend, hovered_legend) = ui.allocate_exact_size(vec2(ui.available_width(), LEGEND), Sense::hover());

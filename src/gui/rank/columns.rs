@@ -10,6 +10,7 @@ use crate::gimbal::{ParameterId, ParameterNames};
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::{meaning_of, part_of};
 use crate::gui::theme::{self, Theme};
+use crate::gui::under_pointer::{Item, offer_item};
 use crate::gui::units::counted;
 use crate::observability::RankReport;
 
@@ -209,6 +210,9 @@ fn name_ui(ui: &Ui, ctx: &mut PanelContext<'_>, parameter: ParameterId, line: Re
     if selected || response.hovered() {
         let stroke = Stroke::new(1.0, if selected { theme.accent } else { theme.outline });
         ui.painter().rect_stroke(line, 0.0, stroke, StrokeKind::Inside);
+    }
+    if response.contains_pointer() {
+        offer_item(ui, Item::Parameter(parameter));
     }
     if response.clicked() {
         ctx.selection.parameter = if selected { None } else { Some(parameter) };

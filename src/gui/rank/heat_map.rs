@@ -9,6 +9,7 @@ use crate::gui::PanelContext;
 use crate::gui::accessible::describe;
 use crate::gui::convergence::names::{meaning_of, part_of};
 use crate::gui::theme::{self, Theme};
+use crate::gui::under_pointer::{Item, offer_item};
 use crate::gui::units::{counted, fixed, significant};
 use crate::observability::{CalibrationDirection, RankReport, parameters_of};
 use crate::session::FlightParameter;
@@ -220,6 +221,9 @@ fn row_ui(
     if selected || response.hovered() {
         let stroke = Stroke::new(1.0, if selected { theme.accent } else { theme.outline });
         painter.rect_stroke(line, 0.0, stroke, StrokeKind::Inside);
+    }
+    if response.contains_pointer() {
+        offer_item(ui, Item::Parameter(parameter));
     }
     if response.clicked() {
         ctx.selection.parameter = if selected { None } else { Some(parameter) };

@@ -9,6 +9,7 @@ use crate::gimbal::ParameterNames;
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::{meaning_of, part_of};
 use crate::gui::theme::{Theme, number_font};
+use crate::gui::under_pointer::{Item, offer_item};
 use crate::gui::units::fixed;
 use crate::observability::{InformationRate, information_rate};
 use crate::session::{RunRecord, StepRecord};
@@ -111,6 +112,9 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joi
             let (sense, _) = ctx.presentation.clickable(egui::Role::Label);
             let label = Label::new(RichText::new(name).small().color(color)).sense(sense);
             let response = ui.add(label).on_hover_text(meaning_of(parameter.parameter, &ctx.recording.rig));
+            if response.contains_pointer() {
+                offer_item(ui, Item::Parameter(parameter.parameter));
+            }
             if response.clicked() {
                 ctx.selection.parameter = if selected { None } else { Some(parameter.parameter) };
             }

@@ -7,6 +7,7 @@ use crate::gui::determination::{LEVELS, level_color, level_of, look_of};
 use crate::gui::flight::{DeterminationHistory, ParameterHistory};
 use crate::gui::plot::PlotArea;
 use crate::gui::theme::{self, Theme};
+use crate::gui::under_pointer::{Item, offer_item};
 use crate::gui::units::fixed;
 use crate::observability::Determination;
 use crate::text::Named as _;
@@ -130,6 +131,9 @@ pub(super) fn labels_ui(ui: &Ui, ctx: &mut PanelContext<'_>, rect: Rect, history
         let response = ui.interact(line, ui.unique_id().with(("parameter of the lane", &name)), sense);
         let text = format!("{name}: {}, σ / prior {}", verdict.name(), fixed(ratio, 2));
         response.widget_info(|| WidgetInfo::selected(role, true, selected, format!("{text} at the cursor")));
+        if response.contains_pointer() {
+            offer_item(ui, Item::Parameter(parameter.parameter));
+        }
         if response.clicked() {
             ctx.selection.parameter = if selected { None } else { Some(parameter.parameter) };
         }

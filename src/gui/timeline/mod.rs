@@ -3,6 +3,7 @@
 mod csv;
 mod determinations;
 mod lanes;
+mod markers;
 mod model;
 mod pace;
 mod parameters_lane;
@@ -10,20 +11,20 @@ mod stretch;
 mod transport;
 
 pub use pace::{Pace, Reading};
-pub(crate) use transport::{SPEEDS, toggled_loop};
+pub(crate) use transport::{SPEEDS, next_speed, toggled_loop};
 
 use egui::{Align2, PointerButton, Rect, Response, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
 use self::lanes::Lane;
 use self::model::RunLanes;
 use self::parameters_lane::{ParametersLane, history};
-use super::copied_value::offer;
 use super::events::name_of;
 use super::plot::{
     Clicks, Curve, Interaction, PlotArea, Wheel, decimals_of_step, navigate, paint_ground, paint_time_labels,
     paint_times, register, ticks, visible_range,
 };
 use super::theme::{LANE_HEIGHT, LANE_LABEL_WIDTH, Theme, number_font};
+use super::under_pointer::{Item, offer, offer_item};
 use super::units::{fixed, seconds};
 use super::{Panel, PanelContext, ReadingCursor};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
@@ -92,7 +93,7 @@ impl Panel for TimelinePanel {
         let lane_y = |run: usize| plot.top() + RULER_HEIGHT + (run as f32 + 0.5) * height - 1.0;
         paint_forks(&painter, ctx, &area, lane_y);
         paint_range(&painter, ctx, &area);
-        paint_markers(&painter, &theme, &area, &ctx.playback.markers_ns);
+        markers::paint(&painter, &theme, &area, &ctx.playback.markers);
         paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
         let below_ruler = PlotArea { rect: plot.with_min_y(plot.top() + RULER_HEIGHT), ..area };
         paint_times(&painter, ctx, &below_ruler);
@@ -221,6 +222,11 @@ impl TimelinePanel {
         };
         lanes::label(&painter, &theme, label_rect, &lane.name(ctx), value.clone(), color);
         let label = ui.interact(label_rect, ui.unique_id().with(("lane", lane.name(ctx))), Sense::hover());
+        if let Lane::Run(run) = lane
+            && label.contains_pointer()
+        {
+            offer_item(ui, Item::Run(run));
+        }
         let text = value.map_or_else(|| lane.name(ctx), |value| format!("{} {value}", lane.name(ctx)));
         label.widget_info(|| WidgetInfo::labeled(Role::Label, true, &text));
         label.on_hover_text(format!("{}\n{}", lane.name(ctx), lane.meaning()));
@@ -264,8 +270,16 @@ impl TimelinePanel {
         let reach_ns = area.stamp_ns_at(pointer.x + REACH) - stamp_ns;
         let near = |other_ns: i64| (other_ns - stamp_ns).abs() <= reach_ns;
         let mut text = format!("{} s", seconds(stamp_ns));
+        if let Some(marker) = markers::at(area, &ctx.playback.markers, pointer.x) {
+            offer_item(ui, Item::Marker(marker.stamp_ns));
+            text.extend(["\nmarker ", marker.name.as_str(), " ", &seconds(marker.stamp_ns), " s"]);
+        }
         if let (Some(rows), Some(history)) = (self.parameters.rows_rect, history(ui, ctx)) {
             let row = determinations::row_under(rows, pointer.y, history.parameters.len());
+            let parameter = row.and_then(|row| history.parameters.get(row));
+            if let Some(parameter) = parameter {
+                offer_item(ui, Item::Parameter(parameter.parameter));
+            }
             let line = row.and_then(|row| determinations::hover_text(ctx, &history, row, stamp_ns));
             text.extend(line.map(|line| format!("\n{line}")));
         }
@@ -355,9 +369,15 @@ fn paint_interval(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotAr
 fn paint_ruler(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotArea) {
     /// Distance in points to a reading cursor, whose name replaces the label.
     const TAKEN: f32 = 58.0;
+    /// Half the width of a label of a time in points.
+    const HALF_LABEL: f32 = 20.0;
     let theme = ctx.theme;
     let cursors = ReadingCursor::ALL.map(|cursor| ctx.selection.reading.cursor_ns(cursor));
-    let taken = |x: f32| cursors.iter().flatten().any(|stamp_ns| (area.x(*stamp_ns) - x).abs() < TAKEN);
+    let marked = markers::covered(painter, theme, area, &ctx.playback.markers);
+    let taken = |x: f32| {
+        cursors.iter().flatten().any(|stamp_ns| (area.x(*stamp_ns) - x).abs() < TAKEN)
+            || marked.iter().any(|range| range.expand(HALF_LABEL).contains(x))
+    };
     let (begin_s, end_s) = (seconds_from_ns(area.begin_ns), seconds_from_ns(area.end_ns));
     let (marks, step) = ticks(begin_s, end_s, ((area.rect.width() / 70.0) as usize).max(1));
     for mark in marks {
@@ -394,15 +414,6 @@ fn paint_forks(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotArea,
             painter.circle_filled(pos2(x, lane_y(parent)), 3.0, ctx.theme.run(parent).color);
             painter.circle_filled(pos2(x, y), 3.5, ctx.theme.run(number).color);
         }
-    }
-}
-
-fn paint_markers(painter: &egui::Painter, theme: &Theme, area: &PlotArea, markers_ns: &[i64]) {
-    for stamp_ns in markers_ns.iter().filter(|stamp_ns| (area.begin_ns..=area.end_ns).contains(stamp_ns)) {
-        let x = area.x(*stamp_ns);
-        painter.vline(x, area.rect.y_range(), Stroke::new(1.0, theme.ok.gamma_multiply(0.7)));
-        let flag = vec![pos2(x, area.rect.top()), pos2(x + 8.0, area.rect.top() + 4.0), pos2(x, area.rect.top() + 8.0)];
-        painter.add(egui::Shape::convex_polygon(flag, theme.ok, Stroke::NONE));
     }
 }
 

@@ -14,6 +14,15 @@ pub(super) const HEIGHT: f32 = 26.0;
 /// Selectable speeds in log seconds per second.
 pub(crate) const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 10.0];
 
+/// The next higher or lower selectable speed; `None` at the end of the list.
+pub(crate) fn next_speed(speed: f64, faster: bool) -> Option<f64> {
+    if faster {
+        SPEEDS.into_iter().find(|other| *other > speed)
+    } else {
+        SPEEDS.into_iter().rev().find(|other| *other < speed)
+    }
+}
+
 /// Draws the buttons, the time, and the progress of the estimation; a figure has only the time.
 pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, pace: Option<Reading>) {
     ui.horizontal(|ui| {
@@ -42,8 +51,8 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, pace: Option<Reading>)
         ui.add_space(4.0);
         speed_ui(ui, ctx);
         loop_ui(ui, ctx);
-        let marked = ctx.playback.markers_ns.binary_search(&ctx.cursor_ns).is_ok();
-        if icon_button(ui, "⚑", "Marker", "M", marked) {
+        let marked = ctx.playback.markers.at(ctx.cursor_ns).is_some();
+        if icon_button(ui, "⚑", "Marker", "M; names: Shift+M", marked) {
             ctx.commands.push(Command::ToggleMarker);
         }
         ui.add_space(8.0);
@@ -72,7 +81,7 @@ fn speed_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
             }
         }
     });
-    response.response.on_hover_text("Playback speed, log seconds per second");
+    response.response.on_hover_text("Playback speed, log seconds per second ([ slower, ] faster)");
 }
 
 fn loop_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {

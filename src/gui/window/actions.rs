@@ -12,6 +12,10 @@ pub(crate) enum Action {
     TogglePlay,
     /// Move the cursor by this number of frames.
     Step(i64),
+    /// Move the cursor by log time in nanoseconds.
+    StepTime(i64),
+    /// Move the cursor to the next (`true`) or previous keyframe of the shown run.
+    Keyframe(bool),
     /// Move the cursor to the next (`true`) or previous iteration of the solver.
     Iteration(bool),
     /// Move the cursor to the next (`true`) or previous event.
@@ -24,6 +28,8 @@ pub(crate) enum Action {
     Loop,
     /// Set or clear a marker.
     Marker,
+    /// Move the cursor to the next (`true`) or previous marker.
+    MarkerBeside(bool),
     /// Set or clear a breakpoint at the frame of the cursor.
     Breakpoint,
     /// Run to the next (`true`) or previous hit of a breakpoint.
@@ -86,6 +92,8 @@ pub(crate) enum Action {
     Hide(PanelName),
     /// Set the speed of playback in log seconds per second.
     Speed(f64),
+    /// Play at the next higher (`true`) or lower speed.
+    SpeedStep(bool),
 }
 
 pub(crate) struct Entry {
@@ -109,20 +117,33 @@ const fn entry(
 const NONE: Modifiers = Modifiers::NONE;
 const SHIFT: Modifiers = Modifiers::SHIFT;
 const CTRL: Modifiers = Modifiers::COMMAND;
+const ALT: Modifiers = Modifiers::ALT;
+const ALT_SHIFT: Modifiers = ALT.plus(SHIFT);
 const CTRL_SHIFT: Modifiers = CTRL.plus(SHIFT);
+
+/// Steps in time, in nanoseconds.
+pub(super) const SECOND_NS: i64 = 1_000_000_000;
+pub(super) const TENTH_NS: i64 = SECOND_NS / 10;
 
 /// All actions. Those with more modifiers are first, because a shortcut also matches with additional modifiers.
 pub(crate) const TABLE: &[Entry] = &[
-    entry(Action::Redo, "Redo the change of settings or layout", "Ctrl+Shift+Z", &[(CTRL_SHIFT, Key::Z)]),
-    entry(Action::Undo, "Undo the last change of settings or layout", "Ctrl+Z", &[(CTRL, Key::Z)]),
+    entry(Action::Redo, "Redo the change of settings, layout or markers", "Ctrl+Shift+Z", &[(CTRL_SHIFT, Key::Z)]),
+    entry(Action::Undo, "Undo the last change of settings, layout or markers", "Ctrl+Z", &[(CTRL, Key::Z)]),
     // The platform's copy key arrives as an event.
     entry(Action::Copy, "Copy the value under the pointer, or the focused panel's table", "Ctrl+C", &[]),
     entry(Action::CloseLog, "Close the log", "Ctrl+W", &[(CTRL, Key::W)]),
     entry(Action::Quit, "Quit", "Ctrl+Q", &[(CTRL, Key::Q)]),
+    entry(Action::StepTime(TENTH_NS), "0.1 s forward", "Alt+Shift+Right", &[(ALT_SHIFT, Key::ArrowRight)]),
+    entry(Action::StepTime(-TENTH_NS), "0.1 s back", "Alt+Shift+Left", &[(ALT_SHIFT, Key::ArrowLeft)]),
+    entry(Action::StepTime(SECOND_NS), "1 s forward", "Alt+Right", &[(ALT, Key::ArrowRight)]),
+    entry(Action::StepTime(-SECOND_NS), "1 s back", "Alt+Left", &[(ALT, Key::ArrowLeft)]),
     entry(Action::Event(true), "Next event", "Ctrl+Right", &[(CTRL, Key::ArrowRight)]),
     entry(Action::Event(false), "Previous event", "Ctrl+Left", &[(CTRL, Key::ArrowLeft)]),
     entry(Action::Step(10), "Ten frames forward", "Shift+Right", &[(SHIFT, Key::ArrowRight)]),
     entry(Action::Step(-10), "Ten frames back", "Shift+Left", &[(SHIFT, Key::ArrowLeft)]),
+    entry(Action::Keyframe(false), "Previous keyframe of the shown run", "Shift+K", &[(SHIFT, Key::K)]),
+    entry(Action::MarkerBeside(false), "Previous marker", "Shift+G", &[(SHIFT, Key::G)]),
+    entry(Action::Dialog(Dialog::Markers), "Markers: list, names, removal…", "Shift+M", &[(SHIFT, Key::M)]),
     entry(Action::Hit(false), "Run back to the previous breakpoint hit", "Shift+N", &[(SHIFT, Key::N)]),
     entry(Action::FollowValues, "Free the value axes of all plots", "Shift+Y", &[(SHIFT, Key::Y)]),
     entry(Action::NextPanel(false), "Focus the previous panel", "Shift+F6", &[(SHIFT, Key::F6)]),
@@ -137,6 +158,10 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::TogglePlay, "Play or pause", "Space", &[(NONE, Key::Space)]),
     entry(Action::Step(1), "One frame forward", "Right", &[(NONE, Key::ArrowRight)]),
     entry(Action::Step(-1), "One frame back", "Left", &[(NONE, Key::ArrowLeft)]),
+    entry(Action::Keyframe(true), "Next keyframe of the shown run", "K", &[(NONE, Key::K)]),
+    entry(Action::MarkerBeside(true), "Next marker", "G", &[(NONE, Key::G)]),
+    entry(Action::SpeedStep(true), "Play faster", "]", &[(NONE, Key::CloseBracket)]),
+    entry(Action::SpeedStep(false), "Play slower", "[", &[(NONE, Key::OpenBracket)]),
     entry(Action::Iteration(true), "Next solver iteration", ".", &[(NONE, Key::Period)]),
     entry(Action::Iteration(false), "Previous solver iteration", ",", &[(NONE, Key::Comma)]),
     entry(Action::Start, "Go to start", "Home", &[(NONE, Key::Home)]),

@@ -1,21 +1,23 @@
-//! Undo and redo for settings and layout.
+//! Undo and redo for settings, layout and markers.
 
 use std::collections::VecDeque;
 
 use super::settings::Settings;
 use super::tiles::PanelLayout;
+use crate::session::Markers;
 
 /// Maximum number of changes that can be undone.
 const MAX_CHANGES: usize = 100;
 
-/// Settings and layout at one time.
+/// Settings, layout and markers at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Arrangement {
     pub(super) settings: Settings,
     pub(super) layout: PanelLayout,
+    pub(super) markers: Markers,
 }
 
-/// Changes of settings and layout, oldest first.
+/// Changes of settings, layout and markers, oldest first.
 #[derive(Debug, Default)]
 pub(super) struct History {
     before: VecDeque<Arrangement>,
@@ -34,15 +36,22 @@ impl History {
     /// A change is recorded when it is complete: no button of the pointer is down (`settled`), and two calls get the
     /// same state, because the tree of panels is simplified in the frame after a drop. Another open tab alone is no
     /// change.
-    pub(super) fn follow(&mut self, settings: &Settings, layout: &PanelLayout, settled: bool) -> bool {
-        let now = || Arrangement { settings: settings.clone(), layout: layout.clone() };
+    pub(super) fn follow(
+        &mut self,
+        settings: &Settings,
+        layout: &PanelLayout,
+        markers: &Markers,
+        settled: bool,
+    ) -> bool {
+        let now = || Arrangement { settings: settings.clone(), layout: layout.clone(), markers: markers.clone() };
         let Some(current) = &mut self.current else {
             self.current = Some(now());
             return false;
         };
-        if current.settings == *settings && current.layout == *layout {
+        let same = current.settings == *settings && current.markers == *markers;
+        if same && current.layout == *layout {
             self.pending = None;
-        } else if current.settings == *settings && current.layout.differs_by_open_tabs_only(layout) {
+        } else if same && current.layout.differs_by_open_tabs_only(layout) {
             *current = now();
             self.pending = None;
         } else if settled {
@@ -71,6 +80,14 @@ impl History {
     pub(super) fn set_barrier(&mut self, message: String) {
         self.record();
         self.barrier = Some(message);
+    }
+
+    /// Replaces the markers of all changes by those of a session that is opened.
+    pub(super) fn begin_session(&mut self, markers: &Markers) {
+        let known = self.before.iter_mut().chain(&mut self.undone).chain(&mut self.current).chain(&mut self.pending);
+        for arrangement in known {
+            arrangement.markers = markers.clone();
+        }
     }
 
     pub(super) fn take_barrier(&mut self) -> Option<String> {
@@ -111,8 +128,8 @@ mod tests {
 
     /// Two frames after a change.
     fn complete(history: &mut History, settings: &Settings, layout: &PanelLayout) {
-        history.follow(settings, layout, true);
-        assert!(!history.follow(settings, layout, true));
+        history.follow(settings, layout, &Markers::default(), true);
+        assert!(!history.follow(settings, layout, &Markers::default(), true));
     }
 
     #[test]
@@ -125,7 +142,7 @@ mod tests {
         complete(&mut history, &settings, &layout);
         for scale in [1.1, 1.2, 1.3] {
             settings.scale = scale;
-            history.follow(&settings, &layout, false);
+            history.follow(&settings, &layout, &Markers::default(), false);
         }
         complete(&mut history, &settings, &layout);
         layout.set_visible(PanelName::Rank, false);
@@ -141,11 +158,32 @@ mod tests {
         assert_eq!(shown(history.redo()), Some((Some(Preset::Scene), 1.0, true)));
         assert_eq!(shown(history.redo()), Some((Some(Preset::Scene), 1.3, true)));
         // A new change replaces those that were undone.
-        let Some(Arrangement { mut settings, layout }) = history.current.clone() else { panic!() };
+        let Some(Arrangement { mut settings, layout, .. }) = history.current.clone() else { panic!() };
         settings.theme = ThemeName::Print;
         complete(&mut history, &settings, &layout);
         assert!(!history.can_redo());
         assert_eq!(history.undo().map(|step| step.settings.theme), Some(ThemeName::default()));
+    }
+
+    #[test]
+    fn markers_are_undone_within_their_session() {
+        let (settings, layout) = (Settings::default(), PanelLayout::default());
+        let mut history = History::default();
+        complete(&mut history, &settings, &layout);
+        let one = Markers::default().toggled(5);
+        let follow = |history: &mut History, markers: &Markers| {
+            history.follow(&settings, &layout, markers, true) || history.follow(&settings, &layout, markers, true)
+        };
+        follow(&mut history, &one);
+        history.follow(&settings, &layout, &one, true);
+        // The session takes the markers over in the frame after the undo.
+        assert_eq!(history.undo().map(|step| step.markers), Some(Markers::default()));
+        assert!(history.follow(&settings, &layout, &one, true));
+        assert!(!history.follow(&settings, &layout, &Markers::default(), true));
+        assert_eq!(history.redo().map(|step| step.markers), Some(one));
+        let other = Markers::default().toggled(8);
+        history.begin_session(&other);
+        assert_eq!(history.undo().map(|step| step.markers), Some(other));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::frontend::FeatureId;
 use crate::gimbal::tests::parameter;
 use crate::gui::theme::ThemeName;
 use crate::gui::{Dialog, PanelName};
-use crate::session::Command;
+use crate::session::{Command, Marker, Markers};
 use crate::text::Named as _;
 
 /// Opens the palette, types, and presses Enter.
@@ -47,6 +47,51 @@ fn the_palette_goes_to_times_and_frames_and_selects() {
     assert!(harness.state().window.layout.is_visible(PanelName::Residuals));
     choose(&mut harness, "compar layout");
     assert_eq!(harness.state().window.layout.preset, Some(Preset::Comparison));
+}
+
+#[test]
+fn markers_are_gone_to_listed_and_restored_by_undo() {
+    let mut harness = bench();
+    let one = Markers::default().with(Marker::new(SECOND_NS, "turn")).with(Marker::new(7 * SECOND_NS / 2, ""));
+    harness.state_mut().playback.markers = one.clone();
+    harness.run_steps(4);
+    let press = |harness: &mut Harness<'static, Bench>, modifiers, key| {
+        commands_of(harness, |harness| harness.key_press_modifiers(modifiers, key))
+    };
+    // The cursor is at 3 s.
+    let next = press(&mut harness, Modifiers::NONE, Key::G);
+    assert_eq!(next, [Command::Seek { stamp_ns: 7 * SECOND_NS / 2 }]);
+    assert_eq!(press(&mut harness, Modifiers::SHIFT, Key::G), [Command::Seek { stamp_ns: SECOND_NS }]);
+    assert_eq!(choose(&mut harness, "turn"), [Command::Seek { stamp_ns: SECOND_NS }]);
+
+    press(&mut harness, Modifiers::SHIFT, Key::M);
+    let pushed = commands_of(&mut harness, |harness| harness.get_by_label("Delete the marker at 1.000 s").click());
+    let [Command::SetMarkers(left)] = &pushed[..] else { panic!("{pushed:?}") };
+    assert_eq!(left.len(), 1);
+    harness.key_press(Key::Escape);
+    harness.run_steps(4);
+    assert_eq!(press(&mut harness, Modifiers::COMMAND, Key::Z), [Command::SetMarkers(one)]);
+    harness.run_steps(4);
+    let redo = press(&mut harness, Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
+    assert_eq!(redo, [Command::SetMarkers(left.clone())]);
+
+    // A name is typed in the list; Escape discards it, Enter keeps it.
+    press(&mut harness, Modifiers::SHIFT, Key::M);
+    for (key, renamed) in [(Key::Escape, false), (Key::Enter, true)] {
+        if harness.query_by_label("Name of the marker at 3.500 s").is_none() {
+            press(&mut harness, Modifiers::SHIFT, Key::M);
+        }
+        harness.get_by_role_and_label(Role::TextInput, "Name of the marker at 3.500 s").focus();
+        harness.run_steps(1);
+        harness.event(egui::Event::Text("hover".to_owned()));
+        harness.run_steps(2);
+        let pushed = commands_of(&mut harness, |harness| harness.key_press(key));
+        let name = match &pushed[..] {
+            [Command::SetMarkers(markers)] => markers.last().map(|marker| marker.name.clone()),
+            _ => None,
+        };
+        assert_eq!(name.as_deref(), renamed.then_some("hover"), "{key:?}: {pushed:?}");
+    }
 }
 
 #[test]

@@ -10,6 +10,7 @@ use crate::gui::PanelContext;
 use crate::gui::comparison::POSES_ONLY;
 use crate::gui::plot::paint_line;
 use crate::gui::theme::{self, CURVE_WIDTH, RunStyle, Theme};
+use crate::gui::under_pointer::{Item, offer_item};
 use crate::gui::units::fixed;
 use crate::session::accuracy::ErrorStatistics;
 use crate::session::{RunRecord, StepRecord, TrajectoryLane};
@@ -46,22 +47,18 @@ impl RunLegend {
     }
 
     /// Draws one entry per run, then one per trajectory, in a total `width`; a click selects the run. Long names are
-    /// shortened. Returns the index of a run that is to be removed.
-    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, accuracy: bool, width: f32) -> Option<usize> {
+    /// shortened.
+    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, accuracy: bool, width: f32) {
         self.update(ctx);
         let count = (self.runs.len() + ctx.recording.trajectories.len()).max(1) as f32;
         let enough = self.widths(ui, ctx)[usize::from(!accuracy)] <= width + 0.5;
         let max_width = if enough { f32::INFINITY } else { width / count - ui.spacing().item_spacing.x };
-        let mut removed = None;
         for (number, (run, known)) in ctx.recording.runs.iter().zip(&self.runs).enumerate() {
-            if entry_ui(ui, ctx, number, run, known, accuracy, max_width) {
-                removed = Some(number);
-            }
+            entry_ui(ui, ctx, number, run, known, accuracy, max_width);
         }
         for (number, lane) in ctx.recording.trajectories.iter().enumerate() {
             lane_ui(ui, ctx, number, lane, accuracy, max_width);
         }
-        removed
     }
 
     fn update(&mut self, ctx: &PanelContext<'_>) {
@@ -145,7 +142,7 @@ impl Entry {
     }
 }
 
-/// Draws the entry of a run; returns true if the run is to be removed.
+/// Draws the entry of a run.
 fn entry_ui(
     ui: &mut Ui,
     ctx: &mut PanelContext<'_>,
@@ -154,7 +151,7 @@ fn entry_ui(
     known: &RunAccuracy,
     accuracy: bool,
     max_width: f32,
-) -> bool {
+) {
     let theme = *ctx.theme;
     let shown = ctx.selection.run == number;
     let text_color = if shown { theme.text_strong } else { theme.text };
@@ -175,18 +172,13 @@ fn entry_ui(
     if response.clicked() {
         ctx.selection.run = number;
     }
-    let mut removed = false;
-    response.context_menu(|ui| {
-        if ui.button("Remove run…").clicked() {
-            removed = true;
-            ui.close();
-        }
-    });
+    if response.contains_pointer() {
+        offer_item(ui, Item::Run(number));
+    }
     // All steps are read only for an open tooltip.
     response.on_hover_ui(|ui| {
         ui.label(details(run, known.statistics.as_ref()));
     });
-    removed
 }
 
 /// Draws the entry of a trajectory of another program; it cannot be selected, as it has no calibration and no features.

@@ -5,7 +5,7 @@ use std::path::Path;
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Button, PopupCloseBehavior, Ui, WidgetInfo};
 
-use super::actions::{Action, Entry, TABLE};
+use super::actions::{Action, Entry, SECOND_NS, TABLE, TENTH_NS};
 use super::request::WindowRequest;
 use super::state::MainWindow;
 use super::tiles::Preset;
@@ -76,9 +76,21 @@ impl Menu {
             Self::Playback => &[
                 &[Action::TogglePlay, Action::Start, Action::End],
                 &[Action::Step(1), Action::Step(-1), Action::Step(10), Action::Step(-10)],
+                &[
+                    Action::StepTime(TENTH_NS),
+                    Action::StepTime(-TENTH_NS),
+                    Action::StepTime(SECOND_NS),
+                    Action::StepTime(-SECOND_NS),
+                ],
                 &[Action::Iteration(true), Action::Iteration(false)],
-                &[Action::Event(true), Action::Event(false)],
-                &[Action::Loop, Action::Marker],
+                &[Action::Event(true), Action::Event(false), Action::Keyframe(true), Action::Keyframe(false)],
+                &[Action::SpeedStep(true), Action::SpeedStep(false), Action::Loop],
+                &[
+                    Action::Marker,
+                    Action::Dialog(Dialog::Markers),
+                    Action::MarkerBeside(true),
+                    Action::MarkerBeside(false),
+                ],
             ],
             Self::Help => &[
                 &[Action::Tour, Action::Manual, Action::Explain],

@@ -3,6 +3,7 @@
 //! The real window and headless screenshots both draw [`window_ui`].
 
 mod actions;
+mod context_menu;
 mod copying;
 #[cfg(test)]
 mod dialog_tests;
@@ -132,7 +133,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
     state.help.ui(ui, &theme, &state.places);
     state.notices.toasts_ui(ui, &theme);
     state.ring.ui(ui, &theme);
-    copying::menu_ui(ui, state, ctx, &mut actions);
+    context_menu::ui(ui, state, ctx, clicks.menu, &mut actions);
     if actions.contains(&Action::Copy) {
         state.pointed = copying::value_under_pointer(ui);
     }
@@ -140,7 +141,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
         perform(action, state, ctx);
     }
     let settled = !ui.input(|input| input.pointer.any_down());
-    if state.history.follow(&state.settings, &state.layout, settled) {
+    if state.history.follow(&state.settings, &state.layout, &ctx.playback.markers, settled) {
         ui.request_repaint();
     }
     if let Some(text) = state.copied.take() {

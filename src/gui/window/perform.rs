@@ -7,14 +7,18 @@ use super::state::MainWindow;
 use super::{copying, panel_export};
 use crate::gui::plot::zoom_about_cursor;
 use crate::gui::theme::ThemeName;
-use crate::gui::timeline::toggled_loop;
-use crate::gui::{PanelContext, PanelName};
+use crate::gui::timeline::{next_speed, toggled_loop};
+use crate::gui::{Dialog, PanelContext, PanelName};
 use crate::session::{Command, PlaybackSpeed};
 
 pub(super) fn perform(action: Action, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
     match action {
         Action::TogglePlay => ctx.commands.push(Command::TogglePlay),
         Action::Step(frames) => ctx.commands.push(Command::StepFrames(frames)),
+        Action::StepTime(by_ns) => ctx.commands.push(Command::StepTime { by_ns }),
+        Action::Keyframe(forward) => {
+            ctx.commands.push(Command::JumpToKeyframe { run: ctx.selection.run, forward });
+        }
         Action::Iteration(forward) => ctx.commands.push(Command::StepIteration { forward }),
         Action::Event(forward) => ctx.commands.push(Command::JumpToEvent { forward }),
         Action::Start => ctx.commands.push(Command::GoToStart),
@@ -23,6 +27,14 @@ pub(super) fn perform(action: Action, state: &mut MainWindow, ctx: &mut PanelCon
         Action::Breakpoint => ctx.commands.push(Command::ToggleBreakpointHere),
         Action::Hit(forward) => ctx.commands.push(Command::RunToBreakpoint { forward }),
         Action::Marker => ctx.commands.push(Command::ToggleMarker),
+        Action::MarkerBeside(forward) => {
+            if let Some(marker) = ctx.playback.markers.beside(ctx.cursor_ns, forward) {
+                ctx.commands.push(Command::Seek { stamp_ns: marker.stamp_ns });
+            } else {
+                let text = if forward { "No marker after the cursor" } else { "No marker before the cursor" };
+                state.notices.show_message(NoticeLevel::Info, text);
+            }
+        }
         Action::WholeLog => ctx.selection.visible_ns = None,
         Action::SetReading(cursor) => {
             let stamp_ns = ctx.selection.reading.pointer_ns.unwrap_or(ctx.cursor_ns);
@@ -51,6 +63,9 @@ pub(super) fn perform(action: Action, state: &mut MainWindow, ctx: &mut PanelCon
         Action::NextRun => {
             ctx.selection.run = (ctx.selection.run + 1) % ctx.recording.runs.len().max(1);
         }
+        Action::Dialog(Dialog::Markers) if ctx.playback.markers.at(ctx.cursor_ns).is_some() => {
+            state.dialogs.edit_marker(ctx.cursor_ns);
+        }
         Action::Dialog(dialog) => state.dialogs.show(dialog),
         Action::Explain => state.explain_focused(),
         Action::Manual => state.help.manual.show(None),
@@ -65,8 +80,8 @@ pub(super) fn perform(action: Action, state: &mut MainWindow, ctx: &mut PanelCon
             copying::copy(value, state, ctx);
         }
         Action::CopyTable(panel) => copying::copy_table(panel, state, ctx),
-        Action::Undo => state.undo(),
-        Action::Redo => state.redo(),
+        Action::Undo => state.undo(ctx),
+        Action::Redo => state.redo(ctx),
         Action::CloseLog => state.requests.push(WindowRequest::CloseLog),
         Action::Quit => state.requests.push(WindowRequest::Quit),
         Action::Save => state.requests.push(WindowRequest::SaveSession),
@@ -98,5 +113,9 @@ pub(super) fn perform(action: Action, state: &mut MainWindow, ctx: &mut PanelCon
         }
         Action::Hide(panel) => state.layout.set_visible(panel, false),
         Action::Speed(speed) => ctx.commands.push(Command::SetSpeed(PlaybackSpeed(speed))),
+        Action::SpeedStep(faster) => {
+            let next = next_speed(ctx.playback.speed, faster);
+            ctx.commands.extend(next.map(|speed| Command::SetSpeed(PlaybackSpeed(speed))));
+        }
     }
 }

@@ -15,7 +15,7 @@ const POINTER: [(&str, &str); 12] = [
     ("Shift+scroll", "pan in time, as horizontal scrolling and middle drag"),
     ("Right drag", "zoom to a time range, or to a box of the image"),
     ("Double-click", "show the whole log, fit the image"),
-    ("Right click", "copy the value or the panel's table, set a reading cursor, fix the value axis"),
+    ("Right click", "menu of the parameter, feature, run, marker, time, value or panel there; also on tabs and runs"),
     ("Shift+drag", "on the timeline: set the loop range"),
     ("Drag on rows", "of the timeline's parameters: σ before and after"),
     ("Click", "a plot: move the cursor; a parameter or feature: select it"),

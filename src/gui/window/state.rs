@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use egui::{Pos2, Rect, Ui, Vec2};
+use egui::{Rect, Ui, Vec2};
 
+use super::context_menu::place::MenuPlace;
 use super::dialogs::state::Dialogs;
 use super::focus_ring::FocusRing;
 use super::history::{Arrangement, History};
@@ -16,25 +17,16 @@ use super::saved_layouts::{self, SavedLayouts};
 use super::settings::{self, Settings};
 use super::tiles::{PanelLayout, Preset};
 use super::tour::state::Tour;
-use crate::gui::PanelName;
 use crate::gui::help::Help;
 use crate::gui::plot::PlotOnScreen;
 use crate::gui::reading::EventLines;
 use crate::gui::theme::Theme;
+use crate::gui::{PanelContext, PanelName};
+use crate::session::{Command, Markers};
 use crate::text::Named as _;
 
 /// Size in points of a panel that is not on the screen.
 const HIDDEN_PANEL_SIZE: Vec2 = Vec2::new(960.0, 540.0);
-
-#[derive(Debug)]
-pub(super) struct PanelMenu {
-    pub(super) panel: PanelName,
-    pub(super) at: Pos2,
-    /// The value under the pointer when the menu was opened.
-    pub(super) value: Option<String>,
-    /// The plot over time under the pointer then, with the time there in nanoseconds since the log began.
-    pub(super) plot: Option<(PlotOnScreen, i64)>,
-}
 
 /// State of the window without the session.
 #[derive(Default)]
@@ -75,7 +67,7 @@ pub struct MainWindow {
     pub(super) pointed: Option<String>,
     /// Text for the clipboard.
     pub(super) copied: Option<String>,
-    pub(super) menu: Option<PanelMenu>,
+    pub(super) menu: Option<MenuPlace>,
     /// The plot over time under the pointer.
     pub(super) pointed_plot: Option<PlotOnScreen>,
     pub(super) event_lines: EventLines,
@@ -112,25 +104,35 @@ impl MainWindow {
         self.help.manual.close();
     }
 
-    /// Restores settings and layout as before the last change.
-    pub(super) fn undo(&mut self) {
+    /// Starts the history of the markers of a session that is opened.
+    pub(in crate::gui) fn begin_session(&mut self, markers: &Markers) {
+        self.history.begin_session(markers);
+    }
+
+    /// Restores settings, layout and markers as before the last change.
+    pub(super) fn undo(&mut self, ctx: &mut PanelContext<'_>) {
         if let Some(message) = self.history.take_barrier() {
             self.notices.show_message(NoticeLevel::Info, message);
             return;
         }
         let before = self.history.undo();
-        self.restore(before, "Nothing to undo");
+        self.restore(before, "Nothing to undo", ctx);
     }
 
-    /// Restores settings and layout as before the last undo.
-    pub(super) fn redo(&mut self) {
+    /// Restores settings, layout and markers as before the last undo.
+    pub(super) fn redo(&mut self, ctx: &mut PanelContext<'_>) {
         let undone = self.history.redo();
-        self.restore(undone, "Nothing to redo");
+        self.restore(undone, "Nothing to redo", ctx);
     }
 
-    fn restore(&mut self, arrangement: Option<Arrangement>, none: &str) {
+    fn restore(&mut self, arrangement: Option<Arrangement>, none: &str, ctx: &mut PanelContext<'_>) {
         match arrangement {
-            Some(Arrangement { settings, layout }) => (self.settings, self.layout) = (settings, layout),
+            Some(Arrangement { settings, layout, markers }) => {
+                (self.settings, self.layout) = (settings, layout);
+                if markers != ctx.playback.markers {
+                    ctx.commands.push(Command::SetMarkers(markers));
+                }
+            }
             None => self.notices.show_message(NoticeLevel::Info, none),
         }
     }

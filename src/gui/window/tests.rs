@@ -50,6 +50,10 @@ impl Bench {
             commands: &mut self.commands,
         };
         window_ui(ui, &mut self.window, &mut context);
+        // The application applies commands before the next frame, which the history of the markers relies on.
+        if let Some(Command::SetMarkers(markers)) = self.commands.last() {
+            self.playback.markers = markers.clone();
+        }
     }
 }
 
@@ -151,6 +155,12 @@ fn keys_push_the_same_commands() {
         (Modifiers::NONE, Key::Home, Command::GoToStart),
         (Modifiers::NONE, Key::End, Command::GoToEnd),
         (Modifiers::NONE, Key::M, Command::ToggleMarker),
+        (Modifiers::ALT, Key::ArrowRight, Command::StepTime { by_ns: SECOND_NS }),
+        (Modifiers::ALT.plus(Modifiers::SHIFT), Key::ArrowLeft, Command::StepTime { by_ns: -SECOND_NS / 10 }),
+        (Modifiers::NONE, Key::K, Command::JumpToKeyframe { run: 0, forward: true }),
+        (Modifiers::SHIFT, Key::K, Command::JumpToKeyframe { run: 0, forward: false }),
+        (Modifiers::NONE, Key::CloseBracket, Command::SetSpeed(PlaybackSpeed(2.0))),
+        (Modifiers::NONE, Key::OpenBracket, Command::SetSpeed(PlaybackSpeed(0.5))),
         (Modifiers::NONE, Key::B, Command::ToggleBreakpointHere),
         (Modifiers::NONE, Key::N, Command::RunToBreakpoint { forward: true }),
         (Modifiers::SHIFT, Key::N, Command::RunToBreakpoint { forward: false }),
@@ -392,7 +402,24 @@ fn the_palette_finds_parameters_by_their_verdict() {
     let run = &harness.state().recording.runs[0];
     let rows = flight_table(&harness.state().recording, run);
     let first = rows.iter().find(|row| row.verdict == Determination::WeaklyDetermined).expect("a weak parameter");
-    assert!(harness.query_all_by_label_contains(&format!("Parameter {}, weakly determined", first.name)).count() > 0);
+    let since = format!("since {:.3} s", first.since_s().unwrap());
+    let entry = format!("Parameter {}, weakly determined {since}", first.name);
+    let entry = harness.get_by_label_contains(&entry).accesskit_node().label().unwrap();
+    let field = |harness: &Harness<'static, Bench>| harness.get_by_role_and_label(Role::TextInput, "Command").rect();
+    let before = field(&harness);
+    let pushed = commands_of(&mut harness, |harness| harness.get_by_label(&entry).click());
+    assert_eq!(pushed, [Command::Seek { stamp_ns: first.since_ns.unwrap() }]);
+    assert_eq!(harness.state().selection.parameter, Some(first.parameter));
+    // The palette stays in its place whatever it finds.
+    for typed in ["w", "qqqq"] {
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
+        harness.run_steps(3);
+        harness.event(egui::Event::Text(typed.to_owned()));
+        harness.run_steps(3);
+        assert_eq!(field(&harness), before, "{typed}");
+        harness.key_press(Key::Escape);
+        harness.run_steps(3);
+    }
 }
 
 /// The verdict of the flight stays while the cursor moves, and a click on its time moves the cursor there.

@@ -73,7 +73,6 @@ impl PanelLayout {
         self.maximized = if self.maximized == Some(pane) || !shown { None } else { Some(pane) };
     }
 
-    #[cfg(test)]
     pub(crate) fn maximized(&self) -> Option<PanelName> {
         self.maximized
     }
@@ -150,6 +149,8 @@ pub(crate) struct TabClicks {
     pub(crate) asked: Option<PanelName>,
     /// The panel whose tab was clicked.
     pub(crate) focused: Option<PanelName>,
+    /// The panel whose tab was clicked with the secondary button.
+    pub(crate) menu: Option<PanelName>,
     /// The panel whose tab was double-clicked.
     maximized: Option<PanelName>,
 }
@@ -272,6 +273,9 @@ impl Behavior<PanelName> for Shown<'_, '_> {
         let panel = tiles.get_pane(&tile).copied();
         if response.clicked() {
             self.clicks.focused = panel.or(self.clicks.focused);
+        }
+        if response.secondary_clicked() {
+            self.clicks.menu = panel;
         }
         if response.double_clicked() {
             self.clicks.maximized = panel;

@@ -50,8 +50,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
             ui.label(RichText::new(rig).color(ctx.theme.text_weak));
         }
         ui.separator();
-        let removed = state.legend.ui(ui, ctx, shown.accuracy, shown.runs);
-        actions.extend(removed.map(Action::RemoveRun));
+        state.legend.ui(ui, ctx, shown.accuracy, shown.runs);
         if shown.buttons {
             for (text, action) in BUTTONS {
                 action_button(ui, text, action, ctx.recording.runs.len() < MAX_RUNS, actions);

@@ -1,3 +1,4 @@
+use super::markers::Markers;
 use crate::session::breakpoints::Condition;
 use crate::session::plan::{ForkChanges, RunSpec};
 
@@ -20,6 +21,10 @@ pub enum Command {
     },
     /// Move the cursor by this number of frames, backwards when negative.
     StepFrames(i64),
+    /// Move the cursor by log time in nanoseconds, backwards when negative; playback goes on.
+    StepTime {
+        by_ns: i64,
+    },
     /// Show the step at the cursor one solver iteration later or earlier; beyond its first or last iteration, the
     /// neighbouring step.
     StepIteration {
@@ -28,6 +33,12 @@ pub enum Command {
     },
     /// Move the cursor to the next event (`forward`) or the previous one.
     JumpToEvent {
+        /// Next (`true`) or previous.
+        forward: bool,
+    },
+    /// Move the cursor to the next keyframe of a run (`forward`) or the previous one.
+    JumpToKeyframe {
+        run: usize,
         /// Next (`true`) or previous.
         forward: bool,
     },
@@ -58,6 +69,8 @@ pub enum Command {
     SetLoop(Option<(i64, i64)>),
     /// Add or remove a marker at the cursor.
     ToggleMarker,
+    /// Replace all markers, as after a change of a name.
+    SetMarkers(Markers),
     /// Add a run on the same log.
     AddRun(RunSpec),
     /// Fork a run: a new run continues it from the step at the cursor with changes.

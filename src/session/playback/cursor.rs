@@ -81,9 +81,11 @@ impl Cursor {
             Command::Seek { stamp_ns } => (self.seek(recording, stamp_ns), None),
             Command::GoToStart => (self.seek(recording, recording.first_stamp_ns()), None),
             Command::GoToEnd => (self.seek(recording, recording.last_stamp_ns()), None),
+            Command::StepTime { by_ns } => (self.seek(recording, self.stamp_ns.saturating_add(by_ns)), None),
             Command::StepFrames(count) => (paused.step_frames(recording, count), None),
             Command::StepIteration { forward } => (paused.step_iteration(recording, forward), None),
             Command::JumpToEvent { forward } => (paused.jump_to_event(recording, forward), None),
+            Command::JumpToKeyframe { run, forward } => (paused.jump_to_keyframe(recording, run, forward), None),
             Command::RunToBreakpoint { forward } => {
                 let halted = Self { running_to_breakpoint: false, ..paused };
                 halted.run_to_breakpoint(recording, breakpoints, forward)
@@ -158,6 +160,13 @@ impl Cursor {
     fn jump_to_event(&self, recording: &Recording, forward: bool) -> Self {
         let notable = |step: &StepRecord| step.report.events.iter().any(|event| event.kind.is_notable());
         self.step_over(&stamps_ns(recording, notable), if forward { 1 } else { -1 })
+    }
+
+    fn jump_to_keyframe(&self, recording: &Recording, run: usize, forward: bool) -> Self {
+        let steps = recording.runs.get(run).into_iter().flat_map(|run| &run.steps);
+        let keyframes = steps.filter(|step| step.report.keyframe);
+        let stamps_ns: Vec<i64> = keyframes.map(|step| step.report.stamp_ns).collect();
+        self.step_over(&stamps_ns, if forward { 1 } else { -1 })
     }
 
     /// Moves to the `count`-th stamp after the cursor (before it if negative), or to the last one in that direction;
@@ -298,6 +307,29 @@ mod tests {
         assert!(playing.playing && !after(playing, &Command::StepFrames(1)).playing);
         // Other commands are handled by the session.
         assert_eq!(at_start.apply(&Command::ToggleMarker, sample(), &Breakpoints::default()), None);
+    }
+
+    #[test]
+    fn steps_in_time_go_on_playing_and_those_to_keyframes_pause() {
+        let (first, last) = (stamps()[0], *stamps().last().unwrap());
+        let playing = after(Cursor::new(first), &Command::Play);
+        let later = after(playing, &Command::StepTime { by_ns: 1_000_000_000 });
+        assert_eq!((later.stamp_ns, later.playing), (first + 1_000_000_000, true));
+        assert_eq!(after(later, &Command::StepTime { by_ns: -1_000_000_000 }), playing);
+        assert_eq!(after(later, &Command::StepTime { by_ns: i64::MIN }).stamp_ns, first);
+        assert_eq!(after(later, &Command::StepTime { by_ns: i64::MAX }).stamp_ns, last);
+        let keyframes: Vec<i64> =
+            sample().runs[0].steps.iter().filter(|it| it.report.keyframe).map(|it| it.report.stamp_ns).collect();
+        assert!(keyframes.len() > 3, "{keyframes:?}");
+        let jump = |cursor, forward| after(cursor, &Command::JumpToKeyframe { run: 0, forward });
+        let mut cursor = playing;
+        for stamp_ns in keyframes.iter().filter(|stamp_ns| **stamp_ns > first) {
+            cursor = jump(cursor, true);
+            assert_eq!((cursor.stamp_ns, cursor.playing), (*stamp_ns, false));
+        }
+        assert_eq!(jump(cursor, true), cursor, "the last one");
+        assert_eq!(jump(cursor, false).stamp_ns, keyframes[keyframes.len() - 2]);
+        assert_eq!(after(cursor, &Command::JumpToKeyframe { run: 7, forward: true }), cursor, "no such run");
     }
 
     #[test]

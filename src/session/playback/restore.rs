@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::markers::Markers;
 use super::saved::{
     PendingRestore, SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError, VERSION, entry_error,
 };
@@ -33,8 +34,7 @@ impl SavedSession {
                 all.enable(number, saved.enabled);
             }
         });
-        session.markers_ns.clone_from(&self.markers_ns);
-        session.markers_ns.sort_unstable();
+        session.markers = Markers::new(self.markers.clone());
         session.pending = PendingRestore { forks, cursor_ns: Some(self.cursor_ns) };
         session.layout.clone_from(&self.layout);
         Ok(session)
@@ -75,7 +75,7 @@ impl Session {
             trajectories: self.plan.trajectories.iter().map(|loaded| saved_spec(&loaded.spec)).collect(),
             forks: forks.chain(pending).collect(),
             breakpoints: breakpoints.collect(),
-            markers_ns: self.markers_ns().to_vec(),
+            markers: self.markers().to_vec(),
             cursor_ns: self.pending.cursor_ns.unwrap_or(self.cursor.stamp_ns),
             layout,
         }
@@ -93,6 +93,11 @@ impl Session {
             std::thread::sleep(std::time::Duration::from_millis(CHECK_MS));
         }
         self.advance(0.0);
+    }
+
+    /// True if the position of the cursor is still to be restored, when all runs have reached it.
+    pub fn restores_cursor(&self) -> bool {
+        self.pending.cursor_ns.is_some()
     }
 
     pub fn layout(&self) -> Option<&serde_json::Value> {
@@ -148,7 +153,7 @@ fn absolute_source(source: &TrajectorySource) -> TrajectorySource {
 mod tests {
     use super::*;
     use crate::session::plan::SessionRequest;
-    use crate::session::playback::Command;
+    use crate::session::playback::{Command, Marker};
 
     fn garden(duration_s: f64) -> SessionPlan {
         let request = SessionRequest {
@@ -180,6 +185,9 @@ mod tests {
         session.apply(Command::GoToEnd);
         session.apply(Command::StepFrames(-4));
         session.apply(Command::ToggleMarker);
+        let named = session.markers().with(Marker::new(1_000_000_000, "turn"));
+        session.apply(Command::SetMarkers(named));
+        assert_eq!(session.markers().len(), 2);
         let changes: ForkChanges = "classical,freeze=yaw.d".parse().unwrap();
         session.apply(Command::Fork { run: 0, changes, label: None });
         assert!(session.take_notices().is_empty());

@@ -7,12 +7,13 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::markers::Marker;
 use crate::flight_log::LogLimits;
 use crate::sensors::LeverArm;
 use crate::session::plan::{ForkChanges, RunSpec, SessionError, SessionRequest, TrajectorySource, TrajectorySpec};
 
 /// Version of the file format that this program writes.
-pub(super) const VERSION: u32 = 1;
+pub(super) const VERSION: u32 = 2;
 
 /// Reason why a text is not a saved session, or its session cannot be opened.
 #[derive(Debug, Error)]
@@ -61,8 +62,9 @@ pub struct SavedSession {
     /// The forks, each after its parent.
     pub forks: Vec<SavedFork>,
     pub breakpoints: Vec<SavedBreakpoint>,
-    /// Stamps of the markers, in nanoseconds since the log began.
-    pub markers_ns: Vec<i64>,
+    /// Version 1 has stamps under the key `markers_ns`.
+    #[serde(default, alias = "markers_ns")]
+    pub markers: Vec<Marker>,
     /// Position of the cursor, in nanoseconds since the log began.
     pub cursor_ns: i64,
     /// Layout of the panels, in the window's format.
@@ -171,13 +173,17 @@ mod tests {
             trajectories: Vec::new(),
             forks: Vec::new(),
             breakpoints: Vec::new(),
-            markers_ns: Vec::new(),
+            markers: vec![Marker::new(5, "turn")],
             cursor_ns: 0,
             layout: None,
         };
         let text = session.to_text();
         assert!(text.contains("\"truth\": \"/logs/plain.yaml\""), "{text}");
         assert_eq!(SavedSession::from_text(&text).unwrap(), session);
+        let old =
+            text.replace("\"session_version\": 2", "\"session_version\": 1").replace("\"markers\"", "\"markers_ns\"");
+        let old = SavedSession::from_text(&old).unwrap();
+        assert_eq!(old, SavedSession { session_version: 1, ..session.clone() });
         let none = SavedSession { rig: None, ..session };
         assert_eq!(SavedSession::from_text(&none.to_text()).unwrap(), none);
     }

@@ -7,6 +7,7 @@ use super::background_diagnosis::{BackgroundDiagnosis, DiagnosisProgress};
 use super::background_images::{BackgroundImages, FrameImage};
 use super::command::{Command, PlaybackSpeed};
 use super::cursor::{Cursor, MoveOutcome};
+use super::markers::Markers;
 use super::saved::PendingRestore;
 use super::shared::{SharedComputation, Wake};
 use crate::flight_log::ImageReader;
@@ -36,7 +37,7 @@ pub struct Session {
     pub(super) recompute: RecomputeThread,
     pub(super) cursor: Cursor,
     pub(super) breakpoints: Arc<Breakpoints>,
-    pub(super) markers_ns: Vec<i64>,
+    pub(super) markers: Markers,
     /// The step whose factor rows are shown.
     pub(super) factor_rows: Option<FactorRowsView>,
     /// Forks and cursor position of a saved session that are still to be restored.
@@ -67,7 +68,7 @@ impl Session {
             engine,
             recompute,
             breakpoints: Arc::default(),
-            markers_ns: Vec::new(),
+            markers: Markers::default(),
             factor_rows: None,
             pending: PendingRestore::default(),
             layout: None,
@@ -143,9 +144,8 @@ impl Session {
         self.cursor.solver
     }
 
-    /// Stamps of the markers, in ascending order.
-    pub fn markers_ns(&self) -> &[i64] {
-        &self.markers_ns
+    pub fn markers(&self) -> &Markers {
+        &self.markers
     }
 
     /// The breakpoints with their hits so far.
@@ -208,7 +208,8 @@ impl Session {
             Command::EnableBreakpoint { number, enabled } => self.change_breakpoints(|all| all.enable(number, enabled)),
             Command::RemoveBreakpoint(number) => self.change_breakpoints(|all| all.remove(number)),
             Command::ToggleBreakpointHere => self.toggle_breakpoint_here(),
-            Command::ToggleMarker => self.toggle_marker(),
+            Command::ToggleMarker => self.markers = self.markers.toggled(self.cursor.stamp_ns),
+            Command::SetMarkers(markers) => self.markers = markers,
             Command::AddRun(spec) => self.add_run(spec),
             Command::Fork { run, changes, label } => {
                 if let Err(problem) = self.fork_at(run, self.cursor.stamp_ns, &changes, label) {
@@ -229,6 +230,8 @@ impl Session {
             | Command::SetSpeed(_)
             | Command::Seek { .. }
             | Command::StepFrames(_)
+            | Command::StepTime { .. }
+            | Command::JumpToKeyframe { .. }
             | Command::StepIteration { .. }
             | Command::JumpToEvent { .. }
             | Command::RunToBreakpoint { .. }
@@ -272,15 +275,6 @@ impl Session {
         let text = here.map(|step| format!("frame == {}", step.report.frame_index));
         if let Some(Ok(condition)) = text.map(|text| text.parse::<Condition>()) {
             self.change_breakpoints(|all| all.toggle(condition));
-        }
-    }
-
-    fn toggle_marker(&mut self) {
-        match self.markers_ns.binary_search(&self.cursor.stamp_ns) {
-            Ok(index) => {
-                self.markers_ns.remove(index);
-            }
-            Err(index) => self.markers_ns.insert(index, self.cursor.stamp_ns),
         }
     }
 }

@@ -32,6 +32,11 @@ pub(super) struct ForkDialog {
 }
 
 impl ForkDialog {
+    /// A dialog in which one key has a value.
+    pub(super) fn with_text(key: &'static str, value: String) -> Self {
+        Self { texts: [(key, value)].into(), ..Self::default() }
+    }
+
     /// Changes as text.
     fn written(&self) -> String {
         let mut parts = Vec::new();

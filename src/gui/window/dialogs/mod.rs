@@ -4,6 +4,7 @@ mod add_run;
 mod diagnosis;
 mod fork;
 mod fuzzy;
+mod markers;
 mod modal;
 mod open_log;
 mod palette;
@@ -41,6 +42,7 @@ pub(super) fn ui(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>, ac
         Some(Dialog::AddRun) => dialogs.add_run.ui(ui, ctx),
         Some(Dialog::Fork) => dialogs.fork.ui(ui, ctx),
         Some(Dialog::Diagnosis) => diagnosis::ui(ui, ctx),
+        Some(Dialog::Markers) => dialogs.markers.ui(ui, ctx),
         Some(Dialog::Palette) => dialogs.palette.ui(ui, ctx, saved_layouts, layout, actions),
         Some(Dialog::Settings) => settings::ui(ui, ctx.theme, settings, history, saved_layouts.names(), actions),
         Some(Dialog::RemoveRun) => remove_run::ui(ui, ctx, dialogs.removed_run, history),

@@ -1,6 +1,6 @@
 //! Command palette: search over all actions of the window.
 
-use egui::{Align, Key, Layout, Modifiers, RichText, ScrollArea, TextEdit, Ui, WidgetInfo};
+use egui::{Align, Button, Key, Layout, Modifiers, RichText, ScrollArea, TextEdit, Ui, WidgetInfo, vec2};
 
 use super::modal::Modal;
 use super::palette_items::{Choice, Item, found};
@@ -8,7 +8,10 @@ use crate::gui::PanelContext;
 use crate::gui::window::actions::Action;
 use crate::gui::window::saved_layouts::SavedLayouts;
 use crate::gui::window::tiles::PanelLayout;
+use crate::session::Command;
 
+/// Width of the palette and height of its list in points.
+const WIDTH: f32 = 640.0;
 const LIST_HEIGHT: f32 = 360.0;
 /// Number of rows that Page up and Page down move.
 const PAGE_ROWS: usize = 10;
@@ -31,7 +34,7 @@ impl CommandPalette {
         actions: &mut Vec<Action>,
     ) -> bool {
         let theme = *ctx.theme;
-        let width = 480.0_f32.min(ui.ctx().content_rect().width() - 60.0);
+        let width = WIDTH.min(ui.ctx().content_rect().width() - 60.0);
         let modal = Modal { name: "command palette", title: "", width };
         let (choice, stays_open) = modal.ui(ui, &theme, |ui| {
             let moved = moves(ui);
@@ -45,16 +48,13 @@ impl CommandPalette {
             if edit.changed() {
                 self.chosen = 0;
             }
-            let items = found(&self.typed, ctx, layouts, layout);
+            let items = found(&self.typed, ui, ctx, layouts, layout);
             let last = items.len().saturating_sub(1);
             let before = self.chosen;
             self.chosen = match moved {
                 Some(Move::By(rows)) => self.chosen.saturating_add_signed(rows).min(last),
                 Some(Move::Enter) | None => self.chosen.min(last),
             };
-            if items.is_empty() {
-                ui.label(RichText::new("No match").color(theme.text_weak));
-            }
             let clicked = list_ui(ui, ctx, &items, self.chosen, self.chosen != before || edit.changed());
             let entered = matches!(moved, Some(Move::Enter)).then_some(self.chosen);
             clicked.or(entered).and_then(|number| items.into_iter().nth(number)).map(|item| item.choice)
@@ -62,7 +62,10 @@ impl CommandPalette {
         let chosen = choice.is_some();
         match choice {
             Some(Choice::Action(action)) => actions.push(action),
-            Some(Choice::Parameter(parameter)) => ctx.selection.parameter = Some(parameter),
+            Some(Choice::Parameter(parameter, since_ns)) => {
+                ctx.selection.parameter = Some(parameter);
+                ctx.commands.extend(since_ns.map(|stamp_ns| Command::Seek { stamp_ns }));
+            }
             None => {}
         }
         stays_open && !chosen
@@ -91,18 +94,25 @@ fn moves(ui: &Ui) -> Option<Move> {
 /// Draws the items and scrolls to the selected one; returns the clicked one.
 fn list_ui(ui: &mut Ui, ctx: &PanelContext<'_>, items: &[Item], chosen: usize, bring: bool) -> Option<usize> {
     let mut clicked = None;
-    ScrollArea::vertical().max_height(LIST_HEIGHT).auto_shrink([false, true]).show(ui, |ui| {
+    // The height does not depend on the number of items, so that the palette stays in its place.
+    let height = LIST_HEIGHT.min(ui.ctx().content_rect().height() - 120.0);
+    ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink(false).show(ui, |ui| {
+        if items.is_empty() {
+            ui.label(RichText::new("No match").color(ctx.theme.text_weak));
+        }
         for (number, item) in items.iter().enumerate() {
-            ui.horizontal(|ui| {
-                let row = ui.selectable_label(number == chosen, &item.name);
-                if row.clicked() {
-                    clicked = Some(number);
-                }
-                if bring && number == chosen {
-                    row.scroll_to_me(None);
-                }
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    ui.label(RichText::new(item.keys).small().color(ctx.theme.text_weak));
+            let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
+            ui.allocate_ui_with_layout(size, Layout::right_to_left(Align::Center), |ui| {
+                ui.label(RichText::new(item.keys).small().color(ctx.theme.text_weak));
+                ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                    // A long name does not widen the palette.
+                    let row = ui.add(Button::selectable(number == chosen, &item.name).truncate());
+                    if row.clicked() {
+                        clicked = Some(number);
+                    }
+                    if bring && number == chosen {
+                        row.scroll_to_me(None);
+                    }
                 });
             });
         }

@@ -1,6 +1,6 @@
 //! Items of the command palette: all actions, and the content of the recording at the cursor.
 
-use std::collections::BTreeMap;
+use egui::Ui;
 
 use super::fuzzy;
 use crate::frontend::FeatureId;
@@ -14,14 +14,14 @@ use crate::gui::window::actions::{Action, TABLE, keys_of};
 use crate::gui::window::saved_layouts::SavedLayouts;
 use crate::gui::window::tiles::PanelLayout;
 use crate::gui::{Dialog, PanelContext, PanelName};
-use crate::observability::Determination;
 use crate::session::RunRecord;
 use crate::text::Named as _;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Choice {
     Action(Action),
-    Parameter(ParameterId),
+    /// Select a parameter, and go to the start of its verdict, in nanoseconds since the log began.
+    Parameter(ParameterId, Option<i64>),
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -37,11 +37,17 @@ fn item(name: impl Into<String>, action: Action) -> Item {
 }
 
 /// Items that match the typed text, best first; all actions in their own order for an empty text.
-pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &PanelLayout) -> Vec<Item> {
+pub(super) fn found(
+    typed: &str,
+    ui: &Ui,
+    ctx: &PanelContext<'_>,
+    layouts: &SavedLayouts,
+    layout: &PanelLayout,
+) -> Vec<Item> {
     let places = places(typed, ctx);
     let mut items = commands(ctx, layouts, layout);
     if !typed.trim().is_empty() {
-        items.extend(parameters(ctx));
+        items.extend(parameters(ui, ctx));
     }
     let mut scored: Vec<(i32, Item)> =
         items.into_iter().filter_map(|item| Some((fuzzy::score(typed, &item.name)?, item))).collect();
@@ -79,8 +85,10 @@ fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &PanelLayout
     if let Some(last) = runs.last().filter(|_| runs.len() > 1) {
         items.push(item(format!("Run: remove {}…", last.spec.label), Action::RemoveRun(runs.len() - 1)));
     }
-    for stamp_ns in &ctx.playback.markers_ns {
-        items.push(item(format!("Marker: go to {} s", seconds(*stamp_ns)), Action::GoTo(*stamp_ns)));
+    for marker in ctx.playback.markers.iter() {
+        let name = if marker.name.is_empty() { String::new() } else { format!("{}, ", marker.name) };
+        let text = format!("Marker: go to {name}{} s", seconds(marker.stamp_ns));
+        items.push(item(text, Action::GoTo(marker.stamp_ns)));
     }
     items.extend(SPEEDS.map(|speed| item(format!("Speed: {speed}×"), Action::Speed(speed))));
     for theme in [ThemeName::Light, ThemeName::Dark, ThemeName::Print] {
@@ -94,19 +102,20 @@ fn shown<'a>(ctx: &PanelContext<'a>) -> Option<&'a RunRecord> {
 }
 
 /// Parameters of the shown run at the cursor, with the verdicts of the flight: the palette finds `weak`.
-fn parameters(ctx: &PanelContext<'_>) -> Vec<Item> {
+fn parameters(ui: &Ui, ctx: &PanelContext<'_>) -> Vec<Item> {
     let step = shown(ctx).and_then(|run| run.step_at(ctx.cursor_ns).or_else(|| run.steps.first()));
     let names = ctx.names();
     let parameters = step.into_iter().flat_map(|step| &step.report.calibration.parameters);
-    let last = shown(ctx).and_then(|run| run.steps.last());
-    let verdicts: BTreeMap<ParameterId, Determination> =
-        last.into_iter().flat_map(|last| last.determinations()).collect();
+    let report = shown(ctx).map(|run| ctx.flight(ui, run)).unwrap_or_default();
     parameters
         .map(|parameter| {
-            let verdict = verdicts.get(parameter).map_or_else(String::new, |verdict| format!(", {}", verdict.name()));
+            let row = report.rows.iter().find(|row| row.parameter == *parameter);
+            let since_ns = row.and_then(|row| row.since_ns);
+            let since = since_ns.map_or_else(String::new, |since_ns| format!(" since {} s", seconds(since_ns)));
+            let verdict = row.map_or_else(String::new, |row| format!(", {}{since}", row.verdict.name()));
             let meaning = meaning_of(*parameter, &ctx.recording.rig);
             let name = format!("Parameter {}{verdict}: {meaning}", names.name(*parameter));
-            Item { name, keys: "", choice: Choice::Parameter(*parameter) }
+            Item { name, keys: "", choice: Choice::Parameter(*parameter, since_ns) }
         })
         .collect()
 }

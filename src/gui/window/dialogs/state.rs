@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::add_run::AddRunDialog;
 use super::fork::ForkDialog;
+use super::markers::MarkersDialog;
 use super::open_log::OpenLogDialog;
 use super::palette::CommandPalette;
 use crate::gui::Dialog;
@@ -16,6 +17,7 @@ pub struct Dialogs {
     pub(super) open_log: OpenLogDialog,
     pub(super) add_run: AddRunDialog,
     pub(super) fork: ForkDialog,
+    pub(super) markers: MarkersDialog,
     pub(super) palette: CommandPalette,
     /// Index of the run that is to be removed.
     pub(super) removed_run: usize,
@@ -33,6 +35,7 @@ impl Dialogs {
     pub fn show(&mut self, dialog: Dialog) {
         match dialog {
             Dialog::OpenLog => self.open_log.show_picker(),
+            Dialog::Markers => self.markers = MarkersDialog::default(),
             Dialog::Palette => self.palette = CommandPalette::default(),
             _ => {}
         }
@@ -49,6 +52,18 @@ impl Dialogs {
     pub(in crate::gui::window) fn ask_to_remove(&mut self, run: usize) {
         self.removed_run = run;
         self.open = Some(Dialog::RemoveRun);
+    }
+
+    /// Lists the markers, with the keyboard focus on the name of one of them.
+    pub(in crate::gui::window) fn edit_marker(&mut self, stamp_ns: i64) {
+        self.markers = MarkersDialog::with_focus(stamp_ns);
+        self.open = Some(Dialog::Markers);
+    }
+
+    /// Opens the fork dialog with the value of one key.
+    pub(in crate::gui::window) fn fork_with(&mut self, key: &'static str, value: String) {
+        self.fork = ForkDialog::with_text(key, value);
+        self.open = Some(Dialog::Fork);
     }
 
     pub fn is_open(&self) -> bool {
