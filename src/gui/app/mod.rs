@@ -42,7 +42,9 @@ use self::welcome::{Choice, Welcome};
 use crate::gui::desktop::Desktop;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::units::counted;
-use crate::gui::window::{MainWindow, NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, window_ui};
+use crate::gui::window::{
+    MainWindow, NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, first_scale, window_ui,
+};
 use crate::gui::{PanelContext, Presentation, Selection};
 use crate::session::{Command, PlaybackSpeed, Recording, WarningLine, log_warning_lines};
 
@@ -217,6 +219,10 @@ impl App {
     /// Applies and stores changed settings.
     fn apply_settings(&mut self, ui: &Ui) {
         let first = self.applied.is_none();
+        if first && self.desktop.kept_settings().is_none() {
+            let viewport = ui.input(|input| input.viewport().clone());
+            self.state.settings.scale = first_scale(viewport.monitor_size, viewport.native_pixels_per_point);
+        }
         // egui handles Ctrl with +, − and 0 itself.
         let zoom = ui.ctx().zoom_factor();
         if self

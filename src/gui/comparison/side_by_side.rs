@@ -1,20 +1,24 @@
 //! Images and scenes of all runs side by side, with one common view.
 
-use egui::{Rect, RichText, Ui, UiBuilder, pos2, vec2};
+use egui::{Rect, RichText, Ui, UiBuilder, Vec2, pos2, vec2};
 
 use crate::gui::image_panel::ImagePanel;
 use crate::gui::scene::ScenePanel;
 use crate::gui::{Panel as _, PanelContext, Selection};
 
-/// Minimum width of a run's cell in points; below it the cells form two rows.
+/// Minimum width of a scene's cell in points; below it the cells form two rows.
 const MIN_CELL_WIDTH: f32 = 250.0;
 const GAP: f32 = 6.0;
+/// Height in points of the label above an image, with its gap.
+const LABEL_HEIGHT: f32 = 22.0;
+/// Height in points of the common legend below the images, with its gap.
+const LEGEND_HEIGHT: f32 = 22.0;
 
 /// Images side by side; zoom, position and options follow the image that was changed last.
 #[derive(Default)]
 pub(super) struct Images {
     lead: ImagePanel,
-    panels: Vec<ImagePanel>,
+    pub(super) panels: Vec<ImagePanel>,
 }
 
 impl Images {
@@ -25,14 +29,22 @@ impl Images {
     pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         self.panels.resize_with(ctx.recording.runs.len(), ImagePanel::default);
         let Self { lead, panels } = self;
-        each_run(ui, ctx, |ui, ctx, run| {
+        lead.common_controls_ui(ui, ctx);
+        let (images, legend) = {
+            let room = ui.available_rect_before_wrap();
+            room.split_top_bottom_at_y((room.bottom() - LEGEND_HEIGHT).max(room.top()))
+        };
+        let columns = columns_of_images(images.size(), ctx.recording.runs.len());
+        each_run(ui, ctx, (images, columns), |ui, ctx, run| {
             let panel = &mut panels[run];
             panel.follow(lead);
-            panel.ui(ui, ctx);
+            panel.cell_ui(ui, ctx);
             if !panel.looks_like(lead) {
                 *lead = panel.view_copy();
             }
         });
+        let moved = ctx.selection.slide.is_some();
+        ui.scope_builder(UiBuilder::new().max_rect(legend), |ui| lead.legend_ui(ui, ctx, moved));
     }
 }
 
@@ -51,7 +63,10 @@ impl Scenes {
     pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         self.panels.resize_with(ctx.recording.runs.len(), ScenePanel::default);
         let Self { lead, panels } = self;
-        each_run(ui, ctx, |ui, ctx, run| {
+        let (room, count) = (ui.available_rect_before_wrap(), ctx.recording.runs.len());
+        // One row if the cells are wide enough for their options, else two.
+        let columns = if count > 2 && room.width() < MIN_CELL_WIDTH * count as f32 { 2 } else { count };
+        each_run(ui, ctx, (room, columns), |ui, ctx, run| {
             let label = &ctx.recording.runs[run].spec.label;
             ui.label(RichText::new(label).strong().color(ctx.theme.run(run).color));
             let panel = &mut panels[run];
@@ -67,12 +82,16 @@ impl Scenes {
 /// Draws each run in a cell, as if it were the shown run.
 ///
 /// A selection in one cell applies to all cells, a selected feature only to runs on the same camera.
-fn each_run(ui: &mut Ui, ctx: &mut PanelContext<'_>, mut draw: impl FnMut(&mut Ui, &mut PanelContext<'_>, usize)) {
-    let all = ui.available_rect_before_wrap();
+fn each_run(
+    ui: &mut Ui,
+    ctx: &mut PanelContext<'_>,
+    (all, columns): (Rect, usize),
+    mut draw: impl FnMut(&mut Ui, &mut PanelContext<'_>, usize),
+) {
     ui.advance_cursor_after_rect(all);
     let runs = &ctx.recording.runs;
     let camera_of = |run: usize| runs.get(run).map(|run| run.camera_key.as_str());
-    for (run, cell) in cells(all, runs.len()).into_iter().enumerate() {
+    for (run, cell) in cells(all, columns, runs.len()).into_iter().enumerate() {
         let shown = ctx.selection.run;
         let kin = camera_of(run) == camera_of(shown);
         let feature = ctx.selection.feature.filter(|_| kin);
@@ -100,14 +119,28 @@ fn each_run(ui: &mut Ui, ctx: &mut PanelContext<'_>, mut draw: impl FnMut(&mut U
     }
 }
 
-/// Rectangles of the cells: one row if they are wide enough, else two.
-fn cells(all: Rect, count: usize) -> Vec<Rect> {
-    let columns = if count > 2 && all.width() < MIN_CELL_WIDTH * count as f32 { 2 } else { count.max(1) };
+/// Number of columns with which images are largest in an area.
+fn columns_of_images(area: Vec2, count: usize) -> usize {
+    /// Width over height of most images.
+    const ASPECT: f32 = 4.0 / 3.0;
+    let height = |columns: usize| {
+        let rows = count.div_ceil(columns);
+        let cell = cell_size(area, columns, rows);
+        (cell.y - LABEL_HEIGHT).min(cell.x / ASPECT)
+    };
+    (1..=count.max(1)).max_by(|a, b| height(*a).total_cmp(&height(*b))).unwrap_or(1)
+}
+
+fn cell_size(area: Vec2, columns: usize, rows: usize) -> Vec2 {
+    let side = |whole: f32, parts: usize| (whole - GAP * (parts.max(1) - 1) as f32) / parts.max(1) as f32;
+    vec2(side(area.x, columns), side(area.y, rows))
+}
+
+/// Rectangles of the cells, row by row.
+fn cells(all: Rect, columns: usize, count: usize) -> Vec<Rect> {
+    let columns = columns.max(1);
     let rows = count.div_ceil(columns);
-    let size = vec2(
-        (all.width() - GAP * (columns - 1) as f32) / columns as f32,
-        (all.height() - GAP * (rows.max(1) - 1) as f32) / rows.max(1) as f32,
-    );
+    let size = cell_size(all.size(), columns, rows);
     let place = |run: usize| {
         let (column, row) = ((run % columns) as f32, (run / columns) as f32);
         Rect::from_min_size(pos2(all.left() + column * (size.x + GAP), all.top() + row * (size.y + GAP)), size)
@@ -124,13 +157,23 @@ mod tests {
         for width in [300.0, 700.0, 1600.0] {
             let all = Rect::from_min_size(pos2(10.0, 20.0), vec2(width, 400.0));
             for count in 1..=4 {
-                let cells = cells(all, count);
-                assert_eq!(cells.len(), count);
-                for (number, cell) in cells.iter().enumerate() {
-                    assert!(all.expand(0.1).contains_rect(*cell) && cell.is_positive());
-                    assert!(cells[..number].iter().all(|other| !other.intersects(cell.shrink(1.0))));
+                for columns in 1..=count {
+                    let cells = cells(all, columns, count);
+                    assert_eq!(cells.len(), count);
+                    for (number, cell) in cells.iter().enumerate() {
+                        assert!(all.expand(0.1).contains_rect(*cell) && cell.is_positive());
+                        assert!(cells[..number].iter().all(|other| !other.intersects(cell.shrink(1.0))));
+                    }
                 }
             }
         }
+    }
+
+    #[test]
+    fn images_are_as_large_as_possible() {
+        assert_eq!(columns_of_images(vec2(600.0, 200.0), 4), 4, "a low area has one row");
+        assert_eq!(columns_of_images(vec2(600.0, 500.0), 4), 2);
+        assert_eq!(columns_of_images(vec2(200.0, 900.0), 4), 1, "a narrow one has one column");
+        assert_eq!(columns_of_images(vec2(600.0, 200.0), 0), 1);
     }
 }

@@ -120,7 +120,7 @@ fn every_view_is_complete_and_differences_seek() {
     assert_eq!(harness.query_all_by_label("Landmarks").count(), 2, "a scene for each run");
     for (view, label, count) in [
         ("Differences", "Difference in informed rank over time", 1),
-        ("Images", "Before", 2),
+        ("Images", "Before", 1),
         ("Scenes", "Landmarks", 2),
         ("Directions", "structural rank", 1),
     ] {
@@ -146,19 +146,17 @@ fn every_view_is_complete_and_differences_seek() {
 
 #[test]
 fn sides_of_the_solve_and_selection_are_shared_by_all_images() {
-    use egui_kittest::kittest::NodeT as _;
+    use crate::gui::image_panel::SolveSide;
     let mut harness = bench(&["auto", "classical"], [1200.0, 700.0]);
     harness.get_by_label("Images").click();
     harness.run_steps(3);
-    let chosen = |harness: &Harness<'static, Bench>| -> Vec<bool> {
-        let nodes = harness.query_all_by_label("Before");
-        nodes.map(|node| node.accesskit_node().toggled() == Some(egui::accesskit::Toggled::True)).collect()
+    let sides = |harness: &Harness<'static, Bench>| -> Vec<SolveSide> {
+        harness.state().panel.images.panels.iter().map(|panel| panel.side).collect()
     };
-    assert_eq!(chosen(&harness), [false, false]);
-    let second = harness.query_all_by_label("Before").nth(1).unwrap();
-    second.click();
+    assert_eq!(sides(&harness), [SolveSide::After; 2]);
+    harness.get_by_label("Before").click();
     harness.run_steps(4);
-    assert_eq!(chosen(&harness), [true, true], "what one image shows the others show");
+    assert_eq!(sides(&harness), [SolveSide::Before; 2], "the options are those of all images");
     let at = harness.state().cursor_ns;
     assert_eq!(harness.state().panel.comparisons[1].at(Quantity::Tracks, at), Some(0.0));
 }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use egui::{Align2, Color32, Pos2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
+use egui::{Align2, Color32, Pos2, Rangef, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::model::{CalibrationHistory, ConvertedHistory};
 use super::names::{CalibrationPart, heading_of, meaning_of};
@@ -14,9 +14,9 @@ use crate::gui::chain_values::ParameterValues;
 use crate::gui::determination::look_of;
 use crate::gui::help::terms::window;
 use crate::gui::plot::{
-    BandCurve, Clicks, Curve, Interaction, PlotArea, ReadLine, Readout, StateCurve, Wheel, paint_band, paint_curve,
-    paint_ground, paint_hatch, paint_line, paint_time_axis, paint_value_axis, plot_ui, value_range_of, visible_range,
-    within_gutters,
+    BandCurve, Clicks, Curve, Interaction, PlotArea, ReadLine, Readout, StateCurve, Wheel, is_named_within, paint_band,
+    paint_curve, paint_ground, paint_hatch, paint_line, paint_time_axis, paint_value_axis, plot_ui, value_range_of,
+    visible_range, within_gutters,
 };
 use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::gui::under_pointer::{Item, offer, offer_item};
@@ -236,9 +236,21 @@ pub(super) fn cell_ui(
     title(&painter, ctx, rect, name, shown, shown_value, verdict, selected);
     if MARKED.contains(&verdict) {
         let (mark, color) = look_of(verdict, &theme);
-        let width = painter.layout_no_wrap(verdict.name().to_owned(), theme::label_font(), color).size().x;
-        let text = if width + 6.0 <= plot.width() { verdict.name() } else { mark };
-        boxed_text(&inner, &theme, plot.right_top() + vec2(-3.0, 1.0), Align2::RIGHT_TOP, text, color);
+        let width = |text: &str| painter.layout_no_wrap(text.to_owned(), theme::label_font(), color).size().x;
+        let [left, right] = [plot.left() + 3.0, plot.right() - 3.0];
+        let named = |left: f32, text: &str| {
+            is_named_within(&painter, ctx, &area, Rangef::new(left - 2.0, left + width(text) + 2.0))
+        };
+        let texts =
+            [verdict.name(), mark].into_iter().filter(|text| *text == mark || width(text) + 6.0 <= plot.width());
+        let corners = texts.flat_map(|text| [(text, right - width(text)), (text, left)]);
+        // The name of a reading cursor neither covers the verdict nor is covered.
+        let free = corners.into_iter().find(|(text, left)| !named(*left, text));
+        let (text, place) = match free {
+            Some((text, left)) => (text, pos2(left, plot.top() + 1.0)),
+            None => (mark, pos2(right - width(mark), plot.top() + TITLE_HEIGHT)),
+        };
+        boxed_text(&inner, &theme, place, Align2::LEFT_TOP, text, color);
     }
 
     let error =

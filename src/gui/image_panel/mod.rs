@@ -88,21 +88,10 @@ impl Panel for ImagePanel {
             return;
         };
         let size = ui.available_size() - vec2(0.0, 2.0 * LINE_HEIGHT + 2.0 * ui.spacing().item_spacing.y);
-        let (area, response) = ui.allocate_exact_size(size.max(Vec2::splat(16.0)), Sense::click_and_drag());
-        let name = format!("Image of {}", run.spec.label);
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
-        describe(&response, &model.caption());
-        let image = context.images.image(&run.camera_key, model.frame_index);
-        self.image_ui(ui, area, &response, context, &model, image);
-        let (legend, line) = ui.allocate_exact_size(vec2(ui.available_width(), LINE_HEIGHT), Sense::hover());
-        line.on_hover_text(LEGEND);
+        self.picture_ui(ui, context, &run.spec.label, &model, size);
         let moved = context.moved_chain(model.stamp_ns).is_some();
-        paint::legend(ui.painter(), legend, context.theme, &self.mark_options(), moved);
-        let (room, font) = (ui.available_width(), egui::TextStyle::Body.resolve(ui.style()));
-        let width =
-            |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), context.theme.text).size().x;
-        let line = ui.add(egui::Label::new(model.fitting_caption(|text| width(text) <= room)).truncate());
-        line.on_hover_text(format!("{}\n{}", model.caption(), window::CAPTION.meaning));
+        self.legend_ui(ui, context, moved);
+        caption_ui(ui, context, &model);
     }
 
     fn view_copy(&self) -> Self {
@@ -112,6 +101,54 @@ impl Panel for ImagePanel {
 }
 
 impl ImagePanel {
+    /// Draws the options that the images of all runs have in common.
+    pub(in crate::gui) fn common_controls_ui(&mut self, ui: &mut Ui, context: &PanelContext<'_>) {
+        ui.horizontal(|ui| {
+            if context.presentation.is_figure() {
+                self.side_ui(ui);
+            } else {
+                self.choices_ui(ui, mask_of(context).is_some());
+            }
+        });
+    }
+
+    /// Draws the image of a run among those of other runs: label and caption in one line, and the image.
+    pub(in crate::gui) fn cell_ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
+        let Some(run) = context.recording.runs.get(context.selection.run) else { return };
+        let model = ImageModel::at(run, context.cursor_ns);
+        ui.horizontal(|ui| {
+            ui.set_height(LINE_HEIGHT);
+            ui.colored_label(context.theme.run(context.selection.run).color, &run.spec.label);
+            if let Some(model) = &model {
+                caption_ui(ui, context, model);
+            }
+        });
+        let Some(model) = model else {
+            empty_ui(ui, "No image at or before the cursor");
+            return;
+        };
+        let size = ui.available_size();
+        self.picture_ui(ui, context, &run.spec.label, &model, size);
+    }
+
+    /// Draws the legend of the marks in one line.
+    pub(in crate::gui) fn legend_ui(&self, ui: &mut Ui, context: &PanelContext<'_>, moved: bool) {
+        let (legend, line) = ui.allocate_exact_size(vec2(ui.available_width(), LINE_HEIGHT), Sense::hover());
+        line.on_hover_text(LEGEND);
+        paint::legend(ui.painter(), legend, context.theme, &self.mark_options(), moved);
+    }
+
+    /// Draws the image with its marks in a size in points.
+    fn picture_ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>, label: &str, model: &ImageModel, size: Vec2) {
+        let (area, response) = ui.allocate_exact_size(size.max(Vec2::splat(16.0)), Sense::click_and_drag());
+        let name = format!("Image of {label}");
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+        describe(&response, &model.caption());
+        let camera_key = context.selected_run().map_or("", |run| run.camera_key.as_str());
+        let image = context.images.image(camera_key, model.frame_index);
+        self.image_ui(ui, area, &response, context, model, image);
+    }
+
     /// Copies the view of another panel.
     pub(in crate::gui) fn follow(&mut self, other: &Self) {
         let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *other;
@@ -137,24 +174,33 @@ impl ImagePanel {
         ui.horizontal(|ui| {
             ui.colored_label(context.theme.run(context.selection.run).color, run_label);
             if context.presentation.is_figure() {
-                let side = if self.side == SolveSide::Before { "before" } else { "after" };
-                ui.weak(format!("residuals {side} the solve"));
+                self.side_ui(ui);
                 return;
             }
-            let has_mask = mask_of(context).is_some();
             ui.separator();
-            ui.selectable_value(&mut self.side, SolveSide::Before, "Before")
-                .on_hover_text("Reprojection residuals before the solve of this step");
-            ui.selectable_value(&mut self.side, SolveSide::After, "After")
-                .on_hover_text("Reprojection residuals after the solve of this step");
-            let wanted = OPTIONS_WIDTH + if has_mask { MASK_WIDTH } else { 0.0 };
-            if ui.available_width() >= wanted {
-                self.options_ui(ui, has_mask);
-            } else {
-                let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
-                MenuButton::new("Show").config(config).ui(ui, |ui| self.options_ui(ui, has_mask));
-            }
+            self.choices_ui(ui, mask_of(context).is_some());
         });
+    }
+
+    /// Names the side of the solve in a figure.
+    fn side_ui(&self, ui: &mut Ui) {
+        let side = if self.side == SolveSide::Before { "before" } else { "after" };
+        ui.weak(format!("residuals {side} the solve"));
+    }
+
+    /// Draws the side of the solve and the options of the overlay.
+    fn choices_ui(&mut self, ui: &mut Ui, has_mask: bool) {
+        ui.selectable_value(&mut self.side, SolveSide::Before, "Before")
+            .on_hover_text("Reprojection residuals before the solve of this step");
+        ui.selectable_value(&mut self.side, SolveSide::After, "After")
+            .on_hover_text("Reprojection residuals after the solve of this step");
+        let wanted = OPTIONS_WIDTH + if has_mask { MASK_WIDTH } else { 0.0 };
+        if ui.available_width() >= wanted {
+            self.options_ui(ui, has_mask);
+        } else {
+            let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+            MenuButton::new("Show").config(config).ui(ui, |ui| self.options_ui(ui, has_mask));
+        }
     }
 
     /// Draws the options of the overlay: in a row where they fit, else in a menu.
@@ -294,6 +340,14 @@ impl ImagePanel {
         cached.masked = masked;
         self.texture.insert(cached).handle.id()
     }
+}
+
+/// Draws the parts of the caption that fit into the room.
+fn caption_ui(ui: &mut Ui, context: &PanelContext<'_>, model: &ImageModel) {
+    let (room, font) = (ui.available_width(), egui::TextStyle::Body.resolve(ui.style()));
+    let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), context.theme.text).size().x;
+    let line = ui.add(egui::Label::new(model.fitting_caption(|text| width(text) <= room)).truncate());
+    line.on_hover_text(format!("{}\n{}", model.caption(), window::CAPTION.meaning));
 }
 
 /// The mask of the camera of the selected run.

@@ -141,8 +141,7 @@ pub(crate) fn paint_time_labels(painter: &Painter, ctx: &PanelContext<'_>, area:
     for cursor in ReadingCursor::ALL {
         let Some(stamp_ns) = ctx.selection.reading.cursor_ns(cursor) else { continue };
         let Some(x) = x_inside(area, stamp_ns) else { continue };
-        let letter = cursor.letter();
-        let text = if with_times { format!("{letter} {} s", seconds(stamp_ns)) } else { letter.to_owned() };
+        let text = name_of(cursor, stamp_ns, with_times);
         boxed_text(painter, pos2(x, top), Align2::CENTER_TOP, &text, theme.surface, theme.accent);
     }
     let pointer = pointer_ns(ctx).filter(|_| pointed);
@@ -153,6 +152,22 @@ pub(crate) fn paint_time_labels(painter: &Painter, ctx: &PanelContext<'_>, area:
         let center = x.min(area.rect.right() - half).max(area.rect.left() + half);
         boxed_text(painter, pos2(center, top), Align2::CENTER_TOP, &text, theme.text_strong, theme.surface_raised);
     }
+}
+
+/// True if the name of a reading cursor covers a part of a range of screen x at the top of a plot.
+pub(crate) fn is_named_within(painter: &Painter, ctx: &PanelContext<'_>, area: &PlotArea, columns: Rangef) -> bool {
+    let with_times = area.rect.width() > MIN_WIDTH_WITH_TIMES;
+    ReadingCursor::ALL.into_iter().any(|cursor| {
+        let Some(stamp_ns) = ctx.selection.reading.cursor_ns(cursor) else { return false };
+        let text = name_of(cursor, stamp_ns, with_times);
+        let half = 0.5 * painter.layout_no_wrap(text, number_font(), ctx.theme.text).size().x + 2.0;
+        x_inside(area, stamp_ns).is_some_and(|x| columns.expand(half).contains(x))
+    })
+}
+
+/// Name of a reading cursor in a plot, with its time where there is room.
+fn name_of(cursor: ReadingCursor, stamp_ns: i64, with_time: bool) -> String {
+    if with_time { format!("{} {} s", cursor.letter(), seconds(stamp_ns)) } else { cursor.letter().to_owned() }
 }
 
 /// Draws the values of the curves at the time under the pointer, and where they do not overlap these the differences at

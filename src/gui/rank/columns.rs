@@ -21,8 +21,15 @@ pub(in crate::gui) struct RankColumn<'a> {
     pub(in crate::gui) rank: &'a RankReport,
 }
 
-/// Width of the names on the left in points.
+/// Width of the names on the left in points, and where columns would be narrower than [`COMFORTABLE_WIDTH`].
 const NAMES: f32 = 128.0;
+const NARROW_NAMES: f32 = 84.0;
+/// Width of a column with all its directions in points.
+const COMFORTABLE_WIDTH: f32 = 140.0;
+/// Minimum width of a direction with a legible sign in points.
+const MIN_DIRECTION_WIDTH: f32 = 13.0;
+/// Rows whose weights are all smaller are omitted where not all rows fit.
+const MIN_WEIGHT_OF_ROW: f64 = 0.2;
 /// Gap between two reports in points.
 const GAP: f32 = 10.0;
 /// Maximum width of a direction's column in points.
@@ -37,13 +44,20 @@ pub(in crate::gui) fn columns_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, column
         return;
     }
     let bottom = ui.max_rect().bottom();
-    let width = (ui.available_width() - NAMES) / columns.len() as f32;
-    table_ui(ui, ctx.theme, &ctx.names(), columns, width);
-    spectra_ui(ui, ctx.theme, &ctx.names(), columns, width);
-    heat_map_ui(ui, ctx, columns, width, bottom);
+    let (theme, names) = (*ctx.theme, ctx.names());
+    let left = if is_narrow(ui.available_width(), columns.len()) { NARROW_NAMES } else { NAMES };
+    let widths = [left, (ui.available_width() - left) / columns.len() as f32];
+    table_ui(ui, &theme, &names, columns, widths);
+    spectra_ui(ui, &theme, &names, columns, widths);
+    heat_map_ui(ui, ctx, columns, widths, bottom);
 }
 
-fn table_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankColumn<'_>], width: f32) {
+/// True if a panel of this width has no room for all directions of `count` reports.
+pub(super) fn is_narrow(width: f32, count: usize) -> bool {
+    width < NAMES + COMFORTABLE_WIDTH * count as f32
+}
+
+fn table_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankColumn<'_>], [left, width]: [f32; 2]) {
     type Cell = fn(&RankReport, &ParameterNames) -> (String, bool);
     let rows: [(&str, &str, Cell); 8] = [
         ("structural rank", "Singular values above the numerical zero, of the number of columns", |rank, _| {
@@ -94,13 +108,13 @@ fn table_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankC
             })
             .inner
         };
-        cell(ui, NAMES, RichText::new(""));
+        cell(ui, left, RichText::new(""));
         for column in columns {
             cell(ui, width, RichText::new(&column.title).strong().color(column.color));
         }
         ui.end_row();
         for (name, meaning, of) in rows {
-            cell(ui, NAMES, RichText::new(name).color(theme.text_weak)).on_hover_text(meaning);
+            cell(ui, left, RichText::new(name).color(theme.text_weak)).on_hover_text(meaning);
             for column in columns {
                 let (text, bad) = of(column.rank, names);
                 let color = if bad { theme.error } else { theme.text_strong };
@@ -115,7 +129,7 @@ fn lost(count: usize) -> (String, bool) {
     if count == 0 { ("–".to_owned(), false) } else { (count.to_string(), true) }
 }
 
-fn spectra_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankColumn<'_>], width: f32) {
+fn spectra_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankColumn<'_>], [left, width]: [f32; 2]) {
     let height = (0.16 * ui.available_height()).clamp(50.0, 130.0);
     let (_, whole) = ui.allocate_space(vec2(ui.available_width(), height));
     let caption = ["singular values", "(log scale)", "line: with priors"];
@@ -125,31 +139,56 @@ fn spectra_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[Ran
     }
     let peers: Vec<&RankReport> = columns.iter().map(|column| column.rank).collect();
     for (number, column) in columns.iter().enumerate() {
-        let left = whole.left() + NAMES + number as f32 * width;
+        let left = whole.left() + left + number as f32 * width;
         let rect = Rect::from_min_size(pos2(left, whole.top()), vec2(width - GAP, height));
         spectrum::paint(ui, theme, names, column.rank, &peers, rect, number);
     }
 }
 
-fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_>], width: f32, bottom: f32) {
+/// Draws the null and uninformed directions, the least observable first.
+fn heat_map_ui(
+    ui: &mut Ui,
+    ctx: &mut PanelContext<'_>,
+    columns: &[RankColumn<'_>],
+    [names_width, width]: [f32; 2],
+    bottom: f32,
+) {
     const HEADER: f32 = 14.0;
     let theme = *ctx.theme;
-    let parameters = parameters_of(columns);
-    let strip_width = groups::strip_width(&parameters);
+    let fitting = ((width - GAP) / MIN_DIRECTION_WIDTH).max(1.0) as usize;
+    let shown_of = |column: &RankColumn<'_>| column.rank.directions.len().min(fitting);
+    let mut parameters = parameters_of(columns);
     let room = (bottom - ui.cursor().top() - HEADER - 4.0).max(0.0);
+    let all_rows = parameters.len();
+    if parameters.len() as f32 * MIN_ROW_HEIGHT > room {
+        let weight = |column: &RankColumn<'_>, parameter: ParameterId| {
+            let entry = column.rank.parameters.iter().position(|known| *known == parameter);
+            let weights = column.rank.directions.iter().take(shown_of(column));
+            entry.map_or(0.0, |entry| {
+                weights
+                    .filter_map(|it| it.weights.get(entry))
+                    .fold(0.0, |largest: f64, weight| largest.max(weight.abs()))
+            })
+        };
+        parameters.retain(|parameter| columns.iter().any(|column| weight(column, *parameter) >= MIN_WEIGHT_OF_ROW));
+    }
+    let rows_omitted = all_rows - parameters.len();
+    let strip_width = groups::strip_width(&parameters);
     let row_height = (room / parameters.len().max(1) as f32).clamp(MIN_ROW_HEIGHT, MAX_ROW_HEIGHT);
     let size = vec2(ui.available_width(), HEADER + row_height * parameters.len() as f32);
     let (_, whole) = ui.allocate_space(size);
     let mut omitted = 0;
     for (number, column) in columns.iter().enumerate() {
-        let left = whole.left() + NAMES + number as f32 * width;
-        let fitting = ((width - GAP) / 6.0).max(1.0) as usize;
-        let directions = &column.rank.directions[..column.rank.directions.len().min(fitting)];
+        let left = whole.left() + names_width + number as f32 * width;
+        let directions = &column.rank.directions[..shown_of(column)];
         omitted += column.rank.directions.len() - directions.len();
         let pitch = ((width - GAP) / directions.len().max(1) as f32).min(MAX_COLUMN_WIDTH);
         if directions.is_empty() {
             let at = pos2(left, whole.top() + HEADER);
-            ui.painter().text(at, Align2::LEFT_TOP, "✔ full informed rank", theme::label_font(), theme.ok);
+            let galley = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), theme::label_font(), theme.ok);
+            let [long, short] = [galley("✔ full informed rank"), galley("✔ full")];
+            let fits = long.size().x <= width - GAP;
+            ui.painter().galley(at, if fits { long } else { short }, theme.ok);
         }
         for (place, direction) in directions.iter().enumerate() {
             let (mark, color) = if direction.structural { ("null", theme.error) } else { ("uninf.", theme.warn) };
@@ -179,8 +218,12 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
         let rows = rows.map(|(row, parameter)| (parameter.group(), Rangef::new(top(row), top(row + 1))));
         groups::paint_groups(ui.painter(), &theme, &rows.collect::<Vec<_>>(), whole.x_range());
     }
-    if omitted > 0 {
-        let text = format!("Not shown: {}", counted(omitted, "more observable direction"));
+    let directions = (omitted > 0).then(|| counted(omitted, "more observable direction"));
+    let rows = (rows_omitted > 0)
+        .then(|| format!("{} with |weight| < {MIN_WEIGHT_OF_ROW}", counted(rows_omitted, "parameter")));
+    let notes: Vec<String> = directions.into_iter().chain(rows).collect();
+    if !notes.is_empty() {
+        let text = format!("Not shown: {}", notes.join(", "));
         ui.label(RichText::new(text).small().color(theme.text_weak));
     }
 }

@@ -2,7 +2,7 @@
 
 use egui::{RichText, ScrollArea, Ui};
 
-use super::columns::{RankColumn, columns_ui};
+use super::columns::{RankColumn, columns_ui, is_narrow};
 use crate::gimbal::{Chain, Parameterization, SWITCH_MARGIN, Singularity};
 use crate::gui::PanelContext;
 use crate::gui::help::terms::window;
@@ -31,8 +31,15 @@ pub(in crate::gui) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
     let ranked: Vec<_> = ranked(ctx).collect();
     ScrollArea::vertical().id_salt("all runs").auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;
-        for (number, run, step, _) in &ranked {
-            singularity_ui(ui, ctx, *number, run, step);
+        let narrow = is_narrow(ui.available_width(), ranked.len());
+        let margins_ui = |ui: &mut Ui, ctx: &mut PanelContext<'_>| {
+            for (number, run, step, _) in &ranked {
+                singularity_ui(ui, ctx, *number, run, step);
+            }
+        };
+        // The wrapped lines of a narrow panel are below the columns.
+        if !narrow {
+            margins_ui(ui, ctx);
         }
         let columns: Vec<RankColumn<'_>> = ranked
             .iter()
@@ -43,6 +50,9 @@ pub(in crate::gui) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
             })
             .collect();
         columns_ui(ui, ctx, &columns);
+        if narrow {
+            margins_ui(ui, ctx);
+        }
     });
 }
 

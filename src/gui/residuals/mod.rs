@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use egui::text::{LayoutJob, TextFormat};
 use egui::{
-    Align2, Grid, Label, Rect, RichText, Role, ScrollArea, Sense, Stroke, TextStyle, TextWrapMode, Ui, Vec2,
+    Align2, Grid, Label, Rect, RichText, Role, ScrollArea, Sense, Stroke, TextStyle, TextWrapMode, Ui, UiBuilder, Vec2,
     WidgetInfo, pos2, vec2,
 };
 
@@ -31,6 +31,17 @@ use crate::session::StepRecord;
 
 /// Panel size in points from which both views are shown.
 const MIN_SIZE_FOR_BOTH: Vec2 = vec2(1000.0, 360.0);
+
+/// Width in points from which a low panel has histogram, RMS over time and factors side by side.
+const MIN_WIDTH_FOR_THREE: f32 = 780.0;
+/// Height in points from which the RMS over time is below the histogram, without scrolling.
+const MIN_HEIGHT_FOR_BOTH_PLOTS: f32 = 240.0;
+/// Width in points of the table of factors, and gap between the columns.
+const FACTORS_WIDTH: f32 = 356.0;
+const COLUMN_GAP: f32 = 10.0;
+/// Minimum heights of the plots in points.
+const MIN_HISTOGRAM_HEIGHT: f32 = 50.0;
+const MIN_OVER_TIME_HEIGHT: f32 = 74.0;
 
 /// View of a panel that is too small for both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -97,32 +108,57 @@ impl Panel for ResidualsPanel {
 
 impl ResidualsPanel {
     fn distribution_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, step: &Arc<StepRecord>) {
-        let height = ui.available_height();
-        let wide = ui.available_width() > 1.6 * height && ui.available_width() > 560.0;
+        let (height, width) = (ui.available_height(), ui.available_width());
+        let low = width > MIN_WIDTH_FOR_THREE && height < MIN_HEIGHT_FOR_BOTH_PLOTS;
+        let wide = width > 1.6 * height && width > 560.0;
         let shown = ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 3.0;
-            if wide {
+            let (report, room) = (&step.report, height - 4.0);
+            if low {
+                self.low_ui(ui, ctx, report, room);
+            } else if wide {
                 ui.columns(2, |columns| {
-                    self.left_ui(&mut columns[0], ctx, &step.report, height - 4.0);
-                    factors_ui(&mut columns[1], ctx.theme, &step.report.residuals);
+                    self.stacked_ui(&mut columns[0], ctx, report, room);
+                    factors_ui(&mut columns[1], ctx.theme, &report.residuals);
                 });
             } else {
-                let table = 22.0 + 19.0 * step.report.residuals.len() as f32;
-                self.left_ui(ui, ctx, &step.report, height - table - 8.0);
-                factors_ui(ui, ctx.theme, &step.report.residuals);
+                let table = 22.0 + 19.0 * report.residuals.len() as f32;
+                self.stacked_ui(ui, ctx, report, height - table - 8.0);
+                factors_ui(ui, ctx.theme, &report.residuals);
             }
         });
         self.overflows = overflows(&shown);
     }
 
-    fn left_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, report: &StepReport, height: f32) {
-        let theme = *ctx.theme;
+    /// Draws histogram, RMS over time and the table of factors side by side.
+    fn low_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, report: &StepReport, height: f32) {
+        let all = ui.available_rect_before_wrap();
+        let all = all.with_max_y(all.top() + height);
+        let plot = 0.5 * (all.width() - FACTORS_WIDTH) - COLUMN_GAP;
+        let mut column_ui = |left: f32, width: f32, draw: &mut dyn FnMut(&mut Ui)| {
+            let place = Rect::from_min_size(all.min + vec2(left, 0.0), vec2(width, all.height()));
+            ui.scope_builder(UiBuilder::new().max_rect(place), |ui| draw(ui));
+        };
+        column_ui(0.0, plot, &mut |ui| self.left_ui(ui, ctx, report, height));
+        column_ui(plot + COLUMN_GAP, plot, &mut |ui| self.over_time_ui(ui, ctx, height));
+        let left = 2.0 * (plot + COLUMN_GAP);
+        column_ui(left, FACTORS_WIDTH, &mut |ui| factors_ui(ui, ctx.theme, &report.residuals));
+        ui.advance_cursor_after_rect(all);
+    }
+
+    /// Draws the summary above the histogram, in a height in points.
+    fn left_ui(&self, ui: &mut Ui, ctx: &PanelContext<'_>, report: &StepReport, height: f32) {
         let Some((_, histogram)) = &self.counted else { return };
         let top = ui.cursor().top();
-        summary_ui(ui, &theme, report, histogram);
+        summary_ui(ui, ctx.theme, report, histogram);
         let below = height - (ui.cursor().top() - top);
-        let over_time = (0.3 * height).max(60.0);
-        histogram_ui(ui, &theme, histogram, (below - over_time - 24.0).max(60.0));
+        histogram_ui(ui, ctx.theme, histogram, below.max(MIN_HISTOGRAM_HEIGHT));
+    }
+
+    /// Draws summary, histogram and RMS over time one above the other.
+    fn stacked_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, report: &StepReport, height: f32) {
+        let over_time = (0.3 * height).max(MIN_OVER_TIME_HEIGHT);
+        self.left_ui(ui, ctx, report, height - over_time - 6.0);
         self.over_time_ui(ui, ctx, over_time);
     }
 

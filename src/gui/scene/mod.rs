@@ -239,7 +239,7 @@ impl ScenePanel {
         let drawing = self.world_canvas.show(ui, area, drawing);
         let painter = ui.painter_at(area);
         overlay::labels(&painter, area, scale, &drawing.labels, theme.plot_background);
-        overlay::legend(&painter, area, theme, &lines, builder.height_range_m);
+        let key = overlay::legend(&painter, area, theme, &lines, builder.height_range_m);
         let legend = Rect::from_min_size(area.min, vec2(LEGEND_WIDTH.min(area.width()), key));
         explain(ui, legend, "scene legend", window::SCENE_LEGEND);
         overlay::scale_bar(&painter, area, scale, theme, &view, &format!(", grid {spacing_m} m"));

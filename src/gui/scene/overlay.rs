@@ -54,25 +54,44 @@ pub(super) struct LegendLine {
     pub(super) text: String,
 }
 
-/// Draws the legend of the lines in the upper left corner, and below it the colour map of the landmarks.
+/// Fractions of the view's area and height from which a legend has names only.
+const MAX_LEGEND_AREA: f32 = 0.2;
+const MAX_LEGEND_HEIGHT: f32 = 0.5;
+/// Size in points of a view below which it has no legend.
+const MIN_SIZE_WITH_LEGEND: Vec2 = vec2(140.0, 100.0);
+
+/// Draws the legend of the lines in the upper left corner, and below it the colour map of the landmarks. In a small
+/// view the lines have names without values, and there is no colour map. Returns the height of the legend in points.
 pub(super) fn legend(
     painter: &Painter,
     rect: Rect,
     theme: &Theme,
     lines: &[LegendLine],
     height_range_m: Option<(f64, f64)>,
-) {
+) -> f32 {
+    if rect.width() < MIN_SIZE_WITH_LEGEND.x || rect.height() < MIN_SIZE_WITH_LEGEND.y {
+        return 0.0;
+    }
     let mut at = rect.left_top() + vec2(8.0, 6.0);
     let ground = theme.plot_background;
-    let height_text = height_range_m.map(|(low_m, high_m)| format!("landmarks, height {low_m:.1} to {high_m:.1} m"));
-    let texts = lines.iter().map(|line| &line.text).chain(&height_text);
-    let width = |text: &String| painter.layout_no_wrap(text.clone(), theme::label_font(), theme.text).size().x;
-    let size = vec2(
-        texts.map(width).fold(0.0, f32::max) + 38.0,
-        LINE_HEIGHT * (lines.len() + usize::from(height_text.is_some())) as f32,
-    );
+    let width = |text: &str| painter.layout_no_wrap(text.to_owned(), theme::label_font(), theme.text).size().x;
+    let size_of = |texts: &[&str]| {
+        vec2(texts.iter().map(|text| width(text)).fold(0.0, f32::max) + 38.0, LINE_HEIGHT * texts.len() as f32)
+    };
+    let mut height_text =
+        height_range_m.map(|(low_m, high_m)| format!("landmarks, height {low_m:.1} to {high_m:.1} m"));
+    let mut texts: Vec<&str> = lines.iter().map(|line| line.text.as_str()).collect();
+    let mut size = size_of(&texts.iter().copied().chain(height_text.as_deref()).collect::<Vec<_>>());
+    if size.x * size.y > MAX_LEGEND_AREA * rect.area() || size.y > MAX_LEGEND_HEIGHT * rect.height() {
+        // The values follow the name after a comma.
+        for text in &mut texts {
+            *text = text.split(", ").next().unwrap_or(text);
+        }
+        height_text = None;
+        size = size_of(&texts);
+    }
     painter.rect_filled(Rect::from_min_size(at, size).expand(4.0).intersect(rect), 3.0, ground.gamma_multiply(0.88));
-    for line in lines {
+    for (line, text) in lines.iter().zip(&texts) {
         let middle = at.y + 0.5 * LINE_HEIGHT;
         let sample = [pos2(at.x, middle), pos2(at.x + 28.0, middle)];
         let stroke = Stroke::new(2.0, line.style.color);
@@ -83,7 +102,7 @@ pub(super) fn legend(
                 line.style.dashes.chunks_exact(2).map(|pair| (pair[0], pair[1])).unzip();
             painter.extend(Shape::dashed_line_with_offset(&sample, stroke, &dashes, &gaps, 0.0));
         }
-        let galley = painter.layout_no_wrap(line.text.clone(), theme::label_font(), theme.text);
+        let galley = painter.layout_no_wrap((*text).to_owned(), theme::label_font(), theme.text);
         plated(painter, at + vec2(34.0, 0.0), galley, theme.text, ground);
         at.y += LINE_HEIGHT;
     }
@@ -97,6 +116,7 @@ pub(super) fn legend(
         let galley = painter.layout_no_wrap(text, theme::label_font(), theme.text_weak);
         plated(painter, at + vec2(34.0, 0.0), galley, theme.text_weak, ground);
     }
+    size.y
 }
 
 /// The text of a length: millimetres below 0.1 m.

@@ -145,3 +145,17 @@ fn the_list_of_shortcuts_fits_and_is_complete() {
         }
     }
 }
+
+#[test]
+fn a_large_window_shows_the_convergence_plots_beside_the_calibration_table() {
+    let both = |size: [f32; 2]| {
+        let harness = bench_of(sample(), size);
+        let place = |panel: PanelName| {
+            harness.state().window.places.iter().find(|(known, _)| *known == panel).map(|(_, rect)| *rect)
+        };
+        Some((place(PanelName::Calibration)?, place(PanelName::Convergence)?))
+    };
+    assert!(both([1920.0, 1080.0]).is_none());
+    let (table, plots) = both([2560.0, 1440.0]).expect("both are on the screen");
+    assert!(table.right() < plots.left() && table.top() == plots.top());
+}

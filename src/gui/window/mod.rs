@@ -24,6 +24,7 @@ mod panels;
 mod perform;
 #[cfg(test)]
 mod pointer_tests;
+mod presets;
 mod progress;
 #[cfg(test)]
 mod reading_tests;
@@ -53,6 +54,7 @@ use self::perform::perform;
 pub use self::progress::{Progress, ProgressMeter};
 pub use self::request::WindowRequest;
 pub use self::saved_layouts::SavedLayouts;
+pub(in crate::gui) use self::settings::first_scale;
 pub use self::settings::{SCALES, Settings};
 pub use self::state::MainWindow;
 pub use self::tiles::Preset;
@@ -85,7 +87,14 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
 
     // The panels are drawn before the timeline below them, because the Tab key follows the order of drawing.
     let open = state.panels.timeline.has_open_parameters();
-    let most = if open { 0.5 } else { 0.25 };
+    let many = ctx.recording.runs.len() + ctx.recording.trajectories.len() > 2;
+    let most = if open {
+        0.5
+    } else if many {
+        0.3
+    } else {
+        0.25
+    };
     let wanted = state.panels.timeline.wanted_height(ui, ctx).min(most * (ui.available_height() - STATUS_HEIGHT));
     let below = state.below_height.unwrap_or(wanted + STATUS_HEIGHT);
     let rest = ui.available_rect_before_wrap();

@@ -1,10 +1,12 @@
 //! Tests of reading values in plots: the pointer's time, reading cursors, value axes, lines of events.
 
-use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, PointerButton, Pos2, Role, TouchPhase, vec2};
+use egui::{
+    Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, PointerButton, Pos2, Role, Shape, TouchPhase, vec2,
+};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
-use super::tests::{Bench, SECOND_NS, bench_with, sample};
+use super::tests::{Bench, SECOND_NS, bench_of, bench_with, sample};
 use super::{MainWindow, Preset, window_ui};
 use crate::gui::rendering::headless::{Headless, HeadlessOptions};
 use crate::gui::rendering::painter::Painter;
@@ -145,6 +147,61 @@ fn the_menu_of_a_plot_offers_reading() {
     assert_eq!(choose("Free the value axis"), ([true, true], 0, false, false));
     assert_eq!(choose("Clear the reading cursors"), ([false, false], 0, false, false));
     assert_eq!(choose("Events and rank losses in all plots"), ([false, false], 0, true, true));
+}
+
+/// Texts on the screen and their rectangles.
+fn texts(harness: &Harness<'static, Bench>) -> Vec<(String, egui::Rect)> {
+    fn collect(shape: &Shape, texts: &mut Vec<(String, egui::Rect)>) {
+        match shape {
+            Shape::Text(text) => texts.push((text.galley.text().to_owned(), text.visual_bounding_rect())),
+            Shape::Vec(shapes) => shapes.iter().for_each(|shape| collect(shape, texts)),
+            _ => {}
+        }
+    }
+    let mut texts = Vec::new();
+    harness.output().shapes.iter().for_each(|clipped| collect(&clipped.shape, &mut texts));
+    texts
+}
+
+#[test]
+fn the_name_of_a_reading_cursor_does_not_cover_a_verdict() {
+    let mut harness = bench_with(PanelName::Convergence);
+    let verdicts = |harness: &Harness<'static, Bench>| -> Vec<egui::Rect> {
+        let marked = ["weakly determined", "not determined", "⚠", "✖"];
+        let panel = harness.state().window.places.iter().find(|(panel, _)| *panel == PanelName::Convergence).unwrap().1;
+        let of = |(text, rect): (String, egui::Rect)| {
+            (marked.contains(&text.as_str()) && panel.contains(rect.center())).then_some(rect)
+        };
+        texts(harness).into_iter().filter_map(of).collect()
+    };
+    let free = verdicts(&harness);
+    assert!(!free.is_empty());
+    let mut moved = 0;
+    for tenths in 0..40 {
+        harness.state_mut().selection.reading.set_cursor(ReadingCursor::B, tenths * SECOND_NS / 10);
+        harness.run_steps(2);
+        let shown = verdicts(&harness);
+        assert_eq!(shown.len(), free.len());
+        for (_, name) in texts(&harness).iter().filter(|(text, _)| text == "B") {
+            assert!(shown.iter().all(|verdict| !verdict.intersects(name.shrink(1.0))), "{tenths}: {name:?} {shown:?}");
+        }
+        moved += usize::from(shown != free);
+    }
+    assert!((1..40).contains(&moved), "a verdict moves only where the name would cover it: {moved}");
+}
+
+#[test]
+fn a_low_residuals_panel_shows_the_values_over_time_without_scrolling() {
+    for (size, preset) in [([1366.0, 768.0], Preset::Overview), ([1920.0, 1080.0], Preset::Overview)] {
+        let mut harness = bench_of(sample(), size);
+        harness.state_mut().window.layout.arrange(preset);
+        harness.state_mut().window.layout.set_visible(PanelName::Residuals, true);
+        harness.run_steps(4);
+        let places = &harness.state().window.places;
+        let panel = places.iter().find(|(panel, _)| *panel == PanelName::Residuals).unwrap().1;
+        let plot = harness.get_by_label("Reprojection RMS over time").rect();
+        assert!(panel.contains_rect(plot) && plot.height() > 30.0, "{size:?}: {plot:?} in {panel:?}");
+    }
 }
 
 /// A window with the pointer at a position in points, painted.

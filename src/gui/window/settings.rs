@@ -1,5 +1,6 @@
 //! User settings, stored for the next start.
 
+use egui::Vec2;
 use serde::{Deserialize, Serialize};
 
 use crate::gui::theme::ThemeName;
@@ -39,6 +40,15 @@ impl Default for Settings {
             event_lines: false,
         }
     }
+}
+
+/// Scale at the first start, given the size of the screen in points: larger on a screen of many pixels that the desktop
+/// does not scale.
+pub(in crate::gui) fn first_scale(screen: Option<Vec2>, native_pixels_per_point: Option<f32>) -> f32 {
+    /// Width in points of a screen on which the text would be too small at a scale of 1.
+    const MANY_POINTS: f32 = 3200.0;
+    let scaled = native_pixels_per_point.is_some_and(|pixels| pixels > 1.0);
+    if !scaled && screen.is_some_and(|screen| screen.x >= MANY_POINTS) { 1.5 } else { 1.0 }
 }
 
 impl Settings {
@@ -82,6 +92,16 @@ impl Settings {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_an_unscaled_screen_of_many_pixels_enlarges_the_window() {
+        let screen = |width: f32| Some(Vec2::new(width, 0.5625 * width));
+        assert_eq!(first_scale(screen(3840.0), Some(1.0)), 1.5);
+        assert_eq!(first_scale(screen(3840.0), None), 1.5);
+        assert_eq!(first_scale(screen(3840.0), Some(1.25)), 1.0);
+        assert_eq!(first_scale(screen(2560.0), Some(1.0)), 1.0);
+        assert_eq!(first_scale(None, None), 1.0);
+    }
 
     #[test]
     fn settings_are_restored_and_invalid_entries_affect_nothing_else() {

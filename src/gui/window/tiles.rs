@@ -1,66 +1,56 @@
-//! The movable panels and their layouts.
+//! The movable panels and their arrangement.
 
-use egui::{Color32, CursorIcon, Id, Rect, Response, Sense, Stroke, Ui, Visuals, WidgetText};
-use egui_tiles::{
-    Behavior, Container, Linear, LinearDir, SimplificationOptions, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
-};
+use egui::{Color32, CursorIcon, Id, Rect, Response, Sense, Stroke, Ui, Vec2, Visuals, WidgetText, vec2};
+use egui_tiles::{Behavior, Container, LinearDir, SimplificationOptions, Tabs, Tile, TileId, Tiles, Tree, UiResponse};
 
 use super::panels::Panels;
+pub use super::presets::Preset;
+use super::presets::{split, tabs, tree_of, tree_of_one};
 use crate::gui::help;
 use crate::gui::theme::{PANEL_MARGIN, Theme};
 use crate::gui::{PanelContext, PanelName};
-use crate::text::Named;
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Preset {
-    /// Image and scene above the calibration table, rank and inspector on the right.
-    #[default]
-    Overview,
-    /// Convergence and rank large.
-    Calibration,
-    /// Image and residuals large.
-    FrontEnd,
-    /// Scene large.
-    Scene,
-    /// Comparison of all runs large.
-    Comparison,
-}
-
-/// In the order of the keys 1 to 5.
-impl Named for Preset {
-    const NAMES: &'static [(Self, &'static str)] = &[
-        (Self::Overview, "Overview"),
-        (Self::Calibration, "Calibration"),
-        (Self::FrontEnd, "Front end"),
-        (Self::Scene, "Scene"),
-        (Self::Comparison, "Comparison"),
-    ];
-}
-
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct PanelLayout {
     tree: Tree<PanelName>,
     /// Panel that fills the space of all panels.
     maximized: Option<PanelName>,
     /// Preset that was chosen last; `None` for a saved layout.
     pub(crate) preset: Option<Preset>,
+    /// True if the preset is still to be arranged for the size of the window.
+    unsized_preset: bool,
+}
+
+/// Size in points of all panels from which the overview has the convergence plots beside the calibration table.
+const LARGE: Vec2 = vec2(2400.0, 1000.0);
+
+impl PartialEq for PanelLayout {
+    /// True if the same panels are in the same places.
+    fn eq(&self, other: &Self) -> bool {
+        let of = |layout: &Self| (layout.maximized, layout.preset);
+        self.tree == other.tree && of(self) == of(other)
+    }
 }
 
 impl Default for PanelLayout {
     fn default() -> Self {
-        Self { tree: tree_of(Preset::default()), maximized: None, preset: Some(Preset::default()) }
+        Self::of(Preset::default())
     }
 }
 
 impl PanelLayout {
+    fn of(preset: Preset) -> Self {
+        Self { tree: tree_of(preset, false), maximized: None, preset: Some(preset), unsized_preset: true }
+    }
+
     /// Arranges the panels as in a preset, with all panels visible.
     pub(crate) fn arrange(&mut self, preset: Preset) {
-        *self = Self { tree: tree_of(preset), maximized: None, preset: Some(preset) };
+        *self = Self::of(preset);
     }
 
     /// Applies a saved layout.
     pub(crate) fn take(&mut self, tree: Tree<PanelName>) {
-        *self = Self { tree, maximized: None, preset: None };
+        *self = Self { tree, maximized: None, preset: None, unsized_preset: false };
     }
 
     pub(crate) fn tree(&self) -> &Tree<PanelName> {
@@ -124,6 +114,13 @@ impl PanelLayout {
         focus: Option<PanelName>,
         places: &mut Vec<(PanelName, Rect)>,
     ) -> TabClicks {
+        let room = ui.available_size();
+        if let (true, Some(preset)) = (std::mem::take(&mut self.unsized_preset), self.preset)
+            && room.x >= LARGE.x
+            && room.y >= LARGE.y
+        {
+            self.tree = tree_of(preset, true);
+        }
         let mut alone = self.maximized.map(tree_of_one);
         let drawn = alone.as_mut().unwrap_or(&mut self.tree);
         let tree = TreeIds { id: drawn.id(), root: drawn.root() };
@@ -153,70 +150,6 @@ pub(crate) struct TabClicks {
     pub(crate) menu: Option<PanelName>,
     /// The panel whose tab was double-clicked.
     maximized: Option<PanelName>,
-}
-
-/// A tree with one panel.
-fn tree_of_one(panel: PanelName) -> Tree<PanelName> {
-    let mut tiles = Tiles::default();
-    let root = tabs(&mut tiles, &[panel]);
-    Tree::new(egui::Id::unique("maximized panel"), root, tiles)
-}
-
-fn tree_of(preset: Preset) -> Tree<PanelName> {
-    use LinearDir::{Horizontal, Vertical};
-    use PanelName::{
-        Breakpoints, Calibration, Comparison, Convergence, Image, Inspector, Jacobian, Laboratory, Rank, Residuals,
-        Scene,
-    };
-    let mut all = Tiles::default();
-    let tiles = &mut all;
-    if preset == Preset::Comparison {
-        let left = tabs(tiles, &[Comparison, Calibration, Convergence, Residuals, Image, Scene, Jacobian, Laboratory]);
-        let (rank, inspector) = (tabs(tiles, &[Rank]), tabs(tiles, &[Inspector, Breakpoints]));
-        let right = split(tiles, Vertical, [rank, inspector], 0.56);
-        let root = split(tiles, Horizontal, [left, right], 0.76);
-        return Tree::new(egui::Id::unique(("panels", preset.name())), root, all);
-    }
-    let (image, scene) = (tabs(tiles, &[Image]), tabs(tiles, &[Scene]));
-    let (rank, inspector) = (tabs(tiles, &[Rank]), tabs(tiles, &[Inspector, Breakpoints]));
-    let (left, right) = match preset {
-        Preset::Overview | Preset::Comparison => {
-            let plots = tabs(tiles, &[Calibration, Convergence, Residuals, Jacobian, Laboratory, Comparison]);
-            let above = split(tiles, Horizontal, [image, scene], 0.5);
-            (split(tiles, Vertical, [above, plots], 0.54), split(tiles, Vertical, [rank, inspector], 0.56))
-        }
-        Preset::Calibration => {
-            let convergence = tabs(tiles, &[Convergence, Calibration, Comparison]);
-            let residuals = tabs(tiles, &[Residuals, Jacobian, Laboratory]);
-            let images = split(tiles, Horizontal, [image, scene], 0.5);
-            let below = split(tiles, Horizontal, [images, residuals], 0.66);
-            (split(tiles, Vertical, [convergence, below], 0.62), split(tiles, Vertical, [rank, inspector], 0.68))
-        }
-        Preset::FrontEnd => {
-            let convergence = tabs(tiles, &[Convergence, Calibration, Comparison]);
-            let residuals = tabs(tiles, &[Residuals, Jacobian, Laboratory]);
-            let above = split(tiles, Horizontal, [image, residuals], 0.6);
-            let below = split(tiles, Horizontal, [convergence, scene], 0.7);
-            (split(tiles, Vertical, [above, below], 0.64), split(tiles, Vertical, [inspector, rank], 0.42))
-        }
-        Preset::Scene => {
-            let plots = tabs(tiles, &[Calibration, Convergence, Residuals, Jacobian, Laboratory, Comparison]);
-            let below = split(tiles, Horizontal, [image, plots], 0.32);
-            (split(tiles, Vertical, [scene, below], 0.68), split(tiles, Vertical, [inspector, rank], 0.42))
-        }
-    };
-    let root = split(tiles, Horizontal, [left, right], 0.745);
-    Tree::new(egui::Id::unique(("panels", preset.name())), root, all)
-}
-
-fn tabs(tiles: &mut Tiles<PanelName>, panes: &[PanelName]) -> TileId {
-    let children = panes.iter().map(|pane| tiles.insert_pane(*pane)).collect();
-    tiles.insert_tab_tile(children)
-}
-
-/// Two tiles side by side or one above the other; the first takes `fraction` of the space.
-fn split(tiles: &mut Tiles<PanelName>, direction: LinearDir, children: [TileId; 2], fraction: f32) -> TileId {
-    tiles.insert_container(Container::Linear(Linear::new_binary(direction, children, fraction)))
 }
 
 #[derive(Clone, Copy)]
