@@ -7,6 +7,8 @@ mod leaving;
 mod leaving_tests;
 mod opening_cursor;
 mod playing_log;
+#[cfg(test)]
+mod question_tests;
 mod repaint;
 mod requests;
 pub mod run_window;

@@ -14,7 +14,7 @@ use crate::gui::theme::ThemeName;
 use crate::session::{RunRecord, Session, SessionPlan, SessionRequest};
 
 /// A window with the first seconds of the sample log, processed by one run.
-fn window_over_garden(spec: &str, duration_s: f64) -> Harness<'static, App> {
+pub(super) fn window_over_garden(spec: &str, duration_s: f64) -> Harness<'static, App> {
     let log_path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
     let specs = vec![spec.parse().unwrap()];
     let request = SessionRequest { log_path, specs, duration_s: Some(duration_s), ..SessionRequest::default() };
@@ -27,11 +27,11 @@ fn window_over_garden(spec: &str, duration_s: f64) -> Harness<'static, App> {
     harness
 }
 
-fn runs(harness: &Harness<'static, App>) -> Vec<RunRecord> {
+pub(super) fn runs(harness: &Harness<'static, App>) -> Vec<RunRecord> {
     harness.state().log().unwrap().recording().runs.clone()
 }
 
-fn all_finished(harness: &Harness<'static, App>) -> bool {
+pub(super) fn all_finished(harness: &Harness<'static, App>) -> bool {
     harness.state().log().unwrap().recording().runs.iter().all(|run| run.finished)
 }
 
