@@ -117,7 +117,10 @@ fn pointer_over_timeline(number: usize) -> Event {
 /// there also with the pointer moving over the timeline, so that all plots show the values at its time.
 pub(crate) fn measure(recording: &Recording, player: &mut Player) -> Table {
     let mut table = Table::new(
-        "A frame of the window at 1920×1080, drawn on the CPU: ms, median / 95 % / largest",
+        format!(
+            "A frame of the window with {} runs at 1920×1080, drawn on the CPU: ms, median / 95 % / largest",
+            recording.runs.len()
+        ),
         &["preset", "cursor", "layout", "painting", "total", "mean CPU time"],
     );
     let steps = recording.runs.first().map_or(&[][..], |run| &run.steps);

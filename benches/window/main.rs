@@ -1,6 +1,7 @@
 //! Costs of the window on a log: opening it, memory of the recording, seeking backwards, and every frame.
 //!
-//! `cargo bench --bench window` plays the sample log with two runs at 1920×1080. Another log and other runs:
+//! `cargo bench --bench window` plays the sample log with two runs at 1920×1080, and measures the frames and the memory
+//! with four runs too. Another log and other runs:
 //! `cargo bench --bench window -- flight.mcap --run auto --run classical`, and `--budget-mib N` for the memory limit of
 //! the recording. Frames are drawn by the CPU painter, as without a graphics adapter.
 //!
@@ -36,11 +37,26 @@ use frames::Player;
 struct Arguments {
     log: PathBuf,
     runs: Vec<RunSpec>,
+    /// True if the frames are measured with four runs too.
+    with_four: bool,
     budget_mib: Option<usize>,
     /// Frames of the simulated long flight.
     frames: Option<usize>,
     /// Number of runs of the study that is measured instead.
     study: Option<usize>,
+}
+
+fn specs(names: &[&str]) -> Result<Vec<RunSpec>> {
+    Ok(names.iter().map(|name| name.parse()).collect::<Result<_, _>>()?)
+}
+
+/// Session whose runs are computed.
+fn computed(plan: &SessionPlan) -> Result<Session> {
+    let session = Session::start(plan.clone())?;
+    while session.recording().runs.iter().any(|run| !run.finished) {
+        sleep(Duration::from_millis(50));
+    }
+    Ok(session)
 }
 
 impl Arguments {
@@ -68,11 +84,12 @@ impl Arguments {
                 }
             }
         }
-        if runs.is_empty() {
-            runs = ["auto", "classical"].map(str::parse).into_iter().collect::<Result<_, _>>()?;
+        let with_four = runs.is_empty();
+        if with_four {
+            runs = specs(&["auto", "classical"])?;
         }
         let sample = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
-        Ok(Self { log: log.unwrap_or_else(sample), runs, budget_mib, frames, study })
+        Ok(Self { log: log.unwrap_or_else(sample), runs, with_four, budget_mib, frames, study })
     }
 
     fn plan(&self) -> Result<SessionPlan> {
@@ -100,10 +117,7 @@ fn main() -> Result<()> {
     println!("{}", opening::measure(&arguments)?);
 
     let plan = arguments.plan()?;
-    let mut session = Session::start(plan.clone())?;
-    while session.recording().runs.iter().any(|run| !run.finished) {
-        sleep(Duration::from_millis(50));
-    }
+    let mut session = computed(&plan)?;
     println!("{}", travel::memory(&session));
     let mut player = Player::new(&plan);
     println!("{}", travel::measure(&mut session, &mut player));
@@ -113,5 +127,13 @@ fn main() -> Result<()> {
         println!("{}", long::memory(&recording));
     }
     println!("{}", frames::measure(&recording, &mut player));
+    if arguments.with_four {
+        drop((session, player, recording));
+        let runs = specs(&["auto", "static", "cluster", "classical"])?;
+        let plan = Arguments { runs, ..arguments }.plan()?;
+        let session = computed(&plan)?;
+        println!("{}", travel::memory(&session));
+        println!("{}", frames::measure(&session.recording(), &mut Player::new(&plan)));
+    }
     Ok(())
 }
