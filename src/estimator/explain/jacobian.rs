@@ -225,7 +225,7 @@ fn window_camera<'a>(
     model: &'a CameraModel,
     start: usize,
 ) -> WindowCamera<'a> {
-    let (sigma_px, landmark_model) = (source.pixel_sigma_px, source.landmark_model);
+    let (sigma_px, landmark_model) = (source.pixel_sigmas_px[camera], source.landmark_model);
     // The robust weights are known.
     let visual =
         VisualModel { camera: model, sigma_px, loss: RobustLoss::None, track_loss: RobustLoss::None, landmark_model };

@@ -29,10 +29,15 @@ pub(crate) struct VisualModel<'a> {
 }
 
 impl<'a> VisualModel<'a> {
-    /// Model with the robust losses of observations and of tracks.
-    pub(crate) fn new(camera: &'a CameraModel, options: &EstimatorOptions, losses: [RobustLoss; 2]) -> Self {
-        let [loss, track_loss] = losses;
-        Self { camera, sigma_px: options.pixel_sigma_px, loss, track_loss, landmark_model: options.landmark_model }
+    /// Model with the ratio of its noise to that of the options, and with the robust losses of observations and of tracks.
+    pub(crate) fn new(
+        camera: &'a CameraModel,
+        options: &EstimatorOptions,
+        noise: f64,
+        [loss, track_loss]: [RobustLoss; 2],
+    ) -> Self {
+        let sigma_px = noise * options.pixel_sigma_px;
+        Self { camera, sigma_px, loss, track_loss, landmark_model: options.landmark_model }
     }
 
     /// Robust cost of a track and the weight of all its observations, from the sum of their robust costs.

@@ -41,7 +41,8 @@ pub struct JacobianSource {
     /// Column-block indices of the norms of all packed rows, parallel to `norms`.
     pub(crate) columns: Box<[u16]>,
     pub(crate) norms: Box<[f32]>,
-    pub(crate) pixel_sigma_px: f64,
+    /// Standard deviation of an observation by camera.
+    pub(crate) pixel_sigmas_px: Box<[f64]>,
     pub(crate) landmark_model: LandmarkModel,
 }
 

@@ -8,6 +8,7 @@ use super::{Event, FactorRows, FeatureReport, JacobianSource, ResidualSummary, S
 use crate::estimator::problem::information_gain::InformationGain;
 use crate::estimator::problem::linearization::Linearization;
 use crate::estimator::problem::solver::IterationReport;
+use crate::frontend::FeatureId;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization, Singularity};
 
@@ -107,8 +108,9 @@ pub struct StepReport {
     pub phase: Phase,
     /// Number of restarts so far.
     pub restarts: usize,
-    /// Assumed standard deviation of a well tracked pixel, per coordinate.
-    pub pixel_sigma_px: f64,
+    /// Standard deviation of a well tracked pixel by camera, per coordinate; it follows the residuals. Empty while
+    /// initializing.
+    pub pixel_sigmas_px: Vec<f64>,
     /// Standard deviation of a pixel with the same average information, robust weights of this step included.
     pub effective_pixel_sigma_px: f64,
     /// Scale of the robust loss by camera, in pixels; with Cauchy's loss an observation with this residual has half
@@ -154,6 +156,11 @@ pub struct StepReport {
 }
 
 impl StepReport {
+    /// Standard deviation of a pixel of a feature's camera, per coordinate; NaN while initializing.
+    pub fn pixel_sigma_px(&self, feature: FeatureId) -> f64 {
+        self.pixel_sigmas_px.get(feature.camera()).copied().unwrap_or(f64::NAN)
+    }
+
     /// Newest frame of the window, `None` while initializing.
     pub fn newest(&self) -> Option<&FrameStateReport> {
         self.window.last()

@@ -84,7 +84,9 @@ impl WindowState {
             rows: packed.into(),
             columns: norms.iter().map(|(column, _)| *column).collect(),
             norms: norms.iter().map(|(_, norm)| *norm).collect(),
-            pixel_sigma_px: options.pixel_sigma_px,
+            pixel_sigmas_px: (0..calibration.cameras())
+                .map(|camera| self.visual_model(setup, camera).sigma_px)
+                .collect(),
             landmark_model: options.landmark_model,
         };
         (source, kept)

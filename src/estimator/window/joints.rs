@@ -62,7 +62,7 @@ impl WindowState {
         view: &CameraView<'_>,
     ) -> (DMatrix<f64>, DVector<f64>, usize) {
         let joints = angles_rad.len();
-        let sigma = setup.config.options.pixel_sigma_px;
+        let sigma = self.visual_model(setup, MAIN).sigma_px;
         let mut state = self.frames[slot].state.clone();
         state.joints_rad = angles_rad.to_vec();
         let sensor = self.calibration.of(MAIN).sensor_model();

@@ -1,4 +1,4 @@
-//! Scale of the robust loss, which follows the residuals of the window.
+//! Scale of the robust loss and the noise of observations, which follow the residuals of the window.
 
 use crate::estimator::config::VisualLoss;
 use crate::geometry::MEDIAN_PLANAR_LENGTH;
@@ -11,10 +11,14 @@ const SCALE_IN_SIGMAS: f64 = 3.3;
 /// Bounds of the scale, in standard deviations of a pixel: the largest is that of a recording whose clocks, lens or
 /// shutter are wrong, so that correct observations keep their weight.
 const BOUNDS: [f64; 2] = [0.3, 1.0];
+/// Smallest standard deviation of an observation relative to that of the options. It is the scale of the loss down to
+/// there: the errors of a track last as long as the track, so that several times its residuals count as noise, as much on
+/// clean images as on others.
+const LEAST_NOISE: f64 = 0.5;
 /// Time constant with which the scale follows, in seconds.
 const TIME_CONSTANT_S: f64 = 2.0;
 
-/// Scale of the loss of one camera, in standard deviations of a pixel.
+/// Scale of the loss of one camera, in standard deviations of a pixel by the options.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LossScale(f64);
 
@@ -26,20 +30,31 @@ impl Default for LossScale {
 }
 
 impl LossScale {
-    /// Losses of the camera's observations and of whole tracks.
+    /// Ratio of the standard deviation of the camera's observations to that of the options.
+    pub(crate) fn noise(self, option: VisualLoss) -> f64 {
+        match option {
+            VisualLoss::Adaptive => self.0.max(LEAST_NOISE),
+            VisualLoss::Fixed(_) => 1.0,
+        }
+    }
+
+    /// Losses of the camera's observations and of whole tracks, in standard deviations by [`Self::noise`].
     ///
     /// The loss of the tracks is nearly as narrow on clean images and fades out as the scale opens: with wrong clocks,
     /// lenses or shutters every track has residuals that do not average out.
     pub(crate) fn losses(self, option: VisualLoss) -> [RobustLoss; 2] {
         match option {
-            VisualLoss::Adaptive => [RobustLoss::Cauchy(self.0), self.track_loss()],
+            VisualLoss::Adaptive => {
+                let noise = self.noise(option);
+                [RobustLoss::Cauchy(self.0 / noise), self.track_loss(noise)]
+            }
             VisualLoss::Fixed(loss) => [loss, RobustLoss::None],
         }
     }
 
-    fn track_loss(self) -> RobustLoss {
+    fn track_loss(self, noise: f64) -> RobustLoss {
         let closed = 1.0 - (self.0 / BOUNDS[1]).powi(2);
-        if closed > 0.0 { RobustLoss::Cauchy(self.0 / closed) } else { RobustLoss::None }
+        if closed > 0.0 { RobustLoss::Cauchy(self.0 / closed / noise) } else { RobustLoss::None }
     }
 
     /// Follows the median length of the residuals of a solved window, in standard deviations of a pixel, for an interval
@@ -62,8 +77,10 @@ mod tests {
     fn scale_after(seconds: usize, median_residual: f64) -> f64 {
         let mut scale = LossScale::default();
         (0..20 * seconds).for_each(|_| scale.follow(median_residual, 0.05));
-        let [RobustLoss::Cauchy(scale), _] = scale.losses(VisualLoss::Adaptive) else { panic!("it is Cauchy's loss") };
-        scale
+        let [RobustLoss::Cauchy(in_sigmas), _] = scale.losses(VisualLoss::Adaptive) else {
+            panic!("it is Cauchy's loss")
+        };
+        in_sigmas * scale.noise(VisualLoss::Adaptive)
     }
 
     #[test]
@@ -81,6 +98,13 @@ mod tests {
             panic!("both are Cauchy's loss")
         };
         assert!(of_tracks > narrow && of_tracks < 1.3 * narrow, "{narrow} and {of_tracks}");
+    }
+
+    #[test]
+    fn observations_weigh_up_to_four_times_as_much_on_clean_images() {
+        let noise = |scale: f64| LossScale(scale).noise(VisualLoss::Adaptive);
+        assert_eq!([0.3, 0.5, 0.8, 1.0].map(noise), [0.5, 0.5, 0.8, 1.0]);
+        assert_eq!(LossScale(0.3).noise(VisualLoss::Fixed(RobustLoss::None)), 1.0);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use super::setup::Setup;
 use super::solve::{SolvedWindow, TrackResiduals, median_length};
 use super::window_state::WindowState;
 use crate::estimator::factors::FactorKind;
+use crate::estimator::factors::reprojection::VisualModel;
 use crate::estimator::problem::solver::Solution;
 use crate::estimator::report::{
     CalibrationEstimate, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport, Phase,
@@ -25,7 +26,7 @@ pub(crate) fn empty_report(
         stamp_ns: input.stamp_ns,
         phase,
         restarts: 0,
-        pixel_sigma_px: setup.config.options.pixel_sigma_px,
+        pixel_sigmas_px: Vec::new(),
         effective_pixel_sigma_px: setup.config.options.pixel_sigma_px,
         loss_scales_px: Vec::new(),
         events: Vec::new(),
@@ -65,11 +66,11 @@ impl WindowState {
         report.newest_pose_covariance = solved.solution.newest_pose_covariance.map(PoseCovariance);
         report.features = self.feature_reports(setup, solved);
         report.counts = FeatureCounts::of(&report.features);
-        report.effective_pixel_sigma_px = effective_sigma(report.pixel_sigma_px, &report.features);
-        report.loss_scales_px = (0..solved.cameras.len())
-            .map(|camera| self.visual_model(setup, camera))
-            .map(|model| model.loss.scale() * model.sigma_px)
-            .collect();
+        let models: Vec<VisualModel<'_>> =
+            (0..solved.cameras.len()).map(|camera| self.visual_model(setup, camera)).collect();
+        report.pixel_sigmas_px = models.iter().map(|model| model.sigma_px).collect();
+        report.loss_scales_px = models.iter().map(|model| model.loss.scale() * model.sigma_px).collect();
+        report.effective_pixel_sigma_px = effective_sigma(&report).unwrap_or(report.effective_pixel_sigma_px);
         report.landmarks = self.landmark_reports(setup, solved);
         report.residuals = residual_summaries(&solved.solution);
         report.reprojection_rms_before_px =
@@ -178,16 +179,19 @@ fn residual_summaries(solution: &Solution) -> Vec<ResidualSummary> {
     FactorKind::all().filter(shown).map(summary).collect()
 }
 
-/// Standard deviation of a pixel with the same average information as the observations, robust weights included.
-fn effective_sigma(sigma_px: f64, features: &[FeatureReport]) -> f64 {
-    let weights = || {
-        let kept = features.iter().filter(|feature| !feature.rejected);
-        kept.flat_map(|feature| feature.observations.iter())
-            .map(|seen| seen.robust_weight)
-            .filter(|weight| *weight > 0.0)
+/// Standard deviation of a pixel with the same average information as the observations, robust weights included; `None`
+/// without any.
+fn effective_sigma(report: &StepReport) -> Option<f64> {
+    let information = || {
+        let kept = report.features.iter().filter(|feature| !feature.rejected);
+        kept.flat_map(|feature| {
+            let sigma_px = report.pixel_sigma_px(feature.id);
+            let weights = feature.observations.iter().map(|seen| seen.robust_weight).filter(|weight| *weight > 0.0);
+            weights.map(move |weight| weight / sigma_px.powi(2))
+        })
     };
-    let count = weights().count();
-    if count == 0 { sigma_px } else { sigma_px / (weights().sum::<f64>() / count as f64).sqrt() }
+    let count = information().count();
+    (count > 0).then(|| (information().sum::<f64>() / count as f64).sqrt().recip())
 }
 
 fn root_mean_square<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> f64 {

@@ -67,7 +67,8 @@ impl WindowState {
     /// Camera model, pixel noise and current robust losses of a camera.
     pub(crate) fn visual_model<'a>(&self, setup: &'a Setup, camera: usize) -> VisualModel<'a> {
         let options = &setup.config.options;
-        VisualModel::new(setup.config.model(camera), options, self.loss_scales[camera].losses(options.loss))
+        let scale = self.loss_scales[camera];
+        VisualModel::new(setup.config.model(camera), options, scale.noise(options.loss), scale.losses(options.loss))
     }
 
     /// Features that take part in the solve, by camera.

@@ -144,7 +144,7 @@ pub(super) fn block_ui(
         let seen = feature.observations.iter().find(|seen| seen.frame_index == frame.0)?;
         let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
         // Conversion from standard deviations to pixels.
-        let pixels = report.pixel_sigma_px / seen.robust_weight.sqrt() / shown.factor;
+        let pixels = report.pixel_sigma_px(id) / seen.robust_weight.sqrt() / shown.factor;
         let slopes = [0, 1].map(|axis| significant(rows.rows[(2 * place + axis, column)] * pixels));
         let mut cells = vec![frame.to_string()];
         cells.extend(residual.map(|pixel| fixed(pixel, 2)));

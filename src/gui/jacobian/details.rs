@@ -152,7 +152,7 @@ fn observations_ui(
         cells.extend(residual.map(|pixel| fixed(pixel, 2)));
         cells.push(fixed(seen.robust_weight, 2));
         // Conversion from standard deviations to pixels.
-        let pixels = step.report.pixel_sigma_px / seen.robust_weight.sqrt();
+        let pixels = step.report.pixel_sigma_px(feature.id) / seen.robust_weight.sqrt();
         for (part, (_, factor)) in parts.iter().enumerate() {
             let at = |axis: usize| rows.rows[(2 * place + axis, block.start + part)] * pixels / factor;
             cells.extend([significant(at(0)), significant(at(1))]);

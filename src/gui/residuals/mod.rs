@@ -246,7 +246,8 @@ fn summary_ui(ui: &mut Ui, theme: &Theme, report: &StepReport, histogram: &Resid
         pair("observations", histogram.observations.to_string(), hover);
         let scales = report.loss_scales_px.iter().map(|scale_px| fixed(*scale_px, 2)).collect::<Vec<_>>().join(", ");
         let hover = "Scale of the robust loss for each camera: an observation with this residual has half weight. It \
-                     follows the median of the residuals";
+                     follows the median of the residuals, and the assumed noise of an observation follows it, too, \
+                     within 0.125 and 0.25 px";
         pair("loss scale", format!("{scales} px"), hover);
         let hover = "Observations with a robust weight below 0.5";
         pair("downweighted", histogram.downweighted.to_string(), hover);

@@ -28,7 +28,7 @@ impl StepRecord {
                 stamp_ns: report.stamp_ns,
                 phase: report.phase,
                 restarts: report.restarts,
-                pixel_sigma_px: report.pixel_sigma_px,
+                pixel_sigmas_px: report.pixel_sigmas_px.clone(),
                 effective_pixel_sigma_px: report.effective_pixel_sigma_px,
                 loss_scales_px: report.loss_scales_px.clone(),
                 events: report.events.clone(),
