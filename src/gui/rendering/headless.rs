@@ -8,8 +8,9 @@ use image::RgbaImage;
 
 use super::chunks::{Chunk, Tessellation};
 use super::painter::Painter;
-use super::svg::{self, Textures};
-use crate::gui::theme::{Theme, ThemeName};
+use super::vector::{Drawing, Textures, elements};
+use super::{pdf, svg};
+use crate::gui::theme::{Theme, ThemeName, fonts};
 
 /// Frames before the screenshot, in which layouts, scroll areas and plot ranges settle.
 const SETTLING_FRAMES: usize = 3;
@@ -127,9 +128,8 @@ impl Headless {
         self.context.run_ui(input, ui)
     }
 
-    /// Runs the user interface until it has settled and returns it as an SVG drawing; see [`svg_of`] for the
-    /// parameters.
-    pub fn drawing(&mut self, prefix: &str, title: &str, mut ui: impl FnMut(&mut Ui)) -> String {
+    /// Runs the user interface until it has settled and returns it as elements, with a title and a description.
+    fn drawing(&mut self, [title, description]: [&str; 2], mut ui: impl FnMut(&mut Ui)) -> Drawing {
         let mut textures = Textures::default();
         let mut shapes = Vec::new();
         for _ in 0..SETTLING_FRAMES {
@@ -141,7 +141,9 @@ impl Headless {
         }
         let HeadlessOptions { size_px, pixels_per_point, theme } = self.options;
         let size = Vec2::new(size_px[0] as f32, size_px[1] as f32) / pixels_per_point;
-        svg::document(&shapes, &textures, size, size_px, Theme::of(theme).background, prefix, title)
+        let elements = elements(&shapes, size);
+        let background = Theme::of(theme).background;
+        Drawing { elements, textures, size, background, title: title.to_owned(), description: description.to_owned() }
     }
 
     /// Runs the user interface until it has settled and paints it over the theme's background.
@@ -172,12 +174,33 @@ pub fn draw(options: HeadlessOptions, ui: impl FnMut(&mut Ui)) -> RgbaImage {
     screenshot
 }
 
-/// A user interface as an SVG drawing.
+/// A user interface as an SVG drawing of the size in pixels.
 ///
 /// `title` is the title of the drawing; `prefix` is the prefix of the ids of its elements, so that one page can hold
 /// several drawings.
 pub fn svg_of(options: HeadlessOptions, prefix: &str, title: &str, ui: impl FnMut(&mut Ui)) -> String {
-    Headless::new(options).drawing(prefix, title, ui)
+    let drawing = Headless::new(options).drawing([title, ""], ui);
+    svg::document(&drawing, &options.size_px.map(|side| side.to_string()), prefix)
+}
+
+/// A user interface as an SVG drawing of a size in millimetres, with a title and a description.
+pub fn svg_in_mm(options: HeadlessOptions, size_mm: [f64; 2], texts: [&str; 2], ui: impl FnMut(&mut Ui)) -> String {
+    let drawing = Headless::new(options).drawing(texts, ui);
+    svg::document(&drawing, &size_mm.map(|side_mm| format!("{}mm", (side_mm * 1e3).round() / 1e3)), "clip")
+}
+
+/// A user interface as a PDF of one page of a size in millimetres, with a title and a description; `None` if a font
+/// cannot be embedded.
+pub fn pdf_of(
+    options: HeadlessOptions,
+    size_mm: [f64; 2],
+    texts: [&str; 2],
+    ui: impl FnMut(&mut Ui),
+) -> Option<Vec<u8>> {
+    /// Points of 1/72 inch in a millimetre.
+    const POINTS_PER_MM: f64 = 72.0 / 25.4;
+    let drawing = Headless::new(options).drawing(texts, ui);
+    pdf::document(&drawing, size_mm.map(|side_mm| (side_mm * POINTS_PER_MM) as f32), &fonts())
 }
 
 #[cfg(test)]

@@ -1,9 +1,11 @@
-//! Painting of egui's frames without a window into pixels or SVG: on the CPU with identical bytes on every machine, or
-//! on a graphics adapter.
+//! Painting of egui's frames without a window into pixels, SVG or PDF: on the CPU with identical bytes on every machine,
+//! or on a graphics adapter.
 
 pub mod chunks;
 pub mod headless;
 mod mixing;
 pub mod offscreen;
 pub mod painter;
+mod pdf;
 mod svg;
+mod vector;

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use self::color::{contrast, rgb};
 pub use self::color::{mix, viridis};
-pub(crate) use self::style::dialog_frame;
+pub(crate) use self::style::{dialog_frame, fonts};
 pub use self::style::{label_font, number_font};
 use crate::text::Named;
 

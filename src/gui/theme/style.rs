@@ -70,7 +70,7 @@ impl Theme {
 }
 
 /// The fonts of egui; the proportional family falls back to the monospace font, the only one with arrows.
-fn fonts() -> FontDefinitions {
+pub(crate) fn fonts() -> FontDefinitions {
     let mut fonts = FontDefinitions::default();
     let monospace = fonts.families.get(&FontFamily::Monospace).and_then(|names| names.first()).cloned();
     fonts.families.entry(FontFamily::Proportional).or_default().extend(monospace);

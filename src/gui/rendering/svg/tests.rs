@@ -1,19 +1,31 @@
 use egui::epaint::{ClippedShape, Mesh, RectShape};
 use egui::{Color32, Pos2, Rect, RichText, Shape, Stroke, Ui, pos2};
 
-use super::mesh::quad;
-use super::{Textures, document};
+use super::document;
 use crate::gui::rendering::headless::{HeadlessOptions, svg_of};
+use crate::gui::rendering::vector::{Drawing, Textures, elements, quad};
 use crate::gui::theme::ThemeName;
 
 const SCREEN: Rect = Rect { min: Pos2::ZERO, max: pos2(100.0, 50.0) };
 
 fn check(shapes: Vec<Shape>, expected: &[&str]) {
     let clipped: Vec<ClippedShape> = shapes.into_iter().map(|shape| clipped(SCREEN, shape)).collect();
-    let svg = document(&clipped, &Textures::default(), SCREEN.size(), [200, 100], Color32::WHITE, "p", "title");
+    let svg = svg(&clipped, ["200", "100"]);
     for part in expected {
         assert!(svg.contains(part), "{part} is missing in {svg}");
     }
+}
+
+fn svg(shapes: &[ClippedShape], size: [&str; 2]) -> String {
+    let drawing = Drawing {
+        elements: elements(shapes, SCREEN.size()),
+        textures: Textures::default(),
+        size: SCREEN.size(),
+        background: Color32::WHITE,
+        title: "title".to_owned(),
+        description: "a < b".to_owned(),
+    };
+    document(&drawing, &size.map(str::to_owned), "p")
 }
 
 fn clipped(clip_rect: Rect, shape: Shape) -> ClippedShape {
@@ -45,7 +57,9 @@ fn shapes_are_clipped_and_shapes_outside_are_omitted() {
     let clip = Rect::from_min_max(pos2(10.0, 10.0), pos2(30.0, 30.0));
     let circle = |x: f32| clipped(clip, Shape::circle_filled(pos2(x, 20.0), 3.0, Color32::BLUE));
     let shapes = [circle(20.0), circle(29.0), circle(60.0)];
-    let svg = document(&shapes, &Textures::default(), SCREEN.size(), [100, 50], Color32::WHITE, "p", "");
+    let svg = svg(&shapes, ["30mm", "15mm"]);
+    assert!(svg.contains(r#"width="30mm" height="15mm" viewBox="0 0 100 50""#), "{svg}");
+    assert!(svg.contains("<title>title</title>\n<desc>a &lt; b</desc>"), "{svg}");
     assert_eq!((svg.matches("<circle").count(), svg.matches("clip-path=").count()), (2, 1));
     assert!(svg.contains(r#"<clipPath id="p0"><rect x="10" y="10" width="20" height="20"/></clipPath>"#), "{svg}");
     assert_eq!(svg.matches("<g").count(), svg.matches("</g>").count());

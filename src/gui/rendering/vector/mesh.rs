@@ -5,19 +5,19 @@ use std::collections::BTreeSet;
 use egui::epaint::{Mesh, Vertex};
 use egui::{Color32, Pos2, Rect};
 
-use super::element::{lines_through, number, paint, put};
+use super::element::{Area, Element};
 
-/// A mesh without a texture. Consecutive triangles of the same colour become one path, so that no seams are visible.
+/// A mesh without a texture. Consecutive triangles of the same colour become one element, so that no seams are visible.
 ///
 /// A triangle with different corner colours gets their mean.
-pub(super) fn mesh(text: &mut String, mesh: &Mesh) {
-    let mut color = Color32::TRANSPARENT;
-    let mut path = String::new();
-    let mut finish = |path: &mut String, color: Color32| {
-        if !path.is_empty() && color.a() > 0 {
-            put(text, format_args!("<path d=\"{path}\"{}/>\n", paint("fill", color)));
+pub(super) fn add_mesh(elements: &mut Vec<Element>, mesh: &Mesh) {
+    let mut fill = Color32::TRANSPARENT;
+    let mut areas: Vec<Area> = Vec::new();
+    let mut finish = |areas: &mut Vec<Area>, fill: Color32| {
+        let areas = std::mem::take(areas);
+        if !areas.is_empty() && fill.a() > 0 {
+            elements.push(Element::Areas { areas, fill });
         }
-        path.clear();
     };
     let corner = |index: &u32| mesh.vertices.get(*index as usize);
     let mut indices = mesh.indices.as_slice();
@@ -25,9 +25,9 @@ pub(super) fn mesh(text: &mut String, mesh: &Mesh) {
         indices = rest;
         let [Some(a), Some(b), Some(c)] = [corner(first), corner(second), corner(third)] else { continue };
         let shown = mean_color([a, b, c]);
-        if shown != color {
-            finish(&mut path, color);
-            color = shown;
+        if shown != fill {
+            finish(&mut areas, fill);
+            fill = shown;
         }
         let next = rest.first_chunk::<3>().filter(|next| {
             let corners = next.iter().filter_map(corner);
@@ -35,20 +35,18 @@ pub(super) fn mesh(text: &mut String, mesh: &Mesh) {
         });
         if let Some(rect) = next.and_then(|next| quad(mesh, &[*first, *second, *third], next)) {
             indices = &rest[3..];
-            let [left, top, right, bottom] = [rect.left(), rect.top(), rect.right(), rect.bottom()].map(number);
-            put(&mut path, format_args!("M{left} {top}H{right}V{bottom}H{left}Z"));
+            areas.push(Area::Rect(rect));
         } else {
-            triangle(&mut path, [a.pos, b.pos, c.pos]);
+            areas.push(Area::Triangle(clockwise([a.pos, b.pos, c.pos])));
         }
     }
-    finish(&mut path, color);
+    finish(&mut areas, fill);
 }
 
-/// A triangle with its corners clockwise on the screen, so that triangles of one path never cancel each other.
-fn triangle(path: &mut String, [a, b, c]: [Pos2; 3]) {
+/// The corners clockwise on the screen, so that triangles of one element never cancel each other.
+fn clockwise([a, b, c]: [Pos2; 3]) -> [Pos2; 3] {
     let turns_right = (b - a).x * (c - a).y - (b - a).y * (c - a).x >= 0.0;
-    let corners = if turns_right { [a, b, c] } else { [a, c, b] };
-    lines_through(path, &corners, true);
+    if turns_right { [a, b, c] } else { [a, c, b] }
 }
 
 fn mean_color(corners: [&Vertex; 3]) -> Color32 {
@@ -60,7 +58,7 @@ fn mean_color(corners: [&Vertex; 3]) -> Color32 {
 }
 
 /// The axis-aligned rectangle that two triangles form.
-pub(super) fn quad(mesh: &Mesh, one: &[u32; 3], other: &[u32; 3]) -> Option<Rect> {
+pub(in crate::gui::rendering) fn quad(mesh: &Mesh, one: &[u32; 3], other: &[u32; 3]) -> Option<Rect> {
     let corners: BTreeSet<u32> = one.iter().chain(other).copied().collect();
     let shared = one.iter().filter(|index| other.contains(index)).count();
     if corners.len() != 4 || shared != 2 {

@@ -1,32 +1,29 @@
-//! Textures as embedded images.
+//! Textures as images that a drawing embeds.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
 use egui::epaint::{ImageData, ImageDelta};
-use egui::{Rect, TextureId, TexturesDelta};
+use egui::{TextureId, TexturesDelta};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder as _};
 
-use super::element::number;
-
 /// Pixels of a texture: red, green, blue and alpha, not premultiplied.
 #[derive(Clone, Debug, Default)]
-struct TextureImage {
-    size: [usize; 2],
-    rgba: Vec<u8>,
+pub(in crate::gui::rendering) struct TextureImage {
+    /// Width and height in pixels.
+    pub(in crate::gui::rendering) size: [usize; 2],
+    pub(in crate::gui::rendering) rgba: Vec<u8>,
 }
 
 /// All textures except the font atlas.
 #[derive(Clone, Debug, Default)]
-pub(in crate::gui) struct Textures {
+pub(in crate::gui::rendering) struct Textures {
     images: BTreeMap<TextureId, TextureImage>,
 }
 
 impl Textures {
-    pub(in crate::gui) fn set(&mut self, delta: &TexturesDelta) {
+    pub(in crate::gui::rendering) fn set(&mut self, delta: &TexturesDelta) {
         for (id, changes) in delta.set.iter().filter(|(id, _)| **id != TextureId::default()) {
             let texture = self.images.entry(*id).or_default();
             for change in changes {
@@ -36,27 +33,13 @@ impl Textures {
     }
 
     /// Drops the textures that the output frees.
-    pub(in crate::gui) fn free(&mut self, delta: &TexturesDelta) {
+    pub(in crate::gui::rendering) fn free(&mut self, delta: &TexturesDelta) {
         self.images.retain(|id, _| !delta.free.contains(id));
     }
 
-    /// SVG element with the region `uv` of a texture in a rectangle; empty for an unknown texture.
-    pub(super) fn element(&self, id: TextureId, rect: Rect, uv: Rect) -> String {
-        let Some(texture) = self.images.get(&id).filter(|texture| !texture.rgba.is_empty()) else {
-            return String::new();
-        };
-        let Some(png) = texture.png() else { return String::new() };
-        let [width, height] = texture.size.map(|side| side as f32);
-        let view = [uv.left() * width, uv.top() * height, uv.width() * width, uv.height() * height].map(number);
-        let place = [rect.left(), rect.top(), rect.width(), rect.height()].map(number);
-        let [x, y, shown_width, shown_height] = place;
-        format!(
-            "<svg x=\"{x}\" y=\"{y}\" width=\"{shown_width}\" height=\"{shown_height}\" viewBox=\"{}\" \
-             preserveAspectRatio=\"none\"><image width=\"{width}\" height=\"{height}\" preserveAspectRatio=\"none\" \
-             href=\"data:image/png;base64,{}\"/></svg>\n",
-            view.join(" "),
-            STANDARD.encode(png)
-        )
+    /// Pixels of a texture; `None` for an unknown or empty one.
+    pub(in crate::gui::rendering) fn image(&self, id: TextureId) -> Option<&TextureImage> {
+        self.images.get(&id).filter(|texture| !texture.rgba.is_empty())
     }
 }
 
@@ -77,7 +60,7 @@ impl TextureImage {
         }
     }
 
-    fn png(&self) -> Option<Vec<u8>> {
+    pub(in crate::gui::rendering) fn png(&self) -> Option<Vec<u8>> {
         let mut bytes = Cursor::new(Vec::new());
         let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive);
         let [width, height] = self.size.map(|side| side as u32);
