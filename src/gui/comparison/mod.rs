@@ -3,6 +3,7 @@
 
 mod columns;
 mod csv;
+mod errors;
 mod numbers;
 mod over_time;
 mod row;
@@ -15,6 +16,7 @@ mod tests;
 use egui::containers::scroll_area::ScrollAreaOutput;
 use egui::{ComboBox, Rect, RichText, ScrollArea, Ui, UiBuilder, Vec2, vec2};
 
+use self::errors::Errors;
 pub(in crate::gui) use self::numbers::POSES_ONLY;
 use self::over_time::OverTime;
 use self::scores::Scores;
@@ -25,6 +27,7 @@ use super::rank;
 use super::theme::PANEL_MARGIN;
 use super::{Dialog, Panel, PanelContext};
 use crate::session::Comparison;
+use crate::text::Named;
 
 /// Panel size from which all views are shown at once.
 const MIN_SIZE_FOR_ALL: Vec2 = vec2(960.0, 430.0);
@@ -33,25 +36,43 @@ const MIN_WIDTH_FOR_BOTH_TABLES: f32 = 860.0;
 /// Height from which scenes are shown below the images.
 const MIN_HEIGHT_FOR_SCENES: f32 = 760.0;
 
+/// Views of the panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum View {
+pub enum ComparisonView {
     All,
     Numbers,
     OverTime,
+    Errors,
     Images,
     Scenes,
     Directions,
 }
 
-impl View {
-    const ALL: [(Self, &'static str, &'static str); 6] = [
-        (Self::All, "All", "All views that fit into the panel"),
-        (Self::Numbers, "Numbers", "Accuracy of all runs and first divergences"),
-        (Self::OverTime, "Differences", "Differences from the reference over time"),
-        (Self::Images, "Images", "The image of each run"),
-        (Self::Scenes, "Scenes", "The scene of each run"),
-        (Self::Directions, "Directions", "Ranks, spectra and lost directions with common rows"),
+impl Named for ComparisonView {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::All, "all"),
+        (Self::Numbers, "numbers"),
+        (Self::OverTime, "differences"),
+        (Self::Errors, "errors"),
+        (Self::Images, "images"),
+        (Self::Scenes, "scenes"),
+        (Self::Directions, "directions"),
     ];
+}
+
+impl ComparisonView {
+    /// Label of its button, and its tooltip.
+    const fn label(self) -> [&'static str; 2] {
+        match self {
+            Self::All => ["All", "All views that fit into the panel"],
+            Self::Numbers => ["Numbers", "Accuracy of all runs and first divergences"],
+            Self::OverTime => ["Differences", "Differences from the reference over time"],
+            Self::Errors => ["Errors", "Errors of each run against the ground truth over time, with 3σ"],
+            Self::Images => ["Images", "The image of each run"],
+            Self::Scenes => ["Scenes", "The scene of each run"],
+            Self::Directions => ["Directions", "Ranks, spectra and lost directions with common rows"],
+        }
+    }
 }
 
 /// State of the comparison panel: reference run, view, and the cached comparisons.
@@ -59,10 +80,11 @@ impl View {
 pub struct ComparisonPanel {
     pub reference: usize,
     /// Chosen view; `None` until the user chooses.
-    view: Option<View>,
+    pub view: Option<ComparisonView>,
     scores: Scores,
     comparisons: Vec<Comparison>,
     over_time: OverTime,
+    errors: Errors,
     images: Images,
     scenes: Scenes,
     single: Single,
@@ -80,7 +102,8 @@ impl Panel for ComparisonPanel {
             return;
         }
         self.read(ctx);
-        if runs.len() == 1 && ctx.recording.trajectories.is_empty() {
+        let errors_only = ctx.presentation.is_figure() && self.view == Some(ComparisonView::Errors);
+        if runs.len() == 1 && ctx.recording.trajectories.is_empty() && !errors_only {
             self.asked = self.single.ui(ui, ctx, &self.scores);
             return;
         }
@@ -89,12 +112,18 @@ impl Panel for ComparisonPanel {
         let (room, controls_height) = (ui.available_size(), ui.cursor().top() - top);
         self.figure_size = Vec2::ZERO;
         match view {
-            View::All if room.x >= MIN_SIZE_FOR_ALL.x && room.y >= MIN_SIZE_FOR_ALL.y => self.all_ui(ui, ctx),
-            View::All | View::Numbers => self.numbers_ui(ui, ctx, Vec2::splat(1.0)),
-            View::OverTime => self.over_time_ui(ui, ctx, Vec2::splat(1.0)),
-            View::Images => self.images.ui(ui, ctx),
-            View::Scenes => self.scenes.ui(ui, ctx),
-            View::Directions => rank::all_runs_ui(ui, ctx),
+            ComparisonView::All if room.x >= MIN_SIZE_FOR_ALL.x && room.y >= MIN_SIZE_FOR_ALL.y => self.all_ui(ui, ctx),
+            ComparisonView::All | ComparisonView::Numbers => self.numbers_ui(ui, ctx, Vec2::splat(1.0)),
+            ComparisonView::OverTime => self.over_time_ui(ui, ctx, Vec2::splat(1.0)),
+            ComparisonView::Errors => {
+                self.errors.read(ctx);
+                if let Some(shown) = self.errors.ui(ui, ctx) {
+                    self.measure(ctx, &shown, Vec2::splat(1.0));
+                }
+            }
+            ComparisonView::Images => self.images.ui(ui, ctx),
+            ComparisonView::Scenes => self.scenes.ui(ui, ctx),
+            ComparisonView::Directions => rank::all_runs_ui(ui, ctx),
         }
         if self.figure_size != Vec2::ZERO {
             self.figure_size += vec2(0.0, controls_height) + Vec2::splat(2.0 * f32::from(PANEL_MARGIN));
@@ -132,8 +161,12 @@ impl ComparisonPanel {
     }
 
     /// Selectors of reference and view; in a figure only the reference.
-    fn controls_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) -> View {
-        let mut view = self.view.unwrap_or(View::All);
+    fn controls_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) -> ComparisonView {
+        let mut view = self.view.unwrap_or(ComparisonView::All);
+        // Errors are against the ground truth, not the reference.
+        if ctx.presentation.is_figure() && view == ComparisonView::Errors {
+            return view;
+        }
         ui.horizontal_wrapped(|ui| {
             let name = ui.label(RichText::new("Reference").color(ctx.theme.text_weak));
             let label = |run: usize| ctx.recording.runs.get(run).map_or("", |run| run.spec.label.as_str());
@@ -149,7 +182,8 @@ impl ComparisonPanel {
             });
             shown.response.labelled_by(name.id).on_hover_text("Reference run of all differences");
             ui.separator();
-            for (choice, name, hover) in View::ALL {
+            for choice in ComparisonView::all() {
+                let [name, hover] = choice.label();
                 let response = ui.selectable_label(view == choice, name);
                 if response.on_hover_text(hover).clicked() {
                     self.view = Some(choice);

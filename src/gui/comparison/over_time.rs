@@ -5,9 +5,8 @@ use egui::{ScrollArea, Ui};
 
 use super::columns::label_of;
 use super::numbers::{difference_text, shown};
-use super::row::{Line, MIN_HEIGHT, Row, row_ui};
+use super::row::{Line, LineCurves, MIN_HEIGHT, Row, row_ui};
 use crate::gui::PanelContext;
-use crate::gui::plot::Curve;
 use crate::session::{Comparison, Quantity};
 use crate::text::Named as _;
 
@@ -28,7 +27,7 @@ const DRAWN: [Quantity; 8] = [
 /// Curves by plotted quantity and run.
 #[derive(Debug, Default)]
 pub(super) struct OverTime {
-    curves: [Vec<Curve>; DRAWN.len()],
+    curves: [Vec<LineCurves>; DRAWN.len()],
 }
 
 impl OverTime {
@@ -70,7 +69,7 @@ impl OverTime {
         height: f32,
     ) {
         let curves = &mut self.curves[index];
-        curves.resize_with(comparisons.len(), Curve::default);
+        curves.resize_with(comparisons.len(), LineCurves::default);
         let lines: Vec<Line<'_>> = comparisons
             .iter()
             .enumerate()
@@ -82,6 +81,7 @@ impl OverTime {
                     epoch: comparison.epoch,
                     stamps_ns: &comparison.stamps_ns,
                     values: if run == reference { &[] } else { comparison.column(quantity) },
+                    bound: &[],
                     text: apart.map(|apart| format!("{} {label}", difference_text(quantity, apart))),
                     mark_ns: comparison.divergence(quantity).notable_ns.filter(|_| run != reference),
                 }
@@ -94,13 +94,12 @@ impl OverTime {
             unit,
             factor,
             threshold: Some(quantity.notable()),
-            bound: None,
             min_high: 0.1 * quantity.notable(),
             steps: quantity.unit().is_empty(),
             id: index,
             label: &format!("Difference in {} over time", quantity.name()),
             hover: &format!("{}\nTriangle: first difference ≥ {threshold}", quantity.meaning()),
         };
-        row_ui(ui, ctx, row, &lines, curves, height);
+        row_ui(ui, ctx, &row, &lines, curves, height);
     }
 }

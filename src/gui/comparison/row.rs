@@ -1,6 +1,6 @@
 //! One row of a plot over time: name and values at the cursor on the left, curves on the right.
 
-use egui::{Align2, Shape, Stroke, Ui, pos2, vec2};
+use egui::{Align2, Color32, Shape, Stroke, Ui, pos2, vec2};
 
 use super::columns::style_of;
 use crate::gui::PanelContext;
@@ -13,6 +13,10 @@ use crate::gui::theme::{self, CURVE_WIDTH, RunStyle};
 
 /// Width of names and values on the left, in points.
 const NAMES: f32 = 158.0;
+/// Width of a row in points below which names and values are above the plot.
+const MIN_WIDTH_FOR_NAMES: f32 = 340.0;
+/// Height of a line of names and values in points.
+const NAME_HEIGHT: f32 = 13.0;
 const BOUND_DASHES: &[f32] = &[4.0, 3.0];
 
 /// Minimum height of a row in points; a list of rows of this height may scroll.
@@ -28,8 +32,6 @@ pub(super) struct Row<'a> {
     pub(super) threshold: Option<f64>,
     /// Smallest upper limit of the axis, so that rounding errors are not magnified.
     pub(super) min_high: f64,
-    /// Bound of the values over time, at the stamps of the first line.
-    pub(super) bound: Option<Bound<'a>>,
     /// True if values are constant until the next one.
     pub(super) steps: bool,
     /// Unique in the panel.
@@ -38,12 +40,11 @@ pub(super) struct Row<'a> {
     pub(super) hover: &'a str,
 }
 
-/// Bound of the values of a row, by frame.
-pub(super) struct Bound<'a> {
-    pub(super) values: &'a [f64],
-    pub(super) curve: &'a mut Curve,
-    /// Bound at the cursor.
-    pub(super) text: Option<String>,
+/// Cached curves of a line: of its values and of their bound.
+#[derive(Debug, Default)]
+pub(super) struct LineCurves {
+    values: Curve,
+    bound: Curve,
 }
 
 /// The values of one run in a row.
@@ -53,6 +54,8 @@ pub(super) struct Line<'a> {
     pub(super) epoch: u64,
     pub(super) stamps_ns: &'a [i64],
     pub(super) values: &'a [f64],
+    /// Bound of the values by frame; empty without one.
+    pub(super) bound: &'a [f64],
     /// Value at the cursor.
     pub(super) text: Option<String>,
     /// Stamp of a triangle on the upper edge.
@@ -63,27 +66,34 @@ pub(super) struct Line<'a> {
 pub(super) fn row_ui(
     ui: &mut Ui,
     ctx: &mut PanelContext<'_>,
-    mut row: Row<'_>,
+    row: &Row<'_>,
     lines: &[Line<'_>],
-    curves: &mut [Curve],
+    curves: &mut [LineCurves],
     height: f32,
 ) {
     let theme = *ctx.theme;
     let (_, whole) = ui.allocate_space(vec2(ui.available_width(), height));
-    let rect = within_gutters(whole.with_min_x(whole.left() + NAMES.min(0.4 * whole.width())), TIME_GUTTER);
+    let beside = whole.width() >= MIN_WIDTH_FOR_NAMES;
+    let outer = if beside {
+        whole.with_min_x(whole.left() + NAMES.min(0.4 * whole.width()))
+    } else {
+        whole.with_min_y(whole.top() + NAME_HEIGHT + 2.0)
+    };
+    let rect = within_gutters(outer, TIME_GUTTER);
     let (begin_ns, end_ns) = visible_range(ctx);
     let mut area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: 1.0 };
     let mut max_value = 0.0_f64;
-    for (line, curve) in lines.iter().zip(curves.iter_mut()) {
-        curve.update(&area, line.epoch, line.stamps_ns, line.values);
-        max_value = max_value.max(curve.extent.map_or(0.0, |(_, max_value)| max_value));
+    let most = |curve: &Curve| curve.extent.map_or(0.0, |(_, max_value)| max_value);
+    let mut max_bound = 0.0_f64;
+    for (line, curves) in lines.iter().zip(curves.iter_mut()) {
+        curves.values.update(&area, line.epoch, line.stamps_ns, line.values);
+        curves.bound.update(&area, line.epoch, line.stamps_ns, line.bound);
+        max_value = max_value.max(most(&curves.values));
+        max_bound = max_bound.max(most(&curves.bound));
     }
-    if let (Some(bound), Some(line)) = (&mut row.bound, lines.first()) {
-        bound.curve.update(&area, line.epoch, line.stamps_ns, bound.values);
-        // A bound far above all values does not flatten their curves.
-        let most = bound.curve.extent.map_or(0.0, |(_, max_value)| max_value);
-        max_value = max_value.max(most.min(3.0 * max_value));
-    }
+    // A bound far above all values does not flatten their curves; a figure shows more of it.
+    let most_above = if ctx.presentation.is_figure() { 12.0 } else { 3.0 };
+    max_value = max_value.max(max_bound.min(most_above * max_value));
     let (low, high) = value_range_of(ctx, row.label, 0.0, 1.15 * max_value.max(row.min_high));
     area = area.with_values(low, high);
     let painter = ui.painter_at(whole);
@@ -96,20 +106,26 @@ pub(super) fn row_ui(
         painter.extend(Shape::dotted_line(&ends, theme.warn.gamma_multiply(0.7), 6.0, 0.7));
     }
     let name = if row.unit.is_empty() { row.name.to_owned() } else { format!("{}, {}", row.name, row.unit) };
-    let names = painter.with_clip_rect(whole.with_max_x(rect.left() - VALUE_GUTTER));
+    let names = if beside { whole.with_max_x(rect.left() - VALUE_GUTTER) } else { whole.with_max_y(outer.top()) };
+    let names = painter.with_clip_rect(names);
     let mut at = whole.left_top() + vec2(2.0, 0.0);
-    names.text(at, Align2::LEFT_TOP, name, theme::label_font(), theme.text);
+    // Texts are below each other beside the plot, and in one line above it.
+    let mut write = |text: &str, color: Color32| {
+        let written = names.text(at, Align2::LEFT_TOP, text, theme::label_font(), color);
+        at += if beside { vec2(0.0, NAME_HEIGHT) } else { vec2(written.width() + 8.0, 0.0) };
+    };
+    write(&name, theme.text);
     let inner = painter.with_clip_rect(rect);
-    if let Some(bound) = &row.bound {
-        let style = RunStyle { color: theme.text_weak, dashes: BOUND_DASHES };
-        paint_curve(&inner, &area, bound.curve, style, 0.8 * CURVE_WIDTH);
+    for (line, curves) in lines.iter().zip(curves.iter()) {
+        let color = if lines.len() == 1 { theme.text_weak } else { style_of(ctx.recording, &theme, line.run).color };
+        paint_curve(&inner, &area, &curves.bound, RunStyle { color, dashes: BOUND_DASHES }, 0.6 * CURVE_WIDTH);
     }
-    for (line, curve) in lines.iter().zip(curves.iter()) {
+    for (line, curves) in lines.iter().zip(curves.iter()) {
         let style = style_of(ctx.recording, &theme, line.run);
         if row.steps {
-            paint_steps(&inner, &area, curve, style, CURVE_WIDTH);
+            paint_steps(&inner, &area, &curves.values, style, CURVE_WIDTH);
         } else {
-            paint_curve(&inner, &area, curve, style, CURVE_WIDTH);
+            paint_curve(&inner, &area, &curves.values, style, CURVE_WIDTH);
         }
         let mark = line.mark_ns.map(|stamp_ns| area.x(stamp_ns)).filter(|x| rect.x_range().contains(*x));
         if let Some(x) = mark {
@@ -117,13 +133,8 @@ pub(super) fn row_ui(
             painter.add(Shape::convex_polygon(triangle, style.color, Stroke::NONE));
         }
         if let Some(text) = &line.text {
-            at.y += 13.0;
-            names.text(at, Align2::LEFT_TOP, text, theme::label_font(), style.color);
+            write(text, style.color);
         }
-    }
-    if let Some(text) = row.bound.as_ref().and_then(|bound| bound.text.as_ref()) {
-        at.y += 13.0;
-        names.text(at, Align2::LEFT_TOP, text, theme::label_font(), theme.text_weak);
     }
     let id = ui.unique_id().with(("row over time", row.id));
     let values: Vec<&str> = lines.iter().filter_map(|line| line.text.as_deref()).collect();

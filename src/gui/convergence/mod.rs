@@ -22,9 +22,6 @@ use super::plot::Wheel;
 use super::{Panel, PanelContext};
 use crate::gimbal::{ParameterGroup, ParameterId};
 
-/// Height in points of the legend above the plots of a figure.
-const LEGEND_ROW_HEIGHT: f32 = 18.0;
-
 /// State of the convergence panel: the calibration of each run over time, and its curves.
 #[derive(Debug, Default)]
 pub struct ConvergencePanel {
@@ -75,9 +72,9 @@ impl Panel for ConvergencePanel {
 
         let mut available = ui.available_rect_before_wrap();
         if ctx.presentation.is_figure() {
-            let (row, below) = available.split_top_bottom_at_y(available.top() + LEGEND_ROW_HEIGHT);
-            paint::legend_row(ui, ctx, row);
-            ui.advance_cursor_after_rect(row);
+            let height = paint::legend_rows(ui, ctx, available);
+            let (rows, below) = available.split_top_bottom_at_y(available.top() + height);
+            ui.advance_cursor_after_rect(rows);
             available = below.with_min_y(ui.cursor().top());
         }
         let groups = groups_of(&parameters);

@@ -64,17 +64,27 @@ pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
     });
 }
 
-/// Draws the same legend in one row, for figures.
-pub(super) fn legend_row(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
+/// Height in points of a row of the legend above the plots of a figure.
+const LEGEND_ROW_HEIGHT: f32 = 18.0;
+
+/// Draws the same legend in rows at the top of a rectangle, for figures; returns their height.
+pub(super) fn legend_rows(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) -> f32 {
     const HEIGHT: f32 = 11.0;
     let painter = ui.painter_at(rect);
-    let mut left = rect.left();
+    let mut at = rect.left_top() + vec2(0.0, 0.5 * LEGEND_ROW_HEIGHT);
     legend_entries(ctx, &mut |text, paint| {
-        let place = Rect::from_min_size(pos2(left, rect.center().y - 0.5 * HEIGHT), vec2(SAMPLE_WIDTH, HEIGHT));
-        paint(&painter, place);
-        let at = place.right_center() + vec2(5.0, 0.0);
-        left = painter.text(at, Align2::LEFT_CENTER, text, theme::label_font(), ctx.theme.text).right() + 14.0;
+        let galley = painter.layout_no_wrap(text.to_owned(), theme::label_font(), ctx.theme.text);
+        let width = SAMPLE_WIDTH + 5.0 + galley.size().x;
+        if at.x > rect.left() && at.x + width > rect.right() {
+            at = pos2(rect.left(), at.y + LEGEND_ROW_HEIGHT);
+        }
+        let sample = Rect::from_min_size(at - vec2(0.0, 0.5 * HEIGHT), vec2(SAMPLE_WIDTH, HEIGHT));
+        paint(&painter, sample);
+        let left = sample.right_center() + vec2(5.0, 0.0);
+        painter.galley(Align2::LEFT_CENTER.anchor_size(left, galley.size()).min, galley, ctx.theme.text);
+        at.x += width + 14.0;
     });
+    at.y + 0.5 * LEGEND_ROW_HEIGHT - rect.top()
 }
 
 /// Draws the sample of an entry of the legend into a rectangle.
