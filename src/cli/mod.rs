@@ -11,6 +11,8 @@ mod estimation_arguments;
 mod evaluate;
 mod exit;
 mod export;
+#[cfg(feature = "gui")]
+mod figure_arguments;
 mod interrupt;
 mod limit_arguments;
 mod noise;

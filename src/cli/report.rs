@@ -11,6 +11,7 @@ use dcvins::report::{ReportFigure, ReportOptions, write_known_report, write_repo
 use dcvins::session::{Computation, SessionPlan, image_rotations};
 #[cfg(feature = "gui")]
 use dcvins::sweep::{OpenedStudy, is_study};
+use dcvins::text::command_line;
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
@@ -133,8 +134,13 @@ fn of_study(arguments: &ReportArguments) -> Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-fn own_command_line() -> String {
-    command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
+/// The command line of this process in a form that can be typed again; the program's name is without its folder.
+pub(crate) fn own_command_line() -> String {
+    let mut words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    if let Some(program) = words.first_mut() {
+        *program = Path::new(program).file_name().unwrap_or_default().to_string_lossy().into_owned();
+    }
+    command_line(words)
 }
 
 /// Runs `work` while another thread checks the log and its rig.
@@ -164,26 +170,4 @@ fn figures_of(
 #[expect(clippy::unnecessary_wraps, reason = "with the window it can fail")]
 fn figures_of(_: &ReportArguments, _: &SessionPlan, _: &mut Computation) -> Result<Vec<ReportFigure>> {
     Ok(Vec::new())
-}
-
-/// The command line in a form that can be typed again; the program's name is without its folder.
-fn command_line(mut words: impl Iterator<Item = String>) -> String {
-    let program = words.next().unwrap_or_default();
-    let program = Path::new(&program).file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let plain = |word: &str| {
-        !word.is_empty() && word.chars().all(|letter| letter.is_alphanumeric() || "/._-:=,+".contains(letter))
-    };
-    let quoted = words.map(|word| if plain(&word) { word } else { format!("'{}'", word.replace('\'', "'\\''")) });
-    std::iter::once(program).chain(quoted).collect::<Vec<_>>().join(" ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::command_line;
-
-    #[test]
-    fn commands_can_be_typed_again() {
-        let words = ["/usr/bin/dcvins", "report", "my log.mcap", "--run", "auto:name=it's", ""].map(str::to_owned);
-        assert_eq!(command_line(words.into_iter()), r"dcvins report 'my log.mcap' --run 'auto:name=it'\''s' ''");
-    }
 }

@@ -4,17 +4,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
-use clap::error::ErrorKind;
 use clap::{Args, ValueEnum};
 use dcvins::export::{
     PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_screenshot, draw_panel, draw_panel_svg,
-    is_session, panel_csv, png_bytes, read_session, write_screenshot,
+    figure_bytes, is_session, panel_csv, png_bytes, read_session, write_screenshot,
 };
 use dcvins::flight_log::{ImageReader, log_name};
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
 use dcvins::gui::app::PlayingLog;
 use dcvins::gui::theme::ThemeName;
-use dcvins::gui::window::Preset;
+use dcvins::gui::window::{FigureFormat, FigureInput, Preset};
 use dcvins::gui::{ImageSource, Playback, Presentation};
 use dcvins::session::{Computation, Session, SessionPlan};
 use dcvins::sweep::{OpenedStudy, is_study};
@@ -23,7 +22,9 @@ use dcvins::text::Named as _;
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::Outcome;
+use crate::cli::figure_arguments::FigureArguments;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::report::own_command_line;
 use crate::cli::result_cache::{CacheArguments, CachedResult};
 use crate::cli::study_arguments::{StudyArguments, StudyPicture, write_study_picture};
 use crate::cli::terminal::{notify, print};
@@ -33,8 +34,8 @@ use crate::cli::value_parsers::{seconds, sides};
 pub(crate) struct ScreenshotArguments {
     /// The log, a saved session (LOG.session.json) with its forks and breakpoints, or the folder of a study.
     pub log: PathBuf,
-    /// Seconds since the first message of the log; may be given several times, then the time is part of the file names.
-    /// Required for a log unless --every is given.
+    /// Seconds since the first message of the log; may be given several times, then the time is part of the file names
+    /// [default: the end of the log, or of --to].
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub at: Vec<f64>,
     /// Period of the screenshots, from the start to the end of the log (or from --start, for --duration).
@@ -46,7 +47,7 @@ pub(crate) struct ScreenshotArguments {
     /// Layout of the whole window, as with keys 1 to 5: overview, calibration, front end, scene, comparison.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=5))]
     pub layout: u8,
-    /// The file to write: a PNG, or an SVG with the extension .svg.
+    /// The file to write: a PNG, an SVG with the extension .svg, or a PDF with the extension .pdf.
     #[arg(short, long, visible_alias = "out", value_name = "FILE.png")]
     pub output: PathBuf,
     /// File format, if it does not follow from the extension.
@@ -61,9 +62,9 @@ pub(crate) struct ScreenshotArguments {
     /// Pixels per point: 2 draws everything twice as large.
     #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = scale)]
     pub scale: f32,
-    /// Colours.
-    #[arg(long, value_enum, default_value_t = ThemeArgument::Light)]
-    pub theme: ThemeArgument,
+    /// Colours; of a figure for a paper print, otherwise light, if none are given.
+    #[arg(long, value_enum)]
+    pub theme: Option<ThemeArgument>,
     /// Renderer: cpu needs no driver and gives the same bytes on every machine, wgpu uses a graphics adapter.
     #[arg(long, value_enum, default_value_t = RendererArgument::Cpu)]
     pub renderer: RendererArgument,
@@ -80,6 +81,8 @@ pub(crate) struct ScreenshotArguments {
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]
+    pub figure: FigureArguments,
+    #[command(flatten)]
     pub study: StudyArguments,
     #[command(flatten)]
     pub estimation: EstimationArguments,
@@ -94,6 +97,18 @@ pub(crate) enum FormatArgument {
     Png,
     /// Scalable Vector Graphics.
     Svg,
+    /// Portable Document Format, one page of the size of the figure.
+    Pdf,
+}
+
+impl FormatArgument {
+    const fn of_figure(self) -> FigureFormat {
+        match self {
+            Self::Png => FigureFormat::Png,
+            Self::Svg => FigureFormat::Svg,
+            Self::Pdf => FigureFormat::Pdf,
+        }
+    }
 }
 
 /// Values of `--renderer`.
@@ -138,10 +153,6 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
         return of_study(arguments);
     }
     arguments.study.require_none(&arguments.log)?;
-    if arguments.at.is_empty() && arguments.every.is_none() {
-        let text = "a screenshot of a log needs a time: --at SECONDS or --every SECONDS (a study has none)";
-        clap::Command::new("dcvins screenshot").error(ErrorKind::MissingRequiredArgument, text).exit();
-    }
     if !PANEL_NAMES.contains(&arguments.panel.as_str()) {
         bail!("unknown panel '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
     }
@@ -149,6 +160,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
         bail!("--csv writes the values of one panel: name the panel with --panel");
     }
     let format = format_of(arguments)?;
+    let range_ns = arguments.figure.range_ns()?;
     let mut shown = Shown::open(arguments)?;
     let log_end_ns = shown.log_end_ns;
     let begin_ns = ns_from_seconds(shown.start_s).min(log_end_ns);
@@ -166,9 +178,16 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
         }
         stamps_ns.extend((0..count).map(|number| begin_ns + number as i64 * period_ns));
     }
+    // Without a time it is the end of the range, or of what is computed.
+    let timeless = stamps_ns.is_empty();
+    if timeless {
+        stamps_ns.push(range_ns.map_or(end_ns, |(_, to_ns)| to_ns.min(log_end_ns)));
+    }
     stamps_ns.sort_unstable();
     stamps_ns.dedup();
-    let Some(last_ns) = stamps_ns.last().copied() else { bail!("no time given: use --at or --every") };
+    let last_stamp_ns = stamps_ns.last().copied().unwrap_or(end_ns);
+    // Plots of a range need the steps to its end, and those of the whole log all steps.
+    let last_ns = range_ns.map_or(last_stamp_ns, |(_, to_ns)| last_stamp_ns.max(to_ns.min(log_end_ns)));
     let several = stamps_ns.len() > 1;
     let path_at = |cursor_ns| if several { numbered(&arguments.output, cursor_ns) } else { arguments.output.clone() };
     for cursor_ns in &stamps_ns {
@@ -215,7 +234,11 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
         }
         None => None,
     };
-    let options = ScreenshotOptions { slide, playback: shown.playback(), ..drawing_options(arguments) };
+    let playback = shown.playback();
+    let run = arguments.figure.run(computation.recording())?;
+    let view = arguments.figure.view;
+    let options = ScreenshotOptions { slide, run, view, visible_ns: range_ns, playback, ..drawing_options(arguments) };
+    let is_figure = arguments.figure.has_paper_size() || format == FormatArgument::Pdf;
     for (number, cursor_ns) in stamps_ns.iter().copied().enumerate() {
         if interrupt.is_set() {
             return stopped(number);
@@ -225,8 +248,14 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
         let path = path_at(cursor_ns);
         let panel = &arguments.panel;
         let picture = match format {
+            _ if is_figure => {
+                let cursor_ns = (!timeless).then_some(cursor_ns);
+                let spec = arguments.figure.spec(panel, options.theme, cursor_ns, recording)?;
+                let input = FigureInput::new(recording, shown.images(), &options.playback, slide);
+                figure_bytes(&spec, format.of_figure(), &own_command_line(), input)?
+            }
             FormatArgument::Png => png_bytes(&draw_panel(panel, recording, cursor_ns, shown.images(), &options)?)?,
-            FormatArgument::Svg => {
+            FormatArgument::Svg | FormatArgument::Pdf => {
                 let title =
                     format!("{panel} of {} at {:.3} s", log_name(&recording.log_path), seconds_from_ns(cursor_ns));
                 let naming = ["clip", &title];
@@ -260,9 +289,11 @@ fn drawing_options(arguments: &ScreenshotArguments) -> ScreenshotOptions {
         size_px: arguments.size.map(|side| side as u32),
         pixels_per_point: arguments.scale,
         theme: match arguments.theme {
-            ThemeArgument::Light => ThemeName::Light,
-            ThemeArgument::Dark => ThemeName::Dark,
-            ThemeArgument::Print => ThemeName::Print,
+            Some(ThemeArgument::Light) => ThemeName::Light,
+            Some(ThemeArgument::Dark) => ThemeName::Dark,
+            Some(ThemeArgument::Print) => ThemeName::Print,
+            None if arguments.figure.has_paper_size() => ThemeName::Print,
+            None => ThemeName::Light,
         },
         renderer: match arguments.renderer {
             RendererArgument::Cpu => Renderer::Cpu,
@@ -285,7 +316,14 @@ fn of_study(arguments: &ScreenshotArguments) -> Result<Outcome> {
     if arguments.csv && arguments.panel == "all" {
         bail!("--csv writes the values of one panel: name the panel with --panel");
     }
-    let svg = format_of(arguments)? == FormatArgument::Svg;
+    if arguments.figure.has_paper_size() || arguments.figure.from.is_some() || arguments.figure.view.is_some() {
+        bail!("{} is a study: leave --from, --to, --view and the sizes on paper out", arguments.log.display());
+    }
+    let format = format_of(arguments)?;
+    if format == FormatArgument::Pdf {
+        bail!("a PDF shows a panel of a log; write an SVG of the panel of a study");
+    }
+    let svg = format == FormatArgument::Svg;
     check_screenshot(&arguments.output, arguments.force)?;
     if arguments.csv {
         check_screenshot(&arguments.output.with_extension("csv"), arguments.force)?;
@@ -302,11 +340,12 @@ fn format_of(arguments: &ScreenshotArguments) -> Result<FormatArgument> {
     let named = match extension.as_deref() {
         Some("svg") => Some(FormatArgument::Svg),
         Some("png") => Some(FormatArgument::Png),
+        Some("pdf") => Some(FormatArgument::Pdf),
         _ => None,
     };
     if named.is_none() && arguments.format.is_none() && extension.is_some() {
         bail!(
-            "the extension of {} is neither .png nor .svg: rename it or give --format; --csv also writes the panel's values",
+            "the extension of {} is none of .png, .svg and .pdf: rename it or give --format; --csv also writes the panel's values",
             arguments.output.display()
         );
     }
@@ -314,8 +353,9 @@ fn format_of(arguments: &ScreenshotArguments) -> Result<FormatArgument> {
     if named.is_some_and(|named| named != format) {
         bail!("--format and the name of {} contradict each other: leave one out", arguments.output.display());
     }
-    if format == FormatArgument::Svg && arguments.renderer == RendererArgument::Wgpu {
-        bail!("an SVG is written without a graphics adapter: leave out --renderer wgpu");
+    let vectors = format != FormatArgument::Png || arguments.figure.has_paper_size();
+    if vectors && arguments.renderer == RendererArgument::Wgpu {
+        bail!("SVG, PDF and figures for papers are written without a graphics adapter: leave out --renderer wgpu");
     }
     Ok(format)
 }
@@ -362,10 +402,12 @@ impl Shown {
         if arguments.renderer == RendererArgument::Wgpu {
             return None;
         }
-        // The output path does not affect the images.
+        // The output path does not affect the images; figures have the command in their metadata.
         let options =
             ScreenshotArguments { output: PathBuf::new(), format: Some(format), force: false, ..arguments.clone() };
-        arguments.cache.result_of(&format!("{options:?}"), &arguments.log, &arguments.estimation, plan)
+        let is_figure = arguments.figure.has_paper_size() || format == FormatArgument::Pdf;
+        let command = if is_figure { own_command_line() } else { String::new() };
+        arguments.cache.result_of(&format!("{options:?}{command}"), &arguments.log, &arguments.estimation, plan)
     }
 
     /// Computes the runs up to a stamp; those of a saved session to their end.

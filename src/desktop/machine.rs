@@ -7,10 +7,10 @@ use std::sync::mpsc::{Receiver, channel};
 use directories::UserDirs;
 
 use super::recent_files::{RecentFiles, state_folder};
-use super::sample_flight;
-use crate::export::{ExportError, is_session, write_csv, write_png, write_svg};
+use super::{report, sample_flight};
+use crate::export::{ExportError, is_session, write_csv, write_png, write_screenshot, write_svg};
 use crate::flight_log::output;
-use crate::gui::desktop::{Desktop, PanelExport, PathEntry, SampleProgress};
+use crate::gui::desktop::{Desktop, DrawnFigure, FigureExport, PanelExport, PathEntry, SampleProgress};
 
 /// Maximum number of entries read from a folder.
 const MAX_ENTRIES: usize = 5000;
@@ -174,6 +174,20 @@ impl Desktop for Machine {
             .and_then(|()| write_csv(&export.table, table));
         written.map_err(|error| error.to_string())?;
         Ok(paths.map(|path| fs::canonicalize(&path).unwrap_or(path)).to_vec())
+    }
+
+    fn write_figure(&self, export: &FigureExport) -> Result<PathBuf, String> {
+        let path = PathBuf::from(&export.path);
+        let written = match &export.figure {
+            DrawnFigure::Pixels(pixels) => write_png(pixels, &path),
+            DrawnFigure::File(bytes) => write_screenshot(bytes, &path),
+        };
+        written.map_err(|error| error.to_string())?;
+        Ok(fs::canonicalize(&path).unwrap_or(path))
+    }
+
+    fn start_report(&self, name: &str, arguments: &[String]) -> Result<Receiver<Result<PathBuf, String>>, String> {
+        report::start(&self.output.join(name).join("report"), arguments)
     }
 
     fn write_session(&self, name: &str, text: &str) -> Result<PathBuf, String> {

@@ -2,6 +2,7 @@
 
 mod machine;
 mod recent_files;
+mod report;
 mod sample_flight;
 
 pub use machine::Machine;

@@ -165,6 +165,8 @@ pub fn check_screenshot(path: &Path, force: bool) -> Result<(), ExportError> {
     let text = || String::from_utf8_lossy(&start).trim_start().to_owned();
     let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
     let same = match extension.as_str() {
+        // Other programs write PDFs too.
+        "pdf" => start.is_empty() || is_own_pdf(path)?,
         "csv" => std::str::from_utf8(&start).is_ok_and(|text| text.contains(['_', ','])),
         _ => {
             start.is_empty()
@@ -180,6 +182,17 @@ pub fn check_screenshot(path: &Path, force: bool) -> Result<(), ExportError> {
         problem: "the file exists and is not a screenshot or table".to_owned(),
         path: path.to_owned(),
     })
+}
+
+/// True for a PDF whose creator is this program.
+fn is_own_pdf(path: &Path) -> Result<bool, ExportError> {
+    /// Figures are smaller.
+    const MAX_BYTES: u64 = 64 << 20;
+    let read = |source| ExportError::Read { source, path: path.to_owned() };
+    let mut bytes = Vec::new();
+    fs::File::open(path).map_err(read)?.take(MAX_BYTES).read_to_end(&mut bytes).map_err(read)?;
+    let creator = b"/Creator (dcvins ";
+    Ok(bytes.starts_with(b"%PDF") && bytes.windows(creator.len()).any(|part| part == creator))
 }
 
 /// Labels of runs in a folder other than the given ones, in alphabetical order.

@@ -6,6 +6,8 @@ mod covariance;
 mod error;
 mod evaluation;
 pub(crate) mod existing;
+#[cfg(feature = "gui")]
+mod figure;
 pub(crate) mod file_hash;
 mod flight_noise;
 pub(crate) mod masks;
@@ -30,6 +32,8 @@ pub use existing::{
     check_calibration_folder, check_converted_log, check_report_folder, check_run_folders, check_screenshot,
     check_simulated_log, other_runs, write_new_rig,
 };
+#[cfg(feature = "gui")]
+pub use figure::figure_bytes;
 pub use flight_noise::{DensityReport, FlightNoiseReport};
 pub use masks::write_masks;
 pub use noise_files::{write_allan, write_flight_noise};

@@ -26,6 +26,22 @@ pub struct PanelExport {
     pub table: String,
 }
 
+/// A figure in its format.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DrawnFigure {
+    Pixels(RgbaImage),
+    /// The bytes of a PDF or SVG file.
+    File(Vec<u8>),
+}
+
+/// A figure to be written to a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FigureExport {
+    /// Path relative to the working folder, with its extension.
+    pub path: String,
+    pub figure: DrawnFigure,
+}
+
 /// Progress of the simulation of the sample flight.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SampleProgress {
@@ -70,6 +86,11 @@ pub trait Desktop: Send + Sync {
     fn keep_window(&self, text: &str) -> Result<(), String>;
     /// Writes a panel as images and as a table, and returns the paths.
     fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String>;
+    /// Writes a figure and returns its path.
+    fn write_figure(&self, export: &FigureExport) -> Result<PathBuf, String>;
+    /// Starts to write a report with the arguments of `dcvins report` into a folder for a log with this name, and to
+    /// open it; the receiver gets its path.
+    fn start_report(&self, name: &str, arguments: &[String]) -> Result<Receiver<Result<PathBuf, String>>, String>;
     /// Writes a session of a log with this name, and returns the path.
     fn write_session(&self, name: &str, text: &str) -> Result<PathBuf, String>;
     /// Resident memory of this process in bytes.

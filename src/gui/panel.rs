@@ -100,12 +100,19 @@ pub enum Presentation {
     Interactive,
     /// Values, plots and legends only.
     Figure,
+    /// The same of a time range: without the line of the cursor.
+    FigureOfRange,
 }
 
 impl Presentation {
     /// True if buttons, selectors and hints are omitted.
     pub fn is_figure(self) -> bool {
-        self == Self::Figure
+        self != Self::Interactive
+    }
+
+    /// True if plots show the cursor as a line.
+    pub(crate) fn shows_cursor(self) -> bool {
+        self != Self::FigureOfRange
     }
 
     /// Sense and accessibility role of a painted element that a click selects. In the window it is a button; in a
@@ -243,6 +250,8 @@ pub enum Dialog {
     Markers,
     Palette,
     Settings,
+    /// Composes a figure of a panel for a paper.
+    Figure,
     /// Question asked before a run is removed.
     RemoveRun,
     /// Question asked before unsaved work is discarded.

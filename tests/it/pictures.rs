@@ -14,7 +14,7 @@ use dcvins::export::{ScreenshotOptions, draw_panel, draw_study_panel};
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::ns_from_seconds;
 use dcvins::gui::app::{App, OpenLog};
-use dcvins::gui::desktop::{Desktop, PanelExport, PathEntry, SampleProgress};
+use dcvins::gui::desktop::{Desktop, FigureExport, PanelExport, PathEntry, SampleProgress};
 use dcvins::gui::rendering::headless::{self, Headless, HeadlessOptions};
 use dcvins::gui::rendering::painter::Painter;
 use dcvins::gui::study::{StudyOptions, StudyPanel};
@@ -220,6 +220,14 @@ impl Desktop for Paper {
 
     fn write_panel(&self, _export: &PanelExport) -> Result<Vec<PathBuf>, String> {
         Ok(Vec::new())
+    }
+
+    fn write_figure(&self, export: &FigureExport) -> Result<PathBuf, String> {
+        Ok(PathBuf::from(&export.path))
+    }
+
+    fn start_report(&self, name: &str, _arguments: &[String]) -> Result<Receiver<Result<PathBuf, String>>, String> {
+        Err(format!("no report on {name}"))
     }
 
     fn write_session(&self, name: &str, _text: &str) -> Result<PathBuf, String> {

@@ -10,6 +10,7 @@ mod playing_log;
 #[cfg(test)]
 mod question_tests;
 mod repaint;
+mod report;
 mod requests;
 pub mod run_window;
 mod sample;
@@ -100,6 +101,8 @@ pub struct App {
     reported_warnings: usize,
     title: String,
     memory_read_s: Option<f64>,
+    /// The report that is being written.
+    report: Option<Receiver<Result<PathBuf, String>>>,
 }
 
 impl App {
@@ -138,6 +141,7 @@ impl App {
             reported_warnings: 0,
             title: String::new(),
             memory_read_s: None,
+            report: None,
         }
     }
 
@@ -211,6 +215,7 @@ impl App {
             self.welcome_ui(ui);
         }
         self.take_requests(ui);
+        self.receive_report(ui);
         self.update_title(ui);
         self.keep_window(ui);
         if self.opening.is_some() {

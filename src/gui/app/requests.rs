@@ -4,7 +4,7 @@ use egui::Ui;
 
 use super::App;
 use super::departure::{Leaving, Work};
-use crate::gui::desktop::PanelExport;
+use crate::gui::desktop::{FigureExport, PanelExport};
 use crate::gui::window::{NoticeLevel, WindowRequest};
 
 impl App {
@@ -27,6 +27,8 @@ impl App {
                     self.save_session();
                 }
                 WindowRequest::WritePanel(export) => self.write_panel(&export),
+                WindowRequest::WriteFigure(export) => self.write_figure(&export),
+                WindowRequest::WriteReport => self.start_report(),
             }
         }
     }
@@ -48,6 +50,15 @@ impl App {
                 self.state.notices.show_message(NoticeLevel::Error, problem);
                 false
             }
+        }
+    }
+
+    fn write_figure(&mut self, export: &FigureExport) {
+        match self.desktop.write_figure(export) {
+            Ok(path) => {
+                self.state.notices.show_message(NoticeLevel::Info, format!("Figure saved:\n{}", path.display()));
+            }
+            Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
         }
     }
 

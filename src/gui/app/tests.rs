@@ -9,7 +9,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
 use super::{App, OpenLog, PlayingLog};
-use crate::gui::desktop::{Desktop, PanelExport, PathEntry, SampleProgress};
+use crate::gui::desktop::{Desktop, FigureExport, PanelExport, PathEntry, SampleProgress};
 use crate::gui::samples::{FRAME_PERIOD_NS, first_tracked_frame, sample_images, sample_recording_of};
 use crate::gui::theme::ThemeName;
 use crate::gui::{ImageSource as _, Playback};
@@ -176,6 +176,14 @@ impl Desktop for TestDesktop {
     fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String> {
         self.written.lock().unwrap().push(export.clone());
         Ok(vec![PathBuf::from(format!("/out/{}.png", export.name))])
+    }
+
+    fn write_figure(&self, export: &FigureExport) -> Result<PathBuf, String> {
+        Ok(PathBuf::from(&export.path))
+    }
+
+    fn start_report(&self, name: &str, _arguments: &[String]) -> Result<Receiver<Result<PathBuf, String>>, String> {
+        Err(format!("no report on {name}"))
     }
 
     fn write_session(&self, name: &str, text: &str) -> Result<PathBuf, String> {

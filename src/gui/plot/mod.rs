@@ -45,7 +45,9 @@ pub(crate) fn plot_ui(
     register(ui, area, readout.key);
     let response = navigate(ui, ctx, area, plot);
     value_axis_ui(ui, ctx, area, readout.key, plot, response.hovered());
-    paint_cursor(&ui.painter_at(area.rect), ctx.theme, area, ctx.cursor_ns);
+    if ctx.presentation.shows_cursor() {
+        paint_cursor(&ui.painter_at(area.rect), ctx.theme, area, ctx.cursor_ns);
+    }
     paint_readout(ui, ctx, area, readout, response.hovered());
     response
 }

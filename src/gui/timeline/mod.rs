@@ -94,7 +94,9 @@ impl Panel for TimelinePanel {
         paint_forks(&painter, ctx, &area, lane_y);
         paint_range(&painter, ctx, &area);
         markers::paint(&painter, &theme, &area, &ctx.playback.markers);
-        paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
+        if ctx.presentation.shows_cursor() {
+            paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
+        }
         let below_ruler = PlotArea { rect: plot.with_min_y(plot.top() + RULER_HEIGHT), ..area };
         paint_times(&painter, ctx, &below_ruler);
         paint_time_labels(&painter, ctx, &area, plot.top() + 1.0, false);

@@ -61,6 +61,8 @@ pub(crate) enum Action {
     Save,
     /// Write the panel with the focus to files.
     Export,
+    /// Write a report on the runs and open it.
+    Report,
     /// Copy the value under the pointer, or the table of the panel with the focus.
     Copy,
     CopyTable(PanelName),
@@ -150,7 +152,9 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Maximize, "Maximize the focused panel, or restore", "Ctrl+M", &[(CTRL, Key::M)]),
     entry(Action::Dialog(Dialog::Settings), "Settings…", "Ctrl+,", &[(CTRL, Key::Comma)]),
     entry(Action::Dialog(Dialog::OpenLog), "Open log or session…", "Ctrl+O", &[(CTRL, Key::O)]),
+    entry(Action::Dialog(Dialog::Figure), "Figure for a paper…", "Ctrl+Shift+E", &[(CTRL_SHIFT, Key::E)]),
     entry(Action::Export, "Export focused panel (PNG, SVG, CSV)", "Ctrl+E", &[(CTRL, Key::E)]),
+    entry(Action::Report, "Write report and open it", "Ctrl+R", &[(CTRL, Key::R)]),
     entry(Action::Save, "Save session", "Ctrl+S", &[(CTRL, Key::S)]),
     entry(Action::Dialog(Dialog::Palette), "Command palette…", "Ctrl+P", &[(CTRL, Key::P)]),
     entry(Action::Tour, "Tour in six steps", "Ctrl+F1", &[(CTRL, Key::F1)]),

@@ -4,7 +4,9 @@ use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
+use super::WindowRequest;
 use super::tests::{Bench, bench, commands_of};
+use crate::gui::desktop::DrawnFigure;
 use crate::gui::{Dialog, PanelName};
 use crate::session::Command;
 
@@ -75,4 +77,33 @@ fn a_fork_with_a_misspelt_parameter_stays_open() {
     assert!(harness.get_by_label("Fork").accesskit_node().is_disabled());
     let pushed = commands_of(&mut harness, |harness| harness.key_press(Key::Enter));
     assert!(pushed.is_empty() && harness.state().window.dialogs.is_open(), "{pushed:?}");
+}
+
+#[test]
+fn a_figure_of_the_focused_panel_is_composed_and_saved() {
+    let mut harness = bench();
+    harness.state_mut().window.focus = Some(PanelName::Residuals);
+    harness.state_mut().selection.visible_ns = Some((1_000_000_000, 3_000_000_000));
+    harness.run_steps(2);
+    harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::E);
+    harness.run_steps(4);
+    let command = |harness: &Harness<'static, Bench>| {
+        let label = harness.get_by_label_contains("dcvins screenshot ");
+        let node = label.accesskit_node();
+        node.value().or_else(|| node.label()).unwrap_or_default()
+    };
+    let shown = command(&harness);
+    assert!(shown.contains("--panel residuals --from 1 --to 3 --width-mm 85 --font-pt 8 --theme print"), "{shown}");
+    harness.get_by_label("Two columns").click();
+    harness.get_by_label("Whole log").click();
+    harness.run_steps(3);
+    let shown = command(&harness);
+    assert!(shown.contains("--panel residuals --width-mm 175 --font-pt 8") && shown.ends_with("175mm.pdf"), "{shown}");
+    harness.get_by_label("Save").click();
+    harness.run_steps(3);
+    let requests = &harness.state().window.requests;
+    let Some(WindowRequest::WriteFigure(export)) = requests.last() else { panic!("{requests:?}") };
+    assert!(export.path.ends_with("/residuals-175mm.pdf"), "{}", export.path);
+    assert!(matches!(&export.figure, DrawnFigure::File(bytes) if bytes.starts_with(b"%PDF")));
+    assert!(!harness.state().window.dialogs.is_open());
 }

@@ -68,7 +68,7 @@ fn operable(recording: &Recording, panel: PanelName, presentation: Presentation,
             presentation,
             commands: &mut Vec::new(),
         };
-        alone_ui(panel, ui, window, &mut context);
+        alone_ui(panel, ui, &mut window.panels, &mut context);
     };
     let mut harness = Harness::builder()
         .with_size(size)

@@ -43,7 +43,7 @@ impl Menu {
         match self {
             Self::File => &[
                 &[Action::Dialog(Dialog::OpenLog)],
-                &[Action::Save, Action::Export, Action::Copy],
+                &[Action::Save, Action::Export, Action::Dialog(Dialog::Figure), Action::Report, Action::Copy],
                 &[Action::Dialog(Dialog::Settings), Action::Undo, Action::Redo],
                 &[Action::CloseLog, Action::Quit],
             ],

@@ -8,6 +8,7 @@ mod copying;
 #[cfg(test)]
 mod dialog_tests;
 mod dialogs;
+mod figure;
 #[cfg(test)]
 mod figure_tests;
 #[cfg(test)]
@@ -46,9 +47,14 @@ use egui::{CentralPanel, Frame, Margin, Rect, Ui, UiBuilder, vec2};
 
 use self::actions::Action;
 pub use self::dialogs::state::Dialogs;
+pub(crate) use self::figure::complete;
+pub use self::figure::{
+    FIGURE_FONT_PT, FIGURE_SIDE_MM, FigureContent, FigureFormat, FigureInput, FigureSpec, FigureText, alone_ui,
+    figure_height,
+};
 pub use self::legend::RunLegend;
 pub use self::notices::{NoticeLevel, Notices};
-pub use self::panel_export::{alone_ui, panel_table};
+pub use self::panel_export::panel_table;
 pub use self::panels::Panels;
 use self::perform::perform;
 pub use self::progress::{Progress, ProgressMeter};

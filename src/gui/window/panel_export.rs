@@ -2,13 +2,13 @@
 
 use std::cell::RefCell;
 
-use egui::{CentralPanel, Frame, Ui, Vec2};
+use egui::{Ui, Vec2};
 
+use super::figure::{alone_ui, complete};
 use super::state::MainWindow;
 use crate::geometry::seconds_from_ns;
 use crate::gui::desktop::PanelExport;
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
-use crate::gui::theme::PANEL_MARGIN;
 use crate::gui::{PanelContext, PanelName, Playback, Presentation};
 use crate::text::Named as _;
 
@@ -23,8 +23,8 @@ const MIN_LIST_SIZE: Vec2 = Vec2::new(460.0, 640.0);
 /// Draws the panel again without the window around it.
 pub(super) fn export(state: &MainWindow, ctx: &mut PanelContext<'_>) -> PanelExport {
     let (panel, size) = state.focused();
-    let mut copy = MainWindow { panels: state.panels.views(), show_times: state.show_times, ..MainWindow::default() };
-    copy.panels.inspector.show_times = state.show_times;
+    let mut copy = state.panels.views();
+    copy.inspector.show_times = state.show_times;
     let copy = RefCell::new(copy);
     // A scrolling list in a low panel is exported completely, up to a limit.
     let min_size = match panel {
@@ -38,7 +38,6 @@ pub(super) fn export(state: &MainWindow, ctx: &mut PanelContext<'_>) -> PanelExp
         pixels_per_point: PIXELS_PER_POINT,
         theme: ctx.theme.name,
     };
-    let mut options = options_of(size);
     let PanelContext { recording, cursor_ns, theme, .. } = *ctx;
     let mut selection = ctx.selection.clone();
     let images = &mut *ctx.images;
@@ -52,27 +51,16 @@ pub(super) fn export(state: &MainWindow, ctx: &mut PanelContext<'_>) -> PanelExp
             &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, presentation, commands };
         alone_ui(panel, ui, &mut copy.borrow_mut(), context);
     };
-    if panel == PanelName::Comparison {
-        // Tables and plots that would scroll are shown completely.
-        headless::svg_of(options, "clip", panel.name(), &mut draw_ui);
-        options = options_of(size.max(copy.borrow().panels.comparison.figure_size));
-    }
+    let options = complete(panel, options_of(size), &copy, &mut draw_ui);
     let screenshot = headless::draw(options, &mut draw_ui);
     let drawing = headless::svg_of(options, "clip", panel.name(), &mut draw_ui);
     let log = recording.log_path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
     let name = format!("{log}/{}-{:.3}s", panel.name(), seconds_from_ns(cursor_ns));
-    PanelExport { name, screenshot, drawing, table: copy.into_inner().panels.csv_table(panel, ctx) }
+    PanelExport { name, screenshot, drawing, table: copy.into_inner().csv_table(panel, ctx) }
 }
 
 /// The values of a panel, comma separated.
 pub fn panel_table(panel: PanelName, state: &mut MainWindow, ctx: &mut PanelContext<'_>) -> String {
     ctx.move_chain();
     state.panels.csv_table(panel, ctx)
-}
-
-/// Draws one panel into all of `ui`.
-pub fn alone_ui(panel: PanelName, ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
-    let frame = Frame::new().fill(ctx.theme.surface).inner_margin(PANEL_MARGIN);
-    ctx.move_chain();
-    CentralPanel::no_frame().frame(frame).show(ui, |ui| state.panels.get(panel).ui(ui, ctx));
 }

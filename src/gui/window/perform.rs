@@ -66,7 +66,13 @@ pub(super) fn perform(action: Action, state: &mut MainWindow, ctx: &mut PanelCon
         Action::Dialog(Dialog::Markers) if ctx.playback.markers.at(ctx.cursor_ns).is_some() => {
             state.dialogs.edit_marker(ctx.cursor_ns);
         }
-        Action::Dialog(dialog) => state.dialogs.show(dialog),
+        Action::Dialog(dialog) => {
+            if dialog == Dialog::Figure {
+                let (panel, _) = state.focused();
+                state.dialogs.figure.start(panel, &state.panels, ctx);
+            }
+            state.dialogs.show(dialog);
+        }
         Action::Explain => state.explain_focused(),
         Action::Manual => state.help.manual.show(None),
         Action::Shortcuts => state.shortcuts_open = !state.shortcuts_open,
@@ -75,6 +81,7 @@ pub(super) fn perform(action: Action, state: &mut MainWindow, ctx: &mut PanelCon
             let export = panel_export::export(state, ctx);
             state.requests.push(WindowRequest::WritePanel(Box::new(export)));
         }
+        Action::Report => state.requests.push(WindowRequest::WriteReport),
         Action::Copy => {
             let value = state.pointed.take();
             copying::copy(value, state, ctx);

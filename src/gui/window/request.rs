@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::gui::desktop::PanelExport;
+use crate::gui::desktop::{FigureExport, PanelExport};
 
 /// Request of the window to the application, in addition to the commands of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,4 +20,7 @@ pub enum WindowRequest {
         save: bool,
     },
     WritePanel(Box<PanelExport>),
+    WriteFigure(Box<FigureExport>),
+    /// Write a report on the runs of the open log and open it.
+    WriteReport,
 }

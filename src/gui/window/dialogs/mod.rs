@@ -2,6 +2,7 @@
 
 mod add_run;
 mod diagnosis;
+mod figure;
 mod fork;
 mod fuzzy;
 mod markers;
@@ -24,7 +25,7 @@ use crate::gui::{Dialog, PanelContext};
 
 /// Draws the dialog that is open.
 pub(super) fn ui(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
-    let MainWindow { dialogs, requests, saved_layouts, settings, layout, history, .. } = state;
+    let MainWindow { dialogs, panels, requests, saved_layouts, settings, layout, history, .. } = state;
     let picked = dialogs.open_log.picked(ui);
     if picked.is_some() && dialogs.open == Some(Dialog::OpenLog) {
         dialogs.open = None;
@@ -43,6 +44,7 @@ pub(super) fn ui(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>, ac
         Some(Dialog::Fork) => dialogs.fork.ui(ui, ctx),
         Some(Dialog::Diagnosis) => diagnosis::ui(ui, ctx),
         Some(Dialog::Markers) => dialogs.markers.ui(ui, ctx),
+        Some(Dialog::Figure) => dialogs.figure.ui(ui, ctx, panels, requests),
         Some(Dialog::Palette) => dialogs.palette.ui(ui, ctx, saved_layouts, layout, actions),
         Some(Dialog::Settings) => settings::ui(ui, ctx.theme, settings, history, saved_layouts.names(), actions),
         Some(Dialog::RemoveRun) => remove_run::ui(ui, ctx, dialogs.removed_run, history),

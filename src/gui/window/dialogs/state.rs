@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::add_run::AddRunDialog;
+use super::figure::FigureDialog;
 use super::fork::ForkDialog;
 use super::markers::MarkersDialog;
 use super::open_log::OpenLogDialog;
@@ -18,6 +19,7 @@ pub struct Dialogs {
     pub(super) add_run: AddRunDialog,
     pub(super) fork: ForkDialog,
     pub(super) markers: MarkersDialog,
+    pub(in crate::gui::window) figure: FigureDialog,
     pub(super) palette: CommandPalette,
     /// Index of the run that is to be removed.
     pub(super) removed_run: usize,
