@@ -56,7 +56,7 @@ pub(crate) fn study_report(
             ReportDrawing::Svg(draw_study_panel_svg(panel, study, view, &drawing, [&prefix, title])?)
         };
         let (heading, title, reading) = ((*heading).to_owned(), title.clone(), reading.clone());
-        figures.push(ReportFigure { heading, title, reading, drawing });
+        figures.push(ReportFigure { heading, title, reading, half: false, drawing });
         tables.push(((*panel).to_owned(), study_panel_csv(panel, study, view)?));
     }
     drop(progress);

@@ -37,10 +37,22 @@ pub(super) fn list(items: &[String]) -> Markup {
     }
 }
 
-/// A table whose first column contains the names of the rows; cells that begin with a digit, a sign or ± are aligned as
-/// numbers.
+/// An unordered list of texts in two columns, empty if there are none.
+pub(super) fn list_in_columns(items: &[String]) -> Markup {
+    html! {
+        @if !items.is_empty() {
+            ul.columns { @for item in items { li { (unbroken(item)) } } }
+        }
+    }
+}
+
+/// True for a cell that is aligned as a number: it begins with a digit, a sign or ±.
+pub(super) fn is_number(cell: &str) -> bool {
+    cell.starts_with(|first: char| first.is_ascii_digit() || "−-±".contains(first))
+}
+
+/// A table whose first column contains the names of the rows.
 pub(super) fn table<S: AsRef<str>>(caption: &str, header: &[S], rows: &[Vec<String>]) -> Markup {
-    let number = |cell: &str| cell.starts_with(|first: char| first.is_ascii_digit() || "−-±".contains(first));
     html! {
         table.short[rows.len() <= MAX_UNBROKEN_ROWS] {
             caption { (caption) }
@@ -50,16 +62,33 @@ pub(super) fn table<S: AsRef<str>>(caption: &str, header: &[S], rows: &[Vec<Stri
                     tr {
                         @for (column, cell) in row.iter().enumerate() {
                             @if column == 0 {
-                                th scope="row" { (cell) }
-                            } @else if number(cell) {
+                                th scope="row" { (breakable(cell)) }
+                            } @else if is_hash(cell) {
+                                td.hash { (cell) }
+                            } @else if is_number(cell) {
                                 td.number { (cell) }
                             } @else {
-                                td { (cell) }
+                                td { (breakable(cell)) }
                             }
                         }
                     }
                 }
             }
+        }
+    }
+}
+
+/// True for a hexadecimal hash, which may be broken anywhere.
+fn is_hash(cell: &str) -> bool {
+    cell.len() >= 40 && cell.bytes().all(|byte| byte.is_ascii_hexdigit())
+}
+
+/// A text that may be broken after slashes, as topics and paths are; words are not broken.
+fn breakable(text: &str) -> Markup {
+    html! {
+        @for (place, part) in text.split_inclusive('/').enumerate() {
+            @if place > 0 { wbr; }
+            (part)
         }
     }
 }
@@ -120,7 +149,7 @@ mod tests {
         assert!(text.contains("<td class=\"number\">-1</td>"), "{text}");
         let shown = |drawing: ReportDrawing| {
             let [heading, title, reading] = ["h", "<p>", "r & s"].map(str::to_owned);
-            figure(3, &ReportFigure { heading, title, reading, drawing }).into_string()
+            figure(3, &ReportFigure { heading, title, reading, half: false, drawing }).into_string()
         };
         let image = shown(ReportDrawing::Png(b"abc".to_vec()));
         assert_eq!(image.matches("base64,YWJj").count(), 1);
@@ -129,6 +158,14 @@ mod tests {
         let expected = "<figure id=\"figure-3\"><svg width=\"1\"></svg><figcaption><b>Figure 3. &lt;p&gt;.</b> r &amp; s\
                         </figcaption></figure>";
         assert_eq!(drawing, expected);
+    }
+
+    #[test]
+    fn only_hashes_are_broken_inside_words_and_topics_after_slashes() {
+        let hash = "0123456789abcdef0123456789abcdef01234567".to_owned();
+        let text = table("t", &["a", "b"], &[vec!["/imu/data".to_owned(), hash.clone()]]).into_string();
+        assert!(text.contains("<th scope=\"row\">/<wbr>imu/<wbr>data</th>"), "{text}");
+        assert!(text.contains(&format!("<td class=\"hash\">{hash}</td>")), "{text}");
     }
 
     #[test]

@@ -12,6 +12,8 @@ pub struct ReportFigure {
     pub title: String,
     /// Legend: colours, dashes, units.
     pub reading: String,
+    /// True for a figure of half the width of the page, beside the next one of that width.
+    pub half: bool,
     pub drawing: ReportDrawing,
 }
 

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::content::{ReportContent, RunContent};
-use super::html::{document, figure, icon, list, unbroken};
+use super::html::{document, figure, icon, list, list_in_columns, unbroken};
 use super::numbers::number;
 use super::options::ReportFigure;
 use super::rank_intervals::RankInterval;
@@ -17,13 +17,17 @@ pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String 
         p.lead { (lead(content)) }
         (contents(content))
         (verdict_section(content))
-        (grouped(figures))
         h2 #accuracy { "Accuracy" }
         (tables::accuracy(content))
         (tables::frames(content))
         @if let Some(trajectories) = tables::trajectories(content) {
             (trajectories)
         }
+        @if let Some(calibration) = tables::calibration(&content.runs) {
+            h2 #calibration { "Calibration" }
+            (calibration)
+        }
+        (grouped(figures))
         @for (index, run) in content.runs.iter().enumerate() {
             (run_section(index, run))
         }
@@ -107,6 +111,9 @@ fn contents(content: &ReportContent) -> Markup {
             ul {
                 li { a href="#verdict" { "Verdict" } }
                 " " li { a href="#accuracy" { "Accuracy" } }
+                @if content.runs.iter().any(|run| !run.estimability.is_empty()) {
+                    " " li { a href="#calibration" { "Calibration" } }
+                }
                 @for (index, run) in content.runs.iter().enumerate() {
                     " " li { a href={ "#run-" (index) } { (run.label) } }
                 }
@@ -127,21 +134,21 @@ fn grouped(figures: &[ReportFigure]) -> Markup {
             @if let Some((_, first)) = group.first() {
                 h2 { (first.heading) }
             }
-            @for (number, shown) in group {
-                (figure(*number, shown))
+            @for beside in group.chunk_by(|(_, a), (_, b)| a.half && b.half) {
+                @if beside.len() > 1 {
+                    div.pair { @for (number, shown) in beside { (figure(*number, shown)) } }
+                } @else {
+                    @for (number, shown) in beside { (figure(*number, shown)) }
+                }
             }
         }
     }
 }
 
 fn run_section(index: usize, run: &RunContent) -> Markup {
-    let calibration = &run.summary.calibration;
     let frequent: Vec<String> = run.frequent_events.iter().map(|(kind, count)| format!("{kind} {count}")).collect();
     html! {
         h2 id={ "run-" (index) } { "Run " (run.label) }
-        @if !calibration.parameters.is_empty() {
-            (tables::calibration(run))
-        }
         (rank_section(run))
         h3 { "Events and warnings" }
         @if !run.events.is_empty() {
@@ -165,10 +172,10 @@ fn rank_section(run: &RunContent) -> Markup {
         @if sentences.is_empty() {
             p { "No rank analysis: no step of the run was linearized." }
         } @else {
-            (list(&sentences))
+            (list_in_columns(&sentences))
             @if !known.is_empty() {
                 p { "Null directions of the parameterization in closed form, and the steps whose Jacobian confirms them:" }
-                (list(&known))
+                (list_in_columns(&known))
             }
         }
     }

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::content::{ReportContent, RunContent};
-use super::html::{list, table};
+use super::html::{is_number, list_in_columns, table, unbroken};
 use super::numbers::{MS_PER_S, number, shown_unit};
 use crate::log_check::{CheckReport, Severity};
 use crate::observability::Determination;
@@ -95,29 +95,64 @@ pub(super) fn trajectories(content: &ReportContent) -> Option<Markup> {
     (!rows.is_empty()).then(|| table(caption, &["trajectory", "file or topic", "poses", "path length, m"], &rows))
 }
 
-/// Calibration table of one run in degrees, millimetres and milliseconds: values, verdicts of the flight, reasons.
-pub(super) fn calibration(run: &RunContent) -> Markup {
-    let parameters = &run.summary.calibration.parameters;
-    let with_ground_truth = parameters.iter().any(|parameter| parameter.ground_truth.is_some());
+/// Calibration parameters of all runs in degrees, millimetres and milliseconds: values, verdicts of the flight, and
+/// below them reasons and what helps; `None` without calibration.
+pub(super) fn calibration(runs: &[RunContent]) -> Option<Markup> {
+    let calibrated = || runs.iter().filter(|run| !run.estimability.is_empty());
+    calibrated().next()?;
+    let parameters = |run: &RunContent| run.summary.calibration.parameters.clone();
+    let with_ground_truth = calibrated().flat_map(parameters).any(|parameter| parameter.ground_truth.is_some());
     let mut header = vec!["parameter", "rig", "final ± 1 σ", "σ / prior σ", "verdict", "since, s"];
     if with_ground_truth {
         header.push("error (multiple of σ)");
     }
-    header.extend(["reason", "what helps"]);
-    let row = |verdict: &FlightParameter| {
-        let parameter = parameters.iter().find(|parameter| parameter.name == verdict.name);
-        calibration_row(verdict, parameter, with_ground_truth)
-    };
-    let rows: Vec<Vec<String>> = run.estimability.iter().map(row).collect();
-    let caption = format!(
-        "Calibration of run {}, parameterization {}. Verdicts of the whole flight: {}",
-        run.label,
-        run.summary.calibration.parameterization,
-        Determination::RULE
-    );
-    table(&caption, &header, &rows)
+    let columns = header.len();
+    Some(html! {
+        p.rule {
+            "Values at the end; verdicts of the whole flight (" (Determination::RULE)
+            "). Below a parameter that is not determined: the reason, and what helps."
+        }
+        table.calibration {
+            thead { tr { @for cell in &header { th scope="col" { (cell) } } } }
+            @for run in calibrated() {
+                tbody.run {
+                    tr {
+                        th colspan=(columns) scope="rowgroup" {
+                            "Calibration of run " (run.label) ", parameterization " (run.summary.calibration.parameterization)
+                        }
+                    }
+                }
+                @for verdict in &run.estimability {
+                    (calibration_rows(run, verdict, with_ground_truth))
+                }
+            }
+        }
+    })
 }
 
+/// The rows of one parameter, which stay on one page.
+fn calibration_rows(run: &RunContent, verdict: &FlightParameter, with_ground_truth: bool) -> Markup {
+    let parameter = run.summary.calibration.parameters.iter().find(|parameter| parameter.name == verdict.name);
+    let cells = calibration_row(verdict, parameter, with_ground_truth);
+    let why: Vec<&str> =
+        [verdict.reason.as_str(), verdict.remedy.as_str()].into_iter().filter(|text| !text.is_empty()).collect();
+    let name_rows = if why.is_empty() { 1 } else { 2 };
+    html! {
+        tbody {
+            tr {
+                th scope="row" rowspan=(name_rows) { (verdict.name) }
+                @for cell in &cells {
+                    @if is_number(cell) { td.number { (cell) } } @else { td { (cell) } }
+                }
+            }
+            @if !why.is_empty() {
+                tr.why { td colspan=(cells.len()) { (unbroken(&why.join(" · "))) } }
+            }
+        }
+    }
+}
+
+/// Cells of a parameter after its name.
 fn calibration_row(
     verdict: &FlightParameter,
     parameter: Option<&ParameterSummary>,
@@ -128,7 +163,6 @@ fn calibration_row(
     let unit = if unit.is_empty() || unit == "°" { unit.to_owned() } else { format!(" {unit}") };
     let sigma = verdict.sigma.map_or_else(String::new, |sigma| format!(" ± {}", shown(sigma)));
     let mut row = vec![
-        verdict.name.clone(),
         parameter.map_or_else(String::new, |parameter| shown(parameter.initial)),
         format!("{}{sigma}{unit}", shown(verdict.value)),
         verdict.ratio.map_or_else(String::new, |ratio| number(ratio, 3)),
@@ -142,7 +176,6 @@ fn calibration_row(
             ratio.map_or_else(String::new, |(error, sigma)| format!(" ({} σ)", number((error / sigma).abs(), 1)));
         row.push(error.map_or_else(String::new, |error| format!("{}{unit}{ratio}", shown(error))));
     }
-    row.extend([verdict.reason.clone(), verdict.remedy.clone()]);
     row
 }
 
@@ -177,7 +210,7 @@ pub(super) fn findings(check: &CheckReport) -> Markup {
         }
         @if !good.is_empty() {
             p { "Checks without problems:" }
-            (list(&good))
+            (list_in_columns(&good))
         }
     }
 }
@@ -243,7 +276,7 @@ mod tests {
             };
             let [rig, last, error] = expected;
             let verdicts = ["0.500", "weakly determined", "1.50"];
-            let expected = [&["parameter", rig, last], &verdicts[..], &[error, "motion", ""]].concat();
+            let expected = [&[rig, last], &verdicts[..], &[error]].concat();
             assert_eq!(calibration_row(&verdict, Some(&summary), true), expected);
             assert_eq!(calibration_row(&verdict, None, false).len(), expected.len() - 1);
         };

@@ -12,7 +12,6 @@ use crate::session::{
     FlightParameter, LostSince, PoseError, Recording, RunRecord, RunSummary, StepRecord, flight_headline,
     least_determined, run_warning_lines,
 };
-use crate::text::Named as _;
 
 /// Largest trajectory error, in percent of the path length, with a good mark.
 const MAX_ATE_PERCENT: f64 = 1.0;
@@ -126,17 +125,10 @@ fn calibration(summary: &RunSummary) -> Statement {
         return statement("Calibration", Mark::Note, text.to_owned(), Vec::new());
     }
     let all = parameters.iter().all(|parameter| parameter.verdict == Determination::Determined);
-    let text = format!("{}, from the whole flight ({}).", flight_headline(parameters), Determination::RULE);
+    let text = format!("{}, from the whole flight.", flight_headline(parameters));
     let mut details = Vec::new();
-    for verdict in Determination::all() {
-        let of = parameters.iter().filter(|parameter| parameter.verdict == verdict);
-        let listed: Vec<String> = of.map(with_sigma).collect();
-        if !listed.is_empty() {
-            details.push(format!("{}: {}.", capitalized(verdict.name()), listed.join(", ")));
-        }
-    }
     if let Some(least) = least_determined(parameters) {
-        details.push(format!("Least determined: {}, {}.", least.name, least.verdict_text()));
+        details.push(format!("Least determined: {}, {}.", with_sigma(least), least.verdict_text()));
         details.push(format!("Reason: {}.", least.reason));
         if !least.remedy.is_empty() {
             details.push(format!("Suggested for it: {}.", least.remedy));
@@ -259,19 +251,20 @@ pub(super) fn log_statement(check: Option<&CheckReport>, reader_warnings: &[Stri
         let findings = check.into_iter().flat_map(|check| &check.findings);
         findings.filter(move |finding| finding.severity == severity).collect::<Vec<_>>()
     };
-    let (errors, warnings) = (of(Severity::Error), of(Severity::Warning));
+    let (errors, warnings, notes) = (of(Severity::Error), of(Severity::Warning), of(Severity::Note));
     let others = warnings.len() + reader_warnings.len();
-    let mark = match (errors.len(), others) {
-        (0, 0) => Mark::Good,
-        (0, _) => Mark::Warning,
+    let mark = match (errors.len(), others, notes.len()) {
+        (0, 0, 0) => Mark::Good,
+        (0, 0, _) => Mark::Note,
+        (0, ..) => Mark::Warning,
         _ => Mark::Error,
     };
-    let text = match (errors.len(), others) {
-        (0, 0) => "No problems found in the log and the rig.".to_owned(),
-        (found, others) => {
-            let counts = format!("{} and {}", count(found, "error"), count(others, "warning"));
-            format!("{} about the log and the rig.", capitalized(&counts))
-        }
+    let text = if mark == Mark::Good {
+        "No problems found in the log and the rig.".to_owned()
+    } else {
+        let counts = [(errors.len(), "error"), (others, "warning"), (notes.len(), "note")];
+        let [errors, warnings, notes] = counts.map(|(number, noun)| count(number, noun));
+        format!("{}, {warnings} and {notes} about the log and the rig.", capitalized(&errors))
     };
     let line = |finding: &crate::log_check::Finding| {
         let remedy = if finding.remedy.is_empty() { String::new() } else { format!(" Remedy: {}", finding.remedy) };
@@ -279,7 +272,8 @@ pub(super) fn log_statement(check: Option<&CheckReport>, reader_warnings: &[Stri
     };
     // What matters most comes first.
     let first = check.map(|check| check.verdict().first).unwrap_or_default();
-    let (named, others): (Vec<_>, Vec<_>) = errors.iter().chain(&warnings).copied().partition(|it| first.contains(it));
+    let (named, others): (Vec<_>, Vec<_>) =
+        errors.iter().chain(&warnings).chain(&notes).copied().partition(|it| first.contains(it));
     let named = first.iter().filter(|it| named.contains(it));
     let details = named.chain(others).map(line).chain(reader_warnings.iter().cloned()).collect();
     statement("Log and rig", mark, text, details)
@@ -349,7 +343,7 @@ mod tests {
         let warned = log_statement(None, &["1.000 s: gap".to_owned()]);
         assert_eq!(
             (warned.mark, warned.text.as_str()),
-            (Mark::Warning, "No errors and 1 warning about the log and the rig.")
+            (Mark::Warning, "No errors, 1 warning and no notes about the log and the rig.")
         );
     }
 
