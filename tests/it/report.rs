@@ -40,7 +40,7 @@ fn check_verdict(page: &str, report: &Value) {
         let heading = format!("Calibration of run {label}, parameterization");
         assert_eq!(page.matches(&heading).count(), 1, "one table");
         let rows = page.split(&heading).nth(1).expect("it is there");
-        let rows = &rows[..rows.find("Calibration of run").or(rows.find("</table>")).expect("the table ends")];
+        let rows = &rows[..rows.find("Calibration of run").or_else(|| rows.find("</table>")).expect("the table ends")];
         let parameters = run["estimability"].as_array().expect("a list");
         assert_eq!(run["estimability"], run["summary"]["calibration"]["estimability"], "one table");
         assert_eq!(parameters.len(), run["summary"]["calibration"]["columns"].as_u64().expect("a count") as usize);
