@@ -41,7 +41,7 @@ pub(crate) enum Command {
     /// Draw one panel at one time into a PNG or an SVG, without a display.
     #[cfg(feature = "gui")]
     #[command(after_help = exit::INTERRUPTIBLE)]
-    Screenshot(ScreenshotArguments),
+    Screenshot(Box<ScreenshotArguments>),
     /// Write a report on a log: one HTML file with figures and tables, and CSV and JSON files.
     #[command(after_help = exit::REPORT)]
     Report(ReportArguments),

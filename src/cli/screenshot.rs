@@ -289,11 +289,10 @@ fn drawing_options(arguments: &ScreenshotArguments) -> ScreenshotOptions {
         size_px: arguments.size.map(|side| side as u32),
         pixels_per_point: arguments.scale,
         theme: match arguments.theme {
-            Some(ThemeArgument::Light) => ThemeName::Light,
             Some(ThemeArgument::Dark) => ThemeName::Dark,
             Some(ThemeArgument::Print) => ThemeName::Print,
             None if arguments.figure.has_paper_size() => ThemeName::Print,
-            None => ThemeName::Light,
+            None | Some(ThemeArgument::Light) => ThemeName::Light,
         },
         renderer: match arguments.renderer {
             RendererArgument::Cpu => Renderer::Cpu,
