@@ -9,9 +9,12 @@ const LARGEST_WIDTH: usize = 640;
 const BLOCK: usize = 8;
 /// Mean gradient of a block with texture, in grey levels per pixel; compression and noise stay below.
 const MIN_GRADIENT: f32 = 2.0;
-/// Ratio of the norm of the summed gradients to the sum of their norms above which a block is static. Moving scenes
+/// Ratio of the norm of the summed gradients to the sum of their norms above which a block may be static. Moving scenes
 /// have about the inverse square root of the number of images.
 const STILL_COHERENCE: f32 = 0.6;
+/// Ratio of the squared mean of the gradient's norm to its mean square above which the block is static: an edge that
+/// moves through a block, such as the horizon in the images of a stabilized camera, keeps its direction but not its place.
+const STILL_CONSTANCY: f32 = 0.6;
 
 /// Sums of the gradients of all sampled images of a camera.
 #[derive(Clone, Debug, Default)]
@@ -22,8 +25,8 @@ pub(super) struct GradientSums {
     /// Side of the square of pixels that is averaged.
     scale: usize,
     pub(super) images: usize,
-    /// Sum of the gradients along columns and rows, and of their norms.
-    sums: Vec<[f32; 3]>,
+    /// Sum of the gradients along columns and rows, of their norms, and of the squares of these.
+    sums: Vec<[f32; 4]>,
 }
 
 impl GradientSums {
@@ -33,7 +36,7 @@ impl GradientSums {
             self.size_px = [image.width, image.height];
             self.scale = image.width.div_ceil(LARGEST_WIDTH).max(1);
             (self.width, self.height) = (image.width / self.scale, image.height / self.scale);
-            self.sums = vec![[0.0; 3]; self.width * self.height];
+            self.sums = vec![[0.0; 4]; self.width * self.height];
         }
         if self.size_px != [image.width, image.height] {
             return;
@@ -49,7 +52,8 @@ impl GradientSums {
                 let along = 0.5 * (here[column + 1] - here[column - 1]);
                 let down = 0.5 * (below[column] - above[column]);
                 let sum = &mut sums[column];
-                *sum = [sum[0] + along, sum[1] + down, sum[2] + planar_length([along, down])];
+                let norm = planar_length([along, down]);
+                *sum = [sum[0] + along, sum[1] + down, sum[2] + norm, sum[3] + norm * norm];
             }
         }
     }
@@ -80,13 +84,17 @@ impl GradientSums {
         let block = |index: usize| {
             let (left, top) = (BLOCK * (index % columns), BLOCK * (index / columns));
             let row = |row: usize| &self.sums[row * self.width + left..][..BLOCK];
-            let (mut summed, mut norms) = (0.0_f32, 0.0_f32);
-            for [along, down, norm] in (top..top + BLOCK).flat_map(row) {
+            let (mut summed, mut norms, mut squared_norms, mut squares) = (0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32);
+            for [along, down, norm, square] in (top..top + BLOCK).flat_map(row) {
                 summed += planar_length([*along, *down]);
                 norms += norm;
+                squared_norms += norm * norm;
+                squares += square;
             }
-            let textured = norms > MIN_GRADIENT * (self.images * BLOCK * BLOCK) as f32;
-            textured.then_some(summed > STILL_COHERENCE * norms)
+            let images = self.images as f32;
+            let textured = norms > MIN_GRADIENT * images * (BLOCK * BLOCK) as f32;
+            let is_constant = squared_norms > STILL_CONSTANCY * images * squares;
+            textured.then_some(summed > STILL_COHERENCE * norms && is_constant)
         };
         (0..columns * rows).map(block).collect()
     }
@@ -115,5 +123,29 @@ impl GradientSums {
         let (left, top) = (side * (block % columns), side * (block / columns));
         let masked = (top..top + side).flat_map(|row| (left..left + side).map(move |column| (column, row)));
         2 * masked.filter(|(column, row)| mask.is_masked(*column, *row)).count() > side * side
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIDE: usize = 16;
+
+    /// Judgement on images whose lower part, from a row by the number of the image on, is brighter.
+    fn judged(edge: impl Fn(usize) -> usize) -> Vec<Option<bool>> {
+        let mut sums = GradientSums::default();
+        for number in 0..40 {
+            let row = |index: usize| index / SIDE;
+            let pixels = (0..SIDE * SIDE).map(|index| if row(index) < edge(number) { 40 } else { 200 }).collect();
+            sums.add(&GrayImage { width: SIDE, height: SIDE, pixels });
+        }
+        sums.judge()
+    }
+
+    #[test]
+    fn an_edge_that_moves_along_its_normal_is_not_static() {
+        assert_eq!(judged(|_| 4)[..2], [Some(true); 2]);
+        assert_eq!(judged(|number| 2 + number % 5)[..2], [Some(false); 2]);
     }
 }
