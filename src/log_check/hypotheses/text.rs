@@ -16,7 +16,6 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
     let key = &data.camera.key;
     let correction = &found.correction;
     let graded = |change: f64| if change.abs() > USELESS_RATIO { Severity::Error } else { Severity::Warning };
-    let of = |severity, area, title: String, remedy: String| Cause::new(severity, area, title, remedy);
     match &found.kind {
         Kind::LeftHanded => left_handed(data, found),
         Kind::GyroscopeScale => gyroscope_scale(correction.gyroscope_scale),
@@ -25,7 +24,7 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
         Kind::FocalPieces(pieces) => focal_pieces(key, pieces),
         Kind::CameraDrift => {
             let ppm = correction.camera_drift * 1e6;
-            of(
+            Cause::new(
                 Severity::Warning,
                 Area::Time,
                 format!("the time offset of {key} drifts by {:+.2} ms per second ({ppm:+.0} ppm)", ppm * 1e-3),
@@ -35,7 +34,7 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
         Kind::Mount => {
             let angle_deg = correction.mount.angle().to_degrees();
             let since_s = found.since_s.unwrap_or(0.0);
-            of(
+            Cause::new(
                 if angle_deg > 3.0 { Severity::Error } else { Severity::Warning },
                 Area::Extrinsics,
                 format!("the mount of {key} moves: rotated by {angle_deg:.1}° from about {since_s:.1} s on"),
@@ -45,7 +44,7 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
         Kind::JointSigns(joints) => {
             let names = joint_names(data, joints);
             let (verb, noun) = if joints.len() == 1 { ("counts", "joint") } else { ("count", "joints") };
-            of(
+            Cause::new(
                 Severity::Error,
                 Area::Encoders,
                 format!("{noun} {names} {verb} in the other direction than in the rig"),
@@ -61,7 +60,7 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
                 .filter(|(joint, change)| *joint != change.source)
                 .map(|(joint, change)| format!("'{}' contains the angle of '{}'", name(change.source), name(joint)))
                 .collect();
-            of(
+            Cause::new(
                 Severity::Error,
                 Area::Encoders,
                 format!("joint names are exchanged: {}", exchanged.join(", ")),
@@ -73,12 +72,12 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
             let unit = JointUnit::of_size(size_rad).map_or_else(|| "in another unit".to_owned(), JointUnit::describe);
             let title = format!("joint angles are {unit}");
             let remedy = "sensor_msgs/JointState requires radians: correct the driver".to_owned();
-            of(Severity::Error, Area::Encoders, title, remedy)
+            Cause::new(Severity::Error, Area::Encoders, title, remedy)
         }
         Kind::JointScale(joint) => {
             let scale = correction.joints[*joint].scale;
             let name = joint_names(data, &[*joint]);
-            of(
+            Cause::new(
                 graded(scale - 1.0),
                 Area::Encoders,
                 format!("readings of joint {name} are {:.3} times its angle", 1.0 / scale),
@@ -90,8 +89,8 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
             let delay_ms = correction.joint_delay_s * 1e3;
             let late = if delay_ms > 0.0 { "late" } else { "early" };
             let given_s = data.rig.gimbal.as_ref().map_or(0.0, |gimbal| gimbal.timeshift_gimbal_imu_s);
-            of(
-                if delay_ms.abs() > 1e3 * USELESS_DELAY_S { Severity::Error } else { Severity::Warning },
+            Cause::new(
+                if correction.joint_delay_s.abs() > USELESS_DELAY_S { Severity::Error } else { Severity::Warning },
                 Area::Time,
                 format!("joint angles are {:.0} ms {late}", delay_ms.abs()),
                 format!("set gimbal.timeshift_gimbal_imu to {:+.3}", given_s - correction.joint_delay_s),

@@ -109,18 +109,14 @@ impl Search<'_, '_> {
         } else if agreement::agrees(&misfit, &given.steps) {
             diagnosis.verdict = Verdict::Agrees;
             diagnosis.ground_truth = truth::disagreement(self.record);
-            self.report(0.5, "check of the log");
-            if !self.is_interrupted() {
-                diagnosis.log_faults = (self.check)();
-            }
-            return diagnosis;
         }
-        let onset = agreement::onset(&given.steps);
+        let onset = if diagnosis.verdict == Verdict::Agrees { None } else { agreement::onset(&given.steps) };
         diagnosis.onset_s = onset.map(|step| self.stamp_s(step));
         self.report(0.03, "check of the log");
         if !self.is_interrupted() {
             diagnosis.log_faults = (self.check)();
-            if !self.undo_measured(&mut diagnosis, &given, onset) {
+            let ends = diagnosis.verdict == Verdict::Agrees || self.undo_measured(&mut diagnosis, &given, onset);
+            if !ends {
                 self.search(&mut diagnosis, &given, misfit.tracked_ratio() < LOST, onset);
             }
         }
@@ -135,7 +131,7 @@ impl Search<'_, '_> {
         let undoing = Undoing::of(self.run, &diagnosis.log_faults);
         let span = screened_span(self.run, self.history, given, undoing.since.or(onset));
         if let Some(span) = span.filter(|_| !undoing.hypotheses.is_empty())
-            && let Some((span, trials)) = self.best_of(&span, given, undoing.hypotheses, 0.05, SCREENED)
+            && let Some((span, trials)) = self.best_of(&span, given, undoing.hypotheses)
         {
             let best = trials.others.iter().min_by(|one, other| one.score.total_cmp(&other.score));
             if best.is_some_and(|best| agreement::disagreement(&best.misfit) <= 1.0) {
@@ -161,23 +157,20 @@ impl Search<'_, '_> {
             let later = changes_at(onset, &hypotheses);
             hypotheses.extend(later);
         }
-        if let Some((span, trials)) = self.best_of(&span, given, hypotheses, 0.05, SCREENED) {
+        if let Some((span, trials)) = self.best_of(&span, given, hypotheses) {
             self.conclude(diagnosis, &span, trials);
         }
     }
 
     /// Trials of hypotheses on a span, and of the best ones with refined values on more of the run, which is returned with
-    /// them; `from` and `screened` are the ratios of the progress before and after the first ones. `None` if the run itself
-    /// could not be computed.
+    /// them. `None` if the run itself could not be computed.
     fn best_of(
         &mut self,
         span: &TrialSpan,
         given: &TrialResult,
         hypotheses: Vec<Hypothesis>,
-        from: f64,
-        screened: f64,
     ) -> Option<(TrialSpan, Trials)> {
-        let first = self.candidates(span, hypotheses, (from, screened), None)?;
+        let first = self.candidates(span, hypotheses, (0.05, SCREENED), None)?;
         let span = confirmed_span(self.run, given, span);
         let mut tried: Vec<Hypothesis> = by_cause(&first.given, first.others.clone())
             .into_iter()
@@ -191,8 +184,8 @@ impl Search<'_, '_> {
             let now =
                 if round == 0 { tried.iter().cloned().chain(next.iter().cloned()).collect() } else { next.clone() };
             tried.append(&mut next);
-            let progress = screened + (1.0 - screened) * round as f64 / ROUNDS as f64;
-            let until = screened + (1.0 - screened) * (round + 1) as f64 / ROUNDS as f64;
+            let progress = SCREENED + (1.0 - SCREENED) * round as f64 / ROUNDS as f64;
+            let until = SCREENED + (1.0 - SCREENED) * (round + 1) as f64 / ROUNDS as f64;
             let Some(trials) = self.candidates(&span, now, (progress, until), confirmed.take()) else { break };
             next = refined(self.run, &trials.others);
             next.extend(tuned(&trials.others));

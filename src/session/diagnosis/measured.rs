@@ -5,7 +5,7 @@ use super::hypotheses::{Cause, Hypothesis, ZOOM_S, axes_hypotheses, flips, uses_
 use super::trial::DiagnosedRun;
 use super::tuning::rounded;
 use crate::estimator::SensorParameters;
-use crate::geometry::seconds_from_ns;
+use crate::geometry::ns_from_seconds;
 use crate::log_check::{FaultySource, Finding, MeasuredFault, Severity};
 use crate::session::plan::{Correction, ForkChanges, LONGEST_SHIFT_S};
 
@@ -50,6 +50,7 @@ impl Undoing {
 fn hypotheses(run: &DiagnosedRun<'_>, fault: &MeasuredFault) -> Option<Vec<Hypothesis>> {
     let of_run = |camera_key: &str| (camera_key == run.camera_key).then_some(());
     let of_joints = || uses_encoders(run).then_some(());
+    let step_at = |time_s: f64| run.step_at(ns_from_seconds(time_s));
     let one = |cause, correction| vec![Hypothesis::correction(cause, correction)];
     Some(match fault {
         MeasuredFault::FocalLength { camera_key, ratio } => {
@@ -61,7 +62,7 @@ fn hypotheses(run: &DiagnosedRun<'_>, fault: &MeasuredFault) -> Option<Vec<Hypot
             let zoom = |over_s: f64| {
                 let zoom = Hypothesis::correction(Cause::Zoom, Correction::Zoom(rounded(*ratio), over_s));
                 // The time is that at which half of the change has been reached.
-                Hypothesis { parameters: 2, ..zoom }.starting(step_at(run, since_s - 0.5 * over_s))
+                Hypothesis { parameters: 2, ..zoom }.starting(step_at(since_s - 0.5 * over_s))
             };
             ZOOM_S.map(zoom).to_vec()
         }
@@ -103,7 +104,7 @@ fn hypotheses(run: &DiagnosedRun<'_>, fault: &MeasuredFault) -> Option<Vec<Hypot
             of_joints()?;
             let offset =
                 Hypothesis::correction(Cause::JointOffset, Correction::Offset(joint.clone(), rounded(*offset_rad)));
-            vec![since_s.map_or(offset.clone(), |since_s| offset.starting(step_at(run, since_s)))]
+            vec![since_s.map_or(offset.clone(), |since_s| offset.starting(step_at(since_s)))]
         }
         MeasuredFault::JointUnit(factor) => {
             of_joints()?;
@@ -149,11 +150,6 @@ fn column(
     let changes = ForkChanges { estimated: [columns].into(), ..ForkChanges::default() };
     let estimate = run.spec.calibrate.then(|| Hypothesis::change(cause, changes, parameters));
     (!is_estimated).then(|| estimate.into_iter().collect())
-}
-
-/// First step at or after a time in seconds since the log began.
-fn step_at(run: &DiagnosedRun<'_>, time_s: f64) -> usize {
-    run.inputs.partition_point(|input| seconds_from_ns(input.stamp_ns) < time_s)
 }
 
 #[cfg(test)]

@@ -31,19 +31,18 @@ pub(super) fn screened_span(
 ) -> Option<TrialSpan> {
     let first_window = given.steps.iter().position(|step| step.tracking);
     let stamp_ns = |step: usize| run.inputs.get(step).map_or(0, |input| input.stamp_ns);
-    let step_at = |stamp_ns: i64| run.inputs.partition_point(|input| input.stamp_ns < stamp_ns);
     let (anchor, length_s) = match onset.or(first_window) {
         Some(step) => (step, SCREENED_S),
         None => (first_motion(&run.inputs), LOST_SCREENED_S),
     };
-    let start = step_at(stamp_ns(anchor) - ns_from_seconds(BEFORE_S));
+    let start = run.step_at(stamp_ns(anchor) - ns_from_seconds(BEFORE_S));
     let length_s = length_s * speed_ratio(run, given);
-    let end = step_at(stamp_ns(anchor) + ns_from_seconds(length_s)).max(start + 1).min(run.inputs.len());
+    let end = run.step_at(stamp_ns(anchor) + ns_from_seconds(length_s)).max(start + 1).min(run.inputs.len());
     // Before the first window an engine that starts later waits for the same motion.
     let is_start = onset.is_none() || first_window.is_some_and(|window| start <= window);
     let engine = history.engine_before(if is_start { 0 } else { start })?;
     let window_by = match first_window {
-        Some(window) if is_start => Some(step_at(stamp_ns(window) + ns_from_seconds(LATER_S))),
+        Some(window) if is_start => Some(run.step_at(stamp_ns(window) + ns_from_seconds(LATER_S))),
         _ => None,
     };
     Some(TrialSpan { engine, steps: start..end, window_by, is_start })
@@ -53,7 +52,7 @@ pub(super) fn screened_span(
 pub(super) fn confirmed_span(run: &DiagnosedRun<'_>, given: &TrialResult, span: &TrialSpan) -> TrialSpan {
     let length_s = BEFORE_S + CONFIRMED_S * speed_ratio(run, given);
     let from_ns = run.inputs.get(span.steps.start).map_or(0, |input| input.stamp_ns);
-    let end = run.inputs.partition_point(|input| input.stamp_ns < from_ns + ns_from_seconds(length_s));
+    let end = run.step_at(from_ns + ns_from_seconds(length_s));
     TrialSpan { steps: span.steps.start..end.max(span.steps.end), ..span.clone() }
 }
 

@@ -50,6 +50,11 @@ pub(super) struct TrialResult {
 }
 
 impl DiagnosedRun<'_> {
+    /// First step at or after a stamp.
+    pub(super) fn step_at(&self, stamp_ns: i64) -> usize {
+        self.inputs.partition_point(|input| input.stamp_ns < stamp_ns)
+    }
+
     /// Computes the steps of a span with changes from step `change_at` on; the reports go to `record` if there is one.
     /// `None` if the changes do not fit the run, a step fails, or after an interrupt.
     pub(super) fn trial(
