@@ -18,6 +18,8 @@ pub mod image_panel;
 pub mod inspector;
 pub mod jacobian;
 pub mod laboratory;
+#[cfg(test)]
+mod painted_texts;
 mod pan_zoom;
 mod panel;
 #[cfg(test)]

@@ -1,32 +1,22 @@
 //! Test of the question that the program exists for, by clicks on the sample log: which parameter is badly determined,
 //! why, since when, and what fixes it.
 
-use egui::{Event, Modifiers, PointerButton, Pos2, Rect, Role, Shape};
+use egui::{Event, Modifiers, PointerButton, Pos2, Rect, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 use super::App;
 use super::session_tests::{all_finished, runs, window_over_garden};
 use super::tests::run_until;
+use crate::gui::painted_texts::painted_texts;
 use crate::gui::units::fixed;
 use crate::session::{FlightParameter, flight_table, least_determined};
 
 /// Texts that are completely on the screen.
 fn visible_texts(harness: &Harness<'static, App>) -> Vec<String> {
-    fn collect(shape: &Shape, clip: Rect, texts: &mut Vec<String>) {
-        match shape {
-            Shape::Text(text) if clip.contains_rect(text.visual_bounding_rect()) => {
-                texts.push(text.galley.text().to_owned());
-            }
-            Shape::Vec(shapes) => shapes.iter().for_each(|shape| collect(shape, clip, texts)),
-            _ => {}
-        }
-    }
-    let mut texts = Vec::new();
-    for clipped in &harness.output().shapes {
-        collect(&clipped.shape, clipped.clip_rect.expand(1.0), &mut texts);
-    }
-    texts
+    let painted = painted_texts(harness).into_iter();
+    let visible = painted.filter(|painted| painted.clip.expand(1.0).contains_rect(painted.rect()));
+    visible.map(|painted| painted.text().to_owned()).collect()
 }
 
 /// A mouse with a counter of its clicks.

@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use egui::{Key, Modifiers, Rect, Role, Shape};
+use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 use super::tests::{TestDesktop, run_until};
 use super::{App, OpenLog};
 use crate::gui::desktop::Desktop;
+use crate::gui::painted_texts::painted_texts;
 use crate::gui::theme::ThemeName;
 use crate::session::{RunRecord, Session, SessionPlan, SessionRequest};
 
@@ -38,20 +39,6 @@ pub(super) fn all_finished(harness: &Harness<'static, App>) -> bool {
 /// Informed rank of a step; `None` during initialization.
 fn informed(run: &RunRecord, step: usize) -> Option<usize> {
     run.steps[step].rank.as_ref().map(|rank| rank.rank_informed)
-}
-
-/// Texts on the screen and their rectangles.
-fn painted_texts(harness: &Harness<'static, App>) -> Vec<(String, Rect)> {
-    fn collect(shape: &Shape, texts: &mut Vec<(String, Rect)>) {
-        match shape {
-            Shape::Text(text) => texts.push((text.galley.text().to_owned(), text.visual_bounding_rect())),
-            Shape::Vec(shapes) => shapes.iter().for_each(|shape| collect(shape, texts)),
-            _ => {}
-        }
-    }
-    let mut texts = Vec::new();
-    harness.output().shapes.iter().for_each(|clipped| collect(&clipped.shape, &mut texts));
-    texts
 }
 
 /// While the run computes, the cursor is at its last frame; a key takes the cursor away from there.
@@ -127,8 +114,11 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     let timeline = harness.get_by_label("Timeline").rect();
     let lanes: Vec<String> = painted_texts(&harness)
         .into_iter()
-        .filter(|(_, rect)| rect.right() <= timeline.left() + 1.0 && timeline.y_range().contains(rect.center().y))
-        .map(|(text, _)| text)
+        .filter(|painted| {
+            let rect = painted.rect();
+            rect.right() <= timeline.left() + 1.0 && timeline.y_range().contains(rect.center().y)
+        })
+        .map(|painted| painted.text().to_owned())
         .collect();
     for run in [&parent, &fork] {
         assert!(lanes.contains(&run.spec.label), "{} in {lanes:?}", run.spec.label);
@@ -153,7 +143,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     harness.run_steps(4);
     assert_eq!(harness.state().selection.run, 1);
     let verdicts = painted_texts(&harness);
-    assert!(verdicts.iter().any(|(text, _)| text.contains("of 18")), "the rank panel shows the fork's rank");
+    assert!(verdicts.iter().any(|painted| painted.text().contains("of 18")), "the rank panel shows the fork's rank");
     let buttons = harness.query_all_by_role(Role::Button);
     let unnamed = buttons.filter(|node| node.accesskit_node().label().is_none_or(|name| name.is_empty())).count();
     assert_eq!(unnamed, 0, "every button has a name");

@@ -1,13 +1,14 @@
 //! Tests of a small screen: it shows whole texts of a legible size, and the summary of the rank panel without
 //! scrolling.
 
-use egui::{Key, Rect, Shape};
+use egui::{Key, Rect};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
 use super::Preset;
 use super::tests::{Bench, bench_of, sample};
 use crate::gui::PanelName;
+use crate::gui::painted_texts::painted_texts;
 use crate::gui::theme::SMALLEST_TEXT;
 use crate::session::Recording;
 use crate::text::Named as _;
@@ -15,52 +16,27 @@ use crate::text::Named as _;
 /// Screen of a small laptop in points.
 const SMALL: [f32; 2] = [1366.0, 768.0];
 
-#[derive(Debug)]
-struct Painted {
-    text: String,
-    rect: Rect,
-    clip: Rect,
-    elided: bool,
-    smallest: f32,
-}
-
-fn painted(harness: &Harness<'static, Bench>) -> Vec<Painted> {
-    fn collect(shape: &Shape, clip: Rect, texts: &mut Vec<Painted>) {
-        match shape {
-            Shape::Text(text) => {
-                let sizes = text.galley.job.sections.iter().map(|section| section.format.font_id.size);
-                texts.push(Painted {
-                    text: text.galley.text().to_owned(),
-                    rect: text.visual_bounding_rect(),
-                    clip,
-                    elided: text.galley.elided,
-                    smallest: sizes.fold(f32::INFINITY, f32::min),
-                });
-            }
-            Shape::Vec(shapes) => shapes.iter().for_each(|shape| collect(shape, clip, texts)),
-            _ => {}
-        }
-    }
-    let mut texts = Vec::new();
-    harness.output().shapes.iter().for_each(|clipped| collect(&clipped.shape, clipped.clip_rect, &mut texts));
-    texts.retain(|painted| !painted.text.trim().is_empty() && painted.clip.y_range().contains(painted.rect.center().y));
-    texts
-}
-
 /// Asserts that texts are whole and legible. Names of positions in the scene move with the view and are exempt.
 fn check_texts(harness: &Harness<'static, Bench>, what: &str) {
     let scene = harness.state().window.places.iter().find(|(panel, _)| *panel == PanelName::Scene);
     let scene = scene.map_or(Rect::NOTHING, |(_, rect)| *rect);
-    let texts = painted(harness);
+    let mut texts = painted_texts(harness);
+    texts.retain(|painted| {
+        !painted.text().trim().is_empty() && painted.clip.y_range().contains(painted.rect().center().y)
+    });
     assert!(texts.len() > 50, "{what}: {} texts", texts.len());
     for painted in texts {
-        assert!(painted.smallest >= SMALLEST_TEXT, "{what}: small text {painted:?}");
-        let (rect, clip) = (painted.rect, painted.clip.expand(1.0));
+        let (text, galley) = (painted.text(), &painted.shape.galley);
+        let sizes = galley.job.sections.iter().map(|section| section.format.font_id.size);
+        let smallest = sizes.fold(f32::INFINITY, f32::min);
+        let (rect, clip) = (painted.rect(), painted.clip.expand(1.0));
+        let place = format!("{text:?} at {rect:?} in {clip:?}");
+        assert!(smallest >= SMALLEST_TEXT, "{what}: small text {place}, {smallest} points");
         let cut = rect.left() < clip.left() || rect.right() > clip.right();
         // The selector of the direction has a tooltip with the whole text.
-        let choice = painted.text.starts_with("uninformed ") || painted.text.starts_with("null ");
-        assert!(choice || !painted.elided, "{what}: shortened text {painted:?}");
-        assert!(!cut || scene.contains(rect.center()), "{what}: text that is cut off {painted:?}");
+        let choice = text.starts_with("uninformed ") || text.starts_with("null ");
+        assert!(choice || !galley.elided, "{what}: shortened text {place}");
+        assert!(!cut || scene.contains(rect.center()), "{what}: text that is cut off {place}");
     }
 }
 

@@ -1,13 +1,12 @@
 //! Tests of reading values in plots: the pointer's time, reading cursors, value axes, lines of events.
 
-use egui::{
-    Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, PointerButton, Pos2, Role, Shape, TouchPhase, vec2,
-};
+use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, PointerButton, Pos2, Role, TouchPhase, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 use super::tests::{Bench, SECOND_NS, bench_of, bench_with, sample};
 use super::{MainWindow, Preset, window_ui};
+use crate::gui::painted_texts::{PaintedText, painted_texts};
 use crate::gui::rendering::headless::{Headless, HeadlessOptions};
 use crate::gui::rendering::painter::Painter;
 use crate::gui::samples::sample_images;
@@ -149,30 +148,16 @@ fn the_menu_of_a_plot_offers_reading() {
     assert_eq!(choose("Events and rank losses in all plots"), ([false, false], 0, true, true));
 }
 
-/// Texts on the screen and their rectangles.
-fn texts(harness: &Harness<'static, Bench>) -> Vec<(String, egui::Rect)> {
-    fn collect(shape: &Shape, texts: &mut Vec<(String, egui::Rect)>) {
-        match shape {
-            Shape::Text(text) => texts.push((text.galley.text().to_owned(), text.visual_bounding_rect())),
-            Shape::Vec(shapes) => shapes.iter().for_each(|shape| collect(shape, texts)),
-            _ => {}
-        }
-    }
-    let mut texts = Vec::new();
-    harness.output().shapes.iter().for_each(|clipped| collect(&clipped.shape, &mut texts));
-    texts
-}
-
 #[test]
 fn the_name_of_a_reading_cursor_does_not_cover_a_verdict() {
     let mut harness = bench_with(PanelName::Convergence);
     let verdicts = |harness: &Harness<'static, Bench>| -> Vec<egui::Rect> {
         let marked = ["weakly determined", "not determined", "⚠", "✖"];
         let panel = harness.state().window.places.iter().find(|(panel, _)| *panel == PanelName::Convergence).unwrap().1;
-        let of = |(text, rect): (String, egui::Rect)| {
-            (marked.contains(&text.as_str()) && panel.contains(rect.center())).then_some(rect)
+        let of = |painted: PaintedText<'_>| {
+            (marked.contains(&painted.text()) && panel.contains(painted.rect().center())).then_some(painted.rect())
         };
-        texts(harness).into_iter().filter_map(of).collect()
+        painted_texts(harness).into_iter().filter_map(of).collect()
     };
     let free = verdicts(&harness);
     assert!(!free.is_empty());
@@ -182,7 +167,8 @@ fn the_name_of_a_reading_cursor_does_not_cover_a_verdict() {
         harness.run_steps(2);
         let shown = verdicts(&harness);
         assert_eq!(shown.len(), free.len());
-        for (_, name) in texts(&harness).iter().filter(|(text, _)| text == "B") {
+        for painted in painted_texts(&harness).iter().filter(|painted| painted.text() == "B") {
+            let name = painted.rect();
             assert!(shown.iter().all(|verdict| !verdict.intersects(name.shrink(1.0))), "{tenths}: {name:?} {shown:?}");
         }
         moved += usize::from(shown != free);
