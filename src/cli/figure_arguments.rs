@@ -10,7 +10,7 @@ use dcvins::gui::window::{FIGURE_FONT_PT, FIGURE_SIDE_MM, FigureSpec};
 use dcvins::session::Recording;
 use dcvins::text::Named as _;
 
-use crate::cli::value_parsers::seconds;
+use crate::cli::value_parsers::{seconds, within};
 
 /// Width of a figure without --width-mm: the text of an A4 page.
 const DEFAULT_WIDTH_MM: f64 = 175.0;
@@ -47,15 +47,11 @@ pub(crate) struct FigureArguments {
 }
 
 fn side_mm(text: &str) -> Result<f64, String> {
-    let value = text.parse::<f64>().ok().filter(|value| FIGURE_SIDE_MM.contains(value));
-    let [least, most] = [FIGURE_SIDE_MM.start(), FIGURE_SIDE_MM.end()];
-    value.ok_or_else(|| format!("expected millimetres from {least} to {most}"))
+    within(text, FIGURE_SIDE_MM, "millimetres")
 }
 
 fn font_pt(text: &str) -> Result<f64, String> {
-    let value = text.parse::<f64>().ok().filter(|value| FIGURE_FONT_PT.contains(value));
-    let [least, most] = [FIGURE_FONT_PT.start(), FIGURE_FONT_PT.end()];
-    value.ok_or_else(|| format!("expected points from {least} to {most}"))
+    within(text, FIGURE_FONT_PT, "points")
 }
 
 fn view(text: &str) -> Result<ComparisonView, String> {

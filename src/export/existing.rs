@@ -186,7 +186,7 @@ pub fn check_screenshot(path: &Path, force: bool) -> Result<(), ExportError> {
 
 /// True for a PDF whose creator is this program.
 fn is_own_pdf(path: &Path) -> Result<bool, ExportError> {
-    /// Figures are smaller.
+    /// Largest part of a file that is searched; figures are smaller.
     const MAX_BYTES: u64 = 64 << 20;
     let read = |source| ExportError::Read { source, path: path.to_owned() };
     let mut bytes = Vec::new();

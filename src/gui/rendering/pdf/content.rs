@@ -20,7 +20,7 @@ pub(super) struct PageWriter<'a> {
     content: Content,
     /// True inside a clip rectangle.
     clip: bool,
-    /// Textures by number.
+    /// Textures in the order of the numbers in their names.
     images: Vec<TextureId>,
     /// Opacities of areas and of lines that are used together.
     opacities: Vec<[u8; 2]>,

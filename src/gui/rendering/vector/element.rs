@@ -66,9 +66,9 @@ pub(in crate::gui::rendering) enum Area {
 /// Letters of one font and colour on one line.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::gui::rendering) struct TextRun {
-    /// The baseline.
+    /// Baseline in points from the top of the drawing.
     pub(in crate::gui::rendering) y: f32,
-    /// Size of the font.
+    /// Font size in points.
     pub(in crate::gui::rendering) size: f32,
     pub(in crate::gui::rendering) monospace: bool,
     pub(in crate::gui::rendering) italics: bool,
@@ -80,8 +80,8 @@ pub(in crate::gui::rendering) struct TextRun {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::gui::rendering) struct Letter {
     pub(in crate::gui::rendering) letter: char,
-    /// Left end.
+    /// Left end in points from the left of the drawing.
     pub(in crate::gui::rendering) x: f32,
-    /// Laid-out width.
+    /// Width in the layout, in points.
     pub(in crate::gui::rendering) width: f32,
 }

@@ -6,7 +6,7 @@ use crate::gui::PanelName;
 use crate::gui::plot::PlotOnScreen;
 use crate::gui::under_pointer::Item;
 
-/// What was under the pointer when the menu was opened.
+/// Position of the pointer when the menu was opened, with the things under it.
 #[derive(Debug)]
 pub(in crate::gui::window) struct MenuPlace {
     pub(super) at: Pos2,

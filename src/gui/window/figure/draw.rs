@@ -22,7 +22,7 @@ const DPI: f64 = 300.0;
 /// Largest side in pixels.
 const MAX_SIDE_PX: f32 = 16_384.0;
 
-/// What a figure shows besides its specification.
+/// Recording and state of the window that a figure shows.
 pub struct FigureInput<'a> {
     pub recording: &'a Recording,
     pub images: &'a mut dyn ImageSource,
