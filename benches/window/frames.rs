@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dcvins::flight_log::ImageReader;
-use dcvins::gui::rendering::headless::{Frame, Headless, HeadlessOptions};
+use dcvins::gui::rendering::headless::{Headless, HeadlessOptions, PaintedFrame};
 use dcvins::gui::rendering::painter::Painter;
 use dcvins::gui::theme::{Theme, ThemeName};
 use dcvins::gui::window::{MainWindow, Preset, window_ui};
@@ -59,7 +59,7 @@ impl Player {
     }
 
     /// Lays out a frame and passes its textures to the painter.
-    fn lay_out(&mut self, recording: &Recording, cursor_ns: i64, events: Vec<Event>) -> Frame {
+    fn lay_out(&mut self, recording: &Recording, cursor_ns: i64, events: Vec<Event>) -> PaintedFrame {
         let Self { images, headless, state, selection, .. } = self;
         let (theme, playback) = (Theme::of(OPTIONS.theme), Playback::default());
         let mut frame = headless.frame(events, |ui| {
@@ -85,7 +85,7 @@ impl Player {
     }
 
     /// Paints a frame and takes the changes that the window passes to the graphics adapter.
-    fn paint(&mut self, frame: &Frame) {
+    fn paint(&mut self, frame: &PaintedFrame) {
         let background = Theme::of(OPTIONS.theme).background;
         self.painter.update(&frame.chunks, OPTIONS.size_px, OPTIONS.pixels_per_point, background);
         self.painter.changes().for_each(drop);

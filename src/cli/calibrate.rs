@@ -8,7 +8,7 @@ use dcvins::calibration::{CalibrationError, CalibrationOptions};
 use dcvins::export;
 use dcvins::session::{self, CalibrationRequest, CalibrationRunError};
 
-use crate::cli::exit::Outcome;
+use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, notify, print, print_json};
@@ -47,7 +47,7 @@ pub(crate) struct CalibrateArguments {
     pub limits: LimitArguments,
 }
 
-pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<Outcome> {
+pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<ExitOutcome> {
     export::check_calibration_folder(&arguments.out, &arguments.log, arguments.force)?;
     let request = CalibrationRequest {
         log_path: arguments.log.clone(),
@@ -68,7 +68,7 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<Outcome> {
     let run = match run {
         Err(error @ CalibrationRunError::Calibration { reason: CalibrationError::Interrupted { .. }, .. }) => {
             notify(&format!("dcvins: {error}"));
-            return Ok(Outcome::Interrupted);
+            return Ok(ExitOutcome::Interrupted);
         }
         run => run?,
     };
@@ -79,5 +79,5 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<Outcome> {
     } else {
         print(&format!("{report}  files        {}\n", arguments.out.display()))?;
     }
-    Ok(Outcome::Success)
+    Ok(ExitOutcome::Success)
 }

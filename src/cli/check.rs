@@ -11,7 +11,7 @@ use dcvins::log_check::{self, Severity};
 use dcvins::sensors::Rig;
 use dcvins::session;
 
-use crate::cli::exit::Outcome;
+use crate::cli::exit::ExitOutcome;
 use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, notify, print_report};
 
@@ -34,7 +34,7 @@ pub(crate) struct CheckArguments {
     pub limits: LimitArguments,
 }
 
-pub(crate) fn check(arguments: &CheckArguments) -> Result<Outcome> {
+pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitOutcome> {
     let progress = Progress::spinner("reading the log");
     let log = Arc::new(FlightLog::open_with(&arguments.log, &arguments.limits.limits())?);
     let (rig, unused_keys) = match Rig::for_log_with_unused_keys(&log, arguments.rig.as_deref()) {
@@ -55,5 +55,5 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<Outcome> {
             |first| names.fold(first, |all, name| format!("{all}\n{name}")),
         ));
     }
-    Ok(if report.worst() == Severity::Error { Outcome::ErrorsFound } else { Outcome::Success })
+    Ok(if report.worst() == Severity::Error { ExitOutcome::ErrorsFound } else { ExitOutcome::Success })
 }

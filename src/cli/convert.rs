@@ -7,7 +7,7 @@ use clap::Args;
 use dcvins::export::{self, VideoAlignmentError};
 use dcvins::flight_log::convert::{self, AutopilotLog, AutopilotLogKind, ConvertError, ConvertOptions, VideoClock};
 
-use crate::cli::exit::Outcome;
+use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, notify, print_report};
@@ -74,7 +74,7 @@ impl ConvertArguments {
     }
 }
 
-pub(crate) fn convert(arguments: &ConvertArguments) -> Result<Outcome> {
+pub(crate) fn convert(arguments: &ConvertArguments) -> Result<ExitOutcome> {
     let interrupt = Interrupt::watch()?;
     export::check_converted_log(&arguments.output, arguments.force)?;
     let progress = Progress::new();
@@ -89,7 +89,7 @@ pub(crate) fn convert(arguments: &ConvertArguments) -> Result<Outcome> {
             Ok(found) => options.video_clock = Some(aligned.insert(found).clock),
             Err(VideoAlignmentError::Convert(error @ ConvertError::Interrupted { .. })) => {
                 notify(&format!("dcvins: {error}"));
-                return Ok(Outcome::Interrupted);
+                return Ok(ExitOutcome::Interrupted);
             }
             Err(error) => return Err(error.into()),
         }
@@ -106,11 +106,11 @@ pub(crate) fn convert(arguments: &ConvertArguments) -> Result<Outcome> {
                 export::write_alignment_plot(aligned, &plot)?;
                 report.notes.insert(0, format!("{aligned}: {}", plot.display()));
             }
-            print_report(&report, arguments.json).map(|()| Outcome::Success)
+            print_report(&report, arguments.json).map(|()| ExitOutcome::Success)
         }
         Err(error @ ConvertError::Interrupted { .. }) => {
             notify(&format!("dcvins: {error}"));
-            Ok(Outcome::Interrupted)
+            Ok(ExitOutcome::Interrupted)
         }
         Err(error) => Err(error.into()),
     }

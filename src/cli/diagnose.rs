@@ -8,7 +8,7 @@ use dcvins::session::{self, Diagnosis, LogFaults, SessionPlan};
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
-use crate::cli::exit::Outcome;
+use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{Progress, notify, print, print_json};
 
@@ -22,7 +22,7 @@ pub(crate) struct DiagnoseArguments {
     pub json: bool,
 }
 
-pub(crate) fn diagnose(arguments: &DiagnoseArguments) -> Result<Outcome> {
+pub(crate) fn diagnose(arguments: &DiagnoseArguments) -> Result<ExitOutcome> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
     let interrupt = Interrupt::watch()?;
     let plan = SessionPlan { interrupted: interrupt.flag(), ..plan };
@@ -47,7 +47,7 @@ pub(crate) fn diagnose(arguments: &DiagnoseArguments) -> Result<Outcome> {
     }
     if interrupt.is_set() {
         notify("dcvins: interrupted; the diagnosis is what was known so far");
-        return Ok(Outcome::Interrupted);
+        return Ok(ExitOutcome::Interrupted);
     }
-    Ok(Outcome::Success)
+    Ok(ExitOutcome::Success)
 }

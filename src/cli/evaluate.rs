@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use dcvins::export::{self, EvaluationOptions};
-use dcvins::session::accuracy::{Alignment, RelativeDelta};
+use dcvins::session::accuracy::{RelativeDelta, TrajectoryAlignment};
 
 use crate::cli::terminal::print_report;
 use crate::cli::value_parsers::seconds;
@@ -43,7 +43,7 @@ pub(crate) enum AlignArgument {
     Sim3,
 }
 
-impl From<AlignArgument> for Alignment {
+impl From<AlignArgument> for TrajectoryAlignment {
     fn from(argument: AlignArgument) -> Self {
         match argument {
             AlignArgument::None => Self::None,

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 /// Outcome of a command that ended without an error; an error is exit code 1, wrong arguments are 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Outcome {
+pub(crate) enum ExitOutcome {
     Success,
     /// A run never initialized.
     NeverInitialized,
@@ -18,15 +18,15 @@ pub(crate) enum Outcome {
     Interrupted,
 }
 
-impl From<Outcome> for ExitCode {
-    fn from(outcome: Outcome) -> Self {
+impl From<ExitOutcome> for ExitCode {
+    fn from(outcome: ExitOutcome) -> Self {
         Self::from(match outcome {
-            Outcome::Success => 0,
-            Outcome::NeverInitialized => 3,
-            Outcome::ErrorsFound => 4,
-            Outcome::BreakHit => 5,
-            Outcome::JobsFailed => JOBS_FAILED,
-            Outcome::Interrupted => INTERRUPTED,
+            ExitOutcome::Success => 0,
+            ExitOutcome::NeverInitialized => 3,
+            ExitOutcome::ErrorsFound => 4,
+            ExitOutcome::BreakHit => 5,
+            ExitOutcome::JobsFailed => JOBS_FAILED,
+            ExitOutcome::Interrupted => INTERRUPTED,
         })
     }
 }

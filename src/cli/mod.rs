@@ -39,15 +39,15 @@ use clap::Parser as _;
 use dcvins::flight_log::printable_lines;
 
 use arguments::{Arguments, Command};
-use exit::Outcome;
+use exit::ExitOutcome;
 use view::ViewArguments;
 
 /// Parses the arguments of the process and runs the sub-command.
 ///
 /// Wrong arguments end the process with exit code 2; an error of the command is returned.
-pub(crate) fn run() -> anyhow::Result<Outcome> {
+pub(crate) fn run() -> anyhow::Result<ExitOutcome> {
     let arguments = Arguments::parse();
-    let done = |result: anyhow::Result<()>| result.map(|()| Outcome::Success);
+    let done = |result: anyhow::Result<()>| result.map(|()| ExitOutcome::Success);
     match arguments.command.unwrap_or_else(|| Command::View(ViewArguments::default())) {
         Command::View(arguments) => done(view::view(&arguments)),
         Command::Run(arguments) => run::run(&arguments),

@@ -12,7 +12,7 @@ use dcvins::log_check::{self, AllanReport};
 use dcvins::sensors::Rig;
 use dcvins::session::{self, FlightNoiseError};
 
-use crate::cli::exit::Outcome;
+use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, notify, print, print_json};
@@ -55,7 +55,7 @@ pub(crate) enum Method {
     Flight,
 }
 
-pub(crate) fn noise(arguments: &NoiseArguments) -> Result<Outcome> {
+pub(crate) fn noise(arguments: &NoiseArguments) -> Result<ExitOutcome> {
     let progress = Progress::spinner("reading the log");
     let log = Arc::new(FlightLog::open_with(&arguments.log, &arguments.limits.limits())?);
     let rig = Rig::for_log(&log, arguments.rig.as_deref());
@@ -90,7 +90,7 @@ fn too_short(report: &AllanReport) -> String {
     )
 }
 
-fn write_stationary(arguments: &NoiseArguments, report: &AllanReport) -> Result<Outcome> {
+fn write_stationary(arguments: &NoiseArguments, report: &AllanReport) -> Result<ExitOutcome> {
     let written = match &arguments.out {
         Some(folder) => export::write_allan(report, &serde_json::to_string_pretty(report)?, folder)?,
         None => Vec::new(),
@@ -101,10 +101,10 @@ fn write_stationary(arguments: &NoiseArguments, report: &AllanReport) -> Result<
         print(&format!("{report}\n{}", report.rig_lines()))?;
     }
     announce(&written);
-    Ok(Outcome::Success)
+    Ok(ExitOutcome::Success)
 }
 
-fn fit_flight(arguments: &NoiseArguments, log: &Arc<FlightLog>, rig: &Rig) -> Result<Outcome> {
+fn fit_flight(arguments: &NoiseArguments, log: &Arc<FlightLog>, rig: &Rig) -> Result<ExitOutcome> {
     let interrupt = Interrupt::watch()?;
     let progress = Progress::new();
     let fitted = session::fit_flight_noise(log, rig, (arguments.start, arguments.duration), &mut |ratio| {
@@ -115,7 +115,7 @@ fn fit_flight(arguments: &NoiseArguments, log: &Arc<FlightLog>, rig: &Rig) -> Re
     let (noise, camera) = match fitted {
         Err(FlightNoiseError::Fit(ImuNoiseError::Interrupted)) => {
             notify("dcvins: interrupted; nothing is written");
-            return Ok(Outcome::Interrupted);
+            return Ok(ExitOutcome::Interrupted);
         }
         fitted => fitted?,
     };
@@ -131,7 +131,7 @@ fn fit_flight(arguments: &NoiseArguments, log: &Arc<FlightLog>, rig: &Rig) -> Re
         print(&format!("{report}\n{}", report.rig_lines()))?;
     }
     announce(&written);
-    Ok(Outcome::Success)
+    Ok(ExitOutcome::Success)
 }
 
 fn announce(written: &[PathBuf]) {

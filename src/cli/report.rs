@@ -15,7 +15,7 @@ use dcvins::text::command_line;
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
-use crate::cli::exit::Outcome;
+use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 #[cfg(feature = "gui")]
 use crate::cli::report_figures;
@@ -52,7 +52,7 @@ pub(crate) struct ReportArguments {
     pub cache: CacheArguments,
 }
 
-pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
+pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitOutcome> {
     #[cfg(feature = "gui")]
     if is_study(&arguments.log) {
         return of_study(arguments);
@@ -67,7 +67,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     if let Some(files) = cached.as_ref().and_then(CachedResult::load) {
         write_known_report(&files, &arguments.output, &labels, &log_name(&arguments.log))?;
         print(&format!("{}\n", page_of(arguments).display()))?;
-        return Ok(Outcome::Success);
+        return Ok(ExitOutcome::Success);
     }
     let plan = SessionPlan { interrupted: interrupt.flag(), ..plan.clone() };
     let (computed, checked) = beside_check(&plan, || {
@@ -80,7 +80,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     });
     let Some((mut computation, figures)) = computed? else {
         notify("dcvins: interrupted before the first step; nothing is written");
-        return Ok(Outcome::Interrupted);
+        return Ok(ExitOutcome::Interrupted);
     };
     // The verdict needs complete last steps.
     computation.fill_in(computation.recording().last_stamp_ns());
@@ -99,17 +99,17 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     }
     if interrupt.is_set() {
         notify(&interrupted(recording));
-        return Ok(Outcome::Interrupted);
+        return Ok(ExitOutcome::Interrupted);
     }
     if !recording.runs.iter().all(is_initialized) {
-        return Ok(Outcome::NeverInitialized);
+        return Ok(ExitOutcome::NeverInitialized);
     }
     if let Some(mut cached) = cached
         && written.iter().all(|path| add_written(&mut cached, path, &arguments.output).is_some())
     {
         cached.store();
     }
-    Ok(Outcome::Success)
+    Ok(ExitOutcome::Success)
 }
 
 fn page_of(arguments: &ReportArguments) -> PathBuf {
@@ -124,14 +124,14 @@ fn add_written(cached: &mut CachedResult, path: &Path, folder: &Path) -> Option<
 }
 
 #[cfg(feature = "gui")]
-fn of_study(arguments: &ReportArguments) -> Result<Outcome> {
+fn of_study(arguments: &ReportArguments) -> Result<ExitOutcome> {
     if !arguments.at.is_empty() || !arguments.estimation.runs.is_empty() {
         anyhow::bail!("{} is a study: leave --at and --run out", arguments.log.display());
     }
     let study = OpenedStudy::read(&arguments.log)?;
     let view = arguments.study.options();
     study_report(&study, &view, &arguments.output, own_command_line(), arguments.force)?;
-    Ok(Outcome::Success)
+    Ok(ExitOutcome::Success)
 }
 
 /// The command line of this process in a form that can be typed again; the program's name is without its folder.

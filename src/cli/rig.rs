@@ -10,7 +10,7 @@ use dcvins::flight_log::rig_template::{CameraChoice, MechanismAxes, PublishedCam
 use dcvins::sensors::BodyAxes;
 use dcvins::text::{Entry, Named as _};
 
-use crate::cli::exit::{self, Outcome};
+use crate::cli::exit::{self, ExitOutcome};
 use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::print;
 use crate::cli::value_parsers::sides;
@@ -140,11 +140,11 @@ fn attitude(text: &str) -> Result<Attitude, String> {
         .ok_or_else(|| format!("expected a topic and entries {}=VALUE between commas", KEYS.join("=VALUE, ")))
 }
 
-pub(crate) fn rig(arguments: &RigArguments) -> Result<Outcome> {
+pub(crate) fn rig(arguments: &RigArguments) -> Result<ExitOutcome> {
     let RigCommand::New(arguments) = &arguments.command;
     if arguments.list {
         let names: Vec<&str> = PublishedCamera::ALL.iter().map(|camera| camera.name()).collect();
-        return print(&format!("{}\n", names.join("\n"))).map(|()| Outcome::Success);
+        return print(&format!("{}\n", names.join("\n"))).map(|()| ExitOutcome::Success);
     }
     let (Some(mechanism), Some(camera)) = (&arguments.mechanism, &arguments.camera) else {
         bail!("--mechanism and --camera are missing");
@@ -174,5 +174,5 @@ pub(crate) fn rig(arguments: &RigArguments) -> Result<Outcome> {
     let assumed: Vec<String> =
         fields.iter().map(|assumed| format!("  {:<34}{}\n", assumed.field, assumed.reason)).collect();
     print(&format!("{}\nassumed, to be measured or confirmed:\n{}", output.display(), assumed.concat()))?;
-    Ok(Outcome::Success)
+    Ok(ExitOutcome::Success)
 }

@@ -12,7 +12,7 @@ use dcvins::session::{BreakpointHit, Recording, RunRecord, RunSummary, SessionPl
 
 use crate::cli::compute::{compute, compute_until};
 use crate::cli::estimation_arguments::EstimationArguments;
-use crate::cli::exit::Outcome;
+use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::run_summary::{describe, describe_trajectory};
 use crate::cli::terminal::{notify, print, print_json};
@@ -55,7 +55,7 @@ fn condition(text: &str) -> Result<Condition, String> {
 /// Memory budget if only tables are written: beyond it, steps are kept as summaries.
 const SUMMARY_BUDGET_BYTES: usize = 16 << 20;
 
-pub(crate) fn run(arguments: &RunArguments) -> Result<Outcome> {
+pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
     let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
     export::check_run_folders(&arguments.out, &labels, &arguments.log, arguments.force)?;
@@ -72,7 +72,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Outcome> {
     let no_steps = recording.runs.iter().all(|run| run.steps.is_empty());
     if interrupt.is_set() && no_steps {
         notify("dcvins: interrupted before the first step; nothing is written");
-        return Ok(Outcome::Interrupted);
+        return Ok(ExitOutcome::Interrupted);
     }
     let mut summaries = Vec::new();
     for run in &recording.runs {
@@ -112,16 +112,16 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Outcome> {
     }
     if interrupt.is_set() {
         notify(&interrupted(&recording));
-        return Ok(Outcome::Interrupted);
+        return Ok(ExitOutcome::Interrupted);
     }
     if no_steps {
         let log = log_name(&arguments.log);
         bail!("no image of '{log}' could be used; reasons: 'dcvins check {}'", arguments.log.display());
     }
     if hit.is_some() {
-        return Ok(Outcome::BreakHit);
+        return Ok(ExitOutcome::BreakHit);
     }
-    Ok(if recording.runs.iter().all(is_initialized) { Outcome::Success } else { Outcome::NeverInitialized })
+    Ok(if recording.runs.iter().all(is_initialized) { ExitOutcome::Success } else { ExitOutcome::NeverInitialized })
 }
 
 /// Notice about the computed part of an interrupted command.

@@ -21,7 +21,7 @@ use dcvins::text::Named as _;
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
-use crate::cli::exit::Outcome;
+use crate::cli::exit::ExitOutcome;
 use crate::cli::figure_arguments::FigureArguments;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::report::own_command_line;
@@ -148,7 +148,7 @@ fn size(text: &str) -> Result<[usize; 2], String> {
 /// Maximum number of screenshots of one command; more are probably due to a mistyped period.
 const MAX_SCREENSHOTS: usize = 100_000;
 
-pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
+pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome> {
     if is_study(&arguments.log) {
         return of_study(arguments);
     }
@@ -200,7 +200,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
     let interrupt = Interrupt::watch()?;
     let stopped = |written: usize| {
         notify(&format!("dcvins: interrupted; {written} of {} screenshots are written", stamps_ns.len()));
-        Ok(Outcome::Interrupted)
+        Ok(ExitOutcome::Interrupted)
     };
     let mut cached = shown.cached(arguments, format);
     if let Some(files) = cached.as_ref().and_then(CachedResult::load) {
@@ -215,7 +215,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
                 print(&format!("{}\n", path.display()))?;
             }
         }
-        return Ok(Outcome::Success);
+        return Ok(ExitOutcome::Success);
     }
     let mut computation = shown.compute(last_ns, &interrupt)?;
     if interrupt.is_set() {
@@ -280,7 +280,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
     if let Some(cached) = cached {
         cached.store();
     }
-    Ok(Outcome::Success)
+    Ok(ExitOutcome::Success)
 }
 
 /// Size, theme and renderer.
@@ -305,7 +305,7 @@ fn drawing_options(arguments: &ScreenshotArguments) -> ScreenshotOptions {
 }
 
 /// Screenshot of a panel of a study, or of its whole view.
-fn of_study(arguments: &ScreenshotArguments) -> Result<Outcome> {
+fn of_study(arguments: &ScreenshotArguments) -> Result<ExitOutcome> {
     if !arguments.at.is_empty() || arguments.every.is_some() || !arguments.estimation.runs.is_empty() {
         bail!("{} is a study: leave --at, --every and --run out", arguments.log.display());
     }
@@ -330,7 +330,7 @@ fn of_study(arguments: &ScreenshotArguments) -> Result<Outcome> {
     let study = OpenedStudy::read(&arguments.log)?;
     let picture = StudyPicture { panel: &arguments.panel, svg, csv: arguments.csv, output: &arguments.output };
     write_study_picture(&study, &arguments.study.options(), &drawing_options(arguments), &picture)?;
-    Ok(Outcome::Success)
+    Ok(ExitOutcome::Success)
 }
 
 /// The requested format, else that of the file's extension, else PNG.

@@ -8,7 +8,7 @@ use dcvins::export;
 use dcvins::simulation::{self, Disturbances, Experiment, SimulationError, SimulationOptions};
 use dcvins::text::key_list;
 
-use crate::cli::exit::Outcome;
+use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{Progress, notify, print};
 use crate::cli::value_parsers::{seconds, sides};
@@ -88,7 +88,7 @@ fn encoder_sigma(text: &str) -> Result<EncoderArgument, String> {
     value.map(EncoderArgument::Sigma).ok_or_else(|| "expected degrees, a number above 0, or none".to_owned())
 }
 
-pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<Outcome> {
+pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<ExitOutcome> {
     let experiment = match arguments.experiment {
         ExperimentArgument::T1 => Experiment::T1,
         ExperimentArgument::T2 => Experiment::T2,
@@ -122,7 +122,7 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<Outcome> {
     let summary = match simulated {
         Err(error @ SimulationError::Interrupted { .. }) => {
             notify(&format!("dcvins: {error}"));
-            return Ok(Outcome::Interrupted);
+            return Ok(ExitOutcome::Interrupted);
         }
         simulated => simulated?,
     };
@@ -138,5 +138,5 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<Outcome> {
         summary.rig.display(),
         summary.ground_truth.display(),
     ))?;
-    Ok(Outcome::Success)
+    Ok(ExitOutcome::Success)
 }

@@ -8,7 +8,8 @@ use serde::Serialize;
 use super::error::ExportError;
 use super::trajectory::read_trajectory;
 use crate::session::accuracy::{
-    Alignment, ErrorStatistics, RelativeDelta, absolute_errors_m, align, associate, path_length_m, relative_errors,
+    ErrorStatistics, RelativeDelta, TrajectoryAlignment, absolute_errors_m, align, associate, path_length_m,
+    relative_errors,
 };
 
 /// Options of a comparison of two trajectories; the defaults are those of `evo_ape tum --align` and `evo_rpe tum
@@ -16,7 +17,7 @@ use crate::session::accuracy::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EvaluationOptions {
     /// Alignment of the estimate with the reference.
-    pub alignment: Alignment,
+    pub alignment: TrajectoryAlignment,
     /// Length of the sub-trajectories of the relative error.
     pub delta: RelativeDelta,
     /// Maximum difference of the stamps of associated poses, in seconds.
@@ -25,7 +26,7 @@ pub struct EvaluationOptions {
 
 impl Default for EvaluationOptions {
     fn default() -> Self {
-        Self { alignment: Alignment::Rigid, delta: RelativeDelta::Frames(1), max_difference_s: 0.01 }
+        Self { alignment: TrajectoryAlignment::Rigid, delta: RelativeDelta::Frames(1), max_difference_s: 0.01 }
     }
 }
 
@@ -33,7 +34,7 @@ impl Default for EvaluationOptions {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EvaluationReport {
     /// Alignment of the estimate with the reference.
-    pub alignment: Alignment,
+    pub alignment: TrajectoryAlignment,
     /// Number of associated poses.
     pub pairs: usize,
     pub estimate_poses: usize,
@@ -110,7 +111,11 @@ impl fmt::Display for EvaluationReport {
             self.reference_poses,
             self.reference_length_m,
             self.alignment.name(),
-            if self.alignment == Alignment::Similarity { format!(", scale {:.6}", self.scale) } else { String::new() }
+            if self.alignment == TrajectoryAlignment::Similarity {
+                format!(", scale {:.6}", self.scale)
+            } else {
+                String::new()
+            }
         )?;
         writeln!(
             formatter,

@@ -85,7 +85,7 @@ pub(crate) fn is_measured(vector: &Vector3<f64>) -> bool {
 }
 
 /// Sample that an [`ImuFilter`] judges.
-pub(crate) trait Reading: Clone {
+pub(crate) trait FilteredSample: Clone {
     fn stamp_ns(&self) -> i64;
     /// Angular velocity in rad/s.
     fn rate(&self) -> &Vector3<f64>;
@@ -93,7 +93,7 @@ pub(crate) trait Reading: Clone {
     fn equals(&self, other: &Self) -> bool;
 }
 
-impl Reading for ImuSample {
+impl FilteredSample for ImuSample {
     fn stamp_ns(&self) -> i64 {
         self.stamp_ns
     }
@@ -108,7 +108,7 @@ impl Reading for ImuSample {
     }
 }
 
-impl Reading for (i64, Vector3<f64>) {
+impl FilteredSample for (i64, Vector3<f64>) {
     fn stamp_ns(&self) -> i64 {
         self.0
     }
@@ -145,7 +145,7 @@ impl<T> Default for ImuFilter<T> {
     }
 }
 
-impl<T: Reading> ImuFilter<T> {
+impl<T: FilteredSample> ImuFilter<T> {
     /// Adds the next sample; stamps must not decrease.
     pub(crate) fn push(&mut self, sample: T) {
         let is_copy = self.last.as_ref().is_some_and(|last| last.equals(&sample));

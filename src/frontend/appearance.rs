@@ -138,7 +138,7 @@ impl Appearance {
     /// `[dx, dy]` in pixels, then the derivatives of dx and of dy by x and y. `window` has [`Self::level`] subtracted
     /// and padding columns of zero. `None` without positive correlation.
     pub(super) fn compare(&self, window: &Rows) -> Option<(f64, Vector6<f64>)> {
-        let moments = Arch::new().dispatch(Comparison { appearance: self, window });
+        let moments = Arch::new().dispatch(AppearanceChange { appearance: self, window });
         let area = (WINDOW * WINDOW) as f32;
         let square = moments.square - moments.sum * moments.sum / area;
         let correlation = f64::from(moments.common) / (f64::from(self.square) * f64::from(square)).sqrt();
@@ -169,12 +169,12 @@ impl NullaryFnOnce for Preparation<'_> {
 }
 
 /// Sums for the comparison with a window, compiled for every width of vector registers.
-struct Comparison<'a> {
+struct AppearanceChange<'a> {
     appearance: &'a Appearance,
     window: &'a Rows,
 }
 
-impl NullaryFnOnce for Comparison<'_> {
+impl NullaryFnOnce for AppearanceChange<'_> {
     type Output = Moments;
 
     #[inline(always)]

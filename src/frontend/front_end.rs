@@ -4,7 +4,7 @@ use thiserror::Error;
 use super::coarse::{self, CoarseAligner};
 use super::corners::{CornerDetector, CornerOptions, PointGrid};
 use super::lucas_kanade::{self, LucasKanadeOptions};
-use super::outliers::{self, BearingPair, Motion, OutlierOptions};
+use super::outliers::{self, BearingPair, ImageMotion, OutlierOptions};
 use super::prediction::{PredictedRotation, RowRotations};
 use super::pyramid::Pyramid;
 use super::reference::{ReferenceOptions, ReferencePatch, ReferenceSearch};
@@ -323,7 +323,7 @@ impl FrontEnd {
         steps: Vec<Step>,
         expected: Option<&UnitQuaternion<f64>>,
         predicted: Option<&PredictedRotation>,
-    ) -> (Vec<Step>, Motion) {
+    ) -> (Vec<Step>, ImageMotion) {
         let rows = predicted.and_then(|predicted| predicted.rows);
         let pairs: Vec<BearingPair> = steps.iter().map(|step| self.pair_of(step, rows.as_ref())).collect();
         let start = expected.copied().unwrap_or_else(UnitQuaternion::identity);

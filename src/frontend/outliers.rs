@@ -39,7 +39,7 @@ impl Default for OutlierOptions {
 
 /// Motion between two images, estimated from their tracks.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Motion {
+pub struct ImageMotion {
     /// Rotation `camera_now_from_camera_previous`.
     pub rotation: UnitQuaternion<f64>,
     /// Unit direction of the translation of points from the previous camera frame to the current one; `None` without
@@ -60,7 +60,7 @@ pub struct BearingPair {
 
 /// Rotation and direction of translation with their cost.
 #[derive(Clone, Copy)]
-pub(super) struct Hypothesis {
+pub(super) struct MotionHypothesis {
     pub(super) rotation: UnitQuaternion<f64>,
     pub(super) direction: Vector3<f64>,
     pub(super) cost: f64,
@@ -76,13 +76,13 @@ pub fn estimate_motion(
     predicted: Option<&PredictedRotation>,
     focal_px: f64,
     options: &OutlierOptions,
-) -> Motion {
+) -> ImageMotion {
     let rotation = fit_rotation(pairs, start, options.threshold_px / focal_px);
     let threshold = options.threshold_px / focal_px;
     if pairs.len() < options.min_tracks {
-        return Motion { rotation, direction: None, is_inlier: vec![true; pairs.len()] };
+        return ImageMotion { rotation, direction: None, is_inlier: vec![true; pairs.len()] };
     }
-    let prior = Prior::new(predicted, options.track_sigma_px / focal_px);
+    let prior = RotationInformation::new(predicted, options.track_sigma_px / focal_px);
     let mut search = Search { pairs, prior, options, dice: Dice(options.seed.max(1)), rotated: Vec::new() };
     let epipolar = search.run(start, &rotation, threshold);
     let (rotation, direction) = choose_model(pairs, rotation, epipolar.as_ref(), threshold);
@@ -94,9 +94,9 @@ pub fn estimate_motion(
     };
     let ratio = is_inlier.iter().filter(|inlier| **inlier).count() as f64 / pairs.len() as f64;
     if ratio < options.min_inlier_ratio {
-        return Motion { rotation, direction: None, is_inlier: vec![true; pairs.len()] };
+        return ImageMotion { rotation, direction: None, is_inlier: vec![true; pairs.len()] };
     }
-    Motion { rotation, direction, is_inlier }
+    ImageMotion { rotation, direction, is_inlier }
 }
 
 /// Ratio of the outliers of a pure rotation that a direction of translation must explain.
@@ -111,7 +111,7 @@ const MIN_MOVING_TRACKS: usize = 6;
 fn choose_model(
     pairs: &[BearingPair],
     rotation: UnitQuaternion<f64>,
-    epipolar: Option<&Hypothesis>,
+    epipolar: Option<&MotionHypothesis>,
     threshold: f64,
 ) -> (UnitQuaternion<f64>, Option<Vector3<f64>>) {
     let Some(epipolar) = epipolar else { return (rotation, None) };
@@ -195,14 +195,14 @@ const FULL_HYPOTHESES: usize = 60;
 const MINIMAL_ITERATIONS: usize = 5;
 
 /// Prior on the rotation, in units of an inlier's variance.
-struct Prior {
+struct RotationInformation {
     rotation: UnitQuaternion<f64>,
     /// Information about the error in the current camera frame (3 × 3, 1/rad²), as [`PredictedRotation`] defines it.
     information: Matrix3<f64>,
     track_sigma_rad: f64,
 }
 
-impl Prior {
+impl RotationInformation {
     fn new(predicted: Option<&PredictedRotation>, track_sigma_rad: f64) -> Self {
         Self {
             rotation: predicted.map_or_else(UnitQuaternion::identity, |predicted| predicted.rotation),
@@ -227,7 +227,7 @@ const PAIRS_BETWEEN_CHECKS: usize = 16;
 /// Search for a rotation and a direction of translation.
 struct Search<'a> {
     pairs: &'a [BearingPair],
-    prior: Prior,
+    prior: RotationInformation,
     options: &'a OutlierOptions,
     dice: Dice,
     /// Pairs with the previous bearing rotated by the current rotation.
@@ -241,10 +241,10 @@ impl Search<'_> {
         predicted: &UnitQuaternion<f64>,
         fitted: &UnitQuaternion<f64>,
         threshold: f64,
-    ) -> Option<Hypothesis> {
+    ) -> Option<MotionHypothesis> {
         let pairs = self.pairs.len() as f64;
-        let outlier_ratio = |best: &Hypothesis| best.cost / pairs;
-        let mut best: Option<Hypothesis> = None;
+        let outlier_ratio = |best: &MotionHypothesis| best.cost / pairs;
+        let mut best: Option<MotionHypothesis> = None;
         for rotation in [predicted, fitted] {
             let found = self.descend(rotation, threshold);
             if let Some(found) = found
@@ -266,13 +266,13 @@ impl Search<'_> {
     }
 
     /// Best of many motions through five random tracks each; used if no start converged.
-    fn draw_with_rotation(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<Hypothesis> {
-        let mut best: Option<Hypothesis> = None;
+    fn draw_with_rotation(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<MotionHypothesis> {
+        let mut best: Option<MotionHypothesis> = None;
         for _ in 0..FULL_HYPOTHESES {
             let sample: [BearingPair; 5] = std::array::from_fn(|_| self.pairs[self.dice.below(self.pairs.len())]);
             let normals = [0, 1].map(|k: usize| (rotation * sample[k].previous).cross(&sample[k].now));
             let Some(direction) = normals[0].cross(&normals[1]).try_normalize(1e-14) else { continue };
-            let mut trial = Hypothesis { rotation: *rotation, direction, cost: f64::INFINITY };
+            let mut trial = MotionHypothesis { rotation: *rotation, direction, cost: f64::INFINITY };
             for _ in 0..MINIMAL_ITERATIONS {
                 // Little damping, and a scale at which all five tracks have full weight.
                 let barely = Matrix3::identity() * 1e-9;
@@ -283,7 +283,7 @@ impl Search<'_> {
                 let limit = best.map_or(f64::INFINITY, |best| best.cost);
                 let cost = self.cost(&trial.rotation, &direction, threshold, limit);
                 if cost < limit {
-                    best = Some(Hypothesis { direction, cost, ..trial });
+                    best = Some(MotionHypothesis { direction, cost, ..trial });
                 }
             }
         }
@@ -291,7 +291,7 @@ impl Search<'_> {
     }
 
     /// Best iterate of a few Gauss–Newton steps.
-    fn settle(&self, start: Hypothesis, scale: f64) -> Hypothesis {
+    fn settle(&self, start: MotionHypothesis, scale: f64) -> MotionHypothesis {
         let (mut best, mut at) = (start, start);
         for _ in 0..REFINEMENTS {
             let Some(refined) = self.refine(&at, scale, best.cost) else { break };
@@ -304,8 +304,8 @@ impl Search<'_> {
     }
 
     /// Hypothesizes directions and refines the best one, at decreasing scales.
-    fn descend(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<Hypothesis> {
-        let mut best = Hypothesis { rotation: *rotation, direction: Vector3::zeros(), cost: f64::INFINITY };
+    fn descend(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<MotionHypothesis> {
+        let mut best = MotionHypothesis { rotation: *rotation, direction: Vector3::zeros(), cost: f64::INFINITY };
         for stage in STAGES {
             let scale = stage * threshold;
             if best.cost.is_finite() {
@@ -322,12 +322,12 @@ impl Search<'_> {
     }
 
     /// Best direction among those of random pairs of tracks, with a fixed rotation; `None` if no cost is below `below`.
-    fn draw(&mut self, rotation: &UnitQuaternion<f64>, scale: f64, mut below: f64) -> Option<Hypothesis> {
+    fn draw(&mut self, rotation: &UnitQuaternion<f64>, scale: f64, mut below: f64) -> Option<MotionHypothesis> {
         self.rotated.clear();
         self.rotated
             .extend(self.pairs.iter().map(|pair| BearingPair { previous: rotation * pair.previous, now: pair.now }));
         let pull = self.prior_cost(rotation, scale);
-        let mut best: Option<Hypothesis> = None;
+        let mut best: Option<MotionHypothesis> = None;
         for _ in 0..self.options.hypotheses {
             // Normals of the epipolar planes at the current rotation.
             let normals = [0, 1].map(|_| {
@@ -339,7 +339,7 @@ impl Search<'_> {
             let (direction, cost) = if forward <= backward { (axis, forward) } else { (-axis, backward) };
             if cost < below {
                 below = cost;
-                best = Some(Hypothesis { rotation: *rotation, direction, cost });
+                best = Some(MotionHypothesis { rotation: *rotation, direction, cost });
             }
         }
         best
@@ -391,11 +391,11 @@ impl Search<'_> {
 
     /// One Gauss–Newton step on rotation and direction, with weights that reject outliers; its cost is that of
     /// [`Self::cost`] with this limit.
-    fn refine(&self, at: &Hypothesis, scale: f64, limit: f64) -> Option<Hypothesis> {
+    fn refine(&self, at: &MotionHypothesis, scale: f64, limit: f64) -> Option<MotionHypothesis> {
         let (information, rotation_error) = self.prior.at(&at.rotation, scale);
         let (rotation, direction) = step_towards(self.pairs, at, scale, &information, &rotation_error)?;
         let cost = self.cost(&rotation, &direction, scale, limit);
-        Some(Hypothesis { rotation, direction, cost })
+        Some(MotionHypothesis { rotation, direction, cost })
     }
 }
 
@@ -410,7 +410,7 @@ const MIN_INFORMATION: f64 = 1e-9;
 /// frame, in radians; a step `φ` changes that error by `R·φ` to first order in the error.
 pub(super) fn step_towards(
     pairs: &[BearingPair],
-    at: &Hypothesis,
+    at: &MotionHypothesis,
     scale: f64,
     prior: &Matrix3<f64>,
     rotation_error: &Vector3<f64>,

@@ -1,6 +1,6 @@
 use crate::geometry::RigidTransform;
 
-use super::frame::{Axis, Frame};
+use super::frame::{Axis, ChainFrame};
 
 /// Denavit–Hartenberg link, `Rz(θ + theta_offset)·Tz(d)·Tx(a)·Rx(α)` (Eq. 2).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -18,12 +18,12 @@ pub struct DhLink {
 impl DhLink {
     /// Returns `joint_l_from_joint_l+1` at an encoder angle (Eq. 2).
     pub fn transform(&self, joint_angle_rad: f64) -> RigidTransform {
-        let mut frame = Frame::identity();
+        let mut frame = ChainFrame::identity();
         self.extend(&mut frame, joint_angle_rad);
         frame.to_transform()
     }
 
-    pub(super) fn extend(&self, frame: &mut Frame, joint_angle_rad: f64) {
+    pub(super) fn extend(&self, frame: &mut ChainFrame, joint_angle_rad: f64) {
         frame.rotate(Axis::Z, joint_angle_rad + self.theta_offset_rad);
         frame.translate(Axis::Z, self.d_m);
         frame.translate(Axis::X, self.a_m);
@@ -54,7 +54,7 @@ impl ClassicalChain {
     /// When the number of angles is not the number of joints.
     pub fn imu_from_camera(&self, joint_angles_rad: &[f64]) -> RigidTransform {
         assert_eq!(joint_angles_rad.len(), self.links.len(), "one angle per joint");
-        let mut frame = Frame::of(&self.imu_from_base);
+        let mut frame = ChainFrame::of(&self.imu_from_base);
         for (link, angle) in self.links.iter().zip(joint_angles_rad) {
             link.extend(&mut frame, *angle);
         }
@@ -70,7 +70,7 @@ impl ClassicalChain {
     /// When the number of angles is not the number of joints.
     pub fn frames_in_imu(&self, joint_angles_rad: &[f64]) -> Vec<RigidTransform> {
         assert_eq!(joint_angles_rad.len(), self.links.len(), "one angle per joint");
-        let mut frame = Frame::of(&self.imu_from_base);
+        let mut frame = ChainFrame::of(&self.imu_from_base);
         let mut frames = vec![self.imu_from_base];
         for (link, angle) in self.links.iter().zip(joint_angles_rad) {
             link.extend(&mut frame, *angle);

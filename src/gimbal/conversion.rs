@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use crate::geometry::RigidTransform;
 
 use super::form::MinimalChain;
-use super::frame::{Axis, Frame};
+use super::frame::{Axis, ChainFrame};
 use super::{ClassicalChain, DhLink, Parameterization};
 
 /// A decomposition is singular when the cosine (or sine) of its middle angle is below this.
@@ -16,7 +16,7 @@ const SINGULAR_COSINE: f64 = 1e-12;
 ///
 /// At a singularity of the base, the first base angle is set to zero; at one of the end block, `y` (or `alpha`) is.
 pub(super) fn minimal(classical: &ClassicalChain, parameterization: Parameterization) -> MinimalChain {
-    let base = split_base(&Frame::of(&classical.imu_from_base), parameterization.base_yx());
+    let base = split_base(&ChainFrame::of(&classical.imu_from_base), parameterization.base_yx());
     let mut links = classical.links.clone();
     links[0].theta_offset_rad += base.joint_rotation_rad;
     links[0].d_m += base.joint_translation_m;
@@ -33,8 +33,8 @@ pub(super) fn minimal(classical: &ClassicalChain, parameterization: Parameteriza
 }
 
 /// Transform of the last link and the camera after it, at joint angle zero of that link.
-pub(super) fn end_block(link: &DhLink, effector_from_camera: &RigidTransform) -> Frame {
-    let mut frame = Frame::identity();
+pub(super) fn end_block(link: &DhLink, effector_from_camera: &RigidTransform) -> ChainFrame {
+    let mut frame = ChainFrame::identity();
     link.extend(&mut frame, 0.0);
     frame.then(effector_from_camera);
     frame
@@ -49,7 +49,7 @@ struct Base {
 }
 
 /// Decomposes into `Rx·Ry·T(tx, ty, 0)·Rz(θ)·Tz(d)`, or with `Ry·Rx`.
-fn split_base(base: &Frame, yx: bool) -> Base {
+fn split_base(base: &ChainFrame, yx: bool) -> Base {
     let r = &base.rotation;
     let (angles_rad, axes) = if yx {
         let middle_cosine = r[(0, 2)].hypot(r[(2, 2)]);
@@ -60,7 +60,7 @@ fn split_base(base: &Frame, yx: bool) -> Base {
         let rx = if middle_cosine < SINGULAR_COSINE { 0.0 } else { (-r[(1, 2)]).atan2(r[(2, 2)]) };
         ([rx, r[(0, 2)].atan2(middle_cosine)], [Axis::X, Axis::Y])
     };
-    let mut rotated = Frame::identity();
+    let mut rotated = ChainFrame::identity();
     rotated.rotate(axes[0], angles_rad[0]);
     rotated.rotate(axes[1], angles_rad[1]);
     let rest = rotated.rotation.tr_mul(r);
@@ -80,7 +80,7 @@ struct End {
 }
 
 /// Decomposes into `Rz·Tz·Tx·Rx·Ry(β)·Ty(y)` (Eq. 19), or into `Rz·Tz·Tx·Ty(y)·Ry(β)·Rx`.
-fn split_end(block: &Frame, swapped: bool) -> End {
+fn split_end(block: &ChainFrame, swapped: bool) -> End {
     let (r, t) = (&block.rotation, &block.origin);
     if swapped {
         let middle_cosine = r[(0, 0)].hypot(r[(1, 0)]);
@@ -102,7 +102,7 @@ fn split_end(block: &Frame, swapped: bool) -> End {
     if middle_cosine < SINGULAR_COSINE {
         // Theta and beta rotate about the same line; theta is chosen such that y is zero.
         let theta_offset_rad = if t.x == 0.0 && t.y == 0.0 { 0.0 } else { t.y.atan2(t.x) };
-        let mut rotated = Frame::identity();
+        let mut rotated = ChainFrame::identity();
         rotated.rotate(Axis::Z, theta_offset_rad);
         rotated.rotate(Axis::X, alpha_rad);
         let rest = rotated.rotation.tr_mul(r);
@@ -131,7 +131,7 @@ fn rotated_back(angle_rad: f64, v: &Vector3<f64>) -> Vector3<f64> {
 /// Converts a minimal chain to the classical parameterization: the base keeps its rotations, and the transform after
 /// the last link (with the swapped end block: after its translation along y) becomes `effector_from_camera`.
 pub(super) fn classical_of_minimal(chain: &MinimalChain, parameterization: Parameterization) -> ClassicalChain {
-    let mut base = Frame::identity();
+    let mut base = ChainFrame::identity();
     let order = if parameterization.base_yx() { [Axis::Y, Axis::X] } else { [Axis::X, Axis::Y] };
     for (axis, angle) in order.into_iter().zip(chain.base_angles_rad) {
         base.rotate(axis, angle);
@@ -139,7 +139,7 @@ pub(super) fn classical_of_minimal(chain: &MinimalChain, parameterization: Param
     base.translate(Axis::X, chain.base_shift_m[0]);
     base.translate(Axis::Y, chain.base_shift_m[1]);
     let mut links = chain.links.clone();
-    let mut camera = Frame::identity();
+    let mut camera = ChainFrame::identity();
     if parameterization.end_swapped() {
         camera.translate(Axis::Y, chain.y_m);
         camera.rotate(Axis::Y, chain.beta_rad);
@@ -173,14 +173,14 @@ pub(super) fn classical_of_poe(blocks: &[RigidTransform]) -> ClassicalChain {
     let mut links = Vec::with_capacity(last);
     let mut handed_on = RigidTransform::identity();
     for block in &blocks[1..last] {
-        let (link, joint_rotation_rad, joint_translation_m) = split_inner(&Frame::of(&(handed_on * *block)));
+        let (link, joint_rotation_rad, joint_translation_m) = split_inner(&ChainFrame::of(&(handed_on * *block)));
         links.push(link);
         handed_on = RigidTransform::new(
             Rotation3::from_axis_angle(&Vector3::z_axis(), joint_rotation_rad).into(),
             Vector3::new(0.0, 0.0, joint_translation_m),
         );
     }
-    let block = Frame::of(&(handed_on * blocks[last]));
+    let block = ChainFrame::of(&(handed_on * blocks[last]));
     let swapped = block.rotation[(2, 0)].abs() < block.rotation[(2, 1)].abs();
     let end = split_end(&block, swapped);
     links.push(end.link);
@@ -191,7 +191,7 @@ pub(super) fn classical_of_poe(blocks: &[RigidTransform]) -> ClassicalChain {
 }
 
 /// Decomposes into `Rz·Tz·Tx·Rx·Rz(θ)·Tz(d)` with a twist between 0 and π.
-fn split_inner(block: &Frame) -> (DhLink, f64, f64) {
+fn split_inner(block: &ChainFrame) -> (DhLink, f64, f64) {
     let (r, t) = (&block.rotation, &block.origin);
     let twist_sine = r[(0, 2)].hypot(r[(1, 2)]);
     let alpha_rad = twist_sine.atan2(r[(2, 2)]);
@@ -203,7 +203,7 @@ fn split_inner(block: &Frame) -> (DhLink, f64, f64) {
     } else {
         t.y.atan2(t.x)
     };
-    let mut rotated = Frame::identity();
+    let mut rotated = ChainFrame::identity();
     rotated.rotate(Axis::Z, theta_offset_rad);
     rotated.rotate(Axis::X, alpha_rad);
     let rest: Matrix3<f64> = rotated.rotation.tr_mul(r);

@@ -21,12 +21,12 @@ impl Axis {
 
 /// Frame that moves along the chain: its orientation and origin in the start frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Frame {
+pub(super) struct ChainFrame {
     pub(super) rotation: Matrix3<f64>,
     pub(super) origin: Vector3<f64>,
 }
 
-impl Frame {
+impl ChainFrame {
     pub(super) fn identity() -> Self {
         Self { rotation: Matrix3::identity(), origin: Vector3::zeros() }
     }

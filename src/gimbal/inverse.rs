@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
 use crate::geometry::{so3, wrap_angle};
 
-use super::frame::{Axis, Frame};
+use super::frame::{Axis, ChainFrame};
 use super::{ClassicalChain, DhLink};
 
 /// Joint angles this far beyond the limits are accepted, because measurements and limits have errors.
@@ -168,7 +168,7 @@ impl InverseChain {
     }
 
     fn pose(&self, angles_rad: &[f64], wanted: &UnitQuaternion<f64>) -> Pose {
-        let mut frame = Frame::identity();
+        let mut frame = ChainFrame::identity();
         let mut axes_in_base = Vec::with_capacity(self.links.len());
         for (link, angle) in self.links.iter().zip(angles_rad) {
             axes_in_base.push(frame.axis(Axis::Z));

@@ -9,7 +9,7 @@ use nalgebra::{Matrix6xX, Vector3};
 use crate::geometry::RigidTransform;
 
 use super::form::Form;
-use super::frame::{Axis, Frame};
+use super::frame::{Axis, ChainFrame};
 use super::{Chain, DhLink};
 
 /// Forward kinematics and its derivatives at given joint angles.
@@ -53,9 +53,9 @@ impl Chain {
         }
     }
 
-    fn traverse<S: MotionSink>(&self, joint_angles_rad: &[f64], sink: &mut S) -> Frame {
+    fn traverse<S: MotionSink>(&self, joint_angles_rad: &[f64], sink: &mut S) -> ChainFrame {
         assert_eq!(joint_angles_rad.len(), self.joint_count(), "one angle per joint");
-        let mut frame = Frame::identity();
+        let mut frame = ChainFrame::identity();
         match &self.form {
             Form::Classical(chain) => {
                 traverse_block(&mut frame, &chain.imu_from_base, sink);
@@ -168,7 +168,7 @@ impl Columns {
         self.filled += 1;
     }
 
-    fn finish(mut self, camera: &Frame) -> Matrix6xX<f64> {
+    fn finish(mut self, camera: &ChainFrame) -> Matrix6xX<f64> {
         debug_assert_eq!(self.filled, self.matrix.ncols(), "the walk met every column");
         for mut column in self.matrix.column_iter_mut() {
             let axis: Vector3<f64> = column.fixed_rows::<3>(0).into_owned();
@@ -183,18 +183,18 @@ impl Columns {
     }
 }
 
-fn rotate<S: MotionSink>(frame: &mut Frame, axis: Axis, angle_rad: f64, sink: &mut S) {
+fn rotate<S: MotionSink>(frame: &mut ChainFrame, axis: Axis, angle_rad: f64, sink: &mut S) {
     sink.rotate(&frame.axis(axis), &frame.origin);
     frame.rotate(axis, angle_rad);
 }
 
-fn translate<S: MotionSink>(frame: &mut Frame, axis: Axis, distance_m: f64, sink: &mut S) {
+fn translate<S: MotionSink>(frame: &mut ChainFrame, axis: Axis, distance_m: f64, sink: &mut S) {
     sink.translate(&frame.axis(axis));
     frame.translate(axis, distance_m);
 }
 
 /// Adds a link without its twist.
-fn traverse_link<S: MotionSink>(frame: &mut Frame, link: &DhLink, joint_angle_rad: f64, sink: &mut S) {
+fn traverse_link<S: MotionSink>(frame: &mut ChainFrame, link: &DhLink, joint_angle_rad: f64, sink: &mut S) {
     let axis = frame.axis(Axis::Z);
     sink.joint(&axis, &frame.origin);
     sink.offset(&axis, &frame.origin);
@@ -204,7 +204,7 @@ fn traverse_link<S: MotionSink>(frame: &mut Frame, link: &DhLink, joint_angle_ra
 }
 
 /// Adds a rigid transform with its six columns: rotations about its inner axes, translations along its outer axes.
-fn traverse_block<S: MotionSink>(frame: &mut Frame, transform: &RigidTransform, sink: &mut S) {
+fn traverse_block<S: MotionSink>(frame: &mut ChainFrame, transform: &RigidTransform, sink: &mut S) {
     let outer = *frame;
     frame.then(transform);
     for axis in [Axis::X, Axis::Y, Axis::Z] {

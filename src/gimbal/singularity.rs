@@ -2,7 +2,7 @@
 
 use super::conversion::end_block;
 use super::form::Form;
-use super::frame::Frame;
+use super::frame::ChainFrame;
 use super::{Chain, ClassicalChain, Parameterization, Singularity};
 
 /// A minimal parameterization is replaced when its margin at base or end falls below this.
@@ -16,7 +16,7 @@ const TIE: f64 = 1e-3;
 /// are equal.
 pub fn auto_parameterization(classical: &ClassicalChain) -> Parameterization {
     let Some(last) = classical.links.last() else { return Parameterization::Minimal };
-    let base = Frame::of(&classical.imu_from_base).rotation;
+    let base = ChainFrame::of(&classical.imu_from_base).rotation;
     let end = end_block(last, &classical.effector_from_camera).rotation;
     let margin_xy = base[(1, 2)].hypot(base[(2, 2)]);
     let margin_yx = base[(0, 2)].hypot(base[(2, 2)]);

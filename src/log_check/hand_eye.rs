@@ -57,7 +57,7 @@ struct HandEye<'a> {
 
 /// Consequence of a comparison for other checks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Outcome {
+pub(super) enum HandEyeOutcome {
     /// The intrinsics are wrong, so that other measurements by the camera's features are, too.
     WrongIntrinsics,
     /// The orientation of a rigid camera differs from the rig: as if the IMU was rotated by this, IMU frame.
@@ -75,10 +75,10 @@ pub(super) fn check_against_gyroscope(
     rotations: &[ImageRotation],
     readout_s: f64,
     findings: &mut Findings,
-) -> Outcome {
+) -> HandEyeOutcome {
     let data = RotationData::new(survey, rig, imu_facts, camera, rotations, readout_s);
     let chain = rig.chain_of_camera(&camera.key).filter(|_| data.measured.len() >= MIN_ROTATIONS);
-    let Some(chain) = chain else { return Outcome::Other };
+    let Some(chain) = chain else { return HandEyeOutcome::Other };
     let faulty = if !findings.can_compare(Measurement::Gyroscope) {
         Some("gyroscope")
     } else if !chain.links.is_empty() && !findings.can_compare(Measurement::Joints) {
@@ -90,7 +90,7 @@ pub(super) fn check_against_gyroscope(
         let title = format!("the rotations of {} are not compared", camera.key);
         let evidence = format!("the fault of the {faulty} is reported above");
         findings.add(Severity::Note, Area::Extrinsics, title, evidence, "check again when it is corrected");
-        return Outcome::Other;
+        return HandEyeOutcome::Other;
     }
     let hand_eye = HandEye { data, camera };
     let given = hand_eye.pairs(&chain, 0.0, 0.0);
@@ -100,7 +100,7 @@ pub(super) fn check_against_gyroscope(
         let title = format!("too little rotation of {} to check its extrinsics", camera.key);
         let evidence = format!("{} image rotations, {:.2}° in the median", given.len(), rotation_rad.to_degrees());
         findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");
-        return Outcome::Other;
+        return HandEyeOutcome::Other;
     }
     let aligned = hand_eye.aligned(&chain);
     let (offset_s, sigma_s) = aligned
@@ -113,7 +113,7 @@ pub(super) fn check_against_gyroscope(
         scale: SCALE_SIGMA,
         chain: hand_eye.data.chain_sigma_rad(),
     };
-    let Some(fit) = RotationFit::of(&pairs, &chain, &priors) else { return Outcome::Other };
+    let Some(fit) = RotationFit::of(&pairs, &chain, &priors) else { return HandEyeOutcome::Other };
     // Over longer times the rotations of a gimbal exceed the noise of its joint angles.
     let longer = (!chain.links.is_empty())
         .then(|| RotationFit::of(&hand_eye.pairs(&chain, offset_s, JOINED_S), &chain, &priors))
@@ -196,7 +196,7 @@ impl HandEye<'_> {
         offset_s: f64,
         within_noise: Option<WithinNoise>,
         findings: &mut Findings,
-    ) -> Outcome {
+    ) -> HandEyeOutcome {
         let key = &self.camera.key;
         let given_rad = misfit_rad(pairs, chain);
         let (error_rad, sigma_rad) = (fit.orientation.angle(), fit.orientation_sigma_rad);
@@ -224,7 +224,7 @@ impl HandEye<'_> {
                 "write the inverse of {field}: T_a_b maps points from b to a (Kalibr: T_cam_imu from the IMU to the camera)"
             );
             findings.add(Severity::Error, Area::Extrinsics, title, evidence, remedy);
-            return Outcome::Other;
+            return HandEyeOutcome::Other;
         }
         let Some(found) = within_noise else {
             let remedy = if self.camera.mount == CameraMount::Gimbal {
@@ -237,12 +237,12 @@ impl HandEye<'_> {
             let explanation = hypotheses::explain(&self.data, chain, tolerance_rad);
             explanation.report(key, &evidence, remedy, findings);
             if explanation.is_of(Area::Intrinsics) {
-                return Outcome::WrongIntrinsics;
+                return HandEyeOutcome::WrongIntrinsics;
             }
             if explanation.is_of(Area::Imu) {
                 findings.exclude(Measurement::Gyroscope);
             }
-            return Outcome::Other;
+            return HandEyeOutcome::Other;
         };
         if let Some((cause, of_cause)) = found.decisive {
             Explanation::Decisive(cause, of_cause).report(key, &evidence, "", findings);
@@ -257,12 +257,12 @@ impl HandEye<'_> {
             self.report_other_orientation(&fit.orientation, &found, evidence, findings);
             if let CameraMount::Static { imu_from_camera } = &self.camera.mount {
                 let rotation = imu_from_camera.rotation;
-                return Outcome::OtherOrientation(rotation * fit.orientation * rotation.inverse());
+                return HandEyeOutcome::OtherOrientation(rotation * fit.orientation * rotation.inverse());
             }
         } else {
             findings.good(Area::Extrinsics, format!("the orientation of {key} agrees with the rig"), evidence);
         }
-        Outcome::Other
+        HandEyeOutcome::Other
     }
 
     /// Reports an orientation of the camera against the rig, camera frame, with causes that explain it as well.

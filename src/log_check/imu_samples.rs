@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use crate::flight_log::imu_filter::{ImuFilter, Reading, Unmeasured, is_measured};
+use crate::flight_log::imu_filter::{FilteredSample, ImuFilter, Unmeasured, is_measured};
 use crate::flight_log::imu_merge::ImuMerge;
 use crate::sensors::ImuSample;
 
@@ -48,13 +48,13 @@ pub(super) fn measured_apart(
 }
 
 /// Samples in the order of their stamps, one for each stamp, that are measurements.
-fn filtered<T: Reading>(
+fn filtered<T: FilteredSample>(
     mut messages: Vec<T>,
     reason: impl Fn(&T) -> Option<Unmeasured>,
     dropped: &mut UnmeasuredStamps,
 ) -> Vec<T> {
     let mut drop_sample = |reason: Unmeasured, stamp_ns: i64| dropped.entry(reason).or_default().push(stamp_ns);
-    messages.sort_by_key(Reading::stamp_ns);
+    messages.sort_by_key(FilteredSample::stamp_ns);
     messages.retain(|sample| match reason(sample) {
         Some(reason) => {
             drop_sample(reason, sample.stamp_ns());

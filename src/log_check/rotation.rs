@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::hand_eye::Outcome;
+use super::hand_eye::HandEyeOutcome;
 use super::imu_facts::ImuFacts;
 use super::readout::check_readout;
 use super::survey::Survey;
@@ -27,9 +27,9 @@ pub(super) fn check_rotations(
         let readout_s = check_readout(camera, imu_facts, rotations, &mut of_readout);
         match hand_eye::check_against_gyroscope(survey, rig, camera, imu_facts, rotations, readout_s, findings) {
             // By a wrong lens, features move faster in one half of the image, as by a rolling shutter.
-            Outcome::WrongIntrinsics => continue,
-            Outcome::OtherOrientation(rotation) => of_imu.push(rotation),
-            Outcome::Other => {}
+            HandEyeOutcome::WrongIntrinsics => continue,
+            HandEyeOutcome::OtherOrientation(rotation) => of_imu.push(rotation),
+            HandEyeOutcome::Other => {}
         }
         findings.list.append(&mut of_readout.list);
     }

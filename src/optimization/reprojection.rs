@@ -84,7 +84,7 @@ impl RelativePoses {
 }
 
 /// Projection `π` of a direction in the camera to a measurement.
-pub(crate) trait Projection {
+pub(crate) trait BearingProjection {
     /// Predicted measurement, `None` when the camera cannot observe the direction.
     fn project(&self, direction: &Vector3<f64>) -> Option<Vector2<f64>>;
 
@@ -93,7 +93,7 @@ pub(crate) trait Projection {
 }
 
 /// Projection to pixels.
-impl Projection for CameraModel {
+impl BearingProjection for CameraModel {
     fn project(&self, direction: &Vector3<f64>) -> Option<Vector2<f64>> {
         self.project(direction)
     }
@@ -123,7 +123,7 @@ impl TangentPlane {
     }
 }
 
-impl Projection for TangentPlane {
+impl BearingProjection for TangentPlane {
     fn project(&self, direction: &Vector3<f64>) -> Option<Vector2<f64>> {
         let (unit, _) = self.ahead(direction)?;
         Some(self.basis * unit)
@@ -176,7 +176,7 @@ impl Reprojection {
 
 /// Residual without derivatives (2 × 1), `None` when the camera cannot observe the landmark.
 pub(crate) fn residual(
-    projection: &impl Projection,
+    projection: &impl BearingProjection,
     relative: &RelativePose,
     landmark: &Landmark,
     measured: &Vector2<f64>,
@@ -191,7 +191,7 @@ pub(crate) fn residual(
 /// derivative of the projection and the landmark stay at the current estimate, as in Basalt.
 #[inline]
 pub(crate) fn linearize(
-    projection: &impl Projection,
+    projection: &impl BearingProjection,
     relative: &RelativePose,
     linearized: &RelativePose,
     landmark: &Landmark,
@@ -234,7 +234,7 @@ fn beside(left: &Matrix2x3<f64>, right: &Matrix2x3<f64>) -> Matrix2x6<f64> {
 
 /// Residual of the anchor's own observation of its landmark, which depends only on the bearing.
 pub(crate) fn linearize_in_anchor(
-    projection: &impl Projection,
+    projection: &impl BearingProjection,
     landmark: &Landmark,
     measured: &Vector2<f64>,
 ) -> Option<Reprojection> {

@@ -1,7 +1,7 @@
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3, Vector6};
 
 use super::damped::{DampedOptions, DampedProblem, StopReason, minimize};
-use super::reprojection::{self, Projection, TangentPlane};
+use super::reprojection::{self, BearingProjection, TangentPlane};
 use super::{
     BlockTerm, CameraPose, Cholesky, DensePoseEquations, Landmark, LandmarkRows, LossSum, Ray, RelativePose,
     Reprojection, ReprojectionEquations, RobustLoss, TriangulationOptions, triangulate,
@@ -43,7 +43,12 @@ fn cameras() -> Vec<CameraModel> {
 
 /// Compares every column of the Jacobians with central differences; `tolerance` is absolute, in the unit of the
 /// projection.
-fn check_jacobians(random: &mut SplitMix64, projection: &impl Projection, measured: &Vector2<f64>, tolerance: f64) {
+fn check_jacobians(
+    random: &mut SplitMix64,
+    projection: &impl BearingProjection,
+    measured: &Vector2<f64>,
+    tolerance: f64,
+) {
     const STEP: f64 = 1e-6;
     let (anchor, observer) = (pose(random), pose(random));
     let bearing = (vector(random, 0.6).xy().push(1.0)).normalize();

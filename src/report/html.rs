@@ -5,7 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::options::{ReportDrawing, ReportFigure};
-use super::verdict::Mark;
+use super::verdict::StatementLevel;
 
 /// Maximum number of rows of a table that is not split between printed pages.
 const MAX_UNBROKEN_ROWS: usize = 14;
@@ -112,12 +112,12 @@ pub(super) fn figure(number: usize, figure: &ReportFigure) -> Markup {
 }
 
 /// The icon of a mark, drawn in the page so that it needs no symbol font.
-pub(super) fn icon(mark: Mark) -> Markup {
+pub(super) fn icon(mark: StatementLevel) -> Markup {
     let svg = match mark {
-        Mark::Good => include_str!("../../assets/report/icons/good.svg"),
-        Mark::Note => include_str!("../../assets/report/icons/note.svg"),
-        Mark::Warning => include_str!("../../assets/report/icons/warning.svg"),
-        Mark::Error => include_str!("../../assets/report/icons/error.svg"),
+        StatementLevel::Good => include_str!("../../assets/report/icons/good.svg"),
+        StatementLevel::Note => include_str!("../../assets/report/icons/note.svg"),
+        StatementLevel::Warning => include_str!("../../assets/report/icons/warning.svg"),
+        StatementLevel::Error => include_str!("../../assets/report/icons/error.svg"),
     };
     PreEscaped(svg.trim_end().to_owned())
 }

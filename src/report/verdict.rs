@@ -21,7 +21,7 @@ const NAMED: usize = 4;
 /// Severity of a statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Mark {
+pub(super) enum StatementLevel {
     /// No problem.
     Good,
     Note,
@@ -35,7 +35,7 @@ pub(super) enum Mark {
 pub(super) struct Statement {
     /// Subject in one word.
     pub(super) topic: &'static str,
-    pub(super) mark: Mark,
+    pub(super) mark: StatementLevel,
     /// The statement in one sentence.
     pub(super) text: String,
     /// Underlying values and reasons, one sentence each.
@@ -58,7 +58,7 @@ impl RunVerdict {
     }
 }
 
-fn statement(topic: &'static str, mark: Mark, text: String, details: Vec<String>) -> Statement {
+fn statement(topic: &'static str, mark: StatementLevel, text: String, details: Vec<String>) -> Statement {
     Statement { topic, mark, text, details }
 }
 
@@ -101,17 +101,21 @@ fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Sta
                 details.push(format!("Relative pose error (RPE, RMSE): {}.", relative.join("; ")));
             }
             details.extend(uncertainty.map(|text| format!("Uncertainty of the estimator: {text}.")));
-            let mark = if found.ate_percent_of_length <= MAX_ATE_PERCENT { Mark::Good } else { Mark::Warning };
+            let mark = if found.ate_percent_of_length <= MAX_ATE_PERCENT {
+                StatementLevel::Good
+            } else {
+                StatementLevel::Warning
+            };
             statement("Accuracy", mark, format!("{found}."), details)
         }
         (None, Some(uncertainty)) => {
             let missing = summary.accuracy_missing.clone().unwrap_or_default();
             let text = format!("No error against ground truth; uncertainty of the estimator {uncertainty}.");
-            statement("Accuracy", Mark::Note, text, vec![capitalized(&missing)])
+            statement("Accuracy", StatementLevel::Note, text, vec![capitalized(&missing)])
         }
         (None, None) => {
             let missing = summary.accuracy_missing.clone().unwrap_or_else(|| "no estimated pose".to_owned());
-            statement("Accuracy", Mark::Error, capitalized(&missing), Vec::new())
+            statement("Accuracy", StatementLevel::Error, capitalized(&missing), Vec::new())
         }
     }
 }
@@ -122,7 +126,7 @@ fn calibration(summary: &RunSummary) -> Statement {
     let estimated = summary.frames.estimated > 0;
     if parameters.is_empty() || !estimated {
         let text = if estimated { "Calibration fixed at the values of the rig." } else { "Not calibrated." };
-        return statement("Calibration", Mark::Note, text.to_owned(), Vec::new());
+        return statement("Calibration", StatementLevel::Note, text.to_owned(), Vec::new());
     }
     let all = parameters.iter().all(|parameter| parameter.verdict == Determination::Determined);
     let text = format!("{}, from the whole flight.", flight_headline(parameters));
@@ -143,7 +147,7 @@ fn calibration(summary: &RunSummary) -> Statement {
             chain_error(last)
         ));
     }
-    statement("Calibration", if all { Mark::Good } else { Mark::Warning }, text, details)
+    statement("Calibration", if all { StatementLevel::Good } else { StatementLevel::Warning }, text, details)
 }
 
 /// For example `yaw.alpha ±0.12°`.
@@ -190,8 +194,11 @@ fn observability(recording: &Recording, run: &RunRecord) -> Option<Statement> {
     {
         details.push(format!("Suggested excitation: {}.", in_words(&sentence)));
     }
-    let mark =
-        if rank.rank_structural == columns && rank.rank_informed == columns { Mark::Good } else { Mark::Warning };
+    let mark = if rank.rank_structural == columns && rank.rank_informed == columns {
+        StatementLevel::Good
+    } else {
+        StatementLevel::Warning
+    };
     Some(statement("Observability", mark, text, details))
 }
 
@@ -237,10 +244,10 @@ fn estimation(run: &RunRecord, summary: &RunSummary) -> Statement {
         count(warnings, "warning")
     );
     let mark = match (frames.estimated, frames.restarts, warnings, &run.error) {
-        (0, ..) | (_, _, _, Some(_)) => Mark::Error,
-        (_, 0, 0, None) => Mark::Good,
-        (_, 0, _, None) => Mark::Note,
-        _ => Mark::Warning,
+        (0, ..) | (_, _, _, Some(_)) => StatementLevel::Error,
+        (_, 0, 0, None) => StatementLevel::Good,
+        (_, 0, _, None) => StatementLevel::Note,
+        _ => StatementLevel::Warning,
     };
     statement("Estimation", mark, text, run.error.iter().cloned().collect())
 }
@@ -254,12 +261,12 @@ pub(super) fn log_statement(check: Option<&CheckReport>, reader_warnings: &[Stri
     let (errors, warnings, notes) = (of(Severity::Error), of(Severity::Warning), of(Severity::Note));
     let others = warnings.len() + reader_warnings.len();
     let mark = match (errors.len(), others, notes.len()) {
-        (0, 0, 0) => Mark::Good,
-        (0, 0, _) => Mark::Note,
-        (0, ..) => Mark::Warning,
-        _ => Mark::Error,
+        (0, 0, 0) => StatementLevel::Good,
+        (0, 0, _) => StatementLevel::Note,
+        (0, ..) => StatementLevel::Warning,
+        _ => StatementLevel::Error,
     };
-    let text = if mark == Mark::Good {
+    let text = if mark == StatementLevel::Good {
         "No problems found in the log and the rig.".to_owned()
     } else {
         let counts = [(errors.len(), "error"), (others, "warning"), (notes.len(), "note")];
@@ -339,11 +346,11 @@ mod tests {
     #[test]
     fn a_log_without_findings_is_in_order_and_warnings_are_counted() {
         let good = log_statement(None, &[]);
-        assert_eq!((good.mark, good.details.len()), (Mark::Good, 0));
+        assert_eq!((good.mark, good.details.len()), (StatementLevel::Good, 0));
         let warned = log_statement(None, &["1.000 s: gap".to_owned()]);
         assert_eq!(
             (warned.mark, warned.text.as_str()),
-            (Mark::Warning, "No errors, 1 warning and no notes about the log and the rig.")
+            (StatementLevel::Warning, "No errors, 1 warning and no notes about the log and the rig.")
         );
     }
 

@@ -16,7 +16,7 @@ pub struct StampedPose {
 
 /// Alignment of the estimate with the reference before positions are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Alignment {
+pub enum TrajectoryAlignment {
     /// No alignment: both trajectories are already in one world.
     None,
     /// Rotation about the vertical and a translation: the gauge freedom of visual-inertial odometry.
@@ -27,7 +27,7 @@ pub enum Alignment {
     Similarity,
 }
 
-impl Alignment {
+impl TrajectoryAlignment {
     /// Name in files and messages.
     pub fn name(self) -> &'static str {
         match self {
@@ -39,7 +39,7 @@ impl Alignment {
     }
 }
 
-impl Serialize for Alignment {
+impl Serialize for TrajectoryAlignment {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
     }
@@ -110,10 +110,10 @@ impl AlignmentSums {
         self.estimate_square += estimate_m.norm_squared();
     }
 
-    /// The least-squares alignment (Umeyama 1991; about the vertical only for [`Alignment::YawPosition`]). Returns
+    /// The least-squares alignment (Umeyama 1991; about the vertical only for [`TrajectoryAlignment::YawPosition`]). Returns
     /// `None` with fewer than three pairs, or when the positions do not constrain it.
-    pub fn solve(&self, alignment: Alignment) -> Option<AlignmentTransform> {
-        if alignment == Alignment::None {
+    pub fn solve(&self, alignment: TrajectoryAlignment) -> Option<AlignmentTransform> {
+        if alignment == TrajectoryAlignment::None {
             return Some(AlignmentTransform { rigid: RigidTransform::identity(), scale: 1.0 });
         }
         if self.count < 3 {
@@ -125,7 +125,7 @@ impl AlignmentSums {
         let covariance = self.reference_by_estimate / count - mean_reference * mean_estimate.transpose();
         let estimate_variance = self.estimate_square / count - mean_estimate.norm_squared();
         let mut scale = 1.0;
-        let rotation = if alignment == Alignment::YawPosition {
+        let rotation = if alignment == TrajectoryAlignment::YawPosition {
             let sine = covariance[(1, 0)] - covariance[(0, 1)];
             let cosine = covariance[(0, 0)] + covariance[(1, 1)];
             UnitQuaternion::from_axis_angle(&Vector3::z_axis(), sine.atan2(cosine))
@@ -139,7 +139,7 @@ impl AlignmentSums {
             if u.determinant() * v_t.determinant() < 0.0 {
                 sign.z = -1.0;
             }
-            if alignment == Alignment::Similarity {
+            if alignment == TrajectoryAlignment::Similarity {
                 scale = svd.singular_values.dot(&sign) / estimate_variance;
             }
             let matrix = u * Matrix3::from_diagonal(&sign) * v_t;
@@ -179,7 +179,7 @@ pub fn associate(
 }
 
 /// The alignment of associated poses; see [`AlignmentSums::solve`].
-pub fn align(pairs: &[(StampedPose, StampedPose)], alignment: Alignment) -> Option<AlignmentTransform> {
+pub fn align(pairs: &[(StampedPose, StampedPose)], alignment: TrajectoryAlignment) -> Option<AlignmentTransform> {
     let mut sums = AlignmentSums::default();
     for (estimate, reference) in pairs {
         sums.add(&estimate.pose.translation_m, &reference.pose.translation_m);

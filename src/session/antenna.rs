@@ -6,7 +6,7 @@ use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
-use super::accuracy::{Alignment, AlignmentSums, ErrorStatistics, path_length_m};
+use super::accuracy::{AlignmentSums, ErrorStatistics, TrajectoryAlignment, path_length_m};
 use crate::geometry::{RigidTransform, so3};
 use crate::sensors::{LeverArm, PoseTrack, PositionSample};
 
@@ -127,7 +127,7 @@ fn aligned(pairs: &[AntennaPair], lever_arm_m: &Vector3<f64>) -> Result<RigidTra
     for pair in pairs {
         sums.add(&pair.pose.transform(lever_arm_m), &pair.antenna_m);
     }
-    let solved = sums.solve(Alignment::YawPosition).filter(|_| pairs.len() >= MIN_PAIRS);
+    let solved = sums.solve(TrajectoryAlignment::YawPosition).filter(|_| pairs.len() >= MIN_PAIRS);
     solved.map(|transform| transform.rigid).ok_or(AntennaError::NotDetermined { pairs: pairs.len() })
 }
 

@@ -28,7 +28,7 @@ mod record;
 pub(crate) mod tests;
 
 pub use diagnosis::{
-    AgreementValue, Cause, Diagnosis, LogFaults, RankedCause, TruthAgreement, Verdict, WaitingReason, diagnose,
+    AgreementValue, Cause, Diagnosis, DiagnosisVerdict, LogFaults, RankedCause, TruthAgreement, WaitingReason, diagnose,
 };
 pub use engine::{
     BreakpointHit, CalibrationErrors, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation,
@@ -36,8 +36,8 @@ pub use engine::{
     image_rotations,
 };
 pub use plan::{
-    Correction, DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, ForkChanges, ForkError,
-    ImageFlip, ImageHalf, LoadedPositions, LoadedTrajectory, MAX_RUNS, MAX_TRAJECTORIES, ParameterizationChoice,
+    DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, ForkChanges, ForkError, ImageFlip, ImageHalf,
+    LoadedPositions, LoadedTrajectory, MAX_RUNS, MAX_TRAJECTORIES, MeasurementCorrection, ParameterizationChoice,
     RunSpec, RunSpecError, SessionError, SessionPlan, SessionRequest, TrajectorySource, TrajectorySpec,
     TrajectorySpecError,
 };
@@ -46,10 +46,10 @@ pub use playback::{
     SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError, Session, Wake,
 };
 pub use record::{
-    Comparison, Divergence, FlightParameter, FlightVerdicts, ForkOrigin, ImageResiduals, KnownLossSummary, LostSince,
-    MeanResidual, ParameterSummary, PassProgress, PoseConsistency, PoseError, PositionTruth, Quantity,
-    RELATIVE_LENGTHS_M, Recording, RelativeAccuracy, ResidualSum, RunMemory, RunRecord, RunSummary, RunWarning,
-    SolverPosition, SolverTrace, StageSummary, StepFactorRows, StepRecord, TrajectoryAccuracy, TrajectoryEvaluation,
-    TrajectoryLane, WarningLine, evaluate_trajectory, flight_advice, flight_headline, flight_table, least_determined,
-    log_warning_lines, run_warning_lines, summarize, warning_lines,
+    ComparedQuantity, Comparison, Divergence, FlightParameter, FlightVerdicts, ForkOrigin, ImageResiduals,
+    KnownLossSummary, LostSince, MeanResidual, ParameterSummary, PassProgress, PoseConsistency, PoseError,
+    PositionTruth, RELATIVE_LENGTHS_M, Recording, RelativeAccuracy, ResidualSum, RunMemory, RunRecord, RunSummary,
+    RunWarning, SolverPosition, SolverTrace, StageSummary, StepFactorRows, StepRecord, TrajectoryAccuracy,
+    TrajectoryEvaluation, TrajectoryLane, WarningLine, evaluate_trajectory, flight_advice, flight_headline,
+    flight_table, least_determined, log_warning_lines, run_warning_lines, summarize, warning_lines,
 };

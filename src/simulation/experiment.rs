@@ -4,7 +4,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::gimbal::LookAround;
 use super::random::RandomStream;
-use super::route::{Cruise, Flight, Pace, Path, Shuttle};
+use super::route::{Cruise, Flight, Manoeuvres, Path, Shuttle};
 use crate::sensors::ChainPrior;
 use crate::text::Named;
 
@@ -87,11 +87,11 @@ impl Experiment {
 
     /// Flight of the experiment; a path that is not closed has at least this length.
     pub(crate) fn flight(self, length_m: f64, random: &mut RandomStream) -> Box<dyn Flight> {
-        self.flight_at(Pace::aggressive(), length_m, random)
+        self.flight_at(Manoeuvres::aggressive(), length_m, random)
     }
 
     /// Flight with another pace.
-    pub(crate) fn flight_at(self, pace: Pace, length_m: f64, random: &mut RandomStream) -> Box<dyn Flight> {
+    pub(crate) fn flight_at(self, pace: Manoeuvres, length_m: f64, random: &mut RandomStream) -> Box<dyn Flight> {
         match self {
             Self::T1 => {
                 let (x, y) = (13.5, 12.0);
@@ -101,7 +101,7 @@ impl Experiment {
                 Box::new(Cruise::new(pace, path, [2.6, 0.8], 1.3, 30_f64.to_radians(), random))
             }
             Self::T2 => Box::new(Shuttle {
-                pace: Pace { manoeuvre_m: [0.4, 0.3], manoeuvre_heading_rad: 0.13, ..pace },
+                pace: Manoeuvres { manoeuvre_m: [0.4, 0.3], manoeuvre_heading_rad: 0.13, ..pace },
                 centre_m: Vector3::new(4.5, -14.0, 2.3),
                 heading_rad: std::f64::consts::FRAC_PI_2,
                 stroke_m: 10.0,

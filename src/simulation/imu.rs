@@ -22,7 +22,7 @@ const GYROSCOPE_TURN_ON_RAD_PER_S: f64 = 0.0087;
 
 /// Biases at one time, in the IMU frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ImuBias {
+pub struct SimulatedBias {
     /// Added to the true specific force.
     pub accelerometer_m_per_s2: Vector3<f64>,
     /// Added to the true angular velocity.
@@ -33,7 +33,7 @@ pub struct ImuBias {
 #[derive(Clone, Debug)]
 pub(crate) struct ImuRecord {
     pub(crate) samples: Vec<ImuSample>,
-    pub(crate) biases: Vec<ImuBias>,
+    pub(crate) biases: Vec<SimulatedBias>,
 }
 
 impl ImuRecord {
@@ -46,7 +46,7 @@ impl ImuRecord {
         random: &mut RandomStream,
     ) -> Self {
         let count = (trajectory.duration_s() * rate_hz).floor() as usize + 1;
-        let mut bias = ImuBias {
+        let mut bias = SimulatedBias {
             accelerometer_m_per_s2: random.normal_vector(ACCELEROMETER_TURN_ON_M_PER_S2 * noise_scale),
             gyroscope_rad_per_s: random.normal_vector(GYROSCOPE_TURN_ON_RAD_PER_S * noise_scale),
         };
@@ -125,7 +125,7 @@ impl ImuRecord {
         between
     }
 
-    pub(crate) fn bias_at(&self, stamp_ns: i64) -> ImuBias {
+    pub(crate) fn bias_at(&self, stamp_ns: i64) -> SimulatedBias {
         let after = self.samples.partition_point(|sample| sample.stamp_ns <= stamp_ns);
         self.biases.get(after.saturating_sub(1)).copied().unwrap_or_default()
     }

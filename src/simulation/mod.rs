@@ -42,7 +42,7 @@ pub use error::SimulationError;
 pub use exercise::{Exercise, JOINT_PERIOD_S, JointSwing, ROCK_M, ROCK_PERIOD_S, SWING_M, VehicleSwing, YAW_SWING_RAD};
 pub use experiment::{Environment, Experiment};
 pub use gimbal::JointMotion;
-pub use imu::ImuBias;
+pub use imu::SimulatedBias;
 #[cfg(feature = "logs")]
 pub use options::{SimulationOptions, SimulationProgress, SimulationSummary};
 #[cfg(feature = "logs")]

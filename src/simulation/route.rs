@@ -47,7 +47,7 @@ impl Flight for Mirrored {
 
 /// Speed and size of the manoeuvres of a flight.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Pace {
+pub(crate) struct Manoeuvres {
     /// Duration of the hover at the start.
     pub(crate) hover_s: f64,
     /// Sway while hovering (standard deviation).
@@ -58,11 +58,11 @@ pub(crate) struct Pace {
     pub(crate) speed_m_per_s: f64,
     /// Horizontal and vertical manoeuvres (standard deviations of the spline's control points).
     pub(crate) manoeuvre_m: [f64; 2],
-    /// Manoeuvres in heading (standard deviation of the spline's control points).
+    /// Pace in heading (standard deviation of the spline's control points).
     pub(crate) manoeuvre_heading_rad: f64,
 }
 
-impl Pace {
+impl Manoeuvres {
     /// Two seconds of near-hover, then random aggressive manoeuvres.
     pub(crate) fn aggressive() -> Self {
         Self {
@@ -195,7 +195,7 @@ fn cut_corners(points: &[Vector2<f64>], closed: bool) -> Vec<Vector2<f64>> {
 /// Flight along a path with slowly varying velocity, height and lateral distance.
 #[derive(Clone, Debug)]
 pub(crate) struct Cruise {
-    pub(crate) pace: Pace,
+    pub(crate) pace: Manoeuvres,
     /// Ground track.
     pub(crate) path: Path,
     /// Height above ground, and its variation.
@@ -209,7 +209,7 @@ pub(crate) struct Cruise {
 
 impl Cruise {
     pub(crate) fn new(
-        pace: Pace,
+        pace: Manoeuvres,
         path: Path,
         height_m: [f64; 2],
         wander_m: f64,
@@ -248,7 +248,7 @@ impl Flight for Cruise {
 /// Forward and backward along the heading, then left and right: experiment T2.
 #[derive(Clone, Debug)]
 pub(crate) struct Shuttle {
-    pub(crate) pace: Pace,
+    pub(crate) pace: Manoeuvres,
     /// Centre of the strokes.
     pub(crate) centre_m: Vector3<f64>,
     /// Constant heading.
@@ -284,7 +284,7 @@ impl Flight for Shuttle {
 /// Flight at one position, with the pace's sway and, after the ramp, its manoeuvres.
 #[derive(Clone, Debug)]
 pub(crate) struct Station {
-    pub(crate) pace: Pace,
+    pub(crate) pace: Manoeuvres,
     pub(crate) position_m: Vector3<f64>,
     pub(crate) heading_rad: f64,
 }

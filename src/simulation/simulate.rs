@@ -16,7 +16,7 @@ use super::experiment::Experiment;
 use super::interval::during;
 use super::options::{SimulationOptions, SimulationProgress, SimulationSummary};
 use super::random::RandomStream;
-use super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
+use super::render::{RenderedView, Sensor, SensorOptions, SurfaceShader, Workspace};
 use super::route::Mirrored;
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{AIR_DRAG_PER_S, Trajectory, VehicleLimits};
@@ -340,8 +340,8 @@ fn schedule(recordings: &Recordings, seed: u64) -> Vec<(i64, Message)> {
 struct Studio<'a> {
     options: &'a SimulationOptions,
     scenario: &'a Scenario,
-    renderer: Renderer<'a>,
-    cameras: Vec<(&'a CameraRig, View, Sensor)>,
+    renderer: SurfaceShader<'a>,
+    cameras: Vec<(&'a CameraRig, RenderedView, Sensor)>,
 }
 
 impl<'a> Studio<'a> {
@@ -353,12 +353,12 @@ impl<'a> Studio<'a> {
             vignetting: disturbances.vignetting.unwrap_or(VIGNETTING),
         };
         let cameras = scenario.true_rig.cameras.iter().enumerate().map(|(index, camera)| {
-            let view = View::new(&camera.model);
+            let view = RenderedView::new(&camera.model);
             let seed = RandomStream::new(options.seed, stream::IMAGES + 1000 * (index as u64 + 1)).next_u64();
             let sensor = Sensor::new(&view, sensor, seed);
             (camera, view, sensor)
         });
-        Self { options, scenario, renderer: Renderer::new(world), cameras: cameras.collect() }
+        Self { options, scenario, renderer: SurfaceShader::new(world), cameras: cameras.collect() }
     }
 
     /// Renders the images of some shots as JPEG, in their order.

@@ -8,9 +8,9 @@ use super::equipment::{Equipment, IntrinsicsError, Lens};
 use super::exercise::Exercise;
 use super::experiment::Experiment;
 use super::gimbal::LookAround;
-use super::imu::ImuBias;
+use super::imu::SimulatedBias;
 use super::random::RandomStream;
-use super::route::{Drill, Flight, Pace, Station};
+use super::route::{Drill, Flight, Manoeuvres, Station};
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{Trajectory, VehicleLimits};
 use crate::camera::CameraModel;
@@ -120,7 +120,7 @@ pub struct SyntheticFrame {
     pub true_world_from_imu: RigidTransform,
     /// True velocity in the world.
     pub true_velocity_m_per_s: Vector3<f64>,
-    pub true_bias: ImuBias,
+    pub true_bias: SimulatedBias,
     /// True joint angles; empty for a rigid camera.
     pub true_joint_angles_rad: Vec<f64>,
     /// True rates of the joints in rad/s; empty for a rigid camera.
@@ -260,10 +260,12 @@ fn spoil(scenario: &mut Scenario, options: &SyntheticOptions) {
 fn trajectory(options: &SyntheticOptions) -> Trajectory {
     let mut route = RandomStream::new(options.seed, stream::ROUTE);
     let pace = match options.motion {
-        SyntheticMotion::Aggressive => Pace { hover_s: -30.0, ..Pace::aggressive() },
-        SyntheticMotion::HoverThenAggressive => Pace::aggressive(),
-        SyntheticMotion::StationaryThenAggressive => Pace { hover_s: 4.0, sway_m: 0.0, ..Pace::aggressive() },
-        SyntheticMotion::Hover => Pace { hover_s: 1e6, ..Pace::aggressive() },
+        SyntheticMotion::Aggressive => Manoeuvres { hover_s: -30.0, ..Manoeuvres::aggressive() },
+        SyntheticMotion::HoverThenAggressive => Manoeuvres::aggressive(),
+        SyntheticMotion::StationaryThenAggressive => {
+            Manoeuvres { hover_s: 4.0, sway_m: 0.0, ..Manoeuvres::aggressive() }
+        }
+        SyntheticMotion::Hover => Manoeuvres { hover_s: 1e6, ..Manoeuvres::aggressive() },
     };
     let station_m = Vector3::new(0.0, -12.0, 2.5);
     let flight: Box<dyn Flight> = if let Some((start_s, exercise)) = options.exercise {

@@ -28,7 +28,7 @@ fn worse_direction(column: &str) -> Direction {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum PairedVerdict {
     /// Within the tolerance, or not distinguishable from noise.
     Unchanged,
     /// Better beyond the tolerance and the noise.
@@ -38,7 +38,7 @@ pub enum Verdict {
     TooFewPairs,
 }
 
-impl Verdict {
+impl PairedVerdict {
     /// Name in reports.
     pub fn name(self) -> &'static str {
         match self {
@@ -67,7 +67,7 @@ pub struct MetricComparison {
     pub interval: Option<[f64; 2]>,
     /// Pair whose ratio is farthest in the worse direction, as a starting point for an investigation.
     pub worst_pair: Option<WorstPair>,
-    pub verdict: Verdict,
+    pub verdict: PairedVerdict,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -201,7 +201,7 @@ fn compare_metric(name: &str, tolerance: f64, values: &[(&str, f64, f64)]) -> Me
     let worst = positive.iter().zip(&ratios).max_by(|a, b| badness(*a.1).total_cmp(&badness(*b.1)));
     let worst_pair = worst.map(|((run, old, new), _)| WorstPair { run: (*run).to_owned(), old: *old, new: *new });
     let interval = MeanInterval::of(&ratios).filter(|interval| interval.pairs >= LEAST_PAIRS);
-    let verdict = interval.map_or(Verdict::TooFewPairs, |interval| judge(&interval, direction, tolerance));
+    let verdict = interval.map_or(PairedVerdict::TooFewPairs, |interval| judge(&interval, direction, tolerance));
     MetricComparison {
         metric: name.to_owned(),
         direction,
@@ -215,14 +215,14 @@ fn compare_metric(name: &str, tolerance: f64, values: &[(&str, f64, f64)]) -> Me
 }
 
 /// Verdict on an interval of log-ratios.
-fn judge(interval: &MeanInterval, direction: Direction, tolerance: f64) -> Verdict {
+fn judge(interval: &MeanInterval, direction: Direction, tolerance: f64) -> PairedVerdict {
     let limit = tolerance.ln_1p();
     let rises = interval.mean > limit && interval.low > 0.0;
     let falls = interval.mean < -limit && interval.high < 0.0;
     match (direction, rises, falls) {
-        (_, false, false) => Verdict::Unchanged,
-        (Direction::Either, ..) | (Direction::Larger, true, _) | (Direction::Smaller, _, true) => Verdict::Worse,
-        (Direction::Larger | Direction::Smaller, ..) => Verdict::Better,
+        (_, false, false) => PairedVerdict::Unchanged,
+        (Direction::Either, ..) | (Direction::Larger, true, _) | (Direction::Smaller, _, true) => PairedVerdict::Worse,
+        (Direction::Larger | Direction::Smaller, ..) => PairedVerdict::Better,
     }
 }
 
@@ -231,9 +231,9 @@ fn compare_success(tolerance: f64, pairs: usize, failed: usize, succeeded: usize
     let allowed = tolerance * pairs as f64;
     let change = failed as f64 - succeeded as f64;
     let verdict = match change {
-        change if change > allowed => Verdict::Worse,
-        change if change < -allowed => Verdict::Better,
-        _ => Verdict::Unchanged,
+        change if change > allowed => PairedVerdict::Worse,
+        change if change < -allowed => PairedVerdict::Better,
+        _ => PairedVerdict::Unchanged,
     };
     MetricComparison {
         metric: SUCCESS.to_owned(),
@@ -250,7 +250,7 @@ fn compare_success(tolerance: f64, pairs: usize, failed: usize, succeeded: usize
 impl StudyComparison {
     /// True if a metric got worse or there are too few pairs for a verdict.
     pub fn fails(&self) -> bool {
-        self.metrics.iter().any(|metric| matches!(metric.verdict, Verdict::Worse | Verdict::TooFewPairs))
+        self.metrics.iter().any(|metric| matches!(metric.verdict, PairedVerdict::Worse | PairedVerdict::TooFewPairs))
     }
 }
 

@@ -33,7 +33,7 @@ pub use columns::{
     Direction, JobCosts, JobResult, JobStatus, PAIRING_COLUMNS, RunResult, StudyTables, frames_table, parameters_table,
     runs_table,
 };
-pub use comparison::{ComparisonError, MetricComparison, SUCCESS, StudyComparison, Verdict, WorstPair, compare};
+pub use comparison::{ComparisonError, MetricComparison, PairedVerdict, SUCCESS, StudyComparison, WorstPair, compare};
 pub use expansion::{expand, shard};
 pub use job::{JobLog, JobSubject, KeyedJob, RecordedLog, SimulatedFlight, StudyJob, StudyTrajectory, hex};
 pub use perturbation::{

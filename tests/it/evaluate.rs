@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 
 use dcvins::export::{EvaluationOptions, EvaluationReport, ExportError, evaluate};
-use dcvins::session::accuracy::{Alignment, RelativeDelta};
+use dcvins::session::accuracy::{RelativeDelta, TrajectoryAlignment};
 
 const TOLERANCE: f64 = 1e-6;
 
@@ -14,13 +14,13 @@ fn data(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }
 
-fn compare(alignment: Alignment, delta: RelativeDelta) -> EvaluationReport {
+fn compare(alignment: TrajectoryAlignment, delta: RelativeDelta) -> EvaluationReport {
     let options = EvaluationOptions { alignment, delta, ..EvaluationOptions::default() };
     evaluate(&data("estimate.tum"), &data("reference.tum"), &options).expect("the fixtures can be compared")
 }
 
 /// `[rmse, mean, median, max]` of the absolute error.
-fn check_absolute(alignment: Alignment, expected: [f64; 4]) {
+fn check_absolute(alignment: TrajectoryAlignment, expected: [f64; 4]) {
     let report = compare(alignment, RelativeDelta::Frames(1));
     assert_eq!(report.pairs, 109);
     let found = [report.ate_m.rmse, report.ate_m.mean, report.ate_m.median, report.ate_m.max];
@@ -30,7 +30,13 @@ fn check_absolute(alignment: Alignment, expected: [f64; 4]) {
 }
 
 /// `[rmse, std, min]` of the relative translation error, then `[rmse, median]` of the rotation error.
-fn check_relative(alignment: Alignment, delta: RelativeDelta, pairs: usize, translation: [f64; 3], rotation: [f64; 2]) {
+fn check_relative(
+    alignment: TrajectoryAlignment,
+    delta: RelativeDelta,
+    pairs: usize,
+    translation: [f64; 3],
+    rotation: [f64; 2],
+) {
     let report = compare(alignment, delta);
     assert_eq!(report.rpe_pairs, pairs, "{alignment:?} {delta:?}");
     let metres = &report.rpe_translation_m;
@@ -43,29 +49,32 @@ fn check_relative(alignment: Alignment, delta: RelativeDelta, pairs: usize, tran
 
 #[test]
 fn absolute_error_is_evos() {
-    check_absolute(Alignment::None, [4.20919436943, 3.86121951724, 4.01290926728, 5.96124147453]);
-    check_absolute(Alignment::Rigid, [0.0500251340797, 0.0466803299608, 0.0443203541791, 0.104091836119]);
-    check_absolute(Alignment::Similarity, [0.0346649464803, 0.0316539666576, 0.0297747238716, 0.0727999051586]);
+    check_absolute(TrajectoryAlignment::None, [4.20919436943, 3.86121951724, 4.01290926728, 5.96124147453]);
+    check_absolute(TrajectoryAlignment::Rigid, [0.0500251340797, 0.0466803299608, 0.0443203541791, 0.104091836119]);
+    check_absolute(
+        TrajectoryAlignment::Similarity,
+        [0.0346649464803, 0.0316539666576, 0.0297747238716, 0.0727999051586],
+    );
 }
 
 #[test]
 fn relative_error_is_evos() {
     check_relative(
-        Alignment::Rigid,
+        TrajectoryAlignment::Rigid,
         RelativeDelta::Frames(1),
         108,
         [0.0484767436704, 0.018054180736, 0.0104313639236],
         [1.48446346111, 1.40570842464],
     );
     check_relative(
-        Alignment::None,
+        TrajectoryAlignment::None,
         RelativeDelta::Frames(7),
         15,
         [0.0532706592673, 0.0168029272709, 0.0288014825495],
         [1.79657168539, 1.76144040506],
     );
     check_relative(
-        Alignment::Similarity,
+        TrajectoryAlignment::Similarity,
         RelativeDelta::Metres(2.5),
         5,
         [0.0527472259414, 0.0184995517138, 0.0227123780697],
@@ -75,8 +84,8 @@ fn relative_error_is_evos() {
 
 #[test]
 fn yaw_alignment_leaves_the_tilt_alone() {
-    let yaw = compare(Alignment::YawPosition, RelativeDelta::Frames(1)).ate_m.rmse;
-    let rigid = compare(Alignment::Rigid, RelativeDelta::Frames(1)).ate_m.rmse;
+    let yaw = compare(TrajectoryAlignment::YawPosition, RelativeDelta::Frames(1)).ate_m.rmse;
+    let rigid = compare(TrajectoryAlignment::Rigid, RelativeDelta::Frames(1)).ate_m.rmse;
     assert!(yaw >= rigid && yaw < 1.2 * rigid, "the estimate is turned about the vertical only: {yaw} and {rigid}");
 }
 

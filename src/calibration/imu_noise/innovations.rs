@@ -73,7 +73,7 @@ impl NoiseDensity {
 
 /// Sums over the residuals of one density.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Sums {
+pub(super) struct InnovationSums {
     pub(super) chi2: f64,
     /// Degrees of freedom of the residuals.
     pub(super) freedom: f64,
@@ -84,7 +84,7 @@ pub(super) struct Sums {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Innovations {
     /// Sums in the order of [`NoiseDensity::NAMES`].
-    pub(super) sums: [Sums; 4],
+    pub(super) sums: [InnovationSums; 4],
     /// Weighted squared residuals of the observations, and their degrees of freedom.
     pub(super) visual: (f64, f64),
     /// First and last stamp of the intervals.

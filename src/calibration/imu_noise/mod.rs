@@ -12,7 +12,7 @@ mod tests;
 use std::ops::ControlFlow;
 
 pub use self::innovations::NoiseDensity;
-use self::innovations::{Innovations, Sums};
+use self::innovations::{InnovationSums, Innovations};
 use super::input::TrackedView;
 use crate::estimator::{Estimator, EstimatorConfig, StepInput, VisualLoss};
 use crate::geometry::seconds_from_ns;
@@ -155,18 +155,18 @@ pub fn fit_imu_noise(
 }
 
 /// Standard deviation of the logarithm of a variance.
-fn variance_sigma(sums: &Sums) -> f64 {
+fn variance_sigma(sums: &InnovationSums) -> f64 {
     (2.0 / sums.information.max(1e-9)).sqrt()
 }
 
 /// True if the flight constrains a density to better than half its value.
-fn is_shown(sums: &Sums) -> bool {
+fn is_shown(sums: &InnovationSums) -> bool {
     0.5 * variance_sigma(sums) < LARGEST_RELATIVE_SIGMA
 }
 
 /// True if the residuals are inconsistent with a density that the flight hardly constrains, for instance a much too
 /// small one.
-fn is_wrong(sums: &Sums) -> bool {
+fn is_wrong(sums: &InnovationSums) -> bool {
     (sums.chi2 - sums.freedom).abs() > CONTRADICTION_SIGMAS * (2.0 * sums.information).sqrt()
 }
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::opened::Sweep;
 use super::pool::{Pool, PoolLimits, duration_text};
-use crate::cli::exit::Outcome;
+use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{notify, print, print_json};
 
@@ -59,7 +59,7 @@ struct Measured {
 }
 
 /// Lists the jobs with an estimate of their cost; if none is done yet, the first one is run for the estimate.
-pub(super) fn dry_run(sweep: &Sweep, limits: &PoolLimits, interrupt: &Interrupt, json: bool) -> Result<Outcome> {
+pub(super) fn dry_run(sweep: &Sweep, limits: &PoolLimits, interrupt: &Interrupt, json: bool) -> Result<ExitOutcome> {
     let mut measured = measure(sweep)?;
     if measured.jobs == 0 {
         let Some(first) = sweep.jobs.first() else { bail!("the plan has no jobs") };
@@ -68,7 +68,7 @@ pub(super) fn dry_run(sweep: &Sweep, limits: &PoolLimits, interrupt: &Interrupt,
         let first = std::slice::from_ref(first);
         let outcome = Pool::new(&sweep.folder, &sweep.plan, &sweep.program, first, one).run(interrupt)?;
         if outcome.interrupted {
-            return Ok(Outcome::Interrupted);
+            return Ok(ExitOutcome::Interrupted);
         }
         measured = measure(sweep)?;
     }
@@ -81,7 +81,7 @@ pub(super) fn dry_run(sweep: &Sweep, limits: &PoolLimits, interrupt: &Interrupt,
     let estimate = estimate(sweep, limits, &measured);
     if json {
         print_json(&DryRun { jobs, estimate })?;
-        return Ok(Outcome::Success);
+        return Ok(ExitOutcome::Success);
     }
     let mut text = String::new();
     for ListedJob { key, job, done } in &jobs {
@@ -103,7 +103,7 @@ pub(super) fn dry_run(sweep: &Sweep, limits: &PoolLimits, interrupt: &Interrupt,
         "no estimate, because the first job has no result".to_owned()
     };
     print(&format!("{text}{} jobs, {} to do{flights}: {time}\n", jobs.len(), estimate.jobs))?;
-    Ok(Outcome::Success)
+    Ok(ExitOutcome::Success)
 }
 
 /// Reads the measured cost of the jobs.

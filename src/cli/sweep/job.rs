@@ -9,7 +9,7 @@ use clap::Args;
 use dcvins::study::{SimulatedFlight, StudyOutput};
 use dcvins::sweep::StudyFolder;
 
-use crate::cli::exit::{INTERRUPTED, Outcome};
+use crate::cli::exit::{ExitOutcome, INTERRUPTED};
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct SweepJobArguments {
@@ -35,7 +35,7 @@ pub(crate) struct SweepJobArguments {
     pub files: bool,
 }
 
-pub(crate) fn sweep_job(arguments: &SweepJobArguments) -> Result<Outcome> {
+pub(crate) fn sweep_job(arguments: &SweepJobArguments) -> Result<ExitOutcome> {
     end_with_parent()?;
     let folder = StudyFolder::open(&arguments.folder)?;
     match (&arguments.key, &arguments.flight) {
@@ -49,7 +49,7 @@ pub(crate) fn sweep_job(arguments: &SweepJobArguments) -> Result<Outcome> {
         }
         (None, None) => bail!("expected --key or --flight; this command is started by 'dcvins sweep'"),
     }
-    Ok(Outcome::Success)
+    Ok(ExitOutcome::Success)
 }
 
 /// Ends this process when its standard input closes, which happens when the parent process ends, even if it is killed.

@@ -15,7 +15,7 @@ use dcvins::study::{self, StudyTable};
 use dcvins::sweep::{read_parquet, write_parquet, write_text};
 use serde::Serialize;
 
-use crate::cli::exit::Outcome;
+use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{notify, print, print_json};
 
@@ -45,7 +45,7 @@ struct SweepReport {
     comparison: Option<study::StudyComparison>,
 }
 
-pub(crate) fn sweep(arguments: &SweepArguments) -> Result<Outcome> {
+pub(crate) fn sweep(arguments: &SweepArguments) -> Result<ExitOutcome> {
     let interrupt = Interrupt::watch()?;
     let baseline = arguments.baseline.as_deref().map(read_parquet).transpose()?;
     let sweep = open(arguments)?;
@@ -71,12 +71,12 @@ pub(crate) fn sweep(arguments: &SweepArguments) -> Result<Outcome> {
         if outcome.interrupted {
             let command = format!("dcvins sweep {} -o {}", arguments.plan.display(), arguments.out.display());
             notify(&format!("dcvins: interrupted; finished jobs are kept, resume with '{command}'"));
-            return Ok(Outcome::Interrupted);
+            return Ok(ExitOutcome::Interrupted);
         }
         if arguments.shard.is_some() {
             report.failed = outcome.failed;
             print_sweep(&report, arguments.json)?;
-            return Ok(if outcome.failed > 0 { Outcome::JobsFailed } else { Outcome::Success });
+            return Ok(if outcome.failed > 0 { ExitOutcome::JobsFailed } else { ExitOutcome::Success });
         }
     }
     finish(&sweep, arguments, baseline.as_ref(), report)
@@ -132,7 +132,7 @@ fn finish(
     arguments: &SweepArguments,
     baseline: Option<&StudyTable>,
     mut report: SweepReport,
-) -> Result<Outcome> {
+) -> Result<ExitOutcome> {
     let (tables, missing) = sweep.folder.collect(&sweep.jobs, &sweep.plan)?;
     report.jobs = sweep.jobs.len();
     report.missing = missing;
@@ -163,7 +163,7 @@ fn finish(
     if missing > 0 {
         bail!("{missing} of {} jobs are not done; the tables contain the others", sweep.jobs.len());
     }
-    Ok(if report.failed > 0 { Outcome::JobsFailed } else { Outcome::Success })
+    Ok(if report.failed > 0 { ExitOutcome::JobsFailed } else { ExitOutcome::Success })
 }
 
 fn baseline_name(arguments: &SweepArguments) -> String {

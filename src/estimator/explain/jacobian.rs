@@ -9,7 +9,7 @@ use crate::camera::CameraModel;
 use crate::estimator::factors::reprojection::{Anchor, RobustWeight, VisualModel, whitened};
 use crate::estimator::problem::linearization::column_blocks;
 use crate::estimator::report::{FeatureReport, JacobianFactor, JacobianRow, JacobianSource, StepReport};
-use crate::estimator::state::camera_pose::{self, CameraMaps, CameraSensor};
+use crate::estimator::state::camera_pose::{self, CameraCalibration, CameraMaps};
 use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS};
 use crate::estimator::state::columns::{ColumnBlock, ColumnId, FrameId, scales_of};
 use crate::estimator::state::frame_state::FrameState;
@@ -243,7 +243,7 @@ fn window_camera<'a>(
     let chain = &source.chains[camera];
     let clocks = source.clocks.get(camera).copied().unwrap_or_default();
     let [then_s, now_s] = clocks.shifts_s;
-    let sensor = CameraSensor {
+    let sensor = CameraCalibration {
         chain: Cow::Borrowed(chain),
         columns: if source.calibrated { chain.dof() + clocks.count } else { 0 },
         shift_s: then_s,

@@ -4,7 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::alignment::{Alignment, AlignmentInput, VectorPrior, align, align_rotations, median_distance};
 use super::checks::{Checklist, Shown};
-use super::refinement::{Refined, RefinedState, Refinement, RefinementInput};
+use super::refinement::{RefinedInitialization, RefinedState, Refinement, RefinementInput};
 use super::selection::{guessed_rotations, select_views};
 use super::structure::{
     Structure, StructureFailure, StructureLimits, ViewPair, collect_tracks, common_bearings, rank_pairs, reconstruct,
@@ -322,7 +322,7 @@ impl AttemptedProblem<'_> {
         alignment: &Alignment,
         increments: &[Preintegration],
         checklist: &mut Checklist,
-    ) -> Option<Refined> {
+    ) -> Option<RefinedInitialization> {
         let options = self.options;
         let extrinsics = self.extrinsics();
         let input = RefinementInput {
@@ -376,7 +376,7 @@ impl AttemptedProblem<'_> {
     }
 
     /// The refined state, rotated such that gravity is vertical.
-    fn solution(&self, refined: &Refined, parallax_rad: f64) -> InitializationSolution {
+    fn solution(&self, refined: &RefinedInitialization, parallax_rad: f64) -> InitializationSolution {
         let state = &refined.state;
         let given = self.extrinsics();
         let extrinsics = state.imu_from_camera(&given);

@@ -6,7 +6,7 @@ use crate::geometry::{RigidTransform, median, so3, tangent_basis};
 
 /// Rotation between two sets of bearings, with the remaining parallax.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RotationFit {
+pub struct BearingRotation {
     pub rotation: UnitQuaternion<f64>,
     /// Median remaining angle in radians: the rotation-compensated parallax.
     pub median_parallax_rad: f64,
@@ -20,7 +20,7 @@ pub struct RotationFit {
 pub fn fit_rotation(
     pairs: &[(Vector3<f64>, Vector3<f64>)],
     camera_j_from_camera_i: &UnitQuaternion<f64>,
-) -> Option<RotationFit> {
+) -> Option<BearingRotation> {
     const ROUNDS: usize = 8;
     if pairs.len() < 3 {
         return None;
@@ -44,7 +44,7 @@ pub fn fit_rotation(
             break;
         }
     }
-    Some(RotationFit { rotation, median_parallax_rad: median_angle(pairs, &rotation) })
+    Some(BearingRotation { rotation, median_parallax_rad: median_angle(pairs, &rotation) })
 }
 
 /// Median angle between `rotation · first` and `second`, in radians.

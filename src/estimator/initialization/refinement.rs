@@ -210,7 +210,7 @@ pub(super) struct Refinement<'a> {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Refined {
+pub(super) struct RefinedInitialization {
     pub(super) state: RefinedState,
     /// Mean square of the whitened IMU residuals, without the priors on the biases.
     pub(super) imu_mean_square: f64,
@@ -243,7 +243,7 @@ impl<'a> Refinement<'a> {
         Some(Self { input, whitening, layout })
     }
 
-    pub(super) fn run(&self, start: RefinedState, rounds: usize) -> Refined {
+    pub(super) fn run(&self, start: RefinedState, rounds: usize) -> RefinedInitialization {
         let options = DampedOptions {
             iterations: rounds,
             relative_cost_tolerance: 1e-4,
@@ -255,7 +255,7 @@ impl<'a> Refinement<'a> {
         let mut problem = self;
         let solution = minimize(&mut problem, start, &options);
         let imu_mean_square = self.imu_cost(&solution.estimate) / (9 * self.input.increments.len()).max(1) as f64;
-        Refined {
+        RefinedInitialization {
             imu_mean_square,
             sigmas: None,
             rounds: solution.tried,

@@ -37,7 +37,7 @@ pub struct RotationPrior {
 
 /// Relative pose up to scale.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RelativePose {
+pub struct UnscaledPose {
     /// Transform of points from camera i to camera j; the translation has unit length.
     pub camera_j_from_camera_i: RigidTransform,
     /// Indices of the inliers in front of both cameras.
@@ -56,7 +56,7 @@ pub fn relative_poses(
     prior: &RotationPrior,
     bearing_sigma_rad: f64,
     seed: u64,
-) -> Vec<RelativePose> {
+) -> Vec<UnscaledPose> {
     if pairs.len() < 8 {
         return Vec::new();
     }
@@ -136,7 +136,7 @@ impl Candidates<'_> {
     }
 
     /// Refines the kept hypotheses; drops duplicates and those clearly worse than the best.
-    fn finish(self) -> Vec<RelativePose> {
+    fn finish(self) -> Vec<UnscaledPose> {
         let mut refined = Candidates { found: Vec::new(), ..self };
         for (_, pose) in &self.found {
             refined.consider(&refine(self.pairs, pose, self.sigma_rad));
@@ -151,7 +151,7 @@ impl Candidates<'_> {
                 let sum: f64 =
                     inliers.iter().map(|&index| epipolar_angle(&essential, &self.pairs[index]).powi(2)).sum();
                 let rms_rad = (sum / inliers.len() as f64).sqrt();
-                (!inliers.is_empty()).then_some(RelativePose { camera_j_from_camera_i: *pose, inliers, rms_rad })
+                (!inliers.is_empty()).then_some(UnscaledPose { camera_j_from_camera_i: *pose, inliers, rms_rad })
             })
             .collect()
     }

@@ -8,8 +8,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3, Vector6};
 
-use super::bearing::{RotationFit, fit_rotation, refine_camera_pose};
-use super::relative_pose::{RelativePose, RotationPrior, relative_poses};
+use super::bearing::{BearingRotation, fit_rotation, refine_camera_pose};
+use super::relative_pose::{RotationPrior, UnscaledPose, relative_poses};
 use super::visual_problem::{
     BearingObservation, TrackedLandmark, between, mean_square, moved, visual_cost, visual_equations,
 };
@@ -97,7 +97,7 @@ pub(super) struct ViewPair {
     pub(super) view_j: usize,
     pub(super) common: usize,
     /// Rotation `camera_j_from_camera_i` and remaining parallax.
-    pub(super) fit: RotationFit,
+    pub(super) fit: BearingRotation,
 }
 
 impl ViewPair {
@@ -206,7 +206,7 @@ fn reconstruct_from(
     let guess = guessed_rotations[pair.view_j].inverse() * guessed_rotations[pair.view_i];
     let prior = RotationPrior { rotation: guess, sigma_rad: limits.rotation_sigma_rad };
     let bases = relative_poses(&bearings, &prior, limits.bearing_sigma_rad, limits.seed);
-    let ratio_of_inliers = |base: &RelativePose| base.inliers.len() as f64 / bearings.len() as f64;
+    let ratio_of_inliers = |base: &UnscaledPose| base.inliers.len() as f64 / bearings.len() as f64;
     let inlier_ratio = bases.iter().map(ratio_of_inliers).fold(0.0, f64::max);
     let mut best: Result<Structure, StructureFailure> = Err(StructureFailure::NoRelativePose { inlier_ratio });
     for base in bases.iter().filter(|base| ratio_of_inliers(base) >= limits.min_inlier_ratio) {
@@ -228,7 +228,7 @@ fn reconstruct_from(
 fn grow(
     tracks: &Tracks,
     pair: &ViewPair,
-    base: &RelativePose,
+    base: &UnscaledPose,
     guessed_rotations: &[UnitQuaternion<f64>],
     limits: &StructureLimits,
 ) -> Result<Structure, StructureFailure> {

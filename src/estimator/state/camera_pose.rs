@@ -17,7 +17,7 @@ pub(crate) const ROLLING_ROWS: [f64; 3] = [0.0, 0.5, 1.0];
 
 /// Extrinsics, time offset and shutter of a camera.
 #[derive(Clone, Debug)]
-pub(crate) struct CameraSensor<'a> {
+pub(crate) struct CameraCalibration<'a> {
     pub(crate) chain: Cow<'a, Chain>,
     /// Number of calibration columns, those of time offset, shutter and intrinsics after the chain; zero when fixed.
     pub(crate) columns: usize,
@@ -35,7 +35,7 @@ pub(crate) struct CameraSensor<'a> {
     pub(crate) intrinsics: Range<usize>,
 }
 
-impl CameraSensor<'_> {
+impl CameraCalibration<'_> {
     /// The first joint angles, as many as the chain has joints; none for a rigid camera.
     fn own<'j>(&self, joints_rad: &'j [f64]) -> &'j [f64] {
         &joints_rad[..self.chain.joint_count().min(joints_rad.len())]
@@ -62,9 +62,9 @@ impl CameraSensor<'_> {
 
 impl Calibration {
     /// Extrinsics, time offset and shutter of the camera.
-    pub(crate) fn sensor_model(&self) -> CameraSensor<'_> {
+    pub(crate) fn sensor_model(&self) -> CameraCalibration<'_> {
         let free = self.dof() > 0;
-        CameraSensor {
+        CameraCalibration {
             chain: Cow::Borrowed(self.chain()),
             columns: self.dof(),
             shift_s: self.camera_shift_s(),
@@ -84,7 +84,7 @@ pub(crate) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
 }
 
 /// `world_from_camera` at a state and the exposure of a row: 0 for the first row, 1 for the end of the last one.
-pub(crate) fn at_row(state: &FrameState, sensor: &CameraSensor<'_>, row: f64) -> CameraPose {
+pub(crate) fn at_row(state: &FrameState, sensor: &CameraCalibration<'_>, row: f64) -> CameraPose {
     let state = &*state_at_exposure(state, sensor.row_time_s(row));
     let pose = state.navigation.world_from_imu * sensor.chain.imu_from_camera(sensor.own(&state.joints_rad));
     CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
@@ -117,7 +117,7 @@ impl CameraMaps {
     ///
     /// With constant rates, the derivatives of the shifted pose by velocity and gyroscope bias are neglected: a bias
     /// change has no effect over a centisecond. Along a measured motion they are included.
-    pub(crate) fn of_sensor(frames: &[FrameState], sensor: &CameraSensor<'_>) -> Self {
+    pub(crate) fn of_sensor(frames: &[FrameState], sensor: &CameraCalibration<'_>) -> Self {
         let rows = sensor.block_rows();
         let mut maps =
             Self { own: Vec::new(), calibration: Vec::new(), blocks_per_frame: rows.len(), frames: frames.len() };
@@ -219,7 +219,7 @@ fn add_transposed_product(
 }
 
 /// Derivatives of the camera pose at a row with respect to the unknowns of its frame and to the calibration.
-fn block_map(stamped: &FrameState, sensor: &CameraSensor<'_>, row: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+fn block_map(stamped: &FrameState, sensor: &CameraCalibration<'_>, row: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let time_s = sensor.row_time_s(row);
     let state = &*state_at_exposure(stamped, time_s);
     let chain = sensor.linearize(&state.joints_rad);

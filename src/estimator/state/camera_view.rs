@@ -6,7 +6,7 @@ use std::cell::OnceCell;
 use nalgebra::{Matrix2x6, Vector2, Vector3};
 
 use super::calibration::Calibration;
-use super::camera_pose::{self, CameraSensor, ROLLING_ROWS};
+use super::camera_pose::{self, CameraCalibration, ROLLING_ROWS};
 use super::frame_state::FrameState;
 use super::track::TrackObservation;
 use crate::camera::CameraModel;
@@ -38,7 +38,7 @@ enum Poses<'a> {
     },
     Rolling {
         frames: Cow<'a, [FrameState]>,
-        sensor: Box<CameraSensor<'a>>,
+        sensor: Box<CameraCalibration<'a>>,
         /// Poses of the first, the middle and the last row, by slot.
         rows: Vec<[CameraPose; 3]>,
     },
@@ -65,7 +65,7 @@ impl<'a> CameraView<'a> {
     /// [`Self::new`] for a given sensor.
     pub(crate) fn of_sensor(
         frames: Cow<'a, [FrameState]>,
-        sensor: CameraSensor<'a>,
+        sensor: CameraCalibration<'a>,
         model: Cow<'a, CameraModel>,
         has_intrinsics: bool,
     ) -> Self {

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::super::imu_filter::{ImuFilter, Reading, Unmeasured, has_forces};
+use super::super::imu_filter::{FilteredSample, ImuFilter, Unmeasured, has_forces};
 use super::super::imu_merge::ImuMerge;
 use super::super::log::relative_ns;
 use super::super::messages::{self, ImuMessage, MessageKind};
@@ -88,7 +88,7 @@ impl ImuStream {
     }
 }
 
-impl<T: Reading> Measured<T> {
+impl<T: FilteredSample> Measured<T> {
     fn new(log: &FlightLog, topic: &str, from_ns: i64, decoder: Decoder<T>) -> Self {
         Self {
             samples: OrderedSamples::new(log, topic, from_ns, false, decoder),

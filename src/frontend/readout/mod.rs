@@ -19,7 +19,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use self::pair_motion::PairMotion;
-use self::sweep::Sweep;
+use self::sweep::ReadoutSweep;
 use super::outliers::BearingPair;
 use crate::geometry::{SIGMA_PER_MEDIAN, median, so3};
 use crate::sensors::AngularRates;
@@ -293,8 +293,8 @@ impl<'a> Search<'a> {
     }
 
     /// Rotations of the camera during the readout of both images.
-    fn sweeps(&self, images: &ImagePair, readout_s: f64) -> [Sweep; 2] {
-        images.stamps_s.map(|stamp_s| Sweep::new(&self.rates, stamp_s + self.offset_s, readout_s))
+    fn sweeps(&self, images: &ImagePair, readout_s: f64) -> [ReadoutSweep; 2] {
+        images.stamps_s.map(|stamp_s| ReadoutSweep::new(&self.rates, stamp_s + self.offset_s, readout_s))
     }
 
     fn of_middle_rows(&self, pair: &Pair<'_>, readout_s: f64) -> UnitQuaternion<f64> {

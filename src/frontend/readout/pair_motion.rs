@@ -1,6 +1,6 @@
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
-use super::super::outliers::{BearingPair, Hypothesis, epipolar_distance, fit_rotation, step_towards};
+use super::super::outliers::{BearingPair, MotionHypothesis, epipolar_distance, fit_rotation, step_towards};
 use crate::geometry::{so3, tangent_basis};
 
 /// Rotation and, with parallax, direction of translation between two images.
@@ -37,7 +37,7 @@ impl PairMotion {
         best.cost = best.cost_of(pairs, sigma_rad);
         let before = self.direction.unwrap_or_else(|| direction_of(pairs, &self.rotation));
         for (rotation, direction) in [(self.rotation, before), (rotation, direction_of(pairs, &rotation))] {
-            let mut at = Hypothesis { rotation, direction, cost: 0.0 };
+            let mut at = MotionHypothesis { rotation, direction, cost: 0.0 };
             for _ in 0..STEPS {
                 let scale = WEIGHT_SIGMAS * sigma_rad;
                 let Some(step) = step_towards(pairs, &at, scale, &Matrix3::zeros(), &Vector3::zeros()) else { break };

@@ -6,9 +6,9 @@ use crate::sensors::AngularRates;
 const NODES: usize = 9;
 
 /// Rotation of a camera during the readout of an image: rotation vectors by row, relative to the first row.
-pub(super) struct Sweep([Vector3<f64>; NODES]);
+pub(super) struct ReadoutSweep([Vector3<f64>; NODES]);
 
-impl Sweep {
+impl ReadoutSweep {
     /// Rotation during the readout of an image whose first row is exposed at a time; zero without rates.
     pub(super) fn new(rates: &AngularRates, first_row_s: f64, readout_s: f64) -> Self {
         let start = rates.angle_at(first_row_s);

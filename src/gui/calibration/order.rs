@@ -8,7 +8,7 @@ use crate::session::FlightParameter;
 
 /// Column by which the rows are sorted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Column {
+pub(super) enum SortColumn {
     Parameter,
     Value,
     Ratio,
@@ -21,20 +21,20 @@ pub(super) enum Column {
 /// Column and direction of the order; at first the worst verdict on top.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Order {
-    pub(super) column: Column,
+    pub(super) column: SortColumn,
     pub(super) descending: bool,
 }
 
 impl Default for Order {
     fn default() -> Self {
-        Self { column: Column::Verdict, descending: true }
+        Self { column: SortColumn::Verdict, descending: true }
     }
 }
 
 impl Order {
     /// Sorts by a clicked column, or reverses its order.
-    pub(super) fn click(&mut self, column: Column) {
-        let largest_first = matches!(column, Column::Ratio | Column::Verdict);
+    pub(super) fn click(&mut self, column: SortColumn) {
+        let largest_first = matches!(column, SortColumn::Ratio | SortColumn::Verdict);
         let descending = if self.column == column { !self.descending } else { largest_first };
         *self = Self { column, descending };
     }
@@ -51,18 +51,18 @@ impl Order {
     fn compare(self, a: &FlightParameter, b: &FlightParameter) -> Ordering {
         let ratio = |row: &FlightParameter| row.ratio.unwrap_or(f64::NEG_INFINITY);
         match self.column {
-            Column::Parameter => place_of(a.parameter).cmp(&place_of(b.parameter)),
-            Column::Value => a.value.total_cmp(&b.value),
-            Column::Ratio => ratio(a).total_cmp(&ratio(b)),
-            Column::Verdict => {
+            SortColumn::Parameter => place_of(a.parameter).cmp(&place_of(b.parameter)),
+            SortColumn::Value => a.value.total_cmp(&b.value),
+            SortColumn::Ratio => ratio(a).total_cmp(&ratio(b)),
+            SortColumn::Verdict => {
                 severity(a.verdict).cmp(&severity(b.verdict)).then_with(|| ratio(a).total_cmp(&ratio(b)))
             }
-            Column::Since => a.since_ns.cmp(&b.since_ns),
+            SortColumn::Since => a.since_ns.cmp(&b.since_ns),
             // Rows without a text are last.
-            Column::Reason => {
+            SortColumn::Reason => {
                 (Reverse(!a.reason.is_empty()), &a.reason).cmp(&(Reverse(!b.reason.is_empty()), &b.reason))
             }
-            Column::Remedy => {
+            SortColumn::Remedy => {
                 (Reverse(!a.remedy.is_empty()), &a.remedy).cmp(&(Reverse(!b.remedy.is_empty()), &b.remedy))
             }
         }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::{Align2, Color32, FontId, Galley, Role, ScrollArea, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
-use super::order::{Column, Order};
+use super::order::{Order, SortColumn};
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::meaning_of;
 use crate::gui::determination::look_of;
@@ -28,19 +28,19 @@ const MIN_TEXT_WIDTH: f32 = 170.0;
 const REASON_FRACTION: f32 = 0.45;
 
 /// Columns with their headings and meanings.
-const COLUMNS: [(Column, &str, &str); 7] = [
-    (Column::Parameter, "Parameter", "Click on a row: go to the start of the verdict and select the parameter"),
-    (Column::Value, "Value ± 1 σ", "Estimate at the end of the flight and its posterior standard deviation"),
-    (Column::Ratio, "σ / prior", "1: the flight adds nothing; 0.5: three quarters of the information come from it"),
-    (Column::Verdict, "Verdict", crate::observability::Determination::RULE),
-    (Column::Since, "Since", "Time from which the verdict holds without interruption until the end of the flight"),
+const COLUMNS: [(SortColumn, &str, &str); 7] = [
+    (SortColumn::Parameter, "Parameter", "Click on a row: go to the start of the verdict and select the parameter"),
+    (SortColumn::Value, "Value ± 1 σ", "Estimate at the end of the flight and its posterior standard deviation"),
+    (SortColumn::Ratio, "σ / prior", "1: the flight adds nothing; 0.5: three quarters of the information come from it"),
+    (SortColumn::Verdict, "Verdict", crate::observability::Determination::RULE),
+    (SortColumn::Since, "Since", "Time from which the verdict holds without interruption until the end of the flight"),
     (
-        Column::Reason,
+        SortColumn::Reason,
         "Why",
         "Cause; windows that inform the parameter less than a prior of 10° or 3 cm; largest posterior correlations",
     ),
     (
-        Column::Remedy,
+        SortColumn::Remedy,
         "What helps",
         "Motion, record or run that would improve the verdict, with its predicted effect on σ",
     ),
@@ -154,22 +154,22 @@ fn cell(theme: &Theme, row: &FlightParameter, column: usize) -> (String, FontId,
     let sigma = row.sigma.unwrap_or(f64::NAN);
     let number = |text: String| (text, number_font(), theme.text_strong);
     match COLUMNS[column].0 {
-        Column::Parameter => (row.name.clone(), label_font(), theme.text_strong),
-        Column::Value => {
+        SortColumn::Parameter => (row.name.clone(), label_font(), theme.text_strong),
+        SortColumn::Value => {
             let value = shown.value(row.value, sigma);
             let value = value.strip_suffix(shown.unit).unwrap_or(&value);
             number(format!("{value} ± {}", shown.sigma(sigma)))
         }
-        Column::Ratio => number(row.ratio.map_or_else(String::new, |ratio| fixed(ratio, 3))),
-        Column::Verdict => {
+        SortColumn::Ratio => number(row.ratio.map_or_else(String::new, |ratio| fixed(ratio, 3))),
+        SortColumn::Verdict => {
             let (mark, color) = look_of(row.verdict, theme);
             (format!("{mark} {}", row.verdict.name()), label_font(), color)
         }
-        Column::Since => {
+        SortColumn::Since => {
             let text = row.since_s().map_or_else(String::new, |since_s| format!("{} s", fixed(since_s, 2)));
             (text, number_font(), theme.accent)
         }
-        Column::Reason | Column::Remedy => (String::new(), label_font(), theme.text),
+        SortColumn::Reason | SortColumn::Remedy => (String::new(), label_font(), theme.text),
     }
 }
 

@@ -4,7 +4,7 @@ use super::ComparisonPanel;
 use super::columns::label_of;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gui::{CsvTable, PanelContext};
-use crate::session::Quantity;
+use crate::session::ComparedQuantity;
 use crate::text::Named as _;
 
 impl CsvTable for ComparisonPanel {
@@ -31,7 +31,7 @@ impl CsvTable for ComparisonPanel {
         }
         let reference = label(self.reference);
         for (run, comparison) in comparisons.iter().enumerate().filter(|(run, _)| *run != self.reference) {
-            let mut push_row = |kind: &str, quantity: Quantity, stamp_ns: i64, value: f64| {
+            let mut push_row = |kind: &str, quantity: ComparedQuantity, stamp_ns: i64, value: f64| {
                 table.row([
                     kind.to_owned(),
                     label(run),
@@ -42,7 +42,7 @@ impl CsvTable for ComparisonPanel {
                     number_cell(value),
                 ]);
             };
-            for (quantity, divergence) in Quantity::all().zip(&comparison.divergences) {
+            for (quantity, divergence) in ComparedQuantity::all().zip(&comparison.divergences) {
                 let at = |stamp_ns: i64| comparison.at(quantity, stamp_ns).unwrap_or(f64::NAN);
                 for (kind, stamp_ns) in
                     [("first different", divergence.exact_ns), ("first notable", divergence.notable_ns)]
@@ -55,7 +55,7 @@ impl CsvTable for ComparisonPanel {
                     push_row("largest", quantity, stamp_ns, largest);
                 }
             }
-            for quantity in Quantity::all() {
+            for quantity in ComparedQuantity::all() {
                 let known = comparison.stamps_ns.iter().zip(comparison.column(quantity));
                 for (stamp_ns, apart) in known.filter(|(_, apart)| apart.is_finite()) {
                     push_row("difference", quantity, *stamp_ns, *apart);

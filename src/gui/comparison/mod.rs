@@ -20,7 +20,7 @@ use self::errors::Errors;
 pub(in crate::gui) use self::numbers::POSES_ONLY;
 use self::over_time::OverTime;
 use self::scores::Scores;
-use self::side_by_side::{Images, Scenes};
+use self::side_by_side::{Scenes, SideBySideImages};
 use self::single::Single;
 use super::convergence::empty_ui;
 use super::rank;
@@ -85,7 +85,7 @@ pub struct ComparisonPanel {
     comparisons: Vec<Comparison>,
     over_time: OverTime,
     errors: Errors,
-    images: Images,
+    images: SideBySideImages,
     scenes: Scenes,
     single: Single,
     /// Size in points at which a figure would show everything; zero in the window and for one run.

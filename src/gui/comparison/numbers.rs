@@ -8,20 +8,22 @@ use crate::gui::PanelContext;
 use crate::gui::help::terms::divergence;
 use crate::gui::theme::ROW_HEIGHT;
 use crate::gui::units::{fixed, seconds, significant};
-use crate::session::{Command, Comparison, Divergence, Quantity};
+use crate::session::{Command, ComparedQuantity, Comparison, Divergence};
 use crate::text::Named as _;
 
 /// Factor from stored to shown unit, and the shown unit.
-pub(super) fn shown(quantity: Quantity) -> (f64, &'static str) {
+pub(super) fn shown(quantity: ComparedQuantity) -> (f64, &'static str) {
     match quantity {
-        Quantity::ChainTranslation => (1e3, "mm"),
-        Quantity::Attitude | Quantity::JointAngles | Quantity::ChainRotation => (180.0 / std::f64::consts::PI, "°"),
-        Quantity::GyroscopeBias => (180.0 / std::f64::consts::PI, "°/s"),
+        ComparedQuantity::ChainTranslation => (1e3, "mm"),
+        ComparedQuantity::Attitude | ComparedQuantity::JointAngles | ComparedQuantity::ChainRotation => {
+            (180.0 / std::f64::consts::PI, "°")
+        }
+        ComparedQuantity::GyroscopeBias => (180.0 / std::f64::consts::PI, "°/s"),
         other => (1.0, other.unit()),
     }
 }
 
-pub(super) fn difference_text(quantity: Quantity, apart: f64) -> String {
+pub(super) fn difference_text(quantity: ComparedQuantity, apart: f64) -> String {
     let (factor, unit) = shown(quantity);
     let space = if unit.is_empty() || unit.starts_with('°') { "" } else { " " };
     let number = if unit.is_empty() { fixed(apart, 0) } else { significant(apart * factor) };
@@ -145,7 +147,7 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
             ui.label(RichText::new(term.name).small().color(theme.text_weak)).on_hover_text(term.meaning);
         }
         ui.end_row();
-        for (quantity, divergence) in Quantity::all().zip(&comparison.divergences) {
+        for (quantity, divergence) in ComparedQuantity::all().zip(&comparison.divergences) {
             let Divergence { exact_ns, notable_ns, largest } = *divergence;
             let Some((largest, largest_ns)) = largest else { continue };
             let name = |what: &str| format!("{own}, {}: {what}", quantity.name());

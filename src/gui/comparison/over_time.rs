@@ -7,21 +7,21 @@ use super::columns::label_of;
 use super::numbers::{difference_text, shown};
 use super::row::{Line, LineCurves, MIN_HEIGHT, Row, row_ui};
 use crate::gui::PanelContext;
-use crate::session::{Comparison, Quantity};
+use crate::session::{ComparedQuantity, Comparison};
 use crate::text::Named as _;
 
 /// Range of the row height in points.
 const HEIGHTS: std::ops::RangeInclusive<f32> = MIN_HEIGHT..=120.0;
 
-const DRAWN: [Quantity; 8] = [
-    Quantity::Position,
-    Quantity::Attitude,
-    Quantity::Velocity,
-    Quantity::ChainTranslation,
-    Quantity::ChainRotation,
-    Quantity::JointAngles,
-    Quantity::Reprojection,
-    Quantity::RankInformed,
+const DRAWN: [ComparedQuantity; 8] = [
+    ComparedQuantity::Position,
+    ComparedQuantity::Attitude,
+    ComparedQuantity::Velocity,
+    ComparedQuantity::ChainTranslation,
+    ComparedQuantity::ChainRotation,
+    ComparedQuantity::JointAngles,
+    ComparedQuantity::Reprojection,
+    ComparedQuantity::RankInformed,
 ];
 
 /// Curves by plotted quantity and run.
@@ -39,12 +39,12 @@ impl OverTime {
         reference: usize,
         comparisons: &[Comparison],
     ) -> Option<ScrollAreaOutput<()>> {
-        let known = |quantity: Quantity| {
+        let known = |quantity: ComparedQuantity| {
             comparisons.iter().enumerate().any(|(run, comparison)| {
                 run != reference && comparison.column(quantity).iter().any(|apart| apart.is_finite())
             })
         };
-        let rows: Vec<(usize, Quantity)> = DRAWN.into_iter().enumerate().filter(|(_, it)| known(*it)).collect();
+        let rows: Vec<(usize, ComparedQuantity)> = DRAWN.into_iter().enumerate().filter(|(_, it)| known(*it)).collect();
         if rows.is_empty() {
             super::empty_ui(ui, "No common estimated frames");
             return None;
@@ -65,7 +65,7 @@ impl OverTime {
         ctx: &mut PanelContext<'_>,
         reference: usize,
         comparisons: &[Comparison],
-        (index, quantity): (usize, Quantity),
+        (index, quantity): (usize, ComparedQuantity),
         height: f32,
     ) {
         let curves = &mut self.curves[index];

@@ -16,12 +16,12 @@ const LEGEND_HEIGHT: f32 = 22.0;
 
 /// Images side by side; zoom, position and options follow the image that was changed last.
 #[derive(Default)]
-pub(super) struct Images {
+pub(super) struct SideBySideImages {
     lead: ImagePanel,
     pub(super) panels: Vec<ImagePanel>,
 }
 
-impl Images {
+impl SideBySideImages {
     pub(super) fn view_copy(&self) -> Self {
         Self { lead: self.lead.view_copy(), panels: Vec::new() }
     }

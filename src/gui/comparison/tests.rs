@@ -9,7 +9,7 @@ use super::scores::{ScoreKind, ScoreRow};
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{Dialog, Panel as _, PanelContext, Playback, Presentation, Selection};
-use crate::session::{Command, Quantity, Recording};
+use crate::session::{Command, ComparedQuantity, Recording};
 use crate::text::Named as _;
 
 struct Bench {
@@ -158,7 +158,7 @@ fn sides_of_the_solve_and_selection_are_shared_by_all_images() {
     harness.run_steps(4);
     assert_eq!(sides(&harness), [SolveSide::Before; 2], "the options are those of all images");
     let at = harness.state().cursor_ns;
-    assert_eq!(harness.state().panel.comparisons[1].at(Quantity::Tracks, at), Some(0.0));
+    assert_eq!(harness.state().panel.comparisons[1].at(ComparedQuantity::Tracks, at), Some(0.0));
 }
 
 /// A trajectory of another program: that of the first run in another world, alternately 5 cm too high and too low.
@@ -199,8 +199,8 @@ fn a_trajectory_stands_beside_a_single_run() {
         assert!(harness.query_by_label(label).is_some(), "{label}");
     }
     let comparison = &harness.state().panel.comparisons[1];
-    assert!(comparison.column(Quantity::Position).iter().any(|apart| apart.is_finite()));
-    assert!(comparison.column(Quantity::RankInformed).iter().all(|apart| apart.is_nan()));
+    assert!(comparison.column(ComparedQuantity::Position).iter().any(|apart| apart.is_finite()));
+    assert!(comparison.column(ComparedQuantity::RankInformed).iter().all(|apart| apart.is_nan()));
     for view in ["Numbers", "Differences", "Images", "Scenes", "Directions"] {
         harness.get_by_label(view).click();
         harness.run_steps(3);

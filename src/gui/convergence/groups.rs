@@ -9,7 +9,7 @@ use crate::text::Named as _;
 
 /// Content of the panel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum View {
+pub(super) enum ConvergenceView {
     /// All groups below each other.
     #[default]
     All,
@@ -24,13 +24,15 @@ pub(super) fn groups_of(parameters: &[ParameterId]) -> Vec<(ParameterGroup, usiz
 }
 
 /// Draws a row of labels, one of which is selected.
-pub(super) fn choice_ui(ui: &mut Ui, view: &mut View, groups: &[(ParameterGroup, usize)]) {
+pub(super) fn choice_ui(ui: &mut Ui, view: &mut ConvergenceView, groups: &[(ParameterGroup, usize)]) {
     ui.horizontal(|ui| {
         let all: usize = groups.iter().map(|(_, count)| count).sum();
-        ui.selectable_value(view, View::All, format!("All ({all})")).on_hover_text("All groups below each other");
+        ui.selectable_value(view, ConvergenceView::All, format!("All ({all})"))
+            .on_hover_text("All groups below each other");
         for (group, count) in groups {
             let label = format!("{} ({count})", capitalized(group.name()));
-            ui.selectable_value(view, View::Group(*group), label).on_hover_text("This group fills the panel");
+            ui.selectable_value(view, ConvergenceView::Group(*group), label)
+                .on_hover_text("This group fills the panel");
         }
     });
 }

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 
 use egui::{Rect, RichText, ScrollArea, Ui, vec2};
 
-use self::groups::{View, groups_of};
+use self::groups::{ConvergenceView, groups_of};
 use self::model::{CalibrationHistory, ConvertedHistory};
 use self::paint::ParameterCurves;
 use super::chain_values::{ParameterValues, true_values};
@@ -30,7 +30,7 @@ pub struct ConvergencePanel {
     converted: Vec<ConvertedHistory>,
     curves: BTreeMap<(usize, ParameterId), ParameterCurves>,
     /// View of a calibration with more than one group.
-    view: View,
+    view: ConvergenceView,
     folded: Vec<ParameterGroup>,
 }
 
@@ -83,8 +83,8 @@ impl Panel for ConvergencePanel {
             available = available.with_min_y(ui.cursor().top());
         }
         let chosen = match self.view {
-            View::Group(chosen) => groups.iter().any(|(group, _)| *group == chosen).then_some(chosen),
-            View::All => None,
+            ConvergenceView::Group(chosen) => groups.iter().any(|(group, _)| *group == chosen).then_some(chosen),
+            ConvergenceView::All => None,
         };
         if let Some(chosen) = chosen {
             parameters.retain(|parameter| parameter.group() == chosen);

@@ -11,7 +11,7 @@ use crate::sensors::Rig;
 use crate::session::{FlightVerdicts, RunRecord, StepRecord};
 
 #[derive(Debug, Default)]
-pub(crate) struct ParameterHistory {
+pub(crate) struct ParameterCurve {
     /// Value by step; NaN where the parameterization has no such parameter.
     pub(crate) values: Vec<f64>,
     /// Value minus 3σ.
@@ -30,7 +30,7 @@ pub(crate) struct CalibrationHistory {
     follower: Follower,
     pub(crate) stamps_ns: Vec<i64>,
     /// The parameters, in the order of their first appearance.
-    pub(crate) parameters: Vec<(ParameterId, ParameterHistory)>,
+    pub(crate) parameters: Vec<(ParameterId, ParameterCurve)>,
     /// Changes when steps are removed.
     pub(crate) epoch: u64,
     /// Values of the last step, the reference for unwrapping angles.
@@ -66,7 +66,7 @@ impl CalibrationHistory {
             let known_place = self.parameters.iter().position(|(known, _)| known == parameter);
             let place = known_place.unwrap_or(self.parameters.len());
             if known_place.is_none() {
-                self.parameters.push((*parameter, ParameterHistory::default()));
+                self.parameters.push((*parameter, ParameterCurve::default()));
             }
             let history = &mut self.parameters[place].1;
             history.pad(row);
@@ -84,7 +84,7 @@ impl CalibrationHistory {
         self.last = values;
     }
 
-    pub(crate) fn parameter(&self, parameter: ParameterId) -> Option<&ParameterHistory> {
+    pub(crate) fn parameter(&self, parameter: ParameterId) -> Option<&ParameterCurve> {
         self.parameters.iter().find(|(known, _)| *known == parameter).map(|(_, history)| history)
     }
 
@@ -153,7 +153,7 @@ impl ConvertedHistory {
     }
 }
 
-impl ParameterHistory {
+impl ParameterCurve {
     /// An angle plus the multiple of 2π that brings it nearest to the last value: the values of a history are
     /// continuous and may leave (−π, π]. Other quantities are returned unchanged.
     pub(super) fn unwrap_near(&self, parameter: ParameterId, value: f64) -> f64 {
@@ -217,12 +217,12 @@ mod tests {
     /// The estimate of the angle is beyond −180°, its ground truth just below 180°.
     #[test]
     fn the_ground_truth_is_shown_on_the_turn_of_the_values() {
-        let history = ParameterHistory { values: vec![-3.145, -3.15, f64::NAN], ..ParameterHistory::default() };
+        let history = ParameterCurve { values: vec![-3.145, -3.15, f64::NAN], ..ParameterCurve::default() };
         let shown = history.unwrap_near(id("I.rx"), 3.13);
         assert!((shown - (3.13 - std::f64::consts::TAU)).abs() < 1e-12, "{shown}");
-        let length = ParameterHistory { values: vec![-3.15], ..ParameterHistory::default() };
+        let length = ParameterCurve { values: vec![-3.15], ..ParameterCurve::default() };
         assert!((length.unwrap_near(id("I.tx"), 3.13) - 3.13).abs() < 1e-12);
-        assert_eq!(ParameterHistory::default().unwrap_near(id("I.rx"), 3.13), 3.13);
+        assert_eq!(ParameterCurve::default().unwrap_near(id("I.rx"), 3.13), 3.13);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use egui::{Painter, Rangef, Shape, Stroke, pos2};
 
-use super::model::ParameterHistory;
+use super::model::ParameterCurve;
 use crate::gui::plot::{Curve, PlotArea};
 use crate::gui::theme::RunStyle;
 
@@ -28,7 +28,7 @@ pub(super) fn value_range(
     own: Option<(f64, f64)>,
     ground_truth: Option<f64>,
     others: impl Iterator<Item = (f64, f64)>,
-    parameter: &ParameterHistory,
+    parameter: &ParameterCurve,
 ) -> (f64, f64) {
     let last = parameter
         .values
@@ -99,8 +99,8 @@ mod tests {
 
     use super::*;
 
-    fn history(values: &[f64], sigma: f64) -> ParameterHistory {
-        ParameterHistory { values: values.to_vec(), sigmas: vec![sigma; values.len()], ..ParameterHistory::default() }
+    fn history(values: &[f64], sigma: f64) -> ParameterCurve {
+        ParameterCurve { values: values.to_vec(), sigmas: vec![sigma; values.len()], ..ParameterCurve::default() }
     }
 
     #[test]

@@ -49,7 +49,7 @@ fn grouped_panels_are_drawn() {
     let mut shown = (ConvergencePanel::default(), Selection::default());
     let all = draw(options, |ui| show(ui, &mut shown));
     keep_screenshot("convergence-groups", &all);
-    shown.0.view = super::View::Group(crate::gimbal::ParameterGroup::Imu);
+    shown.0.view = super::ConvergenceView::Group(crate::gimbal::ParameterGroup::Imu);
     let one = draw(options, |ui| show(ui, &mut shown));
     keep_screenshot("convergence-imu", &one);
     assert!(all != one);

@@ -2,7 +2,7 @@
 
 use egui::{Align, Color32, FontId, Frame, Label, Layout, Link, RichText, Stroke, TextStyle, Ui, vec2};
 
-use super::markdown::{Block, Span};
+use super::markdown::{MarkdownBlock, StyledText};
 use crate::gui::theme::Theme;
 
 /// Indentation of a list in points.
@@ -15,15 +15,15 @@ const MIN_COLUMN_WIDTH: f32 = 70.0;
 const HEADING_SIZES: [f32; 3] = [20.0, 16.5, 14.0];
 
 /// Draws a block and returns the clicked link.
-pub(super) fn block_ui(ui: &mut Ui, theme: &Theme, block: &Block) -> Option<String> {
+pub(super) fn block_ui(ui: &mut Ui, theme: &Theme, block: &MarkdownBlock) -> Option<String> {
     match block {
-        Block::Heading { level, spans, .. } => {
+        MarkdownBlock::Heading { level, spans, .. } => {
             let level = usize::from(*level).clamp(1, HEADING_SIZES.len());
             ui.add_space(if level == 1 { 2.0 } else { 8.0 });
             spans_ui(ui, theme, spans, Some(HEADING_SIZES[level - 1]))
         }
-        Block::Paragraph { depth: 0, spans, .. } => spans_ui(ui, theme, spans, None),
-        Block::Paragraph { depth, marker, spans } => {
+        MarkdownBlock::Paragraph { depth: 0, spans, .. } => spans_ui(ui, theme, spans, None),
+        MarkdownBlock::Paragraph { depth, marker, spans } => {
             let item = ui.horizontal_top(|ui| {
                 ui.add_space(INDENT * (*depth as f32 - 1.0));
                 ui.spacing_mut().item_spacing.x = 0.0;
@@ -35,19 +35,19 @@ pub(super) fn block_ui(ui: &mut Ui, theme: &Theme, block: &Block) -> Option<Stri
             });
             item.inner
         }
-        Block::Code(text) => {
+        MarkdownBlock::Code(text) => {
             Frame::new().fill(theme.surface_raised).corner_radius(3).inner_margin(6).show(ui, |ui| {
                 ui.set_width(ui.available_width());
                 ui.add(Label::new(RichText::new(text).monospace().color(theme.text_strong)).wrap());
             });
             None
         }
-        Block::Table(rows) => table_ui(ui, theme, rows),
+        MarkdownBlock::Table(rows) => table_ui(ui, theme, rows),
     }
 }
 
 /// Draws a paragraph and returns the clicked link.
-pub(super) fn spans_ui(ui: &mut Ui, theme: &Theme, spans: &[Span], heading: Option<f32>) -> Option<String> {
+pub(super) fn spans_ui(ui: &mut Ui, theme: &Theme, spans: &[StyledText], heading: Option<f32>) -> Option<String> {
     let mut clicked = None;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(0.0, 1.0);
@@ -65,7 +65,7 @@ pub(super) fn spans_ui(ui: &mut Ui, theme: &Theme, spans: &[Span], heading: Opti
     clicked
 }
 
-fn look_of(span: &Span, theme: &Theme, heading: Option<f32>) -> RichText {
+fn look_of(span: &StyledText, theme: &Theme, heading: Option<f32>) -> RichText {
     let mut text = RichText::new(&span.text);
     text = match (heading, span.strong, &span.link) {
         (Some(size), ..) => text.size(size).color(theme.text_strong),
@@ -82,7 +82,7 @@ fn look_of(span: &Span, theme: &Theme, heading: Option<f32>) -> RichText {
     text
 }
 
-fn table_ui(ui: &mut Ui, theme: &Theme, rows: &[Vec<Vec<Span>>]) -> Option<String> {
+fn table_ui(ui: &mut Ui, theme: &Theme, rows: &[Vec<Vec<StyledText>>]) -> Option<String> {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let mut natural = vec![0.0_f32; columns];
     for row in rows {
@@ -99,9 +99,9 @@ fn table_ui(ui: &mut Ui, theme: &Theme, rows: &[Vec<Vec<Span>>]) -> Option<Strin
             for (cell, width) in row.iter().zip(&widths) {
                 let place = ui.allocate_ui_with_layout(vec2(*width, 0.0), Layout::top_down(Align::Min), |ui| {
                     ui.set_width(*width);
-                    let strong: Vec<Span>;
+                    let strong: Vec<StyledText>;
                     let spans = if number == 0 {
-                        strong = cell.iter().map(|span| Span { strong: true, ..span.clone() }).collect();
+                        strong = cell.iter().map(|span| StyledText { strong: true, ..span.clone() }).collect();
                         &strong
                     } else {
                         cell
@@ -118,9 +118,9 @@ fn table_ui(ui: &mut Ui, theme: &Theme, rows: &[Vec<Vec<Span>>]) -> Option<Strin
 }
 
 /// Width of a cell without line breaks in points.
-fn width_of(ui: &Ui, cell: &[Span]) -> f32 {
+fn width_of(ui: &Ui, cell: &[StyledText]) -> f32 {
     let fonts = [TextStyle::Body, TextStyle::Monospace].map(|style| style.resolve(ui.style()));
-    let width = |span: &Span| {
+    let width = |span: &StyledText| {
         let font: FontId = fonts[usize::from(span.code)].clone();
         ui.painter().layout_no_wrap(span.text.clone(), font, Color32::WHITE).size().x
     };

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use super::markdown::{Block, parse};
+use super::markdown::{MarkdownBlock, parse};
 
 #[derive(Debug)]
 struct Document {
@@ -52,7 +52,7 @@ const DOCUMENTS: [Document; 26] = [
 pub(super) struct DocumentId(usize);
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Target {
+pub(super) enum LinkTarget {
     /// A section of an embedded document; without an anchor its start.
     Section(DocumentId, Option<String>),
     Web(String),
@@ -66,15 +66,15 @@ impl DocumentId {
     }
 
     /// Blocks of the document, parsed once.
-    pub(super) fn blocks(self) -> &'static [Block] {
-        static PARSED: OnceLock<Vec<Vec<Block>>> = OnceLock::new();
+    pub(super) fn blocks(self) -> &'static [MarkdownBlock] {
+        static PARSED: OnceLock<Vec<Vec<MarkdownBlock>>> = OnceLock::new();
         &PARSED.get_or_init(|| DOCUMENTS.iter().map(|document| parse(document.text)).collect())[self.0]
     }
 
     /// First heading of the document.
     pub(super) fn title(self) -> String {
         let heading = self.blocks().iter().find_map(|block| match block {
-            Block::Heading { spans, .. } => Some(spans),
+            MarkdownBlock::Heading { spans, .. } => Some(spans),
             _ => None,
         });
         heading.map_or_else(String::new, |spans| spans.iter().map(|span| span.text.as_str()).collect())
@@ -83,18 +83,18 @@ impl DocumentId {
     /// True if the document has a heading with this anchor.
     #[cfg(test)]
     pub(super) fn has_anchor(self, wanted: &str) -> bool {
-        self.blocks().iter().any(|block| matches!(block, Block::Heading { anchor, .. } if anchor == wanted))
+        self.blocks().iter().any(|block| matches!(block, MarkdownBlock::Heading { anchor, .. } if anchor == wanted))
     }
 
     /// Target of a link in this document; `None` if it leads to no embedded document.
-    pub(super) fn follow(self, link: &str) -> Option<Target> {
+    pub(super) fn follow(self, link: &str) -> Option<LinkTarget> {
         if link.starts_with("https://") || link.starts_with("http://") {
-            return Some(Target::Web(link.to_owned()));
+            return Some(LinkTarget::Web(link.to_owned()));
         }
         let (path, anchor) = link.split_once('#').unwrap_or((link, ""));
         let anchor = (!anchor.is_empty()).then(|| anchor.to_owned());
         if path.is_empty() {
-            return Some(Target::Section(self, anchor));
+            return Some(LinkTarget::Section(self, anchor));
         }
         let (folder, _) = DOCUMENTS[self.0].path.rsplit_once('/').unwrap_or_default();
         let mut parts: Vec<&str> = folder.split('/').collect();
@@ -107,7 +107,7 @@ impl DocumentId {
         }
         let wanted = parts.join("/");
         let place = DOCUMENTS.iter().position(|document| document.path == wanted)?;
-        Some(Target::Section(Self(place), anchor))
+        Some(LinkTarget::Section(Self(place), anchor))
     }
 }
 
@@ -120,11 +120,11 @@ mod tests {
     fn links_are_followed_from_the_folder_of_their_document() {
         let manual = DocumentId::default();
         let section =
-            |id: usize, anchor: Option<&str>| Some(Target::Section(DocumentId(id), anchor.map(str::to_owned)));
+            |id: usize, anchor: Option<&str>| Some(LinkTarget::Section(DocumentId(id), anchor.map(str::to_owned)));
         assert_eq!(manual.follow("#rank"), section(0, Some("rank")));
         assert_eq!(manual.follow("commands.md"), section(3, None));
         assert_eq!(manual.follow("../assets/README.md"), section(10, None));
-        assert_eq!(manual.follow("https://mcap.dev"), Some(Target::Web("https://mcap.dev".to_owned())));
+        assert_eq!(manual.follow("https://mcap.dev"), Some(LinkTarget::Web("https://mcap.dev".to_owned())));
         assert_eq!(manual.follow("nowhere.md#rank"), None);
         assert!(manual.has_anchor("rank") && !manual.has_anchor("nowhere"));
         assert_eq!(manual.title(), "Manual of the window");
@@ -137,8 +137,8 @@ mod tests {
         for document in DocumentId::all() {
             for link in document.blocks().iter().flat_map(links_of) {
                 let found = match document.follow(link) {
-                    Some(Target::Section(target, Some(anchor))) => target.has_anchor(&anchor),
-                    Some(Target::Section(_, None) | Target::Web(_)) => true,
+                    Some(LinkTarget::Section(target, Some(anchor))) => target.has_anchor(&anchor),
+                    Some(LinkTarget::Section(_, None) | LinkTarget::Web(_)) => true,
                     None => false,
                 };
                 assert!(found, "{}: '{link}' leads nowhere", document.title());

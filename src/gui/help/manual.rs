@@ -3,8 +3,8 @@
 use egui::{Align, Button, ComboBox, Key, Modifiers, RichText, ScrollArea, Ui, WidgetInfo, vec2};
 
 use super::blocks_ui::block_ui;
-use super::documents::{DocumentId, Target};
-use super::markdown::{Block, Span};
+use super::documents::{DocumentId, LinkTarget};
+use super::markdown::{MarkdownBlock, StyledText};
 use crate::gui::theme::Theme;
 
 /// Frames in which the section is scrolled into view: the first ones lay out the window and the scroll area.
@@ -47,8 +47,8 @@ impl Manual {
 
     fn follow_from(&mut self, document: DocumentId, link: &str) {
         match document.follow(link) {
-            Some(Target::Section(document, anchor)) => self.go(Place { document, anchor }),
-            Some(Target::Web(address)) => self.web = Some(address),
+            Some(LinkTarget::Section(document, anchor)) => self.go(Place { document, anchor }),
+            Some(LinkTarget::Web(address)) => self.web = Some(address),
             None => {}
         }
     }
@@ -167,15 +167,15 @@ fn page_of(ui: &Ui) -> f32 {
     })
 }
 
-fn is_section(block: &Block, wanted: Option<&str>) -> bool {
-    matches!((block, wanted), (Block::Heading { anchor, .. }, Some(wanted)) if anchor == wanted)
+fn is_section(block: &MarkdownBlock, wanted: Option<&str>) -> bool {
+    matches!((block, wanted), (MarkdownBlock::Heading { anchor, .. }, Some(wanted)) if anchor == wanted)
 }
 
 /// The first paragraph of a section of the manual.
-pub(super) fn first_paragraph(section: &str) -> Option<&'static [Span]> {
+pub(super) fn first_paragraph(section: &str) -> Option<&'static [StyledText]> {
     let blocks = DocumentId::default().blocks();
     let heading = blocks.iter().position(|block| is_section(block, Some(section)))?;
-    let Block::Paragraph { spans, .. } = blocks.get(heading + 1)? else { return None };
+    let MarkdownBlock::Paragraph { spans, .. } = blocks.get(heading + 1)? else { return None };
     Some(spans)
 }
 

@@ -4,7 +4,7 @@ use pulldown_cmark::{Event, HeadingLevel, Options, Parser, Tag, TagEnd};
 
 /// A piece of text with one style.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Span {
+pub(super) struct StyledText {
     pub(super) text: String,
     pub(super) strong: bool,
     pub(super) emphasis: bool,
@@ -13,13 +13,13 @@ pub(super) struct Span {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Block {
+pub(super) enum MarkdownBlock {
     Heading {
         /// 1 for the title of the document.
         level: u8,
         /// The anchor without `#`.
         anchor: String,
-        spans: Vec<Span>,
+        spans: Vec<StyledText>,
     },
     /// A paragraph, or an item of a list.
     Paragraph {
@@ -27,24 +27,24 @@ pub(super) enum Block {
         depth: usize,
         /// Marker of the item: a bullet or a number with a period.
         marker: Option<String>,
-        spans: Vec<Span>,
+        spans: Vec<StyledText>,
     },
     Code(String),
     /// Rows of cells; the first row is the header.
-    Table(Vec<Vec<Vec<Span>>>),
+    Table(Vec<Vec<Vec<StyledText>>>),
 }
 
 #[cfg(test)]
-pub(super) fn links_of(block: &Block) -> impl Iterator<Item = &str> {
-    let spans: Vec<&Span> = match block {
-        Block::Heading { spans, .. } | Block::Paragraph { spans, .. } => spans.iter().collect(),
-        Block::Code(_) => Vec::new(),
-        Block::Table(rows) => rows.iter().flatten().flatten().collect(),
+pub(super) fn links_of(block: &MarkdownBlock) -> impl Iterator<Item = &str> {
+    let spans: Vec<&StyledText> = match block {
+        MarkdownBlock::Heading { spans, .. } | MarkdownBlock::Paragraph { spans, .. } => spans.iter().collect(),
+        MarkdownBlock::Code(_) => Vec::new(),
+        MarkdownBlock::Table(rows) => rows.iter().flatten().flatten().collect(),
     };
     spans.into_iter().filter_map(|span| span.link.as_deref())
 }
 
-pub(super) fn parse(text: &str) -> Vec<Block> {
+pub(super) fn parse(text: &str) -> Vec<MarkdownBlock> {
     let mut reader = Reader::default();
     for event in Parser::new_ext(text, Options::ENABLE_TABLES) {
         reader.read(event);
@@ -55,12 +55,12 @@ pub(super) fn parse(text: &str) -> Vec<Block> {
 /// State between two events of the parser.
 #[derive(Debug, Default)]
 struct Reader {
-    blocks: Vec<Block>,
+    blocks: Vec<MarkdownBlock>,
     /// Anchors without the number of a repetition.
     anchors: Vec<String>,
     /// Text that is being read, and its style.
-    spans: Vec<Span>,
-    look: Span,
+    spans: Vec<StyledText>,
+    look: StyledText,
     /// Per enclosing list the number of the next item; `None` for bullets.
     lists: Vec<Option<u64>>,
     /// Marker of an item whose text has not started.
@@ -68,7 +68,7 @@ struct Reader {
     code: Option<String>,
     /// True inside a figure. Figures are omitted: they show the window in which the document is read.
     figure: bool,
-    rows: Vec<Vec<Vec<Span>>>,
+    rows: Vec<Vec<Vec<StyledText>>>,
 }
 
 impl Reader {
@@ -97,10 +97,11 @@ impl Reader {
             block.push_str(text);
             return;
         }
-        let span = Span { text: text.to_owned(), code, ..self.look.clone() };
+        let span = StyledText { text: text.to_owned(), code, ..self.look.clone() };
         match self.spans.last_mut() {
             Some(last)
-                if (Span { text: String::new(), ..last.clone() }) == (Span { text: String::new(), ..span.clone() }) =>
+                if (StyledText { text: String::new(), ..last.clone() })
+                    == (StyledText { text: String::new(), ..span.clone() }) =>
             {
                 last.text.push_str(text);
             }
@@ -145,7 +146,7 @@ impl Reader {
             TagEnd::List(_) => drop(self.lists.pop()),
             TagEnd::CodeBlock => {
                 let text = self.code.take().unwrap_or_default();
-                self.blocks.push(Block::Code(text.trim_end().to_owned()));
+                self.blocks.push(MarkdownBlock::Code(text.trim_end().to_owned()));
             }
             TagEnd::TableCell => {
                 let cell = std::mem::take(&mut self.spans);
@@ -153,7 +154,7 @@ impl Reader {
                     row.push(cell);
                 }
             }
-            TagEnd::Table => self.blocks.push(Block::Table(std::mem::take(&mut self.rows))),
+            TagEnd::Table => self.blocks.push(MarkdownBlock::Table(std::mem::take(&mut self.rows))),
             _ => {}
         }
     }
@@ -165,7 +166,7 @@ impl Reader {
         let earlier = self.anchors.iter().filter(|known| **known == plain).count();
         let anchor = if earlier == 0 { plain.clone() } else { format!("{plain}-{earlier}") };
         self.anchors.push(plain);
-        self.blocks.push(Block::Heading { level: level as u8, anchor, spans });
+        self.blocks.push(MarkdownBlock::Heading { level: level as u8, anchor, spans });
     }
 
     /// Ends a paragraph or the text of an item.
@@ -173,7 +174,7 @@ impl Reader {
         let spans = std::mem::take(&mut self.spans);
         if !spans.is_empty() {
             let (depth, marker) = (self.lists.len(), self.marker.take());
-            self.blocks.push(Block::Paragraph { depth, marker, spans });
+            self.blocks.push(MarkdownBlock::Paragraph { depth, marker, spans });
         }
     }
 }
@@ -188,8 +189,8 @@ fn anchor_of(heading: &str) -> String {
 mod tests {
     use super::*;
 
-    fn plain(text: &str) -> Span {
-        Span { text: text.to_owned(), ..Span::default() }
+    fn plain(text: &str) -> StyledText {
+        StyledText { text: text.to_owned(), ..StyledText::default() }
     }
 
     #[test]
@@ -197,24 +198,28 @@ mod tests {
         let text = "# A `b` title\n\nOne\nline, **bold** and [a link](x.md#y).\n\n```sh\nrun it\n```\n\n\
                     | a | b |\n| --- | --- |\n| 1 | `2` |\n";
         let blocks = parse(text);
-        let [Block::Heading { level: 1, anchor, .. }, Block::Paragraph { depth: 0, marker: None, spans }, rest @ ..] =
-            blocks.as_slice()
+        let [
+            MarkdownBlock::Heading { level: 1, anchor, .. },
+            MarkdownBlock::Paragraph { depth: 0, marker: None, spans },
+            rest @ ..,
+        ] = blocks.as_slice()
         else {
             panic!("{blocks:?}")
         };
         assert_eq!(anchor, "a-b-title");
-        let bold = Span { strong: true, ..plain("bold") };
-        let link = Span { link: Some("x.md#y".to_owned()), ..plain("a link") };
+        let bold = StyledText { strong: true, ..plain("bold") };
+        let link = StyledText { link: Some("x.md#y".to_owned()), ..plain("a link") };
         assert_eq!(spans[..], [plain("One line, "), bold, plain(" and "), link, plain(".")]);
-        let code = Span { code: true, ..plain("2") };
+        let code = StyledText { code: true, ..plain("2") };
         let rows = vec![vec![vec![plain("a")], vec![plain("b")]], vec![vec![plain("1")], vec![code]]];
-        assert_eq!(rest[..], [Block::Code("run it".to_owned()), Block::Table(rows)]);
+        assert_eq!(rest[..], [MarkdownBlock::Code("run it".to_owned()), MarkdownBlock::Table(rows)]);
         assert_eq!(links_of(&blocks[1]).collect::<Vec<_>>(), ["x.md#y"]);
     }
 
     #[test]
     fn figures_are_omitted() {
-        let [Block::Paragraph { spans, .. }] = &parse("![a figure](a.png)\n\nText ![with](b.png)one.\n")[..] else {
+        let [MarkdownBlock::Paragraph { spans, .. }] = &parse("![a figure](a.png)\n\nText ![with](b.png)one.\n")[..]
+        else {
             panic!("one paragraph")
         };
         assert_eq!(spans[..], [plain("Text one.")]);
@@ -223,7 +228,7 @@ mod tests {
     #[test]
     fn items_have_marks_and_depths() {
         let blocks = parse("1. one\n   - inner\n2. two\n\nafter\n");
-        let item = |depth: usize, marker: Option<&str>, text: &str| Block::Paragraph {
+        let item = |depth: usize, marker: Option<&str>, text: &str| MarkdownBlock::Paragraph {
             depth,
             marker: marker.map(str::to_owned),
             spans: vec![plain(text)],
@@ -243,7 +248,7 @@ mod tests {
         let anchors: Vec<&str> = blocks
             .iter()
             .filter_map(|block| match block {
-                Block::Heading { anchor, .. } => Some(anchor.as_str()),
+                MarkdownBlock::Heading { anchor, .. } => Some(anchor.as_str()),
                 _ => None,
             })
             .collect();

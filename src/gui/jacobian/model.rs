@@ -19,7 +19,7 @@ pub(super) const ONE_GROUP: &str = "calibration";
 
 /// A row or a column of blocks, or a group of them.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Strip {
+pub(super) struct ColumnStrip {
     pub(super) name: String,
     /// Start and end as fractions of the axis.
     pub(super) begin: f32,
@@ -28,9 +28,9 @@ pub(super) struct Strip {
 
 /// The rows or columns of one axis.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Axis {
-    pub(super) strips: Vec<Strip>,
-    pub(super) groups: Vec<Strip>,
+pub(super) struct MatrixAxis {
+    pub(super) strips: Vec<ColumnStrip>,
+    pub(super) groups: Vec<ColumnStrip>,
 }
 
 /// The block matrix of one step.
@@ -39,8 +39,8 @@ pub(super) struct JacobianModel {
     /// Kept so that its address stays unique.
     pub(super) step: Arc<StepRecord>,
     pub(super) jacobian: StepJacobian,
-    pub(super) rows: Axis,
-    pub(super) columns: Axis,
+    pub(super) rows: MatrixAxis,
+    pub(super) columns: MatrixAxis,
     /// Exponents of the norms with the first and last colour.
     pub(super) decades: (f64, f64),
     pub(super) joint_count: usize,
@@ -95,7 +95,7 @@ impl JacobianModel {
     }
 }
 
-impl Axis {
+impl MatrixAxis {
     /// Index of the row or column at a fraction of the axis.
     pub(super) fn at(&self, fraction: f32) -> Option<usize> {
         self.strips.iter().position(|strip| strip.begin <= fraction && fraction < strip.end)
@@ -107,7 +107,7 @@ impl Axis {
         let total: f32 = strips.iter().map(|(_, _, weight)| weight).sum();
         let mut order: Vec<usize> = (0..strips.len()).collect();
         order.sort_by_key(|index| strips[*index].1);
-        let placed = strips.iter().map(|(name, _, _)| Strip { name: name.clone(), begin: 0.0, end: 0.0 });
+        let placed = strips.iter().map(|(name, _, _)| ColumnStrip { name: name.clone(), begin: 0.0, end: 0.0 });
         let mut axis = Self { strips: placed.collect(), groups: Vec::new() };
         let mut at = 0.0;
         for index in order {
@@ -117,7 +117,7 @@ impl Axis {
             let group_name = group_names.get(group).cloned().unwrap_or_default();
             match axis.groups.last_mut().filter(|last| last.name == group_name) {
                 Some(last) => last.end = end,
-                None => axis.groups.push(Strip { name: group_name, begin, end }),
+                None => axis.groups.push(ColumnStrip { name: group_name, begin, end }),
             }
             (axis.strips[index].begin, axis.strips[index].end) = (begin, end);
         }
@@ -137,7 +137,7 @@ pub(in crate::gui) fn name_of(factor: &JacobianFactor) -> String {
 }
 
 /// Lays out features at the top, the other factors below; each group has a minimum height.
-fn rows_of(jacobian: &StepJacobian) -> Axis {
+fn rows_of(jacobian: &StepJacobian) -> MatrixAxis {
     /// Fractions of the height for visual, IMU and encoder rows and priors.
     const HEIGHT_RATIOS: [f32; 4] = [0.62, 0.15, 0.13, 0.1];
     let group_of = |factor: &JacobianFactor| match factor {
@@ -160,12 +160,12 @@ fn rows_of(jacobian: &StepJacobian) -> Axis {
         let group = group_of(&row.factor);
         (name_of(&row.factor), group, HEIGHT_RATIOS[group] / counts[group].max(1) as f32)
     });
-    Axis::lay_out(strips, &names)
+    MatrixAxis::lay_out(strips, &names)
 }
 
 /// Lays out the columns: wide for the calibration, so that they can be read one by one, narrow for the states of the
 /// frames. The calibration is split by the group of its parameters if it has several.
-pub(super) fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> Axis {
+pub(super) fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> MatrixAxis {
     let states = ["joints", "poses", "velocities, biases", "depth"];
     let mut groups: Vec<String> =
         ParameterGroup::all().map(ParameterGroup::name).chain(states).map(str::to_owned).collect();
@@ -187,7 +187,7 @@ pub(super) fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> Axi
         };
         (column_name(block.id, names), group, weight)
     });
-    Axis::lay_out(strips, &groups)
+    MatrixAxis::lay_out(strips, &groups)
 }
 
 pub(in crate::gui) fn column_name(id: ColumnId, names: &ParameterNames) -> String {

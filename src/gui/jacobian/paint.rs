@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::epaint::{Mesh, TextShape};
 use egui::{Align2, Color32, Painter, Rect, Shape, Stroke, StrokeKind, Ui, pos2, vec2};
 
-use super::model::{Axis, JacobianModel, ONE_GROUP, Strip};
+use super::model::{ColumnStrip, JacobianModel, MatrixAxis, ONE_GROUP};
 use crate::gui::plot::paint_ground;
 use crate::gui::theme::{Theme, ThemeName, label_font};
 use crate::session::StepRecord;
@@ -68,7 +68,7 @@ pub(super) fn column_names_height(ui: &Ui, model: &JacobianModel) -> f32 {
     if model.columns.groups.first().is_none_or(|group| group.name == ONE_GROUP) {
         return OF_CHAIN;
     }
-    let width = |strip: &Strip| {
+    let width = |strip: &ColumnStrip| {
         let name = short_name(strip).to_owned();
         ui.painter().layout_no_wrap(name, label_font(), Color32::PLACEHOLDER).size().x
     };
@@ -76,7 +76,7 @@ pub(super) fn column_names_height(ui: &Ui, model: &JacobianModel) -> f32 {
 }
 
 /// Name of a column under the name of its group; frames are labelled by their number.
-fn short_name(strip: &Strip) -> &str {
+fn short_name(strip: &ColumnStrip) -> &str {
     strip.name.rsplit(' ').next().unwrap_or(&strip.name)
 }
 
@@ -113,11 +113,11 @@ pub(super) fn axes(
     }
 }
 
-fn span(start: f32, length: f32, strip: &Strip) -> egui::Rangef {
+fn span(start: f32, length: f32, strip: &ColumnStrip) -> egui::Rangef {
     egui::Rangef::new(start + strip.begin * length, start + strip.end * length)
 }
 
-fn row_names(painter: &Painter, theme: &Theme, left: Rect, place: Rect, rows: &Axis, selected: Option<usize>) {
+fn row_names(painter: &Painter, theme: &Theme, left: Rect, place: Rect, rows: &MatrixAxis, selected: Option<usize>) {
     let write = |range: egui::Rangef, name: &str, color: Color32| {
         let seen = range.intersection(left.y_range());
         painter.text(pos2(left.right() - 4.0, seen.center()), Align2::RIGHT_CENTER, name, label_font(), color);
@@ -145,7 +145,14 @@ fn row_names(painter: &Painter, theme: &Theme, left: Rect, place: Rect, rows: &A
     }
 }
 
-fn column_names(painter: &Painter, theme: &Theme, top: Rect, place: Rect, columns: &Axis, selected: Option<usize>) {
+fn column_names(
+    painter: &Painter,
+    theme: &Theme,
+    top: Rect,
+    place: Rect,
+    columns: &MatrixAxis,
+    selected: Option<usize>,
+) {
     let small = label_font();
     for group in &columns.groups {
         let seen = span(place.left(), place.width(), group).intersection(top.x_range());

@@ -2,7 +2,7 @@
 
 use egui::{ComboBox, Ui};
 
-use super::worker::Experiment;
+use super::worker::LaboratoryJob;
 use crate::estimator::{JointKnowledge, PoseKnowledge};
 use crate::gimbal::Parameterization;
 use crate::gui::PanelContext;
@@ -159,7 +159,7 @@ impl Choices {
     }
 
     /// The chosen experiment, or the reason why it is invalid.
-    pub(super) fn experiment(&self, ctx: &PanelContext<'_>) -> Result<Experiment, String> {
+    pub(super) fn experiment(&self, ctx: &PanelContext<'_>) -> Result<LaboratoryJob, String> {
         let parameterizations = Parameterization::all().zip(self.parameterizations).filter(|(_, chosen)| *chosen);
         let parameterizations: Vec<LaboratoryForm> = parameterizations
             .map(|(parameterization, _)| LaboratoryForm { parameterization, joint_offsets: self.joint_offsets })
@@ -188,6 +188,6 @@ impl Choices {
             Poses::Inertial => PoseKnowledge::Imu { noise, biases_known: false },
             Poses::InertialBiasKnown => PoseKnowledge::Imu { noise, biases_known: true },
         };
-        Ok(Experiment { setup, parameterizations })
+        Ok(LaboratoryJob { setup, parameterizations })
     }
 }

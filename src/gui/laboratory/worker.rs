@@ -9,7 +9,7 @@ use std::thread::Builder;
 use crate::observability::laboratory::{LaboratoryForm, LaboratoryResult, LaboratorySetup};
 
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Experiment {
+pub(super) struct LaboratoryJob {
     pub(super) setup: LaboratorySetup,
     pub(super) parameterizations: Vec<LaboratoryForm>,
 }
@@ -17,14 +17,14 @@ pub(super) struct Experiment {
 /// The requested experiment and its results so far.
 #[derive(Default)]
 pub(super) struct Worker {
-    asked: Option<Experiment>,
+    asked: Option<LaboratoryJob>,
     coming: Option<Receiver<LaboratoryResult>>,
     results: Vec<LaboratoryResult>,
 }
 
 impl Worker {
     /// Starts an experiment unless it is the current one, and receives results.
-    pub(super) fn request(&mut self, experiment: &Experiment, in_background: bool) {
+    pub(super) fn request(&mut self, experiment: &LaboratoryJob, in_background: bool) {
         if self.asked.as_ref() != Some(experiment) {
             self.results.clear();
             self.coming = None;
@@ -40,7 +40,7 @@ impl Worker {
         }
     }
 
-    fn start(&mut self, experiment: &Experiment, in_background: bool) {
+    fn start(&mut self, experiment: &LaboratoryJob, in_background: bool) {
         self.asked = Some(experiment.clone());
         if in_background {
             let (sender, receiver) = channel();

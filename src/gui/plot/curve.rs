@@ -132,7 +132,7 @@ fn reduce(area: &PlotArea, stamps_ns: &[i64], values: &[f64]) -> Vec<Vec<(f32, f
     let thin = rows.len() <= 2 * columns;
     let mut segments = Vec::new();
     let mut segment: Vec<(f32, f64)> = Vec::new();
-    let mut column: Option<Column> = None;
+    let mut column: Option<PixelColumn> = None;
     for row in rows {
         let x = area.offset_of(stamps_ns[row]);
         let value = values[row];
@@ -148,7 +148,7 @@ fn reduce(area: &PlotArea, stamps_ns: &[i64], values: &[f64]) -> Vec<Vec<(f32, f
                 Some(open) if open.x.floor() == x.floor() => open.take(row, value),
                 _ => {
                     flush(&mut segment, &mut column);
-                    column = Some(Column {
+                    column = Some(PixelColumn {
                         x,
                         first: (row, value),
                         lowest: (row, value),
@@ -167,7 +167,7 @@ fn reduce(area: &PlotArea, stamps_ns: &[i64], values: &[f64]) -> Vec<Vec<(f32, f
 }
 
 /// Rows and values of the extremes of one pixel column.
-struct Column {
+struct PixelColumn {
     x: f32,
     first: (usize, f64),
     lowest: (usize, f64),
@@ -175,7 +175,7 @@ struct Column {
     last: (usize, f64),
 }
 
-impl Column {
+impl PixelColumn {
     fn take(&mut self, row: usize, value: f64) {
         if value < self.lowest.1 {
             self.lowest = (row, value);
@@ -187,8 +187,8 @@ impl Column {
     }
 }
 
-fn flush(segment: &mut Vec<(f32, f64)>, column: &mut Option<Column>) {
-    if let Some(Column { x, first, lowest, highest, last }) = column.take() {
+fn flush(segment: &mut Vec<(f32, f64)>, column: &mut Option<PixelColumn>) {
+    if let Some(PixelColumn { x, first, lowest, highest, last }) = column.take() {
         let mut points = [first, lowest, highest, last];
         points.sort_by_key(|(row, _)| *row);
         let mut before = None;

@@ -24,7 +24,7 @@ use self::information::InformationUi;
 use self::sections::{MIN_HEIGHT_WITH_CAUSE, fact_at_ui, headline_ui, section_ui};
 use self::slider::SliderUi;
 use self::spectrum::ranks_text;
-use self::verdict::{Level, Verdict};
+use self::verdict::{Level, RankVerdict};
 use super::convergence::empty_ui;
 use super::follow::RunTables;
 use super::help::terms::window;
@@ -280,7 +280,13 @@ fn halves(rect: egui::Rect, fraction: f32) -> [egui::Rect; 2] {
 
 /// Draws the verdict at the cursor: a symbol, one line, the reasons, and the least observable direction with its start;
 /// the cause of an uninformed direction if there is room.
-fn verdict_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, verdict: &Verdict, since: Option<LostSince>, with_cause: bool) {
+fn verdict_ui(
+    ui: &mut Ui,
+    ctx: &mut PanelContext<'_>,
+    verdict: &RankVerdict,
+    since: Option<LostSince>,
+    with_cause: bool,
+) {
     let theme = *ctx.theme;
     let look = mark_of(verdict.level, &theme);
     headline_ui(ui, &theme, look, "At the cursor:", &verdict.headline, window::RANKS.meaning);

@@ -20,7 +20,7 @@ pub(crate) enum Level {
 
 /// Summary of a step's rank report.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Verdict {
+pub(crate) struct RankVerdict {
     pub(crate) level: Level,
     pub(crate) headline: String,
     /// Causes of the lost rank, or the condition of the initialization that is not met.
@@ -32,7 +32,7 @@ pub(crate) struct Verdict {
     pub(crate) notes: Vec<Reason>,
 }
 
-impl Verdict {
+impl RankVerdict {
     /// Verdict on a step without a rank.
     fn none(headline: &str, reasons: Vec<Reason>) -> Self {
         Self {
@@ -54,9 +54,9 @@ pub(crate) struct Reason {
 }
 
 /// Verdict on the observability of the calibration in a step.
-pub(crate) fn verdict(step: &StepRecord, names: &ParameterNames) -> Verdict {
+pub(crate) fn verdict(step: &StepRecord, names: &ParameterNames) -> RankVerdict {
     match &step.rank {
-        Some(rank) if rank.parameters.is_empty() => Verdict::none("Calibration fixed in this run", Vec::new()),
+        Some(rank) if rank.parameters.is_empty() => RankVerdict::none("Calibration fixed in this run", Vec::new()),
         Some(rank) => of_rank(rank, step, names),
         None => {
             let initializing = step.report.phase == Phase::Initializing;
@@ -64,12 +64,12 @@ pub(crate) fn verdict(step: &StepRecord, names: &ParameterNames) -> Verdict {
                 if initializing { "Initializing: no rank yet" } else { "No linearization in this step: no rank" };
             let waits = step.report.events.iter().filter(|event| event.kind == EventKind::InitializationWaits);
             let reasons = waits.map(|event| Reason { term: window::INITIALIZATION, text: event.message.clone() });
-            Verdict::none(headline, reasons.collect())
+            RankVerdict::none(headline, reasons.collect())
         }
     }
 }
 
-fn of_rank(rank: &RankReport, step: &StepRecord, names: &ParameterNames) -> Verdict {
+fn of_rank(rank: &RankReport, step: &StepRecord, names: &ParameterNames) -> RankVerdict {
     let columns = rank.parameters.len();
     let null = columns.saturating_sub(rank.rank_structural);
     let uninformed = rank.rank_structural.saturating_sub(rank.rank_informed);
@@ -138,7 +138,7 @@ fn of_rank(rank: &RankReport, step: &StepRecord, names: &ParameterNames) -> Verd
             ),
         });
     }
-    Verdict { level, headline, reasons, cause, direction, notes }
+    RankVerdict { level, headline, reasons, cause, direction, notes }
 }
 
 /// Every known loss with its reason and the measured response, one line each.

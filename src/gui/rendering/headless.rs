@@ -28,7 +28,7 @@ pub struct HeadlessOptions {
 }
 
 /// Output of egui for one frame.
-pub struct Frame {
+pub struct PaintedFrame {
     /// Meshes, in points.
     pub chunks: Vec<Arc<Chunk>>,
     /// New, changed and freed textures.
@@ -105,10 +105,10 @@ impl Headless {
     }
 
     /// Runs one frame with input events.
-    pub fn frame(&mut self, events: Vec<egui::Event>, ui: impl FnMut(&mut Ui)) -> Frame {
+    pub fn frame(&mut self, events: Vec<egui::Event>, ui: impl FnMut(&mut Ui)) -> PaintedFrame {
         let output = self.run(events, ui);
         let chunks = self.tessellation.chunks(&self.context, output.shapes, output.pixels_per_point);
-        Frame { chunks, textures: output.textures_delta }
+        PaintedFrame { chunks, textures: output.textures_delta }
     }
 
     fn run(&mut self, events: Vec<egui::Event>, ui: impl FnMut(&mut Ui)) -> FullOutput {

@@ -1,7 +1,7 @@
 //! Residuals over time; one row per step of a run.
 
-use super::image_plane::{Frame, ImageMeans};
-use super::{ResidualsPanel, View, rms_px};
+use super::image_plane::{ImageGeometry, ImageMeans};
+use super::{ResidualView, ResidualsPanel, rms_px};
 use crate::estimator::FactorKind;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gui::{CsvTable, PanelContext};
@@ -12,7 +12,7 @@ impl CsvTable for ResidualsPanel {
     /// Reprojection RMS and χ² by kind of factor, for every step of every run.
     /// Of the view of the image plane: mean residual by cell, in the window at the cursor and in the whole flight.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
-        if self.view == View::ImagePlane {
+        if self.view == ResidualView::ImagePlane {
             return image_plane_table(ctx);
         }
         let solved = |step: &&std::sync::Arc<StepRecord>| !step.report.window.is_empty();
@@ -55,7 +55,7 @@ fn image_plane_table(ctx: &PanelContext<'_>) -> String {
         ["run", "part", "u_from_px", "u_to_px", "v_from_px", "v_to_px", "count", "mean_u_px", "mean_v_px", "error_px"];
     let mut table = CsvWriter::new(columns.map(str::to_owned).to_vec());
     let run = ctx.selected_run();
-    let shown = run.and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?, Frame::of(ctx, run)?)));
+    let shown = run.and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?, ImageGeometry::of(ctx, run)?)));
     let Some((run, step, frame)) = shown else { return String::new() };
     let window = ImageResiduals::of_window(&step.report);
     for (part, residuals) in [("window", &window), ("flight", &run.image_residuals)] {

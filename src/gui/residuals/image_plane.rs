@@ -40,7 +40,7 @@ pub(super) struct ImageMeans {
 
 /// Geometry of an image and its grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Frame {
+pub(super) struct ImageGeometry {
     pub(super) size_px: [usize; 2],
     center_px: Vector2<f64>,
     /// Distance from the principal point to the farthest corner in pixels.
@@ -48,7 +48,7 @@ pub(super) struct Frame {
     pub(super) rows: usize,
 }
 
-impl Frame {
+impl ImageGeometry {
     /// Image of the main camera of a run; `None` if the rig lacks the camera.
     pub(super) fn of(ctx: &PanelContext<'_>, run: &RunRecord) -> Option<Self> {
         let camera = ctx.recording.rig.camera(&run.camera_key).ok()?;
@@ -72,7 +72,7 @@ impl Frame {
 }
 
 impl ImageMeans {
-    pub(super) fn of(residuals: &ImageResiduals, frame: &Frame) -> Self {
+    pub(super) fn of(residuals: &ImageResiduals, frame: &ImageGeometry) -> Self {
         Self {
             cells: residuals.grid(frame.size_px, COLUMNS, frame.rows),
             total: residuals.total(),
@@ -107,7 +107,7 @@ struct Cached {
     step: Arc<StepRecord>,
     run: u64,
     steps: usize,
-    frame: Frame,
+    frame: ImageGeometry,
     window: ImageMeans,
     flight: ImageMeans,
 }
@@ -123,7 +123,7 @@ impl ImagePlane {
         height: f32,
     ) {
         const GAP: f32 = 10.0;
-        let Some(frame) = Frame::of(ctx, run) else { return };
+        let Some(frame) = ImageGeometry::of(ctx, run) else { return };
         self.read(run, step, frame);
         let Some(cached) = &self.cached else { return };
         let theme = ctx.theme;
@@ -157,7 +157,7 @@ impl ImagePlane {
         profile(by_row, |means| &means.by_row, height_px, right.with_min_x(right.left() + 0.5 * GAP));
     }
 
-    fn read(&mut self, run: &RunRecord, step: &Arc<StepRecord>, frame: Frame) {
+    fn read(&mut self, run: &RunRecord, step: &Arc<StepRecord>, frame: ImageGeometry) {
         let known = self.cached.take().filter(|cached| cached.run == run.id && cached.frame == frame);
         let (same_step, same_flight) = known
             .as_ref()
@@ -179,7 +179,7 @@ impl ImagePlane {
 /// Vector field over the image.
 struct Field<'a> {
     means: &'a ImageMeans,
-    frame: &'a Frame,
+    frame: &'a ImageGeometry,
     /// Length in pixels of an arrow as wide as a cell.
     scale_px: f64,
     theme: &'a Theme,
@@ -358,7 +358,7 @@ mod tests {
         let run = &recording.runs[0];
         let step = run.steps.last().unwrap();
         let show = |ctx: &mut PanelContext<'_>| {
-            let frame = Frame::of(ctx, run).unwrap();
+            let frame = ImageGeometry::of(ctx, run).unwrap();
             let mut plane = ImagePlane::default();
             plane.read(run, step, frame);
             let cached = plane.cached.take().unwrap();

@@ -45,7 +45,7 @@ const MIN_OVER_TIME_HEIGHT: f32 = 74.0;
 
 /// View of a panel that is too small for both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum View {
+enum ResidualView {
     /// Histogram, RMS over time, χ² by factor.
     #[default]
     Distribution,
@@ -59,7 +59,7 @@ pub struct ResidualsPanel {
     tables: RunTables,
     curves: Vec<Curve>,
     counted: Option<(Arc<StepRecord>, ResidualHistogram)>,
-    view: View,
+    view: ResidualView,
     image_plane: ImagePlane,
     /// True if the content is higher than the panel, so that the wheel scrolls.
     overflows: bool,
@@ -86,15 +86,15 @@ impl Panel for ResidualsPanel {
         }
         if !ctx.presentation.is_figure() {
             ui.horizontal(|ui| {
-                ui.selectable_value(&mut self.view, View::Distribution, "Distribution")
+                ui.selectable_value(&mut self.view, ResidualView::Distribution, "Distribution")
                     .on_hover_text("Histogram, over time, and χ² by factor");
-                ui.selectable_value(&mut self.view, View::ImagePlane, "Image plane")
+                ui.selectable_value(&mut self.view, ResidualView::ImagePlane, "Image plane")
                     .on_hover_text(window::IMAGE_PLANE.meaning);
             });
         }
         match self.view {
-            View::Distribution => self.distribution_ui(ui, ctx, step),
-            View::ImagePlane => {
+            ResidualView::Distribution => self.distribution_ui(ui, ctx, step),
+            ResidualView::ImagePlane => {
                 let height = ui.available_height() - 4.0;
                 self.image_plane.ui(ui, ctx, &recording.runs[run], step, height);
             }

@@ -65,7 +65,7 @@ impl Viewport {
 
 /// A camera and its viewport, prepared for projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct View {
+pub(super) struct SceneView {
     pub(super) camera: OrbitCamera,
     pub(super) viewport: Viewport,
     right: Vector3<f64>,
@@ -94,7 +94,7 @@ impl ScreenPoint {
     }
 }
 
-impl View {
+impl SceneView {
     pub(super) fn new(camera: OrbitCamera, viewport: Viewport) -> Self {
         let [right, up] = screen_axes(&camera.towards);
         Self { camera, viewport, right, up, near_m: (camera.distance_m * NEAR_RATIO).max(1e-6) }
@@ -107,7 +107,7 @@ impl View {
         Vector3::new(self.right.dot(&offset), self.up.dot(&offset), away)
     }
 
-    /// Screen position of a point at or behind the near plane, from [`View::in_view`].
+    /// Screen position of a point at or behind the near plane, from [`SceneView::in_view`].
     pub(super) fn on_screen(&self, in_view_m: &Vector3<f64>) -> ScreenPoint {
         let [centre_x, centre_y] = self.viewport.centre_px();
         let scale = self.viewport.focal_px() / in_view_m.z;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::{Context, Id, Pos2, Rect, TextureHandle, TextureOptions, Ui, pos2};
 
-use super::layout::Drawing;
+use super::layout::SceneDrawing;
 use super::{cpu, gpu};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,8 +34,8 @@ impl SceneBackend {
 /// Keeps the last drawing, so that it is drawn again only when it changes.
 pub(super) struct Canvas {
     name: &'static str,
-    drawing: Option<Arc<Drawing>>,
-    texture: Option<(Arc<Drawing>, TextureHandle)>,
+    drawing: Option<Arc<SceneDrawing>>,
+    texture: Option<(Arc<SceneDrawing>, TextureHandle)>,
 }
 
 impl Canvas {
@@ -45,7 +45,7 @@ impl Canvas {
     }
 
     /// Draws everything except the labels; the edges of `rect` are on whole pixels.
-    pub(super) fn show(&mut self, ui: &Ui, rect: Rect, drawing: Drawing) -> Arc<Drawing> {
+    pub(super) fn show(&mut self, ui: &Ui, rect: Rect, drawing: SceneDrawing) -> Arc<SceneDrawing> {
         let drawing = match self.drawing.take() {
             Some(last) if *last == drawing => last,
             _ => Arc::new(drawing),
@@ -61,7 +61,7 @@ impl Canvas {
         drawing
     }
 
-    fn show_texture(&mut self, ui: &Ui, rect: Rect, drawing: &Arc<Drawing>) {
+    fn show_texture(&mut self, ui: &Ui, rect: Rect, drawing: &Arc<SceneDrawing>) {
         let is_current = self.texture.as_ref().is_some_and(|(shown, _)| Arc::ptr_eq(shown, drawing));
         if !is_current {
             let image = cpu::draw(drawing);

@@ -5,7 +5,7 @@ use egui::{Color32, ColorImage};
 use rayon::prelude::*;
 
 use super::camera;
-use super::layout::{Disc, Drawing, ImageCorner, ImageShape, Segment};
+use super::layout::{Disc, ImageCorner, ImageShape, SceneDrawing, Segment};
 use crate::gui::rendering::painter::blend;
 use crate::gui::rendering::painter::triangle::{Clip, Plane, SUBPIXELS, spans};
 
@@ -15,7 +15,7 @@ const SAMPLES: [[i32; 2]; 4] = [[96, 32], [224, 96], [32, 160], [160, 224]];
 const BAND_ROWS: usize = 32;
 
 /// Draws everything except the labels.
-pub(super) fn draw(drawing: &Drawing) -> ColorImage {
+pub(super) fn draw(drawing: &SceneDrawing) -> ColorImage {
     let [width, height] = drawing.size_px.map(|side| side as usize);
     let background = blend::pack(drawing.background.to_array());
     let mut pixels = vec![Color32::TRANSPARENT; width * height];

@@ -9,7 +9,7 @@ use eframe::egui_wgpu::{CallbackResources, CallbackTrait, ScreenDescriptor};
 use egui::PaintCallbackInfo;
 use wgpu::util::DeviceExt as _;
 
-use super::layout::{Corner, Disc, Drawing, ImageCorner, Segment};
+use super::layout::{Corner, Disc, ImageCorner, SceneDrawing, Segment};
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, PipelineMaker, SAMPLES};
 use crate::sensors::GrayImage;
 
@@ -21,13 +21,13 @@ const DISC_VERTICES: u32 = 18;
 /// One view of a scene as a paint callback of egui.
 pub(super) struct SceneCallback {
     canvas: egui::Id,
-    drawing: Arc<Drawing>,
+    drawing: Arc<SceneDrawing>,
     target_format: wgpu::TextureFormat,
 }
 
 impl SceneCallback {
     /// `canvas` identifies the view; each view keeps its targets.
-    pub(super) fn new(canvas: egui::Id, drawing: Arc<Drawing>, target_format: wgpu::TextureFormat) -> Self {
+    pub(super) fn new(canvas: egui::Id, drawing: Arc<SceneDrawing>, target_format: wgpu::TextureFormat) -> Self {
         Self { canvas, drawing, target_format }
     }
 }
@@ -76,7 +76,7 @@ struct SceneRenderer {
 
 /// The targets of one view and its last drawing.
 struct Canvas {
-    drawing: Arc<Drawing>,
+    drawing: Arc<SceneDrawing>,
     size_px: [u32; 2],
     samples: wgpu::TextureView,
     depth: wgpu::TextureView,
@@ -182,7 +182,7 @@ impl SceneRenderer {
         queue: &wgpu::Queue,
         encoder: &mut wgpu::CommandEncoder,
         id: egui::Id,
-        drawing: &Arc<Drawing>,
+        drawing: &Arc<SceneDrawing>,
     ) {
         let old = self.canvases.remove(&id);
         if let Some(canvas) = old.as_ref().filter(|canvas| Arc::ptr_eq(&canvas.drawing, drawing)) {
@@ -306,7 +306,7 @@ impl SceneRenderer {
 impl Canvas {
     fn new(
         device: &wgpu::Device,
-        drawing: &Arc<Drawing>,
+        drawing: &Arc<SceneDrawing>,
         texture_layout: &wgpu::BindGroupLayout,
         sampler: &wgpu::Sampler,
     ) -> Self {

@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use egui::Color32;
 use nalgebra::Vector3;
 
-use super::camera::{ScreenPoint, View, length};
+use super::camera::{SceneView, ScreenPoint, length};
 use super::model::{ImageQuad, Line, SceneModel};
 use crate::sensors::GrayImage;
 
@@ -70,7 +70,7 @@ pub(super) struct ScreenLabel {
 
 /// All shapes of a view, in pixels of the viewport.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Drawing {
+pub(super) struct SceneDrawing {
     pub(super) size_px: [u32; 2],
     pub(super) background: Color32,
     pub(super) segments: Vec<Segment>,
@@ -81,8 +81,13 @@ pub(super) struct Drawing {
     pub(super) labels: Vec<ScreenLabel>,
 }
 
-pub(super) fn lay_out(model: &SceneModel, view: &View, pixels_per_point: f32, background: Color32) -> Drawing {
-    let mut drawing = Drawing {
+pub(super) fn lay_out(
+    model: &SceneModel,
+    view: &SceneView,
+    pixels_per_point: f32,
+    background: Color32,
+) -> SceneDrawing {
+    let mut drawing = SceneDrawing {
         size_px: view.viewport.size_px,
         background,
         segments: Vec::new(),
@@ -130,7 +135,7 @@ fn position(point: &ScreenPoint, lift: f64) -> [f32; 3] {
     [point.x_px as f32, point.y_px as f32, (point.depth * lift).min(1.0) as f32]
 }
 
-fn lay_out_line(line: &Line, view: &View, pixels_per_point: f32, drawing: &mut Drawing) {
+fn lay_out_line(line: &Line, view: &SceneView, pixels_per_point: f32, drawing: &mut SceneDrawing) {
     let half_width_px = 0.5 * line.width * pixels_per_point;
     let color = line.color.to_array();
     let dashes: Vec<f64> = line.dashes.iter().map(|length| f64::from(length * pixels_per_point)).collect();
@@ -233,7 +238,7 @@ fn clipped_triangles(corners: &[ViewCorner], near_m: f64) -> Vec<[ViewCorner; 3]
     (2..kept.len()).map(|last| [kept[0], kept[last - 1], kept[last]]).collect()
 }
 
-fn lay_out_image(quad: &ImageQuad, view: &View) -> Option<ImageShape> {
+fn lay_out_image(quad: &ImageQuad, view: &SceneView) -> Option<ImageShape> {
     let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     let corners: Vec<ViewCorner> =
         quad.corners_m.iter().zip(uvs).map(|(corner, uv)| (view.in_view(corner), uv)).collect();

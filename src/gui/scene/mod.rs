@@ -21,7 +21,7 @@ mod world;
 use egui::{Rect, Response, Role, Sense, Ui, Vec2, WidgetInfo, pos2, vec2};
 use nalgebra::Vector3;
 
-use self::camera::{Orbit, OrbitCamera, View, Viewport, frame};
+use self::camera::{Orbit, OrbitCamera, SceneView, Viewport, frame};
 use self::canvas::Canvas;
 pub use self::canvas::SceneBackend;
 use self::chain::{ChainModel, ChainPose};
@@ -200,7 +200,7 @@ impl ScenePanel {
         {
             framing = OrbitCamera { target_m: at, distance_m: framing.distance_m * VEHICLE_DISTANCE_RATIO, ..framing };
         }
-        let view = View::new(self.world.applied(framing), viewport);
+        let view = SceneView::new(self.world.applied(framing), viewport);
         let mut lines = legend_lines(&views, &lanes, context.cursor_ns, context.recording.truth_name(), theme);
         if context.recording.position_truth.is_some() {
             let text = "ground truth, positions of the antenna".to_owned();
@@ -208,7 +208,7 @@ impl ScenePanel {
         }
         describe(response, &lines.iter().map(|line| line.text.as_str()).collect::<Vec<_>>().join(", "));
         navigate(ui, response, &mut self.world, default_world_orbit(), &view);
-        let view = View::new(self.world.applied(framing), viewport);
+        let view = SceneView::new(self.world.applied(framing), viewport);
 
         let options =
             WorldOptions { landmarks: self.landmarks, keyframes: self.keyframes, image: self.image, tube: self.tube };
@@ -279,10 +279,10 @@ impl ScenePanel {
         let home = Orbit::from_direction(close_up_direction(context));
         let mut orbit = self.close_up.unwrap_or(home);
         let framing = frame(&chain.framing_points_m(), orbit.towards, &viewport);
-        let view = View::new(orbit.applied(framing), viewport);
+        let view = SceneView::new(orbit.applied(framing), viewport);
         navigate(ui, &response, &mut orbit, home, &view);
         self.close_up = (orbit != home).then_some(orbit);
-        let view = View::new(orbit.applied(framing), viewport);
+        let view = SceneView::new(orbit.applied(framing), viewport);
         let drawing = lay_out(&chain.scene(theme), &view, scale, theme.surface);
         let drawing = self.close_up_canvas.show(ui, view_rect, drawing);
         overlay::labels(&painter, view_rect, scale, &drawing.labels, theme.surface);
@@ -425,7 +425,7 @@ fn close_up_rect(area: Rect, place: Vec2, pixels_per_point: f32) -> Rect {
 
 /// Navigation by pointer: dragging rotates, with Shift or another button it shifts, the wheel zooms, a double click
 /// resets the view.
-fn navigate(ui: &Ui, response: &Response, orbit: &mut Orbit, home: Orbit, view: &View) {
+fn navigate(ui: &Ui, response: &Response, orbit: &mut Orbit, home: Orbit, view: &SceneView) {
     if response.double_clicked() {
         *orbit = home;
     }

@@ -3,7 +3,7 @@
 use egui::{Align2, Color32, Galley, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 use std::sync::Arc;
 
-use super::camera::{View, round_length};
+use super::camera::{SceneView, round_length};
 use super::chain::{ChainModel, axis_colors};
 use super::layout::ScreenLabel;
 use crate::geometry::principal_angle;
@@ -125,7 +125,14 @@ fn length_text(length_m: f64) -> String {
 }
 
 /// Draws a bar of a round length, valid at the depth of the view's target, in the lower left corner.
-pub(super) fn scale_bar(painter: &Painter, rect: Rect, pixels_per_point: f32, theme: &Theme, view: &View, note: &str) {
+pub(super) fn scale_bar(
+    painter: &Painter,
+    rect: Rect,
+    pixels_per_point: f32,
+    theme: &Theme,
+    view: &SceneView,
+    note: &str,
+) {
     const WANTED_PX: f64 = 90.0;
     let metres_per_point = view.metres_per_px() * f64::from(pixels_per_point);
     let length_m = round_length(WANTED_PX * metres_per_point);
@@ -141,7 +148,7 @@ pub(super) fn scale_bar(painter: &Painter, rect: Rect, pixels_per_point: f32, th
 }
 
 /// Draws the directions of x, y, z as small axes in a corner.
-pub(super) fn gizmo(painter: &Painter, centre: Pos2, theme: &Theme, view: &View) {
+pub(super) fn gizmo(painter: &Painter, centre: Pos2, theme: &Theme, view: &SceneView) {
     const REACH: f32 = 20.0;
     let camera = view.camera;
     let mut arms: Vec<(f64, Vec2, Color32, &str)> = [("x", 0), ("y", 1), ("z", 2)]

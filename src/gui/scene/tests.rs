@@ -5,9 +5,9 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::camera::{Orbit, OrbitCamera, View, Viewport, frame, round_length};
+use super::camera::{Orbit, OrbitCamera, SceneView, Viewport, frame, round_length};
 use super::chain::{ChainModel, ChainPose};
-use super::layout::{Drawing, lay_out};
+use super::layout::{SceneDrawing, lay_out};
 use super::model::{Dot, Face, ImageQuad, Line, SceneModel};
 use super::{Follow, ScenePanel, cpu};
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
@@ -22,12 +22,12 @@ use crate::text::Named as _;
 const GROUND: Color32 = Color32::from_rgb(1, 2, 3);
 
 /// A view from ten metres in front of the origin, along the world's y axis: x to the right, z up, focal length 250 px.
-fn front_view() -> View {
+fn front_view() -> SceneView {
     let camera = OrbitCamera { target_m: Vector3::zeros(), towards: -Vector3::y(), distance_m: 10.0 };
-    View::new(camera, Viewport::world([400, 200], [0.0, 0.0, 400.0, 200.0]))
+    SceneView::new(camera, Viewport::world([400, 200], [0.0, 0.0, 400.0, 200.0]))
 }
 
-fn draw_front(model: &SceneModel) -> (Drawing, egui::ColorImage) {
+fn draw_front(model: &SceneModel) -> (SceneDrawing, egui::ColorImage) {
     let drawing = lay_out(model, &front_view(), 1.0, GROUND);
     let image = cpu::draw(&drawing);
     (drawing, image)
@@ -76,7 +76,7 @@ fn framing_contains_every_point_and_fills_the_view() {
     let viewport = Viewport::world([800, 450], [0.0, 20.0, 500.0, 450.0]);
     for direction in directions {
         let towards = Vector3::from(direction).normalize();
-        let view = View::new(frame(&points, towards, &viewport), viewport);
+        let view = SceneView::new(frame(&points, towards, &viewport), viewport);
         let seen: Vec<_> = points.iter().map(|point| view.project(point).expect("in front")).collect();
         let bound = |value: fn(&super::camera::ScreenPoint) -> f64| {
             seen.iter().map(value).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))

@@ -3,7 +3,7 @@
 use super::context::StudyPanel;
 use super::model::StudyModel;
 use super::plots::{differences, distributions, success_rates};
-use super::strips::Strip;
+use super::strips::StripPlot;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::study::view::{Study, parameter_errors};
 
@@ -26,7 +26,7 @@ pub(super) fn table(panel: StudyPanel, study: &Study, model: &mut StudyModel) ->
     }
 }
 
-fn points(study: &Study, title: &str, strips: &[Strip]) -> String {
+fn points(study: &Study, title: &str, strips: &[StripPlot]) -> String {
     let mut table = CsvWriter::new(["group", "key", "run", title]);
     for strip in strips {
         for (row, value) in &strip.points {

@@ -19,14 +19,14 @@ pub struct StudyOptions {
 
 /// A condition as typed, and the last valid one.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Condition {
+pub(crate) struct TypedCondition {
     pub(crate) text: String,
     pub(crate) filter: RowFilter,
     /// Error in the text.
     pub(crate) problem: Option<String>,
 }
 
-impl Condition {
+impl TypedCondition {
     fn new(text: &str, study: &Study) -> Result<Self, String> {
         let filter = RowFilter::parse(text, &study.runs).map_err(|problem| problem.to_string())?;
         Ok(Self { text: text.to_owned(), filter, problem: None })
@@ -53,8 +53,8 @@ impl Condition {
 /// State common to all panels.
 #[derive(Clone, Debug)]
 pub(crate) struct StudyModel {
-    pub(crate) filter: Condition,
-    pub(crate) success: Condition,
+    pub(crate) filter: TypedCondition,
+    pub(crate) success: TypedCondition,
     pub(crate) sort: Vec<SortKey>,
     group: Option<String>,
     reference: Option<String>,
@@ -92,9 +92,9 @@ impl StudyModel {
                 .unwrap_or(0),
         };
         let default_success = if study.runs.place(columns::STATUS).is_some() { SUCCESS } else { "" };
-        let success = Condition::new(options.success.as_deref().unwrap_or(default_success), study)?;
+        let success = TypedCondition::new(options.success.as_deref().unwrap_or(default_success), study)?;
         let mut model = Self {
-            filter: Condition::new(&options.filter, study)?,
+            filter: TypedCondition::new(&options.filter, study)?,
             success,
             sort: Vec::new(),
             group,

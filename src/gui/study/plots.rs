@@ -6,7 +6,7 @@ use egui::{Label, RichText, Ui};
 
 use super::context::StudyContext;
 use super::model::{StudyModel, shown_group};
-use super::strips::{Strip, StripsFrame, StripsPlot};
+use super::strips::{StripPlot, StripsFrame, StripsPlot};
 use crate::gui::units::{counted, fixed, significant};
 use crate::study::view::{Metric, Spread, Study, SuccessRate, ValueAxis, columns, paired_differences, success_rate};
 
@@ -14,7 +14,7 @@ use crate::study::view::{Metric, Spread, Study, SuccessRate, ValueAxis, columns,
 #[derive(Debug, Default)]
 struct Cached {
     generation: u64,
-    strips: Vec<Strip>,
+    strips: Vec<StripPlot>,
     axis: Option<ValueAxis>,
 }
 
@@ -23,9 +23,9 @@ impl Cached {
     fn read(
         &mut self,
         model: &StudyModel,
-        strips: impl FnOnce() -> Vec<Strip>,
-        axis: impl FnOnce(&[Strip]) -> ValueAxis,
-    ) -> (&[Strip], ValueAxis) {
+        strips: impl FnOnce() -> Vec<StripPlot>,
+        axis: impl FnOnce(&[StripPlot]) -> ValueAxis,
+    ) -> (&[StripPlot], ValueAxis) {
         if self.axis.is_none() || self.generation != model.generation {
             self.strips = strips();
             self.generation = model.generation;
@@ -35,7 +35,7 @@ impl Cached {
     }
 }
 
-fn values(strips: &[Strip]) -> impl Iterator<Item = f64> {
+fn values(strips: &[StripPlot]) -> impl Iterator<Item = f64> {
     strips.iter().flat_map(|strip| strip.points.iter().map(|(_, value)| *value))
 }
 
@@ -90,7 +90,7 @@ impl DistributionPanel {
 }
 
 /// The values of a metric by group.
-pub(super) fn distributions(study: &Study, model: &StudyModel, metric: &Metric) -> Vec<Strip> {
+pub(super) fn distributions(study: &Study, model: &StudyModel, metric: &Metric) -> Vec<StripPlot> {
     let strip = |(number, group): (usize, &crate::study::view::RowGroup)| {
         let points = metric.values(&study.runs, &group.rows);
         let spread = Spread::of(points.iter().map(|(_, value)| *value));
@@ -103,7 +103,7 @@ pub(super) fn distributions(study: &Study, model: &StudyModel, metric: &Metric) 
             .unwrap_or_else(|| vec!["no value".to_owned()]);
         let all = group.rows.len();
         notes.push(if points.len() == all { format!("n = {all}") } else { format!("n = {} of {all}", points.len()) });
-        Strip {
+        StripPlot {
             name: shown_group(&group.name, model.group()),
             notes,
             hover: "Median, quartiles, number of runs with a value".to_owned(),
@@ -155,7 +155,7 @@ impl PairedPanel {
 }
 
 /// Differences of every group except the reference.
-pub(super) fn differences(study: &Study, model: &StudyModel, metric: &Metric, reference: &str) -> Vec<Strip> {
+pub(super) fn differences(study: &Study, model: &StudyModel, metric: &Metric, reference: &str) -> Vec<StripPlot> {
     let Some(column) = model.group() else { return Vec::new() };
     let groups = &model.arranged.groups;
     let color = |name: &str| groups.iter().position(|group| group.name == name).unwrap_or_default();
@@ -178,7 +178,7 @@ pub(super) fn differences(study: &Study, model: &StudyModel, metric: &Metric, re
         }
         let lower = 100.0 * of.below as f64 / of.pairs.len().max(1) as f64;
         notes.push(format!("{}, {} % lower", counted(of.pairs.len(), "pair"), fixed(lower, 0)));
-        Strip {
+        StripPlot {
             name: shown_group(&of.name, Some(column)),
             notes,
             hover: format!(
@@ -224,7 +224,7 @@ impl SuccessPanel {
     }
 }
 
-pub(super) fn success_rates(study: &Study, model: &StudyModel) -> Vec<Strip> {
+pub(super) fn success_rates(study: &Study, model: &StudyModel) -> Vec<StripPlot> {
     let strip = |(number, group): (usize, &crate::study::view::RowGroup)| {
         let succeeded = |row: &&usize| model.success.filter.passes(&study.runs, **row);
         let rate = success_rate(group.rows.iter().filter(succeeded).count(), group.rows.len());
@@ -235,7 +235,7 @@ pub(super) fn success_rates(study: &Study, model: &StudyModel) -> Vec<Strip> {
         }
         let failures: Vec<String> = failures.into_iter().map(|(status, count)| format!("{count} {status}")).collect();
         let percent = |value: f64| fixed(100.0 * value, 1);
-        Strip {
+        StripPlot {
             name: shown_group(&group.name, model.group()),
             notes: vec![
                 format!("{} %", percent(rate)),

@@ -18,7 +18,7 @@ const BIN: f32 = 3.0;
 
 /// The values of one group.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Strip {
+pub(super) struct StripPlot {
     pub(super) name: String,
     /// Lines of text at the right of the strip.
     pub(super) notes: Vec<String>,
@@ -63,7 +63,13 @@ pub(super) struct StripsFrame<'a> {
 }
 
 impl StripsPlot {
-    pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &mut StudyContext<'_>, strips: &[Strip], frame: &StripsFrame<'_>) {
+    pub(super) fn ui(
+        &mut self,
+        ui: &mut Ui,
+        ctx: &mut StudyContext<'_>,
+        strips: &[StripPlot],
+        frame: &StripsFrame<'_>,
+    ) {
         let theme = *ctx.theme;
         let (width, height) = (ui.available_width(), ui.available_height());
         let each = ((height - AXIS) / strips.len().max(1) as f32).clamp(STRIP[0], STRIP[1]);
@@ -92,7 +98,7 @@ impl StripsPlot {
         &mut self,
         ui: &Ui,
         ctx: &mut StudyContext<'_>,
-        strips: &[Strip],
+        strips: &[StripPlot],
         frame: &StripsFrame<'_>,
         rect: Rect,
         [left, width, right]: [f32; 3],
@@ -113,7 +119,7 @@ impl StripsPlot {
         let key = Key { generation: ctx.model.generation, origin: rect.min, size: rect.size(), theme: theme.name };
         if self.key != Some(key) {
             self.key = Some(key);
-            let points = |(number, strip): (usize, &Strip)| {
+            let points = |(number, strip): (usize, &StripPlot)| {
                 let color = theme.run(strip.color).color.gamma_multiply(0.8);
                 Points::new(swarm(&strip.points, row(number), &frame.axis), color)
             };
@@ -145,7 +151,7 @@ impl StripsPlot {
         &self,
         ui: &Ui,
         ctx: &mut StudyContext<'_>,
-        strips: &[Strip],
+        strips: &[StripPlot],
         frame: &StripsFrame<'_>,
         whole: Rect,
         painter: &Painter,
@@ -198,7 +204,7 @@ pub(super) fn swarm(points: &[(usize, f64)], place: Rect, axis: &ValueAxis) -> V
 }
 
 /// Paints the interval of a strip as a bar with a dot, with a light outline so that it stays visible over points.
-fn interval_ui(painter: &Painter, theme: &Theme, strip: &Strip, place: Rect, x: impl Fn(f64) -> f32) {
+fn interval_ui(painter: &Painter, theme: &Theme, strip: &StripPlot, place: Rect, x: impl Fn(f64) -> f32) {
     let Some([low, middle, high]) = strip.interval else { return };
     let color = if strip.points.is_empty() { theme.run(strip.color).color } else { theme.text_strong };
     let y = place.center().y;
@@ -213,7 +219,7 @@ fn interval_ui(painter: &Painter, theme: &Theme, strip: &Strip, place: Rect, x: 
 }
 
 /// Draws name and notes of a strip at its left and right.
-fn texts_ui(ui: &Ui, theme: &Theme, strip: &Strip, place: Rect, [left, right]: [f32; 2], width: f32) {
+fn texts_ui(ui: &Ui, theme: &Theme, strip: &StripPlot, place: Rect, [left, right]: [f32; 2], width: f32) {
     let clip = ui.clip_rect();
     let name_place = Rect::from_x_y_ranges(left..=place.left() - 4.0, place.y_range());
     let painter = ui.painter_at(name_place.intersect(clip));

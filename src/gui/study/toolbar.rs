@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::{Align, Button, ComboBox, Label, Layout, RichText, TextEdit, Ui, WidgetInfo};
 
 use super::context::StudyRequest;
-use super::model::{Condition, StudyModel, shown_group};
+use super::model::{StudyModel, TypedCondition, shown_group};
 use crate::gui::theme::Theme;
 use crate::gui::units::counted;
 use crate::study::view::Study;
@@ -59,7 +59,7 @@ fn condition_ui(
     hover: &str,
     width: f32,
     study: &Study,
-    condition: &mut Condition,
+    condition: &mut TypedCondition,
 ) -> bool {
     ui.label(name);
     let edit = TextEdit::singleline(&mut condition.text).hint_text(hint).desired_width(width).code_editor();

@@ -7,7 +7,7 @@ use egui::{Align2, Color32, Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
 
 use super::model::{FEATURES, INFORMED, RMS, RunLanes, STRUCTURAL};
 use crate::gui::PanelContext;
-use crate::gui::events::{Mark, look_of, paint_mark};
+use crate::gui::events::{EventSymbol, look_of, paint_mark};
 use crate::gui::plot::{
     Curve, PlotArea, Readout, paint_curve, paint_hatch, paint_steps, paint_value_axis, paint_values, read_lines,
     visible_segments,
@@ -293,17 +293,17 @@ fn highest_by_column(area: &PlotArea, counts: &[(i64, usize)]) -> Vec<(f32, usiz
 pub(super) fn warnings(painter: &Painter, theme: &Theme, area: &PlotArea, log_ns: &[i64], runs: &[RunLanes]) {
     let step_ns = runs.iter().flat_map(|lanes| &lanes.warnings).map(|(stamp_ns, _)| *stamp_ns);
     let mut covered = Covered::default();
-    let mut place = |stamp_ns: i64, mark: Mark, color: Color32| {
+    let mut place = |stamp_ns: i64, mark: EventSymbol, color: Color32| {
         let center = pos2(area.x(stamp_ns), area.rect.center().y);
         if (area.begin_ns..=area.end_ns).contains(&stamp_ns) && covered.is_new(center, mark as u8) {
             paint_mark(painter, mark, center, 9.0, color);
         }
     };
     for stamp_ns in step_ns {
-        place(stamp_ns, Mark::Disc, theme.warn);
+        place(stamp_ns, EventSymbol::Disc, theme.warn);
     }
     for stamp_ns in log_ns {
-        place(*stamp_ns, Mark::Square, theme.warn);
+        place(*stamp_ns, EventSymbol::Square, theme.warn);
     }
 }
 

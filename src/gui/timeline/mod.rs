@@ -10,7 +10,7 @@ mod parameters_lane;
 mod stretch;
 mod transport;
 
-pub use pace::{Pace, Reading};
+pub use pace::{Pace, PaceReading};
 pub(crate) use transport::{SPEEDS, next_speed, toggled_loop};
 
 use egui::{Align2, PointerButton, Rect, Response, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};

@@ -15,7 +15,7 @@ pub struct Pace {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reading {
+pub struct PaceReading {
     /// Log seconds per second.
     pub speed: f64,
     /// Frames drawn per second (fps).
@@ -38,10 +38,10 @@ impl Pace {
     }
 
     /// The measured speed, `None` until playback has run for long enough.
-    pub fn reading(&self) -> Option<Reading> {
+    pub fn reading(&self) -> Option<PaceReading> {
         let ((begin_s, begin_ns), (end_s, end_ns)) = (self.frames.front()?, self.frames.back()?);
         let elapsed_s = end_s - begin_s;
-        (elapsed_s >= MIN_MEASURED_S).then(|| Reading {
+        (elapsed_s >= MIN_MEASURED_S).then(|| PaceReading {
             speed: (end_ns - begin_ns) as f64 * 1e-9 / elapsed_s,
             fps: (self.frames.len() - 1) as f64 / elapsed_s,
         })

@@ -6,7 +6,7 @@ use egui::{PointerButton, Rangef, Rect, Response, Role, Stroke, Ui, WidgetInfo};
 
 use super::determinations::{self, LevelMap};
 use super::lanes::{self, Lane};
-use super::stretch::Stretch;
+use super::stretch::TimelineStretch;
 use super::transport;
 use crate::gui::PanelContext;
 use crate::gui::flight::DeterminationHistory;
@@ -23,7 +23,7 @@ pub(super) struct ParametersLane {
     pub(super) rows_rect: Option<Rect>,
     /// Stretch that was selected on the rows.
     brush_ns: Option<(i64, i64)>,
-    stretch: Option<Stretch>,
+    stretch: Option<TimelineStretch>,
 }
 
 fn selected_run<'a>(ctx: &PanelContext<'a>) -> Option<&'a RunRecord> {
@@ -98,7 +98,7 @@ impl ParametersLane {
         }
         let Some(run) = selected_run(ctx) else { return };
         if !self.stretch.as_ref().is_some_and(|known| known.is_of(run, range_ns)) {
-            self.stretch = Stretch::read(run, range_ns, &ctx.recording.rig.joint_names());
+            self.stretch = TimelineStretch::read(run, range_ns, &ctx.recording.rig.joint_names());
         }
         let top = area.rect.top() - transport::HEIGHT;
         let open = self.stretch.as_ref().is_some_and(|it| it.window_ui(ui.ctx(), ctx, top, columns.center()));

@@ -14,7 +14,7 @@ const SIZE: [f32; 2] = [470.0, 260.0];
 
 /// A stretch of one run, computed once.
 #[derive(Debug)]
-pub(super) struct Stretch {
+pub(super) struct TimelineStretch {
     run: u64,
     /// Number of steps of the run when the stretch was computed.
     steps: usize,
@@ -43,7 +43,7 @@ impl StretchRow {
     }
 }
 
-impl Stretch {
+impl TimelineStretch {
     /// True if the stretch belongs to this run and range, with all its steps so far.
     pub(super) fn is_of(&self, run: &RunRecord, range_ns: (i64, i64)) -> bool {
         (self.run, self.steps, self.range_ns) == (run.id, run.steps.len(), range_ns)
@@ -184,7 +184,7 @@ mod tests {
         let joints = recording.rig.joint_names();
         let (first, last) = (first_tracked_frame() + 5, first_tracked_frame() + 30);
         let range_ns = (run.steps[first].report.stamp_ns, run.steps[last].report.stamp_ns);
-        let stretch = Stretch::read(run, range_ns, &joints).expect("the run estimates parameters");
+        let stretch = TimelineStretch::read(run, range_ns, &joints).expect("the run estimates parameters");
         assert!(stretch.is_of(run, range_ns) && !stretch.is_of(run, (0, range_ns.1)));
         let calibration = |step: usize| &run.steps[step].report.calibration;
         assert_eq!(stretch.rows.len(), calibration(last).parameters.len());
@@ -197,8 +197,8 @@ mod tests {
         assert!(stretch.rows[0].by.is_some(), "{:?}", stretch.rows[0]);
         assert!(stretch.motion.contains("path ") && stretch.motion.contains(&joints[0]), "{}", stretch.motion);
         // Before the first solve σ is that of the prior.
-        let early = Stretch::read(run, (0, range_ns.1), &joints).unwrap();
+        let early = TimelineStretch::read(run, (0, range_ns.1), &joints).unwrap();
         assert!(early.rows.iter().all(|row| row.before == row.prior));
-        assert!(Stretch::read(run, (0, 1), &joints).is_none());
+        assert!(TimelineStretch::read(run, (0, 1), &joints).is_none());
     }
 }

@@ -2,7 +2,7 @@
 
 use egui::{Button, ComboBox, RichText, TextStyle, Ui, vec2};
 
-use super::pace::Reading;
+use super::pace::PaceReading;
 use crate::gui::PanelContext;
 use crate::gui::help::terms::window;
 use crate::gui::units::{fixed, seconds};
@@ -24,7 +24,7 @@ pub(crate) fn next_speed(speed: f64, faster: bool) -> Option<f64> {
 }
 
 /// Draws the buttons, the time, and the progress of the estimation; a figure has only the time.
-pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, pace: Option<Reading>) {
+pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, pace: Option<PaceReading>) {
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT - 4.0);
         ui.spacing_mut().item_spacing.x = 3.0;
@@ -145,7 +145,7 @@ fn solver_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord) {
 
 /// Shows the frame rate, and a warning when the cursor is slower than the set speed. The cursor is then limited by the
 /// estimator: slow drawing only skips frames.
-fn pace_ui(ui: &mut Ui, ctx: &PanelContext<'_>, pace: Reading) {
+fn pace_ui(ui: &mut Ui, ctx: &PanelContext<'_>, pace: PaceReading) {
     /// Ratio of the set speed below which the cursor counts as slow.
     const LATE_RATIO: f64 = 0.9;
     let theme = ctx.theme;

@@ -19,7 +19,7 @@ pub(super) struct Arrangement {
 
 /// Changes of settings, layout and markers, oldest first.
 #[derive(Debug, Default)]
-pub(super) struct History {
+pub(super) struct SettingsHistory {
     before: VecDeque<Arrangement>,
     undone: Vec<Arrangement>,
     /// State after the last change in `before` and before the first one in `undone`.
@@ -30,7 +30,7 @@ pub(super) struct History {
     barrier: Option<String>,
 }
 
-impl History {
+impl SettingsHistory {
     /// Records a change since the last call; returns true if another frame is needed for that.
     ///
     /// A change is recorded when it is complete: no button of the pointer is down (`settled`), and two calls get the
@@ -127,7 +127,7 @@ mod tests {
     use crate::gui::theme::ThemeName;
 
     /// Two frames after a change.
-    fn complete(history: &mut History, settings: &Settings, layout: &PanelLayout) {
+    fn complete(history: &mut SettingsHistory, settings: &Settings, layout: &PanelLayout) {
         history.follow(settings, layout, &Markers::default(), true);
         assert!(!history.follow(settings, layout, &Markers::default(), true));
     }
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn changes_are_undone_and_redone_in_order() {
         let (mut settings, mut layout) = (Settings::default(), PanelLayout::default());
-        let mut history = History::default();
+        let mut history = SettingsHistory::default();
         complete(&mut history, &settings, &layout);
         assert!(!history.can_undo() && history.undo().is_none());
         layout.arrange(Preset::Scene);
@@ -168,10 +168,10 @@ mod tests {
     #[test]
     fn markers_are_undone_within_their_session() {
         let (settings, layout) = (Settings::default(), PanelLayout::default());
-        let mut history = History::default();
+        let mut history = SettingsHistory::default();
         complete(&mut history, &settings, &layout);
         let one = Markers::default().toggled(5);
-        let follow = |history: &mut History, markers: &Markers| {
+        let follow = |history: &mut SettingsHistory, markers: &Markers| {
             history.follow(&settings, &layout, markers, true) || history.follow(&settings, &layout, markers, true)
         };
         follow(&mut history, &one);
@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn an_act_without_undo_is_not_skipped() {
         let (mut settings, layout) = (Settings::default(), PanelLayout::default());
-        let mut history = History::default();
+        let mut history = SettingsHistory::default();
         complete(&mut history, &settings, &layout);
         settings.scale = 2.0;
         complete(&mut history, &settings, &layout);
@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn an_open_tab_is_no_change_and_the_number_of_changes_is_limited() {
         let (mut settings, mut layout) = (Settings::default(), PanelLayout::default());
-        let mut history = History::default();
+        let mut history = SettingsHistory::default();
         complete(&mut history, &settings, &layout);
         layout.set_visible(PanelName::Residuals, true);
         complete(&mut history, &settings, &layout);

@@ -7,7 +7,7 @@ use egui::{Rect, Ui, Vec2};
 use super::context_menu::place::MenuPlace;
 use super::dialogs::state::Dialogs;
 use super::focus_ring::FocusRing;
-use super::history::{Arrangement, History};
+use super::history::{Arrangement, SettingsHistory};
 use super::legend::RunLegend;
 use super::notices::{NoticeLevel, Notices};
 use super::panels::Panels;
@@ -60,7 +60,7 @@ pub struct MainWindow {
     pub(super) tour: Tour,
     pub(super) ring: FocusRing,
     pub(super) layout: PanelLayout,
-    pub(super) history: History,
+    pub(super) history: SettingsHistory,
     /// The layout when its last change was noticed.
     pub(super) noticed: Option<PanelLayout>,
     /// The value under the pointer.

@@ -1,6 +1,6 @@
 //! Correlation of angular speeds over all offsets of the search.
 
-use super::series::{DISTINCT_S, MIN_ROTATIONS, Measured, RotationReference};
+use super::series::{DISTINCT_S, MIN_ROTATIONS, PairRotation, RotationReference};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 
 /// Step of the search and of the sampled speeds, in seconds.
@@ -34,7 +34,7 @@ struct SpeedGrid {
 }
 
 impl SpeedGrid {
-    fn of(measured: &[Measured]) -> Self {
+    fn of(measured: &[PairRotation]) -> Self {
         let step_ns = ns_from_seconds(STEP_S);
         let start_ns = measured.iter().map(|pair| pair.from_ns).min().unwrap_or(0);
         let mut speeds: Vec<(usize, f64)> = Vec::new();
@@ -53,7 +53,7 @@ impl SpeedGrid {
 /// Correlation coefficient of the angular speeds of images and reference by offset in seconds; offsets with too little
 /// overlap are omitted.
 pub(super) fn correlation(
-    measured: &[Measured],
+    measured: &[PairRotation],
     reference: &RotationReference,
     guess_s: f64,
     search_s: f64,

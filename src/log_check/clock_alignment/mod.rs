@@ -20,7 +20,7 @@ pub use self::refinement::ClockAlignment;
 use self::refinement::Refined;
 pub(super) use self::refinement::{BIAS_SIGMA_RAD_PER_S, best_rotation};
 pub use self::series::RotationReference;
-use self::series::{DISTINCT_S, MIN_ROTATIONS, Measured};
+use self::series::{DISTINCT_S, MIN_ROTATIONS, PairRotation};
 use super::ImageRotation;
 use super::statistics::median;
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
@@ -109,8 +109,8 @@ pub fn align_clocks(
     best
 }
 
-fn single(images: &[ImageRotation]) -> Vec<Measured> {
-    let measured = |image: &ImageRotation| Measured {
+fn single(images: &[ImageRotation]) -> Vec<PairRotation> {
+    let measured = |image: &ImageRotation| PairRotation {
         from_ns: image.from_ns,
         to_ns: image.to_ns,
         rotation: so3::log(&image.second_from_first),
@@ -137,7 +137,7 @@ fn without_outliers(images: &[ImageRotation]) -> Vec<ImageRotation> {
 
 /// Rotations over at least `length_s`, composed from those of consecutive images; each one starts in the middle of the
 /// previous one.
-fn composed(images: &[ImageRotation], length_s: f64) -> Vec<Measured> {
+fn composed(images: &[ImageRotation], length_s: f64) -> Vec<PairRotation> {
     let half_ns = ns_from_seconds(0.25 * length_s);
     let mut found = Vec::new();
     let mut start = 0;
@@ -154,7 +154,7 @@ fn composed(images: &[ImageRotation], length_s: f64) -> Vec<Measured> {
             && let (Some(before), Some(after)) =
                 (mean_rate(images, from_ns, half_ns), mean_rate(images, to_ns, half_ns))
         {
-            found.push(Measured { from_ns, to_ns, rotation: so3::log(&rotation), by_shift: after - before });
+            found.push(PairRotation { from_ns, to_ns, rotation: so3::log(&rotation), by_shift: after - before });
         }
         start += (end - start).div_ceil(2).max(1);
     }
@@ -172,7 +172,7 @@ fn mean_rate(images: &[ImageRotation], around_ns: i64, half_ns: i64) -> Option<V
 }
 
 fn align_rotations(
-    measured: &[Measured],
+    measured: &[PairRotation],
     reference: &RotationReference,
     guess_s: f64,
     search_s: f64,

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
 use serde::Serialize;
 
 use super::super::statistics::median;
-use super::series::{MIN_ROTATIONS, Measured, RotationReference};
+use super::series::{MIN_ROTATIONS, PairRotation, RotationReference};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 
 /// Prior standard deviation of the drift between two quartz clocks.
@@ -66,8 +66,8 @@ enum Derivative {
 }
 
 /// Refines an offset; `None` if too few rotations overlap, or without convergence.
-pub(super) fn refine(measured: &[Measured], reference: &RotationReference, offset_s: f64) -> Option<Refined> {
-    let middles = measured.iter().map(Measured::middle_s);
+pub(super) fn refine(measured: &[PairRotation], reference: &RotationReference, offset_s: f64) -> Option<Refined> {
+    let middles = measured.iter().map(PairRotation::middle_s);
     let (first_s, last_s) =
         middles.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), middle| (first.min(middle), last.max(middle)));
     let middle_s = 0.5 * (first_s + last_s);
@@ -103,8 +103,8 @@ pub(super) fn refine(measured: &[Measured], reference: &RotationReference, offse
 }
 
 impl Refined {
-    fn rows(&self, measured: &[Measured], reference: &RotationReference) -> Vec<Row> {
-        let row = |pair: &Measured| {
+    fn rows(&self, measured: &[PairRotation], reference: &RotationReference) -> Vec<Row> {
+        let row = |pair: &PairRotation| {
             let since_middle_s = pair.middle_s() - self.middle_s;
             let shift_ns = ns_from_seconds(self.offset_s + self.drift * since_middle_s);
             let at = |extra_ns: i64| {
@@ -220,12 +220,12 @@ impl Refined {
 
     pub(super) fn alignment(
         &self,
-        measured: &[Measured],
+        measured: &[PairRotation],
         reference: &RotationReference,
         next: Option<(f64, f64)>,
         correlation: Vec<(f64, f64)>,
     ) -> ClockAlignment {
-        let speed = |pair: &Measured| {
+        let speed = |pair: &PairRotation| {
             let shift_s = self.offset_s + self.drift * (pair.middle_s() - self.middle_s);
             let shift_ns = ns_from_seconds(shift_s);
             let predicted = reference.rotation(pair.from_ns + shift_ns, pair.to_ns + shift_ns)?;

@@ -14,7 +14,7 @@ pub(super) const DISTINCT_S: f64 = 0.25;
 
 /// Rotation between two images.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Measured {
+pub(super) struct PairRotation {
     /// Stamps of both images.
     pub(super) from_ns: i64,
     pub(super) to_ns: i64,
@@ -25,7 +25,7 @@ pub(super) struct Measured {
     pub(super) by_shift: Vector3<f64>,
 }
 
-impl Measured {
+impl PairRotation {
     pub(super) fn interval_s(&self) -> f64 {
         seconds_from_ns(self.to_ns - self.from_ns)
     }

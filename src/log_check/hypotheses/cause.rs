@@ -4,7 +4,7 @@ use super::super::{Area, MeasuredFault, Severity};
 
 /// Cause of a misfit in words.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::log_check) struct Cause {
+pub(in crate::log_check) struct NamedCause {
     pub(in crate::log_check) severity: Severity,
     pub(in crate::log_check) area: Area,
     /// Names the cause with its value and time.
@@ -13,7 +13,7 @@ pub(in crate::log_check) struct Cause {
     pub(in crate::log_check) fault: Option<MeasuredFault>,
 }
 
-impl Cause {
+impl NamedCause {
     /// A cause without its value.
     pub(super) fn new(severity: Severity, area: Area, title: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self { severity, area, title: title.into(), remedy: remedy.into(), fault: None }

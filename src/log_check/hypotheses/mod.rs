@@ -16,7 +16,7 @@ mod text;
 use rayon::prelude::*;
 
 use self::candidates::{candidates, intrinsics};
-pub(super) use self::cause::Cause;
+pub(super) use self::cause::NamedCause;
 use self::fit::{Fitted, Fitter, Hypothesis, Kind, length_s};
 use self::focal_grid::FocalGrid;
 use super::rotation_data::RotationData;
@@ -38,17 +38,17 @@ const UNEXPLAINED_IMPROVEMENT: f64 = 0.1;
 /// Result of a comparison of all hypotheses.
 pub(super) enum Explanation {
     /// One cause explains the misfit, and no other does.
-    Decisive(Cause, String),
+    Decisive(NamedCause, String),
     /// Causes that remain, best first, each with what it leaves; may be empty.
-    Open(Vec<(Cause, String)>),
+    Open(Vec<(NamedCause, String)>),
 }
 
 /// Causes of rotations that noise explains.
 pub(super) struct WithinNoise {
     /// Cause with what it leaves, if it is much more likely than none.
-    pub(super) decisive: Option<(Cause, String)>,
+    pub(super) decisive: Option<(NamedCause, String)>,
     /// Causes that explain the rotations as well as another orientation of the camera does, the most likely first.
-    pub(super) instead_of_orientation: Vec<Cause>,
+    pub(super) instead_of_orientation: Vec<NamedCause>,
     /// Number of them that are more likely than another orientation.
     pub(super) more_likely: usize,
 }
@@ -99,8 +99,8 @@ pub(super) fn explain_within_noise(
 }
 
 /// Cause that a fit describes, in words and with its value.
-fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
-    Cause { fault: fault::fault(data, found), ..text::cause(data, found) }
+fn cause(data: &RotationData<'_>, found: &Fitted) -> NamedCause {
+    NamedCause { fault: fault::fault(data, found), ..text::cause(data, found) }
 }
 
 /// Hypotheses about one camera with their fits.
@@ -157,7 +157,7 @@ impl<'a> Comparison<'a> {
     }
 
     /// Cause in words, with what it leaves.
-    fn describe(&self, found: &Fitted) -> (Cause, String) {
+    fn describe(&self, found: &Fitted) -> (NamedCause, String) {
         let compared = match length_s(self.fitter.chain) {
             0.0 => "rotations from image to image".to_owned(),
             length_s => format!("rotations over {length_s:.1} s"),
@@ -193,7 +193,7 @@ impl<'a> Comparison<'a> {
             let (cause, evidence) = self.describe(best);
             return Explanation::Decisive(cause, evidence);
         }
-        let mut open: Vec<(Cause, String)> = Vec::new();
+        let mut open: Vec<(NamedCause, String)> = Vec::new();
         for found in fitted {
             let is_explained = found.fit.is_explained();
             let remains = found.criterion < best.criterion + DECISIVE || (best.fit.is_explained() && is_explained);

@@ -3,7 +3,7 @@
 use super::super::correction::USELESS_DELAY_S;
 use super::super::rotation_data::RotationData;
 use super::super::{Area, Severity};
-use super::cause::Cause;
+use super::cause::NamedCause;
 use super::fault::recorded_axes;
 use super::fit::{Fitted, Kind};
 use super::joint_unit::JointUnit;
@@ -12,7 +12,7 @@ use super::joint_unit::JointUnit;
 const USELESS_RATIO: f64 = 0.05;
 
 /// Cause that a fit describes.
-pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
+pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> NamedCause {
     let key = &data.camera.key;
     let correction = &found.correction;
     let graded = |change: f64| if change.abs() > USELESS_RATIO { Severity::Error } else { Severity::Warning };
@@ -24,7 +24,7 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
         Kind::FocalPieces(pieces) => focal_pieces(key, pieces),
         Kind::CameraDrift => {
             let ppm = correction.camera_drift * 1e6;
-            Cause::new(
+            NamedCause::new(
                 Severity::Warning,
                 Area::Time,
                 format!("the time offset of {key} drifts by {:+.2} ms per second ({ppm:+.0} ppm)", ppm * 1e-3),
@@ -34,7 +34,7 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
         Kind::Mount => {
             let angle_deg = correction.mount.angle().to_degrees();
             let since_s = found.since_s.unwrap_or(0.0);
-            Cause::new(
+            NamedCause::new(
                 if angle_deg > 3.0 { Severity::Error } else { Severity::Warning },
                 Area::Extrinsics,
                 format!("the mount of {key} moves: rotated by {angle_deg:.1}° from about {since_s:.1} s on"),
@@ -44,7 +44,7 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
         Kind::JointSigns(joints) => {
             let names = joint_names(data, joints);
             let (verb, noun) = if joints.len() == 1 { ("counts", "joint") } else { ("count", "joints") };
-            Cause::new(
+            NamedCause::new(
                 Severity::Error,
                 Area::Encoders,
                 format!("{noun} {names} {verb} in the other direction than in the rig"),
@@ -60,7 +60,7 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
                 .filter(|(joint, change)| *joint != change.source)
                 .map(|(joint, change)| format!("'{}' contains the angle of '{}'", name(change.source), name(joint)))
                 .collect();
-            Cause::new(
+            NamedCause::new(
                 Severity::Error,
                 Area::Encoders,
                 format!("joint names are exchanged: {}", exchanged.join(", ")),
@@ -72,12 +72,12 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
             let unit = JointUnit::of_size(size_rad).map_or_else(|| "in another unit".to_owned(), JointUnit::describe);
             let title = format!("joint angles are {unit}");
             let remedy = "sensor_msgs/JointState requires radians: correct the driver".to_owned();
-            Cause::new(Severity::Error, Area::Encoders, title, remedy)
+            NamedCause::new(Severity::Error, Area::Encoders, title, remedy)
         }
         Kind::JointScale(joint) => {
             let scale = correction.joints[*joint].scale;
             let name = joint_names(data, &[*joint]);
-            Cause::new(
+            NamedCause::new(
                 graded(scale - 1.0),
                 Area::Encoders,
                 format!("readings of joint {name} are {:.3} times its angle", 1.0 / scale),
@@ -89,7 +89,7 @@ pub(super) fn cause(data: &RotationData<'_>, found: &Fitted) -> Cause {
             let delay_ms = correction.joint_delay_s * 1e3;
             let late = if delay_ms > 0.0 { "late" } else { "early" };
             let given_s = data.rig.gimbal.as_ref().map_or(0.0, |gimbal| gimbal.timeshift_gimbal_imu_s);
-            Cause::new(
+            NamedCause::new(
                 if correction.joint_delay_s.abs() > USELESS_DELAY_S { Severity::Error } else { Severity::Warning },
                 Area::Time,
                 format!("joint angles are {:.0} ms {late}", delay_ms.abs()),
@@ -106,16 +106,16 @@ fn joint_names(data: &RotationData<'_>, joints: &[usize]) -> String {
 }
 
 /// Left-handed frame of the gyroscope; the camera's orientation by the rig says which axes are exchanged.
-fn left_handed(data: &RotationData<'_>, found: &Fitted) -> Cause {
+fn left_handed(data: &RotationData<'_>, found: &Fitted) -> NamedCause {
     let axes = recorded_axes(data, found).map(|axes| axes.inverse());
     let which = axes.map_or_else(String::new, |axes| format!(" ({})", axes.describe()));
     let title = format!("the axes of the gyroscope form a left-handed frame{which}");
     let remedy = "correct order and signs of the axes in the IMU's driver, of gyroscope and accelerometer alike; no T_cam_imu \
                   can describe it";
-    Cause::new(Severity::Error, Area::Imu, title, remedy)
+    NamedCause::new(Severity::Error, Area::Imu, title, remedy)
 }
 
-fn gyroscope_scale(correction: f64) -> Cause {
+fn gyroscope_scale(correction: f64) -> NamedCause {
     let measured = 1.0 / correction;
     let near = |value: f64| (measured / value - 1.0).abs() < USELESS_RATIO;
     let degrees = 180.0 / std::f64::consts::PI;
@@ -133,10 +133,10 @@ fn gyroscope_scale(correction: f64) -> Cause {
         (format!("the gyroscope measures {measured:.3} times the rotation"), remedy.to_owned())
     };
     let severity = if (measured - 1.0).abs() > USELESS_RATIO { Severity::Error } else { Severity::Warning };
-    Cause::new(severity, Area::Imu, title, remedy)
+    NamedCause::new(severity, Area::Imu, title, remedy)
 }
 
-fn focal(data: &RotationData<'_>, ratio: f64) -> Cause {
+fn focal(data: &RotationData<'_>, ratio: f64) -> NamedCause {
     let key = &data.camera.key;
     let title = if ratio < 1.0 {
         format!("the focal length of {key} in the rig is {:.3} times too long", 1.0 / ratio)
@@ -150,10 +150,10 @@ fn focal(data: &RotationData<'_>, ratio: f64) -> Cause {
         fx * ratio,
         fy * ratio
     );
-    Cause::new(severity, Area::Intrinsics, title, remedy)
+    NamedCause::new(severity, Area::Intrinsics, title, remedy)
 }
 
-fn intrinsics(data: &RotationData<'_>, found: &Fitted) -> Cause {
+fn intrinsics(data: &RotationData<'_>, found: &Fitted) -> NamedCause {
     let key = &data.camera.key;
     let lens = &found.correction.lens;
     let [fx, fy, cx, cy] = data.camera.model.intrinsics_px;
@@ -173,20 +173,20 @@ fn intrinsics(data: &RotationData<'_>, found: &Fitted) -> Cause {
         cx + dx,
         cy + dy
     );
-    Cause::new(severity, Area::Intrinsics, title, remedy)
+    NamedCause::new(severity, Area::Intrinsics, title, remedy)
 }
 
-fn focal_pieces(key: &str, pieces: &[(f64, f64)]) -> Cause {
+fn focal_pieces(key: &str, pieces: &[(f64, f64)]) -> NamedCause {
     let first = pieces.first().map_or(1.0, |(_, ratio)| *ratio);
     let later: Vec<String> =
         pieces.iter().skip(1).map(|(from_s, ratio)| format!("{ratio:.2} from {from_s:.1} s on")).collect();
     let title = format!("the focal length of {key} changes: {first:.2} times the rig's at first, {}", later.join(", "));
     let remedy =
         "switch off zoom and digital stabilization, or use the part of the log with the calibrated focal length";
-    Cause::new(Severity::Error, Area::Intrinsics, title, remedy)
+    NamedCause::new(Severity::Error, Area::Intrinsics, title, remedy)
 }
 
-fn joint_offset(data: &RotationData<'_>, found: &Fitted, joint: usize) -> Cause {
+fn joint_offset(data: &RotationData<'_>, found: &Fitted, joint: usize) -> NamedCause {
     let offset_deg = found.correction.joints[joint].offset_rad.to_degrees();
     let name = joint_names(data, &[joint]);
     let (title, remedy) = match found.since_s {
@@ -200,5 +200,5 @@ fn joint_offset(data: &RotationData<'_>, found: &Fitted, joint: usize) -> Cause 
         ),
     };
     let severity = if offset_deg.abs() > 10.0 { Severity::Error } else { Severity::Warning };
-    Cause::new(severity, Area::Encoders, title, remedy)
+    NamedCause::new(severity, Area::Encoders, title, remedy)
 }

@@ -39,9 +39,9 @@ pub(super) struct AllanVariance {
 
 /// Integrated samples of one stretch, without their mean: `x(k) = Σ (y − ȳ)·τ0`, one more than the samples.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Phase(Vec<f64>);
+pub(super) struct AllanPhase(Vec<f64>);
 
-impl Phase {
+impl AllanPhase {
     pub(super) fn of(samples: &[f64], period_s: f64) -> Self {
         let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
         let mut phase = Vec::with_capacity(samples.len() + 1);
@@ -77,7 +77,7 @@ pub(super) fn counts(longest: usize) -> Vec<usize> {
 }
 
 /// Variance at one averaging time from all stretches that are long enough; `None` without one.
-pub(super) fn overlapping(stretches: &[Phase], count: usize, period_s: f64) -> Option<AllanVariance> {
+pub(super) fn overlapping(stretches: &[AllanPhase], count: usize, period_s: f64) -> Option<AllanVariance> {
     let terms: usize = stretches.iter().map(|phase| phase.terms(count)).sum();
     if terms == 0 {
         return None;
@@ -89,7 +89,7 @@ pub(super) fn overlapping(stretches: &[Phase], count: usize, period_s: f64) -> O
 
 /// Equivalent degrees of freedom of [`overlapping`]: those of independent stretches, weighted by their numbers of terms
 /// (Satterthwaite).
-pub(super) fn degrees_of_freedom(stretches: &[Phase], count: usize, kind: NoiseKind) -> f64 {
+pub(super) fn degrees_of_freedom(stretches: &[AllanPhase], count: usize, kind: NoiseKind) -> f64 {
     let (mut all, mut spread) = (0.0, 0.0);
     for phase in stretches {
         let terms = phase.terms(count) as f64;
@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn the_variance_is_that_of_the_definition() {
         let samples = [1.0, 4.0, 2.0, 8.0, 5.0, 7.0];
-        let phase = [Phase::of(&samples, 0.5)];
+        let phase = [AllanPhase::of(&samples, 0.5)];
         let found = overlapping(&phase, 2, 0.5).unwrap();
         // Means of pairs are 2.5 3 5 6.5 6; differences of means two apart: 2.5, 3.5, 1.0.
         let expected = (2.5_f64.powi(2) + 3.5_f64.powi(2) + 1.0) / (2.0 * 3.0);
@@ -159,7 +159,7 @@ mod tests {
                             if kind == NoiseKind::White { white } else { sum }
                         })
                         .collect();
-                    Phase::of(&samples, period_s)
+                    AllanPhase::of(&samples, period_s)
                 };
                 let stretches = [stretch(100, &mut random), stretch(60, &mut random)];
                 values.push(overlapping(&stretches, count, period_s).unwrap().variance);

@@ -11,7 +11,7 @@ mod tests;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use self::allan::{AllanVariance, NoiseKind, Phase, confidence, counts, degrees_of_freedom, overlapping};
+use self::allan::{AllanPhase, AllanVariance, NoiseKind, confidence, counts, degrees_of_freedom, overlapping};
 use self::samples::ImuSeries;
 use self::stretches::{evenly_sampled, stationary_stretches};
 use self::terms::Fit;
@@ -213,7 +213,7 @@ fn sensor_noise(
     let phases = [0, 1, 2].map(|axis| {
         let of_part = |part: &Vec<Vector3<f64>>| {
             let values: Vec<f64> = part.iter().map(|vector| vector[axis]).collect();
-            Phase::of(&values, period_s)
+            AllanPhase::of(&values, period_s)
         };
         parts.iter().map(of_part).collect::<Vec<_>>()
     });
@@ -265,7 +265,7 @@ fn is_shaken(point: &AllanVariance, lines: &[VibrationLine]) -> bool {
     lines.iter().map(most).sum::<f64>() > VIBRATION_RATIO * 3.0 * point.variance
 }
 
-fn points(variances: &[AllanVariance], shaken: &[bool], phases: &[Phase], fit: Option<&Fit>) -> Vec<AllanPoint> {
+fn points(variances: &[AllanVariance], shaken: &[bool], phases: &[AllanPhase], fit: Option<&Fit>) -> Vec<AllanPoint> {
     let point = |(variance, shaken): (&AllanVariance, &bool)| {
         let kind = fit.map_or(NoiseKind::White, |fit| fit.dominant(variance.tau_s));
         let freedom = degrees_of_freedom(phases, variance.count, kind).max(1.0);
@@ -288,7 +288,7 @@ fn points(variances: &[AllanVariance], shaken: &[bool], phases: &[Phase], fit: O
 fn noise_terms(
     variances: &[AllanVariance],
     fit: Option<&Fit>,
-    (phases, axes): (&[Phase], usize),
+    (phases, axes): (&[AllanPhase], usize),
     longest_s: f64,
     given: Option<GivenNoise>,
 ) -> NoiseTerms {

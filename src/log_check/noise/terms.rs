@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::allan::{AllanVariance, NoiseKind, Phase, degrees_of_freedom};
+use super::allan::{AllanPhase, AllanVariance, NoiseKind, degrees_of_freedom};
 
 /// Relative standard deviation of `√σ²` due to errors of the model: filters, temperature.
 const MODEL_ERROR: f64 = 0.02;
@@ -88,7 +88,12 @@ impl Fit {
 
     /// Fits the points that are not excluded; `None` with fewer than two of them. The points are means over `axes`
     /// independent axes, sampled in these stretches.
-    pub(super) fn of(points: &[AllanVariance], excluded: &[bool], stretches: &[Phase], axes: usize) -> Option<Self> {
+    pub(super) fn of(
+        points: &[AllanVariance],
+        excluded: &[bool],
+        stretches: &[AllanPhase],
+        axes: usize,
+    ) -> Option<Self> {
         let mut used = Vec::new();
         let mut next = 0;
         for (index, point) in points.iter().enumerate() {
@@ -122,7 +127,7 @@ impl Fit {
     }
 
     /// Solves with weights that follow the model.
-    fn refine(&mut self, points: &[AllanVariance], stretches: (&[Phase], usize), kinds: &[usize]) -> Option<()> {
+    fn refine(&mut self, points: &[AllanVariance], stretches: (&[AllanPhase], usize), kinds: &[usize]) -> Option<()> {
         for round in 0..ROUNDS {
             self.solve(points, stretches, kinds, round == 0)?;
         }
@@ -134,7 +139,7 @@ impl Fit {
     fn without_least_significant(
         &self,
         points: &[AllanVariance],
-        stretches: (&[Phase], usize),
+        stretches: (&[AllanPhase], usize),
         kinds: &[usize],
     ) -> Option<(Self, Vec<usize>)> {
         if kinds.len() < 2 {
@@ -163,7 +168,7 @@ impl Fit {
     }
 
     /// Standard deviation of a point's variance by the model.
-    fn sigma(&self, point: &AllanVariance, (stretches, axes): (&[Phase], usize)) -> f64 {
+    fn sigma(&self, point: &AllanVariance, (stretches, axes): (&[AllanPhase], usize)) -> f64 {
         let freedom = degrees_of_freedom(stretches, point.count, self.dominant(point.tau_s)).max(1.0) * axes as f64;
         self.variance(point.tau_s).max(0.05 * point.variance) * (2.0 / freedom + (2.0 * MODEL_ERROR).powi(2)).sqrt()
     }
@@ -172,7 +177,7 @@ impl Fit {
     fn solve(
         &mut self,
         points: &[AllanVariance],
-        (stretches, axes): (&[Phase], usize),
+        (stretches, axes): (&[AllanPhase], usize),
         kinds: &[usize],
         first: bool,
     ) -> Option<()> {
@@ -204,7 +209,7 @@ impl Fit {
 }
 
 /// Number of the shortest averaging times that precede a steeper part of the curve.
-fn filtered_points(points: &[AllanVariance], used: &[usize], stretches: &[Phase], axes: usize) -> usize {
+fn filtered_points(points: &[AllanVariance], used: &[usize], stretches: &[AllanPhase], axes: usize) -> usize {
     let relative_variance = |point: &AllanVariance| {
         2.0 / (degrees_of_freedom(stretches, point.count, NoiseKind::White).max(1.0) * axes as f64)
     };

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::mechanism::Mechanism;
-use super::motion::{Flight, LaboratoryMotion};
+use super::motion::{LaboratoryMotion, MechanismMotion};
 use super::sensors::SensorColumns;
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::estimator::{
@@ -134,9 +134,9 @@ impl LaboratorySetup {
         self.window_from(0)
     }
 
-    pub(super) fn flight(&self) -> Flight<'_> {
+    pub(super) fn flight(&self) -> MechanismMotion<'_> {
         let gravity_in_world = gravity_in_world(GRAVITY_M_PER_S2);
-        Flight { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world }
+        MechanismMotion { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world }
     }
 
     pub(super) fn time_s(slot: usize) -> f64 {

@@ -9,7 +9,7 @@ use crate::gimbal::Parameterization;
 const LANDMARKS_WITHOUT_ENCODER: usize = 130;
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Experiment {
+pub(super) struct DegeneracyExperiment {
     /// Label in the table.
     pub(super) scenario: &'static str,
     pub(super) mechanism: &'static str,
@@ -27,12 +27,12 @@ pub(super) struct Experiment {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Section {
     pub(super) title: &'static str,
-    pub(super) experiments: &'static [Experiment],
+    pub(super) experiments: &'static [DegeneracyExperiment],
 }
 
 /// Experiment with exciting motion, known poses and joint angles, in the classical and the minimal parameterization.
-const fn experiment(scenario: &'static str, mechanism: &'static str) -> Experiment {
-    Experiment {
+const fn experiment(scenario: &'static str, mechanism: &'static str) -> DegeneracyExperiment {
+    DegeneracyExperiment {
         scenario,
         mechanism,
         motion: Motion::Aggressive,
@@ -45,16 +45,16 @@ const fn experiment(scenario: &'static str, mechanism: &'static str) -> Experime
 }
 
 /// [`experiment`], also as a product of exponentials.
-const fn with_poe(scenario: &'static str, mechanism: &'static str) -> Experiment {
+const fn with_poe(scenario: &'static str, mechanism: &'static str) -> DegeneracyExperiment {
     experiment(scenario, mechanism).forms(CLASSICAL_MINIMAL_POE)
 }
 
 /// [`experiment`] in all parameterizations.
-const fn in_all_forms(scenario: &'static str, mechanism: &'static str) -> Experiment {
+const fn in_all_forms(scenario: &'static str, mechanism: &'static str) -> DegeneracyExperiment {
     experiment(scenario, mechanism).forms(ALL_FORMS)
 }
 
-impl Experiment {
+impl DegeneracyExperiment {
     const fn moving(self, motion: Motion) -> Self {
         Self { motion, ..self }
     }
@@ -123,12 +123,12 @@ const IMU: PoseKnowledge = PoseKnowledge::Imu { noise: LABORATORY_IMU, biases_kn
 const IMU_BIASES_KNOWN: PoseKnowledge = PoseKnowledge::Imu { noise: LABORATORY_IMU, biases_known: true };
 
 /// Mechanism of the two windows of one motion; see [`super::spurious`].
-pub(super) const GENERIC: Experiment = experiment("", "generic");
+pub(super) const GENERIC: DegeneracyExperiment = experiment("", "generic");
 /// [`GENERIC`] with free joint angles.
-pub(super) const GENERIC_WITHOUT_ENCODER: Experiment = GENERIC.without_encoder();
+pub(super) const GENERIC_WITHOUT_ENCODER: DegeneracyExperiment = GENERIC.without_encoder();
 
 /// Experiments for which the smallest number of frames with full rank is searched.
-pub(super) const MIN_FRAMES: [Experiment; 6] = [
+pub(super) const MIN_FRAMES: [DegeneracyExperiment; 6] = [
     experiment("encoder, poses known", "generic"),
     experiment("encoder, IMU, bias known", "generic").poses(IMU_BIASES_KNOWN),
     experiment("encoder, IMU, bias free", "generic").poses(IMU),

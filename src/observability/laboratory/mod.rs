@@ -34,4 +34,4 @@ pub use sensors::{
 };
 pub use situation::Situation;
 pub use spurious::SpuriousRow;
-pub use survey::{MinFramesRow, Survey, SurveyEntry, SurveyRow, SurveySection, survey};
+pub use survey::{DegeneracySurvey, MinFramesRow, SurveyEntry, SurveyRow, SurveySection, survey};

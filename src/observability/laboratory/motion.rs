@@ -166,7 +166,7 @@ const ROOM_RATIO: f64 = 0.9;
 
 /// Pose, joint angles and their rates at one time of a motion.
 #[derive(Clone, Debug)]
-pub(super) struct Kinematics {
+pub(super) struct MechanismState {
     pub(super) world_from_imu: RigidTransform,
     /// In the world.
     pub(super) velocity_m_per_s: Vector3<f64>,
@@ -200,7 +200,7 @@ where
 
 /// A mechanism in motion, some of its joints fixed.
 #[derive(Clone, Debug)]
-pub(super) struct Flight<'a> {
+pub(super) struct MechanismMotion<'a> {
     pub(super) mechanism: &'a Mechanism,
     pub(super) motion: LaboratoryMotion,
     /// Fixed joints, in order.
@@ -208,7 +208,7 @@ pub(super) struct Flight<'a> {
     pub(super) gravity_in_world: Vector3<f64>,
 }
 
-impl Flight<'_> {
+impl MechanismMotion<'_> {
     pub(super) fn joints_rad(&self, time_s: f64) -> Vec<f64> {
         let joints = self.mechanism.chain.joint_count();
         (0..joints)
@@ -306,10 +306,10 @@ impl Flight<'_> {
     }
 
     /// Pose, velocity, angular rate and joints at a time.
-    pub(super) fn kinematics(&self, time_s: f64) -> Kinematics {
+    pub(super) fn kinematics(&self, time_s: f64) -> MechanismState {
         let world_from_imu = self.world_from_imu(time_s);
         let (joints_rad, joint_rates_rad_per_s) = self.joint_motion(time_s);
-        Kinematics {
+        MechanismState {
             velocity_m_per_s: if self.motion == LaboratoryMotion::CameraStationary {
                 derivative(|time_s| self.world_from_imu(time_s).translation_m, time_s)
             } else {

@@ -5,7 +5,7 @@ use std::fmt;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::experiments::{Experiment, MIN_FRAMES, SECTIONS};
+use super::experiments::{DegeneracyExperiment, MIN_FRAMES, SECTIONS};
 use super::sensors::{SensorSurveySection, survey_sensors};
 use super::spurious::{self, SpuriousRow};
 use super::{LaboratoryForm, LaboratoryResult};
@@ -19,7 +19,7 @@ const MINIMAL: LaboratoryForm = LaboratoryForm::whole(Parameterization::Minimal)
 
 /// Computed ranks and null directions of the built-in experiments.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Survey {
+pub struct DegeneracySurvey {
     pub sections: Vec<SurveySection>,
     /// Smallest numbers of frames for which the minimal parameterization has its full rank.
     pub least_frames: Vec<MinFramesRow>,
@@ -74,8 +74,8 @@ pub struct MinFramesRow {
 }
 
 /// Runs every built-in experiment: the scenarios of docs/mathematics.md, sections 7 and 11, and the cases of section 9.
-pub fn survey() -> Survey {
-    Survey {
+pub fn survey() -> DegeneracySurvey {
+    DegeneracySurvey {
         sections: SECTIONS
             .par_iter()
             .map(|section| SurveySection {
@@ -90,7 +90,7 @@ pub fn survey() -> Survey {
 }
 
 impl SurveyRow {
-    fn of(experiment: &Experiment) -> Option<Self> {
+    fn of(experiment: &DegeneracyExperiment) -> Option<Self> {
         let results = experiment.setup()?.run_all(experiment.forms);
         if results.len() != experiment.forms.len() {
             return None;
@@ -124,7 +124,7 @@ impl SurveyRow {
 }
 
 impl MinFramesRow {
-    fn of(experiment: &Experiment) -> Option<Self> {
+    fn of(experiment: &DegeneracyExperiment) -> Option<Self> {
         let rank_of = |frames: usize| experiment.setup_of(frames)?.run(MINIMAL).map(|result| result.rank);
         let full = rank_of(MAX_FRAMES)?;
         let frames = (2..MAX_FRAMES)
@@ -153,7 +153,7 @@ fn abbreviation(form: LaboratoryForm) -> String {
     format!("{name}{suffix}")
 }
 
-impl fmt::Display for Survey {
+impl fmt::Display for DegeneracySurvey {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             out,

@@ -1,6 +1,6 @@
 //! Evaluation of a condition in a step.
 
-use super::expression::{Arithmetic, Condition, Number, Predicate, Span};
+use super::expression::{Arithmetic, Condition, Number, Predicate, TextRange};
 use super::quantities::NamedNumber;
 use crate::estimator::ResidualSummary;
 use crate::gimbal::{ParameterId, ParameterNames};
@@ -93,7 +93,7 @@ impl Predicate {
     }
 
     /// Calls `visit` for every quantity, from left to right.
-    fn visit<'a>(&'a self, visit: &mut impl FnMut(Span, &'a Number)) {
+    fn visit<'a>(&'a self, visit: &mut impl FnMut(TextRange, &'a Number)) {
         match self {
             Self::Literal(_) | Self::Flag(_) | Self::Event(..) => {}
             Self::Compared(_, left, right) => {
@@ -137,7 +137,7 @@ impl Number {
         value.is_finite().then_some(value)
     }
 
-    fn visit<'a>(&'a self, visit: &mut impl FnMut(Span, &'a Self)) {
+    fn visit<'a>(&'a self, visit: &mut impl FnMut(TextRange, &'a Self)) {
         match self {
             Self::Literal(_) => {}
             Self::Quantity(_, span) | Self::Named(_, _, span) | Self::Singular(_, span) => visit(*span, self),

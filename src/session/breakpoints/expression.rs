@@ -41,7 +41,7 @@ impl fmt::Display for Condition {
 
 /// Range of characters in the text, from 0; `end` is exclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Span {
+pub(crate) struct TextRange {
     pub(crate) begin: usize,
     pub(crate) end: usize,
 }
@@ -50,13 +50,13 @@ pub(crate) struct Span {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Number {
     Literal(f64),
-    Quantity(NumberName, Span),
+    Quantity(NumberName, TextRange),
     /// A quantity with an argument: `sigma(yaw.alpha)`.
-    Named(NamedNumber, String, Span),
+    Named(NamedNumber, String, TextRange),
     /// A singular value by its number from 1, largest first: `singular(1)`.
-    Singular(usize, Span),
+    Singular(usize, TextRange),
     /// The difference from the step before: `rise(x)`.
-    Rise(Box<Self>, Span),
+    Rise(Box<Self>, TextRange),
     Negated(Box<Self>),
     Absolute(Box<Self>),
     Combined(Arithmetic, Box<Self>, Box<Self>),
@@ -78,15 +78,15 @@ pub(super) enum Arithmetic {
 pub(super) enum Predicate {
     Literal(bool),
     Flag(FlagName),
-    Event(Vec<EventKind>, Span),
-    Compared(Comparison, Number, Number),
+    Event(Vec<EventKind>, TextRange),
+    Compared(ComparisonOperator, Number, Number),
     Not(Box<Self>),
     And(Box<Self>, Box<Self>),
     Or(Box<Self>, Box<Self>),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Comparison {
+pub(crate) enum ComparisonOperator {
     Less,
     LessOrEqual,
     Greater,
@@ -95,7 +95,7 @@ pub(crate) enum Comparison {
     Unequal,
 }
 
-impl Comparison {
+impl ComparisonOperator {
     pub(crate) fn holds(self, left: f64, right: f64) -> bool {
         match self {
             Self::Less => left < right,

@@ -1,13 +1,13 @@
 //! Tokens of a condition's text.
 
-use super::expression::{Comparison, ConditionProblem, Span};
+use super::expression::{ComparisonOperator, ConditionProblem, TextRange};
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Token {
     Number(f64),
     Name(String),
     Quoted(String),
-    Compare(Comparison),
+    Compare(ComparisonOperator),
     Plus,
     Minus,
     Times,
@@ -24,16 +24,16 @@ pub(crate) enum Token {
 
 /// Operators and punctuation, longer ones first.
 const SIGNS: [(&str, Token); 19] = [
-    ("<=", Token::Compare(Comparison::LessOrEqual)),
-    (">=", Token::Compare(Comparison::GreaterOrEqual)),
-    ("==", Token::Compare(Comparison::Equal)),
-    ("!=", Token::Compare(Comparison::Unequal)),
+    ("<=", Token::Compare(ComparisonOperator::LessOrEqual)),
+    (">=", Token::Compare(ComparisonOperator::GreaterOrEqual)),
+    ("==", Token::Compare(ComparisonOperator::Equal)),
+    ("!=", Token::Compare(ComparisonOperator::Unequal)),
     ("&&", Token::And),
     ("||", Token::Or),
-    ("<", Token::Compare(Comparison::Less)),
-    (">", Token::Compare(Comparison::Greater)),
-    ("≤", Token::Compare(Comparison::LessOrEqual)),
-    ("≥", Token::Compare(Comparison::GreaterOrEqual)),
+    ("<", Token::Compare(ComparisonOperator::Less)),
+    (">", Token::Compare(ComparisonOperator::Greater)),
+    ("≤", Token::Compare(ComparisonOperator::LessOrEqual)),
+    ("≥", Token::Compare(ComparisonOperator::GreaterOrEqual)),
     ("!", Token::Not),
     ("+", Token::Plus),
     ("-", Token::Minus),
@@ -46,16 +46,16 @@ const SIGNS: [(&str, Token); 19] = [
 ];
 
 /// The tokens with their positions; the last one is [`Token::End`].
-pub(super) fn tokens(text: &str) -> Result<Vec<(Token, Span)>, ConditionProblem> {
+pub(super) fn tokens(text: &str) -> Result<Vec<(Token, TextRange)>, ConditionProblem> {
     scan(text, false)
 }
 
 /// As [`tokens`], but a single `=` is also accepted as a comparison.
-pub(crate) fn tokens_with_single_equals(text: &str) -> Result<Vec<(Token, Span)>, ConditionProblem> {
+pub(crate) fn tokens_with_single_equals(text: &str) -> Result<Vec<(Token, TextRange)>, ConditionProblem> {
     scan(text, true)
 }
 
-fn scan(text: &str, single_equals: bool) -> Result<Vec<(Token, Span)>, ConditionProblem> {
+fn scan(text: &str, single_equals: bool) -> Result<Vec<(Token, TextRange)>, ConditionProblem> {
     let characters: Vec<char> = text.chars().collect();
     let problem = |at: usize, message: String| ConditionProblem { text: text.to_owned(), column: at + 1, message };
     let mut tokens = Vec::new();
@@ -87,7 +87,7 @@ fn scan(text: &str, single_equals: bool) -> Result<Vec<(Token, Span)>, Condition
             Token::Quoted(characters[begin + 1..at - 1].iter().collect())
         } else {
             let rest: String = characters[at..].iter().take(2).collect();
-            let single = ("=", Token::Compare(Comparison::Equal));
+            let single = ("=", Token::Compare(ComparisonOperator::Equal));
             let signs = SIGNS.iter().chain(single_equals.then_some(&single));
             let Some((sign, token)) = signs.into_iter().find(|(sign, _)| rest.starts_with(sign)) else {
                 let hint = if *character == '=' { ": write == to compare" } else { "" };
@@ -96,9 +96,9 @@ fn scan(text: &str, single_equals: bool) -> Result<Vec<(Token, Span)>, Condition
             at += sign.chars().count();
             token.clone()
         };
-        tokens.push((token, Span { begin, end: at }));
+        tokens.push((token, TextRange { begin, end: at }));
     }
-    tokens.push((Token::End, Span { begin: characters.len(), end: characters.len() }));
+    tokens.push((Token::End, TextRange { begin: characters.len(), end: characters.len() }));
     Ok(tokens)
 }
 

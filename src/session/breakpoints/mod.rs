@@ -13,7 +13,7 @@ mod quantities;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use expression::{Comparison, Span};
+pub(crate) use expression::{ComparisonOperator, TextRange};
 pub(crate) use lexer::{Token, tokens_with_single_equals};
 pub(crate) use parser::factor_of_unit;
 

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::expression::{Arithmetic, Condition, ConditionProblem, Number, Predicate, Span};
+use super::expression::{Arithmetic, Condition, ConditionProblem, Number, Predicate, TextRange};
 use super::lexer::{Token, tokens};
 use super::quantities::{CAUSES, EVENTS, FLAGS, NAMED, NUMBERS, NamedNumber};
 use crate::estimator::FactorKind;
@@ -45,7 +45,7 @@ enum Expression {
 
 struct Parser<'a> {
     text: &'a str,
-    tokens: Vec<(Token, Span)>,
+    tokens: Vec<(Token, TextRange)>,
     at: usize,
     depth: usize,
     operators: usize,
@@ -92,7 +92,7 @@ impl Parser<'_> {
         &self.tokens[self.at.min(self.tokens.len() - 1)].0
     }
 
-    fn span(&self) -> Span {
+    fn span(&self) -> TextRange {
         self.tokens[self.at.min(self.tokens.len() - 1)].1
     }
 
@@ -282,7 +282,7 @@ impl Parser<'_> {
     }
 
     fn plain(&self, name: &str, begin: usize) -> Result<Expression> {
-        let span = Span { begin, end: self.end() };
+        let span = TextRange { begin, end: self.end() };
         if let Some(number) = NUMBERS.iter().find(|known| known.name == name) {
             return Ok(Expression::Number(Number::Quantity(*number, span)));
         }
@@ -319,7 +319,7 @@ impl Parser<'_> {
                 let known = EVENTS.iter().map(|(known, _)| *known);
                 let kinds = kinds.ok_or_else(|| self.problem_at(inside, unknown("kind of event", &kind, known)))?;
                 self.close(begin)?;
-                Expression::Predicate(Predicate::Event(kinds, Span { begin, end: self.end() }))
+                Expression::Predicate(Predicate::Event(kinds, TextRange { begin, end: self.end() }))
             }
             "singular" => {
                 let Token::Number(number) = self.next() else {
@@ -329,12 +329,12 @@ impl Parser<'_> {
                     return Err(self.problem_at(inside, "singular values are counted from 1, the largest first"));
                 }
                 self.close(begin)?;
-                Expression::Number(Number::Singular(number as usize, Span { begin, end: self.end() }))
+                Expression::Number(Number::Singular(number as usize, TextRange { begin, end: self.end() }))
             }
             "rise" => {
                 let inner = self.argument()?;
                 self.close(begin)?;
-                Expression::Number(Number::Rise(Box::new(inner), Span { begin, end: self.end() }))
+                Expression::Number(Number::Rise(Box::new(inner), TextRange { begin, end: self.end() }))
             }
             "abs" => {
                 let inner = self.argument()?;
@@ -378,7 +378,7 @@ impl Parser<'_> {
             return Err(self.problem_at(inside, unknown(what, &name, choices.iter().copied())));
         }
         self.close(begin)?;
-        Ok(Number::Named(*kind, name, Span { begin, end: self.end() }))
+        Ok(Number::Named(*kind, name, TextRange { begin, end: self.end() }))
     }
 
     fn argument(&mut self) -> Result<Number> {

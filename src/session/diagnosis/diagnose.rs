@@ -16,12 +16,12 @@ use rayon::prelude::*;
 
 use super::agreement::{self, AgreementValue};
 use super::axes::plausible_axes;
-use super::hypotheses::{Cause, Hypothesis, changes_at, first_hypotheses};
+use super::hypotheses::{Cause, TrialHypothesis, changes_at, first_hypotheses};
 use super::log_faults::LogFaults;
 use super::measured::Undoing;
 use super::misfit::Misfit;
-use super::outcome::{Diagnosis, RankedCause, TruthAgreement, Verdict, WaitingReason};
-use super::ranking::{Candidate, Decision, by_cause, decide};
+use super::outcome::{Diagnosis, DiagnosisVerdict, RankedCause, TruthAgreement, WaitingReason};
+use super::ranking::{RankedTrial, RankingDecision, by_cause, decide};
 use super::refinement::refined;
 use super::scoring::{LOST, Trials, scored};
 use super::span::{confirmed_span, screened_span};
@@ -33,7 +33,7 @@ use crate::geometry::seconds_from_ns;
 use crate::log_check::Finding;
 use crate::sensors::Rig;
 use crate::session::engine::{Computation, History};
-use crate::session::plan::{Correction, ForkChanges};
+use crate::session::plan::{ForkChanges, MeasurementCorrection};
 use crate::session::record::RunRecord;
 
 /// Causes that are computed again on more of the run.
@@ -107,15 +107,16 @@ impl Search<'_, '_> {
         if given.initialized_ns().is_none() {
             diagnosis.waiting = waiting_reasons(self.record);
         } else if agreement::agrees(&misfit, &given.steps) {
-            diagnosis.verdict = Verdict::Agrees;
+            diagnosis.verdict = DiagnosisVerdict::Agrees;
             diagnosis.ground_truth = truth::disagreement(self.record);
         }
-        let onset = if diagnosis.verdict == Verdict::Agrees { None } else { agreement::onset(&given.steps) };
+        let onset = if diagnosis.verdict == DiagnosisVerdict::Agrees { None } else { agreement::onset(&given.steps) };
         diagnosis.onset_s = onset.map(|step| self.stamp_s(step));
         self.report(0.03, "check of the log");
         if !self.is_interrupted() {
             diagnosis.log_faults = (self.check)();
-            let ends = diagnosis.verdict == Verdict::Agrees || self.undo_measured(&mut diagnosis, &given, onset);
+            let ends =
+                diagnosis.verdict == DiagnosisVerdict::Agrees || self.undo_measured(&mut diagnosis, &given, onset);
             if !ends {
                 self.search(&mut diagnosis, &given, misfit.tracked_ratio() < LOST, onset);
             }
@@ -143,7 +144,7 @@ impl Search<'_, '_> {
             }
         }
         if undoing.has_irreversible {
-            diagnosis.verdict = Verdict::LogFault;
+            diagnosis.verdict = DiagnosisVerdict::LogFault;
         }
         undoing.has_irreversible
     }
@@ -168,11 +169,11 @@ impl Search<'_, '_> {
         &mut self,
         span: &TrialSpan,
         given: &TrialResult,
-        hypotheses: Vec<Hypothesis>,
+        hypotheses: Vec<TrialHypothesis>,
     ) -> Option<(TrialSpan, Trials)> {
         let first = self.candidates(span, hypotheses, (0.05, SCREENED), None)?;
         let span = confirmed_span(self.run, given, span);
-        let mut tried: Vec<Hypothesis> = by_cause(&first.given, first.others.clone())
+        let mut tried: Vec<TrialHypothesis> = by_cause(&first.given, first.others.clone())
             .into_iter()
             .take(CONFIRMED)
             .map(|candidate| candidate.hypothesis)
@@ -200,7 +201,7 @@ impl Search<'_, '_> {
     fn candidates(
         &mut self,
         span: &TrialSpan,
-        hypotheses: Vec<Hypothesis>,
+        hypotheses: Vec<TrialHypothesis>,
         (from, to): (f64, f64),
         known: Option<Trials>,
     ) -> Option<Trials> {
@@ -215,16 +216,16 @@ impl Search<'_, '_> {
         while !open.is_empty() {
             let rest = open.split_off(AT_ONCE.min(open.len()));
             let run = self.run;
-            let trial = |it: Hypothesis| {
+            let trial = |it: TrialHypothesis| {
                 let result = run.trial(span, it.from.unwrap_or(span.steps.start), &it.changes, None)?;
                 Some((it, result))
             };
-            let some: Vec<(Hypothesis, TrialResult)> = open.into_par_iter().filter_map(trial).collect();
+            let some: Vec<(TrialHypothesis, TrialResult)> = open.into_par_iter().filter_map(trial).collect();
             self.trials += some.len();
             done.extend(some);
             open = rest;
             let ratio = 1.0 - open.len() as f64 / count as f64;
-            let label = done.last().map_or_else(String::new, |(it, _): &(Hypothesis, _)| it.changes.to_string());
+            let label = done.last().map_or_else(String::new, |(it, _): &(TrialHypothesis, _)| it.changes.to_string());
             self.report(from + (to - from) * ratio, &label);
         }
         Some(scored(given, done))
@@ -239,9 +240,9 @@ impl Search<'_, '_> {
         ranked.retain(|it| it.hypothesis.cause != Cause::Clocks || it.hypothesis.changes.estimated.is_empty());
         let decision = decide(&given, &ranked);
         (diagnosis.verdict, diagnosis.explaining) = match decision {
-            Decision::One => (Verdict::Cause, 1),
-            Decision::Several(count) => (Verdict::Several, count),
-            Decision::None => (Verdict::Unexplained, 0),
+            RankingDecision::One => (DiagnosisVerdict::Cause, 1),
+            RankingDecision::Several(count) => (DiagnosisVerdict::Several, count),
+            RankingDecision::None => (DiagnosisVerdict::Unexplained, 0),
         };
         let with_truth = self.run.inputs.iter().any(|input| input.ground_truth.is_some());
         let helps = ranked.into_iter().filter(|it| it.score < given.score).take(REPORTED);
@@ -256,8 +257,8 @@ impl Search<'_, '_> {
 
     /// Errors with a change; `None` with another time offset of the camera, because the ground truth of an input is that at
     /// the given one.
-    fn accuracy(&self, span: &TrialSpan, candidate: &Candidate) -> Option<TruthAgreement> {
-        let is_shift = |it: &Correction| matches!(it, Correction::CameraShift(_));
+    fn accuracy(&self, span: &TrialSpan, candidate: &RankedTrial) -> Option<TruthAgreement> {
+        let is_shift = |it: &MeasurementCorrection| matches!(it, MeasurementCorrection::CameraShift(_));
         if candidate.hypothesis.changes.corrections.iter().any(is_shift) {
             return None;
         }
@@ -270,7 +271,7 @@ impl Search<'_, '_> {
     fn ranked_cause(
         &self,
         span: &TrialSpan,
-        candidate: &Candidate,
+        candidate: &RankedTrial,
         given: f64,
         accuracy: Option<TruthAgreement>,
     ) -> RankedCause {

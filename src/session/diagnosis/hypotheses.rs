@@ -4,7 +4,7 @@ use super::axes::PlausibleAxes;
 use super::trial::DiagnosedRun;
 use crate::estimator::SensorParameters;
 use crate::sensors::CameraMount;
-use crate::session::plan::{Correction, ForkChanges, ImageFlip, ImageHalf};
+use crate::session::plan::{ForkChanges, ImageFlip, ImageHalf, MeasurementCorrection};
 use crate::text::Named;
 
 /// Cause of residuals that disagree with their noise.
@@ -65,7 +65,7 @@ impl Named for Cause {
 
 /// A change of the run that undoes one cause.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Hypothesis {
+pub(super) struct TrialHypothesis {
     pub(super) cause: Cause,
     pub(super) changes: ForkChanges,
     /// Number of values that the change takes from the recording.
@@ -74,13 +74,13 @@ pub(super) struct Hypothesis {
     pub(super) from: Option<usize>,
 }
 
-impl Hypothesis {
-    pub(super) fn corrections(cause: Cause, corrections: Vec<Correction>) -> Self {
+impl TrialHypothesis {
+    pub(super) fn corrections(cause: Cause, corrections: Vec<MeasurementCorrection>) -> Self {
         let parameters = corrections.len();
         Self { cause, changes: ForkChanges { corrections, ..ForkChanges::default() }, parameters, from: None }
     }
 
-    pub(super) fn correction(cause: Cause, correction: Correction) -> Self {
+    pub(super) fn correction(cause: Cause, correction: MeasurementCorrection) -> Self {
         Self::corrections(cause, vec![correction])
     }
 
@@ -110,22 +110,22 @@ const CHAIN_FACTORS: [f64; 2] = [5.0, 25.0];
 const SHIFTS_S: [f64; 4] = [-0.04, -0.02, 0.02, 0.04];
 
 /// Hypotheses for a run. `lost` is true if the run has hardly a window: then errors are tried that no run survives.
-pub(super) fn first_hypotheses(run: &DiagnosedRun<'_>, lost: Option<&PlausibleAxes>) -> Vec<Hypothesis> {
+pub(super) fn first_hypotheses(run: &DiagnosedRun<'_>, lost: Option<&PlausibleAxes>) -> Vec<TrialHypothesis> {
     let mut all = estimated_columns(run);
     let joints = if uses_encoders(run) { run.rig.joint_names() } else { Vec::new() };
     all.extend(joint_hypotheses(&joints));
     for factor in NOISE_FACTORS {
         let changes = ForkChanges { imu_noise: factor, ..ForkChanges::default() };
-        all.push(Hypothesis::change(Cause::ImuNoise, changes, 1));
+        all.push(TrialHypothesis::change(Cause::ImuNoise, changes, 1));
     }
     for shift_s in SHIFTS_S {
-        all.push(Hypothesis::correction(Cause::CameraClock, Correction::CameraShift(shift_s)));
+        all.push(TrialHypothesis::correction(Cause::CameraClock, MeasurementCorrection::CameraShift(shift_s)));
     }
     for factor in FOCAL_FACTORS {
-        all.push(Hypothesis::correction(Cause::Focal, Correction::Focal(factor)));
+        all.push(TrialHypothesis::correction(Cause::Focal, MeasurementCorrection::Focal(factor)));
     }
     for half in ImageHalf::all() {
-        all.push(Hypothesis::correction(Cause::ImageRegion, Correction::Ignored(half)));
+        all.push(TrialHypothesis::correction(Cause::ImageRegion, MeasurementCorrection::Ignored(half)));
     }
     if let Some(axes) = lost {
         all.extend(gross_hypotheses(axes));
@@ -134,14 +134,16 @@ pub(super) fn first_hypotheses(run: &DiagnosedRun<'_>, lost: Option<&PlausibleAx
 }
 
 /// Hypotheses of changes at a step.
-pub(super) fn changes_at(step: usize, first: &[Hypothesis]) -> Vec<Hypothesis> {
+pub(super) fn changes_at(step: usize, first: &[TrialHypothesis]) -> Vec<TrialHypothesis> {
     let whole_only = |cause| matches!(cause, Cause::Chain | Cause::ImageFlip | Cause::ImuAxes | Cause::Intrinsics);
-    let mut all: Vec<Hypothesis> =
+    let mut all: Vec<TrialHypothesis> =
         first.iter().filter(|it| !whole_only(it.cause)).map(|it| it.starting(step)).collect();
     for factor in ZOOM_FACTORS {
         for over_s in ZOOM_S {
-            let zoom =
-                Hypothesis { parameters: 2, ..Hypothesis::correction(Cause::Zoom, Correction::Zoom(factor, over_s)) };
+            let zoom = TrialHypothesis {
+                parameters: 2,
+                ..TrialHypothesis::correction(Cause::Zoom, MeasurementCorrection::Zoom(factor, over_s))
+            };
             all.push(zoom.starting(step));
         }
     }
@@ -159,7 +161,7 @@ fn on_gimbal(run: &DiagnosedRun<'_>) -> bool {
 }
 
 /// Parameters that the run could estimate, and a wider prior of the chain.
-fn estimated_columns(run: &DiagnosedRun<'_>) -> Vec<Hypothesis> {
+fn estimated_columns(run: &DiagnosedRun<'_>) -> Vec<TrialHypothesis> {
     let spec = run.spec;
     if !spec.calibrate {
         return Vec::new();
@@ -171,12 +173,12 @@ fn estimated_columns(run: &DiagnosedRun<'_>) -> Vec<Hypothesis> {
         (Cause::Intrinsics, SensorParameters::Intrinsics, spec.intrinsics, intrinsics),
         (Cause::ImuIntrinsics, SensorParameters::ImuIntrinsics, spec.imu_intrinsics, 15),
     ];
-    let mut all: Vec<Hypothesis> = columns
+    let mut all: Vec<TrialHypothesis> = columns
         .into_iter()
         .filter(|(_, _, estimated, _)| !estimated)
         .map(|(cause, columns, _, parameters)| {
             let changes = ForkChanges { estimated: [columns].into(), ..ForkChanges::default() };
-            Hypothesis::change(cause, changes, parameters)
+            TrialHypothesis::change(cause, changes, parameters)
         })
         .collect();
     all.extend(wider_chain_priors(run));
@@ -184,68 +186,71 @@ fn estimated_columns(run: &DiagnosedRun<'_>) -> Vec<Hypothesis> {
 }
 
 /// Wider priors of the chain.
-pub(super) fn wider_chain_priors(run: &DiagnosedRun<'_>) -> impl Iterator<Item = Hypothesis> {
+pub(super) fn wider_chain_priors(run: &DiagnosedRun<'_>) -> impl Iterator<Item = TrialHypothesis> {
     let parameters = if on_gimbal(run) { 6 + 4 * run.rig.joint_names().len() } else { 6 };
     CHAIN_FACTORS.into_iter().map(move |chain_prior| {
         let changes = ForkChanges { chain_prior, ..ForkChanges::default() };
-        Hypothesis::change(Cause::Chain, changes, parameters)
+        TrialHypothesis::change(Cause::Chain, changes, parameters)
     })
 }
 
-fn joint_hypotheses(joints: &[String]) -> Vec<Hypothesis> {
+fn joint_hypotheses(joints: &[String]) -> Vec<TrialHypothesis> {
     if joints.is_empty() {
         return Vec::new();
     }
-    let mut all: Vec<Hypothesis> = joints
+    let mut all: Vec<TrialHypothesis> = joints
         .iter()
-        .map(|joint| Hypothesis::correction(Cause::JointReversed, Correction::Reversed(joint.clone())))
+        .map(|joint| TrialHypothesis::correction(Cause::JointReversed, MeasurementCorrection::Reversed(joint.clone())))
         .collect();
     for (place, first) in joints.iter().enumerate() {
         for second in &joints[place + 1..] {
-            let swapped = Correction::Swapped(first.clone(), second.clone());
-            all.push(Hypothesis::correction(Cause::JointsSwapped, swapped));
+            let swapped = MeasurementCorrection::Swapped(first.clone(), second.clone());
+            all.push(TrialHypothesis::correction(Cause::JointsSwapped, swapped));
         }
     }
     for factor in [std::f64::consts::PI / 180.0, 180.0 / std::f64::consts::PI] {
-        all.push(Hypothesis::correction(Cause::JointScale, Correction::JointScale(factor)));
+        all.push(TrialHypothesis::correction(Cause::JointScale, MeasurementCorrection::JointScale(factor)));
     }
     for shift_s in SHIFTS_S {
-        all.push(Hypothesis::correction(Cause::EncoderClock, Correction::JointShift(shift_s)));
+        all.push(TrialHypothesis::correction(Cause::EncoderClock, MeasurementCorrection::JointShift(shift_s)));
     }
     for factor in NOISE_FACTORS {
         let changes = ForkChanges { encoder_noise: factor, ..ForkChanges::default() };
-        all.push(Hypothesis::change(Cause::EncoderNoise, changes, 1));
+        all.push(TrialHypothesis::change(Cause::EncoderNoise, changes, 1));
     }
     all
 }
 
 /// Errors with which a run hardly initializes.
-fn gross_hypotheses(axes: &PlausibleAxes) -> Vec<Hypothesis> {
-    let mut all: Vec<Hypothesis> = flips().chain(axes_hypotheses(axes)).collect();
+fn gross_hypotheses(axes: &PlausibleAxes) -> Vec<TrialHypothesis> {
+    let mut all: Vec<TrialHypothesis> = flips().chain(axes_hypotheses(axes)).collect();
     for factor in ACCELEROMETER_FACTORS {
-        let scale = Correction::AccelerometerScale(factor);
-        all.push(Hypothesis::correction(Cause::AccelerometerScale, scale));
+        let scale = MeasurementCorrection::AccelerometerScale(factor);
+        all.push(TrialHypothesis::correction(Cause::AccelerometerScale, scale));
     }
     for factor in GYROSCOPE_FACTORS {
-        all.push(Hypothesis::correction(Cause::GyroscopeScale, Correction::GyroscopeScale(factor)));
+        all.push(TrialHypothesis::correction(Cause::GyroscopeScale, MeasurementCorrection::GyroscopeScale(factor)));
     }
     all
 }
 
 /// Mirrored and rotated images.
-pub(super) fn flips() -> impl Iterator<Item = Hypothesis> {
-    ImageFlip::all().map(|flip| Hypothesis::correction(Cause::ImageFlip, Correction::Image(flip)))
+pub(super) fn flips() -> impl Iterator<Item = TrialHypothesis> {
+    ImageFlip::all().map(|flip| TrialHypothesis::correction(Cause::ImageFlip, MeasurementCorrection::Image(flip)))
 }
 
 /// Axes of gyroscope and accelerometer together, and of each alone.
-pub(super) fn axes_hypotheses(axes: &PlausibleAxes) -> Vec<Hypothesis> {
+pub(super) fn axes_hypotheses(axes: &PlausibleAxes) -> Vec<TrialHypothesis> {
     let mut all = Vec::new();
     for axes in &axes.gyroscope {
-        all.push(Hypothesis::correction(Cause::ImuAxes, Correction::ImuAxes(*axes)));
-        all.push(Hypothesis::correction(Cause::GyroscopeAxes, Correction::GyroscopeAxes(*axes)));
+        all.push(TrialHypothesis::correction(Cause::ImuAxes, MeasurementCorrection::ImuAxes(*axes)));
+        all.push(TrialHypothesis::correction(Cause::GyroscopeAxes, MeasurementCorrection::GyroscopeAxes(*axes)));
     }
     for axes in &axes.accelerometer {
-        all.push(Hypothesis::correction(Cause::AccelerometerAxes, Correction::AccelerometerAxes(*axes)));
+        all.push(TrialHypothesis::correction(
+            Cause::AccelerometerAxes,
+            MeasurementCorrection::AccelerometerAxes(*axes),
+        ));
     }
     all
 }

@@ -1,19 +1,19 @@
 //! Hypotheses that undo the faults which the check of a log measures.
 
 use super::axes::PlausibleAxes;
-use super::hypotheses::{Cause, Hypothesis, ZOOM_S, axes_hypotheses, flips, uses_encoders, wider_chain_priors};
+use super::hypotheses::{Cause, TrialHypothesis, ZOOM_S, axes_hypotheses, flips, uses_encoders, wider_chain_priors};
 use super::trial::DiagnosedRun;
 use super::tuning::rounded;
 use crate::estimator::SensorParameters;
 use crate::geometry::ns_from_seconds;
 use crate::log_check::{FaultySource, Finding, MeasuredFault, Severity};
-use crate::session::plan::{Correction, ForkChanges, LONGEST_SHIFT_S};
+use crate::session::plan::{ForkChanges, LONGEST_SHIFT_S, MeasurementCorrection};
 
 /// Changes that undo measured faults.
 #[derive(Debug, Default)]
 pub(super) struct Undoing {
     /// One or a few for each fault, and one for all of them that have no alternative together.
-    pub(super) hypotheses: Vec<Hypothesis>,
+    pub(super) hypotheses: Vec<TrialHypothesis>,
     /// Step from which on the first fault that has a beginning acts.
     pub(super) since: Option<usize>,
     /// True if an error is not among them: no change of a run undoes it.
@@ -24,11 +24,11 @@ impl Undoing {
     /// Changes for the faults of findings that concern a run.
     pub(super) fn of(run: &DiagnosedRun<'_>, findings: &[Finding]) -> Self {
         let mut undoing = Self::default();
-        let mut all: Vec<Correction> = Vec::new();
+        let mut all: Vec<MeasurementCorrection> = Vec::new();
         for finding in findings {
-            let of_faults: Vec<Vec<Hypothesis>> =
+            let of_faults: Vec<Vec<TrialHypothesis>> =
                 finding.faults.iter().filter_map(|fault| hypotheses(run, fault)).collect();
-            let undone: Vec<Hypothesis> = of_faults.concat();
+            let undone: Vec<TrialHypothesis> = of_faults.concat();
             undoing.has_irreversible |=
                 undone.is_empty() && !of_faults.is_empty() && finding.severity == Severity::Error;
             undoing.since = undoing.since.or_else(|| undone.iter().find_map(|it| it.from));
@@ -40,29 +40,30 @@ impl Undoing {
         let is_known = undoing.hypotheses.iter().any(|it| it.changes.corrections == all);
         if all.len() > 1 && !is_known {
             let first = undoing.hypotheses.first().map_or(Cause::Clocks, |it| it.cause);
-            undoing.hypotheses.push(Hypothesis::corrections(first, all));
+            undoing.hypotheses.push(TrialHypothesis::corrections(first, all));
         }
         undoing
     }
 }
 
 /// Hypotheses for one fault, none if no change of a run undoes it; `None` if the run does not use what is faulty.
-fn hypotheses(run: &DiagnosedRun<'_>, fault: &MeasuredFault) -> Option<Vec<Hypothesis>> {
+fn hypotheses(run: &DiagnosedRun<'_>, fault: &MeasuredFault) -> Option<Vec<TrialHypothesis>> {
     let of_run = |camera_key: &str| (camera_key == run.camera_key).then_some(());
     let of_joints = || uses_encoders(run).then_some(());
     let step_at = |time_s: f64| run.step_at(ns_from_seconds(time_s));
-    let one = |cause, correction| vec![Hypothesis::correction(cause, correction)];
+    let one = |cause, correction| vec![TrialHypothesis::correction(cause, correction)];
     Some(match fault {
         MeasuredFault::FocalLength { camera_key, ratio } => {
             of_run(camera_key)?;
-            one(Cause::Focal, Correction::Focal(rounded(*ratio)))
+            one(Cause::Focal, MeasurementCorrection::Focal(rounded(*ratio)))
         }
         MeasuredFault::Zoom { camera_key, since_s, ratio } => {
             of_run(camera_key)?;
             let zoom = |over_s: f64| {
-                let zoom = Hypothesis::correction(Cause::Zoom, Correction::Zoom(rounded(*ratio), over_s));
+                let zoom =
+                    TrialHypothesis::correction(Cause::Zoom, MeasurementCorrection::Zoom(rounded(*ratio), over_s));
                 // The time is that at which half of the change has been reached.
-                Hypothesis { parameters: 2, ..zoom }.starting(step_at(since_s - 0.5 * over_s))
+                TrialHypothesis { parameters: 2, ..zoom }.starting(step_at(since_s - 0.5 * over_s))
             };
             ZOOM_S.map(zoom).to_vec()
         }
@@ -84,37 +85,40 @@ fn hypotheses(run: &DiagnosedRun<'_>, fault: &MeasuredFault) -> Option<Vec<Hypot
         }
         MeasuredFault::CameraShift { camera_key, shift_s } => {
             of_run(camera_key)?;
-            shift(Cause::CameraClock, *shift_s, Correction::CameraShift)
+            shift(Cause::CameraClock, *shift_s, MeasurementCorrection::CameraShift)
         }
         MeasuredFault::JointShift { shift_s } => {
             of_joints()?;
-            shift(Cause::EncoderClock, *shift_s, Correction::JointShift)
+            shift(Cause::EncoderClock, *shift_s, MeasurementCorrection::JointShift)
         }
         MeasuredFault::JointsReversed(joints) => {
             of_joints()?;
-            let reversed = joints.iter().map(|joint| Correction::Reversed(joint.clone()));
-            vec![Hypothesis::corrections(Cause::JointReversed, reversed.collect())]
+            let reversed = joints.iter().map(|joint| MeasurementCorrection::Reversed(joint.clone()));
+            vec![TrialHypothesis::corrections(Cause::JointReversed, reversed.collect())]
         }
         MeasuredFault::JointsExchanged(pairs) => {
             of_joints()?;
-            let swapped = pairs.iter().map(|[first, second]| Correction::Swapped(first.clone(), second.clone()));
-            vec![Hypothesis::corrections(Cause::JointsSwapped, swapped.collect())]
+            let swapped =
+                pairs.iter().map(|[first, second]| MeasurementCorrection::Swapped(first.clone(), second.clone()));
+            vec![TrialHypothesis::corrections(Cause::JointsSwapped, swapped.collect())]
         }
         MeasuredFault::JointOffset { joint, offset_rad, since_s } => {
             of_joints()?;
-            let offset =
-                Hypothesis::correction(Cause::JointOffset, Correction::Offset(joint.clone(), rounded(*offset_rad)));
+            let offset = TrialHypothesis::correction(
+                Cause::JointOffset,
+                MeasurementCorrection::Offset(joint.clone(), rounded(*offset_rad)),
+            );
             vec![since_s.map_or(offset.clone(), |since_s| offset.starting(step_at(since_s)))]
         }
         MeasuredFault::JointUnit(factor) => {
             of_joints()?;
-            one(Cause::JointScale, Correction::JointScale(*factor))
+            one(Cause::JointScale, MeasurementCorrection::JointScale(*factor))
         }
         MeasuredFault::GyroscopeScale(factor) => {
-            one(Cause::GyroscopeScale, Correction::GyroscopeScale(rounded(*factor)))
+            one(Cause::GyroscopeScale, MeasurementCorrection::GyroscopeScale(rounded(*factor)))
         }
         MeasuredFault::AccelerometerScale(factor) => {
-            one(Cause::AccelerometerScale, Correction::AccelerometerScale(rounded(*factor)))
+            one(Cause::AccelerometerScale, MeasurementCorrection::AccelerometerScale(rounded(*factor)))
         }
         MeasuredFault::GyroscopeAxes(axes) => {
             axes_hypotheses(&PlausibleAxes { gyroscope: vec![*axes], ..PlausibleAxes::default() })
@@ -134,9 +138,9 @@ fn hypotheses(run: &DiagnosedRun<'_>, fault: &MeasuredFault) -> Option<Vec<Hypot
 }
 
 /// Shift of a clock; none beyond those of which a fork has the samples.
-fn shift(cause: Cause, shift_s: f64, correction: fn(f64) -> Correction) -> Vec<Hypothesis> {
+fn shift(cause: Cause, shift_s: f64, correction: fn(f64) -> MeasurementCorrection) -> Vec<TrialHypothesis> {
     let is_possible = shift_s.abs() <= LONGEST_SHIFT_S;
-    is_possible.then(|| Hypothesis::correction(cause, correction(rounded(shift_s)))).into_iter().collect()
+    is_possible.then(|| TrialHypothesis::correction(cause, correction(rounded(shift_s)))).into_iter().collect()
 }
 
 /// Estimate of columns, none in a run without calibration; `None` if the run estimates them.
@@ -146,9 +150,9 @@ fn column(
     columns: SensorParameters,
     is_estimated: bool,
     parameters: usize,
-) -> Option<Vec<Hypothesis>> {
+) -> Option<Vec<TrialHypothesis>> {
     let changes = ForkChanges { estimated: [columns].into(), ..ForkChanges::default() };
-    let estimate = run.spec.calibrate.then(|| Hypothesis::change(cause, changes, parameters));
+    let estimate = run.spec.calibrate.then(|| TrialHypothesis::change(cause, changes, parameters));
     (!is_estimated).then(|| estimate.into_iter().collect())
 }
 

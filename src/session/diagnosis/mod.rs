@@ -33,4 +33,4 @@ pub use diagnose::diagnose;
 pub(in crate::session) use diagnose::diagnose_run;
 pub use hypotheses::Cause;
 pub use log_faults::LogFaults;
-pub use outcome::{Diagnosis, RankedCause, TruthAgreement, Verdict, WaitingReason};
+pub use outcome::{Diagnosis, DiagnosisVerdict, RankedCause, TruthAgreement, WaitingReason};

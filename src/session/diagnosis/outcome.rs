@@ -13,7 +13,7 @@ use crate::text::Named as _;
 /// Conclusion of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum DiagnosisVerdict {
     /// The residuals agree with their noise: no cause is looked for.
     Agrees,
     /// One cause explains the residuals.
@@ -85,7 +85,7 @@ pub struct Diagnosis {
     pub log: String,
     /// Specification of the run.
     pub run: String,
-    pub verdict: Verdict,
+    pub verdict: DiagnosisVerdict,
     /// At most three errors and warnings of the log's check, those with the largest effect first.
     pub log_faults: Vec<Finding>,
     /// True if the causes undo faults that the check of the log measures: no others were tried.
@@ -129,7 +129,7 @@ impl fmt::Display for Diagnosis {
                 writeln!(out, "     remedy     {}", fault.remedy)?;
             }
         }
-        if self.verdict == Verdict::LogFault {
+        if self.verdict == DiagnosisVerdict::LogFault {
             writeln!(
                 out,
                 "  no trials    no change of a run undoes this fault: correct it in the log, then diagnose again"
@@ -172,7 +172,7 @@ impl Diagnosis {
         Self {
             log: String::new(),
             run,
-            verdict: Verdict::NoSteps,
+            verdict: DiagnosisVerdict::NoSteps,
             log_faults: Vec::new(),
             measured: false,
             values: Vec::new(),
@@ -196,10 +196,12 @@ impl Diagnosis {
         }
         let is_named = |fault: &&Finding| fault.severity == Severity::Error || !fault.faults.is_empty();
         match self.log_faults.iter().find(is_named) {
-            Some(fault) if self.verdict == Verdict::Agrees => {
+            Some(fault) if self.verdict == DiagnosisVerdict::Agrees => {
                 format!("the residuals agree with their noise; the check of the log says: {}", fault.title)
             }
-            Some(fault) if self.verdict == Verdict::LogFault => format!("{}, by the check of the log", fault.title),
+            Some(fault) if self.verdict == DiagnosisVerdict::LogFault => {
+                format!("{}, by the check of the log", fault.title)
+            }
             Some(fault) => format!("{}, by the check of the log; by the trials: {of_trials}", fault.title),
             None => of_trials,
         }
@@ -208,15 +210,17 @@ impl Diagnosis {
     fn headline_of_trials(&self) -> String {
         let first = || self.causes.first().map_or_else(String::new, |cause| cause.statement.clone());
         match self.verdict {
-            Verdict::Agrees if self.ground_truth.is_some() => {
+            DiagnosisVerdict::Agrees if self.ground_truth.is_some() => {
                 "the residuals agree with their noise; the ground truth disagrees with the estimate".to_owned()
             }
-            Verdict::Agrees => "nothing to diagnose: the residuals agree with their noise".to_owned(),
-            Verdict::Cause => first(),
-            Verdict::Several => format!("{} causes explain the residuals about as well", self.explaining),
-            Verdict::LogFault => "the log has a fault that no change of a run undoes".to_owned(),
-            Verdict::Unexplained => "unexplained: no tried change brings the residuals back to their noise".to_owned(),
-            Verdict::NoSteps => "no image reached the estimator: see dcvins check".to_owned(),
+            DiagnosisVerdict::Agrees => "nothing to diagnose: the residuals agree with their noise".to_owned(),
+            DiagnosisVerdict::Cause => first(),
+            DiagnosisVerdict::Several => format!("{} causes explain the residuals about as well", self.explaining),
+            DiagnosisVerdict::LogFault => "the log has a fault that no change of a run undoes".to_owned(),
+            DiagnosisVerdict::Unexplained => {
+                "unexplained: no tried change brings the residuals back to their noise".to_owned()
+            }
+            DiagnosisVerdict::NoSteps => "no image reached the estimator: see dcvins check".to_owned(),
         }
     }
 }
@@ -257,7 +261,7 @@ mod tests {
             faults: Vec::new(),
         };
         let mut diagnosis = Diagnosis {
-            verdict: Verdict::Unexplained,
+            verdict: DiagnosisVerdict::Unexplained,
             log_faults: vec![fault(Severity::Error)],
             ..Diagnosis::before_trials("auto".to_owned())
         };
@@ -269,7 +273,7 @@ mod tests {
         diagnosis.log_faults = vec![fault(Severity::Warning)];
         assert!(diagnosis.headline().starts_with("unexplained"), "{}", diagnosis.headline());
         assert!(diagnosis.to_string().contains("  log          warning: the heading"));
-        diagnosis.verdict = Verdict::Agrees;
+        diagnosis.verdict = DiagnosisVerdict::Agrees;
         assert!(diagnosis.headline().starts_with("nothing to diagnose"), "{}", diagnosis.headline());
         diagnosis.log_faults[0].faults = vec![MeasuredFault::JointUnit(2.0)];
         assert!(diagnosis.headline().contains("agree with their noise; the check of the log says: the heading"));

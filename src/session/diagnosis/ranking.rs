@@ -5,15 +5,15 @@
 //! image that is not used is compared on the other half.
 
 use super::agreement::disagreement;
-use super::hypotheses::{Cause, Hypothesis};
+use super::hypotheses::{Cause, TrialHypothesis};
 use super::misfit::{Misfit, Scale};
 use super::trial::TrialResult;
-use crate::session::plan::Correction;
+use crate::session::plan::MeasurementCorrection;
 
 /// Trial of a hypothesis with its averages over the scored steps.
 #[derive(Clone, Debug)]
-pub(super) struct Candidate {
-    pub(super) hypothesis: Hypothesis,
+pub(super) struct RankedTrial {
+    pub(super) hypothesis: TrialHypothesis,
     pub(super) result: TrialResult,
     pub(super) misfit: Misfit,
     /// Lower is better.
@@ -33,7 +33,7 @@ const MOST_REMAINING: usize = 3;
 
 /// Conclusion from the ranked causes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Decision {
+pub(super) enum RankingDecision {
     /// The first cause explains the residuals, and no other one does.
     One,
     /// Number of causes that explain them about as well.
@@ -43,10 +43,10 @@ pub(super) enum Decision {
 }
 
 /// Score of a trial.
-pub(super) fn score(hypothesis: &Hypothesis, misfit: &Misfit, given: &Misfit, scale: &Scale) -> f64 {
+pub(super) fn score(hypothesis: &TrialHypothesis, misfit: &Misfit, given: &Misfit, scale: &Scale) -> f64 {
     let observations = (scale.observations * scale.windows).max(2.0);
     let mut cost = misfit.cost(scale);
-    if let [Correction::Ignored(half)] = hypothesis.changes.corrections.as_slice() {
+    if let [MeasurementCorrection::Ignored(half)] = hypothesis.changes.corrections.as_slice() {
         let [visual, ..] = given.parts(scale);
         let [_, rest @ ..] = misfit.parts(scale);
         cost = misfit.calibration
@@ -59,13 +59,13 @@ pub(super) fn score(hypothesis: &Hypothesis, misfit: &Misfit, given: &Misfit, sc
 
 /// The best candidate of each cause, the best cause first; a special case that is about as good precedes the general
 /// cause.
-pub(super) fn by_cause(given: &Candidate, mut candidates: Vec<Candidate>) -> Vec<Candidate> {
-    let is_slight = |it: &Candidate| {
+pub(super) fn by_cause(given: &RankedTrial, mut candidates: Vec<RankedTrial>) -> Vec<RankedTrial> {
+    let is_slight = |it: &RankedTrial| {
         it.hypothesis.cause == Cause::ImageRegion && given.score - it.score < REGION_RATIO * given.score
     };
     candidates.retain(|candidate| !is_slight(candidate));
     candidates.sort_by(|one, other| one.score.total_cmp(&other.score));
-    let mut kept: Vec<Candidate> = Vec::new();
+    let mut kept: Vec<RankedTrial> = Vec::new();
     for candidate in candidates {
         if kept.iter().all(|known| known.hypothesis.cause != candidate.hypothesis.cause) {
             kept.push(candidate);
@@ -87,19 +87,19 @@ fn margin(gain: f64) -> f64 {
 }
 
 /// Decision about ranked causes; `given` is the run without a change.
-pub(super) fn decide(given: &Candidate, ranked: &[Candidate]) -> Decision {
-    let Some(best) = ranked.first() else { return Decision::None };
+pub(super) fn decide(given: &RankedTrial, ranked: &[RankedTrial]) -> RankingDecision {
+    let Some(best) = ranked.first() else { return RankingDecision::None };
     let gain = given.score - best.score;
     let (before, after) = (disagreement(&given.misfit), disagreement(&best.misfit));
     if gain < MARGIN || (after > 1.0 && after > REMAINING * before) {
-        return Decision::None;
+        return RankingDecision::None;
     }
     // A cause that leaves a disagreement does not compete with one that leaves none.
-    let as_good = |it: &&Candidate| after > 1.0 || disagreement(&it.misfit) <= 1.0;
+    let as_good = |it: &&RankedTrial| after > 1.0 || disagreement(&it.misfit) <= 1.0;
     let near = ranked.iter().filter(|candidate| candidate.score < best.score + margin(gain)).filter(as_good);
     match near.filter(|candidate| !is_general(candidate.hypothesis.cause, best.hypothesis.cause)).count() {
-        0 | 1 => Decision::One,
-        count => Decision::Several(count.min(MOST_REMAINING)),
+        0 | 1 => RankingDecision::One,
+        count => RankingDecision::Several(count.min(MOST_REMAINING)),
     }
 }
 
@@ -147,14 +147,14 @@ mod tests {
         Misfit::of(&steps, 0)
     }
 
-    fn candidate(cause: Cause, changes: ForkChanges, length_px: f64, given: &Misfit) -> Candidate {
-        let hypothesis = Hypothesis::change(cause, changes, 1);
+    fn candidate(cause: Cause, changes: ForkChanges, length_px: f64, given: &Misfit) -> RankedTrial {
+        let hypothesis = TrialHypothesis::change(cause, changes, 1);
         let misfit = misfit(length_px);
         let score = score(&hypothesis, &misfit, given, &SCALE);
-        Candidate { hypothesis, result: TrialResult::default(), misfit, score }
+        RankedTrial { hypothesis, result: TrialResult::default(), misfit, score }
     }
 
-    fn decision(given_px: f64, causes: &[(Cause, f64)]) -> (Decision, Vec<Cause>) {
+    fn decision(given_px: f64, causes: &[(Cause, f64)]) -> (RankingDecision, Vec<Cause>) {
         let given = misfit(given_px);
         let all = causes.iter().map(|(cause, px)| candidate(*cause, ForkChanges::default(), *px, &given)).collect();
         let given = candidate(Cause::Focal, ForkChanges::default(), given_px, &given);
@@ -167,13 +167,13 @@ mod tests {
     fn one_cause_several_or_none() {
         let (focal, shutter, chain) = (Cause::Focal, Cause::Shutter, Cause::Chain);
         let (found, order) = decision(1.5, &[(shutter, 0.9), (focal, 0.1), (focal, 0.4), (chain, 1.5)]);
-        assert_eq!((found, order), (Decision::One, vec![focal, shutter, chain]));
-        assert_eq!(decision(1.5, &[(shutter, 0.1), (focal, 0.1), (chain, 1.5)]).0, Decision::Several(2));
-        assert_eq!(decision(1.5, &[(shutter, 1.4), (focal, 1.5)]).0, Decision::None);
+        assert_eq!((found, order), (RankingDecision::One, vec![focal, shutter, chain]));
+        assert_eq!(decision(1.5, &[(shutter, 0.1), (focal, 0.1), (chain, 1.5)]).0, RankingDecision::Several(2));
+        assert_eq!(decision(1.5, &[(shutter, 1.4), (focal, 1.5)]).0, RankingDecision::None);
         // A more general cause does not compete with its special case.
         let (found, order) = decision(1.5, &[(Cause::Intrinsics, 0.1), (focal, 0.1)]);
-        assert_eq!((found, order), (Decision::One, vec![focal, Cause::Intrinsics]));
-        assert_eq!(decision(1.5, &[]).0, Decision::None);
+        assert_eq!((found, order), (RankingDecision::One, vec![focal, Cause::Intrinsics]));
+        assert_eq!(decision(1.5, &[]).0, RankingDecision::None);
     }
 
     #[test]
@@ -182,8 +182,8 @@ mod tests {
         let mut wide = misfit(0.1);
         wide.factors[1].rows = 33.0 * wide.tracked as f64;
         let changes = ForkChanges { encoder_noise: 10.0, ..ForkChanges::default() };
-        let hypothesis = Hypothesis::change(Cause::EncoderNoise, changes, 1);
-        let plain = Hypothesis::change(Cause::EncoderNoise, ForkChanges::default(), 1);
+        let hypothesis = TrialHypothesis::change(Cause::EncoderNoise, changes, 1);
+        let plain = TrialHypothesis::change(Cause::EncoderNoise, ForkChanges::default(), 1);
         let difference = score(&hypothesis, &wide, &given, &SCALE) - score(&plain, &wide, &given, &SCALE);
         assert!((difference - 4.0 * 33.0 * 2.0 * 10.0_f64.ln()).abs() < 1e-6, "{difference}");
     }

@@ -1,12 +1,12 @@
 //! Values of causes from the trials so far: better hypotheses of the same kinds.
 
-use super::hypotheses::{Cause, Hypothesis};
-use super::ranking::Candidate;
+use super::hypotheses::{Cause, TrialHypothesis};
+use super::ranking::RankedTrial;
 use super::trial::{DiagnosedRun, TrialResult};
 use super::tuning::rounded;
 use crate::estimator::SensorParameters;
 use crate::gimbal::{ParameterId, ParameterPart, Quantity};
-use crate::session::plan::{Correction, ForkChanges, LONGEST_SHIFT_S};
+use crate::session::plan::{ForkChanges, LONGEST_SHIFT_S, MeasurementCorrection};
 
 /// Smallest shift that is worth a trial, in seconds.
 const LEAST_SHIFT_S: f64 = 5e-4;
@@ -18,7 +18,7 @@ const LEAST_OFFSET_RAD: f64 = 0.017;
 const STEPS_BESIDE: usize = 15;
 
 /// Hypotheses with values from the trials.
-pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[Candidate]) -> Vec<Hypothesis> {
+pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[RankedTrial]) -> Vec<TrialHypothesis> {
     let mut all = Vec::new();
     for candidate in candidates {
         let changes = &candidate.hypothesis.changes;
@@ -26,10 +26,9 @@ pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[Candidate]) -> Vec<H
             all.extend(shifts(run, &candidate.result));
         }
         if changes.estimated.contains(&SensorParameters::Intrinsics) {
-            all.extend(
-                focal(run, candidate)
-                    .map(|factor| Hypothesis::correction(Cause::Focal, Correction::Focal(rounded(factor)))),
-            );
+            all.extend(focal(run, candidate).map(|factor| {
+                TrialHypothesis::correction(Cause::Focal, MeasurementCorrection::Focal(rounded(factor)))
+            }));
         }
     }
     let best_of = |cause: Cause| {
@@ -40,13 +39,13 @@ pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[Candidate]) -> Vec<H
         // The columns of the intrinsics find the rest of the error from here; the result is refined once more.
         let estimated = [SensorParameters::Intrinsics].into();
         let changes = ForkChanges { estimated, ..best.hypothesis.changes.clone() };
-        all.push(Hypothesis::change(Cause::Intrinsics, changes, best.hypothesis.parameters + 4));
+        all.push(TrialHypothesis::change(Cause::Intrinsics, changes, best.hypothesis.parameters + 4));
     }
     if let Some(best) = best_of(Cause::EncoderNoise) {
         let factor = best.hypothesis.changes.encoder_noise * best.misfit.factors[1].mean_square().sqrt();
         if factor > 1.1 && factor < 1e3 {
             let changes = ForkChanges { encoder_noise: rounded(factor), ..ForkChanges::default() };
-            all.push(Hypothesis::change(Cause::EncoderNoise, changes, 1));
+            all.push(TrialHypothesis::change(Cause::EncoderNoise, changes, 1));
         }
     }
     let noises =
@@ -65,24 +64,24 @@ fn value(result: &TrialResult, part: ParameterPart, quantity: Quantity) -> Optio
 }
 
 /// Shifts of each clock alone and of both from the columns of time offsets.
-fn shifts(run: &DiagnosedRun<'_>, result: &TrialResult) -> Vec<Hypothesis> {
+fn shifts(run: &DiagnosedRun<'_>, result: &TrialResult) -> Vec<TrialHypothesis> {
     let given_s = run.rig.camera(run.camera_key).map_or(0.0, |camera| camera.timeshift_cam_imu_s);
     let camera = value(result, ParameterPart::Camera(0), Quantity::Timeshift).map(|total_s| total_s - given_s);
     let encoder = value(result, ParameterPart::Encoder, Quantity::Timeshift);
     let usable = |shift_s: &f64| (LEAST_SHIFT_S..=LONGEST_SHIFT_S).contains(&shift_s.abs());
-    let camera = camera.filter(usable).map(|shift_s| Correction::CameraShift(rounded(shift_s)));
-    let encoder = encoder.filter(usable).map(|shift_s| Correction::JointShift(rounded(shift_s)));
+    let camera = camera.filter(usable).map(|shift_s| MeasurementCorrection::CameraShift(rounded(shift_s)));
+    let encoder = encoder.filter(usable).map(|shift_s| MeasurementCorrection::JointShift(rounded(shift_s)));
     let mut all = Vec::new();
-    all.extend(camera.clone().map(|it| Hypothesis::correction(Cause::CameraClock, it)));
-    all.extend(encoder.clone().map(|it| Hypothesis::correction(Cause::EncoderClock, it)));
+    all.extend(camera.clone().map(|it| TrialHypothesis::correction(Cause::CameraClock, it)));
+    all.extend(encoder.clone().map(|it| TrialHypothesis::correction(Cause::EncoderClock, it)));
     if let (Some(camera), Some(encoder)) = (camera, encoder) {
-        all.push(Hypothesis::corrections(Cause::Clocks, vec![camera, encoder]));
+        all.push(TrialHypothesis::corrections(Cause::Clocks, vec![camera, encoder]));
     }
     all
 }
 
 /// Factor on the rig's focal length from the columns of the intrinsics and the factor that the trial already has.
-fn focal(run: &DiagnosedRun<'_>, candidate: &Candidate) -> Option<f64> {
+fn focal(run: &DiagnosedRun<'_>, candidate: &RankedTrial) -> Option<f64> {
     let [fx, fy, ..] = run.rig.camera(run.camera_key).ok()?.model.intrinsics();
     let column = |quantity| value(&candidate.result, ParameterPart::Camera(0), quantity);
     let ratio = 0.5 * (column(Quantity::Fx)? / fx + column(Quantity::Fy)? / fy);
@@ -91,14 +90,14 @@ fn focal(run: &DiagnosedRun<'_>, candidate: &Candidate) -> Option<f64> {
         .changes
         .corrections
         .iter()
-        .map(|correction| if let Correction::Focal(factor) = correction { *factor } else { 1.0 })
+        .map(|correction| if let MeasurementCorrection::Focal(factor) = correction { *factor } else { 1.0 })
         .product();
     let factor = known * ratio;
     ((factor - 1.0).abs() > LEAST_FOCAL && (0.1..10.0).contains(&factor)).then_some(factor)
 }
 
 /// Constant and stepping offsets of each joint, from the joint angles of a trial that hardly uses the readings.
-fn offsets(run: &DiagnosedRun<'_>, result: &TrialResult) -> Vec<Hypothesis> {
+fn offsets(run: &DiagnosedRun<'_>, result: &TrialResult) -> Vec<TrialHypothesis> {
     let mut all = Vec::new();
     for (joint, name) in run.rig.joint_names().into_iter().enumerate() {
         let differences: Vec<(usize, f64)> = result
@@ -111,7 +110,10 @@ fn offsets(run: &DiagnosedRun<'_>, result: &TrialResult) -> Vec<Hypothesis> {
             .collect();
         let Some((step, before, after)) = change_point(&differences) else { continue };
         let offset = |offset_rad: f64| {
-            Hypothesis::correction(Cause::JointOffset, Correction::Offset(name.clone(), rounded(offset_rad)))
+            TrialHypothesis::correction(
+                Cause::JointOffset,
+                MeasurementCorrection::Offset(name.clone(), rounded(offset_rad)),
+            )
         };
         if (after - before).abs() > LEAST_OFFSET_RAD {
             all.push(offset(after - before).starting(step));

@@ -1,8 +1,8 @@
 //! Trials of one span on one scale.
 
-use super::hypotheses::{Cause, Hypothesis};
+use super::hypotheses::{Cause, TrialHypothesis};
 use super::misfit::{Misfit, Scale};
-use super::ranking::{Candidate, score};
+use super::ranking::{RankedTrial, score};
 use super::trial::TrialResult;
 use crate::geometry::seconds_from_ns;
 use crate::session::plan::ForkChanges;
@@ -14,13 +14,13 @@ const DEFAULT_SIGMA_PX: f64 = 0.25;
 
 /// Scored trials of one span; `given` is the run without a change.
 pub(super) struct Trials {
-    pub(super) given: Candidate,
-    pub(super) others: Vec<Candidate>,
+    pub(super) given: RankedTrial,
+    pub(super) others: Vec<RankedTrial>,
 }
 
 /// Trials on one scale: the observations and windows of the run itself, or of the trial with the most steps if the run has no
 /// window, and the noise of the trial with the smallest residuals.
-pub(super) fn scored(given: TrialResult, done: Vec<(Hypothesis, TrialResult)>) -> Trials {
+pub(super) fn scored(given: TrialResult, done: Vec<(TrialHypothesis, TrialResult)>) -> Trials {
     let started = given.initialized_ns().or_else(|| done.iter().filter_map(|(_, it)| it.initialized_ns()).min());
     let from_ns = started.unwrap_or_default();
     let averages = |result: &TrialResult| Misfit::of(&result.steps, from_ns);
@@ -41,11 +41,11 @@ pub(super) fn scored(given: TrialResult, done: Vec<(Hypothesis, TrialResult)>) -
         rows: reference.factors.map(|factor| factor.rows / reference.tracked.max(1) as f64),
         windows: (seconds_from_ns(end_ns - from_ns) / reference.window_s.max(0.5)).max(1.0),
     };
-    let candidate = |hypothesis: Hypothesis, result: TrialResult, misfit: Misfit| {
+    let candidate = |hypothesis: TrialHypothesis, result: TrialResult, misfit: Misfit| {
         let score = score(&hypothesis, &misfit, &given_misfit, &scale);
-        Candidate { hypothesis, result, misfit, score }
+        RankedTrial { hypothesis, result, misfit, score }
     };
-    let unchanged = Hypothesis::change(Cause::Chain, ForkChanges::default(), 0);
+    let unchanged = TrialHypothesis::change(Cause::Chain, ForkChanges::default(), 0);
     let others = done.into_iter().zip(misfits).map(|((it, result), misfit)| candidate(it, result, misfit)).collect();
     Trials { given: candidate(unchanged, given, given_misfit.clone()), others }
 }

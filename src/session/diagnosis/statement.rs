@@ -1,16 +1,16 @@
 //! Causes in words: the statement with its value, and the remedy.
 
-use super::hypotheses::{Cause, Hypothesis};
+use super::hypotheses::{Cause, TrialHypothesis};
 use super::trial::{DiagnosedRun, TrialResult};
 use crate::calibration::transform_distance;
 use crate::gimbal::{ParameterId, ParameterPart, Quantity};
-use crate::session::plan::Correction;
+use crate::session::plan::MeasurementCorrection;
 use crate::text::Named as _;
 
 /// Statement and remedy of a cause; `from_s` is the stamp from which on its change acts, `None` for the whole run.
 pub(super) fn texts(
     run: &DiagnosedRun<'_>,
-    hypothesis: &Hypothesis,
+    hypothesis: &TrialHypothesis,
     result: &TrialResult,
     from_s: Option<f64>,
 ) -> (String, String) {
@@ -39,11 +39,11 @@ pub(super) fn texts(
     (format!("{statement}{since}"), remedy)
 }
 
-fn of_correction(run: &DiagnosedRun<'_>, correction: &Correction) -> (String, String) {
+fn of_correction(run: &DiagnosedRun<'_>, correction: &MeasurementCorrection) -> (String, String) {
     let camera = run.camera_key;
     let rig_camera = run.rig.camera(camera).ok();
     match correction {
-        Correction::Focal(factor) => {
+        MeasurementCorrection::Focal(factor) => {
             let intrinsics = rig_camera.map_or([0.0; 6], |camera| camera.model.intrinsics());
             let [fx, fy, cx, cy, ..] = intrinsics;
             let error = if *factor < 1.0 {
@@ -60,19 +60,19 @@ fn of_correction(run: &DiagnosedRun<'_>, correction: &Correction) -> (String, St
                 ),
             )
         }
-        Correction::Zoom(factor, over_s) => (
+        MeasurementCorrection::Zoom(factor, over_s) => (
             format!("the focal length of {camera} changes by a factor of {factor:.2} over {over_s:.1} s"),
             format!("fix the zoom of {camera}"),
         ),
-        Correction::Image(flip) => (
+        MeasurementCorrection::Image(flip) => (
             format!("the images of {camera} are {}", flip.name()),
             format!("record {camera} without this operation, or convert the images and give them their own extrinsics"),
         ),
-        Correction::Ignored(half) => (
+        MeasurementCorrection::Ignored(half) => (
             format!("the {} half of the images of {camera} contradicts the rest", half.name()),
             format!("mask what moves with the camera or the vehicle there: {camera}.mask in the rig"),
         ),
-        Correction::CameraShift(shift_s) => {
+        MeasurementCorrection::CameraShift(shift_s) => {
             let given_s = rig_camera.map_or(0.0, |camera| camera.timeshift_cam_imu_s);
             let side = if *shift_s > 0.0 { "earlier" } else { "later" };
             (
@@ -83,7 +83,7 @@ fn of_correction(run: &DiagnosedRun<'_>, correction: &Correction) -> (String, St
                 ),
             )
         }
-        Correction::JointShift(shift_s) => {
+        MeasurementCorrection::JointShift(shift_s) => {
             let given_s = run.rig.gimbal.as_ref().map_or(0.0, |gimbal| gimbal.timeshift_gimbal_imu_s);
             let side = if *shift_s > 0.0 { "earlier" } else { "later" };
             (
@@ -94,23 +94,23 @@ fn of_correction(run: &DiagnosedRun<'_>, correction: &Correction) -> (String, St
                 ),
             )
         }
-        Correction::Reversed(joint) => (
+        MeasurementCorrection::Reversed(joint) => (
             format!("joint {joint} counts in the other direction"),
             format!("reverse the sign of {joint} in the recording, or turn its axis in the rig"),
         ),
-        Correction::Swapped(first, second) => (
+        MeasurementCorrection::Swapped(first, second) => (
             format!("joints {first} and {second} have each other's readings"),
             "correct the names of gimbal.links in the rig, or the order in the recording".to_owned(),
         ),
-        Correction::Offset(joint, offset_rad) => (
+        MeasurementCorrection::Offset(joint, offset_rad) => (
             format!("the readings of joint {joint} are {:.1}° off", -offset_rad.to_degrees()),
             format!("check the zero of {joint}, or the heading of the vehicle if angles come from attitudes"),
         ),
-        Correction::JointScale(factor) => {
+        MeasurementCorrection::JointScale(factor) => {
             let unit = if *factor < 1.0 { "degrees" } else { "radians that were converted twice" };
             (format!("the joint angles are in {unit}"), "record radians, or set the unit of gimbal.source".to_owned())
         }
-        Correction::ImuAxes(axes) => {
+        MeasurementCorrection::ImuAxes(axes) => {
             let frame = if axes.is_left_handed() { "form a left-handed frame" } else { "belong to another frame" };
             (
                 format!("the axes of the IMU {frame}: x/y/z of the rig's IMU are {axes} of the recording"),
@@ -118,19 +118,19 @@ fn of_correction(run: &DiagnosedRun<'_>, correction: &Correction) -> (String, St
                     .to_owned(),
             )
         }
-        Correction::GyroscopeAxes(axes) => (
+        MeasurementCorrection::GyroscopeAxes(axes) => (
             format!("the axes of the gyroscope differ from the accelerometer's: x/y/z are {axes} of the recording"),
             "correct the axes of the angular velocities in the driver or the converter".to_owned(),
         ),
-        Correction::AccelerometerAxes(axes) => (
+        MeasurementCorrection::AccelerometerAxes(axes) => (
             format!("the axes of the accelerometer differ from the gyroscope's: x/y/z are {axes} of the recording"),
             "correct the axes of the specific forces in the driver or the converter".to_owned(),
         ),
-        Correction::GyroscopeScale(factor) => (
+        MeasurementCorrection::GyroscopeScale(factor) => (
             scale_text("angular velocities", *factor, std::f64::consts::PI / 180.0, "degrees per second"),
             "record rad/s; check the range setting of the gyroscope".to_owned(),
         ),
-        Correction::AccelerometerScale(factor) => (
+        MeasurementCorrection::AccelerometerScale(factor) => (
             scale_text("specific forces", *factor, 9.806_65, "g"),
             "record m/s²; check the range setting of the accelerometer".to_owned(),
         ),
@@ -148,7 +148,7 @@ fn scale_text(what: &str, factor: f64, of_unit: f64, unit: &str) -> String {
 /// Texts of a cause whose value is estimated by the trial.
 fn of_estimate(
     run: &DiagnosedRun<'_>,
-    hypothesis: &Hypothesis,
+    hypothesis: &TrialHypothesis,
     result: &TrialResult,
     camera: &str,
 ) -> (String, String) {

@@ -10,7 +10,7 @@ use crate::estimator::StepReport;
 use crate::gimbal::{ClassicalChain, ParameterId};
 use crate::sensors::Rig;
 use crate::session::engine::{OwnedStepInput, RunEngine, apply_fork, guarded};
-use crate::session::plan::{Correction, ForkChanges, RunSpec};
+use crate::session::plan::{ForkChanges, MeasurementCorrection, RunSpec};
 use crate::session::record::{RunRecord, StepRecord};
 
 /// The run to be diagnosed.
@@ -114,7 +114,7 @@ fn step_record(report: StepReport, input: &OwnedStepInput) -> StepRecord {
 /// Scale of the pixels that the estimator uses, relative to those of the image.
 fn pixel_scale(changes: &ForkChanges) -> f64 {
     let factors = changes.corrections.iter().filter_map(|correction| match correction {
-        Correction::Focal(factor) | Correction::Zoom(factor, _) => Some(factor.recip()),
+        MeasurementCorrection::Focal(factor) | MeasurementCorrection::Zoom(factor, _) => Some(factor.recip()),
         _ => None,
     });
     factors.product()

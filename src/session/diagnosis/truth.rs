@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::outcome::TruthAgreement;
 use crate::geometry::seconds_from_ns;
-use crate::session::accuracy::{Alignment, AlignmentSums};
+use crate::session::accuracy::{AlignmentSums, TrajectoryAlignment};
 use crate::session::record::{PoseError, RunRecord};
 
 /// Mean NEES and ratio of the position error to the length of the path above which the ground truth disagrees; 6 is
@@ -86,7 +86,7 @@ fn root_mean_square(poses: &[(i64, Vector3<f64>, Vector3<f64>)], delay_ns: i64) 
     for (estimate, truth) in &pairs {
         sums.add(estimate, truth);
     }
-    let alignment = sums.solve(Alignment::YawPosition)?;
+    let alignment = sums.solve(TrajectoryAlignment::YawPosition)?;
     let squares = pairs.iter().map(|(estimate, truth)| (alignment.rigid.transform(estimate) - truth).norm_squared());
     Some((squares.sum::<f64>() / pairs.len().max(1) as f64).sqrt())
 }

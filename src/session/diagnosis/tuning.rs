@@ -1,9 +1,9 @@
 //! Values and steps around those of the best trials.
 
-use super::hypotheses::{Cause, Hypothesis};
-use super::ranking::Candidate;
+use super::hypotheses::{Cause, TrialHypothesis};
+use super::ranking::RankedTrial;
 use super::scoring::Trials;
-use crate::session::plan::Correction;
+use crate::session::plan::MeasurementCorrection;
 
 /// Steps around that of the best change which are tried.
 const MOVES: [isize; 8] = [-16, -8, -4, -2, -1, 1, 2, 4];
@@ -12,48 +12,48 @@ const SPREAD: [f64; 2] = [0.94, 1.06];
 const SPREAD_S: [f64; 2] = [0.6, 1.6];
 
 /// The best change that begins at a step, at other steps around it.
-pub(super) fn moved(trials: &Trials) -> Vec<Hypothesis> {
+pub(super) fn moved(trials: &Trials) -> Vec<TrialHypothesis> {
     let later = trials.others.iter().filter(|it| it.hypothesis.from.is_some());
     let Some(best) = later.min_by(|one, other| one.score.total_cmp(&other.score)) else { return Vec::new() };
     let hypothesis = &best.hypothesis;
     let steps = MOVES.map(|by| hypothesis.from.and_then(|from| from.checked_add_signed(by)));
-    steps.into_iter().flatten().map(|step| Hypothesis { from: Some(step), ..hypothesis.clone() }).collect()
+    steps.into_iter().flatten().map(|step| TrialHypothesis { from: Some(step), ..hypothesis.clone() }).collect()
 }
 
 /// Values around those of the best offset of a joint and the best zoom.
-pub(super) fn tuned(candidates: &[Candidate]) -> Vec<Hypothesis> {
+pub(super) fn tuned(candidates: &[RankedTrial]) -> Vec<TrialHypothesis> {
     let mut all = Vec::new();
     for cause in [Cause::JointOffset, Cause::Zoom] {
         let of_cause = candidates.iter().filter(|it| it.hypothesis.cause == cause);
         let Some(best) = of_cause.min_by(|one, other| one.score.total_cmp(&other.score)) else { continue };
         let hypothesis = &best.hypothesis;
-        let with = |correction: Correction| {
+        let with = |correction: MeasurementCorrection| {
             let mut changed = hypothesis.clone();
             changed.changes.corrections = vec![correction];
             changed
         };
         match hypothesis.changes.corrections.as_slice() {
-            [Correction::Offset(joint, offset_rad)] => {
-                let same = |it: &Correction| match it {
-                    Correction::Offset(other, value) if other == joint => Some(*value),
+            [MeasurementCorrection::Offset(joint, offset_rad)] => {
+                let same = |it: &MeasurementCorrection| match it {
+                    MeasurementCorrection::Offset(other, value) if other == joint => Some(*value),
                     _ => None,
                 };
                 let values = around(*offset_rad, &SPREAD, &known(candidates, hypothesis, same));
-                all.extend(values.into_iter().map(|value| with(Correction::Offset(joint.clone(), value))));
+                all.extend(values.into_iter().map(|value| with(MeasurementCorrection::Offset(joint.clone(), value))));
             }
-            [Correction::Zoom(factor, over_s)] => {
-                let same_time = |it: &Correction| match it {
-                    Correction::Zoom(value, other_s) if other_s == over_s => Some(*value),
+            [MeasurementCorrection::Zoom(factor, over_s)] => {
+                let same_time = |it: &MeasurementCorrection| match it {
+                    MeasurementCorrection::Zoom(value, other_s) if other_s == over_s => Some(*value),
                     _ => None,
                 };
-                let same_factor = |it: &Correction| match it {
-                    Correction::Zoom(other, value_s) if other == factor => Some(*value_s),
+                let same_factor = |it: &MeasurementCorrection| match it {
+                    MeasurementCorrection::Zoom(other, value_s) if other == factor => Some(*value_s),
                     _ => None,
                 };
                 let factors = around(*factor, &SPREAD, &known(candidates, hypothesis, same_time));
-                all.extend(factors.into_iter().map(|value| with(Correction::Zoom(value, *over_s))));
+                all.extend(factors.into_iter().map(|value| with(MeasurementCorrection::Zoom(value, *over_s))));
                 let times_s = around(*over_s, &SPREAD_S, &known(candidates, hypothesis, same_factor));
-                all.extend(times_s.into_iter().map(|value_s| with(Correction::Zoom(*factor, value_s))));
+                all.extend(times_s.into_iter().map(|value_s| with(MeasurementCorrection::Zoom(*factor, value_s))));
             }
             _ => {}
         }
@@ -63,9 +63,9 @@ pub(super) fn tuned(candidates: &[Candidate]) -> Vec<Hypothesis> {
 
 /// Values with their scores of trials that differ from a hypothesis in one value only.
 fn known(
-    candidates: &[Candidate],
-    hypothesis: &Hypothesis,
-    value: impl Fn(&Correction) -> Option<f64>,
+    candidates: &[RankedTrial],
+    hypothesis: &TrialHypothesis,
+    value: impl Fn(&MeasurementCorrection) -> Option<f64>,
 ) -> Vec<(f64, f64)> {
     let alike = candidates.iter().filter(|it| it.hypothesis.from == hypothesis.from);
     alike

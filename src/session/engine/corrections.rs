@@ -6,7 +6,7 @@ use crate::camera::CameraModel;
 use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::{ImuSample, JointAngles, Rig};
-use crate::session::plan::{Correction, ForkError, ImageFlip, ImageHalf};
+use crate::session::plan::{ForkError, ImageFlip, ImageHalf, MeasurementCorrection};
 
 /// Steps of a fork with another offset of a joint whose readings are not used.
 const UNREAD_STEPS: usize = 2;
@@ -52,7 +52,7 @@ impl MeasurementCorrections {
     ///
     /// # Errors
     /// If the rig has no such joint.
-    pub(super) fn of(corrections: &[Correction], rig: &Rig, camera_key: &str) -> Result<Self, ForkError> {
+    pub(super) fn of(corrections: &[MeasurementCorrection], rig: &Rig, camera_key: &str) -> Result<Self, ForkError> {
         let names = rig.joint_names();
         let joint = |name: &String| {
             names.iter().position(|known| known == name).ok_or_else(|| ForkError::BadChange {
@@ -63,28 +63,30 @@ impl MeasurementCorrections {
         let mut found = Self::default();
         for correction in corrections {
             match correction {
-                Correction::Focal(factor) => found.image.push(ImageCorrection::Focal(*factor)),
-                Correction::Zoom(factor, over_s) => found.image.push(ImageCorrection::Zoom(*factor, *over_s)),
-                Correction::Image(flip) => found.image.push(ImageCorrection::Flip(*flip)),
-                Correction::Ignored(half) => found.image.push(ImageCorrection::Ignored(*half)),
-                Correction::CameraShift(shift_s) => found.camera_shift_s += shift_s,
-                Correction::JointShift(shift_s) => found.joint_shift_s += shift_s,
-                Correction::Reversed(name) => found.joints.push(JointCorrection::Reversed(joint(name)?)),
-                Correction::Swapped(first, second) => {
+                MeasurementCorrection::Focal(factor) => found.image.push(ImageCorrection::Focal(*factor)),
+                MeasurementCorrection::Zoom(factor, over_s) => {
+                    found.image.push(ImageCorrection::Zoom(*factor, *over_s));
+                }
+                MeasurementCorrection::Image(flip) => found.image.push(ImageCorrection::Flip(*flip)),
+                MeasurementCorrection::Ignored(half) => found.image.push(ImageCorrection::Ignored(*half)),
+                MeasurementCorrection::CameraShift(shift_s) => found.camera_shift_s += shift_s,
+                MeasurementCorrection::JointShift(shift_s) => found.joint_shift_s += shift_s,
+                MeasurementCorrection::Reversed(name) => found.joints.push(JointCorrection::Reversed(joint(name)?)),
+                MeasurementCorrection::Swapped(first, second) => {
                     found.joints.push(JointCorrection::Swapped(joint(first)?, joint(second)?));
                 }
-                Correction::Offset(name, offset) => {
+                MeasurementCorrection::Offset(name, offset) => {
                     found.joints.push(JointCorrection::Offset(joint(name)?, *offset));
                     found.unread = UNREAD_STEPS;
                 }
-                Correction::JointScale(factor) => found.joints.push(JointCorrection::Scale(*factor)),
-                Correction::ImuAxes(axes) => found.rotate([axes.matrix(), axes.matrix()]),
-                Correction::GyroscopeAxes(axes) => found.rotate([axes.matrix(), Matrix3::identity()]),
-                Correction::AccelerometerAxes(axes) => found.rotate([Matrix3::identity(), axes.matrix()]),
-                Correction::GyroscopeScale(factor) => {
+                MeasurementCorrection::JointScale(factor) => found.joints.push(JointCorrection::Scale(*factor)),
+                MeasurementCorrection::ImuAxes(axes) => found.rotate([axes.matrix(), axes.matrix()]),
+                MeasurementCorrection::GyroscopeAxes(axes) => found.rotate([axes.matrix(), Matrix3::identity()]),
+                MeasurementCorrection::AccelerometerAxes(axes) => found.rotate([Matrix3::identity(), axes.matrix()]),
+                MeasurementCorrection::GyroscopeScale(factor) => {
                     found.rotate([Matrix3::identity() * *factor, Matrix3::identity()]);
                 }
-                Correction::AccelerometerScale(factor) => {
+                MeasurementCorrection::AccelerometerScale(factor) => {
                     found.rotate([Matrix3::identity(), Matrix3::identity() * *factor]);
                 }
             }
@@ -243,7 +245,7 @@ mod tests {
 
     fn corrections(texts: &[&str]) -> Result<(MeasurementCorrections, Rig), ForkError> {
         let flight = synthetic_tracks(&SyntheticOptions { duration_s: 0.1, ..SyntheticOptions::default() });
-        let all: Vec<Correction> = texts.iter().map(|text| text.parse().unwrap()).collect();
+        let all: Vec<MeasurementCorrection> = texts.iter().map(|text| text.parse().unwrap()).collect();
         Ok((MeasurementCorrections::of(&all, &flight.given_rig, "cam0")?, flight.given_rig))
     }
 

@@ -10,7 +10,7 @@ use crate::text::Named;
 
 /// Assumed error of the measurements, undone before the estimator uses them.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Correction {
+pub enum MeasurementCorrection {
     /// Factor on the focal lengths of the rig's main camera.
     Focal(f64),
     /// Factor by which the focal lengths of the main camera change over a number of seconds from the fork's first step on.
@@ -84,7 +84,7 @@ impl ImageHalf {
     }
 }
 
-impl fmt::Display for Correction {
+impl fmt::Display for MeasurementCorrection {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Focal(factor) => write!(out, "focal:{factor}"),
@@ -112,7 +112,7 @@ const FORMS: &str = "focal:FACTOR, zoom:FACTOR:1s, image:mirrored|flipped|upside
                      imu-axes:y/x/-z, gyroscope-axes:…, accelerometer-axes:…, gyroscope-scale:FACTOR, \
                      accelerometer-scale:FACTOR";
 
-impl FromStr for Correction {
+impl FromStr for MeasurementCorrection {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -193,9 +193,9 @@ mod tests {
             "gyroscope-scale:0.5",
             "accelerometer-scale:9.81",
         ] {
-            assert_eq!(text.parse::<Correction>().unwrap().to_string(), text);
+            assert_eq!(text.parse::<MeasurementCorrection>().unwrap().to_string(), text);
         }
-        assert_eq!("camera-shift:15ms".parse(), Ok(Correction::CameraShift(0.015)));
+        assert_eq!("camera-shift:15ms".parse(), Ok(MeasurementCorrection::CameraShift(0.015)));
         for (text, word) in [
             ("focus:2", "'focus:2' is no correction"),
             ("focal:0", "'0' is no factor"),
@@ -204,7 +204,7 @@ mod tests {
             ("imu-axes:x/x/z", "no axes"),
             ("offset:yaw", "no correction"),
         ] {
-            let problem = text.parse::<Correction>().unwrap_err();
+            let problem = text.parse::<MeasurementCorrection>().unwrap_err();
             assert!(problem.contains(word), "{text}: {problem}");
         }
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use thiserror::Error;
 
-use super::correction::Correction;
+use super::correction::MeasurementCorrection;
 use super::run_spec::{ParameterizationChoice, RunSpec};
 use crate::estimator::{InterventionError, SensorParameters};
 use crate::text::Named as _;
@@ -40,7 +40,7 @@ pub struct ForkChanges {
     /// Scale factor of the rig's standard deviations of the chain (`chain-prior=`).
     pub chain_prior: f64,
     /// Errors of recording or rig that are undone (`correct=`).
-    pub corrections: Vec<Correction>,
+    pub corrections: Vec<MeasurementCorrection>,
 }
 
 impl Default for ForkChanges {

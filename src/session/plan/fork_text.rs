@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::correction::Correction;
+use super::correction::MeasurementCorrection;
 use super::fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError, OTHER_CAMERA};
 use super::run_options::{encoder_noise, imu_noise, pixel_noise};
 use super::run_spec::ParameterizationChoice;
@@ -94,7 +94,9 @@ impl ForkChanges {
             "ERROR+…",
             "errors of recording or rig that are undone, as `dcvins diagnose` names them: `focal:0.77`, `reversed:yaw`, \
              `camera-shift:15ms`, `imu-axes:y/x/z`",
-            Field::Other(read_corrections, |changes| joined(changes.corrections.iter().map(Correction::to_string))),
+            Field::Other(read_corrections, |changes| {
+                joined(changes.corrections.iter().map(MeasurementCorrection::to_string))
+            }),
         ),
     ];
 }

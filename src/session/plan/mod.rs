@@ -12,7 +12,7 @@ mod trajectory_spec;
 mod tuning;
 
 pub(in crate::session) use correction::LONGEST_SHIFT_S;
-pub use correction::{Correction, ImageFlip, ImageHalf};
+pub use correction::{ImageFlip, ImageHalf, MeasurementCorrection};
 pub use error::SessionError;
 pub use fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError};
 pub use run_spec::{MAX_RUNS, ParameterizationChoice, RunSpec, RunSpecError};

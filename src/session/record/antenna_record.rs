@@ -6,7 +6,7 @@ use super::trajectory_accuracy::TrajectoryAccuracy;
 use super::trajectory_evaluation::TrajectoryEvaluation;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{LeverArm, NEAREST_POSE_NS, PoseSample, PoseTrack, PositionSample};
-use crate::session::accuracy::{Alignment, AlignmentSums, StampedPose};
+use crate::session::accuracy::{AlignmentSums, StampedPose, TrajectoryAlignment};
 use crate::session::antenna::{AntennaAlignment, AntennaError, AntennaPair, align_antenna, antenna_pairs};
 
 /// Ratio of new pairs to previous pairs after which the lever arm is estimated again.
@@ -92,7 +92,7 @@ impl AntennaRecord {
                 for pair in &self.pairs[first..] {
                     self.sums.add(&pair.pose.transform(&lever_arm_m), &pair.antenna_m);
                 }
-                self.alignment = self.sums.solve(Alignment::YawPosition).map(|transform| AntennaAlignment {
+                self.alignment = self.sums.solve(TrajectoryAlignment::YawPosition).map(|transform| AntennaAlignment {
                     true_from_estimate: transform.rigid,
                     lever_arm_m,
                     lever_arm_sigma_m: None,

@@ -12,7 +12,7 @@ use crate::geometry::{RigidTransform, so3, wrap_angle};
 use crate::text::Named;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Quantity {
+pub enum ComparedQuantity {
     Phase,
     Tracks,
     Keyframe,
@@ -30,7 +30,7 @@ pub enum Quantity {
 }
 
 /// In the order in which a difference usually spreads.
-impl Named for Quantity {
+impl Named for ComparedQuantity {
     const NAMES: &'static [(Self, &'static str)] = &[
         (Self::Phase, "phase"),
         (Self::Tracks, "tracks"),
@@ -49,7 +49,7 @@ impl Named for Quantity {
     ];
 }
 
-impl Quantity {
+impl ComparedQuantity {
     /// Unit as stored, empty for counts, and threshold of a notable difference: 1 cm and 0.1° for a trajectory, 1 mm and
     /// 0.1° for a calibration; for biases, the values that change the trajectory by the same amount within a second.
     const fn unit_and_threshold(self) -> (&'static str, f64) {
@@ -178,7 +178,7 @@ fn track_difference(a: &StepRecord, b: &StepRecord) -> f64 {
 pub struct Divergence {
     /// Stamp of the first exact difference (values not equal), `None` without one.
     pub exact_ns: Option<i64>,
-    /// Stamp of the first notable difference (at least [`Quantity::notable`]), `None` without one.
+    /// Stamp of the first notable difference (at least [`ComparedQuantity::notable`]), `None` without one.
     pub notable_ns: Option<i64>,
     /// Largest difference and its stamp.
     pub largest: Option<(f64, i64)>,
@@ -197,8 +197,8 @@ pub struct Comparison {
     /// Stamps common to both runs, in nanoseconds since the log began.
     pub stamps_ns: Vec<i64>,
     /// Differences by quantity and row; NaN where a run does not have the quantity.
-    pub columns: [Vec<f64>; Quantity::NAMES.len()],
-    pub divergences: [Divergence; Quantity::NAMES.len()],
+    pub columns: [Vec<f64>; ComparedQuantity::NAMES.len()],
+    pub divergences: [Divergence; ComparedQuantity::NAMES.len()],
     /// Counter that changes when rows are removed.
     pub epoch: u64,
 }
@@ -234,11 +234,11 @@ impl Comparison {
             let Some(pose) = lane.track.at(step.report.stamp_ns) else { continue };
             let reference_pose = step.report.newest().map(|newest| newest.world_from_imu);
             self.align_at(reference_pose.as_ref(), Some(&pose));
-            let differences = |gauge: &RigidTransform, quantity: Quantity| match (reference_pose, quantity) {
-                (Some(reference_pose), Quantity::Position) => {
+            let differences = |gauge: &RigidTransform, quantity: ComparedQuantity| match (reference_pose, quantity) {
+                (Some(reference_pose), ComparedQuantity::Position) => {
                     Some((gauge.transform(&pose.translation_m) - reference_pose.translation_m).norm())
                 }
-                (Some(reference_pose), Quantity::Attitude) => {
+                (Some(reference_pose), ComparedQuantity::Attitude) => {
                     Some(angle(&reference_pose.rotation, &(gauge.rotation * pose.rotation)))
                 }
                 _ => None,
@@ -267,10 +267,10 @@ impl Comparison {
     }
 
     /// Appends the differences at a stamp; `difference` is a function of the alignment of the other world.
-    fn push_row(&mut self, stamp_ns: i64, difference: impl Fn(&RigidTransform, Quantity) -> Option<f64>) {
+    fn push_row(&mut self, stamp_ns: i64, difference: impl Fn(&RigidTransform, ComparedQuantity) -> Option<f64>) {
         self.stamps_ns.push(stamp_ns);
         let gauge = self.gauge.unwrap_or_default();
-        for (index, quantity) in Quantity::all().enumerate() {
+        for (index, quantity) in ComparedQuantity::all().enumerate() {
             let apart = difference(&gauge, quantity);
             self.columns[index].push(apart.unwrap_or(f64::NAN));
             let Some(apart) = apart else { continue };
@@ -290,32 +290,32 @@ impl Comparison {
     }
 
     /// The difference at the last common stamp at or before `stamp_ns`.
-    pub fn at(&self, quantity: Quantity, stamp_ns: i64) -> Option<f64> {
+    pub fn at(&self, quantity: ComparedQuantity, stamp_ns: i64) -> Option<f64> {
         let row = self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).checked_sub(1)?;
         self.column(quantity).get(row).copied().filter(|apart| apart.is_finite())
     }
 
     /// The differences of a quantity by row.
-    pub fn column(&self, quantity: Quantity) -> &[f64] {
+    pub fn column(&self, quantity: ComparedQuantity) -> &[f64] {
         &self.columns[quantity as usize]
     }
 
-    pub fn divergence(&self, quantity: Quantity) -> &Divergence {
+    pub fn divergence(&self, quantity: ComparedQuantity) -> &Divergence {
         &self.divergences[quantity as usize]
     }
 
     /// Stamp of the first difference in any quantity, and the quantity.
-    pub fn first_exact(&self) -> Option<(i64, Quantity)> {
+    pub fn first_exact(&self) -> Option<(i64, ComparedQuantity)> {
         self.first(|divergence| divergence.exact_ns)
     }
 
     /// Stamp of the first notable difference in any quantity, and the quantity.
-    pub fn first_notable(&self) -> Option<(i64, Quantity)> {
+    pub fn first_notable(&self) -> Option<(i64, ComparedQuantity)> {
         self.first(|divergence| divergence.notable_ns)
     }
 
-    fn first(&self, of: impl Fn(&Divergence) -> Option<i64>) -> Option<(i64, Quantity)> {
-        let known = self.divergences.iter().zip(Quantity::all());
+    fn first(&self, of: impl Fn(&Divergence) -> Option<i64>) -> Option<(i64, ComparedQuantity)> {
+        let known = self.divergences.iter().zip(ComparedQuantity::all());
         known
             .filter_map(|(divergence, quantity)| Some((of(divergence)?, quantity)))
             .min_by_key(|(stamp_ns, _)| *stamp_ns)
@@ -340,9 +340,9 @@ mod tests {
         assert_eq!(comparison.stamps_ns.len(), run.steps.len());
         assert_eq!((comparison.first_exact(), comparison.first_notable()), (None, None));
         let end_ns = run.steps.last().unwrap().report.stamp_ns;
-        assert_eq!(comparison.at(Quantity::Position, end_ns), Some(0.0));
-        assert_eq!(comparison.at(Quantity::Position, -1), None);
-        assert!(Quantity::all().enumerate().all(|(index, quantity)| index == quantity as usize));
+        assert_eq!(comparison.at(ComparedQuantity::Position, end_ns), Some(0.0));
+        assert_eq!(comparison.at(ComparedQuantity::Position, -1), None);
+        assert!(ComparedQuantity::all().enumerate().all(|(index, quantity)| index == quantity as usize));
     }
 
     #[test]
@@ -362,12 +362,12 @@ mod tests {
         comparison.read(&run, &growing);
         comparison.read(&run, &other);
         let stamp_ns = |number: usize| run.steps[number].report.stamp_ns;
-        assert_eq!(comparison.first_exact(), Some((stamp_ns(at), Quantity::Position)));
-        assert_eq!(comparison.first_notable(), Some((stamp_ns(at + 2), Quantity::Position)));
-        let divergence = comparison.divergence(Quantity::Position);
+        assert_eq!(comparison.first_exact(), Some((stamp_ns(at), ComparedQuantity::Position)));
+        assert_eq!(comparison.first_notable(), Some((stamp_ns(at + 2), ComparedQuantity::Position)));
+        let divergence = comparison.divergence(ComparedQuantity::Position);
         let (largest, largest_ns) = divergence.largest.unwrap();
         assert!((largest - 0.08).abs() < 1e-9 && largest_ns == stamp_ns(at + 19), "{divergence:?}");
-        assert_eq!(comparison.at(Quantity::Velocity, stamp_ns(at + 19)), Some(0.0));
+        assert_eq!(comparison.at(ComparedQuantity::Velocity, stamp_ns(at + 19)), Some(0.0));
         let epoch = comparison.epoch;
         comparison.read(&run, &run);
         assert!(comparison.epoch > epoch && comparison.first_exact().is_none());
@@ -393,10 +393,10 @@ mod tests {
         comparison.read_trajectory(&run, &lane);
         comparison.read_trajectory(&run, &lane);
         let end_ns = run.steps[last].report.stamp_ns;
-        assert_eq!(comparison.first_notable(), Some((end_ns, Quantity::Position)));
-        assert!((comparison.at(Quantity::Position, end_ns).unwrap() - 0.5).abs() < 1e-9);
-        assert!(comparison.at(Quantity::Attitude, end_ns).unwrap() < 1e-9);
-        assert!(comparison.column(Quantity::Velocity).iter().all(|apart| apart.is_nan()));
+        assert_eq!(comparison.first_notable(), Some((end_ns, ComparedQuantity::Position)));
+        assert!((comparison.at(ComparedQuantity::Position, end_ns).unwrap() - 0.5).abs() < 1e-9);
+        assert!(comparison.at(ComparedQuantity::Attitude, end_ns).unwrap() < 1e-9);
+        assert!(comparison.column(ComparedQuantity::Velocity).iter().all(|apart| apart.is_nan()));
     }
 
     #[test]
@@ -418,13 +418,13 @@ mod tests {
         let mut comparison = Comparison::default();
         comparison.read(&run, &rotated);
         assert_eq!(comparison.first_notable(), None);
-        assert!(comparison.column(Quantity::Position).iter().all(|apart| apart.is_nan() || *apart < 1e-9));
+        assert!(comparison.column(ComparedQuantity::Position).iter().all(|apart| apart.is_nan() || *apart < 1e-9));
 
         let classical = recorded(&flight, "classical");
         comparison.read(&run, &classical);
         let (_, first) = comparison.first_exact().unwrap();
-        assert!(!matches!(first, Quantity::Phase | Quantity::Tracks), "{first:?}: they begin alike");
+        assert!(!matches!(first, ComparedQuantity::Phase | ComparedQuantity::Tracks), "{first:?}: they begin alike");
         let end_ns = run.steps.last().unwrap().report.stamp_ns;
-        assert!(comparison.at(Quantity::Position, end_ns).unwrap() < 0.02);
+        assert!(comparison.at(ComparedQuantity::Position, end_ns).unwrap() < 0.02);
     }
 }

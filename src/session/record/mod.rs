@@ -25,7 +25,7 @@ mod warning_lines;
 mod warnings;
 
 pub use antenna_record::PositionTruth;
-pub use comparison::{Comparison, Divergence, Quantity};
+pub use comparison::{ComparedQuantity, Comparison, Divergence};
 pub use flight_parameter::FlightParameter;
 pub use flight_table::{flight_headline, flight_table, least_determined};
 pub use flight_verdicts::{FlightVerdicts, flight_advice};

@@ -11,7 +11,7 @@ use super::step::{StepFactorRows, StepRecord};
 use super::summary::SummaryOrder;
 use super::warnings::{RunWarning, add_warnings, warnings_of};
 use crate::geometry::RigidTransform;
-use crate::session::accuracy::{Alignment, AlignmentSums};
+use crate::session::accuracy::{AlignmentSums, TrajectoryAlignment};
 use crate::session::plan::{ForkChanges, RunSpec};
 
 /// Maximum number of recomputed complete steps of a run.
@@ -147,7 +147,8 @@ impl RunRecord {
     pub fn push(&mut self, record: StepRecord) {
         if let (Some(newest), Some(ground_truth)) = (record.report.newest(), &record.ground_truth) {
             self.alignment_sums.add(&newest.world_from_imu.translation_m, &ground_truth.translation_m);
-            self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);
+            self.alignment =
+                self.alignment_sums.solve(TrajectoryAlignment::YawPosition).map(|transform| transform.rigid);
         }
         if let (Some(newest), Some(truth)) = (record.report.newest(), &self.position_truth) {
             self.antenna.push(truth, newest.stamp_ns, newest.world_from_imu);
@@ -189,7 +190,7 @@ impl RunRecord {
                 self.alignment_sums.add(&newest.world_from_imu.translation_m, &ground_truth.translation_m);
             }
         }
-        self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);
+        self.alignment = self.alignment_sums.solve(TrajectoryAlignment::YawPosition).map(|transform| transform.rigid);
         if let Some(truth) = &self.position_truth {
             self.antenna = AntennaRecord::default();
             for newest in self.steps.iter().filter_map(|step| step.report.newest()) {

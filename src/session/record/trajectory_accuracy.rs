@@ -5,13 +5,13 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::session::accuracy::{
-    Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, heading_drift_rad, path_length_m,
-    relative_errors,
+    ErrorStatistics, RelativeDelta, StampedPose, TrajectoryAlignment, absolute_errors_m, align, heading_drift_rad,
+    path_length_m, relative_errors,
 };
 use crate::session::antenna::{AntennaAlignment, AntennaPair, antenna_statistics};
 
 /// Alignment of every run and trajectory with the ground truth.
-const ALIGNMENT: Alignment = Alignment::YawPosition;
+const ALIGNMENT: TrajectoryAlignment = TrajectoryAlignment::YawPosition;
 
 /// Largest difference of stamps between a step and the last antenna position before it, in nanoseconds.
 pub(super) const MAX_POSITION_AGE_NS: i64 = 500_000_000;
@@ -23,7 +23,7 @@ pub const RELATIVE_LENGTHS_M: [f64; 3] = [5.0, 10.0, 25.0];
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrajectoryAccuracy {
     /// Alignment of the estimate with the ground truth.
-    pub alignment: Alignment,
+    pub alignment: TrajectoryAlignment,
     /// Root mean square of the absolute position error.
     pub ate_rmse_m: f64,
     /// Mean of the absolute position error.

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::trajectory_accuracy::TrajectoryAccuracy;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{PoseSample, PoseTrack};
-use crate::session::accuracy::{Alignment, StampedPose, align};
+use crate::session::accuracy::{StampedPose, TrajectoryAlignment, align};
 
 /// Pairs of poses, their alignment and its errors.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -37,6 +37,6 @@ pub fn evaluate_trajectory(estimate: &[PoseSample], ground_truth: &PoseTrack) ->
         Some((StampedPose { stamp_s, pose: sample.world_from_imu }, StampedPose { stamp_s, pose: actual }))
     };
     let pairs: Vec<_> = estimate.iter().filter_map(pair).collect();
-    let alignment = align(&pairs, Alignment::YawPosition).map(|transform| transform.rigid);
+    let alignment = align(&pairs, TrajectoryAlignment::YawPosition).map(|transform| transform.rigid);
     TrajectoryEvaluation { alignment, accuracy: TrajectoryAccuracy::of(&pairs), pairs }
 }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use crate::log_check::{Area, FaultySource, Finding, MeasuredFault, Severity};
 use crate::sensors::Rig;
-use crate::session::diagnosis::{Cause, Diagnosis, Verdict, diagnose_run};
+use crate::session::diagnosis::{Cause, Diagnosis, DiagnosisVerdict, diagnose_run};
 use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
-use crate::session::plan::{Correction, RunSpec};
+use crate::session::plan::{MeasurementCorrection, RunSpec};
 use crate::session::record::RunRecord;
 use crate::session::tests::memory::input_of;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
@@ -59,7 +59,7 @@ fn no_fault(_: &mut OwnedStepInput, _: &Rig) {}
 #[test]
 fn a_sound_flight_has_no_cause() {
     let found = diagnosed(|_| (), no_fault, &[]);
-    assert_eq!((found.verdict, found.trials, found.causes.len()), (Verdict::Agrees, 0, 0), "{found}");
+    assert_eq!((found.verdict, found.trials, found.causes.len()), (DiagnosisVerdict::Agrees, 0, 0), "{found}");
     assert!(found.to_string().contains("nothing to diagnose"), "{found}");
 }
 
@@ -80,8 +80,10 @@ fn a_wrong_focal_length_is_named_with_its_value() {
         input.tracks[0] = Arc::new(tracks);
     };
     let found = diagnosed(longer, bearings, &[]);
-    assert_eq!((found.verdict, found.causes[0].cause), (Verdict::Cause, Cause::Focal), "{found}");
-    let [Correction::Focal(factor)] = found.causes[0].changes.corrections.as_slice() else { panic!("{found}") };
+    assert_eq!((found.verdict, found.causes[0].cause), (DiagnosisVerdict::Cause, Cause::Focal), "{found}");
+    let [MeasurementCorrection::Focal(factor)] = found.causes[0].changes.corrections.as_slice() else {
+        panic!("{found}")
+    };
     assert!((factor * 1.1 - 1.0).abs() < 0.01, "{factor}");
     assert!(found.causes[0].values.iter().all(|value| value.agrees()), "{found}");
 }
@@ -96,8 +98,10 @@ fn jump(input: &mut OwnedStepInput, _: &Rig) {
 }
 
 fn assert_jump(found: &Diagnosis) {
-    assert_eq!((found.verdict, found.causes[0].cause), (Verdict::Cause, Cause::JointOffset), "{found}");
-    let [Correction::Offset(_, undone_rad)] = found.causes[0].changes.corrections.as_slice() else { panic!("{found}") };
+    assert_eq!((found.verdict, found.causes[0].cause), (DiagnosisVerdict::Cause, Cause::JointOffset), "{found}");
+    let [MeasurementCorrection::Offset(_, undone_rad)] = found.causes[0].changes.corrections.as_slice() else {
+        panic!("{found}")
+    };
     assert!((undone_rad + JUMP_RAD).abs() < 0.02, "{undone_rad}");
     assert!((found.causes[0].from_s - 3.5).abs() < 0.21, "{found}");
 }
@@ -122,7 +126,7 @@ fn a_fault_that_the_check_measures_is_undone_first() {
 #[test]
 fn a_fault_that_no_change_undoes_ends_the_search() {
     let found = diagnosed(|_| (), jump, &[MeasuredFault::Irreversible(FaultySource::Joints)]);
-    assert_eq!((found.verdict, found.trials, found.causes.len()), (Verdict::LogFault, 0, 0), "{found}");
+    assert_eq!((found.verdict, found.trials, found.causes.len()), (DiagnosisVerdict::LogFault, 0, 0), "{found}");
     assert!(found.headline().ends_with("by the check of the log"), "{found}");
 }
 
@@ -132,6 +136,6 @@ fn a_run_without_steps_has_no_cause() {
     let record = RunRecord::new(RunSpec::default(), "cam0".to_owned());
     let history = History::new(usize::MAX);
     let found = diagnose_run(&rig, &record, &history, &Vec::new, &mut |_, _| ControlFlow::Continue(()));
-    assert_eq!(found.verdict, Verdict::NoSteps);
+    assert_eq!(found.verdict, DiagnosisVerdict::NoSteps);
     assert!(found.to_string().contains("no image reached the estimator"), "{found}");
 }

@@ -3,7 +3,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::estimator::VisualLoss;
 use crate::optimization::RobustLoss;
 use crate::sensors::{CameraRig, Rig};
-use crate::session::accuracy::{Alignment, AlignmentSums};
+use crate::session::accuracy::{AlignmentSums, TrajectoryAlignment};
 use crate::session::engine::estimator_config;
 use crate::session::plan::{ParameterizationChoice, RunSpec, RunSpecError, cameras_of_run, distinct_labels};
 use crate::simulation::{SyntheticMount, SyntheticOptions, synthetic_tracks};
@@ -98,7 +98,7 @@ fn labels_are_folders_and_differ() {
 fn alignment_recovers_yaw_translation_and_scale() {
     let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.1);
     let shift = Vector3::new(3.0, -2.0, 0.7);
-    let check = |alignment: Alignment, rotation: UnitQuaternion<f64>, scale: f64| {
+    let check = |alignment: TrajectoryAlignment, rotation: UnitQuaternion<f64>, scale: f64| {
         let mut sums = AlignmentSums::default();
         for step in 0..50 {
             let time = f64::from(step) * 0.3;
@@ -110,10 +110,10 @@ fn alignment_recovers_yaw_translation_and_scale() {
         assert!((found.rigid.translation_m - shift).norm() < 1e-9, "{alignment:?}");
         assert!((found.scale - scale).abs() < 1e-9, "{alignment:?}");
     };
-    check(Alignment::YawPosition, yaw, 1.0);
-    check(Alignment::Rigid, UnitQuaternion::from_euler_angles(0.3, -0.5, 2.0), 1.0);
-    check(Alignment::Similarity, UnitQuaternion::from_euler_angles(0.3, -0.5, 2.0), 1.3);
-    assert!(AlignmentSums::default().solve(Alignment::YawPosition).is_none());
+    check(TrajectoryAlignment::YawPosition, yaw, 1.0);
+    check(TrajectoryAlignment::Rigid, UnitQuaternion::from_euler_angles(0.3, -0.5, 2.0), 1.0);
+    check(TrajectoryAlignment::Similarity, UnitQuaternion::from_euler_angles(0.3, -0.5, 2.0), 1.3);
+    assert!(AlignmentSums::default().solve(TrajectoryAlignment::YawPosition).is_none());
 }
 
 #[test]

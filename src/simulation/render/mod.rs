@@ -12,5 +12,5 @@ mod view;
 
 pub(crate) use raster::Workspace;
 pub(crate) use sensor::{Sensor, SensorOptions};
-pub(crate) use shade::Renderer;
-pub(crate) use view::View;
+pub(crate) use shade::SurfaceShader;
+pub(crate) use view::RenderedView;

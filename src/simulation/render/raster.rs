@@ -276,7 +276,7 @@ impl Workspace {
     /// Depth of the face at the first sample of every pixel, from a pose.
     pub(crate) fn depths_m(
         &mut self,
-        view: &super::view::View,
+        view: &super::view::RenderedView,
         world: &crate::simulation::world::World,
         world_from_camera: &crate::geometry::RigidTransform,
     ) -> Vec<f64> {

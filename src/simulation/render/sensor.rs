@@ -1,4 +1,4 @@
-use super::view::View;
+use super::view::RenderedView;
 use crate::sensors::GrayImage;
 use crate::simulation::random::mix;
 
@@ -25,7 +25,7 @@ pub(crate) struct Sensor {
 
 impl Sensor {
     /// Sensor whose noise is a function of this seed, the frame number and the pixel.
-    pub(crate) fn new(view: &View, options: SensorOptions, seed: u64) -> Self {
+    pub(crate) fn new(view: &RenderedView, options: SensorOptions, seed: u64) -> Self {
         let half = [0.5 * view.width as f64, 0.5 * view.height as f64];
         let corner = half[0] * half[0] + half[1] * half[1];
         let mut shading = Vec::with_capacity(view.pixels());

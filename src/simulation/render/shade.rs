@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::raster::{Eye, Prepared, SKY, Workspace};
 use super::shadow::ShadowMap;
-use super::view::{OFFSETS_PX, PixelRay, Rays, SAMPLES, View};
+use super::view::{OFFSETS_PX, PixelRay, Rays, RenderedView, SAMPLES};
 use crate::geometry::RigidTransform;
 use crate::simulation::world::{Footprints, World};
 
@@ -26,7 +26,7 @@ const HAZE_M: f32 = 420.0;
 
 /// Environment prepared for rendering, shared by any number of threads.
 #[derive(Clone, Debug)]
-pub(crate) struct Renderer<'a> {
+pub(crate) struct SurfaceShader<'a> {
     world: &'a World,
     shadows: ShadowMap,
 }
@@ -47,7 +47,7 @@ fn rows(matrix: &nalgebra::Matrix3<f64>) -> [[f32; 3]; 3] {
     std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)] as f32))
 }
 
-impl<'a> Renderer<'a> {
+impl<'a> SurfaceShader<'a> {
     /// Prepares the shadows of a world.
     pub(crate) fn new(world: &'a World) -> Self {
         Self { world, shadows: ShadowMap::new(world) }
@@ -57,7 +57,7 @@ impl<'a> Renderer<'a> {
     /// image) times `fraction`.
     pub(crate) fn render(
         &self,
-        view: &View,
+        view: &RenderedView,
         shown: Range<usize>,
         world_from_camera: &RigidTransform,
         fraction: f32,
@@ -90,7 +90,7 @@ impl<'a> Renderer<'a> {
     #[expect(clippy::too_many_arguments, reason = "a row of an image needs all that the image needs")]
     fn shade_row(
         &self,
-        view: &View,
+        view: &RenderedView,
         light: &Light,
         row: usize,
         first_sample: usize,

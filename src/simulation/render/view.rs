@@ -29,7 +29,7 @@ const DARK: f32 = f32::NAN;
 ///
 /// The grid is that of a pinhole camera wide enough for all rays.
 #[derive(Clone, Debug)]
-pub(crate) struct View {
+pub(crate) struct RenderedView {
     pub(super) width: usize,
     pub(super) height: usize,
     /// `x/z` and `y/z` per pixel; NaN outside the lens.
@@ -72,7 +72,7 @@ impl From<PixelRay> for Rays<1> {
     }
 }
 
-impl View {
+impl RenderedView {
     pub(crate) fn new(model: &CameraModel) -> Self {
         let [width, height] = model.resolution_px;
         let ray = |u: f64, v: f64| {
@@ -197,7 +197,7 @@ impl View {
 }
 
 #[cfg(test)]
-impl View {
+impl RenderedView {
     pub(crate) fn width(&self) -> usize {
         self.width
     }

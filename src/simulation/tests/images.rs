@@ -3,7 +3,7 @@ use nalgebra::Vector3;
 use super::super::equipment::{Lens, camera_model};
 use super::super::experiment::{Environment, Experiment};
 use super::super::random::RandomStream;
-use super::super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
+use super::super::render::{RenderedView, Sensor, SensorOptions, SurfaceShader, Workspace};
 use super::super::world::{self, World};
 use super::flight::experiment_trajectory;
 use crate::geometry::{RigidTransform, so3};
@@ -12,13 +12,13 @@ use crate::text::Named as _;
 
 /// Image from a position along a heading, 8° down.
 fn radiance(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> GrayImage {
-    let view = View::new(&camera_model(0, lens, [640, 480]));
+    let view = RenderedView::new(&camera_model(0, lens, [640, 480]));
     let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let optical = nalgebra::UnitQuaternion::from_matrix(&optical);
     let heading = so3::exp(&Vector3::new(0.0, 0.0, heading_deg.to_radians())) * so3::exp(&Vector3::new(0.0, 0.14, 0.0));
     let mut grey = vec![0.0; view.pixels()];
     let pose = RigidTransform::new(heading * optical, Vector3::from(place_m));
-    Renderer::new(world).render(
+    SurfaceShader::new(world).render(
         &view,
         view.bands(usize::MAX).next().unwrap(),
         &pose,
@@ -82,7 +82,7 @@ fn a_pixel_sees_what_its_ray_hits() {
     // A point of the house's corner edge projects to the image edge between two walls.
     let world = world::build(Environment::House, 1);
     let model = camera_model(0, Lens::Radtan, [640, 480]);
-    let view = View::new(&model);
+    let view = RenderedView::new(&model);
     let place = Vector3::new(-13.0, -11.0, 2.6);
     let corner = Vector3::new(-6.0, -4.5, 2.6);
     let forward = (corner - place).normalize();
@@ -116,8 +116,8 @@ fn textures_do_not_flicker_under_slow_motion() {
     // Between shifts of a hundredth of a pixel, a tracked patch must change smoothly: neighbouring images are much more
     // similar than images a pixel apart.
     let world = world::build(Environment::Town, 1);
-    let renderer = Renderer::new(&world);
-    let view = View::new(&camera_model(0, Lens::Pinhole, [320, 240]));
+    let renderer = SurfaceShader::new(&world);
+    let view = RenderedView::new(&camera_model(0, Lens::Pinhole, [320, 240]));
     let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let optical = nalgebra::UnitQuaternion::from_matrix(&optical);
     let shot = |turn_px: f64| {
@@ -147,12 +147,12 @@ fn textures_do_not_flicker_under_slow_motion() {
 #[test]
 fn rows_rendered_apart_are_those_of_the_whole_image() {
     let world = world::build(Environment::House, 1);
-    let renderer = Renderer::new(&world);
+    let renderer = SurfaceShader::new(&world);
     let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let rotation = nalgebra::UnitQuaternion::from_matrix(&optical) * so3::exp(&Vector3::new(0.1, 0.7, 0.2));
     let pose = RigidTransform::new(rotation, Vector3::new(-13.0, -11.0, 2.6));
     for lens in [Lens::Pinhole, Lens::Radtan] {
-        let view = View::new(&camera_model(0, lens, [160, 120]));
+        let view = RenderedView::new(&camera_model(0, lens, [160, 120]));
         let render = |rows: usize| {
             let mut grey = vec![0.0; view.pixels()];
             for rows in view.bands(rows) {
@@ -197,7 +197,7 @@ fn flights_keep_clear_of_everything_built() {
 
 #[test]
 fn noise_follows_from_frame_and_pixel_alone() {
-    let view = View::new(&camera_model(0, Lens::Pinhole, [64, 48]));
+    let view = RenderedView::new(&camera_model(0, Lens::Pinhole, [64, 48]));
     let options = SensorOptions { noise: 3.0, exposure_drift: 0.0, vignetting: 0.0 };
     let sensor = Sensor::new(&view, options, RandomStream::new(2, 0).next_u64());
     let flat = vec![100.0; view.pixels()];

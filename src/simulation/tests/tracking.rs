@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::super::disturbances::{EXPOSURE_DRIFT, VIGNETTING};
 use super::super::experiment::Experiment;
-use super::super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
+use super::super::render::{RenderedView, Sensor, SensorOptions, SurfaceShader, Workspace};
 use super::super::world::{self, World};
 use super::flight::experiment_scenario;
 use crate::camera::CameraModel;
@@ -83,7 +83,7 @@ fn tracks_follow_the_surfaces() {
     let scenario = experiment_scenario(experiment, 1, 10.0, false);
     let world = world::build(experiment.environment(), 1);
     let camera = &scenario.true_rig.cameras[0];
-    let (model, view, renderer) = (&camera.model, View::new(&camera.model), Renderer::new(&world));
+    let (model, view, renderer) = (&camera.model, RenderedView::new(&camera.model), SurfaceShader::new(&world));
     let sensor =
         Sensor::new(&view, SensorOptions { noise: 2.0, exposure_drift: EXPOSURE_DRIFT, vignetting: VIGNETTING }, 7);
 

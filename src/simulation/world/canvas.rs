@@ -1,6 +1,6 @@
 //! Painted surface: grey values over metres, with noise, strokes and shapes.
 
-use super::texture::Texture;
+use super::texture::WorldTexture;
 use crate::simulation::random::{RandomStream, mix};
 
 /// Grey values from 0 to 255 over a rectangle in metres, rows from top to bottom.
@@ -15,14 +15,14 @@ pub(crate) struct Canvas {
 
 /// Rectangle on a canvas: left, top, width and height in metres.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Area {
+pub(crate) struct CanvasRectangle {
     pub(crate) x: f32,
     pub(crate) y: f32,
     pub(crate) w: f32,
     pub(crate) h: f32,
 }
 
-impl Area {
+impl CanvasRectangle {
     pub(crate) fn new(x: f32, y: f32, w: f32, h: f32) -> Self {
         Self { x, y, w, h }
     }
@@ -70,14 +70,14 @@ impl Canvas {
         [self.width as f32 / self.texels_per_m, self.height as f32 / self.texels_per_m]
     }
 
-    pub(crate) fn area(&self) -> Area {
+    pub(crate) fn area(&self) -> CanvasRectangle {
         let [w, h] = self.size_m();
-        Area::new(0.0, 0.0, w, h)
+        CanvasRectangle::new(0.0, 0.0, w, h)
     }
 
-    pub(crate) fn finish(self) -> Texture {
+    pub(crate) fn finish(self) -> WorldTexture {
         let texels: Vec<u8> = self.values.iter().map(|value| value.round().clamp(0.0, 255.0) as u8).collect();
-        Texture::new(self.width, self.height, &texels, self.wrap, self.texels_per_m)
+        WorldTexture::new(self.width, self.height, &texels, self.wrap, self.texels_per_m)
     }
 
     /// Blends a value into one texel.
@@ -122,7 +122,7 @@ impl Canvas {
     }
 
     /// Fills a rectangle by `paint(x, y)` of metres from its corner, which returns a grey value and its weight.
-    pub(crate) fn fill(&mut self, area: Area, mut paint: impl FnMut(f32, f32) -> (f32, f32)) {
+    pub(crate) fn fill(&mut self, area: CanvasRectangle, mut paint: impl FnMut(f32, f32) -> (f32, f32)) {
         let scale = self.texels_per_m;
         let first = |from: f32| (from * scale - 0.5).ceil() as i64;
         for y in first(area.y)..first(area.y + area.h) {
@@ -135,12 +135,12 @@ impl Canvas {
         }
     }
 
-    pub(crate) fn rectangle(&mut self, area: Area, value: f32) {
+    pub(crate) fn rectangle(&mut self, area: CanvasRectangle, value: f32) {
         self.fill(area, |_, _| (value, 1.0));
     }
 
     /// Multiplies a rectangle by a brightness factor; its texture is kept.
-    pub(crate) fn shade(&mut self, area: Area, factor: f32) {
+    pub(crate) fn shade(&mut self, area: CanvasRectangle, factor: f32) {
         let scale = self.texels_per_m;
         let range = |from: f32, length: f32, size: usize| {
             let edge = |place: f32| ((place * scale).round().max(0.0) as usize).min(size);
@@ -159,7 +159,7 @@ impl Canvas {
         let reach = radii[0].max(radii[1]);
         let (sine, cosine) = angle.sin_cos();
         let soft = 1.0 / (self.texels_per_m * radii[0].min(radii[1]).max(1e-4));
-        let area = Area::new(centre[0] - reach, centre[1] - reach, 2.0 * reach, 2.0 * reach);
+        let area = CanvasRectangle::new(centre[0] - reach, centre[1] - reach, 2.0 * reach, 2.0 * reach);
         self.fill(area, |x, y| {
             let (dx, dy) = (x - reach, y - reach);
             let along = (dx * cosine + dy * sine) / radii[0];
@@ -173,7 +173,7 @@ impl Canvas {
     pub(crate) fn stroke(&mut self, from: [f32; 2], to: [f32; 2], width: f32, value: f32, fraction: f32) {
         let half = 0.5 * width;
         let margin = half + 1.0 / self.texels_per_m;
-        let area = Area::new(
+        let area = CanvasRectangle::new(
             from[0].min(to[0]) - margin,
             from[1].min(to[1]) - margin,
             (from[0] - to[0]).abs() + 2.0 * margin,
@@ -239,7 +239,7 @@ impl Canvas {
     }
 
     /// Lines of random letters that fill an area.
-    pub(crate) fn letters(&mut self, area: Area, letter_height: f32, value: f32, random: &mut RandomStream) {
+    pub(crate) fn letters(&mut self, area: CanvasRectangle, letter_height: f32, value: f32, random: &mut RandomStream) {
         let cell = letter_height / 6.0;
         let mut y = area.y;
         while y + letter_height <= area.y + area.h {
@@ -251,7 +251,7 @@ impl Canvas {
                     let on = (pattern >> part) & 1 == 1 || part % 3 == 0;
                     if on && !blank {
                         let (column, row) = ((part % 3) as f32, (part / 3) as f32);
-                        self.rectangle(Area::new(x + column * cell, y + row * cell, cell, cell), value);
+                        self.rectangle(CanvasRectangle::new(x + column * cell, y + row * cell, cell, cell), value);
                     }
                 }
                 x += 4.0 * cell;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::texture::Texture;
+use super::texture::WorldTexture;
 use crate::simulation::random::RandomStream;
 
 /// Index of a material in its world.
@@ -37,7 +37,7 @@ impl Affine {
 
 /// Convex planar polygon that is visible from its front only, where its corners are counter-clockwise.
 #[derive(Clone, Debug)]
-pub(crate) struct Face {
+pub(crate) struct MeshFace {
     pub(crate) corners: Vec<Vector3<f64>>,
     pub(crate) bounds: Bounds,
     /// Outward unit normal and its distance: `normal · point = distance`.
@@ -68,9 +68,9 @@ impl Bounds {
 /// World: faces, materials, textures, sun and sky.
 #[derive(Clone, Debug)]
 pub(crate) struct World {
-    pub(crate) faces: Vec<Face>,
+    pub(crate) faces: Vec<MeshFace>,
     pub(crate) materials: Vec<Material>,
-    pub(crate) textures: Vec<Texture>,
+    pub(crate) textures: Vec<WorldTexture>,
     /// Unit direction towards the sun.
     pub(crate) to_sun: Vector3<f64>,
     /// Half the side of the square around the origin with shadows.
@@ -80,7 +80,7 @@ pub(crate) struct World {
 }
 
 impl World {
-    pub(crate) fn new(to_sun: Vector3<f64>, shadow_reach_m: f64, clouds: Texture) -> Self {
+    pub(crate) fn new(to_sun: Vector3<f64>, shadow_reach_m: f64, clouds: WorldTexture) -> Self {
         Self {
             faces: Vec::new(),
             materials: Vec::new(),
@@ -92,7 +92,7 @@ impl World {
     }
 
     /// Adds a texture as a separate material.
-    pub(crate) fn material(&mut self, texture: Texture) -> MaterialId {
+    pub(crate) fn material(&mut self, texture: WorldTexture) -> MaterialId {
         self.textures.push(texture);
         self.materials.push(Material { texture: self.textures.len() - 1, overlay: None });
         MaterialId(self.materials.len() - 1)
@@ -119,7 +119,7 @@ impl World {
         let normal = area_normal(&corners);
         let Some(normal) = normal.try_normalize(1e-12) else { return };
         let sun = normal.dot(&self.to_sun).max(0.0);
-        self.faces.push(Face {
+        self.faces.push(MeshFace {
             bounds: Bounds::of(&corners),
             distance: normal.dot(&origin),
             normal,

@@ -1,7 +1,7 @@
 //! Materials of surfaces: bricks, boards, plaster, tiles, slabs, grass, asphalt, leaves.
 
-use super::canvas::{Area, Canvas};
-use super::texture::Texture;
+use super::canvas::{Canvas, CanvasRectangle};
+use super::texture::WorldTexture;
 use crate::simulation::random::RandomStream;
 
 /// Material of a wall.
@@ -58,13 +58,13 @@ pub(crate) fn wall(canvas: &mut Canvas, kind: Wall, random: &mut RandomStream) {
     }
     canvas.grain(7.0, random);
     // Rain and splashes darken the foot of every wall.
-    canvas.shade(Area::new(0.0, area.h - 0.28, area.w, 0.28), 0.8);
+    canvas.shade(CanvasRectangle::new(0.0, area.h - 0.28, area.w, 0.28), 0.8);
 }
 
 /// Rows of stones, every other one shifted by half a stone, each stone with a random grey.
 fn courses(
     canvas: &mut Canvas,
-    area: Area,
+    area: CanvasRectangle,
     stone: [f32; 2],
     joint: f32,
     base: f32,
@@ -79,13 +79,13 @@ fn courses(
             let value = base + spread * random.normal().clamp(-2.0, 2.0) as f32;
             let x = area.x + shift + column as f32 * stone[0];
             let y = area.y + row as f32 * stone[1];
-            canvas.rectangle(Area::new(x, y, stone[0], stone[1]).inset(0.5 * joint), value);
+            canvas.rectangle(CanvasRectangle::new(x, y, stone[0], stone[1]).inset(0.5 * joint), value);
         }
     }
 }
 
 /// Upright boards with grain, knots and dark gaps.
-fn boards(canvas: &mut Canvas, area: Area, width: f32, base: f32, random: &mut RandomStream) {
+fn boards(canvas: &mut Canvas, area: CanvasRectangle, width: f32, base: f32, random: &mut RandomStream) {
     let count = (area.w / width).ceil() as usize;
     for index in 0..count {
         let x = area.x + index as f32 * width;
@@ -93,7 +93,7 @@ fn boards(canvas: &mut Canvas, area: Area, width: f32, base: f32, random: &mut R
         while y < area.y + area.h {
             let length = number(random, 0.9, 2.6).min(area.y + area.h - y);
             let value = base + 18.0 * random.normal().clamp(-2.0, 2.0) as f32;
-            let board = Area::new(x, y, width, length);
+            let board = CanvasRectangle::new(x, y, width, length);
             let phase = number(random, 0.0, 90.0);
             canvas.fill(board, |u, v| {
                 let gap = u < 0.013 || v < 0.013;
@@ -110,7 +110,7 @@ fn boards(canvas: &mut Canvas, area: Area, width: f32, base: f32, random: &mut R
 }
 
 /// A slope of roof tiles.
-pub(crate) fn roof(width_m: f32, height_m: f32, texels_per_m: f32, random: &mut RandomStream) -> Texture {
+pub(crate) fn roof(width_m: f32, height_m: f32, texels_per_m: f32, random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(width_m, height_m, texels_per_m, false, 60.0);
     let base = number(random, 80.0, 115.0);
     let tile = [0.3, 0.34];
@@ -120,7 +120,7 @@ pub(crate) fn roof(width_m: f32, height_m: f32, texels_per_m: f32, random: &mut 
         for column in 0..columns {
             let value = base + 24.0 * random.normal().clamp(-2.0, 2.0) as f32;
             let shift = if row % 2 == 0 { 0.0 } else { -0.15 };
-            let area = Area::new(column as f32 * tile[0] + shift, row as f32 * tile[1], tile[0], tile[1]);
+            let area = CanvasRectangle::new(column as f32 * tile[0] + shift, row as f32 * tile[1], tile[0], tile[1]);
             canvas.fill(area, |u, v| {
                 let gap = u < 0.018 || v > 0.34 - 0.03;
                 (if gap { 38.0 } else { value + 70.0 * (v - 0.17) + 10.0 * (u * 21.0).cos() }, 1.0)
@@ -134,7 +134,7 @@ pub(crate) fn roof(width_m: f32, height_m: f32, texels_per_m: f32, random: &mut 
 }
 
 /// Repeating lawn.
-pub(crate) fn grass(random: &mut RandomStream) -> Texture {
+pub(crate) fn grass(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(10.0, 10.0, 102.4, true, 96.0);
     canvas.noise(2.5, 22.0, 4, random);
     canvas.hatch(21_000, 0.13, 0.016, [48.0, 168.0], random);
@@ -144,7 +144,7 @@ pub(crate) fn grass(random: &mut RandomStream) -> Texture {
     canvas.finish()
 }
 
-pub(crate) fn asphalt(random: &mut RandomStream) -> Texture {
+pub(crate) fn asphalt(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(10.0, 10.0, 102.4, true, 92.0);
     canvas.noise(3.3, 16.0, 5, random);
     canvas.dots(26_000, [0.008, 0.026], [45.0, 160.0], 0.75, random);
@@ -156,7 +156,7 @@ pub(crate) fn asphalt(random: &mut RandomStream) -> Texture {
     }
     for _ in 0..7 {
         let (x, y) = (number(random, 0.0, 8.0), number(random, 0.0, 8.0));
-        let patch = Area::new(x, y, number(random, 0.5, 1.8), number(random, 0.4, 1.2));
+        let patch = CanvasRectangle::new(x, y, number(random, 0.5, 1.8), number(random, 0.4, 1.2));
         canvas.shade(patch, number(random, 0.62, 0.82));
     }
     canvas.grain(10.0, random);
@@ -164,12 +164,12 @@ pub(crate) fn asphalt(random: &mut RandomStream) -> Texture {
 }
 
 /// Repeating paving slabs.
-pub(crate) fn slabs(random: &mut RandomStream) -> Texture {
+pub(crate) fn slabs(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(8.0, 8.0, 64.0, true, 75.0);
     for row in 0..16 {
         for column in 0..16 {
             let value = 138.0 + 17.0 * random.normal().clamp(-2.0, 2.0) as f32;
-            let slab = Area::new(column as f32 * 0.5, row as f32 * 0.5, 0.5, 0.5).inset(0.013);
+            let slab = CanvasRectangle::new(column as f32 * 0.5, row as f32 * 0.5, 0.5, 0.5).inset(0.013);
             canvas.rectangle(slab, value);
         }
     }
@@ -185,7 +185,7 @@ pub(crate) fn slabs(random: &mut RandomStream) -> Texture {
 }
 
 /// Repeating foliage: leaves in light and shade.
-pub(crate) fn leaves(random: &mut RandomStream) -> Texture {
+pub(crate) fn leaves(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(4.0, 4.0, 128.0, true, 58.0);
     canvas.noise(0.7, 26.0, 3, random);
     canvas.dots(2600, [0.03, 0.085], [26.0, 60.0], 0.8, random);
@@ -196,7 +196,7 @@ pub(crate) fn leaves(random: &mut RandomStream) -> Texture {
 }
 
 /// Repeating bark, weathered wood or other rough dark material.
-pub(crate) fn bark(random: &mut RandomStream) -> Texture {
+pub(crate) fn bark(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(2.0, 2.0, 128.0, true, 82.0);
     let area = canvas.area();
     boards(&mut canvas, area, 0.125, 90.0, random);
@@ -207,7 +207,7 @@ pub(crate) fn bark(random: &mut RandomStream) -> Texture {
 }
 
 /// Repeating boards, for fences and sheds.
-pub(crate) fn planks(random: &mut RandomStream) -> Texture {
+pub(crate) fn planks(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(8.0, 4.0, 64.0, true, 100.0);
     let area = canvas.area();
     boards(&mut canvas, area, 0.16, 112.0, random);
@@ -218,7 +218,7 @@ pub(crate) fn planks(random: &mut RandomStream) -> Texture {
 }
 
 /// Repeating rough stone or concrete.
-pub(crate) fn concrete(random: &mut RandomStream) -> Texture {
+pub(crate) fn concrete(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(4.0, 4.0, 64.0, true, 130.0);
     canvas.noise(0.9, 30.0, 5, random);
     canvas.dots(900, [0.01, 0.035], [70.0, 190.0], 0.7, random);
@@ -231,13 +231,13 @@ pub(crate) fn concrete(random: &mut RandomStream) -> Texture {
 }
 
 /// Painted metal with dents, rust and stickers, for cars and boxes.
-pub(crate) fn metal(base: f32, random: &mut RandomStream) -> Texture {
+pub(crate) fn metal(base: f32, random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(4.0, 4.0, 64.0, true, base);
     canvas.noise(1.0, 12.0, 4, random);
     canvas.dots(130, [0.02, 0.09], [45.0, 105.0], 0.6, random);
     for _ in 0..22 {
         let (x, y) = (number(random, 0.0, 3.5), number(random, 0.0, 3.5));
-        let sticker = Area::new(x, y, number(random, 0.12, 0.45), number(random, 0.1, 0.3));
+        let sticker = CanvasRectangle::new(x, y, number(random, 0.12, 0.45), number(random, 0.1, 0.3));
         canvas.rectangle(sticker, number(random, 160.0, 235.0));
         canvas.letters(sticker.inset(0.03), number(random, 0.06, 0.1), 40.0, random);
     }
@@ -250,7 +250,7 @@ pub(crate) fn metal(base: f32, random: &mut RandomStream) -> Texture {
 }
 
 /// Repeating worn white paint, for road markings.
-pub(crate) fn paint(random: &mut RandomStream) -> Texture {
+pub(crate) fn paint(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(4.0, 4.0, 64.0, true, 188.0);
     canvas.noise(0.8, 20.0, 4, random);
     canvas.dots(420, [0.012, 0.05], [95.0, 135.0], 0.8, random);
@@ -263,7 +263,7 @@ pub(crate) fn paint(random: &mut RandomStream) -> Texture {
 }
 
 /// Repeating slow blotches around mid grey; as an overlay they hide the repetition of other textures.
-pub(crate) fn blotches(random: &mut RandomStream) -> Texture {
+pub(crate) fn blotches(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(64.0, 64.0, 8.0, true, 128.0);
     canvas.noise(9.0, 40.0, 5, random);
     canvas.dots(420, [0.3, 1.4], [96.0, 150.0], 0.4, random);
@@ -271,7 +271,7 @@ pub(crate) fn blotches(random: &mut RandomStream) -> Texture {
 }
 
 /// Wooded hills in the distance, hazy.
-pub(crate) fn woods(random: &mut RandomStream) -> Texture {
+pub(crate) fn woods(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(256.0, 64.0, 4.0, true, 118.0);
     canvas.noise(24.0, 13.0, 5, random);
     canvas.dots(5200, [0.8, 2.6], [92.0, 140.0], 0.5, random);
@@ -279,7 +279,7 @@ pub(crate) fn woods(random: &mut RandomStream) -> Texture {
 }
 
 /// Repeating soft clouds.
-pub(crate) fn clouds(random: &mut RandomStream) -> Texture {
+pub(crate) fn clouds(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(512.0, 512.0, 1.0, true, 128.0);
     canvas.noise(128.0, 42.0, 6, random);
     canvas.finish()

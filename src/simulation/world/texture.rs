@@ -2,7 +2,7 @@
 ///
 /// Texel `(x, y)` covers `[x, x + 1) × [y, y + 1)`; a wrapping texture repeats and its sides are powers of two.
 #[derive(Clone, Debug)]
-pub(crate) struct Texture {
+pub(crate) struct WorldTexture {
     levels: Vec<Level>,
     wrap: bool,
     texels_per_m: f32,
@@ -52,7 +52,7 @@ const FRACTION: f32 = (1 << FRACTION_BITS) as f32;
 /// Offset of the level of detail: finer than exact, for images as sharp as those of a lens.
 const LEVEL_BIAS: f32 = -0.2;
 
-impl Texture {
+impl WorldTexture {
     /// Texture from the finest level, rows top to bottom.
     pub(crate) fn new(width: usize, height: usize, texels: &[u8], wrap: bool, texels_per_m: f32) -> Self {
         debug_assert!(!wrap || (width.is_power_of_two() && height.is_power_of_two()));
@@ -121,7 +121,7 @@ impl Texture {
         near + (far - near) * blend
     }
 
-    /// [`Texture::sample`] with one sample as wide as the longer side, for textures without detail.
+    /// [`WorldTexture::sample`] with one sample as wide as the longer side, for textures without detail.
     pub(crate) fn sample_roughly<const N: usize>(&self, footprints: &Footprints<N>, count: usize) -> [f32; N] {
         let [across, down] = footprints.squares();
         let mut values = [0.0; N];
@@ -217,7 +217,7 @@ mod tests {
         // Half a grey value per texel: the grey value identifies the texel.
         for size in [509_u16, 385, 301] {
             let texels: Vec<u8> = (0..size).map(|x| (x / 2) as u8).collect();
-            let texture = Texture::new(texels.len(), 1, &texels, false, 1.0);
+            let texture = WorldTexture::new(texels.len(), 1, &texels, false, 1.0);
             for width in [1.0, 2.0, 4.0, 8.0, 16.0] {
                 for centre in [48.0, 0.5 * f32::from(size), f32::from(size) - 48.0] {
                     let sides = [[[width], [0.0]], [[0.0], [width]]];

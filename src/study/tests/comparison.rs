@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use crate::geometry::SplitMix64;
-use crate::study::{Cell, SUCCESS, StudyTable, Verdict, baseline_table, compare, runs_table};
+use crate::study::{Cell, PairedVerdict, SUCCESS, StudyTable, baseline_table, compare, runs_table};
 
 /// A study of 4 logs × 5 seeds: errors differ between logs by a factor of ten, and between two studies by noise of this
 /// relative size. ATE is multiplied by `factor`, NEES divided by its square.
@@ -73,7 +73,7 @@ fn equal_studies_are_unchanged_and_an_exact_change_has_no_interval() {
     );
     let better =
         compare(&study(0.0, 1.0, &mut random), &study(0.0, 0.5, &mut random), &tolerances(&["ate_rmse_m"])).unwrap();
-    assert_eq!((better.metrics[0].verdict, better.fails()), (Verdict::Better, false));
+    assert_eq!((better.metrics[0].verdict, better.fails()), (PairedVerdict::Better, false));
 }
 
 #[test]
@@ -108,7 +108,7 @@ fn what_cannot_be_compared_is_said() {
     assert!(problem(&StudyTable::default(), &old, "ate_rmse_m").starts_with("the baseline has no column 'log'"));
     let two = old.select(&[0, 1]);
     let few = compare(&two, &two, &tolerances(&["ate_rmse_m"])).unwrap();
-    assert_eq!((few.metrics[0].verdict, few.fails()), (Verdict::TooFewPairs, true));
+    assert_eq!((few.metrics[0].verdict, few.fails()), (PairedVerdict::TooFewPairs, true));
 }
 
 /// A table with one run of each specification; its ATE is 1 m times its number.

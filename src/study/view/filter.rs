@@ -5,7 +5,7 @@
 
 use crate::flight_log::nearest_name;
 use crate::session::breakpoints::{
-    Comparison, ConditionProblem, Span, Token, factor_of_unit, tokens_with_single_equals,
+    ComparisonOperator, ConditionProblem, TextRange, Token, factor_of_unit, tokens_with_single_equals,
 };
 use crate::study::{ColumnType, StudyTable};
 
@@ -30,8 +30,8 @@ enum Predicate {
     Has(String),
     /// True if a text column contains a text, case-insensitive.
     Contains(String, String),
-    Texts(Comparison, Text, Text),
-    Numbers(Comparison, Number, Number),
+    Texts(ComparisonOperator, Text, Text),
+    Numbers(ComparisonOperator, Number, Number),
     Not(Box<Self>),
     All(Vec<Self>),
     Any(Vec<Self>),
@@ -148,7 +148,7 @@ impl Number {
 struct Parser<'a> {
     text: &'a str,
     table: &'a StudyTable,
-    tokens: Vec<(Token, Span)>,
+    tokens: Vec<(Token, TextRange)>,
     at: usize,
     depth: usize,
     operators: usize,
@@ -161,7 +161,7 @@ impl Parser<'_> {
         &self.tokens[self.at.min(self.tokens.len() - 1)].0
     }
 
-    fn span(&self) -> Span {
+    fn span(&self) -> TextRange {
         self.tokens[self.at.min(self.tokens.len() - 1)].1
     }
 

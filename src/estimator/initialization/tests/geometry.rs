@@ -7,7 +7,7 @@ use crate::estimator::initialization::alignment::{quadratic_on_sphere, solve_wit
 use crate::estimator::initialization::bearing::{angle_between, fit_rotation, refine_camera_pose};
 use crate::estimator::initialization::essential::{decompose, five_point};
 use crate::estimator::initialization::polynomial::{evaluate, real_roots};
-use crate::estimator::initialization::relative_pose::{RelativePose, RotationPrior, relative_poses};
+use crate::estimator::initialization::relative_pose::{RotationPrior, UnscaledPose, relative_poses};
 use crate::geometry::{RigidTransform, so3};
 
 fn random_pose(random: &mut Random) -> RigidTransform {
@@ -113,7 +113,7 @@ fn relative_pose_survives_noise_outliers_and_planes() {
         if pose.translation_m.norm() < 0.4 {
             continue;
         }
-        let error = |found: &RelativePose| {
+        let error = |found: &UnscaledPose| {
             let rotation_error = (found.camera_j_from_camera_i.rotation.inverse() * pose.rotation).angle();
             (rotation_error, angle_between(&found.camera_j_from_camera_i.translation_m, &pose.translation_m))
         };

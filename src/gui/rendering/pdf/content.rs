@@ -5,7 +5,7 @@ use pdf_writer::types::LineJoinStyle;
 use pdf_writer::{Content, Finish as _, Name, Str};
 
 use super::fonts::{FontGlyph, Fonts};
-use crate::gui::rendering::vector::{Area, Drawing, Element, Letter, TextRun};
+use crate::gui::rendering::vector::{Drawing, Element, FilledArea, Letter, TextRun};
 
 /// Distance of the control points of a quarter of a circle of radius 1 from its ends.
 const QUARTER: f32 = 0.552_284_8;
@@ -83,8 +83,8 @@ impl<'a> PageWriter<'a> {
             Element::Areas { areas, fill } => self.painted(*fill, Stroke::NONE, |content| {
                 for area in areas {
                     match area {
-                        Area::Rect(rect) => rounded(content, *rect, 0.0),
-                        Area::Triangle(corners) => polygon(content, corners, true),
+                        FilledArea::Rect(rect) => rounded(content, *rect, 0.0),
+                        FilledArea::Triangle(corners) => polygon(content, corners, true),
                     }
                 }
             }),

@@ -6,7 +6,7 @@ use egui::{Rect, TextureId};
 
 use super::attributes::{attribute, escape, lines_through, number, paint, put, stroke};
 use super::text;
-use crate::gui::rendering::vector::{Area, Drawing, Element, Textures};
+use crate::gui::rendering::vector::{Drawing, Element, FilledArea, Textures};
 
 /// SVG file of a drawing, over an opaque background.
 ///
@@ -168,12 +168,12 @@ impl Writer<'_> {
     }
 }
 
-fn add_area(path: &mut String, area: &Area) {
+fn add_area(path: &mut String, area: &FilledArea) {
     match area {
-        Area::Rect(rect) => {
+        FilledArea::Rect(rect) => {
             let [left, top, right, bottom] = [rect.left(), rect.top(), rect.right(), rect.bottom()].map(number);
             put(path, format_args!("M{left} {top}H{right}V{bottom}H{left}Z"));
         }
-        Area::Triangle(corners) => lines_through(path, corners, true),
+        FilledArea::Triangle(corners) => lines_through(path, corners, true),
     }
 }

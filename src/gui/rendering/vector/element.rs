@@ -44,7 +44,7 @@ pub(in crate::gui::rendering) enum Element {
     },
     /// Areas of one colour, painted together.
     Areas {
-        areas: Vec<Area>,
+        areas: Vec<FilledArea>,
         fill: Color32,
     },
     /// Region `uv` (0 to 1) of a texture in a rectangle.
@@ -57,7 +57,7 @@ pub(in crate::gui::rendering) enum Element {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::gui::rendering) enum Area {
+pub(in crate::gui::rendering) enum FilledArea {
     Rect(Rect),
     /// Corners clockwise on the screen.
     Triangle([Pos2; 3]),

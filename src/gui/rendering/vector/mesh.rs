@@ -5,15 +5,15 @@ use std::collections::BTreeSet;
 use egui::epaint::{Mesh, Vertex};
 use egui::{Color32, Pos2, Rect};
 
-use super::element::{Area, Element};
+use super::element::{Element, FilledArea};
 
 /// A mesh without a texture. Consecutive triangles of the same colour become one element, so that no seams are visible.
 ///
 /// A triangle with different corner colours gets their mean.
 pub(super) fn add_mesh(elements: &mut Vec<Element>, mesh: &Mesh) {
     let mut fill = Color32::TRANSPARENT;
-    let mut areas: Vec<Area> = Vec::new();
-    let mut finish = |areas: &mut Vec<Area>, fill: Color32| {
+    let mut areas: Vec<FilledArea> = Vec::new();
+    let mut finish = |areas: &mut Vec<FilledArea>, fill: Color32| {
         let areas = std::mem::take(areas);
         if !areas.is_empty() && fill.a() > 0 {
             elements.push(Element::Areas { areas, fill });
@@ -35,9 +35,9 @@ pub(super) fn add_mesh(elements: &mut Vec<Element>, mesh: &Mesh) {
         });
         if let Some(rect) = next.and_then(|next| quad(mesh, &[*first, *second, *third], next)) {
             indices = &rest[3..];
-            areas.push(Area::Rect(rect));
+            areas.push(FilledArea::Rect(rect));
         } else {
-            areas.push(Area::Triangle(clockwise([a.pos, b.pos, c.pos])));
+            areas.push(FilledArea::Triangle(clockwise([a.pos, b.pos, c.pos])));
         }
     }
     finish(&mut areas, fill);

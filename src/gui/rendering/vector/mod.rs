@@ -10,7 +10,7 @@ mod textures;
 
 use egui::{Color32, Vec2};
 
-pub(super) use self::element::{Area, Element, Letter, TextRun};
+pub(super) use self::element::{Element, FilledArea, Letter, TextRun};
 #[cfg(test)]
 pub(super) use self::mesh::quad;
 pub(super) use self::shapes::elements;

@@ -104,7 +104,7 @@ mod tests {
     use crate::gui::Dialog;
     use crate::gui::window::tests::{SECOND_NS, bench, commands_of};
     use crate::log_check::{Area, Finding, Severity};
-    use crate::session::{Cause, Command, Diagnosis, DiagnosisProgress, ForkChanges, RankedCause, Verdict};
+    use crate::session::{Cause, Command, Diagnosis, DiagnosisProgress, DiagnosisVerdict, ForkChanges, RankedCause};
 
     fn diagnosis() -> Diagnosis {
         let changes: ForkChanges = "correct=reversed:yaw".parse().unwrap();
@@ -123,7 +123,7 @@ mod tests {
         Diagnosis {
             log: "flight.mcap".to_owned(),
             run: "auto".to_owned(),
-            verdict: Verdict::Cause,
+            verdict: DiagnosisVerdict::Cause,
             values: Vec::new(),
             log_faults: vec![Finding {
                 severity: Severity::Warning,

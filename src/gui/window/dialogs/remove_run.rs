@@ -5,11 +5,11 @@ use egui::{Button, RichText, Ui};
 use super::modal::Modal;
 use crate::geometry::seconds_from_ns;
 use crate::gui::PanelContext;
-use crate::gui::window::history::History;
+use crate::gui::window::history::SettingsHistory;
 use crate::session::{Command, Recording};
 
 /// Draws the question about run `number`. Returns true if it stays open.
-pub(super) fn ui(ui: &Ui, ctx: &mut PanelContext<'_>, number: usize, history: &mut History) -> bool {
+pub(super) fn ui(ui: &Ui, ctx: &mut PanelContext<'_>, number: usize, history: &mut SettingsHistory) -> bool {
     let Some(run) = ctx.recording.runs.get(number) else { return false };
     let title = format!("Remove run {}?", run.spec.label);
     let modal = Modal { name: "remove run", title: &title, width: 430.0 };

@@ -6,7 +6,7 @@ use super::modal::Modal;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::timeline::SPEEDS;
 use crate::gui::window::actions::Action;
-use crate::gui::window::history::History;
+use crate::gui::window::history::SettingsHistory;
 use crate::gui::window::settings::{LAST_LAYOUT, MEMORY_MIB, SCALES, Settings};
 use crate::gui::window::tiles::Preset;
 use crate::text::Named as _;
@@ -16,7 +16,7 @@ pub(super) fn ui<'a>(
     ui: &Ui,
     theme: &Theme,
     settings: &mut Settings,
-    history: &History,
+    history: &SettingsHistory,
     layouts: impl Iterator<Item = &'a str>,
     actions: &mut Vec<Action>,
 ) -> bool {
@@ -32,7 +32,7 @@ pub(super) fn ui<'a>(
     contents.1
 }
 
-fn buttons_ui(ui: &mut Ui, settings: &mut Settings, history: &History, actions: &mut Vec<Action>) {
+fn buttons_ui(ui: &mut Ui, settings: &mut Settings, history: &SettingsHistory, actions: &mut Vec<Action>) {
     let keys = ui.input_mut(|input| {
         let redo = input.consume_key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
         (!redo && input.consume_key(Modifiers::COMMAND, Key::Z), redo)

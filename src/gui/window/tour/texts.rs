@@ -5,7 +5,7 @@ use super::story::{self, Story};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::gui::PanelContext;
-use crate::gui::rank::verdict::{Verdict, verdict};
+use crate::gui::rank::verdict::{RankVerdict, verdict};
 use crate::gui::theme::MAX_RUNS;
 use crate::gui::units::{Shown, counted, fixed};
 use crate::observability::{RankReport, parameters_of};
@@ -167,7 +167,7 @@ fn direction_name(rank: &RankReport, names: &ParameterNames) -> Option<String> {
 }
 
 fn which_lines(run: &RunRecord, step: &StepRecord, names: &ParameterNames) -> Vec<String> {
-    let Verdict { headline, .. } = verdict(step, names);
+    let RankVerdict { headline, .. } = verdict(step, names);
     let mut lines =
         vec![format!("Run {} at {} s. {headline}.", run.spec.label, fixed(seconds_from_ns(step.report.stamp_ns), 2))];
     let Some(rank) = &step.rank else { return lines };

@@ -10,7 +10,7 @@ use crate::estimator::{HypotheticalFrame, JointKnowledge, NavigationState, PoseK
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::ParameterId;
 use crate::observability::laboratory::experiment::{LaboratoryForm, LaboratorySetup};
-use crate::observability::laboratory::motion::{Flight, Kinematics};
+use crate::observability::laboratory::motion::{MechanismMotion, MechanismState};
 
 /// Largest number of iterations that find the image row in which a landmark is exposed; the camera moves little within
 /// a readout.
@@ -29,7 +29,7 @@ pub(super) struct SensorObservation {
 /// A window with its exact state.
 #[derive(Debug)]
 pub(super) struct SensorWindow<'a> {
-    pub(super) flight: Flight<'a>,
+    pub(super) flight: MechanismMotion<'a>,
     pub(super) setup: &'a LaboratorySetup,
     /// Times of the frames: exposure of the first row at the true time offset.
     pub(super) times_s: Vec<f64>,
@@ -301,7 +301,7 @@ impl<'a> SensorWindow<'a> {
     }
 }
 
-fn frame_at(kinematics: &Kinematics) -> SensorFrameState {
+fn frame_at(kinematics: &MechanismState) -> SensorFrameState {
     SensorFrameState {
         navigation: NavigationState {
             world_from_imu: kinematics.world_from_imu,

@@ -3,7 +3,7 @@
 //! Column A of these tables, the paper's literal swap, is omitted: that parameterization cannot represent every
 //! mechanism and is not implemented.
 
-use super::super::{Survey, SurveyRow, survey};
+use super::super::{DegeneracySurvey, SurveyRow, survey};
 
 /// Expected ranks of one experiment.
 struct Expected {
@@ -182,7 +182,7 @@ fn check(row: &SurveyRow, expected: &Expected) -> usize {
 
 #[test]
 fn ranks_losses_and_null_directions_match_the_expected_table() {
-    let Survey { sections, least_frames, spurious, sensors: _ } = survey();
+    let DegeneracySurvey { sections, least_frames, spurious, sensors: _ } = survey();
     let mut compared = 0;
     assert_eq!(sections.len(), SECTIONS.len());
     for (section, (title, rows)) in sections.iter().zip(&SECTIONS) {
