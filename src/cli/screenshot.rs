@@ -15,6 +15,7 @@ use dcvins::gui::app::PlayingLog;
 use dcvins::gui::theme::ThemeName;
 use dcvins::gui::window::{FigureFormat, FigureInput, Preset};
 use dcvins::gui::{ImageSource, Playback, Presentation};
+use dcvins::observability::SlideRequest;
 use dcvins::session::{Computation, Session, SessionPlan};
 use dcvins::sweep::{OpenedStudy, is_study};
 use dcvins::text::Named as _;
@@ -72,7 +73,7 @@ pub(crate) struct ScreenshotArguments {
     /// closed-form null direction (base-d, end-theta, …) or a parameter by name; VALUE in units of 10° and 3 cm. Scene
     /// and image show the moved chain.
     #[arg(long, value_name = "DIRECTION=VALUE")]
-    pub slide: Option<dcvins::observability::SlideRequest>,
+    pub slide: Option<SlideRequest>,
     /// Draw a single panel with its buttons and selectors, as in the window, instead of as a figure.
     #[arg(long)]
     pub controls: bool,
@@ -162,35 +163,11 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
     let format = format_of(arguments)?;
     let range_ns = arguments.figure.range_ns()?;
     let mut shown = Shown::open(arguments)?;
-    let log_end_ns = shown.log_end_ns;
-    let begin_ns = ns_from_seconds(shown.start_s).min(log_end_ns);
-    let end_ns =
-        shown.duration_s.map_or(log_end_ns, |duration_s| log_end_ns.min(begin_ns + ns_from_seconds(duration_s)));
-    if arguments.at.iter().any(|at_s| ns_from_seconds(*at_s) > log_end_ns) {
-        notify(&format!("dcvins: the log ends at {:.3} s: the last step is drawn", seconds_from_ns(log_end_ns)));
-    }
-    let mut stamps_ns: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(log_end_ns)).collect();
-    if let Some(period_s) = arguments.every {
-        let period_ns = ns_from_seconds(period_s).max(1);
-        let count = ((end_ns - begin_ns) / period_ns) as usize + 1;
-        if count > MAX_SCREENSHOTS {
-            bail!("--every {period_s}: {count} screenshots, more than {MAX_SCREENSHOTS}; give a longer period");
-        }
-        stamps_ns.extend((0..count).map(|number| begin_ns + number as i64 * period_ns));
-    }
-    // Without a time it is the end of the range, or of what is computed.
-    let timeless = stamps_ns.is_empty();
-    if timeless {
-        stamps_ns.push(range_ns.map_or(end_ns, |(_, to_ns)| to_ns.min(log_end_ns)));
-    }
-    stamps_ns.sort_unstable();
-    stamps_ns.dedup();
-    let last_stamp_ns = stamps_ns.last().copied().unwrap_or(end_ns);
-    // Plots of a range need the steps to its end, and those of the whole log all steps.
-    let last_ns = range_ns.map_or(last_stamp_ns, |(_, to_ns)| last_stamp_ns.max(to_ns.min(log_end_ns)));
+    let instants = Instants::of(arguments, &shown, range_ns)?;
+    let stamps_ns = &instants.stamps_ns;
     let several = stamps_ns.len() > 1;
     let path_at = |cursor_ns| if several { numbered(&arguments.output, cursor_ns) } else { arguments.output.clone() };
-    for cursor_ns in &stamps_ns {
+    for cursor_ns in stamps_ns {
         let path = path_at(*cursor_ns);
         check_screenshot(&path, arguments.force)?;
         if arguments.csv {
@@ -205,7 +182,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
     let mut cached = shown.cached(arguments, format);
     if let Some(files) = cached.as_ref().and_then(CachedResult::load) {
         let mut files = files.iter();
-        for cursor_ns in &stamps_ns {
+        for cursor_ns in stamps_ns {
             let path = path_at(*cursor_ns);
             let table = arguments.csv.then(|| path.with_extension("csv"));
             for (path, (_, content)) in [Some(&path), table.as_ref()].into_iter().flatten().zip(&mut files) {
@@ -217,28 +194,23 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
         }
         return Ok(ExitOutcome::Success);
     }
-    let mut computation = shown.compute(last_ns, &interrupt)?;
+    let mut computation = shown.compute(instants.last_ns, &interrupt)?;
     if interrupt.is_set() {
         return stopped(0);
     }
     let names = computation.recording().rig.parameter_names();
-    let slide = match &arguments.slide {
-        Some(request) => {
-            let known = || {
-                format!(
-                    "unknown direction '{}': expected a number, a name such as base-d, or a parameter",
-                    request.direction
-                )
-            };
-            Some(request.position(&names).with_context(known)?)
-        }
-        None => None,
+    let position = |request: &SlideRequest| {
+        let known = || {
+            let direction = &request.direction;
+            format!("unknown direction '{direction}': expected a number, a name such as base-d, or a parameter")
+        };
+        request.position(&names).with_context(known)
     };
+    let slide = arguments.slide.as_ref().map(position).transpose()?;
     let playback = shown.playback();
     let run = arguments.figure.run(computation.recording())?;
     let view = arguments.figure.view;
     let options = ScreenshotOptions { slide, run, view, visible_ns: range_ns, playback, ..drawing_options(arguments) };
-    let is_figure = arguments.figure.has_paper_size() || format == FormatArgument::Pdf;
     for (number, cursor_ns) in stamps_ns.iter().copied().enumerate() {
         if interrupt.is_set() {
             return stopped(number);
@@ -247,19 +219,18 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
         let recording = computation.recording();
         let path = path_at(cursor_ns);
         let panel = &arguments.panel;
+        let at_ns = (!instants.is_assumed).then_some(cursor_ns);
         let picture = match format {
-            _ if is_figure => {
-                let cursor_ns = (!timeless).then_some(cursor_ns);
-                let spec = arguments.figure.spec(panel, options.theme, cursor_ns, recording)?;
+            _ if arguments.figure.has_paper_size() || format == FormatArgument::Pdf => {
+                let spec = arguments.figure.spec(panel, options.theme, at_ns, recording)?;
                 let input = FigureInput::new(recording, shown.images(), &options.playback, slide);
                 figure_bytes(&spec, format.of_figure(), &own_command_line(), input)?
             }
             FormatArgument::Png => png_bytes(&draw_panel(panel, recording, cursor_ns, shown.images(), &options)?)?,
             FormatArgument::Svg | FormatArgument::Pdf => {
-                let title =
-                    format!("{panel} of {} at {:.3} s", log_name(&recording.log_path), seconds_from_ns(cursor_ns));
-                let naming = ["clip", &title];
-                draw_panel_svg(panel, recording, cursor_ns, shown.images(), &options, naming)?.into_bytes()
+                let time_s = seconds_from_ns(cursor_ns);
+                let title = format!("{panel} of {} at {time_s:.3} s", log_name(&recording.log_path));
+                draw_panel_svg(panel, recording, cursor_ns, shown.images(), &options, ["clip", &title])?.into_bytes()
             }
         };
         let mut written = vec![(path.clone(), picture)];
@@ -281,6 +252,47 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
         cached.store();
     }
     Ok(ExitOutcome::Success)
+}
+
+/// Times of the screenshots of one command, in nanoseconds since the log began.
+struct Instants {
+    /// In order and different from each other, at least one.
+    stamps_ns: Vec<i64>,
+    /// True without `--at` and `--every`: the end of the range, or of what is computed.
+    is_assumed: bool,
+    /// End of the steps that the screenshots need: plots of a range need those to its end.
+    last_ns: i64,
+}
+
+impl Instants {
+    fn of(arguments: &ScreenshotArguments, shown: &Shown, range_ns: Option<(i64, i64)>) -> Result<Self> {
+        let log_end_ns = shown.log_end_ns;
+        let begin_ns = ns_from_seconds(shown.start_s).min(log_end_ns);
+        let end_ns =
+            shown.duration_s.map_or(log_end_ns, |duration_s| log_end_ns.min(begin_ns + ns_from_seconds(duration_s)));
+        if arguments.at.iter().any(|at_s| ns_from_seconds(*at_s) > log_end_ns) {
+            notify(&format!("dcvins: the log ends at {:.3} s: the last step is drawn", seconds_from_ns(log_end_ns)));
+        }
+        let mut stamps_ns: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(log_end_ns)).collect();
+        if let Some(period_s) = arguments.every {
+            let period_ns = ns_from_seconds(period_s).max(1);
+            let count = ((end_ns - begin_ns) / period_ns) as usize + 1;
+            if count > MAX_SCREENSHOTS {
+                bail!("--every {period_s}: {count} screenshots, more than {MAX_SCREENSHOTS}; give a longer period");
+            }
+            stamps_ns.extend((0..count).map(|number| begin_ns + number as i64 * period_ns));
+        }
+        let range_end_ns = range_ns.map(|(_, to_ns)| to_ns.min(log_end_ns));
+        let is_assumed = stamps_ns.is_empty();
+        if is_assumed {
+            stamps_ns.push(range_end_ns.unwrap_or(end_ns));
+        }
+        stamps_ns.sort_unstable();
+        stamps_ns.dedup();
+        let last_stamp_ns = stamps_ns.last().copied().unwrap_or(end_ns);
+        let last_ns = range_end_ns.map_or(last_stamp_ns, |to_ns| last_stamp_ns.max(to_ns));
+        Ok(Self { stamps_ns, is_assumed, last_ns })
+    }
 }
 
 /// Size, theme and renderer.
