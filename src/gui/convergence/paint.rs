@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use egui::{Align2, Color32, Pos2, Rangef, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
+use egui::{Align2, Color32, Painter, Pos2, Rangef, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 
-use super::model::{CalibrationHistory, ConvertedHistory};
+use super::model::{CalibrationHistory, ConvertedHistory, ParameterCurve};
 use super::names::{CalibrationPart, heading_of, meaning_of};
 use super::range::{paint_outside, value_range};
 use crate::gimbal::{ParameterId, Parameterization};
@@ -18,7 +18,7 @@ use crate::gui::plot::{
     paint_curve, paint_ground, paint_hatch, paint_line, paint_time_axis, paint_value_axis, plot_ui, value_range_of,
     visible_range, within_gutters,
 };
-use crate::gui::theme::{self, CURVE_WIDTH};
+use crate::gui::theme::{self, CURVE_WIDTH, Theme};
 use crate::gui::under_pointer::{Item, offer, offer_item};
 use crate::gui::units::{Shown, fixed};
 use crate::observability::Determination;
@@ -88,7 +88,7 @@ pub(super) fn legend_rows(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) -> f32 {
 }
 
 /// Draws the sample of an entry of the legend into a rectangle.
-type PaintSample<'a> = &'a dyn Fn(&egui::Painter, Rect);
+type PaintSample<'a> = &'a dyn Fn(&Painter, Rect);
 
 /// Calls a function with every entry of the legend: its text and the function that draws its sample.
 fn legend_entries(ctx: &PanelContext<'_>, add_entry: &mut dyn FnMut(&str, PaintSample<'_>)) {
@@ -145,6 +145,28 @@ impl<'a> PlotData<'a> {
         Some((history.epoch, &history.stamps_ns, &history.parameter(parameter)?.values))
     }
 
+    /// Brings the curves of the runs, and band and verdicts of the shown one, to the shown range of time.
+    fn update_curves(
+        &self,
+        curves: &mut BTreeMap<(usize, ParameterId), ParameterCurves>,
+        area: &PlotArea,
+        id: ParameterId,
+        parameter: &ParameterCurve,
+        runs: &[usize],
+    ) {
+        for run in runs {
+            let Some((epoch, stamps_ns, values)) = self.values(*run, id) else { continue };
+            let curves = curves.entry((*run, id)).or_default();
+            curves.value.update(area, epoch, stamps_ns, values);
+            if *run == self.shown {
+                curves.band.update(area, epoch, stamps_ns, &parameter.lower, &parameter.upper);
+                for (segments, verdict) in curves.verdicts.iter_mut().zip(MARKED) {
+                    segments.update(area, epoch, stamps_ns, |row| parameter.verdicts[row] == verdict);
+                }
+            }
+        }
+    }
+
     /// Values of the other runs at the cursor, with a note for those outside the plot.
     fn others_lines(
         &self,
@@ -187,17 +209,7 @@ pub(super) fn cell_ui(
     let mut area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0 };
 
     let overlaid: Vec<usize> = (0..data.histories.len()).filter(|run| data.values(*run, id).is_some()).collect();
-    for run in &overlaid {
-        let Some((epoch, stamps_ns, values)) = data.values(*run, id) else { continue };
-        let curves = curves.entry((*run, id)).or_default();
-        curves.value.update(&area, epoch, stamps_ns, values);
-        if *run == shown_run {
-            curves.band.update(&area, epoch, stamps_ns, &parameter.lower, &parameter.upper);
-            for (segments, verdict) in curves.verdicts.iter_mut().zip(MARKED) {
-                segments.update(&area, epoch, stamps_ns, |row| parameter.verdicts[row] == verdict);
-            }
-        }
-    }
+    data.update_curves(curves, &area, id, parameter, &overlaid);
     let curve_of = |run: usize| curves.get(&(run, id));
     let ground_truth = data.ground_truth.get(&id).map(|truth| parameter.unwrap_near(id, *truth));
     let extent_of = |run: usize| curve_of(run)?.value.extent;
@@ -224,17 +236,7 @@ pub(super) fn cell_ui(
         let line = [pos2(plot.left(), y), pos2(plot.right(), y)];
         paint_line(&inner, &line, theme.ground_truth_style(), CURVE_WIDTH);
     }
-    // The shown run is drawn last, on top.
-    for run in overlaid.iter().filter(|run| **run != shown_run).chain([&shown_run]) {
-        if let Some(curves) = curve_of(*run) {
-            paint_curve(&inner, &area, &curves.value, theme.run(*run), CURVE_WIDTH);
-        }
-    }
-    for (level, run) in overlaid.iter().filter(|run| **run != shown_run).enumerate() {
-        if let Some(curves) = curve_of(*run) {
-            paint_outside(&inner, &area, &curves.value, theme.run(*run), level);
-        }
-    }
+    paint_runs(&inner, &theme, &area, &overlaid, shown_run, curve_of);
     let selected = ctx.selection.parameter == Some(id);
     let border = if selected { Stroke::new(2.0, theme.accent) } else { Stroke::new(1.0, theme.outline) };
     painter.rect_stroke(plot, 0.0, border, StrokeKind::Inside);
@@ -245,44 +247,16 @@ pub(super) fn cell_ui(
     let shown_value = value.map(|(value, sigma)| (id.principal_value(value), sigma));
     title(&painter, ctx, rect, name, shown, shown_value, verdict, selected);
     if MARKED.contains(&verdict) {
-        let (mark, color) = look_of(verdict, &theme);
-        let width = |text: &str| painter.layout_no_wrap(text.to_owned(), theme::label_font(), color).size().x;
-        let [left, right] = [plot.left() + 3.0, plot.right() - 3.0];
-        let named = |left: f32, text: &str| {
-            is_named_within(&painter, ctx, &area, Rangef::new(left - 2.0, left + width(text) + 2.0))
-        };
-        let texts =
-            [verdict.name(), mark].into_iter().filter(|text| *text == mark || width(text) + 6.0 <= plot.width());
-        let corners = texts.flat_map(|text| [(text, right - width(text)), (text, left)]);
-        // The name of a reading cursor neither covers the verdict nor is covered.
-        let free = corners.into_iter().find(|(text, left)| !named(*left, text));
-        let (text, place) = match free {
-            Some((text, left)) => (text, pos2(left, plot.top() + 1.0)),
-            None => (mark, pos2(right - width(mark), plot.top() + TITLE_HEIGHT)),
-        };
-        boxed_text(&inner, &theme, place, Align2::LEFT_TOP, text, color);
+        paint_verdict_name(&painter, &inner, ctx, &area, verdict);
     }
 
     let error =
         value.zip(ground_truth).map(|((value, sigma), ground_truth)| (id.principal_value(value - ground_truth), sigma));
     if let Some((error, sigma)) = error {
-        let far = error.abs() > 3.0 * sigma;
-        let place = plot.right_bottom() + vec2(-3.0, -STRIP_HEIGHT - 1.0);
-        let color = if far { theme.error } else { theme.text_weak };
-        // The longer text only in a plot that stays visible beside it.
-        let room = 0.6 * plot.width();
-        let texts = [error_text(shown, error, sigma), signed(shown, error, sigma)].map(|text| format!("Δ {text}"));
-        let width = |text: &String| painter.layout_no_wrap(text.clone(), theme::label_font(), color).size().x;
-        let text = texts.iter().find(|text| width(text) <= room).unwrap_or(&texts[1]);
-        boxed_text(&inner, &theme, place, Align2::RIGHT_BOTTOM, text, color);
+        paint_error(&inner, &theme, plot, shown, (error, sigma));
     }
 
-    let mut text = shown_value
-        .map_or_else(String::new, |(value, sigma)| format!("{} ± {}", shown.value(value, sigma), shown.sigma(sigma)));
-    if let Some((error, sigma)) = error {
-        text.push_str(", error ");
-        text.push_str(&error_text(shown, error, sigma));
-    }
+    let text = value_text(shown, shown_value, error);
     let label = format!("{name} {text} {}", verdict.name());
     let widget = ui.unique_id().with(("parameter", name));
     let plot = Interaction { id: widget, name: label.trim_end(), value: "", clicks: Clicks::Select, wheel: data.wheel };
@@ -315,6 +289,71 @@ pub(super) fn cell_ui(
     });
 }
 
+/// Curves of all runs: the shown run last, on top; marks for those outside the plot.
+fn paint_runs<'c>(
+    painter: &Painter,
+    theme: &Theme,
+    area: &PlotArea,
+    overlaid: &[usize],
+    shown_run: usize,
+    curve_of: impl Fn(usize) -> Option<&'c ParameterCurves>,
+) {
+    let others = || overlaid.iter().filter(|run| **run != shown_run);
+    for run in others().chain([&shown_run]) {
+        if let Some(curves) = curve_of(*run) {
+            paint_curve(painter, area, &curves.value, theme.run(*run), CURVE_WIDTH);
+        }
+    }
+    for (level, run) in others().enumerate() {
+        if let Some(curves) = curve_of(*run) {
+            paint_outside(painter, area, &curves.value, theme.run(*run), level);
+        }
+    }
+}
+
+/// Name of a verdict in a corner of the plot where no reading cursor is named, or its mark alone.
+fn paint_verdict_name(
+    painter: &Painter,
+    inner: &Painter,
+    ctx: &PanelContext<'_>,
+    area: &PlotArea,
+    verdict: Determination,
+) {
+    let plot = area.rect;
+    let (mark, color) = look_of(verdict, ctx.theme);
+    let width = |text: &str| painter.layout_no_wrap(text.to_owned(), theme::label_font(), color).size().x;
+    let [left, right] = [plot.left() + 3.0, plot.right() - 3.0];
+    let named =
+        |left: f32, text: &str| is_named_within(painter, ctx, area, Rangef::new(left - 2.0, left + width(text) + 2.0));
+    let texts = [verdict.name(), mark].into_iter().filter(|text| *text == mark || width(text) + 6.0 <= plot.width());
+    let corners = texts.flat_map(|text| [(text, right - width(text)), (text, left)]);
+    // The name of a reading cursor neither covers the verdict nor is covered.
+    let free = corners.into_iter().find(|(text, left)| !named(*left, text));
+    let (text, place) = match free {
+        Some((text, left)) => (text, pos2(left, plot.top() + 1.0)),
+        None => (mark, pos2(right - width(mark), plot.top() + TITLE_HEIGHT)),
+    };
+    boxed_text(inner, ctx.theme, place, Align2::LEFT_TOP, text, color);
+}
+
+/// Error against the ground truth in the lower right corner, with its multiple of σ where the plot stays visible.
+fn paint_error(painter: &Painter, theme: &Theme, plot: Rect, shown: Shown, (error, sigma): (f64, f64)) {
+    let far = error.abs() > 3.0 * sigma;
+    let place = plot.right_bottom() + vec2(-3.0, -STRIP_HEIGHT - 1.0);
+    let color = if far { theme.error } else { theme.text_weak };
+    let texts = [error_text(shown, error, sigma), signed(shown, error, sigma)].map(|text| format!("Δ {text}"));
+    let width = |text: &String| painter.layout_no_wrap(text.clone(), theme::label_font(), color).size().x;
+    let text = texts.iter().find(|text| width(text) <= 0.6 * plot.width()).unwrap_or(&texts[1]);
+    boxed_text(painter, theme, place, Align2::RIGHT_BOTTOM, text, color);
+}
+
+/// Value ± 1 σ at the cursor and its error with the multiple of σ, empty without an estimate.
+fn value_text(shown: Shown, value: Option<(f64, f64)>, error: Option<(f64, f64)>) -> String {
+    let value = value.map(|(value, sigma)| format!("{} ± {}", shown.value(value, sigma), shown.sigma(sigma)));
+    let error = error.map(|(error, sigma)| format!(", error {}", error_text(shown, error, sigma)));
+    [value, error].into_iter().flatten().collect()
+}
+
 /// Signed error against the ground truth.
 fn signed(shown: Shown, error: f64, sigma: f64) -> String {
     let value = shown.value(error, sigma);
@@ -329,7 +368,7 @@ fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
 }
 
 /// Hatches the ranges in which the flight has not determined the parameter; a strip at the bottom shows the verdict.
-fn paint_verdicts(painter: &egui::Painter, theme: &theme::Theme, area: &PlotArea, curves: &ParameterCurves) {
+fn paint_verdicts(painter: &Painter, theme: &Theme, area: &PlotArea, curves: &ParameterCurves) {
     for (segments, verdict) in curves.verdicts.iter().zip(MARKED) {
         for segment in segments.on_screen(area) {
             let segment = Rect::from_x_y_ranges(segment, area.rect.y_range());
@@ -345,7 +384,7 @@ fn paint_verdicts(painter: &egui::Painter, theme: &theme::Theme, area: &PlotArea
 /// Draws the name on the left, value and σ on the right as far as they fit.
 #[expect(clippy::too_many_arguments, reason = "one line of text has that many inputs")]
 fn title(
-    painter: &egui::Painter,
+    painter: &Painter,
     ctx: &PanelContext<'_>,
     rect: Rect,
     name: &str,
@@ -378,7 +417,7 @@ fn fixed_value(shown: Shown, value: f64, sigma: f64) -> String {
 }
 
 /// Draws a text with a background, legible over curves.
-fn boxed_text(painter: &egui::Painter, theme: &theme::Theme, place: Pos2, align: Align2, text: &str, color: Color32) {
+fn boxed_text(painter: &Painter, theme: &Theme, place: Pos2, align: Align2, text: &str, color: Color32) {
     let galley = painter.layout_no_wrap(text.to_owned(), theme::label_font(), color);
     let rect = align.anchor_size(place, galley.size());
     painter.rect_filled(rect.expand2(vec2(2.0, 0.0)), 2.0, theme.plot_background);
