@@ -8,6 +8,7 @@ use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use super::{MainWindow, alone_ui};
 use crate::gimbal::tests::parameter;
+use crate::gui::desktop::PanelExport;
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{PanelContext, PanelName, Playback, Presentation, Selection};
@@ -102,12 +103,25 @@ fn figures_have_no_buttons_sliders_or_selectors() {
 
 #[test]
 fn an_exported_comparison_shows_its_tables_and_plots_completely() {
+    let export = exported(PanelName::Comparison);
+    let height = export.screenshot.height() as f32 / 2.0;
+    assert!(height > 550.0, "{height}");
+    crate::gui::tests::keep_screenshot("exported-comparison", &export.screenshot);
+}
+
+#[test]
+fn the_drawing_of_an_exported_image_has_the_image() {
+    let export = exported(PanelName::Image);
+    assert!(export.drawing.contains("<image "), "no image in {} bytes", export.drawing.len());
+}
+
+/// Export of a panel that is too low for its tables, with two runs.
+fn exported(panel: PanelName) -> PanelExport {
     let recording = sample_recording_of(80, &["auto", "classical"]);
     let theme = Theme::of(ThemeName::Light);
     let (playback, mut commands, mut selection) = (Playback::default(), Vec::new(), Selection::default());
-    let mut state = MainWindow { focus: Some(PanelName::Comparison), ..MainWindow::default() };
-    // The panel is too low for its tables.
-    state.places.push((PanelName::Comparison, egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(700.0, 400.0))));
+    let mut state = MainWindow { focus: Some(panel), ..MainWindow::default() };
+    state.places.push((panel, egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(700.0, 400.0))));
     let mut context = PanelContext {
         recording: &recording,
         cursor_ns: recording.last_stamp_ns(),
@@ -118,8 +132,5 @@ fn an_exported_comparison_shows_its_tables_and_plots_completely() {
         presentation: Presentation::Interactive,
         commands: &mut commands,
     };
-    let export = super::panel_export::export(&state, &mut context);
-    let height = export.screenshot.height() as f32 / 2.0;
-    assert!(height > 550.0, "{height}");
-    crate::gui::tests::keep_screenshot("exported-comparison", &export.screenshot);
+    super::panel_export::export(&state, &mut context)
 }

@@ -53,6 +53,7 @@ pub(super) fn export(state: &MainWindow, ctx: &mut PanelContext<'_>) -> PanelExp
     };
     let options = complete(panel, options_of(size), &copy, &mut draw_ui);
     let screenshot = headless::draw(options, &mut draw_ui);
+    copy.borrow_mut().drop_textures();
     let drawing = headless::svg_of(options, "clip", panel.name(), &mut draw_ui);
     let log = recording.log_path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
     let name = format!("{log}/{}-{:.3}s", panel.name(), seconds_from_ns(cursor_ns));

@@ -49,6 +49,11 @@ impl Panels {
         }
     }
 
+    /// Drops the textures before the panels are drawn by another context: textures belong to the one that made them.
+    pub(super) fn drop_textures(&mut self) {
+        *self = self.views();
+    }
+
     pub(super) fn get(&mut self, panel: PanelName) -> &mut dyn Panel {
         match panel {
             PanelName::Image => &mut self.image,

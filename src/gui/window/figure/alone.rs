@@ -32,9 +32,7 @@ pub(crate) fn complete(
     }
     headless::svg_of(options, "clip", panel.name(), ui);
     let wanted = panels.borrow().comparison.figure_size * options.pixels_per_point;
-    // Textures belong to the frames that measured.
-    let fresh = panels.borrow().views();
-    *panels.borrow_mut() = fresh;
+    panels.borrow_mut().drop_textures();
     let [width, height] = options.size_px;
     let side = |least: u32, wanted: f32| least.max(wanted.ceil().min(MAX_SIDE_PX) as u32);
     HeadlessOptions { size_px: [side(width, wanted.x), side(height, wanted.y)], ..options }
