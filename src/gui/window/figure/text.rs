@@ -3,6 +3,7 @@
 use crate::geometry::seconds_from_ns;
 use crate::gui::PanelName;
 use crate::gui::comparison::ComparisonView;
+use crate::observability::{DETERMINED_RATIO, NOT_DETERMINED_RATIO};
 use crate::session::Recording;
 
 /// Colours and dashes of the runs in the light and the print theme, in words.
@@ -113,9 +114,9 @@ fn convergence(recording: &Recording, label: &str, runs: &str, at_s: f64) -> Str
     let error = if known { " Δ is the error against the ground truth, also as a multiple of σ." } else { "" };
     format!(
         "One plot per parameter, in the order of the chain; horizontally time, vertically the value in degrees or \
-         millimetres. Lines: {runs}{truth}. Band: ±3σ of run {label}. Hatched: initializing. The strip below each plot is \
-         amber where the window at that time alone constrains the parameter less than a prior of 10° or 3 cm, and red \
-         where the parameter is unobservable in it. Above each plot: value and σ at {at_s:.2} s.{error}"
+         millimetres. Lines: {runs}{truth}. Band: ±3σ of run {label}. Hatched, with a red strip below: the flight up to \
+         then does not determine the parameter (σ from {NOT_DETERMINED_RATIO} of the prior σ on); amber strip: it \
+         determines it weakly (from {DETERMINED_RATIO} on). Above each plot: value and σ at {at_s:.2} s.{error}"
     )
 }
 
