@@ -40,8 +40,10 @@ const MIN_HEIGHT_FOR_BOTH_PLOTS: f32 = 240.0;
 const FACTORS_WIDTH: f32 = 356.0;
 const COLUMN_GAP: f32 = 10.0;
 /// Minimum heights of the plots in points.
-const MIN_HISTOGRAM_HEIGHT: f32 = 50.0;
+const MIN_HISTOGRAM_HEIGHT: f32 = 58.0;
 const MIN_OVER_TIME_HEIGHT: f32 = 74.0;
+/// Height of the legend above the bars of the histogram, in points.
+const LEGEND_HEIGHT: f32 = 18.0;
 
 /// View of a panel that is too small for both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -259,7 +261,8 @@ fn histogram_ui(ui: &mut Ui, theme: &Theme, histogram: &ResidualHistogram, heigh
     let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
     let painter = ui.painter_at(rect);
     paint_ground(&painter, theme, rect);
-    let plot = Rect::from_min_max(rect.min + vec2(2.0, 4.0), rect.max - vec2(2.0, 15.0));
+    // The legend is above the bars.
+    let plot = Rect::from_min_max(rect.min + vec2(2.0, LEGEND_HEIGHT), rect.max - vec2(2.0, 15.0));
     let reach = histogram.reach_px;
     let x = |value: f64| plot.center().x + (value / reach) as f32 * plot.width() / 2.0;
     let font = number_font();
