@@ -16,6 +16,7 @@ use rayon::prelude::*;
 
 use super::agreement::{self, AgreementValue};
 use super::axes::plausible_axes;
+use super::cost_bound::CostBound;
 use super::hypotheses::{Cause, TrialHypothesis, changes_at, first_hypotheses};
 use super::log_faults::LogFaults;
 use super::measured::Undoing;
@@ -171,7 +172,8 @@ impl Search<'_, '_> {
         given: &TrialResult,
         hypotheses: Vec<TrialHypothesis>,
     ) -> Option<(TrialSpan, Trials)> {
-        let first = self.candidates(span, hypotheses, (0.05, SCREENED), None)?;
+        let bound = |given: &TrialResult| CostBound::of_run(&given.steps);
+        let first = self.candidates(span, hypotheses, (0.05, SCREENED), None, &bound)?;
         let span = confirmed_span(self.run, given, span);
         let mut tried: Vec<TrialHypothesis> = by_cause(&first.given, first.others.clone())
             .into_iter()
@@ -179,6 +181,8 @@ impl Search<'_, '_> {
             .map(|candidate| candidate.hypothesis)
             .collect();
         let mut next = refined(self.run, &first.others);
+        let best = first.others.iter().min_by(|one, other| one.score.total_cmp(&other.score));
+        let bound = |given: &TrialResult| CostBound::of_best(&given.steps, &best?.result.steps);
         let mut confirmed: Option<Trials> = None;
         for round in 0..ROUNDS {
             next.retain(|it| !tried.contains(it));
@@ -187,7 +191,7 @@ impl Search<'_, '_> {
             tried.append(&mut next);
             let progress = SCREENED + (1.0 - SCREENED) * round as f64 / ROUNDS as f64;
             let until = SCREENED + (1.0 - SCREENED) * (round + 1) as f64 / ROUNDS as f64;
-            let Some(trials) = self.candidates(&span, now, (progress, until), confirmed.take()) else { break };
+            let Some(trials) = self.candidates(&span, now, (progress, until), confirmed.take(), &bound) else { break };
             next = refined(self.run, &trials.others);
             next.extend(tuned(&trials.others));
             next.extend(moved(&trials));
@@ -196,14 +200,15 @@ impl Search<'_, '_> {
         Some((span, confirmed.unwrap_or(first)))
     }
 
-    /// Computes trials of a span, with those that are already there, and scores all on one scale. `None` if the run itself
-    /// could not be computed.
+    /// Computes trials of a span, with those that are already there, and scores all on one scale; trials beyond the bound
+    /// that the run itself gives are left out. `None` if the run itself could not be computed.
     fn candidates(
         &mut self,
         span: &TrialSpan,
         hypotheses: Vec<TrialHypothesis>,
         (from, to): (f64, f64),
         known: Option<Trials>,
+        bound: &dyn Fn(&TrialResult) -> Option<CostBound>,
     ) -> Option<Trials> {
         let (given, mut done) = match known {
             Some(known) => {
@@ -211,17 +216,18 @@ impl Search<'_, '_> {
             }
             None => (self.run.trial(span, span.steps.start, &ForkChanges::default(), None)?, Vec::new()),
         };
+        let bound = bound(&given);
         let count = hypotheses.len();
         let mut open = hypotheses;
         while !open.is_empty() {
             let rest = open.split_off(AT_ONCE.min(open.len()));
             let run = self.run;
             let trial = |it: TrialHypothesis| {
-                let result = run.trial(span, it.from.unwrap_or(span.steps.start), &it.changes, None)?;
+                let result = run.trial(span, it.from.unwrap_or(span.steps.start), &it.changes, bound.as_ref())?;
                 Some((it, result))
             };
+            self.trials += open.len();
             let some: Vec<(TrialHypothesis, TrialResult)> = open.into_par_iter().filter_map(trial).collect();
-            self.trials += some.len();
             done.extend(some);
             open = rest;
             let ratio = 1.0 - open.len() as f64 / count as f64;
@@ -262,9 +268,9 @@ impl Search<'_, '_> {
         if candidate.hypothesis.changes.corrections.iter().any(is_shift) {
             return None;
         }
-        let mut record = RunRecord::new(self.record.spec.clone(), self.record.camera_key.clone());
+        let record = RunRecord::new(self.record.spec.clone(), self.record.camera_key.clone());
         let from = candidate.hypothesis.from.unwrap_or(span.steps.start);
-        self.run.trial(span, from, &candidate.hypothesis.changes, Some(&mut record))?;
+        let record = self.run.recorded(span, from, &candidate.hypothesis.changes, record)?;
         truth::accuracy(&record)
     }
 

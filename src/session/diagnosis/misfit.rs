@@ -115,6 +115,20 @@ pub(super) struct Scale {
     pub(super) windows: f64,
 }
 
+impl Scale {
+    /// Observations and rows of a reference, for steps over a time in nanoseconds.
+    pub(super) fn of(reference: &Misfit, sigma_px: f64, length_ns: i64) -> Self {
+        let tracked = reference.tracked.max(1) as f64;
+        Self {
+            sigma_px,
+            observations: reference.observations(),
+            frames: reference.frames as f64 / tracked,
+            rows: reference.factors.map(|factor| factor.rows / tracked),
+            windows: (seconds_from_ns(length_ns) / reference.window_s.max(0.5)).max(1.0),
+        }
+    }
+}
+
 /// Averages over the scored steps of a trial.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Misfit {

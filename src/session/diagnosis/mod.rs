@@ -2,7 +2,7 @@
 //!
 //! - `misfit`, `pixel_histogram`: residuals of a trial by sensor, on one scale for all trials.
 //! - `agreement`: limits within which residuals agree with their noise, and the step at which that ends.
-//! - `trial`, `span`: a run computed again with a change, on a part of it.
+//! - `trial`, `span`, `cost_bound`: a run computed again with a change, on a part of it, as long as it may be the best.
 //! - `hypotheses`, `axes`, `refinement`, `tuning`: the causes that are tried, with the values to try.
 //! - `scoring`, `ranking`: the best cause of each kind, and whether it is decisive.
 //! - `log_faults`, `measured`: faults that the check of the log measures, and the changes that undo them.
@@ -11,6 +11,7 @@
 
 mod agreement;
 mod axes;
+mod cost_bound;
 mod diagnose;
 mod hypotheses;
 mod log_faults;

@@ -4,7 +4,6 @@ use super::hypotheses::{Cause, TrialHypothesis};
 use super::misfit::{Misfit, Scale};
 use super::ranking::{RankedTrial, score};
 use super::trial::TrialResult;
-use crate::geometry::seconds_from_ns;
 use crate::session::plan::ForkChanges;
 
 /// Ratio of the steps with a window below which a run is lost.
@@ -34,13 +33,7 @@ pub(super) fn scored(given: TrialResult, done: Vec<(TrialHypothesis, TrialResult
     };
     let sigma_px = tracking().filter_map(Misfit::sigma_px).min_by(f64::total_cmp).unwrap_or(DEFAULT_SIGMA_PX);
     let end_ns = given.steps.last().map_or(from_ns, |step| step.stamp_ns);
-    let scale = Scale {
-        sigma_px,
-        observations: reference.observations(),
-        frames: reference.frames as f64 / reference.tracked.max(1) as f64,
-        rows: reference.factors.map(|factor| factor.rows / reference.tracked.max(1) as f64),
-        windows: (seconds_from_ns(end_ns - from_ns) / reference.window_s.max(0.5)).max(1.0),
-    };
+    let scale = Scale::of(&reference, sigma_px, end_ns - from_ns);
     let candidate = |hypothesis: TrialHypothesis, result: TrialResult, misfit: Misfit| {
         let score = score(&hypothesis, &misfit, &given_misfit, &scale);
         RankedTrial { hypothesis, result, misfit, score }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::cost_bound::CostBound;
 use super::misfit::StepMisfit;
 use crate::estimator::StepReport;
 use crate::gimbal::{ClassicalChain, ParameterId};
@@ -55,14 +56,38 @@ impl DiagnosedRun<'_> {
         self.inputs.partition_point(|input| input.stamp_ns < stamp_ns)
     }
 
-    /// Computes the steps of a span with changes from step `change_at` on; the reports go to `record` if there is one.
-    /// `None` if the changes do not fit the run, a step fails, or after an interrupt.
+    /// Computes the steps of a span with changes from step `change_at` on. `None` if the changes do not fit the run, a step
+    /// fails, the cost exceeds a bound, or after an interrupt.
     pub(super) fn trial(
         &self,
         span: &TrialSpan,
         change_at: usize,
         changes: &ForkChanges,
-        mut record: Option<&mut RunRecord>,
+        bound: Option<&CostBound>,
+    ) -> Option<TrialResult> {
+        self.steps(span, change_at, changes, bound, &mut |_, _| ())
+    }
+
+    /// Records the steps of a span with changes from step `change_at` on, as [`Self::trial`].
+    pub(super) fn recorded(
+        &self,
+        span: &TrialSpan,
+        change_at: usize,
+        changes: &ForkChanges,
+        mut record: RunRecord,
+    ) -> Option<RunRecord> {
+        let push = &mut |report: StepReport, input: &OwnedStepInput| record.push(step_record(report, input));
+        self.steps(span, change_at, changes, None, push)?;
+        Some(record)
+    }
+
+    fn steps(
+        &self,
+        span: &TrialSpan,
+        change_at: usize,
+        changes: &ForkChanges,
+        bound: Option<&CostBound>,
+        on_report: &mut dyn FnMut(StepReport, &OwnedStepInput),
     ) -> Option<TrialResult> {
         let mut engine = span.engine.clone();
         let change_at = change_at.max(span.steps.start);
@@ -88,8 +113,9 @@ impl DiagnosedRun<'_> {
                 StepMisfit::of(&report, input.main_tracks().statistics.tracked, scale, self.resolution_px()),
                 &report,
             );
-            if let Some(record) = &mut record {
-                record.push(step_record(report, input));
+            on_report(report, input);
+            if bound.is_some_and(|bound| bound.is_exceeded(changes, &result.steps)) {
+                return None;
             }
         }
         Some(result)

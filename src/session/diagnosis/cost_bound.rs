@@ -1,0 +1,111 @@
+//! Bound on the cost of a trial part of the way: a correction that explains less than another by then is not computed on.
+
+use super::misfit::{Misfit, Scale, StepMisfit};
+use crate::session::plan::ForkChanges;
+
+/// Ratio of the steps of a span after which trials are compared with the run itself.
+const COMPARED_AT: f64 = 0.6;
+/// Largest ratio of a trial's cost to that of the run itself.
+const WORSE_RATIO: f64 = 1.1;
+/// Smallest ratio of the gain of the best trial that another one must reach.
+const LEAST_GAIN: f64 = 0.2;
+
+/// Largest cost of the steps up to one of them.
+#[derive(Clone, Debug)]
+pub(super) struct CostBound {
+    /// Number of steps after which the costs are compared.
+    steps: usize,
+    /// Stamp in nanoseconds from which on steps are scored.
+    from_ns: i64,
+    scale: Scale,
+    largest: f64,
+}
+
+impl CostBound {
+    /// Bound by the run itself over a span: a correction makes it worse. `None` for a run without a window until then.
+    pub(super) fn of_run(given: &[StepMisfit]) -> Option<Self> {
+        let bound = Self::at(given, (COMPARED_AT * given.len() as f64) as usize)?;
+        let largest = WORSE_RATIO * bound.cost(given)?;
+        Some(Self { largest, ..bound })
+    }
+
+    /// Bound by the best trial of the first part of a span: a correction reaches little of its gain. `None` if the best trial
+    /// gains nothing.
+    pub(super) fn of_best(given: &[StepMisfit], best: &[StepMisfit]) -> Option<Self> {
+        let bound = Self::at(given, best.len())?;
+        let [before, after] = [bound.cost(given)?, bound.cost(best)?];
+        (after < before).then_some(Self { largest: before - LEAST_GAIN * (before - after), ..bound })
+    }
+
+    fn at(given: &[StepMisfit], steps: usize) -> Option<Self> {
+        let part = given.get(..steps)?;
+        let from_ns = part.iter().find(|step| step.tracking)?.stamp_ns;
+        let misfit = Misfit::of(part, from_ns);
+        let scale = Scale::of(&misfit, misfit.sigma_px()?, part.last()?.stamp_ns - from_ns);
+        Some(Self { steps, from_ns, scale, largest: f64::INFINITY })
+    }
+
+    /// Cost of the first steps of a trial over those with a window: a later first window is no worse explanation. `None`
+    /// without one.
+    fn cost(&self, steps: &[StepMisfit]) -> Option<f64> {
+        let misfit = Misfit::of(steps.get(..self.steps)?, self.from_ns);
+        (misfit.tracked > 0).then(|| Misfit { steps: misfit.tracked, ..misfit }.cost(&self.scale))
+    }
+
+    /// True if a trial that has just computed its steps exceeds the bound. Only corrections of the measurements act at once
+    /// and are compared: estimated parameters and wider priors take time to converge.
+    pub(super) fn is_exceeded(&self, changes: &ForkChanges, steps: &[StepMisfit]) -> bool {
+        steps.len() == self.steps
+            && !changes.corrections.is_empty()
+            && changes.estimated.is_empty()
+            && self.cost(steps).is_some_and(|cost| cost > self.largest)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::plan::MeasurementCorrection;
+
+    /// Steps of a trial with residuals of one length from its first window on.
+    fn steps(length_px: f64, first_window: i64) -> Vec<StepMisfit> {
+        let step = |number: i64| {
+            let mut step = StepMisfit { stamp_ns: number * 50_000_000, window_s: 1.0, ..StepMisfit::default() };
+            if number >= first_window {
+                (step.tracking, step.frames) = (true, 11);
+                (0..800).for_each(|_| step.pixels.add(length_px));
+            }
+            step
+        };
+        (0..100).map(step).collect()
+    }
+
+    fn exceeded(bound: &CostBound, steps: &[StepMisfit], changes: &ForkChanges) -> bool {
+        (1..=steps.len()).any(|count| bound.is_exceeded(changes, &steps[..count]))
+    }
+
+    fn focal() -> ForkChanges {
+        ForkChanges { corrections: vec![MeasurementCorrection::Focal(1.3)], ..ForkChanges::default() }
+    }
+
+    #[test]
+    fn corrections_that_make_residuals_longer_are_not_computed_on() {
+        let bound = CostBound::of_run(&steps(1.0, 20)).unwrap();
+        let found = [0.3, 1.0, 4.0].map(|length_px| exceeded(&bound, &steps(length_px, 20), &focal()));
+        assert_eq!(found, [false, false, true]);
+        // A later first window with shorter residuals is no reason, and what is estimated has time to converge.
+        assert!(!exceeded(&bound, &steps(0.3, 35), &focal()));
+        assert!(!exceeded(&bound, &steps(4.0, 20), &ForkChanges { chain_prior: 5.0, ..ForkChanges::default() }));
+        // A trial without any window is not compared.
+        assert!(!exceeded(&bound, &steps(4.0, 100), &focal()));
+    }
+
+    #[test]
+    fn corrections_with_little_of_the_best_gain_are_not_computed_on() {
+        let (given, best) = (steps(4.0, 20), steps(0.1, 20));
+        let bound = CostBound::of_best(&given, &best[..60]).unwrap();
+        let found = [0.1, 1.0, 3.8].map(|length_px| exceeded(&bound, &steps(length_px, 20), &focal()));
+        assert_eq!(found, [false, false, true]);
+        assert!(CostBound::of_best(&best, &given).is_none());
+    }
+}
