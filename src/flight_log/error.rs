@@ -41,6 +41,13 @@ pub enum LogError {
         /// Trajectory file or log.
         path: PathBuf,
     },
+    #[error("cannot use the stills: {problem}: {}", path.display())]
+    Stills {
+        /// Place in the file, what is wrong and what is expected there.
+        problem: String,
+        /// Stills file, or file of a chain.
+        path: PathBuf,
+    },
     #[error("line {line} {problem}; expected 't x y z qx qy qz qw': {}", path.display())]
     TrajectoryLine {
         /// Counted from 1.

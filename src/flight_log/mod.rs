@@ -33,6 +33,7 @@ mod sensor_frame;
 pub(crate) mod spacing;
 pub(crate) mod stamp_clock;
 mod stamp_text;
+mod stills;
 pub(crate) mod stream;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -51,6 +52,7 @@ pub use log::FlightLog;
 pub use messages::MessageKind;
 pub use rig::template as rig_template;
 pub use sensor_frame::SensorFrame;
+pub use stills::{read_stills, read_stills_chain};
 pub use stream::FrameStream;
 pub use text::{edit_distance, log_name, nearest_name, printable, printable_lines, shortened, without_signed_zeros};
 pub use topic_info::TopicInfo;

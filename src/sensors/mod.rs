@@ -13,6 +13,7 @@ mod joints;
 mod named_axes;
 mod pose;
 mod rig;
+mod stills;
 
 pub use angular_rates::AngularRates;
 pub use attitude_source::{
@@ -29,3 +30,4 @@ pub use rig::{
     AssumedField, CameraMask, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, IntrinsicsSigma, Joint, Rig,
     UnknownCamera,
 };
+pub use stills::{MapPoint, StillCamera, StillSet, StillView, Stills, StillsChain};
