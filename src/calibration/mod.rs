@@ -10,6 +10,8 @@
 //! 3. *Pixels.* One bundle adjustment of both cameras: all observations, IMU samples, encoder readings and
 //!    priors, all unknowns jointly.
 //!
+//! From still images of known points, without IMU: [`stills`].
+//!
 //! The chain uses its best minimal parameterization, in which every column is observable under sufficient excitation.
 
 mod arrow;
@@ -32,6 +34,7 @@ mod segments;
 mod solver;
 mod state;
 mod statistics;
+pub mod stills;
 #[cfg(test)]
 mod tests;
 mod trajectory;

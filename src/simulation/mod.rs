@@ -27,6 +27,7 @@ mod scenario;
 mod simulate;
 mod spline;
 mod synthetic;
+mod synthetic_stills;
 #[cfg(test)]
 mod tests;
 mod trajectory;
@@ -50,5 +51,6 @@ pub use simulate::{simulate, simulate_interruptible};
 pub use synthetic::{
     SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks,
 };
+pub use synthetic_stills::{SyntheticStills, SyntheticStillsOptions, synthetic_stills};
 pub use trajectory::{Kinematics, Trajectory, VehicleLimits};
 pub use vibration::Vibration;

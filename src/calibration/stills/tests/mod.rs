@@ -1,0 +1,2 @@
+mod derivatives;
+mod recovery;
