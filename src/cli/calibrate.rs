@@ -1,8 +1,8 @@
-//! `dcvins calibrate`: the offline calibration of a log.
+//! `dcvins calibrate`: the offline calibration of a log or of stills.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
 use dcvins::calibration::{CalibrationError, CalibrationOptions};
 use dcvins::export;
@@ -11,33 +11,37 @@ use dcvins::session::{self, CalibrationRequest, CalibrationRunError};
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::limit_arguments::LimitArguments;
+use crate::cli::stills_arguments::StillsArguments;
 use crate::cli::terminal::{Progress, notify, print, print_json};
 use crate::cli::value_parsers::seconds;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct CalibrateArguments {
     /// The log; its rig names a static camera, a gimbal camera and encoders.
-    pub log: PathBuf,
-    /// Folder for rig.yaml, calibration.json and report.txt.
+    #[arg(required_unless_present = "stills", conflicts_with = "stills")]
+    pub log: Option<PathBuf>,
+    /// Folder for rig.yaml, calibration.json and report.txt; with --stills gimbal.rig.yaml, tables and a figure, too.
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: PathBuf,
     /// Rig file; default: next to the log (LOG with .rig.yaml) or attached to it.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "stills")]
     pub rig: Option<PathBuf>,
     /// Ground-truth rig file; default: next to the log (LOG with .truth.yaml).
-    #[arg(long = "truth", value_name = "FILE")]
+    #[arg(long = "truth", value_name = "FILE", conflicts_with = "stills")]
     pub ground_truth: Option<PathBuf>,
     /// Skip this many seconds at the start of the log.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, conflicts_with = "stills")]
     pub start: f64,
     /// Duration to process from there.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "stills")]
     pub duration: Option<f64>,
     /// Also write the estimated trajectory with covariances: trajectory.tum, a reference for runs (--truth-trajectory),
     /// and covariance.csv.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "stills")]
     pub trajectory: bool,
-    /// Overwrite any existing files. Without it, only a calibration of a log of the same name is replaced.
+    #[command(flatten)]
+    pub stills: StillsArguments,
+    /// Overwrite any existing files. Without it, only a calibration of a log or stills of the same name is replaced.
     #[arg(long)]
     pub force: bool,
     /// Print calibration.json instead of the report.
@@ -48,9 +52,17 @@ pub(crate) struct CalibrateArguments {
 }
 
 pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<ExitOutcome> {
-    export::check_calibration_folder(&arguments.out, &arguments.log, arguments.force)?;
+    match (&arguments.stills.stills, &arguments.log) {
+        (Some(stills), _) => arguments.stills.calibrate(stills, &arguments.out, [arguments.force, arguments.json]),
+        (None, Some(log)) => calibrate_log(arguments, log),
+        (None, None) => bail!("no log to calibrate from: give LOG, or --stills FILE"),
+    }
+}
+
+fn calibrate_log(arguments: &CalibrateArguments, log: &Path) -> Result<ExitOutcome> {
+    export::check_calibration_folder(&arguments.out, log, arguments.force)?;
     let request = CalibrationRequest {
-        log_path: arguments.log.clone(),
+        log_path: log.to_owned(),
         rig_path: arguments.rig.clone(),
         ground_truth_path: arguments.ground_truth.clone(),
         start_s: arguments.start,

@@ -26,6 +26,7 @@ mod run_summary;
 #[cfg(feature = "gui")]
 mod screenshot;
 mod simulate;
+mod stills_arguments;
 #[cfg(feature = "gui")]
 mod study_arguments;
 #[cfg(feature = "gui")]

@@ -3,12 +3,13 @@
 use std::fs;
 use std::path::Path;
 
-use super::calibration_report::{CalibrationReport, ParameterReport};
+use super::calibration_report::CalibrationReport;
 use super::covariance::covariance_of_calibration;
 use super::error::ExportError;
 use super::masks;
 use super::trajectory::tum_of_calibration;
 use crate::flight_log::output::OutputSet;
+use crate::geometry::Dimension;
 use crate::session::CalibrationRun;
 
 pub(super) const TRAJECTORY_FILES: [&str; 2] = ["trajectory.tum", "covariance.csv"];
@@ -27,11 +28,12 @@ pub fn write_calibration(
     fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     let json = serde_json::to_string_pretty(report)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("calibration.json") })?;
+    let sigmas = report.parameters.iter().map(|it| (it.name.as_str(), it.dimension, it.sigma));
     let mut rig = run.rig.clone();
     let masks = masks::beside(&mut rig)?;
     let mut files = vec![
         ("calibration.json", format!("{json}\n")),
-        ("rig.yaml", format!("{}{}", rig.to_yaml(), sigmas_yaml(report))),
+        ("rig.yaml", format!("{}{}", rig.to_yaml(), sigmas_yaml(&report.parameterization, sigmas))),
         ("report.txt", report.to_string()),
     ];
     if trajectory {
@@ -57,19 +59,21 @@ pub fn write_calibration(
     Ok(())
 }
 
-/// Standard deviations as an additional entry of the rig file, which readers of rigs ignore.
-fn sigmas_yaml(report: &CalibrationReport) -> String {
-    let sigma_of = |parameter: &ParameterReport| {
-        let key = format!("{}_{}", parameter.name, parameter.dimension.unit());
+/// Standard deviations (name, dimension, σ) as an additional entry of the rig file, which readers of rigs ignore.
+pub(super) fn sigmas_yaml<'a>(
+    parameterization: &str,
+    sigmas: impl Iterator<Item = (&'a str, Dimension, f64)>,
+) -> String {
+    let line = |(name, dimension, sigma): (&str, Dimension, f64)| {
+        let key = format!("{name}_{}", dimension.unit());
         // A joint may have any name.
         let plain = key.chars().all(|letter| letter.is_ascii_alphanumeric() || "_.".contains(letter));
         let key = if plain { key } else { serde_json::Value::from(key).to_string() };
-        format!("    {key}: {:?}\n", parameter.sigma)
+        format!("    {key}: {sigma:?}\n")
     };
-    let sigmas: String = report.parameters.iter().map(sigma_of).collect();
+    let sigmas: String = sigmas.map(line).collect();
     format!(
         "# Standard deviations of the calibrated parameters, in the parameterization named here.\n\
-         calibration:\n  parameterization: {}\n  sigmas:\n{sigmas}",
-        report.parameterization
+         calibration:\n  parameterization: {parameterization}\n  sigmas:\n{sigmas}"
     )
 }

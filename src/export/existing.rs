@@ -13,6 +13,7 @@ use serde_json::Value;
 use super::calibration_files::TRAJECTORY_FILES;
 use super::error::ExportError;
 use super::masks::is_mask_name;
+use super::stills_files::STILLS_FILES;
 use crate::flight_log::output;
 use crate::flight_log::{FlightLog, log_name, shortened};
 
@@ -67,6 +68,15 @@ pub fn check_report_folder(folder: &Path, labels: &[&str], log: &Path, force: bo
 pub fn check_calibration_folder(folder: &Path, log: &Path, force: bool) -> Result<(), ExportError> {
     output::check_folder(folder).map_err(ExportError::write(folder))?;
     if force { Ok(()) } else { check_files(folder, &CALIBRATION_FILES, &log_name(log)) }
+}
+
+/// Checks that a calibration from stills may be written into a folder.
+///
+/// # Errors
+/// As [`check_calibration_folder`].
+pub fn check_stills_folder(folder: &Path, stills: &Path, force: bool) -> Result<(), ExportError> {
+    output::check_folder(folder).map_err(ExportError::write(folder))?;
+    if force { Ok(()) } else { check_files(folder, &STILLS_FILES, &log_name(stills)) }
 }
 
 /// Checks that `simulate` may write a log and its rigs: an existing log must be a simulation of the same experiment,
@@ -235,10 +245,10 @@ fn check_files(folder: &Path, names: &[&str], log: &str) -> Result<(), ExportErr
     }
 }
 
-/// Name of the log in an index file of results.
+/// Name of the log or of the stills in an index file of results.
 fn log_of(index: &Path) -> Option<String> {
     let value = read_index(index)?;
-    value.get("log").and_then(Value::as_str).map(str::to_owned)
+    value.get("log").or_else(|| value.get("stills")).and_then(Value::as_str).map(str::to_owned)
 }
 
 /// A JSON file of results.

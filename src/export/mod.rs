@@ -18,6 +18,9 @@ pub(crate) mod run_files;
 #[cfg(feature = "gui")]
 pub(crate) mod screenshot;
 mod session_file;
+mod stills_files;
+mod stills_report;
+mod stills_rig;
 #[cfg(feature = "gui")]
 mod study_screenshot;
 mod tables;
@@ -30,7 +33,7 @@ pub use error::ExportError;
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 pub use existing::{
     check_calibration_folder, check_converted_log, check_report_folder, check_run_folders, check_screenshot,
-    check_simulated_log, other_runs, write_new_rig,
+    check_simulated_log, check_stills_folder, other_runs, write_new_rig,
 };
 #[cfg(feature = "gui")]
 pub use figure::figure_bytes;
@@ -45,6 +48,8 @@ pub use screenshot::{
     panel_csv, png_bytes, write_csv, write_png, write_screenshot, write_svg,
 };
 pub use session_file::{is_session, read_session};
+pub use stills_files::write_stills;
+pub use stills_report::StillsReport;
 #[cfg(feature = "gui")]
 pub use study_screenshot::{draw_study_panel, draw_study_panel_svg, study_panel_csv};
 pub use video_alignment::{VideoAlignment, VideoAlignmentError, align_video, write_alignment_plot};

@@ -35,6 +35,7 @@ pub(crate) mod samples;
 pub mod scene;
 mod slide;
 mod step_work;
+pub mod stills_figure;
 pub mod study;
 #[cfg(test)]
 pub(crate) mod tests;
