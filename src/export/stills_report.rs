@@ -89,7 +89,12 @@ impl StillsReport {
         match outcome.angles {
             Some(AngleModel::Encoder) => writeln!(f, "  encoder σ      {}", encoders.join(", "))?,
             Some(AngleModel::Free) => writeln!(f, "  encoder σ      none: every angle is free")?,
-            None => writeln!(f, "  corrections    {} (robust σ of estimated angle − reading)", encoders.join(", "))?,
+            None => {
+                let rms = outcome.joints.iter().enumerate();
+                let rms: Vec<String> =
+                    rms.map(|(index, joint)| format!("{joint} {:.2}°", outcome.rms_correction_deg(index))).collect();
+                writeln!(f, "  corrections    {} rms, estimated angle − reading", rms.join(", "))?;
+            }
         }
         let axes: Vec<String> = outcome
             .axes

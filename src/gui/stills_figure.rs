@@ -3,7 +3,7 @@
 
 use egui::{Align2, Color32, FontFamily, FontId, Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
 
-use crate::calibration::stills::{ScoredChain, SetReport, StillsOutcome, ViewReport};
+use crate::calibration::stills::{AngleModel, ScoredChain, SetReport, StillsOutcome, ViewReport};
 use crate::gui::plot::paint_ground;
 use crate::gui::theme::{HAIRLINE_WIDTH, Theme, label_font, number_font};
 
@@ -65,7 +65,7 @@ fn mean(set: &SetReport, of: fn(&ViewReport) -> Option<f64>) -> Option<f64> {
 }
 
 /// A series of the first plot.
-struct Series {
+struct ErrorSeries {
     name: &'static str,
     of: fn(&ViewReport) -> Option<f64>,
     color: Color32,
@@ -73,15 +73,15 @@ struct Series {
 }
 
 /// Series of a calibration, or of the judgement of a chain.
-fn series(theme: &Theme, outcome: &StillsOutcome) -> Vec<Series> {
+fn series(theme: &Theme, outcome: &StillsOutcome) -> Vec<ErrorSeries> {
     let judged = outcome.angles.is_none();
-    let initial = Series {
+    let initial = ErrorSeries {
         name: "initial chain, angles as read",
         of: |view| view.initial_px,
         color: theme.text_weak,
         filled: false,
     };
-    let floor = Series {
+    let floor = ErrorSeries {
         name: "floor: pose of the image alone",
         of: |view| Some(view.floor_px),
         color: theme.hatch,
@@ -96,8 +96,8 @@ fn series(theme: &Theme, outcome: &StillsOutcome) -> Vec<Series> {
         let estimated: fn(&ViewReport) -> Option<f64> = |view| view.hold_out_estimated_px.or(view.estimated_px);
         (("calibrated without this set, angles as read", as_read), ("the same, angles estimated", estimated))
     };
-    let as_read = Series { name: as_read.0, of: as_read.1, color: theme.axis_x, filled: true };
-    let estimated = Series { name: estimated.0, of: estimated.1, color: theme.axis_z, filled: true };
+    let as_read = ErrorSeries { name: as_read.0, of: as_read.1, color: theme.axis_x, filled: true };
+    let estimated = ErrorSeries { name: estimated.0, of: estimated.1, color: theme.axis_z, filled: true };
     vec![floor, initial, estimated, as_read]
 }
 
@@ -110,8 +110,13 @@ fn head(painter: &Painter, theme: &Theme, outcome: &StillsOutcome, whole: Rect) 
         .filter_map(|score| Some(format!("{} {:.1} px", score.camera, score.as_read?.mean_px)))
         .collect();
     let wrong = outcome.sets.iter().filter(|set| set.wrong).count();
+    let model = match outcome.angles {
+        Some(AngleModel::Encoder) => "",
+        Some(AngleModel::Free) => " calibrated with free angles",
+        None => ", given chain",
+    };
     let title = format!(
-        "{}: {} with the angles as read; {wrong} of {} sets with wrong readings",
+        "{}{model}: {} with the angles as read; {wrong} of {} sets with wrong readings",
         outcome.configuration,
         errors.join(", "),
         outcome.sets.len()
@@ -185,9 +190,8 @@ fn errors(painter: &Painter, theme: &Theme, outcome: &StillsOutcome, plot: Rect)
 fn corrections(painter: &Painter, theme: &Theme, outcome: &StillsOutcome, joint: usize, plot: Rect) {
     paint_ground(painter, theme, plot);
     shade_wrong(painter, theme, outcome, plot);
-    let right: Vec<f64> = outcome.sets.iter().filter(|set| !set.wrong).map(|set| set.corrections_deg[joint]).collect();
-    let rms_deg = (right.iter().map(|it| it * it).sum::<f64>() / right.len().max(1) as f64).sqrt();
-    let free = outcome.angles == Some(crate::calibration::stills::AngleModel::Free);
+    let rms_deg = outcome.rms_correction_deg(joint);
+    let free = outcome.angles == Some(AngleModel::Free);
     let sigma_deg = outcome.noise.encoder_rad.get(joint).map(|sigma| sigma.to_degrees()).filter(|_| !free);
     let range = sigma_deg.map_or(FREE_STRIP * rms_deg, |sigma| STRIP_SIGMAS * sigma).max(0.01);
     let y = |value_deg: f64| plot.center().y - (value_deg / range).clamp(-1.0, 1.0) as f32 * plot.height() / 2.0;
@@ -196,8 +200,9 @@ fn corrections(painter: &Painter, theme: &Theme, outcome: &StillsOutcome, joint:
         painter.rect_filled(band, 0.0, theme.ok.gamma_multiply(0.18));
     }
     painter.hline(plot.x_range(), y(0.0), Stroke::new(HAIRLINE_WIDTH, theme.hatch));
-    for value_deg in [-range, 0.0, range] {
-        let (at, align) = (pos2(plot.left() - 6.0, y(value_deg)), Align2::RIGHT_CENTER);
+    for (value_deg, align) in [(-range, Align2::RIGHT_BOTTOM), (0.0, Align2::RIGHT_CENTER), (range, Align2::RIGHT_TOP)]
+    {
+        let at = pos2(plot.left() - 6.0, y(value_deg));
         painter.text(at, align, format!("{value_deg:.1}°"), number_font(), theme.text_weak);
     }
     let name = match sigma_deg {
@@ -219,6 +224,8 @@ fn corrections(painter: &Painter, theme: &Theme, outcome: &StillsOutcome, joint:
             painter.text(at, align, format!("{value_deg:.1}°"), number_font(), theme.text_strong);
         }
     }
-    let at = pos2(plot.left() + 6.0, plot.top() + 3.0);
-    painter.text(at, Align2::LEFT_TOP, name, font(12.5), theme.text);
+    let galley = painter.layout_no_wrap(name, font(12.5), theme.text);
+    let ground = Rect::from_min_size(plot.min, galley.size() + vec2(12.0, 5.0));
+    painter.rect_filled(ground, 0.0, theme.plot_background);
+    painter.galley(plot.min + vec2(6.0, 3.0), galley, theme.text);
 }

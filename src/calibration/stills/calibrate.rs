@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::encoders::encoder_tests;
 use super::error::StillsError;
-use super::fit::{AngleModel, Start, StillsFit, WRONG_AT_FIRST};
+use super::fit::{AngleModel, Start, StillsFit};
 use super::hold_out::hold_out;
 use super::noise::StillsNoise;
 use super::observed::{ObservedSet, observe};
@@ -16,8 +16,8 @@ use super::pixels::{SetErrors, set_errors};
 use super::ranks::ranks;
 use super::scores::{SetEvaluation, floors, scores, set_report};
 use super::warnings::warnings;
+use super::wrong_readings::{next_wrong, robust_sigma_rad, wrong_at_first};
 use crate::calibration::CalibrationProgress;
-use crate::geometry::{SIGMA_PER_MEDIAN, median};
 use crate::gimbal::{Chain, Parameterization};
 use crate::sensors::{Stills, StillsChain};
 use crate::text::Named as _;
@@ -37,9 +37,9 @@ impl Default for StillsOptions {
 }
 
 /// Progress callback; a break ends the calibration.
-type OnProgress<'a> = &'a mut dyn FnMut(CalibrationProgress) -> ControlFlow<()>;
+type OnStillsProgress<'a> = &'a mut dyn FnMut(CalibrationProgress) -> ControlFlow<()>;
 
-fn report(on_progress: OnProgress<'_>, stage: &'static str, fraction: f64) -> Result<(), StillsError> {
+fn report(on_progress: OnStillsProgress<'_>, stage: &'static str, fraction: f64) -> Result<(), StillsError> {
     match on_progress(CalibrationProgress { stage, fraction }) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(StillsError::Interrupted { stage }),
@@ -64,7 +64,7 @@ fn observed(stills: &Stills, needed: usize) -> Result<(Vec<ObservedSet>, Vec<Str
 pub fn calibrate_stills(
     stills: &Stills,
     options: &StillsOptions,
-    on_progress: OnProgress<'_>,
+    on_progress: OnStillsProgress<'_>,
 ) -> Result<StillsOutcome, StillsError> {
     report(on_progress, "refining the camera poses", 0.0)?;
     let (sets, left_out) = observed(stills, stills.joints.len() + 2)?;
@@ -96,21 +96,21 @@ pub fn calibrate_stills(
         let corrections: Vec<f64> =
             (0..joints).map(|joint| fit.loops.correction_rad(&fit.state, place, joint)).collect();
         let sigmas: Vec<f64> = (0..joints).map(|joint| fit.angle_sigma_rad(place, joint)).collect();
-        let evaluation = SetEvaluation {
-            initial: initial[place].as_ref(),
-            chain: training[place].as_ref(),
-            hold_out: held[place].as_ref(),
-        };
+        let evaluation =
+            SetEvaluation { initial: &initial[place], chain: &training[place], hold_out: held[place].as_ref() };
         set_report(stills, set, fit.wrong[place], [&corrections, &sigmas], &evaluation)
     });
-    let scored = [(ScoredChain::Initial, &initial), (ScoredChain::Training, &training), (ScoredChain::HoldOut, &held)];
+    let mut scored = scores(stills, ScoredChain::Initial, &seen(&initial), &fit.wrong);
+    scored.extend(scores(stills, ScoredChain::Training, &seen(&training), &fit.wrong));
+    let held: Vec<Option<&SetErrors>> = held.iter().map(Option::as_ref).collect();
+    scored.extend(scores(stills, ScoredChain::HoldOut, &held, &fit.wrong));
     let mut outcome = StillsOutcome {
         configuration: stills.name.clone(),
         joints: stills.joints.clone(),
         angles: Some(options.angles),
         stations: fit.loops.stations.len(),
         floors: floors(stills, &sets),
-        scores: scored.iter().flat_map(|(chain, errors)| scores(stills, *chain, errors, &fit.wrong)).collect(),
+        scores: scored,
         noise: fit.loops.noise.clone(),
         axes: axes(&chain.chain, &stills.initial.chain, stills, tables.first()),
         parameterization: reported(&chain.chain).name(),
@@ -135,7 +135,7 @@ pub fn calibrate_stills(
 pub fn judge_stills(
     stills: &Stills,
     given: &StillsChain,
-    on_progress: OnProgress<'_>,
+    on_progress: OnStillsProgress<'_>,
 ) -> Result<StillsOutcome, StillsError> {
     report(on_progress, "refining the camera poses", 0.0)?;
     let (sets, left_out) = observed(stills, 1)?;
@@ -143,27 +143,28 @@ pub fn judge_stills(
     let (initial, errors) =
         (evaluated(stills, &sets, &start_of(&stills.initial)), evaluated(stills, &sets, &start_of(given)));
     let joints = stills.joints.len();
-    let corrections = |joint: usize| errors.iter().flatten().map(move |set| set.corrections_rad[joint].abs());
-    let robust = |joint: usize| SIGMA_PER_MEDIAN * median(corrections(joint)).unwrap_or(f64::NAN);
+    let corrections: Vec<Vec<f64>> = errors.iter().map(|set| set.corrections_rad.clone()).collect();
+    let encoder_rad: Vec<f64> =
+        (0..joints).map(|joint| robust_sigma_rad(&corrections, joint).unwrap_or(f64::NAN)).collect();
+    let mut wrong = wrong_at_first(&corrections, &encoder_rad);
+    loop {
+        let right = wrong.iter().filter(|wrong| !**wrong).count() as f64;
+        let Some(place) = next_wrong(&corrections, &wrong, &vec![right; joints]) else { break };
+        wrong[place] = true;
+    }
     let noise = StillsNoise {
-        encoder_rad: (0..joints).map(robust).collect(),
+        encoder_rad,
         station_rotation_rad: f64::NAN,
         station_position_m: f64::NAN,
         set_position_m: f64::NAN,
     };
-    let is_wrong = |set: &SetErrors| {
-        let ratios = set.corrections_rad.iter().zip(&noise.encoder_rad);
-        ratios.map(|(correction, sigma)| correction.abs() / sigma).any(|ratio| ratio > WRONG_AT_FIRST)
-    };
-    let wrong: Vec<bool> = errors.iter().map(|set| set.as_ref().is_some_and(is_wrong)).collect();
     let unknown = vec![f64::NAN; joints];
     let set_reports = sets.iter().enumerate().map(|(place, set)| {
-        let corrections = errors[place].as_ref().map_or(&unknown, |errors| &errors.corrections_rad);
-        let evaluation =
-            SetEvaluation { initial: initial[place].as_ref(), chain: errors[place].as_ref(), hold_out: None };
-        set_report(stills, set, wrong[place], [corrections, &unknown], &evaluation)
+        let evaluation = SetEvaluation { initial: &initial[place], chain: &errors[place], hold_out: None };
+        set_report(stills, set, wrong[place], [&corrections[place], &unknown], &evaluation)
     });
-    let scored = [(ScoredChain::Initial, &initial), (ScoredChain::Given, &errors)];
+    let mut scored = scores(stills, ScoredChain::Initial, &seen(&initial), &wrong);
+    scored.extend(scores(stills, ScoredChain::Given, &seen(&errors), &wrong));
     let mut stations: Vec<u64> = sets.iter().map(|set| set.station).collect();
     stations.sort_unstable();
     stations.dedup();
@@ -173,7 +174,7 @@ pub fn judge_stills(
         angles: None,
         stations: stations.len(),
         floors: floors(stills, &sets),
-        scores: scored.iter().flat_map(|(chain, errors)| scores(stills, *chain, errors, &wrong)).collect(),
+        scores: scored,
         noise,
         axes: axes(&given.chain, &stills.initial.chain, stills, None),
         parameterization: reported(&given.chain).name(),
@@ -196,7 +197,10 @@ fn start_of(chain: &StillsChain) -> Start {
     Start { chain: Chain::from_classical(&chain.chain, Parameterization::Poe), further }
 }
 
-fn evaluated(stills: &Stills, sets: &[ObservedSet], chain: &Start) -> Vec<Option<SetErrors>> {
-    let evaluate = |set: &ObservedSet| Some(set_errors(set, &stills.rigid_cameras, &chain.chain, &chain.further));
-    sets.par_iter().map(evaluate).collect()
+fn evaluated(stills: &Stills, sets: &[ObservedSet], chain: &Start) -> Vec<SetErrors> {
+    sets.par_iter().map(|set| set_errors(set, &stills.rigid_cameras, &chain.chain, &chain.further)).collect()
+}
+
+fn seen(errors: &[SetErrors]) -> Vec<Option<&SetErrors>> {
+    errors.iter().map(Some).collect()
 }

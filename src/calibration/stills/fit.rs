@@ -1,10 +1,11 @@
 //! Calibration of some sets: chain, noise, and the sets whose readings are wrong.
 
 use super::equations::StillsPosterior;
-use super::loops::{EncoderTerm, LoopState, StillsLoops};
+use super::loops::{EncoderTerm, StillsLoops, StillsState};
 use super::noise::{EffectSum, StillsNoise};
 use super::observed::ObservedSet;
-use crate::geometry::{RigidTransform, SIGMA_PER_MEDIAN, median};
+use super::wrong_readings::{next_wrong, robust_sigma_rad, wrong_at_first};
+use crate::geometry::RigidTransform;
 use crate::gimbal::Chain;
 use crate::optimization::damped::{DampedOptions, minimize};
 
@@ -24,11 +25,6 @@ const CAUCHY_SIGMAS: f64 = 3.0;
 const NOISE_ROUNDS: usize = 60;
 /// Relative change of a standard deviation at which the noise has converged.
 const NOISE_TOLERANCE: f64 = 2e-3;
-/// Correction of a joint, in standard deviations of its encoder, from which the reading of a set is wrong after the robust
-/// adjustment, whose noise is a rough estimate.
-pub(super) const WRONG_AT_FIRST: f64 = 8.0;
-/// Correction in standard deviations from which a reading is wrong: one in 16,000 of a normal distribution.
-const WRONG: f64 = 4.0;
 /// Smallest robust estimate of an encoder's standard deviation, in rad (0.01°).
 const MIN_ROBUST_RAD: f64 = 1.7e-4;
 
@@ -45,7 +41,7 @@ pub enum AngleModel {
 #[derive(Clone, Debug)]
 pub(super) struct StillsFit<'a> {
     pub(super) loops: StillsLoops<'a>,
-    pub(super) state: LoopState,
+    pub(super) state: StillsState,
     pub(super) posterior: StillsPosterior,
     /// True for each set whose readings are wrong.
     pub(super) wrong: Vec<bool>,
@@ -63,39 +59,40 @@ impl<'a> StillsFit<'a> {
     pub(super) fn new(sets: &[&'a ObservedSet], start: &Start, model: AngleModel) -> Option<Self> {
         let noise = StillsNoise::initial(start.chain.joint_count());
         let mut loops = StillsLoops::new(sets.to_vec(), noise);
-        let mut state = LoopState::at_readings(start.chain.clone(), start.further.clone(), &loops);
-        let mut wrong = vec![false; sets.len()];
+        let mut state = StillsState::at_readings(start.chain.clone(), start.further.clone(), &loops);
         if model == AngleModel::Free {
+            let wrong = vec![false; sets.len()];
             loops.reading_weights.fill(0.0);
             let posterior = settle(&mut loops, &mut state, &wrong)?;
             return Some(Self { loops, state, posterior, wrong });
         }
         for _ in 0..ROBUST_ROUNDS {
             state = minimize(&mut loops, state, &OPTIONS).estimate;
+            let corrections = all_corrections(&loops, &state);
             for joint in 0..state.chain.joint_count() {
-                let lengths = (0..sets.len()).map(|place| loops.correction_rad(&state, place, joint).abs());
-                let sigma = SIGMA_PER_MEDIAN * median(lengths)?;
-                loops.noise.encoder_rad[joint] = sigma.max(MIN_ROBUST_RAD);
+                loops.noise.encoder_rad[joint] = robust_sigma_rad(&corrections, joint)?.max(MIN_ROBUST_RAD);
             }
             for place in 0..sets.len() {
                 let ratio = largest_ratio(&loops, &state, place) / CAUCHY_SIGMAS;
                 loops.reading_weights[place] = 1.0 / (1.0 + ratio * ratio);
             }
         }
-        for place in 0..sets.len() {
-            wrong[place] = largest_ratio(&loops, &state, place) > WRONG_AT_FIRST;
-        }
+        let mut wrong = wrong_at_first(&all_corrections(&loops, &state), &loops.noise.encoder_rad);
         let posterior = loop {
             weigh(&mut loops, &wrong);
             let posterior = settle(&mut loops, &mut state, &wrong)?;
-            let ratios = (0..sets.len())
-                .filter(|place| !wrong[*place])
-                .map(|place| (largest_ratio(&loops, &state, place), place));
-            let Some((ratio, place)) = ratios.max_by(|a, b| a.0.total_cmp(&b.0)) else { break posterior };
-            let right = wrong.iter().filter(|wrong| !**wrong).count();
-            if ratio <= WRONG || 2 * right <= sets.len() {
-                break posterior;
-            }
+            let corrections = all_corrections(&loops, &state);
+            let determined: Vec<f64> = loops
+                .noise
+                .encoder_rad
+                .iter()
+                .enumerate()
+                .map(|(joint, sigma)| {
+                    let right = corrections.iter().zip(&wrong).filter(|(_, wrong)| !**wrong);
+                    right.map(|(set, _)| (set[joint] / sigma).powi(2)).sum()
+                })
+                .collect();
+            let Some(place) = next_wrong(&corrections, &wrong, &determined) else { break posterior };
             wrong[place] = true;
         };
         Some(Self { loops, state, posterior, wrong })
@@ -111,13 +108,13 @@ impl<'a> StillsFit<'a> {
     }
 
     /// The chain without one station, with this noise and these wrong readings.
-    pub(super) fn without_station(&self, station: usize) -> Option<LoopState> {
+    pub(super) fn without_station(&self, station: usize) -> Option<StillsState> {
         let kept: Vec<usize> =
             (0..self.loops.sets.len()).filter(|place| !self.loops.stations[station].contains(place)).collect();
         let sets = kept.iter().map(|place| self.loops.sets[*place]).collect();
         let mut loops = StillsLoops::new(sets, self.loops.noise.clone());
         loops.reading_weights = kept.iter().map(|place| self.loops.reading_weights[*place]).collect();
-        let mut state = LoopState::at_readings(self.state.chain.clone(), self.state.further.clone(), &loops);
+        let mut state = StillsState::at_readings(self.state.chain.clone(), self.state.further.clone(), &loops);
         state.joints_rad = kept.iter().map(|place| self.state.joints_rad[*place].clone()).collect();
         loops.posterior(&state)?;
         Some(minimize(&mut loops, state, &OPTIONS).estimate)
@@ -147,14 +144,21 @@ fn weigh(loops: &mut StillsLoops<'_>, wrong: &[bool]) {
     }
 }
 
+/// Corrections of all joints by set, in rad.
+fn all_corrections(loops: &StillsLoops<'_>, state: &StillsState) -> Vec<Vec<f64>> {
+    let joints = state.chain.joint_count();
+    let of_set = |place: usize| (0..joints).map(|joint| loops.correction_rad(state, place, joint)).collect();
+    (0..loops.sets.len()).map(of_set).collect()
+}
+
 /// Largest correction of a set's joints, in standard deviations of their encoders.
-fn largest_ratio(loops: &StillsLoops<'_>, state: &LoopState, place: usize) -> f64 {
+fn largest_ratio(loops: &StillsLoops<'_>, state: &StillsState, place: usize) -> f64 {
     let ratio = |joint: usize| loops.correction_rad(state, place, joint).abs() / loops.noise.encoder_rad[joint];
     (0..state.chain.joint_count()).map(ratio).fold(0.0, f64::max)
 }
 
 /// Adjusts and estimates the noise in turn until both have converged; `None` if the equations are singular.
-fn settle(loops: &mut StillsLoops<'_>, state: &mut LoopState, wrong: &[bool]) -> Option<StillsPosterior> {
+fn settle(loops: &mut StillsLoops<'_>, state: &mut StillsState, wrong: &[bool]) -> Option<StillsPosterior> {
     for _ in 0..NOISE_ROUNDS {
         *state = minimize(loops, state.clone(), &OPTIONS).estimate;
         let posterior = loops.posterior(state)?;
@@ -172,7 +176,7 @@ fn settle(loops: &mut StillsLoops<'_>, state: &mut LoopState, wrong: &[bool]) ->
 /// Standard deviations that the effects of a solution have, given their posterior variances.
 fn estimated_noise(
     loops: &StillsLoops<'_>,
-    state: &LoopState,
+    state: &StillsState,
     posterior: &StillsPosterior,
     wrong: &[bool],
 ) -> StillsNoise {

@@ -26,7 +26,7 @@ pub(super) struct EncoderTerm {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct LoopState {
+pub(super) struct StillsState {
     /// Chain as a product of exponentials, which has no singularity.
     pub(super) chain: Chain,
     /// `camera_from_first` of the rigid cameras after the first one.
@@ -41,7 +41,7 @@ pub(super) struct LoopState {
     pub(super) rigid_map: Vec<Vec<Vector6<f64>>>,
 }
 
-impl LoopState {
+impl StillsState {
     pub(super) fn at_readings(chain: Chain, further: Vec<RigidTransform>, loops: &StillsLoops<'_>) -> Self {
         Self {
             chain,
@@ -82,13 +82,13 @@ impl<'a> StillsLoops<'a> {
     }
 
     /// Sum of the encoder terms of a joint at a set, in rad.
-    fn encoder_error_rad(&self, state: &LoopState, place: usize, joint: usize) -> f64 {
+    fn encoder_error_rad(&self, state: &StillsState, place: usize, joint: usize) -> f64 {
         let terms = self.terms.iter().zip(&state.effects).filter(|(term, _)| term.joint == joint);
         terms.map(|(term, coefficient)| term.values[place] * coefficient).sum()
     }
 
     /// Angle minus reading and encoder terms, in rad.
-    pub(super) fn correction_rad(&self, state: &LoopState, place: usize, joint: usize) -> f64 {
+    pub(super) fn correction_rad(&self, state: &StillsState, place: usize, joint: usize) -> f64 {
         state.joints_rad[place][joint]
             - self.sets[place].readings_rad[joint]
             - self.encoder_error_rad(state, place, joint)
@@ -104,13 +104,13 @@ impl<'a> StillsLoops<'a> {
         if coordinate < 3 { self.noise.station_rotation_rad } else { self.noise.station_position_m }
     }
 
-    fn residual(&self, state: &LoopState, station: usize, place: usize) -> DVector<f64> {
+    fn residual(&self, state: &StillsState, station: usize, place: usize) -> DVector<f64> {
         let set = self.sets[place];
         self.with_map(state, station, place, set.residual(&state.chain, &state.further, &state.joints_rad[place]))
     }
 
     /// `r + D·u`.
-    fn with_map(&self, state: &LoopState, station: usize, place: usize, mut residual: DVector<f64>) -> DVector<f64> {
+    fn with_map(&self, state: &StillsState, station: usize, place: usize, mut residual: DVector<f64>) -> DVector<f64> {
         let set = self.sets[place];
         residual += &set.by_gimbal_map * state.gimbal_map_m[place];
         for ((camera, _), by_map) in set.rigid.iter().zip(&set.by_rigid_map) {
@@ -120,16 +120,16 @@ impl<'a> StillsLoops<'a> {
     }
 
     /// Sizes of the common unknowns: chain, further cameras, encoder terms.
-    fn common_sizes(&self, state: &LoopState) -> [usize; 3] {
+    fn common_sizes(&self, state: &StillsState) -> [usize; 3] {
         [state.chain.dof(), 6 * state.further.len(), self.terms.len()]
     }
 
-    fn own_size(&self, state: &LoopState, station: usize) -> usize {
+    fn own_size(&self, state: &StillsState, station: usize) -> usize {
         self.stations[station].len() * (state.chain.joint_count() + 3) + 6 * (state.further.len() + 1)
     }
 
     /// Largest σ of the common unknowns.
-    fn weakest(&self, state: &LoopState) -> DVector<f64> {
+    fn weakest(&self, state: &StillsState) -> DVector<f64> {
         let chain = state.chain.parameters().into_iter().map(|parameter| WEAKEST * parameter.scale());
         let six = crate::gimbal::Quantity::TRANSFORM.map(|quantity| WEAKEST * quantity.dimension().scale());
         let further = (0..state.further.len()).flat_map(|_| six);
@@ -138,11 +138,11 @@ impl<'a> StillsLoops<'a> {
         DVector::from_vec(values)
     }
 
-    pub(super) fn posterior(&self, state: &LoopState) -> Option<StillsPosterior> {
+    pub(super) fn posterior(&self, state: &StillsState) -> Option<StillsPosterior> {
         self.linearized(state).posterior(&self.weakest(state))
     }
 
-    fn linearized(&self, state: &LoopState) -> StillsEquations {
+    fn linearized(&self, state: &StillsState) -> StillsEquations {
         let common = self.common_sizes(state).iter().sum();
         let sizes: Vec<usize> = (0..self.stations.len()).map(|station| self.own_size(state, station)).collect();
         let mut equations = StillsEquations::zeros(&sizes, common);
@@ -165,7 +165,7 @@ impl<'a> StillsLoops<'a> {
     }
 
     /// Adds rows and priors of one set, the `index`-th of its station.
-    fn add_set(&self, equations: &mut StillsEquations, state: &LoopState, station: usize, index: usize) {
+    fn add_set(&self, equations: &mut StillsEquations, state: &StillsState, station: usize, index: usize) {
         let place = self.stations[station][index];
         let set = self.sets[place];
         let joints = state.chain.joint_count();
@@ -218,10 +218,10 @@ impl<'a> StillsLoops<'a> {
 }
 
 impl DampedProblem for StillsLoops<'_> {
-    type Estimate = LoopState;
+    type Estimate = StillsState;
     type Equations = StillsEquations;
 
-    fn cost(&self, state: &LoopState) -> f64 {
+    fn cost(&self, state: &StillsState) -> f64 {
         let mut cost = 0.0;
         for (station, places) in self.stations.iter().enumerate() {
             for &place in places {
@@ -240,11 +240,11 @@ impl DampedProblem for StillsLoops<'_> {
         cost
     }
 
-    fn linearize(&self, state: &LoopState) -> StillsEquations {
+    fn linearize(&self, state: &StillsState) -> StillsEquations {
         self.linearized(state)
     }
 
-    fn step(&mut self, state: &LoopState, equations: &StillsEquations, damping: f64) -> Option<LoopState> {
+    fn step(&mut self, state: &StillsState, equations: &StillsEquations, damping: f64) -> Option<StillsState> {
         let step = equations.solve(damping)?;
         let mut moved = state.clone();
         let [chain, further, _] = self.common_sizes(state);

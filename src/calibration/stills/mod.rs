@@ -31,6 +31,7 @@ mod significance;
 mod tests;
 mod view_pose;
 mod warnings;
+mod wrong_readings;
 
 pub use calibrate::{StillsOptions, calibrate_stills, judge_stills};
 pub use encoders::{EncoderErrorKind, EncoderTest};

@@ -192,6 +192,12 @@ impl StillsOutcome {
         self.scores.iter().find(|score| score.chain == chain && score.camera == camera)
     }
 
+    /// Root mean square of the corrections of a joint over the sets with right readings, in degrees.
+    pub fn rms_correction_deg(&self, joint: usize) -> f64 {
+        let right: Vec<f64> = self.sets.iter().filter(|set| !set.wrong).map(|set| set.corrections_deg[joint]).collect();
+        (right.iter().map(|it| it * it).sum::<f64>() / right.len().max(1) as f64).sqrt()
+    }
+
     /// Largest correction of a set's joints with its joint.
     pub fn largest_correction_deg<'a>(&'a self, set: &SetReport) -> Option<(&'a str, f64)> {
         let corrections = self.joints.iter().map(String::as_str).zip(set.corrections_deg.iter().copied());

@@ -26,13 +26,13 @@ pub(super) fn floors(stills: &Stills, sets: &[ObservedSet]) -> Vec<CameraFloor> 
 pub(super) fn scores(
     stills: &Stills,
     chain: ScoredChain,
-    errors: &[Option<SetErrors>],
+    errors: &[Option<&SetErrors>],
     wrong: &[bool],
 ) -> Vec<StillsScore> {
     let score = |(index, camera): (usize, &crate::sensors::StillCamera)| {
         let values = |all: bool, of: fn(&ViewErrors) -> Option<f64>| -> Vec<f64> {
             let used = errors.iter().zip(wrong).filter(|(_, wrong)| all || !**wrong);
-            let views = used.filter_map(|(errors, _)| errors.as_ref()).flat_map(|errors| &errors.views);
+            let views = used.filter_map(|(errors, _)| *errors).flat_map(|errors| &errors.views);
             views.filter(|view| view.camera == index).filter_map(of).collect()
         };
         StillsScore {
@@ -48,9 +48,9 @@ pub(super) fn scores(
 
 /// Errors of one set by the chains that were evaluated.
 pub(super) struct SetEvaluation<'a> {
-    pub(super) initial: Option<&'a SetErrors>,
-    /// Calibrated or given chain.
-    pub(super) chain: Option<&'a SetErrors>,
+    pub(super) initial: &'a SetErrors,
+    /// By the calibrated or given chain.
+    pub(super) chain: &'a SetErrors,
     pub(super) hold_out: Option<&'a SetErrors>,
 }
 
@@ -65,7 +65,7 @@ pub(super) fn set_report(
     let degrees = |angles: &[f64]| angles.iter().map(|angle| angle.to_degrees()).collect();
     let views = set.rigid.iter().map(|(camera, view)| {
         let of = |errors: Option<&SetErrors>| errors?.views.iter().find(|view| view.camera == *camera).copied();
-        let (initial, chain, held) = (of(evaluation.initial), of(evaluation.chain), of(evaluation.hold_out));
+        let [initial, chain, held] = [Some(evaluation.initial), Some(evaluation.chain), evaluation.hold_out].map(of);
         ViewReport {
             camera: stills.rigid_cameras[*camera].name.clone(),
             floor_px: view.mean_px,

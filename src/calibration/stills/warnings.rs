@@ -7,6 +7,8 @@ use crate::text::counted;
 
 /// Difference of an angle between axes to the initial chain that is implausible, in degrees.
 const MAX_AXIS_CHANGE_DEG: f64 = 15.0;
+/// Standard deviation of an angle between axes that leaves it open, in degrees.
+const MAX_AXIS_SIGMA_DEG: f64 = 5.0;
 /// Standard deviation of an encoder that is implausible, in degrees.
 const MAX_ENCODER_DEG: f64 = 3.0;
 /// Ratio of corrections to the σ of the encoder that is implausible.
@@ -15,12 +17,6 @@ const MAX_CORRECTION_RATIO: f64 = 3.0;
 const MAX_HOLD_OUT_RATIO: f64 = 2.0;
 /// Ratio of the error with angles as read to that with estimated angles at which the angles carry the answer.
 const MAX_READING_RATIO: f64 = 10.0;
-
-/// Root mean square of the corrections of a joint over the sets with right readings, in degrees.
-pub(super) fn rms_correction_deg(outcome: &StillsOutcome, joint: usize) -> f64 {
-    let right: Vec<f64> = outcome.sets.iter().filter(|set| !set.wrong).map(|set| set.corrections_deg[joint]).collect();
-    (right.iter().map(|it| it * it).sum::<f64>() / right.len().max(1) as f64).sqrt()
-}
 
 /// Warnings in the order of their weight; `encoder_rad` are the σ of the encoders by the encoder model, if it was fitted.
 pub(super) fn warnings(outcome: &StillsOutcome, encoder_rad: Option<&[f64]>) -> Vec<String> {
@@ -42,6 +38,12 @@ pub(super) fn warnings(outcome: &StillsOutcome, encoder_rad: Option<&[f64]>) -> 
 fn axes(outcome: &StillsOutcome, warnings: &mut Vec<String>) {
     for axis in &outcome.axes {
         let change = axis.value_deg - axis.initial_deg;
+        if axis.sigma_deg > MAX_AXIS_SIGMA_DEG {
+            warnings.push(format!(
+                "the angle between the axes of {} and {} is not determined: {:.0}° ± {:.0}°",
+                axis.joints[0], axis.joints[1], axis.value_deg, axis.sigma_deg
+            ));
+        }
         if change.abs() > MAX_AXIS_CHANGE_DEG {
             warnings.push(format!(
                 "implausible axes: {:.1}° between the axes of {} and {}, {:.1}° in the initial chain; a mechanism is not \
@@ -58,7 +60,7 @@ fn axes(outcome: &StillsOutcome, warnings: &mut Vec<String>) {
 
 fn corrections(outcome: &StillsOutcome, encoder_rad: Option<&[f64]>, warnings: &mut Vec<String>) {
     for (joint, name) in outcome.joints.iter().enumerate() {
-        let rms_deg = rms_correction_deg(outcome, joint);
+        let rms_deg = outcome.rms_correction_deg(joint);
         let sigma_deg = encoder_rad.map(|sigmas| sigmas[joint].to_degrees());
         if let Some(sigma_deg) = sigma_deg
             .filter(|sigma| outcome.angles != Some(AngleModel::Encoder) && rms_deg > MAX_CORRECTION_RATIO * sigma)
@@ -121,8 +123,8 @@ fn ranks(outcome: &StillsOutcome, warnings: &mut Vec<String>) {
     }
     if let Some(rank) = found.filter(|rank| rank.rank_informed < rank.rank_structural) {
         warnings.push(format!(
-            "{} of the chain known to 10° and 3 cm only by the initial chain: {}",
-            if rank.rank_structural - rank.rank_informed == 1 { "1 direction" } else { "several directions" },
+            "{} of the chain have a σ above 10° or 3 cm: {}",
+            counted(rank.rank_structural - rank.rank_informed, "more direction"),
             rank.uninformed_directions.join("; ")
         ));
     }

@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::Matrix4;
 
 use super::document::{ChainDocument, Matrix};
+use super::json_file::parsed;
 use crate::flight_log::LogError;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, DhLink};
@@ -25,7 +26,7 @@ pub fn read_stills_chain(path: &Path, stills: &Stills) -> Result<StillsChain, Lo
     let chain = if of_rig {
         chain_of_rig(&Rig::from_file(path)?, &stills.joints, &names)
     } else {
-        let document: serde_json::Value = super::parsed(path)?;
+        let document: serde_json::Value = parsed(path)?;
         let document = document.get("initial_chain").unwrap_or(&document).clone();
         let document = serde_json::from_value(document).map_err(|error| format!("initial_chain: {error}"));
         document.and_then(|document| chain_of(document, &stills.joints, &names))

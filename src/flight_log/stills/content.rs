@@ -4,12 +4,13 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::FORMAT;
 use super::chain::{chain_of, transform};
 use super::document::{CameraDocument, SetDocument, StillsDocument, ViewDocument};
 use crate::camera::CameraModel;
 use crate::sensors::{MapPoint, StillCamera, StillSet, StillView, Stills};
 
+/// Value of `format`.
+const FORMAT: &str = "acdcc-stills 1";
 /// Largest number of joints, as in a rig.
 const MAX_JOINTS: usize = 16;
 /// Largest number of cameras, as in a rig.

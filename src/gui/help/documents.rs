@@ -18,7 +18,7 @@ macro_rules! document {
 }
 
 /// The manual is first.
-const DOCUMENTS: [Document; 26] = [
+const DOCUMENTS: [Document; 27] = [
     document!("docs/manual.md"),
     document!("docs/tutorial.md"),
     document!("docs/recordings.md"),
@@ -27,6 +27,7 @@ const DOCUMENTS: [Document; 26] = [
     document!("docs/coming_from.md"),
     document!("docs/mathematics.md"),
     document!("docs/accuracy.md"),
+    document!("docs/real_data.md"),
     document!("docs/packages.md"),
     document!("docs/architecture.md"),
     document!("assets/README.md"),
