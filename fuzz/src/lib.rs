@@ -12,6 +12,7 @@ use dcvins::export::{self, EvaluationOptions};
 use dcvins::flight_log::convert::convert;
 use dcvins::flight_log::{
     FlightLog, FrameStream, ImageReader, LogWriter, LogWriterOptions, MessageKind, MessageTimes, MessageType,
+    read_stills, read_stills_chain,
 };
 use dcvins::log_check;
 use dcvins::sensors::Rig;
@@ -274,6 +275,15 @@ pub fn rig(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     let Ok(rig) = Rig::from_yaml(text, Path::new("rig.yaml")) else { return };
     Rig::from_yaml(&rig.to_yaml(), Path::new("rig.yaml")).expect("a rig that was written can be read");
+}
+
+/// Fuzzes a file of stills, and of a chain for it.
+pub fn stills(bytes: &[u8]) {
+    let folder = folder();
+    let path = write(&folder.path().join("input.json"), bytes);
+    if let Ok(stills) = read_stills(&path) {
+        drop(read_stills_chain(&path, &stills));
+    }
 }
 
 pub fn session(bytes: &[u8]) {

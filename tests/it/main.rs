@@ -27,6 +27,7 @@ mod sample_log;
 mod screenshots;
 #[cfg(unix)]
 mod slurm;
+mod stills;
 #[cfg(feature = "gui")]
 mod studies;
 #[cfg(feature = "gui")]

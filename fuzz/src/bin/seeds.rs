@@ -30,6 +30,19 @@ const KEYFRAME_BYTES: usize = 859;
 const PICTURE_END: usize = 979;
 /// Header stamp of the first message.
 const EPOCH_NS: i64 = 1_700_000_000_250_000_000;
+/// Stills of one joint: six points in each of two cameras.
+const STILLS: &str = r#"{"format": "acdcc-stills 1", "joints": ["yaw"], "static_cameras": ["front"],
+  "cameras": {"front": {"resolution": [64, 48], "intrinsics": [50, 50, 32, 24]},
+    "gimbal": {"resolution": [64, 48], "intrinsics": [50, 50, 32, 24], "distortion_model": "none"}},
+  "initial_chain": {"T_I_B": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+    "links": [{"joint": "yaw", "theta_offset": 0, "d": 0.1, "a": 0, "alpha": 0}],
+    "T_E_C": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]},
+  "sets": [{"id": 1, "station": 1, "joint_angles_rad": [0.1], "views": {
+    "front": {"points": [[0, 0, 2, 32, 24], [1, 0, 2, 57, 24], [0, 1, 2, 32, 49], [1, 1, 4, 44, 36], [1, 0, 4, 44, 24],
+      [0, 1, 4, 32, 36]]},
+    "gimbal": {"T_camera_world": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+      "points": [[0, 0, 2, 32, 24], [1, 0, 2, 57, 24], [0, 1, 2, 32, 49], [1, 1, 4, 44, 36], [1, 0, 4, 44, 24],
+        [0, 1, 4, 32, 36]]}}}]}"#;
 /// Width and height of the images.
 const RESOLUTION_PX: [usize; 2] = [16, 12];
 /// PNG image of 16 × 12 gray pixels, all 0.
@@ -322,6 +335,7 @@ fn texts(corpus: &Path) -> Result<(), Failed> {
     }
     let tum = "# stamp x y z qx qy qz qw\n1.0 0 0 0 0 0 0 1\n2.0 1 0 0.5 0 0 0.7071068 0.7071068\n3.0 2 0 1 0 0 1 0\n";
     fs::write(target(corpus, "trajectory")?.join("two-poses"), tum)?;
+    fs::write(target(corpus, "stills")?.join("one-set"), STILLS)?;
     let folder = target(corpus, "euroc")?;
     for (index, (name, content)) in EUROC_FILES.iter().enumerate() {
         fs::write(folder.join(name.replace('/', "-")), [&[index as u8], content.as_bytes()].concat())?;
