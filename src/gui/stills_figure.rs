@@ -218,9 +218,10 @@ fn corrections(painter: &Painter, theme: &Theme, outcome: &StillsOutcome, joint:
         painter.line_segment(ends, Stroke::new(1.2, color));
         marker(painter, pos2(x, y(value_deg)), color, true);
         if value_deg.abs() > range {
-            let (shift, align) =
-                if value_deg > 0.0 { (9.0, Align2::CENTER_TOP) } else { (-9.0, Align2::CENTER_BOTTOM) };
-            let at = pos2(x, y(value_deg) + shift);
+            let (side, align) = if value_deg > 0.0 { (1.0, Align2::CENTER_TOP) } else { (-1.0, Align2::CENTER_BOTTOM) };
+            // Values of neighbouring sets stand above one another.
+            let shift = if place % 2 == 0 { 8.0 } else { 20.0 };
+            let at = pos2(x, y(value_deg) + side * shift);
             painter.text(at, align, format!("{value_deg:.1}°"), number_font(), theme.text_strong);
         }
     }
