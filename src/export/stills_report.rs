@@ -88,7 +88,11 @@ impl StillsReport {
             encoders.map(|(joint, sigma)| format!("{joint} {:.2}°", sigma.to_degrees())).collect();
         match outcome.angles {
             Some(AngleModel::Encoder) => writeln!(f, "  encoder σ      {}", encoders.join(", "))?,
-            Some(AngleModel::Free) => writeln!(f, "  encoder σ      none: every angle is free")?,
+            Some(AngleModel::Free) => writeln!(
+                f,
+                "  encoder σ      not used, every angle is free; by the encoder model {}",
+                encoders.join(", ")
+            )?,
             None => {
                 let rms = outcome.joints.iter().enumerate();
                 let rms: Vec<String> =

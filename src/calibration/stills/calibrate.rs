@@ -71,15 +71,12 @@ pub fn calibrate_stills(
     let references: Vec<&ObservedSet> = sets.iter().collect();
     let start = start_of(&stills.initial);
     report(on_progress, "closing the pose loops", 0.3)?;
-    let fit = StillsFit::new(&references, &start, options.angles).ok_or(StillsError::Singular)?;
+    let mut fit = StillsFit::new(&references, &start, options.angles).ok_or(StillsError::Singular)?;
     // Free angles are compared with what the readings are worth.
-    let encoder_rad = match options.angles {
-        AngleModel::Encoder => Some(fit.loops.noise.encoder_rad.clone()),
-        AngleModel::Free => {
-            let reference = StillsFit::new(&references, &start, AngleModel::Encoder);
-            reference.map(|reference| reference.loops.noise.encoder_rad)
-        }
-    };
+    if options.angles == AngleModel::Free {
+        let reference = StillsFit::new(&references, &start, AngleModel::Encoder).ok_or(StillsError::Singular)?;
+        fit.loops.noise.encoder_rad = reference.loops.noise.encoder_rad;
+    }
     report(on_progress, "calibrating without one station each", 0.5)?;
     let jackknife = Jackknife::new(&fit);
     report(on_progress, "calibrating without some stations", 0.65)?;
@@ -123,7 +120,7 @@ pub fn calibrate_stills(
         tables,
         chain,
     };
-    outcome.warnings = warnings(&outcome, encoder_rad.as_deref());
+    outcome.warnings = warnings(&outcome);
     outcome.warnings.extend(left_out);
     Ok(outcome)
 }
@@ -187,7 +184,7 @@ pub fn judge_stills(
         warnings: Vec::new(),
         chain: given.clone(),
     };
-    outcome.warnings = warnings(&outcome, None);
+    outcome.warnings = warnings(&outcome);
     outcome.warnings.extend(left_out);
     Ok(outcome)
 }

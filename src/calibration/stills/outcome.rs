@@ -167,7 +167,8 @@ pub struct StillsOutcome {
     pub stations: usize,
     pub floors: Vec<CameraFloor>,
     pub scores: Vec<StillsScore>,
-    /// Noise of readings and map; for a given chain only a robust estimate of the encoders.
+    /// Noise of readings and map; that of the encoders for free angles by the encoder model on the same sets, for a given
+    /// chain a robust estimate and no noise of the map.
     pub noise: StillsNoise,
     pub axes: Vec<AxisAngle>,
     /// Parameterization in which the chain is reported first, minimal and far from its singularities.

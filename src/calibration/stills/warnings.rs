@@ -18,11 +18,11 @@ const MAX_HOLD_OUT_RATIO: f64 = 2.0;
 /// Ratio of the error with angles as read to that with estimated angles at which the angles carry the answer.
 const MAX_READING_RATIO: f64 = 10.0;
 
-/// Warnings in the order of their weight; `encoder_rad` are the σ of the encoders by the encoder model, if it was fitted.
-pub(super) fn warnings(outcome: &StillsOutcome, encoder_rad: Option<&[f64]>) -> Vec<String> {
+/// Warnings in the order of their weight.
+pub(super) fn warnings(outcome: &StillsOutcome) -> Vec<String> {
     let mut warnings = Vec::new();
     axes(outcome, &mut warnings);
-    corrections(outcome, encoder_rad, &mut warnings);
+    corrections(outcome, &mut warnings);
     pixels(outcome, &mut warnings);
     let wrong = outcome.sets.iter().filter(|set| set.wrong).count();
     if 4 * wrong > outcome.sets.len() {
@@ -58,13 +58,11 @@ fn axes(outcome: &StillsOutcome, warnings: &mut Vec<String>) {
     }
 }
 
-fn corrections(outcome: &StillsOutcome, encoder_rad: Option<&[f64]>, warnings: &mut Vec<String>) {
+fn corrections(outcome: &StillsOutcome, warnings: &mut Vec<String>) {
     for (joint, name) in outcome.joints.iter().enumerate() {
         let rms_deg = outcome.rms_correction_deg(joint);
-        let sigma_deg = encoder_rad.map(|sigmas| sigmas[joint].to_degrees());
-        if let Some(sigma_deg) = sigma_deg
-            .filter(|sigma| outcome.angles != Some(AngleModel::Encoder) && rms_deg > MAX_CORRECTION_RATIO * sigma)
-        {
+        let sigma_deg = outcome.noise.encoder_rad[joint].to_degrees();
+        if outcome.angles == Some(AngleModel::Free) && rms_deg > MAX_CORRECTION_RATIO * sigma_deg {
             warnings.push(format!(
                 "the readings of {name} are corrected by {rms_deg:.1}° rms, {:.0} times the σ of {sigma_deg:.2}° that an \
                  encoder model estimates from the same sets: the answer leans on free angles",
