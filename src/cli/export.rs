@@ -1,13 +1,17 @@
-//! `dcvins export`: a rig as the configuration of another program.
+//! `dcvins export`: a rig as the configuration of another program, or as a robot description.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use dcvins::flight_log::FlightLog;
-use dcvins::interop::{FixedJointAngles, OtherEstimator, configure, write_configuration};
-use dcvins::sensors::Rig;
+use dcvins::flight_log::urdf::{CameraAxes, RobotModel};
+use dcvins::flight_log::{FlightLog, log_name};
+use dcvins::interop::{
+    Configuration, FixedJointAngles, OtherEstimator, calibrated_description, configure, robot_description,
+    write_configuration,
+};
+use dcvins::sensors::{CameraMount, Rig};
 use dcvins::text::{Entry, FINITE, Named as _};
 use serde::Serialize;
 
@@ -38,6 +42,19 @@ pub(crate) struct ExportArguments {
     /// The log for --at, and for intrinsics and rates that are missing in the rig.
     #[arg(long, value_name = "LOG")]
     pub log: Option<PathBuf>,
+    /// With --to urdf: write the calibrated chain into this robot description. Only the origins of its joints change.
+    #[arg(long, value_name = "FILE", requires = "imu_link", requires = "camera_link")]
+    pub urdf: Option<PathBuf>,
+    /// Link of that robot description whose frame is that of the IMU.
+    #[arg(long, value_name = "LINK", requires = "urdf")]
+    pub imu_link: Option<String>,
+    /// Link of that robot description whose frame is that of the camera.
+    #[arg(long, value_name = "LINK", requires = "urdf")]
+    pub camera_link: Option<String>,
+    /// Axes of that link: optical (x right, y down, z forward) or flu (x forward, y left, z up) [default: optical if its name
+    /// contains "optical", else flu].
+    #[arg(long, value_name = "optical|flu", value_parser = camera_axes, requires = "urdf")]
+    pub camera_axes: Option<CameraAxes>,
     /// Overwrite files that were not written by this command.
     #[arg(long)]
     pub force: bool,
@@ -63,17 +80,21 @@ pub(crate) enum ProgramArgument {
     /// Settings for one camera and the IMU.
     #[value(name = "orb-slam3")]
     OrbSlam3,
+    /// Robot description with the joints of the gimbal.
+    Urdf,
 }
 
-impl From<ProgramArgument> for OtherEstimator {
-    fn from(argument: ProgramArgument) -> Self {
-        match argument {
-            ProgramArgument::Kalibr => Self::Kalibr,
-            ProgramArgument::VinsFusion => Self::VinsFusion,
-            ProgramArgument::OpenVins => Self::OpenVins,
-            ProgramArgument::Basalt => Self::Basalt,
-            ProgramArgument::OrbSlam3 => Self::OrbSlam3,
-        }
+impl ProgramArgument {
+    /// Estimator whose configuration is written; `None` for a robot description.
+    fn estimator(self) -> Option<OtherEstimator> {
+        Some(match self {
+            Self::Kalibr => OtherEstimator::Kalibr,
+            Self::VinsFusion => OtherEstimator::VinsFusion,
+            Self::OpenVins => OtherEstimator::OpenVins,
+            Self::Basalt => OtherEstimator::Basalt,
+            Self::OrbSlam3 => OtherEstimator::OrbSlam3,
+            Self::Urdf => return None,
+        })
     }
 }
 
@@ -103,25 +124,59 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<()> {
         (Some(log), rig_path) => Rig::for_log(log, rig_path)?,
         (None, _) => Rig::from_file(&arguments.rig)?,
     };
+    let Some(program) = arguments.program.estimator() else {
+        return written(arguments, "URDF", &[], &description(arguments, &rig)?);
+    };
+    if arguments.urdf.is_some() {
+        anyhow::bail!("--urdf is for --to urdf");
+    }
     let angles = match (arguments.at, &log) {
         (Some(time_s), Some(log)) => FixedJointAngles::measured(log, &rig, time_s)?,
         (Some(_), None) => anyhow::bail!("--at needs a log: give it with --log LOG"),
         (None, _) if arguments.joints.is_empty() => FixedJointAngles::neutral(&rig),
         (None, _) => FixedJointAngles::given(&rig, &arguments.joints)?,
     };
-    let program = OtherEstimator::from(arguments.program);
     let configuration = configure(&rig, program, &arguments.cameras, &angles)?;
-    let paths = write_configuration(&configuration, &arguments.out, arguments.force)?;
+    written(arguments, program.name(), &angles.angles_rad, &configuration)
+}
+
+/// Robot description of the rig, or the given one with the calibrated chain.
+fn description(arguments: &ExportArguments, rig: &Rig) -> Result<Configuration> {
+    if arguments.at.is_some() || !arguments.joints.is_empty() {
+        anyhow::bail!("a robot description has the joints themselves: leave --joints and --at out");
+    }
+    let (Some(file), Some(imu), Some(link)) = (&arguments.urdf, &arguments.imu_link, &arguments.camera_link) else {
+        return Ok(robot_description(rig, &arguments.cameras)?);
+    };
+    let camera = match arguments.cameras.as_slice() {
+        [] => rig.cameras.iter().find(|camera| camera.mount == CameraMount::Gimbal).or_else(|| rig.cameras.first()),
+        [key] => Some(rig.camera(key)?),
+        _ => anyhow::bail!("--camera: one camera belongs to --camera-link"),
+    };
+    let camera = camera.ok_or_else(|| anyhow::anyhow!("the rig has no camera"))?;
+    let model = RobotModel::read(file)?;
+    let path = model.path(imu, link, arguments.camera_axes.unwrap_or_else(|| CameraAxes::of_link(link)))?;
+    Ok(calibrated_description(rig, camera, &path, &log_name(file))?)
+}
+
+fn camera_axes(text: &str) -> Result<CameraAxes, String> {
+    CameraAxes::from_name(text).ok_or_else(|| format!("expected {}", CameraAxes::alternatives()))
+}
+
+/// Writes the files and prints their paths and notes.
+fn written(
+    arguments: &ExportArguments,
+    program: &'static str,
+    joint_angles_rad: &[f64],
+    configuration: &Configuration,
+) -> Result<()> {
+    let paths = write_configuration(configuration, &arguments.out, arguments.force)?;
     let files: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     if arguments.json {
-        return print_json(&Written {
-            program: program.name(),
-            joint_angles_rad: &angles.angles_rad,
-            files,
-            notes: &configuration.notes,
-        });
+        return print_json(&Written { program, joint_angles_rad, files, notes: &configuration.notes });
     }
     let files = files.iter().map(|file| format!("{file}\n")).collect::<Vec<_>>().concat();
     let notes = configuration.notes.iter().map(|note| format!("  {note}\n")).collect::<Vec<_>>().concat();
-    print(&format!("{files}notes, also at the head of the files:\n{notes}"))
+    let head = if arguments.urdf.is_some() { "notes:" } else { "notes, also at the head of the files:" };
+    print(&format!("{files}{head}\n{notes}"))
 }

@@ -6,7 +6,10 @@ use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use dcvins::export;
 use dcvins::flight_log::FlightLog;
-use dcvins::flight_log::rig_template::{CameraChoice, MechanismAxes, PublishedCamera, RigChoices, RigTemplate};
+use dcvins::flight_log::rig_template::{
+    CameraChoice, DescribedChain, MechanismAxes, PublishedCamera, RigChoices, RigTemplate,
+};
+use dcvins::flight_log::urdf::{CameraAxes, RobotModel};
 use dcvins::sensors::BodyAxes;
 use dcvins::text::{Entry, Named as _};
 
@@ -35,8 +38,22 @@ pub(crate) struct NewArguments {
     pub log: Option<PathBuf>,
     /// Axes of the gimbal from the vehicle to the camera, as in yaw-roll-pitch, yaw-pitch or pitch; rigid for a camera without
     /// a gimbal.
-    #[arg(long, value_name = "AXES", value_parser = parsed::<MechanismAxes>, required_unless_present = "list")]
+    #[arg(long, value_name = "AXES", value_parser = parsed::<MechanismAxes>, required_unless_present_any = ["list", "urdf"])]
     pub mechanism: Option<MechanismAxes>,
+    /// The chain of a robot description in place of --mechanism and --at: a URDF file, or `topic:NAME` for the topic of a
+    /// log, as in `topic:/robot_description`. Rotating, mimicking and fixed joints between the links are taken, with their limits.
+    #[arg(long, value_name = "FILE", requires = "imu_link", requires = "camera_link", conflicts_with_all = ["mechanism", "at", "positive", "joints"])]
+    pub urdf: Option<PathBuf>,
+    /// Link of the robot description whose frame is that of the IMU.
+    #[arg(long, value_name = "LINK", requires = "urdf")]
+    pub imu_link: Option<String>,
+    /// Link of the robot description whose frame is that of the camera.
+    #[arg(long, value_name = "LINK", requires = "urdf")]
+    pub camera_link: Option<String>,
+    /// Axes of that link: optical (x right, y down, z forward) or flu (x forward, y left, z up) [default: optical if its name
+    /// contains "optical", else flu].
+    #[arg(long, value_name = "optical|flu", value_parser = camera_axes, requires = "urdf")]
+    pub camera_axes: Option<CameraAxes>,
     /// The camera: fov:DEG (horizontal field of view), a model with published intrinsics (--list prints all), or
     /// info[:TOPIC] for the log's `CameraInfo`.
     #[arg(long, value_name = "CAMERA", value_parser = parsed::<CameraChoice>, required_unless_present = "list")]
@@ -140,16 +157,36 @@ fn attitude(text: &str) -> Result<Attitude, String> {
         .ok_or_else(|| format!("expected a topic and entries {}=VALUE between commas", KEYS.join("=VALUE, ")))
 }
 
+fn camera_axes(text: &str) -> Result<CameraAxes, String> {
+    CameraAxes::from_name(text).ok_or_else(|| format!("expected {}", CameraAxes::alternatives()))
+}
+
+/// Chain of `--urdf`.
+fn described_chain(arguments: &NewArguments, log: Option<&FlightLog>) -> Result<Option<DescribedChain>> {
+    let (Some(urdf), Some(imu), Some(camera)) = (&arguments.urdf, &arguments.imu_link, &arguments.camera_link) else {
+        return Ok(None);
+    };
+    let model = match (urdf.to_str().and_then(|text| text.strip_prefix("topic:")), log) {
+        (Some(topic), Some(log)) => RobotModel::of_topic(log, topic)?,
+        (Some(topic), None) => bail!("--urdf topic:{topic} needs a log"),
+        (None, _) => RobotModel::read(urdf)?,
+    };
+    let axes = arguments.camera_axes.unwrap_or_else(|| CameraAxes::of_link(camera));
+    let path = model.path(imu, camera, axes)?;
+    Ok(Some(path.described(arguments.camera_axes.is_some())))
+}
+
 pub(crate) fn rig(arguments: &RigArguments) -> Result<ExitOutcome> {
     let RigCommand::New(arguments) = &arguments.command;
     if arguments.list {
         let names: Vec<&str> = PublishedCamera::ALL.iter().map(|camera| camera.name()).collect();
         return print(&format!("{}\n", names.join("\n"))).map(|()| ExitOutcome::Success);
     }
-    let (Some(mechanism), Some(camera)) = (&arguments.mechanism, &arguments.camera) else {
+    let (Some(camera), true) = (&arguments.camera, arguments.mechanism.is_some() || arguments.urdf.is_some()) else {
         bail!("--mechanism and --camera are missing");
     };
     let log = arguments.log.as_ref().map(|log| FlightLog::open_with(log, &arguments.limits.limits())).transpose()?;
+    let described = described_chain(arguments, log.as_ref())?;
     let beside = arguments.log.as_ref().map(|log| log.with_extension("rig.yaml"));
     let Some(output) = arguments.output.clone().or(beside) else { bail!("-o FILE is missing") };
     let stem = output.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -157,7 +194,8 @@ pub(crate) fn rig(arguments: &RigArguments) -> Result<ExitOutcome> {
         name: stem.split('.').next().unwrap_or_default().to_owned(),
         camera: camera.clone(),
         resolution_px: arguments.size,
-        mechanism: mechanism.clone(),
+        mechanism: arguments.mechanism.clone().unwrap_or(MechanismAxes(Vec::new())),
+        described,
         positive: arguments.positive,
         imu_axes: arguments.imu_axes,
         position_m: arguments.at.map(Into::into),

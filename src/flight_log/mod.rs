@@ -40,6 +40,7 @@ pub(crate) mod tests;
 mod text;
 pub(crate) mod topic_info;
 mod trajectory;
+pub mod urdf;
 pub(crate) mod video;
 mod warning;
 mod writer;

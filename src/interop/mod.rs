@@ -1,4 +1,5 @@
-//! Configuration files of other estimators from a rig, with the gimbal fixed at given joint angles.
+//! Configuration files of other estimators from a rig, with the gimbal fixed at given joint angles, and robot
+//! descriptions with its joints.
 //!
 //! Each module writes the text of one program's files from a rig of static cameras; `Format` describes the
 //! capabilities of the program. Unsupported properties are noted at the head of the files, or are an error.
@@ -14,6 +15,9 @@ mod other_estimator;
 #[cfg(test)]
 mod tests;
 mod text;
+mod urdf;
+#[cfg(test)]
+mod urdf_tests;
 mod vins_fusion;
 
 use std::path::{Path, PathBuf};
@@ -25,6 +29,7 @@ use crate::sensors::Rig;
 pub use error::ConfigurationError;
 pub use joint_angles::{AngleOrigin, FixedJointAngles};
 pub use other_estimator::OtherEstimator;
+pub use urdf::{calibrated_description, robot_description};
 
 use format::Format;
 

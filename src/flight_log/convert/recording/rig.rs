@@ -84,6 +84,7 @@ impl VideoFacts {
             // Size of the decoded images, since the container can declare another display size.
             resolution_px: None,
             mechanism: mechanism.parse::<MechanismAxes>()?,
+            described: None,
             positive: Some(frd),
             imu_axes: Some(if self.has_autopilot { frd } else { flu }),
             position_m: None,

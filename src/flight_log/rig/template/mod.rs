@@ -18,7 +18,8 @@ use nalgebra::Vector3;
 use crate::camera::CameraModel;
 use crate::sensors::{
     AssumedField, AttitudeSource, BodyAxes, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuNoise,
-    ImuRig, IntrinsicsSigma, Rig,
+use crate::gimbal::ClassicalChain;
+    ImuRig, IntrinsicsSigma, Joint, Rig,
 };
 
 /// Standard deviations of intrinsics from a field of view: of the focal length as a ratio (manufacturers round, crop
@@ -117,7 +118,17 @@ impl CameraTemplate {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct GimbalTemplate {
-    /// Axes from the vehicle to the camera.
+/// Chain from the IMU to the camera with known dimensions, such as that of a robot description.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DescribedChain {
+    /// Without links for a rigid camera.
+    pub chain: ClassicalChain,
+    pub joints: Vec<Joint>,
+    /// Origin of the dimensions and assumptions about them, as one sentence without a full stop.
+    pub reason: String,
+}
+
+    /// Axes from the vehicle to the camera; empty for a described chain.
     pub axes: MechanismAxes,
     /// Positive directions of rotation.
     pub positive: Sourced<BodyAxes>,
@@ -132,7 +143,9 @@ pub struct RigTemplate {
     pub name: String,
     pub imu: ImuTemplate,
     pub camera: CameraTemplate,
-    /// `None` for a rigid camera that looks forward.
+    /// Chain in place of the axes of the gimbal, and of the pose of a rigid camera.
+    pub described: Option<DescribedChain>,
+    /// `None` for a rigid camera; it looks forward if its pose is not described.
     pub gimbal: Option<GimbalTemplate>,
     /// Position of the gimbal, or of the rigid camera: forward, left and up of the IMU, in metres.
     pub position_m: Sourced<Vector3<f64>>,
@@ -147,7 +160,8 @@ impl RigTemplate {
         let mount = if self.gimbal.is_some() {
             CameraMount::Gimbal
         } else {
-            let chain = MechanismAxes(Vec::new()).chain(imu_axes, imu_axes, self.position_m.value);
+            let forward = || MechanismAxes(Vec::new()).chain(imu_axes, imu_axes, self.position_m.value);
+            let chain = self.described.as_ref().map_or_else(forward, |described| described.chain.clone());
             CameraMount::Static { imu_from_camera: chain.imu_from_base }
         };
         Rig {
@@ -185,15 +199,21 @@ impl RigTemplate {
     }
 
     fn gimbal_rig(&self, gimbal: &GimbalTemplate) -> GimbalRig {
-        let chain = gimbal.axes.chain(gimbal.positive.value, self.imu.axes.value, self.position_m.value);
+        let described = self.described.as_ref();
+        let of_axes = || gimbal.axes.chain(gimbal.positive.value, self.imu.axes.value, self.position_m.value);
+        let chain = described.map_or_else(of_axes, |described| described.chain.clone());
+        let default_names = described.map_or_else(
+            || gimbal.axes.default_names(),
+            |described| described.joints.iter().map(|joint| joint.name.clone()).collect(),
+        );
         let (topic, rate_hz, sigma_rad, names) = match &gimbal.angles {
             AngleTemplate::Joints { topic, rate_hz, names } => {
                 (Some(topic.value.clone()), *rate_hz, Some(JOINT_SIGMA_RAD), names.clone())
             }
             AngleTemplate::Attitude(attitude) => {
-                (Some(attitude.topic.clone()), attitude.rate_hz, Some(ATTITUDE_SIGMA_RAD), gimbal.axes.default_names())
+                (Some(attitude.topic.clone()), attitude.rate_hz, Some(ATTITUDE_SIGMA_RAD), default_names)
             }
-            AngleTemplate::None => (None, 0.0, None, gimbal.axes.default_names()),
+            AngleTemplate::None => (None, 0.0, None, default_names),
         };
         GimbalRig {
             topic,
@@ -208,7 +228,10 @@ impl RigTemplate {
             prior: CHAIN_PRIOR,
             switches_parameterization: false,
             chain,
-            joints: gimbal.axes.joints(&names, gimbal.positive.value),
+            joints: described.map_or_else(
+                || gimbal.axes.joints(&names, gimbal.positive.value),
+                |described| described.joints.clone(),
+            ),
         }
     }
 
@@ -230,7 +253,10 @@ impl RigTemplate {
             let reasons: Vec<&str> = a.iter().chain(b).map(String::as_str).collect();
             (!reasons.is_empty()).then(|| reasons.join("; "))
         };
-        let place = both(&self.position_m.assumed, &self.imu.axes.assumed);
+        let place = match &self.described {
+            Some(described) => Some(described.reason.clone()),
+            None => both(&self.position_m.assumed, &self.imu.axes.assumed),
+        };
         let Some(gimbal) = &self.gimbal else {
             add("cam0.T_cam_imu", place);
             return fields;
@@ -247,6 +273,11 @@ impl RigTemplate {
         add("gimbal.T_I_B", place);
         let meeting = format!(
             "the axes {} meet in one point at right angles; at angles zero the camera looks forward",
+        if let Some(described) = &self.described {
+            add("gimbal.links", Some(described.reason.clone()));
+            add("gimbal.T_E_C", Some(described.reason.clone()));
+            return fields;
+        }
             gimbal.axes
         );
         add("gimbal.links", both(&Some(meeting), &gimbal.positive.assumed));

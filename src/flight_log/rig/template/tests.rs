@@ -14,6 +14,7 @@ fn choices(mechanism: &str, camera: &str) -> RigChoices {
         name: "new".to_owned(),
         camera: camera.parse().unwrap(),
         resolution_px: Some(SIZE_PX),
+        described: None,
         mechanism: mechanism.parse().unwrap(),
         positive: None,
         imu_axes: None,

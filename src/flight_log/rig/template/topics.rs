@@ -7,8 +7,8 @@ use nalgebra::Vector3;
 use super::super::fields::Field;
 use super::camera::{of_field_of_view, of_published};
 use super::{
-    AngleTemplate, AttitudeTemplate, CameraChoice, CameraTemplate, GimbalAxis, GimbalTemplate, ImuTemplate,
-    MechanismAxes, RigTemplate, Sourced, TYPICAL_IMU_NOISE, TemplateError,
+    AngleTemplate, AttitudeTemplate, CameraChoice, CameraTemplate, DescribedChain, GimbalAxis, GimbalTemplate,
+    ImuTemplate, MechanismAxes, RigTemplate, Sourced, TYPICAL_IMU_NOISE, TemplateError,
 };
 use crate::camera::CameraModel;
 use crate::flight_log::messages::{self, MessageKind};
@@ -33,6 +33,8 @@ pub struct RigChoices {
     /// Size of the images, `None` to read it from the log.
     pub resolution_px: Option<[usize; 2]>,
     pub mechanism: MechanismAxes,
+    /// Chain in place of the mechanism.
+    pub described: Option<DescribedChain>,
     /// Positive directions of rotation; `None` if unknown.
     pub positive: Option<BodyAxes>,
     /// Axes of the IMU; `None` to determine them from gravity.
@@ -53,6 +55,16 @@ pub struct RigChoices {
     pub noise: Option<ImuNoise>,
 }
 
+impl RigChoices {
+    /// Mechanism in messages: its axes, or the joints of a described chain.
+    fn mechanism_text(&self) -> String {
+        self.described.as_ref().map_or_else(
+            || self.mechanism.to_string(),
+            |described| described.joints.iter().map(|joint| joint.name.as_str()).collect::<Vec<_>>().join(", "),
+        )
+    }
+}
+
 impl RigTemplate {
     /// Template for these choices, with the rest from the log, if there is one.
     ///
@@ -62,7 +74,9 @@ impl RigTemplate {
     pub fn new(choices: &RigChoices, log: Option<&FlightLog>) -> Result<Self, TemplateError> {
         let imu = imu(choices, log)?;
         let camera = camera(choices, log)?;
-        let gimbal = if choices.mechanism.0.is_empty() { None } else { Some(gimbal(choices, imu.axes.value, log)?) };
+        let described_joints = choices.described.as_ref().map_or(0, |described| described.joints.len());
+        let is_rigid = choices.mechanism.0.is_empty() && described_joints == 0;
+        let gimbal = if is_rigid { None } else { Some(gimbal(choices, imu.axes.value, log)?) };
         let nothing_known = "gimbal position not measured: assumed at the IMU, ±3 cm per link";
         let position_m = choices.position_m.map_or_else(
             || Sourced::assumed(Vector3::zeros(), nothing_known),
@@ -72,6 +86,7 @@ impl RigTemplate {
             name: choices.name.clone(),
             imu,
             camera,
+            described: choices.described.clone(),
             gimbal,
             position_m,
             ground_truth_topic: log.and_then(ground_truth_topic),
@@ -259,7 +274,7 @@ fn gimbal(choices: &RigChoices, imu_axes: BodyAxes, log: Option<&FlightLog>) -> 
     };
     let positive = match (&choices.positive, &angles) {
         (Some(positive), _) => Sourced::known(*positive),
-        (None, AngleTemplate::Joints { .. }) => Sourced::assumed(
+        (None, AngleTemplate::Joints { .. }) if choices.described.is_none() => Sourced::assumed(
             BodyAxes::Frd,
             "angles are assumed to be positive to the right (yaw, roll) and upwards (pitch)",
         ),
@@ -307,7 +322,10 @@ fn joints(choices: &RigChoices, log: &FlightLog) -> Result<AngleTemplate, Templa
         Some(message.names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>())
     });
     let found = found.unwrap_or_default();
-    let names = if choices.joint_names.is_empty() {
+    let names = if let Some(described) = &choices.described {
+        let names: Vec<String> = described.joints.iter().map(|joint| joint.name.clone()).collect();
+        names.iter().all(|name| found.contains(name)).then_some(names)
+    } else if choices.joint_names.is_empty() {
         names_of_axes(&choices.mechanism, &found)
     } else {
         let known = choices.joint_names.iter().all(|name| found.contains(name));
@@ -316,7 +334,7 @@ fn joints(choices: &RigChoices, log: &FlightLog) -> Result<AngleTemplate, Templa
     let names = names.ok_or_else(|| TemplateError::Joints {
         topic: info.topic.clone(),
         found,
-        mechanism: choices.mechanism.to_string(),
+        mechanism: choices.mechanism_text(),
     })?;
     let topic = Sourced::known(info.topic.clone());
     Ok(AngleTemplate::Joints { topic, rate_hz: rounded_hz(info.rate_hz, IMU_RATE_HZ), names })
