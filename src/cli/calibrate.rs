@@ -11,6 +11,7 @@ use dcvins::session::{self, CalibrationRequest, CalibrationRunError};
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::limit_arguments::LimitArguments;
+use crate::cli::prepared_log::prepare;
 use crate::cli::stills_arguments::StillsArguments;
 use crate::cli::terminal::{Progress, notify, print, print_json};
 use crate::cli::value_parsers::seconds;
@@ -60,11 +61,12 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<ExitOutcome> {
 }
 
 fn calibrate_log(arguments: &CalibrateArguments, log: &Path) -> Result<ExitOutcome> {
-    export::check_calibration_folder(&arguments.out, log, arguments.force)?;
+    let prepared = prepare(&[log.to_owned()], arguments.rig.as_deref(), &arguments.limits.limits())?;
+    export::check_calibration_folder(&arguments.out, &prepared.log, arguments.force)?;
     let request = CalibrationRequest {
-        log_path: log.to_owned(),
-        rig_path: arguments.rig.clone(),
-        ground_truth_path: arguments.ground_truth.clone(),
+        log_path: prepared.log,
+        rig_path: arguments.rig.clone().or(prepared.rig),
+        ground_truth_path: arguments.ground_truth.clone().or(prepared.ground_truth),
         start_s: arguments.start,
         duration_s: arguments.duration,
         limits: arguments.limits.limits(),

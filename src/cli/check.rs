@@ -13,10 +13,12 @@ use dcvins::session;
 
 use crate::cli::exit::ExitOutcome;
 use crate::cli::limit_arguments::LimitArguments;
+use crate::cli::prepared_log::prepare;
 use crate::cli::terminal::{Progress, notify, print_report};
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct CheckArguments {
+    /// The log, or a recording that is converted into the cache folder first.
     pub log: PathBuf,
     /// Rig file; default: next to the log or attached to it.
     #[arg(long, value_name = "FILE")]
@@ -35,9 +37,12 @@ pub(crate) struct CheckArguments {
 }
 
 pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitOutcome> {
+    let limits = arguments.limits.limits();
+    let prepared = prepare(std::slice::from_ref(&arguments.log), arguments.rig.as_deref(), &limits)?;
+    let rig_path = arguments.rig.clone().or(prepared.rig);
     let progress = Progress::spinner("reading the log");
-    let log = Arc::new(FlightLog::open_with(&arguments.log, &arguments.limits.limits())?);
-    let (rig, unused_keys) = match Rig::for_log_with_unused_keys(&log, arguments.rig.as_deref()) {
+    let log = Arc::new(FlightLog::open_with(&prepared.log, &limits)?);
+    let (rig, unused_keys) = match Rig::for_log_with_unused_keys(&log, rig_path.as_deref()) {
         Ok((rig, unused_keys)) => (Ok(rig), unused_keys),
         Err(error) => (Err(error), Vec::new()),
     };

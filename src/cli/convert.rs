@@ -17,6 +17,8 @@ pub(crate) struct ConvertArguments {
     /// A EuRoC/ASL folder (with mav0), a ROS 1 bag, a ROS 2 bag (its folder, one .db3 or one .mcap), an MP4 video (H.264 or
     /// H.265; with GoPro's telemetry, or with a log of the autopilot), or a log of an autopilot alone (.ulg, .bin, .tlog).
     pub source: PathBuf,
+    /// Further bags that continue a ROS 1 bag, in the order of time (`NAME_1.bag`, `NAME_2.bag`, …).
+    pub splits: Vec<PathBuf>,
     /// The log to write; the rig, where the source describes one, gets the same name with .rig.yaml.
     #[arg(short, long, visible_alias = "out", value_name = "LOG.mcap")]
     pub output: PathBuf,
@@ -67,6 +69,7 @@ impl ConvertArguments {
         let mut given = logs.into_iter().filter_map(|(kind, path)| Some(AutopilotLog { kind, path: path.clone()? }));
         ConvertOptions {
             limits: self.limits.limits(),
+            splits: self.splits.clone(),
             autopilot: given.next(),
             video_clock: self.video_offset.map(|offset_s| VideoClock { offset_s, drift_ppm: 0.0 }),
             take: self.take.clone(),
@@ -81,7 +84,8 @@ pub(crate) fn convert(arguments: &ConvertArguments) -> Result<ExitOutcome> {
     let mut options = arguments.options();
     let mut aligned = None;
     if options.autopilot.is_some() && options.video_clock.is_none() {
-        let found = export::align_video(&arguments.source, &arguments.output, &options, &mut |ratio| {
+        let rig = Some(arguments.output.with_extension("rig.yaml")).filter(|rig| rig.is_file());
+        let found = export::align_video(&arguments.source, &arguments.output, rig.as_deref(), &options, &mut |ratio| {
             progress.show(0.5 * ratio, || "aligning the video".to_owned());
             interrupt.control_flow()
         });

@@ -10,6 +10,7 @@ use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::prepared_log::prepared_log;
 use crate::cli::terminal::{Progress, notify, print, print_json};
 
 #[derive(Args, Clone, Debug)]
@@ -23,6 +24,8 @@ pub(crate) struct DiagnoseArguments {
 }
 
 pub(crate) fn diagnose(arguments: &DiagnoseArguments) -> Result<ExitOutcome> {
+    let (log, estimation) = prepared_log(std::slice::from_ref(&arguments.log), &arguments.estimation)?;
+    let arguments = &DiagnoseArguments { log, estimation, ..arguments.clone() };
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
     let interrupt = Interrupt::watch()?;
     let plan = SessionPlan { interrupted: interrupt.flag(), ..plan };

@@ -16,6 +16,9 @@ mod figure_arguments;
 mod interrupt;
 mod limit_arguments;
 mod noise;
+#[cfg(feature = "gui")]
+mod open_log;
+mod prepared_log;
 mod report;
 #[cfg(feature = "gui")]
 mod report_figures;
@@ -37,10 +40,12 @@ mod value_parsers;
 mod view;
 
 use clap::Parser as _;
+use dcvins::export::SourceError;
 use dcvins::flight_log::printable_lines;
 
 use arguments::{Arguments, Command};
 use exit::ExitOutcome;
+use terminal::notify;
 use view::ViewArguments;
 
 /// Parses the arguments of the process and runs the sub-command.
@@ -49,7 +54,7 @@ use view::ViewArguments;
 pub(crate) fn run() -> anyhow::Result<ExitOutcome> {
     let arguments = Arguments::parse();
     let done = |result: anyhow::Result<()>| result.map(|()| ExitOutcome::Success);
-    match arguments.command.unwrap_or_else(|| Command::View(ViewArguments::default())) {
+    let result = match arguments.command.unwrap_or_else(|| Command::View(ViewArguments::default())) {
         Command::View(arguments) => done(view::view(&arguments)),
         Command::Run(arguments) => run::run(&arguments),
         #[cfg(feature = "gui")]
@@ -67,6 +72,13 @@ pub(crate) fn run() -> anyhow::Result<ExitOutcome> {
         Command::Convert(arguments) => convert::convert(&arguments),
         Command::Evaluate(arguments) => done(evaluate::evaluate(&arguments)),
         Command::Export(arguments) => done(export::export(&arguments)),
+    };
+    match result {
+        Err(error) if error.downcast_ref::<SourceError>().is_some_and(SourceError::is_interrupted) => {
+            notify(&format!("dcvins: {error}"));
+            Ok(ExitOutcome::Interrupted)
+        }
+        result => result,
     }
 }
 

@@ -15,6 +15,7 @@ use dcvins::session::{self, FlightNoiseError};
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::limit_arguments::LimitArguments;
+use crate::cli::prepared_log::prepare;
 use crate::cli::terminal::{Progress, notify, print, print_json};
 use crate::cli::value_parsers::seconds;
 
@@ -56,8 +57,12 @@ pub(crate) enum Method {
 }
 
 pub(crate) fn noise(arguments: &NoiseArguments) -> Result<ExitOutcome> {
+    let limits = arguments.limits.limits();
+    let prepared = prepare(std::slice::from_ref(&arguments.log), arguments.rig.as_deref(), &limits)?;
+    let arguments =
+        &NoiseArguments { log: prepared.log, rig: arguments.rig.clone().or(prepared.rig), ..arguments.clone() };
     let progress = Progress::spinner("reading the log");
-    let log = Arc::new(FlightLog::open_with(&arguments.log, &arguments.limits.limits())?);
+    let log = Arc::new(FlightLog::open_with(&arguments.log, &limits)?);
     let rig = Rig::for_log(&log, arguments.rig.as_deref());
     if let (Err(error), true) = (&rig, arguments.rig.is_some()) {
         bail!("{error}");

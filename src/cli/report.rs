@@ -17,6 +17,7 @@ use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::prepared_log::prepared_log;
 #[cfg(feature = "gui")]
 use crate::cli::report_figures;
 use crate::cli::result_cache::{CacheArguments, CachedResult};
@@ -30,7 +31,7 @@ use crate::cli::value_parsers::seconds;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ReportArguments {
-    /// The log, or the folder of a study.
+    /// The log, a recording that is converted into the cache folder first, or the folder of a study.
     pub log: PathBuf,
     /// Folder for report.html, report.json and the files of each run.
     #[arg(short, long, visible_alias = "out", value_name = "DIR")]
@@ -59,6 +60,8 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitOutcome> {
     }
     #[cfg(feature = "gui")]
     arguments.study.require_none(&arguments.log)?;
+    let (log, estimation) = prepared_log(std::slice::from_ref(&arguments.log), &arguments.estimation)?;
+    let arguments = &ReportArguments { log, estimation, ..arguments.clone() };
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
     let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
     export::check_report_folder(&arguments.output, &labels, &arguments.log, arguments.force)?;

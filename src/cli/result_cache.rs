@@ -10,7 +10,7 @@ use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::terminal::notify;
 
 /// Environment variable with another folder for the cache; an empty value disables the cache.
-const FOLDER_VARIABLE: &str = "DCVINS_CACHE_DIR";
+pub(crate) const FOLDER_VARIABLE: &str = "DCVINS_CACHE_DIR";
 /// Size limit in bytes of a cached result.
 const MAX_RESULT_BYTES: usize = 64 << 20;
 

@@ -14,11 +14,13 @@ use crate::cli::compute::{compute, compute_until};
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::prepared_log::prepared_log;
 use crate::cli::run_summary::{describe, describe_trajectory};
 use crate::cli::terminal::{notify, print, print_json};
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct RunArguments {
+    /// The log, or a recording that is converted into the cache folder first.
     pub log: PathBuf,
     /// Folder for the files; each run gets a sub-folder with its name.
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
@@ -56,6 +58,8 @@ fn condition(text: &str) -> Result<Condition, String> {
 const SUMMARY_BUDGET_BYTES: usize = 16 << 20;
 
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
+    let (log, estimation) = prepared_log(std::slice::from_ref(&arguments.log), &arguments.estimation)?;
+    let arguments = &RunArguments { log, estimation, ..arguments.clone() };
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
     let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
     export::check_run_folders(&arguments.out, &labels, &arguments.log, arguments.force)?;

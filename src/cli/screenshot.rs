@@ -25,6 +25,7 @@ use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::ExitOutcome;
 use crate::cli::figure_arguments::FigureArguments;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::prepared_log::prepared_log;
 use crate::cli::report::own_command_line;
 use crate::cli::result_cache::{CacheArguments, CachedResult};
 use crate::cli::study_arguments::{StudyArguments, StudyPicture, write_study_picture};
@@ -33,7 +34,8 @@ use crate::cli::value_parsers::{seconds, sides};
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ScreenshotArguments {
-    /// The log, a saved session (LOG.session.json) with its forks and breakpoints, or the folder of a study.
+    /// The log, a recording that is converted into the cache folder first, a saved session (LOG.session.json) with its
+    /// forks and breakpoints, or the folder of a study.
     pub log: PathBuf,
     /// Seconds since the first message of the log; may be given several times, then the time is part of the file names
     /// [default: the end of the log, or of --to].
@@ -162,6 +164,8 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
     }
     let format = format_of(arguments)?;
     let range_ns = arguments.figure.range_ns()?;
+    let (log, estimation) = prepared_log(std::slice::from_ref(&arguments.log), &arguments.estimation)?;
+    let arguments = &ScreenshotArguments { log, estimation, ..arguments.clone() };
     let mut shown = Shown::open(arguments)?;
     let instants = Instants::of(arguments, &shown, range_ns)?;
     let stamps_ns = &instants.stamps_ns;

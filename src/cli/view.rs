@@ -8,9 +8,11 @@ use crate::cli::estimation_arguments::EstimationArguments;
 
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct ViewArguments {
-    /// The log, a saved session or the folder of a study; without one the window lists the sample logs and recent
-    /// files.
-    pub log: Option<PathBuf>,
+    /// The log, a saved session or the folder of a study; or a recording that 'dcvins convert' reads, which is converted
+    /// into the cache folder first. Several files form one log: a video and the log of its autopilot, the parts of a
+    /// split bag, and a rig. Without one the window lists the sample logs and recent files.
+    #[arg(value_name = "SOURCE")]
+    pub sources: Vec<PathBuf>,
     /// Folder of the screenshots if there is no display [default: dcvins-output/NAME].
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -32,58 +34,50 @@ pub(crate) fn view(_arguments: &ViewArguments) -> anyhow::Result<()> {
 
 #[cfg(feature = "gui")]
 mod window {
-    use std::path::Path;
+    use std::path::{Path, PathBuf};
     use std::sync::Arc;
 
     use anyhow::Result;
     use dcvins::desktop::Machine;
     use dcvins::export::{
-        self, PANEL_NAMES, RunFileOptions, ScreenshotOptions, draw_panel, is_session, read_session, write_png,
+        self, LogSources, PANEL_NAMES, RunFileOptions, ScreenshotOptions, draw_panel, is_session, read_session,
+        write_png,
     };
-    use dcvins::flight_log::ImageReader;
+    use dcvins::flight_log::{ImageReader, LogError};
     use dcvins::gui::app::run_window::{WindowError, WindowOptions, run_window};
-    use dcvins::gui::app::{PlayingLog, StudySource};
+    use dcvins::gui::app::{OpenLog, OpenRequest, StudySource};
     use dcvins::gui::theme::ThemeName;
-    use dcvins::session::{Session, SessionPlan};
+    use dcvins::session::{SessionError, SessionPlan, SessionRequest};
     use dcvins::sweep::{OpenedStudy, is_study};
     use parking_lot::Mutex;
 
     use super::ViewArguments;
     use crate::cli::compute::compute;
+    use crate::cli::estimation_arguments::EstimationArguments;
+    use crate::cli::open_log::open_log;
+    use crate::cli::prepared_log::prepared_log;
     use crate::cli::run_summary::describe;
     use crate::cli::study_arguments::write_study_pictures;
     use crate::cli::terminal::{notify, print};
 
     /// Opens the window, or writes screenshots if there is no display.
     pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
-        // Errors of the log or its rig are reported here, before a window opens.
-        let request = |log: &Path| arguments.estimation.request(log.to_owned());
-        let given = arguments.log.as_deref();
-        let study = given.filter(|path| is_study(path)).map(OpenedStudy::read).transpose()?.map(Arc::new);
-        let plan = given
-            .filter(|path| !is_session(path) && !is_study(path))
-            .map(|log| SessionPlan::open(&request(log)))
-            .transpose()?;
-        if let Some(path) = given.filter(|path| is_session(path)) {
-            read_session(path)?;
+        // Errors of the sources, of a log or of its rig are reported here, before a window opens. A recording is converted
+        // in the window, with its progress; a missing rig is asked for there.
+        let given = arguments.sources.first().map(PathBuf::as_path);
+        let alone = given.filter(|_| arguments.sources.len() == 1);
+        let study = alone.filter(|path| is_study(path)).map(OpenedStudy::read).transpose()?.map(Arc::new);
+        if study.is_none() && given.is_some() {
+            let sources = LogSources::gather(&arguments.sources, &arguments.estimation.limits.limits())?;
+            if is_session(&sources.main) {
+                read_session(&sources.main)?;
+            } else if sources.kind.is_none() {
+                check_log(&sources, &arguments.estimation)?;
+            }
         }
-        let opened = Mutex::new(plan.clone());
         let estimation = arguments.estimation.clone();
-        let open_log = move |path: &Path| {
-            let mut opened = opened.lock();
-            // The log of the command line is already open; other logs are opened here.
-            let session = match opened.take().filter(|plan| plan.log_path == path) {
-                Some(plan) => Session::start(plan),
-                None if is_session(path) => {
-                    let saved = read_session(path).map_err(|error| error.to_string())?;
-                    let session = saved.open().map_err(|error| format!("{error}: {}", path.display()))?;
-                    return Ok(Box::new(session) as Box<dyn PlayingLog>);
-                }
-                None => Session::open(&estimation.request(path.to_owned())),
-            };
-            Ok(Box::new(session.map_err(|error| error.to_string())?) as Box<dyn PlayingLog>)
-        };
-        let first_study = Mutex::new(study.clone().zip(arguments.log.clone()));
+        let open_log: OpenLog = Arc::new(move |request, progress| open_log(request, &estimation, progress));
+        let first_study = Mutex::new(study.clone().zip(given.map(Path::to_owned)));
         let open_study = move |path: &Path| {
             // The study of the command line is already read.
             let read = first_study.lock().take().filter(|(_, of)| of == path);
@@ -94,20 +88,42 @@ mod window {
             let opened = is_study(path).then(|| OpenedStudy::read(path));
             opened.map(|opened| opened.map(|study| shown(Arc::new(study))).map_err(|error| error.to_string()))
         };
+        let sources = arguments.sources.clone();
         let options = WindowOptions {
             log: None,
-            log_path: arguments.log.clone(),
-            open_log: Arc::new(open_log),
+            request: given.is_some().then_some(OpenRequest { sources, rig: None }),
+            open_log,
             open_study: Arc::new(open_study),
             desktop: Arc::new(Machine::new()),
             theme: ThemeName::Light,
             tour: arguments.tour,
         };
-        match (run_window(options), &plan, &study) {
-            (Err(WindowError::NoDisplay), Some(plan), _) => write_screenshots(plan, arguments.out.as_deref()),
-            (Err(WindowError::NoDisplay), _, Some(study)) => write_study(study, arguments.out.as_deref()),
+        match (run_window(options), &study, alone) {
+            (Err(WindowError::NoDisplay), Some(study), _) => write_study(study, arguments.out.as_deref()),
+            (Err(WindowError::NoDisplay), None, _) if given.is_some() => without_display(arguments),
             (result, ..) => Ok(result?),
         }
+    }
+
+    /// Reports an error of a log or of its rig; a log without a rig is none, since the window asks for one.
+    fn check_log(sources: &LogSources, estimation: &EstimationArguments) -> Result<()> {
+        let rig_path = sources.rig.clone().or_else(|| estimation.rig.clone());
+        let request = SessionRequest { rig_path, ..estimation.request(sources.main.clone()) };
+        match SessionPlan::open(&request) {
+            Err(SessionError::Log(LogError::NoRig { .. })) | Ok(_) => Ok(()),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Writes screenshots of a log or a recording, for a machine without a display.
+    fn without_display(arguments: &ViewArguments) -> Result<()> {
+        if let [path] = arguments.sources.as_slice()
+            && is_session(path)
+        {
+            return Err(WindowError::NoDisplay.into());
+        }
+        let (log, estimation) = prepared_log(&arguments.sources, &arguments.estimation)?;
+        write_screenshots(&SessionPlan::open(&estimation.request(log))?, arguments.out.as_deref())
     }
 
     /// Writes a screenshot of every panel of a study.

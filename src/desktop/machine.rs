@@ -8,9 +8,10 @@ use directories::UserDirs;
 
 use super::recent_files::{RecentFiles, state_folder};
 use super::{report, sample_flight};
-use crate::export::{ExportError, is_session, write_csv, write_png, write_screenshot, write_svg};
+use crate::export::{ExportError, is_session, write_csv, write_new_rig, write_png, write_screenshot, write_svg};
 use crate::flight_log::output;
 use crate::gui::desktop::{Desktop, DrawnFigure, FigureExport, PanelExport, PathEntry, SampleProgress};
+use crate::sensors::Rig;
 
 /// Maximum number of entries read from a folder.
 const MAX_ENTRIES: usize = 5000;
@@ -19,6 +20,11 @@ const MAX_ENTRIES: usize = 5000;
 const LEVELS_ABOVE: usize = 4;
 /// Folders of sample logs below these: in the repository, and below the prefix of an installed package.
 const SAMPLE_FOLDERS: [&str; 2] = ["sample_logs", "share/dcvins/sample_logs"];
+
+/// Endings of recordings that are converted when they are opened.
+const RECORDINGS: [&str; 8] = ["bag", "db3", "mp4", "mov", "m4v", "ulg", "bin", "tlog"];
+/// Endings of rigs, which are opened together with a log.
+const RIGS: [&str; 2] = ["yaml", "yml"];
 
 /// File of the saved layouts in the user's state folder.
 const LAYOUTS: &str = "layouts.json";
@@ -91,27 +97,32 @@ impl Desktop for Machine {
                 }
                 let folder = entry.path().is_dir();
                 let end = if folder { "/" } else { "" };
-                (folder || is_log(&entry.path())).then(|| PathEntry { path: format!("{prefix}{name}{end}"), folder })
+                (folder || can_be_opened(&entry.path()))
+                    .then(|| PathEntry { path: format!("{prefix}{name}{end}"), folder })
             })
             .collect();
         found.sort_by(|a, b| (!a.folder, &a.path).cmp(&(!b.folder, &b.path)));
         found
     }
 
-    fn pick_log(&self) -> Option<Receiver<Option<PathBuf>>> {
+    fn pick_log(&self) -> Option<Receiver<Vec<PathBuf>>> {
+        let mut endings: Vec<String> = vec!["mcap".to_owned(), "zstd".to_owned(), "zst".to_owned(), "json".to_owned()];
+        endings.extend(RECORDINGS.iter().chain(&RIGS).map(|ending| (*ending).to_owned()));
+        endings.extend(endings.clone().iter().map(|ending| ending.to_ascii_uppercase()));
         let mut dialog = rfd::AsyncFileDialog::new()
-            .set_title("Open flight log or session")
-            .add_filter("Flight logs and sessions", &["mcap", "MCAP", "zstd", "zst", "json"]);
+            .set_title("Open flight log, recording or session")
+            .add_filter("Flight logs, recordings, rigs and sessions", &endings)
+            .add_filter("All files", &["*"]);
         if let Ok(folder) = std::env::current_dir() {
             dialog = dialog.set_directory(folder);
         }
         // On macOS the dialog must be created on the window's thread; any thread may wait for its result.
-        let answer = dialog.pick_file();
+        let answer = dialog.pick_files();
         let (sender, receiver) = channel();
         let wait = move || {
-            let file = pollster::block_on(answer);
+            let files = pollster::block_on(answer).unwrap_or_default();
             // The receiver is dropped if the window was closed in the meantime.
-            drop(sender.send(file.map(|file| file.path().to_path_buf())));
+            drop(sender.send(files.iter().map(|file| file.path().to_path_buf()).collect()));
         };
         std::thread::Builder::new().name("file-dialog".to_owned()).spawn(wait).ok().map(|_| receiver)
     }
@@ -198,6 +209,15 @@ impl Desktop for Machine {
         Ok(fs::canonicalize(&path).unwrap_or(path))
     }
 
+    fn write_rig(&self, path: &Path, text: &str) -> Result<PathBuf, String> {
+        Rig::from_yaml(text, path).map_err(|error| error.to_string())?;
+        write_new_rig(path, text, false).map_err(|error| match error {
+            ExportError::Existing { .. } => format!("the rig exists; give another file name: {}", path.display()),
+            error => error.to_string(),
+        })?;
+        Ok(fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()))
+    }
+
     fn resident_bytes(&self) -> Option<u64> {
         let status = fs::read_to_string("/proc/self/status").ok()?;
         let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
@@ -206,12 +226,23 @@ impl Desktop for Machine {
     }
 }
 
-/// True if the window can open the file: a log, also compressed by Zstandard, or a saved session.
+/// True if the window can open the file: a log, a saved session, or a recording that is converted.
+fn can_be_opened(path: &Path) -> bool {
+    let plain = unpacked(path);
+    let is_recording =
+        plain.extension().is_some_and(|found| RECORDINGS.iter().any(|ending| found.eq_ignore_ascii_case(ending)));
+    is_log(path) || is_recording
+}
+
+/// Path without the extension of a Zstandard file.
+fn unpacked(path: &Path) -> PathBuf {
+    let packed = path.extension().is_some_and(|found| ["zstd", "zst"].iter().any(|it| found.eq_ignore_ascii_case(it)));
+    if packed { path.with_extension("") } else { path.to_path_buf() }
+}
+
+/// True for a log, also compressed by Zstandard, or a saved session.
 fn is_log(path: &Path) -> bool {
-    let is = |path: &Path, wanted: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(wanted));
-    let packed = is(path, "zstd") || is(path, "zst");
-    let plain = if packed { path.with_extension("") } else { path.to_path_buf() };
-    is(&plain, "mcap") || is_session(path)
+    unpacked(path).extension().is_some_and(|found| found.eq_ignore_ascii_case("mcap")) || is_session(path)
 }
 
 fn logs_in(folder: &Path) -> Vec<PathBuf> {
@@ -257,9 +288,11 @@ mod tests {
     }
 
     #[test]
-    fn folders_come_first_and_only_logs_are_offered() {
+    fn folders_come_first_and_only_logs_and_recordings_are_offered() {
         let folder = tempfile::tempdir().unwrap();
-        for name in ["b.mcap", "a.MCAP", "b.rig.yaml", ".hidden.mcap", "c.mcap.zstd", "c.bag.zstd"] {
+        for name in
+            ["b.mcap", "a.MCAP", "b.rig.yaml", ".hidden.mcap", "c.mcap.zstd", "c.bag.zstd", "d.MP4", "notes.txt"]
+        {
             fs::write(folder.path().join(name), "").unwrap();
         }
         fs::create_dir(folder.path().join("bags")).unwrap();
@@ -268,11 +301,27 @@ mod tests {
         let names = |typed: String| -> Vec<String> {
             machine.complete(&typed).into_iter().map(|entry| entry.path.replacen(&root, "", 1)).collect()
         };
-        assert_eq!(names(format!("{root}/")), ["/bags/", "/a.MCAP", "/b.mcap", "/c.mcap.zstd"]);
+        assert_eq!(
+            names(format!("{root}/")),
+            ["/bags/", "/a.MCAP", "/b.mcap", "/c.bag.zstd", "/c.mcap.zstd", "/d.MP4"]
+        );
         assert_eq!(names(format!("{root}/b")), ["/bags/", "/b.mcap"]);
         assert_eq!(names(format!("{root}/.h")), ["/.hidden.mcap"]);
         assert!(names(format!("{root}/nowhere/x")).is_empty());
         assert!(machine.complete("/").iter().all(|entry| entry.path.starts_with('/')));
+    }
+
+    #[test]
+    fn a_rig_is_written_if_it_can_be_read_and_never_over_another_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let (machine, path) = (machine_in(folder.path()), folder.path().join("yard.rig.yaml"));
+        let sample = include_str!("../../sample_logs/garden.rig.yaml");
+        let problem = machine.write_rig(&path, &sample.replace("gravity", "gravitation")).unwrap_err();
+        assert!(problem.contains("gravit") && !path.exists(), "{problem}");
+        let written = machine.write_rig(&path, sample).unwrap();
+        assert_eq!(fs::read_to_string(&written).unwrap(), sample);
+        let problem = machine.write_rig(&path, sample).unwrap_err();
+        assert!(problem.starts_with("the rig exists; give another file name"), "{problem}");
     }
 
     #[test]

@@ -18,6 +18,7 @@ pub(crate) mod run_files;
 #[cfg(feature = "gui")]
 pub(crate) mod screenshot;
 mod session_file;
+mod sources;
 mod stills_files;
 mod stills_report;
 mod stills_rig;
@@ -48,6 +49,7 @@ pub use screenshot::{
     panel_csv, png_bytes, write_csv, write_png, write_screenshot, write_svg,
 };
 pub use session_file::{is_session, read_session};
+pub use sources::{ConversionStage, ConvertedLogs, LogSources, PreparedLog, SourceError, prepare_log};
 pub use stills_files::write_stills;
 pub use stills_report::StillsReport;
 #[cfg(feature = "gui")]

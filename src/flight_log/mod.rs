@@ -52,6 +52,7 @@ pub use limits::{LimitExceeded, LimitKind, LimitSetting, LogLimits};
 pub use log::FlightLog;
 pub use messages::MessageKind;
 pub use rig::template as rig_template;
+pub use rig::{MissingSensors, RigCandidate, is_imu_file_of, is_rig_name, missing_sensors, rig_candidates};
 pub use sensor_frame::SensorFrame;
 pub use stills::{read_stills, read_stills_chain};
 pub use stream::FrameStream;

@@ -57,11 +57,11 @@ pub enum SampleProgress {
 pub trait Desktop: Send + Sync {
     /// Folders and logs whose paths start with the typed text, in order.
     fn complete(&self, typed: &str) -> Vec<PathEntry>;
-    /// Opens the desktop's file dialog for a log or a saved session without waiting for it; `None` if there is no such
-    /// dialog.
+    /// Opens the desktop's file dialog for logs, recordings and saved sessions without waiting for it; `None` if there is
+    /// no such dialog.
     ///
-    /// The receiver gets `None` if nothing is chosen, and immediately if the desktop has no such dialog.
-    fn pick_log(&self) -> Option<Receiver<Option<PathBuf>>>;
+    /// The receiver gets no path if nothing is chosen, and immediately if the desktop has no such dialog.
+    fn pick_log(&self) -> Option<Receiver<Vec<PathBuf>>>;
     /// Recently opened logs that still exist, newest first.
     fn recent_logs(&self) -> Vec<PathBuf>;
     /// Moves a log to the head of the recent ones.
@@ -93,6 +93,8 @@ pub trait Desktop: Send + Sync {
     fn start_report(&self, name: &str, arguments: &[String]) -> Result<Receiver<Result<PathBuf, String>>, String>;
     /// Writes a session of a log with this name, and returns the path.
     fn write_session(&self, name: &str, text: &str) -> Result<PathBuf, String>;
+    /// Writes the text of a new rig after reading it as a rig, and returns its path; an existing file is not replaced.
+    fn write_rig(&self, path: &Path, text: &str) -> Result<PathBuf, String>;
     /// Resident memory of this process in bytes.
     fn resident_bytes(&self) -> Option<u64>;
 }

@@ -13,7 +13,7 @@ use std::sync::{Arc, LazyLock};
 use dcvins::export::{ScreenshotOptions, draw_panel, draw_study_panel};
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::ns_from_seconds;
-use dcvins::gui::app::{App, OpenLog};
+use dcvins::gui::app::{App, OpenFailure, OpenLog};
 use dcvins::gui::desktop::{Desktop, FigureExport, PanelExport, PathEntry, SampleProgress};
 use dcvins::gui::rendering::headless::{self, Headless, HeadlessOptions};
 use dcvins::gui::rendering::painter::Painter;
@@ -140,7 +140,8 @@ impl Subject {
                 cut_to_dialog(&window, headless.context())
             }
             Self::Welcome => {
-                let open: OpenLog = Arc::new(|path: &Path| Err(format!("{} is not opened here", path.display())));
+                let open: OpenLog =
+                    Arc::new(|request, _| Err(OpenFailure::Problem(format!("{} is not opened here", request.names()))));
                 let mut app = App::new(open, Arc::new(Paper), options.theme);
                 headless::draw(options, |ui| app.ui(ui))
             }
@@ -180,7 +181,7 @@ impl Desktop for Paper {
         Vec::new()
     }
 
-    fn pick_log(&self) -> Option<Receiver<Option<PathBuf>>> {
+    fn pick_log(&self) -> Option<Receiver<Vec<PathBuf>>> {
         None
     }
 
@@ -232,6 +233,10 @@ impl Desktop for Paper {
 
     fn write_session(&self, name: &str, _text: &str) -> Result<PathBuf, String> {
         Ok(PathBuf::from(name))
+    }
+
+    fn write_rig(&self, path: &Path, _text: &str) -> Result<PathBuf, String> {
+        Ok(path.to_path_buf())
     }
 
     fn sample_folder(&self) -> &Path {

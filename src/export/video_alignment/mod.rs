@@ -94,13 +94,15 @@ impl fmt::Display for VideoAlignment {
 }
 
 /// Estimates the time offset of a video in the autopilot's log of `options` within ±60 s of the first guess, which is
-/// that of the conversion. If there is a rig next to `output`, its camera model is used.
+/// that of the conversion. The camera model is that of `rig`, else the one that the conversion assumes. Temporary files lie
+/// in the folder of `output`.
 ///
 /// # Errors
 /// If the sources cannot be converted, or the rotations do not determine a unique offset.
 pub fn align_video(
     source: &Path,
     output: &Path,
+    rig: Option<&Path>,
     options: &ConvertOptions,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<VideoAlignment, VideoAlignmentError> {
@@ -111,8 +113,7 @@ pub fn align_video(
     let report = convert_with(source, &path, options, &mut |ratio| progress(CONVERTED * ratio))?;
     let guess = report.video_clock.unwrap_or_default();
     let log = Arc::new(FlightLog::open_with(&path, &options.limits)?);
-    let existing = output.with_extension("rig.yaml");
-    let rig = Rig::for_log(&log, existing.is_file().then_some(existing.as_path()))?;
+    let rig = Rig::for_log(&log, rig)?;
     let camera_key = rig.cameras.first().map(|camera| camera.key.clone()).unwrap_or_default();
     let rotations = camera_rotations(&log, &rig, &camera_key, SECTIONS, SECTION_S)?;
     let aligned = align_camera(&log, &rig, &camera_key, &rotations, SEARCH_S);

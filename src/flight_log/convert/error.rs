@@ -41,6 +41,8 @@ pub enum ConvertError {
     },
     #[error("{kind} has no video: --ulog, --dataflash, --tlog and --video-offset are for an MP4 video as the source: {}", path.display())]
     NoVideo { kind: &'static str, path: PathBuf },
+    #[error("{kind} has no further parts: several sources are the bags of one split ROS 1 recording: {}", path.display())]
+    NoSplits { kind: &'static str, path: PathBuf },
     /// The autopilot's log of a video is of another kind than given.
     #[error("no {expected}, {found}: {}", path.display())]
     NotThatLog { expected: &'static str, found: String, path: PathBuf },

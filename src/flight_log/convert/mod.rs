@@ -17,55 +17,25 @@ mod ros1_record;
 mod ros2_bag;
 mod sink;
 mod source_file;
+mod source_kind;
 mod sqlite;
 mod taken_records;
 
 use std::fs;
-use std::io::Read as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 pub use error::ConvertError;
 pub use options::{AutopilotLog, AutopilotLogKind, ConvertOptions, VideoClock};
 pub use report::{ConversionReport, ConvertedTopic};
+pub use source_kind::{SourceKind, source_kind};
 
-use super::file::{LogFile, ZSTD_MAGIC, kind_of, unpacked_name};
-use super::foreign;
-use super::log::lfs_pointer;
-use super::text::log_name;
-use super::{FlightLog, LogError, LogLimits, LogWriter, LogWriterOptions};
+use super::{FlightLog, LogError, LogWriter, LogWriterOptions};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 use recording::VideoFacts;
 use sink::LogSink;
 use taken_records::TakenRecords;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum SourceKind {
-    Euroc,
-    Ros1Bag,
-    Ros2Bag,
-    Sqlite,
-    /// SQLite compressed with Zstandard.
-    PackedSqlite,
-    Mcap,
-    Video,
-    Autopilot(AutopilotLogKind),
-}
-
-impl SourceKind {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Euroc => "EuRoC folder",
-            Self::Ros1Bag => "ROS 1 bag",
-            Self::Ros2Bag => "ROS 2 bag",
-            Self::Sqlite | Self::PackedSqlite => "ROS 2 bag (one SQLite file)",
-            Self::Mcap => "MCAP",
-            Self::Video => "MP4 video",
-            Self::Autopilot(kind) => kind.name(),
-        }
-    }
-}
 
 /// Converts `source` into the log `output`, with a rig next to it if the source has a calibration; `progress` is called
 /// with the completed fraction, from 0 to 1.
@@ -93,14 +63,24 @@ pub fn convert_with(
     options: &ConvertOptions,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<ConversionReport, ConvertError> {
-    let kind = detect(source, &options.limits)?;
+    let kind = source_kind(source, &options.limits)?;
     if kind != SourceKind::Video && (options.autopilot.is_some() || options.video_clock.is_some()) {
         return Err(ConvertError::NoVideo { kind: kind.name(), path: source.to_owned() });
+    }
+    if kind != SourceKind::Ros1Bag && !options.splits.is_empty() {
+        return Err(ConvertError::NoSplits { kind: kind.name(), path: source.to_owned() });
+    }
+    for split in &options.splits {
+        let kind = source_kind(split, &options.limits)?;
+        if kind != SourceKind::Ros1Bag {
+            return Err(ConvertError::NoSplits { kind: kind.name(), path: split.clone() });
+        }
     }
     let same = |a: &Path, b: &Path| fs::canonicalize(a).ok().is_some_and(|path| fs::canonicalize(b).ok() == Some(path));
     if same(source, output)
         || output.parent().is_some_and(|folder| kind == SourceKind::Ros2Bag && same(source, folder))
         || options.autopilot.as_ref().is_some_and(|log| same(&log.path, output))
+        || options.splits.iter().any(|split| same(split, output))
     {
         return Err(ConvertError::OntoItself { path: output.to_owned() });
     }
@@ -207,8 +187,11 @@ fn write(
             rig.map_or(SourceRig::None, |rig| SourceRig::Calibrated(Box::new(rig)))
         }
         SourceKind::Ros1Bag => {
-            let bag = ros1_bag::open(source, &sink)?;
-            ros1_bag::convert(&bag, &mut sink).map(|()| SourceRig::None)?
+            for path in std::iter::once(source).chain(options.splits.iter().map(PathBuf::as_path)) {
+                let bag = ros1_bag::open(path, &sink)?;
+                ros1_bag::convert(&bag, &mut sink)?;
+            }
+            SourceRig::None
         }
         SourceKind::Ros2Bag => ros2_bag::convert(source, &mut sink).map(|()| SourceRig::None)?,
         SourceKind::Sqlite => {
@@ -232,71 +215,4 @@ fn write(
     };
     let report = sink.finish(kind.name(), source)?;
     Ok((report, rig))
-}
-
-/// Number of bytes at the start that identify the kind of a source.
-const START_BYTES: usize = 512;
-
-fn detect(source: &Path, limits: &LogLimits) -> Result<SourceKind, ConvertError> {
-    let metadata = fs::metadata(source).map_err(ConvertError::io("open the source", source))?;
-    let unknown = |found: String| ConvertError::UnknownSource { found, path: source.to_owned() };
-    if metadata.is_dir() {
-        return if euroc::root(source).is_some() {
-            Ok(SourceKind::Euroc)
-        } else if ros2_bag::is_bag(source) {
-            Ok(SourceKind::Ros2Bag)
-        } else {
-            Err(unknown(
-                "a folder without mav0/imu0/data.csv and without metadata.yaml, .db3 or .mcap files".to_owned(),
-            ))
-        };
-    }
-    if !metadata.is_file() {
-        return Err(unknown(kind_of(&metadata).to_owned()));
-    }
-    let mut start = Vec::new();
-    let file = fs::File::open(source).map_err(ConvertError::io("open the source", source))?;
-    file.take(START_BYTES as u64).read_to_end(&mut start).map_err(ConvertError::io("read the source", source))?;
-    let packed = start.starts_with(&ZSTD_MAGIC);
-    if packed {
-        // The name gives the kind of the content, so that it is not decompressed twice.
-        let name = unpacked_name(source);
-        let ending = name.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-        match ending.as_deref() {
-            Some("db3") => return Ok(SourceKind::PackedSqlite),
-            Some("mcap") => return Ok(SourceKind::Mcap),
-            Some("bag") => return Ok(SourceKind::Ros1Bag),
-            _ => {
-                let plain = LogFile::open(source, limits)?;
-                start = plain
-                    .read(0..plain.len().min(START_BYTES))
-                    .map_err(|problem| ConvertError::unreadable(problem, source))?;
-            }
-        }
-    }
-    if start.starts_with(mcap::MAGIC) {
-        Ok(SourceKind::Mcap)
-    } else if start.starts_with(ros1_bag::MAGIC) {
-        Ok(SourceKind::Ros1Bag)
-    } else if start.starts_with(b"#ROSBAG") {
-        let version = String::from_utf8_lossy(&start[1..]).lines().next().unwrap_or_default().to_owned();
-        Err(unknown(format!("a bag of version {version:?}; only ROSBAG V2.0 is read ('rosbag fix' makes one)")))
-    } else if start.starts_with(b"SQLite format 3") {
-        Ok(if packed { SourceKind::PackedSqlite } else { SourceKind::Sqlite })
-    } else if recording::is_movie(&start) {
-        Ok(SourceKind::Video)
-    } else if let Some(kind) = recording::autopilot_log_kind(&start) {
-        Ok(SourceKind::Autopilot(kind))
-    } else if let Some(found) = foreign::without_imu(&start, &log_name(source)) {
-        Err(ConvertError::WithoutImu { found, path: source.to_owned() })
-    } else if start.is_empty() {
-        Err(unknown("an empty file".to_owned()))
-    } else if let Some(bytes) = lfs_pointer(&start) {
-        let problem =
-            format!("a Git LFS pointer in place of the file ({bytes} bytes): fetch the file with `git lfs pull`");
-        Err(ConvertError::unreadable(problem, source))
-    } else {
-        let bytes: Vec<String> = start.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
-        Err(unknown(format!("a file that begins with the bytes {}", bytes.join(" "))))
-    }
 }

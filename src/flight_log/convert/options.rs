@@ -8,6 +8,8 @@ use super::super::LogLimits;
 pub struct ConvertOptions {
     /// Limits on reading the source.
     pub limits: LogLimits,
+    /// Bags that continue a ROS 1 bag, in the order of time, as `rosbag record --split` writes them.
+    pub splits: Vec<PathBuf>,
     /// Autopilot's log of the flight in a video.
     pub autopilot: Option<AutopilotLog>,
     /// Relation of the video's clock to the autopilot's log; if not given, by the recorded times of both, else both

@@ -3,6 +3,7 @@
 pub(crate) mod attitude;
 mod camera_facts;
 pub(crate) mod camera_info;
+mod candidates;
 mod document;
 mod fields;
 mod find;
@@ -18,3 +19,5 @@ pub mod template;
 #[cfg(test)]
 mod tests;
 mod write;
+
+pub use candidates::{MissingSensors, RigCandidate, is_imu_file_of, is_rig_name, missing_sensors, rig_candidates};

@@ -1,9 +1,8 @@
 //! Work in a session that leaving it would lose.
 
-use std::path::PathBuf;
-
 use serde_json::Value;
 
+use super::open_request::OpenRequest;
 use super::playing_log::PlayingLog;
 use crate::gui::units::counted;
 
@@ -16,7 +15,7 @@ pub(super) enum Leaving {
     Quit,
     /// Close the log and go back to the welcome view.
     CloseLog,
-    Open(PathBuf),
+    Open(OpenRequest),
 }
 
 /// Forks, breakpoints and markers of a session in saved form. Runs, layout and cursor are not included: they are easily

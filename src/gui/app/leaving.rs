@@ -50,7 +50,7 @@ impl App {
                 ui.send_viewport_cmd(ViewportCommand::Close);
             }
             Leaving::CloseLog => self.close_log(),
-            Leaving::Open(path) => self.open(path),
+            Leaving::Open(request) => self.open(request),
         }
     }
 

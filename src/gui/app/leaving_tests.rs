@@ -1,14 +1,14 @@
 //! Tests: leaving a log, restoring the window, and names in the welcome view.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
-use super::tests::{Dropped, SampleLog, TestDesktop, app, opened, run_until};
-use super::{App, OpenLog, PlayingLog};
+use super::App;
+use super::tests::{Dropped, TestDesktop, app, opened, run_until, sample_opener};
 use crate::gui::desktop::Desktop;
 use crate::gui::theme::ThemeName;
 
@@ -61,6 +61,8 @@ fn unsaved_work_is_asked_about_before_it_is_left() {
     // Opening another log after saving.
     harness.input_mut().dropped_files.push(Arc::new(Dropped(PathBuf::from("/x/b.mcap"))));
     harness.run_steps(3);
+    harness.get_by_role_and_label(egui::Role::Button, "Open").click();
+    harness.run_steps(3);
     assert!(harness.query_by_label(question).is_some());
     harness.get_by_label("Save").click();
     run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/x/b.mcap")));
@@ -107,8 +109,7 @@ fn the_layout_is_kept_and_restored() {
     harness.run_steps(90);
     let kept = desktop.window.lock().unwrap().clone().expect("it is stored");
     assert!(kept.contains("\"preset\":\"Scene\"") && kept.contains("\"size\""), "{kept}");
-    let open: OpenLog = Arc::new(|path: &Path| Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>));
-    let again = App::new(open, desktop as Arc<dyn Desktop>, ThemeName::Dark);
+    let again = App::new(sample_opener(), desktop as Arc<dyn Desktop>, ThemeName::Dark);
     assert!(again.state.last_layout_value() == harness.state().state.last_layout_value());
 }
 

@@ -5,6 +5,11 @@ mod kept_window;
 mod leaving;
 #[cfg(test)]
 mod leaving_tests;
+mod open;
+mod open_request;
+#[cfg(test)]
+mod open_tests;
+mod opening;
 mod opening_cursor;
 mod playing_log;
 #[cfg(test)]
@@ -12,6 +17,7 @@ mod question_tests;
 mod repaint;
 mod report;
 mod requests;
+mod rig_question;
 pub mod run_window;
 mod sample;
 mod session_log;
@@ -28,17 +34,20 @@ mod welcome;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use egui::{CentralPanel, Frame, Ui, ViewportCommand, vec2};
 
-use self::departure::{Departure, Leaving, Work};
+use self::departure::{Departure, Work};
 use self::kept_window::{KeptWindow, SHOWN_FRAMES, STORED_AFTER_S, WindowKeeper, move_inside_screen};
+pub use self::open_request::{OpenFailure, OpenLog, OpenProgress, OpenRequest, OpenedLog, RigQuestion};
+use self::opening::Opening;
 use self::opening_cursor::OpeningCursor;
 use self::playing_log::Images;
-pub use self::playing_log::{OpenLog, PlayingLog};
+pub use self::playing_log::PlayingLog;
 use self::repaint::{POLL_PERIOD, until_next_step};
+use self::rig_question::RigPage;
 use self::shown_study::ShownStudy;
 pub use self::shown_study::{OpenStudy, StudySource};
 use self::welcome::{Choice, Welcome};
@@ -57,21 +66,6 @@ const MAX_FRAME_TIME_S: f64 = 2.0;
 /// Period in seconds at which the memory of the process is read.
 const MEMORY_PERIOD_S: f64 = 1.0;
 
-/// Result of a thread that opens a path.
-enum Opened {
-    /// A log or a saved session.
-    Log(Box<dyn PlayingLog>),
-    Study(Arc<dyn StudySource>),
-    /// A run of the open study, with comparable runs.
-    RunOfStudy(Box<dyn PlayingLog>),
-}
-
-/// A log or a study that is being opened on another thread.
-struct Opening {
-    path: PathBuf,
-    result: Receiver<Result<Opened, String>>,
-}
-
 pub struct App {
     open_log: OpenLog,
     desktop: Arc<dyn Desktop>,
@@ -86,6 +80,10 @@ pub struct App {
     /// Wall-clock time of the window's last frame in seconds, if playback ran then.
     played_s: Option<f64>,
     opening: Option<Opening>,
+    /// Dropped files that wait for the answer whether they replace what is open.
+    replacement: Option<OpenRequest>,
+    /// Page on which the rig of a log is chosen or described.
+    rig_page: Option<RigPage>,
     departure: Departure,
     keeper: WindowKeeper,
     welcome: Welcome,
@@ -130,6 +128,8 @@ impl App {
             wakes: false,
             played_s: None,
             opening: None,
+            replacement: None,
+            rig_page: None,
             tour_of: None,
             departure: Departure::default(),
             keeper: WindowKeeper::new(kept),
@@ -142,29 +142,6 @@ impl App {
             title: String::new(),
             memory_read_s: None,
             report: None,
-        }
-    }
-
-    /// Starts to open a log or a study; the current one stays open until then.
-    pub fn open(&mut self, path: PathBuf) {
-        let (open_log, open_study, target) = (Arc::clone(&self.open_log), self.open_study.clone(), path.clone());
-        self.open_on_thread(path, move || match open_study.and_then(|open_study| open_study(&target)) {
-            Some(study) => study.map(Opened::Study),
-            None => open_log(&target).map(Opened::Log),
-        });
-    }
-
-    fn open_on_thread(&mut self, path: PathBuf, open: impl FnOnce() -> Result<Opened, String> + Send + 'static) {
-        let (sender, result) = channel();
-        let thread = std::thread::Builder::new().name("open-log".to_owned()).spawn(move || {
-            // The receiver has been dropped if another log was requested meanwhile.
-            drop(sender.send(open()));
-        });
-        match thread {
-            Ok(_) => self.opening = Some(Opening { path, result }),
-            Err(error) => {
-                self.state.notices.show_message(NoticeLevel::Error, format!("Cannot start a thread: {error}"));
-            }
         }
     }
 
@@ -214,6 +191,7 @@ impl App {
         } else {
             self.welcome_ui(ui);
         }
+        self.opening_dialogs_ui(ui);
         self.take_requests(ui);
         self.receive_report(ui);
         self.update_title(ui);
@@ -295,7 +273,7 @@ impl App {
         self.opening_cursor.update(log.as_mut(), now_s);
         let (recording, playback, generation) = (log.recording(), log.playback(), log.generation());
         self.state.progress = self.progress.read(&recording, Some(now_s));
-        self.state.opening = self.opening.as_ref().map(|opening| opening.path.clone());
+        self.state.opening = self.opening.as_ref().map(Opening::text);
         self.state.study = self.study.as_ref().map(ShownStudy::name);
         self.state.panels.timeline.pace.frame(playback.playing, now_s, log.cursor_ns());
         let mut commands = Vec::new();
@@ -332,45 +310,6 @@ impl App {
         self.report_warnings(&recording);
     }
 
-    fn take_opened(&mut self) {
-        let Some(opening) = &self.opening else { return };
-        match opening.result.try_recv() {
-            Ok(Ok(opened)) => {
-                let path = self.opening.take().map(|opening| opening.path);
-                match opened {
-                    Opened::Log(log) => self.show(log, path.as_deref()),
-                    Opened::Study(study) => self.show_study(study, path.clone().unwrap_or_default()),
-                    Opened::RunOfStudy(log) => self.show_session(log),
-                }
-                if self.tour_of.take().is_some_and(|of| Some(of) == path) {
-                    self.state.start_tour();
-                }
-            }
-            Ok(Err(message)) => {
-                self.opening = None;
-                self.state.notices.show_message(NoticeLevel::Error, message);
-            }
-            Err(TryRecvError::Empty) => {}
-            Err(TryRecvError::Disconnected) => {
-                let text = format!("Cannot open {}: the loader thread stopped", opening.path.display());
-                self.state.notices.show_message(NoticeLevel::Error, text);
-                self.opening = None;
-            }
-        }
-    }
-
-    fn take_dropped(&mut self, ui: &Ui) {
-        let dropped: Vec<PathBuf> =
-            ui.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
-        if dropped.len() > 1 {
-            let text = format!("{} files dropped; only the first one is opened", dropped.len());
-            self.state.notices.show_message(NoticeLevel::Info, text);
-        }
-        if let Some(path) = dropped.into_iter().next() {
-            self.leave(ui, Leaving::Open(path));
-        }
-    }
-
     fn read_memory(&mut self, ui: &Ui) {
         let now_s = ui.input(|input| input.time);
         if self.memory_read_s.is_none_or(|read_s| now_s - read_s >= MEMORY_PERIOD_S) {
@@ -392,9 +331,17 @@ impl App {
 
     /// Draws the view, the manual over it and the notices, and executes the choice.
     fn welcome_ui(&mut self, ui: &mut Ui) {
-        let opening = self.opening.as_ref().map(|opening| opening.path.as_path());
+        let mut cancelled = false;
         let frame = Frame::new().fill(self.theme.surface).inner_margin(20);
-        let chosen = CentralPanel::no_frame().frame(frame).show(ui, |ui| self.welcome.ui(ui, &self.theme, opening));
+        let chosen = CentralPanel::no_frame().frame(frame).show(ui, |ui| {
+            let opening = self.opening.as_ref();
+            let mut opening_ui = opening.map(|it| |ui: &mut Ui| cancelled = it.ui(ui, &self.theme));
+            let busy = opening_ui.as_mut().map(|draw| draw as &mut dyn FnMut(&mut Ui));
+            self.welcome.ui(ui, &self.theme, busy)
+        });
+        if cancelled {
+            self.opening = None;
+        }
         self.state.help.welcome_ui(ui, &self.theme);
         self.state.focus_ring_ui(ui, &self.theme);
         self.state.notices.toasts_ui(ui, &self.theme);
@@ -405,10 +352,10 @@ impl App {
 
     fn take_choice(&mut self, choice: Choice) {
         match choice {
-            Choice::Open(path) => self.open(path),
+            Choice::Open(path) => self.open(OpenRequest::of(path)),
             Choice::Tour(path) => {
                 self.tour_of = Some(path.clone());
-                self.open(path);
+                self.open(OpenRequest::of(path));
             }
             Choice::Manual => self.state.help.manual.show(None),
             Choice::Tutorial => self.state.help.manual.show_tutorial(),
@@ -420,7 +367,7 @@ impl App {
         if self.log.is_some() {
             self.state.start_tour();
         } else if let Some(opening) = &self.opening {
-            self.tour_of = Some(opening.path.clone());
+            self.tour_of = Some(opening.path());
         } else if let Some(choice) = self.welcome.sample(true) {
             self.take_choice(choice);
         }

@@ -1,6 +1,5 @@
 //! Interface of a session that the window needs.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use crate::gui::{ImageSource, Playback};
@@ -32,9 +31,6 @@ pub trait PlayingLog: Send {
     /// Panel layout of the saved session.
     fn layout(&self) -> Option<&serde_json::Value>;
 }
-
-/// Opens a log. An error message states cause and remedy.
-pub type OpenLog = Arc<dyn Fn(&Path) -> Result<Box<dyn PlayingLog>, String> + Send + Sync>;
 
 /// The images of the session as an [`ImageSource`].
 pub(super) struct Images<'a>(pub(super) &'a mut dyn PlayingLog);

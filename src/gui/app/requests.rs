@@ -4,6 +4,7 @@ use egui::Ui;
 
 use super::App;
 use super::departure::{Leaving, Work};
+use super::open_request::OpenRequest;
 use crate::gui::desktop::{FigureExport, PanelExport};
 use crate::gui::window::{NoticeLevel, WindowRequest};
 
@@ -14,7 +15,10 @@ impl App {
             // The next frame shows the result.
             ui.ctx().request_repaint();
             match request {
-                WindowRequest::OpenLog(path) => self.leave(ui, Leaving::Open(path)),
+                WindowRequest::OpenLog(sources) => {
+                    self.leave(ui, Leaving::Open(OpenRequest { sources, rig: None }));
+                }
+                WindowRequest::CancelOpening => self.opening = None,
                 WindowRequest::CloseLog => self.leave(ui, Leaving::CloseLog),
                 WindowRequest::Quit => self.leave(ui, Leaving::Quit),
                 WindowRequest::Leave { save } => self.leave_as_asked(ui, save),

@@ -1,7 +1,6 @@
 //! Opening the window on a display.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use egui::{IconData, ViewportBuilder};
@@ -9,7 +8,7 @@ use thiserror::Error;
 
 use super::kept_window::{KeptWindow, move_inside_screen};
 use super::software_window::SoftwareWindow;
-use crate::gui::app::{App, OpenLog, OpenStudy, PlayingLog};
+use crate::gui::app::{App, OpenLog, OpenRequest, OpenStudy, PlayingLog};
 use crate::gui::desktop::Desktop;
 use crate::gui::scene::SceneBackend;
 use crate::gui::theme::ThemeName;
@@ -36,8 +35,8 @@ pub enum WindowError {
 pub struct WindowOptions {
     /// A session that is already open.
     pub log: Option<Box<dyn PlayingLog>>,
-    /// Log to open when the window is shown.
-    pub log_path: Option<PathBuf>,
+    /// Files to open when the window is shown.
+    pub request: Option<OpenRequest>,
     /// Opens the logs that the user selects.
     pub open_log: OpenLog,
     pub open_study: OpenStudy,
@@ -76,8 +75,8 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
                 if let Some(log) = options.log {
                     app.show(log, None);
                 }
-                if let Some(path) = options.log_path {
-                    app.open(path);
+                if let Some(request) = options.request {
+                    app.open(request);
                 }
                 if options.tour {
                     app.start_tour();

@@ -1,6 +1,6 @@
 //! Tests of the application with a session that processes a sample log.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use egui::{Key, Modifiers, Role};
@@ -8,7 +8,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 use super::tests::{TestDesktop, run_until};
-use super::{App, OpenLog};
+use super::{App, OpenFailure, OpenLog};
 use crate::gui::desktop::Desktop;
 use crate::gui::painted_texts::painted_texts;
 use crate::gui::theme::ThemeName;
@@ -20,7 +20,7 @@ pub(super) fn window_over_garden(spec: &str, duration_s: f64) -> Harness<'static
     let specs = vec![spec.parse().unwrap()];
     let request = SessionRequest { log_path, specs, duration_s: Some(duration_s), ..SessionRequest::default() };
     let session = Session::start(SessionPlan::open(&request).unwrap()).unwrap();
-    let open: OpenLog = Arc::new(|_: &Path| Err("no other log is opened here".to_owned()));
+    let open: OpenLog = Arc::new(|_, _| Err(OpenFailure::Problem("no other log is opened here".to_owned())));
     let mut app = App::new(open, Arc::new(TestDesktop::default()) as Arc<dyn Desktop>, ThemeName::Dark);
     app.show(Box::new(session), None);
     let mut harness = Harness::builder().with_size([1500.0, 900.0]).build_ui_state(|ui, app: &mut App| app.ui(ui), app);

@@ -5,8 +5,10 @@ use std::sync::Arc;
 
 use egui::Ui;
 
+use super::App;
+use super::open_request::{OpenFailure, OpenRequest};
+use super::opening::Opened;
 use super::shown_study::{OpenStudy, ShownStudy, StudySource};
-use super::{App, Opened};
 use crate::gui::study::{StudyOptions, StudyRequest, StudyState, study_ui};
 use crate::gui::theme::MAX_RUNS;
 use crate::gui::window::NoticeLevel;
@@ -72,6 +74,9 @@ impl App {
         let title = table.title_of(row);
         let source = Arc::clone(&study.source);
         self.state.notices.show_message(NoticeLevel::Info, format!("Opening {title}"));
-        self.open_on_thread(PathBuf::from(title), move || source.open_runs(&rows).map(Opened::RunOfStudy));
+        let request = OpenRequest::of(PathBuf::from(title));
+        self.open_on_thread(request, move |_| {
+            source.open_runs(&rows).map(Opened::RunOfStudy).map_err(OpenFailure::Problem)
+        });
     }
 }

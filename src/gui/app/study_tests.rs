@@ -7,8 +7,8 @@ use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
-use super::tests::{SampleLog, TestDesktop, opened, run_until};
-use super::{App, OpenLog, OpenStudy, PlayingLog, StudySource};
+use super::tests::{SampleLog, TestDesktop, opened, run_until, sample_opener};
+use super::{App, OpenLog, OpenRequest, OpenStudy, PlayingLog, StudySource};
 use crate::gui::desktop::Desktop;
 use crate::gui::theme::ThemeName;
 use crate::study::view::Study;
@@ -37,7 +37,7 @@ impl StudySource for SampleStudy {
 /// A window in which a study has been opened by its path.
 fn with_study() -> (Harness<'static, App>, Arc<SampleStudy>) {
     let source = Arc::new(SampleStudy { study: Arc::new(synthetic_study(1)), opened: Mutex::default() });
-    let open: OpenLog = Arc::new(|path: &Path| Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>));
+    let open: OpenLog = sample_opener();
     let shared = Arc::clone(&source);
     let open_study: OpenStudy = Arc::new(move |path: &Path| {
         let shared = Arc::clone(&shared);
@@ -45,7 +45,7 @@ fn with_study() -> (Harness<'static, App>, Arc<SampleStudy>) {
     });
     let desktop = Arc::new(TestDesktop::default()) as Arc<dyn Desktop>;
     let mut app = App::new(open, desktop, ThemeName::Dark).with_studies(open_study);
-    app.open(PathBuf::from("/studies/gimbal-sweep"));
+    app.open(OpenRequest::of(PathBuf::from("/studies/gimbal-sweep")));
     let mut harness = Harness::builder().with_size([1600.0, 900.0]).build_ui_state(|ui, app: &mut App| app.ui(ui), app);
     run_until(&mut harness, |harness| harness.state().has_study());
     harness.run_steps(3);
@@ -90,7 +90,7 @@ fn a_run_that_cannot_be_opened_is_reported_and_the_study_stays() {
 #[test]
 fn another_log_replaces_the_study() {
     let (mut harness, _) = with_study();
-    harness.state_mut().open(PathBuf::from("/logs/city.mcap"));
+    harness.state_mut().open(OpenRequest::of(PathBuf::from("/logs/city.mcap")));
     run_until(&mut harness, |harness| opened(harness).is_some());
     assert!(!harness.state().has_study());
     harness.run_steps(2);

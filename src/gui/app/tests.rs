@@ -8,7 +8,7 @@ use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
-use super::{App, OpenLog, PlayingLog};
+use super::{App, OpenFailure, OpenLog, OpenedLog, PlayingLog};
 use crate::gui::desktop::{Desktop, FigureExport, PanelExport, PathEntry, SampleProgress};
 use crate::gui::samples::{FRAME_PERIOD_NS, first_tracked_frame, sample_images, sample_recording_of};
 use crate::gui::theme::ThemeName;
@@ -104,7 +104,9 @@ pub(super) struct TestDesktop {
     settings: Mutex<Option<String>>,
     pub(super) window: Mutex<Option<String>>,
     /// Result of the desktop's file dialog; `None` without such a dialog.
-    picked: Mutex<Option<Receiver<Option<PathBuf>>>>,
+    picked: Mutex<Option<Receiver<Vec<PathBuf>>>>,
+    /// Rigs that were written, with their texts.
+    pub(super) rigs: Mutex<Vec<(PathBuf, String)>>,
 }
 
 impl Desktop for TestDesktop {
@@ -117,7 +119,7 @@ impl Desktop for TestDesktop {
             .collect()
     }
 
-    fn pick_log(&self) -> Option<Receiver<Option<PathBuf>>> {
+    fn pick_log(&self) -> Option<Receiver<Vec<PathBuf>>> {
         self.picked.lock().unwrap().take()
     }
 
@@ -191,6 +193,11 @@ impl Desktop for TestDesktop {
         Ok(PathBuf::from(format!("/out/{name}.session.json")))
     }
 
+    fn write_rig(&self, path: &Path, text: &str) -> Result<PathBuf, String> {
+        self.rigs.lock().unwrap().push((path.to_path_buf(), text.to_owned()));
+        Ok(path.to_path_buf())
+    }
+
     fn resident_bytes(&self) -> Option<u64> {
         Some(300 << 20)
     }
@@ -209,12 +216,24 @@ impl egui::DroppedFile for Dropped {
     }
 }
 
+/// The sample log under a path.
+pub(super) fn opened_log(path: &Path) -> OpenedLog {
+    OpenedLog { log: Box::new(SampleLog::new(path)), remembered: path.to_path_buf(), notices: Vec::new() }
+}
+
+/// Opens the sample log under the first path of a request.
+pub(super) fn sample_opener() -> OpenLog {
+    Arc::new(|request, _| Ok(opened_log(&request.sources[0])))
+}
+
 pub(super) fn app() -> (Harness<'static, App>, Arc<TestDesktop>) {
-    let open: OpenLog = Arc::new(|path: &Path| {
+    let open: OpenLog = Arc::new(|request, _| {
+        let path = request.sources.first().expect("there is a path");
         if path.extension().is_some_and(|extension| extension == "mcap") {
-            Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>)
+            Ok(opened_log(path))
         } else {
-            Err(format!("this is not an MCAP file: it begins with 'hello' ({})", path.display()))
+            let text = format!("this is not an MCAP file: it begins with 'hello' ({})", path.display());
+            Err(OpenFailure::Problem(text))
         }
     });
     let desktop = Arc::new(TestDesktop::default());
@@ -256,7 +275,7 @@ fn the_welcome_view_offers_logs_and_opens_them() {
 
 #[test]
 fn a_program_that_stands_alone_simulates_its_sample_and_begins_the_tour() {
-    let open: OpenLog = Arc::new(|path: &Path| Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>));
+    let open: OpenLog = sample_opener();
     let desktop = Arc::new(TestDesktop { stands_alone: true, ..TestDesktop::default() });
     let app = App::new(open, desktop, ThemeName::Dark);
     let mut harness = Harness::builder().with_size([1400.0, 850.0]).build_ui_state(|ui, app: &mut App| app.ui(ui), app);
@@ -285,11 +304,19 @@ fn a_dropped_log_is_opened_and_a_wrong_file_reported() {
     harness.input_mut().dropped_files.push(Arc::new(Dropped(PathBuf::from("/x/a.mcap"))));
     run_until(&mut harness, |harness| opened(harness).is_some());
     harness.input_mut().dropped_files.push(Arc::new(Dropped(PathBuf::from("/x/b.mcap"))));
+    harness.run_steps(3);
+    assert!(harness.query_by_label("b.mcap, instead of a.mcap").is_some());
+    harness.get_by_label("Keep").click();
+    harness.run_steps(3);
+    assert_eq!(opened(&harness), Some(PathBuf::from("/x/a.mcap")), "nothing is replaced without an answer");
+    harness.input_mut().dropped_files.push(Arc::new(Dropped(PathBuf::from("/x/b.mcap"))));
+    harness.run_steps(3);
+    harness.get_by_role_and_label(egui::Role::Button, "Open").click();
     run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/x/b.mcap")));
 }
 
 /// A window with a log and an open file dialog of the desktop; the sender gives the result of the dialog.
-fn with_file_dialog() -> (Harness<'static, App>, Sender<Option<PathBuf>>) {
+fn with_file_dialog() -> (Harness<'static, App>, Sender<Vec<PathBuf>>) {
     let (mut harness, desktop) = app();
     harness.get_by_label("Open yard.mcap").click();
     run_until(&mut harness, |harness| opened(harness).is_some());
@@ -303,7 +330,7 @@ fn with_file_dialog() -> (Harness<'static, App>, Sender<Option<PathBuf>>) {
 #[test]
 fn the_file_dialog_of_the_desktop_opens_a_log() {
     let (mut harness, sender) = with_file_dialog();
-    sender.send(Some(PathBuf::from("/logs/city.mcap"))).unwrap();
+    sender.send(vec![PathBuf::from("/logs/city.mcap")]).unwrap();
     run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/logs/city.mcap")));
     assert!(harness.query_by_label("Path of the log").is_none(), "the path field closes with it");
 }
@@ -328,7 +355,7 @@ fn cancelling_the_file_dialog_closes_the_path_field_unless_it_is_in_use() {
         }
         harness.run_steps(20);
         assert!(harness.query_by_label("Path of the log").is_some(), "both are open");
-        sender.send(None).unwrap();
+        sender.send(Vec::new()).unwrap();
         harness.run_steps(3);
         assert_eq!(harness.query_by_label("Path of the log").is_some(), stays_open, "{typed:?}");
     }
@@ -467,7 +494,7 @@ fn settings_hold_at_once_and_are_kept() {
     assert_eq!(harness.ctx.theme(), egui::Theme::Dark);
     // The next start uses them.
     *desktop.settings.lock().unwrap() = Some("{\"theme\": \"light\", \"layout\": \"Scene\"}".to_owned());
-    let open: OpenLog = Arc::new(|path: &Path| Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>));
+    let open: OpenLog = sample_opener();
     let again = App::new(open, desktop as Arc<dyn Desktop>, ThemeName::Dark);
     assert_eq!(again.state.settings.theme, ThemeName::Light);
     assert_eq!(again.theme.name, ThemeName::Light);
@@ -513,7 +540,7 @@ fn dialogs_are_drawn() {
         ("warnings", Some(key(Key::W, Modifiers::NONE))),
     ];
     for (name, event) in cases {
-        let open: OpenLog = Arc::new(|path: &Path| Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>));
+        let open: OpenLog = sample_opener();
         let mut app = App::new(open, Arc::new(TestDesktop::default()), ThemeName::Dark);
         let (mut headless, mut painter) = (Headless::new(options), Painter::new());
         let log_is_shown = event.is_some();

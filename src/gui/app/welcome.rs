@@ -1,6 +1,6 @@
 //! The view before a log is open.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use egui::{Align, Button, Layout, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, vec2};
@@ -56,8 +56,13 @@ impl Welcome {
         None
     }
 
-    /// Draws the view and returns the choice. `opening` is the log that is being opened.
-    pub(super) fn ui(&mut self, ui: &mut Ui, theme: &Theme, opening: Option<&Path>) -> Option<Choice> {
+    /// Draws the view and returns the choice. `opening` draws the progress of a log that is being opened.
+    pub(super) fn ui(
+        &mut self,
+        ui: &mut Ui,
+        theme: &Theme,
+        opening: Option<&mut dyn FnMut(&mut Ui)>,
+    ) -> Option<Choice> {
         let mut chosen = self.flight.receive().map(|path| chosen_sample(path, self.tour));
         if self.flight.is_running() {
             ui.ctx().request_repaint_after(POLL_PERIOD);
@@ -68,9 +73,8 @@ impl Welcome {
             let subtitle = "Debugger for visual-inertial navigation with a gimballed camera";
             ui.label(RichText::new(subtitle).size(14.0).color(theme.text_weak));
             ui.add_space(12.0);
-            if let Some(path) = opening {
-                ui.spinner();
-                ui.label(RichText::new(format!("Opening {}", path.display())).color(theme.text));
+            if let Some(opening) = opening {
+                opening(ui);
                 return;
             }
             let width = ui.available_width().min(WIDTH);
@@ -150,9 +154,13 @@ fn drop_target_ui(ui: &mut Ui, theme: &Theme) {
     let color = if file_over_window { theme.accent } else { theme.outline };
     ui.painter().rect(rect, 6.0, theme.plot_background, Stroke::new(1.5, color), StrokeKind::Inside);
     let lines = [
-        ("Drop a flight log (.mcap, .mcap.zstd) or a saved session (.session.json) here", 14.0, theme.text_strong),
-        ("Rig: NAME.rig.yaml next to NAME.mcap, or attached to the log", 12.0, theme.text_weak),
-        ("Convert ROS bags and EuRoC folders to a log first: dcvins convert SOURCE -o LOG.mcap", 12.0, theme.text_weak),
+        ("Drop a flight log (.mcap), a recording, or a saved session (.session.json) here", 14.0, theme.text_strong),
+        (
+            "Recordings: ROS 1 and ROS 2 bags, EuRoC folders, MP4 videos together with their .ulg, .bin or .tlog",
+            12.0,
+            theme.text_weak,
+        ),
+        ("Rig: dropped with the log, next to it (NAME.rig.yaml), attached, or described here", 12.0, theme.text_weak),
     ];
     let spoken = lines.map(|(text, ..)| text).join(". ");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &spoken));

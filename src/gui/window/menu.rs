@@ -170,7 +170,7 @@ fn first_group_ui(ui: &mut Ui, menu: Menu, state: &mut MainWindow, ctx: &PanelCo
                 ui.menu_button("Open recent", |ui| {
                     for path in state.recent_logs.iter().take(MAX_RECENT) {
                         if recent_ui(ui, path) {
-                            state.requests.push(WindowRequest::OpenLog(path.clone()));
+                            state.requests.push(WindowRequest::OpenLog(vec![path.clone()]));
                         }
                     }
                 });

@@ -46,6 +46,7 @@ use std::sync::Arc;
 use egui::{CentralPanel, Frame, Margin, Rect, Ui, UiBuilder, vec2};
 
 use self::actions::Action;
+pub(in crate::gui) use self::dialogs::Modal;
 pub use self::dialogs::state::Dialogs;
 pub(crate) use self::figure::complete;
 pub use self::figure::{

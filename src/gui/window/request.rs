@@ -7,7 +7,10 @@ use crate::gui::desktop::{FigureExport, PanelExport};
 /// Request of the window to the application, in addition to the commands of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum WindowRequest {
-    OpenLog(PathBuf),
+    /// Open a log, or the files of one log together.
+    OpenLog(Vec<PathBuf>),
+    /// Stop opening a log.
+    CancelOpening,
     /// Store the saved layouts, given as text.
     KeepLayouts(String),
     SaveSession,

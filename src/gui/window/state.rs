@@ -49,8 +49,8 @@ pub struct MainWindow {
     pub settings: Settings,
     /// Progress of the estimation; `None` when all steps are computed.
     pub progress: Option<Progress>,
-    /// Log that is being opened while another one is shown.
-    pub opening: Option<PathBuf>,
+    /// Progress of a log that is being opened while another one is shown, as text.
+    pub opening: Option<String>,
     /// Name of the study from which the session was opened.
     pub study: Option<String>,
     /// State of "What is this?" and the manual.

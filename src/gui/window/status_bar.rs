@@ -1,10 +1,9 @@
 //! Status bar: step time, real-time factor, memory, clock, warnings.
 
-use std::path::Path;
-
 use egui::{Align, Button, FontId, Label, Layout as UiLayout, ProgressBar, RichText, TextStyle, Ui};
 
 use super::progress::Progress;
+use super::request::WindowRequest;
 use super::state::MainWindow;
 use crate::gui::theme::{self, Theme};
 use crate::gui::units::{bytes, counted, fixed, seconds};
@@ -15,7 +14,7 @@ use crate::session::{Recording, RunRecord};
 /// Widths in points of the warnings, of the progress, and of the log that is being opened.
 const RIGHT_WIDTH: f32 = 110.0;
 const PROGRESS_WIDTH: f32 = 160.0;
-const OPENING_WIDTH: f32 = 200.0;
+const OPENING_WIDTH: f32 = 240.0;
 
 /// Number of steps over which the real-time factor is averaged.
 const STEPS_OF_MEAN: usize = 100;
@@ -85,8 +84,10 @@ pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
             if let Some(progress) = &state.progress {
                 progress_ui(ui, progress);
             }
-            if let Some(path) = &state.opening {
-                opening_ui(ui, path);
+            if let Some(text) = &state.opening
+                && opening_ui(ui, text)
+            {
+                state.requests.push(WindowRequest::CancelOpening);
             }
         });
     });
@@ -132,12 +133,15 @@ fn progress_ui(ui: &mut Ui, progress: &Progress) {
     response.on_hover_text("Estimation progress: processed log time of all runs, remaining wall-clock time");
 }
 
-/// Shows that another log is being opened.
-fn opening_ui(ui: &mut Ui, path: &Path) {
-    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let text = RichText::new(format!("opening {name}…")).small();
-    ui.add_sized([OPENING_WIDTH - 30.0, 14.0], Label::new(text).truncate()).on_hover_text(path.display().to_string());
+/// Shows that another log is being opened; returns true if that is cancelled.
+fn opening_ui(ui: &mut Ui, text: &str) -> bool {
+    let label = Label::new(RichText::new(text).small()).truncate();
+    let cancel = Button::new(RichText::new("✖").small()).frame(false);
+    let cancel = ui.add(cancel).on_hover_text("Cancel opening");
+    cancel.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Cancel opening"));
+    ui.add_sized([OPENING_WIDTH - 50.0, 14.0], label).on_hover_text(text);
     ui.add(egui::Spinner::new().size(12.0));
+    cancel.clicked()
 }
 
 /// Memory of the recording relative to its budget, and the number of steps that are only summaries.

@@ -3,6 +3,7 @@
 mod camera;
 mod error;
 mod mechanism;
+mod suggested;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -11,14 +12,15 @@ mod topics;
 pub use camera::{CameraChoice, PublishedCamera};
 pub use error::TemplateError;
 pub use mechanism::{GimbalAxis, MechanismAxes};
+pub use suggested::suggested_mechanism;
 pub use topics::RigChoices;
 
 use nalgebra::Vector3;
 
 use crate::camera::CameraModel;
+use crate::gimbal::ClassicalChain;
 use crate::sensors::{
     AssumedField, AttitudeSource, BodyAxes, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuNoise,
-use crate::gimbal::ClassicalChain;
     ImuRig, IntrinsicsSigma, Joint, Rig,
 };
 
@@ -116,8 +118,6 @@ impl CameraTemplate {
     }
 }
 
-#[derive(Clone, Debug, PartialEq)]
-pub struct GimbalTemplate {
 /// Chain from the IMU to the camera with known dimensions, such as that of a robot description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DescribedChain {
@@ -128,6 +128,8 @@ pub struct DescribedChain {
     pub reason: String,
 }
 
+#[derive(Clone, Debug, PartialEq)]
+pub struct GimbalTemplate {
     /// Axes from the vehicle to the camera; empty for a described chain.
     pub axes: MechanismAxes,
     /// Positive directions of rotation.
@@ -271,13 +273,13 @@ impl RigTemplate {
             add("gimbal.encoder_sigma", Some(reason.to_owned()));
         }
         add("gimbal.T_I_B", place);
-        let meeting = format!(
-            "the axes {} meet in one point at right angles; at angles zero the camera looks forward",
         if let Some(described) = &self.described {
             add("gimbal.links", Some(described.reason.clone()));
             add("gimbal.T_E_C", Some(described.reason.clone()));
             return fields;
         }
+        let meeting = format!(
+            "the axes {} meet in one point at right angles; at angles zero the camera looks forward",
             gimbal.axes
         );
         add("gimbal.links", both(&Some(meeting), &gimbal.positive.assumed));

@@ -17,6 +17,7 @@ mod unsaved;
 
 use egui::Ui;
 
+pub(in crate::gui) use self::modal::Modal;
 use self::open_log::Picked;
 use super::actions::Action;
 use super::request::WindowRequest;
@@ -30,14 +31,14 @@ pub(super) fn ui(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>, ac
     if picked.is_some() && dialogs.open == Some(Dialog::OpenLog) {
         dialogs.open = None;
     }
-    if let Some(Picked::Path(path)) = picked {
-        requests.push(WindowRequest::OpenLog(path));
+    if let Some(Picked::Paths(paths)) = picked {
+        requests.push(WindowRequest::OpenLog(paths));
     }
     let stays_open = match dialogs.open {
         None => return,
         Some(Dialog::OpenLog) => {
             let (path, stays_open) = dialogs.open_log.ui(ui, ctx.theme);
-            requests.extend(path.map(WindowRequest::OpenLog));
+            requests.extend(path.map(|path| WindowRequest::OpenLog(vec![path])));
             stays_open
         }
         Some(Dialog::AddRun) => dialogs.add_run.ui(ui, ctx),

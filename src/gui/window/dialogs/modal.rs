@@ -5,20 +5,20 @@ use egui::{Button, Id, Key, RichText, Ui};
 use crate::gui::theme::{Theme, dialog_frame};
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Modal<'a> {
+pub(in crate::gui) struct Modal<'a> {
     /// Id in the window.
-    pub(super) name: &'static str,
+    pub(in crate::gui) name: &'static str,
     /// Title; not shown if it is empty.
-    pub(super) title: &'a str,
+    pub(in crate::gui) title: &'a str,
     /// Width of the content in points.
-    pub(super) width: f32,
+    pub(in crate::gui) width: f32,
 }
 
 impl Modal<'_> {
     /// Draws the dialog. Returns the result of `contents`, and true if the dialog stays open.
     ///
     /// Escape, a click outside and `ui.close()` in the contents close it.
-    pub(super) fn ui<T>(self, ui: &Ui, theme: &Theme, contents: impl FnOnce(&mut Ui) -> T) -> (T, bool) {
+    pub(in crate::gui) fn ui<T>(self, ui: &Ui, theme: &Theme, contents: impl FnOnce(&mut Ui) -> T) -> (T, bool) {
         let modal = egui::Modal::new(Id::unique(self.name)).frame(dialog_frame(theme));
         let response = modal.show(ui.ctx(), |ui| {
             ui.set_width(self.width);

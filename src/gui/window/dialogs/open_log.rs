@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
-use egui::{RichText, Ui};
+use egui::{Label, RichText, Ui};
 
 use super::modal::Modal;
 use crate::gui::desktop::Desktop;
@@ -25,14 +25,15 @@ pub(super) struct OpenLogDialog {
 }
 
 struct FilePicker {
-    answer: Receiver<Option<PathBuf>>,
+    /// Chosen files; none if the dialog was cancelled.
+    answer: Receiver<Vec<PathBuf>>,
     /// Time in seconds of the first frame in which it was polled.
     since_s: Option<f64>,
 }
 
 /// The result of the desktop's file dialog.
 pub(super) enum Picked {
-    Path(PathBuf),
+    Paths(Vec<PathBuf>),
     Cancelled,
 }
 
@@ -56,28 +57,29 @@ impl OpenLogDialog {
         let picker = self.picker.as_mut()?;
         let now_s = ui.input(|input| input.time);
         let since_s = *picker.since_s.get_or_insert(now_s);
-        let path = match picker.answer.try_recv() {
+        let paths = match picker.answer.try_recv() {
             Err(TryRecvError::Empty) => {
                 ui.ctx().request_repaint_after(POLL_PERIOD);
                 return None;
             }
-            Ok(path) => path,
-            Err(TryRecvError::Disconnected) => None,
+            Ok(paths) => paths,
+            Err(TryRecvError::Disconnected) => Vec::new(),
         };
         self.picker = None;
-        match path {
-            Some(path) => Some(Picked::Path(path)),
-            None if now_s - since_s < MIN_CANCEL_S || !self.path_field.is_empty() => None,
-            None => Some(Picked::Cancelled),
+        if !paths.is_empty() {
+            return Some(Picked::Paths(paths));
         }
+        let unseen = now_s - since_s < MIN_CANCEL_S || !self.path_field.is_empty();
+        (!unseen).then_some(Picked::Cancelled)
     }
 
     /// Draws the dialog. Returns the chosen path, and true if the dialog stays open.
     pub(super) fn ui(&mut self, ui: &Ui, theme: &Theme) -> (Option<PathBuf>, bool) {
-        let modal =
-            Modal { name: "open log", title: "Open flight log (.mcap) or session (.session.json)", width: 560.0 };
+        let modal = Modal { name: "open log", title: "Open flight log, recording or session", width: 560.0 };
         modal.ui(ui, theme, |ui| {
-            ui.label(RichText::new("Files can also be dropped onto the window").color(theme.text_weak));
+            let hint = "MCAP, ROS bags, EuRoC folders, MP4, ULog, DataFlash, telemetry logs. Files can also be dropped onto the \
+                        window, a video together with the log of its autopilot";
+            ui.add(Label::new(RichText::new(hint).color(theme.text_weak)).wrap());
             ui.add_space(4.0);
             let chosen = self.path_field.ui(ui, theme, true, 300.0);
             ui.add_space(4.0);

@@ -1,0 +1,116 @@
+//! Opening of logs, sessions and recordings for the window.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use dcvins::export::{ConvertedLogs, LogSources, PreparedLog, SourceError, is_session, prepare_log, read_session};
+use dcvins::flight_log::convert::SourceKind;
+use dcvins::flight_log::{FlightLog, LogError, LogLimits, log_name, missing_sensors, rig_candidates};
+use dcvins::gui::app::{OpenFailure, OpenProgress, OpenRequest, OpenedLog, RigQuestion};
+use dcvins::session::{Session, SessionError, SessionPlan, SessionRequest};
+
+use crate::cli::estimation_arguments::EstimationArguments;
+use crate::cli::prepared_log::{converted_logs, stage_text};
+
+/// Largest number of notes of a conversion that are shown; its report has all.
+const SHOWN_NOTES: usize = 3;
+
+/// Opens what a person has asked for: a log and a session directly, a recording after its conversion.
+///
+/// # Errors
+/// With the reason, or with the question for a rig.
+pub(crate) fn open_log(
+    request: &OpenRequest,
+    estimation: &EstimationArguments,
+    progress: &mut dyn FnMut(OpenProgress) -> ControlFlow<()>,
+) -> Result<OpenedLog, OpenFailure> {
+    let limits = estimation.limits.limits();
+    let sources = LogSources::gather(&request.sources, &limits).map_err(|error| failure(&error))?;
+    if is_session(&sources.main) {
+        let problem = |text: String| OpenFailure::Problem(text);
+        let saved = read_session(&sources.main).map_err(|error| problem(error.to_string()))?;
+        let session = saved.open().map_err(|error| problem(format!("{error}: {}", sources.main.display())))?;
+        return Ok(OpenedLog { log: Box::new(session), remembered: sources.main, notices: Vec::new() });
+    }
+    let sources = LogSources { rig: request.rig.clone().or(sources.rig), ..sources };
+    let cache = converted_logs();
+    let prepared = prepare_log(&sources, cache.as_ref().map_err(|reason| *reason), &limits, &mut |stage, ratio| {
+        progress(OpenProgress { text: stage_text(stage, &sources), ratio })
+    });
+    let prepared = prepared.map_err(|error| failure(&error))?;
+    let of_recording = cache.as_ref().map_or_else(|_| Vec::new(), |cache| cache.sources_of(&prepared.log));
+    // The rig that was written next to the recording, for a log that is opened from the cache by its own path.
+    let beside = of_recording.first().map(|path| ConvertedLogs::path_beside(path, "rig.yaml"));
+    let beside = beside.filter(|path| path.is_file());
+    let session_request = SessionRequest {
+        rig_path: prepared.rig.clone().or_else(|| estimation.rig.clone()).or(beside),
+        ground_truth_path: prepared.ground_truth.clone().or_else(|| estimation.ground_truth.clone()),
+        ..estimation.request(prepared.log.clone())
+    };
+    if session_request.rig_path.is_none() && sources.kind == Some(SourceKind::Video) {
+        // The conversion of a video writes a rig whose values are assumed; they are shown before they are used.
+        return Err(rig_question(request, &sources, &prepared, &of_recording, &limits));
+    }
+    match SessionPlan::open(&session_request).and_then(Session::start) {
+        Ok(session) => {
+            let remembered =
+                if sources.splits.is_empty() && sources.autopilot.is_none() { sources.main } else { prepared.log };
+            let notices = conversion_notice(prepared.kind, &prepared.notes, &log_name(&remembered));
+            Ok(OpenedLog { log: Box::new(session), remembered, notices })
+        }
+        Err(SessionError::Log(LogError::NoRig { .. })) => {
+            Err(rig_question(request, &sources, &prepared, &of_recording, &limits))
+        }
+        Err(error) => Err(OpenFailure::Problem(error.to_string())),
+    }
+}
+
+fn failure(error: &SourceError) -> OpenFailure {
+    if error.is_interrupted() { OpenFailure::Cancelled } else { OpenFailure::Problem(error.to_string()) }
+}
+
+/// Notice about a conversion made now; none for a log of the cache.
+fn conversion_notice(kind: Option<&str>, notes: &[String], name: &str) -> Vec<String> {
+    let (Some(kind), false) = (kind, notes.is_empty()) else { return Vec::new() };
+    let shown: Vec<&str> = notes.iter().take(SHOWN_NOTES).map(String::as_str).collect();
+    let more = notes.len().saturating_sub(SHOWN_NOTES);
+    let more = if more > 0 { format!("\n{more} more in report.txt next to the log") } else { String::new() };
+    vec![format!("Converted {name} ({kind})\n{}{more}", shown.join("\n"))]
+}
+
+/// Question for the rig of a log, or the reason why no rig helps.
+fn rig_question(
+    request: &OpenRequest,
+    sources: &LogSources,
+    prepared: &PreparedLog,
+    of_recording: &[PathBuf],
+    limits: &LogLimits,
+) -> OpenFailure {
+    let log = match FlightLog::open_with(&prepared.log, limits) {
+        Ok(log) => Arc::new(log),
+        Err(error) => return OpenFailure::Problem(error.to_string()),
+    };
+    // A log of the cache stands for the recording from which it was made.
+    let source = of_recording.first().unwrap_or(&sources.main);
+    let name = log_name(source);
+    let kind = prepared.kind.unwrap_or("flight log");
+    if let Some(missing) = missing_sensors(&log) {
+        return OpenFailure::Problem(format!("{name} ({kind}): {missing}"));
+    }
+    let mut folders: Vec<PathBuf> = Vec::new();
+    for path in std::iter::once(&prepared.log).chain(&request.sources).chain(of_recording) {
+        let folder = path.parent().map(std::path::Path::to_owned).unwrap_or_default();
+        if !folders.contains(&folder) {
+            folders.push(folder);
+        }
+    }
+    let candidates = rig_candidates(&log, &folders);
+    let new_rig = ConvertedLogs::path_beside(source, "rig.yaml");
+    let reason = if sources.kind == Some(SourceKind::Video) {
+        format!("{name} says little about its camera: choose a rig, confirm the assumed one, or describe it")
+    } else {
+        format!("{name} ({kind}) has no rig: none given, none at {}, none attached", new_rig.display())
+    };
+    OpenFailure::NeedsRig(Box::new(RigQuestion { log, request: request.clone(), reason, candidates, new_rig }))
+}

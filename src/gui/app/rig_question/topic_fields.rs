@@ -1,0 +1,217 @@
+//! Topics of a new rig: IMU, images, and the angles of the gimbal.
+
+use egui::{ComboBox, Ui};
+
+use crate::flight_log::{FlightLog, MessageKind, TopicInfo};
+use crate::sensors::{AngleUnit, AttitudeFrame, BodyAxes};
+use crate::text::Named as _;
+
+/// Topics with an attitude that a gimbal may have.
+const ATTITUDES: [MessageKind; 5] = [
+    MessageKind::QuaternionStamped,
+    MessageKind::PoseStamped,
+    MessageKind::Vector3Stamped,
+    MessageKind::MavrosGimbalAttitude,
+    MessageKind::Px4GimbalAttitude,
+];
+/// Topics with the attitude of the vehicle.
+const VEHICLES: [MessageKind; 6] = [
+    MessageKind::QuaternionStamped,
+    MessageKind::PoseStamped,
+    MessageKind::Odometry,
+    MessageKind::TransformStamped,
+    MessageKind::Imu,
+    MessageKind::Px4VehicleAttitude,
+];
+/// Order of Euler angles at first: the fields z, x, y of DJI are yaw, roll and pitch.
+const USUAL_ORDER: &str = "yaw=z roll=x pitch=y";
+
+/// Source of the joint angles.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum AngleField {
+    None,
+    Joints(String),
+    Attitude(String, MessageKind),
+}
+
+impl AngleField {
+    fn text(&self) -> String {
+        match self {
+            Self::None => "not measured".to_owned(),
+            Self::Joints(topic) => format!("{topic} (joint angles)"),
+            Self::Attitude(topic, _) => format!("{topic} (attitude)"),
+        }
+    }
+}
+
+pub(super) struct TopicFields {
+    imus: Vec<String>,
+    images: Vec<String>,
+    sources: Vec<AngleField>,
+    vehicles: Vec<String>,
+    imu: Option<String>,
+    pub(super) image: Option<String>,
+    pub(super) angles: AngleField,
+    frame: AttitudeFrame,
+    axes: BodyAxes,
+    vehicle: Option<String>,
+    order: String,
+    unit: AngleUnit,
+}
+
+/// True for the part of the name of a topic that belongs to the gimbal.
+fn of_gimbal(topic: &str) -> bool {
+    ["gimbal", "mount"].iter().any(|word| topic.to_ascii_lowercase().contains(word))
+}
+
+impl TopicFields {
+    pub(super) fn new(log: &FlightLog) -> Self {
+        let named = |info: &TopicInfo| info.topic.clone();
+        let of_kind = |kind: MessageKind| log.topics().iter().filter(move |info| info.kind == Some(kind));
+        let joints = of_kind(MessageKind::JointState).map(|info| AngleField::Joints(named(info)));
+        let attitudes = ATTITUDES.into_iter().flat_map(|kind| {
+            of_kind(kind).map(move |info| AngleField::Attitude(info.topic.clone(), kind)).collect::<Vec<_>>()
+        });
+        let sources: Vec<AngleField> = joints.chain(attitudes).chain([AngleField::None]).collect();
+        // An attitude is only taken at first if its name says that it is the gimbal's.
+        let angles = sources.iter().find(|source| match source {
+            AngleField::Joints(_) | AngleField::None => true,
+            AngleField::Attitude(topic, _) => of_gimbal(topic),
+        });
+        let (imus, images) = (log.topics_of(&[MessageKind::Imu]), log.topics_of(&MessageKind::IMAGES));
+        let vehicles: Vec<String> = VEHICLES.iter().flat_map(|kind| log.topics_of(&[*kind])).collect();
+        let first_of_gimbal = images.iter().find(|topic| of_gimbal(topic)).or_else(|| images.first());
+        Self {
+            imu: imus.first().cloned().filter(|_| imus.len() > 1 && !are_halves(&imus)),
+            image: first_of_gimbal.cloned(),
+            angles: angles.cloned().unwrap_or(AngleField::None),
+            frame: AttitudeFrame::Body,
+            axes: BodyAxes::Frd,
+            vehicle: vehicles.iter().find(|topic| !of_gimbal(topic)).cloned(),
+            order: USUAL_ORDER.to_owned(),
+            unit: AngleUnit::Degrees,
+            imus,
+            images,
+            sources,
+            vehicles,
+        }
+    }
+
+    pub(super) fn has_attitudes(&self) -> bool {
+        matches!(self.angles, AngleField::Attitude(..))
+    }
+
+    /// Topic of the IMU; `None` leaves an only one, or two halves, to the log.
+    pub(super) fn imu_choice(&self) -> Option<String> {
+        self.imu.clone()
+    }
+
+    /// Attitude topic with its entries of `gimbal.source`; `None` if the angles are measured in another way.
+    pub(super) fn attitude(&self) -> Option<(String, Vec<(String, String)>)> {
+        let AngleField::Attitude(topic, kind) = &self.angles else { return None };
+        let mut entries: Vec<(&str, String)> = Vec::new();
+        let message = match kind {
+            MessageKind::MavrosGimbalAttitude => "mavros",
+            MessageKind::Px4GimbalAttitude => "px4",
+            MessageKind::Vector3Stamped => "euler",
+            MessageKind::PoseStamped => "pose",
+            _ => "quaternion",
+        };
+        entries.push(("type", message.to_owned()));
+        if message == "euler" {
+            entries.push(("order", self.order.clone()));
+            entries.push(("unit", self.unit.name().to_owned()));
+        }
+        if !self.by_flags() {
+            entries.push(("frame", self.frame.name().to_owned()));
+            entries.push(("axes", self.axes.name().to_owned()));
+        }
+        if self.needs_vehicle() {
+            entries.extend(self.vehicle.clone().map(|vehicle| ("vehicle", vehicle)));
+        }
+        Some((topic.clone(), entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()))
+    }
+
+    /// True for messages that say by flags what they are relative to.
+    fn by_flags(&self) -> bool {
+        let flagged = [MessageKind::MavrosGimbalAttitude, MessageKind::Px4GimbalAttitude];
+        matches!(&self.angles, AngleField::Attitude(_, kind) if flagged.contains(kind))
+    }
+
+    fn needs_vehicle(&self) -> bool {
+        self.by_flags() || self.has_attitudes() && self.frame != AttitudeFrame::Body
+    }
+
+    /// Draws the rows of a grid with two columns; those of the angles only for a gimbal.
+    pub(super) fn ui(&mut self, ui: &mut Ui, gimbal: bool, width: f32) {
+        if self.images.len() > 1 {
+            topic_ui(ui, "Images", &mut self.image, &self.images, width);
+        }
+        if self.imus.len() > 1 {
+            topic_ui(ui, "IMU", &mut self.imu, &self.imus, width);
+        }
+        if !gimbal {
+            return;
+        }
+        let name = ui.label("Gimbal angles");
+        let combo = ComboBox::from_id_salt("angles").width(width).selected_text(self.angles.text());
+        let shown = combo.show_ui(ui, |ui| {
+            for source in &self.sources {
+                ui.selectable_value(&mut self.angles, source.clone(), source.text());
+            }
+        });
+        shown.response.labelled_by(name.id);
+        ui.end_row();
+        if !self.has_attitudes() {
+            return;
+        }
+        if matches!(&self.angles, AngleField::Attitude(_, MessageKind::Vector3Stamped)) {
+            let name = ui.label("Order and unit of the angles");
+            ui.horizontal(|ui| {
+                ui.add(egui::TextEdit::singleline(&mut self.order).desired_width(150.0)).labelled_by(name.id);
+                for unit in AngleUnit::all() {
+                    ui.selectable_value(&mut self.unit, unit, unit.name());
+                }
+            });
+            ui.end_row();
+        }
+        if !self.by_flags() {
+            let name = ui.label("Attitude relative to");
+            ui.horizontal(|ui| {
+                let combo = ComboBox::from_id_salt("frame").selected_text(self.frame.name());
+                let shown = combo.show_ui(ui, |ui| {
+                    for frame in AttitudeFrame::all().filter(|frame| *frame != AttitudeFrame::Flags) {
+                        ui.selectable_value(&mut self.frame, frame, frame.name());
+                    }
+                });
+                shown.response.labelled_by(name.id);
+                for axes in BodyAxes::all() {
+                    ui.selectable_value(&mut self.axes, axes, axes.name());
+                }
+            });
+            ui.end_row();
+        }
+        if self.needs_vehicle() {
+            topic_ui(ui, "Attitude of the vehicle", &mut self.vehicle, &self.vehicles, width);
+        }
+    }
+}
+
+/// True for the separate topics of gyroscope and accelerometer, which are found together.
+fn are_halves(imus: &[String]) -> bool {
+    let has = |word: &str| imus.iter().any(|topic| topic.to_ascii_lowercase().contains(word));
+    imus.len() == 2 && has("gyro") && has("accel")
+}
+
+fn topic_ui(ui: &mut Ui, label: &str, chosen: &mut Option<String>, topics: &[String], width: f32) {
+    let name = ui.label(label);
+    let text = chosen.clone().unwrap_or_else(|| "found in the log".to_owned());
+    let combo = ComboBox::from_id_salt(label).width(width).selected_text(text);
+    let shown = combo.show_ui(ui, |ui| {
+        for topic in topics {
+            ui.selectable_value(chosen, Some(topic.clone()), topic);
+        }
+    });
+    shown.response.labelled_by(name.id);
+    ui.end_row();
+}
