@@ -11,6 +11,7 @@ use crate::cli::evaluate::EvaluateArguments;
 use crate::cli::exit;
 use crate::cli::export::ExportArguments;
 use crate::cli::noise::NoiseArguments;
+use crate::cli::plan::PlanArguments;
 use crate::cli::report::ReportArguments;
 use crate::cli::rig::RigArguments;
 use crate::cli::run::RunArguments;
@@ -71,6 +72,9 @@ pub(crate) enum Command {
     /// Compute which calibration parameters are observable with a mechanism, a parameterization and a motion, without a log.
     #[command(after_help = exit::PLAIN)]
     Degeneracy(DegeneracyArguments),
+    /// Plan the motion of joints and vehicle that leaves the calibration of a rig with the smallest σ.
+    #[command(after_help = exit::INTERRUPTIBLE)]
+    Plan(PlanArguments),
     /// Convert a EuRoC/ASL folder, a ROS bag, an MP4 video or a log of an autopilot into a log.
     #[command(after_help = exit::INTERRUPTIBLE)]
     Convert(ConvertArguments),

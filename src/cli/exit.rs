@@ -39,7 +39,7 @@ pub(crate) const JOBS_FAILED: u8 = 6;
 
 /// Exit codes of commands without special ones, for `--help`.
 pub(crate) const PLAIN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use.";
-/// Exit codes of `simulate`, `convert`, `calibrate`, `noise` and `screenshot`.
+/// Exit codes of `simulate`, `plan`, `convert`, `calibrate`, `noise` and `screenshot`.
 pub(crate) const INTERRUPTIBLE: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 130 interrupted (Ctrl+C; files \
     that are not complete are not written; a second Ctrl+C ends at once).";
 pub(crate) const RUN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 3 a run never initialized, 5 the condition of \

@@ -18,6 +18,7 @@ mod limit_arguments;
 mod noise;
 #[cfg(feature = "gui")]
 mod open_log;
+mod plan;
 mod prepared_log;
 mod report;
 #[cfg(feature = "gui")]
@@ -69,6 +70,7 @@ pub(crate) fn run() -> anyhow::Result<ExitOutcome> {
         Command::Sweep(arguments) => sweep::sweep(&arguments),
         Command::SweepJob(arguments) => sweep::sweep_job(&arguments),
         Command::Degeneracy(arguments) => done(degeneracy::degeneracy(&arguments)),
+        Command::Plan(arguments) => plan::plan(&arguments),
         Command::Convert(arguments) => convert::convert(&arguments),
         Command::Evaluate(arguments) => done(evaluate::evaluate(&arguments)),
         Command::Export(arguments) => done(export::export(&arguments)),

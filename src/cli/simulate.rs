@@ -46,6 +46,10 @@ pub(crate) struct SimulateArguments {
     /// unmodified rigs is replaced.
     #[arg(long)]
     pub force: bool,
+    /// Fly the motion of this table instead, from the start of the experiment's route: `t_s`, `NAME_rad` of each joint,
+    /// `x_m` (forward), `y_m` (left), `z_m` (up), `heading_rad`; `dcvins plan` writes one.
+    #[arg(long, value_name = "FILE.csv", conflicts_with = "mirror")]
+    pub motion: Option<PathBuf>,
     #[arg(long, value_name = "KEY=VALUE[,VALUE…]", help = disturb_help())]
     pub disturb: Vec<String>,
 }
@@ -110,6 +114,7 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<ExitOutcome> {
     for disturbance in &arguments.disturb {
         options.disturbances.set(disturbance)?;
     }
+    options.motion = arguments.motion.as_deref().map(export::read_motion).transpose()?;
     let interrupt = Interrupt::watch()?;
     export::check_simulated_log(&arguments.output, arguments.force)?;
     let progress = Progress::new();

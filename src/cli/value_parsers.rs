@@ -9,7 +9,6 @@ pub(crate) fn seconds(text: &str) -> Result<f64, String> {
 }
 
 /// Parses a number within `range`, in a unit.
-#[cfg(feature = "gui")]
 pub(crate) fn within(text: &str, range: RangeInclusive<f64>, unit: &str) -> Result<f64, String> {
     let value = text.parse::<f64>().ok().filter(|value| range.contains(value));
     value.ok_or_else(|| format!("expected {unit} from {} to {}", range.start(), range.end()))

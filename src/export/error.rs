@@ -19,6 +19,9 @@ pub enum ExportError {
     /// A file is not a saved session that this version can read.
     #[error("cannot open: {problem}: {path}")]
     Session { problem: Box<SavedSessionError>, path: PathBuf },
+    /// A file is not a motion of joints and vehicle.
+    #[error("cannot read the motion: {problem}: {path}")]
+    Motion { problem: String, path: PathBuf },
     #[error(transparent)]
     Log(#[from] LogError),
     /// Two trajectories cannot be compared.

@@ -11,7 +11,9 @@ mod figure;
 pub(crate) mod file_hash;
 mod flight_noise;
 pub(crate) mod masks;
+mod motion_csv;
 mod noise_files;
+mod plan_files;
 pub(crate) mod result_cache;
 mod results;
 pub(crate) mod run_files;
@@ -40,7 +42,9 @@ pub use existing::{
 pub use figure::figure_bytes;
 pub use flight_noise::{DensityReport, FlightNoiseReport};
 pub use masks::write_masks;
+pub use motion_csv::read_motion;
 pub use noise_files::{write_allan, write_flight_noise};
+pub use plan_files::{PlanReport, PlannedFlight, check_plan_folder, write_plan};
 pub use result_cache::{CachedFile, ResultCache, ResultKey, ResultKeyBuilder};
 pub use run_files::{RunFileOptions, write_run};
 #[cfg(feature = "gui")]

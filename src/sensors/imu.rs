@@ -32,3 +32,16 @@ pub struct ImuNoise {
     /// Random walk of the gyroscope bias in rad/s²/√Hz.
     pub gyroscope_random_walk: f64,
 }
+
+impl ImuNoise {
+    /// Noise with all densities multiplied by a factor.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        Self {
+            accelerometer_noise_density: self.accelerometer_noise_density * factor,
+            accelerometer_random_walk: self.accelerometer_random_walk * factor,
+            gyroscope_noise_density: self.gyroscope_noise_density * factor,
+            gyroscope_random_walk: self.gyroscope_random_walk * factor,
+        }
+    }
+}

@@ -33,7 +33,7 @@ pub use diagnosis::{
 pub use engine::{
     BreakpointHit, CalibrationErrors, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation,
     FlightNoiseError, SnapshotUse, Stopwatch, calibrate, camera_rotations, compute, compute_until, fit_flight_noise,
-    image_rotations,
+    image_rotations, situation_before_flight,
 };
 pub use plan::{
     DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, ForkChanges, ForkError, ImageFlip, ImageHalf,

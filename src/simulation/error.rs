@@ -23,6 +23,9 @@ pub enum SimulationError {
         /// Message of the encoder.
         problem: String,
     },
+    /// A prescribed motion that the vehicle or its gimbal cannot follow.
+    #[error("the motion cannot be flown: {problem}")]
+    Motion { problem: String },
     /// The caller stopped the conversion.
     #[error("interrupted after {images_done} of {images_total} images; nothing is written")]
     Interrupted {

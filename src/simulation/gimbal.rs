@@ -191,6 +191,12 @@ impl JointMotion {
         Self { states }
     }
 
+    /// Joints that follow prescribed angles; `at` returns angles and rates at a time in seconds.
+    pub(crate) fn prescribed(duration_s: f64, at: impl Fn(f64) -> ([f64; 3], [f64; 3])) -> Self {
+        let steps = (duration_s / CONTROL_STEP_S).ceil() as usize + 2;
+        Self { states: (0..steps).map(|step| at(step as f64 * CONTROL_STEP_S)).collect() }
+    }
+
     /// Fixes the joints from a time on, except for the swing of an exercise within the joint limits.
     pub(crate) fn exercise_from(&mut self, start_s: f64, exercise: &Exercise, joints: &[Joint]) {
         let first = ((start_s / CONTROL_STEP_S).ceil() as usize).min(self.states.len() - 1);

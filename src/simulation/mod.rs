@@ -16,8 +16,11 @@ mod experiment;
 mod gimbal;
 mod imu;
 mod interval;
+mod motion;
 #[cfg(feature = "logs")]
 mod options;
+#[cfg(feature = "logs")]
+mod prescribed;
 mod random;
 #[cfg(feature = "logs")]
 mod render;
@@ -44,6 +47,7 @@ pub use exercise::{Exercise, JOINT_PERIOD_S, JointSwing, ROCK_M, ROCK_PERIOD_S, 
 pub use experiment::{Environment, Experiment};
 pub use gimbal::JointMotion;
 pub use imu::SimulatedBias;
+pub use motion::{MotionSample, MotionSplines, PrescribedMotion};
 #[cfg(feature = "logs")]
 pub use options::{SimulationOptions, SimulationProgress, SimulationSummary};
 #[cfg(feature = "logs")]

@@ -4,6 +4,7 @@ use super::disturbances::Disturbances;
 use super::equipment::Lens;
 use super::error::SimulationError;
 use super::experiment::Experiment;
+use super::motion::PrescribedMotion;
 use crate::sensors::ChainPrior;
 
 /// Flight and sensors of a simulation; [`SimulationOptions::new`] gives an experiment of the paper.
@@ -33,6 +34,8 @@ pub struct SimulationOptions {
     /// Quality of the JPEG images, 1 to 100.
     pub jpeg_quality: u8,
     pub disturbances: Disturbances,
+    /// Motion that replaces the experiment's, relative to the start of its route; `None` for the experiment's.
+    pub motion: Option<PrescribedMotion>,
 }
 
 impl SimulationOptions {
@@ -53,6 +56,7 @@ impl SimulationOptions {
             image_noise: 2.0,
             jpeg_quality: 85,
             disturbances: Disturbances::default(),
+            motion: None,
         }
     }
 

@@ -15,6 +15,7 @@ use super::error::SimulationError;
 use super::experiment::Experiment;
 use super::interval::during;
 use super::options::{SimulationOptions, SimulationProgress, SimulationSummary};
+use super::prescribed::PrescribedFlight;
 use super::random::RandomStream;
 use super::render::{RenderedView, Sensor, SensorOptions, SurfaceShader, Workspace};
 use super::route::Mirrored;
@@ -74,16 +75,19 @@ pub fn simulate_interruptible(
 ) -> Result<SimulationSummary, SimulationError> {
     options.check()?;
     let name = output.file_stem().map_or_else(|| "simulation".to_owned(), |stem| stem.to_string_lossy().into_owned());
-    let scenario = fly_scenario(options, &name);
+    let scenario = fly_scenario(options, &name)?;
     let chain_error = given_chain_error(&scenario);
     let ground_truth_notes = ground_truth_notes(options, &scenario, chain_error);
     let (rig_path, ground_truth_path) = (output.with_extension("rig.yaml"), output.with_extension("truth.yaml"));
 
     let mut log = LogWriter::create(output, &LogWriterOptions::default())?;
-    let notes = BTreeMap::from([
+    let mut notes = BTreeMap::from([
         ("experiment".to_owned(), options.experiment.name().to_owned()),
         ("seed".to_owned(), options.seed.to_string()),
     ]);
+    if options.motion.is_some() {
+        notes.insert("motion".to_owned(), "prescribed".to_owned());
+    }
     log.write_metadata("dcvins simulate", notes)?;
     let images = write_messages(options, &scenario, &mut log, progress)?;
     let attachments = [
@@ -111,7 +115,7 @@ pub fn simulate_interruptible(
 }
 
 /// Flight with its measurements.
-fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
+fn fly_scenario(options: &SimulationOptions, name: &str) -> Result<Scenario, SimulationError> {
     let experiment = options.experiment;
     let variant = 100 * Experiment::all().position(|other| other == experiment).unwrap_or(0) as u64;
     let random = |stream: u64| RandomStream::new(options.seed, stream + variant);
@@ -122,17 +126,24 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
         flight = Box::new(Mirrored(flight));
         look = look.mirrored();
     }
-    let mut trajectory = Trajectory::new(
-        flight.as_ref(),
-        &mut random(stream::MANOEUVRES),
-        &VehicleLimits::default(),
-        planned_s,
-        gravity_m_per_s2(),
-    );
+    let prescribed = options.motion.as_ref().map(|motion| PrescribedFlight::new(motion, options)).transpose()?;
+    let mut trajectory = match &prescribed {
+        Some(prescribed) => prescribed.trajectory(&flight.point(0.0))?,
+        None => Trajectory::new(
+            flight.as_ref(),
+            &mut random(stream::MANOEUVRES),
+            &VehicleLimits::default(),
+            planned_s,
+            gravity_m_per_s2(),
+        ),
+    };
     if let Some(stretch_s) = options.disturbances.hover_s {
         trajectory.hover(stretch_s);
     }
-    let end_s = options.duration_s.unwrap_or_else(|| trajectory.time_of_length(experiment.length_m()));
+    let whole_s = || {
+        if prescribed.is_some() { trajectory.duration_s() } else { trajectory.time_of_length(experiment.length_m()) }
+    };
+    let end_s = options.duration_s.unwrap_or_else(whole_s);
     if let Some([start_s, length_s, rate_rad_per_s]) = options.disturbances.spin {
         trajectory.spin([start_s, length_s], rate_rad_per_s);
     }
@@ -162,6 +173,9 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
             imu_noise_scale: options.imu_noise_scale,
         },
     );
+    if let Some(prescribed) = &prescribed {
+        scenario.joints = Some(prescribed.joints(&scenario)?);
+    }
     if let Some(vibration) = &options.disturbances.vibration {
         shake(&mut scenario.imu_record, &scenario.trajectory, vibration, &mut random(stream::VIBRATION));
     }
@@ -183,7 +197,7 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
             sample.specific_force_m_per_s2.apply(|force| *force = force.clamp(-range.abs(), range.abs()));
         }
     }
-    scenario
+    Ok(scenario)
 }
 
 /// Message of the log by its index among those of its kind.

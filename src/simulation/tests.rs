@@ -1,5 +1,6 @@
 mod flight;
 mod images;
 mod logs;
+mod prescribed;
 mod synthetic;
 mod tracking;

@@ -102,6 +102,16 @@ impl Trajectory {
         trajectory
     }
 
+    /// Flight along these splines.
+    pub(super) fn of_splines(
+        position_m: Spline<3>,
+        heading_rad: Spline<1>,
+        gravity_m_per_s2: f64,
+        duration_s: f64,
+    ) -> Self {
+        Self { position_m, heading_rad, gravity_m_per_s2, duration_s }
+    }
+
     /// Reduces the manoeuvres where a limit is exceeded until none is, in at most 200 iterations.
     fn soften(&mut self, base: &[SVector<f64, 3>], position_wander: &mut [SVector<f64, 3>], limits: &VehicleLimits) {
         for _ in 0..200 {
@@ -237,6 +247,16 @@ impl Trajectory {
 }
 
 impl VehicleLimits {
+    /// Checks a flight every 0.02 s.
+    ///
+    /// # Errors
+    /// The first time in seconds at which the flight exceeds the limits.
+    pub(super) fn admit_flight(&self, trajectory: &Trajectory) -> Result<(), f64> {
+        let steps = (trajectory.duration_s / CHECK_STEP_S).floor() as usize;
+        let mut times_s = (0..=steps).map(|step| step as f64 * CHECK_STEP_S);
+        times_s.find(|time_s| !self.admit(&trajectory.at(*time_s))).map_or(Ok(()), Err)
+    }
+
     /// True if the state is within the limits.
     pub fn admit(&self, state: &Kinematics) -> bool {
         let thrust = state.specific_force_m_per_s2.z;

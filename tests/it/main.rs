@@ -15,6 +15,7 @@ mod other_estimators;
 mod outputs;
 #[cfg(feature = "gui")]
 mod pictures;
+mod plan;
 #[cfg(feature = "gui")]
 mod renderers;
 mod report;

@@ -32,15 +32,14 @@ pub(crate) struct Setup {
 
 impl Setup {
     pub(crate) fn new(config: EstimatorConfig) -> Self {
-        let mut imu_noise = config.imu_noise;
-        scale_noise(&mut imu_noise, config.options.imu_noise_factor);
+        let imu_noise = config.imu_noise.scaled(config.options.imu_noise_factor);
         Self { imu_noise, gravity_in_world: gravity_in_world(config.gravity_m_per_s2), config }
     }
 
     /// Scales the noise densities of all following IMU intervals.
     pub(crate) fn scale_imu_noise(&mut self, factor: f64) {
-        scale_noise(&mut self.imu_noise, factor);
-        scale_noise(&mut self.config.imu_noise, factor);
+        self.imu_noise = self.imu_noise.scaled(factor);
+        self.config.imu_noise = self.config.imu_noise.scaled(factor);
     }
 
     /// Time of the stage-time clock in milliseconds.
@@ -131,11 +130,4 @@ impl Setup {
         self.config.encoder_in_use()?;
         input.encoder_angles(joints).cloned()
     }
-}
-
-fn scale_noise(noise: &mut ImuNoise, factor: f64) {
-    noise.accelerometer_noise_density *= factor;
-    noise.accelerometer_random_walk *= factor;
-    noise.gyroscope_noise_density *= factor;
-    noise.gyroscope_random_walk *= factor;
 }

@@ -3,20 +3,17 @@
 
 use std::fmt;
 
-use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::super::analysis::measured_information;
 use super::super::classification::excitable_directions;
 use super::Situation;
 use super::mechanism::LaboratoryJoint;
-use crate::estimator::{
-    EstimatorOptions, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, NavigationState, PoseKnowledge,
-};
+use super::predicted_window::predicted_information;
+use crate::estimator::{HypotheticalFrame, NavigationState};
 use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, so3};
 use crate::gimbal::ParameterId;
-use crate::optimization::LandmarkModel;
 use crate::sensors::ImuSample;
 use crate::simulation::{
     Exercise, JOINT_PERIOD_S, JointSwing, ROCK_M, ROCK_PERIOD_S, SWING_M, VehicleSwing, YAW_SWING_RAD,
@@ -25,13 +22,9 @@ use crate::simulation::{
 /// Duration of a candidate, in seconds.
 pub const ADVICE_DURATION_S: f64 = 4.0;
 /// Number of frames of a candidate's window: about as many keyframes as the estimator makes.
-const FRAMES: usize = 16;
+pub(super) const FRAMES: usize = 16;
 /// Landmarks drawn in each frame's view.
-const LANDMARKS_PER_FRAME: usize = 12;
-/// Smallest number of observations of a landmark, as in the estimator.
-const MIN_OBSERVATIONS: usize = 3;
-/// Landmarks are drawn with this distance to the image border, and observed up to the border.
-const BORDER_PX: f64 = 8.0;
+pub(super) const LANDMARKS_PER_FRAME: usize = 12;
 /// Rate of the simulated IMU samples: their covariance hardly depends on it.
 const IMU_RATE_HZ: f64 = 50.0;
 /// Largest amplitude of a joint.
@@ -165,7 +158,7 @@ impl WeakDirection {
 }
 
 /// All combinations of a vehicle motion with a joint motion that the joint's range admits.
-fn candidates(situation: &Situation) -> Vec<Exercise> {
+pub(super) fn candidates(situation: &Situation) -> Vec<Exercise> {
     let mut swings = vec![None];
     for (joint, angle_rad) in situation.joints_rad.iter().enumerate() {
         let (low, high) = situation.joints.get(joint).map_or((-JOINT_SWING_RAD, JOINT_SWING_RAD), |it| it.limits_rad);
@@ -183,11 +176,21 @@ fn candidates(situation: &Situation) -> Vec<Exercise> {
 /// Information matrix of a candidate about the calibration columns (n × n), in units of 10° and 3 cm; `None`
 /// when it is not finite.
 fn information_of(situation: &Situation, exercise: &Exercise) -> Option<DMatrix<f64>> {
-    let states: Vec<(f64, NavigationState, Vec<f64>)> = (0..FRAMES)
-        .map(|slot| {
-            let time_s = ADVICE_DURATION_S * slot as f64 / (FRAMES - 1) as f64;
-            (time_s, navigation_at(situation, exercise, time_s), joints_at(situation, exercise, time_s))
-        })
+    let times_s: Vec<f64> = (0..FRAMES).map(|slot| ADVICE_DURATION_S * slot as f64 / (FRAMES - 1) as f64).collect();
+    let joints_at = |time_s: f64| joints_at(situation, exercise, time_s);
+    information_of_exercise(situation, exercise, &times_s, &joints_at)
+}
+
+/// Information matrix of the frames at these times of an exercise, with joint angles of their own.
+pub(super) fn information_of_exercise(
+    situation: &Situation,
+    exercise: &Exercise,
+    times_s: &[f64],
+    joints_at: &dyn Fn(f64) -> Vec<f64>,
+) -> Option<DMatrix<f64>> {
+    let states: Vec<(f64, NavigationState, Vec<f64>)> = times_s
+        .iter()
+        .map(|time_s| (*time_s, navigation_at(situation, exercise, *time_s), joints_at(*time_s)))
         .collect();
     let gravity = situation.gravity_in_world;
     let frames: Vec<HypotheticalFrame> = states
@@ -203,28 +206,7 @@ fn information_of(situation: &Situation, exercise: &Exercise) -> Option<DMatrix<
             }),
         })
         .collect();
-    let poses: Vec<RigidTransform> = frames
-        .iter()
-        .map(|frame| frame.navigation.world_from_imu * situation.chain.imu_from_camera(&frame.joints_rad))
-        .collect();
-    let mut landmarks = landmarks(situation, &poses);
-    if !makes_keyframes(&landmarks, &poses) {
-        landmarks.clear();
-    }
-    let window = HypotheticalWindow {
-        camera: situation.camera.clone(),
-        landmarks,
-        frames,
-        poses: PoseKnowledge::Imu { noise: situation.imu_noise, biases_known: false },
-        joints: situation.encoders,
-        pixel_sigma_px: situation.pixel_sigma_px,
-        landmark_model: LandmarkModel::BearingAndInverseDistance,
-        gravity_in_world: gravity,
-        chain_prior: (Dimension::Length.scale(), Dimension::Angle.scale()),
-    };
-    let chain = &situation.chain;
-    let linearization = window.linearize(&chain.to_classical(), chain.parameterization(), !chain.hides_joint_offsets());
-    measured_information(&linearization)
+    predicted_information(situation, frames, LANDMARKS_PER_FRAME)
 }
 
 fn joints_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> Vec<f64> {
@@ -295,65 +277,8 @@ fn samples(
         .collect()
 }
 
-/// Landmarks in the view of every frame at the distances of the scene, observed while they are in the image.
-fn landmarks(situation: &Situation, poses: &[RigidTransform]) -> Vec<HypotheticalLandmark> {
-    let camera = &situation.camera;
-    let scene_m = situation.scene_m();
-    let [width, height] = camera.resolution_px.map(|size| size as f64);
-    let mut landmarks = Vec::new();
-    for index in 0..LANDMARKS_PER_FRAME * poses.len() {
-        let home = index % poses.len();
-        // A low-discrepancy sequence over the image and over the distances (Roberts' R3).
-        let fraction = |factor: f64| (0.5 + factor * (index + 1) as f64).fract();
-        let (across, down, far) = (fraction(0.819_172_513_4), fraction(0.671_043_606_7), fraction(0.549_700_477_9));
-        let inside = |position: f64, size: f64| BORDER_PX + position * (size - 2.0 * BORDER_PX);
-        let uv_px = Vector2::new(inside(across, width), inside(down, height));
-        let distance_m = scene_m[((far * scene_m.len() as f64) as usize).min(scene_m.len() - 1)];
-        let Some(ray) = camera.unproject(&uv_px) else { continue };
-        let point = poses[home].transform(&(ray.normalize() * distance_m));
-        let seen = |slot: &usize| {
-            let in_camera = poses[*slot].inverse().transform(&point);
-            let seen = camera.project(&in_camera).filter(|_| in_camera.z > 0.0);
-            *slot == home || seen.is_some_and(|uv_px| camera.contains(&uv_px, 0.0))
-        };
-        let first = (0..=home).rev().take_while(seen).last().unwrap_or(home);
-        let last = (home..poses.len()).take_while(seen).last().unwrap_or(home);
-        if last + 1 - first < MIN_OBSERVATIONS {
-            continue;
-        }
-        let in_anchor = poses[first].inverse().transform(&point);
-        landmarks.push(HypotheticalLandmark {
-            anchor: first,
-            bearing: in_anchor.normalize(),
-            inverse_distance_per_m: in_anchor.norm().recip(),
-            observers: (first + 1..=last).collect(),
-        });
-    }
-    landmarks
-}
-
-/// True if the estimator makes a keyframe of any frame after the first, by parallax or by new features. A camera that
-/// hardly translates makes none, whatever the motion of its gimbal, and its observations are dropped.
-fn makes_keyframes(landmarks: &[HypotheticalLandmark], poses: &[RigidTransform]) -> bool {
-    let options = EstimatorOptions::default();
-    let is_keyframe = |slot: usize| {
-        let seen = || landmarks.iter().filter(|landmark| landmark.anchor == slot || landmark.observers.contains(&slot));
-        let parallaxes = || {
-            seen().filter(|landmark| landmark.anchor == 0).map(|landmark| {
-                let point = poses[0].transform(&(landmark.bearing / landmark.inverse_distance_per_m));
-                (point - poses[0].translation_m).angle(&(point - poses[slot].translation_m))
-            })
-        };
-        let common = parallaxes().count() as f64;
-        let new_ratio = 1.0 - common / seen().count().max(1) as f64;
-        let parallax_rad = parallaxes().sum::<f64>() / common.max(1.0);
-        parallax_rad >= options.keyframe_parallax_rad || new_ratio > options.keyframe_new_ratio
-    };
-    (1..poses.len()).any(is_keyframe)
-}
-
 /// Describes a candidate as an instruction.
-fn words(exercise: &Exercise, joints: &[LaboratoryJoint]) -> String {
+pub(super) fn words(exercise: &Exercise, joints: &[LaboratoryJoint]) -> String {
     let swing = exercise.joint.map(|swing| {
         let name = joints.get(swing.joint).map_or("a joint", |joint| joint.name.as_str());
         let size_deg = swing.amplitude_rad.to_degrees();

@@ -11,6 +11,8 @@ mod experiment;
 mod experiments;
 mod mechanism;
 mod motion;
+mod planning;
+mod predicted_window;
 mod report;
 mod run;
 mod sensors;
@@ -27,6 +29,10 @@ pub use experiment::{
 };
 pub use mechanism::{LaboratoryJoint, Mechanism, UnknownMechanism};
 pub use motion::{LaboratoryMotion, UnknownMotion};
+pub use planning::{
+    HandPlan, HandStep, ListedComparison, MotionLimits, MotionPlan, MotionPlanError, PLAN_DURATION_S, PlanCriterion,
+    PlanOptions, PlanStart, PlanTable, PlannedParameter, ReachedLimit, SigmaRow, plan_by_hand, plan_motion,
+};
 pub use report::LaboratoryReport;
 pub use sensors::{
     ParameterSigmas, SensorColumns, SensorExcitation, SensorSurveyEntry, SensorSurveyRow, SensorSurveySection,

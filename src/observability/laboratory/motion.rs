@@ -198,6 +198,12 @@ where
         * (1.0 / (180.0 * STENCIL_STEP_S * STENCIL_STEP_S))
 }
 
+/// Angle of a joint about which it moves: zero, moved so that at least a quarter of the range lies on both sides.
+pub(super) fn middle_angle_rad((low, high): (f64, f64)) -> f64 {
+    let quarter = 0.25 * (high - low).max(0.0);
+    0.0_f64.max(low + quarter).min(high - quarter)
+}
+
 /// A mechanism in motion, some of its joints fixed.
 #[derive(Clone, Debug)]
 pub(super) struct MechanismMotion<'a> {
@@ -214,9 +220,7 @@ impl MechanismMotion<'_> {
         (0..joints)
             .map(|joint| {
                 let (low, high) = self.mechanism.joints.get(joint).map_or((-TAU, TAU), |joint| joint.limits_rad);
-                // Centre of the motion: zero, moved so that at least a quarter of the range lies on both sides.
-                let quarter = 0.25 * (high - low).max(0.0);
-                let center = 0.0_f64.max(low + quarter).min(high - quarter);
+                let center = middle_angle_rad((low, high));
                 if self.frozen.contains(&joint) || self.motion.holds_joint(joint, joints) {
                     return center;
                 }

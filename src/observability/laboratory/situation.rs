@@ -3,9 +3,10 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::mechanism::LaboratoryJoint;
+use super::motion::middle_angle_rad;
 use super::{LaboratoryForm, LaboratorySetup};
 use crate::camera::CameraModel;
-use crate::estimator::{JointKnowledge, NavigationState, PoseKnowledge, StepReport, gravity_in_world};
+use crate::estimator::{EstimatorConfig, JointKnowledge, NavigationState, PoseKnowledge, StepReport, gravity_in_world};
 use crate::gimbal::{Chain, ParameterNames};
 use crate::observability::{RankReport, analyse, chain_of_step};
 use crate::sensors::{ImuNoise, Rig};
@@ -108,6 +109,45 @@ impl Situation {
         })
     }
 
+    /// State before a flight: the IMU at rest at the origin and level, with the calibration known as well as the prior.
+    ///
+    /// `joints` has one entry per joint of the configured chain. The joints start in the middle: at zero, moved so that
+    /// at least a quarter of the range lies on both sides. `encoder_sigma_rad` is the standard deviation of an encoder
+    /// angle at an image. `None` when the calibration is fixed or a number is not finite.
+    pub fn before_flight(
+        config: &EstimatorConfig,
+        joints: Vec<LaboratoryJoint>,
+        names: ParameterNames,
+        encoder_sigma_rad: Option<f64>,
+        distances_m: Vec<f64>,
+    ) -> Option<Self> {
+        let chain = Chain::from_classical(&config.chain, config.parameterization);
+        // Without encoders the estimator fixes the joint offsets.
+        let chain = if encoder_sigma_rad.is_some() { chain } else { chain.without_joint_offsets() };
+        let (translation_m, rotation_rad) = config.extrinsics_sigmas(0);
+        let scale = scale_of(&chain);
+        let covariance = chain.prior_covariance(&config.chain, translation_m, rotation_rad);
+        let scaled = DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |row, column| {
+            covariance[(row, column)] / (scale[row] * scale[column])
+        });
+        let joints_rad = joints.iter().map(|joint| middle_angle_rad(joint.limits_rad)).collect();
+        config.calibrate.then_some(())?;
+        Some(Self {
+            camera: config.camera.clone(),
+            joints,
+            names,
+            information: regular(scaled).cholesky()?.inverse(),
+            navigation: NavigationState::default(),
+            joints_rad,
+            encoders: encoder_sigma_rad.map_or(JointKnowledge::Unknown, JointKnowledge::Encoder),
+            imu_noise: config.imu_noise.scaled(config.options.imu_noise_factor),
+            gravity_in_world: gravity_in_world(config.gravity_m_per_s2),
+            pixel_sigma_px: config.options.pixel_sigma_px,
+            distances_m,
+            chain,
+        })
+    }
+
     /// Distances of the scene's landmarks in metres; [`UNKNOWN_DISTANCE_M`] without landmarks.
     pub(super) fn scene_m(&self) -> &[f64] {
         if self.distances_m.is_empty() { &UNKNOWN_DISTANCE_M } else { &self.distances_m }
@@ -120,9 +160,21 @@ impl Situation {
 
     /// One unit of each column: 10° or 3 cm.
     pub(super) fn scale(&self) -> DVector<f64> {
-        let parameters = self.chain.parameters();
-        DVector::from_iterator(parameters.len(), parameters.iter().map(|parameter| parameter.scale()))
+        scale_of(&self.chain)
     }
+}
+
+fn scale_of(chain: &Chain) -> DVector<f64> {
+    let parameters = chain.parameters();
+    DVector::from_iterator(parameters.len(), parameters.iter().map(|parameter| parameter.scale()))
+}
+
+/// Covariance with a floor on its diagonal, for columns that the prior fixes.
+fn regular(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
+    for column in 0..covariance.ncols() {
+        covariance[(column, column)] += 1.0 / KNOWN;
+    }
+    covariance
 }
 
 /// Marginal information of the first `count` columns; the others (those of further cameras) are marginalized.

@@ -18,6 +18,7 @@ mod history;
 mod image_rotations;
 mod message;
 mod passes;
+mod planned_flight;
 mod recompute;
 mod run_engine;
 mod shifted_imu;
@@ -43,6 +44,7 @@ pub(in crate::session) use message::EngineMessage;
 #[cfg(test)]
 pub(in crate::session) use passes::EarlierPasses;
 pub(in crate::session) use passes::guarded;
+pub use planned_flight::situation_before_flight;
 pub(in crate::session) use recompute::{Detail, RecomputeRequest, RecomputeThread, Recomputed, STEPS_AT_ONCE};
 pub(in crate::session) use run_engine::RunEngine;
 pub(in crate::session) use step_inputs::OwnedStepInput;

@@ -33,6 +33,8 @@ pub enum SessionError {
         end_s: f64,
         path: PathBuf,
     },
+    #[error("no motion can be planned for the run '{run}': {problem}")]
+    Unplannable { run: String, problem: String },
     #[error("cannot start a thread: {source}")]
     Thread { source: std::io::Error },
 }

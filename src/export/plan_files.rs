@@ -1,0 +1,149 @@
+//! Files of a planned motion: `plan.json`, `plan.txt`, `sigma.csv` and, for a searched motion, `motion.csv`.
+
+use std::fmt::{self, Display, Formatter};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::error::ExportError;
+use super::existing::read_index;
+use super::motion_csv::motion_csv;
+use crate::flight_log::csv_writer::{CsvWriter, number_cell};
+use crate::flight_log::{output, printable, shortened};
+use crate::observability::laboratory::{HandPlan, MotionPlan, PlanTable, SigmaRow};
+
+const INDEX: &str = "plan.json";
+const TEXT: &str = "plan.txt";
+const SIGMAS: &str = "sigma.csv";
+const MOTION: &str = "motion.csv";
+const PLAN_FILES: [&str; 4] = [INDEX, TEXT, SIGMAS, MOTION];
+/// Key of the index whose value names the rig.
+const RIG_KEY: &str = "rig";
+
+/// A plan with the settings it was made with.
+#[derive(Clone, Debug, Serialize)]
+pub struct PlanReport {
+    pub rig: String,
+    /// Specification of the run that estimates the calibration.
+    pub run: String,
+    pub parameterization: String,
+    pub criterion: &'static str,
+    /// Nearest and farthest distance of the scene.
+    pub scene_m: (f64, f64),
+    pub seed: u64,
+    #[serde(flatten)]
+    pub plan: PlannedFlight,
+}
+
+/// A searched motion or moves by hand.
+#[derive(Clone, Debug, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum PlannedFlight {
+    Motion(Box<MotionPlan>),
+    ByHand(HandPlan),
+}
+
+impl PlannedFlight {
+    fn table(&self) -> &PlanTable {
+        match self {
+            Self::Motion(plan) => &plan.table,
+            Self::ByHand(plan) => &plan.table,
+        }
+    }
+
+    fn sigmas(&self) -> &[SigmaRow] {
+        match self {
+            Self::Motion(plan) => &plan.sigmas,
+            Self::ByHand(plan) => &plan.sigmas,
+        }
+    }
+}
+
+impl Display for PlanReport {
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        writeln!(
+            out,
+            "{}: {}, {}, scene from {} to {} m, criterion {}",
+            printable(&self.rig),
+            self.run,
+            self.parameterization,
+            self.scene_m.0,
+            self.scene_m.1,
+            self.criterion
+        )?;
+        match &self.plan {
+            PlannedFlight::Motion(plan) => {
+                writeln!(out, "planned motion of {:.0} s", plan.duration_s)?;
+                plan.fmt(out)
+            }
+            PlannedFlight::ByHand(plan) => plan.fmt(out),
+        }
+    }
+}
+
+/// Checks that a plan may be written into a folder: existing files of a plan must be of the same rig.
+///
+/// # Errors
+/// If the folder cannot be written or, without `force`, contains another plan or files of the same names.
+pub fn check_plan_folder(folder: &Path, rig: &str, force: bool) -> Result<(), ExportError> {
+    output::check_folder(folder).map_err(ExportError::write(folder))?;
+    let Some(found) = PLAN_FILES.iter().find(|name| folder.join(name).exists()).filter(|_| !force) else {
+        return Ok(());
+    };
+    let index = read_index(&folder.join(INDEX));
+    let problem = match index.as_ref().and_then(|index| index.get(RIG_KEY)).and_then(serde_json::Value::as_str) {
+        Some(other) if other == rig => return Ok(()),
+        Some(other) => format!("the folder holds a plan for the rig '{}'", shortened(other, 80)),
+        None => format!("the folder holds '{found}' and no {INDEX} that names its rig"),
+    };
+    Err(ExportError::Existing { problem, path: folder.to_owned() })
+}
+
+/// Writes the files of a plan and returns their paths; the motion of an earlier plan is removed if this one has none.
+///
+/// # Errors
+/// If the folder or a file cannot be written.
+pub fn write_plan(report: &PlanReport, joint_names: &[String], folder: &Path) -> Result<Vec<PathBuf>, ExportError> {
+    fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
+    let json = serde_json::to_string_pretty(report)
+        .map_err(|source| ExportError::Write { source: source.into(), path: folder.join(INDEX) })?;
+    let mut files = vec![
+        (INDEX, format!("{json}\n")),
+        (TEXT, report.to_string()),
+        (SIGMAS, sigma_csv(report.plan.table(), report.plan.sigmas())),
+    ];
+    if let PlannedFlight::Motion(plan) = &report.plan {
+        files.push((MOTION, motion_csv(&plan.motion, joint_names)));
+    }
+    let mut outputs = output::OutputSet::default();
+    let mut paths = Vec::new();
+    for (name, text) in &files {
+        let path = folder.join(name);
+        outputs.write(&path, text.as_bytes()).map_err(ExportError::write(&path))?;
+        paths.push(path);
+    }
+    outputs.commit().map_err(ExportError::commit)?;
+    let motion = folder.join(MOTION);
+    if !paths.contains(&motion) && motion.is_file() {
+        fs::remove_file(&motion).map_err(ExportError::write(&motion))?;
+    }
+    Ok(paths)
+}
+
+/// Predicted σ over time, one row per time and parameter.
+fn sigma_csv(table: &PlanTable, rows: &[SigmaRow]) -> String {
+    let mut csv = CsvWriter::new(["t_s", "parameter", "unit", "sigma", "ratio"]);
+    for row in rows {
+        for (parameter, (sigma, ratio)) in table.parameters.iter().zip(&row.sigmas) {
+            csv.row([
+                number_cell(row.time_s),
+                parameter.name.clone(),
+                parameter.dimension.unit().to_owned(),
+                number_cell(*sigma),
+                number_cell(*ratio),
+            ]);
+        }
+    }
+    csv.into_text()
+}

@@ -1,0 +1,25 @@
+//! Planned motions: curves of joints and vehicle that leave the calibration with the smallest predicted σ.
+//!
+//! A motion is one spline per joint and per axis of the vehicle ([`MotionSplines`](crate::simulation::MotionSplines)).
+//! Its information is that of consecutive windows, each linearized as a candidate of the suggested excitation is
+//! ([`super::advise`]). The search adds bumps to the splines within the limits of joints and vehicle.
+
+mod by_hand;
+mod limits;
+mod moves;
+mod objective;
+mod plan;
+mod search;
+mod starts;
+mod summary;
+#[cfg(test)]
+mod tests;
+mod windows;
+
+pub use by_hand::{HandPlan, HandStep};
+pub use limits::{MotionLimits, ReachedLimit};
+pub use objective::PlanCriterion;
+pub use plan::{
+    ListedComparison, MotionPlan, MotionPlanError, PLAN_DURATION_S, PlanOptions, PlanStart, plan_by_hand, plan_motion,
+};
+pub use summary::{PlanTable, PlannedParameter, SigmaRow};

@@ -1,0 +1,204 @@
+//! Local search over the control values of a motion.
+//!
+//! A trial adds a bump to the control values of one or two channels, within the limits, and is accepted if the criterion
+//! falls. Only the windows that the bump changes are linearized again.
+
+use nalgebra::DMatrix;
+
+use super::super::Situation;
+use super::limits::MotionLimits;
+use super::objective::Objective;
+use super::windows::{WindowLayout, information_of_window, sum, trajectory};
+use crate::geometry::SplitMix64;
+use crate::simulation::MotionSplines;
+
+/// Step at which rates and accelerations are compared with the limits during the search.
+const CHECK_STEP_S: f64 = 0.04;
+/// Ratio of the limits within which the search stays, for extremes between its steps.
+const MARGIN: f64 = 0.97;
+/// Knots on either side of a control value on which it has an effect.
+const REACH_KNOTS: f64 = 6.0;
+/// Half widths of bumps, in knots.
+const WIDTHS_KNOTS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+/// Ratio of trials that change two channels.
+const TWO_CHANNELS: f64 = 0.3;
+/// Factors on the size of bumps in a channel after an accepted and after a rejected trial.
+const SIZE_FACTORS: [f64; 2] = [1.3, 0.97];
+/// Smallest and largest size of bumps, as ratios of a channel's range.
+const SIZES: [f64; 2] = [0.02, 0.6];
+/// Times that a bump beyond the limits is halved before the trial is given up.
+const HALVINGS: usize = 3;
+
+/// What a search does not change.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SearchProblem<'a> {
+    pub(super) situation: &'a Situation,
+    pub(super) objective: &'a Objective,
+    pub(super) limits: &'a MotionLimits,
+    pub(super) layout: WindowLayout,
+}
+
+/// A motion with the information of its windows.
+#[derive(Clone, Debug)]
+pub(super) struct SearchedMotion {
+    pub(super) motion: MotionSplines,
+    pub(super) windows: Vec<DMatrix<f64>>,
+    value: f64,
+}
+
+/// Change of the control values of a channel: centre and half width as indices, height in the channel's unit.
+#[derive(Clone, Copy, Debug)]
+struct Bump {
+    channel: usize,
+    centre: usize,
+    width: f64,
+    height: f64,
+}
+
+impl SearchProblem<'_> {
+    /// Information of every window of a motion; `None` when a number is not finite.
+    pub(super) fn evaluate(&self, motion: MotionSplines) -> Option<SearchedMotion> {
+        let flight = trajectory(self.situation, &motion);
+        let of = |window| information_of_window(self.situation, &motion, &flight, &self.layout, window);
+        let windows: Vec<DMatrix<f64>> = (0..self.layout.count).map(of).collect::<Option<_>>()?;
+        let value = self.objective.search_value(&self.total(&windows))?;
+        Some(SearchedMotion { motion, windows, value })
+    }
+
+    pub(super) fn total(&self, windows: &[DMatrix<f64>]) -> DMatrix<f64> {
+        sum(windows, self.situation.information.ncols())
+    }
+
+    /// Runs a number of trials from a motion; `stop` is asked after each.
+    pub(super) fn improve(
+        &self,
+        start: SearchedMotion,
+        trials: usize,
+        random: &mut SplitMix64,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> SearchedMotion {
+        let limits = self.limits.reduced(MARGIN);
+        let mut best = start;
+        let mut sizes = vec![0.25; best.motion.channel_count()];
+        for _ in 0..trials {
+            let bumps = self.draw(&best.motion, &sizes, random);
+            let better =
+                bumped(&best.motion, &bumps, &limits).and_then(|motion| self.reevaluate(&best, motion, &bumps));
+            let is_better = better.as_ref().is_some_and(|better| better.value < best.value);
+            for bump in &bumps {
+                let size = &mut sizes[bump.channel];
+                *size = (*size * SIZE_FACTORS[usize::from(!is_better)]).clamp(SIZES[0], SIZES[1]);
+            }
+            if let Some(better) = better.filter(|_| is_better) {
+                best = better;
+            }
+            if stop() {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Draws the bumps of a trial.
+    fn draw(&self, motion: &MotionSplines, sizes: &[f64], random: &mut SplitMix64) -> Vec<Bump> {
+        let free = motion.free_points();
+        let count = if random.next_unit() < TWO_CHANNELS { 2 } else { 1 };
+        let index =
+            |random: &mut SplitMix64, count: usize| ((random.next_unit() * count as f64) as usize).min(count - 1);
+        (0..count)
+            .map(|_| {
+                let channel = index(random, motion.channel_count());
+                let (low, high) = self.limits.range(channel);
+                // About normal: the sum of three uniform numbers.
+                let height = 2.0 * (random.next_unit() + random.next_unit() + random.next_unit() - 1.5);
+                Bump {
+                    channel,
+                    centre: free.start + index(random, free.len()),
+                    width: WIDTHS_KNOTS[index(random, WIDTHS_KNOTS.len())],
+                    height: height * sizes[channel] * (high - low),
+                }
+            })
+            .collect()
+    }
+
+    /// Linearizes the windows that bumps have changed.
+    fn reevaluate(&self, before: &SearchedMotion, motion: MotionSplines, bumps: &[Bump]) -> Option<SearchedMotion> {
+        let flight = trajectory(self.situation, &motion);
+        let mut windows = before.windows.clone();
+        let mut is_changed = vec![false; windows.len()];
+        for bump in bumps {
+            is_changed[self.layout.within(reach_s(&motion, bump))].fill(true);
+        }
+        for (window, _) in is_changed.iter().enumerate().filter(|(_, is_changed)| **is_changed) {
+            windows[window] = information_of_window(self.situation, &motion, &flight, &self.layout, window)?;
+        }
+        let value = self.objective.search_value(&self.total(&windows))?;
+        Some(SearchedMotion { motion, windows, value })
+    }
+
+    /// Makes a motion slower and smaller until it is within the limits, each of its channels for itself.
+    pub(super) fn within_limits(&self, mut motion: MotionSplines) -> MotionSplines {
+        const ROUNDS: usize = 120;
+        const FACTOR: f64 = 0.94;
+        let limits = self.limits.reduced(MARGIN);
+        let whole_s = [0.0, motion.duration_s()];
+        for _ in 0..ROUNDS {
+            let exceeded: Vec<usize> = (0..motion.channel_count())
+                .filter(|channel| limits.load(&motion, *channel, whole_s, CHECK_STEP_S) > 1.0)
+                .collect();
+            if exceeded.is_empty() {
+                break;
+            }
+            for channel in exceeded {
+                let rest = motion.point(channel, 0);
+                for index in motion.free_points() {
+                    let value = motion.point(channel, index);
+                    motion.set_point(channel, index, rest + (value - rest) * FACTOR);
+                }
+            }
+        }
+        motion
+    }
+}
+
+/// Motion with these bumps, smaller ones if they exceed the limits; `None` if these still do.
+fn bumped(motion: &MotionSplines, bumps: &[Bump], limits: &MotionLimits) -> Option<MotionSplines> {
+    let mut factor = 1.0;
+    for _ in 0..=HALVINGS {
+        let mut changed = motion.clone();
+        for bump in bumps {
+            let range = limits.range(bump.channel);
+            add(&mut changed, &Bump { height: bump.height * factor, ..*bump }, range);
+        }
+        let within = |bump: &Bump| limits.load(&changed, bump.channel, reach_s(motion, bump), CHECK_STEP_S) <= 1.0;
+        if bumps.iter().all(within) {
+            return Some(changed);
+        }
+        factor *= 0.5;
+    }
+    None
+}
+
+/// Time in which a bump changes a motion.
+fn reach_s(motion: &MotionSplines, bump: &Bump) -> [f64; 2] {
+    let middle_s = motion.time_of_point(bump.centre);
+    let half_s = (REACH_KNOTS + extent(bump)) * motion.knot_s();
+    [(middle_s - half_s).max(0.0), (middle_s + half_s).min(motion.duration_s())]
+}
+
+/// Knots on either side of its centre beyond which a bump is zero.
+fn extent(bump: &Bump) -> f64 {
+    (2.5 * bump.width).ceil()
+}
+
+/// Adds a bump to the free control values of its channel, limited to a range.
+fn add(motion: &mut MotionSplines, bump: &Bump, (low, high): (f64, f64)) {
+    for index in motion.free_points() {
+        let distance = index.abs_diff(bump.centre) as f64;
+        if distance <= extent(bump) {
+            let weight = (-0.5 * (distance / bump.width).powi(2)).exp();
+            let value = motion.point(bump.channel, index) + bump.height * weight;
+            motion.set_point(bump.channel, index, value.clamp(low, high));
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Predicted σ of the calibration parameters as tables.
+
+use std::fmt;
+
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use super::super::Situation;
+use super::objective::Objective;
+use crate::geometry::Dimension;
+
+/// Prior and predicted σ of one parameter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlannedParameter {
+    pub name: String,
+    #[serde(rename = "unit")]
+    pub dimension: Dimension,
+    /// σ before the motion, within the directions that some motion makes observable.
+    pub prior_sigma: f64,
+    /// Predicted σ after the motion.
+    pub sigma: f64,
+    /// Ratio of the two.
+    pub ratio: f64,
+    /// True if the criterion contains it.
+    pub matters: bool,
+}
+
+/// Predicted σ of all parameters after a motion.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlanTable {
+    pub parameters: Vec<PlannedParameter>,
+    /// Least determined parameter of the criterion.
+    pub worst: String,
+    pub worst_ratio: f64,
+    /// Mean ratio of the parameters of the criterion.
+    pub mean_ratio: f64,
+}
+
+/// Predicted σ of all parameters at one time of a motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SigmaRow {
+    pub time_s: f64,
+    /// σ and σ/prior of each parameter.
+    pub sigmas: Vec<(f64, f64)>,
+}
+
+impl PlanTable {
+    /// Table after this much information; `None` when a number is not finite.
+    pub(super) fn new(situation: &Situation, objective: &Objective, gained: &DMatrix<f64>) -> Option<Self> {
+        let (prior, after) = objective.sigmas(gained)?;
+        let scale = situation.scale();
+        let parameters: Vec<PlannedParameter> = situation
+            .chain
+            .parameters()
+            .into_iter()
+            .enumerate()
+            .map(|(column, parameter)| PlannedParameter {
+                name: situation.names.name(parameter),
+                dimension: parameter.dimension(),
+                prior_sigma: prior[column] * scale[column],
+                sigma: after[column] * scale[column],
+                ratio: if prior[column] > 0.0 { after[column] / prior[column] } else { 1.0 },
+                matters: objective.is_chosen(column),
+            })
+            .collect();
+        let matters: Vec<&PlannedParameter> = parameters.iter().filter(|parameter| parameter.matters).collect();
+        let worst = matters.iter().max_by(|a, b| a.ratio.total_cmp(&b.ratio))?;
+        Some(Self {
+            worst: worst.name.clone(),
+            worst_ratio: worst.ratio,
+            mean_ratio: matters.iter().map(|parameter| parameter.ratio).sum::<f64>() / matters.len() as f64,
+            parameters,
+        })
+    }
+}
+
+impl SigmaRow {
+    pub(super) fn new(time_s: f64, table: &PlanTable) -> Self {
+        Self { time_s, sigmas: table.parameters.iter().map(|parameter| (parameter.sigma, parameter.ratio)).collect() }
+    }
+}
+
+impl fmt::Display for PlanTable {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(out, "predicted σ at the end\n  {:<16}{:>12}{:>12}{:>10}", "", "prior", "after", "ratio")?;
+        for parameter in &self.parameters {
+            let (factor, unit) = match parameter.dimension {
+                Dimension::Angle => (1_f64.to_degrees(), "°"),
+                _ => (1e3, " mm"),
+            };
+            let [prior, after] =
+                [parameter.prior_sigma, parameter.sigma].map(|sigma| format!("{:.3}{unit}", sigma * factor));
+            let note = if parameter.matters { "" } else { "  not in the criterion" };
+            writeln!(out, "  {:<16}{prior:>12}{after:>12}{:>10.3}{note}", parameter.name, parameter.ratio)?;
+        }
+        writeln!(out, "largest σ/prior {:.3} ({}), mean {:.3}", self.worst_ratio, self.worst, self.mean_ratio)
+    }
+}

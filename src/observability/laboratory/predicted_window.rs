@@ -1,0 +1,104 @@
+//! Windows of predicted motions: landmarks at the distances of the scene, and the information about the calibration.
+
+use nalgebra::{DMatrix, Vector2};
+
+use super::super::analysis::measured_information;
+use super::Situation;
+use crate::estimator::{EstimatorOptions, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, PoseKnowledge};
+use crate::geometry::{Dimension, RigidTransform};
+use crate::optimization::LandmarkModel;
+
+/// Smallest number of observations of a landmark, as in the estimator.
+const MIN_OBSERVATIONS: usize = 3;
+/// Landmarks are drawn with this distance to the image border, and observed up to the border.
+const BORDER_PX: f64 = 8.0;
+
+/// Information matrix of a window of predicted frames about the calibration columns (n × n), in units of 10° and 3 cm,
+/// with `landmarks_per_frame` landmarks drawn in the view of each frame; `None` when it is not finite.
+///
+/// The window is independent of the past: positions, yaw, velocities and biases at its start are unknown.
+pub(super) fn predicted_information(
+    situation: &Situation,
+    frames: Vec<HypotheticalFrame>,
+    landmarks_per_frame: usize,
+) -> Option<DMatrix<f64>> {
+    let poses: Vec<RigidTransform> = frames
+        .iter()
+        .map(|frame| frame.navigation.world_from_imu * situation.chain.imu_from_camera(&frame.joints_rad))
+        .collect();
+    let mut landmarks = landmarks(situation, &poses, landmarks_per_frame);
+    if !makes_keyframes(&landmarks, &poses) {
+        landmarks.clear();
+    }
+    let window = HypotheticalWindow {
+        camera: situation.camera.clone(),
+        landmarks,
+        frames,
+        poses: PoseKnowledge::Imu { noise: situation.imu_noise, biases_known: false },
+        joints: situation.encoders,
+        pixel_sigma_px: situation.pixel_sigma_px,
+        landmark_model: LandmarkModel::BearingAndInverseDistance,
+        gravity_in_world: situation.gravity_in_world,
+        chain_prior: (Dimension::Length.scale(), Dimension::Angle.scale()),
+    };
+    let chain = &situation.chain;
+    let linearization = window.linearize(&chain.to_classical(), chain.parameterization(), !chain.hides_joint_offsets());
+    measured_information(&linearization)
+}
+
+/// Landmarks in the view of every frame at the distances of the scene, observed while they are in the image.
+fn landmarks(situation: &Situation, poses: &[RigidTransform], per_frame: usize) -> Vec<HypotheticalLandmark> {
+    let camera = &situation.camera;
+    let scene_m = situation.scene_m();
+    let [width, height] = camera.resolution_px.map(|size| size as f64);
+    let mut landmarks = Vec::new();
+    for index in 0..per_frame * poses.len() {
+        let home = index % poses.len();
+        // A low-discrepancy sequence over the image and over the distances (Roberts' R3).
+        let fraction = |factor: f64| (0.5 + factor * (index + 1) as f64).fract();
+        let (across, down, far) = (fraction(0.819_172_513_4), fraction(0.671_043_606_7), fraction(0.549_700_477_9));
+        let inside = |position: f64, size: f64| BORDER_PX + position * (size - 2.0 * BORDER_PX);
+        let uv_px = Vector2::new(inside(across, width), inside(down, height));
+        let distance_m = scene_m[((far * scene_m.len() as f64) as usize).min(scene_m.len() - 1)];
+        let Some(ray) = camera.unproject(&uv_px) else { continue };
+        let point = poses[home].transform(&(ray.normalize() * distance_m));
+        let seen = |slot: &usize| {
+            let in_camera = poses[*slot].inverse().transform(&point);
+            let seen = camera.project(&in_camera).filter(|_| in_camera.z > 0.0);
+            *slot == home || seen.is_some_and(|uv_px| camera.contains(&uv_px, 0.0))
+        };
+        let first = (0..=home).rev().take_while(seen).last().unwrap_or(home);
+        let last = (home..poses.len()).take_while(seen).last().unwrap_or(home);
+        if last + 1 - first < MIN_OBSERVATIONS {
+            continue;
+        }
+        let in_anchor = poses[first].inverse().transform(&point);
+        landmarks.push(HypotheticalLandmark {
+            anchor: first,
+            bearing: in_anchor.normalize(),
+            inverse_distance_per_m: in_anchor.norm().recip(),
+            observers: (first + 1..=last).collect(),
+        });
+    }
+    landmarks
+}
+
+/// True if the estimator makes a keyframe of any frame after the first, by parallax or by new features. A camera that
+/// hardly translates makes none, whatever the motion of its gimbal, and its observations are dropped.
+fn makes_keyframes(landmarks: &[HypotheticalLandmark], poses: &[RigidTransform]) -> bool {
+    let options = EstimatorOptions::default();
+    let is_keyframe = |slot: usize| {
+        let seen = || landmarks.iter().filter(|landmark| landmark.anchor == slot || landmark.observers.contains(&slot));
+        let parallaxes = || {
+            seen().filter(|landmark| landmark.anchor == 0).map(|landmark| {
+                let point = poses[0].transform(&(landmark.bearing / landmark.inverse_distance_per_m));
+                (point - poses[0].translation_m).angle(&(point - poses[slot].translation_m))
+            })
+        };
+        let common = parallaxes().count() as f64;
+        let new_ratio = 1.0 - common / seen().count().max(1) as f64;
+        let parallax_rad = parallaxes().sum::<f64>() / common.max(1.0);
+        parallax_rad >= options.keyframe_parallax_rad || new_ratio > options.keyframe_new_ratio
+    };
+    (1..poses.len()).any(is_keyframe)
+}

@@ -1,0 +1,98 @@
+//! Flights along a prescribed motion.
+
+use std::sync::Arc;
+
+use super::super::{
+    Experiment, MotionSplines, PrescribedMotion, SimulationError, SimulationOptions, SimulationSummary, simulate,
+};
+use crate::flight_log::{FlightLog, FrameStream};
+use crate::geometry::{seconds_from_ns, so3};
+use crate::sensors::Rig;
+
+/// A motion of two seconds with a heading, a translation and a swing of the pitch joint.
+fn motion() -> PrescribedMotion {
+    let mut splines = MotionSplines::at_rest(&[0.2, 0.0, -0.3], 4.0, 16);
+    for index in splines.free_points() {
+        splines.set_point(2, index, -0.3 + 0.2 * (0.9 * index as f64).sin());
+        splines.set_point(3, index, 0.1);
+        splines.set_point(6, index, 0.15);
+    }
+    PrescribedMotion {
+        joint_names: ["yaw", "roll", "pitch"].map(str::to_owned).into(),
+        samples: (0..=40).map(|step| splines.sample(0.1 * f64::from(step))).collect(),
+    }
+}
+
+fn fly(
+    change: impl FnOnce(&mut SimulationOptions, &mut PrescribedMotion),
+) -> Result<SimulationSummary, SimulationError> {
+    let folder = tempfile::tempdir().unwrap();
+    fly_in(folder.path(), change)
+}
+
+fn fly_in(
+    folder: &std::path::Path,
+    change: impl FnOnce(&mut SimulationOptions, &mut PrescribedMotion),
+) -> Result<SimulationSummary, SimulationError> {
+    let mut options = SimulationOptions {
+        static_camera: false,
+        resolution_px: [32, 24],
+        camera_rate_hz: 10.0,
+        imu_noise_scale: 0.0,
+        encoder_sigma_rad: Some(1e-4),
+        ..SimulationOptions::new(Experiment::T2)
+    };
+    let mut motion = motion();
+    change(&mut options, &mut motion);
+    options.motion = Some(motion);
+    simulate(&options, &folder.join("flight.mcap"), &mut |_| ())
+}
+
+#[test]
+fn a_prescribed_motion_is_flown_from_the_start_of_the_route() {
+    let folder = tempfile::tempdir().unwrap();
+    let summary = fly_in(folder.path(), |_, _| ()).unwrap();
+    assert!((summary.duration_s - 4.0).abs() < 1e-9, "{summary:?}");
+    let log = Arc::new(FlightLog::open(&summary.log).unwrap());
+    let rig = Rig::for_log(&log, None).unwrap();
+    let frames: Vec<_> = FrameStream::new(log, &rig, "cam0", 0.0, None).unwrap().collect();
+    let expected = MotionSplines::through(&motion());
+    let first = frames[0].ground_truth.unwrap();
+    let mut largest_m: f64 = 0.0;
+    for frame in &frames {
+        let (time_s, pose) = (seconds_from_ns(frame.stamp_ns), frame.ground_truth.unwrap());
+        let sample = expected.sample(time_s);
+        // T2 starts with the heading +y: forward is +y, left is −x.
+        let moved = pose.translation_m - first.translation_m;
+        let shift = nalgebra::Vector3::new(moved.y, -moved.x, moved.z);
+        assert!((shift - sample.position_m).norm() < 1e-3, "{shift} {} at {time_s}", sample.position_m);
+        largest_m = largest_m.max(shift.norm());
+        let turned = so3::log(&(first.rotation.inverse() * pose.rotation)).z;
+        assert!((turned - sample.heading_rad).abs() < 0.02, "{turned} {}", sample.heading_rad);
+        let angles = frame.joint_angles.as_ref().unwrap();
+        for (angle, wanted) in angles.angles_rad.iter().zip(&sample.joints_rad) {
+            assert!((angle - wanted).abs() < 2e-3, "{angles:?} {sample:?}");
+        }
+    }
+    assert!(largest_m > 0.09, "{largest_m}");
+}
+
+#[test]
+fn motions_beyond_the_vehicle_and_its_gimbal_are_rejected() {
+    let check = |change: fn(&mut SimulationOptions, &mut PrescribedMotion), words: &str| {
+        let problem = fly(change).unwrap_err().to_string();
+        assert!(problem.contains(words), "{problem}");
+    };
+    check(|_, motion| motion.joint_names[1] = "tilt".to_owned(), "no joint 'roll'");
+    check(
+        |_, motion| {
+            motion.joint_names.pop();
+            motion.samples.iter_mut().for_each(|sample| sample.joints_rad.truncate(2));
+        },
+        "yaw, roll and pitch",
+    );
+    check(|_, motion| motion.samples[20].joints_rad[1] = 0.6, "the joint 'roll' is at 34.4°, its range is -25° to 25°");
+    check(|_, motion| motion.samples[20].position_m.x = 30.0, "the vehicle would exceed 7 m/s");
+    check(|_, motion| motion.samples[3].time_s = 0.1, "after 0.200 s is 0.100 s");
+    check(|options, _| options.disturbances.set("hover=1,1").unwrap(), "the disturbance 'hover'");
+}
