@@ -178,13 +178,6 @@ impl FlightLog {
         self.topics.iter().find(|info| info.has_unread_encoding(kinds))
     }
 
-    /// True if messages of the IMU, the camera or the joints are encoded as in ROS 1, which only the conversion reads.
-    pub fn needs_conversion(&self) -> bool {
-        let kinds: Vec<MessageKind> =
-            MessageKind::IMAGES.into_iter().chain([MessageKind::Imu, MessageKind::JointState]).collect();
-        self.topics.iter().any(|info| info.encoding == "ros1" && info.has_unread_encoding(&kinds))
-    }
-
     /// Positions of the messages of a topic.
     pub(super) fn topic_index(&self, topic: &str) -> TopicIndex {
         TopicIndex::new(&self.index, self.channel_ids.get(topic).map_or(&[], |ids| ids))

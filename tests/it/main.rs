@@ -11,6 +11,7 @@ mod hostile_logs;
 mod imports;
 mod layering;
 mod masks;
+mod open_sources;
 mod other_estimators;
 mod outputs;
 #[cfg(feature = "gui")]

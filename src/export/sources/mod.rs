@@ -9,6 +9,8 @@ mod prepare;
 #[cfg(test)]
 mod tests;
 
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 pub use self::converted_logs::ConvertedLogs;
@@ -16,7 +18,7 @@ pub use self::error::SourceError;
 pub use self::prepare::{ConversionStage, PreparedLog, prepare_log};
 use super::session_file::is_session;
 use crate::flight_log::convert::{AutopilotLog, SourceKind, source_kind};
-use crate::flight_log::{FlightLog, LogLimits, is_imu_file_of, is_rig_name, log_name};
+use crate::flight_log::{LogLimits, is_imu_file_of, is_rig_name, log_name};
 
 /// Endings of rigs, in lower case.
 const RIG_ENDINGS: [&str; 2] = ["yaml", "yml"];
@@ -108,14 +110,27 @@ fn kind_of_recording(path: &Path, limits: &LogLimits) -> Result<Option<SourceKin
         return Ok(None);
     }
     match source_kind(path, limits)? {
-        SourceKind::Mcap if !holds_unread_encodings(path, limits) => Ok(None),
+        SourceKind::Mcap if !is_of_ros1(path) => Ok(None),
         kind => Ok(Some(kind)),
     }
 }
 
-/// True if the log has messages that only the conversion reads, in the encoding of ROS 1.
-fn holds_unread_encodings(path: &Path, limits: &LogLimits) -> bool {
-    FlightLog::open_with(path, limits).is_ok_and(|log| log.needs_conversion())
+/// Bytes of a log that hold its profile: magic, opcode and length of the header record, length and text of the profile.
+const PROFILE_BYTES: usize = 64;
+
+/// True for an MCAP file with the profile of ROS 1, whose messages only the conversion reads.
+fn is_of_ros1(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(PROFILE_BYTES as u64).read_to_end(&mut start));
+    read.is_ok() && profile_of(&start) == Some(b"ros1")
+}
+
+/// Profile at the start of an MCAP file; `None` for any other file.
+fn profile_of(start: &[u8]) -> Option<&[u8]> {
+    const HEADER: u8 = 1;
+    let record = start.strip_prefix(mcap::MAGIC)?.strip_prefix(&[HEADER])?;
+    let (length, text) = record.get(size_of::<u64>()..)?.split_first_chunk()?;
+    text.get(..usize::try_from(u32::from_le_bytes(*length)).ok()?)
 }
 
 /// Bag of ROS 2 whose files are given instead of its folder; `None` for anything else.

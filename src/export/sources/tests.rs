@@ -64,6 +64,18 @@ fn files_that_form_one_log_are_sorted_and_others_are_named() {
     assert_eq!(bags.main, folder.join("c_1.bag"));
     assert_eq!(bags.splits, ["c_2.bag", "c_10.bag"].map(|name| folder.join(name)));
 
+    // A log of MCAP is opened as it is, one with messages of ROS 1 converted.
+    let log = |profile: &str| {
+        let mut bytes = mcap::MAGIC.to_vec();
+        bytes.push(1);
+        bytes.extend_from_slice(&40_u64.to_le_bytes());
+        bytes.extend_from_slice(&(profile.len() as u32).to_le_bytes());
+        bytes.extend_from_slice(profile.as_bytes());
+        fs::write(folder.join("d.mcap"), bytes).unwrap();
+        gather(folder, &["d.mcap", "a.rig.yaml"]).unwrap().kind
+    };
+    assert_eq!((log("ros2"), log("ros1"), log("")), (None, Some(SourceKind::Mcap), None));
+
     let problem = |names: &[&str]| gather(folder, names).unwrap_err().to_string();
     assert!(problem(&["a.rig.yaml"]).starts_with("a.rig.yaml: a rig alone"));
     assert!(problem(&["a.mp4", "a.rig.yaml", "camchain-imucam.yaml"]).starts_with("several rigs"));

@@ -32,7 +32,6 @@ impl App {
         request: OpenRequest,
         open: impl FnOnce(&mut ShowProgress<'_>) -> Result<Opened, OpenFailure> + Send + 'static,
     ) {
-        self.rig_page = None;
         match Opening::start(request, open) {
             Ok(opening) => self.opening = Some(opening),
             Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
@@ -45,6 +44,7 @@ impl App {
         let path = self.opening.take().map(|opening| opening.path()).unwrap_or_default();
         match result {
             Ok(opened) => {
+                self.rig_page = None;
                 match opened {
                     Opened::Log(opened) => {
                         self.show(opened.log, Some(&opened.remembered));
@@ -59,6 +59,7 @@ impl App {
                     self.state.start_tour();
                 }
             }
+            // The page of a missing rig stays, for another choice.
             Err(OpenFailure::Problem(message)) => self.state.notices.show_message(NoticeLevel::Error, message),
             Err(OpenFailure::NeedsRig(question)) => self.rig_page = Some(RigPage::new(*question)),
             Err(OpenFailure::Cancelled) => {}
