@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use dcvins::export::{self, EvaluationOptions};
 use dcvins::flight_log::convert::convert;
+use dcvins::flight_log::urdf::{CameraAxes, RobotModel};
 use dcvins::flight_log::{
     FlightLog, FrameStream, ImageReader, LogWriter, LogWriterOptions, MessageKind, MessageTimes, MessageType,
     read_stills, read_stills_chain,
@@ -283,6 +284,18 @@ pub fn stills(bytes: &[u8]) {
     let path = write(&folder.path().join("input.json"), bytes);
     if let Ok(stills) = read_stills(&path) {
         drop(read_stills_chain(&path, &stills));
+    }
+}
+
+/// Fuzzes a robot description: the chain between its first and its last link, and the same chain written back.
+pub fn urdf(bytes: &[u8]) {
+    let Ok(text) = String::from_utf8(bytes.to_vec()) else { return };
+    let Ok(model) = RobotModel::parse(text, Path::new("robot.urdf")) else { return };
+    let (Some(first), Some(last)) = (model.links.first(), model.links.last()) else { return };
+    let Ok(path) = model.path(first, last, CameraAxes::Optical) else { return };
+    let names: Vec<String> = path.joints().map(|joint| joint.name.clone()).collect();
+    if let Ok((written, _)) = path.with_calibration(&names, &path.chain()) {
+        RobotModel::parse(written, Path::new("robot.urdf")).expect("a description that was written can be read");
     }
 }
 

@@ -304,6 +304,11 @@ fn databases(corpus: &Path, log: &Path) -> Result<(), Failed> {
 
 /// Writes the seeds of the targets that read text.
 fn texts(corpus: &Path) -> Result<(), Failed> {
+    let descriptions = target(corpus, "urdf")?;
+    for entry in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/urdf"))? {
+        let path = entry?.path();
+        fs::copy(&path, descriptions.join(path.file_name().unwrap_or_default()))?;
+    }
     let rigs = target(corpus, "rig")?;
     fs::write(rigs.join("commented"), RIG)?;
     for (number, source) in SOURCES.iter().enumerate() {
